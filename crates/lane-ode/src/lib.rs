@@ -1,0 +1,1 @@
+//! ODE over lanes.

@@ -1,0 +1,9 @@
+//! Physics of a front-loading washing machine: parameters, equations of motion, equilibrium, spin.
+
+mod channel;
+mod machine;
+mod spin;
+
+pub use channel::Channel;
+pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};
+pub use spin::Spin;

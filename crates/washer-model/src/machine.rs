@@ -1,0 +1,172 @@
+//! The machine in SI units, as a machine file describes it.
+
+/// A front-loading washing machine on its suspension. Lengths are in metres from O, the midpoint between the
+/// bearing centres before loading; x runs along the drum axis towards the door, y up, z horizontal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machine {
+    /// Acceleration of gravity along -y.
+    pub gravity_m_per_s2: f64,
+    /// Radial clearance between drum and tub at rest.
+    pub radial_clearance_m: f64,
+    /// Body T.
+    pub tub: Tub,
+    /// Body S.
+    pub shaft: Shaft,
+    /// Body D without its unbalance.
+    pub drum: Drum,
+    /// The laundry stuck to the drum's wall, a point mass.
+    pub unbalance: Unbalance,
+    /// Bending flexibility between shaft and drum.
+    pub flexure: Flexure,
+    /// The two radial bearings between tub and shaft.
+    pub bearings: Bearings,
+    /// Springs between cabinet and tub, any number.
+    pub springs: Vec<Spring>,
+    /// Dampers between cabinet and tub, any number.
+    pub dampers: Vec<Damper>,
+}
+
+/// Body T, which the springs hold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tub {
+    /// Mass.
+    pub mass_kg: f64,
+    /// Mass centre on the tub axis (L_T).
+    pub centre_x_m: f64,
+    /// Principal moments of inertia about the mass centre, in body axes.
+    pub inertia_kg_m2: [f64; 3],
+    /// Front centre P_TE on the tub axis.
+    pub front_x_m: f64,
+}
+
+/// Body S: shaft and rotor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shaft {
+    /// Mass.
+    pub mass_kg: f64,
+    /// Mass centre on the shaft axis, negative behind O (-L_S).
+    pub centre_x_m: f64,
+    /// Principal moments of inertia about the mass centre, in body axes.
+    pub inertia_kg_m2: [f64; 3],
+}
+
+/// Body D without the unbalance mass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drum {
+    /// Mass m_0.
+    pub mass_kg: f64,
+    /// Mass centre x_0 on the axis.
+    pub centre_x_m: f64,
+    /// Principal moments of inertia about the mass centre, in body axes.
+    pub inertia_kg_m2: [f64; 3],
+    /// P_D, where drum and shaft meet (L_D).
+    pub hinge_x_m: f64,
+    /// Front centre P_DE (L_D + L_DE).
+    pub front_x_m: f64,
+}
+
+/// The unbalance: a point mass on the drum's wall, along d2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unbalance {
+    /// Mass m_u.
+    pub mass_kg: f64,
+    /// Position x_u along the axis.
+    pub x_m: f64,
+    /// Distance r_u from the axis.
+    pub radius_m: f64,
+}
+
+/// The drum shaft's bending stiffness K_D.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flexure {
+    /// Stiffness against the angle between the axes of S and D.
+    pub stiffness_n_m_per_rad: f64,
+}
+
+/// Two radial bearings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bearings {
+    /// Front bearing centre (L_fb).
+    pub front_x_m: f64,
+    /// Rear bearing centre, negative (-L_rb).
+    pub rear_x_m: f64,
+    /// Radial stiffness K_fb.
+    pub front_stiffness_n_per_m: f64,
+    /// Radial stiffness K_rb.
+    pub rear_stiffness_n_per_m: f64,
+}
+
+/// A spring between a cabinet point and a tub point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spring {
+    /// End at the cabinet, in cabinet axes from O.
+    pub cabinet_m: [f64; 3],
+    /// End at the tub, in tub axes from P_T.
+    pub tub_m: [f64; 3],
+    /// Stiffness.
+    pub stiffness_n_per_m: f64,
+    /// Length without force; the distance between the ends as given if absent.
+    pub free_length_m: Option<f64>,
+}
+
+/// A viscous damper between a cabinet point and a tub point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Damper {
+    /// End at the cabinet, in cabinet axes from O.
+    pub cabinet_m: [f64; 3],
+    /// End at the tub, in tub axes from P_T.
+    pub tub_m: [f64; 3],
+    /// Damping along the line between the ends.
+    pub damping_n_s_per_m: f64,
+}
+
+impl Machine {
+    /// The machine of Park, Jeong and Yoo (Machines 2021, 9(11), 289): Tables 2 and 3, the bare drum and unbalance
+    /// split of the equations page, and this project's assumptions where the paper is silent (bearing positions,
+    /// hinge, fronts, clearance).
+    #[must_use]
+    pub fn paper() -> Self {
+        let [unbalance_mass_kg, drum_mass_kg, drum_x_m] = [0.4, 3.64, 0.200];
+        let unbalance = Unbalance { mass_kg: unbalance_mass_kg, x_m: 0.300, radius_m: 0.200 };
+        // Table 2 prints the drum with its 0.4 kg unbalance; take the point mass out (model page, section 2).
+        let reduced_mass_kg = unbalance_mass_kg * drum_mass_kg / (unbalance_mass_kg + drum_mass_kg);
+        let (dx, r) = (unbalance.x_m - drum_x_m, unbalance.radius_m);
+        let with_unbalance = [0.196, 0.162, 0.177];
+        let point = [r * r, dx * dx, r * r + dx * dx];
+        let bare = std::array::from_fn(|i| with_unbalance[i] - reduced_mass_kg * point[i]);
+        let spring = |x: f64, side: f64| Spring {
+            cabinet_m: [x, 0.3002, side * 0.2506],
+            tub_m: [x, 0.1626, side * 0.1626],
+            stiffness_n_per_m: 8000.0,
+            free_length_m: None,
+        };
+        let damper = |side: f64| Damper {
+            cabinet_m: [0.3068, -0.2800, side * 0.2800],
+            tub_m: [0.3068, -0.1626, side * 0.1626],
+            damping_n_s_per_m: 140.0,
+        };
+        Self {
+            gravity_m_per_s2: 9.81,
+            radial_clearance_m: 0.010,
+            tub: Tub { mass_kg: 23.87, centre_x_m: 0.24061, inertia_kg_m2: [1.03, 1.61, 1.53], front_x_m: 0.450 },
+            shaft: Shaft { mass_kg: 4.34, centre_x_m: -0.01811, inertia_kg_m2: [0.0553, 0.0384, 0.0384] },
+            drum: Drum {
+                mass_kg: drum_mass_kg,
+                centre_x_m: drum_x_m,
+                inertia_kg_m2: bare,
+                hinge_x_m: 0.150,
+                front_x_m: 0.450,
+            },
+            unbalance,
+            flexure: Flexure { stiffness_n_m_per_rad: 29_670.0 },
+            bearings: Bearings {
+                front_x_m: 0.050,
+                rear_x_m: -0.050,
+                front_stiffness_n_per_m: 2e8,
+                rear_stiffness_n_per_m: 2e8,
+            },
+            springs: vec![spring(0.3268, 1.0), spring(0.3268, -1.0), spring(0.0868, 1.0), spring(0.0868, -1.0)],
+            dampers: vec![damper(1.0), damper(-1.0)],
+        }
+    }
+}
