@@ -1,5 +1,7 @@
 //! Prescribed spin of the shaft: angle, speed and acceleration as functions of time.
 
+use lane_ode::{N, Real};
+
 /// Speed of the drum over time, as a user describes it. Speeds in rpm, times in s.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Spin {
@@ -31,4 +33,28 @@ pub enum Spin {
         /// Speeds at these times.
         speed_rpm: Vec<f64>,
     },
+}
+
+/// The spin at one instant, as the equations read it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SpinState<T> {
+    pub(crate) sin: N<T>,
+    pub(crate) cos: N<T>,
+    /// Of twice the angle.
+    pub(crate) sin_2: N<T>,
+    pub(crate) cos_2: N<T>,
+    /// theta', rad/s.
+    pub(crate) speed: N<T>,
+    /// theta'', rad/s^2.
+    pub(crate) acceleration: N<T>,
+}
+
+impl<T: Real> SpinState<T> {
+    /// From the sine and cosine of theta.
+    #[inline(always)]
+    pub(crate) fn new((sin, cos): (N<T>, N<T>), speed: N<T>, acceleration: N<T>) -> Self {
+        let sin_2 = (2.0 * (sin * cos).v()).v();
+        let cos_2 = 1.0 - 2.0 * (sin * sin).v();
+        Self { sin, cos, sin_2, cos_2, speed, acceleration }
+    }
 }

@@ -1,0 +1,55 @@
+//! What the equations need of a number, and nothing more.
+
+/// A real number, or several side by side, or one with derivatives: physics written over this trait runs on all.
+///
+/// Every operation is correctly rounded (IEEE 754), or built from such in a fixed order, so that one source gives
+/// the same bits on every type of lane. There is no constructor from nothing: [`Real::lit`] makes a constant out of a
+/// value that exists already, because a vector type's first value proves that the processor has its instructions.
+pub trait Real: Copy {
+    /// One truth value per lane.
+    type Mask: Copy;
+
+    /// The constant `value` in every lane.
+    #[must_use]
+    fn lit(self, value: f64) -> Self;
+    /// `self + b`
+    #[must_use]
+    fn add(self, b: Self) -> Self;
+    /// `self - b`
+    #[must_use]
+    fn sub(self, b: Self) -> Self;
+    /// `self * b`
+    #[must_use]
+    fn mul(self, b: Self) -> Self;
+    /// `self / b`
+    #[must_use]
+    fn div(self, b: Self) -> Self;
+    /// `-self`
+    #[must_use]
+    fn neg(self) -> Self;
+    /// `self * b + c`, rounded once.
+    #[must_use]
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// `self * b - c`, rounded once.
+    #[must_use]
+    fn mul_sub(self, b: Self, c: Self) -> Self;
+    /// `c - self * b`, rounded once.
+    #[must_use]
+    fn neg_mul_add(self, b: Self, c: Self) -> Self;
+    /// Square root.
+    #[must_use]
+    fn sqrt(self) -> Self;
+    /// Magnitude.
+    #[must_use]
+    fn abs(self) -> Self;
+    /// Sine and cosine of an angle in radians.
+    #[must_use]
+    fn sin_cos(self) -> (Self, Self);
+    /// Where `self < b`; false where either is NaN.
+    fn less(self, b: Self) -> Self::Mask;
+    /// `a` where the mask holds, else `b`.
+    #[must_use]
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// Whether the mask holds in every lane.
+    fn all(mask: Self::Mask) -> bool;
+}

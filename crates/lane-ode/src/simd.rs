@@ -1,0 +1,125 @@
+//! Which instruction set runs, decided when the program runs.
+
+use crate::lane::Array;
+use crate::lane::Lane;
+
+/// An instruction set the integrators can run on. Results are the same bits on all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Simd {
+    /// One lane, with the processor's fused multiply-add where it has one. Without one, the fused operations run in
+    /// software: the same bits, about ten times slower.
+    Scalar,
+    /// Four lanes of AVX2 with FMA.
+    Avx2,
+    /// Eight lanes of AVX-512.
+    Avx512,
+    /// Two lanes of NEON.
+    Neon,
+}
+
+/// Work that is written once and compiled for every instruction set.
+///
+/// Mark `run`, and all that it calls in a loop, `#[inline(always)]`: only code that ends up inside the entry function
+/// of an instruction set is compiled with its instructions.
+pub trait Kernel {
+    /// What the work gives.
+    type Output;
+    /// Does the work over lanes of type `T`; `zero` is the first value, from which all constants are made.
+    fn run<T: Lane>(self, zero: T) -> Self::Output;
+}
+
+impl Simd {
+    /// Every instruction set, the widest first.
+    pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Scalar];
+
+    /// The best that this processor has.
+    #[must_use]
+    pub fn best() -> Self {
+        Self::ALL.into_iter().find(|simd| simd.is_available()).unwrap_or(Self::Scalar)
+    }
+
+    /// Whether this processor has it.
+    #[must_use]
+    pub fn is_available(self) -> bool {
+        match self {
+            Self::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                Self::Avx2.is_available()
+                    && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl")
+            }
+            Self::Neon => cfg!(target_arch = "aarch64"),
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 | Self::Avx512 => false,
+        }
+    }
+
+    /// Name as in `SWEEP_SIMD`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+            Self::Neon => "neon",
+        }
+    }
+
+    /// Trajectories side by side.
+    #[must_use]
+    pub const fn lanes(self) -> usize {
+        match self {
+            Self::Scalar => 1,
+            Self::Avx2 => 4,
+            Self::Avx512 => 8,
+            Self::Neon => 2,
+        }
+    }
+
+    /// Runs the kernel on this instruction set, or on [`Simd::Scalar`] if this processor lacks it: the result is the
+    /// same.
+    #[inline(never)]
+    pub fn dispatch<K: Kernel>(self, kernel: K) -> K::Output {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 if self.is_available() => x86::avx512(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 if self.is_available() => x86::avx2(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Self::Scalar if Self::Avx2.is_available() => x86::scalar(kernel),
+            Self::Neon => kernel.run(Array([0.0; 2])),
+            _ => kernel.run(0.0_f64),
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+mod x86 {
+    use super::Kernel;
+    use crate::x86::{F64x4, F64x8};
+
+    /// An entry function with an instruction set, and a safe one around it that checks for it.
+    macro_rules! entry {
+        ($name:ident, $features:literal, $simd:expr, $first:expr) => {
+            pub(super) fn $name<K: Kernel>(kernel: K) -> K::Output {
+                #[target_feature(enable = $features)]
+                fn inner<K: Kernel>(kernel: K) -> K::Output {
+                    kernel.run($first)
+                }
+                assert!($simd.is_available(), "dispatched to an instruction set that this processor lacks");
+                // SAFETY: asserted above.
+                unsafe { inner(kernel) }
+            }
+        };
+    }
+
+    // SAFETY (of the two `first`): inside the entry function of their instruction set.
+    entry!(avx512, "avx2,fma,avx512f,avx512dq,avx512vl", super::Simd::Avx512, unsafe { F64x8::first(0.0) });
+    entry!(avx2, "avx2,fma", super::Simd::Avx2, unsafe { F64x4::first(0.0) });
+    entry!(scalar, "avx2,fma", super::Simd::Avx2, 0.0_f64);
+}

@@ -1,0 +1,172 @@
+//! Forces: springs, dampers, bearings and the drum shaft's flexure (section 3 of the model page).
+
+use crate::coefficients::Bodies;
+use crate::frame::{Tilt, Vec3};
+use crate::nonlinear::{COORDINATES, MachineView};
+use lane_ode::{N, Real};
+
+/// Cabinet forces (y, z) on points of a body's axis.
+pub(crate) struct AxisLoad<T> {
+    /// Their sum.
+    pub(crate) force: [N<T>; 2],
+    /// Their sum, each times its position along the axis.
+    pub(crate) moment: [N<T>; 2],
+}
+
+/// What springs and dampers do to the tub.
+pub(crate) struct SuspensionLoad<T> {
+    /// y and z of the force, cabinet axes.
+    pub(crate) force: [N<T>; 2],
+    /// Moment about the bearing midpoint P_T, tub axes.
+    pub(crate) moment: Vec3<T>,
+}
+
+/// Bearing forces on the shaft: linear in the relative displacement of the bearing centres in the y-z plane.
+#[inline(always)]
+pub(crate) fn bearing_load<T: Real>(
+    b: &Bodies<T>,
+    q: &[N<T>; COORDINATES],
+    tub: &Tilt<T>,
+    shaft: &Tilt<T>,
+) -> AxisLoad<T> {
+    let offset = [q[2] - q[0], q[3] - q[1]];
+    let tilt = [shaft.axis_c[1] - tub.axis_c[1], shaft.axis_c[2] - tub.axis_c[2]];
+    let at = |position: N<T>, stiffness: N<T>| -> [N<T>; 2] {
+        core::array::from_fn(|i| -(stiffness * (offset[i] + position * tilt[i])).v())
+    };
+    let front = at(b.bearing_front, b.front_stiffness);
+    let rear = at(b.bearing_rear, b.rear_stiffness);
+    AxisLoad {
+        force: core::array::from_fn(|i| front[i] + rear[i]),
+        moment: core::array::from_fn(|i| front[i] * b.bearing_front + rear[i] * b.bearing_rear),
+    }
+}
+
+/// Springs and dampers, worked out in tub axes, where their tub ends stand still.
+#[inline(always)]
+pub(crate) fn suspension_load<T: Real>(
+    machine: &MachineView<'_, T>,
+    tilt: &Tilt<T>,
+    midpoint: &[N<T>; 2],
+    midpoint_velocity: &[N<T>; 2],
+    rate: &Vec3<T>,
+) -> SuspensionLoad<T> {
+    let zero = midpoint[0].lit(0.0);
+    let mut force = [zero; 3];
+    let mut moment = [zero; 3];
+    // From the cabinet end to the tub end. t3 has no y component.
+    let span = |cabinet: [N<T>; 3], end: Vec3<T>| -> Vec3<T> {
+        let [x, y, z] = [cabinet[0], cabinet[1] - midpoint[0], cabinet[2] - midpoint[1]];
+        let [t1, t2] = [&tilt.axis_c, &tilt.second_c];
+        [
+            end[0] - t1[0] * x - t1[1] * y - t1[2] * z,
+            end[1] - t2[0] * x - t2[1] * y - t2[2] * z,
+            end[2] - tilt.sin_yaw * x - tilt.cos_yaw * z,
+        ]
+    };
+    let mut apply = |pull: N<T>, span: &Vec3<T>, end: &Vec3<T>| {
+        let f: Vec3<T> = span.map(|d| (pull * d).v());
+        for i in 0..3 {
+            force[i] += f[i];
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            moment[i] = moment[i] + end[j] * f[k] - end[k] * f[j];
+        }
+    };
+    for s in machine.springs {
+        let end = [s.tub_x, s.tub_y, s.tub_z];
+        let d = span([s.cabinet_x, s.cabinet_y, s.cabinet_z], end);
+        let length = (d[0] * d[0] + (d[1] * d[1] + d[2] * d[2])).sqrt();
+        apply(s.stiffness_times_free_length / length - s.stiffness, &d, &end);
+    }
+    if !machine.dampers.is_empty() {
+        // Velocity of the midpoint in tub axes.
+        let [vy, vz] = *midpoint_velocity;
+        let base = [
+            tilt.axis_c[1] * vy + tilt.axis_c[2] * vz,
+            tilt.second_c[1] * vy + tilt.second_c[2] * vz,
+            (tilt.cos_yaw * vz).v(),
+        ];
+        for damper in machine.dampers {
+            let end = [damper.tub_x, damper.tub_y, damper.tub_z];
+            let d = span([damper.cabinet_x, damper.cabinet_y, damper.cabinet_z], end);
+            let velocity: Vec3<T> = core::array::from_fn(|i| {
+                let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+                base[i] + rate[j] * end[k] - rate[k] * end[j]
+            });
+            let along = d[0] * velocity[0] + (d[1] * velocity[1] + d[2] * velocity[2]);
+            let squared = d[0] * d[0] + (d[1] * d[1] + d[2] * d[2]);
+            // Eqs. 33 to 35: F = -C (v . n) n.
+            apply(-(damper.damping * along).v() / squared, &d, &end);
+        }
+    }
+    SuspensionLoad {
+        force: [
+            tilt.axis_c[1] * force[0] + tilt.second_c[1] * force[1],
+            tilt.axis_c[2] * force[0] + tilt.second_c[2] * force[1] + tilt.cos_yaw * force[2],
+        ],
+        moment,
+    }
+}
+
+/// The drum shaft's flexure: derivatives of K_D phi^2 / 2 with cos phi = cos q9 cos q10.
+pub(crate) struct Flexure<T> {
+    pub(crate) about_9: N<T>,
+    pub(crate) about_10: N<T>,
+}
+
+impl<T: Real> Flexure<T> {
+    #[inline(always)]
+    pub(crate) fn new(stiffness: N<T>, s9: N<T>, c9: N<T>, s10: N<T>, c10: N<T>) -> Self {
+        // sin^2 phi without cancellation.
+        let sin_squared = s9 * s9 + (c9 * c9) * (s10 * s10);
+        let factor = (stiffness * phi_over_sin(sin_squared, (c9 * c10).v())).v();
+        Self { about_9: (factor * (s9 * c10)).v(), about_10: (factor * (c9 * s10)).v() }
+    }
+}
+
+/// Coefficients of asin(x)/x in powers of x^2: c_k = c_{k-1} (2k - 1)^2 / (2k (2k + 1)).
+const ASIN_SERIES: [f64; 22] = {
+    let mut c = [1.0; 22];
+    let mut k = 1;
+    while k < c.len() {
+        let two_k = 2.0 * k as f64;
+        c[k] = c[k - 1] * ((two_k - 1.0) * (two_k - 1.0)) / (two_k * (two_k + 1.0));
+        k += 1;
+    }
+    c
+};
+
+/// Up to here, sin^2 phi is small enough for a short series: its first dropped term is below 2e-17.
+const SMALL_SIN_SQUARED: f64 = 1.0 / 1024.0;
+
+/// phi / sin phi from sin^2 phi and cos phi, for phi up to pi/2 and beyond.
+#[inline(always)]
+fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
+    let mut short = sin_squared.lit(ASIN_SERIES[4]);
+    for &c in ASIN_SERIES[..4].iter().rev() {
+        short = short * sin_squared + c;
+    }
+    let bound = sin_squared.lit(SMALL_SIN_SQUARED);
+    let is_small = sin_squared.0.less(bound.0);
+    // A folded hinge has a small sine too.
+    let is_ahead = cos.lit(0.0).0.less(cos.0);
+    if T::all(is_small) && T::all(is_ahead) {
+        return short;
+    }
+    let long = phi_over_sin_by_quarters(sin_squared, cos);
+    N(T::select(is_ahead, T::select(is_small, short.0, long.0), long.0))
+}
+
+/// The same by quarter angles: with s = sin^2(phi/4), phi / sin phi = (asin sqrt(s) / sqrt(s)) / (cos(phi/4) cos(phi/2)).
+#[cold]
+#[inline(always)]
+fn phi_over_sin_by_quarters<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
+    let half = 0.5 * (sin_squared / (1.0 + cos));
+    let cos_half_squared = 1.0 - half.v();
+    let quarter = (0.5 * (half.v() / (1.0 + cos_half_squared.sqrt()))).v();
+    let mut series = quarter.lit(ASIN_SERIES[21]);
+    for &c in ASIN_SERIES[..21].iter().rev() {
+        series = series * quarter + c;
+    }
+    series / ((1.0 - quarter) * cos_half_squared).v().sqrt()
+}

@@ -1,0 +1,90 @@
+//! A body axis tilted by yaw and pitch: what the tub and the shaft have in common (Table 1, first two angles).
+//!
+//! The frame is R = Ry(yaw) Rz(pitch); its columns are the axis a1, a2 and a3. Vectors are in frame axes unless a name
+//! ends in `_c`: those are in cabinet axes.
+
+use lane_ode::{N, Real};
+
+/// A vector's three components.
+pub(crate) type Vec3<T> = [N<T>; 3];
+
+/// Orientation of a tilted axis.
+pub(crate) struct Tilt<T> {
+    pub(crate) sin_yaw: N<T>,
+    pub(crate) cos_yaw: N<T>,
+    pub(crate) sin_pitch: N<T>,
+    pub(crate) cos_pitch: N<T>,
+    /// a1 in cabinet axes.
+    pub(crate) axis_c: Vec3<T>,
+    /// a2 in cabinet axes.
+    pub(crate) second_c: Vec3<T>,
+}
+
+impl<T: Real> Tilt<T> {
+    #[inline(always)]
+    pub(crate) fn new(yaw: N<T>, pitch: N<T>) -> Self {
+        let (sin_yaw, cos_yaw) = yaw.sin_cos();
+        let (sin_pitch, cos_pitch) = pitch.sin_cos();
+        Self {
+            sin_yaw,
+            cos_yaw,
+            sin_pitch,
+            cos_pitch,
+            axis_c: [(cos_yaw * cos_pitch).v(), sin_pitch, (-sin_yaw * cos_pitch).v()],
+            second_c: [(-cos_yaw * sin_pitch).v(), cos_pitch, (sin_yaw * sin_pitch).v()],
+        }
+    }
+
+    /// From frame axes to cabinet axes. a3 is (sin yaw, 0, cos yaw).
+    #[inline(always)]
+    pub(crate) fn to_cabinet(&self, v: &Vec3<T>) -> Vec3<T> {
+        let [a1, a2] = [&self.axis_c, &self.second_c];
+        [
+            a1[0] * v[0] + (a2[0] * v[1] + self.sin_yaw * v[2]),
+            a1[1] * v[0] + a2[1] * v[1],
+            a1[2] * v[0] + (a2[2] * v[1] + self.cos_yaw * v[2]),
+        ]
+    }
+
+    /// Angular velocity of the frame, and the angular acceleration and the axis's second derivative that it
+    /// has at constant generalised speeds.
+    #[inline(always)]
+    pub(crate) fn motion(&self, yaw_rate: N<T>, pitch_rate: N<T>) -> TiltMotion<T> {
+        let rate = [(yaw_rate * self.sin_pitch).v(), (yaw_rate * self.cos_pitch).v(), pitch_rate];
+        let [x, y, z] = rate;
+        TiltMotion {
+            rate,
+            acceleration_x: (y * z).v(),
+            acceleration_y: -(x * z).v(),
+            axis_acceleration: [-(y * y + z * z), (x * y).v(), (2.0 * (x * z).v()).v()],
+        }
+    }
+
+    /// Generalised forces along yaw and pitch of cabinet forces (y, z) that act on the axis: `moment` is the sum of
+    /// force times position along the axis.
+    #[inline(always)]
+    pub(crate) fn torque_of_axis_load(&self, moment: &[N<T>; 2]) -> [N<T>; 2] {
+        [
+            (self.axis_yaw_z() * moment[1]).v(),
+            self.cos_pitch * moment[0] + self.second_c[2] * moment[1],
+        ]
+    }
+
+    /// The z component of the axis's derivative by yaw; its y component is zero.
+    #[inline(always)]
+    pub(crate) fn axis_yaw_z(&self) -> N<T> {
+        -self.axis_c[0]
+    }
+}
+
+/// Motion of a tilted axis at constant generalised speeds.
+pub(crate) struct TiltMotion<T> {
+    /// Angular velocity.
+    pub(crate) rate: Vec3<T>,
+    /// Angular acceleration about a1.
+    pub(crate) acceleration_x: N<T>,
+    /// Angular acceleration about a2; about a3 it is zero.
+    pub(crate) acceleration_y: N<T>,
+    /// Second derivative of a1.
+    pub(crate) axis_acceleration: Vec3<T>,
+}

@@ -1,0 +1,368 @@
+//! The nonlinear equations of motion (section 4 of the model page; Eqs. 19 to 37 of the paper).
+//!
+//! Kane's equations, arranged as recursive Newton-Euler in the frames where vectors are sparse. Frame A is the shaft's before
+//! the spin (yaw q7, pitch q8), frame S spins with the shaft, frame E is S turned by q9, frame D by q10 more.
+
+use crate::coefficients::{Bodies, Coefficients, DamperOf, SpringOf};
+use crate::floating::Floating;
+use crate::forces::{AxisLoad, Flexure, bearing_load, suspension_load};
+use crate::frame::{Tilt, Vec3};
+use crate::spin::SpinState;
+use lane_ode::{N, Real};
+
+/// Number of generalised coordinates.
+pub const COORDINATES: usize = 10;
+
+/// Both halves of the machine, still coupled by nothing but the load that each carries.
+pub(crate) struct Halves<T> {
+    pub(crate) tub: Floating<T, 2>,
+    pub(crate) rotor: Floating<T, 4>,
+}
+
+/// Assembles the equations of motion at coordinates `q` (m, rad) and speeds `u`.
+#[inline(always)]
+pub(crate) fn halves<T: Real>(
+    machine: &MachineView<'_, T>,
+    spin: &SpinState<T>,
+    q: &[N<T>; COORDINATES],
+    u: &[N<T>; COORDINATES],
+) -> Halves<T> {
+    let tub_tilt = Tilt::new(q[4], q[5]);
+    let shaft_tilt = Tilt::new(q[6], q[7]);
+    let on_shaft = bearing_load(machine.bodies, q, &tub_tilt, &shaft_tilt);
+    let on_tub = AxisLoad { force: on_shaft.force.map(|f| -f), moment: on_shaft.moment.map(|m| -m) };
+    Halves {
+        tub: tub(machine, &tub_tilt, &on_tub, q, u),
+        rotor: rotor(machine.bodies, spin, &shaft_tilt, &on_shaft, q, u),
+    }
+}
+
+/// The coefficients that the equations read.
+pub(crate) struct MachineView<'a, T> {
+    pub(crate) bodies: &'a Bodies<T>,
+    pub(crate) springs: &'a [SpringOf<T>],
+    pub(crate) dampers: &'a [DamperOf<T>],
+}
+
+impl<T> Coefficients<T> {
+    #[inline(always)]
+    pub(crate) fn view(&self) -> MachineView<'_, T> {
+        MachineView { bodies: &self.bodies, springs: &self.springs, dampers: &self.dampers }
+    }
+}
+
+/// Accelerations du/dt of all ten coordinates.
+#[inline(always)]
+pub(crate) fn accelerations<T: Real>(
+    machine: &MachineView<'_, T>,
+    spin: &SpinState<T>,
+    q: &[N<T>; COORDINATES],
+    u: &[N<T>; COORDINATES],
+) -> [N<T>; COORDINATES] {
+    let Halves { tub, rotor } = halves(machine, spin, q, u);
+    let ([a1, a2], [a5, a6]) = tub.accelerations();
+    let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations();
+    [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
+}
+
+/// Body T about its mass centre.
+#[inline(always)]
+fn tub<T: Real>(
+    machine: &MachineView<'_, T>,
+    tilt: &Tilt<T>,
+    bearings: &AxisLoad<T>,
+    q: &[N<T>; COORDINATES],
+    u: &[N<T>; COORDINATES],
+) -> Floating<T, 2> {
+    let b = machine.bodies;
+    let motion = tilt.motion(u[4], u[5]);
+    let [x, y, z] = motion.rate;
+    let suspension = suspension_load(machine, tilt, &[q[0], q[1]], &[u[0], u[1]], &motion.rate);
+    let centre = b.tub_centre;
+
+    // Inertia moments I alpha + omega x I omega at constant speeds, in tub axes.
+    let inertia_moment = [
+        b.tub_i11 * motion.acceleration_x + (b.tub_i33 - b.tub_i22) * (y * z),
+        b.tub_i22 * motion.acceleration_y + (b.tub_i11 - b.tub_i33) * (x * z),
+        ((b.tub_i22 - b.tub_i11) * (x * y)).v(),
+    ];
+    let moment: Vec3<T> = core::array::from_fn(|i| suspension.moment[i] - inertia_moment[i]);
+
+    // The mass centre L_T t1 (Eq. 8): partial velocities in cabinet axes, and acceleration.
+    let arm_yaw_x = (centre * tilt.axis_c[2]).v();
+    let arm_yaw_z = (centre * tilt.axis_yaw_z()).v();
+    let arm_pitch: Vec3<T> = tilt.second_c.map(|t2| (centre * t2).v());
+    let drift = tilt.to_cabinet(&motion.axis_acceleration).map(|a| (centre * a).v());
+
+    let in_plane = suspension.force;
+    let force = [bearings.force[0] + in_plane[0], bearings.force[1] + in_plane[1]];
+    let [bearing_yaw, bearing_pitch] = tilt.torque_of_axis_load(&bearings.moment);
+    let axial = (b.tub_mass * drift[0]).v();
+    let torque_yaw = bearing_yaw + tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]
+        - force[1] * arm_yaw_z
+        - axial * arm_yaw_x;
+    let torque_pitch =
+        bearing_pitch + moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial * arm_pitch[0];
+
+    let axial_yaw = (b.tub_mass * arm_yaw_x).v();
+    let s = tilt.sin_pitch;
+    let c = tilt.cos_pitch;
+    let zero = s.lit(0.0);
+    Floating {
+        mass_kg: b.tub_mass,
+        force: [force[0] - b.gravity * b.tub_mass, force[1]],
+        drift: [drift[1], drift[2]],
+        arm: [[zero, arm_yaw_z], [arm_pitch[1], arm_pitch[2]]],
+        inertia: [
+            [axial_yaw * arm_yaw_x + (b.tub_i11 * (s * s) + b.tub_i22 * (c * c)), zero],
+            [(axial_yaw * arm_pitch[0]).v(), b.tub_i33 + b.tub_mass * (arm_pitch[0] * arm_pitch[0])],
+        ],
+        torque: [torque_yaw, torque_pitch],
+    }
+}
+
+/// Bodies S and D about their common mass centre.
+///
+/// The vector between their centres, l s1 + rho, moves as if the reduced mass were at its end. Its part in rho is in the
+/// drum's inertia about the hinge (`Bodies::drum_i11` ...); the rest appears below with `mu_l` and `mu_l2`.
+#[inline(always)]
+fn rotor<T: Real>(
+    b: &Bodies<T>,
+    spin: &SpinState<T>,
+    tilt: &Tilt<T>,
+    bearings: &AxisLoad<T>,
+    q: &[N<T>; COORDINATES],
+    u: &[N<T>; COORDINATES],
+) -> Floating<T, 4> {
+    let motion = tilt.motion(u[6], u[7]);
+    let (u9, u10) = (u[8], u[9]);
+    let (s9, c9) = q[8].sin_cos();
+    let (s10, c10) = q[9].sin_cos();
+
+    // Angular velocities and their rates at constant speeds: S in S, then D in E.
+    let omega_s = {
+        let [x, y, z] = into_spin(spin, &motion.rate);
+        [x + spin.speed, y, z]
+    };
+    let alpha_s = [
+        motion.acceleration_x + spin.acceleration,
+        spin.cos * motion.acceleration_y + spin.speed * omega_s[2],
+        -(spin.sin * motion.acceleration_y + spin.speed * omega_s[1]),
+    ];
+    let [ex, ey, ez] = [c9 * omega_s[0] - s9 * omega_s[2], omega_s[1] + u9, s9 * omega_s[0] + c9 * omega_s[2]];
+    let alpha_d = [
+        c9 * alpha_s[0] - s9 * alpha_s[2] + (u10 * ey - u9 * ez),
+        alpha_s[1] - u10 * ex,
+        s9 * alpha_s[0] + c9 * alpha_s[2] + u9 * ex,
+    ];
+    let omega_d = [ex, ey, ez + u10];
+
+    // The drum about the hinge, in E, where rho has no third component.
+    let rho = [c10 * b.rho_1 - s10 * b.rho_2, s10 * b.rho_1 + c10 * b.rho_2];
+    let k = drum_inertia_in_e(b, s10, c10);
+    let rho_acceleration = second_derivative(&rho, &omega_d, &alpha_d);
+    let axis_acceleration_e = into_hinge(s9, c9, &into_spin(spin, &motion.axis_acceleration));
+    let drum_moment_e = {
+        let [x, y, z] = k.moment(&omega_d, &alpha_d);
+        let [ax, ay, az] = axis_acceleration_e.map(|a| (b.mu_l * a).v());
+        [x + rho[1] * az, y - rho[0] * az, z + (rho[0] * ay - rho[1] * ax)]
+    };
+
+    // Inertia moment of S and D together, in A; the shaft's is added where both are in S.
+    let shaft_moment = {
+        let [x, y, z] = omega_s;
+        [
+            b.shaft_i11 * alpha_s[0] + (b.shaft_i33 - b.shaft_i22) * (y * z),
+            b.shaft_i22 * alpha_s[1] + (b.shaft_i11 - b.shaft_i33) * (x * z),
+            b.shaft_i33 * alpha_s[2] + (b.shaft_i22 - b.shaft_i11) * (x * y),
+        ]
+    };
+    let drum_moment_s = out_of_hinge(s9, c9, &drum_moment_e);
+    let moment = out_of_spin(spin, &core::array::from_fn(|i| shaft_moment[i] + drum_moment_s[i]));
+    let rho_acceleration_a = out_of_spin(spin, &out_of_hinge(s9, c9, &rho_acceleration));
+    let axis_acceleration = &motion.axis_acceleration;
+    let moment = [
+        moment[0],
+        moment[1] - (b.mu_l * rho_acceleration_a[2] + b.mu_l2 * axis_acceleration[2]),
+        moment[2] + (b.mu_l * rho_acceleration_a[1] + b.mu_l2 * axis_acceleration[1]),
+    ];
+
+    // The common centre w = along_shaft s1 + drum_share rho: place, partial velocities, acceleration; in cabinet axes.
+    let rho_s = [(c9 * rho[0]).v(), rho[1], -(s9 * rho[0]).v()];
+    let rho_a = out_of_spin(spin, &rho_s);
+    let w = tilt.to_cabinet(&[
+        b.along_shaft + b.drum_share * rho_a[0],
+        (b.drum_share * rho_a[1]).v(),
+        (b.drum_share * rho_a[2]).v(),
+    ]);
+    let drift = tilt.to_cabinet(&core::array::from_fn(|i| {
+        b.along_shaft * axis_acceleration[i] + b.drum_share * rho_acceleration_a[i]
+    }));
+    let arm_9 = {
+        let share = -(b.drum_share * rho[0]).v();
+        let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];
+        tilt.to_cabinet(&d3_a).map(|d3| (share * d3).v())
+    };
+    let arm_10 = {
+        let [x, y] = [-(b.drum_share * rho[1]).v(), (b.drum_share * rho[0]).v()];
+        tilt.to_cabinet(&out_of_spin(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
+    };
+    let zero = s9.lit(0.0);
+    let arm_7_z = -w[0];
+    let arm_8 = [(tilt.cos_yaw * w[0] - tilt.sin_yaw * w[2]), (tilt.sin_yaw * w[1]).v()];
+    let arm = [[zero, arm_7_z], arm_8, [arm_9[1], arm_9[2]], [arm_10[1], arm_10[2]]];
+    let axial_arm = [w[2], -(tilt.cos_yaw * w[1]).v(), arm_9[0], arm_10[0]];
+
+    // Generalised forces less inertia forces.
+    let flexure = Flexure::new(b.flexure_stiffness, s9, c9, s10, c10);
+    let [bearing_yaw, bearing_pitch] = tilt.torque_of_axis_load(&bearings.moment);
+    let about_centre = [
+        bearing_yaw - (tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]),
+        bearing_pitch - moment[2],
+        -(flexure.about_9 + drum_moment_e[1]),
+        -(flexure.about_10 + drum_moment_e[2]),
+    ];
+    let axial = (b.rotor_mass * drift[0]).v();
+    let torque = core::array::from_fn(|r| {
+        let torque = about_centre[r] - axial * axial_arm[r] - bearings.force[1] * arm[r][1];
+        if r > 0 { torque - bearings.force[0] * arm[r][0] } else { torque }
+    });
+
+    let mut inertia = rotor_inertia(b, spin, tilt, &k, &rho_s, (s9, c9));
+    for (r, row) in inertia.iter_mut().enumerate() {
+        let axial_r = (b.rotor_mass * axial_arm[r]).v();
+        for (value, &axial_s) in row.iter_mut().zip(&axial_arm).take(r + 1) {
+            *value += axial_r * axial_s;
+        }
+    }
+    Floating {
+        mass_kg: b.rotor_mass,
+        force: [bearings.force[0] - b.gravity * b.rotor_mass, bearings.force[1]],
+        drift: [drift[1], drift[2]],
+        arm,
+        inertia,
+        torque,
+    }
+}
+
+/// The drum's inertia about the hinge in E: its 1-3 and 2-3 entries are zero.
+struct DrumInertia<T> {
+    k11: N<T>,
+    k22: N<T>,
+    k33: N<T>,
+    k12: N<T>,
+}
+
+#[inline(always)]
+fn drum_inertia_in_e<T: Real>(b: &Bodies<T>, s10: N<T>, c10: N<T>) -> DrumInertia<T> {
+    let difference = b.drum_i11 - b.drum_i22;
+    let (ss, cs) = ((s10 * s10).v(), (c10 * s10).v());
+    // k11 = c^2 i11 - 2 c s i12 + s^2 i22, and k22 so that the trace stays.
+    let turned = difference * ss + 2.0 * (cs * b.drum_i12).v();
+    DrumInertia {
+        k11: b.drum_i11 - turned,
+        k22: b.drum_i22 + turned,
+        k33: b.drum_i33,
+        k12: cs * difference + b.drum_i12 * (1.0 - 2.0 * ss),
+    }
+}
+
+impl<T: Real> DrumInertia<T> {
+    /// K alpha + omega x K omega.
+    #[inline(always)]
+    fn moment(&self, omega: &Vec3<T>, alpha: &Vec3<T>) -> Vec3<T> {
+        let [x, y, z] = *omega;
+        let h = [self.k11 * x + self.k12 * y, self.k12 * x + self.k22 * y, (self.k33 * z).v()];
+        [
+            self.k11 * alpha[0] + self.k12 * alpha[1] + (y * h[2] - z * h[1]),
+            self.k12 * alpha[0] + self.k22 * alpha[1] + (z * h[0] - x * h[2]),
+            self.k33 * alpha[2] + (x * h[1] - y * h[0]),
+        ]
+    }
+}
+
+/// Inertia of the rotor about its mass centre over (q7, q8, q9, q10), without the axial motion's share; lower triangle.
+#[inline(always)]
+fn rotor_inertia<T: Real>(
+    b: &Bodies<T>,
+    spin: &SpinState<T>,
+    tilt: &Tilt<T>,
+    k: &DrumInertia<T>,
+    rho_s: &Vec3<T>,
+    (s9, c9): (N<T>, N<T>),
+) -> [[N<T>; 4]; 4] {
+    // The drum's K turned by q9 into S.
+    let ss = (s9 * s9).v();
+    let difference = k.k33 - k.k11;
+    let l12 = (c9 * k.k12).v();
+    let l23 = -(s9 * k.k12).v();
+    let l11 = k.k11 + ss * difference;
+    let l33 = k.k33 - ss * difference;
+    let mu_rho = rho_s.map(|rho| (b.mu_l * rho).v());
+
+    // Whole rotor in S, then its rows turned into A.
+    let across = 2.0 * mu_rho[0] + b.mu_l2;
+    let j11 = l11 + b.shaft_i11;
+    let j22 = k.k22 + b.shaft_i22 + across;
+    let j33 = l33 + b.shaft_i33 + across;
+    let [_, j12, j13] =
+        out_of_spin(spin, &[j11, l12 - mu_rho[1], (c9 * s9) * difference - mu_rho[2]]);
+    let half_sum = (0.5 * (j22 + j33)).v();
+    let half_difference = (0.5 * (j22 - j33)).v();
+    let turned = half_difference * spin.cos_2 - l23 * spin.sin_2;
+    let j22_a = half_sum + turned;
+    let j33_a = half_sum - turned;
+    let j23_a = half_difference * spin.sin_2 + l23 * spin.cos_2;
+
+    // Angular momentum for unit speeds of q9 and q10.
+    let h9_y = k.k22 + mu_rho[0];
+    let h9 = out_of_spin(spin, &[l12, h9_y, l23]);
+    let rho_1 = c9 * mu_rho[0] - s9 * mu_rho[2];
+    let h10 = out_of_spin(spin, &[(k.k33 * s9).v(), -(s9 * mu_rho[1]).v(), k.k33 * c9 + rho_1]);
+
+    let (s8, c8) = (tilt.sin_pitch, tilt.cos_pitch);
+    let zero = s9.lit(0.0);
+    [
+        [s8 * (s8 * j11 + 2.0 * (c8 * j12).v()) + (c8 * c8) * j22_a, zero, zero, zero],
+        [s8 * j13 + c8 * j23_a, j33_a, zero, zero],
+        [s8 * h9[0] + c8 * h9[1], h9[2], k.k22, zero],
+        [s8 * h10[0] + c8 * h10[1], h10[2], zero, k.k33],
+    ]
+}
+
+/// Second derivative of a vector (rho_1, rho_2, 0) fixed in a body.
+#[inline(always)]
+fn second_derivative<T: Real>(rho: &[N<T>; 2], omega: &Vec3<T>, alpha: &Vec3<T>) -> Vec3<T> {
+    let [x, y, z] = *omega;
+    let zz = (z * z).v();
+    let xy = (x * y).v();
+    [
+        (xy - alpha[2]) * rho[1] - (y * y + zz) * rho[0],
+        (xy + alpha[2]) * rho[0] - (x * x + zz) * rho[1],
+        (x * z - alpha[1]) * rho[0] + (y * z + alpha[0]) * rho[1],
+    ]
+}
+
+/// From A to S.
+#[inline(always)]
+fn into_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
+    [v[0], spin.cos * v[1] + spin.sin * v[2], spin.cos * v[2] - spin.sin * v[1]]
+}
+
+/// From S to A.
+#[inline(always)]
+fn out_of_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
+    [v[0], spin.cos * v[1] - spin.sin * v[2], spin.sin * v[1] + spin.cos * v[2]]
+}
+
+/// From S to E.
+#[inline(always)]
+fn into_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
+    [c9 * v[0] - s9 * v[2], v[1], s9 * v[0] + c9 * v[2]]
+}
+
+/// From E to S.
+#[inline(always)]
+fn out_of_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
+    [c9 * v[0] + s9 * v[2], v[1], c9 * v[2] - s9 * v[0]]
+}

@@ -1,0 +1,48 @@
+//! Against numbers from programs independent of this one (`tests/reference/README.md` says how they were made).
+
+use crate::coefficients::Coefficients;
+use crate::machine::Machine;
+use crate::nonlinear::{self, COORDINATES};
+use crate::spin::SpinState;
+use lane_ode::N;
+use serde_json::Value;
+
+fn reference(file: &str) -> Value {
+    let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn numbers<const K: usize>(value: &Value) -> [f64; K] {
+    let list = value.as_array().unwrap();
+    std::array::from_fn(|i| list[i].as_f64().unwrap())
+}
+
+/// The paper's machine at a case's unbalance mass and damping.
+fn machine(case: &Value) -> Machine {
+    let mut machine = Machine::paper();
+    machine.unbalance.mass_kg = case["unbalance_mass"].as_f64().unwrap();
+    if let Some(damping) = case["damping"].as_f64() {
+        machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = damping);
+    }
+    machine
+}
+
+fn spin(case: &Value) -> SpinState<f64> {
+    let number = |name: &str| N(case[name].as_f64().unwrap());
+    SpinState::new(number("theta").sin_cos(), number("theta_dot"), number("theta_ddot"))
+}
+
+#[test]
+fn val_accelerations_match_an_independent_right_hand_side() {
+    for case in reference("rhs.json")["cases"].as_array().unwrap() {
+        let coefficients = Coefficients::new(&machine(case));
+        let [q, u] = ["q", "u"].map(|name| numbers::<COORDINATES>(&case[name]).map(N));
+        let ours = nonlinear::accelerations(&coefficients.view(), &spin(case), &q, &u);
+        let theirs: [f64; COORDINATES] = numbers(&case["acceleration"]);
+        let largest = theirs.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+        for i in 0..COORDINATES {
+            let error = (ours[i].0 - theirs[i]).abs() / largest;
+            assert!(error < 1e-9, "coordinate {}: {} against {}", i + 1, ours[i].0, theirs[i]);
+        }
+    }
+}
