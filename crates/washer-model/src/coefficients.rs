@@ -37,10 +37,10 @@ lane_struct! {
     /// Bodies, flexure and bearings (model page, sections 1 to 3).
     Bodies {
         gravity,
-        tub_mass, tub_centre, tub_i11, tub_i22, tub_i33,
+        tub_mass, tub_per_mass, tub_centre, tub_i11, tub_i22, tub_i33,
         shaft_i11, shaft_i22, shaft_i33,
         /// Mass of shaft, drum and unbalance.
-        rotor_mass,
+        rotor_mass, rotor_per_mass,
         /// The rotor's centre from the bearing midpoint is `along_shaft * s1 + drum_share * rho`.
         along_shaft, drum_share,
         /// rho, from the hinge P_D to the drum's mass centre, in drum axes: (L_DM, e, 0).
@@ -93,6 +93,7 @@ impl Bodies<f64> {
         Self {
             gravity: N(machine.gravity_m_per_s2),
             tub_mass: N(tub.mass_kg),
+            tub_per_mass: N(1.0 / tub.mass_kg),
             tub_centre: N(tub.centre_x_m),
             tub_i11: N(tub.inertia_kg_m2[0]),
             tub_i22: N(tub.inertia_kg_m2[1]),
@@ -101,6 +102,7 @@ impl Bodies<f64> {
             shaft_i22: N(shaft.inertia_kg_m2[1]),
             shaft_i33: N(shaft.inertia_kg_m2[2]),
             rotor_mass: N(rotor_mass),
+            rotor_per_mass: N(1.0 / rotor_mass),
             along_shaft: N((m_s * shaft.centre_x_m + m_d * drum.hinge_x_m) / rotor_mass),
             drum_share: N(m_d / rotor_mass),
             rho_1: N(rho_1),

@@ -11,32 +11,50 @@
 //! with arm_r the partial velocity of the mass centre relative to the bearing midpoint, and drift that point's acceleration at
 //! constant speeds. This is the Schur complement of the block in closed form: J is 2x2 or 4x4.
 
-use lane_ode::{N, Real};
+use crate::forces::AxisLoad;
+use lane_ode::{Lane, N, Real};
 
-/// Equations of motion of one half of the machine, with `R` rotations. The first rotation is about c2, so that its
-/// arm has no y component.
+/// Equations of motion of one half of the machine, with `R` rotations. The first is the axis's yaw about c2, so that its
+/// partial velocities have no y component; the second is the axis's pitch.
 pub(crate) struct Floating<T, const R: usize> {
-    /// Mass of the chain.
-    pub(crate) mass_kg: N<T>,
+    /// Reciprocal of the chain's mass.
+    pub(crate) per_mass: N<T>,
     /// Force on the chain along y and z.
     pub(crate) force: [N<T>; 2],
     /// Acceleration of the mass centre relative to the bearing midpoint at constant speeds, y and z.
     pub(crate) drift: [N<T>; 2],
     /// Partial velocities of the mass centre relative to the bearing midpoint, y and z.
     pub(crate) arm: [[N<T>; 2]; R],
-    /// Inertia about the mass centre; only the lower triangle is read.
-    pub(crate) inertia: [[N<T>; R]; R],
+    /// Partial derivatives of the axis (a1) by yaw and pitch, y and z.
+    pub(crate) axis: [[N<T>; 2]; 2],
     /// Generalised forces less inertia forces at constant speeds, about the mass centre.
     pub(crate) torque: [N<T>; R],
 }
 
 impl<T: Real, const R: usize> Floating<T, R> {
-    /// Accelerations: y and z of the bearing midpoint, then the rotations.
+    /// Adds forces on the axis.
     #[inline(always)]
-    pub(crate) fn accelerations(self) -> ([N<T>; 2], [N<T>; R]) {
-        let rotation = solve_symmetric(self.inertia, self.torque);
-        let per_mass = self.mass_kg.recip();
-        let mut translation: [N<T>; 2] = core::array::from_fn(|i| self.force[i] * per_mass - self.drift[i]);
+    pub(crate) fn apply(&mut self, load: &AxisLoad<T>) {
+        let [moment_y, moment_z] = load.moment;
+        self.torque[0] += self.axis[0][1] * moment_z;
+        self.torque[1] = self.torque[1] + self.axis[1][0] * moment_y + self.axis[1][1] * moment_z;
+        for r in 0..R {
+            if r > 0 {
+                self.torque[r] -= self.arm[r][0] * load.force[0];
+            }
+            self.torque[r] -= self.arm[r][1] * load.force[1];
+        }
+        for i in 0..2 {
+            self.force[i] += load.force[i];
+        }
+    }
+
+    /// Accelerations: y and z of the bearing midpoint, then the rotations. `inertia` is J.
+    #[inline(always)]
+    pub(crate) fn accelerations(&self, inertia: &Factors<T, R>) -> ([N<T>; 2], [N<T>; R]) {
+        let rotation = inertia.solve(self.torque);
+        let mut translation: [N<T>; 2] =
+            core::array::from_fn(|i| self.force[i] * self.per_mass - self.drift[i]);
         for r in 0..R {
             if r > 0 {
                 translation[0] -= self.arm[r][0] * rotation[r];
@@ -45,23 +63,16 @@ impl<T: Real, const R: usize> Floating<T, R> {
         }
         (translation, rotation)
     }
-}
 
-impl<T: Real, const R: usize> Floating<T, R> {
     /// Forces that the coordinates (y and z of the bearing midpoint, then the rotations) see: `f` in M q'' = f.
+    #[inline(always)]
     pub(crate) fn generalised_forces(&self) -> ([N<T>; 2], [N<T>; R]) {
-        let midpoint: [N<T>; 2] = core::array::from_fn(|i| self.force[i] - self.mass_kg * self.drift[i]);
+        let midpoint: [N<T>; 2] = core::array::from_fn(|i| self.force[i] - self.drift[i] / self.per_mass);
         let rotation = core::array::from_fn(|r| {
             self.torque[r] + self.arm[r][0] * midpoint[0] + self.arm[r][1] * midpoint[1]
         });
         (midpoint, rotation)
     }
-}
-
-/// Solves `a x = b` for a symmetric positive definite `a` (lower triangle) by its L D L^T factors.
-#[inline(always)]
-pub(crate) fn solve_symmetric<T: Real, const R: usize>(a: [[N<T>; R]; R], b: [N<T>; R]) -> [N<T>; R] {
-    Factors::new(a).solve(b)
 }
 
 /// L D L^T factors of a symmetric positive definite matrix.
@@ -91,6 +102,16 @@ impl<T: Real, const R: usize> Factors<T, R> {
             a[j][j] = pivot;
         }
         Self { packed: a }
+    }
+
+    /// Bit i: the matrix of lane i is positive definite.
+    #[inline(always)]
+    pub(crate) fn is_positive(&self) -> u32
+    where
+        T: Lane,
+    {
+        let zero = self.packed[0][0].lit(0.0);
+        (0..R).fold(u32::MAX, |bits, j| bits & T::bits(zero.0.less(self.packed[j][j].0)))
     }
 
     /// Solves for one right-hand side.

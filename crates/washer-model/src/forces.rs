@@ -13,6 +13,14 @@ pub(crate) struct AxisLoad<T> {
     pub(crate) moment: [N<T>; 2],
 }
 
+impl<T: Real> AxisLoad<T> {
+    /// What the other body feels.
+    #[inline(always)]
+    pub(crate) fn reaction(&self) -> Self {
+        Self { force: self.force.map(|f| -f), moment: self.moment.map(|m| -m) }
+    }
+}
+
 /// What springs and dampers do to the tub.
 pub(crate) struct SuspensionLoad<T> {
     /// y and z of the force, cabinet axes.
@@ -31,6 +39,12 @@ pub(crate) fn bearing_load<T: Real>(
 ) -> AxisLoad<T> {
     let offset = [q[2] - q[0], q[3] - q[1]];
     let tilt = [shaft.axis_c[1] - tub.axis_c[1], shaft.axis_c[2] - tub.axis_c[2]];
+    load_of_displacement(b, &offset, &tilt)
+}
+
+/// Bearing forces on the shaft when its midpoint is `offset` from the tub's and its axis `tilt` from the tub's (y, z).
+#[inline(always)]
+pub(crate) fn load_of_displacement<T: Real>(b: &Bodies<T>, offset: &[N<T>; 2], tilt: &[N<T>; 2]) -> AxisLoad<T> {
     let at = |position: N<T>, stiffness: N<T>| -> [N<T>; 2] {
         core::array::from_fn(|i| -(stiffness * (offset[i] + position * tilt[i])).v())
     };

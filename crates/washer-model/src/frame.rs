@@ -60,14 +60,10 @@ impl<T: Real> Tilt<T> {
         }
     }
 
-    /// Generalised forces along yaw and pitch of cabinet forces (y, z) that act on the axis: `moment` is the sum of
-    /// force times position along the axis.
+    /// Derivatives of the axis by yaw and by pitch, y and z; the first one's y component is zero.
     #[inline(always)]
-    pub(crate) fn torque_of_axis_load(&self, moment: &[N<T>; 2]) -> [N<T>; 2] {
-        [
-            (self.axis_yaw_z() * moment[1]).v(),
-            self.cos_pitch * moment[0] + self.second_c[2] * moment[1],
-        ]
+    pub(crate) fn axis_partials(&self) -> [[N<T>; 2]; 2] {
+        [[self.sin_yaw.lit(0.0), self.axis_yaw_z()], [self.second_c[1], self.second_c[2]]]
     }
 
     /// The z component of the axis's derivative by yaw; its y component is zero.

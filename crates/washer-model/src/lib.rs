@@ -2,11 +2,13 @@
 
 mod channel;
 mod coefficients;
+mod equilibrium;
 mod floating;
 mod forces;
 mod frame;
 mod machine;
 mod nonlinear;
+mod outputs;
 mod spin;
 
 pub use channel::Channel;

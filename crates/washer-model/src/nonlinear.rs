@@ -4,7 +4,7 @@
 //! the spin (yaw q7, pitch q8), frame S spins with the shaft, frame E is S turned by q9, frame D by q10 more.
 
 use crate::coefficients::{Bodies, Coefficients, DamperOf, SpringOf};
-use crate::floating::Floating;
+use crate::floating::{Factors, Floating};
 use crate::forces::{AxisLoad, Flexure, bearing_load, suspension_load};
 use crate::frame::{Tilt, Vec3};
 use crate::spin::SpinState;
@@ -13,13 +13,21 @@ use lane_ode::{N, Real};
 /// Number of generalised coordinates.
 pub const COORDINATES: usize = 10;
 
-/// Both halves of the machine, still coupled by nothing but the load that each carries.
-pub(crate) struct Halves<T> {
-    pub(crate) tub: Floating<T, 2>,
-    pub(crate) rotor: Floating<T, 4>,
+/// One half of the machine: its equations without the bearings, its inertia (lower triangle), and its axis.
+pub(crate) struct Half<T, const R: usize> {
+    pub(crate) floating: Floating<T, R>,
+    pub(crate) inertia: [[N<T>; R]; R],
+    pub(crate) tilt: Tilt<T>,
 }
 
-/// Assembles the equations of motion at coordinates `q` (m, rad) and speeds `u`.
+/// Both halves, and what the bearings do to the shaft.
+pub(crate) struct Halves<T> {
+    pub(crate) tub: Half<T, 2>,
+    pub(crate) rotor: Half<T, 4>,
+    pub(crate) on_shaft: AxisLoad<T>,
+}
+
+/// Assembles the equations of motion at coordinates `q` (m, rad) and speeds `u`, with the bearing forces in both halves.
 #[inline(always)]
 pub(crate) fn halves<T: Real>(
     machine: &MachineView<'_, T>,
@@ -27,14 +35,12 @@ pub(crate) fn halves<T: Real>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> Halves<T> {
-    let tub_tilt = Tilt::new(q[4], q[5]);
-    let shaft_tilt = Tilt::new(q[6], q[7]);
-    let on_shaft = bearing_load(machine.bodies, q, &tub_tilt, &shaft_tilt);
-    let on_tub = AxisLoad { force: on_shaft.force.map(|f| -f), moment: on_shaft.moment.map(|m| -m) };
-    Halves {
-        tub: tub(machine, &tub_tilt, &on_tub, q, u),
-        rotor: rotor(machine.bodies, spin, &shaft_tilt, &on_shaft, q, u),
-    }
+    let mut tub = tub(machine, q, u);
+    let mut rotor = rotor(machine.bodies, spin, q, u);
+    let on_shaft = bearing_load(machine.bodies, q, &tub.tilt, &rotor.tilt);
+    tub.floating.apply(&on_shaft.reaction());
+    rotor.floating.apply(&on_shaft);
+    Halves { tub, rotor, on_shaft }
 }
 
 /// The coefficients that the equations read.
@@ -59,25 +65,24 @@ pub(crate) fn accelerations<T: Real>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
-    let Halves { tub, rotor } = halves(machine, spin, q, u);
-    let ([a1, a2], [a5, a6]) = tub.accelerations();
-    let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations();
+    let Halves { tub, rotor, .. } = halves(machine, spin, q, u);
+    let ([a1, a2], [a5, a6]) = tub.floating.accelerations(&Factors::new(tub.inertia));
+    let ([a3, a4], [a7, a8, a9, a10]) = rotor.floating.accelerations(&Factors::new(rotor.inertia));
     [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
 }
 
 /// Body T about its mass centre.
 #[inline(always)]
-fn tub<T: Real>(
+pub(crate) fn tub<T: Real>(
     machine: &MachineView<'_, T>,
-    tilt: &Tilt<T>,
-    bearings: &AxisLoad<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
-) -> Floating<T, 2> {
+) -> Half<T, 2> {
     let b = machine.bodies;
+    let tilt = Tilt::new(q[4], q[5]);
     let motion = tilt.motion(u[4], u[5]);
     let [x, y, z] = motion.rate;
-    let suspension = suspension_load(machine, tilt, &[q[0], q[1]], &[u[0], u[1]], &motion.rate);
+    let suspension = suspension_load(machine, &tilt, &[q[0], q[1]], &[u[0], u[1]], &motion.rate);
     let centre = b.tub_centre;
 
     // Inertia moments I alpha + omega x I omega at constant speeds, in tub axes.
@@ -94,30 +99,30 @@ fn tub<T: Real>(
     let arm_pitch: Vec3<T> = tilt.second_c.map(|t2| (centre * t2).v());
     let drift = tilt.to_cabinet(&motion.axis_acceleration).map(|a| (centre * a).v());
 
-    let in_plane = suspension.force;
-    let force = [bearings.force[0] + in_plane[0], bearings.force[1] + in_plane[1]];
-    let [bearing_yaw, bearing_pitch] = tilt.torque_of_axis_load(&bearings.moment);
+    let force = suspension.force;
     let axial = (b.tub_mass * drift[0]).v();
-    let torque_yaw = bearing_yaw + tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]
-        - force[1] * arm_yaw_z
-        - axial * arm_yaw_x;
+    let torque_yaw =
+        tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1] - force[1] * arm_yaw_z - axial * arm_yaw_x;
     let torque_pitch =
-        bearing_pitch + moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial * arm_pitch[0];
+        moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial * arm_pitch[0];
 
     let axial_yaw = (b.tub_mass * arm_yaw_x).v();
-    let s = tilt.sin_pitch;
-    let c = tilt.cos_pitch;
+    let (s, c) = (tilt.sin_pitch, tilt.cos_pitch);
     let zero = s.lit(0.0);
-    Floating {
-        mass_kg: b.tub_mass,
-        force: [force[0] - b.gravity * b.tub_mass, force[1]],
-        drift: [drift[1], drift[2]],
-        arm: [[zero, arm_yaw_z], [arm_pitch[1], arm_pitch[2]]],
+    Half {
+        floating: Floating {
+            per_mass: b.tub_per_mass,
+            force: [force[0] - b.gravity * b.tub_mass, force[1]],
+            drift: [drift[1], drift[2]],
+            arm: [[zero, arm_yaw_z], [arm_pitch[1], arm_pitch[2]]],
+            axis: tilt.axis_partials(),
+            torque: [torque_yaw, torque_pitch],
+        },
         inertia: [
             [axial_yaw * arm_yaw_x + (b.tub_i11 * (s * s) + b.tub_i22 * (c * c)), zero],
             [(axial_yaw * arm_pitch[0]).v(), b.tub_i33 + b.tub_mass * (arm_pitch[0] * arm_pitch[0])],
         ],
-        torque: [torque_yaw, torque_pitch],
+        tilt,
     }
 }
 
@@ -126,14 +131,13 @@ fn tub<T: Real>(
 /// The vector between their centres, l s1 + rho, moves as if the reduced mass were at its end. Its part in rho is in the
 /// drum's inertia about the hinge (`Bodies::drum_i11` ...); the rest appears below with `mu_l` and `mu_l2`.
 #[inline(always)]
-fn rotor<T: Real>(
+pub(crate) fn rotor<T: Real>(
     b: &Bodies<T>,
     spin: &SpinState<T>,
-    tilt: &Tilt<T>,
-    bearings: &AxisLoad<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
-) -> Floating<T, 4> {
+) -> Half<T, 4> {
+    let tilt = Tilt::new(q[6], q[7]);
     let motion = tilt.motion(u[6], u[7]);
     let (u9, u10) = (u[8], u[9]);
     let (s9, c9) = q[8].sin_cos();
@@ -215,33 +219,32 @@ fn rotor<T: Real>(
 
     // Generalised forces less inertia forces.
     let flexure = Flexure::new(b.flexure_stiffness, s9, c9, s10, c10);
-    let [bearing_yaw, bearing_pitch] = tilt.torque_of_axis_load(&bearings.moment);
     let about_centre = [
-        bearing_yaw - (tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]),
-        bearing_pitch - moment[2],
+        -(tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]),
+        -moment[2],
         -(flexure.about_9 + drum_moment_e[1]),
         -(flexure.about_10 + drum_moment_e[2]),
     ];
     let axial = (b.rotor_mass * drift[0]).v();
-    let torque = core::array::from_fn(|r| {
-        let torque = about_centre[r] - axial * axial_arm[r] - bearings.force[1] * arm[r][1];
-        if r > 0 { torque - bearings.force[0] * arm[r][0] } else { torque }
-    });
 
-    let mut inertia = rotor_inertia(b, spin, tilt, &k, &rho_s, (s9, c9));
+    let mut inertia = rotor_inertia(b, spin, &tilt, &k, &rho_s, (s9, c9));
     for (r, row) in inertia.iter_mut().enumerate() {
         let axial_r = (b.rotor_mass * axial_arm[r]).v();
         for (value, &axial_s) in row.iter_mut().zip(&axial_arm).take(r + 1) {
             *value += axial_r * axial_s;
         }
     }
-    Floating {
-        mass_kg: b.rotor_mass,
-        force: [bearings.force[0] - b.gravity * b.rotor_mass, bearings.force[1]],
-        drift: [drift[1], drift[2]],
-        arm,
+    Half {
+        floating: Floating {
+            per_mass: b.rotor_per_mass,
+            force: [-(b.gravity * b.rotor_mass).v(), zero],
+            drift: [drift[1], drift[2]],
+            arm,
+            axis: tilt.axis_partials(),
+            torque: core::array::from_fn(|r| about_centre[r] - axial * axial_arm[r]),
+        },
         inertia,
-        torque,
+        tilt,
     }
 }
 

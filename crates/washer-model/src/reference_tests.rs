@@ -1,6 +1,7 @@
 //! Against numbers from programs independent of this one (`tests/reference/README.md` says how they were made).
 
 use crate::coefficients::Coefficients;
+use crate::equilibrium;
 use crate::machine::Machine;
 use crate::nonlinear::{self, COORDINATES};
 use crate::spin::SpinState;
@@ -43,6 +44,18 @@ fn val_accelerations_match_an_independent_right_hand_side() {
         for i in 0..COORDINATES {
             let error = (ours[i].0 - theirs[i]).abs() / largest;
             assert!(error < 1e-9, "coordinate {}: {} against {}", i + 1, ours[i].0, theirs[i]);
+        }
+    }
+}
+
+#[test]
+fn val_equilibrium_matches_an_independent_solution() {
+    for case in reference("equilibrium.json")["cases"].as_array().unwrap() {
+        let (q, found) = equilibrium::find(N(0.0), &Coefficients::new(&machine(case)));
+        assert_eq!(found & 1, 1);
+        let theirs: [f64; COORDINATES] = numbers(&case["q"]);
+        for i in 0..COORDINATES {
+            assert!((q[i].0 - theirs[i]).abs() < 1e-12, "q{}: {} against {}", i + 1, q[i].0, theirs[i]);
         }
     }
 }

@@ -1,0 +1,135 @@
+//! Error norm and step size control of adaptive methods, per lane.
+
+use crate::lane::Lane;
+use crate::num::N;
+
+/// What an adaptive method is allowed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Relative error per component and step.
+    pub relative: f64,
+    /// Absolute error per component and step, in the component's unit.
+    pub absolute: f64,
+    /// Steps, accepted and rejected, that one leg may take.
+    pub max_steps: u64,
+}
+
+impl Tolerance {
+    /// The largest component of the error over its tolerance; NaN if any is not finite. Below 1 the step is good.
+    #[inline(always)]
+    pub(crate) fn norm<T: Lane, const D: usize>(
+        &self,
+        before: &[N<T>; D],
+        after: &[N<T>; D],
+        error: impl Fn(usize) -> N<T>,
+    ) -> N<T> {
+        let zero = before[0].lit(0.0);
+        let mut largest = zero;
+        let mut poison = zero;
+        for i in 0..D {
+            let size = N(before[i].0.abs().larger(after[i].0.abs()));
+            let ratio = error(i).abs() / (size * self.relative + self.absolute);
+            largest = N(ratio.0.larger(largest.0));
+            // Comparisons drop a NaN; a product with zero keeps it.
+            poison += ratio * zero;
+        }
+        largest + poison
+    }
+}
+
+/// Whether a step counts.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    Accepted,
+    Rejected,
+}
+
+/// Proportional-integral step control (Hairer and Wanner II, section IV.2): h grows by
+/// 0.9 err^-alpha err_before^beta, within 0.2 to 5.
+///
+/// The exponents are sums of powers of one half, so that square roots are enough: the same bits everywhere.
+pub(crate) struct StepControl<T> {
+    /// The step to try next.
+    pub(crate) step: N<T>,
+    /// err^beta of the last accepted step.
+    memory: N<T>,
+    /// Lanes whose last attempt was rejected: their step must not grow at once.
+    was_rejected: u32,
+}
+
+/// What each lane's step would be.
+pub(crate) struct Proposals<T> {
+    accepted: N<T>,
+    rejected: N<T>,
+    memory: N<T>,
+}
+
+const SAFETY: f64 = 0.9;
+const SHRINK_LIMIT: f64 = 0.2;
+const GROWTH_LIMIT: f64 = 5.0;
+/// Below this the error says nothing about the step.
+const LEAST_ERROR: f64 = 1e-10;
+
+impl<T: Lane> StepControl<T> {
+    #[inline(always)]
+    pub(crate) fn new(zero: N<T>) -> Self {
+        Self { step: zero, memory: zero.lit(1.0), was_rejected: 0 }
+    }
+
+    /// A leg begins: a new trajectory tries `first_step_s`, one that goes on keeps its own step.
+    #[inline(always)]
+    pub(crate) fn start(&mut self, lane: usize, first_step_s: Option<f64>, is_new: bool) {
+        if is_new {
+            self.step.0.set(lane, first_step_s.unwrap_or(0.0));
+            self.memory.0.set(lane, 1.0);
+        }
+        self.was_rejected &= !(1 << lane);
+    }
+
+    /// The next steps after error `error` over step `h`.
+    #[inline(always)]
+    pub(crate) fn proposals(&self, error: N<T>, h: N<T>) -> Proposals<T> {
+        let one = error.lit(1.0);
+        // NaN counts as far too large.
+        let error = error.where_less(error.lit(1e30), error, error.lit(1e30));
+        let error = error.lit(LEAST_ERROR).where_less(error, error, error.lit(LEAST_ERROR));
+        let root_2 = error.sqrt();
+        let root_8 = root_2.sqrt().sqrt();
+        let root_32 = root_8.sqrt().sqrt();
+        let root_64 = root_32.sqrt();
+        let root_128 = root_64.sqrt();
+        // alpha = 11/64 = 0.172, beta = 5/128 = 0.039 (dopri5.f: 0.17 and 0.04).
+        let alpha = (root_8 * (root_32 * root_64)).v();
+        let beta = (root_32 * root_128).v();
+        let clamp = |factor: N<T>, most: f64| {
+            let factor = factor.where_less(one.lit(most), factor, one.lit(most));
+            one.lit(SHRINK_LIMIT).where_less(factor, factor, one.lit(SHRINK_LIMIT))
+        };
+        Proposals {
+            accepted: (h * clamp(SAFETY * self.memory / alpha, GROWTH_LIMIT)).v(),
+            rejected: (h * clamp(SAFETY / alpha, 1.0)).v(),
+            memory: beta,
+        }
+    }
+
+    /// Takes up a lane's proposal.
+    #[inline(always)]
+    pub(crate) fn settle(&mut self, lane: usize, verdict: Verdict, next: &Proposals<T>) {
+        let bit = 1 << lane;
+        match verdict {
+            Verdict::Accepted => {
+                let mut step = next.accepted.0.get(lane);
+                if self.was_rejected & bit != 0 {
+                    step = step.min(self.step.0.get(lane));
+                }
+                self.step.0.set(lane, step);
+                self.memory.0.set(lane, next.memory.0.get(lane));
+                self.was_rejected &= !bit;
+            }
+            Verdict::Rejected => {
+                self.step.0.set(lane, next.rejected.0.get(lane));
+                self.was_rejected |= bit;
+            }
+        }
+    }
+}

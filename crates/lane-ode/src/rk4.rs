@@ -1,0 +1,143 @@
+//! The classical fourth-order Runge-Kutta method with a fixed step.
+//!
+//! W. Kutta, Zeitschrift fuer Mathematik und Physik 46 (1901) 435; Hairer, Norsett, Wanner, Solving Ordinary
+//! Differential Equations I, Table II.1.2.
+
+use crate::lane::Lane;
+use crate::num::N;
+use crate::system::{Count, Ended, Failure, Leg, Step, Task};
+
+/// On the imaginary axis the method is stable up to |h w| = 2 sqrt(2).
+pub const RK4_STABILITY_LIMIT: f64 = 2.828_427_124_746_190_3;
+
+/// The most lanes any instruction set has here.
+pub(crate) const MAX_LANES: usize = 8;
+
+/// Nodes and weights, over one step: each stage starts `REACH` of the last slope away, and adds `WEIGHT` of its own.
+const REACH: [f64; 4] = [0.5, 0.5, 1.0, 0.0];
+const WEIGHT: [f64; 4] = [1.0, 2.0, 2.0, 1.0];
+
+/// Steps of one lane's leg: the smallest whole number of equal steps not above the leg's own.
+#[must_use]
+pub fn fixed_steps(leg: &Leg) -> u64 {
+    // The quotient may come out a hair above a whole number that was meant.
+    let steps = ((leg.end_s - leg.start_s) / leg.step_s * (1.0 - 1e-12)).ceil().max(1.0);
+    steps as u64
+}
+
+/// Where a lane stands in its leg.
+#[derive(Clone, Copy, Default)]
+struct Progress {
+    is_active: bool,
+    total: u64,
+    left: u64,
+}
+
+/// Runs every trajectory that the task has, lanes full as long as there are any.
+#[inline(always)]
+pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) {
+    let zero = N(zero);
+    let mut x = [zero; D];
+    let mut start = zero;
+    let mut h = zero;
+    let mut index = zero;
+    let mut lanes = [Progress::default(); MAX_LANES];
+    let mut ended = [Some(Ended::Idle); MAX_LANES];
+
+    loop {
+        for lane in 0..T::LANES {
+            let Some(how) = ended[lane].take() else { continue };
+            let leg = task.next_leg(lane, how, &mut x);
+            let steps = leg.as_ref().map_or(0, fixed_steps);
+            lanes[lane] = Progress { is_active: leg.is_some(), total: steps, left: steps };
+            let (from, step) = leg.map_or((0.0, 0.0), |l| (l.start_s, (l.end_s - l.start_s) / steps as f64));
+            start.0.set(lane, from);
+            h.0.set(lane, step);
+            index.0.set(lane, 0.0);
+        }
+        let active = || lanes[..T::LANES].iter().filter(|lane| lane.is_active);
+        let Some(mut run) = active().map(|lane| lane.left).min() else { return };
+
+        let sixth = h / zero.lit(6.0);
+        let mut now = task.forcing(index * h + start);
+        let mut before = x;
+        let mut slope_before = x;
+        let mut is_fresh = true;
+        let mut done = 0;
+        loop {
+            // The one after the last is an evaluation only: observers want the slope at both ends of a step.
+            let stages = if done == run { 1 } else { 4 };
+            let mid = task.forcing((index + 0.5) * h + start);
+            let end = task.forcing((index + 1.0) * h + start);
+            let forcing = [&now, &mid, &mid, &end];
+            let mut y = x;
+            let mut sum = [zero; D];
+            let mut first_slope = [zero; D];
+            // One copy of the right-hand side: four would not fit the instruction cache.
+            for stage in 0..stages {
+                let slope = task.derivative(forcing[stage], &y);
+                let reach = (h * REACH[stage]).v();
+                let weight = zero.lit(WEIGHT[stage]);
+                for i in 0..D {
+                    y[i] = x[i] + reach * slope[i];
+                    sum[i] += weight * slope[i];
+                }
+                if stage == 0 {
+                    first_slope = slope;
+                    if is_fresh {
+                        task.begin(&now, &x, &slope);
+                        is_fresh = false;
+                    } else {
+                        task.observe(
+                            &now,
+                            &Step {
+                                end_s: index * h + start,
+                                length_s: h,
+                                before: &before,
+                                slope_before: &slope_before,
+                                after: &x,
+                                slope_after: &slope,
+                                dense: None,
+                            },
+                        );
+                    }
+                }
+            }
+            if done == run {
+                break;
+            }
+            before = x;
+            slope_before = first_slope;
+            for i in 0..D {
+                x[i] += sixth * sum[i];
+            }
+            index = index + 1.0;
+            now = end;
+            done += 1;
+            let in_range = task.in_range(&x);
+            if !T::all(in_range) {
+                let out = !T::bits(in_range);
+                for lane in (0..T::LANES).filter(|lane| lanes[*lane].is_active && out >> lane & 1 == 1) {
+                    let made = lanes[lane].total - lanes[lane].left + done;
+                    ended[lane] = Some(Ended::Failed {
+                        reason: Failure::Diverged,
+                        time_s: start.0.get(lane) + h.0.get(lane) * made as f64,
+                        count: Count { accepted: made, rejected: 0 },
+                    });
+                }
+                if ended.iter().any(Option::is_some) {
+                    run = done;
+                }
+            }
+        }
+        for lane in 0..T::LANES {
+            let progress = &mut lanes[lane];
+            if progress.is_active {
+                progress.left -= done;
+                if progress.left == 0 && ended[lane].is_none() {
+                    ended[lane] = Some(Ended::Arrived(Count { accepted: progress.total, rejected: 0 }));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! What the integrators ask of a model, and what they tell about a trajectory.
+
+use crate::lane::Lane;
+use crate::num::N;
+
+/// A first-order system x' = f(t, x) with `D` states, in lanes.
+pub trait System<T: Lane, const D: usize> {
+    /// What f needs that depends on time alone; found once where several stages share a time.
+    type Forcing;
+
+    /// The forcing at time `t_s`, which may differ between lanes.
+    fn forcing(&self, t_s: N<T>) -> Self::Forcing;
+
+    /// f at state `x`.
+    fn derivative(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D];
+
+    /// Where a state still means something; a lane that leaves this range has diverged. NaN must count as out.
+    fn in_range(&self, x: &[N<T>; D]) -> T::Mask;
+}
+
+/// Trajectories fed into lanes one after another: a lane that ends takes up the next at once.
+pub trait Task<T: Lane, const D: usize>: System<T, D> {
+    /// Says how lane `lane` got to the end of its leg, and asks what it does next: another leg of the same
+    /// trajectory, the first of a new one (write its parameters and its state), or nothing.
+    fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; D]) -> Option<Leg>;
+
+    /// A leg has begun in some lane: the trajectory may have a kink here, or be a new one. Lanes whose legs went on
+    /// are given the sample that they had.
+    fn begin(&mut self, forcing: &Self::Forcing, x: &[N<T>; D], dx: &[N<T>; D]);
+
+    /// Every lane has made a step, or stood still (zero length).
+    fn observe(&mut self, forcing: &Self::Forcing, step: &Step<'_, T, D>);
+}
+
+/// A stretch of a trajectory without kinks: its end is hit exactly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leg {
+    /// Where it starts.
+    pub start_s: f64,
+    /// Where it ends.
+    pub end_s: f64,
+    /// Fixed-step methods: the longest step; a whole number of equal steps fills the leg. Adaptive methods: the first
+    /// step to try.
+    pub step_s: f64,
+}
+
+/// How a lane came to the end of a leg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ended {
+    /// It had none yet.
+    Idle,
+    /// At the leg's end.
+    Arrived(Count),
+    /// Before it.
+    Failed {
+        /// Why.
+        reason: Failure,
+        /// When.
+        time_s: f64,
+        /// Steps so far.
+        count: Count,
+    },
+}
+
+/// Why a trajectory cannot go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Failure {
+    /// The state left the range of the model, or is not finite.
+    Diverged,
+    /// The error asked for needs steps that time cannot resolve.
+    StepTooSmall,
+    /// The allowance of steps is used up.
+    StepLimit,
+}
+
+/// Steps of one leg.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Count {
+    /// Accepted.
+    pub accepted: u64,
+    /// Rejected.
+    pub rejected: u64,
+}
+
+/// A step just made, with what an observer needs to look inside it.
+pub struct Step<'a, T, const D: usize> {
+    /// Its end in time.
+    pub end_s: N<T>,
+    /// Its length; zero in a lane that stood still.
+    pub length_s: N<T>,
+    /// State at its start.
+    pub before: &'a [N<T>; D],
+    /// Derivative there.
+    pub slope_before: &'a [N<T>; D],
+    /// State at its end.
+    pub after: &'a [N<T>; D],
+    /// Derivative there.
+    pub slope_after: &'a [N<T>; D],
+    /// The fourth-order term of the method's own dense output, if it has one.
+    pub dense: Option<&'a [N<T>; D]>,
+}
+
+impl<T: Lane, const D: usize> Step<'_, T, D> {
+    /// The state a fraction `s` (0 to 1) into the step: the method's dense output, or the cubic through both ends.
+    ///
+    /// Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.6 (`contd5`).
+    #[inline(always)]
+    #[must_use]
+    pub fn at(&self, s: N<T>) -> [N<T>; D] {
+        let rest = 1.0 - s;
+        core::array::from_fn(|i| {
+            let difference = self.after[i] - self.before[i];
+            let start = self.length_s * self.slope_before[i] - difference;
+            let end = difference - self.length_s * self.slope_after[i] - start;
+            let inner = match self.dense {
+                Some(dense) => end + rest * dense[i],
+                None => end,
+            };
+            self.before[i] + s * (difference + rest * (start + s * inner))
+        })
+    }
+}

@@ -1,0 +1,71 @@
+//! From coordinates to what is observed: channels and gap (section 6 of the model page).
+
+use crate::channel::Channel;
+use crate::coefficients::Bodies;
+use crate::frame::{Tilt, Vec3};
+use crate::nonlinear::COORDINATES;
+use lane_ode::{N, Real};
+
+/// Number of observed quantities: every channel, and the gap's measure.
+pub(crate) const OUTPUTS: usize = Channel::ALL.len() + 1;
+
+/// Index of the squared distance between the drum's front centre and the tub axis, across that axis. Its square, because
+/// a distance has a kink at zero.
+pub(crate) const RADIAL_SQUARED: usize = Channel::ALL.len();
+
+/// Positions (m) and angles (rad) in the order of [`Channel::ALL`], then the squared radial distance (m^2).
+#[inline(always)]
+pub(crate) fn outputs<T: Real>(
+    b: &Bodies<T>,
+    (sin, cos): (N<T>, N<T>),
+    q: &[N<T>; COORDINATES],
+) -> [N<T>; OUTPUTS] {
+    let tub = Tilt::new(q[4], q[5]);
+    let shaft = Tilt::new(q[6], q[7]);
+    let (s9, c9) = q[8].sin_cos();
+    let (s10, c10) = q[9].sin_cos();
+    let from_spin = |v: [N<T>; 3]| -> Vec3<T> {
+        shaft.to_cabinet(&[v[0], cos * v[1] - sin * v[2], sin * v[1] + cos * v[2]])
+    };
+    // d1 and rho = rho_1 d1 + rho_2 d2, by way of S.
+    let drum_axis = from_spin([(c9 * c10).v(), s10, -(s9 * c10).v()]);
+    let rho = {
+        let (x, y) = (c10 * b.rho_1 - s10 * b.rho_2, s10 * b.rho_1 + c10 * b.rho_2);
+        from_spin([(c9 * x).v(), y, -(s9 * x).v()])
+    };
+
+    let midpoint = [q[0], q[1]];
+    let rotor_midpoint = [q[2], q[3]];
+    let tub_front: Vec3<T> = in_cabinet(&midpoint, tub.axis_c.map(|t1| (b.tub_front * t1).v()));
+    let drum_front: Vec3<T> = in_cabinet(
+        &rotor_midpoint,
+        core::array::from_fn(|i| b.drum_hinge * shaft.axis_c[i] + b.hinge_to_front * drum_axis[i]),
+    );
+    let total_mass = b.tub_mass + b.rotor_mass;
+    let total_centre: [N<T>; 2] = core::array::from_fn(|i| {
+        let of_tub = b.tub_mass * (midpoint[i] + b.tub_centre * tub.axis_c[i + 1]);
+        let rotor_centre = rotor_midpoint[i] + b.along_shaft * shaft.axis_c[i + 1] + b.drum_share * rho[i + 1];
+        (of_tub + b.rotor_mass * rotor_centre) / total_mass
+    });
+
+    let apart: Vec3<T> = core::array::from_fn(|i| drum_front[i] - tub_front[i]);
+    let along_2 = tub.second_c[0] * apart[0] + tub.second_c[1] * apart[1] + tub.second_c[2] * apart[2];
+    let along_3 = tub.sin_yaw * apart[0] + tub.cos_yaw * apart[2];
+    [
+        tub_front[1],
+        tub_front[2],
+        drum_front[1],
+        drum_front[2],
+        total_centre[0],
+        total_centre[1],
+        q[4],
+        q[5],
+        along_2 * along_2 + along_3 * along_3,
+    ]
+}
+
+/// A point of a body: its bearing midpoint, which does not move along x, plus an offset in cabinet axes.
+#[inline(always)]
+fn in_cabinet<T: Real>(midpoint: &[N<T>; 2], offset: Vec3<T>) -> Vec3<T> {
+    [offset[0], offset[1] + midpoint[0], offset[2] + midpoint[1]]
+}
