@@ -3,7 +3,7 @@
 use crate::coefficients::Bodies;
 use crate::frame::{Tilt, Vec3};
 use crate::nonlinear::{COORDINATES, MachineView};
-use lane_ode::{N, Real};
+use lane_ode::{Dual, N, Real};
 
 /// Cabinet forces (y, z) on points of a body's axis.
 pub(crate) struct AxisLoad<T> {
@@ -14,6 +14,13 @@ pub(crate) struct AxisLoad<T> {
 }
 
 impl<T: Real> AxisLoad<T> {
+    /// As a constant of a dual number.
+    #[inline(always)]
+    pub(crate) fn constant(&self) -> AxisLoad<Dual<T>> {
+        let lift = |v: N<T>| N(Dual::constant(v.0));
+        AxisLoad { force: self.force.map(lift), moment: self.moment.map(lift) }
+    }
+
     /// What the other body feels.
     #[inline(always)]
     pub(crate) fn reaction(&self) -> Self {

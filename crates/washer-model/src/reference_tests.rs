@@ -1,7 +1,7 @@
 //! Against numbers from programs independent of this one (`tests/reference/README.md` says how they were made).
 
 use crate::coefficients::Coefficients;
-use crate::equilibrium;
+use crate::{equilibrium, linear};
 use crate::machine::Machine;
 use crate::nonlinear::{self, COORDINATES};
 use crate::spin::SpinState;
@@ -56,6 +56,33 @@ fn val_equilibrium_matches_an_independent_solution() {
         let theirs: [f64; COORDINATES] = numbers(&case["q"]);
         for i in 0..COORDINATES {
             assert!((q[i].0 - theirs[i]).abs() < 1e-12, "q{}: {} against {}", i + 1, q[i].0, theirs[i]);
+        }
+    }
+}
+
+#[test]
+fn val_linear_matrices_match_an_independent_expansion() {
+    for case in reference("linear_matrices.json")["cases"].as_array().unwrap() {
+        let coefficients = Coefficients::new(&machine(case));
+        let (q, _) = equilibrium::find(N(0.0), &coefficients);
+        let point = linear::linearise(&coefficients, &q).remove(0);
+        let ours = point.matrices(&coefficients.bodies, &spin(case));
+        for (name, ours) in [("M", ours.mass), ("C", ours.damping), ("K", ours.stiffness)] {
+            let theirs: [[f64; COORDINATES]; COORDINATES] =
+                std::array::from_fn(|i| numbers(&case[name].as_array().unwrap()[i]));
+            let largest = theirs.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
+            for i in 0..COORDINATES {
+                for j in 0..COORDINATES {
+                    let error = (ours[i][j] - theirs[i][j]).abs() / largest;
+                    assert!(error < 1e-9, "{name}[{i}][{j}]: {} against {}", ours[i][j], theirs[i][j]);
+                }
+            }
+        }
+        let theirs: [f64; COORDINATES] = numbers(&case["F"]);
+        let largest = theirs.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+        for i in 0..COORDINATES {
+            let error = (ours.force[i] - theirs[i]).abs() / largest;
+            assert!(error < 1e-9, "F[{i}]: {} against {}", ours.force[i], theirs[i]);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Prescribed spin of the shaft: angle, speed and acceleration as functions of time.
 
 use core::f64::consts::TAU;
-use lane_ode::{Lane, N, Real, trig};
+use lane_ode::{Dual, Lane, N, Real, trig};
 
 /// Speed of the drum over time, as a user describes it. Speeds in rpm, times in s.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +57,20 @@ impl<T: Real> SpinState<T> {
         let sin_2 = (2.0 * (sin * cos).v()).v();
         let cos_2 = 1.0 - 2.0 * (sin * sin).v();
         Self { sin, cos, sin_2, cos_2, speed, acceleration }
+    }
+
+    /// As constants of a dual number.
+    #[inline(always)]
+    pub(crate) fn constant(&self) -> SpinState<Dual<T>> {
+        let lift = |v: N<T>| N(Dual::constant(v.0));
+        SpinState {
+            sin: lift(self.sin),
+            cos: lift(self.cos),
+            sin_2: lift(self.sin_2),
+            cos_2: lift(self.cos_2),
+            speed: lift(self.speed),
+            acceleration: lift(self.acceleration),
+        }
     }
 }
 

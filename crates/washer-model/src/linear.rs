@@ -1,0 +1,396 @@
+//! The linear model: exact first order about the static equilibrium (section 5 of the model page, Eq. 41).
+//!
+//! Every coefficient comes from the nonlinear source by automatic differentiation, once per grid point. What depends on theta
+//! is a trigonometric polynomial of harmonics 0 to 2, times 1, theta', theta'^2 or theta''; five angles determine it. Like the
+//! nonlinear model it is solved by halves, each about its mass centre; only the bearings couple them.
+
+use crate::coefficients::{Bodies, Coefficients};
+use crate::floating::{Factors, Floating};
+use crate::forces::{AxisLoad, bearing_load, load_of_displacement};
+use crate::frame::Tilt;
+use crate::harmonics::{BASIS, Factor, HARMONICS, SAMPLES, Term, TermLanes, basis, push_terms};
+use crate::lanes::{GetLane, SetLane, Splat};
+use crate::nonlinear::{COORDINATES, Half, rotor, tub};
+use crate::spin::SpinState;
+use lane_ode::{Dual, Lane, N, Real};
+
+/// Coordinates of the tub: q1, q2, q5, q6.
+const TUB: [usize; 4] = [0, 1, 4, 5];
+/// Coordinates that turn the rotor: q7 to q10. Its forces do not depend on q3 and q4 but through the bearings.
+const TURNS: [usize; 4] = [6, 7, 8, 9];
+
+/// Rows of one half: y, z of its midpoint, then its rotations about the mass centre.
+const ROTOR_ROWS: usize = 6;
+
+// Entries of the rotor's theta-dependent arrays, in this order.
+const INERTIA: usize = 0;
+const ARM: usize = INERTIA + 10;
+const FORCE: usize = ARM + 8;
+const STIFFNESS: usize = FORCE + ROTOR_ROWS;
+const DAMPING: usize = STIFFNESS + ROTOR_ROWS * 4;
+const ENTRIES: usize = DAMPING + ROTOR_ROWS * 4;
+
+/// The linear model of one machine; `N<f64>` for one, `N<T>` for one per lane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Constants<T> {
+    tub_per_mass: N<T>,
+    tub_arm: [[N<T>; 2]; 2],
+    tub_axis: [[N<T>; 2]; 2],
+    tub_inertia: [[N<T>; 2]; 2],
+    tub_stiffness: [[N<T>; 4]; 4],
+    tub_damping: [[N<T>; 4]; 4],
+    rotor_per_mass: N<T>,
+    rotor_axis: [[N<T>; 2]; 2],
+}
+
+macro_rules! each_field {
+    ($mac:ident) => {
+        $mac!(
+            tub_per_mass, tub_arm, tub_axis, tub_inertia, tub_stiffness, tub_damping, rotor_per_mass, rotor_axis
+        )
+    };
+}
+
+impl<T: Lane> SetLane<Constants<f64>> for Constants<T> {
+    fn set_lane(&mut self, lane: usize, from: &Constants<f64>) {
+        macro_rules! set { ($($f:ident),*) => { $(self.$f.set_lane(lane, &from.$f);)* }; }
+        each_field!(set);
+    }
+}
+
+impl<T: Lane> Constants<T> {
+    fn lane(&self, lane: usize) -> Constants<f64> {
+        macro_rules! get { ($($f:ident),*) => { Constants { $($f: self.$f.get_lane(lane),)* } }; }
+        each_field!(get)
+    }
+
+    pub(crate) fn splat(zero: N<T>, from: &Constants<f64>) -> Self {
+        macro_rules! splat { ($($f:ident),*) => { Self { $($f: Splat::splat(zero, &from.$f),)* } }; }
+        each_field!(splat)
+    }
+}
+
+/// The linear model of one machine.
+#[derive(Clone, Debug)]
+pub(crate) struct LinearPoint {
+    pub(crate) constants: Constants<f64>,
+    pub(crate) terms: Vec<Term>,
+}
+
+/// Linearises one machine per lane about the equilibrium `q`.
+#[inline(always)]
+pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINATES]) -> Vec<LinearPoint> {
+    let zero = q[0].lit(0.0);
+    let still = [zero; COORDINATES];
+    let bodies = &machine.bodies;
+    let on_shaft = bearing_load(bodies, q, &Tilt::new(q[4], q[5]), &Tilt::new(q[6], q[7]));
+    let on_tub = on_shaft.reaction();
+    let lifted = machine.constant();
+
+    // The tub does not know the spin.
+    let at_rest = tub(&machine.view(), q, &still);
+    let mut tub_stiffness = [[zero; 4]; 4];
+    let mut tub_damping = [[zero; 4]; 4];
+    for (column, &j) in TUB.iter().enumerate() {
+        for (matrix, dq, du) in [(&mut tub_stiffness, 1.0, 0.0), (&mut tub_damping, 0.0, 1.0)] {
+            let Half { mut floating, .. } = tub(&lifted.view(), &seeded(q, j, dq), &seeded(&still, j, du));
+            floating.apply(&on_tub.constant());
+            let rows: [_; 4] = about_centre(floating.generalised_forces(), &at_rest.floating.arm);
+            for (row, slope) in rows.iter().enumerate() {
+                matrix[row][column] = -*slope;
+            }
+        }
+    }
+
+    let mut samples = [[[zero; HARMONICS]; ENTRIES]; 3];
+    for (k, &(cos, sin)) in SAMPLES.iter().enumerate() {
+        for (kind, (speed, acceleration)) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
+            let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero.lit(speed), zero.lit(acceleration));
+            let mut put = |entry: usize, value: N<T>| samples[kind][entry][k] = value;
+            let Half { mut floating, inertia, .. } = rotor(bodies, &spin, q, &still);
+            floating.apply(&on_shaft);
+            let (force, torque) = floating.generalised_forces();
+            let arm = floating.arm;
+            let lifted_spin = spin.constant();
+            let mut put_slopes = |first: usize, column: usize, dq: f64, du: f64| {
+                let (q, u) = (seeded(q, TURNS[column], dq), seeded(&still, TURNS[column], du));
+                let Half { mut floating, .. } = rotor(&lifted.bodies, &lifted_spin, &q, &u);
+                floating.apply(&on_shaft.constant());
+                let rows: [_; ROTOR_ROWS] = about_centre(floating.generalised_forces(), &arm);
+                for (row, slope) in rows.iter().enumerate() {
+                    put(first + row * 4 + column, -*slope);
+                }
+            };
+            for column in 0..4 {
+                put_slopes(STIFFNESS, column, 1.0, 0.0);
+                if kind == 1 {
+                    put_slopes(DAMPING, column, 0.0, 1.0);
+                }
+            }
+            for row in 0..2 {
+                put(FORCE + row, force[row]);
+            }
+            for row in 0..4 {
+                put(FORCE + 2 + row, torque[row] - arm[row][0] * force[0] - arm[row][1] * force[1]);
+            }
+            if kind == 0 {
+                for row in 0..4 {
+                    for column in 0..=row {
+                        put(INERTIA + row * (row + 1) / 2 + column, inertia[row][column]);
+                    }
+                    put(ARM + 2 * row, arm[row][0]);
+                    put(ARM + 2 * row + 1, arm[row][1]);
+                }
+            }
+        }
+    }
+
+    let constants = Constants {
+        tub_per_mass: bodies.tub_per_mass,
+        tub_arm: at_rest.floating.arm,
+        tub_axis: at_rest.floating.axis,
+        tub_inertia: at_rest.inertia,
+        tub_stiffness,
+        tub_damping,
+        rotor_per_mass: bodies.rotor_per_mass,
+        rotor_axis: Tilt::new(q[6], q[7]).axis_partials(),
+    };
+    (0..T::LANES)
+        .map(|lane| LinearPoint { constants: constants.lane(lane), terms: terms_of_lane(&samples, lane) })
+        .collect()
+}
+
+/// `values` with a unit derivative (times `slope`) along coordinate `j`.
+#[inline(always)]
+fn seeded<T: Lane>(values: &[N<T>; COORDINATES], j: usize, slope: f64) -> [N<Dual<T>>; COORDINATES] {
+    core::array::from_fn(|i| {
+        let zero = values[i].lit(0.0);
+        N(Dual { value: values[i].0, slope: if i == j { zero.lit(slope).0 } else { zero.0 } })
+    })
+}
+
+/// Slopes of generalised forces, from the bearing midpoint's rows to the mass centre's: the inverse of what
+/// `Floating::generalised_forces` does, at the equilibrium's arms.
+#[inline(always)]
+fn about_centre<T: Real, const R: usize, const ROWS: usize>(
+    (midpoint, rotation): ([N<Dual<T>>; 2], [N<Dual<T>>; R]),
+    arm: &[[N<T>; 2]; R],
+) -> [N<T>; ROWS] {
+    let force = midpoint.map(|f| N(f.0.slope));
+    core::array::from_fn(|row| match row {
+        0 | 1 => force[row],
+        _ => {
+            let r = row - 2;
+            N(rotation[r].0.slope) - arm[r][0] * force[0] - arm[r][1] * force[1]
+        }
+    })
+}
+
+/// The rotor's terms of one lane, from samples at no spin, unit speed and unit acceleration.
+fn terms_of_lane<T: Lane>(samples: &[[[N<T>; HARMONICS]; ENTRIES]; 3], lane: usize) -> Vec<Term> {
+    let at = |kind: usize, entry: usize| -> [f64; HARMONICS] { samples[kind][entry].map(|v| v.0.get(lane)) };
+    let above_rest = |kind: usize, entry: usize| -> [f64; HARMONICS] {
+        let (value, rest) = (at(kind, entry), at(0, entry));
+        core::array::from_fn(|k| value[k] - rest[k])
+    };
+    let mut terms = Vec::with_capacity(256);
+    push_terms(&mut terms, INERTIA, Factor::One, (INERTIA..ARM).map(|e| at(0, e)));
+    push_terms(&mut terms, ARM, Factor::One, (ARM..FORCE).map(|e| at(0, e)));
+    // Forces and stiffness come together: a share of the larger tells rounding from physics for both.
+    for (first, past) in [(FORCE, STIFFNESS), (STIFFNESS, DAMPING)] {
+        push_terms(&mut terms, first, Factor::One, (first..past).map(|e| at(0, e)));
+        push_terms(&mut terms, first, Factor::SpeedSquared, (first..past).map(|e| above_rest(1, e)));
+        push_terms(&mut terms, first, Factor::Acceleration, (first..past).map(|e| above_rest(2, e)));
+    }
+    push_terms(&mut terms, DAMPING, Factor::Speed, (DAMPING..ENTRIES).map(|e| at(1, e)));
+    terms.sort_unstable_by_key(|term| term.key);
+    terms
+}
+
+/// The rotor's arrays at one instant.
+pub(crate) struct RotorAt<T> {
+    entries: [N<T>; ENTRIES],
+    inertia: Factors<T, 4>,
+}
+
+/// What depends on time alone.
+#[inline(always)]
+pub(crate) fn rotor_at<T: Lane>(terms: &TermLanes<T>, spin: &SpinState<T>) -> RotorAt<T> {
+    let functions: [N<T>; BASIS] = basis(spin);
+    let entries: [N<T>; ENTRIES] = terms.sum(&functions);
+    let zero = spin.sin.lit(0.0);
+    let mut inertia = [[zero; 4]; 4];
+    for row in 0..4 {
+        for column in 0..=row {
+            inertia[row][column] = entries[INERTIA + row * (row + 1) / 2 + column];
+        }
+    }
+    RotorAt { entries, inertia: Factors::new(inertia) }
+}
+
+/// Accelerations du/dt at deviations `q` from equilibrium and speeds `u`.
+#[inline(always)]
+pub(crate) fn accelerations<T: Lane>(
+    bodies: &Bodies<T>,
+    constants: &Constants<T>,
+    tub_inertia: &Factors<T, 2>,
+    rotor_at: &RotorAt<T>,
+    q: &[N<T>; COORDINATES],
+    u: &[N<T>; COORDINATES],
+) -> [N<T>; COORDINATES] {
+    let c = constants;
+    let zero = q[0].lit(0.0);
+    let (mut tub, mut rotor) = unloaded(c, rotor_at, q, u, zero);
+    let on_shaft = linear_load(bodies, c, q);
+    tub.apply(&on_shaft.reaction());
+    rotor.apply(&on_shaft);
+    let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia);
+    let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(&rotor_at.inertia);
+    [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
+}
+
+/// What the bearings add to their equilibrium load on the shaft.
+#[inline(always)]
+fn linear_load<T: Real>(bodies: &Bodies<T>, c: &Constants<T>, q: &[N<T>; COORDINATES]) -> AxisLoad<T> {
+    let offset = [q[2] - q[0], q[3] - q[1]];
+    let tilt = [
+        c.rotor_axis[1][0] * q[7] - c.tub_axis[1][0] * q[5],
+        c.rotor_axis[0][1] * q[6] + c.rotor_axis[1][1] * q[7]
+            - (c.tub_axis[0][1] * q[4] + c.tub_axis[1][1] * q[5]),
+    ];
+    load_of_displacement(bodies, &offset, &tilt)
+}
+
+/// Both halves without what the bearings add to their equilibrium load.
+#[inline(always)]
+fn unloaded<T: Lane>(
+    c: &Constants<T>,
+    rotor_at: &RotorAt<T>,
+    q: &[N<T>; COORDINATES],
+    u: &[N<T>; COORDINATES],
+    zero: N<T>,
+) -> (Floating<T, 2>, Floating<T, 4>) {
+    let tub_row = |row: usize| {
+        let mut f = zero;
+        for (column, &j) in TUB.iter().enumerate() {
+            f = f - c.tub_stiffness[row][column] * q[j] - c.tub_damping[row][column] * u[j];
+        }
+        f
+    };
+    let e = &rotor_at.entries;
+    let rotor_row = |row: usize| {
+        let mut f = e[FORCE + row];
+        for (column, &j) in TURNS.iter().enumerate() {
+            let entry = row * 4 + column;
+            f = f - e[STIFFNESS + entry] * q[j] - e[DAMPING + entry] * u[j];
+        }
+        f
+    };
+    (
+        Floating {
+            per_mass: c.tub_per_mass,
+            force: [tub_row(0), tub_row(1)],
+            drift: [zero; 2],
+            arm: c.tub_arm,
+            axis: c.tub_axis,
+            torque: [tub_row(2), tub_row(3)],
+        },
+        Floating {
+            per_mass: c.rotor_per_mass,
+            force: [rotor_row(0), rotor_row(1)],
+            drift: [zero; 2],
+            arm: core::array::from_fn(|r| [e[ARM + 2 * r], e[ARM + 2 * r + 1]]),
+            axis: c.rotor_axis,
+            torque: core::array::from_fn(|r| rotor_row(2 + r)),
+        },
+    )
+}
+
+/// The tub's inertia, factored once.
+#[inline(always)]
+pub(crate) fn tub_factors<T: Real>(constants: &Constants<T>) -> Factors<T, 2> {
+    Factors::new(constants.tub_inertia)
+}
+
+/// M, C, K and F of Eq. 41 in the coordinates q, as full matrices; for one machine, at one instant.
+#[derive(Clone, Debug)]
+pub struct Matrices {
+    /// Mass matrix.
+    pub mass: [[f64; COORDINATES]; COORDINATES],
+    /// Damping and gyroscopic matrix.
+    pub damping: [[f64; COORDINATES]; COORDINATES],
+    /// Stiffness matrix.
+    pub stiffness: [[f64; COORDINATES]; COORDINATES],
+    /// Force.
+    pub force: [f64; COORDINATES],
+}
+
+impl LinearPoint {
+    /// The matrices at one instant; `bodies` is the same machine's.
+    pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
+        let zero = N(0.0);
+        let c = &self.constants;
+        let rotor_at = rotor_at(&TermLanes::splat(zero, &self.terms), spin);
+        // Columns of C and K, and F, are forces of single deviations; the bearings' share comes back with them.
+        let rows = |q: &[N<f64>; COORDINATES], u: &[N<f64>; COORDINATES], loaded: bool| {
+            let (mut tub, mut rotor) = unloaded(c, &rotor_at, q, u, zero);
+            if loaded {
+                let on_shaft = linear_load(bodies, c, q);
+                tub.apply(&on_shaft.reaction());
+                rotor.apply(&on_shaft);
+            }
+            let ([f1, f2], [f5, f6]) = tub.generalised_forces();
+            let ([f3, f4], [f7, f8, f9, f10]) = rotor.generalised_forces();
+            [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10].map(|f| f.0)
+        };
+        let still = [zero; COORDINATES];
+        let force = rows(&still, &still, false);
+        let mut matrices = Matrices {
+            mass: [[0.0; COORDINATES]; COORDINATES],
+            damping: [[0.0; COORDINATES]; COORDINATES],
+            stiffness: [[0.0; COORDINATES]; COORDINATES],
+            force,
+        };
+        for j in 0..COORDINATES {
+            let mut unit = still;
+            unit[j] = N(1.0);
+            let (of_q, of_u) = (rows(&unit, &still, true), rows(&still, &unit, false));
+            for i in 0..COORDINATES {
+                matrices.stiffness[i][j] = force[i] - of_q[i];
+                matrices.damping[i][j] = force[i] - of_u[i];
+            }
+        }
+        let e = &rotor_at.entries;
+        let rotor_arm: [[N<f64>; 2]; 4] = core::array::from_fn(|r| [e[ARM + 2 * r], e[ARM + 2 * r + 1]]);
+        let rotor_inertia = |r: usize, s: usize| e[INERTIA + r * (r + 1) / 2 + s].0;
+        fill_mass(&mut matrices.mass, [0, 1], &[4, 5], c.tub_per_mass, &c.tub_arm, |r, s| c.tub_inertia[r][s].0);
+        fill_mass(&mut matrices.mass, [2, 3], &TURNS, c.rotor_per_mass, &rotor_arm, rotor_inertia);
+        matrices
+    }
+}
+
+/// One block of the mass matrix: J^T M J of the transformation in `floating`.
+fn fill_mass<const R: usize>(
+    mass: &mut [[f64; COORDINATES]; COORDINATES],
+    midpoint: [usize; 2],
+    turns: &[usize; R],
+    per_mass: N<f64>,
+    arm: &[[N<f64>; 2]; R],
+    inertia: impl Fn(usize, usize) -> f64,
+) {
+    let m = 1.0 / per_mass.0;
+    for i in 0..2 {
+        mass[midpoint[i]][midpoint[i]] = m;
+        for r in 0..R {
+            mass[midpoint[i]][turns[r]] = m * arm[r][i].0;
+            mass[turns[r]][midpoint[i]] = m * arm[r][i].0;
+        }
+    }
+    for r in 0..R {
+        for s in 0..=r {
+            let entry = inertia(r, s) + m * (arm[r][0].0 * arm[s][0].0 + arm[r][1].0 * arm[s][1].0);
+            mass[turns[r]][turns[s]] = entry;
+            mass[turns[s]][turns[r]] = entry;
+        }
+    }
+}
