@@ -21,5 +21,6 @@ pub use lane::{Array, Lane};
 pub use num::{N, Product};
 pub use peaks::{Peaks, Sample};
 pub use real::Real;
+pub use rk4::MAX_LANES;
 pub use simd::{Kernel, Simd};
 pub use system::{Count, Ended, Failure, Leg, Step, System, Task};

@@ -11,7 +11,7 @@ use crate::system::{Count, Ended, Failure, Leg, Step, Task};
 pub const RK4_STABILITY_LIMIT: f64 = 2.828_427_124_746_190_3;
 
 /// The most lanes any instruction set has here.
-pub(crate) const MAX_LANES: usize = 8;
+pub const MAX_LANES: usize = 8;
 
 /// Nodes and weights, over one step: each stage starts `REACH` of the last slope away, and adds `WEIGHT` of its own.
 const REACH: [f64; 4] = [0.5, 0.5, 1.0, 0.0];

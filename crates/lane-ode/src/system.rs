@@ -82,6 +82,14 @@ pub struct Count {
     pub rejected: u64,
 }
 
+impl Count {
+    /// Adds another leg's.
+    pub const fn add(&mut self, other: Self) {
+        self.accepted += other.accepted;
+        self.rejected += other.rejected;
+    }
+}
+
 /// A step just made, with what an observer needs to look inside it.
 pub struct Step<'a, T, const D: usize> {
     /// Its end in time.

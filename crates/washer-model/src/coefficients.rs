@@ -31,7 +31,6 @@ macro_rules! lane_struct {
         }
     };
 }
-pub(crate) use lane_struct;
 
 lane_struct! {
     /// Bodies, flexure and bearings (model page, sections 1 to 3).

@@ -12,6 +12,7 @@
 //! constant speeds. This is the Schur complement of the block in closed form: J is 2x2 or 4x4.
 
 use crate::forces::AxisLoad;
+use crate::lanes::SetLane;
 use lane_ode::{Lane, N, Real};
 
 /// Equations of motion of one half of the machine, with `R` rotations. The first is the axis's yaw about c2, so that its
@@ -80,6 +81,12 @@ impl<T: Real, const R: usize> Floating<T, R> {
 pub(crate) struct Factors<T, const R: usize> {
     /// L below the diagonal (unit diagonal not stored), 1/D on it.
     packed: [[N<T>; R]; R],
+}
+
+impl<T: Lane, const R: usize> SetLane<Factors<f64, R>> for Factors<T, R> {
+    fn set_lane(&mut self, lane: usize, from: &Factors<f64, R>) {
+        self.packed.set_lane(lane, &from.packed);
+    }
 }
 
 impl<T: Real, const R: usize> Factors<T, R> {

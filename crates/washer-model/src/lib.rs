@@ -9,14 +9,22 @@ mod frame;
 mod harmonics;
 mod lanes;
 mod linear;
+mod linear_outputs;
 mod machine;
+mod model;
 mod nonlinear;
 mod outputs;
+mod point;
+mod run;
 mod spin;
 
 pub use channel::Channel;
+pub use linear::Matrices;
 pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};
-pub use spin::Spin;
+pub use nonlinear::COORDINATES;
+pub use point::{NoEquilibrium, Point, Timing, prepare};
+pub use run::{Method, ModelKind, Record, simulate};
+pub use spin::{Spin, SpinStretch};
 
 #[cfg(test)]
 mod reference_tests;

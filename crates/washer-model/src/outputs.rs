@@ -6,14 +6,14 @@ use crate::frame::{Tilt, Vec3};
 use crate::nonlinear::COORDINATES;
 use lane_ode::{N, Real};
 
-/// Number of observed quantities: every channel, and the gap's measure.
-pub(crate) const OUTPUTS: usize = Channel::ALL.len() + 1;
+/// Number of channels.
+pub(crate) const CHANNELS: usize = Channel::ALL.len();
 
-/// Index of the squared distance between the drum's front centre and the tub axis, across that axis. Its square, because
-/// a distance has a kink at zero.
-pub(crate) const RADIAL_SQUARED: usize = Channel::ALL.len();
+/// Number of outputs: every channel, then the two components of the radial distance.
+pub(crate) const OUTPUTS: usize = CHANNELS + 2;
 
-/// Positions (m) and angles (rad) in the order of [`Channel::ALL`], then the squared radial distance (m^2).
+/// Positions (m) and angles (rad) in the order of [`Channel::ALL`], then where the drum's front centre stands from the tub
+/// axis, along t2 and t3 (m).
 #[inline(always)]
 pub(crate) fn outputs<T: Real>(
     b: &Bodies<T>,
@@ -60,8 +60,16 @@ pub(crate) fn outputs<T: Real>(
         total_centre[1],
         q[4],
         q[5],
-        along_2 * along_2 + along_3 * along_3,
+        along_2,
+        along_3,
     ]
+}
+
+/// Squared distance of the drum's front centre from the tub axis. Its square, because a distance has a kink at zero.
+#[inline(always)]
+pub(crate) fn radial_squared<T: Real>(outputs: &[N<T>; OUTPUTS]) -> N<T> {
+    let [y, z] = [outputs[CHANNELS], outputs[CHANNELS + 1]];
+    y * y + z * z
 }
 
 /// A point of a body: its bearing midpoint, which does not move along x, plus an offset in cabinet axes.

@@ -1,0 +1,131 @@
+//! A grid point made ready: everything that is found once before its trajectories start.
+
+use crate::coefficients::Coefficients;
+use crate::equilibrium;
+use crate::harmonics::Term;
+use crate::linear::{LinearPoint, linearise};
+use crate::linear_outputs::linearise_outputs;
+use crate::machine::Machine;
+use crate::nonlinear::COORDINATES;
+use crate::outputs::{CHANNELS, outputs};
+use crate::spin::{Spin, SpinStretch};
+use lane_ode::{Kernel, Lane, N, Simd};
+
+/// When a trajectory ends, and when its amplitudes are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timing {
+    /// The run is from 0 to here.
+    pub end_s: f64,
+    /// Amplitudes are taken over this closed interval within the run.
+    pub window_s: [f64; 2],
+}
+
+/// The machine has no static equilibrium, or none that is stable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the machine has no stable static equilibrium: its springs cannot carry it")]
+pub struct NoEquilibrium;
+
+/// A machine and its spin, ready to be integrated by either model.
+#[derive(Clone, Debug)]
+pub struct Point {
+    pub(crate) machine: Coefficients<f64>,
+    pub(crate) equilibrium: [f64; COORDINATES],
+    /// Channels at the equilibrium.
+    pub(crate) rest: [f64; CHANNELS],
+    pub(crate) linear: LinearPoint,
+    pub(crate) linear_outputs: Vec<Term>,
+    pub(crate) stretches: Vec<SpinStretch>,
+    pub(crate) legs: Vec<PlannedLeg>,
+}
+
+/// A stretch of the run between two kinks: of the spin, or of what is recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PlannedLeg {
+    pub(crate) start_s: f64,
+    pub(crate) end_s: f64,
+    /// Which stretch of the spin holds.
+    pub(crate) stretch: usize,
+    /// Whether amplitudes are taken.
+    pub(crate) in_window: bool,
+}
+
+impl Point {
+    /// Coordinates at static equilibrium (m, rad), unbalance up.
+    #[must_use]
+    pub const fn equilibrium(&self) -> &[f64; COORDINATES] {
+        &self.equilibrium
+    }
+}
+
+/// Makes points ready, on lanes.
+///
+/// # Errors
+/// Per point: [`NoEquilibrium`].
+#[must_use]
+pub fn prepare(simd: Simd, points: &[(Machine, Spin)], timing: &Timing) -> Vec<Result<Point, NoEquilibrium>> {
+    simd.dispatch(Prepare { points, timing })
+}
+
+struct Prepare<'a> {
+    points: &'a [(Machine, Spin)],
+    timing: &'a Timing,
+}
+
+impl Kernel for Prepare<'_> {
+    type Output = Vec<Result<Point, NoEquilibrium>>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
+        let zero = N(zero);
+        let mut ready = Vec::with_capacity(self.points.len());
+        for group in self.points.chunks(T::LANES) {
+            let machines: Vec<_> = group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
+            let mut lanes = Coefficients::splat(zero, &machines[0]);
+            for (lane, machine) in machines.iter().enumerate() {
+                lanes.set_lane(lane, machine);
+            }
+            let (q, found) = equilibrium::find(zero, &lanes);
+            let linear = linearise(&lanes, &q);
+            let linear_outputs = linearise_outputs(&lanes.bodies, &q);
+            let at_rest = outputs(&lanes.bodies, (zero, zero.lit(1.0)), &q);
+            let parts = machines.into_iter().zip(linear).zip(linear_outputs).zip(group);
+            ready.extend(parts.enumerate().map(|(lane, (((machine, linear), linear_outputs), (_, spin)))| {
+                if found >> lane & 1 == 0 {
+                    return Err(NoEquilibrium);
+                }
+                let stretches = spin.stretches();
+                Ok(Point {
+                    machine,
+                    equilibrium: q.map(|q| q.0.get(lane)),
+                    rest: core::array::from_fn(|i| at_rest[i].0.get(lane)),
+                    linear,
+                    linear_outputs,
+                    legs: legs(&stretches, self.timing),
+                    stretches,
+                })
+            }));
+        }
+        ready
+    }
+}
+
+/// The run cut at every kink.
+fn legs(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedLeg> {
+    let [from, to] = timing.window_s;
+    let kinks = stretches.iter().map(|s| s.start_s).chain([0.0, from, to, timing.end_s]);
+    let mut times: Vec<f64> = kinks.filter(|t| (0.0..=timing.end_s).contains(t)).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    times
+        .windows(2)
+        .map(|pair| {
+            let (start_s, end_s) = (pair[0], pair[1]);
+            PlannedLeg {
+                start_s,
+                end_s,
+                stretch: stretches.iter().rposition(|s| s.start_s <= start_s).unwrap_or(0),
+                in_window: from <= start_s && end_s <= to,
+            }
+        })
+        .collect()
+}

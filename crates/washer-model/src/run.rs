@@ -1,0 +1,264 @@
+//! Trajectories: points through the lanes of an integrator, and what is recorded of them.
+
+use crate::model::{Linear, Model, Nonlinear, STATES};
+use crate::outputs::{CHANNELS, OUTPUTS, radial_squared};
+use crate::point::{PlannedLeg, Point};
+use core::marker::PhantomData;
+use lane_ode::{
+    Count, Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, System, Task,
+    Tolerance, dopri5, rk4,
+};
+
+/// How trajectories are integrated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// Classical Runge-Kutta of order 4.
+    Rk4 {
+        /// Longest step.
+        step_s: f64,
+    },
+    /// Dormand-Prince 5(4).
+    Dopri5(Tolerance),
+}
+
+/// Which of the two models.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ModelKind {
+    /// Section 4 of the model page.
+    Nonlinear,
+    /// Its first-order expansion.
+    Linear,
+}
+
+/// First step that an adaptive method tries.
+const FIRST_STEP_S: f64 = 1e-5;
+
+/// How one trajectory went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Record {
+    /// Why and when (s) it failed, if it did.
+    pub failure: Option<(Failure, f64)>,
+    /// Largest deviation from equilibrium within the window, in the order of `Channel::ALL` (m, rad).
+    pub amplitudes: [f64; CHANNELS],
+    /// Least gap between drum and tub over the whole run (m).
+    pub min_gap_m: f64,
+    /// Steps of the integrator.
+    pub steps: u64,
+    /// Steps that an adaptive method took back.
+    pub rejected: u64,
+}
+
+/// Integrates one model at every point and records peaks. The result does not depend on the instruction set, nor on which
+/// points come together.
+#[must_use]
+pub fn simulate(simd: Simd, model: ModelKind, method: &Method, points: &[&Point]) -> Vec<Record> {
+    if points.is_empty() {
+        return Vec::new();
+    }
+    match model {
+        ModelKind::Nonlinear => simd.dispatch(Simulate::<OfNonlinear> { points, method, family: PhantomData }),
+        ModelKind::Linear => simd.dispatch(Simulate::<OfLinear> { points, method, family: PhantomData }),
+    }
+}
+
+/// A model before the lanes' type is known.
+trait Family {
+    type Over<T: Lane>: Model<T>;
+}
+
+enum OfNonlinear {}
+enum OfLinear {}
+impl Family for OfNonlinear {
+    type Over<T: Lane> = Nonlinear<T>;
+}
+impl Family for OfLinear {
+    type Over<T: Lane> = Linear<T>;
+}
+
+struct Simulate<'a, F> {
+    points: &'a [&'a Point],
+    method: &'a Method,
+    family: PhantomData<F>,
+}
+
+impl<F: Family> Kernel for Simulate<'_, F> {
+    type Output = Vec<Record>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Vec<Record> {
+        let step_s = match self.method {
+            Method::Rk4 { step_s } => *step_s,
+            Method::Dopri5(_) => FIRST_STEP_S,
+        };
+        let mut run = Run::<T, F::Over<T>> {
+            model: Model::splat(N(zero), self.points[0]),
+            points: self.points,
+            taken: 0,
+            lanes: [LaneState::default(); MAX_LANES],
+            step_s,
+            channels: Peaks::new(N(zero)),
+            radial: Peaks::new(N(zero)),
+            windows: N(zero),
+            records: vec![EMPTY; self.points.len()],
+        };
+        match self.method {
+            Method::Rk4 { .. } => rk4::integrate(zero, &mut run),
+            Method::Dopri5(tolerance) => dopri5::integrate(zero, &mut run, tolerance),
+        }
+        run.records
+    }
+}
+
+const EMPTY: Record =
+    Record { failure: None, amplitudes: [f64::NAN; CHANNELS], min_gap_m: f64::NAN, steps: 0, rejected: 0 };
+
+/// Which trajectory a lane holds, and where in it.
+#[derive(Clone, Copy, Default)]
+struct LaneState {
+    point: usize,
+    leg: usize,
+    count: Count,
+}
+
+/// The task: every point through one model.
+struct Run<'a, T, M> {
+    model: M,
+    points: &'a [&'a Point],
+    taken: usize,
+    lanes: [LaneState; MAX_LANES],
+    step_s: f64,
+    channels: Peaks<T, CHANNELS>,
+    radial: Peaks<T, 1>,
+    /// 1 where a lane is inside its window, else 0.
+    windows: N<T>,
+    records: Vec<Record>,
+}
+
+impl<T: Lane, M: Model<T>> System<T, STATES> for Run<'_, T, M> {
+    type Forcing = M::Forcing;
+
+    #[inline(always)]
+    fn forcing(&self, t_s: N<T>) -> M::Forcing {
+        self.model.forcing(t_s)
+    }
+
+    #[inline(always)]
+    fn derivative(&self, forcing: &M::Forcing, x: &[N<T>; STATES]) -> [N<T>; STATES] {
+        self.model.derivative(forcing, x)
+    }
+
+    #[inline(always)]
+    fn in_range(&self, x: &[N<T>; STATES]) -> T::Mask {
+        self.model.in_range(x)
+    }
+}
+
+impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
+    #[inline(never)]
+    fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; STATES]) -> Option<Leg> {
+        let state = &mut self.lanes[lane];
+        let mut failure = None;
+        match ended {
+            Ended::Idle => return self.next_point(lane, x),
+            Ended::Arrived(count) => state.count.add(count),
+            Ended::Failed { reason, time_s, count } => {
+                state.count.add(count);
+                failure = Some((reason, time_s));
+            }
+        }
+        let point = self.points[state.point];
+        if failure.is_none() && state.leg + 1 < point.legs.len() {
+            state.leg += 1;
+            return Some(self.enter(lane));
+        }
+        let Count { accepted: steps, rejected } = state.count;
+        let record = &mut self.records[state.point];
+        *record = Record { failure, steps, rejected, ..EMPTY };
+        if failure.is_none() {
+            record.amplitudes = self.channels.lane(lane);
+            let [radial_squared] = self.radial.lane(lane);
+            record.min_gap_m = point.machine.bodies.clearance.0 - radial_squared.sqrt();
+        }
+        self.next_point(lane, x)
+    }
+
+    #[inline(always)]
+    fn begin(&mut self, forcing: &M::Forcing, x: &[N<T>; STATES], _: &[N<T>; STATES]) {
+        let (channels, radial) = samples(&self.model.rates(M::spin(forcing), x));
+        let inside = self.inside();
+        self.channels.begin(channels, inside);
+        self.radial.begin(radial, everywhere(self.windows));
+    }
+
+    #[inline(always)]
+    fn observe(&mut self, forcing: &M::Forcing, step: &Step<'_, T, STATES>) {
+        let spin = M::spin(forcing);
+        let (channels, radial) = samples(&self.model.rates(spin, step.after));
+        let model = &self.model;
+        let curvatures = || {
+            let before = model.spin_at(step.end_s - step.length_s);
+            let before = model.curvatures(&before, step.before, step.slope_before);
+            [before, model.curvatures(spin, step.after, step.slope_after)]
+        };
+        let inside = self.inside();
+        if T::bits(inside) != 0 {
+            self.channels.step(step.length_s, channels, inside, || {
+                curvatures().map(|y| core::array::from_fn(|i| N(y[i].0.slope.slope)))
+            });
+        }
+        self.radial.step(step.length_s, radial, everywhere(self.windows), || {
+            curvatures().map(|y| [N(radial_squared(&y).0.slope.slope)])
+        });
+    }
+}
+
+/// Values and slopes of the channels, and of the squared radial distance.
+#[inline(always)]
+fn samples<T: Lane>(y: &[N<Dual<T>>; OUTPUTS]) -> ([Sample<T>; CHANNELS], [Sample<T>; 1]) {
+    let sample = |y: N<Dual<T>>| (N(y.0.value), N(y.0.slope));
+    (core::array::from_fn(|i| sample(y[i])), [sample(radial_squared(y))])
+}
+
+/// True in every lane.
+#[inline(always)]
+fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
+    like.lit(0.0).0.less(like.lit(1.0).0)
+}
+
+impl<T: Lane, M: Model<T>> Run<'_, T, M> {
+    #[inline(always)]
+    fn inside(&self) -> T::Mask {
+        self.windows.lit(0.0).0.less(self.windows.0)
+    }
+
+    /// Takes up the next point, if there is one.
+    fn next_point(&mut self, lane: usize, x: &mut [N<T>; STATES]) -> Option<Leg> {
+        self.windows.0.set(lane, 0.0);
+        // An idle lane stands still at its last point's start, where the model means something.
+        let is_last = self.taken == self.points.len();
+        let index = if is_last { self.lanes[lane].point } else { self.taken };
+        let point = self.points[index];
+        for (x, at_rest) in x.iter_mut().zip(M::at_rest(point)) {
+            x.0.set(lane, at_rest);
+        }
+        if is_last {
+            return None;
+        }
+        self.taken += 1;
+        self.lanes[lane] = LaneState { point: index, ..LaneState::default() };
+        self.model.set_point(lane, point);
+        self.channels.reset(lane);
+        self.radial.reset(lane);
+        Some(self.enter(lane))
+    }
+
+    /// Starts the lane's current leg.
+    fn enter(&mut self, lane: usize) -> Leg {
+        let state = &self.lanes[lane];
+        let point = self.points[state.point];
+        let PlannedLeg { start_s, end_s, stretch, in_window } = point.legs[state.leg];
+        self.model.set_spin(lane, &point.stretches[stretch]);
+        self.windows.0.set(lane, f64::from(u8::from(in_window)));
+        Leg { start_s, end_s, step_s: self.step_s }
+    }
+}
