@@ -21,14 +21,14 @@ impl Tolerance {
         &self,
         before: &[N<T>; D],
         after: &[N<T>; D],
-        error: impl Fn(usize) -> N<T>,
+        error: &[N<T>; D],
     ) -> N<T> {
         let zero = before[0].lit(0.0);
         let mut largest = zero;
         let mut poison = zero;
         for i in 0..D {
             let size = N(before[i].0.abs().larger(after[i].0.abs()));
-            let ratio = error(i).abs() / (size * self.relative + self.absolute);
+            let ratio = error[i].abs() / (size * self.relative + self.absolute);
             largest = N(ratio.0.larger(largest.0));
             // Comparisons drop a NaN; a product with zero keeps it.
             poison += ratio * zero;
@@ -64,6 +64,14 @@ pub(crate) struct Proposals<T> {
     memory: N<T>,
 }
 
+/// A step's factor between the shrink limit and `most`.
+#[inline(always)]
+fn clamped<T: Lane>(factor: N<T>, most: f64) -> N<T> {
+    let (least, most) = (factor.lit(SHRINK_LIMIT), factor.lit(most));
+    let factor = factor.where_less(most, factor, most);
+    least.where_less(factor, factor, least)
+}
+
 const SAFETY: f64 = 0.9;
 const SHRINK_LIMIT: f64 = 0.2;
 const GROWTH_LIMIT: f64 = 5.0;
@@ -89,7 +97,6 @@ impl<T: Lane> StepControl<T> {
     /// The next steps after error `error` over step `h`.
     #[inline(always)]
     pub(crate) fn proposals(&self, error: N<T>, h: N<T>) -> Proposals<T> {
-        let one = error.lit(1.0);
         // NaN counts as far too large.
         let error = error.where_less(error.lit(1e30), error, error.lit(1e30));
         let error = error.lit(LEAST_ERROR).where_less(error, error, error.lit(LEAST_ERROR));
@@ -101,13 +108,9 @@ impl<T: Lane> StepControl<T> {
         // alpha = 11/64 = 0.172, beta = 5/128 = 0.039 (dopri5.f: 0.17 and 0.04).
         let alpha = (root_8 * (root_32 * root_64)).v();
         let beta = (root_32 * root_128).v();
-        let clamp = |factor: N<T>, most: f64| {
-            let factor = factor.where_less(one.lit(most), factor, one.lit(most));
-            one.lit(SHRINK_LIMIT).where_less(factor, factor, one.lit(SHRINK_LIMIT))
-        };
         Proposals {
-            accepted: (h * clamp(SAFETY * self.memory / alpha, GROWTH_LIMIT)).v(),
-            rejected: (h * clamp(SAFETY / alpha, 1.0)).v(),
+            accepted: (h * clamped(SAFETY * self.memory / alpha, GROWTH_LIMIT)).v(),
+            rejected: (h * clamped(SAFETY / alpha, 1.0)).v(),
             memory: beta,
         }
     }

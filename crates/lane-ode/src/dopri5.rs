@@ -50,6 +50,19 @@ const DENSE: [f64; STAGES] = [
     69_997_945.0 / 29_380_423.0,
 ];
 
+/// h times a weighted sum of the stages' slopes.
+#[inline(always)]
+fn combined<T: Lane, const D: usize>(h: N<T>, k: &[[N<T>; D]; STAGES], weights: &[f64; STAGES]) -> [N<T>; D] {
+    let mut sums = [h.lit(0.0); D];
+    for i in 0..D {
+        for stage in 0..STAGES {
+            sums[i] += k[stage][i] * weights[stage];
+        }
+        sums[i] = (h * sums[i]).v();
+    }
+    sums
+}
+
 /// What a lane keeps of its own.
 #[derive(Clone, Copy, Default)]
 struct Progress {
@@ -112,13 +125,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
         }
         is_fresh = false;
 
-        let error = tolerance.norm(&x, &y, |i| {
-            let mut sum = zero;
-            for (k, weight) in k.iter().zip(ERROR) {
-                sum += k[i] * weight;
-            }
-            (h * sum).v()
-        });
+        let error = tolerance.norm(&x, &y, &combined(h, &k, &ERROR));
         let accepted = T::bits(error.0.less(zero.lit(1.0).0));
         let in_range = T::bits(task.in_range(&y));
 
@@ -127,13 +134,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
         let before = x;
         let slope_before = k[0];
         let mut slope_after = k[0];
-        let dense: [N<T>; D] = core::array::from_fn(|i| {
-            let mut sum = zero;
-            for (k, weight) in k.iter().zip(DENSE) {
-                sum += k[i] * weight;
-            }
-            (h * sum).v()
-        });
+        let dense = combined(h, &k, &DENSE);
         let next = control.proposals(error, h);
         for (lane, progress) in lanes[..T::LANES].iter_mut().enumerate().filter(|(_, lane)| lane.is_active) {
             let step = h.0.get(lane);

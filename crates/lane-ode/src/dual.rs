@@ -1,5 +1,6 @@
 //! Forward automatic differentiation: the same source, with one derivative carried along.
 
+use crate::num::N;
 use crate::real::Real;
 
 /// A value and its derivative along one direction. Nest it for second derivatives.
@@ -17,6 +18,15 @@ impl<T: Real> Dual<T> {
     #[must_use]
     pub fn constant(value: T) -> Self {
         Self { value, slope: value.lit(0.0) }
+    }
+}
+
+impl<T: Real> N<T> {
+    /// This value as a constant of a dual number.
+    #[inline(always)]
+    #[must_use]
+    pub fn constant(self) -> N<Dual<T>> {
+        N(Dual::constant(self.0))
     }
 }
 

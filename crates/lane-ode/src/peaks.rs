@@ -46,41 +46,50 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         self.last = sample;
     }
 
-    /// The sample at the end of a step of `length_s`. `counts` says in which lanes; `second` gives second derivatives at
-    /// both ends, and is asked only where a peak may lie inside the step.
+    /// The sample at the end of a step of `length_s`; `counts` says in which lanes. Says whether a peak may lie inside the
+    /// step: then [`Peaks::look_inside`] must follow, and in any case [`Peaks::finish`].
     #[inline(always)]
-    pub fn step(
+    pub fn reach_end(&mut self, length_s: N<T>, sample: &[Sample<T>; M], counts: T::Mask) -> bool {
+        let mut excess = length_s.lit(0.0);
+        for i in 0..M {
+            self.raise(i, sample[i].0.abs(), counts);
+            excess = N(self.rise(i, length_s, sample).0.larger(excess.0));
+        }
+        T::bits(excess.lit(0.0).0.less(T::select(counts, excess.0, excess.lit(0.0).0))) != 0
+    }
+
+    /// Looks for peaks between the last sample and this one, with the second derivatives at both.
+    #[inline(always)]
+    pub fn look_inside(
         &mut self,
         length_s: N<T>,
-        sample: [Sample<T>; M],
+        sample: &[Sample<T>; M],
         counts: T::Mask,
-        second: impl FnOnce() -> [[N<T>; M]; 2],
+        second: &[[N<T>; M]; 2],
     ) {
-        let third = (length_s * (1.0 / 3.0)).v();
         let zero = length_s.lit(0.0);
-        let mut excess = zero;
-        let mut rises = [zero; M];
         for i in 0..M {
-            let ((y0, d0), (y1, d1)) = (self.last[i], sample[i]);
-            self.raise(i, y1.abs(), counts);
-            let reach = N((y0 + third * d0).abs().0.larger((y1 - third * d1).abs().0));
-            let rise = reach - self.peak[i];
-            rises[i] = rise;
-            excess = N(rise.0.larger(excess.0));
-        }
-        let excess = N(T::select(counts, excess.0, zero.0));
-        if T::bits(zero.0.less(excess.0)) != 0 {
-            let [second_0, second_1] = second();
-            for i in 0..M {
-                let may = N(T::select(counts, rises[i].0, zero.0));
-                if T::bits(zero.0.less(may.0)) != 0 {
-                    let inside = Quintic::new(length_s, self.last[i], second_0[i], sample[i], second_1[i]).extremum();
-                    let inside = zero.where_less(may, inside.abs(), zero);
-                    self.peak[i] = N(inside.0.larger(self.peak[i].0));
-                }
+            let rise = N(T::select(counts, self.rise(i, length_s, sample).0, zero.0));
+            if T::bits(zero.0.less(rise.0)) != 0 {
+                let inside = Quintic::new(length_s, self.last[i], second[0][i], sample[i], second[1][i]).extremum();
+                let inside = zero.where_less(rise, inside.abs(), zero);
+                self.peak[i] = N(inside.0.larger(self.peak[i].0));
             }
         }
-        self.last = sample;
+    }
+
+    /// Makes this sample the last.
+    #[inline(always)]
+    pub fn finish(&mut self, sample: &[Sample<T>; M]) {
+        self.last = *sample;
+    }
+
+    /// How far the control polygon of the step to this sample reaches above the peak.
+    #[inline(always)]
+    fn rise(&self, i: usize, length_s: N<T>, sample: &[Sample<T>; M]) -> N<T> {
+        let third = (length_s * (1.0 / 3.0)).v();
+        let ((y0, d0), (y1, d1)) = (self.last[i], sample[i]);
+        N((y0 + third * d0).abs().0.larger((y1 - third * d1).abs().0)) - self.peak[i]
     }
 
     #[inline(always)]
@@ -114,20 +123,21 @@ impl<T: Lane> Quintic<T> {
     #[inline(always)]
     fn extremum(&self) -> N<T> {
         let c = &self.c;
-        let one = c[0].lit(1.0);
-        let zero = c[0].lit(0.0);
         let slope_end = c[1] + 2.0 * c[2] + 3.0 * c[3] + 4.0 * c[4] + 5.0 * c[5];
         // Secant start: where a straight slope would cross zero.
-        let clamp = |s: N<T>| {
-            let s = s.where_less(one, s, one);
-            zero.where_less(s, s, zero)
-        };
-        let mut s = clamp(c[1] / (c[1] - slope_end));
+        let mut s = within_step(c[1] / (c[1] - slope_end));
         for _ in 0..4 {
             let slope = c[1] + s * (2.0 * c[2] + s * (3.0 * c[3] + s * (4.0 * c[4] + (5.0 * s) * c[5])));
             let curvature = 2.0 * c[2] + s * (6.0 * c[3] + s * (12.0 * c[4] + (20.0 * s) * c[5]));
-            s = clamp(s - slope / curvature);
+            s = within_step(s - slope / curvature);
         }
         c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5]))))
     }
+}
+
+/// Between 0 and 1; NaN becomes 1.
+#[inline(always)]
+fn within_step<T: Lane>(s: N<T>) -> N<T> {
+    let s = s.where_less(s.lit(1.0), s, s.lit(1.0));
+    s.lit(0.0).where_less(s, s, s.lit(0.0))
 }

@@ -116,7 +116,8 @@ impl<T: Lane, const D: usize> Step<'_, T, D> {
     #[must_use]
     pub fn at(&self, s: N<T>) -> [N<T>; D] {
         let rest = 1.0 - s;
-        core::array::from_fn(|i| {
+        let mut x = *self.before;
+        for i in 0..D {
             let difference = self.after[i] - self.before[i];
             let start = self.length_s * self.slope_before[i] - difference;
             let end = difference - self.length_s * self.slope_after[i] - start;
@@ -124,7 +125,8 @@ impl<T: Lane, const D: usize> Step<'_, T, D> {
                 Some(dense) => end + rest * dense[i],
                 None => end,
             };
-            self.before[i] + s * (difference + rest * (start + s * inner))
-        })
+            x[i] += s * (difference + rest * (start + s * inner));
+        }
+        x
     }
 }

@@ -34,16 +34,19 @@ const HALF_PI: [f64; 2] = [1.570_796_326_794_896_6, 6.123_233_995_736_766e-17];
 #[inline(always)]
 fn within_quarter<T: Real>(x: N<T>) -> (N<T>, N<T>) {
     let z = x.squared().v();
-    let horner = |c: &[f64; 6]| {
-        let mut sum = z.lit(c[5]);
-        for &c in c[..5].iter().rev() {
-            sum = sum * z + c;
-        }
-        sum
-    };
-    let sin = (x * z) * horner(&SIN) + x;
-    let cos = z.squared() * horner(&COS) + (1.0 - z * 0.5);
+    let sin = (x * z) * polynomial(&SIN, z) + x;
+    let cos = z.squared() * polynomial(&COS, z) + (1.0 - z * 0.5);
     (sin, cos)
+}
+
+/// c0 + c1 z + ... by Horner's rule.
+#[inline(always)]
+fn polynomial<T: Real>(c: &[f64; 6], z: N<T>) -> N<T> {
+    let mut sum = z.lit(c[5]);
+    for i in (0..5).rev() {
+        sum = sum * z + c[i];
+    }
+    sum
 }
 
 /// Turns a pair within quadrant 0 on by `quadrant` (an integer) quarter turns.
@@ -52,11 +55,15 @@ fn turned_on<T: Lane>(quadrant: N<T>, sin: N<T>, cos: N<T>) -> (N<T>, N<T>) {
     // In quarters: 0, 0.25, 0.5 or 0.75 of four quadrants. A multiple of 1/4 less 3/8 rounds to its floor.
     let quarter = (quadrant * 0.25).v();
     let part = quarter - N((quarter - 0.375).0.round());
-    let (is_0, below_2, below_3) = (part.lit(0.125), part.lit(0.375), part.lit(0.625));
-    let pick = |of_0, of_1, of_2, of_3| {
-        part.where_less(is_0, of_0, part.where_less(below_2, of_1, part.where_less(below_3, of_2, of_3)))
-    };
-    (pick(sin, cos, -sin, -cos), pick(cos, -sin, -cos, sin))
+    (by_quadrant(part, [sin, cos, -sin, -cos]), by_quadrant(part, [cos, -sin, -cos, sin]))
+}
+
+/// The value for the quadrant that `part` (0, 0.25, 0.5 or 0.75) names.
+#[inline(always)]
+fn by_quadrant<T: Real>(part: N<T>, of: [N<T>; 4]) -> N<T> {
+    let upper = part.where_less(part.lit(0.625), of[2], of[3]);
+    let lower = part.where_less(part.lit(0.125), of[0], of[1]);
+    part.where_less(part.lit(0.375), lower, upper)
 }
 
 /// Sine and cosine of any angle up to about 1e6 rad.

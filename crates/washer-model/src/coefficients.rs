@@ -19,7 +19,7 @@ macro_rules! lane_struct {
             /// As constants of a dual number.
             #[inline(always)]
             pub(crate) fn constant(&self) -> $name<Dual<T>> {
-                $name { $($field: N(Dual::constant(self.$field.0)),)* }
+                $name { $($field: self.$field.constant(),)* }
             }
         }
 
@@ -40,6 +40,8 @@ lane_struct! {
         shaft_i11, shaft_i22, shaft_i33,
         /// Mass of shaft, drum and unbalance.
         rotor_mass, rotor_per_mass,
+        /// Of the whole mass.
+        tub_share, rotor_share,
         /// The rotor's centre from the bearing midpoint is `along_shaft * s1 + drum_share * rho`.
         along_shaft, drum_share,
         /// rho, from the hinge P_D to the drum's mass centre, in drum axes: (L_DM, e, 0).
@@ -102,6 +104,8 @@ impl Bodies<f64> {
             shaft_i33: N(shaft.inertia_kg_m2[2]),
             rotor_mass: N(rotor_mass),
             rotor_per_mass: N(1.0 / rotor_mass),
+            tub_share: N(tub.mass_kg / (tub.mass_kg + rotor_mass)),
+            rotor_share: N(rotor_mass / (tub.mass_kg + rotor_mass)),
             along_shaft: N((m_s * shaft.centre_x_m + m_d * drum.hinge_x_m) / rotor_mass),
             drum_share: N(m_d / rotor_mass),
             rho_1: N(rho_1),
@@ -176,12 +180,20 @@ impl Coefficients<f64> {
 
 impl<T: Lane> Coefficients<T> {
     /// The same machine in every lane.
+    #[inline(always)]
     pub(crate) fn splat(zero: N<T>, from: &Coefficients<f64>) -> Self {
-        Self {
+        let mut lanes = Self {
             bodies: Bodies::splat(zero, &from.bodies),
-            springs: from.springs.iter().map(|s| SpringOf::splat(zero, s)).collect(),
-            dampers: from.dampers.iter().map(|d| DamperOf::splat(zero, d)).collect(),
+            springs: Vec::with_capacity(from.springs.len()),
+            dampers: Vec::with_capacity(from.dampers.len()),
+        };
+        for spring in &from.springs {
+            lanes.springs.push(SpringOf::splat(zero, spring));
         }
+        for damper in &from.dampers {
+            lanes.dampers.push(DamperOf::splat(zero, damper));
+        }
+        lanes
     }
 
     /// Puts a machine with as many springs and dampers into one lane.
@@ -194,11 +206,20 @@ impl<T: Lane> Coefficients<T> {
 
 impl<T: Real> Coefficients<T> {
     /// As constants of a dual number.
+    #[inline(always)]
     pub(crate) fn constant(&self) -> Coefficients<Dual<T>> {
-        Coefficients {
+        let mut lifted = Coefficients {
             bodies: self.bodies.constant(),
-            springs: self.springs.iter().map(SpringOf::constant).collect(),
-            dampers: self.dampers.iter().map(DamperOf::constant).collect(),
+            springs: Vec::with_capacity(self.springs.len()),
+            dampers: Vec::with_capacity(self.dampers.len()),
+        };
+        // Loops, not closures: only what is inlined into an instruction set's entry function is compiled for it.
+        for spring in &self.springs {
+            lifted.springs.push(spring.constant());
         }
+        for damper in &self.dampers {
+            lifted.dampers.push(damper.constant());
+        }
+        lifted
     }
 }

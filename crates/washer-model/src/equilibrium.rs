@@ -2,9 +2,10 @@
 
 use crate::coefficients::Coefficients;
 use crate::floating::Factors;
+use crate::linear::seeded;
 use crate::nonlinear::{COORDINATES, Halves, halves};
 use crate::spin::SpinState;
-use lane_ode::{Dual, Lane, N, Real};
+use lane_ode::{Lane, N, Real};
 
 /// Newton steps before giving up.
 const MAX_ITERATIONS: usize = 60;
@@ -26,10 +27,7 @@ pub(crate) fn find<T: Lane>(zero: N<T>, machine: &Coefficients<T>) -> ([N<T>; CO
         let mut stiffness = [[zero; COORDINATES]; COORDINATES];
         let mut force = [zero; COORDINATES];
         for j in 0..COORDINATES {
-            let seeded = core::array::from_fn(|i| {
-                N(Dual { value: q[i].0, slope: if i == j { one.0 } else { zero.0 } })
-            });
-            let f = static_forces(&machine, &seeded);
+            let f = static_forces(&machine, &seeded(&q, j, 1.0));
             for i in 0..COORDINATES {
                 stiffness[i][j] = N(f[i].0.slope.neg());
                 force[i] = N(f[i].0.value);

@@ -54,8 +54,8 @@ impl<T: Real, const R: usize> Floating<T, R> {
     #[inline(always)]
     pub(crate) fn accelerations(&self, inertia: &Factors<T, R>) -> ([N<T>; 2], [N<T>; R]) {
         let rotation = inertia.solve(self.torque);
-        let mut translation: [N<T>; 2] =
-            core::array::from_fn(|i| self.force[i] * self.per_mass - self.drift[i]);
+        let mut translation =
+            [self.force[0] * self.per_mass - self.drift[0], self.force[1] * self.per_mass - self.drift[1]];
         for r in 0..R {
             if r > 0 {
                 translation[0] -= self.arm[r][0] * rotation[r];
@@ -68,10 +68,12 @@ impl<T: Real, const R: usize> Floating<T, R> {
     /// Forces that the coordinates (y and z of the bearing midpoint, then the rotations) see: `f` in M q'' = f.
     #[inline(always)]
     pub(crate) fn generalised_forces(&self) -> ([N<T>; 2], [N<T>; R]) {
-        let midpoint: [N<T>; 2] = core::array::from_fn(|i| self.force[i] - self.drift[i] / self.per_mass);
-        let rotation = core::array::from_fn(|r| {
-            self.torque[r] + self.arm[r][0] * midpoint[0] + self.arm[r][1] * midpoint[1]
-        });
+        let midpoint =
+            [self.force[0] - self.drift[0] / self.per_mass, self.force[1] - self.drift[1] / self.per_mass];
+        let mut rotation = self.torque;
+        for r in 0..R {
+            rotation[r] = rotation[r] + self.arm[r][0] * midpoint[0] + self.arm[r][1] * midpoint[1];
+        }
         (midpoint, rotation)
     }
 }

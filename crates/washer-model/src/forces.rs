@@ -1,7 +1,7 @@
 //! Forces: springs, dampers, bearings and the drum shaft's flexure (section 3 of the model page).
 
 use crate::coefficients::Bodies;
-use crate::frame::{Tilt, Vec3};
+use crate::frame::{Tilt, Vec3, dot, plus_cross, scaled, sum};
 use crate::nonlinear::{COORDINATES, MachineView};
 use lane_ode::{Dual, N, Real};
 
@@ -17,14 +17,15 @@ impl<T: Real> AxisLoad<T> {
     /// As a constant of a dual number.
     #[inline(always)]
     pub(crate) fn constant(&self) -> AxisLoad<Dual<T>> {
-        let lift = |v: N<T>| N(Dual::constant(v.0));
-        AxisLoad { force: self.force.map(lift), moment: self.moment.map(lift) }
+        let [[fy, fz], [my, mz]] = [self.force, self.moment];
+        AxisLoad { force: [fy.constant(), fz.constant()], moment: [my.constant(), mz.constant()] }
     }
 
     /// What the other body feels.
     #[inline(always)]
     pub(crate) fn reaction(&self) -> Self {
-        Self { force: self.force.map(|f| -f), moment: self.moment.map(|m| -m) }
+        let [[fy, fz], [my, mz]] = [self.force, self.moment];
+        Self { force: [-fy, -fz], moment: [-my, -mz] }
     }
 }
 
@@ -52,15 +53,15 @@ pub(crate) fn bearing_load<T: Real>(
 /// Bearing forces on the shaft when its midpoint is `offset` from the tub's and its axis `tilt` from the tub's (y, z).
 #[inline(always)]
 pub(crate) fn load_of_displacement<T: Real>(b: &Bodies<T>, offset: &[N<T>; 2], tilt: &[N<T>; 2]) -> AxisLoad<T> {
-    let at = |position: N<T>, stiffness: N<T>| -> [N<T>; 2] {
-        core::array::from_fn(|i| -(stiffness * (offset[i] + position * tilt[i])).v())
-    };
-    let front = at(b.bearing_front, b.front_stiffness);
-    let rear = at(b.bearing_rear, b.rear_stiffness);
-    AxisLoad {
-        force: core::array::from_fn(|i| front[i] + rear[i]),
-        moment: core::array::from_fn(|i| front[i] * b.bearing_front + rear[i] * b.bearing_rear),
+    let mut load = AxisLoad { force: [offset[0].lit(0.0); 2], moment: [offset[0].lit(0.0); 2] };
+    for (position, stiffness) in [(b.bearing_front, b.front_stiffness), (b.bearing_rear, b.rear_stiffness)] {
+        for i in 0..2 {
+            let force = -(stiffness * (offset[i] + position * tilt[i])).v();
+            load.force[i] += force;
+            load.moment[i] += position * force;
+        }
     }
+    load
 }
 
 /// Springs and dampers, worked out in tub axes, where their tub ends stand still.
@@ -75,29 +76,13 @@ pub(crate) fn suspension_load<T: Real>(
     let zero = midpoint[0].lit(0.0);
     let mut force = [zero; 3];
     let mut moment = [zero; 3];
-    // From the cabinet end to the tub end. t3 has no y component.
-    let span = |cabinet: [N<T>; 3], end: Vec3<T>| -> Vec3<T> {
-        let [x, y, z] = [cabinet[0], cabinet[1] - midpoint[0], cabinet[2] - midpoint[1]];
-        let [t1, t2] = [&tilt.axis_c, &tilt.second_c];
-        [
-            end[0] - t1[0] * x - t1[1] * y - t1[2] * z,
-            end[1] - t2[0] * x - t2[1] * y - t2[2] * z,
-            end[2] - tilt.sin_yaw * x - tilt.cos_yaw * z,
-        ]
-    };
-    let mut apply = |pull: N<T>, span: &Vec3<T>, end: &Vec3<T>| {
-        let f: Vec3<T> = span.map(|d| (pull * d).v());
-        for i in 0..3 {
-            force[i] += f[i];
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            moment[i] = moment[i] + end[j] * f[k] - end[k] * f[j];
-        }
-    };
     for s in machine.springs {
         let end = [s.tub_x, s.tub_y, s.tub_z];
-        let d = span([s.cabinet_x, s.cabinet_y, s.cabinet_z], end);
-        let length = (d[0] * d[0] + (d[1] * d[1] + d[2] * d[2])).sqrt();
-        apply(s.stiffness_times_free_length / length - s.stiffness, &d, &end);
+        let d = span(tilt, midpoint, &[s.cabinet_x, s.cabinet_y, s.cabinet_z], &end);
+        let pull = s.stiffness_times_free_length / dot(&d, &d).sqrt() - s.stiffness;
+        let f = scaled(pull, d);
+        force = sum(force, &f);
+        moment = plus_cross(&moment, &end, &f);
     }
     if !machine.dampers.is_empty() {
         // Velocity of the midpoint in tub axes.
@@ -109,15 +94,12 @@ pub(crate) fn suspension_load<T: Real>(
         ];
         for damper in machine.dampers {
             let end = [damper.tub_x, damper.tub_y, damper.tub_z];
-            let d = span([damper.cabinet_x, damper.cabinet_y, damper.cabinet_z], end);
-            let velocity: Vec3<T> = core::array::from_fn(|i| {
-                let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-                base[i] + rate[j] * end[k] - rate[k] * end[j]
-            });
-            let along = d[0] * velocity[0] + (d[1] * velocity[1] + d[2] * velocity[2]);
-            let squared = d[0] * d[0] + (d[1] * d[1] + d[2] * d[2]);
+            let d = span(tilt, midpoint, &[damper.cabinet_x, damper.cabinet_y, damper.cabinet_z], &end);
+            let velocity = plus_cross(&base, rate, &end);
             // Eqs. 33 to 35: F = -C (v . n) n.
-            apply(-(damper.damping * along).v() / squared, &d, &end);
+            let f = scaled(-(damper.damping * dot(&d, &velocity)).v() / dot(&d, &d), d);
+            force = sum(force, &f);
+            moment = plus_cross(&moment, &end, &f);
         }
     }
     SuspensionLoad {
@@ -127,6 +109,18 @@ pub(crate) fn suspension_load<T: Real>(
         ],
         moment,
     }
+}
+
+/// From a cabinet end to a tub end, in tub axes. t3 has no y component.
+#[inline(always)]
+fn span<T: Real>(tilt: &Tilt<T>, midpoint: &[N<T>; 2], cabinet: &Vec3<T>, end: &Vec3<T>) -> Vec3<T> {
+    let [x, y, z] = [cabinet[0], cabinet[1] - midpoint[0], cabinet[2] - midpoint[1]];
+    let [t1, t2] = [&tilt.axis_c, &tilt.second_c];
+    [
+        end[0] - t1[0] * x - t1[1] * y - t1[2] * z,
+        end[1] - t2[0] * x - t2[1] * y - t2[2] * z,
+        end[2] - tilt.sin_yaw * x - tilt.cos_yaw * z,
+    ]
 }
 
 /// The drum shaft's flexure: derivatives of K_D phi^2 / 2 with cos phi = cos q9 cos q10.
@@ -164,8 +158,8 @@ const SMALL_SIN_SQUARED: f64 = 1.0 / 1024.0;
 #[inline(always)]
 fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
     let mut short = sin_squared.lit(ASIN_SERIES[4]);
-    for &c in ASIN_SERIES[..4].iter().rev() {
-        short = short * sin_squared + c;
+    for k in (0..4).rev() {
+        short = short * sin_squared + ASIN_SERIES[k];
     }
     let bound = sin_squared.lit(SMALL_SIN_SQUARED);
     let is_small = sin_squared.0.less(bound.0);
@@ -179,15 +173,14 @@ fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
 }
 
 /// The same by quarter angles: with s = sin^2(phi/4), phi / sin phi = (asin sqrt(s) / sqrt(s)) / (cos(phi/4) cos(phi/2)).
-#[cold]
 #[inline(always)]
 fn phi_over_sin_by_quarters<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
     let half = 0.5 * (sin_squared / (1.0 + cos));
     let cos_half_squared = 1.0 - half.v();
     let quarter = (0.5 * (half.v() / (1.0 + cos_half_squared.sqrt()))).v();
     let mut series = quarter.lit(ASIN_SERIES[21]);
-    for &c in ASIN_SERIES[..21].iter().rev() {
-        series = series * quarter + c;
+    for k in (0..21).rev() {
+        series = series * quarter + ASIN_SERIES[k];
     }
     series / ((1.0 - quarter) * cos_half_squared).v().sqrt()
 }

@@ -8,6 +8,55 @@ use lane_ode::{N, Real};
 /// A vector's three components.
 pub(crate) type Vec3<T> = [N<T>; 3];
 
+/// k v
+#[inline(always)]
+pub(crate) fn scaled<T: Real, const K: usize>(k: N<T>, mut v: [N<T>; K]) -> [N<T>; K] {
+    for x in &mut v {
+        *x = (k * *x).v();
+    }
+    v
+}
+
+/// a + b
+#[inline(always)]
+pub(crate) fn sum<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [N<T>; K] {
+    for i in 0..K {
+        a[i] += b[i];
+    }
+    a
+}
+
+/// a - b
+#[inline(always)]
+pub(crate) fn difference<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [N<T>; K] {
+    for i in 0..K {
+        a[i] -= b[i];
+    }
+    a
+}
+
+/// j a + k b
+#[inline(always)]
+pub(crate) fn combination<T: Real>(j: N<T>, a: &Vec3<T>, k: N<T>, b: &Vec3<T>) -> Vec3<T> {
+    [j * a[0] + k * b[0], j * a[1] + k * b[1], j * a[2] + k * b[2]]
+}
+
+/// start + a x b
+#[inline(always)]
+pub(crate) fn plus_cross<T: Real>(start: &Vec3<T>, a: &Vec3<T>, b: &Vec3<T>) -> Vec3<T> {
+    [
+        start[0] + a[1] * b[2] - a[2] * b[1],
+        start[1] + a[2] * b[0] - a[0] * b[2],
+        start[2] + a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// a . b
+#[inline(always)]
+pub(crate) fn dot<T: Real>(a: &Vec3<T>, b: &Vec3<T>) -> N<T> {
+    a[0] * b[0] + (a[1] * b[1] + a[2] * b[2])
+}
+
 /// Orientation of a tilted axis.
 pub(crate) struct Tilt<T> {
     pub(crate) sin_yaw: N<T>,

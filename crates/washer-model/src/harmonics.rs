@@ -83,6 +83,7 @@ pub(crate) struct TermLanes<T> {
 }
 
 impl<T: Lane> TermLanes<T> {
+    #[inline(always)]
     pub(crate) fn splat(zero: N<T>, terms: &[Term]) -> Self {
         let mut lanes = Self { zero, keys: Vec::new(), coefficients: Vec::new(), lanes: vec![terms.to_vec(); T::LANES] };
         lanes.rebuild();
@@ -136,5 +137,9 @@ pub(crate) fn basis<T: Real>(spin: &SpinState<T>) -> [N<T>; BASIS] {
     let one = spin.cos.lit(1.0);
     let harmonics = [one, spin.cos, spin.sin, spin.cos_2, spin.sin_2];
     let factors = [one, (spin.speed * spin.speed).v(), spin.acceleration, spin.speed];
-    core::array::from_fn(|i| (factors[i / HARMONICS] * harmonics[i % HARMONICS]).v())
+    let mut functions = [one; BASIS];
+    for (i, function) in functions.iter_mut().enumerate() {
+        *function = (factors[i / HARMONICS] * harmonics[i % HARMONICS]).v();
+    }
+    functions
 }

@@ -64,6 +64,7 @@ impl<T: Lane> Constants<T> {
         each_field!(get)
     }
 
+    #[inline(always)]
     pub(crate) fn splat(zero: N<T>, from: &Constants<f64>) -> Self {
         macro_rules! splat { ($($f:ident),*) => { Self { $($f: Splat::splat(zero, &from.$f),)* } }; }
         each_field!(splat)
@@ -106,41 +107,34 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
     for (k, &(cos, sin)) in SAMPLES.iter().enumerate() {
         for (kind, (speed, acceleration)) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
             let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero.lit(speed), zero.lit(acceleration));
-            let mut put = |entry: usize, value: N<T>| samples[kind][entry][k] = value;
             let Half { mut floating, inertia, .. } = rotor(bodies, &spin, q, &still);
             floating.apply(&on_shaft);
             let (force, torque) = floating.generalised_forces();
             let arm = floating.arm;
             let lifted_spin = spin.constant();
-            let mut put_slopes = |first: usize, column: usize, dq: f64, du: f64| {
+            // Stiffness at every kind of spin, damping only at unit speed: without spin the rotor has none.
+            let directions = if kind == 1 { 8 } else { 4 };
+            for direction in 0..directions {
+                let (first, column) = ([STIFFNESS, DAMPING][direction / 4], direction % 4);
+                let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
                 let (q, u) = (seeded(q, TURNS[column], dq), seeded(&still, TURNS[column], du));
                 let Half { mut floating, .. } = rotor(&lifted.bodies, &lifted_spin, &q, &u);
                 floating.apply(&on_shaft.constant());
                 let rows: [_; ROTOR_ROWS] = about_centre(floating.generalised_forces(), &arm);
-                for (row, slope) in rows.iter().enumerate() {
-                    put(first + row * 4 + column, -*slope);
-                }
-            };
-            for column in 0..4 {
-                put_slopes(STIFFNESS, column, 1.0, 0.0);
-                if kind == 1 {
-                    put_slopes(DAMPING, column, 0.0, 1.0);
+                for row in 0..ROTOR_ROWS {
+                    samples[kind][first + row * 4 + column][k] = -rows[row];
                 }
             }
-            for row in 0..2 {
-                put(FORCE + row, force[row]);
+            for i in 0..2 {
+                samples[kind][FORCE + i][k] = force[i];
             }
-            for row in 0..4 {
-                put(FORCE + 2 + row, torque[row] - arm[row][0] * force[0] - arm[row][1] * force[1]);
-            }
-            if kind == 0 {
-                for row in 0..4 {
-                    for column in 0..=row {
-                        put(INERTIA + row * (row + 1) / 2 + column, inertia[row][column]);
-                    }
-                    put(ARM + 2 * row, arm[row][0]);
-                    put(ARM + 2 * row + 1, arm[row][1]);
+            for r in 0..4 {
+                samples[kind][FORCE + 2 + r][k] = torque[r] - arm[r][0] * force[0] - arm[r][1] * force[1];
+                for s in 0..=r {
+                    samples[kind][INERTIA + r * (r + 1) / 2 + s][k] = inertia[r][s];
                 }
+                samples[kind][ARM + 2 * r][k] = arm[r][0];
+                samples[kind][ARM + 2 * r + 1][k] = arm[r][1];
             }
         }
     }
@@ -162,11 +156,13 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
 
 /// `values` with a unit derivative (times `slope`) along coordinate `j`.
 #[inline(always)]
-fn seeded<T: Lane>(values: &[N<T>; COORDINATES], j: usize, slope: f64) -> [N<Dual<T>>; COORDINATES] {
-    core::array::from_fn(|i| {
-        let zero = values[i].lit(0.0);
-        N(Dual { value: values[i].0, slope: if i == j { zero.lit(slope).0 } else { zero.0 } })
-    })
+pub(crate) fn seeded<T: Lane>(values: &[N<T>; COORDINATES], j: usize, slope: f64) -> [N<Dual<T>>; COORDINATES] {
+    let mut seeded = [values[0].constant(); COORDINATES];
+    for i in 0..COORDINATES {
+        seeded[i] = values[i].constant();
+    }
+    seeded[j].0.slope = values[j].lit(slope).0;
+    seeded
 }
 
 /// Slopes of generalised forces, from the bearing midpoint's rows to the mass centre's: the inverse of what
@@ -176,14 +172,13 @@ fn about_centre<T: Real, const R: usize, const ROWS: usize>(
     (midpoint, rotation): ([N<Dual<T>>; 2], [N<Dual<T>>; R]),
     arm: &[[N<T>; 2]; R],
 ) -> [N<T>; ROWS] {
-    let force = midpoint.map(|f| N(f.0.slope));
-    core::array::from_fn(|row| match row {
-        0 | 1 => force[row],
-        _ => {
-            let r = row - 2;
-            N(rotation[r].0.slope) - arm[r][0] * force[0] - arm[r][1] * force[1]
-        }
-    })
+    let force = [N(midpoint[0].0.slope), N(midpoint[1].0.slope)];
+    let mut rows = [force[0]; ROWS];
+    rows[1] = force[1];
+    for r in 0..R {
+        rows[2 + r] = N(rotation[r].0.slope) - arm[r][0] * force[0] - arm[r][1] * force[1];
+    }
+    rows
 }
 
 /// The rotor's terms of one lane, from samples at no spin, unit speed and unit acceleration.
@@ -270,38 +265,38 @@ fn unloaded<T: Lane>(
     u: &[N<T>; COORDINATES],
     zero: N<T>,
 ) -> (Floating<T, 2>, Floating<T, 4>) {
-    let tub_row = |row: usize| {
-        let mut f = zero;
-        for (column, &j) in TUB.iter().enumerate() {
-            f = f - c.tub_stiffness[row][column] * q[j] - c.tub_damping[row][column] * u[j];
+    let mut tub = [zero; 4];
+    for row in 0..4 {
+        for column in 0..4 {
+            let j = TUB[column];
+            tub[row] = tub[row] - c.tub_stiffness[row][column] * q[j] - c.tub_damping[row][column] * u[j];
         }
-        f
-    };
+    }
     let e = &rotor_at.entries;
-    let rotor_row = |row: usize| {
-        let mut f = e[FORCE + row];
-        for (column, &j) in TURNS.iter().enumerate() {
-            let entry = row * 4 + column;
-            f = f - e[STIFFNESS + entry] * q[j] - e[DAMPING + entry] * u[j];
+    let mut rotor = [zero; ROTOR_ROWS];
+    for row in 0..ROTOR_ROWS {
+        rotor[row] = e[FORCE + row];
+        for column in 0..4 {
+            let (entry, j) = (row * 4 + column, TURNS[column]);
+            rotor[row] = rotor[row] - e[STIFFNESS + entry] * q[j] - e[DAMPING + entry] * u[j];
         }
-        f
-    };
+    }
     (
         Floating {
             per_mass: c.tub_per_mass,
-            force: [tub_row(0), tub_row(1)],
+            force: [tub[0], tub[1]],
             drift: [zero; 2],
             arm: c.tub_arm,
             axis: c.tub_axis,
-            torque: [tub_row(2), tub_row(3)],
+            torque: [tub[2], tub[3]],
         },
         Floating {
             per_mass: c.rotor_per_mass,
-            force: [rotor_row(0), rotor_row(1)],
+            force: [rotor[0], rotor[1]],
             drift: [zero; 2],
-            arm: core::array::from_fn(|r| [e[ARM + 2 * r], e[ARM + 2 * r + 1]]),
+            arm: [[e[ARM], e[ARM + 1]], [e[ARM + 2], e[ARM + 3]], [e[ARM + 4], e[ARM + 5]], [e[ARM + 6], e[ARM + 7]]],
             axis: c.rotor_axis,
-            torque: core::array::from_fn(|r| rotor_row(2 + r)),
+            torque: [rotor[2], rotor[3], rotor[4], rotor[5]],
         },
     )
 }

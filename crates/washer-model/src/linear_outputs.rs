@@ -3,9 +3,10 @@
 use crate::coefficients::Bodies;
 use crate::harmonics::Term;
 use crate::lanes::GetLane;
+use crate::linear::seeded;
 use crate::nonlinear::COORDINATES;
 use crate::outputs::{CHANNELS, OUTPUTS, outputs};
-use lane_ode::{Dual, Lane, N, Real};
+use lane_ode::{Lane, N, Real};
 
 /// Angles that determine harmonics 0 and 1: cos and sin of 2 pi k / 3.
 const SAMPLES: [(f64, f64); 3] =
@@ -26,16 +27,15 @@ pub(crate) fn features<R: Real>(
     (sin, cos): (N<R>, N<R>),
     q: &[N<R>; COORDINATES],
 ) -> [N<R>; FEATURES] {
-    let one = sin.lit(1.0);
-    core::array::from_fn(|i| {
-        let column = i % COLUMNS;
-        let factor = if column == 0 { one } else { q[column - 1] };
-        match i / COLUMNS {
-            0 => factor,
-            1 => (cos * factor).v(),
-            _ => (sin * factor).v(),
-        }
-    })
+    let mut features = [sin.lit(1.0); FEATURES];
+    for column in 1..COLUMNS {
+        features[column] = q[column - 1];
+    }
+    for column in 0..COLUMNS {
+        features[COLUMNS + column] = (cos * features[column]).v();
+        features[2 * COLUMNS + column] = (sin * features[column]).v();
+    }
+    features
 }
 
 /// Expands the nonlinear outputs of one machine per lane about the equilibrium `q`, as sparse terms: output, then feature.
@@ -44,15 +44,13 @@ pub(crate) fn linearise_outputs<T: Lane>(bodies: &Bodies<T>, q: &[N<T>; COORDINA
     let zero = q[0].lit(0.0);
     let lifted = bodies.constant();
     let mut samples = [[[zero; COLUMNS]; OUTPUTS]; 3];
-    for (sample, (cos, sin)) in samples.iter_mut().zip(SAMPLES) {
-        let theta = (N(Dual::constant(zero.lit(sin).0)), N(Dual::constant(zero.lit(cos).0)));
+    for (k, (cos, sin)) in SAMPLES.into_iter().enumerate() {
+        let theta = (zero.lit(sin).constant(), zero.lit(cos).constant());
         for j in 0..COORDINATES {
-            let seeded = core::array::from_fn(|i| {
-                N(Dual { value: q[i].0, slope: zero.lit(if i == j { 1.0 } else { 0.0 }).0 })
-            });
-            for (row, y) in sample.iter_mut().zip(outputs(&lifted, theta, &seeded)) {
-                row[0] = N(y.0.value);
-                row[1 + j] = N(y.0.slope);
+            let y = outputs(&lifted, theta, &seeded(q, j, 1.0));
+            for output in 0..OUTPUTS {
+                samples[k][output][0] = N(y[output].0.value);
+                samples[k][output][1 + j] = N(y[output].0.slope);
             }
         }
     }
@@ -67,8 +65,10 @@ fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> Vec<Term> {
             let mean = (values[0] + values[1] + values[2]) / 3.0;
             let cos = (2.0 * values[0] - values[1] - values[2]) / 3.0;
             let sin = (values[1] - values[2]) * 2.0 * SAMPLES[1].1 / 3.0;
-            // Channels are deviations from the equilibrium, where theta is zero.
-            let mean = if column == 0 && output < CHANNELS { -cos } else { mean };
+            // Outputs of the linear model are linear in q: channels have no constant (model page, section 5).
+            if column == 0 && output < CHANNELS {
+                continue;
+            }
             for (harmonic, coefficient) in [mean, cos, sin].into_iter().enumerate() {
                 let key = (output as u16, (harmonic * COLUMNS + column) as u16);
                 terms.push(Term { key, coefficient });

@@ -139,6 +139,7 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
 }
 
 impl<T: Lane> Model<T> for Nonlinear<T> {
+    #[inline(always)]
     fn splat(zero: N<T>, point: &Point) -> Self {
         Self {
             machine: Coefficients::splat(zero, &point.machine),
@@ -234,6 +235,7 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
 }
 
 impl<T: Lane> Model<T> for Linear<T> {
+    #[inline(always)]
     fn splat(zero: N<T>, point: &Point) -> Self {
         let constants = Constants::splat(zero, &point.linear.constants);
         Self {
@@ -275,11 +277,9 @@ impl<T: Lane> Model<T> for Linear<T> {
     #[inline(always)]
     fn rates(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<Dual<T>>; OUTPUTS] {
         let features = features(theta_rate(spin), &coordinate_rates(x));
-        let [y, dy] = [features.map(|f| N(f.0.value)), features.map(|f| N(f.0.slope))].map(|f| self.outputs.sum(&f));
-        core::array::from_fn(|i| {
-            let (y, dy): (&[N<T>; OUTPUTS], &[N<T>; OUTPUTS]) = (&y, &dy);
-            N(Dual { value: y[i].0, slope: dy[i].0 })
-        })
+        let y: [N<T>; OUTPUTS] = self.outputs.sum(&features.map(|f| N(f.0.value)));
+        let dy: [N<T>; OUTPUTS] = self.outputs.sum(&features.map(|f| N(f.0.slope)));
+        core::array::from_fn(|i| N(Dual { value: y[i].0, slope: dy[i].0 }))
     }
 
     #[inline(always)]
@@ -290,12 +290,9 @@ impl<T: Lane> Model<T> for Linear<T> {
         dx: &[N<T>; STATES],
     ) -> [N<Jet<T>>; OUTPUTS] {
         let features = features(theta_jet(spin), &coordinate_jets(x, dx));
-        let [y, dy, ddy]: [[N<T>; OUTPUTS]; 3] = [
-            features.map(|f| N(f.0.value.value)),
-            features.map(|f| N(f.0.slope.value)),
-            features.map(|f| N(f.0.slope.slope)),
-        ]
-        .map(|f| self.outputs.sum(&f));
+        let y: [N<T>; OUTPUTS] = self.outputs.sum(&features.map(|f| N(f.0.value.value)));
+        let dy: [N<T>; OUTPUTS] = self.outputs.sum(&features.map(|f| N(f.0.slope.value)));
+        let ddy: [N<T>; OUTPUTS] = self.outputs.sum(&features.map(|f| N(f.0.slope.slope)));
         core::array::from_fn(|i| jet(y[i], dy[i], ddy[i]))
     }
 }

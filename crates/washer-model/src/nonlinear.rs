@@ -6,7 +6,7 @@
 use crate::coefficients::{Bodies, Coefficients, DamperOf, SpringOf};
 use crate::floating::{Factors, Floating};
 use crate::forces::{AxisLoad, Flexure, bearing_load, suspension_load};
-use crate::frame::{Tilt, Vec3};
+use crate::frame::{Tilt, Vec3, combination, difference, scaled, sum};
 use crate::spin::SpinState;
 use lane_ode::{N, Real};
 
@@ -91,13 +91,13 @@ pub(crate) fn tub<T: Real>(
         b.tub_i22 * motion.acceleration_y + (b.tub_i11 - b.tub_i33) * (x * z),
         ((b.tub_i22 - b.tub_i11) * (x * y)).v(),
     ];
-    let moment: Vec3<T> = core::array::from_fn(|i| suspension.moment[i] - inertia_moment[i]);
+    let moment = difference(suspension.moment, &inertia_moment);
 
     // The mass centre L_T t1 (Eq. 8): partial velocities in cabinet axes, and acceleration.
     let arm_yaw_x = (centre * tilt.axis_c[2]).v();
     let arm_yaw_z = (centre * tilt.axis_yaw_z()).v();
-    let arm_pitch: Vec3<T> = tilt.second_c.map(|t2| (centre * t2).v());
-    let drift = tilt.to_cabinet(&motion.axis_acceleration).map(|a| (centre * a).v());
+    let arm_pitch = scaled(centre, tilt.second_c);
+    let drift = scaled(centre, tilt.to_cabinet(&motion.axis_acceleration));
 
     let force = suspension.force;
     let axial = (b.tub_mass * drift[0]).v();
@@ -168,7 +168,7 @@ pub(crate) fn rotor<T: Real>(
     let axis_acceleration_e = into_hinge(s9, c9, &into_spin(spin, &motion.axis_acceleration));
     let drum_moment_e = {
         let [x, y, z] = k.moment(&omega_d, &alpha_d);
-        let [ax, ay, az] = axis_acceleration_e.map(|a| (b.mu_l * a).v());
+        let [ax, ay, az] = scaled(b.mu_l, axis_acceleration_e);
         [x + rho[1] * az, y - rho[0] * az, z + (rho[0] * ay - rho[1] * ax)]
     };
 
@@ -182,7 +182,7 @@ pub(crate) fn rotor<T: Real>(
         ]
     };
     let drum_moment_s = out_of_hinge(s9, c9, &drum_moment_e);
-    let moment = out_of_spin(spin, &core::array::from_fn(|i| shaft_moment[i] + drum_moment_s[i]));
+    let moment = out_of_spin(spin, &sum(shaft_moment, &drum_moment_s));
     let rho_acceleration_a = out_of_spin(spin, &out_of_hinge(s9, c9, &rho_acceleration));
     let axis_acceleration = &motion.axis_acceleration;
     let moment = [
@@ -199,13 +199,12 @@ pub(crate) fn rotor<T: Real>(
         (b.drum_share * rho_a[1]).v(),
         (b.drum_share * rho_a[2]).v(),
     ]);
-    let drift = tilt.to_cabinet(&core::array::from_fn(|i| {
-        b.along_shaft * axis_acceleration[i] + b.drum_share * rho_acceleration_a[i]
-    }));
+    let drift =
+        tilt.to_cabinet(&combination(b.along_shaft, axis_acceleration, b.drum_share, &rho_acceleration_a));
     let arm_9 = {
         let share = -(b.drum_share * rho[0]).v();
         let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];
-        tilt.to_cabinet(&d3_a).map(|d3| (share * d3).v())
+        scaled(share, tilt.to_cabinet(&d3_a))
     };
     let arm_10 = {
         let [x, y] = [-(b.drum_share * rho[1]).v(), (b.drum_share * rho[0]).v()];
@@ -228,10 +227,10 @@ pub(crate) fn rotor<T: Real>(
     let axial = (b.rotor_mass * drift[0]).v();
 
     let mut inertia = rotor_inertia(b, spin, &tilt, &k, &rho_s, (s9, c9));
-    for (r, row) in inertia.iter_mut().enumerate() {
+    for r in 0..4 {
         let axial_r = (b.rotor_mass * axial_arm[r]).v();
-        for (value, &axial_s) in row.iter_mut().zip(&axial_arm).take(r + 1) {
-            *value += axial_r * axial_s;
+        for s in 0..=r {
+            inertia[r][s] += axial_r * axial_arm[s];
         }
     }
     Half {
@@ -241,7 +240,7 @@ pub(crate) fn rotor<T: Real>(
             drift: [drift[1], drift[2]],
             arm,
             axis: tilt.axis_partials(),
-            torque: core::array::from_fn(|r| about_centre[r] - axial * axial_arm[r]),
+            torque: difference(about_centre, &scaled(axial, axial_arm)),
         },
         inertia,
         tilt,
@@ -301,7 +300,7 @@ fn rotor_inertia<T: Real>(
     let l23 = -(s9 * k.k12).v();
     let l11 = k.k11 + ss * difference;
     let l33 = k.k33 - ss * difference;
-    let mu_rho = rho_s.map(|rho| (b.mu_l * rho).v());
+    let mu_rho = scaled(b.mu_l, *rho_s);
 
     // Whole rotor in S, then its rows turned into A.
     let across = 2.0 * mu_rho[0] + b.mu_l2;

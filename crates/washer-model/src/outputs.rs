@@ -2,7 +2,7 @@
 
 use crate::channel::Channel;
 use crate::coefficients::Bodies;
-use crate::frame::{Tilt, Vec3};
+use crate::frame::{Tilt, Vec3, combination, difference, dot, scaled};
 use crate::nonlinear::COORDINATES;
 use lane_ode::{N, Real};
 
@@ -24,40 +24,35 @@ pub(crate) fn outputs<T: Real>(
     let shaft = Tilt::new(q[6], q[7]);
     let (s9, c9) = q[8].sin_cos();
     let (s10, c10) = q[9].sin_cos();
-    let from_spin = |v: [N<T>; 3]| -> Vec3<T> {
-        shaft.to_cabinet(&[v[0], cos * v[1] - sin * v[2], sin * v[1] + cos * v[2]])
-    };
     // d1 and rho = rho_1 d1 + rho_2 d2, by way of S.
-    let drum_axis = from_spin([(c9 * c10).v(), s10, -(s9 * c10).v()]);
+    let drum_axis = from_spin(&shaft, sin, cos, [(c9 * c10).v(), s10, -(s9 * c10).v()]);
     let rho = {
         let (x, y) = (c10 * b.rho_1 - s10 * b.rho_2, s10 * b.rho_1 + c10 * b.rho_2);
-        from_spin([(c9 * x).v(), y, -(s9 * x).v()])
+        from_spin(&shaft, sin, cos, [(c9 * x).v(), y, -(s9 * x).v()])
     };
 
     let midpoint = [q[0], q[1]];
     let rotor_midpoint = [q[2], q[3]];
-    let tub_front: Vec3<T> = in_cabinet(&midpoint, tub.axis_c.map(|t1| (b.tub_front * t1).v()));
-    let drum_front: Vec3<T> = in_cabinet(
+    let tub_front = in_cabinet(&midpoint, scaled(b.tub_front, tub.axis_c));
+    let drum_front = in_cabinet(
         &rotor_midpoint,
-        core::array::from_fn(|i| b.drum_hinge * shaft.axis_c[i] + b.hinge_to_front * drum_axis[i]),
+        combination(b.drum_hinge, &shaft.axis_c, b.hinge_to_front, &drum_axis),
     );
-    let total_mass = b.tub_mass + b.rotor_mass;
-    let total_centre: [N<T>; 2] = core::array::from_fn(|i| {
-        let of_tub = b.tub_mass * (midpoint[i] + b.tub_centre * tub.axis_c[i + 1]);
-        let rotor_centre = rotor_midpoint[i] + b.along_shaft * shaft.axis_c[i + 1] + b.drum_share * rho[i + 1];
-        (of_tub + b.rotor_mass * rotor_centre) / total_mass
-    });
+    let tub_centre = in_cabinet(&midpoint, scaled(b.tub_centre, tub.axis_c));
+    let rotor_centre =
+        in_cabinet(&rotor_midpoint, combination(b.along_shaft, &shaft.axis_c, b.drum_share, &rho));
+    let total_centre = combination(b.tub_share, &tub_centre, b.rotor_share, &rotor_centre);
 
-    let apart: Vec3<T> = core::array::from_fn(|i| drum_front[i] - tub_front[i]);
-    let along_2 = tub.second_c[0] * apart[0] + tub.second_c[1] * apart[1] + tub.second_c[2] * apart[2];
+    let apart = difference(drum_front, &tub_front);
+    let along_2 = dot(&tub.second_c, &apart);
     let along_3 = tub.sin_yaw * apart[0] + tub.cos_yaw * apart[2];
     [
         tub_front[1],
         tub_front[2],
         drum_front[1],
         drum_front[2],
-        total_centre[0],
         total_centre[1],
+        total_centre[2],
         q[4],
         q[5],
         along_2,
@@ -70,6 +65,12 @@ pub(crate) fn outputs<T: Real>(
 pub(crate) fn radial_squared<T: Real>(outputs: &[N<T>; OUTPUTS]) -> N<T> {
     let [y, z] = [outputs[CHANNELS], outputs[CHANNELS + 1]];
     y * y + z * z
+}
+
+/// From S to cabinet axes.
+#[inline(always)]
+fn from_spin<T: Real>(shaft: &Tilt<T>, sin: N<T>, cos: N<T>, v: Vec3<T>) -> Vec3<T> {
+    shaft.to_cabinet(&[v[0], cos * v[1] - sin * v[2], sin * v[1] + cos * v[2]])
 }
 
 /// A point of a body: its bearing midpoint, which does not move along x, plus an offset in cabinet axes.

@@ -5,7 +5,8 @@ use crate::{equilibrium, linear};
 use crate::machine::Machine;
 use crate::nonlinear::{self, COORDINATES};
 use crate::spin::SpinState;
-use lane_ode::N;
+use crate::{Channel, Method, ModelKind, Spin, Timing, prepare, simulate};
+use lane_ode::{N, Simd};
 use serde_json::Value;
 
 fn reference(file: &str) -> Value {
@@ -85,4 +86,57 @@ fn val_linear_matrices_match_an_independent_expansion() {
             assert!(error < 1e-9, "F[{i}]: {} against {}", ours.force[i], theirs[i]);
         }
     }
+}
+
+/// Columns of a reference CSV by name.
+fn table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let names = lines.next().unwrap().split(',').map(str::to_owned).collect();
+    let rows = lines.map(|line| line.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+    (names, rows)
+}
+
+#[test]
+fn val_reliability_map_matches_an_independent_one() {
+    let (names, rows) = table("reliability_map.csv");
+    let scenarios: Vec<_> = rows
+        .iter()
+        .map(|row| {
+            let mut machine = Machine::paper();
+            machine.unbalance.mass_kg = row[0];
+            machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = row[1]);
+            (machine, Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 })
+        })
+        .collect();
+    let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0] };
+    let simd = Simd::best();
+    let points: Vec<_> = prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
+    let points: Vec<_> = points.iter().collect();
+    let method = Method::Rk4 { step_s: 2e-4 };
+    let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|m| simulate(simd, m, &method, &points));
+    let column = |name: &str| names.iter().position(|n| n == name).unwrap();
+    let mut compared = 0;
+    for (i, row) in rows.iter().enumerate() {
+        let mut largest_ratio = 0.0_f64;
+        for channel in Channel::ALL {
+            if matches!(channel, Channel::TotalCentreY | Channel::TotalCentreZ) {
+                continue;
+            }
+            let [ours_n, ours_l] = [&nonlinear, &linear].map(|r| r[i].amplitudes[channel.index()]);
+            largest_ratio = largest_ratio.max(ours_n / ours_l);
+            for (prefix, ours) in [("nonlinear", ours_n), ("linear", ours_l)] {
+                let theirs = row[column(&format!("{prefix}_{}", channel.name()))];
+                let is_regular = row[column("step_sensitivity")] < 1e-4;
+                if prefix == "linear" || is_regular {
+                    let error = (ours - theirs).abs() / theirs;
+                    assert!(error < 1e-4, "{prefix} {} at {:?}: {ours} against {theirs}", channel.name(), &row[..2]);
+                    compared += 1;
+                }
+            }
+        }
+        assert_eq!(largest_ratio < 2.0, row[column("ratio_max")] < 2.0, "verdict at {:?}", &row[..2]);
+    }
+    assert!(compared > 500, "only {compared} amplitudes were regular enough to compare");
 }

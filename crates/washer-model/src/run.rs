@@ -194,29 +194,40 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
     fn observe(&mut self, forcing: &M::Forcing, step: &Step<'_, T, STATES>) {
         let spin = M::spin(forcing);
         let (channels, radial) = samples(&self.model.rates(spin, step.after));
-        let model = &self.model;
-        let curvatures = || {
-            let before = model.spin_at(step.end_s - step.length_s);
-            let before = model.curvatures(&before, step.before, step.slope_before);
-            [before, model.curvatures(spin, step.after, step.slope_after)]
-        };
-        let inside = self.inside();
-        if T::bits(inside) != 0 {
-            self.channels.step(step.length_s, channels, inside, || {
-                curvatures().map(|y| core::array::from_fn(|i| N(y[i].0.slope.slope)))
-            });
+        let (inside, everywhere) = (self.inside(), everywhere(self.windows));
+        let is_inside = T::bits(inside) != 0;
+        let may_peak = is_inside && self.channels.reach_end(step.length_s, &channels, inside);
+        let may_touch = self.radial.reach_end(step.length_s, &radial, everywhere);
+        if may_peak || may_touch {
+            let mut second_channels = [[self.windows; CHANNELS]; 2];
+            let mut second_radial = [[self.windows; 1]; 2];
+            let times = [step.end_s - step.length_s, step.end_s];
+            let states = [(step.before, step.slope_before), (step.after, step.slope_after)];
+            for end in 0..2 {
+                let (x, dx) = states[end];
+                let y = self.model.curvatures(&self.model.spin_at(times[end]), x, dx);
+                for i in 0..CHANNELS {
+                    second_channels[end][i] = N(y[i].0.slope.slope);
+                }
+                second_radial[end][0] = N(radial_squared(&y).0.slope.slope);
+            }
+            if may_peak {
+                self.channels.look_inside(step.length_s, &channels, inside, &second_channels);
+            }
+            if may_touch {
+                self.radial.look_inside(step.length_s, &radial, everywhere, &second_radial);
+            }
         }
-        self.radial.step(step.length_s, radial, everywhere(self.windows), || {
-            curvatures().map(|y| [N(radial_squared(&y).0.slope.slope)])
-        });
+        self.channels.finish(&channels);
+        self.radial.finish(&radial);
     }
 }
 
 /// Values and slopes of the channels, and of the squared radial distance.
 #[inline(always)]
 fn samples<T: Lane>(y: &[N<Dual<T>>; OUTPUTS]) -> ([Sample<T>; CHANNELS], [Sample<T>; 1]) {
-    let sample = |y: N<Dual<T>>| (N(y.0.value), N(y.0.slope));
-    (core::array::from_fn(|i| sample(y[i])), [sample(radial_squared(y))])
+    let radial = radial_squared(y);
+    (core::array::from_fn(|i| (N(y[i].0.value), N(y[i].0.slope))), [(N(radial.0.value), N(radial.0.slope))])
 }
 
 /// True in every lane.

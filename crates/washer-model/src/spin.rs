@@ -62,14 +62,13 @@ impl<T: Real> SpinState<T> {
     /// As constants of a dual number.
     #[inline(always)]
     pub(crate) fn constant(&self) -> SpinState<Dual<T>> {
-        let lift = |v: N<T>| N(Dual::constant(v.0));
         SpinState {
-            sin: lift(self.sin),
-            cos: lift(self.cos),
-            sin_2: lift(self.sin_2),
-            cos_2: lift(self.cos_2),
-            speed: lift(self.speed),
-            acceleration: lift(self.acceleration),
+            sin: self.sin.constant(),
+            cos: self.cos.constant(),
+            sin_2: self.sin_2.constant(),
+            cos_2: self.cos_2.constant(),
+            speed: self.speed.constant(),
+            acceleration: self.acceleration.constant(),
         }
     }
 }
@@ -184,6 +183,7 @@ pub(crate) struct SpinLanes<T> {
 
 impl<T: Lane> SpinLanes<T> {
     /// The same stretch in every lane.
+    #[inline(always)]
     pub(crate) fn splat(zero: N<T>, stretch: &SpinStretch) -> Self {
         Self {
             start_s: zero.lit(stretch.start_s),
