@@ -24,7 +24,7 @@ pub use channel::Channel;
 pub use linear::Matrices;
 pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};
 pub use nonlinear::COORDINATES;
-pub use parameters::{Parameter, Range, Source, UnknownParameter};
+pub use parameters::{Parameter, Range, Source, UnknownParameter, decimal};
 pub use point::{NoEquilibrium, Point, Timing, prepare};
 pub use run::{Method, ModelKind, Record, simulate};
 pub use spin::{Spin, SpinStretch};

@@ -98,15 +98,36 @@ impl Range {
     }
 }
 
+impl Range {
+    /// What would be accepted in place of a refused value.
+    #[must_use]
+    pub fn instead_of(self, value: f64) -> String {
+        if value.is_finite() && value.abs() > Self::LARGEST && !matches!(self, Self::Within(..)) {
+            format!("{self}, at most {:e} in magnitude", Self::LARGEST)
+        } else {
+            self.to_string()
+        }
+    }
+}
+
+/// A number as a message shows it: the shortest decimal that reads back the same, in powers of ten where it would be
+/// long.
+#[must_use]
+pub fn decimal(value: f64) -> String {
+    let text = format!("{value:?}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let largest = Self::LARGEST;
         match self {
-            Self::Any => write!(f, "a number between -{largest:e} and {largest:e}"),
-            Self::Positive => write!(f, "a number greater than 0, at most {largest:e}"),
-            Self::NonNegative => write!(f, "a number from 0 to {largest:e}"),
-            Self::Negative => write!(f, "a number less than 0, at least -{largest:e}"),
-            Self::Within(least, greatest) => write!(f, "a number from {least} to {greatest}"),
+            Self::Any => f.write_str("a finite number"),
+            Self::Positive => f.write_str("a number greater than 0"),
+            Self::NonNegative => f.write_str("a number, 0 or greater"),
+            Self::Negative => f.write_str("a number less than 0"),
+            Self::Within(least, greatest) => {
+                write!(f, "a number from {} to {}", decimal(*least), decimal(*greatest))
+            }
         }
     }
 }

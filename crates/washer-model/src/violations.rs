@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use crate::{Machine, Parameter, Spin};
+use crate::{Machine, Parameter, Range, Spin, decimal};
 
 /// Ends of a spring or damper closer than this have no direction; bearings closer than this hold no angle.
 const SHORTEST_M: f64 = 1e-6;
@@ -105,7 +105,7 @@ impl Violation {
     #[must_use]
     pub fn expected(&self) -> String {
         match self {
-            Self::OutOfRange { parameter, .. } => parameter.range().to_string(),
+            Self::OutOfRange { parameter, value } => parameter.range().instead_of(*value),
             Self::Inertia { .. } => "each moment at most the sum of the other two".to_owned(),
             Self::ZeroLength { .. } => format!("ends at least {SHORTEST_M:e} m apart"),
             Self::BearingsTogether { .. } => format!("bearings at least {SHORTEST_M:e} m apart"),
@@ -113,8 +113,8 @@ impl Violation {
             Self::TableLength { .. } => "as many speeds as times, at least one of each".to_owned(),
             Self::TableStart { .. } => "a table that starts at time 0".to_owned(),
             Self::TableOrder { .. } => "times that increase".to_owned(),
-            Self::TableValue { column: "time_s", .. } => crate::Range::NonNegative.to_string(),
-            Self::TableValue { .. } => crate::Range::Within(-FASTEST_RPM, FASTEST_RPM).to_string(),
+            Self::TableValue { column: "time_s", value, .. } => Range::NonNegative.instead_of(*value),
+            Self::TableValue { .. } => Range::Within(-FASTEST_RPM, FASTEST_RPM).to_string(),
         }
     }
 }
@@ -123,11 +123,11 @@ impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::OutOfRange { parameter, value } => {
-                write!(f, "{} = {value} is out of range", parameter.name())
+                write!(f, "{} = {} is out of range", parameter.name(), decimal(*value))
             }
             Self::Inertia { body, greatest, moments_kg_m2 } => {
-                let others = moments_kg_m2.iter().sum::<f64>() - moments_kg_m2[*greatest];
-                let value = moments_kg_m2[*greatest];
+                let others = rounded(moments_kg_m2.iter().sum::<f64>() - moments_kg_m2[*greatest]);
+                let value = decimal(moments_kg_m2[*greatest]);
                 let ii = 11 * (greatest + 1);
                 write!(
                     f,
@@ -135,10 +135,14 @@ impl fmt::Display for Violation {
                 )
             }
             Self::ZeroLength { element, number, length_m } => {
-                write!(f, "the ends of {element} {number} are {length_m} m apart: it has no direction")
+                write!(
+                    f,
+                    "the ends of {element} {number} are {} m apart: it has no direction",
+                    rounded(*length_m)
+                )
             }
             Self::BearingsTogether { distance_m } => {
-                write!(f, "front and rear bearing are {distance_m} m apart and hold no angle")
+                write!(f, "front and rear bearing are {} m apart and hold no angle", rounded(*distance_m))
             }
             Self::NoSprings => f.write_str("the machine has no springs: nothing carries it"),
             Self::TableLength { times: 0, speeds: 0 } => f.write_str("the spin table is empty"),
@@ -150,10 +154,20 @@ impl fmt::Display for Violation {
                 write!(f, "time {time_s} s of the spin table follows {before_s} s")
             }
             Self::TableValue { column, index, value } => {
-                write!(f, "{column} = {value} (entry {}) of the spin table is out of range", index + 1)
+                write!(
+                    f,
+                    "{column} = {} (entry {}) of the spin table is out of range",
+                    decimal(*value),
+                    index + 1
+                )
             }
         }
     }
+}
+
+/// A computed number for a message, without the last digits' rounding error.
+fn rounded(value: f64) -> String {
+    decimal(format!("{value:.12e}").parse().unwrap_or(value))
 }
 
 impl Machine {
@@ -221,8 +235,8 @@ impl Spin {
         if time_s.len() != speed_rpm.len() || time_s.is_empty() {
             found.push(Violation::TableLength { times: time_s.len(), speeds: speed_rpm.len() });
         }
-        let time_ok = |t: f64| crate::Range::NonNegative.contains(t);
-        let speed_ok = |n: f64| crate::Range::Within(-FASTEST_RPM, FASTEST_RPM).contains(n);
+        let time_ok = |t: f64| Range::NonNegative.contains(t);
+        let speed_ok = |n: f64| Range::Within(-FASTEST_RPM, FASTEST_RPM).contains(n);
         let bad_times = time_s.iter().enumerate().filter(|&(_, &t)| !time_ok(t));
         found.extend(bad_times.map(|(index, &value)| Violation::TableValue {
             column: "time_s",
@@ -285,7 +299,7 @@ mod tests {
                 "tub_mass_kg = -1 is out of range",
                 "bearing_rear_x_m = 0.05 is out of range",
                 "damper_2_damping_n_s_per_m = NaN is out of range",
-                "no rigid body has the shaft's inertia: I11 = 0.1 exceeds the other two's sum, 0.04000000000000001",
+                "no rigid body has the shaft's inertia: I11 = 0.1 exceeds the other two's sum, 0.04",
                 "the ends of spring 3 are 0 m apart: it has no direction",
             ]
         );

@@ -2,15 +2,14 @@
 
 use std::path::Path;
 
-use toml::Spanned;
-use toml::de::DeTable;
-use washer_model::{Channel, Machine, Range, Spin};
+use washer_model::{Channel, Machine, Range, Spin, decimal};
 
 use super::origins::Origins;
 use super::parameters::Written;
 use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, listed, unknown_word};
-use super::source::{Located, Location, ReadError, SourceId, read};
+use super::source::{Located, Location, ReadError, read};
+use super::syntax::parse;
 use super::{machine, parameters};
 use crate::plan::{Integrator, Plan, Reliability};
 
@@ -118,20 +117,9 @@ pub(super) fn is_blank(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim().is_empty()
 }
 
-/// The table a text holds; what is not TOML is reported, what can be made out of the rest is returned.
-pub(super) fn parse<'a>(text: &'a str, source: SourceId, report: &mut Report) -> Spanned<DeTable<'a>> {
-    let (table, errors) = DeTable::parse_recoverable(text);
-    for error in errors {
-        let span = error.span().unwrap_or(0..0);
-        // The message says what was expected after the first comma, if anything.
-        let (what, expected) = error.message().split_once(", ").unwrap_or((error.message(), ""));
-        report.push_syntax(Diagnostic::new(what).at(&Location::new(source, span), expected));
-    }
-    table
-}
-
 fn name(root: &mut Section<'_>, path: &Path, report: &mut Report) -> String {
-    const EXPECTED: &str = "letters, digits, `-`, `_` and `.`, the first a letter or digit, at most 100";
+    const EXPECTED: &str =
+        "letters, digits, `-`, `_` and `.`, beginning with a letter or digit, at most 100 characters";
     let plain = |name: &str| {
         let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
         first && name.len() <= 100 && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
@@ -148,7 +136,8 @@ fn name(root: &mut Section<'_>, path: &Path, report: &mut Report) -> String {
             if plain(stem) {
                 return stem.to_owned();
             }
-            root.missing("name", &format!("a name, as the file's own has more than {EXPECTED}"), report);
+            let title = "`name` is missing, and the file's own name cannot stand in for it";
+            report.push_missing(Diagnostic::new(title).at(root.at(), format!("expected {EXPECTED}")));
         }
     }
     String::new()
@@ -229,15 +218,16 @@ fn time(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> [
     let field = root.table("time", "[time]", report);
     let Some(section) = root.require(field, "time", "a section [time]", report) else { return STAND_IN };
     let mut section = section.value;
-    let field = section.number("end_s", Range::Positive, report);
+    let field = section.number("end_s", Range::Any, report);
     let end = section.require(field, "end_s", "the end of the integration in s", report);
     let end = end.filter(|end| {
-        let long = end.value > LONGEST_S;
-        if long {
-            let title = format!("`end_s` = {} is longer than any run", end.value);
-            report.push(Diagnostic::new(title).at(&end.at, format!("expected at most {LONGEST_S:e} s")));
+        let sound = 0.0 < end.value && end.value <= LONGEST_S;
+        if !sound {
+            let title = format!("`end_s` = {} is out of range", decimal(end.value));
+            let expected = format!("expected a time greater than 0, at most {LONGEST_S:e} s");
+            report.push(Diagnostic::new(title).at(&end.at, expected));
         }
-        !long
+        sound
     });
     let window = section.numbers("window_s", Range::NonNegative, report).given();
     let window = window.and_then(|window| self::window(window, end.as_ref(), report));
@@ -260,13 +250,17 @@ fn window(
     };
     if from.value >= to.value {
         let what = if from.value > to.value { "reversed" } else { "empty" };
-        let title = format!("the window is {what}: it goes from {} s to {} s", from.value, to.value);
+        let title = format!(
+            "the window is {what}: it goes from {} s to {} s",
+            decimal(from.value),
+            decimal(to.value)
+        );
         report.push(Diagnostic::new(title).at(&window.at, "expected [from, to] with from < to"));
         return None;
     }
     if let Some(end) = end.filter(|end| to.value > end.value) {
-        let title = format!("the window ends at {} s, after the integration", to.value);
-        let expected = format!("expected at most {}", end.value);
+        let title = format!("the window ends at {} s, after the integration", decimal(to.value));
+        let expected = format!("expected at most {}", decimal(end.value));
         report.push(Diagnostic::new(title).at(&to.at, expected).at(&end.at, "the integration ends here"));
         return None;
     }

@@ -131,7 +131,7 @@ impl Reader<'_> {
         let Some(parameter) = self.find(&name) else { return };
         let field = section.number(key, parameter.range(), self.report);
         let found = if required {
-            let expected = format!("{}, {}", parameter.range(), parameter.description());
+            let expected = format!("{}: {}", parameter.description(), parameter.range());
             section.require(field, key, &expected, self.report)
         } else {
             field.given()

@@ -18,12 +18,16 @@ mod report;
 pub mod schema;
 mod section;
 mod source;
+mod syntax;
+#[cfg(test)]
+mod tests;
 mod validate;
 
 use std::path::Path;
 
 pub use report::Diagnostics;
 
+use grid::Draft;
 use report::Report;
 use washer_model::Machine;
 
@@ -34,8 +38,26 @@ use crate::plan::Plan;
 /// # Errors
 /// Every mistake found, in one pass.
 pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
+    resolve(path, sets, |_, _| ())
+}
+
+/// As [`load`], for one point: `at` gives each axis of several values one (on the grid or between its points), and any
+/// other parameter too. The plan has no axes; its machine and spin are the point's.
+///
+/// # Errors
+/// Every mistake found, in one pass.
+pub fn load_point(path: &Path, sets: &[String], at: &[String]) -> Result<Plan, Diagnostics> {
+    resolve(path, sets, |draft, report| parameters::point(at, draft, report))
+}
+
+fn resolve(
+    path: &Path,
+    sets: &[String],
+    finish: impl FnOnce(&mut Draft, &mut Report),
+) -> Result<Plan, Diagnostics> {
     let mut report = Report::default();
-    let Some(draft) = grid::draft(path, sets, &mut report) else { return Err(report.into_diagnostics()) };
+    let Some(mut draft) = grid::draft(path, sets, &mut report) else { return Err(report.into_diagnostics()) };
+    finish(&mut draft, &mut report);
     validate::steps(&draft, &mut report);
     validate::scenarios(&draft, &mut report);
     report.finish(draft.plan)

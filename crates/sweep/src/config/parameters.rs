@@ -3,11 +3,11 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use washer_model::{Machine, Parameter, Range, Spin, UnknownParameter};
+use washer_model::{Machine, Parameter, Range, Spin, UnknownParameter, decimal};
 
 use super::grid::Draft;
 use super::report::{Diagnostic, Report};
-use super::section::{Field, Section, check_number, short};
+use super::section::{Field, Section, check_number, quoted, short};
 use super::source::{Located, Location};
 use crate::plan::{Axis, AxisValues};
 
@@ -49,6 +49,27 @@ pub(super) fn constants(root: &mut Section<'_>, sets: &[String], draft: &mut Dra
     apply(&arguments("--set", sets, draft, report), draft, report);
 }
 
+/// Puts one point in place of the axes: `--at` gives every axis of several values, and may give more.
+pub(super) fn point(at: &[String], draft: &mut Draft, report: &mut Report) {
+    let constants = arguments("--at", at, draft, report);
+    let named =
+        |name: &str| at.iter().any(|argument| argument.split('=').next().is_some_and(|n| n.trim() == name));
+    for (k, axis) in std::mem::take(&mut draft.plan.axes).into_iter().enumerate() {
+        if named(axis.parameter.name()) {
+            continue;
+        }
+        if axis.values.len() == 1 {
+            axis.parameter.set(&mut draft.plan.machine, &mut draft.plan.spin, axis.values.value(0));
+        } else if let Some(place) = draft.origins.get(&format!("axis[{k}]")) {
+            let name = axis.parameter.name();
+            let title = format!("a point of the grid needs a value of `{name}`");
+            report
+                .push(Diagnostic::new(title).at(place, format!("expected --at {name}=VALUE for this axis")));
+        }
+    }
+    apply(&constants, draft, report);
+}
+
 /// Reads NAME=VALUE arguments.
 fn arguments<'a>(
     option: &str,
@@ -68,7 +89,7 @@ fn arguments<'a>(
         let value_at = Location::new(source, name.len() + 1..argument.len());
         let name = Located { value: name.trim(), at: Location::new(source, 0..name.len()) };
         let number = |range: Range, report: &mut Report| match value.trim().parse() {
-            Ok(number) => check_number(name.value, number, value_at, range, report),
+            Ok(number) => check_number(&quoted(name.value), number, value_at, range, report),
             Err(_) => {
                 let title = format!("`{}` is not a number", short(value));
                 report.push(Diagnostic::new(title).at(&value_at, format!("expected {range}")));
@@ -183,7 +204,8 @@ pub(super) fn axes(root: &mut Section<'_>, draft: &mut Draft, report: &mut Repor
         }
         for constant in &draft.constants {
             if constant.parts.iter().all(|part| parts.contains(part)) {
-                let title = format!("`{}` is an axis: this constant has no effect", constant.name.value);
+                let title =
+                    format!("`{}` is swept by an axis: this constant has no effect", constant.name.value);
                 let diagnostic =
                     Diagnostic::new(title).at(&constant.name.at, "expected a parameter that no axis sweeps");
                 report.push(diagnostic.at(&name.at, "swept here"));
@@ -232,7 +254,7 @@ fn list(listed: Located<(Vec<Located<f64>>, bool)>, report: &mut Report) -> Opti
     order.sort_by(|a, b| a.value.total_cmp(&b.value).then(a.at.span.start.cmp(&b.at.span.start)));
     for pair in order.windows(2) {
         if pair[0].value == pair[1].value {
-            let title = format!("the value {} stands twice on this axis", pair[1].value);
+            let title = format!("the value {} stands twice on this axis", decimal(pair[1].value));
             let diagnostic = Diagnostic::new(title).at(&pair[1].at, "expected each value once");
             report.push(diagnostic.at(&pair[0].at, "first given here"));
             sound = false;
@@ -260,7 +282,8 @@ fn spacing(mut section: Section<'_>, range: Range, report: &mut Report) -> Optio
         None
     };
     if from.value == to.value && count.value > 1 {
-        let title = format!("a range from {0} to {0} has one value, not {1}", from.value, count.value);
+        let title =
+            format!("a range from {0} to {0} has one value, not {1}", decimal(from.value), count.value);
         return refuse(title, &to.at, "expected another number, or count = 1");
     }
     if from.value != to.value && count.value == 1 {
@@ -272,7 +295,7 @@ fn spacing(mut section: Section<'_>, range: Range, report: &mut Report) -> Optio
     }
     if logarithmic && !(from.value > 0.0 && to.value > 0.0) {
         let end = if from.value > 0.0 { &to } else { &from };
-        let title = format!("{} has no logarithm", end.value);
+        let title = format!("{} has no logarithm", decimal(end.value));
         return refuse(title, &end.at, "expected a number greater than 0, or spacing = \"linear\"");
     }
     let (from, to, count) = (from.value, to.value, count.value);

@@ -8,8 +8,9 @@ use super::report::Diagnostic;
 use super::source::{Line, Location, Sources, floor_char_boundary};
 
 /// Lines longer than this are shown only around the place that matters.
-const LONGEST_LINE_BYTES: usize = 160;
-/// How much is shown before such a place.
+const LONGEST_LINE_BYTES: usize = 4000;
+/// How much of such a line is shown, and how much of that before the place.
+const SHOWN_BYTES: usize = 130;
 const BEFORE_BYTES: usize = 40;
 
 fn renderer(colour: bool) -> Renderer {
@@ -66,7 +67,7 @@ fn window(line: &Line<'_>) -> Range<usize> {
         return 0..line.text.len();
     }
     let start = floor_char_boundary(line.text, line.span.start.saturating_sub(BEFORE_BYTES));
-    start..floor_char_boundary(line.text, start + LONGEST_LINE_BYTES)
+    start..floor_char_boundary(line.text, start + SHOWN_BYTES)
 }
 
 /// The last line.

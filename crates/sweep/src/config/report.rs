@@ -78,13 +78,17 @@ pub(super) struct Report {
     beyond: usize,
     /// Lines that are not TOML: what recovery makes of them is not the user's mistake.
     broken: BTreeMap<SourceId, BTreeSet<usize>>,
+    /// Where an array that is never closed begins to swallow the rest of its text.
+    swallowed: BTreeMap<SourceId, usize>,
 }
 
 impl Report {
     /// Keeps a mistake, unless it stands on a line whose syntax is already refused.
     pub(super) fn push(&mut self, diagnostic: Diagnostic) {
         let broken = diagnostic.places.first().is_some_and(|(at, _)| {
-            self.broken.get(&at.source).is_some_and(|lines| lines.contains(&self.sources.line(at).number))
+            let swallowed = self.swallowed.get(&at.source).is_some_and(|&from| at.span.start >= from);
+            let broken = self.broken.get(&at.source);
+            swallowed || broken.is_some_and(|lines| lines.contains(&self.sources.line(at).number))
         });
         if broken {
             return;
@@ -101,6 +105,11 @@ impl Report {
         if first {
             self.keep(diagnostic);
         }
+    }
+
+    /// Takes what follows a place for the inside of an array that is never closed.
+    pub(super) fn swallow(&mut self, from: &Location) {
+        self.swallowed.insert(from.source, from.span.start);
     }
 
     /// Keeps the report of a missing key, unless broken syntax may have swallowed it.

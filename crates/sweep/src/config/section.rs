@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use washer_model::Range;
+use washer_model::{Range, decimal};
 
 use super::report::{Diagnostic, Report};
 use super::source::{Located, Location, SourceId};
@@ -108,7 +108,7 @@ impl<'a> Section<'a> {
     /// A finite number in a range.
     pub(super) fn number(&mut self, key: &'static str, range: Range, report: &mut Report) -> Field<f64> {
         let Some(value) = self.get(key) else { return Field::Absent };
-        number(key, self.at.source, value, range, report).map_or(Field::Bad, Field::Given)
+        number(&quoted(key), self.at.source, value, range, report).map_or(Field::Bad, Field::Given)
     }
 
     /// A whole number from 1 to `most`.
@@ -126,7 +126,7 @@ impl<'a> Section<'a> {
                 }
             },
             other => {
-                report.push(wrong_kind(key, &at, "a whole number", other));
+                report.push(wrong_kind(&quoted(key), &at, "a whole number", other));
                 Field::Bad
             }
         }
@@ -135,7 +135,7 @@ impl<'a> Section<'a> {
     /// A string.
     pub(super) fn text(&mut self, key: &'static str, report: &mut Report) -> Field<&'a str> {
         let Some(value) = self.get(key) else { return Field::Absent };
-        text(key, self.at.source, value, report).map_or(Field::Bad, Field::Given)
+        text(&quoted(key), self.at.source, value, report).map_or(Field::Bad, Field::Given)
     }
 
     /// One of a few words. Given back as the word's position in `choices`.
@@ -176,8 +176,11 @@ impl<'a> Section<'a> {
     ) -> Field<(Vec<Located<f64>>, bool)> {
         let source = self.at.source;
         self.items(key, "an array of numbers", report).then(|items| {
-            let numbers: Vec<_> =
-                items.value.iter().filter_map(|item| number(key, source, item, range, report)).collect();
+            let numbers: Vec<_> = items
+                .value
+                .iter()
+                .filter_map(|item| number(&entry(key), source, item, range, report))
+                .collect();
             let all = numbers.len() == items.value.len();
             Some(Located { value: (numbers, all), at: items.at })
         })
@@ -187,7 +190,8 @@ impl<'a> Section<'a> {
     pub(super) fn texts(&mut self, key: &'static str, report: &mut Report) -> Field<Vec<Located<&'a str>>> {
         let source = self.at.source;
         self.items(key, "an array of strings", report).then(|items| {
-            let texts = items.value.iter().filter_map(|item| text(key, source, item, report)).collect();
+            let texts =
+                items.value.iter().filter_map(|item| text(&entry(key), source, item, report)).collect();
             Some(Located { value: texts, at: items.at })
         })
     }
@@ -198,7 +202,7 @@ impl<'a> Section<'a> {
         match value.get_ref() {
             DeValue::Array(items) => Field::Given(Located { value: items, at }),
             other => {
-                report.push(wrong_kind(key, &at, kind, other));
+                report.push(wrong_kind(&quoted(key), &at, kind, other));
                 Field::Bad
             }
         }
@@ -218,7 +222,7 @@ impl<'a> Section<'a> {
                 Field::Given(Located { value: Section::new(title, at.clone(), table), at })
             }
             other => {
-                report.push(wrong_kind(key, &at, &format!("a table, {title}"), other));
+                report.push(wrong_kind(&quoted(key), &at, &format!("a table, {title}"), other));
                 Field::Bad
             }
         }
@@ -231,7 +235,7 @@ impl<'a> Section<'a> {
             None => return Vec::new(),
             Some((_, DeValue::Array(items))) => items,
             Some((value, other)) => {
-                report.push(wrong_kind(key, &self.place(value.span()), &kind, other));
+                report.push(wrong_kind(&quoted(key), &self.place(value.span()), &kind, other));
                 return Vec::new();
             }
         };
@@ -242,7 +246,7 @@ impl<'a> Section<'a> {
                 DeValue::Table(table) => {
                     sections.push(Section::new(format!("[[{key}]] number {}", k + 1), at, table))
                 }
-                other => report.push(wrong_kind(key, &at, &kind, other)),
+                other => report.push(wrong_kind(&entry(key), &at, &kind, other)),
             }
         }
         sections
@@ -250,14 +254,16 @@ impl<'a> Section<'a> {
 
     /// Every key as it stands, for tables whose keys are names of parameters.
     pub(super) fn names(&self) -> Vec<Located<&'a str>> {
-        let located =
-            |key: &'a Spanned<_>| Located { value: as_str(key.get_ref()), at: self.place(key.span()) };
-        self.table.keys().map(located).collect()
+        let mut names = Vec::new();
+        for key in self.table.keys() {
+            names.push(Located { value: key.get_ref() as &'a str, at: self.place(key.span()) });
+        }
+        names
     }
 
     /// The number under a name from [`Section::names`].
     pub(super) fn number_named(&self, name: &str, range: Range, report: &mut Report) -> Option<Located<f64>> {
-        number(name, self.at.source, self.table.get(name)?, range, report)
+        number(&quoted(name), self.at.source, self.table.get(name)?, range, report)
     }
 
     /// Reports every key that was not asked for.
@@ -280,10 +286,6 @@ impl<'a> Section<'a> {
     }
 }
 
-fn as_str<'a>(text: &'a std::borrow::Cow<'_, str>) -> &'a str {
-    text
-}
-
 /// A word that is none of the choices.
 pub(super) fn unknown_word(what: &str, found: &Located<&str>, choices: &[&str]) -> Diagnostic {
     Diagnostic::new(format!("unknown {what} \"{}\"", short(found.value)))
@@ -301,6 +303,16 @@ pub(super) fn listed(choices: &[&str]) -> String {
     }
 }
 
+/// A key as messages call it.
+pub(super) fn quoted(key: &str) -> String {
+    format!("`{}`", short(key))
+}
+
+/// An entry of an array as messages call it.
+fn entry(key: &str) -> String {
+    format!("an entry of `{key}`")
+}
+
 /// What a user typed, cut to what fits a title.
 pub(super) fn short(typed: &str) -> String {
     const LONGEST: usize = 60;
@@ -311,7 +323,7 @@ pub(super) fn short(typed: &str) -> String {
 }
 
 fn text<'a>(
-    key: &str,
+    what: &str,
     source: SourceId,
     value: &'a Value<'a>,
     report: &mut Report,
@@ -320,14 +332,14 @@ fn text<'a>(
     match value.get_ref() {
         DeValue::String(text) => Some(Located { value: text, at }),
         other => {
-            report.push(wrong_kind(key, &at, "a string", other));
+            report.push(wrong_kind(what, &at, "a string", other));
             None
         }
     }
 }
 
 fn number(
-    key: &str,
+    what: &str,
     source: SourceId,
     value: &Value<'_>,
     range: Range,
@@ -341,11 +353,11 @@ fn number(
             u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|value| value as f64)
         }
         other => {
-            report.push(wrong_kind(key, &at, "a number", other));
+            report.push(wrong_kind(what, &at, "a number", other));
             return None;
         }
     };
-    check_number(key, number.unwrap_or(f64::INFINITY), at, range, report)
+    check_number(what, number.unwrap_or(f64::INFINITY), at, range, report)
 }
 
 /// The number if it is finite and in range.
@@ -360,27 +372,27 @@ pub(super) fn check_number(
         return Some(Located { value, at });
     }
     let title = if value.is_nan() {
-        format!("`{}` is not a number", short(what))
+        format!("{what} is not a number")
     } else if value.is_infinite() {
-        format!("`{}` is not finite", short(what))
+        format!("{what} is not finite")
     } else {
-        format!("`{}` = {value} is out of range", short(what))
+        format!("{what} = {} is out of range", decimal(value))
     };
-    report.push(Diagnostic::new(title).at(&at, format!("expected {range}")));
+    report.push(Diagnostic::new(title).at(&at, format!("expected {}", range.instead_of(value))));
     None
 }
 
-fn wrong_kind(key: &str, at: &Location, expected: &str, found: &DeValue<'_>) -> Diagnostic {
+fn wrong_kind(what: &str, at: &Location, expected: &str, found: &DeValue<'_>) -> Diagnostic {
     let kind = match found {
         DeValue::String(_) => "a string",
         DeValue::Integer(_) => "a whole number",
-        DeValue::Float(_) => "a number",
+        DeValue::Float(_) => "a decimal number",
         DeValue::Boolean(_) => "true or false",
         DeValue::Datetime(_) => "a date or time",
         DeValue::Array(_) => "an array",
         DeValue::Table(_) => "a table",
     };
-    let diagnostic = Diagnostic::new(format!("`{}` has the wrong type", short(key)))
+    let diagnostic = Diagnostic::new(format!("{what} has the wrong type"))
         .at(at, format!("expected {expected}, found {kind}"));
     match found {
         DeValue::String(text) if expected.contains("number") && text.parse::<f64>().is_ok() => {

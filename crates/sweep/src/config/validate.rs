@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use washer_model::{Parameter, Violation};
+use washer_model::{Parameter, Violation, decimal};
 
 use super::grid::Draft;
 use super::report::{Diagnostic, Report};
-use super::source::Location;
+use super::source::{Location, Sources};
 use crate::plan::{Integrator, Scenario};
 
 /// Most fixed steps of a trajectory that are accepted; an hour or more of computing for one point.
@@ -21,7 +21,7 @@ pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
             let concerns = keys(&violation, of_spin);
             let judged = !concerns.iter().any(|key| draft.origins.is_doubtful(key));
             if judged && reported.insert(concerns.clone()) {
-                let places = places(draft, &concerns);
+                let places = places(draft, &concerns, &report.sources);
                 report.push(describe(&violation, &places));
             }
         }
@@ -42,7 +42,7 @@ fn keys(violation: &Violation, of_spin: bool) -> Vec<String> {
 }
 
 /// Where the concerned numbers were written: the axes that sweep them first, then files and arguments.
-fn places(draft: &Draft, concerns: &[String]) -> Vec<Location> {
+fn places(draft: &Draft, concerns: &[String], sources: &Sources) -> Vec<Location> {
     let sweeps = |parameter: &Parameter| {
         parameter.parts(&draft.plan.machine).iter().any(|part| concerns.iter().any(|key| key == part))
     };
@@ -50,8 +50,16 @@ fn places(draft: &Draft, concerns: &[String]) -> Vec<Location> {
     let axes = axes.filter_map(|(k, _)| draft.origins.get(&format!("axis[{k}]")));
     let mut places: Vec<Location> = Vec::new();
     for place in axes.chain(concerns.iter().filter_map(|key| draft.origins.get(key))) {
-        if !places.contains(place) {
-            places.push(place.clone());
+        // Numbers of one line, as of one vector, are one place.
+        let line = sources.line(place).number;
+        let same = places
+            .iter_mut()
+            .find(|other| other.source == place.source && sources.line(other).number == line);
+        match same {
+            Some(other) => {
+                other.span = other.span.start.min(place.span.start)..other.span.end.max(place.span.end);
+            }
+            None => places.push(place.clone()),
         }
     }
     places
@@ -72,13 +80,13 @@ pub(super) fn steps(draft: &Draft, report: &mut Report) {
     let end_s = draft.plan.end_s;
     let steps = end_s / step_s;
     let title = if step_s > end_s {
-        format!("a step of {step_s} s is longer than the whole run, {end_s} s")
+        format!("a step of {} s is longer than the whole run, {} s", decimal(step_s), decimal(end_s))
     } else if steps > MOST_STEPS {
-        format!("a step of {step_s} s makes {steps:.1e} steps to {end_s} s")
+        format!("a step of {} s makes {steps:.1e} steps to {} s", decimal(step_s), decimal(end_s))
     } else {
         return;
     };
-    let expected = format!("expected a step from {:e} s to {end_s} s", end_s / MOST_STEPS);
+    let expected = format!("expected a step from {:e} s to {} s", end_s / MOST_STEPS, decimal(end_s));
     let mut diagnostic = Diagnostic::new(title);
     let written = ["integrator.step_s", "time.end_s"];
     for (at, label) in
