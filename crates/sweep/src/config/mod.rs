@@ -4,6 +4,13 @@
 //! place where it stands. Wrong values are reported and replaced by stand-ins, so that the walk goes on and one pass
 //! finds every mistake; a plan comes out only if there is none.
 //!
+//! Left out: `name` is the file's own name, `machine` is `"paper"`, `window_s` the whole run, `[integrator]`
+//! `rk4-mass-scaled` with `accuracy = 1e-3` (`rk4`: `step_s = 2e-4`; `dopri5`: `rtol = 1e-6`, `atol = 1e-9`),
+//! `[reliability]` the ratio 2 over the six channels of tub and drum fronts and tub angles; without axes the grid is a
+//! single point. `[spin]` and `end_s` must be given, and a machine file is always whole.
+//!
+//! Bounds: files to 4 MiB, 1e12 grid points, 1e6 s, 1e10 fixed steps, numbers to 1e12 in magnitude.
+//!
 //! Precedence, later over earlier: machine file, `[set]`, `--set`, axes. Within each of them no number may be written
 //! twice, not even under two names (`damping_n_s_per_m` writes every `damper_1_damping_n_s_per_m`), because nothing
 //! would say which comes last.

@@ -274,7 +274,7 @@ fn loads_or_explains(text: &[u8]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn any_bytes_load_or_are_explained(bytes in prop::collection::vec(any::<u8>(), 0..300)) {

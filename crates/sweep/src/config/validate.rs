@@ -87,12 +87,13 @@ pub(super) fn steps(draft: &Draft, report: &mut Report) {
         return;
     };
     let expected = format!("expected a step from {:e} s to {} s", end_s / MOST_STEPS, decimal(end_s));
-    let mut diagnostic = Diagnostic::new(title);
-    let written = ["integrator.step_s", "time.end_s"];
-    for (at, label) in
-        written.iter().filter_map(|key| draft.origins.get(key)).zip([expected.as_str(), "and this"])
-    {
-        diagnostic = diagnostic.at(at, label);
-    }
-    report.push(diagnostic);
+    report.push(refuse_step(draft, title, &expected));
+}
+
+/// A refusal of the step, pointing at it, or at the section that leaves it out, and at the end it must reach.
+fn refuse_step(draft: &Draft, title: String, expected: &str) -> Diagnostic {
+    let step = draft.origins.get("integrator.step_s").or_else(|| draft.origins.get("integrator"));
+    let end = draft.origins.get("time.end_s");
+    let places = step.into_iter().chain(end).zip([expected, "and this"]);
+    places.fold(Diagnostic::new(title), |diagnostic, (at, label)| diagnostic.at(at, label))
 }
