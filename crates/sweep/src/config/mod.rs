@@ -1,0 +1,77 @@
+//! From what a user typed to a [`Plan`], or to every mistake in it.
+//!
+//! A grid file, the machine file it names and the constants of the command line are walked once, each value with the
+//! place where it stands. Wrong values are reported and replaced by stand-ins, so that the walk goes on and one pass
+//! finds every mistake; a plan comes out only if there is none.
+//!
+//! Left out: `name` is the file's own name, `machine` is `"paper"`, `window_s` the whole run, `[integrator]`
+//! `rk4-mass-scaled` with `accuracy = 1e-3` (`rk4`: `step_s = 2e-4`; `dopri5`: `rtol = 1e-6`, `atol = 1e-9`),
+//! `[reliability]` the ratio 2 over the six channels of tub and drum fronts and tub angles; without axes the grid is a
+//! single point. `[spin]` and `end_s` must be given, and a machine file is always whole.
+//!
+//! Bounds: files to 4 MiB, 1e12 grid points, 1e6 s, 1e10 fixed steps, numbers to 1e12 in magnitude.
+//!
+//! Precedence, later over earlier: machine file, `[set]`, `--set`, axes. Within each of them no number may be written
+//! twice, not even under two names (`damping_n_s_per_m` writes every `damper_1_damping_n_s_per_m`), because nothing
+//! would say which comes last.
+
+mod canonical;
+mod grid;
+mod machine;
+mod origins;
+mod parameters;
+mod render;
+mod report;
+pub mod schema;
+mod section;
+mod source;
+mod syntax;
+#[cfg(test)]
+mod tests;
+mod validate;
+
+use std::path::Path;
+
+pub use report::Diagnostics;
+
+use grid::Draft;
+use report::Report;
+use washer_model::Machine;
+
+use crate::plan::Plan;
+
+/// Reads a grid file with its machine file, puts the constants `NAME=VALUE` in place, and checks the whole.
+///
+/// # Errors
+/// Every mistake found, in one pass.
+pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
+    resolve(path, sets, |_, _| ())
+}
+
+/// As [`load`], for one point: `at` gives each axis of several values one (on the grid or between its points), and any
+/// other parameter too. The plan has no axes; its machine and spin are the point's.
+///
+/// # Errors
+/// Every mistake found, in one pass.
+pub fn load_point(path: &Path, sets: &[String], at: &[String]) -> Result<Plan, Diagnostics> {
+    resolve(path, sets, |draft, report| parameters::point(at, draft, report))
+}
+
+fn resolve(
+    path: &Path,
+    sets: &[String],
+    finish: impl FnOnce(&mut Draft, &mut Report),
+) -> Result<Plan, Diagnostics> {
+    let mut report = Report::default();
+    let Some(mut draft) = grid::draft(path, sets, &mut report) else { return Err(report.into_diagnostics()) };
+    finish(&mut draft, &mut report);
+    validate::steps(&draft, &mut report);
+    validate::scenarios(&draft, &mut report);
+    report.finish(draft.plan)
+}
+
+/// A machine as the text of a machine file: loading it gives the same machine, bit for bit.
+#[must_use]
+pub fn machine_file(machine: &Machine) -> String {
+    machine::to_toml(machine)
+}

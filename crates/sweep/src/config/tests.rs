@@ -1,0 +1,335 @@
+//! Every kind of mistake with its whole message, the defaults, precedence, and inputs no user would type.
+//!
+//! Each file of `testdata/broken` is a grid with mistakes; its snapshot stands beside it. A first line
+//! `# args: --set NAME=VALUE ...` adds the command line's part; `--at` makes it the load of a point.
+
+use std::path::{Path, PathBuf};
+
+use proptest::prelude::*;
+use washer_model::{Machine, Spin};
+
+use super::*;
+use crate::plan::{AxisValues, Integrator};
+
+fn testdata() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata")
+}
+
+fn sweeps() -> Vec<PathBuf> {
+    files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sweeps"))
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut files: Vec<_> = entries.filter(|path| path.extension().is_some_and(|x| x == "toml")).collect();
+    files.sort();
+    files
+}
+
+/// Loads a grid as its first line says.
+fn load_as_told(path: &Path) -> Result<Plan, Diagnostics> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let first = text.lines().next().unwrap_or_default();
+    let arguments: Vec<_> = first.strip_prefix("# args: ").unwrap_or_default().split_whitespace().collect();
+    let of = |option: &str| -> Vec<String> {
+        arguments.chunks(2).filter(|pair| pair[0] == option).map(|pair| pair[1].to_owned()).collect()
+    };
+    let (sets, at) = (of("--set"), of("--at"));
+    if at.is_empty() { load(path, &sets) } else { load_point(path, &sets, &at) }
+}
+
+/// A grid written to a folder of its own.
+fn load_text(text: impl AsRef<[u8]>, sets: &[&str]) -> Result<Plan, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grid.toml");
+    std::fs::write(&path, text).unwrap();
+    let sets: Vec<_> = sets.iter().map(|&set| set.to_owned()).collect();
+    load(&path, &sets).map_err(|diagnostics| diagnostics.to_string())
+}
+
+const SMALLEST: &str = "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = 50\n";
+
+#[test]
+fn broken_files_are_refused_with_these_messages() {
+    let broken = files(&testdata().join("broken"));
+    assert!(broken.len() >= 40, "{} broken files", broken.len());
+    let mut settings = insta::Settings::clone_current();
+    settings.set_snapshot_path(testdata().join("broken"));
+    settings.set_prepend_module_to_snapshot(false);
+    settings.set_omit_expression(true);
+    let mut accepted = Vec::new();
+    settings.bind(|| {
+        for path in broken {
+            let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+            match load_as_told(&path) {
+                Ok(_) => accepted.push(name),
+                Err(found) => {
+                    let folder = format!("{}/", testdata().join("broken").display());
+                    insta::assert_snapshot!(name, found.to_string().replace(&folder, ""));
+                }
+            }
+        }
+    });
+    assert_eq!(accepted, [""; 0], "accepted, but broken");
+}
+
+#[test]
+fn every_sweep_of_the_repository_loads() {
+    let sweeps = sweeps();
+    assert!(sweeps.len() >= 6);
+    for path in sweeps {
+        let plan = load(&path, &[]).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+        assert_eq!(Some(plan.name.as_str()), path.file_stem().and_then(|stem| stem.to_str()));
+    }
+}
+
+#[test]
+fn what_is_left_out_has_its_default() {
+    let plan = load_text(SMALLEST, &[]).unwrap();
+    assert_eq!(plan.name, "grid");
+    assert_eq!(plan.machine, Machine::paper());
+    assert_eq!(plan.spin, Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 });
+    assert_eq!((plan.end_s, plan.window_s), (50.0, [0.0, 50.0]));
+    assert_eq!(plan.integrator, Integrator::Rk4MassScaled { accuracy: 1e-3 });
+    assert_eq!(plan.points(), 1);
+    assert_eq!(plan.reliability.ratio_limit, 2.0);
+    let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name()).collect();
+    assert_eq!(
+        channels,
+        ["tub_front_y", "tub_front_z", "drum_front_y", "drum_front_z", "tub_yaw", "tub_pitch"]
+    );
+    let method = |text: &str| load_text(format!("{SMALLEST}[integrator]\n{text}"), &[]).unwrap().integrator;
+    assert_eq!(method("method = \"rk4\""), Integrator::Rk4 { step_s: 2e-4 });
+    assert_eq!(method("method = \"dopri5\""), Integrator::Dopri5 { rtol: 1e-6, atol: 1e-9 });
+    assert_eq!(method("accuracy = 1e-5"), Integrator::Rk4MassScaled { accuracy: 1e-5 });
+}
+
+#[test]
+fn a_starter_grid_is_the_documented_one() {
+    let starter = load_text(include_str!("../commands/starter.toml"), &[]).unwrap();
+    assert_eq!(starter.points(), 16);
+    let bare = load_text(SMALLEST, &[]).unwrap();
+    assert_eq!((starter.integrator, starter.reliability), (bare.integrator, bare.reliability));
+    assert_eq!(starter.machine, bare.machine);
+}
+
+#[test]
+fn later_layers_override_earlier_ones() {
+    let grid =
+        format!("{SMALLEST}[set]\ndamping_n_s_per_m = 100\nunbalance_mass_kg = 0.2\nspin_peak_rpm = 600\n");
+    let plan = load_text(&grid, &["unbalance_mass_kg=0.3", "damper_2_damping_n_s_per_m=90"]).unwrap();
+    assert_eq!(plan.machine.unbalance.mass_kg, 0.3);
+    let dampings = plan.machine.dampers.iter().map(|damper| damper.damping_n_s_per_m);
+    assert_eq!(dampings.collect::<Vec<_>>(), [100.0, 90.0]);
+    assert_eq!(plan.spin, Spin::Triangular { peak_rpm: 600.0, ramp_s: 50.0 });
+    // An axis of one damper beside a constant for all of them.
+    let axis = "[[axis]]\nparameter = \"damper_1_damping_n_s_per_m\"\nvalues = [50, 60]\n";
+    let plan = load_text(format!("{grid}{axis}"), &[]).unwrap();
+    let dampings = plan.scenario(1).machine.dampers.iter().map(|d| d.damping_n_s_per_m).collect::<Vec<_>>();
+    assert_eq!(dampings, [60.0, 100.0]);
+}
+
+#[test]
+fn a_point_may_lie_between_the_grids() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sweeps/fig12.toml");
+    let at = |at: &[&str]| load_point(&path, &[], &at.iter().map(|&at| at.to_owned()).collect::<Vec<_>>());
+    let plan = at(&["damping_n_s_per_m=99.5", "unbalance_mass_kg=0.4", "tub_mass_kg=25"]).unwrap();
+    assert_eq!((plan.points(), plan.machine.tub.mass_kg), (1, 25.0));
+    assert!(plan.machine.dampers.iter().all(|damper| damper.damping_n_s_per_m == 99.5));
+    assert_eq!(at(&["unbalance_mass_kg=0.4"]).unwrap_err().count(), 1);
+    assert_eq!(at(&[]).unwrap_err().count(), 2);
+}
+
+#[test]
+fn a_written_machine_reads_back_the_same_bits() {
+    let mut machine = Machine::paper();
+    machine.tub.mass_kg = 23.87 + 1e-13;
+    machine.springs[1].free_length_m = Some(0.1);
+    machine.springs.truncate(3);
+    machine.dampers.clear();
+    for machine in [machine, Machine::paper()] {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("machine.toml"), machine_file(&machine)).unwrap();
+        let grid = folder.path().join("grid.toml");
+        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
+        assert_eq!(load(&grid, &[]).unwrap().machine, machine);
+    }
+}
+
+#[test]
+fn the_canonical_plan_tells_plans_apart_and_keeps_every_bit() {
+    let json = |grid: &str, sets: &[&str]| load_text(grid, sets).unwrap().to_json().to_string();
+    let reordered =
+        "[time]\nend_s = 5e1\n[spin]\nramp_s = 50.0\npeak_rpm = 3.5e2\nprofile = \"triangular\"\n";
+    assert_eq!(json(SMALLEST, &[]), json(reordered, &[]));
+    assert_eq!(json(SMALLEST, &[]), json(SMALLEST, &["tub_mass_kg=23.87"]));
+    let odd = 0.1 + 0.2;
+    assert_ne!(json(SMALLEST, &["tub_mass_kg=0.3"]), json(SMALLEST, &[&format!("tub_mass_kg={odd}")]));
+    assert!(json(SMALLEST, &[&format!("tub_mass_kg={odd}")]).contains("0.30000000000000004"));
+}
+
+#[test]
+fn a_byte_order_mark_and_windows_line_ends_are_read_over() {
+    let dressed = format!("\u{feff}{}", SMALLEST.replace('\n', "\r\n"));
+    assert_eq!(load_text(dressed, &[]).unwrap(), load_text(SMALLEST, &[]).unwrap());
+}
+
+#[test]
+fn files_that_cannot_be_read_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let refusal = |path: &Path| load(path, &[]).unwrap_err().to_string();
+    let missing = refusal(&folder.path().join("missing.toml"));
+    assert!(missing.contains("missing.toml") && missing.contains("sweep init"), "{missing}");
+    assert!(refusal(folder.path()).contains("cannot read the grid file"));
+    assert!(
+        load_text(b"name = \"\xff\"", &[])
+            .unwrap_err()
+            .contains("not UTF-8 text: the first bad byte is number 9")
+    );
+    assert!(load_text(b"\xff\xfen\0a\0", &[]).unwrap_err().contains("UTF-16"));
+    assert!(load_text(vec![b'#'; 5 << 20], &[]).unwrap_err().contains("longer than 4 MiB"));
+    for blank in ["", " \n\t\n", "\u{feff}"] {
+        assert!(load_text(blank, &[]).unwrap_err().contains("is empty"), "{blank:?}");
+    }
+}
+
+#[test]
+fn a_file_of_nothing_but_mistakes_is_refused_in_bounded_text_and_time() {
+    let lines = (0..100_000).map(|k| format!("key_{k} = {k}\n"));
+    let unknown = load_text(lines.collect::<String>(), &[]).unwrap_err();
+    assert!(unknown.contains("100002 mistakes (100 shown)"), "{}", &unknown[unknown.len() - 200..]);
+    let unknown = load_text("]".repeat(1 << 20), &[]).unwrap_err();
+    assert!(unknown.len() < 10_000, "{}", unknown.len());
+    let list = format!("values = [{}]", "nan,".repeat(200_000));
+    let axis = format!("{SMALLEST}[[axis]]\nparameter = \"tub_mass_kg\"\n{list}\n");
+    let long = load_text(axis, &[]).unwrap_err();
+    assert!(long.len() < 100_000, "{}", long.len());
+}
+
+#[test]
+fn a_grid_of_as_many_points_as_allowed_takes_no_memory() {
+    let axis = |name: &str, count: u64| {
+        format!("[[axis]]\nparameter = \"{name}\"\nrange = {{ from = 1.0, to = 2.0, count = {count} }}\n")
+    };
+    let grid = format!("{SMALLEST}{}{}", axis("tub_mass_kg", 1_000_000), axis("shaft_mass_kg", 1_000_000));
+    let plan = load_text(grid, &[]).unwrap();
+    assert_eq!(plan.points(), 1_000_000_000_000);
+    assert_eq!(plan.axis_values(plan.points() - 1), [2.0, 2.0]);
+    let most = "18446744073709551615";
+    let grid = format!("{SMALLEST}{}{}", axis("tub_mass_kg", 1_000_000), axis("shaft_mass_kg", 1_000_001));
+    assert!(load_text(grid, &[]).unwrap_err().contains("too many grid points"));
+    let grid =
+        format!("{SMALLEST}{}", axis("tub_mass_kg", 1)).replace("count = 1 ", &format!("count = {most} "));
+    assert!(load_text(grid, &[]).unwrap_err().contains("out of range"));
+}
+
+#[test]
+fn an_axis_value_is_what_stands_in_the_file() {
+    let grid = format!("{SMALLEST}[[axis]]\nparameter = \"tub_mass_kg\"\nvalues = [3, 1, 0x10]\n");
+    let plan = load_text(grid, &[]).unwrap();
+    assert_eq!(plan.axes[0].values, AxisValues::List(vec![3.0, 1.0, 16.0]));
+}
+
+/// Pieces that mutations splice into a valid grid.
+const PIECES: [&str; 24] = [
+    "nan",
+    "inf",
+    "-1",
+    "1e999",
+    "0",
+    "\"",
+    "[",
+    "]",
+    "{",
+    "}",
+    "=",
+    ".",
+    ",",
+    "\n",
+    "#",
+    "[[axis]]\n",
+    "[set]\n",
+    "true",
+    "1979-05-27",
+    "\u{feff}",
+    "é",
+    "'''",
+    "spring_1_tub_y_m",
+    "99999999999999999999",
+];
+
+/// Either a plan whose every corner is sound, or mistakes; nothing else.
+fn loads_or_explains(text: &[u8]) {
+    match load_text(text, &[]) {
+        Ok(plan) => {
+            for point in plan.corners() {
+                let scenario = plan.scenario(point);
+                assert_eq!(scenario.machine.violations(), []);
+                assert_eq!(scenario.spin.violations(), []);
+            }
+            assert!(plan.window_s[0] < plan.window_s[1] && plan.window_s[1] <= plan.end_s);
+        }
+        Err(mistakes) => assert!(mistakes.contains("nothing was done")),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_bytes_load_or_are_explained(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        loads_or_explains(&bytes);
+    }
+
+    #[test]
+    fn any_text_loads_or_is_explained(text in "(\\PC|\n){0,200}") {
+        loads_or_explains(text.as_bytes());
+    }
+
+    #[test]
+    fn any_mutation_of_a_valid_grid_loads_or_is_explained(
+        start in 0_usize..5,
+        edits in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..20, 0_usize..PIECES.len(), any::<bool>()), 1..5),
+    ) {
+        let mut text = match start {
+            0 => include_str!("../commands/starter.toml").to_owned(),
+            k => std::fs::read_to_string(&sweeps()[k]).unwrap(),
+        };
+        for (place, cut, piece, insert) in edits {
+            let boundaries: Vec<_> = text.char_indices().map(|(at, _)| at).collect();
+            if boundaries.is_empty() { break; }
+            let from = *place.get(&boundaries);
+            let to = boundaries.iter().copied().find(|&at| at >= from + cut).unwrap_or(text.len());
+            text.replace_range(from..to, if insert { PIECES[piece] } else { "" });
+        }
+        loads_or_explains(text.as_bytes());
+    }
+
+    #[test]
+    fn any_constant_loads_or_is_explained(name in "[a-z_0-9=.]{0,40}", value in "\\PC{0,20}", known in any::<bool>()) {
+        let name = if known { "damping_n_s_per_m" } else { name.as_str() };
+        let set = format!("{name}={value}");
+        if let Err(mistakes) = load_text(SMALLEST, &[&set]) {
+            assert!(mistakes.contains("nothing was done"));
+        }
+    }
+
+    #[test]
+    fn any_number_of_a_machine_file_loads_or_is_explained(line in 0_usize..60, value in any::<f64>()) {
+        let machine = machine_file(&Machine::paper());
+        let mut lines: Vec<String> = machine.lines().map(str::to_owned).collect();
+        let line = line % lines.len();
+        if let Some((key, rest)) = lines[line].clone().split_once(" = ") {
+            let many = rest.starts_with('[');
+            lines[line] = if many { format!("{key} = [{value:?}, 1.0, 1.0]") } else { format!("{key} = {value:?}") };
+        }
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("machine.toml"), lines.join("\n")).unwrap();
+        let grid = folder.path().join("grid.toml");
+        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
+        match load(&grid, &[]) {
+            Ok(plan) => assert_eq!(plan.machine.violations(), []),
+            Err(mistakes) => assert!(mistakes.count() >= 1),
+        }
+    }
+}
