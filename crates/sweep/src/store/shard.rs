@@ -341,7 +341,10 @@ mod tests {
         let dealing = Dealing { shards: 4, first_array_id: 1 };
         assert_eq!(dealing.incomplete(6, &BTreeSet::new()), [1, 2, 3, 4]);
         assert_eq!(dealing.incomplete(6, &BTreeSet::from([0, 1, 3, 4])), [2, 3]);
-        assert!(dealing.incomplete(2, &BTreeSet::from([0, 1])).is_empty(), "shards without a chunk lack nothing");
+        assert!(
+            dealing.incomplete(2, &BTreeSet::from([0, 1])).is_empty(),
+            "shards without a chunk lack nothing"
+        );
     }
 
     #[test]
