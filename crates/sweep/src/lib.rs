@@ -1,1 +1,4 @@
-//! The sweep.
+//! The sweep: from a grid file to a result file.
+
+pub mod outcome;
+pub mod plan;
