@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use serde_json::{Map, Value};
 use washer_model::{Damper, Machine, Parameter, Spin, Spring};
 
 use super::grid::is_blank;
@@ -182,4 +183,41 @@ impl Reader<'_> {
 /// Path of a machine file as the grid file means it.
 pub(super) fn beside(grid: &Path, machine: &str) -> std::path::PathBuf {
     grid.parent().unwrap_or(Path::new("")).join(machine)
+}
+
+/// The machine as a machine file's tables hold it; every number as its shortest decimal that reads back the same.
+pub(crate) fn to_json(machine: &Machine) -> Value {
+    let mut root = Map::new();
+    for block in &BLOCKS {
+        let numbers = block_to_json(block, block.prefix, machine);
+        if block.section.is_empty() {
+            root.extend(numbers);
+        } else {
+            root.insert(block.section.to_owned(), Value::Object(numbers));
+        }
+    }
+    let spring = |(k, spring): (usize, &Spring)| {
+        let mut numbers = block_to_json(&SPRINGS, &format!("{}{}_", SPRINGS.prefix, k + 1), machine);
+        if let Some(free_length_m) = spring.free_length_m {
+            numbers.insert(FREE_LENGTH.to_owned(), free_length_m.into());
+        }
+        Value::Object(numbers)
+    };
+    let springs = machine.springs.iter().enumerate().map(spring).collect();
+    root.insert(SPRINGS.section.to_owned(), springs);
+    let damper = |k: usize| block_to_json(&DAMPERS, &format!("{}{}_", DAMPERS.prefix, k + 1), machine);
+    let dampers = (0..machine.dampers.len()).map(|k| Value::Object(damper(k))).collect();
+    root.insert(DAMPERS.section.to_owned(), dampers);
+    Value::Object(root)
+}
+
+fn block_to_json(block: &Block, prefix: &str, machine: &Machine) -> Map<String, Value> {
+    let number = |name: &str| {
+        let parameter = Parameter::find(&format!("{prefix}{name}"), machine, &no_spin()).ok();
+        parameter.and_then(|parameter| parameter.get(machine, &no_spin())).map_or(Value::Null, Value::from)
+    };
+    let numbers = block.numbers.iter().map(|&key| (key.to_owned(), number(key)));
+    let vector = |components: &[&str; 3]| components.iter().map(|name| number(name)).collect();
+    let vectors = block.vectors.iter().map(|(key, components)| ((*key).to_owned(), vector(components)));
+    numbers.chain(vectors).collect()
 }

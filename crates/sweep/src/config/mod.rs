@@ -8,6 +8,7 @@
 //! twice, not even under two names (`damping_n_s_per_m` writes every `damper_1_damping_n_s_per_m`), because nothing
 //! would say which comes last.
 
+mod canonical;
 mod grid;
 mod machine;
 mod origins;

@@ -39,8 +39,10 @@ pub(super) fn range(parameter: &str, spin: &Spin) -> Range {
 pub(super) fn constants(root: &mut Section<'_>, sets: &[String], draft: &mut Draft, report: &mut Report) {
     let mut constants = Vec::new();
     if let Some(section) = root.table("set", "[set]", report).given() {
-        for (name, value) in section.value.named_numbers(report) {
-            constants.extend(constant(name, value, draft, report));
+        let section = section.value;
+        for name in section.names() {
+            let number = |range: Range, report: &mut Report| section.number_named(name.value, range, report);
+            constants.extend(constant(name.clone(), number, draft, report));
         }
         apply(&constants, draft, report);
     }
@@ -65,29 +67,28 @@ fn arguments<'a>(
         };
         let value_at = Location::new(source, name.len() + 1..argument.len());
         let name = Located { value: name.trim(), at: Location::new(source, 0..name.len()) };
-        let value = match value.trim().parse() {
-            Ok(number) => check_number(name.value, number, value_at, Range::Any, report),
+        let number = |range: Range, report: &mut Report| match value.trim().parse() {
+            Ok(number) => check_number(name.value, number, value_at, range, report),
             Err(_) => {
                 let title = format!("`{}` is not a number", short(value));
-                report.push(Diagnostic::new(title).at(&value_at, "expected a number"));
+                report.push(Diagnostic::new(title).at(&value_at, format!("expected {range}")));
                 None
             }
         };
-        constants.extend(constant(name, value, draft, report));
+        constants.extend(constant(name.clone(), number, draft, report));
     }
     constants
 }
 
-/// A constant if its name and value are right.
+/// A constant if its name is right and `number` has one in the parameter's range.
 fn constant<'a>(
     name: Located<&'a str>,
-    value: Option<Located<f64>>,
+    number: impl FnOnce(Range, &mut Report) -> Option<Located<f64>>,
     draft: &Draft,
     report: &mut Report,
 ) -> Option<Constant<'a>> {
     let parameter = find(&name, draft, report)?;
-    let value = value?;
-    let value = check_number(name.value, value.value, value.at, parameter.range(), report)?;
+    let value = number(parameter.range(), report)?;
     Some(Constant { name, parameter, value })
 }
 
@@ -199,7 +200,7 @@ pub(super) fn axes(root: &mut Section<'_>, draft: &mut Draft, report: &mut Repor
 
 /// The values of an axis: listed, or a range.
 fn values(section: &mut Section<'_>, range: Range, report: &mut Report) -> Option<Located<AxisValues>> {
-    let listed = section.numbers("values", range, report);
+    let listed = section.right_numbers("values", range, report);
     let spaced = section.table("range", "range = { from, to, count }", report);
     match (listed, spaced) {
         (Field::Absent, Field::Absent) => {
@@ -221,14 +222,14 @@ fn values(section: &mut Section<'_>, range: Range, report: &mut Report) -> Optio
     }
 }
 
-fn list(listed: Located<Vec<Located<f64>>>, report: &mut Report) -> Option<Located<AxisValues>> {
-    if listed.value.is_empty() {
+fn list(listed: Located<(Vec<Located<f64>>, bool)>, report: &mut Report) -> Option<Located<AxisValues>> {
+    let (values, mut sound) = listed.value;
+    if values.is_empty() && sound {
         report.push(Diagnostic::new("`values` is empty").at(&listed.at, "expected at least one number"));
         return None;
     }
-    let mut order: Vec<&Located<f64>> = listed.value.iter().collect();
+    let mut order: Vec<&Located<f64>> = values.iter().collect();
     order.sort_by(|a, b| a.value.total_cmp(&b.value).then(a.at.span.start.cmp(&b.at.span.start)));
-    let mut sound = true;
     for pair in order.windows(2) {
         if pair[0].value == pair[1].value {
             let title = format!("the value {} stands twice on this axis", pair[1].value);
@@ -237,7 +238,7 @@ fn list(listed: Located<Vec<Located<f64>>>, report: &mut Report) -> Option<Locat
             sound = false;
         }
     }
-    let values = AxisValues::List(listed.value.iter().map(|value| value.value).collect());
+    let values = AxisValues::List(values.iter().map(|value| value.value).collect());
     sound.then_some(Located { value: values, at: listed.at })
 }
 

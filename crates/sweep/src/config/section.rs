@@ -154,18 +154,32 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// An array of finite numbers in a range, wrong ones left out and reported.
+    /// An array of finite numbers in a range; a single wrong one makes it wrong.
     pub(super) fn numbers(
         &mut self,
         key: &'static str,
         range: Range,
         report: &mut Report,
     ) -> Field<Vec<Located<f64>>> {
+        self.right_numbers(key, range, report).then(|found| {
+            let (numbers, all) = found.value;
+            all.then_some(Located { value: numbers, at: found.at })
+        })
+    }
+
+    /// The right ones among an array of numbers, and whether those are all.
+    pub(super) fn right_numbers(
+        &mut self,
+        key: &'static str,
+        range: Range,
+        report: &mut Report,
+    ) -> Field<(Vec<Located<f64>>, bool)> {
         let source = self.at.source;
         self.items(key, "an array of numbers", report).then(|items| {
             let numbers: Vec<_> =
                 items.value.iter().filter_map(|item| number(key, source, item, range, report)).collect();
-            (numbers.len() == items.value.len()).then_some(Located { value: numbers, at: items.at })
+            let all = numbers.len() == items.value.len();
+            Some(Located { value: (numbers, all), at: items.at })
         })
     }
 
@@ -234,16 +248,16 @@ impl<'a> Section<'a> {
         sections
     }
 
-    /// Every key as it stands with its number, for tables whose keys are names of parameters.
-    pub(super) fn named_numbers(&self, report: &mut Report) -> Vec<(Located<&'a str>, Option<Located<f64>>)> {
-        let mut pairs = Vec::new();
-        for (key, value) in self.table {
-            let name: &'a str = key.get_ref();
-            // The range is the parameter's, known only once the name is; here the number only has to be one.
-            let value = number(name, self.at.source, value, Range::Any, report);
-            pairs.push((Located { value: name, at: self.place(key.span()) }, value));
-        }
-        pairs
+    /// Every key as it stands, for tables whose keys are names of parameters.
+    pub(super) fn names(&self) -> Vec<Located<&'a str>> {
+        let located =
+            |key: &'a Spanned<_>| Located { value: as_str(key.get_ref()), at: self.place(key.span()) };
+        self.table.keys().map(located).collect()
+    }
+
+    /// The number under a name from [`Section::names`].
+    pub(super) fn number_named(&self, name: &str, range: Range, report: &mut Report) -> Option<Located<f64>> {
+        number(name, self.at.source, self.table.get(name)?, range, report)
     }
 
     /// Reports every key that was not asked for.
@@ -264,6 +278,10 @@ impl<'a> Section<'a> {
             });
         }
     }
+}
+
+fn as_str<'a>(text: &'a std::borrow::Cow<'_, str>) -> &'a str {
+    text
 }
 
 /// A word that is none of the choices.
