@@ -337,7 +337,7 @@ use Source::{Assumed, Convention, Derived, Grid, Paper};
 
 const TABLE_2: Source = Paper("Table 2");
 const TABLE_3: Source = Paper("Table 3");
-const SPLIT: Source = Derived("splits Table 2's drum into a symmetric bare drum and a point mass");
+const SPLIT: Source = Derived("Table 2's drum less its 0.4 kg unbalance");
 
 /// Rows with a single number each, and the three that write several.
 #[rustfmt::skip]

@@ -221,3 +221,50 @@ fn block_to_json(block: &Block, prefix: &str, machine: &Machine) -> Map<String, 
     let vectors = block.vectors.iter().map(|(key, components)| ((*key).to_owned(), vector(components)));
     numbers.chain(vectors).collect()
 }
+
+/// The machine as the text of a machine file, each number with its meaning and source.
+pub(crate) fn to_toml(machine: &Machine) -> String {
+    let mut text = "# A machine in full, in SI units. Lengths in m from O, midway between the bearings before loading: x along the\n\
+         # drum axis towards the door, y up, z sideways. Inertia about each body's own mass centre, in body axes.\n"
+        .to_owned();
+    for block in &BLOCKS {
+        let header = if block.section.is_empty() { String::new() } else { format!("[{}]", block.section) };
+        text.push_str(&block_to_toml(block, block.prefix, &header, machine));
+    }
+    for (k, spring) in machine.springs.iter().enumerate() {
+        let prefix = format!("{}{}_", SPRINGS.prefix, k + 1);
+        text.push_str(&block_to_toml(&SPRINGS, &prefix, "[[springs]]", machine));
+        if let Some(free_length_m) = spring.free_length_m {
+            text.push_str(&format!("{FREE_LENGTH} = {free_length_m:?}\n"));
+        }
+    }
+    for k in 0..machine.dampers.len() {
+        text.push_str(&block_to_toml(
+            &DAMPERS,
+            &format!("{}{}_", DAMPERS.prefix, k + 1),
+            "[[dampers]]",
+            machine,
+        ));
+    }
+    text
+}
+
+fn block_to_toml(block: &Block, prefix: &str, header: &str, machine: &Machine) -> String {
+    let find = |name: &str| Parameter::find(&format!("{prefix}{name}"), machine, &no_spin()).ok();
+    let value = |parameter: &Parameter| parameter.get(machine, &no_spin()).unwrap_or(f64::NAN);
+    let mut text = if header.is_empty() { String::new() } else { format!("\n{header}\n") };
+    for key in block.numbers {
+        if let Some(parameter) = find(key) {
+            let written = format!("{key} = {:?}", value(&parameter));
+            text.push_str(&format!("{written:<40} # {} [{}]\n", parameter.description(), parameter.source()));
+        }
+    }
+    for (key, components) in block.vectors {
+        let parameters: Vec<_> = components.iter().filter_map(|name| find(name)).collect();
+        let values: Vec<_> = parameters.iter().map(|parameter| format!("{:?}", value(parameter))).collect();
+        let source = parameters.first().map_or_else(String::new, |parameter| parameter.source().to_string());
+        let written = format!("{key} = [{}]", values.join(", "));
+        text.push_str(&format!("{written:<40} # [{source}]\n"));
+    }
+    text
+}

@@ -15,6 +15,7 @@ mod origins;
 mod parameters;
 mod render;
 mod report;
+pub mod schema;
 mod section;
 mod source;
 mod validate;
@@ -23,8 +24,10 @@ use std::path::Path;
 
 pub use report::Diagnostics;
 
-use crate::plan::Plan;
 use report::Report;
+use washer_model::Machine;
+
+use crate::plan::Plan;
 
 /// Reads a grid file with its machine file, puts the constants `NAME=VALUE` in place, and checks the whole.
 ///
@@ -36,4 +39,10 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
     validate::steps(&draft, &mut report);
     validate::scenarios(&draft, &mut report);
     report.finish(draft.plan)
+}
+
+/// A machine as the text of a machine file: loading it gives the same machine, bit for bit.
+#[must_use]
+pub fn machine_file(machine: &Machine) -> String {
+    machine::to_toml(machine)
 }
