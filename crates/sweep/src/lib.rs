@@ -1,7 +1,12 @@
-//! The sweep.
+//! The sweep: from a grid file to a result file.
 
+pub mod cli;
+pub mod commands;
+pub mod config;
+pub mod exit;
 pub mod interrupt;
 pub mod outcome;
+pub mod plan;
 pub mod progress;
 pub mod run;
 pub mod store;

@@ -1,7 +1,7 @@
 //! What a run is about to do, with every value resolved and checked: the one thing that flows from the
 //! configuration into the engine, the store and the reports.
 
-use washer_model::{Channel, Machine, Spin};
+use washer_model::{Channel, Machine, Parameter, Spin};
 
 /// A validated run: every grid point of every axis, and how each is integrated.
 ///
@@ -52,8 +52,8 @@ pub enum Integrator {
 /// One swept parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// Name from the parameter table.
-    pub parameter: &'static washer_model::Parameter,
+    /// From the parameter table.
+    pub parameter: Parameter,
     /// The values along it.
     pub values: AxisValues,
 }
@@ -83,6 +83,124 @@ pub enum AxisValues {
     },
 }
 
+impl AxisValues {
+    /// How many values.
+    #[must_use]
+    pub fn len(&self) -> u64 {
+        match self {
+            Self::List(values) => values.len() as u64,
+            Self::Linear { count, .. } | Self::Log { count, .. } => *count,
+        }
+    }
+
+    /// Whether there are none; never in a plan.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Value `i`, from 0; beyond the last, the last. Both ends are exact and every value is the same on all
+    /// machines: a linear one has the bits of NumPy's `linspace`, a logarithmic one takes no platform's `pow`.
+    ///
+    /// # Panics
+    /// If there are no values.
+    #[must_use]
+    pub fn value(&self, i: u64) -> f64 {
+        let at = |from: f64, to: f64, count: u64, between: &dyn Fn(f64, f64) -> f64| {
+            if i == 0 {
+                from
+            } else if i + 1 >= count {
+                to
+            } else {
+                between(i as f64, (count - 1) as f64)
+            }
+        };
+        match *self {
+            Self::List(ref values) => {
+                let last = values.len() - 1;
+                values[usize::try_from(i).map_or(last, |i| i.min(last))]
+            }
+            Self::Linear { from, to, count } => {
+                at(from, to, count, &|i, last| i * ((to - from) / last) + from)
+            }
+            Self::Log { from, to, count } => {
+                at(from, to, count, &|i, last| from * libm::exp10(i * (libm::log10(to / from) / last)))
+            }
+        }
+    }
+
+    /// Indices of the least and the greatest value.
+    #[must_use]
+    pub fn extremes(&self) -> [u64; 2] {
+        match self {
+            Self::List(values) => {
+                let by_value = |a: &(usize, &f64), b: &(usize, &f64)| a.1.total_cmp(b.1);
+                let index = |found: Option<(usize, &f64)>| found.map_or(0, |(i, _)| i as u64);
+                let pairs = || values.iter().enumerate();
+                [index(pairs().min_by(by_value)), index(pairs().max_by(by_value))]
+            }
+            Self::Linear { from, to, count } | Self::Log { from, to, count } => {
+                if from <= to {
+                    [0, count - 1]
+                } else {
+                    [count - 1, 0]
+                }
+            }
+        }
+    }
+}
+
+impl Plan {
+    /// Axes beyond this many are held at their least value by [`Plan::corners`].
+    const CORNER_AXES: usize = 12;
+
+    /// Number of grid points; 1 without axes.
+    #[must_use]
+    pub fn points(&self) -> u64 {
+        self.axes.iter().map(|axis| axis.values.len()).product()
+    }
+
+    /// Value of each axis at a grid point; the first axis varies slowest.
+    #[must_use]
+    pub fn axis_values(&self, point: u64) -> Vec<f64> {
+        let mut values = vec![0.0; self.axes.len()];
+        let mut rest = point;
+        for (value, axis) in values.iter_mut().zip(&self.axes).rev() {
+            *value = axis.values.value(rest % axis.values.len());
+            rest /= axis.values.len();
+        }
+        values
+    }
+
+    /// Machine and spin of a grid point.
+    #[must_use]
+    pub fn scenario(&self, point: u64) -> Scenario {
+        self.scenario_at(&self.axis_values(point))
+    }
+
+    /// Machine and spin at the given value of each axis, on the grid or between its points.
+    #[must_use]
+    pub fn scenario_at(&self, axis_values: &[f64]) -> Scenario {
+        let mut scenario = Scenario { machine: self.machine.clone(), spin: self.spin.clone() };
+        for (axis, &value) in self.axes.iter().zip(axis_values) {
+            axis.parameter.set(&mut scenario.machine, &mut scenario.spin, value);
+        }
+        scenario
+    }
+
+    /// Points where every axis is at its least or greatest value: where a condition that is monotonic along each axis
+    /// is hardest to meet. One point without axes.
+    pub fn corners(&self) -> impl Iterator<Item = u64> + '_ {
+        let free = self.axes.len().min(Self::CORNER_AXES);
+        (0..1_u32 << free).map(move |sides| {
+            self.axes.iter().enumerate().fold(0, |point, (k, axis)| {
+                let greatest = k < free && sides >> k & 1 == 1;
+                point * axis.values.len() + axis.values.extremes()[usize::from(greatest)]
+            })
+        })
+    }
+}
+
 /// The verdict's rule.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reliability {
@@ -99,4 +217,94 @@ pub struct Scenario {
     pub machine: Machine,
     /// The spin.
     pub spin: Spin,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(axes: &[(&str, AxisValues)]) -> Plan {
+        let machine = Machine::paper();
+        let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+        let axis = |(name, values): &(&str, AxisValues)| Axis {
+            parameter: Parameter::find(name, &machine, &spin).unwrap(),
+            values: values.clone(),
+        };
+        Plan {
+            name: "test".to_owned(),
+            axes: axes.iter().map(axis).collect(),
+            machine: machine.clone(),
+            spin: spin.clone(),
+            end_s: 50.0,
+            window_s: [30.0, 50.0],
+            integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 },
+            reliability: Reliability { ratio_limit: 2.0, channels: Channel::ALL.to_vec() },
+        }
+    }
+
+    #[test]
+    fn linear_values_are_numpys_linspace() {
+        // linspace is i * step + start with the last value replaced by the end; these are its doubles in Python.
+        let masses = AxisValues::Linear { from: 0.05, to: 1.0, count: 39 };
+        let numpy = [(0, 0.05), (1, 0.075), (2, 0.1), (20, 0.549_999_999_999_999_9), (37, 0.975), (38, 1.0)];
+        for (i, value) in numpy {
+            assert_eq!(masses.value(i), value, "{i}");
+        }
+        let dampings = AxisValues::Linear { from: 60.0, to: 300.0, count: 33 };
+        assert_eq!([dampings.value(1), dampings.value(31), dampings.value(32)], [67.5, 292.5, 300.0]);
+    }
+
+    #[test]
+    fn logarithmic_values_hit_the_decades_and_both_ends() {
+        let log = AxisValues::Log { from: 1e4, to: 1e9, count: 6 };
+        let values: Vec<_> = (0..6).map(|i| log.value(i)).collect();
+        assert_eq!(values, [1e4, 1e5, 1e6, 1e7, 1e8, 1e9]);
+        let odd = AxisValues::Log { from: 0.3, to: 7.7, count: 5 };
+        assert_eq!([odd.value(0), odd.value(4)], [0.3, 7.7]);
+        let ratio = odd.value(2) / odd.value(1);
+        assert!((odd.value(3) / odd.value(2) / ratio - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn an_axis_of_a_million_million_values_takes_no_memory() {
+        let axis = AxisValues::Linear { from: 0.0, to: 1.0, count: 1_000_000_000_000 };
+        assert_eq!([axis.value(0), axis.value(999_999_999_999)], [0.0, 1.0]);
+        let middle = axis.value(500_000_000_000);
+        assert!((middle - 0.5).abs() < 1e-11, "{middle}");
+    }
+
+    #[test]
+    fn the_first_axis_varies_slowest() {
+        let plan = plan(&[
+            ("unbalance_mass_kg", AxisValues::List(vec![0.1, 0.2])),
+            ("damping_n_s_per_m", AxisValues::Linear { from: 60.0, to: 80.0, count: 3 }),
+        ]);
+        assert_eq!(plan.points(), 6);
+        let order: Vec<_> = (0..6).map(|p| plan.axis_values(p)).collect();
+        let expected =
+            [[0.1, 60.0], [0.1, 70.0], [0.1, 80.0], [0.2, 60.0], [0.2, 70.0], [0.2, 80.0]].map(Vec::from);
+        assert_eq!(order, expected);
+        let scenario = plan.scenario(4);
+        assert_eq!(scenario.machine.unbalance.mass_kg, 0.2);
+        assert!(scenario.machine.dampers.iter().all(|d| d.damping_n_s_per_m == 70.0));
+        assert_eq!(scenario.spin, plan.spin);
+    }
+
+    #[test]
+    fn corners_are_the_extreme_points_even_of_unordered_lists() {
+        let plan = plan(&[
+            ("unbalance_mass_kg", AxisValues::List(vec![0.3, 0.1, 0.2])),
+            ("damping_n_s_per_m", AxisValues::Linear { from: 80.0, to: 60.0, count: 3 }),
+        ]);
+        let corners: Vec<_> = plan.corners().map(|p| plan.axis_values(p)).collect();
+        assert_eq!(corners, [[0.1, 60.0], [0.3, 60.0], [0.1, 80.0], [0.3, 80.0]].map(Vec::from));
+    }
+
+    #[test]
+    fn a_plan_without_axes_is_one_point() {
+        let plan = plan(&[]);
+        assert_eq!(plan.points(), 1);
+        assert_eq!(plan.corners().collect::<Vec<_>>(), [0]);
+        assert_eq!(plan.scenario(0).machine, plan.machine);
+    }
 }

@@ -148,7 +148,12 @@ impl Machine {
         Self {
             gravity_m_per_s2: 9.81,
             radial_clearance_m: 0.010,
-            tub: Tub { mass_kg: 23.87, centre_x_m: 0.24061, inertia_kg_m2: [1.03, 1.61, 1.53], front_x_m: 0.450 },
+            tub: Tub {
+                mass_kg: 23.87,
+                centre_x_m: 0.24061,
+                inertia_kg_m2: [1.03, 1.61, 1.53],
+                front_x_m: 0.450,
+            },
             shaft: Shaft { mass_kg: 4.34, centre_x_m: -0.01811, inertia_kg_m2: [0.0553, 0.0384, 0.0384] },
             drum: Drum {
                 mass_kg: drum_mass_kg,
@@ -165,7 +170,12 @@ impl Machine {
                 front_stiffness_n_per_m: 2e8,
                 rear_stiffness_n_per_m: 2e8,
             },
-            springs: vec![spring(0.3268, 1.0), spring(0.3268, -1.0), spring(0.0868, 1.0), spring(0.0868, -1.0)],
+            springs: vec![
+                spring(0.3268, 1.0),
+                spring(0.3268, -1.0),
+                spring(0.0868, 1.0),
+                spring(0.0868, -1.0),
+            ],
             dampers: vec![damper(1.0), damper(-1.0)],
         }
     }

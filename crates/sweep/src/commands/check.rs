@@ -1,0 +1,82 @@
+//! `sweep check GRID.toml`: every mistake, or what a run would do.
+
+use std::fmt::Write as _;
+
+use super::Grid;
+use crate::exit::{Error, Exit, print, tell};
+use crate::plan::{Axis, AxisValues, Integrator, Plan};
+
+/// Arguments of `sweep check`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    grid: Grid,
+    /// Print the plan as JSON, with every default and constant in place
+    #[arg(long)]
+    json: bool,
+}
+
+/// Checks a grid and shows its plan.
+///
+/// # Errors
+/// Mistakes in the grid file, or standard output that cannot be written.
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    let plan = args.grid.load()?;
+    if args.json {
+        return print(&format!("{:#}\n", plan.to_json()));
+    }
+    tell(summary(&plan).trim_end());
+    Ok(Exit::Done)
+}
+
+/// The plan in a few lines.
+fn summary(plan: &Plan) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{name:<12}{value}");
+    };
+    line("name", plan.name.clone());
+    for (k, axis) in plan.axes.iter().enumerate() {
+        line(if k == 0 { "axes" } else { "" }, describe(axis));
+    }
+    let points = plan.points();
+    line("points", if points == 1 { "1 (no axes)".to_owned() } else { points.to_string() });
+    line("time", format!("0 to {} s, window {} to {} s", plan.end_s, plan.window_s[0], plan.window_s[1]));
+    line("method", method(plan));
+    let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name()).collect();
+    line("channels", channels.join(", "));
+    line("verdict", format!("reliable where every ratio is below {}", plan.reliability.ratio_limit));
+    line("output", format!("results/{}.parquet", plan.name));
+    text
+}
+
+fn describe(axis: &Axis) -> String {
+    let (name, count) = (axis.parameter.name(), axis.values.len());
+    match &axis.values {
+        AxisValues::List(values) => {
+            let shown: Vec<_> = values.iter().take(8).map(f64::to_string).collect();
+            let more = if values.len() > shown.len() { ", ..." } else { "" };
+            format!("{name}: {count} values, {}{more}", shown.join(", "))
+        }
+        AxisValues::Linear { from, to, .. } => format!("{name}: {count} values from {from} to {to}"),
+        AxisValues::Log { from, to, .. } => {
+            format!("{name}: {count} values from {from} to {to}, logarithmic")
+        }
+    }
+}
+
+fn method(plan: &Plan) -> String {
+    match plan.integrator {
+        Integrator::Rk4 { step_s } => {
+            // Both window edges and the end are hit exactly, so each stretch rounds up.
+            let edges = [0.0, plan.window_s[0], plan.window_s[1], plan.end_s];
+            let steps: f64 = edges.windows(2).map(|edge| ((edge[1] - edge[0]) / step_s).ceil()).sum();
+            format!("rk4, step {step_s} s: about {steps} steps per trajectory, two trajectories per point")
+        }
+        Integrator::Dopri5 { rtol, atol } => {
+            format!("dopri5, rtol {rtol:e}, atol {atol:e}: steps as it needs")
+        }
+        Integrator::Rk4MassScaled { accuracy } => format!("rk4-mass-scaled, accuracy {accuracy:e}"),
+    }
+}

@@ -1,0 +1,51 @@
+//! `sweep init`: a grid or machine file to start from.
+
+use std::fs::OpenOptions;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use washer_model::Machine;
+
+use crate::config;
+use crate::exit::{Error, Exit, print, tell};
+
+/// The commented grid file.
+const GRID: &str = include_str!("starter.toml");
+
+/// Arguments of `sweep init`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// File to write; `-` for standard output [default: grid.toml, or machine.toml with --machine]
+    file: Option<PathBuf>,
+    /// Write the built-in machine as a machine file instead, to be changed and named by a grid file
+    #[arg(long)]
+    machine: bool,
+}
+
+/// Writes the file, never over another.
+///
+/// # Errors
+/// When the file exists or cannot be written.
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    let text = if args.machine { config::machine_file(&Machine::paper()) } else { GRID.to_owned() };
+    let default = if args.machine { "machine.toml" } else { "grid.toml" };
+    let path = args.file.as_deref().unwrap_or(Path::new(default));
+    if path == Path::new("-") {
+        return print(&text);
+    }
+    let written = OpenOptions::new().write(true).create_new(true).open(path).and_then(|mut file| {
+        file.write_all(text.as_bytes())?;
+        file.sync_all()
+    });
+    written.map_err(|source| Error::File { action: "write", path: path.to_owned(), source })?;
+    let shown = path.display();
+    tell(&if args.machine {
+        format!(
+            "wrote {shown}; a grid file beside it names it: machine = \"{}\"",
+            path.file_name().unwrap_or_default().display()
+        )
+    } else {
+        format!("wrote {shown}; next: sweep check {shown}")
+    });
+    Ok(Exit::Done)
+}

@@ -1,0 +1,21 @@
+//! `sweep schema`: JSON Schema of the files a user writes.
+
+use crate::config::schema;
+use crate::exit::{Error, Exit, print};
+
+/// Arguments of `sweep schema`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The schema of machine files instead of grid files
+    #[arg(long)]
+    machine: bool,
+}
+
+/// Prints the schema.
+///
+/// # Errors
+/// When standard output cannot be written.
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    let schema = if args.machine { schema::machine() } else { schema::grid() };
+    print(&format!("{schema:#}\n"))
+}

@@ -1,0 +1,70 @@
+//! A plan as JSON: what a result file carries as its input, and what tells one run's plan from another's.
+
+use serde_json::{Value, json};
+use washer_model::{Channel, Spin};
+
+use super::machine;
+use crate::plan::{Axis, AxisValues, Integrator, Plan};
+
+impl Plan {
+    /// The whole plan with every default and constant in place, in the grid file's own terms: `name`, `machine` (in
+    /// full), `spin`, `time`, `integrator`, `axis`, `reliability`.
+    ///
+    /// Canonical: keys are sorted, and numbers are written as the shortest decimal that reads back to the same bits,
+    /// so two plans are the same if and only if their texts are.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        json!({
+            "name": self.name,
+            "machine": machine::to_json(&self.machine),
+            "spin": spin(&self.spin),
+            "time": { "end_s": self.end_s, "window_s": self.window_s },
+            "integrator": integrator(&self.integrator),
+            "axis": self.axes.iter().map(axis).collect::<Value>(),
+            "reliability": {
+                "ratio_limit": self.reliability.ratio_limit,
+                "channels": self.reliability.channels.iter().map(|channel| Channel::name(*channel)).collect::<Value>(),
+            },
+        })
+    }
+}
+
+fn spin(spin: &Spin) -> Value {
+    match spin {
+        Spin::Cycloidal { peak_rpm, ramp_s } => {
+            json!({ "profile": "cycloidal", "peak_rpm": peak_rpm, "ramp_s": ramp_s })
+        }
+        Spin::Triangular { peak_rpm, ramp_s } => {
+            json!({ "profile": "triangular", "peak_rpm": peak_rpm, "ramp_s": ramp_s })
+        }
+        Spin::Ramp { peak_rpm, ramp_s } => {
+            json!({ "profile": "ramp", "peak_rpm": peak_rpm, "ramp_s": ramp_s })
+        }
+        Spin::Table { time_s, speed_rpm } => {
+            json!({ "profile": "table", "time_s": time_s, "speed_rpm": speed_rpm })
+        }
+    }
+}
+
+fn integrator(integrator: &Integrator) -> Value {
+    match integrator {
+        Integrator::Rk4 { step_s } => json!({ "method": "rk4", "step_s": step_s }),
+        Integrator::Dopri5 { rtol, atol } => json!({ "method": "dopri5", "rtol": rtol, "atol": atol }),
+        Integrator::Rk4MassScaled { accuracy } => {
+            json!({ "method": "rk4-mass-scaled", "accuracy": accuracy })
+        }
+    }
+}
+
+fn axis(axis: &Axis) -> Value {
+    let parameter = axis.parameter.name();
+    let range = |from: f64, to: f64, count: u64, spacing: &str| {
+        let range = json!({ "from": from, "to": to, "count": count, "spacing": spacing });
+        json!({ "parameter": parameter, "range": range })
+    };
+    match axis.values {
+        AxisValues::List(ref values) => json!({ "parameter": parameter, "values": values }),
+        AxisValues::Linear { from, to, count } => range(from, to, count, "linear"),
+        AxisValues::Log { from, to, count } => range(from, to, count, "log"),
+    }
+}

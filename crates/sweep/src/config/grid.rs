@@ -1,0 +1,353 @@
+//! The grid file, section by section. What is left out has the defaults of the constants below.
+
+use std::path::Path;
+
+use toml::Spanned;
+use toml::de::DeTable;
+use washer_model::{Channel, Machine, Range, Spin};
+
+use super::origins::Origins;
+use super::parameters::Written;
+use super::report::{Diagnostic, Report};
+use super::section::{Field, Section, listed, unknown_word};
+use super::source::{Located, Location, ReadError, SourceId, read};
+use super::{machine, parameters};
+use crate::plan::{Integrator, Plan, Reliability};
+
+/// `machine` when the grid names none.
+pub(super) const DEFAULT_MACHINE: &str = "paper";
+/// `method` when the grid names none.
+pub(super) const DEFAULT_METHOD: &str = "rk4-mass-scaled";
+/// `accuracy` of `rk4-mass-scaled`.
+pub(super) const DEFAULT_ACCURACY: f64 = 1e-3;
+/// `step_s` of `rk4`.
+pub(super) const DEFAULT_STEP_S: f64 = 2e-4;
+/// `rtol` of `dopri5`.
+pub(super) const DEFAULT_RTOL: f64 = 1e-6;
+/// `atol` of `dopri5`.
+pub(super) const DEFAULT_ATOL: f64 = 1e-9;
+/// `ratio_limit` of `[reliability]`.
+pub(super) const DEFAULT_RATIO_LIMIT: f64 = 2.0;
+/// `channels` of `[reliability]`.
+pub(super) const DEFAULT_CHANNELS: [Channel; 6] = [
+    Channel::TubFrontY,
+    Channel::TubFrontZ,
+    Channel::DrumFrontY,
+    Channel::DrumFrontZ,
+    Channel::TubYaw,
+    Channel::TubPitch,
+];
+
+/// Longest integration that is accepted: eleven days of spinning.
+pub(super) const LONGEST_S: f64 = 1e6;
+/// Values of `accuracy`.
+pub(super) const ACCURACY: Range = Range::Within(1e-9, 1e-1);
+/// Values of `rtol`.
+pub(super) const RTOL: Range = Range::Within(1e-14, 1e-1);
+/// Values of `atol`.
+pub(super) const ATOL: Range = Range::Within(1e-18, 1e-1);
+
+/// The methods, in the order of [`Integrator`].
+pub(super) const METHODS: [&str; 3] = ["rk4", "dopri5", "rk4-mass-scaled"];
+/// The profiles, in the order of [`Spin`].
+pub(super) const PROFILES: [&str; 4] = ["cycloidal", "triangular", "ramp", "table"];
+/// Names of machines that need no file.
+pub(super) const MACHINES: [&str; 1] = [DEFAULT_MACHINE];
+
+/// A plan in the making: whole, but sound only if nothing was reported.
+pub(super) struct Draft {
+    pub(super) plan: Plan,
+    pub(super) origins: Origins,
+    pub(super) constants: Vec<Written>,
+}
+
+/// Reads the grid file and its machine file and puts the constants in place. `None` if the grid file has no text.
+pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option<Draft> {
+    let shown = path.display();
+    let text = match read(path) {
+        Ok(text) => text,
+        Err(error) => {
+            let missing =
+                matches!(&error, ReadError::Io(error) if error.kind() == std::io::ErrorKind::NotFound);
+            let diagnostic = Diagnostic::new(format!("cannot read the grid file {shown}: {error}"));
+            report.push(if missing {
+                diagnostic.help("`sweep init FILE` writes a grid file to start from")
+            } else {
+                diagnostic
+            });
+            return None;
+        }
+    };
+    let source = report.sources.add(shown.to_string(), text.as_str());
+    if is_blank(&text) {
+        let at = Location::new(source, 0..0);
+        let diagnostic =
+            Diagnostic::new(format!("the grid file {shown} is empty")).at(&at, "expected a grid");
+        report.push(diagnostic.help("`sweep init FILE` writes a grid file to start from"));
+        return None;
+    }
+    let table = parse(&text, source, report);
+    let mut root = Section::new("the grid file", Location::new(source, 0..0), table.get_ref());
+
+    let name = name(&mut root, path, report);
+    let mut origins = Origins::default();
+    let machine = machine(&mut root, path, &mut origins, report);
+    let spin = spin(&mut root, &mut origins, report);
+    let [end_s, from_s, to_s] = time(&mut root, &mut origins, report);
+    let integrator = integrator(&mut root, &mut origins, report);
+    let reliability = reliability(&mut root, report);
+    let plan = Plan {
+        name,
+        machine,
+        spin,
+        end_s,
+        window_s: [from_s, to_s],
+        integrator,
+        axes: Vec::new(),
+        reliability,
+    };
+    let mut draft = Draft { plan, origins, constants: Vec::new() };
+    parameters::constants(&mut root, sets, &mut draft, report);
+    parameters::axes(&mut root, &mut draft, report);
+    root.finish(report);
+    Some(draft)
+}
+
+/// Nothing but white space and perhaps a byte order mark.
+pub(super) fn is_blank(text: &str) -> bool {
+    text.trim_start_matches('\u{feff}').trim().is_empty()
+}
+
+/// The table a text holds; what is not TOML is reported, what can be made out of the rest is returned.
+pub(super) fn parse<'a>(text: &'a str, source: SourceId, report: &mut Report) -> Spanned<DeTable<'a>> {
+    let (table, errors) = DeTable::parse_recoverable(text);
+    for error in errors {
+        let span = error.span().unwrap_or(0..0);
+        // The message says what was expected after the first comma, if anything.
+        let (what, expected) = error.message().split_once(", ").unwrap_or((error.message(), ""));
+        report.push_syntax(Diagnostic::new(what).at(&Location::new(source, span), expected));
+    }
+    table
+}
+
+fn name(root: &mut Section<'_>, path: &Path, report: &mut Report) -> String {
+    const EXPECTED: &str = "letters, digits, `-`, `_` and `.`, the first a letter or digit, at most 100";
+    let plain = |name: &str| {
+        let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
+        first && name.len() <= 100 && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
+    };
+    match root.text("name", report) {
+        Field::Given(found) if plain(found.value) => return found.value.to_owned(),
+        Field::Given(found) => {
+            let title = "`name` is not a plain file name";
+            report.push(Diagnostic::new(title).at(&found.at, format!("expected {EXPECTED}")));
+        }
+        Field::Bad => {}
+        Field::Absent => {
+            let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+            if plain(stem) {
+                return stem.to_owned();
+            }
+            root.missing("name", &format!("a name, as the file's own has more than {EXPECTED}"), report);
+        }
+    }
+    String::new()
+}
+
+fn machine(root: &mut Section<'_>, grid: &Path, origins: &mut Origins, report: &mut Report) -> Machine {
+    let Some(named) = root.text("machine", report).given() else { return Machine::paper() };
+    if named.value == DEFAULT_MACHINE {
+        return Machine::paper();
+    }
+    let path = machine::beside(grid, named.value);
+    let text = match read(&path) {
+        Ok(text) => text,
+        Err(error) => {
+            let title = format!("cannot read the machine file {}: {error}", path.display());
+            let expected = format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
+            report.push(Diagnostic::new(title).at(&named.at, expected).nearest(named.value, MACHINES));
+            return Machine::paper();
+        }
+    };
+    let source = report.sources.add(path.display().to_string(), text.as_str());
+    let table = parse(&text, source, report);
+    let root = Section::new("the machine file", Location::new(source, 0..0), table.get_ref());
+    machine::read(&text, root, origins, report)
+}
+
+fn spin(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> Spin {
+    // Stands in for a wrong spin, so that axes over its numbers are still known.
+    let stand_in = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+    let field = root.table("spin", "[spin]", report);
+    let Some(section) = root.require(field, "spin", "a section [spin]", report) else { return stand_in };
+    let mut section = section.value;
+    let expected = listed(&PROFILES);
+    let field = section.choice("profile", &PROFILES, report);
+    let Some(profile) = section.require(field, "profile", &expected, report) else {
+        return stand_in;
+    };
+    let spin = if PROFILES[profile.value] == "table" {
+        section.misplace(&["peak_rpm", "ramp_s"], "a table gives `time_s` and `speed_rpm` instead");
+        let mut column = |key: &'static str, range: Range| {
+            let field = section.numbers(key, range, report);
+            let found = section.require(field, key, "an array of numbers", report)?;
+            origins.put(format!("spin.{key}"), found.at);
+            let mut values = Vec::with_capacity(found.value.len());
+            for (k, entry) in found.value.into_iter().enumerate() {
+                origins.put(format!("spin.{key}[{k}]"), entry.at);
+                values.push(entry.value);
+            }
+            Some(values)
+        };
+        let (time_s, speed_rpm) = (column("time_s", Range::NonNegative), column("speed_rpm", Range::Any));
+        time_s.zip(speed_rpm).map(|(time_s, speed_rpm)| Spin::Table { time_s, speed_rpm })
+    } else {
+        let reason = format!("only the profile \"table\" has it, not \"{}\"", PROFILES[profile.value]);
+        section.misplace(&["time_s", "speed_rpm"], &reason);
+        let mut number = |key: &'static str, parameter: &str, expected: &str| {
+            let range = parameters::range(parameter, &stand_in);
+            let field = section.number(key, range, report);
+            let found = section.require(field, key, expected, report)?;
+            origins.put(parameter.to_owned(), found.at);
+            Some(found.value)
+        };
+        let peak_rpm = number("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm");
+        let ramp_s = number("ramp_s", "spin_ramp_s", "the duration of the run-up in s");
+        peak_rpm.zip(ramp_s).map(|(peak_rpm, ramp_s)| match PROFILES[profile.value] {
+            "cycloidal" => Spin::Cycloidal { peak_rpm, ramp_s },
+            "triangular" => Spin::Triangular { peak_rpm, ramp_s },
+            _ => Spin::Ramp { peak_rpm, ramp_s },
+        })
+    };
+    section.finish(report);
+    spin.unwrap_or_else(|| if PROFILES[profile.value] == "table" { machine::no_spin() } else { stand_in })
+}
+
+/// End and both edges of the window, in s.
+fn time(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> [f64; 3] {
+    const STAND_IN: [f64; 3] = [50.0, 0.0, 50.0];
+    let field = root.table("time", "[time]", report);
+    let Some(section) = root.require(field, "time", "a section [time]", report) else { return STAND_IN };
+    let mut section = section.value;
+    let field = section.number("end_s", Range::Positive, report);
+    let end = section.require(field, "end_s", "the end of the integration in s", report);
+    let end = end.filter(|end| {
+        let long = end.value > LONGEST_S;
+        if long {
+            let title = format!("`end_s` = {} is longer than any run", end.value);
+            report.push(Diagnostic::new(title).at(&end.at, format!("expected at most {LONGEST_S:e} s")));
+        }
+        !long
+    });
+    let window = section.numbers("window_s", Range::NonNegative, report).given();
+    let window = window.and_then(|window| self::window(window, end.as_ref(), report));
+    section.finish(report);
+    let Some(end) = end else { return STAND_IN };
+    let [from_s, to_s] = window.unwrap_or([0.0, end.value]);
+    origins.put("time.end_s".to_owned(), end.at);
+    [end.value, from_s, to_s]
+}
+
+fn window(
+    window: Located<Vec<Located<f64>>>,
+    end: Option<&Located<f64>>,
+    report: &mut Report,
+) -> Option<[f64; 2]> {
+    let [from, to] = window.value.as_slice() else {
+        let title = format!("`window_s` has {} numbers", window.value.len());
+        report.push(Diagnostic::new(title).at(&window.at, "expected two, [from, to], in s"));
+        return None;
+    };
+    if from.value >= to.value {
+        let what = if from.value > to.value { "reversed" } else { "empty" };
+        let title = format!("the window is {what}: it goes from {} s to {} s", from.value, to.value);
+        report.push(Diagnostic::new(title).at(&window.at, "expected [from, to] with from < to"));
+        return None;
+    }
+    if let Some(end) = end.filter(|end| to.value > end.value) {
+        let title = format!("the window ends at {} s, after the integration", to.value);
+        let expected = format!("expected at most {}", end.value);
+        report.push(Diagnostic::new(title).at(&to.at, expected).at(&end.at, "the integration ends here"));
+        return None;
+    }
+    Some([from.value, to.value])
+}
+
+fn integrator(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> Integrator {
+    let stand_in = Integrator::Rk4MassScaled { accuracy: DEFAULT_ACCURACY };
+    let Some(section) = root.table("integrator", "[integrator]", report).given() else { return stand_in };
+    let mut section = section.value;
+    origins.put("integrator".to_owned(), section.at().clone());
+    let method = match section.choice("method", &METHODS, report) {
+        Field::Given(method) => METHODS[method.value],
+        Field::Absent => DEFAULT_METHOD,
+        // Which keys belong to a method that is none cannot be said.
+        Field::Bad => return stand_in,
+    };
+    let mut misplace = |keys: &[&'static str], owner: &str| {
+        section.misplace(keys, &format!("only the method \"{owner}\" has it, not \"{method}\""));
+    };
+    if method != "rk4" {
+        misplace(&["step_s"], "rk4");
+    }
+    if method != "dopri5" {
+        misplace(&["rtol", "atol"], "dopri5");
+    }
+    if method != "rk4-mass-scaled" {
+        misplace(&["accuracy"], "rk4-mass-scaled");
+    }
+    let mut number = |key: &'static str, range: Range, default: f64| {
+        if let Some(at) = section.key_at(key) {
+            origins.put(format!("integrator.{key}"), at);
+        }
+        section.number(key, range, report).or(default).unwrap_or(default)
+    };
+    let integrator = match method {
+        "rk4" => Integrator::Rk4 { step_s: number("step_s", Range::Positive, DEFAULT_STEP_S) },
+        "dopri5" => Integrator::Dopri5 {
+            rtol: number("rtol", RTOL, DEFAULT_RTOL),
+            atol: number("atol", ATOL, DEFAULT_ATOL),
+        },
+        _ => Integrator::Rk4MassScaled { accuracy: number("accuracy", ACCURACY, DEFAULT_ACCURACY) },
+    };
+    section.finish(report);
+    integrator
+}
+
+fn reliability(root: &mut Section<'_>, report: &mut Report) -> Reliability {
+    let stand_in = Reliability { ratio_limit: DEFAULT_RATIO_LIMIT, channels: DEFAULT_CHANNELS.to_vec() };
+    let Some(section) = root.table("reliability", "[reliability]", report).given() else { return stand_in };
+    let mut section = section.value;
+    let ratio_limit = section.number("ratio_limit", Range::Positive, report).or(DEFAULT_RATIO_LIMIT);
+    let channels = channels(&mut section, report);
+    section.finish(report);
+    Reliability {
+        ratio_limit: ratio_limit.unwrap_or(DEFAULT_RATIO_LIMIT),
+        channels: channels.unwrap_or(stand_in.channels),
+    }
+}
+
+fn channels(section: &mut Section<'_>, report: &mut Report) -> Option<Vec<Channel>> {
+    let names = Channel::ALL.map(Channel::name);
+    let list = section.texts("channels", report).given()?;
+    if list.value.is_empty() {
+        let expected = format!("expected at least one of `{}`", names.join("`, `"));
+        report.push(Diagnostic::new("`channels` is empty").at(&list.at, expected));
+    }
+    let mut channels: Vec<Located<Channel>> = Vec::new();
+    for found in list.value {
+        let Some(&channel) = Channel::ALL.iter().find(|channel| channel.name() == found.value) else {
+            report.push(unknown_word("channel", &found, &names));
+            continue;
+        };
+        match channels.iter().find(|other| other.value == channel) {
+            Some(first) => report.push(
+                Diagnostic::new(format!("the channel \"{}\" is given twice", found.value))
+                    .at(&found.at, "expected each channel once")
+                    .at(&first.at, "first given here"),
+            ),
+            None => channels.push(Located { value: channel, at: found.at }),
+        }
+    }
+    Some(channels.into_iter().map(|channel| channel.value).collect())
+}

@@ -1,0 +1,285 @@
+//! Constants (`[set]`, `--set`, `--at`) and axes: names from the parameter table with a value each.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use washer_model::{Machine, Parameter, Range, Spin, UnknownParameter};
+
+use super::grid::Draft;
+use super::report::{Diagnostic, Report};
+use super::section::{Field, Section, check_number, short};
+use super::source::{Located, Location};
+use crate::plan::{Axis, AxisValues};
+
+/// Most grid points that are accepted. A hundred thousand points a second would take four months.
+pub(super) const MOST_POINTS: u64 = 1_000_000_000_000;
+
+/// Names offered as the nearest one; a machine of thousands of springs has more than a reader wants compared.
+const COMPARED: usize = 400;
+
+/// A name with its value, and the numbers it writes.
+struct Constant<'a> {
+    name: Located<&'a str>,
+    parameter: Parameter,
+    value: Located<f64>,
+}
+
+/// A constant that was put in place.
+pub(super) struct Written {
+    name: Located<String>,
+    parts: Vec<Cow<'static, str>>,
+}
+
+/// The range of a parameter of the spin.
+pub(super) fn range(parameter: &str, spin: &Spin) -> Range {
+    Parameter::find(parameter, &Machine::paper(), spin).map_or(Range::Any, |parameter| parameter.range())
+}
+
+/// Reads `[set]`, then `--set`, which overrides it, and writes both into the plan.
+pub(super) fn constants(root: &mut Section<'_>, sets: &[String], draft: &mut Draft, report: &mut Report) {
+    let mut constants = Vec::new();
+    if let Some(section) = root.table("set", "[set]", report).given() {
+        let section = section.value;
+        for name in section.names() {
+            let number = |range: Range, report: &mut Report| section.number_named(name.value, range, report);
+            constants.extend(constant(name.clone(), number, draft, report));
+        }
+        apply(&constants, draft, report);
+    }
+    apply(&arguments("--set", sets, draft, report), draft, report);
+}
+
+/// Reads NAME=VALUE arguments.
+fn arguments<'a>(
+    option: &str,
+    arguments: &'a [String],
+    draft: &Draft,
+    report: &mut Report,
+) -> Vec<Constant<'a>> {
+    let mut constants = Vec::new();
+    for argument in arguments {
+        let source = report.sources.add(option, argument.as_str());
+        let whole = Location::new(source, 0..argument.len());
+        let Some((name, value)) = argument.split_once('=') else {
+            let title = format!("`{}` is not a constant", short(argument));
+            report.push(Diagnostic::new(title).at(&whole, "expected NAME=VALUE"));
+            continue;
+        };
+        let value_at = Location::new(source, name.len() + 1..argument.len());
+        let name = Located { value: name.trim(), at: Location::new(source, 0..name.len()) };
+        let number = |range: Range, report: &mut Report| match value.trim().parse() {
+            Ok(number) => check_number(name.value, number, value_at, range, report),
+            Err(_) => {
+                let title = format!("`{}` is not a number", short(value));
+                report.push(Diagnostic::new(title).at(&value_at, format!("expected {range}")));
+                None
+            }
+        };
+        constants.extend(constant(name.clone(), number, draft, report));
+    }
+    constants
+}
+
+/// A constant if its name is right and `number` has one in the parameter's range.
+fn constant<'a>(
+    name: Located<&'a str>,
+    number: impl FnOnce(Range, &mut Report) -> Option<Located<f64>>,
+    draft: &Draft,
+    report: &mut Report,
+) -> Option<Constant<'a>> {
+    let parameter = find(&name, draft, report)?;
+    let value = number(parameter.range(), report)?;
+    Some(Constant { name, parameter, value })
+}
+
+/// The parameter of this name.
+fn find(name: &Located<&str>, draft: &Draft, report: &mut Report) -> Option<Parameter> {
+    let (machine, spin) = (&draft.plan.machine, &draft.plan.spin);
+    let error = match Parameter::find(name.value, machine, spin) {
+        Ok(parameter) => return Some(parameter),
+        Err(error) => error,
+    };
+    let title = format!("unknown parameter `{}`", short(name.value));
+    let diagnostic = Diagnostic::new(title).at(&name.at, error.to_string());
+    let section = match name.value {
+        "end_s" | "window_s" => Some("[time]"),
+        "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator]"),
+        "ratio_limit" | "channels" => Some("[reliability]"),
+        _ => None,
+    };
+    report.push(match (error, section) {
+        (UnknownParameter::Name, Some(section)) => diagnostic.help(format!(
+            "`{}` stands in {section} of the grid file and is the same at every point",
+            name.value
+        )),
+        (UnknownParameter::Name, None) => {
+            let all = Parameter::all(machine, spin);
+            let near = diagnostic.nearest(name.value, all.iter().take(COMPARED).map(Parameter::name));
+            near.help("`sweep parameters` lists every name")
+        }
+        (UnknownParameter::Number { .. } | UnknownParameter::TableSpin, _) => diagnostic,
+    });
+    None
+}
+
+/// Writes constants of equal rank; no number may be written twice, as nothing says which comes last.
+fn apply(constants: &[Constant<'_>], draft: &mut Draft, report: &mut Report) {
+    let mut written: BTreeMap<Cow<'static, str>, &Constant<'_>> = BTreeMap::new();
+    for constant in constants {
+        let parts = constant.parameter.parts(&draft.plan.machine);
+        match parts.iter().find_map(|part| written.get(part)) {
+            Some(first) => report.push(twice(&constant.name, &first.name)),
+            None => {
+                constant.parameter.set(&mut draft.plan.machine, &mut draft.plan.spin, constant.value.value);
+                for part in &parts {
+                    draft.origins.put(part.clone().into_owned(), constant.value.at.clone());
+                    written.insert(part.clone(), constant);
+                }
+                let name = Located { value: constant.name.value.to_owned(), at: constant.name.at.clone() };
+                draft.constants.push(Written { name, parts });
+            }
+        }
+    }
+}
+
+fn twice(second: &Located<&str>, first: &Located<&str>) -> Diagnostic {
+    let title = if second.value == first.value {
+        format!("`{}` is given twice", second.value)
+    } else {
+        format!("`{}` and `{}` write the same number", first.value, second.value)
+    };
+    Diagnostic::new(title).at(&second.at, "expected each number once").at(&first.at, "first written here")
+}
+
+/// Reads every `[[axis]]`.
+pub(super) fn axes(root: &mut Section<'_>, draft: &mut Draft, report: &mut Report) {
+    let mut swept: BTreeMap<Cow<'static, str>, Located<String>> = BTreeMap::new();
+    let mut points: Option<u64> = Some(1);
+    for mut section in root.tables("axis", report) {
+        let field = section.text("parameter", report);
+        let name = section.require(field, "parameter", "the name of a parameter", report);
+        let parameter = name.as_ref().and_then(|name| find(name, draft, report));
+        let range = parameter.as_ref().map_or(Range::Any, Parameter::range);
+        let values = values(&mut section, range, report);
+        section.finish(report);
+
+        let count = values.as_ref().map_or(1, |values| values.value.len());
+        let product =
+            points.and_then(|points| points.checked_mul(count)).filter(|&points| points <= MOST_POINTS);
+        if let (Some(points), None, Some(values)) = (points, product, &values) {
+            let title = format!("too many grid points: {points} before this axis, times {count}");
+            report.push(
+                Diagnostic::new(title).at(&values.at, format!("expected at most {MOST_POINTS} in all")),
+            );
+        }
+        points = product;
+
+        let (Some(name), Some(parameter)) = (name, parameter) else { continue };
+        let parts = parameter.parts(&draft.plan.machine);
+        if let Some(first) = parts.iter().find_map(|part| swept.get(part)) {
+            let first = Located { value: first.value.as_str(), at: first.at.clone() };
+            report.push(twice(&name, &first));
+            continue;
+        }
+        for constant in &draft.constants {
+            if constant.parts.iter().all(|part| parts.contains(part)) {
+                let title = format!("`{}` is an axis: this constant has no effect", constant.name.value);
+                let diagnostic =
+                    Diagnostic::new(title).at(&constant.name.at, "expected a parameter that no axis sweeps");
+                report.push(diagnostic.at(&name.at, "swept here"));
+            }
+        }
+        let own = Located { value: name.value.to_owned(), at: name.at };
+        swept.extend(parts.into_iter().map(|part| (part, own.clone())));
+        if let (Some(values), Some(_)) = (values, product) {
+            draft.origins.put(format!("axis[{}]", draft.plan.axes.len()), values.at);
+            draft.plan.axes.push(Axis { parameter, values: values.value });
+        }
+    }
+}
+
+/// The values of an axis: listed, or a range.
+fn values(section: &mut Section<'_>, range: Range, report: &mut Report) -> Option<Located<AxisValues>> {
+    let listed = section.right_numbers("values", range, report);
+    let spaced = section.table("range", "range = { from, to, count }", report);
+    match (listed, spaced) {
+        (Field::Absent, Field::Absent) => {
+            section.missing(
+                "values",
+                "`values = [...]` or `range = { from = ..., to = ..., count = ... }`",
+                report,
+            );
+            None
+        }
+        (Field::Given(listed), Field::Absent) => list(listed, report),
+        (Field::Absent, Field::Given(spaced)) => spacing(spaced.value, range, report),
+        (Field::Given(listed), Field::Given(spaced)) => {
+            let diagnostic = Diagnostic::new("an axis has both `values` and `range`");
+            report.push(diagnostic.at(&spaced.at, "expected only one of them").at(&listed.at, "given here"));
+            None
+        }
+        (Field::Bad, _) | (_, Field::Bad) => None,
+    }
+}
+
+fn list(listed: Located<(Vec<Located<f64>>, bool)>, report: &mut Report) -> Option<Located<AxisValues>> {
+    let (values, mut sound) = listed.value;
+    if values.is_empty() && sound {
+        report.push(Diagnostic::new("`values` is empty").at(&listed.at, "expected at least one number"));
+        return None;
+    }
+    let mut order: Vec<&Located<f64>> = values.iter().collect();
+    order.sort_by(|a, b| a.value.total_cmp(&b.value).then(a.at.span.start.cmp(&b.at.span.start)));
+    for pair in order.windows(2) {
+        if pair[0].value == pair[1].value {
+            let title = format!("the value {} stands twice on this axis", pair[1].value);
+            let diagnostic = Diagnostic::new(title).at(&pair[1].at, "expected each value once");
+            report.push(diagnostic.at(&pair[0].at, "first given here"));
+            sound = false;
+        }
+    }
+    let values = AxisValues::List(values.iter().map(|value| value.value).collect());
+    sound.then_some(Located { value: values, at: listed.at })
+}
+
+fn spacing(mut section: Section<'_>, range: Range, report: &mut Report) -> Option<Located<AxisValues>> {
+    let at = section.at().clone();
+    let end = |key: &'static str, section: &mut Section<'_>, report: &mut Report| {
+        let field = section.number(key, range, report);
+        section.require(field, key, "a number", report)
+    };
+    let from = end("from", &mut section, report);
+    let to = end("to", &mut section, report);
+    let field = section.count("count", MOST_POINTS, report);
+    let count = section.require(field, "count", "the number of values, both ends included", report);
+    let logarithmic = section.choice("spacing", &["linear", "log"], report).or(0);
+    section.finish(report);
+    let (from, to, count, logarithmic) = (from?, to?, count?, logarithmic? == 1);
+    let mut refuse = |title: String, at: &Location, expected: &str| {
+        report.push(Diagnostic::new(title).at(at, expected));
+        None
+    };
+    if from.value == to.value && count.value > 1 {
+        let title = format!("a range from {0} to {0} has one value, not {1}", from.value, count.value);
+        return refuse(title, &to.at, "expected another number, or count = 1");
+    }
+    if from.value != to.value && count.value == 1 {
+        return refuse(
+            "one value cannot be both ends of a range".to_owned(),
+            &count.at,
+            "expected at least 2",
+        );
+    }
+    if logarithmic && !(from.value > 0.0 && to.value > 0.0) {
+        let end = if from.value > 0.0 { &to } else { &from };
+        let title = format!("{} has no logarithm", end.value);
+        return refuse(title, &end.at, "expected a number greater than 0, or spacing = \"linear\"");
+    }
+    let (from, to, count) = (from.value, to.value, count.value);
+    let value = if logarithmic {
+        AxisValues::Log { from, to, count }
+    } else {
+        AxisValues::Linear { from, to, count }
+    };
+    Some(Located { value, at })
+}

@@ -1,0 +1,78 @@
+//! A mistake as text, in the form of rustc's messages.
+
+use std::ops::Range;
+
+use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+
+use super::report::Diagnostic;
+use super::source::{Line, Location, Sources, floor_char_boundary};
+
+/// Lines longer than this are shown only around the place that matters.
+const LONGEST_LINE_BYTES: usize = 160;
+/// How much is shown before such a place.
+const BEFORE_BYTES: usize = 40;
+
+fn renderer(colour: bool) -> Renderer {
+    if colour { Renderer::styled() } else { Renderer::plain() }
+}
+
+/// One mistake, without a newline at the end.
+pub(super) fn diagnostic(diagnostic: &Diagnostic, sources: &Sources, colour: bool) -> String {
+    let mut group = Group::with_title(Level::ERROR.primary_title(diagnostic.title.as_str()));
+    // Places on one line share its picture.
+    let mut shown: Vec<(usize, &Location)> = Vec::new();
+    for (k, (at, _)) in diagnostic.places.iter().enumerate() {
+        let number = sources.line(at).number;
+        if shown.iter().any(|&(line, other)| line == number && other.source == at.source) {
+            continue;
+        }
+        shown.push((number, at));
+        group = picture(group, diagnostic, sources, k);
+    }
+    let help = diagnostic.help.iter().map(|help| Level::HELP.message(help.as_str()));
+    renderer(colour).render(&[group.elements(help)])
+}
+
+/// The line of place `k`, with every place of that line marked.
+fn picture<'a>(group: Group<'a>, diagnostic: &'a Diagnostic, sources: &'a Sources, k: usize) -> Group<'a> {
+    let at = &diagnostic.places[k].0;
+    let line = sources.line(at);
+    let window = window(&line);
+    let column = line.text[..line.span.start].chars().count() + 1;
+    let mut snippet = Snippet::source(&line.text[window.clone()]).line_start(line.number);
+    for (j, (other, label)) in diagnostic.places.iter().enumerate() {
+        let marked = sources.line(other);
+        let inside = other.source == at.source
+            && marked.number == line.number
+            && window.start <= marked.span.start
+            && marked.span.start <= window.end;
+        if inside {
+            let kind = if j == 0 { AnnotationKind::Primary } else { AnnotationKind::Context };
+            let span = marked.span.start - window.start..marked.span.end.min(window.end) - window.start;
+            snippet = snippet.annotation(kind.span(span).label(label.as_str()));
+        }
+    }
+    let name = sources.name(at.source);
+    if window == (0..line.text.len()) {
+        group.element(snippet.path(name))
+    } else {
+        group.element(Origin::path(name).line(line.number).char_column(column)).element(snippet)
+    }
+}
+
+/// The part of a line that is shown, in its bytes.
+fn window(line: &Line<'_>) -> Range<usize> {
+    if line.text.len() <= LONGEST_LINE_BYTES {
+        return 0..line.text.len();
+    }
+    let start = floor_char_boundary(line.text, line.span.start.saturating_sub(BEFORE_BYTES));
+    start..floor_char_boundary(line.text, start + LONGEST_LINE_BYTES)
+}
+
+/// The last line.
+pub(super) fn summary(count: usize, beyond: usize, colour: bool) -> String {
+    let mistakes = if count == 1 { "1 mistake".to_owned() } else { format!("{count} mistakes") };
+    let shown = if beyond == 0 { String::new() } else { format!(" ({} shown)", count - beyond) };
+    let title = format!("{mistakes}{shown}, nothing was done");
+    renderer(colour).render(&[Group::with_title(Level::ERROR.primary_title(title))])
+}

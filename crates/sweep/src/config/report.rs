@@ -1,0 +1,214 @@
+//! Mistakes as they are found: collected, not thrown, so that one pass shows them all.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+use super::render;
+use super::source::{Location, SourceId, Sources};
+
+/// More mistakes than this are counted but not kept: a wrong file should not fill a terminal or the memory.
+const KEPT: usize = 100;
+
+/// One mistake.
+#[derive(Debug)]
+pub(super) struct Diagnostic {
+    /// What is wrong, in one line.
+    pub(super) title: String,
+    /// Where, and what was expected there; the first is the place itself, the rest explain.
+    pub(super) places: Vec<(Location, String)>,
+    /// What to do.
+    pub(super) help: Vec<String>,
+}
+
+impl Diagnostic {
+    pub(super) fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), places: Vec::new(), help: Vec::new() }
+    }
+
+    pub(super) fn at(mut self, at: &Location, expected: impl Into<String>) -> Self {
+        self.places.push((at.clone(), expected.into()));
+        self
+    }
+
+    pub(super) fn help(mut self, help: impl Into<String>) -> Self {
+        self.help.push(help.into());
+        self
+    }
+
+    /// Adds the nearest valid name, if any is near.
+    pub(super) fn nearest<'a>(self, typed: &str, valid: impl IntoIterator<Item = &'a str>) -> Self {
+        match nearest(typed, valid) {
+            Some(name) => self.help(format!("did you mean `{name}`?")),
+            None => self,
+        }
+    }
+}
+
+/// The valid name most like what was typed.
+fn nearest<'a>(typed: &str, valid: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // Comparing takes time with the square of the length, and no valid name is long.
+    let typed: String = typed.chars().take(80).flat_map(char::to_lowercase).collect();
+    let likeness = |name: &str| {
+        // Leaving out the unit or a leading word is as common as a slip of the finger.
+        let part =
+            typed.len() >= 4 && (name.starts_with(&typed) || name.split('_').any(|word| word == typed));
+        if part {
+            0.95
+        } else {
+            strsim::jaro_winkler(&typed, name)
+                .min(strsim::normalized_damerau_levenshtein(&typed, name) + 0.45)
+        }
+    };
+    valid
+        .into_iter()
+        .map(|name| (name, likeness(name)))
+        .filter(|&(_, likeness)| likeness > 0.8)
+        .fold(None, |best: Option<(&str, f64)>, next| match best {
+            Some(best) if best.1 >= next.1 => Some(best),
+            _ => Some(next),
+        })
+        .map(|(name, _)| name)
+}
+
+/// Texts read and mistakes found so far.
+#[derive(Debug, Default)]
+pub(super) struct Report {
+    pub(super) sources: Sources,
+    found: Vec<Diagnostic>,
+    beyond: usize,
+    /// Lines that are not TOML: what recovery makes of them is not the user's mistake.
+    broken: BTreeMap<SourceId, BTreeSet<usize>>,
+}
+
+impl Report {
+    /// Keeps a mistake, unless it stands on a line whose syntax is already refused.
+    pub(super) fn push(&mut self, diagnostic: Diagnostic) {
+        let broken = diagnostic.places.first().is_some_and(|(at, _)| {
+            self.broken.get(&at.source).is_some_and(|lines| lines.contains(&self.sources.line(at).number))
+        });
+        if broken {
+            return;
+        }
+        self.keep(diagnostic);
+    }
+
+    /// Keeps a mistake of syntax, the first of each line.
+    pub(super) fn push_syntax(&mut self, diagnostic: Diagnostic) {
+        let first = diagnostic.places.first().is_none_or(|(at, _)| {
+            let number = self.sources.line(at).number;
+            self.broken.entry(at.source).or_default().insert(number)
+        });
+        if first {
+            self.keep(diagnostic);
+        }
+    }
+
+    /// Keeps the report of a missing key, unless broken syntax may have swallowed it.
+    pub(super) fn push_missing(&mut self, diagnostic: Diagnostic) {
+        if !diagnostic.places.iter().any(|(at, _)| self.broken.contains_key(&at.source)) {
+            self.keep(diagnostic);
+        }
+    }
+
+    fn keep(&mut self, diagnostic: Diagnostic) {
+        if self.found.len() < KEPT {
+            self.found.push(diagnostic);
+        } else {
+            self.beyond += 1;
+        }
+    }
+
+    /// Whether nothing is wrong so far.
+    pub(super) fn is_clean(&self) -> bool {
+        self.found.is_empty()
+    }
+
+    /// The value if nothing is wrong.
+    pub(super) fn finish<T>(self, value: T) -> Result<T, Diagnostics> {
+        if self.is_clean() { Ok(value) } else { Err(self.into_diagnostics()) }
+    }
+
+    pub(super) fn into_diagnostics(mut self) -> Diagnostics {
+        self.found.sort_by_key(|d| d.places.first().map(|(at, _)| (at.source, at.span.start)));
+        Diagnostics { sources: self.sources, found: self.found, beyond: self.beyond }
+    }
+}
+
+/// Everything wrong with a grid file, its machine file and the command line's constants.
+///
+/// `Display` shows each mistake with file, line and column, the text pointed at, what was expected and the nearest
+/// valid name, without colour; [`Diagnostics::styled`] the same with colour.
+#[derive(Debug)]
+pub struct Diagnostics {
+    sources: Sources,
+    found: Vec<Diagnostic>,
+    beyond: usize,
+}
+
+impl Diagnostics {
+    /// How many mistakes, at least 1.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.found.len() + self.beyond
+    }
+
+    /// The whole text with terminal colours.
+    #[must_use]
+    pub fn styled(&self) -> String {
+        self.text(true)
+    }
+
+    fn text(&self, colour: bool) -> String {
+        let mut text = String::new();
+        for diagnostic in &self.found {
+            text.push_str(&render::diagnostic(diagnostic, &self.sources, colour));
+            text.push_str("\n\n");
+        }
+        text.push_str(&render::summary(self.count(), self.beyond, colour));
+        text
+    }
+}
+
+impl fmt::Display for Diagnostics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text(false))
+    }
+}
+
+impl std::error::Error for Diagnostics {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_name_is_what_a_reader_would_say() {
+        let valid = [
+            "unbalance_mass_kg",
+            "tub_mass_kg",
+            "damping_n_s_per_m",
+            "spring_stiffness_n_per_m",
+            "spin_ramp_s",
+        ];
+        let near = |typed| nearest(typed, valid);
+        assert_eq!(near("unbalance_mas_kg"), Some("unbalance_mass_kg"));
+        assert_eq!(near("Unbalance_Mass_kg"), Some("unbalance_mass_kg"));
+        assert_eq!(near("tub_mass"), Some("tub_mass_kg"));
+        assert_eq!(near("damping"), Some("damping_n_s_per_m"));
+        assert_eq!(near("spring_stifness_n_per_m"), Some("spring_stiffness_n_per_m"));
+        assert_eq!(near("colour"), None);
+        assert_eq!(near(""), None);
+        assert_eq!(near(&"damping".repeat(1000)), None);
+    }
+
+    #[test]
+    fn mistakes_beyond_what_is_kept_are_counted() {
+        let mut report = Report::default();
+        for _ in 0..1000 {
+            report.push(Diagnostic::new("wrong"));
+        }
+        let diagnostics = report.into_diagnostics();
+        assert_eq!((diagnostics.count(), diagnostics.found.len()), (1000, KEPT));
+        assert!(diagnostics.to_string().contains("1000 mistakes"));
+    }
+}

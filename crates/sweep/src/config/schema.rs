@@ -1,0 +1,256 @@
+//! JSON Schema (draft 2020-12) of grid and machine files, made from the tables that read them. It covers what a schema
+//! can say about one file; what needs the machine or two values together is left to [`super::load`].
+
+use serde_json::{Map, Value, json};
+use washer_model::{Channel, Machine, Parameter, Range, Spin};
+
+use super::grid::{
+    ACCURACY, ATOL, DEFAULT_ACCURACY, DEFAULT_ATOL, DEFAULT_CHANNELS, DEFAULT_MACHINE, DEFAULT_METHOD,
+    DEFAULT_RATIO_LIMIT, DEFAULT_RTOL, DEFAULT_STEP_S, LONGEST_S, METHODS, RTOL,
+};
+use super::machine::{BLOCKS, Block, DAMPERS, FREE_LENGTH, SPRINGS, no_spin};
+use super::parameters::MOST_POINTS;
+
+const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
+
+/// The schema of grid files.
+#[must_use]
+pub fn grid() -> Value {
+    let name = json!({
+        "type": "string",
+        "pattern": "^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
+        "description": "name of the run and of its result file; the grid file's own name if left out",
+    });
+    let machine = json!({
+        "type": "string",
+        "default": DEFAULT_MACHINE,
+        "description": "\"paper\", or a machine file relative to this file",
+    });
+    let axes = json!({
+        "type": "array",
+        "items": axis(),
+        "description": "swept parameters; the first varies slowest",
+    });
+    let sections = [
+        ("name", name),
+        ("machine", machine),
+        ("set", set()),
+        ("spin", spin()),
+        ("time", time()),
+        ("integrator", integrator()),
+        ("axis", axes),
+        ("reliability", reliability()),
+    ];
+    document("Grid file of sweep", table(sections, &["spin", "time"]))
+}
+
+/// The schema of machine files.
+#[must_use]
+pub fn machine() -> Value {
+    let mut properties: Vec<(&str, Value)> = Vec::new();
+    let mut required = Vec::new();
+    for block in &BLOCKS {
+        if block.section.is_empty() {
+            properties.extend(block_properties(block, block.prefix));
+            required.extend(block.numbers);
+        } else {
+            properties.push((block.section, block_schema(block, block.prefix, &[])));
+            required.push(block.section);
+        }
+    }
+    let free_length = (FREE_LENGTH, parameter(&format!("{}1_{FREE_LENGTH}", SPRINGS.prefix)));
+    let springs = block_schema(&SPRINGS, &format!("{}1_", SPRINGS.prefix), &[free_length]);
+    properties.push((SPRINGS.section, json!({ "type": "array", "items": springs, "minItems": 1 })));
+    let dampers = block_schema(&DAMPERS, &format!("{}1_", DAMPERS.prefix), &[]);
+    properties.push((DAMPERS.section, json!({ "type": "array", "items": dampers })));
+    required.push(SPRINGS.section);
+    document("Machine file of sweep", table(properties, &required))
+}
+
+fn document(title: &str, mut schema: Value) -> Value {
+    schema["$schema"] = DRAFT.into();
+    schema["title"] = title.into();
+    schema
+}
+
+fn table<'k>(properties: impl IntoIterator<Item = (&'k str, Value)>, required: &[&str]) -> Value {
+    let properties: Map<String, Value> =
+        properties.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+    json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
+}
+
+fn number(range: Range) -> Value {
+    let largest = Range::LARGEST;
+    match range {
+        Range::Any => json!({ "type": "number", "minimum": -largest, "maximum": largest }),
+        Range::Positive => json!({ "type": "number", "exclusiveMinimum": 0, "maximum": largest }),
+        Range::NonNegative => json!({ "type": "number", "minimum": 0, "maximum": largest }),
+        Range::Negative => json!({ "type": "number", "minimum": -largest, "exclusiveMaximum": 0 }),
+        Range::Within(least, greatest) => json!({ "type": "number", "minimum": least, "maximum": greatest }),
+    }
+}
+
+fn described(mut schema: Value, default: f64, description: &str) -> Value {
+    schema["default"] = default.into();
+    schema["description"] = description.into();
+    schema
+}
+
+/// A parameter's number, by name, of the built-in machine.
+fn parameter(name: &str) -> Value {
+    let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
+    Parameter::find(name, &Machine::paper(), &spin)
+        .map_or(json!({ "type": "number" }), |parameter| of(&parameter))
+}
+
+fn of(parameter: &Parameter) -> Value {
+    let mut schema = number(parameter.range());
+    schema["description"] = format!("{}, {}", parameter.description(), parameter.unit()).into();
+    schema
+}
+
+fn block_properties(block: &Block, prefix: &str) -> Vec<(&'static str, Value)> {
+    let numbers = block.numbers.iter().map(|&key| (key, parameter(&format!("{prefix}{key}"))));
+    let vectors = block.vectors.iter().map(|(key, components)| {
+        let items = number_of(&format!("{prefix}{}", components[0]));
+        (*key, json!({ "type": "array", "items": items, "minItems": 3, "maxItems": 3 }))
+    });
+    numbers.chain(vectors).collect()
+}
+
+fn number_of(name: &str) -> Value {
+    Parameter::find(name, &Machine::paper(), &no_spin())
+        .map_or(number(Range::Any), |found| number(found.range()))
+}
+
+fn block_schema(block: &Block, prefix: &str, optional: &[(&'static str, Value)]) -> Value {
+    let properties = block_properties(block, prefix);
+    let required: Vec<&str> = properties.iter().map(|(key, _)| *key).collect();
+    table(properties.into_iter().chain(optional.iter().cloned()), &required)
+}
+
+/// Names of the table as properties; those of numbered springs and dampers as patterns.
+fn set() -> Value {
+    let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
+    let all = Parameter::all(&Machine::paper(), &spin);
+    let (mut properties, mut patterns) = (Map::new(), Map::new());
+    for parameter in &all {
+        let name = parameter.name();
+        match ["spring_", "damper_"].iter().find_map(|prefix| Some((prefix, name.strip_prefix(prefix)?))) {
+            Some((prefix, rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => {
+                let suffix = rest.trim_start_matches(|c: char| c.is_ascii_digit());
+                patterns.insert(format!("^{prefix}[1-9][0-9]*{suffix}$"), of(parameter));
+            }
+            _ => {
+                properties.insert(name.to_owned(), of(parameter));
+            }
+        }
+    }
+    json!({
+        "type": "object", "properties": properties, "patternProperties": patterns, "additionalProperties": false,
+        "description": "constants, by the names of `sweep parameters`",
+    })
+}
+
+fn spin() -> Value {
+    let ramped = |profile: &str, description: &str| {
+        let profile = json!({ "const": profile, "description": description });
+        let keys = [
+            ("profile", profile),
+            ("peak_rpm", parameter("spin_peak_rpm")),
+            ("ramp_s", parameter("spin_ramp_s")),
+        ];
+        table(keys, &["profile", "peak_rpm", "ramp_s"])
+    };
+    let column = |range: Range, description: &str| json!({ "type": "array", "items": number(range), "minItems": 1, "description": description });
+    let tabled = table(
+        [
+            (
+                "profile",
+                json!({ "const": "table", "description": "linear between given points, constant after the last" }),
+            ),
+            ("time_s", column(Range::NonNegative, "increasing times from 0, s")),
+            ("speed_rpm", column(Range::Within(-1e5, 1e5), "speeds at these times, rpm")),
+        ],
+        &["profile", "time_s", "speed_rpm"],
+    );
+    json!({
+        "oneOf": [
+            ramped("cycloidal", "smooth run-up, then constant"),
+            ramped("triangular", "linear up, and as long down"),
+            ramped("ramp", "linear up, then constant"),
+            tabled,
+        ],
+    })
+}
+
+fn time() -> Value {
+    let end_s = json!({
+        "type": "number",
+        "exclusiveMinimum": 0,
+        "maximum": LONGEST_S,
+        "description": "end of the integration, s",
+    });
+    let window_s = json!({
+        "type": "array",
+        "items": number(Range::NonNegative),
+        "minItems": 2,
+        "maxItems": 2,
+        "description": "amplitudes are taken from the first to the second time, s; the whole run if left out",
+    });
+    table([("end_s", end_s), ("window_s", window_s)], &["end_s"])
+}
+
+fn integrator() -> Value {
+    let step_s = described(number(Range::Positive), DEFAULT_STEP_S, "fixed step, s");
+    let rtol = described(number(RTOL), DEFAULT_RTOL, "relative tolerance per component");
+    let atol = described(number(ATOL), DEFAULT_ATOL, "absolute tolerance per component");
+    let accuracy = described(number(ACCURACY), DEFAULT_ACCURACY, "relative error of the amplitudes");
+    let one = |name: &str| {
+        let method = ("method", json!({ "const": name }));
+        let required: &[&str] = if name == DEFAULT_METHOD { &[] } else { &["method"] };
+        match name {
+            "rk4" => table([method, ("step_s", step_s.clone())], required),
+            "dopri5" => table([method, ("rtol", rtol.clone()), ("atol", atol.clone())], required),
+            _ => table([method, ("accuracy", accuracy.clone())], required),
+        }
+    };
+    json!({ "oneOf": METHODS.map(one) })
+}
+
+fn reliability() -> Value {
+    let limit = "a point is reliable where every ratio is below this";
+    let channels = json!({
+        "type": "array",
+        "items": { "enum": Channel::ALL.map(Channel::name) },
+        "minItems": 1,
+        "uniqueItems": true,
+        "default": DEFAULT_CHANNELS.map(Channel::name),
+        "description": "motions that are compared",
+    });
+    let ratio_limit = described(number(Range::Positive), DEFAULT_RATIO_LIMIT, limit);
+    table([("ratio_limit", ratio_limit), ("channels", channels)], &[])
+}
+
+fn axis() -> Value {
+    let parameter = json!({ "type": "string", "description": "a name of `sweep parameters`" });
+    let range = table(
+        [
+            ("from", number(Range::Any)),
+            ("to", number(Range::Any)),
+            (
+                "count",
+                json!({ "type": "integer", "minimum": 1, "maximum": MOST_POINTS, "description": "how many, both ends included" }),
+            ),
+            ("spacing", json!({ "enum": ["linear", "log"], "default": "linear" })),
+        ],
+        &["from", "to", "count"],
+    );
+    let values = json!({ "type": "array", "items": number(Range::Any), "minItems": 1, "uniqueItems": true });
+    json!({
+        "oneOf": [
+            table([("parameter", parameter.clone()), ("values", values)], &["parameter", "values"]),
+            table([("parameter", parameter), ("range", range)], &["parameter", "range"]),
+        ],
+    })
+}

@@ -1,0 +1,391 @@
+//! Walks one TOML table key by key. Every value is taken by name and kind; a wrong one is reported and the walk goes
+//! on, so that one pass finds every mistake. Keys nobody asked for are reported at the end.
+
+use std::collections::BTreeMap;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+use washer_model::Range;
+
+use super::report::{Diagnostic, Report};
+use super::source::{Located, Location, SourceId};
+
+/// A key's value: not written, written wrong (already reported), or as written.
+pub(super) enum Field<T> {
+    Absent,
+    Bad,
+    Given(Located<T>),
+}
+
+impl<T> Field<T> {
+    /// The value, or the default when it is not written; `None` when it is wrong.
+    pub(super) fn or(self, default: T) -> Option<T> {
+        match self {
+            Self::Absent => Some(default),
+            Self::Bad => None,
+            Self::Given(found) => Some(found.value),
+        }
+    }
+
+    /// The value with its place, if it is written and right.
+    pub(super) fn given(self) -> Option<Located<T>> {
+        match self {
+            Self::Given(found) => Some(found),
+            Self::Absent | Self::Bad => None,
+        }
+    }
+
+    fn then<U>(self, next: impl FnOnce(Located<T>) -> Option<Located<U>>) -> Field<U> {
+        match self {
+            Self::Absent => Field::Absent,
+            Self::Bad => Field::Bad,
+            Self::Given(found) => next(found).map_or(Field::Bad, Field::Given),
+        }
+    }
+}
+
+type Value<'a> = Spanned<DeValue<'a>>;
+
+/// One table of a file.
+pub(super) struct Section<'a> {
+    /// As messages call it: `[spin]`, `the grid file`.
+    title: String,
+    at: Location,
+    table: &'a DeTable<'a>,
+    known: Vec<&'static str>,
+    /// Keys that are valid elsewhere, with the reason why not here.
+    misplaced: BTreeMap<&'static str, String>,
+}
+
+impl<'a> Section<'a> {
+    pub(super) fn new(title: impl Into<String>, at: Location, table: &'a DeTable<'a>) -> Self {
+        Self { title: title.into(), at, table, known: Vec::new(), misplaced: BTreeMap::new() }
+    }
+
+    /// Where the table begins.
+    pub(super) fn at(&self) -> &Location {
+        &self.at
+    }
+
+    fn place(&self, span: std::ops::Range<usize>) -> Location {
+        Location::new(self.at.source, span)
+    }
+
+    fn get(&mut self, key: &'static str) -> Option<&'a Value<'a>> {
+        self.known.push(key);
+        self.table.get(key)
+    }
+
+    /// Where a key stands, if it is written.
+    pub(super) fn key_at(&self, key: &str) -> Option<Location> {
+        self.table.get_key_value(key).map(|(key, _)| self.place(key.span()))
+    }
+
+    /// Refuses these keys with a reason of their own instead of "unknown key".
+    pub(super) fn misplace(&mut self, keys: &[&'static str], reason: &str) {
+        self.misplaced.extend(keys.iter().map(|&key| (key, reason.to_owned())));
+    }
+
+    /// Reports a key that must be there.
+    pub(super) fn require<T>(
+        &self,
+        field: Field<T>,
+        key: &str,
+        expected: &str,
+        report: &mut Report,
+    ) -> Option<Located<T>> {
+        if matches!(field, Field::Absent) {
+            self.missing(key, expected, report);
+        }
+        field.given()
+    }
+
+    pub(super) fn missing(&self, key: &str, expected: &str, report: &mut Report) {
+        let title = format!("`{key}` is missing in {}", self.title);
+        report.push_missing(Diagnostic::new(title).at(&self.at, format!("expected {expected}")));
+    }
+
+    /// A finite number in a range.
+    pub(super) fn number(&mut self, key: &'static str, range: Range, report: &mut Report) -> Field<f64> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        number(key, self.at.source, value, range, report).map_or(Field::Bad, Field::Given)
+    }
+
+    /// A whole number from 1 to `most`.
+    pub(super) fn count(&mut self, key: &'static str, most: u64, report: &mut Report) -> Field<u64> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        let at = self.place(value.span());
+        let expected = format!("expected a whole number from 1 to {most}");
+        match value.get_ref() {
+            DeValue::Integer(integer) => match u64::from_str_radix(integer.as_str(), integer.radix()) {
+                Ok(count) if (1..=most).contains(&count) => Field::Given(Located { value: count, at }),
+                _ => {
+                    let title = format!("`{key}` = {integer} is out of range");
+                    report.push(Diagnostic::new(title).at(&at, expected));
+                    Field::Bad
+                }
+            },
+            other => {
+                report.push(wrong_kind(key, &at, "a whole number", other));
+                Field::Bad
+            }
+        }
+    }
+
+    /// A string.
+    pub(super) fn text(&mut self, key: &'static str, report: &mut Report) -> Field<&'a str> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        text(key, self.at.source, value, report).map_or(Field::Bad, Field::Given)
+    }
+
+    /// One of a few words. Given back as the word's position in `choices`.
+    pub(super) fn choice(
+        &mut self,
+        key: &'static str,
+        choices: &[&str],
+        report: &mut Report,
+    ) -> Field<usize> {
+        self.text(key, report).then(|found| {
+            let position = choices.iter().position(|&choice| choice == found.value);
+            if position.is_none() {
+                report.push(unknown_word(key, &found, choices));
+            }
+            position.map(|value| Located { value, at: found.at })
+        })
+    }
+
+    /// An array of finite numbers in a range; a single wrong one makes it wrong.
+    pub(super) fn numbers(
+        &mut self,
+        key: &'static str,
+        range: Range,
+        report: &mut Report,
+    ) -> Field<Vec<Located<f64>>> {
+        self.right_numbers(key, range, report).then(|found| {
+            let (numbers, all) = found.value;
+            all.then_some(Located { value: numbers, at: found.at })
+        })
+    }
+
+    /// The right ones among an array of numbers, and whether those are all.
+    pub(super) fn right_numbers(
+        &mut self,
+        key: &'static str,
+        range: Range,
+        report: &mut Report,
+    ) -> Field<(Vec<Located<f64>>, bool)> {
+        let source = self.at.source;
+        self.items(key, "an array of numbers", report).then(|items| {
+            let numbers: Vec<_> =
+                items.value.iter().filter_map(|item| number(key, source, item, range, report)).collect();
+            let all = numbers.len() == items.value.len();
+            Some(Located { value: (numbers, all), at: items.at })
+        })
+    }
+
+    /// An array of strings, wrong ones left out and reported.
+    pub(super) fn texts(&mut self, key: &'static str, report: &mut Report) -> Field<Vec<Located<&'a str>>> {
+        let source = self.at.source;
+        self.items(key, "an array of strings", report).then(|items| {
+            let texts = items.value.iter().filter_map(|item| text(key, source, item, report)).collect();
+            Some(Located { value: texts, at: items.at })
+        })
+    }
+
+    fn items(&mut self, key: &'static str, kind: &str, report: &mut Report) -> Field<&'a [Value<'a>]> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        let at = self.place(value.span());
+        match value.get_ref() {
+            DeValue::Array(items) => Field::Given(Located { value: items, at }),
+            other => {
+                report.push(wrong_kind(key, &at, kind, other));
+                Field::Bad
+            }
+        }
+    }
+
+    /// A table under this key.
+    pub(super) fn table(
+        &mut self,
+        key: &'static str,
+        title: &str,
+        report: &mut Report,
+    ) -> Field<Section<'a>> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        let at = self.place(value.span());
+        match value.get_ref() {
+            DeValue::Table(table) => {
+                Field::Given(Located { value: Section::new(title, at.clone(), table), at })
+            }
+            other => {
+                report.push(wrong_kind(key, &at, &format!("a table, {title}"), other));
+                Field::Bad
+            }
+        }
+    }
+
+    /// An array of tables, `[[key]]`; empty if it is not written.
+    pub(super) fn tables(&mut self, key: &'static str, report: &mut Report) -> Vec<Section<'a>> {
+        let kind = format!("tables, each under [[{key}]]");
+        let items = match self.get(key).map(|value| (value, value.get_ref())) {
+            None => return Vec::new(),
+            Some((_, DeValue::Array(items))) => items,
+            Some((value, other)) => {
+                report.push(wrong_kind(key, &self.place(value.span()), &kind, other));
+                return Vec::new();
+            }
+        };
+        let mut sections = Vec::new();
+        for (k, item) in items.iter().enumerate() {
+            let at = self.place(item.span());
+            match item.get_ref() {
+                DeValue::Table(table) => {
+                    sections.push(Section::new(format!("[[{key}]] number {}", k + 1), at, table))
+                }
+                other => report.push(wrong_kind(key, &at, &kind, other)),
+            }
+        }
+        sections
+    }
+
+    /// Every key as it stands, for tables whose keys are names of parameters.
+    pub(super) fn names(&self) -> Vec<Located<&'a str>> {
+        let located =
+            |key: &'a Spanned<_>| Located { value: as_str(key.get_ref()), at: self.place(key.span()) };
+        self.table.keys().map(located).collect()
+    }
+
+    /// The number under a name from [`Section::names`].
+    pub(super) fn number_named(&self, name: &str, range: Range, report: &mut Report) -> Option<Located<f64>> {
+        number(name, self.at.source, self.table.get(name)?, range, report)
+    }
+
+    /// Reports every key that was not asked for.
+    pub(super) fn finish(self, report: &mut Report) {
+        for key in self.table.keys() {
+            let name: &str = key.get_ref();
+            if self.known.contains(&name) {
+                continue;
+            }
+            let at = self.place(key.span());
+            let title = format!("unknown key `{}` in {}", short(name), self.title);
+            report.push(match self.misplaced.get(name) {
+                Some(reason) => Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
+                    .at(&at, reason.as_str()),
+                None => Diagnostic::new(title)
+                    .at(&at, format!("expected {}", listed(&self.known)))
+                    .nearest(name, self.known.iter().copied()),
+            });
+        }
+    }
+}
+
+fn as_str<'a>(text: &'a std::borrow::Cow<'_, str>) -> &'a str {
+    text
+}
+
+/// A word that is none of the choices.
+pub(super) fn unknown_word(what: &str, found: &Located<&str>, choices: &[&str]) -> Diagnostic {
+    Diagnostic::new(format!("unknown {what} \"{}\"", short(found.value)))
+        .at(&found.at, format!("expected {}", listed(choices)))
+        .nearest(found.value, choices.iter().copied())
+}
+
+/// `a`, `a or b`, `one of a, b, c`.
+pub(super) fn listed(choices: &[&str]) -> String {
+    match choices {
+        [] => "nothing".to_owned(),
+        [only] => format!("`{only}`"),
+        [first, second] => format!("`{first}` or `{second}`"),
+        many => format!("one of `{}`", many.join("`, `")),
+    }
+}
+
+/// What a user typed, cut to what fits a title.
+pub(super) fn short(typed: &str) -> String {
+    const LONGEST: usize = 60;
+    if typed.chars().count() <= LONGEST {
+        return typed.to_owned();
+    }
+    typed.chars().take(LONGEST).chain("...".chars()).collect()
+}
+
+fn text<'a>(
+    key: &str,
+    source: SourceId,
+    value: &'a Value<'a>,
+    report: &mut Report,
+) -> Option<Located<&'a str>> {
+    let at = Location::new(source, value.span());
+    match value.get_ref() {
+        DeValue::String(text) => Some(Located { value: text, at }),
+        other => {
+            report.push(wrong_kind(key, &at, "a string", other));
+            None
+        }
+    }
+}
+
+fn number(
+    key: &str,
+    source: SourceId,
+    value: &Value<'_>,
+    range: Range,
+    report: &mut Report,
+) -> Option<Located<f64>> {
+    let at = Location::new(source, value.span());
+    let number = match value.get_ref() {
+        DeValue::Float(float) => float.as_str().parse().ok(),
+        DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
+        DeValue::Integer(integer) => {
+            u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|value| value as f64)
+        }
+        other => {
+            report.push(wrong_kind(key, &at, "a number", other));
+            return None;
+        }
+    };
+    check_number(key, number.unwrap_or(f64::INFINITY), at, range, report)
+}
+
+/// The number if it is finite and in range.
+pub(super) fn check_number(
+    what: &str,
+    value: f64,
+    at: Location,
+    range: Range,
+    report: &mut Report,
+) -> Option<Located<f64>> {
+    if range.contains(value) {
+        return Some(Located { value, at });
+    }
+    let title = if value.is_nan() {
+        format!("`{}` is not a number", short(what))
+    } else if value.is_infinite() {
+        format!("`{}` is not finite", short(what))
+    } else {
+        format!("`{}` = {value} is out of range", short(what))
+    };
+    report.push(Diagnostic::new(title).at(&at, format!("expected {range}")));
+    None
+}
+
+fn wrong_kind(key: &str, at: &Location, expected: &str, found: &DeValue<'_>) -> Diagnostic {
+    let kind = match found {
+        DeValue::String(_) => "a string",
+        DeValue::Integer(_) => "a whole number",
+        DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date or time",
+        DeValue::Array(_) => "an array",
+        DeValue::Table(_) => "a table",
+    };
+    let diagnostic = Diagnostic::new(format!("`{}` has the wrong type", short(key)))
+        .at(at, format!("expected {expected}, found {kind}"));
+    match found {
+        DeValue::String(text) if expected.contains("number") && text.parse::<f64>().is_ok() => {
+            diagnostic.help("write the number without quotes")
+        }
+        _ => diagnostic,
+    }
+}

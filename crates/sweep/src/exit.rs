@@ -1,0 +1,167 @@
+//! How the program ends, and why it could not go on.
+
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use crate::config::Diagnostics;
+
+/// Exit codes, a contract with scripts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// Done.
+    Done = 0,
+    /// Something failed that the input is not to blame for.
+    Failed = 1,
+    /// Bad input; nothing was done.
+    BadInput = 2,
+    /// Done, but some points failed and `--fail-on-error` was given.
+    PointsFailed = 3,
+    /// Another run holds this output.
+    Busy = 75,
+    /// Interrupted (SIGINT).
+    Interrupted = 130,
+    /// Asked to stop (SIGTERM).
+    Terminated = 143,
+}
+
+impl Exit {
+    /// Every exit code.
+    pub const ALL: [Self; 7] = [
+        Self::Done,
+        Self::Failed,
+        Self::BadInput,
+        Self::PointsFailed,
+        Self::Busy,
+        Self::Interrupted,
+        Self::Terminated,
+    ];
+
+    /// What it tells a script.
+    #[must_use]
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Failed => "an I/O or internal failure",
+            Self::BadInput => "bad input, refused before any work",
+            Self::PointsFailed => "with --fail-on-error: done, but some points failed",
+            Self::Busy => "another run holds this output",
+            Self::Interrupted => "interrupted; finished work is kept",
+            Self::Terminated => "terminated; finished work is kept",
+        }
+    }
+
+    /// All codes with their meanings, for `--help`.
+    #[must_use]
+    pub fn table() -> String {
+        let mut table = "Exit codes:".to_owned();
+        for exit in Self::ALL {
+            // Writing to a String cannot fail.
+            let _ = write!(table, "\n  {:>3}  {}", exit as u8, exit.meaning());
+        }
+        table
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// Why a command ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Mistakes in what the user wrote.
+    #[error(transparent)]
+    Input(#[from] Diagnostics),
+    /// A file that could not be read or written.
+    #[error("cannot {action} {}: {source}", path.display())]
+    File {
+        /// What was attempted: `"write"`.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Standard output could not be written.
+    #[error("cannot write to standard output: {0}")]
+    Stdout(io::Error),
+}
+
+impl Error {
+    /// The exit code it ends with.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Input(_) => Exit::BadInput,
+            Self::File { .. } | Self::Stdout(_) => Exit::Failed,
+        }
+    }
+
+    /// What to do about it, where something can be said.
+    #[must_use]
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::File { source, .. } if source.kind() == io::ErrorKind::AlreadyExists => {
+                Some("give another name, or remove the file first")
+            }
+            _ => None,
+        }
+    }
+
+    /// Tells the user, on standard error, in colour on a terminal unless `NO_COLOR` is set.
+    pub fn report(&self) {
+        let text = match self {
+            Self::Input(diagnostics) => diagnostics.styled(),
+            other => match other.hint() {
+                Some(hint) => format!("error: {other}\n  = help: {hint}"),
+                None => format!("error: {other}"),
+            },
+        };
+        // With standard error gone there is nobody left to tell; the exit code still does.
+        let _ = writeln!(anstream::stderr(), "{text}");
+    }
+}
+
+/// Writes a command's product to standard output. A reader that has seen enough (`| head`) is no failure.
+///
+/// # Errors
+/// When standard output cannot be written for any other reason.
+pub fn print(text: &str) -> Result<Exit, Error> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Error::Stdout(error)),
+        _ => Ok(Exit::Done),
+    }
+}
+
+/// Writes a message for a human to standard error.
+pub fn tell(text: &str) {
+    // As in `Error::report`: nobody is left to tell.
+    let _ = writeln!(anstream::stderr(), "{text}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_codes_are_the_contract() {
+        assert_eq!(Exit::ALL.map(|exit| exit as u8), [0, 1, 2, 3, 75, 130, 143]);
+        for exit in Exit::ALL {
+            assert!(Exit::table().contains(exit.meaning()));
+        }
+    }
+
+    #[test]
+    fn a_file_that_exists_comes_with_advice() {
+        let exists = io::Error::from(io::ErrorKind::AlreadyExists);
+        let error = Error::File { action: "write", path: "grid.toml".into(), source: exists };
+        assert_eq!(error.exit(), Exit::Failed);
+        assert!(error.to_string().starts_with("cannot write grid.toml: "));
+        assert_eq!(error.hint(), Some("give another name, or remove the file first"));
+    }
+}

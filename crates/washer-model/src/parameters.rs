@@ -1,0 +1,522 @@
+//! The one table of parameters: every number of machine and spin under one flat, unit-suffixed name, with its
+//! unit, meaning, source and range. Grid axes, `[set]`, `--set`, reports and the machine file's checks all read it.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use crate::{Damper, Machine, Spin, Spring};
+
+/// A number of the machine or the spin that a user can name, set and sweep.
+///
+/// Most write one number. Three write several at once: `bearing_stiffness_n_per_m` (both bearings),
+/// `spring_stiffness_n_per_m` (all springs) and `damping_n_s_per_m` (all dampers); see [`Parameter::parts`].
+#[derive(Clone)]
+pub struct Parameter {
+    name: Cow<'static, str>,
+    row: &'static Row,
+    /// Which spring or damper, from 0; 0 where the row has only one.
+    index: usize,
+}
+
+/// Where a parameter's default comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Printed by the paper, at this place.
+    Paper(&'static str),
+    /// Follows from what the paper prints, in this way.
+    Derived(&'static str),
+    /// The paper is silent: this project's assumption, for this reason.
+    Assumed(&'static str),
+    /// A constant everybody uses.
+    Convention,
+    /// Has no default: the grid file's `[spin]` gives it.
+    Grid,
+}
+
+/// Values a parameter may take. Beyond [`Range::LARGEST`] in magnitude nothing is accepted anywhere, so that
+/// products of a few parameters stay finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Range {
+    /// Any finite number.
+    Any,
+    /// Greater than 0.
+    Positive,
+    /// 0 or greater.
+    NonNegative,
+    /// Less than 0.
+    Negative,
+    /// Within these bounds, both included.
+    Within(f64, f64),
+}
+
+/// Why a name is not a parameter of this machine and spin.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnknownParameter {
+    /// No row of the table has this name.
+    #[error("no parameter has this name")]
+    Name,
+    /// The name is one of a numbered spring or damper that the machine does not have.
+    #[error("the machine has {count} {element}s, numbered from 1")]
+    Number {
+        /// `"spring"` or `"damper"`.
+        element: &'static str,
+        /// How many there are.
+        count: usize,
+    },
+    /// A spin given as a table has no peak and no ramp.
+    #[error("a spin given as a table has no such number")]
+    TableSpin,
+}
+
+/// One line of the table.
+struct Row {
+    /// The whole name, or what follows `spring_1_` and `damper_1_`.
+    name: &'static str,
+    unit: &'static str,
+    description: &'static str,
+    source: Source,
+    range: Range,
+    get: fn(&Machine, &Spin, usize) -> Option<f64>,
+    set: fn(&mut Machine, &mut Spin, usize, f64),
+}
+
+impl Range {
+    /// Greatest magnitude accepted of any number.
+    pub const LARGEST: f64 = 1e12;
+
+    /// Whether `value` is allowed; never for NaN or infinity.
+    #[must_use]
+    pub fn contains(self, value: f64) -> bool {
+        value.abs() <= Self::LARGEST
+            && match self {
+                Self::Any => true,
+                Self::Positive => value > 0.0,
+                Self::NonNegative => value >= 0.0,
+                Self::Negative => value < 0.0,
+                Self::Within(least, greatest) => (least..=greatest).contains(&value),
+            }
+    }
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let largest = Self::LARGEST;
+        match self {
+            Self::Any => write!(f, "a number between -{largest:e} and {largest:e}"),
+            Self::Positive => write!(f, "a number greater than 0, at most {largest:e}"),
+            Self::NonNegative => write!(f, "a number from 0 to {largest:e}"),
+            Self::Negative => write!(f, "a number less than 0, at least -{largest:e}"),
+            Self::Within(least, greatest) => write!(f, "a number from {least} to {greatest}"),
+        }
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Paper(place) => write!(f, "paper, {place}"),
+            Self::Derived(how) => write!(f, "derived: {how}"),
+            Self::Assumed(why) => write!(f, "assumed: {why}"),
+            Self::Convention => f.write_str("convention"),
+            Self::Grid => f.write_str("the grid file's [spin]"),
+        }
+    }
+}
+
+impl PartialEq for Parameter {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for Parameter {}
+
+impl fmt::Debug for Parameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Parameter").field(&self.name).finish()
+    }
+}
+
+impl Parameter {
+    /// Every parameter of this machine and spin, in the table's order, springs and dampers one by one.
+    #[must_use]
+    pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
+        let tabled = matches!(spin, Spin::Table { .. });
+        let single = TABLE.iter().filter(|row| !(tabled && row.source == Source::Grid)).map(Self::single);
+        let springs =
+            (0..machine.springs.len()).flat_map(|k| SPRING.iter().map(move |row| Self::spring(row, k)));
+        let dampers =
+            (0..machine.dampers.len()).flat_map(|k| DAMPER.iter().map(move |row| Self::damper(row, k)));
+        single.chain(springs).chain(dampers).collect()
+    }
+
+    /// The parameter of this name.
+    ///
+    /// # Errors
+    /// When the table has no such row, or this machine or spin no such number.
+    pub fn find(name: &str, machine: &Machine, spin: &Spin) -> Result<Self, UnknownParameter> {
+        if let Some(row) = TABLE.iter().find(|row| row.name == name) {
+            return if row.source == Source::Grid && matches!(spin, Spin::Table { .. }) {
+                Err(UnknownParameter::TableSpin)
+            } else {
+                Ok(Self::single(row))
+            };
+        }
+        if let Some((k, rest)) = numbered(name, "spring_") {
+            let row = SPRING.iter().find(|row| row.name == rest).ok_or(UnknownParameter::Name)?;
+            let count = machine.springs.len();
+            return if k < count {
+                Ok(Self::spring(row, k))
+            } else {
+                Err(UnknownParameter::Number { element: "spring", count })
+            };
+        }
+        let (k, rest) = numbered(name, "damper_").ok_or(UnknownParameter::Name)?;
+        let row = DAMPER.iter().find(|row| row.name == rest).ok_or(UnknownParameter::Name)?;
+        let count = machine.dampers.len();
+        if k < count {
+            Ok(Self::damper(row, k))
+        } else {
+            Err(UnknownParameter::Number { element: "damper", count })
+        }
+    }
+
+    /// Name in grid files, on the command line and of the result's column.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// SI unit (rpm for speeds), as in the name's suffix but readable.
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        self.row.unit
+    }
+
+    /// What it is, in a phrase.
+    #[must_use]
+    pub fn description(&self) -> &'static str {
+        self.row.description
+    }
+
+    /// Where the built-in machine's value comes from.
+    #[must_use]
+    pub fn source(&self) -> Source {
+        self.row.source
+    }
+
+    /// Values it may take.
+    #[must_use]
+    pub fn range(&self) -> Range {
+        self.row.range
+    }
+
+    /// Its value; `None` if it stands for several numbers that differ, or the machine has no such number.
+    #[must_use]
+    pub fn get(&self, machine: &Machine, spin: &Spin) -> Option<f64> {
+        (self.row.get)(machine, spin, self.index)
+    }
+
+    /// Writes the value, unchecked: [`Machine::violations`] judges the whole. Nothing is written if the machine has
+    /// no such number, which [`Parameter::find`] rules out.
+    pub fn set(&self, machine: &mut Machine, spin: &mut Spin, value: f64) {
+        (self.row.set)(machine, spin, self.index, value);
+    }
+
+    /// Whether it writes several numbers at once.
+    #[must_use]
+    pub fn writes_several(&self) -> bool {
+        matches!(self.name(), "bearing_stiffness_n_per_m" | "spring_stiffness_n_per_m" | "damping_n_s_per_m")
+    }
+
+    /// Names of the single numbers this parameter writes: its own name, but for the three that write several.
+    #[must_use]
+    pub fn parts(&self, machine: &Machine) -> Vec<Cow<'static, str>> {
+        match self.name() {
+            "bearing_stiffness_n_per_m" => {
+                vec!["bearing_front_stiffness_n_per_m".into(), "bearing_rear_stiffness_n_per_m".into()]
+            }
+            "spring_stiffness_n_per_m" => {
+                (1..=machine.springs.len()).map(|k| format!("spring_{k}_stiffness_n_per_m").into()).collect()
+            }
+            "damping_n_s_per_m" => {
+                (1..=machine.dampers.len()).map(|k| format!("damper_{k}_damping_n_s_per_m").into()).collect()
+            }
+            _ => vec![self.name.clone()],
+        }
+    }
+
+    fn single(row: &'static Row) -> Self {
+        Self { name: Cow::Borrowed(row.name), row, index: 0 }
+    }
+
+    fn spring(row: &'static Row, index: usize) -> Self {
+        Self { name: Cow::Owned(format!("spring_{}_{}", index + 1, row.name)), row, index }
+    }
+
+    fn damper(row: &'static Row, index: usize) -> Self {
+        Self { name: Cow::Owned(format!("damper_{}_{}", index + 1, row.name)), row, index }
+    }
+}
+
+/// `"spring_2_tub_x_m"` with `"spring_"` gives 1 (from 0) and `"tub_x_m"`. Only the canonical spelling counts (no
+/// `spring_02_`), so that one number has one name.
+fn numbered<'a>(name: &'a str, prefix: &str) -> Option<(usize, &'a str)> {
+    let (digits, rest) = name.strip_prefix(prefix)?.split_once('_')?;
+    let canonical = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
+    let number: usize = if canonical { digits.parse().ok()? } else { return None };
+    Some((number - 1, rest))
+}
+
+/// The value all items share.
+fn common<T>(items: &[T], value: fn(&T) -> f64) -> Option<f64> {
+    let first = value(items.first()?);
+    items.iter().all(|item| value(item).to_bits() == first.to_bits()).then_some(first)
+}
+
+impl Spring {
+    /// Distance between the ends as given, before the machine sags, in m.
+    #[must_use]
+    pub fn given_length_m(&self) -> f64 {
+        distance_m(self.cabinet_m, self.tub_m)
+    }
+}
+
+impl Damper {
+    /// Distance between the ends as given, before the machine sags, in m.
+    #[must_use]
+    pub fn given_length_m(&self) -> f64 {
+        distance_m(self.cabinet_m, self.tub_m)
+    }
+}
+
+fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    (x * x + y * y + z * z).sqrt()
+}
+
+/// A row of the table. The last part says what it reads and writes.
+macro_rules! row {
+    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, machine $($field:tt)+) => {
+        row!(@ $name, $unit, $range, $source, $description,
+            |m, _, _| Some(m.$($field)+), |m, _, _, v| m.$($field)+ = v)
+    };
+    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, spring $($field:tt)+) => {
+        row!(@ $name, $unit, $range, $source, $description,
+            |m, _, k| m.springs.get(k).map(|s| s.$($field)+),
+            |m, _, k, v| if let Some(s) = m.springs.get_mut(k) { s.$($field)+ = v })
+    };
+    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, damper $($field:tt)+) => {
+        row!(@ $name, $unit, $range, $source, $description,
+            |m, _, k| m.dampers.get(k).map(|d| d.$($field)+),
+            |m, _, k, v| if let Some(d) = m.dampers.get_mut(k) { d.$($field)+ = v })
+    };
+    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, spin $field:ident) => {
+        row!(@ $name, $unit, $range, $source, $description,
+            |_, spin, _| match spin {
+                Spin::Cycloidal { $field, .. } | Spin::Triangular { $field, .. } | Spin::Ramp { $field, .. } => Some(*$field),
+                Spin::Table { .. } => None,
+            },
+            |_, spin, _, v| match spin {
+                Spin::Cycloidal { $field, .. } | Spin::Triangular { $field, .. } | Spin::Ramp { $field, .. } => *$field = v,
+                Spin::Table { .. } => {}
+            })
+    };
+    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, by $get:expr, $set:expr) => {
+        row!(@ $name, $unit, $range, $source, $description, $get, $set)
+    };
+    (@ $name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, $get:expr, $set:expr) => {
+        Row {
+            name: $name, unit: $unit, range: $range, source: $source, description: $description, get: $get, set: $set,
+        }
+    };
+}
+
+use Range::{Any, Negative, NonNegative, Positive};
+use Source::{Assumed, Convention, Derived, Grid, Paper};
+
+const TABLE_2: Source = Paper("Table 2");
+const TABLE_3: Source = Paper("Table 3");
+const SPLIT: Source = Derived("Table 2's drum less its 0.4 kg unbalance");
+
+/// Rows with a single number each, and the three that write several.
+#[rustfmt::skip]
+static TABLE: &[Row] = &[
+    row!("gravity_m_per_s2", "m/s^2", NonNegative, Convention, "acceleration of gravity, downwards", machine gravity_m_per_s2),
+    row!("radial_clearance_m", "m", NonNegative, Assumed("a usual gap"), "radial gap between drum and tub at rest", machine radial_clearance_m),
+    row!("tub_mass_kg", "kg", Positive, TABLE_2, "mass of the tub", machine tub.mass_kg),
+    row!("tub_centre_x_m", "m", Any, TABLE_2, "mass centre of the tub on its axis (L_T)", machine tub.centre_x_m),
+    row!("tub_inertia_11_kg_m2", "kg m^2", Positive, TABLE_2, "tub's moment of inertia about its axis", machine tub.inertia_kg_m2[0]),
+    row!("tub_inertia_22_kg_m2", "kg m^2", Positive, TABLE_2, "tub's moment of inertia about the vertical", machine tub.inertia_kg_m2[1]),
+    row!("tub_inertia_33_kg_m2", "kg m^2", Positive, TABLE_2, "tub's moment of inertia about the horizontal cross axis", machine tub.inertia_kg_m2[2]),
+    row!("tub_front_x_m", "m", Any, Assumed("level with the drum's front"), "front centre of the tub on its axis (P_TE)", machine tub.front_x_m),
+    row!("shaft_mass_kg", "kg", Positive, TABLE_2, "mass of shaft and rotor", machine shaft.mass_kg),
+    row!("shaft_centre_x_m", "m", Any, TABLE_2, "mass centre of shaft and rotor on their axis (-L_S)", machine shaft.centre_x_m),
+    row!("shaft_inertia_11_kg_m2", "kg m^2", Positive, TABLE_2, "shaft's moment of inertia about its axis", machine shaft.inertia_kg_m2[0]),
+    row!("shaft_inertia_22_kg_m2", "kg m^2", Positive, TABLE_2, "shaft's moment of inertia across its axis, along s2", machine shaft.inertia_kg_m2[1]),
+    row!("shaft_inertia_33_kg_m2", "kg m^2", Positive, TABLE_2, "shaft's moment of inertia across its axis, along s3", machine shaft.inertia_kg_m2[2]),
+    row!("drum_mass_kg", "kg", Positive, SPLIT, "mass of the drum without unbalance (m_0)", machine drum.mass_kg),
+    row!("drum_centre_x_m", "m", Any, SPLIT, "mass centre of the drum without unbalance, on its axis (x_0)", machine drum.centre_x_m),
+    row!("drum_inertia_11_kg_m2", "kg m^2", Positive, SPLIT, "bare drum's moment of inertia about its axis", machine drum.inertia_kg_m2[0]),
+    row!("drum_inertia_22_kg_m2", "kg m^2", Positive, SPLIT, "bare drum's moment of inertia along d2, towards the unbalance", machine drum.inertia_kg_m2[1]),
+    row!("drum_inertia_33_kg_m2", "kg m^2", Positive, SPLIT, "bare drum's moment of inertia along d3", machine drum.inertia_kg_m2[2]),
+    row!("drum_hinge_x_m", "m", Any, Assumed("between front bearing and drum"), "where drum and shaft meet (P_D, L_D)", machine drum.hinge_x_m),
+    row!("drum_front_x_m", "m", Any, Assumed("the drum's middle is at the unbalance"), "front centre of the drum on its axis (P_DE, L_D + L_DE)", machine drum.front_x_m),
+    row!("unbalance_mass_kg", "kg", NonNegative, TABLE_2, "point mass stuck to the drum's wall (m_u)", machine unbalance.mass_kg),
+    row!("unbalance_x_m", "m", Any, SPLIT, "position of the unbalance along the axis (x_u)", machine unbalance.x_m),
+    row!("unbalance_radius_m", "m", NonNegative, SPLIT, "distance of the unbalance from the axis (r_u)", machine unbalance.radius_m),
+    row!("flexure_stiffness_n_m_per_rad", "N m/rad", Positive, TABLE_3, "bending stiffness between shaft and drum (K_D)", machine flexure.stiffness_n_m_per_rad),
+    row!("bearing_stiffness_n_per_m", "N/m", Positive, TABLE_3, "radial stiffness of both bearings (K_fb, K_rb)",
+        by |m, _, _| common(&[m.bearings.front_stiffness_n_per_m, m.bearings.rear_stiffness_n_per_m], |k| *k),
+        |m, _, _, v| [m.bearings.front_stiffness_n_per_m, m.bearings.rear_stiffness_n_per_m] = [v; 2]),
+    row!("bearing_front_x_m", "m", Positive, Assumed("a usual length"), "front bearing centre (L_fb)", machine bearings.front_x_m),
+    row!("bearing_rear_x_m", "m", Negative, Assumed("O is midway between the bearings"), "rear bearing centre (-L_rb)", machine bearings.rear_x_m),
+    row!("bearing_front_stiffness_n_per_m", "N/m", Positive, TABLE_3, "radial stiffness of the front bearing (K_fb)", machine bearings.front_stiffness_n_per_m),
+    row!("bearing_rear_stiffness_n_per_m", "N/m", Positive, TABLE_3, "radial stiffness of the rear bearing (K_rb)", machine bearings.rear_stiffness_n_per_m),
+    row!("spring_stiffness_n_per_m", "N/m", NonNegative, TABLE_3, "stiffness of all springs (K_k)",
+        by |m, _, _| common(&m.springs, |s| s.stiffness_n_per_m),
+        |m, _, _, v| m.springs.iter_mut().for_each(|s| s.stiffness_n_per_m = v)),
+    row!("damping_n_s_per_m", "N s/m", NonNegative, TABLE_3, "damping of all dampers (C)",
+        by |m, _, _| common(&m.dampers, |d| d.damping_n_s_per_m),
+        |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = v)),
+    row!("spin_peak_rpm", "rpm", Range::Within(-1e5, 1e5), Grid, "greatest spin speed; negative turns backwards", spin peak_rpm),
+    row!("spin_ramp_s", "s", Positive, Grid, "duration of the run-up, and of a triangle's run-down", spin ramp_s),
+];
+
+/// Rows of each spring, after `spring_1_`.
+#[rustfmt::skip]
+static SPRING: &[Row] = &[
+    row!("stiffness_n_per_m", "N/m", NonNegative, TABLE_3, "stiffness of this spring", spring stiffness_n_per_m),
+    row!("free_length_m", "m", NonNegative, Derived("the distance between the ends as given"), "length of this spring without force",
+        by |m, _, k| m.springs.get(k).map(|s| s.free_length_m.unwrap_or_else(|| s.given_length_m())),
+        |m, _, k, v| if let Some(s) = m.springs.get_mut(k) { s.free_length_m = Some(v) }),
+    row!("cabinet_x_m", "m", Any, TABLE_3, "cabinet end of this spring, towards the door", spring cabinet_m[0]),
+    row!("cabinet_y_m", "m", Any, TABLE_3, "cabinet end of this spring, upwards", spring cabinet_m[1]),
+    row!("cabinet_z_m", "m", Any, TABLE_3, "cabinet end of this spring, sideways", spring cabinet_m[2]),
+    row!("tub_x_m", "m", Any, TABLE_3, "tub end of this spring, towards the door", spring tub_m[0]),
+    row!("tub_y_m", "m", Any, TABLE_3, "tub end of this spring, upwards", spring tub_m[1]),
+    row!("tub_z_m", "m", Any, TABLE_3, "tub end of this spring, sideways", spring tub_m[2]),
+];
+
+/// Rows of each damper, after `damper_1_`.
+#[rustfmt::skip]
+static DAMPER: &[Row] = &[
+    row!("damping_n_s_per_m", "N s/m", NonNegative, TABLE_3, "damping of this damper", damper damping_n_s_per_m),
+    row!("cabinet_x_m", "m", Any, TABLE_3, "cabinet end of this damper, towards the door", damper cabinet_m[0]),
+    row!("cabinet_y_m", "m", Any, TABLE_3, "cabinet end of this damper, upwards", damper cabinet_m[1]),
+    row!("cabinet_z_m", "m", Any, TABLE_3, "cabinet end of this damper, sideways", damper cabinet_m[2]),
+    row!("tub_x_m", "m", Any, TABLE_3, "tub end of this damper, towards the door", damper tub_m[0]),
+    row!("tub_y_m", "m", Any, TABLE_3, "tub end of this damper, upwards", damper tub_m[1]),
+    row!("tub_z_m", "m", Any, TABLE_3, "tub end of this damper, sideways", damper tub_m[2]),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spin() -> Spin {
+        Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 }
+    }
+
+    #[test]
+    fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
+        for parameter in Parameter::all(&Machine::paper(), &spin()) {
+            let (mut machine, mut spin) = (Machine::paper(), spin());
+            assert_eq!(Parameter::find(parameter.name(), &machine, &spin).as_ref(), Ok(&parameter));
+            let before = parameter.get(&machine, &spin).expect("the paper's machine has one value for each");
+            assert!(parameter.range().contains(before), "{parameter:?} = {before}");
+            parameter.set(&mut machine, &mut spin, before + 0.125);
+            assert_eq!(parameter.get(&machine, &spin), Some(before + 0.125), "{parameter:?}");
+        }
+    }
+
+    #[test]
+    fn each_parameter_writes_its_parts_and_nothing_else() {
+        let everything = Parameter::all(&Machine::paper(), &spin());
+        for parameter in &everything {
+            let (mut machine, mut spin) = (Machine::paper(), spin());
+            let before: Vec<_> = everything.iter().map(|p| p.get(&machine, &spin)).collect();
+            parameter.set(&mut machine, &mut spin, 0.875);
+            let parts = parameter.parts(&machine);
+            for (other, before) in everything.iter().zip(before) {
+                if other.parts(&machine).iter().all(|part| !parts.contains(part)) {
+                    // A default free length follows the ends of its spring.
+                    let follows = other.name().ends_with("free_length_m") && other.index == parameter.index;
+                    assert!(follows || other.get(&machine, &spin) == before, "{parameter:?} wrote {other:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn names_end_with_their_unit_and_are_unique() {
+        let everything = Parameter::all(&Machine::paper(), &spin());
+        let mut names: Vec<_> = everything.iter().map(Parameter::name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), everything.len());
+        for parameter in &everything {
+            let suffix = match parameter.unit() {
+                "m" => "_m",
+                "kg" => "_kg",
+                "s" => "_s",
+                "rpm" => "_rpm",
+                "N/m" => "_n_per_m",
+                "N s/m" => "_n_s_per_m",
+                "N m/rad" => "_n_m_per_rad",
+                "kg m^2" => "_kg_m2",
+                "m/s^2" => "_m_per_s2",
+                other => panic!("no suffix is known for {other}"),
+            };
+            assert!(parameter.name().ends_with(suffix), "{parameter:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_beyond_the_machine_are_told_from_misspellings() {
+        let (machine, spin) = (Machine::paper(), spin());
+        let find = |name: &str| Parameter::find(name, &machine, &spin).map(|p| p.index);
+        assert_eq!(find("spring_4_tub_z_m"), Ok(3));
+        assert_eq!(find("spring_5_tub_z_m"), Err(UnknownParameter::Number { element: "spring", count: 4 }));
+        assert_eq!(
+            find("damper_3_damping_n_s_per_m"),
+            Err(UnknownParameter::Number { element: "damper", count: 2 })
+        );
+        for name in [
+            "spring_0_tub_z_m",
+            "spring_01_tub_z_m",
+            "spring_+1_tub_z_m",
+            "spring__tub_z_m",
+            "spring_99999999999999999999_tub_z_m",
+            "spring_1_tub_w_m",
+            "tub_mass",
+            "",
+        ] {
+            assert_eq!(find(name), Err(UnknownParameter::Name), "{name}");
+        }
+        let table = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 100.0] };
+        assert_eq!(Parameter::find("spin_ramp_s", &machine, &table), Err(UnknownParameter::TableSpin));
+        assert!(Parameter::all(&machine, &table).iter().all(|p| p.source() != Source::Grid));
+    }
+
+    #[test]
+    fn a_parameter_of_several_numbers_has_no_value_when_they_differ() {
+        let (mut machine, spin) = (Machine::paper(), spin());
+        let all = Parameter::find("damping_n_s_per_m", &machine, &spin).unwrap();
+        assert_eq!(all.get(&machine, &spin), Some(140.0));
+        machine.dampers[1].damping_n_s_per_m = 100.0;
+        assert_eq!(all.get(&machine, &spin), None);
+    }
+
+    #[test]
+    fn ranges_refuse_what_is_not_a_number() {
+        for range in [Any, Positive, NonNegative, Negative, Range::Within(-1e5, 1e5)] {
+            for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e13, -1e13] {
+                assert!(!range.contains(value), "{range:?} {value}");
+            }
+        }
+        assert!(!Positive.contains(0.0) && Positive.contains(1e-9));
+        assert!(NonNegative.contains(0.0) && !NonNegative.contains(-1e-9));
+        assert!(!Negative.contains(0.0) && Negative.contains(-1e-9));
+    }
+}
