@@ -76,6 +76,8 @@ pub struct RunOptions<'a> {
     pub progress: Mode,
     /// Where a scheduler's word is looked up.
     pub environment: Environment<'a>,
+    /// Takes what a user should hear before the work starts.
+    pub tell: &'a dyn Fn(&str),
 }
 
 /// How a run ended, other than by an error.
@@ -131,6 +133,15 @@ pub fn run(
     };
     let threads = options.threads.unwrap_or_else(|| default_threads(environment));
     let (points, there) = run.own_points();
+    if let Some(shard) = run.shard() {
+        (options.tell)(&format!("shard {} of {}", shard.index, shard.of));
+    }
+    for note in run.take_notes() {
+        (options.tell)(&note);
+    }
+    if there > 0 {
+        (options.tell)(&format!("going on: {there} of {points} points are there"));
+    }
     let clock = Clock { began: Instant::now(), started_unix_s: provenance::now_unix_s(), threads, there };
     let mut progress = Progress::new(options.progress, points, there);
     let result = compute_and_join(engine, job, &mut run, threads, &mut progress, interrupt);

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicU64;
 
 use super::*;
+use crate::exit::Exit;
 use crate::store::synthetic;
 
 const POINTS: u64 = 81;
@@ -48,6 +49,7 @@ fn options(threads: usize) -> RunOptions<'static> {
         shard: None,
         progress: Mode::None,
         environment: &|_| None,
+        tell: &|_| {},
     }
 }
 
@@ -140,7 +142,7 @@ fn a_panic_that_leaves_the_engine_costs_its_chunk_alone() {
     let (home, job) = (tempfile::tempdir().unwrap(), synthetic::job(POINTS));
     let engine = Formula::new(|point| assert_ne!(point, 20, "twenty is too much"));
     let error = run(&engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap_err();
-    assert_eq!(error.exit_code(), 1);
+    assert_eq!(error.exit(), Exit::Failed);
     let text = error.to_string();
     assert!(text.contains("points 16 to 23") && text.contains("twenty is too much"), "{text}");
     let mended = Formula::new(|_| {});

@@ -93,6 +93,7 @@ pub(crate) fn parent(path: &Path) -> &Path {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exit::Exit;
 
     #[test]
     fn create_leaves_the_first_and_write_replaces() {
@@ -133,6 +134,6 @@ mod tests {
         let error = write(Path::new("/nonexistent/x.partial"), Path::new("/nonexistent/x"), b"").unwrap_err();
         let text = error.to_string();
         assert!(text.contains("/nonexistent/x.partial") && text.contains("bring it back"), "{text}");
-        assert_eq!(error.exit_code(), 1);
+        assert_eq!(error.exit(), Exit::Failed);
     }
 }

@@ -5,12 +5,13 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::plan_file::Difference;
+use crate::exit::Exit;
 
 /// A failure of the store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The file system said no.
-    #[error("cannot {action} {}: {source}\n  {}", path.display(), advice(source))]
+    #[error("cannot {action} {}: {source}\n  = help: {}", path.display(), advice(source))]
     Io {
         /// What was being done, in the infinitive.
         action: &'static str,
@@ -20,7 +21,7 @@ pub enum StoreError {
         source: io::Error,
     },
     /// Another process runs on this output.
-    #[error("{} is in use by {}\n  wait for it to end, or give another --out", output.display(), Holders(holders))]
+    #[error("{} is in use by {}\n  = help: wait for it to end, or give another --out", output.display(), Holders(holders))]
     Busy {
         /// The output both want.
         output: PathBuf,
@@ -29,7 +30,7 @@ pub enum StoreError {
     },
     /// The run folder belongs to another plan.
     #[error(
-        "{} was begun with another plan:\n{}  run the old plan to its end, give another --out, or start over \
+        "{} was begun with another plan:\n{}  = help: run the old plan to its end, give another --out, or start over \
          with --fresh (which deletes that folder's finished chunks)",
         folder.display(),
         Differences(differences)
@@ -42,7 +43,7 @@ pub enum StoreError {
     },
     /// The finished output belongs to another plan.
     #[error(
-        "{} already holds the result of another plan:\n{}  give another --out, or replace it with --fresh",
+        "{} already holds the result of another plan:\n{}  = help: give another --out, or replace it with --fresh",
         output.display(),
         Differences(differences)
     )]
@@ -53,7 +54,7 @@ pub enum StoreError {
         differences: Vec<Difference>,
     },
     /// Something that this program did not write stands where the output should go.
-    #[error("{} exists and is not a result of `sweep run` ({reason})\n  give another --out, or replace it with --fresh",
+    #[error("{} exists and is not a result of `sweep run` ({reason})\n  = help: give another --out, or replace it with --fresh",
         output.display())]
     OutputForeign {
         /// The file in the way.
@@ -73,7 +74,7 @@ pub enum StoreError {
     #[error("{0}")]
     Shard(String),
     /// Chunks are missing, so there is no whole result to write.
-    #[error("{} is incomplete: {missing} of {chunks} chunks are missing{}\n  \
+    #[error("{} is incomplete: {missing} of {chunks} chunks are missing{}\n  = help: \
          {}", folder.display(), ShardsMissing(missing_shards), how_to_complete(missing_shards))]
     Incomplete {
         /// The run folder.
@@ -86,7 +87,7 @@ pub enum StoreError {
         missing_shards: Option<String>,
     },
     /// There is no run to speak of.
-    #[error("there is no run at {}: neither {} nor that file exists\n  start it with `sweep run`",
+    #[error("there is no run at {}: neither {} nor that file exists\n  = help: start it with `sweep run`",
         output.display(), folder.display())]
     NoRun {
         /// The output asked about.
@@ -96,7 +97,7 @@ pub enum StoreError {
     },
     /// The engine handed over something that cannot be a chunk; a defect of this program.
     #[error(
-        "internal error in points {first} to {last}: {reason}\n  \
+        "internal error in points {first} to {last}: {reason}\n  = help: \
          the other chunks are kept; please report this with the grid file"
     )]
     Engine {
@@ -118,7 +119,7 @@ pub enum StoreError {
         source: parquet::errors::ParquetError,
     },
     /// The worker threads could not be started.
-    #[error("cannot start {threads} threads: {reason}\n  try fewer with --threads")]
+    #[error("cannot start {threads} threads: {reason}\n  = help: try fewer with --threads")]
     Threads {
         /// How many were asked for.
         threads: usize,
@@ -163,23 +164,23 @@ impl StoreError {
         }
     }
 
-    /// The process's exit code for this failure: 75 when another run holds the output, 2 when nothing was begun
-    /// because the request does not fit what is there, else 1.
+    /// How the program ends on it.
     #[must_use]
-    pub fn exit_code(&self) -> u8 {
+    pub fn exit(&self) -> Exit {
         match self {
-            Self::Busy { .. } => 75,
+            Self::Busy { .. } => Exit::Busy,
+            // Nothing was begun: the request does not fit what is there.
             Self::PlanDiffers { .. }
             | Self::OutputDiffers { .. }
             | Self::OutputForeign { .. }
             | Self::BadOutput { .. }
-            | Self::Shard(_) => 2,
+            | Self::Shard(_) => Exit::BadInput,
             Self::Io { .. }
             | Self::Incomplete { .. }
             | Self::NoRun { .. }
             | Self::Engine { .. }
             | Self::Parquet { .. }
-            | Self::Threads { .. } => 1,
+            | Self::Threads { .. } => Exit::Failed,
         }
     }
 }

@@ -156,6 +156,7 @@ fn held_by(path: &Path, shard: Option<u64>) -> Option<Holder> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exit::Exit;
 
     fn folder(home: &tempfile::TempDir) -> Folder {
         Folder::of(&home.path().join("x.parquet")).unwrap()
@@ -164,7 +165,7 @@ mod tests {
     fn busy(result: Result<Lock, StoreError>) -> Vec<Holder> {
         match result {
             Err(error @ StoreError::Busy { .. }) => {
-                assert_eq!(error.exit_code(), 75);
+                assert_eq!(error.exit(), Exit::Busy);
                 let StoreError::Busy { holders, .. } = error else { unreachable!() };
                 holders
             }

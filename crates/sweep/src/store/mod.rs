@@ -43,6 +43,8 @@ pub use schema::{AxisColumn, Layout};
 pub use shard::{Environment, Shard, ShardRequest};
 pub use status::{FolderStatus, State, status};
 
+use crate::plan::{Axis, Plan};
+
 /// The values of the axes at a point of the grid, first axis first.
 pub type AxisValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
 
@@ -60,7 +62,28 @@ pub struct Job<'a> {
     pub axis_values: AxisValues<'a>,
 }
 
-impl Job<'_> {
+impl<'a> Job<'a> {
+    /// What the store must know of this plan, as run by this version of the program.
+    #[must_use]
+    pub fn of(plan: &'a Plan) -> Self {
+        let column = |axis: &Axis| AxisColumn {
+            name: axis.parameter.name().to_owned(),
+            unit: axis.parameter.unit().to_owned(),
+            description: axis.parameter.description().to_owned(),
+        };
+        Self {
+            plan: plan.to_json(),
+            version: env!("CARGO_PKG_VERSION"),
+            points: plan.points(),
+            layout: Layout {
+                axes: plan.axes.iter().map(column).collect(),
+                channels: plan.reliability.channels.clone(),
+                ratio_limit: plan.reliability.ratio_limit,
+            },
+            axis_values: Box::new(|point| plan.axis_values(point)),
+        }
+    }
+
     /// Hash of version and plan.
     #[must_use]
     pub fn hash(&self) -> blake3::Hash {

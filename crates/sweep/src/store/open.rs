@@ -68,7 +68,7 @@ impl Run {
         let mut dealt = shard::resolve(options.shard, options.environment, Dealing::read(&folder)?)?;
         if options.fresh && dealt.is_some() {
             return Err(StoreError::Shard(format!(
-                "--fresh would delete what the other shards have done\n  delete {} first, then start the shards",
+                "--fresh would delete what the other shards have done\n  = help: delete {} first, then start the shards",
                 folder.path.display()
             )));
         }

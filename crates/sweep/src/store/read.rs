@@ -264,6 +264,27 @@ impl ColumnRange {
     }
 }
 
+/// Numeric columns of one row, counted from 0.
+///
+/// # Errors
+/// [`StoreError::Io`] and [`StoreError::Parquet`], the latter also for a row or column that is not there.
+pub fn row(path: &Path, row: u64, columns: &[&str]) -> Result<Vec<f64>, StoreError> {
+    let failed = |error| StoreError::parquet("read", path)(error);
+    let absent = || ParquetError::General(format!("there is no row {row} with all of {columns:?}"));
+    let builder = builder(path)?;
+    let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().copied());
+    let reader =
+        builder.with_projection(mask).with_offset(usize::try_from(row).unwrap_or(usize::MAX)).with_limit(1);
+    let batch = reader.build().map_err(failed)?.next().ok_or_else(absent).map_err(failed)?;
+    let batch = batch.map_err(|error| failed(error.into()))?;
+    let value = |name: &&str| {
+        let column = batch.column_by_name(name).ok_or_else(absent)?;
+        let numbers = cast(column, &DataType::Float64)?;
+        numbers.as_primitive::<Float64Type>().iter().next().flatten().ok_or_else(absent)
+    };
+    columns.iter().map(value).collect::<Result<_, _>>().map_err(failed)
+}
+
 fn builder(path: &Path) -> Result<ParquetRecordBatchReaderBuilder<File>, StoreError> {
     let file = File::open(path).map_err(StoreError::io("open", path))?;
     ParquetRecordBatchReaderBuilder::try_new(file).map_err(StoreError::parquet("read", path))

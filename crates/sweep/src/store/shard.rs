@@ -141,7 +141,7 @@ pub(crate) fn resolve(
         let dealing = frozen.unwrap_or(Dealing { shards: shard.of, first_array_id: 1 });
         if dealing.shards != shard.of {
             return refuse(format!(
-                "this run was dealt into {} shards by the first to start, not {}\n  use --shard I/{}, or run it \
+                "this run was dealt into {} shards by the first to start, not {}\n  = help: use --shard I/{}, or run it \
                  whole without --shard",
                 dealing.shards, shard.of, dealing.shards
             ));
@@ -157,14 +157,14 @@ pub(crate) fn resolve(
             None => Ok(None),
             Some(of) => refuse(format!(
                 "--shard auto/{of} takes its place from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX, and neither is \
-                 set\n  give it as --shard I/{of}"
+                 set\n  = help: give it as --shard I/{of}"
             )),
         };
     };
     let dealing = match (frozen, asked.or(scheduler.count)) {
         (Some(dealing), _) if asked.is_some_and(|of| of != dealing.shards) => {
             return refuse(format!(
-                "this run was dealt into {} shards by the first to start, not {}\n  use --shard auto/{}",
+                "this run was dealt into {} shards by the first to start, not {}\n  = help: use --shard auto/{}",
                 dealing.shards,
                 asked.unwrap_or_default(),
                 dealing.shards
@@ -174,7 +174,7 @@ pub(crate) fn resolve(
         (None, Some(shards)) => Dealing { shards, first_array_id: scheduler.first },
         (None, None) => {
             return refuse(format!(
-                "{} is set, but not how many shards there are\n  give --shard auto/N, or --shard 1/1 to run it whole",
+                "{} is set, but not how many shards there are\n  = help: give --shard auto/N, or --shard 1/1 to run it whole",
                 scheduler.name
             ));
         }
@@ -184,7 +184,7 @@ pub(crate) fn resolve(
             Ok(Some((Shard { index: place + 1, of: dealing.shards }, dealing)))
         }
         _ => refuse(format!(
-            "{} is {}, but this run's {} shards are numbered {} to {}\n  submit those numbers, or give --shard I/N",
+            "{} is {}, but this run's {} shards are numbered {} to {}\n  = help: submit those numbers, or give --shard I/N",
             scheduler.name,
             scheduler.id,
             dealing.shards,
@@ -239,6 +239,7 @@ pub(crate) fn list(numbers: impl IntoIterator<Item = u64>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exit::Exit;
 
     fn environment(pairs: &'static [(&'static str, &'static str)]) -> impl Fn(&str) -> Option<String> {
         move |name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
@@ -246,7 +247,7 @@ mod tests {
 
     fn refusal(result: Result<Option<(Shard, Dealing)>, StoreError>) -> String {
         let error = result.unwrap_err();
-        assert_eq!(error.exit_code(), 2);
+        assert_eq!(error.exit(), Exit::BadInput);
         error.to_string()
     }
 

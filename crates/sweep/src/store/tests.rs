@@ -12,6 +12,7 @@ use serde_json::json;
 use tempfile::TempDir;
 
 use super::*;
+use crate::exit::Exit;
 use crate::verdict::{ROW_STATUSES, Verdict, row_status};
 
 const POINTS: u64 = 81;
@@ -265,7 +266,7 @@ fn another_plan_is_refused_with_the_difference_until_fresh() {
         ..synthetic::job(POINTS)
     };
     let error = Run::open(&home.output(), &other, options()).unwrap_err();
-    assert_eq!(error.exit_code(), 2);
+    assert_eq!(error.exit(), Exit::BadInput);
     let text = error.to_string();
     assert!(text.contains("/step_s: was 0.0002, is 0.0001") && text.contains("--fresh"), "{text}");
 
@@ -294,7 +295,7 @@ fn a_finished_output_is_left_alone() {
 
     let other = Job { plan: json!({ "name": "other" }), ..synthetic::job(POINTS) };
     let error = Run::open(&home.output(), &other, options()).unwrap_err();
-    assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.exit_code() == 2, "{error}");
+    assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.exit() == Exit::BadInput, "{error}");
     assert!(error.to_string().contains(r#"/name: was "synthetic", is "other""#), "{error}");
 
     // Started over, the old result stays until the new one takes its place, interrupted or not.
@@ -313,7 +314,7 @@ fn a_strangers_file_is_not_overwritten() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     fs::write(home.output(), "my thesis").unwrap();
     let error = Run::open(&home.output(), &job, options()).unwrap_err();
-    assert!(matches!(error, StoreError::OutputForeign { .. }) && error.exit_code() == 2, "{error}");
+    assert!(matches!(error, StoreError::OutputForeign { .. }) && error.exit() == Exit::BadInput, "{error}");
     assert!(!home.partial().exists());
     let error = Run::open(home.0.path(), &job, options()).unwrap_err();
     assert!(error.to_string().contains("it is a folder"), "{error}");
@@ -400,7 +401,7 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
         write_missing(run);
     }
     let busy = Run::open_for_merge(&home.output(), &job).unwrap_err();
-    assert_eq!(busy.exit_code(), 75, "{busy}");
+    assert_eq!(busy.exit(), Exit::Busy, "{busy}");
     let running = status(&home.output(), &job).unwrap().running;
     assert_eq!(running.iter().map(|holder| holder.shard).collect::<Vec<_>>(), [Some(1), Some(3)]);
     drop((first, third, again));
@@ -409,7 +410,7 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
         panic!("is not done")
     };
     let error = merge.join(&job, &|| false).unwrap_err();
-    assert_eq!(error.exit_code(), 1);
+    assert_eq!(error.exit(), Exit::Failed);
     assert!(error.to_string().contains("5 of 11 chunks are missing, of shards 2,4"), "{error}");
     drop(merge);
     let found = status(&home.output(), &job).unwrap();
