@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{check, completions, init, parameters, schema};
+use crate::commands::{check, completions, init, merge, parameters, schema, show, status};
 use crate::exit::{Error, Exit};
 
 /// Printed before everything else by `--help`: most readers want to see one line that works.
@@ -35,6 +35,12 @@ pub struct Cli {
 pub enum Command {
     /// Check a grid file and show what it would do, without doing it
     Check(check::Args),
+    /// Join the finished shards of a run into its one result file
+    Merge(merge::Args),
+    /// Show how far a run is: done, missing, failed, running
+    Status(status::Args),
+    /// Show what a result file holds: counts, verdicts, extremes, provenance
+    Show(show::Args),
     /// List every parameter that can be set or swept
     Parameters(parameters::Args),
     /// Write a commented grid file, or a machine file, to start from
@@ -53,6 +59,9 @@ impl Command {
     pub fn run(&self) -> Result<Exit, Error> {
         match self {
             Self::Check(args) => check::run(args),
+            Self::Merge(args) => merge::run(args),
+            Self::Status(args) => status::run(args),
+            Self::Show(args) => show::run(args),
             Self::Parameters(args) => parameters::run(args),
             Self::Init(args) => init::run(args),
             Self::Schema(args) => schema::run(args),

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use crate::config::Diagnostics;
+use crate::store::StoreError;
 
 /// Exit codes, a contract with scripts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,6 +77,9 @@ pub enum Error {
     /// Mistakes in what the user wrote.
     #[error(transparent)]
     Input(#[from] Diagnostics),
+    /// A run's files.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// A file that could not be read or written.
     #[error("cannot {action} {}: {source}", path.display())]
     File {
@@ -97,6 +101,7 @@ impl Error {
     pub fn exit(&self) -> Exit {
         match self {
             Self::Input(_) => Exit::BadInput,
+            Self::Store(error) => error.exit(),
             Self::File { .. } | Self::Stdout(_) => Exit::Failed,
         }
     }

@@ -17,6 +17,12 @@ pub enum Status {
     Panicked,
 }
 
+impl Status {
+    /// Every status; the position is its code in chunk files, so new ones go to the end.
+    pub const ALL: [Self; 6] =
+        [Self::Ok, Self::Diverged, Self::StepTooSmall, Self::StepLimit, Self::NoEquilibrium, Self::Panicked];
+}
+
 /// One model's trajectory at one grid point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
@@ -43,4 +49,7 @@ pub struct Outcome {
     pub nonlinear: Trajectory,
     /// The linear model.
     pub linear: Trajectory,
+    /// Whether the nonlinear motion is chaotic, so that the verdict is stable but the ratio's digits are not;
+    /// `None` where it was not assessed.
+    pub sensitive: Option<bool>,
 }

@@ -8,8 +8,12 @@ use crate::plan::Plan;
 pub mod check;
 pub mod completions;
 pub mod init;
+pub mod merge;
 pub mod parameters;
+pub mod run;
 pub mod schema;
+pub mod show;
+pub mod status;
 
 /// A grid file and changes to its constants, as most commands take them.
 #[derive(Debug, clap::Args)]
@@ -17,7 +21,7 @@ pub struct Grid {
     /// Grid file
     #[arg(value_name = "GRID.toml")]
     pub grid: PathBuf,
-    /// Set a constant, over those of the grid file; may be repeated
+    /// Set a constant, over the grid file's [set]; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub sets: Vec<String>,
 }
@@ -29,5 +33,62 @@ impl Grid {
     /// Every mistake in the grid file, its machine file and the constants.
     pub fn load(&self) -> Result<Plan, Diagnostics> {
         config::load(&self.grid, &self.sets)
+    }
+}
+
+/// A grid and where its result goes, as the commands about runs take them.
+#[derive(Debug, clap::Args)]
+pub struct Target {
+    /// The grid.
+    #[command(flatten)]
+    pub grid: Grid,
+    /// Result file [default: results/<name>.parquet]
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+impl Target {
+    /// The result file.
+    #[must_use]
+    pub fn output(&self, plan: &Plan) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{}.parquet", plan.name)))
+    }
+
+    /// A command line about the same run, for a user to copy.
+    #[must_use]
+    pub fn command(&self, verb: &str) -> String {
+        let mut line = format!("sweep {verb} {}", quoted(&self.grid.grid.display().to_string()));
+        for set in &self.grid.sets {
+            line.push_str(&format!(" --set {}", quoted(set)));
+        }
+        if let Some(out) = &self.out {
+            line.push_str(&format!(" --out {}", quoted(&out.display().to_string())));
+        }
+        line
+    }
+}
+
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/._-=:,+".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_to_copy_survives_the_shell() {
+        let grid = Grid { grid: "my grids/it's.toml".into(), sets: vec!["tub_mass_kg=20".into()] };
+        let target = Target { grid, out: Some("x.parquet".into()) };
+        assert_eq!(
+            target.command("merge"),
+            r"sweep merge 'my grids/it'\''s.toml' --set tub_mass_kg=20 --out x.parquet"
+        );
     }
 }

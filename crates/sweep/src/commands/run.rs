@@ -1,0 +1,204 @@
+//! `sweep run GRID.toml`: the sweep.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::{Target, quoted};
+use crate::exit::{Error, Exit, tell};
+use crate::interrupt::Interrupt;
+use crate::plan::Plan;
+use crate::progress::{self, Mode, duration, per_second};
+use crate::run::{self, Ended, Engine, Report, RunOptions};
+use crate::store::provenance::Session;
+use crate::store::read::Tally;
+use crate::store::{Job, ShardRequest};
+
+/// Arguments of `sweep run`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The run.
+    #[command(flatten)]
+    pub target: Target,
+    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<usize>,
+    /// Compute one of N equal shards only, to be joined by `sweep merge`; `auto/N` takes the place from
+    /// SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX. In a Slurm array the default is that array's task and count
+    /// (--shard 1/1 is the whole)
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<ShardRequest>,
+    /// Start over, even if the result is there or another plan was begun
+    #[arg(long)]
+    pub fresh: bool,
+    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every 5 s) or none
+    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
+    pub progress: Mode,
+    /// Exit with 3 if any row of the finished result failed
+    #[arg(long)]
+    pub fail_on_error: bool,
+}
+
+/// As many threads as a process can sensibly ask for.
+fn threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(threads @ 1..=4096) => Ok(threads),
+        _ => Err(format!("expected a number of threads from 1 to 4096; got `{text}`")),
+    }
+}
+
+/// Runs a plan, with an engine made for it, and tells how it went.
+///
+/// # Errors
+/// Whatever of [`crate::store::StoreError`] kept it from its end; finished chunks are kept.
+pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Error> {
+    let interrupt = Interrupt::install().map_err(|source| Error::File {
+        action: "install signal handlers for",
+        path: PathBuf::from("this process"),
+        source,
+    })?;
+    let (job, output) = (Job::of(plan), args.target.output(plan));
+    let options = RunOptions {
+        threads: args.threads,
+        fresh: args.fresh,
+        shard: args.shard,
+        progress: args.progress,
+        environment: &|name| std::env::var(name).ok(),
+        tell: &tell,
+    };
+    let report = run::run(engine, &job, &output, options, &interrupt)?;
+    for note in &report.notes {
+        tell(note);
+    }
+    tell(summary(args, plan, &job, &output, &report).trim_end());
+    Ok(match report.ended {
+        Ended::Interrupted { signal: 15, .. } => Exit::Terminated,
+        Ended::Interrupted { .. } => Exit::Interrupted,
+        Ended::Already(_, tally) | Ended::Finished(tally)
+            if args.fail_on_error && tally.by_status.failed() > 0 =>
+        {
+            Exit::PointsFailed
+        }
+        _ => Exit::Done,
+    })
+}
+
+/// What came of the run, in at most twelve lines.
+fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &Report) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = match (&report.ended, &report.session) {
+        (Ended::Already(file, _), _) => {
+            writeln!(
+                text,
+                "{}: all {} points are there already (--fresh computes them again)",
+                plan.name, file.points
+            )
+        }
+        (Ended::Interrupted { kept, points, .. }, session) => writeln!(
+            text,
+            "{}: interrupted with {kept} of {points} points kept{}",
+            plan.name,
+            session
+                .as_ref()
+                .map(|session| format!(", after {}", duration(session.wall_s)))
+                .unwrap_or_default()
+        ),
+        (Ended::Shard(shard), Some(session)) => {
+            writeln!(text, "{}, shard {} of {}: {}", plan.name, shard.index, shard.of, work(session))
+        }
+        (_, Some(session)) => writeln!(text, "{}: {}", plan.name, work(session)),
+        (_, None) => Ok(()),
+    };
+    match &report.ended {
+        Ended::Already(_, tally) | Ended::Finished(tally) => text.push_str(&rows(tally, job)),
+        Ended::Interrupted { .. } | Ended::Shard(_) => {}
+    }
+    if let Some(accuracy) = report.session.as_ref().and_then(|session| session.observed_accuracy) {
+        line(&mut text, "accuracy", &format!("{accuracy:.1e} of the amplitude, as observed"));
+    }
+    let out = quoted(&output.display().to_string());
+    match &report.ended {
+        Ended::Already(..) | Ended::Finished(_) => {
+            line(&mut text, "file", &output.display().to_string());
+            line(&mut text, "next", &format!("sweep plot {out}"));
+        }
+        Ended::Shard(_) => {
+            line(&mut text, "next", &format!("{}, when all shards are done", args.target.command("merge")));
+        }
+        Ended::Interrupted { .. } => {
+            line(&mut text, "next", &format!("{} goes on", args.target.command("run")))
+        }
+    }
+    text
+}
+
+/// What this process did.
+fn work(session: &Session) -> String {
+    format!(
+        "{} points in {}, {} on {} thread{} ({})",
+        session.points,
+        duration(session.wall_s),
+        per_second(session.points_per_s),
+        session.threads,
+        if session.threads == 1 { "" } else { "s" },
+        session.simd
+    )
+}
+
+/// A result's rows: verdicts, failures, what stands out. At most six lines.
+pub(super) fn rows(tally: &Tally, job: &Job<'_>) -> String {
+    let at = |point: u64| {
+        let values = (job.axis_values)(point);
+        let place = job.layout.axes.iter().zip(values).map(|(axis, value)| format!("{} {value}", axis.name));
+        place.collect::<Vec<_>>().join(", ")
+    };
+    counts(tally, job.layout.ratio_limit, &at)
+}
+
+/// As [`rows`], where `at` says where a point lies.
+pub(super) fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String) -> String {
+    let mut text = String::new();
+    let percent = |count: u64| 100.0 * count as f64 / tally.points.max(1) as f64;
+    let verdicts = format!(
+        "{} ({:.1} %) below ratio {ratio_limit}, {} not, {} undefined",
+        tally.reliable,
+        percent(tally.reliable),
+        tally.unreliable,
+        tally.undefined
+    );
+    line(&mut text, "reliable", &verdicts);
+    if tally.by_status.failed() > 0 {
+        let by_status = tally.by_status.iter().filter(|(status, _)| *status != "ok");
+        let list: Vec<String> = by_status.map(|(status, count)| format!("{count} {status}")).collect();
+        line(&mut text, "failed", &list.join(", "));
+    }
+    if tally.sensitive > 0 {
+        let chaotic = format!("{}: their verdict holds, their ratio's digits do not", tally.sensitive);
+        line(&mut text, "chaotic", &chaotic);
+    }
+    let place = |point: u64| match at(point) {
+        place if place.is_empty() => place,
+        place => format!(" at {place}"),
+    };
+    if let Some(greatest) = &tally.greatest_ratio {
+        line(&mut text, "most", &format!("ratio {:.3}{}", greatest.value, place(greatest.point)));
+    }
+    if let Some(least) = &tally.least_gap_nonlinear_m {
+        line(&mut text, "least gap", &format!("{:.5} m{}", least.value, place(least.point)));
+    }
+    text
+}
+
+/// A named line of a summary.
+pub(super) fn line(text: &mut String, name: &str, value: &str) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "{name:>10}  {value}");
+}
+
+impl clap::builder::ValueParserFactory for Mode {
+    type Parser = clap::builder::ValueParser;
+
+    fn value_parser() -> Self::Parser {
+        clap::builder::ValueParser::new(|text: &str| text.parse::<progress::Mode>())
+    }
+}

@@ -1,0 +1,127 @@
+//! `sweep show FILE`: what a Parquet file of this program holds.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use serde_json::Value;
+
+use super::run::{counts, line};
+use crate::exit::{Error, Exit, print};
+use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, overview, row, tally};
+
+/// Arguments of `sweep show`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A result, trace, modes or boundary file
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+}
+
+/// Shows a file's content in short: for a result its verdicts and extremes, for any file its columns and their ranges.
+///
+/// # Errors
+/// A file that cannot be read, or is not Parquet.
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    let file = overview(&args.file)?;
+    let mut text = String::new();
+    line(&mut text, "file", &args.file.display().to_string());
+    match &file.result {
+        Some(result) => {
+            provenance(&mut text, result);
+            let tally = tally(&args.file)?;
+            let limit = result.plan["reliability"]["ratio_limit"].as_f64().unwrap_or(f64::NAN);
+            let axes: Vec<&str> =
+                axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
+            let places = places(&args.file, &axes, &[&tally.greatest_ratio, &tally.least_gap_nonlinear_m])?;
+            let at = |point| {
+                places.iter().find(|(known, _)| *known == point).map_or(String::new(), |(_, at)| at.clone())
+            };
+            text.push_str(&counts(&tally, limit, &at));
+        }
+        None => line(&mut text, "made by", file.created_by.as_deref().unwrap_or("unknown")),
+    }
+    columns(&mut text, &file);
+    print(&text)
+}
+
+fn provenance(text: &mut String, result: &ResultFile) {
+    let plan = &result.plan;
+    line(text, "name", plan["name"].as_str().unwrap_or_default());
+    line(text, "made by", &format!("sweep {}, plan {}", result.version, &result.plan_hash));
+    let brief = |value: &Value| value.to_string().replace('"', "").replace(',', ", ").replace(':', ": ");
+    for (name, key) in [("spin", "spin"), ("time", "time"), ("method", "integrator")] {
+        line(text, name, brief(&plan[key]).trim_matches(['{', '}']));
+    }
+    for axis in axes(plan) {
+        line(text, "axis", brief(axis).trim_matches(['{', '}']));
+    }
+}
+
+fn axes(plan: &Value) -> &[Value] {
+    plan["axis"].as_array().map_or(&[], Vec::as_slice)
+}
+
+/// Where the extremes lie, in axis values.
+fn places(
+    path: &std::path::Path,
+    axes: &[&str],
+    extremes: &[&Option<Extreme>],
+) -> Result<Vec<(u64, String)>, Error> {
+    let mut places = Vec::new();
+    for extreme in extremes.iter().filter_map(|extreme| extreme.as_ref()) {
+        let values = row(path, extreme.point, axes)?;
+        let at: Vec<String> =
+            axes.iter().zip(values).map(|(axis, value)| format!("{axis} {value}")).collect();
+        places.push((extreme.point, at.join(", ")));
+    }
+    Ok(places)
+}
+
+/// The columns with their units and ranges.
+fn columns(text: &mut String, file: &Overview) {
+    line(text, "rows", &file.rows.to_string());
+    let width = file.columns.iter().map(|column| column.name.len()).max().unwrap_or(0);
+    for column in &file.columns {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "    {:width$}  {}", column.name, range(column));
+    }
+}
+
+fn range(column: &ColumnRange) -> String {
+    let mut parts = Vec::new();
+    if let Some((least, greatest)) = column.range {
+        let unit = column
+            .unit
+            .as_deref()
+            .filter(|unit| *unit != "1")
+            .map(|unit| format!(" {unit}"))
+            .unwrap_or_default();
+        parts.push(format!("{} to {}{unit}", short(least), short(greatest)));
+    }
+    if column.nulls > 0 {
+        parts.push(format!("{} null", column.nulls));
+    }
+    parts.join(", ")
+}
+
+/// Six digits, without an exponent where that reads well.
+fn short(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e9).contains(&value.abs()) {
+        let text = format!("{value:.6}");
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    } else {
+        format!("{value:.5e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        let shown: Vec<String> =
+            [0.0, 0.05, 300.0, -1.5e-7, 2e12, 1.0 / 3.0].into_iter().map(short).collect();
+        assert_eq!(shown, ["0", "0.05", "300", "-1.50000e-7", "2.00000e12", "0.333333"]);
+    }
+}

@@ -1,0 +1,78 @@
+//! `sweep status GRID.toml`: where a run stands.
+
+use serde_json::json;
+
+use super::Target;
+use super::run::line;
+use crate::exit::{Error, Exit, print, tell};
+use crate::store::{FolderStatus, Job, State, status};
+
+/// Arguments of `sweep status`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    target: Target,
+    /// Print it as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Tells where a run stands, disturbing nobody.
+///
+/// # Errors
+/// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    let plan = args.target.grid.load()?;
+    let output = args.target.output(&plan);
+    let found = status(&output, &Job::of(&plan))?;
+    if args.json {
+        return print(&format!("{:#}\n", json!(found)));
+    }
+    tell(summary(args, &found).trim_end());
+    Ok(Exit::Done)
+}
+
+fn summary(args: &Args, found: &FolderStatus) -> String {
+    let mut text = String::new();
+    let state = match found.state {
+        State::NotStarted => "not started",
+        State::Unfinished => "unfinished",
+        State::Complete => "complete, to be merged",
+        State::Finished => "finished",
+    };
+    line(&mut text, "state", state);
+    line(&mut text, "file", &found.output.display().to_string());
+    line(
+        &mut text,
+        "points",
+        &format!("{} of {} done, {} failed", found.points_done, found.points, found.points_failed),
+    );
+    if found.state == State::Finished || found.state == State::NotStarted {
+        return text;
+    }
+    let damaged = match found.chunks_damaged.len() {
+        0 => String::new(),
+        count => format!(" ({count} of them damaged)"),
+    };
+    let chunks =
+        format!("{} of {} done, {} missing{damaged}", found.chunks_done, found.chunks, found.chunks_missing);
+    line(&mut text, "chunks", &chunks);
+    for holder in &found.running {
+        let shard = holder.shard.map(|shard| format!(", shard {shard}")).unwrap_or_default();
+        line(&mut text, "running", &format!("process {} on {}{shard}", holder.pid, holder.host));
+    }
+    if let Some(shards) = found.shards {
+        line(&mut text, "shards", &shards.to_string());
+        if !found.missing_shards.is_empty() {
+            line(&mut text, "again", &format!("sbatch --array={} ...", found.missing_shards));
+        }
+    }
+    let next = match found.state {
+        State::Complete => args.target.command("merge"),
+        _ => args.target.command("run"),
+    };
+    if found.running.is_empty() && (found.shards.is_none() || found.state == State::Complete) {
+        line(&mut text, "next", &next);
+    }
+    text
+}

@@ -1,0 +1,79 @@
+//! SIGINT and SIGTERM: the first asks the run to stop where nothing is lost, the second leaves at once.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+
+/// The stop flag, shared with whoever has work to put down.
+#[derive(Clone, Debug, Default)]
+pub struct Interrupt {
+    stop: Arc<AtomicBool>,
+    signal: Arc<AtomicUsize>,
+}
+
+impl Interrupt {
+    /// A flag that only [`Interrupt::raise`] sets.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Installs the handlers for this process. A second signal ends it at once with 130 or 143.
+    ///
+    /// Also takes SIGXFSZ, whose default is death, so that a file-size limit (`ulimit -f`) is met as a failed
+    /// write with a path and advice.
+    ///
+    /// # Errors
+    /// When the system refuses a handler.
+    pub fn install() -> io::Result<Self> {
+        let interrupt = Self::new();
+        for signal in [SIGINT, SIGTERM] {
+            // Order matters: the shutdown looks at the flag before this signal's own registration sets it.
+            flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.stop))?;
+            flag::register_usize(
+                signal,
+                Arc::clone(&interrupt.signal),
+                usize::try_from(signal).unwrap_or(0),
+            )?;
+            flag::register(signal, Arc::clone(&interrupt.stop))?;
+        }
+        #[cfg(unix)]
+        flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
+        Ok(interrupt)
+    }
+
+    /// Asks for a stop, as a signal of this number would.
+    pub fn raise(&self, signal: usize) {
+        self.signal.store(signal, Ordering::Relaxed);
+        self.stop.store(true, Ordering::Release);
+    }
+
+    /// Whether a stop was asked for.
+    #[must_use]
+    pub fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Acquire)
+    }
+
+    /// The signal that asked (2 for SIGINT, 15 for SIGTERM).
+    #[must_use]
+    pub fn signal(&self) -> Option<u8> {
+        if self.stopped() { u8::try_from(self.signal.load(Ordering::Relaxed)).ok() } else { None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_sets_the_flag_and_is_remembered() {
+        let interrupt = Interrupt::install().unwrap();
+        assert_eq!(interrupt.signal(), None);
+        signal_hook::low_level::raise(SIGTERM).unwrap();
+        assert!(interrupt.stopped());
+        assert_eq!(interrupt.signal(), Some(15));
+    }
+}

@@ -1,0 +1,173 @@
+//! How far the run is: a bar on a terminal, now and then a line elsewhere, or nothing.
+
+use std::io::{IsTerminal, Write};
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// What `--progress` said.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// A bar on a terminal; elsewhere a line a minute, which is what a batch job's log can bear.
+    #[default]
+    Auto,
+    /// A line every five seconds.
+    Plain,
+    /// Nothing.
+    None,
+}
+
+impl FromStr for Mode {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "plain" => Ok(Self::Plain),
+            "none" => Ok(Self::None),
+            _ => Err(format!("expected auto, plain or none; got `{text}`")),
+        }
+    }
+}
+
+/// Something that shows how far the run is, on stderr.
+pub(crate) struct Progress {
+    shown: Shown,
+    total: u64,
+    /// Points that were there at the start: they count as done, but not towards the rate.
+    start: u64,
+    began: Instant,
+}
+
+enum Shown {
+    Bar(ProgressBar),
+    Lines { every: Duration, next: Instant },
+    Nothing,
+}
+
+impl Progress {
+    pub(crate) fn new(mode: Mode, total: u64, start: u64) -> Self {
+        let lines = |seconds| {
+            let every = Duration::from_secs(seconds);
+            Shown::Lines { every, next: Instant::now() + every }
+        };
+        let shown = match mode {
+            Mode::None => Shown::Nothing,
+            Mode::Plain => lines(5),
+            Mode::Auto if std::io::stderr().is_terminal() => Shown::Bar(bar(total, start)),
+            Mode::Auto => lines(60),
+        };
+        Self { shown, total, start, began: Instant::now() }
+    }
+
+    /// Shows that `done` points of the total are there.
+    pub(crate) fn show(&mut self, done: u64) {
+        let text = match &self.shown {
+            Shown::Lines { next, .. } if Instant::now() >= *next => self.line(done),
+            _ => String::new(),
+        };
+        match &mut self.shown {
+            Shown::Bar(bar) => bar.set_position(done),
+            Shown::Lines { every, next } if !text.is_empty() => {
+                *next = Instant::now() + *every;
+                // A log that cannot be written to must not end the run.
+                let _ = writeln!(std::io::stderr(), "{text}");
+            }
+            _ => {}
+        }
+    }
+
+    /// Says that the chunks are being joined.
+    pub(crate) fn joining(&self) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.set_style(
+                ProgressStyle::with_template("{spinner} joining {human_len} points")
+                    .unwrap_or_else(|_| ProgressStyle::default_spinner()),
+            );
+            bar.tick();
+        }
+    }
+
+    /// Clears the bar away.
+    pub(crate) fn finish(&self) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn line(&self, done: u64) -> String {
+        let seconds = self.began.elapsed().as_secs_f64();
+        let rate = done.saturating_sub(self.start) as f64 / seconds.max(1e-9);
+        let percent = 100.0 * done as f64 / self.total.max(1) as f64;
+        let left = if rate > 0.0 {
+            format!("{} left", duration(self.total.saturating_sub(done) as f64 / rate))
+        } else {
+            "time left unknown".into()
+        };
+        format!("{done} of {} points ({percent:.1} %), {}, {left}", self.total, per_second(rate))
+    }
+}
+
+fn bar(total: u64, start: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(8));
+    let template = "{wide_bar} {human_pos}/{human_len} points  {per_sec}  {eta} left";
+    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_position(start);
+    bar.reset_eta();
+    bar
+}
+
+/// A duration as people say it: `0.42 s`, `12 s`, `3 min 20 s`, `5 h 02 min`.
+#[must_use]
+pub(crate) fn duration(seconds: f64) -> String {
+    if seconds < 10.0 {
+        return format!("{seconds:.2} s");
+    }
+    // Saturates; nobody waits for 1e19 s.
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{whole} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        3600..172_800 => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
+        _ => format!("{} days", whole / 86_400),
+    }
+}
+
+/// A rate with three digits.
+#[must_use]
+pub(crate) fn per_second(rate: f64) -> String {
+    if rate >= 100.0 { format!("{rate:.0} points/s") } else { format!("{rate:.3} points/s") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_read_as_people_say_them() {
+        let said: Vec<String> =
+            [0.416, 12.2, 200.0, 18_120.0, 1e6, f64::INFINITY].into_iter().map(duration).collect();
+        assert_eq!(said[..5], ["0.42 s", "12 s", "3 min 20 s", "5 h 02 min", "11 days"]);
+        assert!(said[5].ends_with("days"));
+    }
+
+    #[test]
+    fn a_resumed_run_counts_what_is_there_but_not_towards_the_rate() {
+        let mut progress = Progress::new(Mode::Plain, 1000, 900);
+        progress.began = Instant::now() - Duration::from_secs(10);
+        let line = progress.line(950);
+        assert!(line.starts_with("950 of 1000 points (95.0 %), 5.0"), "{line}");
+        assert!(
+            line.ends_with("10 s left") || line.ends_with("9.99 s left") || line.ends_with("10.00 s left"),
+            "{line}"
+        );
+        assert!(progress.line(900).contains("unknown"));
+    }
+
+    #[test]
+    fn modes_read_as_written() {
+        assert_eq!("plain".parse(), Ok(Mode::Plain));
+        assert!("loud".parse::<Mode>().unwrap_err().contains("expected auto, plain or none"));
+    }
+}

@@ -1,0 +1,326 @@
+//! The runner: takes missing chunks in order, has the engine compute them on all cores, keeps each as it comes, and
+//! joins the whole.
+//!
+//! Memory: a chunk (at most 4096 points, about 2 MB) in hand for each thread and as many again on their way to the
+//! disk, then about 40 MB for the join; nothing grows with the number of points but one set entry a chunk.
+
+use std::any::Any;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::time::{Duration, Instant};
+
+use crate::interrupt::Interrupt;
+use crate::outcome::Outcome;
+use crate::progress::{Mode, Progress};
+use crate::store::provenance::{self, Session};
+use crate::store::read::{ResultFile, Tally};
+use crate::store::{Environment, Job, Opened, Options, Run, Shard, ShardRequest, StoreError};
+
+/// What computes points.
+pub trait Engine: Sync {
+    /// Evaluates neighbouring points and returns one outcome each, in order; `None` if it put the work down because
+    /// [`Watch::stopped`] said so. Called from several threads of one rayon pool at once, which it may use itself.
+    ///
+    /// A point that fails, even by a panic, is an outcome; a panic that leaves this function costs the whole chunk.
+    fn evaluate(&self, points: Range<u64>, watch: &Watch<'_>) -> Option<Vec<Outcome>>;
+
+    /// The instruction set in use.
+    fn simd(&self) -> &str;
+
+    /// The largest relative error of an amplitude seen so far when checking itself, if it does.
+    fn observed_accuracy(&self) -> Option<f64> {
+        None
+    }
+}
+
+/// The engine's view of the run it serves.
+pub struct Watch<'a> {
+    interrupt: &'a Interrupt,
+    /// Set when a chunk could not be kept: what is in hand would be lost too.
+    abort: AtomicBool,
+    done: AtomicU64,
+}
+
+impl<'a> Watch<'a> {
+    /// A watch over nothing but the stop flag.
+    #[must_use]
+    pub const fn new(interrupt: &'a Interrupt) -> Self {
+        Self { interrupt, abort: AtomicBool::new(false), done: AtomicU64::new(0) }
+    }
+
+    /// Counts points done, for the bar.
+    pub fn done(&self, points: u64) {
+        self.done.fetch_add(points, Ordering::Relaxed);
+    }
+
+    /// Whether to put the work down.
+    #[must_use]
+    pub fn stopped(&self) -> bool {
+        self.interrupt.stopped() || self.abort.load(Ordering::Relaxed)
+    }
+}
+
+/// How to run.
+#[derive(Clone, Copy)]
+pub struct RunOptions<'a> {
+    /// Worker threads; `None` takes the cores that Slurm gave (`SLURM_CPUS_PER_TASK`), else those the process may use.
+    pub threads: Option<usize>,
+    /// Start over.
+    pub fresh: bool,
+    /// Which part.
+    pub shard: Option<ShardRequest>,
+    /// How progress is shown.
+    pub progress: Mode,
+    /// Where a scheduler's word is looked up.
+    pub environment: Environment<'a>,
+    /// Takes what a user should hear before the work starts.
+    pub tell: &'a dyn Fn(&str),
+}
+
+/// How a run ended, other than by an error.
+#[derive(Debug)]
+pub enum Ended {
+    /// The output was there already.
+    Already(Box<ResultFile>, Box<Tally>),
+    /// The output is in place.
+    Finished(Box<Tally>),
+    /// This shard's part is there; the merge comes when all are.
+    Shard(Shard),
+    /// A signal stopped it; what is done is kept.
+    Interrupted {
+        /// The signal.
+        signal: u8,
+        /// Points that are there.
+        kept: u64,
+        /// Of how many.
+        points: u64,
+    },
+}
+
+/// What there is to say about a run.
+#[derive(Debug)]
+pub struct Report {
+    /// How it ended.
+    pub ended: Ended,
+    /// This process's work; absent if there was none to do.
+    pub session: Option<Session>,
+    /// Things a user should hear of.
+    pub notes: Vec<String>,
+}
+
+/// Runs a job on an output, resuming what is there.
+///
+/// # Errors
+/// Everything of [`StoreError`]; finished chunks are kept whatever it is.
+pub fn run(
+    engine: &dyn Engine,
+    job: &Job<'_>,
+    output: &Path,
+    options: RunOptions<'_>,
+    interrupt: &Interrupt,
+) -> Result<Report, StoreError> {
+    let RunOptions { fresh, shard, environment, .. } = options;
+    let mut run = match Run::open(output, job, Options { fresh, shard, environment })? {
+        Opened::Finished(file) => {
+            let tally = crate::store::read::tally(output)?;
+            let ended = Ended::Already(file, Box::new(tally));
+            return Ok(Report { ended, session: None, notes: Vec::new() });
+        }
+        Opened::Run(run) => *run,
+    };
+    let threads = options.threads.unwrap_or_else(|| default_threads(environment));
+    let (points, there) = run.own_points();
+    if let Some(shard) = run.shard() {
+        (options.tell)(&format!("shard {} of {}", shard.index, shard.of));
+    }
+    for note in run.take_notes() {
+        (options.tell)(&note);
+    }
+    if there > 0 {
+        (options.tell)(&format!("going on: {there} of {points} points are there"));
+    }
+    let clock = Clock { began: Instant::now(), started_unix_s: provenance::now_unix_s(), threads, there };
+    let mut progress = Progress::new(options.progress, points, there);
+    let result = compute_and_join(engine, job, &mut run, threads, &mut progress, interrupt);
+    progress.finish();
+    let session = clock.session(engine, job, &run);
+    match result {
+        Ok(Some(tally)) => {
+            let joined = run.complete(job, tally, Some(session.clone()))?;
+            let ended = Ended::Finished(Box::new(joined.tally));
+            Ok(Report { ended, session: Some(session), notes: joined.notes })
+        }
+        Ok(None) => {
+            let mut notes = run.take_notes();
+            // Only the sidecar's account of the work would miss this; the work itself is kept.
+            notes.extend(run.record(&session).err().map(|error| error.to_string()));
+            let (points, kept) = run.own_points();
+            let ended = match (interrupt.signal(), run.shard()) {
+                (None, Some(shard)) => Ended::Shard(shard),
+                (signal, _) => Ended::Interrupted { signal: signal.unwrap_or_default(), kept, points },
+            };
+            Ok(Report { ended, session: Some(session), notes })
+        }
+        Err(error) => {
+            // The error counts; whether its session can be recorded on the same disk does not.
+            let _ = run.record(&session);
+            Err(error)
+        }
+    }
+}
+
+/// Computes what is missing and joins the whole; `None` for a shard, or when a signal stopped it.
+fn compute_and_join(
+    engine: &dyn Engine,
+    job: &Job<'_>,
+    run: &mut Run,
+    threads: usize,
+    progress: &mut Progress,
+    interrupt: &Interrupt,
+) -> Result<Option<Tally>, StoreError> {
+    let mut attempts_left = 2;
+    loop {
+        compute(engine, run, threads, progress, interrupt)?;
+        if interrupt.stopped() || run.shard().is_some() {
+            return Ok(None);
+        }
+        progress.joining();
+        match run.join(job, &|| interrupt.stopped()) {
+            // A chunk that was whole a moment ago is not any more: compute it again, but not for ever.
+            Err(StoreError::Incomplete { .. }) if attempts_left > 0 => attempts_left -= 1,
+            result => return result,
+        }
+    }
+}
+
+/// Computes and keeps every missing chunk of this process's part, or as many as a signal or an error lets.
+fn compute(
+    engine: &dyn Engine,
+    run: &Run,
+    threads: usize,
+    progress: &mut Progress,
+    interrupt: &Interrupt,
+) -> Result<(), StoreError> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|i| format!("sweep-{i}"))
+        .build()
+        .map_err(|error| StoreError::Threads { threads, reason: error.to_string() })?;
+    let watch = Watch::new(interrupt);
+    let (_, start) = run.own_points();
+    let next = AtomicU64::new(0);
+    // Bounded, so that a disk slower than the engine holds the engine up instead of filling memory.
+    let (sender, receiver) = sync_channel(threads);
+    let mut result = Ok(());
+    std::thread::scope(|scope| {
+        let (watch, next, pool) = (&watch, &next, &pool);
+        scope.spawn(move || pool.broadcast(|_| work(engine, run, next, watch, &sender)));
+        loop {
+            match receiver.recv_timeout(Duration::from_millis(100)) {
+                Ok((chunk, computed)) => {
+                    let kept = computed.and_then(|outcomes: Vec<Outcome>| run.write_chunk(chunk, &outcomes));
+                    if let Err(error) = kept {
+                        // An engine's defect costs its chunk; a disk that fails would cost them all.
+                        if !matches!(error, StoreError::Engine { .. }) {
+                            watch.abort.store(true, Ordering::Relaxed);
+                        }
+                        if result.is_ok() {
+                            result = Err(error);
+                        }
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            progress.show(start + watch.done.load(Ordering::Relaxed));
+        }
+    });
+    result
+}
+
+type Computed = (u64, Result<Vec<Outcome>, StoreError>);
+
+/// One worker: the next missing chunk, and the next, until none is left or someone said stop.
+fn work(engine: &dyn Engine, run: &Run, next: &AtomicU64, watch: &Watch<'_>, sender: &SyncSender<Computed>) {
+    while !watch.stopped() {
+        let chunk = next.fetch_add(1, Ordering::Relaxed);
+        if chunk >= run.chunks() {
+            return;
+        }
+        if !run.is_missing(chunk) {
+            continue;
+        }
+        let points = run.chunk_range(chunk);
+        let defect = |reason| {
+            let (first, last) = (points.start, points.end.saturating_sub(1));
+            Err(StoreError::Engine { first, last, reason })
+        };
+        let computed = match catch_unwind(AssertUnwindSafe(|| engine.evaluate(points.clone(), watch))) {
+            Ok(Some(outcomes)) => Ok(outcomes),
+            Ok(None) if watch.stopped() => return,
+            Ok(None) => defect("the engine put its work down unasked".into()),
+            Err(panic) => defect(format!("the engine panicked: {}", panic_text(panic.as_ref()))),
+        };
+        // The receiver outlives the workers.
+        if sender.send((chunk, computed)).is_err() {
+            return;
+        }
+    }
+}
+
+fn panic_text(panic: &(dyn Any + Send)) -> &str {
+    panic
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("without a message")
+}
+
+/// The cores that Slurm gave this task, else those the process may use.
+fn default_threads(environment: Environment<'_>) -> usize {
+    environment("SLURM_CPUS_PER_TASK")
+        .and_then(|cores| cores.parse().ok())
+        .filter(|cores| *cores > 0)
+        .unwrap_or_else(cpus)
+}
+
+fn cpus() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// What a session is made of besides the engine's word.
+struct Clock {
+    began: Instant,
+    started_unix_s: u64,
+    threads: usize,
+    /// Points that were there at the start.
+    there: u64,
+}
+
+impl Clock {
+    fn session(&self, engine: &dyn Engine, job: &Job<'_>, run: &Run) -> Session {
+        let points = run.own_points().1.saturating_sub(self.there);
+        let wall_s = self.began.elapsed().as_secs_f64();
+        Session {
+            started_unix_s: self.started_unix_s,
+            wall_s,
+            host: provenance::host(),
+            pid: std::process::id(),
+            cpus: cpus(),
+            cpu_model: provenance::cpu_model(),
+            simd: engine.simd().to_owned(),
+            threads: self.threads,
+            shard: run.shard().map(|shard| format!("{}/{}", shard.index, shard.of)),
+            points,
+            points_per_s: if wall_s > 0.0 { points as f64 / wall_s } else { 0.0 },
+            observed_accuracy: engine.observed_accuracy(),
+            version: job.version.to_owned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,265 @@
+//! What can go wrong with a run's files, each with the path and what to do about it.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::plan_file::Difference;
+use crate::exit::Exit;
+
+/// A failure of the store.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The file system said no.
+    #[error("cannot {action} {}: {source}\n  = help: {}", path.display(), advice(source))]
+    Io {
+        /// What was being done, in the infinitive.
+        action: &'static str,
+        /// To which file or folder.
+        path: PathBuf,
+        /// What the system answered.
+        source: io::Error,
+    },
+    /// Another process runs on this output.
+    #[error("{} is in use by {}\n  = help: wait for it to end, or give another --out", output.display(), Holders(holders))]
+    Busy {
+        /// The output both want.
+        output: PathBuf,
+        /// Who holds it, as far as they could be read.
+        holders: Vec<Holder>,
+    },
+    /// The run folder belongs to another plan.
+    #[error(
+        "{} was begun with another plan:\n{}  = help: run the old plan to its end, give another --out, or start over \
+         with --fresh (which deletes that folder's finished chunks)",
+        folder.display(),
+        Differences(differences)
+    )]
+    PlanDiffers {
+        /// The run folder.
+        folder: PathBuf,
+        /// Where the plans part.
+        differences: Vec<Difference>,
+    },
+    /// The finished output belongs to another plan.
+    #[error(
+        "{} already holds the result of another plan:\n{}  = help: give another --out, or replace it with --fresh",
+        output.display(),
+        Differences(differences)
+    )]
+    OutputDiffers {
+        /// The finished file.
+        output: PathBuf,
+        /// Where the plans part.
+        differences: Vec<Difference>,
+    },
+    /// Something that this program did not write stands where the output should go.
+    #[error("{} exists and is not a result of `sweep run` ({reason})\n  = help: give another --out, or replace it with --fresh",
+        output.display())]
+    OutputForeign {
+        /// The file in the way.
+        output: PathBuf,
+        /// Why it was not recognised.
+        reason: String,
+    },
+    /// The output's path cannot name a file.
+    #[error("{} cannot be an output: {reason}", output.display())]
+    BadOutput {
+        /// The path as given.
+        output: PathBuf,
+        /// Why not.
+        reason: &'static str,
+    },
+    /// A shard that does not fit.
+    #[error("{0}")]
+    Shard(String),
+    /// Chunks are missing, so there is no whole result to write.
+    #[error("{} is incomplete: {missing} of {chunks} chunks are missing{}\n  = help: \
+         {}", folder.display(), ShardsMissing(missing_shards), how_to_complete(missing_shards))]
+    Incomplete {
+        /// The run folder.
+        folder: PathBuf,
+        /// How many chunks are missing.
+        missing: u64,
+        /// Of how many.
+        chunks: u64,
+        /// The shards they belong to, as a list such as `2,5-7`, if the run was sharded.
+        missing_shards: Option<String>,
+    },
+    /// There is no run to speak of.
+    #[error("there is no run at {}: neither {} nor that file exists\n  = help: start it with `sweep run`",
+        output.display(), folder.display())]
+    NoRun {
+        /// The output asked about.
+        output: PathBuf,
+        /// Its run folder.
+        folder: PathBuf,
+    },
+    /// The engine handed over something that cannot be a chunk; a defect of this program.
+    #[error(
+        "internal error in points {first} to {last}: {reason}\n  = help: \
+         the other chunks are kept; please report this with the grid file"
+    )]
+    Engine {
+        /// First point of the chunk.
+        first: u64,
+        /// Last point of the chunk.
+        last: u64,
+        /// What was wrong.
+        reason: String,
+    },
+    /// Arrow or Parquet refused; a defect of this program or a file that is no Parquet.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Parquet {
+        /// What was being done, in the infinitive.
+        action: &'static str,
+        /// To which file.
+        path: PathBuf,
+        /// What the library answered.
+        source: parquet::errors::ParquetError,
+    },
+    /// The worker threads could not be started.
+    #[error("cannot start {threads} threads: {reason}\n  = help: try fewer with --threads")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// What the system answered.
+        reason: String,
+    },
+}
+
+/// A process that holds an output.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Holder {
+    /// Process id.
+    pub pid: u32,
+    /// Its machine.
+    pub host: String,
+    /// Its shard, 1-based, if it runs one.
+    pub shard: Option<u64>,
+}
+
+impl StoreError {
+    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_path_buf();
+        move |source| Self::Io { action, path, source }
+    }
+
+    /// Wraps what the Parquet library reported, as a plain I/O failure where it was one.
+    pub(crate) fn parquet(
+        action: &'static str,
+        path: &Path,
+    ) -> impl Fn(parquet::errors::ParquetError) -> Self {
+        let path = path.to_path_buf();
+        move |error| match error {
+            parquet::errors::ParquetError::External(inner) => match inner.downcast::<io::Error>() {
+                Ok(source) => Self::Io { action, path: path.clone(), source: *source },
+                Err(inner) => Self::Parquet {
+                    action,
+                    path: path.clone(),
+                    source: parquet::errors::ParquetError::External(inner),
+                },
+            },
+            source => Self::Parquet { action, path: path.clone(), source },
+        }
+    }
+
+    /// How the program ends on it.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Busy { .. } => Exit::Busy,
+            // Nothing was begun: the request does not fit what is there.
+            Self::PlanDiffers { .. }
+            | Self::OutputDiffers { .. }
+            | Self::OutputForeign { .. }
+            | Self::BadOutput { .. }
+            | Self::Shard(_) => Exit::BadInput,
+            Self::Io { .. }
+            | Self::Incomplete { .. }
+            | Self::NoRun { .. }
+            | Self::Engine { .. }
+            | Self::Parquet { .. }
+            | Self::Threads { .. } => Exit::Failed,
+        }
+    }
+}
+
+/// What a user can do about an I/O failure. Finished chunks are whole whatever happened, so it ends alike.
+fn advice(source: &io::Error) -> &'static str {
+    match source.kind() {
+        io::ErrorKind::StorageFull => {
+            "the disk is full: free some space and run the same command again; finished chunks are kept"
+        }
+        io::ErrorKind::QuotaExceeded => {
+            "the quota is used up: free some space and run the same command again; finished chunks are kept"
+        }
+        io::ErrorKind::FileTooLarge => {
+            "a file-size limit was hit: raise it (ulimit -f) and run the same command again; finished chunks are kept"
+        }
+        io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied => {
+            "make it writable for this user, or write elsewhere with --out"
+        }
+        io::ErrorKind::NotFound => {
+            "it was there and has vanished, or its folder cannot be reached: bring it back and run the same command \
+             again; chunks that are still there are used"
+        }
+        io::ErrorKind::NotADirectory => {
+            "a part of that path is a file, not a folder: move it, or write elsewhere with --out"
+        }
+        _ => {
+            "check the disk (the system's log may say more) and run the same command again; finished chunks are kept"
+        }
+    }
+}
+
+fn how_to_complete(missing_shards: &Option<String>) -> &'static str {
+    match missing_shards {
+        Some(_) => "run those shards again, or run the same command as `sweep run` without --shard",
+        None => "run `sweep run` with the same grid: it computes what is missing",
+    }
+}
+
+struct ShardsMissing<'a>(&'a Option<String>);
+
+impl fmt::Display for ShardsMissing<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(list) => write!(f, ", of shards {list}"),
+            None => Ok(()),
+        }
+    }
+}
+
+struct Holders<'a>(&'a [Holder]);
+
+impl fmt::Display for Holders<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() {
+            return f.write_str("another run");
+        }
+        for (i, holder) in self.0.iter().take(4).enumerate() {
+            let comma = if i > 0 { ", " } else { "" };
+            write!(f, "{comma}process {} on {}", holder.pid, holder.host)?;
+            if let Some(shard) = holder.shard {
+                write!(f, " (shard {shard})")?;
+            }
+        }
+        if self.0.len() > 4 { write!(f, " and {} more", self.0.len() - 4) } else { Ok(()) }
+    }
+}
+
+struct Differences<'a>(&'a [Difference]);
+
+impl fmt::Display for Differences<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const SHOWN: usize = 12;
+        for difference in self.0.iter().take(SHOWN) {
+            writeln!(f, "  {difference}")?;
+        }
+        if self.0.len() > SHOWN {
+            writeln!(f, "  and {} more differences", self.0.len() - SHOWN)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,214 @@
+//! Who may work on an output: one whole run, or any number of shards of one run.
+//!
+//! Locks are the system's (`flock`), so a killed process frees its own; the files only say who holds them. A whole
+//! run and a merge hold `lock` alone; shards share it, and each also holds `shard-<i>.lock`, which says which are
+//! running. The same shard started twice is harmless and not refused: a scheduler that lost sight of a node does
+//! exactly that, and must not wait for the lost node's lock to expire.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use super::Folder;
+use super::error::{Holder, StoreError};
+
+/// How long a lock is asked for before it counts as held: `sweep status` holds it for an instant when it looks.
+const ATTEMPTS: u32 = 5;
+const PAUSE: Duration = Duration::from_millis(40);
+
+/// A held lock; dropping it, or dying, lets go.
+#[derive(Debug)]
+pub(crate) struct Lock {
+    _run: Option<File>,
+    _shard: Option<File>,
+    path: PathBuf,
+    /// Set when the file system has no locks and the run goes on without.
+    pub(crate) missing: bool,
+}
+
+impl Lock {
+    /// Makes the folder if need be and takes the whole run's lock, or one shard's share of it.
+    pub(crate) fn acquire(folder: &Folder, shard: Option<u64>) -> Result<Self, StoreError> {
+        let path = folder.lock();
+        for attempt in 0..ATTEMPTS {
+            if attempt > 0 {
+                std::thread::sleep(PAUSE);
+            }
+            fs::create_dir_all(&folder.path).map_err(StoreError::io("make the folder", &folder.path))?;
+            let mut file = match open(&path) {
+                Ok(file) => file,
+                // A run that just finished removed the folder between the two lines above.
+                Err(error) if error.kind() == io::ErrorKind::NotFound && attempt + 1 < ATTEMPTS => continue,
+                Err(error) => return Err(StoreError::io("open the lock", &path)(error)),
+            };
+            let taken = if shard.is_some() { file.try_lock_shared() } else { file.try_lock() };
+            match taken {
+                Ok(()) if !still_there(&file, &path) => continue,
+                Ok(()) => {
+                    if shard.is_none() {
+                        sign(&mut file, &path)?;
+                    }
+                    let shard = match shard {
+                        Some(shard) => take_shard(folder, shard)?,
+                        None => None,
+                    };
+                    return Ok(Self { _run: Some(file), _shard: shard, path, missing: false });
+                }
+                Err(TryLockError::WouldBlock) => {}
+                Err(TryLockError::Error(error)) if no_locks_here(&error) => {
+                    return Ok(Self { _run: None, _shard: None, path, missing: true });
+                }
+                Err(TryLockError::Error(error)) => return Err(StoreError::io("lock", &path)(error)),
+            }
+        }
+        Err(StoreError::Busy { output: folder.output.clone(), holders: holders(folder) })
+    }
+
+    /// Deletes the lock's file while it is still held, so that no one can take it over, then lets go.
+    pub(crate) fn retire(self) -> Result<(), StoreError> {
+        super::atomic::remove(&self.path)
+    }
+}
+
+/// Everyone who holds the folder now, as far as it can be read without disturbing them.
+pub(crate) fn holders(folder: &Folder) -> Vec<Holder> {
+    let mut found: Vec<Holder> =
+        shard_locks(folder).into_iter().filter_map(|(shard, path)| held_by(&path, Some(shard))).collect();
+    // Shards share the folder's lock, and whoever last held it alone has left his name in it.
+    if found.is_empty() {
+        found.extend(held_by(&folder.lock(), None));
+    }
+    found
+}
+
+fn open(path: &Path) -> io::Result<File> {
+    OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)
+}
+
+fn take_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
+    let path = folder.shard_lock(shard);
+    let mut file = open(&path).map_err(StoreError::io("open the lock", &path))?;
+    if file.try_lock().is_err() {
+        return Ok(None);
+    }
+    sign(&mut file, &path)?;
+    Ok(Some(file))
+}
+
+/// Writes this process's name into a lock it holds.
+fn sign(file: &mut File, path: &Path) -> Result<(), StoreError> {
+    let name = format!("{} {}\n", std::process::id(), super::provenance::host());
+    file.set_len(0)
+        .and_then(|()| file.rewind())
+        .and_then(|()| file.write_all(name.as_bytes()))
+        .map_err(StoreError::io("write the process id to", path))
+}
+
+/// Whether the locked file is the one that the path names: a run that finishes deletes its lock.
+#[cfg(unix)]
+fn still_there(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (file.metadata(), fs::metadata(path)) {
+        (Ok(held), Ok(named)) => (held.dev(), held.ino()) == (named.dev(), named.ino()),
+        _ => false,
+    }
+}
+
+/// Elsewhere an open file cannot be deleted, so it is.
+#[cfg(not(unix))]
+fn still_there(_file: &File, path: &Path) -> bool {
+    path.exists()
+}
+
+/// Some cluster file systems are mounted without locks.
+fn no_locks_here(error: &io::Error) -> bool {
+    const ENOLCK: i32 = 37;
+    error.kind() == io::ErrorKind::Unsupported
+        || (cfg!(target_os = "linux") && error.raw_os_error() == Some(ENOLCK))
+}
+
+fn shard_locks(folder: &Folder) -> Vec<(u64, PathBuf)> {
+    let Ok(entries) = fs::read_dir(&folder.path) else { return Vec::new() };
+    let mut found: Vec<(u64, PathBuf)> = entries
+        .flatten()
+        .filter_map(|entry| {
+            let name = entry.file_name();
+            let shard = name.to_str()?.strip_prefix("shard-")?.strip_suffix(".lock")?.parse().ok()?;
+            Some((shard, entry.path()))
+        })
+        .collect();
+    found.sort_unstable();
+    found
+}
+
+/// The holder named in a lock file, if someone holds it.
+fn held_by(path: &Path, shard: Option<u64>) -> Option<Holder> {
+    let file = File::open(path).ok()?;
+    if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
+        return None;
+    }
+    let text = fs::read_to_string(path).ok()?;
+    let (pid, host) = text.trim_end().split_once(' ')?;
+    Some(Holder { pid: pid.parse().ok()?, host: host.to_owned(), shard })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::exit::Exit;
+
+    fn folder(home: &tempfile::TempDir) -> Folder {
+        Folder::of(&home.path().join("x.parquet")).unwrap()
+    }
+
+    fn busy(result: Result<Lock, StoreError>) -> Vec<Holder> {
+        match result {
+            Err(error @ StoreError::Busy { .. }) => {
+                assert_eq!(error.exit(), Exit::Busy);
+                let StoreError::Busy { holders, .. } = error else { unreachable!() };
+                holders
+            }
+            other => panic!("expected a busy output, got {other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_second_whole_run_is_told_the_first_ones_process() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = folder(&home);
+        let first = Lock::acquire(&folder, None).unwrap();
+        let holders = busy(Lock::acquire(&folder, None));
+        assert_eq!(holders[0].pid, std::process::id());
+        assert_eq!(holders[0].shard, None);
+        drop(first);
+        Lock::acquire(&folder, None).unwrap();
+    }
+
+    #[test]
+    fn shards_share_and_keep_a_whole_run_out() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = folder(&home);
+        let shards: Vec<Lock> =
+            [1, 2, 2].iter().map(|&shard| Lock::acquire(&folder, Some(shard)).unwrap()).collect();
+        let holders = busy(Lock::acquire(&folder, None));
+        assert_eq!(holders.iter().map(|h| h.shard).collect::<Vec<_>>(), [Some(1), Some(2)]);
+        drop(shards);
+        let whole = Lock::acquire(&folder, None).unwrap();
+        busy(Lock::acquire(&folder, Some(1)));
+        drop(whole);
+        assert!(super::holders(&folder).is_empty());
+    }
+
+    #[test]
+    fn a_lock_that_was_removed_with_its_folder_is_not_taken_for_held() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = folder(&home);
+        let first = Lock::acquire(&folder, None).unwrap();
+        let stale = open(&folder.lock()).unwrap();
+        first.retire().unwrap();
+        stale.try_lock().unwrap();
+        assert!(!still_there(&stale, &folder.lock()));
+        Lock::acquire(&folder, None).unwrap();
+    }
+}

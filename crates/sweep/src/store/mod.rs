@@ -1,0 +1,170 @@
+//! A run's files: nothing computed is lost, and nothing but the plan decides a byte of the result.
+//!
+//! A run on `x.parquet` works in the folder `x.parquet.partial`:
+//!
+//! | file | what |
+//! |---|---|
+//! | `plan.json` | the frozen plan, written first ([`plan_file`]) |
+//! | `shards.json` | into how many shards the run was dealt, if it was ([`shard`]) |
+//! | `chunk-<index>.bin` | outcomes of neighbouring points, each file whole or absent ([`chunk`]) |
+//! | `*.damaged` | what was not as it had been written; computed again |
+//! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
+//! | `lock`, `shard-<i>.lock` | who is at work ([`lock`]) |
+//!
+//! When every chunk is there they are joined into the one Parquet file ([`merge`]), and the folder goes. The store
+//! knows points, axis names and outcomes; it does not know the engine that makes them.
+
+mod atomic;
+mod chunk;
+mod error;
+mod lock;
+mod merge;
+mod open;
+mod plan_file;
+pub mod provenance;
+pub mod read;
+pub mod schema;
+mod shard;
+mod status;
+#[cfg(test)]
+pub(crate) mod synthetic;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+pub use error::{Holder, StoreError};
+pub use merge::Joined;
+pub use open::{Opened, Options, Run};
+pub use plan_file::Difference;
+pub use schema::{AxisColumn, Layout};
+pub use shard::{Environment, Shard, ShardRequest};
+pub use status::{FolderStatus, State, status};
+
+use crate::plan::{Axis, Plan};
+
+/// The values of the axes at a point of the grid, first axis first.
+pub type AxisValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
+
+/// What the store must know of a plan.
+pub struct Job<'a> {
+    /// Grid as run, full machine and method. Two runs are the same when this and `version` are.
+    pub plan: Value,
+    /// Version of the program; other versions may round differently, so their chunks do not mix.
+    pub version: &'a str,
+    /// Rows of the result.
+    pub points: u64,
+    /// What the columns depend on.
+    pub layout: Layout,
+    /// Axis values by point.
+    pub axis_values: AxisValues<'a>,
+}
+
+impl<'a> Job<'a> {
+    /// What the store must know of this plan, as run by this version of the program.
+    #[must_use]
+    pub fn of(plan: &'a Plan) -> Self {
+        let column = |axis: &Axis| AxisColumn {
+            name: axis.parameter.name().to_owned(),
+            unit: axis.parameter.unit().to_owned(),
+            description: axis.parameter.description().to_owned(),
+        };
+        Self {
+            plan: plan.to_json(),
+            version: env!("CARGO_PKG_VERSION"),
+            points: plan.points(),
+            layout: Layout {
+                axes: plan.axes.iter().map(column).collect(),
+                channels: plan.reliability.channels.clone(),
+                ratio_limit: plan.reliability.ratio_limit,
+            },
+            axis_values: Box::new(|point| plan.axis_values(point)),
+        }
+    }
+
+    /// Hash of version and plan.
+    #[must_use]
+    pub fn hash(&self) -> blake3::Hash {
+        plan_file::plan_hash(self.version, &self.plan)
+    }
+}
+
+/// Points a chunk holds (the last may hold fewer), from the number of points alone.
+///
+/// A power of two, so that chunks fill whole SIMD lane groups: 8 for the smallest grids, so that every core gets some;
+/// then 16 to 4096, for about a thousand chunks; then 4096 each, for chunks of a megabyte.
+#[must_use]
+pub const fn chunk_points(points: u64) -> u64 {
+    const SMALL_GRID: u64 = 128;
+    const CHUNKS: u64 = 1024;
+    if points <= SMALL_GRID {
+        return 8;
+    }
+    let wanted = points.div_ceil(CHUNKS);
+    if wanted <= 16 {
+        16
+    } else if wanted >= 4096 {
+        4096
+    } else {
+        wanted.next_power_of_two()
+    }
+}
+
+/// The paths of one run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Folder {
+    /// The finished file.
+    pub(crate) output: PathBuf,
+    /// The folder of the unfinished run, beside it.
+    pub(crate) path: PathBuf,
+}
+
+impl Folder {
+    pub(crate) fn of(output: &Path) -> Result<Self, StoreError> {
+        let bad = |reason| StoreError::BadOutput { output: output.to_path_buf(), reason };
+        let Some(name) = output.file_name() else { return Err(bad("it has no file name")) };
+        if output.is_dir() {
+            return Err(bad("it is a folder"));
+        }
+        let mut name = name.to_owned();
+        name.push(".partial");
+        Ok(Self { output: output.to_path_buf(), path: output.with_file_name(name) })
+    }
+
+    fn plan(&self) -> PathBuf {
+        self.path.join("plan.json")
+    }
+
+    fn shards(&self) -> PathBuf {
+        self.path.join("shards.json")
+    }
+
+    fn lock(&self) -> PathBuf {
+        self.path.join("lock")
+    }
+
+    fn shard_lock(&self, shard: u64) -> PathBuf {
+        self.path.join(format!("shard-{shard}.lock"))
+    }
+
+    fn chunk(&self, chunk: u64) -> PathBuf {
+        self.path.join(chunk_name(chunk))
+    }
+
+    /// The sidecar that says how the run went.
+    fn sidecar(&self) -> PathBuf {
+        self.output.with_extension("run.json")
+    }
+}
+
+fn chunk_name(chunk: u64) -> String {
+    format!("chunk-{chunk:08}.bin")
+}
+
+/// The chunk a file name stands for, if it stands for one.
+fn chunk_of_name(name: &str) -> Option<u64> {
+    let chunk = name.strip_prefix("chunk-")?.strip_suffix(".bin")?.parse().ok()?;
+    (chunk_name(chunk) == name).then_some(chunk)
+}

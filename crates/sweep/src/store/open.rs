@@ -1,0 +1,367 @@
+//! Opening a run on an output: whose it is, what is there, what is missing.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{self, ErrorKind};
+use std::ops::Range;
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::chunk::{self, Damage, Place};
+use super::error::StoreError;
+use super::lock::Lock;
+use super::plan_file::{Found, PlanFile, set_aside};
+use super::read::{self, Finished, ResultFile};
+use super::shard::{self, Dealing, Environment, Shard, ShardRequest};
+use super::{Folder, Job, atomic, chunk_of_name, chunk_points};
+use crate::outcome::Outcome;
+
+/// How a run is opened.
+#[derive(Clone, Copy)]
+pub struct Options<'a> {
+    /// Start over: finished chunks go now, a finished file stays until the new one takes its place.
+    pub fresh: bool,
+    /// Which part to compute; a scheduler's word counts if it is `None`.
+    pub shard: Option<ShardRequest>,
+    /// Where a scheduler's word is looked up.
+    pub environment: Environment<'a>,
+}
+
+/// What opening an output came to.
+#[derive(Debug)]
+pub enum Opened {
+    /// The output is there, and of this very plan.
+    Finished(Box<ResultFile>),
+    /// There is something to do; the run holds its lock.
+    Run(Box<Run>),
+}
+
+/// A run folder this process has a right to.
+#[derive(Debug)]
+pub struct Run {
+    pub(super) folder: Folder,
+    pub(super) lock: Lock,
+    place: Place,
+    points: u64,
+    chunk_points: u64,
+    dealt: Option<(Shard, Dealing)>,
+    /// This process's chunks that are there; behind a lock because workers look while the writer adds.
+    present: Mutex<BTreeSet<u64>>,
+    notes: Vec<String>,
+}
+
+impl Run {
+    /// Takes the output for this job, freezes its plan or finds it frozen, and looks through its chunks.
+    ///
+    /// # Errors
+    /// [`StoreError::Busy`] when another run holds the output, [`StoreError::PlanDiffers`],
+    /// [`StoreError::OutputDiffers`] and [`StoreError::OutputForeign`] when something else is there already,
+    /// [`StoreError::Shard`] for a part that does not fit, [`StoreError::Io`] for the file system.
+    pub fn open(output: &Path, job: &Job<'_>, options: Options<'_>) -> Result<Opened, StoreError> {
+        let folder = Folder::of(output)?;
+        if !options.fresh
+            && !folder.path.exists()
+            && let Some(file) = finished(&folder, job)?
+        {
+            return Ok(Opened::Finished(Box::new(file)));
+        }
+        let mut dealt = shard::resolve(options.shard, options.environment, Dealing::read(&folder)?)?;
+        if options.fresh && dealt.is_some() {
+            return Err(StoreError::Shard(format!(
+                "--fresh would delete what the other shards have done\n  = help: delete {} first, then start the shards",
+                folder.path.display()
+            )));
+        }
+        let lock = Lock::acquire(&folder, dealt.map(|(shard, _)| shard.index))?;
+        let mut notes = Vec::new();
+        if lock.missing {
+            notes.push(format!(
+                "{} is on a file system without locks: make sure that nothing else runs on this output",
+                folder.path.display()
+            ));
+        }
+        if options.fresh {
+            clear(&folder)?;
+        }
+        if dealt.is_none() {
+            atomic::sweep_leftovers(&folder.path)?;
+        }
+        let ours = PlanFile::of(job);
+        match PlanFile::read(&folder)? {
+            Found::Plan(found) => refuse_other_plan(&folder, &found, &ours)?,
+            Found::Damaged => {
+                let aside = set_aside(&folder.plan())?;
+                notes.push(format!("the frozen plan was damaged; kept as {}", aside.display()));
+                ours.freeze(&folder)?;
+            }
+            Found::Nothing => {
+                if !options.fresh
+                    && let Some(file) = finished(&folder, job)?
+                {
+                    // What a run leaves that dies between publishing its file and removing its folder.
+                    remove(&folder, lock);
+                    return Ok(Opened::Finished(Box::new(file)));
+                }
+                ours.freeze(&folder)?;
+                // Another shard may have been first, with another plan.
+                if let Found::Plan(found) = PlanFile::read(&folder)? {
+                    refuse_other_plan(&folder, &found, &ours)?;
+                }
+            }
+        }
+        if let Some((_, dealing)) = dealt {
+            let frozen = dealing.freeze(&folder)?;
+            dealt = shard::resolve(options.shard, options.environment, Some(frozen))?;
+        }
+        let place = Place {
+            plan: job.hash(),
+            channels: u32::try_from(job.layout.channels.len()).unwrap_or(u32::MAX),
+            chunk: 0,
+            first: 0,
+            count: 0,
+        };
+        let mut run = Self {
+            folder,
+            lock,
+            place,
+            points: job.points,
+            chunk_points: chunk_points(job.points),
+            dealt,
+            present: Mutex::default(),
+            notes,
+        };
+        run.rescan()?;
+        Ok(Opened::Run(Box::new(run)))
+    }
+
+    /// Opens what shards have left, in order to join it; never begins a run.
+    ///
+    /// # Errors
+    /// [`StoreError::NoRun`] when nothing is there; else as [`Run::open`].
+    pub fn open_for_merge(output: &Path, job: &Job<'_>) -> Result<Opened, StoreError> {
+        let folder = Folder::of(output)?;
+        if !folder.path.exists() && !output.exists() {
+            return Err(StoreError::NoRun { output: output.to_path_buf(), folder: folder.path });
+        }
+        Self::open(output, job, Options { fresh: false, shard: None, environment: &|_| None })
+    }
+
+    /// Looks through the chunks again, setting aside what is not whole.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    pub fn rescan(&mut self) -> Result<(), StoreError> {
+        let mut present = BTreeSet::new();
+        for chunk in chunks_named(&self.folder)? {
+            if chunk >= self.chunks() || !self.owns(chunk) {
+                continue;
+            }
+            if self.read_chunk(chunk)?.is_some() {
+                present.insert(chunk);
+            }
+        }
+        *self.present() = present;
+        Ok(())
+    }
+
+    /// A chunk's outcomes; `None`, with the file set aside and noted, if it is damaged, or if it is not there.
+    pub(super) fn read_chunk(&mut self, chunk: u64) -> Result<Option<Vec<Outcome>>, StoreError> {
+        match read_chunk(&self.folder, &self.place(chunk))? {
+            ChunkFile::Whole(outcomes) => Ok(Some(outcomes)),
+            ChunkFile::Absent => Ok(None),
+            ChunkFile::Damaged(damage) => {
+                let path = self.folder.chunk(chunk);
+                let aside = set_aside(&path)?;
+                self.notes.push(format!(
+                    "{}: {damage}; kept as {} and computed again",
+                    path.display(),
+                    aside.file_name().unwrap_or_default().to_string_lossy()
+                ));
+                self.present().remove(&chunk);
+                Ok(None)
+            }
+        }
+    }
+
+    /// Keeps a chunk for good: when this returns, it outlives a power cut.
+    ///
+    /// # Errors
+    /// [`StoreError::Engine`] when the outcomes are not this chunk's points in order, [`StoreError::Io`].
+    pub fn write_chunk(&self, chunk: u64, outcomes: &[Outcome]) -> Result<(), StoreError> {
+        let bytes = chunk::encode(&self.place(chunk), outcomes)?;
+        atomic::write(&self.folder.path, &self.folder.chunk(chunk), &bytes)?;
+        self.present().insert(chunk);
+        Ok(())
+    }
+
+    /// How many chunks make up the whole result.
+    #[must_use]
+    pub fn chunks(&self) -> u64 {
+        self.points.div_ceil(self.chunk_points)
+    }
+
+    /// The points of a chunk.
+    #[must_use]
+    pub fn chunk_range(&self, chunk: u64) -> Range<u64> {
+        let first = chunk.saturating_mul(self.chunk_points).min(self.points);
+        first..first.saturating_add(self.chunk_points).min(self.points)
+    }
+
+    /// The part this process computes, if not the whole.
+    #[must_use]
+    pub fn shard(&self) -> Option<Shard> {
+        self.dealt.map(|(shard, _)| shard)
+    }
+
+    fn owns(&self, chunk: u64) -> bool {
+        self.shard().is_none_or(|shard| shard.owns(chunk))
+    }
+
+    /// Whether a chunk is this process's to compute and not there yet.
+    #[must_use]
+    pub fn is_missing(&self, chunk: u64) -> bool {
+        self.owns(chunk) && !self.present().contains(&chunk)
+    }
+
+    fn present(&self) -> MutexGuard<'_, BTreeSet<u64>> {
+        self.present.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Points this process answers for, and how many of them are there.
+    #[must_use]
+    pub fn own_points(&self) -> (u64, u64) {
+        let length = |chunk| {
+            let range = self.chunk_range(chunk);
+            range.end - range.start
+        };
+        let chunks = self.chunks();
+        let own = self.shard().map_or(chunks, |shard| shard.chunks(chunks));
+        // All chunks are full but the last of the run.
+        let short = match chunks.checked_sub(1) {
+            Some(last) if self.owns(last) => self.chunk_points - length(last),
+            _ => 0,
+        };
+        let there = self.present().iter().map(|&chunk| length(chunk)).sum();
+        (own.saturating_mul(self.chunk_points).saturating_sub(short), there)
+    }
+
+    /// The unfinished run's folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder.path
+    }
+
+    /// Where the finished file goes.
+    #[must_use]
+    pub fn output(&self) -> &Path {
+        &self.folder.output
+    }
+
+    /// Things a user should hear of once: damaged chunks, a file system without locks.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+
+    pub(super) fn place(&self, chunk: u64) -> Place {
+        let range = self.chunk_range(chunk);
+        Place { chunk, first: range.start, count: range.end - range.start, ..self.place }
+    }
+
+    /// The error that says which chunks, and of which shards, are missing from the whole.
+    pub(super) fn incomplete(&self) -> Result<StoreError, StoreError> {
+        let chunks = self.chunks();
+        let present = self.present();
+        let dealing = Dealing::read(&self.folder)?;
+        Ok(StoreError::Incomplete {
+            folder: self.folder.path.clone(),
+            missing: chunks - present.len() as u64,
+            chunks,
+            missing_shards: dealing.map(|dealing| shard::list(dealing.incomplete(chunks, &present))),
+        })
+    }
+}
+
+/// What stands where a chunk should be.
+pub(super) enum ChunkFile {
+    Whole(Vec<Outcome>),
+    Absent,
+    Damaged(Damage),
+}
+
+/// Reads and verifies a chunk, leaving the file alone.
+pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
+    let path = folder.chunk(place.chunk);
+    let bytes = match fs::read(&path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(ChunkFile::Absent),
+        Err(error) => return Err(StoreError::io("read", &path)(error)),
+    };
+    Ok(match chunk::decode(place, &bytes) {
+        Ok(outcomes) => ChunkFile::Whole(outcomes),
+        Err(damage) => ChunkFile::Damaged(damage),
+    })
+}
+
+/// Chunks that a folder has by name, unread.
+pub(super) fn chunks_named(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
+    let mut chunks = BTreeSet::new();
+    for entry in fs::read_dir(&folder.path).map_err(StoreError::io("list", &folder.path))? {
+        let entry = entry.map_err(StoreError::io("list", &folder.path))?;
+        chunks.extend(entry.file_name().to_str().and_then(chunk_of_name));
+    }
+    Ok(chunks)
+}
+
+/// The finished file, if it is of this plan.
+fn finished(folder: &Folder, job: &Job<'_>) -> Result<Option<ResultFile>, StoreError> {
+    match read::finished(&folder.output)? {
+        Finished::Absent => Ok(None),
+        Finished::Result(file) if file.plan_hash == job.hash().to_hex().as_str() => Ok(Some(*file)),
+        Finished::Result(file) => {
+            let was = PlanFile { plan: file.plan, version: file.version, ..PlanFile::of(job) };
+            let differences = was.differences(&PlanFile::of(job));
+            Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
+        }
+        Finished::Foreign(reason) => Err(StoreError::OutputForeign { output: folder.output.clone(), reason }),
+    }
+}
+
+fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Result<(), StoreError> {
+    if found == ours {
+        return Ok(());
+    }
+    Err(StoreError::PlanDiffers { folder: folder.path.clone(), differences: found.differences(ours) })
+}
+
+/// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers' files stay.
+fn clear(folder: &Folder) -> Result<(), StoreError> {
+    const OURS: [&str; 6] = ["plan.json", "shards.json", "chunk-", "session-", "shard-", ".sweep-"];
+    atomic::remove(&folder.plan())?;
+    for entry in fs::read_dir(&folder.path).map_err(StoreError::io("list", &folder.path))? {
+        let entry = entry.map_err(StoreError::io("list", &folder.path))?;
+        let name = entry.file_name();
+        if name.to_str().is_some_and(|name| OURS.iter().any(|ours| name.starts_with(ours))) {
+            atomic::remove(&entry.path())?;
+        }
+    }
+    atomic::sync_folder(&folder.path)
+}
+
+/// Removes a folder that has served; the result does not depend on it, so a failure is only worth a note.
+pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
+    let removed =
+        clear(folder).and_then(|()| lock.retire()).and_then(|()| match fs::remove_dir(&folder.path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(StoreError::io("remove the folder", &folder.path)(error))
+            }
+            _ => Ok(()),
+        });
+    match removed {
+        Ok(()) => None,
+        Err(error) => Some(format!(
+            "the result is whole, but {} could not be removed; delete it by hand ({})",
+            folder.path.display(),
+            error.to_string().lines().next().unwrap_or_default()
+        )),
+    }
+}

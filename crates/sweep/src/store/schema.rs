@@ -1,0 +1,404 @@
+//! The result file's columns: a function of the plan, with units and descriptions that travel in the file.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use arrow::array::{
+    ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray, UInt64Array,
+};
+use arrow::datatypes::{DataType, Field, Int32Type, Schema, SchemaRef};
+use arrow::error::ArrowError;
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
+use parquet::schema::types::ColumnPath;
+use serde_json::{Map, Value, json};
+use washer_model::Channel;
+
+use super::Job;
+use crate::outcome::{Outcome, Trajectory};
+use crate::verdict::{ROW_STATUSES, Verdict, row_status};
+
+/// Rows in a row group: fixed, so that chunking leaves no trace in the file. A group of 25 columns takes about 30 MB
+/// in memory while it is written.
+const ROW_GROUP_ROWS: usize = 1 << 17;
+
+/// Rows handed to the Parquet writer at once: fixed for the same reason, and a whole number of them makes a group.
+pub(crate) const BATCH_ROWS: usize = 1 << 12;
+
+/// Keys of the file's own key-value metadata.
+pub mod key {
+    /// The plan as JSON: grid as run, full machine, method.
+    pub const PLAN: &str = "sweep.plan";
+    /// Hash over version and plan, hexadecimal.
+    pub const PLAN_HASH: &str = "sweep.plan_hash";
+    /// Version of the program.
+    pub const VERSION: &str = "sweep.version";
+    /// JSON object: column name to `type`, `unit`, `description`.
+    pub const COLUMNS: &str = "sweep.columns";
+}
+
+/// A swept parameter as a column.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AxisColumn {
+    /// Parameter name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// One line.
+    pub description: String,
+}
+
+/// What the columns depend on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// The axes, first to last.
+    pub axes: Vec<AxisColumn>,
+    /// The compared channels, in column order.
+    pub channels: Vec<Channel>,
+    /// A point is reliable when its greatest ratio is below this.
+    pub ratio_limit: f64,
+}
+
+/// What a row's cells are taken from.
+pub(crate) struct Row {
+    pub(crate) axis_values: Vec<f64>,
+    pub(crate) outcome: Outcome,
+    pub(crate) verdict: Verdict,
+    /// Position in [`ROW_STATUSES`].
+    pub(crate) status: usize,
+    fail_time_s: Option<f64>,
+}
+
+type Get<T> = Box<dyn Fn(&Row) -> T>;
+
+/// How a column takes its cell from a row, which settles its type too.
+enum Cell {
+    Count(Get<u64>),
+    /// A number that hardly ever repeats.
+    Measured(Get<Option<f64>>),
+    /// A swept value, never null.
+    Axis(Get<f64>),
+    Time(Get<Option<f64>>),
+    Flag(Get<Option<bool>>),
+    /// A position in a list of names that is the same for every row, batch and run of the plan.
+    Name(Vec<&'static str>, Get<Option<usize>>),
+}
+
+/// A column of the file.
+struct Column {
+    name: String,
+    unit: String,
+    description: String,
+    cell: Cell,
+}
+
+impl Column {
+    fn new(name: impl Into<String>, unit: &str, description: impl Into<String>, cell: Cell) -> Self {
+        Self { name: name.into(), unit: unit.into(), description: description.into(), cell }
+    }
+
+    fn field(&self) -> Field {
+        let names = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let (data_type, nullable) = match self.cell {
+            Cell::Count(_) => (DataType::UInt64, false),
+            Cell::Axis(_) => (DataType::Float64, false),
+            Cell::Measured(_) | Cell::Time(_) => (DataType::Float64, true),
+            Cell::Flag(_) => (DataType::Boolean, true),
+            Cell::Name(..) => (names(), true),
+        };
+        let metadata = HashMap::from([
+            ("unit".into(), self.unit.clone()),
+            ("description".into(), self.description.clone()),
+        ]);
+        Field::new(&self.name, data_type, nullable).with_metadata(metadata)
+    }
+
+    fn array(&self, rows: &[Row]) -> Result<ArrayRef, ArrowError> {
+        Ok(match &self.cell {
+            Cell::Count(get) => Arc::new(UInt64Array::from_iter_values(rows.iter().map(get))),
+            Cell::Axis(get) => Arc::new(Float64Array::from_iter_values(rows.iter().map(get))),
+            Cell::Measured(get) | Cell::Time(get) => Arc::new(rows.iter().map(get).collect::<Float64Array>()),
+            Cell::Flag(get) => Arc::new(rows.iter().map(get).collect::<BooleanArray>()),
+            Cell::Name(names, get) => {
+                let position = |row: &Row| get(row).and_then(|name| i32::try_from(name).ok());
+                let keys: Int32Array = rows.iter().map(position).collect();
+                let names = StringArray::from_iter_values(names);
+                Arc::new(DictionaryArray::<Int32Type>::try_new(keys, Arc::new(names))?)
+            }
+        })
+    }
+
+    /// Name of the type in the column dictionary.
+    const fn type_name(&self) -> &'static str {
+        match self.cell {
+            Cell::Count(_) => "uint64",
+            Cell::Axis(_) | Cell::Measured(_) | Cell::Time(_) => "float64",
+            Cell::Flag(_) => "bool",
+            Cell::Name(..) => "string",
+        }
+    }
+}
+
+/// The two models by name.
+const MODELS: [(&str, fn(&Outcome) -> &Trajectory); 2] =
+    [("nonlinear", |outcome| &outcome.nonlinear), ("linear", |outcome| &outcome.linear)];
+
+impl Layout {
+    /// Every column, in order: the one place that says what the file holds.
+    fn columns(&self) -> Vec<Column> {
+        let point = Cell::Count(Box::new(|row| row.outcome.point));
+        let mut columns = vec![Column::new("point", "1", "index in grid order", point)];
+        for (i, axis) in self.axes.iter().enumerate() {
+            let cell = Cell::Axis(Box::new(move |row| row.axis_values.get(i).copied().unwrap_or(f64::NAN)));
+            columns.push(Column::new(&axis.name, &axis.unit, &axis.description, cell));
+        }
+        columns.extend(self.amplitude_columns());
+        columns.extend(self.verdict_columns());
+        columns.extend(run_columns());
+        columns
+    }
+
+    fn amplitude_columns(&self) -> Vec<Column> {
+        let mut columns = Vec::new();
+        for (model, of) in MODELS {
+            for (i, channel) in self.channels.iter().enumerate() {
+                let text = format!(
+                    "{}: largest deviation from equilibrium in the window, {model} model; null if it failed",
+                    channel.description()
+                );
+                let cell = Cell::Measured(Box::new(move |row| of(&row.outcome).amplitudes.get(i).copied()));
+                columns.push(Column::new(format!("{model}_{}", channel.name()), channel.unit(), text, cell));
+            }
+        }
+        for (i, channel) in self.channels.iter().enumerate() {
+            let text = format!(
+                "{}: nonlinear over linear amplitude; null where the linear one is zero or a model failed",
+                channel.description()
+            );
+            let cell = Cell::Measured(Box::new(move |row| row.verdict.ratios.get(i).copied().flatten()));
+            columns.push(Column::new(format!("ratio_{}", channel.name()), "1", text, cell));
+        }
+        columns
+    }
+
+    fn verdict_columns(&self) -> [Column; 4] {
+        let channels = self.channels.iter().map(|channel| channel.name()).collect();
+        [
+            Column::new(
+                "ratio_max",
+                "1",
+                "greatest of the defined ratios; null if none is",
+                Cell::Measured(Box::new(|row| row.verdict.greatest.map(|(_, ratio)| ratio))),
+            ),
+            Column::new(
+                "ratio_max_channel",
+                "",
+                "channel of ratio_max; the first of the plan's channels wins a tie",
+                Cell::Name(channels, Box::new(|row| row.verdict.greatest.map(|(channel, _)| channel))),
+            ),
+            Column::new(
+                "reliable",
+                "",
+                format!("ratio_max below {}; null where ratio_max is", self.ratio_limit),
+                Cell::Flag(Box::new(|row| row.verdict.reliable)),
+            ),
+            Column::new(
+                "sensitive",
+                "",
+                "true where the nonlinear motion is chaotic: the verdict holds, the ratio's digits depend on the \
+                 integrator; null where not assessed",
+                Cell::Flag(Box::new(|row| row.outcome.sensitive)),
+            ),
+        ]
+    }
+
+    /// The Arrow schema.
+    #[must_use]
+    pub fn schema(&self) -> SchemaRef {
+        Arc::new(Schema::new(self.columns().iter().map(Column::field).collect::<Vec<_>>()))
+    }
+
+    /// The column dictionary: name to type, unit and description.
+    fn dictionary(&self) -> Value {
+        let entry = |column: &Column| {
+            let facts = json!({
+                "type": column.type_name(),
+                "unit": column.unit,
+                "description": column.description,
+            });
+            (column.name.clone(), facts)
+        };
+        Value::Object(self.columns().iter().map(entry).collect::<Map<_, _>>())
+    }
+}
+
+/// Columns about the two integrations, the same for every plan.
+fn run_columns() -> Vec<Column> {
+    let mut columns = Vec::new();
+    for (model, of) in MODELS {
+        let text = format!(
+            "least gap between drum and tub over the whole run, {model} model; negative where they clash; null if \
+             it failed"
+        );
+        let cell = Cell::Measured(Box::new(move |row| of(&row.outcome).min_gap_m));
+        columns.push(Column::new(format!("min_gap_{model}_m"), "m", text, cell));
+    }
+    columns.push(Column::new(
+        "status",
+        "",
+        "ok, or why the nonlinear model failed, or behind linear_ why the linear model alone did",
+        Cell::Name(ROW_STATUSES.to_vec(), Box::new(|row| Some(row.status))),
+    ));
+    columns.push(Column::new(
+        "fail_time_s",
+        "s",
+        "when the model named by status failed; null if none did or it never started",
+        Cell::Time(Box::new(|row| row.fail_time_s)),
+    ));
+    let counts: [(&str, &str, fn(&Trajectory) -> u64); 2] =
+        [("steps", "accepted", |model| model.steps), ("rejected", "rejected", |model| model.rejected)];
+    for (name, kind, count) in counts {
+        for (model, of) in MODELS {
+            let text = format!("{kind} integration steps, {model} model");
+            let cell = Cell::Count(Box::new(move |row| count(of(&row.outcome))));
+            columns.push(Column::new(format!("{name}_{model}"), "1", text, cell));
+        }
+    }
+    columns
+}
+
+/// Writer settings and metadata of a result file. Nothing in them depends on when, where or how the run went.
+pub(crate) fn properties(job: &Job<'_>) -> WriterProperties {
+    let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
+    let metadata = vec![
+        pair(key::PLAN, job.plan.to_string()),
+        pair(key::PLAN_HASH, job.hash().to_hex().to_string()),
+        pair(key::VERSION, job.version.to_owned()),
+        pair(key::COLUMNS, job.layout.dictionary().to_string()),
+    ];
+    let builder = WriterProperties::builder()
+        // The library's own default names its version, and an upgrade would change the bytes.
+        .set_created_by(format!("sweep version {}", job.version))
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
+        .set_max_row_group_bytes(None)
+        .set_key_value_metadata(Some(metadata));
+    job.layout.columns().iter().fold(builder, encoding).build()
+}
+
+fn encoding(builder: WriterPropertiesBuilder, column: &Column) -> WriterPropertiesBuilder {
+    let path = ColumnPath::from(column.name.as_str());
+    match column.cell {
+        // A dictionary of them would be written and thrown away.
+        Cell::Measured(_) => builder.set_column_dictionary_enabled(path, false),
+        _ => builder,
+    }
+}
+
+/// Rows on their way into a batch.
+pub(crate) struct Rows<'a> {
+    layout: &'a Layout,
+    schema: SchemaRef,
+    columns: Vec<Column>,
+    rows: Vec<Row>,
+}
+
+impl<'a> Rows<'a> {
+    pub(crate) fn new(layout: &'a Layout) -> Self {
+        let (schema, columns) = (layout.schema(), layout.columns());
+        Self { layout, schema, columns, rows: Vec::with_capacity(BATCH_ROWS) }
+    }
+
+    pub(crate) fn schema(&self) -> SchemaRef {
+        Arc::clone(&self.schema)
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Adds a row: the axis values at the point, and what came of it. Returns the row with its verdict.
+    pub(crate) fn push(&mut self, axis_values: Vec<f64>, outcome: Outcome) -> &Row {
+        let verdict = Verdict::new(&outcome, self.layout.channels.len(), self.layout.ratio_limit);
+        let (status, fail_time_s) = row_status(&outcome);
+        let row = self.rows.len();
+        self.rows.push(Row { axis_values, outcome, verdict, status, fail_time_s });
+        &self.rows[row]
+    }
+
+    /// The rows so far as a batch; leaves none.
+    pub(crate) fn take(&mut self) -> Result<RecordBatch, ArrowError> {
+        let rows = std::mem::take(&mut self.rows);
+        let arrays = self.columns.iter().map(|column| column.array(&rows)).collect::<Result<Vec<_>, _>>()?;
+        self.rows = rows;
+        self.rows.clear();
+        RecordBatch::try_new(self.schema(), arrays)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::synthetic;
+
+    #[test]
+    fn columns_stand_as_the_contract_says() {
+        let names: Vec<String> =
+            synthetic::layout().schema().fields().iter().map(|f| f.name().clone()).collect();
+        assert_eq!(
+            names,
+            [
+                "point",
+                "unbalance_mass_kg",
+                "damping_n_s_per_m",
+                "nonlinear_tub_front_y",
+                "nonlinear_tub_yaw",
+                "linear_tub_front_y",
+                "linear_tub_yaw",
+                "ratio_tub_front_y",
+                "ratio_tub_yaw",
+                "ratio_max",
+                "ratio_max_channel",
+                "reliable",
+                "sensitive",
+                "min_gap_nonlinear_m",
+                "min_gap_linear_m",
+                "status",
+                "fail_time_s",
+                "steps_nonlinear",
+                "steps_linear",
+                "rejected_nonlinear",
+                "rejected_linear",
+            ]
+        );
+    }
+
+    #[test]
+    fn every_field_carries_unit_and_description() {
+        let layout = synthetic::layout();
+        let dictionary = layout.dictionary();
+        for field in layout.schema().fields() {
+            let unit = &field.metadata()["unit"];
+            assert_eq!(dictionary[field.name()]["unit"], unit.as_str());
+            assert!(!field.metadata()["description"].is_empty(), "{}", field.name());
+        }
+        assert_eq!(dictionary["nonlinear_tub_yaw"]["unit"], "rad");
+    }
+
+    #[test]
+    fn name_dictionaries_do_not_depend_on_which_names_appear() {
+        let layout = synthetic::layout();
+        let mut rows = Rows::new(&layout);
+        rows.push(vec![0.1, 60.0], synthetic::outcome(0, 2));
+        let batch = rows.take().unwrap();
+        let names = |column: &str| {
+            let array = batch.column_by_name(column).unwrap();
+            let array = array.as_any().downcast_ref::<DictionaryArray<Int32Type>>().unwrap();
+            let values = array.values().as_any().downcast_ref::<StringArray>().unwrap();
+            values.iter().flatten().map(str::to_owned).collect::<Vec<_>>()
+        };
+        assert_eq!(names("status"), ROW_STATUSES);
+        assert_eq!(names("ratio_max_channel"), ["tub_front_y", "tub_yaw"]);
+    }
+}

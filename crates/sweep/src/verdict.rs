@@ -1,0 +1,137 @@
+//! From two trajectories to a verdict: the ratios, the greatest of them, reliable or not, and the row's status.
+
+use crate::outcome::{Outcome, Status};
+
+/// Every value of the result file's `status` column, in the order of its dictionary.
+///
+/// A row whose nonlinear model failed carries that model's reason, whatever became of the linear one; a row whose
+/// linear model alone failed carries that reason behind `linear_`.
+pub const ROW_STATUSES: [&str; 11] = [
+    "ok",
+    "diverged",
+    "step_too_small",
+    "step_limit",
+    "no_equilibrium",
+    "panicked",
+    "linear_diverged",
+    "linear_step_too_small",
+    "linear_step_limit",
+    "linear_no_equilibrium",
+    "linear_panicked",
+];
+
+/// The row's entry in [`ROW_STATUSES`], and the failing model's time of failure.
+#[must_use]
+pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
+    let code = |status: Status| status as usize;
+    if outcome.nonlinear.status != Status::Ok {
+        (code(outcome.nonlinear.status), outcome.nonlinear.fail_time_s)
+    } else if outcome.linear.status != Status::Ok {
+        (Status::ALL.len() - 1 + code(outcome.linear.status), outcome.linear.fail_time_s)
+    } else {
+        (0, None)
+    }
+}
+
+/// How the two models compare at one grid point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verdict {
+    /// Nonlinear over linear amplitude per channel of the plan; `None` where the linear amplitude is zero or a model
+    /// failed.
+    pub ratios: Vec<Option<f64>>,
+    /// The greatest defined ratio and its channel's position in the plan; the first channel wins a tie.
+    pub greatest: Option<(usize, f64)>,
+    /// Whether the greatest ratio is below the limit; `None` where no ratio is defined.
+    pub reliable: Option<bool>,
+}
+
+impl Verdict {
+    /// Compares the amplitudes of an outcome over `channels` channels.
+    #[must_use]
+    pub fn new(outcome: &Outcome, channels: usize, ratio_limit: f64) -> Self {
+        let (nonlinear, linear) = (&outcome.nonlinear.amplitudes, &outcome.linear.amplitudes);
+        let ratios: Vec<Option<f64>> = (0..channels)
+            .map(|i| match (nonlinear.get(i), linear.get(i)) {
+                (Some(nonlinear), Some(linear)) if *linear != 0.0 => Some(nonlinear / linear),
+                _ => None,
+            })
+            .collect();
+        let mut greatest: Option<(usize, f64)> = None;
+        for (channel, ratio) in ratios.iter().enumerate() {
+            if let Some(ratio) = *ratio
+                && greatest.is_none_or(|(_, so_far)| ratio > so_far)
+            {
+                greatest = Some((channel, ratio));
+            }
+        }
+        Self { ratios, greatest, reliable: greatest.map(|(_, ratio)| ratio < ratio_limit) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::Trajectory;
+
+    fn trajectory(status: Status, amplitudes: &[f64], fail_time_s: Option<f64>) -> Trajectory {
+        Trajectory {
+            status,
+            fail_time_s,
+            amplitudes: amplitudes.to_vec(),
+            min_gap_m: None,
+            steps: 0,
+            rejected: 0,
+        }
+    }
+
+    fn outcome(nonlinear: Trajectory, linear: Trajectory) -> Outcome {
+        Outcome { point: 0, nonlinear, linear, sensitive: None }
+    }
+
+    #[test]
+    fn greatest_ratio_decides_and_the_first_channel_wins_a_tie() {
+        let row = outcome(
+            trajectory(Status::Ok, &[2.0, 3.0, 6.0], None),
+            trajectory(Status::Ok, &[2.0, 1.0, 2.0], None),
+        );
+        let verdict = Verdict::new(&row, 3, 3.0);
+        assert_eq!(verdict.ratios, [Some(1.0), Some(3.0), Some(3.0)]);
+        assert_eq!(verdict.greatest, Some((1, 3.0)));
+        assert_eq!(verdict.reliable, Some(false), "reliable means below the limit, not at it");
+        assert_eq!(Verdict::new(&row, 3, 3.5).reliable, Some(true));
+    }
+
+    #[test]
+    fn zero_linear_amplitude_leaves_that_ratio_undefined() {
+        let row =
+            outcome(trajectory(Status::Ok, &[1.0, 1.0], None), trajectory(Status::Ok, &[0.0, 1.0], None));
+        assert_eq!(Verdict::new(&row, 2, 2.0).ratios, [None, Some(1.0)]);
+        assert_eq!(Verdict::new(&row, 2, 2.0).reliable, Some(true));
+        let still =
+            outcome(trajectory(Status::Ok, &[0.0, 0.0], None), trajectory(Status::Ok, &[0.0, 0.0], None));
+        assert_eq!(
+            Verdict::new(&still, 2, 2.0),
+            Verdict { ratios: vec![None, None], greatest: None, reliable: None }
+        );
+    }
+
+    #[test]
+    fn a_failed_model_leaves_everything_undefined_and_names_itself() {
+        let row =
+            outcome(trajectory(Status::Diverged, &[], Some(3.5)), trajectory(Status::Ok, &[1.0, 1.0], None));
+        assert_eq!(Verdict::new(&row, 2, 2.0).reliable, None);
+        assert_eq!(row_status(&row), (1, Some(3.5)));
+        let row =
+            outcome(trajectory(Status::Ok, &[1.0], None), trajectory(Status::StepLimit, &[], Some(2.0)));
+        let (status, time) = row_status(&row);
+        assert_eq!((ROW_STATUSES[status], time), ("linear_step_limit", Some(2.0)));
+    }
+
+    #[test]
+    fn both_failed_reports_the_nonlinear_reason_and_time() {
+        let row =
+            outcome(trajectory(Status::Panicked, &[], None), trajectory(Status::Diverged, &[], Some(1.0)));
+        let (status, time) = row_status(&row);
+        assert_eq!((ROW_STATUSES[status], time), ("panicked", None));
+    }
+}
