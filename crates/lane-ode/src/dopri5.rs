@@ -29,15 +29,8 @@ const A: [[f64; 6]; STAGES] = [
 ];
 
 /// Weights of order 5 less those of order 4.
-const ERROR: [f64; STAGES] = [
-    71.0 / 57600.0,
-    0.0,
-    -71.0 / 16695.0,
-    71.0 / 1920.0,
-    -17253.0 / 339_200.0,
-    22.0 / 525.0,
-    -1.0 / 40.0,
-];
+const ERROR: [f64; STAGES] =
+    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
 
 /// The dense output's fourth-order term (Hairer's `dopri5.f`, d1 to d7).
 const DENSE: [f64; STAGES] = [
@@ -88,7 +81,11 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
             let Some(how) = ended[lane].take() else { continue };
             is_fresh = true;
             let leg = task.next_leg(lane, how, &mut x);
-            lanes[lane] = Progress { is_active: leg.is_some(), end_s: leg.map_or(0.0, |l| l.end_s), ..Progress::default() };
+            lanes[lane] = Progress {
+                is_active: leg.is_some(),
+                end_s: leg.map_or(0.0, |l| l.end_s),
+                ..Progress::default()
+            };
             t.0.set(lane, leg.map_or(0.0, |l| l.start_s));
             let is_new = !matches!(how, Ended::Arrived(_));
             control.start(lane, leg.map(|l| l.step_s), is_new);

@@ -71,7 +71,8 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         for i in 0..M {
             let rise = N(T::select(counts, self.rise(i, length_s, sample).0, zero.0));
             if T::bits(zero.0.less(rise.0)) != 0 {
-                let inside = Quintic::new(length_s, self.last[i], second[0][i], sample[i], second[1][i]).extremum();
+                let inside =
+                    Quintic::new(length_s, self.last[i], second[0][i], sample[i], second[1][i]).extremum();
                 let inside = zero.where_less(rise, inside.abs(), zero);
                 self.peak[i] = N(inside.0.larger(self.peak[i].0));
             }
@@ -114,9 +115,7 @@ impl<T: Lane> Quintic<T> {
         let r = y1 - y0 - v0 - a0;
         let s = v1 - v0 - 2.0 * a0;
         let t = a1 - a0;
-        Self {
-            c: [y0, v0, a0, 10.0 * r - 4.0 * s + t, 7.0 * s - 15.0 * r - 2.0 * t, 6.0 * r - 3.0 * s + t],
-        }
+        Self { c: [y0, v0, a0, 10.0 * r - 4.0 * s + t, 7.0 * s - 15.0 * r - 2.0 * t, 6.0 * r - 3.0 * s + t] }
     }
 
     /// The value where the slope vanishes, by Newton's method from where the cubic's slope would; at worst an end's.

@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{check, completions, init, merge, parameters, schema, show, status};
+use crate::commands::{check, completions, init, merge, parameters, run, schema, show, status};
 use crate::exit::{Error, Exit};
 
 /// Printed before everything else by `--help`: most readers want to see one line that works.
@@ -33,6 +33,8 @@ pub struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Integrate every grid point with both models, into one Parquet file; resumes what was interrupted
+    Run(run::Args),
     /// Check a grid file and show what it would do, without doing it
     Check(check::Args),
     /// Join the finished shards of a run into its one result file
@@ -58,6 +60,7 @@ impl Command {
     /// Whatever kept the command from its end.
     pub fn run(&self) -> Result<Exit, Error> {
         match self {
+            Self::Run(args) => run::run(args),
             Self::Check(args) => check::run(args),
             Self::Merge(args) => merge::run(args),
             Self::Status(args) => status::run(args),

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use crate::config::Diagnostics;
+use crate::engine::EngineError;
 use crate::store::StoreError;
 
 /// Exit codes, a contract with scripts.
@@ -77,6 +78,9 @@ pub enum Error {
     /// Mistakes in what the user wrote.
     #[error(transparent)]
     Input(#[from] Diagnostics),
+    /// No engine for what was asked.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
     /// A run's files.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -101,6 +105,7 @@ impl Error {
     pub fn exit(&self) -> Exit {
         match self {
             Self::Input(_) => Exit::BadInput,
+            Self::Engine(_) => Exit::BadInput,
             Self::Store(error) => error.exit(),
             Self::File { .. } | Self::Stdout(_) => Exit::Failed,
         }

@@ -138,7 +138,8 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 impl SpringOf<f64> {
     pub(crate) fn new(spring: &crate::machine::Spring) -> Self {
         let free_length = spring.free_length_m.unwrap_or_else(|| distance(spring.cabinet_m, spring.tub_m));
-        let ([cabinet_x, cabinet_y, cabinet_z], [tub_x, tub_y, tub_z]) = (spring.cabinet_m.map(N), spring.tub_m.map(N));
+        let ([cabinet_x, cabinet_y, cabinet_z], [tub_x, tub_y, tub_z]) =
+            (spring.cabinet_m.map(N), spring.tub_m.map(N));
         Self {
             cabinet_x,
             cabinet_y,
@@ -154,7 +155,8 @@ impl SpringOf<f64> {
 
 impl DamperOf<f64> {
     pub(crate) fn new(damper: &crate::machine::Damper) -> Self {
-        let ([cabinet_x, cabinet_y, cabinet_z], [tub_x, tub_y, tub_z]) = (damper.cabinet_m.map(N), damper.tub_m.map(N));
+        let ([cabinet_x, cabinet_y, cabinet_z], [tub_x, tub_y, tub_z]) =
+            (damper.cabinet_m.map(N), damper.tub_m.map(N));
         let damping = N(damper.damping_n_s_per_m);
         Self { cabinet_x, cabinet_y, cabinet_z, tub_x, tub_y, tub_z, damping }
     }

@@ -65,7 +65,7 @@ pub(crate) fn find<T: Lane>(zero: N<T>, machine: &Coefficients<T>) -> ([N<T>; CO
 fn static_forces<T: Real>(machine: &Coefficients<T>, q: &[N<T>; COORDINATES]) -> [N<T>; COORDINATES] {
     let zero = q[0].lit(0.0);
     let spin = SpinState::new((zero, zero.lit(1.0)), zero, zero);
-    let Halves { tub, rotor, .. } = halves(&machine.view(), &spin, q, &[zero; COORDINATES]);
+    let Halves { tub, rotor } = halves(&machine.view(), &spin, q, &[zero; COORDINATES]);
     let ([f1, f2], [f5, f6]) = tub.floating.generalised_forces();
     let ([f3, f4], [f7, f8, f9, f10]) = rotor.floating.generalised_forces();
     [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]

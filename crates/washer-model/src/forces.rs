@@ -52,7 +52,11 @@ pub(crate) fn bearing_load<T: Real>(
 
 /// Bearing forces on the shaft when its midpoint is `offset` from the tub's and its axis `tilt` from the tub's (y, z).
 #[inline(always)]
-pub(crate) fn load_of_displacement<T: Real>(b: &Bodies<T>, offset: &[N<T>; 2], tilt: &[N<T>; 2]) -> AxisLoad<T> {
+pub(crate) fn load_of_displacement<T: Real>(
+    b: &Bodies<T>,
+    offset: &[N<T>; 2],
+    tilt: &[N<T>; 2],
+) -> AxisLoad<T> {
     let mut load = AxisLoad { force: [offset[0].lit(0.0); 2], moment: [offset[0].lit(0.0); 2] };
     for (position, stiffness) in [(b.bearing_front, b.front_stiffness), (b.bearing_rear, b.rear_stiffness)] {
         for i in 0..2 {

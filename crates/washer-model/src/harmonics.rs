@@ -85,7 +85,8 @@ pub(crate) struct TermLanes<T> {
 impl<T: Lane> TermLanes<T> {
     #[inline(always)]
     pub(crate) fn splat(zero: N<T>, terms: &[Term]) -> Self {
-        let mut lanes = Self { zero, keys: Vec::new(), coefficients: Vec::new(), lanes: vec![terms.to_vec(); T::LANES] };
+        let mut lanes =
+            Self { zero, keys: Vec::new(), coefficients: Vec::new(), lanes: vec![terms.to_vec(); T::LANES] };
         lanes.rebuild();
         lanes
     }

@@ -46,7 +46,14 @@ pub(crate) struct Constants<T> {
 macro_rules! each_field {
     ($mac:ident) => {
         $mac!(
-            tub_per_mass, tub_arm, tub_axis, tub_inertia, tub_stiffness, tub_damping, rotor_per_mass, rotor_axis
+            tub_per_mass,
+            tub_arm,
+            tub_axis,
+            tub_inertia,
+            tub_stiffness,
+            tub_damping,
+            rotor_per_mass,
+            rotor_axis
         )
     };
 }
@@ -106,7 +113,8 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
     let mut samples = [[[zero; HARMONICS]; ENTRIES]; 3];
     for (k, &(cos, sin)) in SAMPLES.iter().enumerate() {
         for (kind, (speed, acceleration)) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
-            let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero.lit(speed), zero.lit(acceleration));
+            let spin =
+                SpinState::new((zero.lit(sin), zero.lit(cos)), zero.lit(speed), zero.lit(acceleration));
             let Half { mut floating, inertia, .. } = rotor(bodies, &spin, q, &still);
             floating.apply(&on_shaft);
             let (force, torque) = floating.generalised_forces();
@@ -156,7 +164,11 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
 
 /// `values` with a unit derivative (times `slope`) along coordinate `j`.
 #[inline(always)]
-pub(crate) fn seeded<T: Lane>(values: &[N<T>; COORDINATES], j: usize, slope: f64) -> [N<Dual<T>>; COORDINATES] {
+pub(crate) fn seeded<T: Lane>(
+    values: &[N<T>; COORDINATES],
+    j: usize,
+    slope: f64,
+) -> [N<Dual<T>>; COORDINATES] {
     let mut seeded = [values[0].constant(); COORDINATES];
     for i in 0..COORDINATES {
         seeded[i] = values[i].constant();
@@ -294,7 +306,12 @@ fn unloaded<T: Lane>(
             per_mass: c.rotor_per_mass,
             force: [rotor[0], rotor[1]],
             drift: [zero; 2],
-            arm: [[e[ARM], e[ARM + 1]], [e[ARM + 2], e[ARM + 3]], [e[ARM + 4], e[ARM + 5]], [e[ARM + 6], e[ARM + 7]]],
+            arm: [
+                [e[ARM], e[ARM + 1]],
+                [e[ARM + 2], e[ARM + 3]],
+                [e[ARM + 4], e[ARM + 5]],
+                [e[ARM + 6], e[ARM + 7]],
+            ],
             axis: c.rotor_axis,
             torque: [rotor[2], rotor[3], rotor[4], rotor[5]],
         },
@@ -358,7 +375,9 @@ impl LinearPoint {
         let e = &rotor_at.entries;
         let rotor_arm: [[N<f64>; 2]; 4] = core::array::from_fn(|r| [e[ARM + 2 * r], e[ARM + 2 * r + 1]]);
         let rotor_inertia = |r: usize, s: usize| e[INERTIA + r * (r + 1) / 2 + s].0;
-        fill_mass(&mut matrices.mass, [0, 1], &[4, 5], c.tub_per_mass, &c.tub_arm, |r, s| c.tub_inertia[r][s].0);
+        fill_mass(&mut matrices.mass, [0, 1], &[4, 5], c.tub_per_mass, &c.tub_arm, |r, s| {
+            c.tub_inertia[r][s].0
+        });
         fill_mass(&mut matrices.mass, [2, 3], &TURNS, c.rotor_per_mass, &rotor_arm, rotor_inertia);
         matrices
     }

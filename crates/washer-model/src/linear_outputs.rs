@@ -23,10 +23,7 @@ pub(crate) const FEATURES: usize = 3 * COLUMNS;
 
 /// The features at coordinates `q` (deviations).
 #[inline(always)]
-pub(crate) fn features<R: Real>(
-    (sin, cos): (N<R>, N<R>),
-    q: &[N<R>; COORDINATES],
-) -> [N<R>; FEATURES] {
+pub(crate) fn features<R: Real>((sin, cos): (N<R>, N<R>), q: &[N<R>; COORDINATES]) -> [N<R>; FEATURES] {
     let mut features = [sin.lit(1.0); FEATURES];
     for column in 1..COLUMNS {
         features[column] = q[column - 1];

@@ -14,7 +14,7 @@ use core::f64::consts::FRAC_PI_2;
 use lane_ode::{Dual, Lane, N, Real, System};
 
 /// States: ten coordinates, then their speeds.
-pub const STATES: usize = 2 * COORDINATES;
+pub(crate) const STATES: usize = 2 * COORDINATES;
 
 /// Coordinates farther than this from equilibrium (m) have left the machine.
 const FARTHEST_M: f64 = 10.0;

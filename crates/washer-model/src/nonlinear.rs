@@ -5,7 +5,7 @@
 
 use crate::coefficients::{Bodies, Coefficients, DamperOf, SpringOf};
 use crate::floating::{Factors, Floating};
-use crate::forces::{AxisLoad, Flexure, bearing_load, suspension_load};
+use crate::forces::{Flexure, bearing_load, suspension_load};
 use crate::frame::{Tilt, Vec3, combination, difference, scaled, sum};
 use crate::spin::SpinState;
 use lane_ode::{N, Real};
@@ -20,11 +20,10 @@ pub(crate) struct Half<T, const R: usize> {
     pub(crate) tilt: Tilt<T>,
 }
 
-/// Both halves, and what the bearings do to the shaft.
+/// Both halves, loaded by the bearings.
 pub(crate) struct Halves<T> {
     pub(crate) tub: Half<T, 2>,
     pub(crate) rotor: Half<T, 4>,
-    pub(crate) on_shaft: AxisLoad<T>,
 }
 
 /// Assembles the equations of motion at coordinates `q` (m, rad) and speeds `u`, with the bearing forces in both halves.
@@ -40,7 +39,7 @@ pub(crate) fn halves<T: Real>(
     let on_shaft = bearing_load(machine.bodies, q, &tub.tilt, &rotor.tilt);
     tub.floating.apply(&on_shaft.reaction());
     rotor.floating.apply(&on_shaft);
-    Halves { tub, rotor, on_shaft }
+    Halves { tub, rotor }
 }
 
 /// The coefficients that the equations read.
@@ -65,7 +64,7 @@ pub(crate) fn accelerations<T: Real>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
-    let Halves { tub, rotor, .. } = halves(machine, spin, q, u);
+    let Halves { tub, rotor } = halves(machine, spin, q, u);
     let ([a1, a2], [a5, a6]) = tub.floating.accelerations(&Factors::new(tub.inertia));
     let ([a3, a4], [a7, a8, a9, a10]) = rotor.floating.accelerations(&Factors::new(rotor.inertia));
     [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
@@ -103,8 +102,7 @@ pub(crate) fn tub<T: Real>(
     let axial = (b.tub_mass * drift[0]).v();
     let torque_yaw =
         tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1] - force[1] * arm_yaw_z - axial * arm_yaw_x;
-    let torque_pitch =
-        moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial * arm_pitch[0];
+    let torque_pitch = moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial * arm_pitch[0];
 
     let axial_yaw = (b.tub_mass * arm_yaw_x).v();
     let (s, c) = (tilt.sin_pitch, tilt.cos_pitch);
@@ -153,7 +151,8 @@ pub(crate) fn rotor<T: Real>(
         spin.cos * motion.acceleration_y + spin.speed * omega_s[2],
         -(spin.sin * motion.acceleration_y + spin.speed * omega_s[1]),
     ];
-    let [ex, ey, ez] = [c9 * omega_s[0] - s9 * omega_s[2], omega_s[1] + u9, s9 * omega_s[0] + c9 * omega_s[2]];
+    let [ex, ey, ez] =
+        [c9 * omega_s[0] - s9 * omega_s[2], omega_s[1] + u9, s9 * omega_s[0] + c9 * omega_s[2]];
     let alpha_d = [
         c9 * alpha_s[0] - s9 * alpha_s[2] + (u10 * ey - u9 * ez),
         alpha_s[1] - u10 * ex,
@@ -307,8 +306,7 @@ fn rotor_inertia<T: Real>(
     let j11 = l11 + b.shaft_i11;
     let j22 = k.k22 + b.shaft_i22 + across;
     let j33 = l33 + b.shaft_i33 + across;
-    let [_, j12, j13] =
-        out_of_spin(spin, &[j11, l12 - mu_rho[1], (c9 * s9) * difference - mu_rho[2]]);
+    let [_, j12, j13] = out_of_spin(spin, &[j11, l12 - mu_rho[1], (c9 * s9) * difference - mu_rho[2]]);
     let half_sum = (0.5 * (j22 + j33)).v();
     let half_difference = (0.5 * (j22 - j33)).v();
     let turned = half_difference * spin.cos_2 - l23 * spin.sin_2;

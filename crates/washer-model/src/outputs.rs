@@ -34,10 +34,8 @@ pub(crate) fn outputs<T: Real>(
     let midpoint = [q[0], q[1]];
     let rotor_midpoint = [q[2], q[3]];
     let tub_front = in_cabinet(&midpoint, scaled(b.tub_front, tub.axis_c));
-    let drum_front = in_cabinet(
-        &rotor_midpoint,
-        combination(b.drum_hinge, &shaft.axis_c, b.hinge_to_front, &drum_axis),
-    );
+    let drum_front =
+        in_cabinet(&rotor_midpoint, combination(b.drum_hinge, &shaft.axis_c, b.hinge_to_front, &drum_axis));
     let tub_centre = in_cabinet(&midpoint, scaled(b.tub_centre, tub.axis_c));
     let rotor_centre =
         in_cabinet(&rotor_midpoint, combination(b.along_shaft, &shaft.axis_c, b.drum_share, &rho));

@@ -3,12 +3,12 @@
 use crate::coefficients::Coefficients;
 use crate::equilibrium;
 use crate::harmonics::Term;
-use crate::linear::{LinearPoint, linearise};
+use crate::linear::{LinearPoint, Matrices, linearise};
 use crate::linear_outputs::linearise_outputs;
 use crate::machine::Machine;
 use crate::nonlinear::COORDINATES;
 use crate::outputs::{CHANNELS, outputs};
-use crate::spin::{Spin, SpinStretch};
+use crate::spin::{Spin, SpinState, SpinStretch};
 use lane_ode::{Kernel, Lane, N, Simd};
 
 /// When a trajectory ends, and when its amplitudes are taken.
@@ -55,6 +55,13 @@ impl Point {
     pub const fn equilibrium(&self) -> &[f64; COORDINATES] {
         &self.equilibrium
     }
+
+    /// M, C, K and F of the linear model (Eq. 41) at spin angle `theta_rad`, speed and acceleration.
+    #[must_use]
+    pub fn matrices(&self, theta_rad: f64, speed_rad_per_s: f64, acceleration_rad_per_s2: f64) -> Matrices {
+        let spin = SpinState::new(N(theta_rad).sin_cos(), N(speed_rad_per_s), N(acceleration_rad_per_s2));
+        self.linear.matrices(&self.machine.bodies, &spin)
+    }
 }
 
 /// Makes points ready, on lanes.
@@ -89,21 +96,23 @@ impl Kernel for Prepare<'_> {
             let linear_outputs = linearise_outputs(&lanes.bodies, &q);
             let at_rest = outputs(&lanes.bodies, (zero, zero.lit(1.0)), &q);
             let parts = machines.into_iter().zip(linear).zip(linear_outputs).zip(group);
-            ready.extend(parts.enumerate().map(|(lane, (((machine, linear), linear_outputs), (_, spin)))| {
-                if found >> lane & 1 == 0 {
-                    return Err(NoEquilibrium);
-                }
-                let stretches = spin.stretches();
-                Ok(Point {
-                    machine,
-                    equilibrium: q.map(|q| q.0.get(lane)),
-                    rest: core::array::from_fn(|i| at_rest[i].0.get(lane)),
-                    linear,
-                    linear_outputs,
-                    legs: legs(&stretches, self.timing),
-                    stretches,
-                })
-            }));
+            ready.extend(parts.enumerate().map(
+                |(lane, (((machine, linear), linear_outputs), (_, spin)))| {
+                    if found >> lane & 1 == 0 {
+                        return Err(NoEquilibrium);
+                    }
+                    let stretches = spin.stretches();
+                    Ok(Point {
+                        machine,
+                        equilibrium: q.map(|q| q.0.get(lane)),
+                        rest: core::array::from_fn(|i| at_rest[i].0.get(lane)),
+                        linear,
+                        linear_outputs,
+                        legs: legs(&stretches, self.timing),
+                        stretches,
+                    })
+                },
+            ));
         }
         ready
     }

@@ -1,11 +1,11 @@
 //! Against numbers from programs independent of this one (`tests/reference/README.md` says how they were made).
 
 use crate::coefficients::Coefficients;
-use crate::{equilibrium, linear};
 use crate::machine::Machine;
 use crate::nonlinear::{self, COORDINATES};
 use crate::spin::SpinState;
 use crate::{Channel, Method, ModelKind, Spin, Timing, prepare, simulate};
+use crate::{equilibrium, linear};
 use lane_ode::{N, Simd};
 use serde_json::Value;
 
@@ -115,7 +115,8 @@ fn val_reliability_map_matches_an_independent_one() {
     let points: Vec<_> = prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let points: Vec<_> = points.iter().collect();
     let method = Method::Rk4 { step_s: 2e-4 };
-    let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|m| simulate(simd, m, &method, &points));
+    let [nonlinear, linear] =
+        [ModelKind::Nonlinear, ModelKind::Linear].map(|m| simulate(simd, m, &method, &points));
     let column = |name: &str| names.iter().position(|n| n == name).unwrap();
     let mut compared = 0;
     for (i, row) in rows.iter().enumerate() {
@@ -131,7 +132,12 @@ fn val_reliability_map_matches_an_independent_one() {
                 let is_regular = row[column("step_sensitivity")] < 1e-4;
                 if prefix == "linear" || is_regular {
                     let error = (ours - theirs).abs() / theirs;
-                    assert!(error < 1e-4, "{prefix} {} at {:?}: {ours} against {theirs}", channel.name(), &row[..2]);
+                    assert!(
+                        error < 1e-4,
+                        "{prefix} {} at {:?}: {ours} against {theirs}",
+                        channel.name(),
+                        &row[..2]
+                    );
                     compared += 1;
                 }
             }

@@ -56,7 +56,9 @@ pub fn simulate(simd: Simd, model: ModelKind, method: &Method, points: &[&Point]
         return Vec::new();
     }
     match model {
-        ModelKind::Nonlinear => simd.dispatch(Simulate::<OfNonlinear> { points, method, family: PhantomData }),
+        ModelKind::Nonlinear => {
+            simd.dispatch(Simulate::<OfNonlinear> { points, method, family: PhantomData })
+        }
         ModelKind::Linear => simd.dispatch(Simulate::<OfLinear> { points, method, family: PhantomData }),
     }
 }

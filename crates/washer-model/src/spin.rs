@@ -233,10 +233,6 @@ impl<T: Lane> SpinLanes<T> {
             turn_rate -= rate * sin;
             turn_acceleration -= (TAU * (rate * self.wave_hz).v()).v() * cos;
         }
-        SpinState::new(
-            trig::sin_cos_turns(turns),
-            (TAU * turn_rate).v(),
-            (TAU * turn_acceleration).v(),
-        )
+        SpinState::new(trig::sin_cos_turns(turns), (TAU * turn_rate).v(), (TAU * turn_acceleration).v())
     }
 }

@@ -4,11 +4,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::{Target, quoted};
+use crate::engine::ModelEngine;
 use crate::exit::{Error, Exit, tell};
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
 use crate::progress::{self, Mode, duration, per_second};
-use crate::run::{self, Ended, Engine, Report, RunOptions};
+use crate::run::{self as runner, Ended, Engine, Report, RunOptions};
 use crate::store::provenance::Session;
 use crate::store::read::Tally;
 use crate::store::{Job, ShardRequest};
@@ -46,6 +47,16 @@ fn threads(text: &str) -> Result<usize, String> {
     }
 }
 
+/// Runs a grid.
+///
+/// # Errors
+/// Mistakes in the grid file, and whatever kept the run from its end.
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    let plan = args.target.grid.load()?;
+    let engine = ModelEngine::new(&plan)?;
+    execute(args, &plan, &engine)
+}
+
 /// Runs a plan, with an engine made for it, and tells how it went.
 ///
 /// # Errors
@@ -65,7 +76,7 @@ pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Er
         environment: &|name| std::env::var(name).ok(),
         tell: &tell,
     };
-    let report = run::run(engine, &job, &output, options, &interrupt)?;
+    let report = runner::run(engine, &job, &output, options, &interrupt)?;
     for note in &report.notes {
         tell(note);
     }
