@@ -152,7 +152,7 @@ impl AxisValues {
 
 impl Plan {
     /// Axes beyond this many are held at their least value by [`Plan::corners`].
-    const CORNER_AXES: usize = 12;
+    const CORNER_AXES: usize = 8;
 
     /// Number of grid points; 1 without axes.
     #[must_use]

@@ -21,8 +21,8 @@ pub struct Grid {
     /// Grid file
     #[arg(value_name = "GRID.toml")]
     pub grid: PathBuf,
-    /// Set a constant, over the grid file's [set]; may be repeated
-    #[arg(long = "set", value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    /// Set a constant, over those of the grid file; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE")]
     pub sets: Vec<String>,
 }
 

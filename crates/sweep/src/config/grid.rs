@@ -7,7 +7,7 @@ use washer_model::{Channel, Machine, Range, Spin, decimal};
 use super::origins::Origins;
 use super::parameters::Written;
 use super::report::{Diagnostic, Report};
-use super::section::{Field, Section, listed, unknown_word};
+use super::section::{Field, Section, cut, listed, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
 use super::{machine, parameters};
@@ -39,6 +39,8 @@ pub(super) const DEFAULT_CHANNELS: [Channel; 6] = [
 
 /// Longest integration that is accepted: eleven days of spinning.
 pub(super) const LONGEST_S: f64 = 1e6;
+/// Most characters of a path in a message; no system takes much longer ones.
+const LONGEST_PATH: usize = 1000;
 /// Values of `accuracy`.
 pub(super) const ACCURACY: Range = Range::Within(1e-9, 1e-1);
 /// Values of `rtol`.
@@ -152,7 +154,10 @@ fn machine(root: &mut Section<'_>, grid: &Path, origins: &mut Origins, report: &
     let text = match read(&path) {
         Ok(text) => text,
         Err(error) => {
-            let title = format!("cannot read the machine file {}: {error}", path.display());
+            let title = format!(
+                "cannot read the machine file {}: {error}",
+                cut(&path.display().to_string(), LONGEST_PATH)
+            );
             let expected = format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
             report.push(Diagnostic::new(title).at(&named.at, expected).nearest(named.value, MACHINES));
             return Machine::paper();
@@ -331,7 +336,7 @@ fn channels(section: &mut Section<'_>, report: &mut Report) -> Option<Vec<Channe
     let mut channels: Vec<Located<Channel>> = Vec::new();
     for found in list.value {
         let Some(&channel) = Channel::ALL.iter().find(|channel| channel.name() == found.value) else {
-            report.push(unknown_word("channel", &found, &names));
+            report.push_with(|_| unknown_word("channel", &found, &names));
             continue;
         };
         match channels.iter().find(|other| other.value == channel) {

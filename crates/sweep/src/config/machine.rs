@@ -50,6 +50,8 @@ pub(super) const SPRINGS: Block =
 /// One `[[dampers]]`; its prefix is completed by the number.
 pub(super) const DAMPERS: Block =
     Block { section: "dampers", prefix: "damper_", numbers: &["damping_n_s_per_m"], vectors: ENDS };
+/// Most springs, and most dampers, of a machine: enough for any, and what depends on all of them stays quick.
+const MOST_ELEMENTS: usize = 1000;
 /// The one key that may be left out of a spring.
 pub(super) const FREE_LENGTH: &str = "free_length_m";
 
@@ -83,8 +85,8 @@ pub(super) fn read(text: &str, root: Section<'_>, origins: &mut Origins, report:
         }
     }
 
-    let springs = root.tables(SPRINGS.section, reader.report);
-    let dampers = root.tables(DAMPERS.section, reader.report);
+    let springs = reader.elements(&SPRINGS, &mut root);
+    let dampers = reader.elements(&DAMPERS, &mut root);
     let like = Machine::paper();
     reader.machine.springs = vec![Spring { free_length_m: None, ..like.springs[0] }; springs.len()];
     reader.machine.dampers = vec![Damper { ..like.dampers[0] }; dampers.len()];
@@ -117,6 +119,18 @@ struct Reader<'r> {
 }
 
 impl Reader<'_> {
+    /// The tables of springs or dampers, no more of them than are accepted.
+    fn elements<'a>(&mut self, block: &Block, root: &mut Section<'a>) -> Vec<Section<'a>> {
+        let mut sections = root.tables(block.section, self.report);
+        if let Some(first_beyond) = sections.get(MOST_ELEMENTS) {
+            let title = format!("the machine has {} {}", sections.len(), block.section);
+            let expected = format!("expected at most {MOST_ELEMENTS}");
+            self.report.push(Diagnostic::new(title).at(first_beyond.at(), expected));
+            sections.truncate(MOST_ELEMENTS);
+        }
+        sections
+    }
+
     fn block(&mut self, block: &Block, prefix: &str, section: &mut Section<'_>) {
         for &key in block.numbers {
             self.number(prefix, key, true, section);

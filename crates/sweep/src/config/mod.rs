@@ -9,7 +9,8 @@
 //! `[reliability]` the ratio 2 over the six channels of tub and drum fronts and tub angles; without axes the grid is a
 //! single point. `[spin]` and `end_s` must be given, and a machine file is always whole.
 //!
-//! Bounds: files to 4 MiB, 1e12 grid points, 1e6 s, 1e10 fixed steps, numbers to 1e12 in magnitude.
+//! Bounds: files to 4 MiB, 1e12 grid points, 1e6 s, 1e10 fixed steps, numbers to 1e12 in magnitude, 1000 springs and 1000
+//! dampers.
 //!
 //! Precedence, later over earlier: machine file, `[set]`, `--set`, axes. Within each of them no number may be written
 //! twice, not even under two names (`damping_n_s_per_m` writes every `damper_1_damping_n_s_per_m`), because nothing

@@ -120,7 +120,12 @@ fn find(name: &Located<&str>, draft: &Draft, report: &mut Report) -> Option<Para
         Ok(parameter) => return Some(parameter),
         Err(error) => error,
     };
-    let title = format!("unknown parameter `{}`", short(name.value));
+    report.push_with(|_| unknown(name, &error, machine, spin));
+    None
+}
+
+fn unknown(name: &Located<&str>, error: &UnknownParameter, machine: &Machine, spin: &Spin) -> Diagnostic {
+    let title = format!("unknown parameter {}", quoted(name.value));
     let diagnostic = Diagnostic::new(title).at(&name.at, error.to_string());
     let section = match name.value {
         "end_s" | "window_s" => Some("[time]"),
@@ -128,7 +133,7 @@ fn find(name: &Located<&str>, draft: &Draft, report: &mut Report) -> Option<Para
         "ratio_limit" | "channels" => Some("[reliability]"),
         _ => None,
     };
-    report.push(match (error, section) {
+    match (error, section) {
         (UnknownParameter::Name, Some(section)) => diagnostic.help(format!(
             "`{}` stands in {section} of the grid file and is the same at every point",
             name.value
@@ -139,8 +144,7 @@ fn find(name: &Located<&str>, draft: &Draft, report: &mut Report) -> Option<Para
             near.help("`sweep parameters` lists every name")
         }
         (UnknownParameter::Number { .. } | UnknownParameter::TableSpin, _) => diagnostic,
-    });
-    None
+    }
 }
 
 /// Writes constants of equal rank; no number may be written twice, as nothing says which comes last.

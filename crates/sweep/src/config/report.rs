@@ -85,6 +85,17 @@ pub(super) struct Report {
 impl Report {
     /// Keeps a mistake, unless it stands on a line whose syntax is already refused.
     pub(super) fn push(&mut self, diagnostic: Diagnostic) {
+        self.push_with(|_| diagnostic);
+    }
+
+    /// As [`Report::push`], but a mistake beyond those kept is only counted: finding its line, or the nearest name,
+    /// a million times over would take minutes.
+    pub(super) fn push_with(&mut self, diagnose: impl FnOnce(&Sources) -> Diagnostic) {
+        if self.is_full() {
+            self.beyond += 1;
+            return;
+        }
+        let diagnostic = diagnose(&self.sources);
         let broken = diagnostic.places.first().is_some_and(|(at, _)| {
             let swallowed = self.swallowed.get(&at.source).is_some_and(|&from| at.span.start >= from);
             let broken = self.broken.get(&at.source);
@@ -98,6 +109,10 @@ impl Report {
 
     /// Keeps a mistake of syntax, the first of each line.
     pub(super) fn push_syntax(&mut self, diagnostic: Diagnostic) {
+        if self.is_full() {
+            self.beyond += 1;
+            return;
+        }
         let first = diagnostic.places.first().is_none_or(|(at, _)| {
             let number = self.sources.line(at).number;
             self.broken.entry(at.source).or_default().insert(number)
@@ -120,11 +135,15 @@ impl Report {
     }
 
     fn keep(&mut self, diagnostic: Diagnostic) {
-        if self.found.len() < KEPT {
-            self.found.push(diagnostic);
-        } else {
+        if self.is_full() {
             self.beyond += 1;
+        } else {
+            self.found.push(diagnostic);
         }
+    }
+
+    fn is_full(&self) -> bool {
+        self.found.len() >= KEPT
     }
 
     /// Whether nothing is wrong so far.

@@ -148,7 +148,7 @@ impl<'a> Section<'a> {
         self.text(key, report).then(|found| {
             let position = choices.iter().position(|&choice| choice == found.value);
             if position.is_none() {
-                report.push(unknown_word(key, &found, choices));
+                report.push_with(|_| unknown_word(key, &found, choices));
             }
             position.map(|value| Located { value, at: found.at })
         })
@@ -273,14 +273,15 @@ impl<'a> Section<'a> {
             if self.known.contains(&name) {
                 continue;
             }
-            let at = self.place(key.span());
-            let title = format!("unknown key `{}` in {}", short(name), self.title);
-            report.push(match self.misplaced.get(name) {
-                Some(reason) => Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
-                    .at(&at, reason.as_str()),
-                None => Diagnostic::new(title)
-                    .at(&at, format!("expected {}", listed(&self.known)))
-                    .nearest(name, self.known.iter().copied()),
+            report.push_with(|_| {
+                let at = self.place(key.span());
+                match self.misplaced.get(name) {
+                    Some(reason) => Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
+                        .at(&at, reason.as_str()),
+                    None => Diagnostic::new(format!("unknown key `{}` in {}", short(name), self.title))
+                        .at(&at, format!("expected {}", listed(&self.known)))
+                        .nearest(name, self.known.iter().copied()),
+                }
             });
         }
     }
@@ -315,11 +316,15 @@ fn entry(key: &str) -> String {
 
 /// What a user typed, cut to what fits a title.
 pub(super) fn short(typed: &str) -> String {
-    const LONGEST: usize = 60;
-    if typed.chars().count() <= LONGEST {
-        return typed.to_owned();
+    cut(typed, 60)
+}
+
+/// At most `most` characters of a text.
+pub(super) fn cut(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
     }
-    typed.chars().take(LONGEST).chain("...".chars()).collect()
 }
 
 fn text<'a>(

@@ -157,6 +157,21 @@ fn a_written_machine_reads_back_the_same_bits() {
 }
 
 #[test]
+fn a_machine_of_a_thousand_springs_is_enough() {
+    let load_with = |springs: usize| {
+        let mut machine = Machine::paper();
+        machine.springs = vec![machine.springs[0]; springs];
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("machine.toml"), machine_file(&machine)).unwrap();
+        let grid = folder.path().join("grid.toml");
+        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
+        load(&grid, &[]).map_err(|mistakes| mistakes.to_string())
+    };
+    assert_eq!(load_with(1000).unwrap().machine.springs.len(), 1000);
+    assert!(load_with(1001).unwrap_err().contains("the machine has 1001 springs"));
+}
+
+#[test]
 fn the_canonical_plan_tells_plans_apart_and_keeps_every_bit() {
     let json = |grid: &str, sets: &[&str]| load_text(grid, sets).unwrap().to_json().to_string();
     let reordered =
@@ -200,6 +215,13 @@ fn a_file_of_nothing_but_mistakes_is_refused_in_bounded_text_and_time() {
     assert!(unknown.contains("100002 mistakes (100 shown)"), "{}", &unknown[unknown.len() - 200..]);
     let unknown = load_text("]".repeat(1 << 20), &[]).unwrap_err();
     assert!(unknown.len() < 10_000, "{}", unknown.len());
+    let repeated = load_text("a = 1\n".repeat(100_000), &[]).unwrap_err();
+    assert!(repeated.contains("100000 mistakes (100 shown)"), "{}", &repeated[repeated.len() - 200..]);
+    let (times, speeds) = ("1,".repeat(50_000), "2,".repeat(50_000));
+    let table = format!(
+        "[spin]\nprofile = \"table\"\ntime_s = [{times}]\nspeed_rpm = [{speeds}]\n[time]\nend_s = 9\n"
+    );
+    assert!(load_text(table, &[]).unwrap_err().contains("50000 mistakes (100 shown)"));
     let list = format!("values = [{}]", "nan,".repeat(200_000));
     let axis = format!("{SMALLEST}[[axis]]\nparameter = \"tub_mass_kg\"\n{list}\n");
     let long = load_text(axis, &[]).unwrap_err();

@@ -12,8 +12,9 @@ use crate::plan::{Integrator, Scenario};
 /// Most fixed steps of a trajectory that are accepted; an hour or more of computing for one point.
 pub(super) const MOST_STEPS: f64 = 1e10;
 
-/// A machine or spin that cannot be, at any corner of the grid; the conditions are linear in each parameter, so a
-/// machine that is sound at the corners is sound between them.
+/// A machine or spin that cannot be, at any corner of the grid. Ranges, inertia and bearings are linear conditions, so
+/// a machine that meets them at the corners meets them between; a spring that shrinks to nothing only in between is
+/// left to the run, as a failed row.
 pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
     let mut reported = BTreeSet::new();
     for point in draft.plan.corners() {
@@ -21,8 +22,7 @@ pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
             let concerns = keys(&violation, of_spin);
             let judged = !concerns.iter().any(|key| draft.origins.is_doubtful(key));
             if judged && reported.insert(concerns.clone()) {
-                let places = places(draft, &concerns, &report.sources);
-                report.push(describe(&violation, &places));
+                report.push_with(|sources| describe(&violation, &places(draft, &concerns, sources)));
             }
         }
     }
