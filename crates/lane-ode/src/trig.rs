@@ -28,7 +28,7 @@ const COS: [f64; 6] = [
 ];
 
 /// pi/2 as a sum of two doubles.
-const HALF_PI: [f64; 2] = [1.570_796_326_794_896_6, 6.123_233_995_736_766e-17];
+const HALF_PI: [f64; 2] = [core::f64::consts::FRAC_PI_2, 6.123_233_995_736_766e-17];
 
 /// Sine and cosine for |x| up to pi/4.
 #[inline(always)]

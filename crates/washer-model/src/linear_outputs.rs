@@ -25,9 +25,7 @@ pub(crate) const FEATURES: usize = 3 * COLUMNS;
 #[inline(always)]
 pub(crate) fn features<R: Real>((sin, cos): (N<R>, N<R>), q: &[N<R>; COORDINATES]) -> [N<R>; FEATURES] {
     let mut features = [sin.lit(1.0); FEATURES];
-    for column in 1..COLUMNS {
-        features[column] = q[column - 1];
-    }
+    features[1..COLUMNS].copy_from_slice(q);
     for column in 0..COLUMNS {
         features[COLUMNS + column] = (cos * features[column]).v();
         features[2 * COLUMNS + column] = (sin * features[column]).v();

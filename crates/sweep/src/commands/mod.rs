@@ -42,7 +42,7 @@ pub struct Target {
     /// The grid.
     #[command(flatten)]
     pub grid: Grid,
-    /// Result file [default: results/<name>.parquet]
+    /// Result file [default: results/NAME.parquet]
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }

@@ -4,14 +4,14 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `plan.json` | the frozen plan, written first ([`plan_file`]) |
-//! | `shards.json` | into how many shards the run was dealt, if it was ([`shard`]) |
-//! | `chunk-<index>.bin` | outcomes of neighbouring points, each file whole or absent ([`chunk`]) |
+//! | `plan.json` | the frozen plan, written first (`plan_file`) |
+//! | `shards.json` | into how many shards the run was dealt, if it was (`shard`) |
+//! | `chunk-<index>.bin` | outcomes of neighbouring points, each file whole or absent (`chunk`) |
 //! | `*.damaged` | what was not as it had been written; computed again |
 //! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
-//! | `lock`, `shard-<i>.lock` | who is at work ([`lock`]) |
+//! | `lock`, `shard-<i>.lock` | who is at work (`lock`) |
 //!
-//! When every chunk is there they are joined into the one Parquet file ([`merge`]), and the folder goes. The store
+//! When every chunk is there they are joined into the one Parquet file (`merge`), and the folder goes. The store
 //! knows points, axis names and outcomes; it does not know the engine that makes them.
 
 mod atomic;
