@@ -136,9 +136,7 @@ fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &Repo
         Ended::Shard(_) => {
             line(&mut text, "next", &format!("{}, when all shards are done", args.target.command("merge")));
         }
-        Ended::Interrupted { .. } => {
-            line(&mut text, "next", &format!("{} goes on", args.target.command("run")))
-        }
+        Ended::Interrupted { .. } => line(&mut text, "go on", &args.target.command("run")),
     }
     text
 }
@@ -192,7 +190,7 @@ pub(super) fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String
         place => format!(" at {place}"),
     };
     if let Some(greatest) = &tally.greatest_ratio {
-        line(&mut text, "most", &format!("ratio {:.3}{}", greatest.value, place(greatest.point)));
+        line(&mut text, "greatest", &format!("ratio {:.3}{}", greatest.value, place(greatest.point)));
     }
     if let Some(least) = &tally.least_gap_nonlinear_m {
         line(&mut text, "least gap", &format!("{:.5} m{}", least.value, place(least.point)));

@@ -48,12 +48,30 @@ fn provenance(text: &mut String, result: &ResultFile) {
     let plan = &result.plan;
     line(text, "name", plan["name"].as_str().unwrap_or_default());
     line(text, "made by", &format!("sweep {}, plan {}", result.version, &result.plan_hash));
-    let brief = |value: &Value| value.to_string().replace('"', "").replace(',', ", ").replace(':', ": ");
     for (name, key) in [("spin", "spin"), ("time", "time"), ("method", "integrator")] {
-        line(text, name, brief(&plan[key]).trim_matches(['{', '}']));
+        line(text, name, &brief(&plan[key]));
     }
     for axis in axes(plan) {
-        line(text, "axis", brief(axis).trim_matches(['{', '}']));
+        let values = axis.get("range").or(axis.get("values")).map(brief).unwrap_or_default();
+        line(text, "axis", &format!("{}: {values}", axis["parameter"].as_str().unwrap_or_default()));
+    }
+}
+
+/// A small JSON value on one line, as a person would write it.
+fn brief(value: &Value) -> String {
+    let list = |parts: Vec<String>| parts.join(", ");
+    match value {
+        Value::Object(map) => {
+            list(map.iter().map(|(key, value)| format!("{key} {}", brief(value))).collect())
+        }
+        Value::Array(values) => match values.get(..12) {
+            Some(first) if values.len() > 12 => {
+                format!("{}, ... ({} values)", list(first.iter().map(brief).collect()), values.len())
+            }
+            _ => list(values.iter().map(brief).collect()),
+        },
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
     }
 }
 
@@ -98,6 +116,7 @@ fn range(column: &ColumnRange) -> String {
             .unwrap_or_default();
         parts.push(format!("{} to {}{unit}", short(least), short(greatest)));
     }
+    parts.extend(column.names.iter().map(|(name, count)| format!("{count} {name}")));
     if column.nulls > 0 {
         parts.push(format!("{} null", column.nulls));
     }
@@ -117,6 +136,15 @@ fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn values_read_as_a_person_would_write_them() {
+        let spin = serde_json::json!({ "profile": "ramp", "peak_rpm": 350.0 });
+        assert_eq!(brief(&spin), "peak_rpm 350.0, profile ramp");
+        assert_eq!(brief(&serde_json::json!([1, 2.5])), "1, 2.5");
+        let long: Vec<u32> = (0..40).collect();
+        assert!(brief(&serde_json::json!(long)).ends_with("10, 11, ... (40 values)"));
+    }
 
     #[test]
     fn numbers_are_short() {

@@ -205,7 +205,12 @@ pub struct ColumnRange {
     pub nulls: u64,
     /// Least and greatest value of a numeric column that has any.
     pub range: Option<(f64, f64)>,
+    /// How often each value of a text or bool column occurs; the first [`NAMES_SHOWN`] to appear.
+    pub names: Vec<(String, u64)>,
 }
+
+/// A text column of more different values is not a list of names.
+const NAMES_SHOWN: usize = 16;
 
 /// What any Parquet file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -236,6 +241,7 @@ pub fn overview(path: &Path) -> Result<Overview, StoreError> {
         unit: field.metadata().get("unit").cloned().filter(|unit| !unit.is_empty()),
         nulls: 0,
         range: None,
+        names: Vec::new(),
     };
     let mut columns: Vec<ColumnRange> = builder.schema().fields().iter().map(new).collect();
     let reader: ParquetRecordBatchReader = builder.build().map_err(failed)?;
@@ -252,6 +258,8 @@ impl ColumnRange {
     fn widen(&mut self, array: &ArrayRef) -> Result<(), arrow::error::ArrowError> {
         self.nulls += array.null_count() as u64;
         if !array.data_type().is_numeric() {
+            let names = cast(array, &DataType::Utf8)?;
+            names.as_string::<i32>().iter().flatten().for_each(|name| self.count(name));
             return Ok(());
         }
         let numbers = cast(array, &DataType::Float64)?;
@@ -261,6 +269,14 @@ impl ColumnRange {
             self.range = Some((a.min(least), b.max(greatest)));
         }
         Ok(())
+    }
+
+    fn count(&mut self, name: &str) {
+        if let Some((_, count)) = self.names.iter_mut().find(|(known, _)| known == name) {
+            *count += 1;
+        } else if self.names.len() < NAMES_SHOWN {
+            self.names.push((name.to_owned(), 1));
+        }
     }
 }
 
