@@ -1,0 +1,396 @@
+//! Whatever happens to a run, running it again ends in the undisturbed run's bytes.
+//!
+//! Drives the real binary on a small grid. Needs `strace`, `unshare` and `mount` (packages strace, util-linux, mount);
+//! a missing one fails the test that needs it.
+
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use sweep_tests::sweep_binary;
+use tempfile::TempDir;
+
+/// Five chunks of eight points, of trajectories so short that the files are most of the work.
+const GRID: &str = r#"
+name = "faults"
+machine = "paper"
+
+[spin]
+profile = "triangular"
+peak_rpm = 350.0
+ramp_s = 50.0
+
+[time]
+end_s = 0.1
+window_s = [0.05, 0.1]
+
+[integrator]
+method = "rk4"
+step_s = 2.0e-4
+
+[[axis]]
+parameter = "unbalance_mass_kg"
+range = { from = 0.05, to = 1.0, count = 5 }
+
+[[axis]]
+parameter = "damping_n_s_per_m"
+range = { from = 60.0, to = 300.0, count = 8 }
+
+[reliability]
+ratio_limit = 2.0
+channels = ["tub_front_y", "tub_yaw"]
+"#;
+
+/// A folder with the grid in it, and where its result goes.
+struct Home(TempDir);
+
+impl Home {
+    fn new() -> Self {
+        let home = Self(tempfile::tempdir().expect("a temporary folder"));
+        fs::write(home.path("grid.toml"), GRID).expect("the grid is written");
+        home
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn output(&self) -> PathBuf {
+        self.path("x.parquet")
+    }
+
+    fn partial(&self) -> PathBuf {
+        self.path("x.parquet.partial")
+    }
+
+    /// The arguments of a run: one thread, so that which call is the third does not depend on luck.
+    fn arguments(&self) -> Vec<String> {
+        let path = |path: PathBuf| path.to_str().expect("temporary folders are UTF-8").to_owned();
+        let mut arguments = vec![path(sweep_binary().to_owned()), "run".into(), path(self.path("grid.toml"))];
+        arguments.extend(["--threads".into(), "1".into(), "--out".into(), path(self.output())]);
+        arguments
+    }
+
+    fn run(&self) -> Command {
+        self.run_under(&[])
+    }
+
+    /// A run behind another program's command line.
+    fn run_under(&self, wrapper: &[&str]) -> Command {
+        let mut words = wrapper.iter().map(|word| (*word).to_owned()).chain(self.arguments());
+        let mut command = Command::new(words.next().expect("there is a program"));
+        command.args(words).env_remove("SLURM_ARRAY_TASK_ID").env_remove("JOB_COMPLETION_INDEX");
+        command
+    }
+
+    /// A run in which strace tampers with system calls.
+    fn tampered(&self, tamper: &[&str]) -> Command {
+        let mut wrapper = vec!["strace", "-f", "-qq", "-o", "/dev/null"];
+        for tamper in tamper {
+            wrapper.extend(["-e", tamper]);
+        }
+        self.run_under(&wrapper)
+    }
+
+    /// Whatever stands at the output is whole, and one more run makes it so if nothing does.
+    fn assert_mends(&self, after: &str) {
+        if let Ok(bytes) = fs::read(self.output()) {
+            assert!(bytes == undisturbed(), "{after}: a broken result stands at the output");
+        }
+        let again = output(&mut self.run());
+        assert_eq!(again.status.code(), Some(0), "{after}: {}", said(&again));
+        let bytes = fs::read(self.output()).expect("a finished run has an output");
+        assert!(bytes == undisturbed(), "{after}: other bytes than the undisturbed run's");
+        assert!(!self.partial().exists(), "{after}: the folder stays behind");
+    }
+}
+
+/// The bytes of a run that nothing happens to.
+fn undisturbed() -> &'static [u8] {
+    static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+    BYTES.get_or_init(|| {
+        let home = Home::new();
+        let done = output(&mut home.run());
+        assert!(done.status.success(), "{}", said(&done));
+        fs::read(home.output()).expect("a finished run has an output")
+    })
+}
+
+fn output(command: &mut Command) -> Output {
+    command.output().unwrap_or_else(|error| missing(command, &error))
+}
+
+fn spawn(command: &mut Command) -> Child {
+    command.stderr(Stdio::piped()).spawn().unwrap_or_else(|error| missing(command, &error))
+}
+
+fn missing<T>(command: &Command, error: &std::io::Error) -> T {
+    panic!(
+        "{:?} does not start ({error}); these tests need strace, util-linux and mount",
+        command.get_program()
+    )
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn signal(name: &str, process: u32) {
+    let status =
+        Command::new("sh").args(["-c", &format!("kill -{name} {process}")]).status().expect("sh runs");
+    assert!(status.success(), "process {process} takes no {name}");
+}
+
+/// The process that holds the run, once it has computed something.
+fn holder_with_chunk(home: &Home) -> u32 {
+    let started = Instant::now();
+    loop {
+        let lock = fs::read_to_string(home.partial().join("lock")).unwrap_or_default();
+        let chunks = home.partial().join("chunk-00000000.bin").exists();
+        if let (true, Some(process)) = (chunks, lock.split(' ').next().and_then(|word| word.parse().ok())) {
+            return process;
+        }
+        assert!(started.elapsed() < Duration::from_secs(60), "no run starts: lock `{lock}`");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Holds a run up, for some seconds, between its first chunk and its last.
+fn held_up(home: &Home, seconds: u32) -> Child {
+    // Syncs: the plan and its folder, then each chunk and its folder; the sixth is the second chunk's folder.
+    let delay = format!("inject=fsync:delay_enter={seconds}s:when=6");
+    spawn(&mut home.tampered(&["trace=fsync", &delay]))
+}
+
+#[test]
+fn killed_at_thirty_random_instants() {
+    undisturbed();
+    let home = Home::new();
+    let started = Instant::now();
+    assert!(output(&mut home.run()).status.success());
+    let whole = started.elapsed();
+    let mut random = 0x2545_f491_4f6c_dd1d_u64;
+    let mut killed = 0;
+    for round in 0..6 {
+        let home = Home::new();
+        // Each kill meets what the ones before left.
+        for _ in 0..6 {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            let mut run = spawn(&mut home.run());
+            std::thread::sleep(whole.mul_f64((random % 1000) as f64 / 1000.0));
+            // It may have ended by itself.
+            let _ = run.kill();
+            let status = run.wait().expect("a child can be waited for");
+            killed += u32::from(status.code().is_none());
+        }
+        home.assert_mends(&format!("round {round}"));
+    }
+    assert!(killed >= 15, "only {killed} of 36 kills met a run");
+}
+
+/// Tampers with the first, second, ... call of some system calls, until a run has fewer of them.
+fn at_every_call(calls: &str, what: &str, check: impl Fn(&Output, u32)) {
+    for when in 1.. {
+        let home = Home::new();
+        let tamper = format!("inject={calls}:{what}:when={when}");
+        let run = output(&mut home.tampered(&[&format!("trace={calls}"), &tamper]));
+        let untouched = run.status.success();
+        check(&run, when);
+        home.assert_mends(&format!("{what} at {calls} {when}"));
+        if untouched {
+            assert!(when > 3, "a run has more than {when} of {calls}");
+            return;
+        }
+        assert!(when < 200, "{what} at {calls} has no end");
+    }
+}
+
+const RENAMES: &str = "rename,renameat,renameat2,linkat";
+
+#[test]
+fn killed_at_every_write() {
+    at_every_call("write", "signal=SIGKILL", |run, when| {
+        assert!(run.status.code() != Some(1), "write {when}: {}", said(run));
+    });
+}
+
+#[test]
+fn killed_at_every_fsync() {
+    at_every_call("fsync", "signal=SIGKILL", |run, when| {
+        assert!(run.status.code() != Some(1), "fsync {when}: {}", said(run));
+    });
+}
+
+#[test]
+fn killed_at_every_rename() {
+    at_every_call(RENAMES, "signal=SIGKILL", |run, when| {
+        assert!(run.status.code() != Some(1), "rename {when}: {}", said(run));
+    });
+}
+
+/// A failed call is a message with the path and what to do, and exit code 1.
+fn told(run: &Output, when: u32) {
+    let said = said(run);
+    if !run.status.success() {
+        assert_eq!(run.status.code(), Some(1), "call {when}: {said}");
+        assert!(said.contains("x.parquet") && said.contains("= help: "), "call {when}: {said}");
+        assert!(!said.contains("panicked"), "call {when}: {said}");
+    }
+}
+
+#[test]
+fn io_error_at_every_fsync() {
+    at_every_call("fsync", "error=EIO", told);
+}
+
+#[test]
+fn io_error_at_every_rename() {
+    at_every_call(RENAMES, "error=EIO", told);
+}
+
+#[test]
+fn disk_full_at_every_write() {
+    at_every_call("write", "error=ENOSPC", told);
+}
+
+#[test]
+fn a_disk_too_small_is_told_and_a_larger_one_is_gone_on_with() {
+    let home = Home::new();
+    let run = home.arguments().join("' '");
+    let out = home.output();
+    // The file system lives in a name space of its own and goes with it; only the result leaves.
+    let script = format!(
+        "set -eu\n\
+         disk=\"$1\"; pages=\"$2\"; result=\"$3\"\n\
+         mount -t tmpfs -o size=$((pages * 4))k none \"$disk\"\n\
+         code=0; '{}' || code=$?\n\
+         echo \"first $code\"\n\
+         mount -o remount,size=16m \"$disk\"\n\
+         '{}'\n\
+         cp \"$disk/x.parquet\" \"$result\"\n",
+        run.replace(out.to_str().expect("UTF-8"), "'\"$1\"'/x.parquet"),
+        run.replace(out.to_str().expect("UTF-8"), "'\"$1\"'/x.parquet"),
+    );
+    let mut full = 0;
+    for pages in [1, 2, 3, 4, 5, 6, 8, 10, 12, 16] {
+        let (disk, result) = (home.path("disk"), home.path("result"));
+        fs::create_dir_all(&disk).expect("a mount point");
+        let mut command = Command::new("unshare");
+        command.args(["--map-root-user", "--mount", "sh", "-c", &script, "sh"]);
+        command.args([disk.as_os_str(), pages.to_string().as_ref(), result.as_os_str()]);
+        let run = output(&mut command);
+        let said = said(&run);
+        assert!(run.status.success(), "{pages} pages: {said}");
+        let first = String::from_utf8_lossy(&run.stdout).into_owned();
+        if first.contains("first 1") {
+            full += 1;
+            assert!(said.contains("the disk is full: free some space"), "{pages} pages: {said}");
+        } else {
+            assert!(first.contains("first 0"), "{pages} pages: {first} {said}");
+        }
+        assert!(fs::read(&result).expect("a result") == undisturbed(), "{pages} pages: other bytes");
+    }
+    assert!(full >= 4, "only {full} disks were too small");
+}
+
+#[test]
+fn a_file_size_limit_is_told_and_gone_on_from() {
+    let mut limited = 0;
+    // Blocks of 512 bytes: too small for the plan, for a chunk, for the result.
+    for blocks in [1, 2, 4, 8, 16, 24, 32] {
+        let home = Home::new();
+        let limit = format!("ulimit -f {blocks}; exec \"$@\"");
+        let run = output(&mut home.run_under(&["sh", "-c", &limit, "sh"]));
+        if !run.status.success() {
+            limited += 1;
+            told(&run, blocks);
+            assert!(said(&run).contains("a file-size limit was hit"), "{blocks} blocks: {}", said(&run));
+        }
+        home.assert_mends(&format!("{blocks} blocks"));
+    }
+    assert!(limited >= 3, "only {limited} limits were met");
+}
+
+#[test]
+fn a_flipped_bit_and_a_truncation_are_told_and_mended() {
+    let break_chunk = |change: &dyn Fn(&mut Vec<u8>)| {
+        let home = Home::new();
+        let shard = output(home.run().args(["--shard", "1/2"]));
+        assert!(shard.status.success(), "{}", said(&shard));
+        let chunk = home.partial().join("chunk-00000002.bin");
+        let mut bytes = fs::read(&chunk).expect("the first shard has the third chunk");
+        change(&mut bytes);
+        fs::write(&chunk, bytes).expect("the chunk is broken");
+        let run = output(&mut home.run());
+        assert!(run.status.success(), "{}", said(&run));
+        assert!(said(&run).contains("chunk-00000002.bin.damaged"), "{}", said(&run));
+        assert!(fs::read(home.output()).expect("a result") == undisturbed());
+    };
+    break_chunk(&|bytes| {
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 0x10;
+    });
+    break_chunk(&|bytes| bytes.truncate(bytes.len() - 1));
+    break_chunk(&Vec::clear);
+}
+
+#[test]
+fn a_second_runner_is_sent_away_with_the_first_ones_process_and_a_killed_one_blocks_nobody() {
+    let home = Home::new();
+    let mut first = held_up(&home, 3);
+    let process = holder_with_chunk(&home);
+    let second = output(&mut home.run());
+    assert_eq!(second.status.code(), Some(75), "{}", said(&second));
+    assert!(said(&second).contains(&format!("process {process} on ")), "{}", said(&second));
+    assert!(first.wait().expect("a child can be waited for").success());
+    home.assert_mends("two runners");
+
+    let home = Home::new();
+    let mut first = held_up(&home, 30);
+    signal("KILL", holder_with_chunk(&home));
+    first.wait().expect("a child can be waited for");
+    home.assert_mends("a killed runner");
+}
+
+#[test]
+fn a_signal_keeps_what_is_done_and_a_second_one_leaves_at_once() {
+    for (name, code) in [("TERM", 143), ("INT", 130)] {
+        let home = Home::new();
+        let run = held_up(&home, 1);
+        signal(name, holder_with_chunk(&home));
+        let run = run.wait_with_output().expect("a child can be waited for");
+        assert_eq!(run.status.code(), Some(code), "{}", said(&run));
+        assert!(said(&run).contains("of 40 points kept"), "{}", said(&run));
+        assert!(!home.output().exists());
+        home.assert_mends(name);
+    }
+    let home = Home::new();
+    let mut run = held_up(&home, 30);
+    let process = holder_with_chunk(&home);
+    let started = Instant::now();
+    signal("TERM", process);
+    std::thread::sleep(Duration::from_millis(200));
+    signal("TERM", process);
+    assert_eq!(run.wait().expect("a child can be waited for").code(), Some(143));
+    assert!(started.elapsed() < Duration::from_secs(10), "it stayed for {:?}", started.elapsed());
+    home.assert_mends("two signals");
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_told() {
+    let home = Home::new();
+    let blocked = home.path("grid.toml/sub/x.parquet");
+    let arguments = home.arguments();
+    let mut command = Command::new(&arguments[0]);
+    command.args(&arguments[1..arguments.len() - 1]).arg(&blocked);
+    let run = output(&mut command);
+    assert_eq!(run.status.code(), Some(1), "{}", said(&run));
+    assert!(said(&run).contains("write elsewhere with --out"), "{}", said(&run));
+    assert!(Path::new(&home.path("grid.toml")).is_file());
+}
