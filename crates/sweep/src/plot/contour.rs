@@ -103,10 +103,10 @@ fn join(links: &mut BTreeMap<Edge, Vec<Edge>>) -> Vec<Vec<Edge>> {
         let mut line = vec![start];
         let mut here = start;
         while let Some(next) = links.get_mut(&here).and_then(Vec::pop) {
-            if let Some(back) = links.get_mut(&next) {
-                if let Some(place) = back.iter().position(|&edge| edge == here) {
-                    back.remove(place);
-                }
+            if let Some(back) = links.get_mut(&next)
+                && let Some(place) = back.iter().position(|&edge| edge == here)
+            {
+                back.remove(place);
             }
             line.push(next);
             here = next;

@@ -96,3 +96,11 @@ pub enum PlotError {
     #[error("cannot draw the figure: {0}")]
     Drawing(String),
 }
+
+impl PlotError {
+    /// Whether the command line is at fault rather than a file or the machine.
+    #[must_use]
+    pub fn is_usage(&self) -> bool {
+        matches!(self, Self::NotThere { .. } | Self::Unfit(_) | Self::Format { .. })
+    }
+}

@@ -66,13 +66,6 @@ pub(crate) struct Grid {
     rows: Vec<Option<usize>>,
 }
 
-/// Columns of results rather than of the grid.
-fn is_result(name: &str) -> bool {
-    const PREFIXES: [&str; 6] = ["nonlinear_", "linear_", "ratio_", "min_gap_", "steps_", "rejected_"];
-    matches!(name, "point" | "reliable" | "status" | "fail_time_s")
-        || PREFIXES.iter().any(|p| name.starts_with(p))
-}
-
 /// Past this many grid points without a row, the rows are no grid.
 const MOST_MISSING: usize = 1_000_000;
 
@@ -90,9 +83,11 @@ impl Grid {
         let no_grid = |reason: String| PlotError::NotAGrid { path: table.path.clone(), reason };
         let mut axes = Vec::new();
         let mut places: Vec<Vec<usize>> = Vec::new();
-        for column in &table.columns {
+        let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
+        // The axes stand between the point's index and the results.
+        for column in table.columns.iter().take_while(|column| !of_model(&column.name)) {
             let Values::Number(numbers) = &column.values else { continue };
-            if is_result(&column.name) {
+            if column.name == "point" {
                 continue;
             }
             if numbers.iter().any(|value| !value.is_finite()) {

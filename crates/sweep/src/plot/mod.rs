@@ -1,7 +1,7 @@
 //! Figures from this program's Parquet files: as SVG, as PNG, or as one HTML page that needs nothing else.
 //!
-//! A file is [read](read) and its kind told by its columns; a map becomes a picture of cells, everything else a
-//! [chart] of curves. Either is laid out once as a scene of shapes and text, and written as SVG or PNG. The page gets
+//! A file is read and its kind told by its columns; a map becomes a picture of cells, everything else a chart of
+//! curves. Either is laid out once as a scene of shapes and text, and written as SVG or PNG. The page gets
 //! the numbers instead and draws them itself. The same file and options give the same bytes.
 
 mod axis;
@@ -19,8 +19,12 @@ mod layer;
 mod raster;
 mod read;
 mod region;
+#[cfg(test)]
+mod sample;
 mod scene;
 mod svg;
+#[cfg(test)]
+mod tests;
 
 use std::path::{Path, PathBuf};
 

@@ -162,12 +162,24 @@ impl Table {
             .collect()
     }
 
-    /// The first value stored under `key` anywhere in the provenance.
+    /// The first value stored under `key` in the provenance, outer levels before inner ones.
     #[must_use]
     pub fn find(&self, key: &str) -> Option<&Value> {
         self.provenance
             .iter()
             .find_map(|(name, value)| if name == key { Some(value) } else { find(value, key) })
+    }
+
+    /// Name of the run, if the file says it.
+    #[must_use]
+    pub fn run_name(&self) -> Option<&str> {
+        self.find("name").and_then(Value::as_str)
+    }
+
+    /// How each row's point ended; `unknown` where the file does not say.
+    pub fn statuses(&self) -> impl Iterator<Item = &str> {
+        let texts = self.column("status").and_then(Column::texts).unwrap_or_default();
+        texts.iter().map(|text| text.as_deref().unwrap_or("unknown"))
     }
 
     /// The ratio from which on a point is unreliable: as the run was told, or else 2 as in the paper.
@@ -230,9 +242,11 @@ pub(crate) fn bracket<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
 
 fn column(field: &Field, values: Values) -> Column {
     let told = |key: &str| field.metadata().get(key).filter(|text| !text.is_empty()).cloned();
+    let unit = told("unit").unwrap_or_else(|| label::unit_of_name(field.name()).to_owned());
     Column {
         name: field.name().clone(),
-        unit: told("unit").unwrap_or_else(|| label::unit_of_name(field.name()).to_owned()),
+        // A pure number's unit is 1, which no label should say.
+        unit: if unit == "1" { String::new() } else { unit },
         description: told("description").unwrap_or_default(),
         values,
     }

@@ -37,8 +37,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         y: pick(&y.name)?,
         style: Style::Band(pick(low)?, pick(high)?),
     };
-    let run =
-        table.find("name").and_then(|name| name.as_str()).map_or(String::new(), |name| format!("{name} · "));
+    let run = table.run_name().map_or(String::new(), |name| format!("{name} · "));
     Ok(Chart {
         title: "Boundary of the linear model's reliability".to_owned(),
         subtitle: format!("{run}{} points", rows.len()),

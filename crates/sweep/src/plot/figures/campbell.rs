@@ -62,13 +62,13 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         style: Style::Dashed,
     };
     series.push(line);
-    let mut notes: Vec<String> =
-        table.find("name").and_then(|name| name.as_str()).map(str::to_owned).into_iter().collect();
+    let mut notes: Vec<String> = table.run_name().map(str::to_owned).into_iter().collect();
     if series.iter().any(|series| matches!(series.style, Style::Band(..))) {
         notes.push("shaded: least to greatest over a turn of the drum".to_owned());
     }
     if !far.is_empty() {
-        notes.push(format!("{} modes lie above", far.len()));
+        let lie = if far.len() == 1 { "mode lies" } else { "modes lie" };
+        notes.push(format!("{} {lie} above", far.len()));
     }
     Ok(Chart {
         title: "Natural frequencies over spin speed".to_owned(),

@@ -69,13 +69,11 @@ pub(crate) fn chart(table: &Table, grid: &Grid, options: &PlotOptions) -> Result
     panels.push(gaps);
     panels.retain(|panel| !panel.series.is_empty());
 
-    let status = table.column("status").and_then(Column::texts).unwrap_or_default();
+    let status: Vec<&str> = table.statuses().collect();
     let failures = order.iter().zip(&axis.values).filter_map(|(&row, &x)| {
-        let status = status.get(row)?.as_deref().unwrap_or("unknown");
+        let status = *status.get(row)?;
         (status != "ok").then(|| Mark { x, label: status.replace('_', " ") })
     });
-    let run =
-        table.find("name").and_then(|name| name.as_str()).map_or(String::new(), |name| format!("{name} · "));
     Ok(Chart {
         title: match options.quantity {
             Quantity::Ratio => "Where the linear model can be trusted",
@@ -83,7 +81,7 @@ pub(crate) fn chart(table: &Table, grid: &Grid, options: &PlotOptions) -> Result
             _ => "Least gap between drum and tub",
         }
         .to_owned(),
-        subtitle: format!("{run}{} points", table.rows),
+        subtitle: super::map::counts(table),
         x_label: axis.label(),
         x_log: axis.log,
         marks: failures.collect(),

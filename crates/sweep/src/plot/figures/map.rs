@@ -191,22 +191,22 @@ impl Slices {
     }
 }
 
-/// Name of the run, count of points by verdict, and where the map is cut.
+/// Name of the run, count of points and failures, and where the map is cut.
 fn subtitle(table: &Table, slices: &Slices) -> String {
-    let mut parts: Vec<String> =
-        table.find("name").and_then(|name| name.as_str()).map(str::to_owned).into_iter().collect();
-    let failed = statuses(table).filter(|status| *status != "ok").count();
-    parts.push(format!("{} points", table.rows));
-    if failed > 0 {
-        parts.push(format!("{failed} failed"));
-    }
+    let mut parts = vec![counts(table)];
     parts.extend(slices.notes.iter().cloned());
     parts.join(" · ")
 }
 
-fn statuses(table: &Table) -> impl Iterator<Item = &str> {
-    let texts = table.column("status").and_then(|column| column.texts()).unwrap_or_default();
-    texts.iter().map(|text| text.as_deref().unwrap_or("unknown"))
+/// Name of the run, and how many points it has and how many failed.
+pub(crate) fn counts(table: &Table) -> String {
+    let mut parts: Vec<String> = table.run_name().map(str::to_owned).into_iter().collect();
+    parts.push(format!("{} points", table.rows));
+    let failed = table.statuses().filter(|status| *status != "ok").count();
+    if failed > 0 {
+        parts.push(format!("{failed} failed"));
+    }
+    parts.join(" · ")
 }
 
 /// What is drawn in a cell.
@@ -232,7 +232,7 @@ impl Cells {
         let fills = layer
             .values
             .iter()
-            .zip(statuses(table))
+            .zip(table.statuses())
             .map(|(value, status)| match (value.is_finite(), status) {
                 (true, _) => Fill::Level(layer.scale.level(*value)),
                 (false, "ok") => Fill::Undefined,
@@ -243,10 +243,11 @@ impl Cells {
     }
 
     fn by_status(table: &Table) -> Self {
-        let mut kinds: Vec<String> = statuses(table).map(str::to_owned).collect();
+        let mut kinds: Vec<String> = table.statuses().map(str::to_owned).collect();
         kinds.sort_by_key(|kind| (kind != "ok", kind.clone()));
         kinds.dedup();
-        let fills = statuses(table)
+        let fills = table
+            .statuses()
             .map(|status| Fill::Kind(kinds.iter().position(|kind| kind == status).unwrap_or_default()))
             .collect();
         Self { title: "How each point ended".to_owned(), fills, layer: None, kinds }
@@ -345,11 +346,12 @@ impl Cells {
             let y = place(&borders[1], panel.ys, 1.0 - y / panel.height);
             level.offset(self.value(grid.row(x, y, rest)))
         };
-        let above = |point: [f64; 2]| offset(point) >= 0.0;
-        let below = |point: [f64; 2]| offset(point) < 0.0;
-        let regions: [(&str, &dyn Fn([f64; 2]) -> bool); 2] =
-            [(&level.above[0], &above), (&level.below[0], &below)];
-        for (name, inside) in regions {
+        for (name, wanted_above) in [(&level.above[0], true), (&level.below[0], false)] {
+            // A cell without a value is on neither side.
+            let inside = |point: [f64; 2]| {
+                let offset = offset(point);
+                offset.is_finite() && (offset >= 0.0) == wanted_above
+            };
             let size = [typeface.width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
             if let Some([x, y]) = roomiest([panel.width, panel.height], size, inside) {
                 let at = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];

@@ -98,7 +98,7 @@ function createChart(host, spec, name) {
       for (const [value] of panel.levels) drawLine(context, box.left, atY(value), box.left + box.width, atY(value), [3, 3], themed("ink"));
       for (const [x, label] of spec.marks) {
         drawLine(context, atX(x), top, atX(x), top + panel.height, [6, 4], themed("muted"));
-        if (index === 0) upright(context, label, atX(x) - 5, top + 5);
+        if (index === 0) upright(context, label, atX(x) - box.left < 20 ? atX(x) + 13 : atX(x) - 5, top + 5);
       }
       context.restore();
       for (const [x, y, label] of panel.stars) drawStar(context, atX(x), atY(y), label, box, top, panel.height);
@@ -204,6 +204,7 @@ function createChart(host, spec, name) {
   // The values at the cursor, in the legend.
   function tell() {
     legend.replaceChildren();
+    const entries = new Set();
     const words = [];
     if (cursor !== null) {
       words.push(`${spec.xLabel}: ${significant(cursor)}`);
@@ -216,8 +217,11 @@ function createChart(host, spec, name) {
         const value = cursor === null ? "" : `: ${significant(series.y[nearest(grid, cursor)])}`;
         const sign = element("i");
         sign.style.cssText = `height:0;border-top:3px ${series.dashed ? "dashed" : "solid"} ${lineColour(series.colour)}`;
-        legend.append(element("li", {}, sign, title + value));
-        if (value) words.push(title + value);
+        // Without a cursor, one entry tells what all curves of a name are.
+        const entry = value ? title + value : series.name || panel.label;
+        if (!entries.has(entry)) legend.append(element("li", {}, sign, entry));
+        entries.add(entry);
+        if (value) words.push(entry);
       }
     }
     said.textContent = words.join("; ");

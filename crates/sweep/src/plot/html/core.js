@@ -54,13 +54,21 @@ function ticks(low, high, count, log) {
     return best.map((value) => [value, significant(value, 2)]);
   }
   const rough = (high - low) / Math.max(count, 1);
-  const unit = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].find((factor) => factor * unit >= 0.999 * rough) * unit;
-  const decimals = Math.max(0, -Math.floor(Math.log10(step * 1.0001)));
-  const found = [];
-  for (let k = Math.ceil(low / step - 1e-9); k <= high / step + 1e-9; k++) {
-    found.push([k * step, (k === 0 ? 0 : k * step).toFixed(Math.min(decimals, 12))]);
+  let power = Math.floor(Math.log10(rough));
+  let mantissa = [1, 2, 5, 10].find((step) => step >= (0.999 * rough) / 10 ** power) ?? 10;
+  const bounds = () => {
+    const step = mantissa * 10 ** power;
+    return [Math.ceil(low / step - 1e-9), Math.floor(high / step + 1e-9), step];
+  };
+  let [first, last, step] = bounds();
+  // A round step can leave fewer than three ticks, which do not make a scale: the next finer ones then.
+  while (last - first < 2) {
+    [mantissa, power] = { 10: [5, power], 5: [2, power], 2: [1, power], 1: [5, power - 1] }[mantissa];
+    [first, last, step] = bounds();
   }
+  const decimals = Math.min(Math.max(-power - (mantissa === 10 ? 1 : 0), 0), 12);
+  const found = [];
+  for (let k = first; k <= last; k++) found.push([k * step, (k === 0 ? 0 : k * step).toFixed(decimals)]);
   return found;
 }
 

@@ -281,6 +281,22 @@ function createMap(host, data) {
     context.beginPath();
     context.rect(box.left, box.top, box.width, box.height);
     context.clip();
+    // Rings where a click shows time histories, unless it does everywhere.
+    if (data.traces && Object.keys(data.traces).length < nx * ny * cuts) {
+      for (let i = 0; i < nx; i++) {
+        for (let j = 0; j < ny; j++) {
+          if (!data.traces[pointAt(i, j)]) continue;
+          const [x, y] = [0.5 * (borders[0][i] + borders[0][i + 1]), 0.5 * (borders[1][j] + borders[1][j + 1])];
+          for (const [colour, thick] of [["#ffffff", 4], ["#1b1f24", 1.5]]) {
+            context.beginPath();
+            context.arc(toPx(box, x), toPy(box, y), 4, 0, 2 * Math.PI);
+            context.strokeStyle = colour;
+            context.lineWidth = thick;
+            context.stroke();
+          }
+        }
+      }
+    }
     for (const [place, thick] of [[hovered, 2], [pinned, 3.5]]) {
       if (!place) continue;
       const [i, j] = place;
@@ -316,6 +332,15 @@ function createMap(host, data) {
     } else if (codes.status.words.some((kind) => kind !== "ok")) {
       add(`background:repeating-linear-gradient(135deg,#1b1f24 0 1px,${data.palettes.failed} 1px 6px)`, "failed: no result");
     }
+    if (layer?.group === "ratio" && anyUndefined(layer)) {
+      add(`background:radial-gradient(circle,${themed("muted")} 2px,${themed("paper")} 2.5px);outline:1px solid ${themed("faint")}`, "undefined: no excitation");
+    }
+  }
+
+  function anyUndefined(layer) {
+    const { values } = columns[layer.column];
+    const ok = codes.status.words.indexOf("ok");
+    return codes.status.values.some((code, point) => code === ok && !Number.isFinite(values[point]));
   }
 
   const labelled = (axis) => (axis.unit ? `${axis.words} (${axis.unit})` : axis.words);
@@ -354,6 +379,7 @@ function createMap(host, data) {
     for (const line of coordinates(place)) readout.append(element("p", {}, line));
     const largest = word("ratio_max_channel", point);
     readout.append(element("p", { class: "verdict" }, capitalised(verdict(point))),
+      ...(word("sensitive", point) === "true" ? [element("p", {}, "The motion is chaotic here: the verdict holds, the ratio's digits depend on the integrator.")] : []),
       element("p", { id: "ratio" }, `Largest ratio ${shownValue("ratio_max", point)}${largest ? ` (${largest.replaceAll("_", " ")})` : ""}`));
     if (!Number.isNaN(columns.fail_time_s?.values[point] ?? NaN)) {
       readout.append(element("p", {}, `Failed at ${shownValue("fail_time_s", point)} s`));
@@ -382,7 +408,7 @@ function createMap(host, data) {
     const box = area();
     const [right, left] = [toPx(box, borders[0][i + 1]) + 10, toPx(box, borders[0][i]) - 10];
     const top = toPy(box, borders[1][j + 1]);
-    tip.style.left = `${right + tip.offsetWidth < box.left + box.width ? right : Math.max(0, left - tip.offsetWidth)}px`;
+    tip.style.left = `${right + tip.offsetWidth < figure.clientWidth ? right : Math.max(0, left - tip.offsetWidth)}px`;
     tip.style.top = `${Math.min(Math.max(top, box.top), box.top + box.height - tip.offsetHeight)}px`;
   }
 

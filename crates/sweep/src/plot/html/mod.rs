@@ -9,10 +9,11 @@ use super::chart::{Chart, ChartPanel, Series, Style};
 use super::colour::{ColourScale, DISTINCT, FAILED, LEVELS};
 use super::contour::zero_lines;
 use super::error::PlotError;
+use super::figures;
 use super::grid::{Grid, GridAxis};
 use super::label;
 use super::layer::{Layer, Level, channels, layer};
-use super::read::{Column, Table, Values};
+use super::read::{Table, Values};
 use super::scene::{Colour, INK};
 use super::svg::escape;
 use super::{PlotOptions, Quantity};
@@ -66,7 +67,7 @@ pub(crate) fn map_page(table: &Table, grid: &Grid, options: &PlotOptions) -> Res
     let data = json!({
         "kind": "map",
         "title": title,
-        "subtitle": subtitle(table),
+        "subtitle": figures::map::counts(table),
         "limit": table.ratio_limit(),
         "axes": grid.axes.iter().map(axis_json).collect::<Vec<_>>(),
         "columns": columns_json(table, grid),
@@ -106,14 +107,6 @@ fn page(title: &str, data: &Value, scripts: &[&str]) -> String {
         .replace("{{data}}", &data)
 }
 
-fn subtitle(table: &Table) -> String {
-    let run = table.find("name").and_then(Value::as_str).map_or(String::new(), |name| format!("{name} · "));
-    let status = table.column("status").and_then(Column::texts).unwrap_or_default();
-    let failed = status.iter().filter(|status| status.as_deref() != Some("ok")).count();
-    let failed = if failed > 0 { format!(" · {failed} failed") } else { String::new() };
-    format!("{run}{} points{failed}", table.rows)
-}
-
 /// The layer and the cut that the page opens with.
 fn first_view(table: &Table, grid: &Grid, options: &PlotOptions) -> Result<Value, PlotError> {
     let group = match options.quantity {
@@ -129,7 +122,7 @@ fn first_view(table: &Table, grid: &Grid, options: &PlotOptions) -> Result<Value
     if !free_choice {
         layer(table, options)?;
     }
-    let cuts = super::figures::map::Slices::of(table, grid, options)?;
+    let cuts = figures::map::Slices::of(table, grid, options)?;
     Ok(json!({
         "group": group,
         "channel": options.channels.first().map_or("", String::as_str),
