@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::plot::{PlotError, PlotOptions, Quantity, render};
+use crate::exit::{Error, Exit, tell};
+use crate::plot::{PlotOptions, Quantity, render};
 
-/// Draw the figure that fits a file: reliability map, boundary, time histories or Campbell diagram
-#[derive(Clone, Debug, clap::Args)]
-pub struct PlotArgs {
+/// Arguments of `sweep plot`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
     /// Result of `sweep run`, `trace`, `modes` or `boundary`
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
@@ -28,7 +29,7 @@ pub struct PlotArgs {
     pub at: Vec<(String, f64)>,
 
     /// Trace: mark where these speeds are passed, in rpm, separated by commas
-    #[arg(long, value_name = "RPM,...", value_delimiter = ',', value_parser = speed)]
+    #[arg(long, value_name = "RPM,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = speed)]
     pub resonances: Vec<f64>,
 
     /// Trace: mark where the resonance speeds of this modes file are passed
@@ -40,22 +41,23 @@ pub struct PlotArgs {
     pub traces: Option<PathBuf>,
 }
 
-/// Draws the figure and returns where it was written.
+/// Draws the figure and says where it is.
 ///
 /// # Errors
 /// As [`render`].
-pub fn run(args: PlotArgs) -> Result<PathBuf, PlotError> {
-    let output = args.output.unwrap_or_else(|| default_output(&args.file));
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    let output = args.output.clone().unwrap_or_else(|| default_output(&args.file));
     let options = PlotOptions {
         quantity: args.quantity,
-        channels: args.channels,
-        at: args.at,
-        resonances_rpm: args.resonances,
-        modes: args.modes,
-        traces: args.traces,
+        channels: args.channels.clone(),
+        at: args.at.clone(),
+        resonances_rpm: args.resonances.clone(),
+        modes: args.modes.clone(),
+        traces: args.traces.clone(),
     };
     render(&args.file, &options, &output)?;
-    Ok(output)
+    tell(&format!("wrote {}", output.display()));
+    Ok(Exit::Done)
 }
 
 /// Beside the input, under its name.
@@ -89,10 +91,10 @@ mod tests {
     #[derive(Parser)]
     struct Cli {
         #[command(flatten)]
-        plot: PlotArgs,
+        plot: Args,
     }
 
-    fn parse(line: &str) -> Result<PlotArgs, String> {
+    fn parse(line: &str) -> Result<Args, String> {
         let words = std::iter::once("plot").chain(line.split(' '));
         Cli::try_parse_from(words).map(|cli| cli.plot).map_err(|error| error.to_string())
     }
@@ -115,7 +117,7 @@ mod tests {
         for (line, said) in [
             ("m.parquet --at spin_peak_rpm", "expected NAME=VALUE"),
             ("m.parquet --at x=nan", "`nan` is not a finite number"),
-            ("m.parquet --resonances -3", "--resonances"),
+            ("m.parquet --resonances -3", "expected a speed above 0 rpm"),
             ("m.parquet --resonances 0", "expected a speed above 0 rpm"),
             ("m.parquet --quantity gapp", "gap-nonlinear"),
         ] {
