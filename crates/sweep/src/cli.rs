@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{check, completions, init, merge, parameters, run, schema, show, status};
+use crate::commands::{check, completions, init, merge, parameters, plot, run, schema, show, status};
 use crate::exit::{Error, Exit};
 
 /// Printed before everything else by `--help`: most readers want to see one line that works.
@@ -43,6 +43,8 @@ pub enum Command {
     Status(status::Args),
     /// Show what a result file holds: counts, verdicts, extremes, provenance
     Show(show::Args),
+    /// Draw the figure that fits a file: map, boundary, time histories or Campbell diagram
+    Plot(plot::Args),
     /// List every parameter that can be set or swept
     Parameters(parameters::Args),
     /// Write a commented grid file, or a machine file, to start from
@@ -65,6 +67,7 @@ impl Command {
             Self::Merge(args) => merge::run(args),
             Self::Status(args) => status::run(args),
             Self::Show(args) => show::run(args),
+            Self::Plot(args) => plot::run(args),
             Self::Parameters(args) => parameters::run(args),
             Self::Init(args) => init::run(args),
             Self::Schema(args) => schema::run(args),

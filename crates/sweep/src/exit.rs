@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use crate::config::Diagnostics;
 use crate::engine::EngineError;
+use crate::plot::PlotError;
 use crate::store::StoreError;
 
 /// Exit codes, a contract with scripts.
@@ -84,6 +85,9 @@ pub enum Error {
     /// A run's files.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// A figure.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
     /// A file that could not be read or written.
     #[error("cannot {action} {}: {source}", path.display())]
     File {
@@ -107,6 +111,8 @@ impl Error {
             Self::Input(_) => Exit::BadInput,
             Self::Engine(_) => Exit::BadInput,
             Self::Store(error) => error.exit(),
+            Self::Plot(error) if error.is_usage() => Exit::BadInput,
+            Self::Plot(_) => Exit::Failed,
             Self::File { .. } | Self::Stdout(_) => Exit::Failed,
         }
     }

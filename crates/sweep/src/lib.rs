@@ -8,6 +8,7 @@ pub mod exit;
 pub mod interrupt;
 pub mod outcome;
 pub mod plan;
+pub mod plot;
 pub mod progress;
 pub mod run;
 pub mod store;

@@ -10,6 +10,7 @@ pub mod completions;
 pub mod init;
 pub mod merge;
 pub mod parameters;
+pub mod plot;
 pub mod run;
 pub mod schema;
 pub mod show;

@@ -1,0 +1,128 @@
+//! `sweep plot`: the figure that fits a file.
+
+use std::path::{Path, PathBuf};
+
+use crate::exit::{Error, Exit, tell};
+use crate::plot::{PlotOptions, Quantity, render};
+
+/// Arguments of `sweep plot`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Result of `sweep run`, `trace`, `modes` or `boundary`
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+
+    /// Where to write; the ending .svg, .png or .html says how [default: FILE with .svg]
+    #[arg(short, long, value_name = "IMAGE")]
+    pub output: Option<PathBuf>,
+
+    /// Map: what the colours show
+    #[arg(long, value_enum, default_value_t)]
+    pub quantity: Quantity,
+
+    /// Channel to show, as in the column names (tub_yaw, drum_front_y, ...); again for more of them in a trace
+    #[arg(long = "channel", value_name = "NAME")]
+    pub channels: Vec<String>,
+
+    /// Map of three or more axes: cut an axis beyond the second at this value
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
+    pub at: Vec<(String, f64)>,
+
+    /// Trace: mark where these speeds are passed, in rpm, separated by commas
+    #[arg(long, value_name = "RPM,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = speed)]
+    pub resonances: Vec<f64>,
+
+    /// Trace: mark where the resonance speeds of this modes file are passed
+    #[arg(long, value_name = "FILE")]
+    pub modes: Option<PathBuf>,
+
+    /// Map as .html: folder of trace files; clicking a point that has one shows its time histories
+    #[arg(long, value_name = "FOLDER")]
+    pub traces: Option<PathBuf>,
+}
+
+/// Draws the figure and says where it is.
+///
+/// # Errors
+/// As [`render`].
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    let output = args.output.clone().unwrap_or_else(|| default_output(&args.file));
+    let options = PlotOptions {
+        quantity: args.quantity,
+        channels: args.channels.clone(),
+        at: args.at.clone(),
+        resonances_rpm: args.resonances.clone(),
+        modes: args.modes.clone(),
+        traces: args.traces.clone(),
+    };
+    render(&args.file, &options, &output)?;
+    tell(&format!("wrote {}", output.display()));
+    Ok(Exit::Done)
+}
+
+/// Beside the input, under its name.
+fn default_output(file: &Path) -> PathBuf {
+    file.with_extension("svg")
+}
+
+fn assignment(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, as in spin_peak_rpm=350")?;
+    Ok((name.trim().to_owned(), finite(value)?))
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    let speed = finite(text)?;
+    if speed > 0.0 { Ok(speed) } else { Err("expected a speed above 0 rpm".to_owned()) }
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    text.trim()
+        .parse::<f64>()
+        .ok()
+        .filter(|value| value.is_finite())
+        .ok_or_else(|| format!("`{}` is not a finite number", text.trim()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        plot: Args,
+    }
+
+    fn parse(line: &str) -> Result<Args, String> {
+        let words = std::iter::once("plot").chain(line.split(' '));
+        Cli::try_parse_from(words).map(|cli| cli.plot).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn options_are_read_as_documented() {
+        let args = parse(
+            "m.parquet --quantity gap-linear --at spin_peak_rpm=350 --resonances 99.9,147.6 --channel a --channel b",
+        );
+        let args = args.unwrap();
+        assert_eq!(args.quantity, Quantity::GapLinear);
+        assert_eq!(args.at, [("spin_peak_rpm".to_owned(), 350.0)]);
+        assert_eq!(args.resonances, [99.9, 147.6]);
+        assert_eq!(args.channels, ["a", "b"]);
+        assert_eq!(default_output(&args.file), Path::new("m.svg"));
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_refused_with_what_was_expected() {
+        for (line, said) in [
+            ("m.parquet --at spin_peak_rpm", "expected NAME=VALUE"),
+            ("m.parquet --at x=nan", "`nan` is not a finite number"),
+            ("m.parquet --resonances -3", "expected a speed above 0 rpm"),
+            ("m.parquet --resonances 0", "expected a speed above 0 rpm"),
+            ("m.parquet --quantity gapp", "gap-nonlinear"),
+        ] {
+            let message = parse(line).unwrap_err();
+            assert!(message.contains(said), "{line}: {message}");
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! Scales and their ticks.
+
+use super::label;
+
+/// From values to a position, evenly or by the logarithm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Scale {
+    /// Even steps are equal factors.
+    pub(crate) log: bool,
+    /// Value at the start.
+    pub(crate) from: f64,
+    /// Value at the end.
+    pub(crate) to: f64,
+}
+
+/// A place on a scale that is marked.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tick {
+    /// Its value.
+    pub(crate) value: f64,
+    /// What stands beside it.
+    pub(crate) label: String,
+}
+
+impl Scale {
+    /// An even scale from one value to another.
+    pub(crate) fn linear(from: f64, to: f64) -> Self {
+        Self { log: false, from, to }
+    }
+
+    /// A logarithmic scale between two positive values.
+    pub(crate) fn log(from: f64, to: f64) -> Self {
+        Self { log: true, from, to }
+    }
+
+    /// An even scale that holds all `values` and 0 if it is near, with some room; 0 to 1 if there are none.
+    pub(crate) fn around(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = extremes(values).unwrap_or((0.0, 1.0));
+        let room = if high > low { 0.05 * (high - low) } else { 0.05 * high.abs().max(1.0) };
+        Self::linear(low - room, high + room)
+    }
+
+    /// The value in the units in which the scale is even.
+    pub(crate) fn even(self, value: f64) -> f64 {
+        if self.log { value.ln() } else { value }
+    }
+
+    /// Position of a value, 0 at the start and 1 at the end.
+    pub(crate) fn position(self, value: f64) -> f64 {
+        let (from, to) = (self.even(self.from), self.even(self.to));
+        (self.even(value) - from) / (to - from)
+    }
+
+    /// About `count` round values within the scale.
+    pub(crate) fn ticks(self, count: usize) -> Vec<Tick> {
+        let (low, high) = (self.from.min(self.to), self.from.max(self.to));
+        if self.log { log_ticks(low, high, count) } else { even_ticks(low, high, count) }
+    }
+}
+
+/// Least and greatest of the finite values.
+pub(crate) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values.filter(|value| value.is_finite()).fold(None, |found, value| {
+        Some(found.map_or((value, value), |(low, high): (f64, f64)| (low.min(value), high.max(value))))
+    })
+}
+
+fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
+    let rough = (high - low) / count.max(1) as f64;
+    if !(rough > 0.0 && rough.is_finite()) {
+        return Vec::new();
+    }
+    let mut power = rough.log10().floor() as i32;
+    let factor = rough / 10_f64.powi(power);
+    let mut mantissa =
+        [1, 2, 5, 10].into_iter().find(|&step| f64::from(step) >= 0.999 * factor).unwrap_or(10);
+    // A round step can leave fewer than three ticks, which do not make a scale: the next finer ones then.
+    loop {
+        let step = f64::from(mantissa) * 10_f64.powi(power);
+        let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+        if last - first >= 2 {
+            let decimals = usize::try_from(-power - i32::from(mantissa == 10)).unwrap_or_default();
+            let tick = |k: i64| {
+                let value = k as f64 * step;
+                Tick { value, label: format!("{value:.decimals$}") }
+            };
+            return (first..=last).map(tick).collect();
+        }
+        (mantissa, power) = match mantissa {
+            10 => (5, power),
+            5 => (2, power),
+            2 => (1, power),
+            _ => (5, power - 1),
+        };
+    }
+}
+
+fn log_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
+    let within = |factors: &[f64]| {
+        let mut values = Vec::new();
+        for power in (low.log10().floor() as i32)..=(high.log10().ceil() as i32) {
+            values.extend(
+                factors
+                    .iter()
+                    .map(|factor| factor * 10_f64.powi(power))
+                    .filter(|value| (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(value)),
+            );
+        }
+        values
+    };
+    let sets: [&[f64]; 5] = [
+        &[1.0],
+        &[1.0, 3.0],
+        &[1.0, 2.0, 5.0],
+        &[1.0, 1.5, 2.0, 3.0, 5.0, 7.0],
+        &[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0],
+    ];
+    let mut best = within(sets[0]);
+    for factors in &sets[1..] {
+        let values = within(factors);
+        if best.len() >= 2 && values.len() > count.max(2) + 1 {
+            break;
+        }
+        best = values;
+    }
+    if best.len() < 2 {
+        return even_ticks(low, high, count);
+    }
+    best.into_iter().map(|value| Tick { value, label: label::significant(value, 2) }).collect()
+}
+
+/// Whether values are spread more evenly by their logarithm; both choices hold for fewer than three.
+pub(crate) fn evenly_by_log(values: &[f64]) -> bool {
+    if values.len() < 3 || values.iter().any(|&value| value <= 0.0) {
+        return false;
+    }
+    let spread = |position: &dyn Fn(f64) -> f64| {
+        let steps = values.windows(2).map(|pair| position(pair[1]) - position(pair[0]));
+        extremes(steps).map_or(f64::INFINITY, |(least, greatest)| greatest / least)
+    };
+    // A plain even axis is read more easily, so the logarithm must be clearly the better fit.
+    spread(&f64::ln) * 1.2 < spread(&|value| value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(scale: Scale, count: usize) -> Vec<String> {
+        scale.ticks(count).into_iter().map(|tick| tick.label).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_and_lie_within() {
+        assert_eq!(labels(Scale::linear(0.0, 1.0), 5), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(labels(Scale::linear(46.0, 314.0), 6), ["50", "100", "150", "200", "250", "300"]);
+        assert_eq!(labels(Scale::linear(-0.3, 0.3), 3), ["-0.2", "0.0", "0.2"]);
+        assert_eq!(labels(Scale::linear(-48.0, 48.0), 3), ["-40", "-20", "0", "20", "40"]);
+        assert_eq!(labels(Scale::log(1.0, 1000.0), 4), ["1", "10", "100", "1000"]);
+        assert_eq!(labels(Scale::log(1.0, 9.0), 4), ["1", "2", "5"]);
+        assert!(labels(Scale::linear(1.0, 1.0), 5).is_empty());
+    }
+
+    #[test]
+    fn spacing_is_recognised() {
+        assert!(!evenly_by_log(&[60.0, 120.0, 180.0, 240.0]));
+        assert!(evenly_by_log(&[1.0, 10.0, 100.0, 1000.0]));
+        assert!(!evenly_by_log(&[0.0, 1.0, 10.0]));
+        assert!(!evenly_by_log(&[1.0, 10.0]));
+    }
+}

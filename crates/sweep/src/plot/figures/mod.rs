@@ -1,0 +1,7 @@
+//! One figure a file.
+
+pub(crate) mod boundary;
+pub(crate) mod campbell;
+pub(crate) mod curves;
+pub(crate) mod map;
+pub(crate) mod trace;

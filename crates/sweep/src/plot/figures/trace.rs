@@ -1,0 +1,172 @@
+//! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
+
+use crate::plot::PlotOptions;
+use crate::plot::chart::{Chart, ChartPanel, Mark, Series, Style};
+use crate::plot::colour::{LINEAR, NONLINEAR};
+use crate::plot::error::PlotError;
+use crate::plot::figures::campbell;
+use crate::plot::label;
+use crate::plot::read::Table;
+use crate::plot::scene::INK;
+
+/// Channels that a picture shows unless told otherwise: one a way the tub can move.
+const USUAL: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
+
+/// The chart of a trace file.
+///
+/// # Errors
+/// [`PlotError::Column`] without time, [`PlotError::NotThere`] for an unknown channel, and as
+/// [`campbell::resonances`] for the modes file that gives the resonance speeds.
+pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
+    let time = table.numbers("time_s")?.to_vec();
+    if time.len() < 2 {
+        return Err(PlotError::Empty {
+            path: table.path.clone(),
+            reason: "a trace needs at least two instants",
+        });
+    }
+    let channels: Vec<&str> = table.with_prefix("nonlinear_").into_iter().map(|(name, _)| name).collect();
+    if let Some(unknown) = options.channels.iter().find(|asked| !channels.contains(&asked.as_str())) {
+        return Err(PlotError::NotThere {
+            option: "--channel",
+            given: unknown.clone(),
+            path: table.path.clone(),
+            what: "channel",
+            known: channels.join(", "),
+        });
+    }
+    let usual: Vec<&str> = USUAL.into_iter().filter(|name| channels.contains(name)).collect();
+    let shown: Vec<&str> = match (&options.channels[..], &usual[..]) {
+        ([], []) => channels.clone(),
+        ([], usual) => usual.to_vec(),
+        (asked, _) => asked.iter().map(String::as_str).collect(),
+    };
+
+    let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
+        let models = [("nonlinear model", NONLINEAR), ("linear model", LINEAR)];
+        columns
+            .iter()
+            .zip(models)
+            .filter_map(|(column, (name, colour))| {
+                let y = table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
+                Some(Series { name: name.to_owned(), colour, grid: 0, y, style: Style::Solid(1.3) })
+            })
+            .collect()
+    };
+    let mut panels: Vec<ChartPanel> = channels
+        .iter()
+        .map(|name| {
+            let columns = [format!("nonlinear_{name}"), format!("linear_{name}")];
+            let unit = table.column(&columns[0]).map_or("", |column| column.unit.as_str());
+            let unit = if unit.is_empty() { unit_of_channel(name) } else { unit };
+            let (unit, factor) = label::shown(unit);
+            panel(
+                name,
+                label::with_unit(&label::channel(name), unit),
+                shown.contains(name),
+                pair(columns, factor),
+            )
+        })
+        .collect();
+    let gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
+    if !gaps.is_empty() {
+        let levels = vec![(0.0, "gap closed".to_owned())];
+        panels.push(ChartPanel { levels, ..panel("gap", "gap, drum to tub (mm)".to_owned(), true, gaps) });
+    }
+    let mut marks = Vec::new();
+    if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
+        for (x, resonance) in passages(&time, speed, &resonances(options)?) {
+            marks.push(Mark { x, label: format!("{} rpm", label::significant(resonance, 4)) });
+        }
+        let y = speed.to_vec();
+        let series = Series { name: String::new(), colour: INK, grid: 0, y, style: Style::Solid(2.0) };
+        let height = 130.0;
+        panels.push(ChartPanel { height, ..panel("speed", "spin (rpm)".to_owned(), true, vec![series]) });
+    }
+    Ok(Chart {
+        title: "Time histories of the nonlinear and the linear model".to_owned(),
+        subtitle: subtitle(table),
+        x_label: "Time (s)".to_owned(),
+        x_log: false,
+        grids: vec![time],
+        panels,
+        marks,
+        mark_meaning: "resonance speed passed".to_owned(),
+    })
+}
+
+/// The unit of a channel whose file does not say it.
+fn unit_of_channel(name: &str) -> &'static str {
+    washer_model::Channel::ALL
+        .into_iter()
+        .find(|channel| channel.name() == name)
+        .map_or("", |channel| channel.unit())
+}
+
+/// Name of the run, and the point if the file says which.
+fn subtitle(table: &Table) -> String {
+    let mut parts: Vec<String> = table.run_name().map(str::to_owned).into_iter().collect();
+    if let Some(at) = table.find("at").and_then(|at| at.as_object()) {
+        for (name, value) in at {
+            if let Some(value) = value.as_f64() {
+                let unit = label::unit_of_name(name);
+                parts.push(format!("{} {} {unit}", label::words(name), label::significant(value, 4)));
+            }
+        }
+    }
+    parts.push("deviation from the static equilibrium".to_owned());
+    parts.join(" · ")
+}
+
+fn resonances(options: &PlotOptions) -> Result<Vec<f64>, PlotError> {
+    let mut speeds = options.resonances_rpm.clone();
+    if let Some(path) = &options.modes {
+        speeds.extend(campbell::resonances(&Table::open(path)?)?);
+    }
+    Ok(speeds)
+}
+
+/// Instants at which the speed passes each resonance, upwards or downwards, in order of time.
+fn passages(time: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> {
+    let mut found = Vec::new();
+    for k in 1..time.len().min(speed.len()) {
+        for &resonance in resonances {
+            let (before, after) = (speed[k - 1] - resonance, speed[k] - resonance);
+            if (before < 0.0) != (after < 0.0) && before.is_finite() && after.is_finite() {
+                let part = before / (before - after);
+                found.push((time[k - 1] + part * (time[k] - time[k - 1]), resonance));
+            }
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // A peak that only touches a resonance is one passage, not one up and one down.
+    found.dedup();
+    found
+}
+
+fn panel(name: &str, label: String, shown: bool, series: Vec<Series>) -> ChartPanel {
+    ChartPanel {
+        name: name.to_owned(),
+        label: label::capitalised(&label),
+        shown,
+        log: false,
+        range: None,
+        height: 165.0,
+        series,
+        levels: Vec::new(),
+        stars: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_resonance_is_passed_on_the_way_up_and_down() {
+        let time: Vec<f64> = (0..=8).map(f64::from).collect();
+        let speed: Vec<f64> = time.iter().map(|t| 50.0 * (4.0 - (t - 4.0).abs())).collect();
+        assert_eq!(passages(&time, &speed, &[75.0, 500.0]), [(1.5, 75.0), (6.5, 75.0)]);
+        assert_eq!(passages(&time, &speed, &[200.0]), [(4.0, 200.0)]);
+    }
+}

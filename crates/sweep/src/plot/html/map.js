@@ -1,0 +1,516 @@
+// The map over the first two axes: cells, the dividing line, values under the pointer, time histories on a click.
+
+const MAP = { left: 76, right: 128, top: 10, bottom: 52, height: 560 };
+
+function createMap(host, data) {
+  const [xAxis, yAxis] = data.axes;
+  const extra = data.axes.slice(2);
+  const [nx, ny] = [xAxis.values.length, yAxis.values.length];
+  const cuts = extra.reduce((product, axis) => product * axis.values.length, 1);
+  const columns = {};
+  for (const [name, column] of Object.entries(data.columns)) columns[name] = { ...column, values: floats(column.data) };
+  const codes = {};
+  for (const [name, coded] of Object.entries(data.codes)) codes[name] = { ...coded, values: decode(coded.data) };
+  const word = (name, point) => codes[name]?.words[codes[name].values[point]] ?? null;
+
+  const evenOf = (axis) => (axis.log ? Math.log : (value) => value);
+  const [evenX, evenY] = [evenOf(xAxis), evenOf(yAxis)];
+  const borders = [xAxis.borders.map(evenX), yAxis.borders.map(evenY)];
+  const full = borders.map((list) => [list[0], list[list.length - 1]]);
+  let view = full.map((range) => [...range]);
+  let rest = [...data.first.rest];
+  let hovered = null;
+  let pinned = null;
+  let cursor = [Math.floor(nx / 2), Math.floor(ny / 2)];
+
+  const pointAt = (i, j) => {
+    const cut = extra.reduce((index, axis, k) => index * axis.values.length + rest[k], 0);
+    return (i * ny + j) * cuts + cut;
+  };
+
+  // Controls.
+  const groups = [
+    ["ratio", "ratio, nonlinear / linear"], ["nonlinear", "amplitude, nonlinear model"],
+    ["linear", "amplitude, linear model"], ["gap-nonlinear", "least gap, nonlinear model"],
+    ["gap-linear", "least gap, linear model"], ["status", "status"],
+  ].filter(([group]) => group === "status" || data.layers.some((layer) => layer.group === group));
+  const quantity = element("select", { id: "quantity", onchange: () => offerChannels() });
+  for (const [group, words] of groups) quantity.append(element("option", { value: group, selected: group === data.first.group }, words));
+  const channel = element("select", { id: "channel", onchange: () => changed() });
+  const controls = element("div", { class: "controls" },
+    element("label", {}, "Show", quantity), element("label", {}, "of", channel));
+  extra.forEach((axis, k) => {
+    const cut = element("select", { "data-axis": axis.name, onchange: () => { rest[k] = Number(cut.value); changed(); } });
+    axis.values.forEach((value, index) => {
+      cut.append(element("option", { value: index, selected: index === rest[k] }, `${significant(value)} ${axis.unit}`));
+    });
+    controls.append(element("label", {}, axis.words, cut));
+  });
+  controls.append(element("button", { type: "button", id: "reset", onclick: () => setView(full) }, "Reset zoom"));
+
+  const figure = element("div", {
+    class: "figure", id: "map", tabindex: "0", role: "application",
+    "aria-label": "Map. Arrow keys move from point to point, Enter keeps a point, Escape lets it go, plus and minus zoom, 0 resets.",
+  });
+  const tip = element("div", { class: "tip", id: "tip", hidden: true });
+  const legend = element("ul", { class: "legend", id: "legend" });
+  const help = element("p", { class: "help" }, "Hover for values, click to keep a point, wheel to zoom, drag to move, "
+    + "double-click to reset; or focus the map and use the arrow keys, Enter, Escape, +, - and 0.");
+  const readout = element("aside", { class: "readout", id: "readout", "aria-label": "Values at a point" });
+  const said = element("p", { class: "unseen", id: "said", "aria-live": "polite" });
+  const histories = element("section", { id: "histories" });
+  host.append(controls, element("div", { class: "columns" }, element("div", {}, figure, legend, help, said), readout), histories);
+
+  const height = () => MAP.height;
+  const cells = surface(figure, height, paint);
+  const over = surface(figure, height, paintOver);
+  over.canvas.classList.add("over");
+  figure.append(tip);
+
+  function offerChannels() {
+    const before = channel.value || data.first.channel;
+    const offered = data.layers.filter((layer) => layer.group === quantity.value && (layer.channel || layer.group === "ratio"));
+    channel.replaceChildren();
+    for (const layer of offered) {
+      channel.append(element("option", { value: layer.channel }, layer.channel ? layer.channelWords : "all channels (largest)"));
+    }
+    channel.disabled = offered.length === 0;
+    if (offered.length === 0) channel.append(element("option", { value: "" }, "no channel"));
+    if (offered.some((layer) => layer.channel === before)) channel.value = before;
+    changed();
+  }
+
+  function currentLayer() {
+    return data.layers.find((layer) => layer.group === quantity.value && layer.channel === channel.value) ?? null;
+  }
+
+  function changed() {
+    const layer = currentLayer();
+    figure.dataset.layer = layer ? layer.column : "status";
+    document.getElementById("title").textContent = layer ? layer.title : "How each point ended";
+    tellLegend(layer);
+    cells.request();
+    over.request();
+    tell();
+  }
+
+  function setView(next) {
+    view = next.map((range) => [...range]);
+    cells.request();
+    over.request();
+  }
+
+  // Geometry: the plot's rectangle, and positions within it.
+  function area() {
+    return { left: MAP.left, top: MAP.top, width: figure.clientWidth - MAP.left - MAP.right, height: MAP.height - MAP.top - MAP.bottom };
+  }
+  const toPx = (box, x) => box.left + ((x - view[0][0]) / (view[0][1] - view[0][0])) * box.width;
+  const toPy = (box, y) => box.top + box.height * (1 - (y - view[1][0]) / (view[1][1] - view[1][0]));
+  const fromPx = (box, px) => view[0][0] + ((px - box.left) / box.width) * (view[0][1] - view[0][0]);
+  const fromPy = (box, py) => view[1][0] + (1 - (py - box.top) / box.height) * (view[1][1] - view[1][0]);
+
+  function position(scale, value) {
+    const even = scale.log ? Math.log : (x) => x;
+    let place;
+    if (scale.centre === undefined) {
+      place = (even(value) - even(scale.low)) / (even(scale.high) - even(scale.low));
+    } else {
+      const offset = even(value) - even(scale.centre);
+      const half = offset < 0 ? even(scale.centre) - even(scale.low) : even(scale.high) - even(scale.centre);
+      place = 0.5 + (0.5 * offset) / half;
+    }
+    return Math.min(Math.max(place, 0), 1);
+  }
+
+  function palette(layer) {
+    if (layer.scale.centre === undefined) return data.palettes.sequential;
+    return layer.scale.reversed ? [...data.palettes.diverging].reverse() : data.palettes.diverging;
+  }
+
+  // What fills a point's cell: a colour, "failed", "undefined", or null where the file has no row.
+  function filler(layer) {
+    const status = codes.status;
+    if (!layer) {
+      const kinds = kindColours();
+      return (point) => kinds[status.values[point]] ?? null;
+    }
+    const colours = palette(layer);
+    const { values, factor } = columns[layer.column];
+    return (point) => {
+      const value = values[point] * factor;
+      if (Number.isFinite(value) && (layer.group !== "ratio" || value > 0)) {
+        return colours[Math.min(Math.floor(position(layer.scale, value) * colours.length), colours.length - 1)];
+      }
+      if (status.values[point] === 255) return null;
+      return status.words[status.values[point]] === "ok" ? "undefined" : "failed";
+    };
+  }
+
+  function kindColours() {
+    let next = 1;
+    return codes.status.words.map((kind) => (kind === "ok" ? themed("faint") : data.palettes.kinds[next++ % data.palettes.kinds.length]));
+  }
+
+  function hatching(context) {
+    const tile = element("canvas", { width: 8, height: 8 });
+    const brush = tile.getContext("2d");
+    brush.fillStyle = data.palettes.failed;
+    brush.fillRect(0, 0, 8, 8);
+    brush.strokeStyle = "#1b1f24";
+    brush.beginPath();
+    for (const shift of [-8, 0, 8]) {
+      brush.moveTo(shift, 8);
+      brush.lineTo(shift + 8, 0);
+    }
+    brush.stroke();
+    return context.createPattern(tile, "repeat");
+  }
+
+  function paint(context, width) {
+    const box = area();
+    const layer = currentLayer();
+    const fill = filler(layer);
+    const failed = hatching(context);
+    context.save();
+    context.beginPath();
+    context.rect(box.left, box.top, box.width, box.height);
+    context.clip();
+    // Edges on whole pixels: neighbours meet without a seam.
+    const xs = borders[0].map((border) => Math.round(toPx(box, border)));
+    const ys = borders[1].map((border) => Math.round(toPy(box, border)));
+    for (let i = 0; i < nx; i++) {
+      if (xs[i + 1] < box.left || xs[i] > box.left + box.width) continue;
+      for (let j = 0; j < ny;) {
+        const kind = fill(pointAt(i, j));
+        const start = j++;
+        while (kind !== "undefined" && j < ny && fill(pointAt(i, j)) === kind) j++;
+        if (kind === null) continue;
+        context.fillStyle = kind === "failed" ? failed : kind === "undefined" ? themed("paper") : kind;
+        context.fillRect(xs[i], ys[j], xs[i + 1] - xs[i], ys[start] - ys[j]);
+        if (kind === "undefined") {
+          const side = Math.min(4, 0.4 * (xs[i + 1] - xs[i]), 0.4 * (ys[start] - ys[j]));
+          context.fillStyle = themed("muted");
+          context.fillRect((xs[i] + xs[i + 1] - side) / 2, (ys[start] + ys[j] - side) / 2, side, side);
+        }
+      }
+    }
+    if (layer?.level) {
+      const cut = extra.reduce((index, axis, k) => index * axis.values.length + rest[k], 0);
+      context.beginPath();
+      for (const line of layer.level.lines[cut]) {
+        for (let k = 0; k < line.length; k += 2) {
+          const at = [toPx(box, evenX(line[k])), toPy(box, evenY(line[k + 1]))];
+          if (k === 0) context.moveTo(...at);
+          else context.lineTo(...at);
+        }
+      }
+      context.lineJoin = "round";
+      for (const [colour, thick] of [["#ffffff", 5], ["#1b1f24", 2.4]]) {
+        context.strokeStyle = colour;
+        context.lineWidth = thick;
+        context.stroke();
+      }
+    }
+    context.restore();
+    drawAxes(context, box);
+    if (layer) drawBar(context, box, layer, width);
+    figure.dataset.area = [box.left, box.top, box.width, box.height].join(" ");
+    figure.dataset.view = view.flat().join(" ");
+  }
+
+  function drawAxes(context, box) {
+    const ink = themed("ink");
+    context.strokeStyle = context.fillStyle = ink;
+    context.lineWidth = 1;
+    context.strokeRect(box.left, box.top, box.width, box.height);
+    context.font = `13px ${FONT}`;
+    const range = (axis, k) => view[k].map((even) => (axis.log ? Math.exp(even) : even));
+    const bottom = box.top + box.height;
+    context.textAlign = "center";
+    for (const [value, label] of ticks(...range(xAxis, 0), box.width / 90, xAxis.log)) {
+      const x = toPx(box, evenX(value));
+      drawLine(context, x, bottom, x, bottom + 5, [], ink);
+      context.fillText(label, x, bottom + 19);
+    }
+    context.textAlign = "right";
+    for (const [value, label] of ticks(...range(yAxis, 1), box.height / 55, yAxis.log)) {
+      const y = toPy(box, evenY(value));
+      drawLine(context, box.left - 5, y, box.left, y, [], ink);
+      context.fillText(label, box.left - 8, y + 4.5);
+    }
+    context.font = `15px ${FONT}`;
+    context.textAlign = "center";
+    context.fillText(labelled(xAxis), box.left + box.width / 2, bottom + 42);
+    context.save();
+    context.translate(17, box.top + box.height / 2);
+    context.rotate(-Math.PI / 2);
+    context.fillText(labelled(yAxis), 0, 0);
+    context.restore();
+  }
+
+  function drawBar(context, box, layer, width) {
+    const [x, thick] = [box.left + box.width + 22, 20];
+    const colours = palette(layer);
+    const bottom = box.top + box.height;
+    colours.forEach((colour, k) => {
+      const [low, high] = [k, k + 1].map((step) => Math.round(bottom - (step / colours.length) * box.height));
+      context.fillStyle = colour;
+      context.fillRect(x, high, thick, low - high);
+    });
+    context.strokeStyle = context.fillStyle = themed("ink");
+    context.strokeRect(x, box.top, thick, box.height);
+    context.textAlign = "left";
+    for (const [value, label] of layer.ticks) {
+      const y = bottom - position(layer.scale, value) * box.height;
+      const centre = value === layer.scale.centre;
+      drawLine(context, centre ? x : x + thick, y, x + thick + 5, y, [], centre ? "#1b1f24" : themed("ink"));
+      context.font = `${centre ? "bold " : ""}13px ${FONT}`;
+      context.fillText(label, x + thick + 8, y + 4.5);
+    }
+    context.save();
+    context.font = `13px ${FONT}`;
+    context.translate(width - 8, box.top + box.height / 2);
+    context.rotate(-Math.PI / 2);
+    context.textAlign = "center";
+    context.fillText(layer.label, 0, 0);
+    context.restore();
+  }
+
+  function paintOver(context) {
+    const box = area();
+    context.beginPath();
+    context.rect(box.left, box.top, box.width, box.height);
+    context.clip();
+    // Rings where a click shows time histories, unless it does everywhere.
+    if (data.traces && Object.keys(data.traces).length < nx * ny * cuts) {
+      for (let i = 0; i < nx; i++) {
+        for (let j = 0; j < ny; j++) {
+          if (!data.traces[pointAt(i, j)]) continue;
+          const [x, y] = [0.5 * (borders[0][i] + borders[0][i + 1]), 0.5 * (borders[1][j] + borders[1][j + 1])];
+          for (const [colour, thick] of [["#ffffff", 4], ["#1b1f24", 1.5]]) {
+            context.beginPath();
+            context.arc(toPx(box, x), toPy(box, y), 4, 0, 2 * Math.PI);
+            context.strokeStyle = colour;
+            context.lineWidth = thick;
+            context.stroke();
+          }
+        }
+      }
+    }
+    for (const [place, thick] of [[hovered, 2], [pinned, 3.5]]) {
+      if (!place) continue;
+      const [i, j] = place;
+      const [left, right] = [toPx(box, borders[0][i]), toPx(box, borders[0][i + 1])];
+      const [low, high] = [toPy(box, borders[1][j]), toPy(box, borders[1][j + 1])];
+      for (const [colour, extra] of [["#ffffff", 3], ["#1b1f24", 0]]) {
+        context.strokeStyle = colour;
+        context.lineWidth = thick + extra;
+        context.strokeRect(left, high, right - left, low - high);
+      }
+    }
+  }
+
+  function tellLegend(layer) {
+    legend.replaceChildren();
+    const add = (style, text) => {
+      const sign = element("i");
+      sign.style.cssText = style;
+      legend.append(element("li", {}, sign, text));
+    };
+    if (layer?.level) {
+      const colours = palette(layer);
+      add(`height:0;border-top:3px solid ${themed("ink")}`, layer.level.line);
+      add(`background:${colours[Math.floor(colours.length * 0.75)]}`, layer.level.above);
+      add(`background:${colours[Math.floor(colours.length * 0.25)]}`, layer.level.below);
+    }
+    if (!layer) {
+      const colours = kindColours();
+      codes.status.words.forEach((kind, k) => {
+        const count = codes.status.values.reduce((sum, code) => sum + (code === k), 0);
+        add(`background:${colours[k]}`, `${kind.replaceAll("_", " ")} (${count})`);
+      });
+    } else if (codes.status.words.some((kind) => kind !== "ok")) {
+      add(`background:repeating-linear-gradient(135deg,#1b1f24 0 1px,${data.palettes.failed} 1px 6px)`, "failed: no result");
+    }
+    if (layer?.group === "ratio" && anyUndefined(layer)) {
+      add(`background:radial-gradient(circle,${themed("muted")} 2px,${themed("paper")} 2.5px);outline:1px solid ${themed("faint")}`, "undefined: no excitation");
+    }
+  }
+
+  function anyUndefined(layer) {
+    const { values } = columns[layer.column];
+    const ok = codes.status.words.indexOf("ok");
+    return codes.status.values.some((code, point) => code === ok && !Number.isFinite(values[point]));
+  }
+
+  const labelled = (axis) => (axis.unit ? `${axis.words} (${axis.unit})` : axis.words);
+
+  function verdict(point) {
+    const reliable = word("reliable", point);
+    if (reliable !== null) return reliable === "true" ? "linear model reliable" : "linear model unreliable";
+    const status = word("status", point);
+    if (status === null) return "not in the file";
+    return status === "ok" ? "undefined: no excitation" : `failed: ${status.replaceAll("_", " ")}`;
+  }
+
+  function coordinates([i, j]) {
+    const places = [[xAxis, i], [yAxis, j], ...extra.map((axis, k) => [axis, rest[k]])];
+    return places.map(([axis, index]) => `${axis.words} ${significant(axis.values[index])} ${axis.unit}`.trim());
+  }
+
+  function shownValue(name, point, digits = 4) {
+    const column = columns[name];
+    return column ? significant(column.values[point] * column.factor, digits) : "–";
+  }
+
+  function tell() {
+    const place = hovered ?? pinned;
+    readout.replaceChildren();
+    if (!place) {
+      readout.append(element("h2", {}, "No point chosen"),
+        element("p", {}, "Hover over the map, or focus it and use the arrow keys."));
+      tip.hidden = true;
+      return;
+    }
+    const point = pointAt(...place);
+    const layer = currentLayer();
+    figure.dataset.point = shownValue("point", point, 9);
+    readout.append(element("h2", {}, `Point ${shownValue("point", point, 9)}`));
+    for (const line of coordinates(place)) readout.append(element("p", {}, line));
+    const largest = word("ratio_max_channel", point);
+    readout.append(element("p", { class: "verdict" }, capitalised(verdict(point))),
+      ...(word("sensitive", point) === "true" ? [element("p", {}, "The motion is chaotic here: the verdict holds, the ratio's digits depend on the integrator.")] : []),
+      element("p", { id: "ratio" }, `Largest ratio ${shownValue("ratio_max", point)}${largest ? ` (${largest.replaceAll("_", " ")})` : ""}`));
+    if (!Number.isNaN(columns.fail_time_s?.values[point] ?? NaN)) {
+      readout.append(element("p", {}, `Failed at ${shownValue("fail_time_s", point)} s`));
+    }
+    const rows = element("tbody");
+    for (const { channel: name, channelWords } of data.layers.filter((one) => one.group === "nonlinear")) {
+      rows.append(element("tr", { "data-channel": name }, element("th", { scope: "row" }, `${channelWords} (${columns[`nonlinear_${name}`].unit})`),
+        ...["nonlinear", "linear", "ratio"].map((kind) => element("td", { "data-kind": kind }, shownValue(`${kind}_${name}`, point)))));
+    }
+    rows.append(element("tr", { "data-channel": "gap" }, element("th", { scope: "row" }, "least gap (mm)"),
+      element("td", {}, shownValue("min_gap_nonlinear_m", point)), element("td", {}, shownValue("min_gap_linear_m", point)), element("td")));
+    const head = element("tr", {}, ...["amplitude", "nonlinear", "linear", "ratio"].map((text) => element("th", { scope: "col" }, text)));
+    readout.append(element("table", {}, element("thead", {}, head), rows));
+    if (data.traces) {
+      readout.append(element("p", { class: "help" }, data.traces[point] ? "Click or press Enter for its time histories." : "No time history kept for this point."));
+    }
+    const value = layer ? `${layer.label}: ${shownValue(layer.column, point)}` : "";
+    const lines = [...coordinates(place), ...(value ? [value] : []), verdict(point)];
+    said.textContent = lines.join("; ");
+    tip.textContent = lines.join("\n");
+    tip.hidden = !hovered;
+    if (hovered) placeTip(hovered);
+  }
+
+  function placeTip([i, j]) {
+    const box = area();
+    const [right, left] = [toPx(box, borders[0][i + 1]) + 10, toPx(box, borders[0][i]) - 10];
+    const top = toPy(box, borders[1][j + 1]);
+    tip.style.left = `${right + tip.offsetWidth < figure.clientWidth ? right : Math.max(0, left - tip.offsetWidth)}px`;
+    tip.style.top = `${Math.min(Math.max(top, box.top), box.top + box.height - tip.offsetHeight)}px`;
+  }
+
+  function hover(place) {
+    if (hovered?.[0] === place?.[0] && hovered?.[1] === place?.[1]) return;
+    hovered = place;
+    if (place) cursor = place;
+    over.request();
+    tell();
+  }
+
+  function pin(place) {
+    pinned = place;
+    over.request();
+    showHistories(place && pointAt(...place));
+    tell();
+  }
+
+  function showHistories(point) {
+    histories.replaceChildren();
+    const trace = point === null ? null : data.traces?.[point];
+    if (!trace) return;
+    const names = Object.keys(trace.series);
+    const values = (name) => {
+      const { data: text, unit, factor } = trace.series[name];
+      return quantised(text, unit * factor);
+    };
+    const series = (name, title, colour) => ({ name: title, colour, grid: 0, width: 1.3, dashed: false, y: values(name) });
+    const panel = (name, label, lines, levels = []) => ({ name, label, shown: true, log: false, range: null, height: 150, series: lines, levels, stars: [] });
+    const both = (name, [nonlinear, linear], words, levels) => {
+      const lines = [[nonlinear, "nonlinear model", "#0072b2"], [linear, "linear model", "#d55e00"]].filter(([column]) => names.includes(column));
+      return panel(name, `${words} (${trace.series[nonlinear].shown})`, lines.map((line) => series(...line)), levels);
+    };
+    const words = Object.fromEntries(data.layers.map((layer) => [layer.channel, layer.channelWords]));
+    const panels = names.filter((name) => name.startsWith("nonlinear_")).map((column) => {
+      const name = column.slice("nonlinear_".length);
+      const one = both(name, [column, `linear_${name}`], capitalised(words[name] ?? name.replaceAll("_", " ")));
+      one.shown = name === (channel.value || word("ratio_max_channel", point));
+      return one;
+    });
+    if (panels.length && !panels.some((one) => one.shown)) panels[0].shown = true;
+    if (names.includes("gap_nonlinear_m")) panels.push(both("gap", ["gap_nonlinear_m", "gap_linear_m"], "Gap, drum to tub", [[0, "gap closed"]]));
+    if (names.includes("speed_rpm")) panels.push(panel("speed", "Spin (rpm)", [series("speed_rpm", "", "ink")]));
+    histories.append(element("h2", {}, `Time histories at ${coordinates(pinned).join(", ")}`));
+    createChart(histories, { xLabel: "Time (s)", xLog: false, grids: [floats(trace.time_s)], panels, marks: [], markMeaning: "" }, "Time histories");
+  }
+
+  // Pointer and keys.
+  const cellAt = (event) => {
+    const box = area();
+    const bounds = cells.canvas.getBoundingClientRect();
+    const [px, py] = [event.clientX - bounds.left, event.clientY - bounds.top];
+    if (px < box.left || px >= box.left + box.width || py < box.top || py >= box.top + box.height) return null;
+    const find = (list, even) => Math.min(Math.max(lowerBound(list, even) - 1, 0), list.length - 2);
+    return [find(borders[0], fromPx(box, px)), find(borders[1], fromPy(box, py))];
+  };
+  let drag = null;
+  figure.addEventListener("pointermove", (event) => {
+    if (drag) {
+      const box = area();
+      const shift = [(drag.at[0] - event.clientX) / box.width, (event.clientY - drag.at[1]) / box.height];
+      drag.far ||= Math.hypot(event.clientX - drag.at[0], event.clientY - drag.at[1]) > 4;
+      if (drag.far) setView(drag.view.map((range, k) => moved(range, shift[k] * (range[1] - range[0]), full[k])));
+    }
+    hover(drag?.far ? null : cellAt(event));
+  });
+  figure.addEventListener("pointerdown", (event) => {
+    drag = { at: [event.clientX, event.clientY], view, far: false };
+    figure.setPointerCapture(event.pointerId);
+  });
+  figure.addEventListener("pointerup", (event) => {
+    const clicked = drag && !drag.far ? cellAt(event) : null;
+    drag = null;
+    if (clicked) pin(clicked);
+  });
+  figure.addEventListener("pointercancel", () => { drag = null; });
+  figure.addEventListener("pointerleave", () => hover(null));
+  figure.addEventListener("blur", () => hover(null));
+  figure.addEventListener("dblclick", () => setView(full));
+  const zoom = (factor, centre) => setView(view.map((range, k) => zoomed(range, factor, centre[k], full[k])));
+  figure.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    const box = area();
+    const bounds = cells.canvas.getBoundingClientRect();
+    zoom(Math.exp(0.0015 * event.deltaY), [fromPx(box, event.clientX - bounds.left), fromPy(box, event.clientY - bounds.top)]);
+    hover(cellAt(event));
+  }, { passive: false });
+  figure.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    const centre = [(borders[0][cursor[0]] + borders[0][cursor[0] + 1]) / 2, (borders[1][cursor[1]] + borders[1][cursor[1] + 1]) / 2];
+    if (step) {
+      const reach = event.shiftKey ? 5 : 1;
+      const clamp = (value, count) => Math.min(Math.max(value, 0), count - 1);
+      hover(hovered ? [clamp(cursor[0] + reach * step[0], nx), clamp(cursor[1] + reach * step[1], ny)] : [...cursor]);
+    } else if (event.key === "Enter" || event.key === " ") pin([...cursor]);
+    else if (event.key === "Escape") pin(null);
+    else if (event.key === "+" || event.key === "=") zoom(0.7, centre);
+    else if (event.key === "-") zoom(1 / 0.7, centre);
+    else if (event.key === "0") setView(full);
+    else return;
+    event.preventDefault();
+  });
+  darkTheme.addEventListener("change", () => tellLegend(currentLayer()));
+  offerChannels();
+}

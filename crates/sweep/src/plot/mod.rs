@@ -1,0 +1,174 @@
+//! Figures from this program's Parquet files: as SVG, as PNG, or as one HTML page that needs nothing else.
+//!
+//! A file is read and its kind told by its columns; a map becomes a picture of cells, everything else a chart of
+//! curves. Either is laid out once as a scene of shapes and text, and written as SVG or PNG. The page gets
+//! the numbers instead and draws them itself. The same file and options give the same bytes.
+
+mod axis;
+mod chart;
+mod colour;
+mod contour;
+mod decimate;
+mod error;
+mod figures;
+mod frame;
+mod grid;
+mod html;
+mod label;
+mod layer;
+mod raster;
+mod read;
+mod region;
+#[cfg(test)]
+mod sample;
+mod scene;
+mod svg;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+
+pub use error::PlotError;
+pub use read::{Column, Kind, Table, Values};
+
+use chart::Chart;
+use grid::Grid;
+use raster::Typeface;
+use scene::Scene;
+
+/// Image pixels to a scene pixel in a PNG: sharp on dense screens and in print.
+const PNG_SCALE: f64 = 2.0;
+
+/// What a map shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Quantity {
+    /// Nonlinear over linear amplitude: of `--channel`, or the largest of all
+    #[default]
+    Ratio,
+    /// Amplitude of `--channel` in the nonlinear model
+    Nonlinear,
+    /// Amplitude of `--channel` in the linear model
+    Linear,
+    /// Least gap between drum and tub in the nonlinear model
+    GapNonlinear,
+    /// Least gap between drum and tub in the linear model
+    GapLinear,
+    /// How each point ended
+    Status,
+}
+
+/// What to show; the default is the figure that fits the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlotOptions {
+    /// Map: what the colours are.
+    pub quantity: Quantity,
+    /// Map: the channel of the quantity. Trace: the channels shown.
+    pub channels: Vec<String>,
+    /// Map of three or more axes: where to cut an axis beyond the second, by name and value.
+    pub at: Vec<(String, f64)>,
+    /// Trace: resonance speeds whose passages are marked, rpm.
+    pub resonances_rpm: Vec<f64>,
+    /// Trace: a modes file whose resonance speeds are marked too.
+    pub modes: Option<PathBuf>,
+    /// Map as a page: a folder of trace files; clicking a point that has one shows it.
+    pub traces: Option<PathBuf>,
+}
+
+/// How a figure is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Svg,
+    Png,
+    Html,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self, PlotError> {
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        match ending.to_ascii_lowercase().as_str() {
+            "svg" => Ok(Self::Svg),
+            "png" => Ok(Self::Png),
+            "html" | "htm" => Ok(Self::Html),
+            _ => Err(PlotError::Format { path: path.to_owned() }),
+        }
+    }
+}
+
+/// Draws the figure that fits `input` to `output`, whose ending (`.svg`, `.png`, `.html`) says how.
+///
+/// # Errors
+/// Any [`PlotError`]: an unreadable file, options that do not fit it, an output that cannot be written. The output's
+/// name and the options are judged before the output is touched.
+pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), PlotError> {
+    let format = Format::of(output)?;
+    if input == output {
+        return Err(PlotError::Unfit(format!("{} would be overwritten by its own figure", input.display())));
+    }
+    let table = Table::open(input)?;
+    check_options(&table, options, format)?;
+    let bytes = match figure(&table, options)? {
+        Figure::Map(grid) => match format {
+            Format::Html => html::map_page(&table, &grid, options)?.into_bytes(),
+            Format::Svg | Format::Png => {
+                let typeface = Typeface::load()?;
+                image(&figures::map::draw(&table, &grid, options, &typeface)?, format)?
+            }
+        },
+        Figure::Chart(chart) => match format {
+            Format::Html => html::chart_page(&table, &chart).into_bytes(),
+            Format::Svg | Format::Png => image(&chart::draw(&chart, &Typeface::load()?), format)?,
+        },
+    };
+    std::fs::write(output, bytes).map_err(|source| PlotError::Write { path: output.to_owned(), source })
+}
+
+enum Figure {
+    Map(Grid),
+    Chart(Chart),
+}
+
+fn figure(table: &Table, options: &PlotOptions) -> Result<Figure, PlotError> {
+    Ok(match table.kind {
+        Kind::Map => {
+            let grid = Grid::of(table)?;
+            if grid.axes.len() == 1 {
+                Figure::Chart(figures::curves::chart(table, &grid, options)?)
+            } else {
+                Figure::Map(grid)
+            }
+        }
+        Kind::Trace => Figure::Chart(figures::trace::chart(table, options)?),
+        Kind::Modes => Figure::Chart(figures::campbell::chart(table)?),
+        Kind::Boundary => Figure::Chart(figures::boundary::chart(table)?),
+    })
+}
+
+fn image(scene: &Scene, format: Format) -> Result<Vec<u8>, PlotError> {
+    match format {
+        Format::Png => raster::write(scene, PNG_SCALE),
+        _ => Ok(svg::write(scene).into_bytes()),
+    }
+}
+
+/// Refuses options that the file's kind or the output's format would leave without effect.
+fn check_options(table: &Table, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
+    let (map, trace) = (table.kind == Kind::Map, table.kind == Kind::Trace);
+    let rules = [
+        ("--quantity", options.quantity != Quantity::default(), map, "maps"),
+        ("--channel", !options.channels.is_empty(), map || trace, "maps and traces"),
+        ("--at", !options.at.is_empty(), map, "maps"),
+        ("--resonances", !options.resonances_rpm.is_empty(), trace, "traces"),
+        ("--modes", options.modes.is_some(), trace, "traces"),
+        ("--traces", options.traces.is_some(), map && format == Format::Html, "maps drawn as .html"),
+    ];
+    for (option, given, fits, where_it_does) in rules {
+        if given && !fits {
+            let kind = table.kind.name();
+            let path = table.path.display();
+            return Err(PlotError::Unfit(format!(
+                "`{option}` is for {where_it_does}; {path} is a {kind} file"
+            )));
+        }
+    }
+    Ok(())
+}

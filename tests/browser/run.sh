@@ -1,0 +1,23 @@
+#!/bin/sh
+# The page of a map in a real browser: tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
+#
+# Needs chromium and chromedriver on the PATH (Debian: chromium, chromium-driver) and Python 3; what else it needs goes into a
+# virtual environment under target/. SWEEP names another binary than the release build, SHOTS a folder for screenshots.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+root=$(cd "$here/../.." && pwd)
+sweep=${SWEEP:-$root/target/release/sweep}
+venv=$root/target/browser-venv
+map=$1
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+if [ ! -x "$venv/bin/python" ]; then python3 -m venv "$venv"; fi
+"$venv/bin/pip" install --quiet --disable-pip-version-check -r "$here/requirements.txt"
+
+if [ $# -gt 1 ]; then
+    "$sweep" plot "$map" --traces "$2" -o "$work/page.html"
+else
+    "$sweep" plot "$map" -o "$work/page.html"
+fi
+"$venv/bin/python" "$here/check_page.py" "$map" "$work/page.html" ${SHOTS:+--screenshots "$SHOTS"}
