@@ -60,10 +60,14 @@ impl<T: Lane> Splat<N<f64>> for N<T> {
     }
 }
 
-impl<A: Splat<B>, B, const K: usize> Splat<[B; K]> for [A; K] {
+impl<A: Splat<B> + Copy, B, const K: usize> Splat<[B; K]> for [A; K] {
     type Number = A::Number;
     #[inline(always)]
     fn splat(zero: A::Number, from: &[B; K]) -> Self {
-        core::array::from_fn(|i| A::splat(zero, &from[i]))
+        let mut all = [A::splat(zero, &from[0]); K];
+        for i in 1..K {
+            all[i] = A::splat(zero, &from[i]);
+        }
+        all
     }
 }
