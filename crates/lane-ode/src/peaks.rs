@@ -3,8 +3,25 @@
 use crate::lane::Lane;
 use crate::num::N;
 
-/// An output with its first derivative.
-pub type Sample<T> = (N<T>, N<T>);
+/// An output with its first two derivatives in time.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample<T> {
+    /// The output.
+    pub value: N<T>,
+    /// Its first derivative, per second.
+    pub slope: N<T>,
+    /// Its second derivative, per second squared.
+    pub curvature: N<T>,
+}
+
+impl<T: Copy> Sample<T> {
+    /// An output that stands still.
+    #[inline(always)]
+    #[must_use]
+    pub const fn still(value: N<T>, zero: N<T>) -> Self {
+        Self { value, slope: zero, curvature: zero }
+    }
+}
 
 /// Largest magnitude so far of `M` outputs.
 ///
@@ -21,7 +38,7 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
     #[inline(always)]
     #[must_use]
     pub fn new(zero: N<T>) -> Self {
-        Self { peak: [zero; M], last: [(zero, zero); M] }
+        Self { peak: [zero; M], last: [Sample::still(zero, zero); M] }
     }
 
     /// Forgets one lane.
@@ -37,60 +54,41 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         self.peak.map(|peak| peak.0.get(lane))
     }
 
-    /// A sample that no step leads to.
+    /// Samples that no step leads to; `counts` says in which lanes they count.
     #[inline(always)]
-    pub fn begin(&mut self, sample: [Sample<T>; M], counts: T::Mask) {
+    pub fn begin(&mut self, samples: &[Sample<T>; M], counts: T::Mask) {
         for i in 0..M {
-            self.raise(i, sample[i].0.abs(), counts);
+            self.raise(i, samples[i].value.abs(), counts);
         }
-        self.last = sample;
+        self.last = *samples;
     }
 
-    /// The sample at the end of a step of `length_s`; `counts` says in which lanes. Says whether a peak may lie inside the
-    /// step: then [`Peaks::look_inside`] must follow, and in any case [`Peaks::finish`].
+    /// The samples at the end of a step of `length_s` that began at the last ones.
     #[inline(always)]
-    pub fn reach_end(&mut self, length_s: N<T>, sample: &[Sample<T>; M], counts: T::Mask) -> bool {
-        let mut excess = length_s.lit(0.0);
-        for i in 0..M {
-            self.raise(i, sample[i].0.abs(), counts);
-            excess = N(self.rise(i, length_s, sample).0.larger(excess.0));
-        }
-        T::bits(excess.lit(0.0).0.less(T::select(counts, excess.0, excess.lit(0.0).0))) != 0
-    }
-
-    /// Looks for peaks between the last sample and this one, with the second derivatives at both.
-    #[inline(always)]
-    pub fn look_inside(
-        &mut self,
-        length_s: N<T>,
-        sample: &[Sample<T>; M],
-        counts: T::Mask,
-        second: &[[N<T>; M]; 2],
-    ) {
+    pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let zero = length_s.lit(0.0);
+        let third = (length_s * (1.0 / 3.0)).v();
+        let mut highest = zero;
+        let mut rises = [zero; M];
         for i in 0..M {
-            let rise = N(T::select(counts, self.rise(i, length_s, sample).0, zero.0));
-            if T::bits(zero.0.less(rise.0)) != 0 {
-                let inside =
-                    Quintic::new(length_s, self.last[i], second[0][i], sample[i], second[1][i]).extremum();
-                let inside = zero.where_less(rise, inside.abs(), zero);
-                self.peak[i] = N(inside.0.larger(self.peak[i].0));
+            let (last, now) = (self.last[i], &samples[i]);
+            self.raise(i, now.value.abs(), counts);
+            // How far the control polygon reaches above the peak.
+            let polygon = (last.value + third * last.slope).abs().0.larger((now.value - third * now.slope).abs().0);
+            rises[i] = N(polygon) - self.peak[i];
+            highest = N(rises[i].0.larger(highest.0));
+        }
+        if T::bits(zero.0.less(T::select(counts, highest.0, zero.0))) != 0 {
+            for i in 0..M {
+                let rise = N(T::select(counts, rises[i].0, zero.0));
+                if T::bits(zero.0.less(rise.0)) != 0 {
+                    let inside = Quintic::new(length_s, &self.last[i], &samples[i]).extremum();
+                    let inside = zero.where_less(rise, inside.abs(), zero);
+                    self.peak[i] = N(inside.0.larger(self.peak[i].0));
+                }
             }
         }
-    }
-
-    /// Makes this sample the last.
-    #[inline(always)]
-    pub fn finish(&mut self, sample: &[Sample<T>; M]) {
-        self.last = *sample;
-    }
-
-    /// How far the control polygon of the step to this sample reaches above the peak.
-    #[inline(always)]
-    fn rise(&self, i: usize, length_s: N<T>, sample: &[Sample<T>; M]) -> N<T> {
-        let third = (length_s * (1.0 / 3.0)).v();
-        let ((y0, d0), (y1, d1)) = (self.last[i], sample[i]);
-        N((y0 + third * d0).abs().0.larger((y1 - third * d1).abs().0)) - self.peak[i]
+        self.last = *samples;
     }
 
     #[inline(always)]
@@ -107,7 +105,9 @@ struct Quintic<T> {
 
 impl<T: Lane> Quintic<T> {
     #[inline(always)]
-    fn new(h: N<T>, (y0, d0): Sample<T>, e0: N<T>, (y1, d1): Sample<T>, e1: N<T>) -> Self {
+    fn new(h: N<T>, start: &Sample<T>, end: &Sample<T>) -> Self {
+        let (Sample { value: y0, slope: d0, curvature: e0 }, Sample { value: y1, slope: d1, curvature: e1 }) =
+            (*start, *end);
         let hh = (h * h).v();
         let (v0, v1) = ((h * d0).v(), (h * d1).v());
         let (a0, a1) = ((0.5 * (hh * e0).v()).v(), (0.5 * (hh * e1).v()).v());

@@ -59,23 +59,33 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let Some(mut run) = active().map(|lane| lane.left).min() else { return };
 
         let sixth = h / zero.lit(6.0);
+        // At the start, the middle and the end of a step.
         let mut now = task.forcing(index * h + start);
+        let mut mid = now;
+        let mut end = now;
         let mut before = x;
         let mut slope_before = x;
         let mut is_fresh = true;
         let mut done = 0;
         loop {
             // The one after the last is an evaluation only: observers want the slope at both ends of a step.
-            let stages = if done == run { 1 } else { 4 };
-            let mid = task.forcing((index + 0.5) * h + start);
-            let end = task.forcing((index + 1.0) * h + start);
-            let forcing = [&now, &mid, &mid, &end];
+            let is_last = done == run;
+            let stages = if is_last { 1 } else { 4 };
+            if !is_last {
+                mid = task.forcing((index + 0.5) * h + start);
+                end = task.forcing((index + 1.0) * h + start);
+            }
             let mut y = x;
             let mut sum = [zero; D];
             let mut first_slope = [zero; D];
             // One copy of the right-hand side: four would not fit the instruction cache.
             for stage in 0..stages {
-                let slope = task.derivative(forcing[stage], &y);
+                let forcing = match stage {
+                    0 => &now,
+                    3 => &end,
+                    _ => &mid,
+                };
+                let slope = task.derivative(forcing, &y);
                 let reach = (h * REACH[stage]).v();
                 let weight = zero.lit(WEIGHT[stage]);
                 for i in 0..D {
@@ -103,7 +113,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                     }
                 }
             }
-            if done == run {
+            if is_last {
                 break;
             }
             before = x;

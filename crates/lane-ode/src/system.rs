@@ -6,7 +6,7 @@ use crate::num::N;
 /// A first-order system x' = f(t, x) with `D` states, in lanes.
 pub trait System<T: Lane, const D: usize> {
     /// What f needs that depends on time alone; found once where several stages share a time.
-    type Forcing;
+    type Forcing: Copy;
 
     /// The forcing at time `t_s`, which may differ between lanes.
     fn forcing(&self, t_s: N<T>) -> Self::Forcing;

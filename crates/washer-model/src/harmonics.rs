@@ -78,15 +78,24 @@ pub(crate) fn push_terms(
 pub(crate) struct TermLanes<T> {
     zero: N<T>,
     keys: Vec<(u16, u16)>,
+    /// How many terms each entry has, and the basis function of each.
+    counts: Vec<u16>,
+    functions: Vec<u16>,
     coefficients: Vec<N<T>>,
     lanes: Vec<Vec<Term>>,
 }
 
 impl<T: Lane> TermLanes<T> {
-    #[inline(always)]
-    pub(crate) fn splat(zero: N<T>, terms: &[Term]) -> Self {
-        let mut lanes =
-            Self { zero, keys: Vec::new(), coefficients: Vec::new(), lanes: vec![terms.to_vec(); T::LANES] };
+    /// The same terms in every lane; sums have `entries` entries.
+    pub(crate) fn splat(zero: N<T>, terms: &[Term], entries: usize) -> Self {
+        let mut lanes = Self {
+            zero,
+            keys: Vec::new(),
+            counts: vec![0; entries],
+            functions: Vec::new(),
+            coefficients: Vec::new(),
+            lanes: vec![terms.to_vec(); T::LANES],
+        };
         lanes.rebuild();
         lanes
     }
@@ -107,6 +116,12 @@ impl<T: Lane> TermLanes<T> {
         self.keys.extend(self.lanes.iter().flatten().map(|term| term.key));
         self.keys.sort_unstable();
         self.keys.dedup();
+        self.counts.fill(0);
+        for (entry, _) in &self.keys {
+            self.counts[usize::from(*entry)] += 1;
+        }
+        self.functions.clear();
+        self.functions.extend(self.keys.iter().map(|(_, function)| function));
         self.coefficients.clear();
         self.coefficients.resize(self.keys.len(), self.zero);
         (0..T::LANES).for_each(|lane| self.fill(lane));
@@ -121,12 +136,25 @@ impl<T: Lane> TermLanes<T> {
         }
     }
 
-    /// Sum of coefficient times basis for each entry.
+    /// For each entry the sum of coefficient times basis function, in each of `W` sets of basis functions.
     #[inline(always)]
-    pub(crate) fn sum<const ENTRIES: usize, const B: usize>(&self, basis: &[N<T>; B]) -> [N<T>; ENTRIES] {
-        let mut entries = [self.zero; ENTRIES];
-        for (&(entry, b), &coefficient) in self.keys.iter().zip(&self.coefficients) {
-            entries[usize::from(entry)] += coefficient * basis[usize::from(b)];
+    pub(crate) fn sum<const ENTRIES: usize, const B: usize, const W: usize>(
+        &self,
+        basis: &[[N<T>; W]; B],
+    ) -> [[N<T>; W]; ENTRIES] {
+        let mut entries = [[self.zero; W]; ENTRIES];
+        let mut first = 0;
+        for (entry, &count) in entries.iter_mut().zip(&self.counts) {
+            let terms = first..first + usize::from(count);
+            first = terms.end;
+            let mut sum = [self.zero; W];
+            for (&function, &coefficient) in self.functions[terms.clone()].iter().zip(&self.coefficients[terms]) {
+                let basis = &basis[usize::from(function)];
+                for w in 0..W {
+                    sum[w] += coefficient * basis[w];
+                }
+            }
+            *entry = sum;
         }
         entries
     }
@@ -134,13 +162,13 @@ impl<T: Lane> TermLanes<T> {
 
 /// All basis functions at one instant.
 #[inline(always)]
-pub(crate) fn basis<T: Real>(spin: &SpinState<T>) -> [N<T>; BASIS] {
+pub(crate) fn basis<T: Real>(spin: &SpinState<T>) -> [[N<T>; 1]; BASIS] {
     let one = spin.cos.lit(1.0);
     let harmonics = [one, spin.cos, spin.sin, spin.cos_2, spin.sin_2];
     let factors = [one, (spin.speed * spin.speed).v(), spin.acceleration, spin.speed];
-    let mut functions = [one; BASIS];
+    let mut functions = [[one]; BASIS];
     for (i, function) in functions.iter_mut().enumerate() {
-        *function = (factors[i / HARMONICS] * harmonics[i % HARMONICS]).v();
+        *function = [(factors[i / HARMONICS] * harmonics[i % HARMONICS]).v()];
     }
     functions
 }

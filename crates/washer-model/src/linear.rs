@@ -28,7 +28,7 @@ const ARM: usize = INERTIA + 10;
 const FORCE: usize = ARM + 8;
 const STIFFNESS: usize = FORCE + ROTOR_ROWS;
 const DAMPING: usize = STIFFNESS + ROTOR_ROWS * 4;
-const ENTRIES: usize = DAMPING + ROTOR_ROWS * 4;
+pub(crate) const ENTRIES: usize = DAMPING + ROTOR_ROWS * 4;
 
 /// The linear model of one machine; `N<f64>` for one, `N<T>` for one per lane.
 #[derive(Clone, Copy, Debug)]
@@ -215,21 +215,35 @@ fn terms_of_lane<T: Lane>(samples: &[[[N<T>; HARMONICS]; ENTRIES]; 3], lane: usi
 }
 
 /// The rotor's arrays at one instant.
+#[derive(Clone, Copy)]
 pub(crate) struct RotorAt<T> {
-    entries: [N<T>; ENTRIES],
+    entries: [[N<T>; 1]; ENTRIES],
     inertia: Factors<T, 4>,
+}
+
+impl<T: Copy> RotorAt<T> {
+    /// Partial velocities of the rotor's mass centre.
+    #[inline(always)]
+    fn arm(&self) -> [[N<T>; 2]; 4] {
+        let e = &self.entries;
+        [
+            [e[ARM][0], e[ARM + 1][0]],
+            [e[ARM + 2][0], e[ARM + 3][0]],
+            [e[ARM + 4][0], e[ARM + 5][0]],
+            [e[ARM + 6][0], e[ARM + 7][0]],
+        ]
+    }
 }
 
 /// What depends on time alone.
 #[inline(always)]
 pub(crate) fn rotor_at<T: Lane>(terms: &TermLanes<T>, spin: &SpinState<T>) -> RotorAt<T> {
-    let functions: [N<T>; BASIS] = basis(spin);
-    let entries: [N<T>; ENTRIES] = terms.sum(&functions);
+    let entries: [[N<T>; 1]; ENTRIES] = terms.sum::<ENTRIES, BASIS, 1>(&basis(spin));
     let zero = spin.sin.lit(0.0);
     let mut inertia = [[zero; 4]; 4];
     for row in 0..4 {
         for column in 0..=row {
-            inertia[row][column] = entries[INERTIA + row * (row + 1) / 2 + column];
+            [inertia[row][column]] = entries[INERTIA + row * (row + 1) / 2 + column];
         }
     }
     RotorAt { entries, inertia: Factors::new(inertia) }
@@ -287,10 +301,10 @@ fn unloaded<T: Lane>(
     let e = &rotor_at.entries;
     let mut rotor = [zero; ROTOR_ROWS];
     for row in 0..ROTOR_ROWS {
-        rotor[row] = e[FORCE + row];
+        [rotor[row]] = e[FORCE + row];
         for column in 0..4 {
             let (entry, j) = (row * 4 + column, TURNS[column]);
-            rotor[row] = rotor[row] - e[STIFFNESS + entry] * q[j] - e[DAMPING + entry] * u[j];
+            rotor[row] = rotor[row] - e[STIFFNESS + entry][0] * q[j] - e[DAMPING + entry][0] * u[j];
         }
     }
     (
@@ -306,12 +320,7 @@ fn unloaded<T: Lane>(
             per_mass: c.rotor_per_mass,
             force: [rotor[0], rotor[1]],
             drift: [zero; 2],
-            arm: [
-                [e[ARM], e[ARM + 1]],
-                [e[ARM + 2], e[ARM + 3]],
-                [e[ARM + 4], e[ARM + 5]],
-                [e[ARM + 6], e[ARM + 7]],
-            ],
+            arm: rotor_at.arm(),
             axis: c.rotor_axis,
             torque: [rotor[2], rotor[3], rotor[4], rotor[5]],
         },
@@ -342,7 +351,7 @@ impl LinearPoint {
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let zero = N(0.0);
         let c = &self.constants;
-        let rotor_at = rotor_at(&TermLanes::splat(zero, &self.terms), spin);
+        let rotor_at = rotor_at(&TermLanes::splat(zero, &self.terms, ENTRIES), spin);
         // Columns of C and K, and F, are forces of single deviations; the bearings' share comes back with them.
         let rows = |q: &[N<f64>; COORDINATES], u: &[N<f64>; COORDINATES], loaded: bool| {
             let (mut tub, mut rotor) = unloaded(c, &rotor_at, q, u, zero);
@@ -373,8 +382,8 @@ impl LinearPoint {
             }
         }
         let e = &rotor_at.entries;
-        let rotor_arm: [[N<f64>; 2]; 4] = core::array::from_fn(|r| [e[ARM + 2 * r], e[ARM + 2 * r + 1]]);
-        let rotor_inertia = |r: usize, s: usize| e[INERTIA + r * (r + 1) / 2 + s].0;
+        let rotor_arm = rotor_at.arm();
+        let rotor_inertia = |r: usize, s: usize| e[INERTIA + r * (r + 1) / 2 + s][0].0;
         fill_mass(&mut matrices.mass, [0, 1], &[4, 5], c.tub_per_mass, &c.tub_arm, |r, s| {
             c.tub_inertia[r][s].0
         });

@@ -1,12 +1,16 @@
 //! The linear model's outputs: first order in the coordinates, harmonics 0 and 1 in theta.
 
 use crate::coefficients::Bodies;
-use crate::harmonics::Term;
+use crate::harmonics::{Term, TermLanes};
 use crate::lanes::GetLane;
 use crate::linear::seeded;
 use crate::nonlinear::COORDINATES;
-use crate::outputs::{CHANNELS, OUTPUTS, outputs};
-use lane_ode::{Lane, N, Real};
+use crate::outputs::{Axes, CHANNELS, Motion, RADIAL};
+use crate::spin::SpinState;
+use lane_ode::{Lane, N, Real, Sample};
+
+/// Every channel, then the two components of the radial distance.
+const OUTPUTS: usize = CHANNELS + RADIAL;
 
 /// Angles that determine harmonics 0 and 1: cos and sin of 2 pi k / 3.
 const SAMPLES: [(f64, f64); 3] =
@@ -19,40 +23,109 @@ const COLUMNS: usize = COORDINATES + 1;
 const NOISE: f64 = 1e-13;
 
 /// What the outputs are sums of: 1, cos and sin of theta, each times 1 and every coordinate.
-pub(crate) const FEATURES: usize = 3 * COLUMNS;
+const FEATURES: usize = 3 * COLUMNS;
 
-/// The features at coordinates `q` (deviations).
-#[inline(always)]
-pub(crate) fn features<R: Real>((sin, cos): (N<R>, N<R>), q: &[N<R>; COORDINATES]) -> [N<R>; FEATURES] {
-    let mut features = [sin.lit(1.0); FEATURES];
-    features[1..COLUMNS].copy_from_slice(q);
-    for column in 0..COLUMNS {
-        features[COLUMNS + column] = (cos * features[column]).v();
-        features[2 * COLUMNS + column] = (sin * features[column]).v();
-    }
-    features
+/// The outputs, as sparse terms.
+#[derive(Clone, Debug)]
+pub(crate) struct LinearOutputs {
+    channels: Vec<Term>,
+    radial: Vec<Term>,
 }
 
-/// Expands the nonlinear outputs of one machine per lane about the equilibrium `q`, as sparse terms: output, then feature.
+/// One machine's outputs per lane.
+pub(crate) struct OutputLanes<T> {
+    channels: TermLanes<T>,
+    radial: TermLanes<T>,
+}
+
+impl<T: Lane> OutputLanes<T> {
+    pub(crate) fn splat(zero: N<T>, outputs: &LinearOutputs) -> Self {
+        Self {
+            channels: TermLanes::splat(zero, &outputs.channels, CHANNELS),
+            radial: TermLanes::splat(zero, &outputs.radial, RADIAL),
+        }
+    }
+
+    pub(crate) fn set_lane(&mut self, lane: usize, outputs: &LinearOutputs) {
+        self.channels.set_lane(lane, &outputs.channels);
+        self.radial.set_lane(lane, &outputs.radial);
+    }
+
+    /// Deviations of the channels from equilibrium, where the features move.
+    #[inline(always)]
+    pub(crate) fn channels(&self, features: &Features<T>) -> [Sample<T>; CHANNELS] {
+        samples(&self.channels.sum(&features.0))
+    }
+
+    /// The drum's front centre from the tub axis, along t2 and t3.
+    #[inline(always)]
+    pub(crate) fn radial(&self, features: &Features<T>) -> [Sample<T>; RADIAL] {
+        samples(&self.radial.sum(&features.0))
+    }
+}
+
 #[inline(always)]
-pub(crate) fn linearise_outputs<T: Lane>(bodies: &Bodies<T>, q: &[N<T>; COORDINATES]) -> Vec<Vec<Term>> {
+fn samples<T: Lane, const M: usize>(sums: &[[N<T>; 3]; M]) -> [Sample<T>; M] {
+    core::array::from_fn(|i| Sample { value: sums[i][0], slope: sums[i][1], curvature: sums[i][2] })
+}
+
+/// The features with two time derivatives.
+pub(crate) struct Features<T>([[N<T>; 3]; FEATURES]);
+
+impl<T: Real> Features<T> {
+    /// At deviations from equilibrium in motion.
+    #[inline(always)]
+    pub(crate) fn new(spin: &SpinState<T>, motion: &Motion<T>) -> Self {
+        let zero = spin.sin.lit(0.0);
+        let (n, nn) = (spin.speed, (spin.speed * spin.speed).v());
+        let acceleration = spin.acceleration;
+        let one = [zero.lit(1.0), zero, zero];
+        let cos = [spin.cos, -(n * spin.sin).v(), -(acceleration * spin.sin + nn * spin.cos)];
+        let sin = [spin.sin, (n * spin.cos).v(), acceleration * spin.cos - nn * spin.sin];
+        let mut features = [one; FEATURES];
+        features[COLUMNS] = cos;
+        features[2 * COLUMNS] = sin;
+        for j in 0..COORDINATES {
+            let q = [motion.q[j], motion.u[j], motion.a[j]];
+            features[1 + j] = q;
+            features[COLUMNS + 1 + j] = product(&cos, &q);
+            features[2 * COLUMNS + 1 + j] = product(&sin, &q);
+        }
+        Self(features)
+    }
+}
+
+/// A product with its two derivatives.
+#[inline(always)]
+fn product<T: Real>(a: &[N<T>; 3], b: &[N<T>; 3]) -> [N<T>; 3] {
+    let slope = a[0] * b[1] + a[1] * b[0];
+    let curvature = a[0] * b[2] + (a[2] * b[0] + 2.0 * (a[1] * b[1]).v());
+    [(a[0] * b[0]).v(), slope, curvature]
+}
+
+/// Expands the nonlinear outputs of one machine per lane about the equilibrium `q`.
+#[inline(always)]
+pub(crate) fn linearise_outputs<T: Lane>(bodies: &Bodies<T>, q: &[N<T>; COORDINATES]) -> Vec<LinearOutputs> {
     let zero = q[0].lit(0.0);
     let lifted = bodies.constant();
+    let still = [zero.constant(); COORDINATES];
     let mut samples = [[[zero; COLUMNS]; OUTPUTS]; 3];
     for (k, (cos, sin)) in SAMPLES.into_iter().enumerate() {
-        let theta = (zero.lit(sin).constant(), zero.lit(cos).constant());
+        let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero, zero).constant();
         for j in 0..COORDINATES {
-            let y = outputs(&lifted, theta, &seeded(q, j, 1.0));
-            for output in 0..OUTPUTS {
-                samples[k][output][0] = N(y[output].0.value);
-                samples[k][output][1 + j] = N(y[output].0.slope);
+            let motion = Motion { q: seeded(q, j, 1.0), u: still, a: still };
+            let axes = Axes::new(&spin, &motion);
+            let (channels, radial) = (axes.channels(&lifted, &motion), axes.radial(&lifted, &motion));
+            for (output, y) in channels.iter().chain(&radial).enumerate() {
+                samples[k][output][0] = N(y.value.0.value);
+                samples[k][output][1 + j] = N(y.value.0.slope);
             }
         }
     }
     (0..T::LANES).map(|lane| of_lane(&samples.get_lane(lane))).collect()
 }
 
-fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> Vec<Term> {
+fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs {
     let mut terms = Vec::with_capacity(128);
     for output in 0..OUTPUTS {
         for column in 0..COLUMNS {
@@ -73,5 +146,9 @@ fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> Vec<Term> {
     let largest = terms.iter().fold(0.0_f64, |m, t| m.max(t.coefficient.abs()));
     terms.retain(|term| term.coefficient.abs() > NOISE * largest);
     terms.sort_unstable_by_key(|term| term.key);
-    terms
+    let mut radial = terms.split_off(terms.partition_point(|term| usize::from(term.key.0) < CHANNELS));
+    for term in &mut radial {
+        term.key.0 -= CHANNELS as u16;
+    }
+    LinearOutputs { channels: terms, radial }
 }

@@ -4,23 +4,20 @@ use crate::coefficients::Coefficients;
 use crate::floating::Factors;
 use crate::harmonics::TermLanes;
 use crate::lanes::SetLane;
-use crate::linear::{self, Constants, RotorAt};
-use crate::linear_outputs::features;
+use crate::linear::{self, Constants, ENTRIES, RotorAt};
+use crate::linear_outputs::{Features, OutputLanes};
 use crate::nonlinear::{self, COORDINATES};
-use crate::outputs::{CHANNELS, OUTPUTS, outputs};
+use crate::outputs::{Axes, CHANNELS, Motion, RADIAL};
 use crate::point::Point;
 use crate::spin::{SpinLanes, SpinState, SpinStretch};
 use core::f64::consts::FRAC_PI_2;
-use lane_ode::{Dual, Lane, N, Real, System};
+use lane_ode::{Lane, N, Sample, System};
 
 /// States: ten coordinates, then their speeds.
 pub(crate) const STATES: usize = 2 * COORDINATES;
 
 /// Coordinates farther than this from equilibrium (m) have left the machine.
 const FARTHEST_M: f64 = 10.0;
-
-/// A time derivative carried along; nested for the second.
-pub(crate) type Jet<T> = Dual<Dual<T>>;
 
 /// One of the two models, over lanes.
 pub(crate) trait Model<T: Lane>: System<T, STATES> {
@@ -32,58 +29,22 @@ pub(crate) trait Model<T: Lane>: System<T, STATES> {
     fn set_spin(&mut self, lane: usize, stretch: &SpinStretch);
     /// State at rest.
     fn at_rest(point: &Point) -> [f64; STATES];
-    /// The spin at time `t_s`.
-    fn spin_at(&self, t_s: N<T>) -> SpinState<T>;
-    /// The spin in a forcing.
-    fn spin(forcing: &Self::Forcing) -> &SpinState<T>;
-    /// Outputs and their first time derivatives; channels as deviations from equilibrium.
-    fn rates(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<Dual<T>>; OUTPUTS];
-    /// The same with second derivatives; `dx` is the state's derivative.
-    fn curvatures(
+    /// Where the drum's front centre stands from the tub axis, and how far the channels are from equilibrium; these only if
+    /// asked for. `dx` is the state's derivative.
+    fn observe(
         &self,
-        spin: &SpinState<T>,
+        forcing: &Self::Forcing,
         x: &[N<T>; STATES],
         dx: &[N<T>; STATES],
-    ) -> [N<Jet<T>>; OUTPUTS];
+        with_channels: bool,
+    ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>);
 }
 
-/// sin and cos of theta with one time derivative.
+/// Coordinates with two derivatives, from a state and its derivative.
 #[inline(always)]
-pub(crate) fn theta_rate<T: Real>(spin: &SpinState<T>) -> (N<Dual<T>>, N<Dual<T>>) {
-    let n = spin.speed;
-    (
-        N(Dual { value: spin.sin.0, slope: (n * spin.cos).v().0 }),
-        N(Dual { value: spin.cos.0, slope: (-n * spin.sin).v().0 }),
-    )
-}
-
-/// sin and cos of theta with two time derivatives.
-#[inline(always)]
-pub(crate) fn theta_jet<T: Real>(spin: &SpinState<T>) -> (N<Jet<T>>, N<Jet<T>>) {
-    let (n, a) = (spin.speed, spin.acceleration);
-    let nn = (n * n).v();
-    (
-        jet(spin.sin, (n * spin.cos).v(), a * spin.cos - nn * spin.sin),
-        jet(spin.cos, (-n * spin.sin).v(), -(a * spin.sin) - nn * spin.cos),
-    )
-}
-
-/// A value with its first two time derivatives.
-#[inline(always)]
-fn jet<T: Copy>(v: N<T>, d: N<T>, dd: N<T>) -> N<Jet<T>> {
-    N(Dual { value: Dual { value: v.0, slope: d.0 }, slope: Dual { value: d.0, slope: dd.0 } })
-}
-
-/// Coordinates with their speeds.
-#[inline(always)]
-fn coordinate_rates<T: Copy>(x: &[N<T>; STATES]) -> [N<Dual<T>>; COORDINATES] {
-    core::array::from_fn(|i| N(Dual { value: x[i].0, slope: x[COORDINATES + i].0 }))
-}
-
-/// Coordinates with their speeds and accelerations.
-#[inline(always)]
-fn coordinate_jets<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> [N<Jet<T>>; COORDINATES] {
-    core::array::from_fn(|i| jet(x[i], x[COORDINATES + i], dx[COORDINATES + i]))
+fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> Motion<T> {
+    let (q, u) = split(x);
+    Motion { q, u, a: split(dx).1 }
 }
 
 /// Coordinates of a state.
@@ -162,37 +123,25 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
     }
 
     #[inline(always)]
-    fn spin_at(&self, t_s: N<T>) -> SpinState<T> {
-        self.spin.at(t_s)
-    }
-
-    #[inline(always)]
-    fn spin(forcing: &SpinState<T>) -> &SpinState<T> {
-        forcing
-    }
-
-    #[inline(always)]
-    fn rates(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<Dual<T>>; OUTPUTS] {
-        let mut y = outputs(&self.machine.bodies.constant(), theta_rate(spin), &coordinate_rates(x));
-        for (y, rest) in y.iter_mut().zip(&self.rest) {
-            y.0.value = y.0.value.sub(rest.0);
-        }
-        y
-    }
-
-    #[inline(always)]
-    fn curvatures(
+    fn observe(
         &self,
         spin: &SpinState<T>,
         x: &[N<T>; STATES],
         dx: &[N<T>; STATES],
-    ) -> [N<Jet<T>>; OUTPUTS] {
-        let bodies = self.machine.bodies.constant().constant();
-        let mut y = outputs(&bodies, theta_jet(spin), &coordinate_jets(x, dx));
-        for (y, rest) in y.iter_mut().zip(&self.rest) {
-            y.0.value.value = y.0.value.value.sub(rest.0);
+        with_channels: bool,
+    ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>) {
+        let motion = motion(x, dx);
+        let axes = Axes::new(spin, &motion);
+        let bodies = &self.machine.bodies;
+        let mut channels = None;
+        if with_channels {
+            let mut samples = axes.channels(bodies, &motion);
+            for i in 0..CHANNELS {
+                samples[i].value -= self.rest[i];
+            }
+            channels = Some(samples);
         }
-        y
+        (axes.radial(bodies, &motion), channels)
     }
 }
 
@@ -202,11 +151,12 @@ pub(crate) struct Linear<T> {
     constants: Constants<T>,
     tub_inertia: Factors<T, 2>,
     terms: TermLanes<T>,
-    outputs: TermLanes<T>,
+    outputs: OutputLanes<T>,
     spin: SpinLanes<T>,
 }
 
 /// What the linear model needs of an instant.
+#[derive(Clone, Copy)]
 pub(crate) struct LinearForcing<T> {
     spin: SpinState<T>,
     rotor: RotorAt<T>,
@@ -242,8 +192,8 @@ impl<T: Lane> Model<T> for Linear<T> {
             machine: Coefficients::splat(zero, &point.machine),
             tub_inertia: linear::tub_factors(&constants),
             constants,
-            terms: TermLanes::splat(zero, &point.linear.terms),
-            outputs: TermLanes::splat(zero, &point.linear_outputs),
+            terms: TermLanes::splat(zero, &point.linear.terms, ENTRIES),
+            outputs: OutputLanes::splat(zero, &point.linear_outputs),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
         }
     }
@@ -265,34 +215,15 @@ impl<T: Lane> Model<T> for Linear<T> {
     }
 
     #[inline(always)]
-    fn spin_at(&self, t_s: N<T>) -> SpinState<T> {
-        self.spin.at(t_s)
-    }
-
-    #[inline(always)]
-    fn spin(forcing: &LinearForcing<T>) -> &SpinState<T> {
-        &forcing.spin
-    }
-
-    #[inline(always)]
-    fn rates(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<Dual<T>>; OUTPUTS] {
-        let features = features(theta_rate(spin), &coordinate_rates(x));
-        let y: [N<T>; OUTPUTS] = self.outputs.sum(&features.map(|f| N(f.0.value)));
-        let dy: [N<T>; OUTPUTS] = self.outputs.sum(&features.map(|f| N(f.0.slope)));
-        core::array::from_fn(|i| N(Dual { value: y[i].0, slope: dy[i].0 }))
-    }
-
-    #[inline(always)]
-    fn curvatures(
+    fn observe(
         &self,
-        spin: &SpinState<T>,
+        forcing: &LinearForcing<T>,
         x: &[N<T>; STATES],
         dx: &[N<T>; STATES],
-    ) -> [N<Jet<T>>; OUTPUTS] {
-        let features = features(theta_jet(spin), &coordinate_jets(x, dx));
-        let y: [N<T>; OUTPUTS] = self.outputs.sum(&features.map(|f| N(f.0.value.value)));
-        let dy: [N<T>; OUTPUTS] = self.outputs.sum(&features.map(|f| N(f.0.slope.value)));
-        let ddy: [N<T>; OUTPUTS] = self.outputs.sum(&features.map(|f| N(f.0.slope.slope)));
-        core::array::from_fn(|i| jet(y[i], dy[i], ddy[i]))
+        with_channels: bool,
+    ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>) {
+        let features = Features::new(&forcing.spin, &motion(x, dx));
+        let channels = if with_channels { Some(self.outputs.channels(&features)) } else { None };
+        (self.outputs.radial(&features), channels)
     }
 }

@@ -345,13 +345,13 @@ fn second_derivative<T: Real>(rho: &[N<T>; 2], omega: &Vec3<T>, alpha: &Vec3<T>)
 
 /// From A to S.
 #[inline(always)]
-fn into_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
+pub(crate) fn into_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
     [v[0], spin.cos * v[1] + spin.sin * v[2], spin.cos * v[2] - spin.sin * v[1]]
 }
 
 /// From S to A.
 #[inline(always)]
-fn out_of_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
+pub(crate) fn out_of_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
     [v[0], spin.cos * v[1] - spin.sin * v[2], spin.sin * v[1] + spin.cos * v[2]]
 }
 
@@ -363,6 +363,6 @@ fn into_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
 
 /// From E to S.
 #[inline(always)]
-fn out_of_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
+pub(crate) fn out_of_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
     [c9 * v[0] + s9 * v[2], v[1], c9 * v[2] - s9 * v[0]]
 }

@@ -1,78 +1,250 @@
-//! From coordinates to what is observed: channels and gap (section 6 of the model page).
+//! From motion to what is observed: channels and gap, with their time derivatives (section 6 of the model page).
 
 use crate::channel::Channel;
 use crate::coefficients::Bodies;
-use crate::frame::{Tilt, Vec3, combination, difference, dot, scaled};
-use crate::nonlinear::COORDINATES;
-use lane_ode::{N, Real};
+use crate::frame::{Tilt, TiltMotion, Vec3, combination, difference, dot, plus_cross, scaled};
+use crate::nonlinear::{COORDINATES, into_spin, out_of_hinge, out_of_spin};
+use crate::spin::SpinState;
+use lane_ode::{N, Real, Sample};
 
 /// Number of channels.
 pub(crate) const CHANNELS: usize = Channel::ALL.len();
 
-/// Number of outputs: every channel, then the two components of the radial distance.
-pub(crate) const OUTPUTS: usize = CHANNELS + 2;
+/// Components of the radial distance between drum and tub.
+pub(crate) const RADIAL: usize = 2;
 
-/// Positions (m) and angles (rad) in the order of [`Channel::ALL`], then where the drum's front centre stands from the tub
-/// axis, along t2 and t3 (m).
+/// Coordinates (m, rad) with their first and second time derivatives.
+pub(crate) struct Motion<T> {
+    pub(crate) q: [N<T>; COORDINATES],
+    pub(crate) u: [N<T>; COORDINATES],
+    pub(crate) a: [N<T>; COORDINATES],
+}
+
+/// A vector with its first and second time derivatives.
+struct Course<T> {
+    value: Vec3<T>,
+    rate: Vec3<T>,
+    second: Vec3<T>,
+}
+
+/// j a + k b
 #[inline(always)]
-pub(crate) fn outputs<T: Real>(
-    b: &Bodies<T>,
-    (sin, cos): (N<T>, N<T>),
-    q: &[N<T>; COORDINATES],
-) -> [N<T>; OUTPUTS] {
-    let tub = Tilt::new(q[4], q[5]);
-    let shaft = Tilt::new(q[6], q[7]);
-    let (s9, c9) = q[8].sin_cos();
-    let (s10, c10) = q[9].sin_cos();
-    // d1 and rho = rho_1 d1 + rho_2 d2, by way of S.
-    let drum_axis = from_spin(&shaft, sin, cos, [(c9 * c10).v(), s10, -(s9 * c10).v()]);
-    let rho = {
-        let (x, y) = (c10 * b.rho_1 - s10 * b.rho_2, s10 * b.rho_1 + c10 * b.rho_2);
-        from_spin(&shaft, sin, cos, [(c9 * x).v(), y, -(s9 * x).v()])
-    };
+fn blend<T: Real>(j: N<T>, a: &Course<T>, k: N<T>, b: &Course<T>) -> Course<T> {
+    Course {
+        value: combination(j, &a.value, k, &b.value),
+        rate: combination(j, &a.rate, k, &b.rate),
+        second: combination(j, &a.second, k, &b.second),
+    }
+}
 
-    let midpoint = [q[0], q[1]];
-    let rotor_midpoint = [q[2], q[3]];
-    let tub_front = in_cabinet(&midpoint, scaled(b.tub_front, tub.axis_c));
-    let drum_front =
-        in_cabinet(&rotor_midpoint, combination(b.drum_hinge, &shaft.axis_c, b.hinge_to_front, &drum_axis));
-    let tub_centre = in_cabinet(&midpoint, scaled(b.tub_centre, tub.axis_c));
-    let rotor_centre =
-        in_cabinet(&rotor_midpoint, combination(b.along_shaft, &shaft.axis_c, b.drum_share, &rho));
-    let total_centre = combination(b.tub_share, &tub_centre, b.rotor_share, &rotor_centre);
+/// Where the body axes point, and how fast: what every output is made of. Cabinet axes unless said.
+pub(crate) struct Axes<T> {
+    tub: Tilt<T>,
+    /// Angular velocity and acceleration of the tub, tub axes.
+    tub_turn: [Vec3<T>; 2],
+    tub_axis: Course<T>,
+    shaft_axis: Course<T>,
+    /// The drum's d1 and d2.
+    drum: [Course<T>; 2],
+}
 
-    let apart = difference(drum_front, &tub_front);
-    let along_2 = dot(&tub.second_c, &apart);
-    let along_3 = tub.sin_yaw * apart[0] + tub.cos_yaw * apart[2];
-    [
-        tub_front[1],
-        tub_front[2],
-        drum_front[1],
-        drum_front[2],
-        total_centre[1],
-        total_centre[2],
-        q[4],
-        q[5],
-        along_2,
-        along_3,
-    ]
+impl<T: Real> Axes<T> {
+    #[inline(always)]
+    pub(crate) fn new(spin: &SpinState<T>, motion: &Motion<T>) -> Self {
+        let Motion { q, u, a } = motion;
+        let tub = Tilt::new(q[4], q[5]);
+        let of_tub = tub.motion(u[4], u[5]);
+        let shaft = Tilt::new(q[6], q[7]);
+        let of_shaft = shaft.motion(u[6], u[7]);
+        let hinge = Hinge::new(q[8], q[9]);
+        let (s9, c9) = hinge.first;
+
+        // Angular velocity and acceleration: shaft in S, then drum in E; as in `nonlinear::rotor`, with u' now.
+        let omega_s = {
+            let [x, y, z] = into_spin(spin, &of_shaft.rate);
+            [x + spin.speed, y, z]
+        };
+        let alpha_s = {
+            let [x, y, z] = into_spin(spin, &angular_acceleration(&shaft, &of_shaft, a[6], a[7]));
+            [x + spin.acceleration, y + spin.speed * omega_s[2], z - spin.speed * omega_s[1]]
+        };
+        let (u9, u10) = (u[8], u[9]);
+        let [ex, ey, ez] =
+            [c9 * omega_s[0] - s9 * omega_s[2], omega_s[1] + u9, s9 * omega_s[0] + c9 * omega_s[2]];
+        let turn = [
+            [ex, ey, ez + u10],
+            [
+                c9 * alpha_s[0] - s9 * alpha_s[2] + (u10 * ey - u9 * ez),
+                alpha_s[1] - u10 * ex + a[8],
+                s9 * alpha_s[0] + c9 * alpha_s[2] + u9 * ex + a[9],
+            ],
+        ];
+        let (s10, c10) = hinge.second;
+        let zero = s9.lit(0.0);
+        Self {
+            tub_turn: [of_tub.rate, angular_acceleration(&tub, &of_tub, a[4], a[5])],
+            tub_axis: axis_course(&tub, &of_tub, [u[4], u[5]], [a[4], a[5]]),
+            shaft_axis: axis_course(&shaft, &of_shaft, [u[6], u[7]], [a[6], a[7]]),
+            drum: [
+                drum_course(&shaft, spin, &hinge, &turn, &[c10, s10, zero]),
+                drum_course(&shaft, spin, &hinge, &turn, &[-s10, c10, zero]),
+            ],
+            tub,
+        }
+    }
+
+    /// Where the drum's front centre stands from the tub axis, along t2 and t3 (m).
+    #[inline(always)]
+    pub(crate) fn radial(&self, b: &Bodies<T>, motion: &Motion<T>) -> [Sample<T>; RADIAL] {
+        let tub_front = point(motion, 0, &self.tub_axis, b.tub_front);
+        let drum_front = self.drum_front(b, motion);
+        let [omega, alpha] = &self.tub_turn;
+        let apart = self.in_tub(&difference(drum_front.value, &tub_front.value));
+        let velocity = self.in_tub(&difference(drum_front.rate, &tub_front.rate));
+        let acceleration = self.in_tub(&difference(drum_front.second, &tub_front.second));
+        // As seen from the turning tub.
+        let rate = plus_cross(&velocity, &apart, omega);
+        let second = plus_cross(&plus_cross(&acceleration, &apart, alpha), &sum_of(&velocity, &rate), omega);
+        [sample(apart[1], rate[1], second[1]), sample(apart[2], rate[2], second[2])]
+    }
+
+    /// Positions (m) and angles (rad) in the order of [`Channel::ALL`].
+    #[inline(always)]
+    pub(crate) fn channels(&self, b: &Bodies<T>, motion: &Motion<T>) -> [Sample<T>; CHANNELS] {
+        let tub_front = point(motion, 0, &self.tub_axis, b.tub_front);
+        let tub_centre = point(motion, 0, &self.tub_axis, b.tub_centre);
+        let drum_front = self.drum_front(b, motion);
+        let rho = blend(b.rho_1, &self.drum[0], b.rho_2, &self.drum[1]);
+        let one = b.tub_share.lit(1.0);
+        let rotor_centre = point(motion, 2, &blend(b.along_shaft, &self.shaft_axis, b.drum_share, &rho), one);
+        let total_centre = blend(b.tub_share, &tub_centre, b.rotor_share, &rotor_centre);
+        [
+            component(&tub_front, 1),
+            component(&tub_front, 2),
+            component(&drum_front, 1),
+            component(&drum_front, 2),
+            component(&total_centre, 1),
+            component(&total_centre, 2),
+            sample(motion.q[4], motion.u[4], motion.a[4]),
+            sample(motion.q[5], motion.u[5], motion.a[5]),
+        ]
+    }
+
+    #[inline(always)]
+    fn drum_front(&self, b: &Bodies<T>, motion: &Motion<T>) -> Course<T> {
+        let one = b.drum_hinge.lit(1.0);
+        point(motion, 2, &blend(b.drum_hinge, &self.shaft_axis, b.hinge_to_front, &self.drum[0]), one)
+    }
+
+    /// From cabinet to tub axes.
+    #[inline(always)]
+    fn in_tub(&self, v: &Vec3<T>) -> Vec3<T> {
+        [
+            dot(&self.tub.axis_c, v),
+            dot(&self.tub.second_c, v),
+            self.tub.sin_yaw * v[0] + self.tub.cos_yaw * v[2],
+        ]
+    }
 }
 
 /// Squared distance of the drum's front centre from the tub axis. Its square, because a distance has a kink at zero.
 #[inline(always)]
-pub(crate) fn radial_squared<T: Real>(outputs: &[N<T>; OUTPUTS]) -> N<T> {
-    let [y, z] = [outputs[CHANNELS], outputs[CHANNELS + 1]];
-    y * y + z * z
+pub(crate) fn squared<T: Real>([y, z]: &[Sample<T>; RADIAL]) -> Sample<T> {
+    sample(
+        y.value * y.value + z.value * z.value,
+        (2.0 * (y.value * y.slope + z.value * z.slope)).v(),
+        (2.0 * (y.slope * y.slope + y.value * y.curvature + (z.slope * z.slope + z.value * z.curvature))).v(),
+    )
 }
 
-/// From S to cabinet axes.
-#[inline(always)]
-fn from_spin<T: Real>(shaft: &Tilt<T>, sin: N<T>, cos: N<T>, v: Vec3<T>) -> Vec3<T> {
-    shaft.to_cabinet(&[v[0], cos * v[1] - sin * v[2], sin * v[1] + cos * v[2]])
+/// Sines and cosines of the hinge's two angles.
+struct Hinge<T> {
+    first: (N<T>, N<T>),
+    second: (N<T>, N<T>),
 }
 
-/// A point of a body: its bearing midpoint, which does not move along x, plus an offset in cabinet axes.
+impl<T: Real> Hinge<T> {
+    #[inline(always)]
+    fn new(first: N<T>, second: N<T>) -> Self {
+        Self { first: first.sin_cos(), second: second.sin_cos() }
+    }
+}
+
 #[inline(always)]
-fn in_cabinet<T: Real>(midpoint: &[N<T>; 2], offset: Vec3<T>) -> Vec3<T> {
-    [offset[0], offset[1] + midpoint[0], offset[2] + midpoint[1]]
+fn sample<T>(value: N<T>, slope: N<T>, curvature: N<T>) -> Sample<T> {
+    Sample { value, slope, curvature }
+}
+
+#[inline(always)]
+fn component<T: Real>(course: &Course<T>, i: usize) -> Sample<T> {
+    sample(course.value[i], course.rate[i], course.second[i])
+}
+
+#[inline(always)]
+fn sum_of<T: Real>(a: &Vec3<T>, b: &Vec3<T>) -> Vec3<T> {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// Angular acceleration of a tilted frame, in its axes.
+#[inline(always)]
+fn angular_acceleration<T: Real>(tilt: &Tilt<T>, at: &TiltMotion<T>, yaw: N<T>, pitch: N<T>) -> Vec3<T> {
+    [at.acceleration_x + yaw * tilt.sin_pitch, at.acceleration_y + yaw * tilt.cos_pitch, pitch]
+}
+
+/// The axis of a tilted frame.
+#[inline(always)]
+fn axis_course<T: Real>(tilt: &Tilt<T>, at: &TiltMotion<T>, rates: [N<T>; 2], seconds: [N<T>; 2]) -> Course<T> {
+    let zero = rates[0].lit(0.0);
+    let by_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
+    let by_pitch = &tilt.second_c;
+    let at_constant_speeds = tilt.to_cabinet(&at.axis_acceleration);
+    let by_accelerations = combination(seconds[0], &by_yaw, seconds[1], by_pitch);
+    Course {
+        value: tilt.axis_c,
+        rate: combination(rates[0], &by_yaw, rates[1], by_pitch),
+        second: sum_of(&at_constant_speeds, &by_accelerations),
+    }
+}
+
+/// A vector fixed in the drum, given in E; `turn` is the drum's angular velocity and acceleration there.
+#[inline(always)]
+fn drum_course<T: Real>(
+    shaft: &Tilt<T>,
+    spin: &SpinState<T>,
+    hinge: &Hinge<T>,
+    turn: &[Vec3<T>; 2],
+    v: &Vec3<T>,
+) -> Course<T> {
+    let zero = v[0].lit(0.0);
+    let still = [zero; 3];
+    let rate = plus_cross(&still, &turn[0], v);
+    let second = plus_cross(&plus_cross(&still, &turn[1], v), &turn[0], &rate);
+    Course {
+        value: out_of_drum(shaft, spin, hinge, v),
+        rate: out_of_drum(shaft, spin, hinge, &rate),
+        second: out_of_drum(shaft, spin, hinge, &second),
+    }
+}
+
+/// From E to cabinet axes.
+#[inline(always)]
+fn out_of_drum<T: Real>(shaft: &Tilt<T>, spin: &SpinState<T>, hinge: &Hinge<T>, v: &Vec3<T>) -> Vec3<T> {
+    let (s9, c9) = hinge.first;
+    shaft.to_cabinet(&out_of_spin(spin, &out_of_hinge(s9, c9, v)))
+}
+
+/// A point `reach` along an axis from a bearing midpoint, whose y is coordinate `first`; midpoints do not move along x.
+#[inline(always)]
+fn point<T: Real>(motion: &Motion<T>, first: usize, axis: &Course<T>, reach: N<T>) -> Course<T> {
+    let mut course = Course {
+        value: scaled(reach, axis.value),
+        rate: scaled(reach, axis.rate),
+        second: scaled(reach, axis.second),
+    };
+    for i in 0..2 {
+        course.value[1 + i] += motion.q[first + i];
+        course.rate[1 + i] += motion.u[first + i];
+        course.second[1 + i] += motion.a[first + i];
+    }
+    course
 }

@@ -2,12 +2,11 @@
 
 use crate::coefficients::Coefficients;
 use crate::equilibrium;
-use crate::harmonics::Term;
 use crate::linear::{LinearPoint, Matrices, linearise};
-use crate::linear_outputs::linearise_outputs;
+use crate::linear_outputs::{LinearOutputs, linearise_outputs};
 use crate::machine::Machine;
 use crate::nonlinear::COORDINATES;
-use crate::outputs::{CHANNELS, outputs};
+use crate::outputs::{Axes, CHANNELS, Motion};
 use crate::spin::{Spin, SpinState, SpinStretch};
 use lane_ode::{Kernel, Lane, N, Simd};
 
@@ -33,7 +32,7 @@ pub struct Point {
     /// Channels at the equilibrium.
     pub(crate) rest: [f64; CHANNELS],
     pub(crate) linear: LinearPoint,
-    pub(crate) linear_outputs: Vec<Term>,
+    pub(crate) linear_outputs: LinearOutputs,
     pub(crate) stretches: Vec<SpinStretch>,
     pub(crate) legs: Vec<PlannedLeg>,
 }
@@ -94,7 +93,10 @@ impl Kernel for Prepare<'_> {
             let (q, found) = equilibrium::find(zero, &lanes);
             let linear = linearise(&lanes, &q);
             let linear_outputs = linearise_outputs(&lanes.bodies, &q);
-            let at_rest = outputs(&lanes.bodies, (zero, zero.lit(1.0)), &q);
+            let still = [zero; COORDINATES];
+            let at_rest = Motion { q, u: still, a: still };
+            let unbalance_up = SpinState::new((zero, zero.lit(1.0)), zero, zero);
+            let rest = Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
             let parts = machines.into_iter().zip(linear).zip(linear_outputs).zip(group);
             ready.extend(parts.enumerate().map(
                 |(lane, (((machine, linear), linear_outputs), (_, spin)))| {
@@ -105,7 +107,7 @@ impl Kernel for Prepare<'_> {
                     Ok(Point {
                         machine,
                         equilibrium: q.map(|q| q.0.get(lane)),
-                        rest: core::array::from_fn(|i| at_rest[i].0.get(lane)),
+                        rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),
                         linear,
                         linear_outputs,
                         legs: legs(&stretches, self.timing),

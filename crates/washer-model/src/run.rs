@@ -1,12 +1,11 @@
 //! Trajectories: points through the lanes of an integrator, and what is recorded of them.
 
 use crate::model::{Linear, Model, Nonlinear, STATES};
-use crate::outputs::{CHANNELS, OUTPUTS, radial_squared};
+use crate::outputs::{CHANNELS, squared};
 use crate::point::{PlannedLeg, Point};
 use core::marker::PhantomData;
 use lane_ode::{
-    Count, Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, System, Task,
-    Tolerance, dopri5, rk4,
+    Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Simd, Step, System, Task, Tolerance, dopri5, rk4,
 };
 
 /// How trajectories are integrated.
@@ -185,51 +184,25 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
     }
 
     #[inline(always)]
-    fn begin(&mut self, forcing: &M::Forcing, x: &[N<T>; STATES], _: &[N<T>; STATES]) {
-        let (channels, radial) = samples(&self.model.rates(M::spin(forcing), x));
+    fn begin(&mut self, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
         let inside = self.inside();
-        self.channels.begin(channels, inside);
-        self.radial.begin(radial, everywhere(self.windows));
+        let (radial, channels) = self.model.observe(forcing, x, dx, T::bits(inside) != 0);
+        if let Some(channels) = channels {
+            self.channels.begin(&channels, inside);
+        }
+        self.radial.begin(&[squared(&radial)], everywhere(self.windows));
     }
 
     #[inline(always)]
     fn observe(&mut self, forcing: &M::Forcing, step: &Step<'_, T, STATES>) {
-        let spin = M::spin(forcing);
-        let (channels, radial) = samples(&self.model.rates(spin, step.after));
-        let (inside, everywhere) = (self.inside(), everywhere(self.windows));
-        let is_inside = T::bits(inside) != 0;
-        let may_peak = is_inside && self.channels.reach_end(step.length_s, &channels, inside);
-        let may_touch = self.radial.reach_end(step.length_s, &radial, everywhere);
-        if may_peak || may_touch {
-            let mut second_channels = [[self.windows; CHANNELS]; 2];
-            let mut second_radial = [[self.windows; 1]; 2];
-            let times = [step.end_s - step.length_s, step.end_s];
-            let states = [(step.before, step.slope_before), (step.after, step.slope_after)];
-            for end in 0..2 {
-                let (x, dx) = states[end];
-                let y = self.model.curvatures(&self.model.spin_at(times[end]), x, dx);
-                for i in 0..CHANNELS {
-                    second_channels[end][i] = N(y[i].0.slope.slope);
-                }
-                second_radial[end][0] = N(radial_squared(&y).0.slope.slope);
-            }
-            if may_peak {
-                self.channels.look_inside(step.length_s, &channels, inside, &second_channels);
-            }
-            if may_touch {
-                self.radial.look_inside(step.length_s, &radial, everywhere, &second_radial);
-            }
+        let inside = self.inside();
+        let (radial, channels) =
+            self.model.observe(forcing, step.after, step.slope_after, T::bits(inside) != 0);
+        if let Some(channels) = channels {
+            self.channels.advance(step.length_s, &channels, inside);
         }
-        self.channels.finish(&channels);
-        self.radial.finish(&radial);
+        self.radial.advance(step.length_s, &[squared(&radial)], everywhere(self.windows));
     }
-}
-
-/// Values and slopes of the channels, and of the squared radial distance.
-#[inline(always)]
-fn samples<T: Lane>(y: &[N<Dual<T>>; OUTPUTS]) -> ([Sample<T>; CHANNELS], [Sample<T>; 1]) {
-    let radial = radial_squared(y);
-    (core::array::from_fn(|i| (N(y[i].0.value), N(y[i].0.slope))), [(N(radial.0.value), N(radial.0.slope))])
 }
 
 /// True in every lane.
