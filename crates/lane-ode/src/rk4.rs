@@ -25,6 +25,23 @@ pub fn fixed_steps(leg: &Leg) -> u64 {
     steps as u64
 }
 
+/// Where each lane's leg is in time; its end is exact, whatever the rounding error of the step.
+struct Clock<T> {
+    start: N<T>,
+    end: N<T>,
+    h: N<T>,
+    /// Steps in the leg.
+    total: N<T>,
+}
+
+impl<T: Lane> Clock<T> {
+    /// Time after `index` steps.
+    #[inline(always)]
+    fn at(&self, index: N<T>) -> N<T> {
+        index.where_less(self.total, index * self.h + self.start, self.end)
+    }
+}
+
 /// Where a lane stands in its leg.
 #[derive(Clone, Copy, Default)]
 struct Progress {
@@ -38,8 +55,7 @@ struct Progress {
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) {
     let zero = N(zero);
     let mut x = [zero; D];
-    let mut start = zero;
-    let mut h = zero;
+    let mut clock = Clock { start: zero, end: zero, h: zero, total: zero };
     let mut index = zero;
     let mut lanes = [Progress::default(); MAX_LANES];
     let mut ended = [Some(Ended::Idle); MAX_LANES];
@@ -50,16 +66,20 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             let leg = task.next_leg(lane, how, &mut x);
             let steps = leg.as_ref().map_or(0, fixed_steps);
             lanes[lane] = Progress { is_active: leg.is_some(), total: steps, left: steps };
-            let (from, step) = leg.map_or((0.0, 0.0), |l| (l.start_s, (l.end_s - l.start_s) / steps as f64));
-            start.0.set(lane, from);
-            h.0.set(lane, step);
+            let (from, to) = leg.map_or((0.0, 0.0), |l| (l.start_s, l.end_s));
+            clock.start.0.set(lane, from);
+            clock.end.0.set(lane, to);
+            clock.h.0.set(lane, (to - from) / steps.max(1) as f64);
+            clock.total.0.set(lane, steps as f64);
             index.0.set(lane, 0.0);
         }
         let active = || lanes[..T::LANES].iter().filter(|lane| lane.is_active);
         let Some(mut run) = active().map(|lane| lane.left).min() else { return };
 
+        let h = clock.h;
         let sixth = h / zero.lit(6.0);
-        let mut now = task.forcing(index * h + start);
+        let mut time = clock.at(index);
+        let mut now = task.forcing(time);
         let mut before = x;
         let mut slope_before = x;
         let mut is_fresh = true;
@@ -67,8 +87,9 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         loop {
             // The one after the last is an evaluation only: observers want the slope at both ends of a step.
             let stages = if done == run { 1 } else { 4 };
-            let mid = task.forcing((index + 0.5) * h + start);
-            let end = task.forcing((index + 1.0) * h + start);
+            let next_time = clock.at(index + 1.0);
+            let mid = task.forcing(clock.at(index + 0.5));
+            let end = task.forcing(next_time);
             let forcing = [&now, &mid, &mid, &end];
             let mut y = x;
             let mut sum = [zero; D];
@@ -91,7 +112,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                         task.observe(
                             &now,
                             &Step {
-                                end_s: index * h + start,
+                                end_s: time,
                                 length_s: h,
                                 before: &before,
                                 slope_before: &slope_before,
@@ -112,6 +133,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                 x[i] += sixth * sum[i];
             }
             index = index + 1.0;
+            time = next_time;
             now = end;
             done += 1;
             let in_range = task.in_range(&x);
@@ -121,7 +143,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                     let made = lanes[lane].total - lanes[lane].left + done;
                     ended[lane] = Some(Ended::Failed {
                         reason: Failure::Diverged,
-                        time_s: start.0.get(lane) + h.0.get(lane) * made as f64,
+                        time_s: time.0.get(lane),
                         count: Count { accepted: made, rejected: 0 },
                     });
                 }
