@@ -84,13 +84,11 @@ impl<T: Lane> StepControl<T> {
         Self { step: zero, memory: zero.lit(1.0), was_rejected: 0 }
     }
 
-    /// A leg begins: a new trajectory tries `first_step_s`, one that goes on keeps its own step.
+    /// A leg begins, with nothing of what the lane did before: a result must not depend on who was there.
     #[inline(always)]
-    pub(crate) fn start(&mut self, lane: usize, first_step_s: Option<f64>, is_new: bool) {
-        if is_new {
-            self.step.0.set(lane, first_step_s.unwrap_or(0.0));
-            self.memory.0.set(lane, 1.0);
-        }
+    pub(crate) fn start(&mut self, lane: usize, first_step_s: f64) {
+        self.step.0.set(lane, first_step_s);
+        self.memory.0.set(lane, 1.0);
         self.was_rejected &= !(1 << lane);
     }
 

@@ -87,8 +87,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
                 ..Progress::default()
             };
             t.0.set(lane, leg.map_or(0.0, |l| l.start_s));
-            let is_new = !matches!(how, Ended::Arrived(_));
-            control.start(lane, leg.map(|l| l.step_s), is_new);
+            control.start(lane, leg.map_or(0.0, |l| l.step_s));
         }
         if !lanes[..T::LANES].iter().any(|lane| lane.is_active) {
             return;

@@ -24,3 +24,6 @@ pub use real::Real;
 pub use rk4::MAX_LANES;
 pub use simd::{Kernel, Simd};
 pub use system::{Count, Ended, Failure, Leg, Step, System, Task};
+
+#[cfg(test)]
+mod tests;

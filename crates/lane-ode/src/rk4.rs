@@ -25,6 +25,23 @@ pub fn fixed_steps(leg: &Leg) -> u64 {
     steps as u64
 }
 
+/// Where each lane's leg is in time; its end is exact, whatever the rounding error of the step.
+struct Clock<T> {
+    start: N<T>,
+    end: N<T>,
+    h: N<T>,
+    /// Steps in the leg.
+    total: N<T>,
+}
+
+impl<T: Lane> Clock<T> {
+    /// Time after `index` steps.
+    #[inline(always)]
+    fn at(&self, index: N<T>) -> N<T> {
+        index.where_less(self.total, index * self.h + self.start, self.end)
+    }
+}
+
 /// Where a lane stands in its leg.
 #[derive(Clone, Copy, Default)]
 struct Progress {
@@ -38,8 +55,7 @@ struct Progress {
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) {
     let zero = N(zero);
     let mut x = [zero; D];
-    let mut start = zero;
-    let mut h = zero;
+    let mut clock = Clock { start: zero, end: zero, h: zero, total: zero };
     let mut index = zero;
     let mut lanes = [Progress::default(); MAX_LANES];
     let mut ended = [Some(Ended::Idle); MAX_LANES];
@@ -50,19 +66,22 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             let leg = task.next_leg(lane, how, &mut x);
             let steps = leg.as_ref().map_or(0, fixed_steps);
             lanes[lane] = Progress { is_active: leg.is_some(), total: steps, left: steps };
-            let (from, step) = leg.map_or((0.0, 0.0), |l| (l.start_s, (l.end_s - l.start_s) / steps as f64));
-            start.0.set(lane, from);
-            h.0.set(lane, step);
+            let (from, to) = leg.map_or((0.0, 0.0), |l| (l.start_s, l.end_s));
+            clock.start.0.set(lane, from);
+            clock.end.0.set(lane, to);
+            clock.h.0.set(lane, (to - from) / steps.max(1) as f64);
+            clock.total.0.set(lane, steps as f64);
             index.0.set(lane, 0.0);
         }
         let active = || lanes[..T::LANES].iter().filter(|lane| lane.is_active);
         let Some(mut run) = active().map(|lane| lane.left).min() else { return };
 
+        let h = clock.h;
         let sixth = h / zero.lit(6.0);
-        // At the start, the middle and the end of a step.
-        let mut now = task.forcing(index * h + start);
-        let mut mid = now;
-        let mut end = now;
+        let mut time = clock.at(index);
+        // At three times: the step's start, middle and end; start and end change places from step to step.
+        let mut forcing = [task.forcing(time); 3];
+        let (mut start, middle, mut end) = (0, 1, 2);
         let mut before = x;
         let mut slope_before = x;
         let mut is_fresh = true;
@@ -70,21 +89,21 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         loop {
             // The one after the last is an evaluation only: observers want the slope at both ends of a step.
             let is_last = done == run;
+            let next_time = clock.at(index + 1.0);
             let stages = if is_last { 1 } else { 4 };
             if !is_last {
-                mid = task.forcing((index + 0.5) * h + start);
-                end = task.forcing((index + 1.0) * h + start);
+                // One copy of the code for both, as below.
+                for (place, at) in [(middle, clock.at(index + 0.5)), (end, next_time)] {
+                    task.renew(at, &mut forcing[place]);
+                }
             }
+            let places = [start, middle, middle, end];
             let mut y = x;
             let mut sum = [zero; D];
             let mut first_slope = [zero; D];
             // One copy of the right-hand side: four would not fit the instruction cache.
             for stage in 0..stages {
-                let forcing = match stage {
-                    0 => &now,
-                    3 => &end,
-                    _ => &mid,
-                };
+                let forcing = &forcing[places[stage]];
                 let slope = task.derivative(forcing, &y);
                 let reach = (h * REACH[stage]).v();
                 let weight = zero.lit(WEIGHT[stage]);
@@ -95,13 +114,13 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                 if stage == 0 {
                     first_slope = slope;
                     if is_fresh {
-                        task.begin(&now, &x, &slope);
+                        task.begin(forcing, &x, &slope);
                         is_fresh = false;
                     } else {
                         task.observe(
-                            &now,
+                            forcing,
                             &Step {
-                                end_s: index * h + start,
+                                end_s: time,
                                 length_s: h,
                                 before: &before,
                                 slope_before: &slope_before,
@@ -122,7 +141,8 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                 x[i] += sixth * sum[i];
             }
             index = index + 1.0;
-            now = end;
+            time = next_time;
+            (start, end) = (end, start);
             done += 1;
             let in_range = task.in_range(&x);
             if !T::all(in_range) {
@@ -131,7 +151,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                     let made = lanes[lane].total - lanes[lane].left + done;
                     ended[lane] = Some(Ended::Failed {
                         reason: Failure::Diverged,
-                        time_s: start.0.get(lane) + h.0.get(lane) * made as f64,
+                        time_s: time.0.get(lane),
                         count: Count { accepted: made, rejected: 0 },
                     });
                 }

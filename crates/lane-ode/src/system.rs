@@ -11,6 +11,12 @@ pub trait System<T: Lane, const D: usize> {
     /// The forcing at time `t_s`, which may differ between lanes.
     fn forcing(&self, t_s: N<T>) -> Self::Forcing;
 
+    /// Overwrites a forcing of this system by that at another time; for large ones cheaper than a new one.
+    #[inline(always)]
+    fn renew(&self, t_s: N<T>, forcing: &mut Self::Forcing) {
+        *forcing = self.forcing(t_s);
+    }
+
     /// f at state `x`.
     fn derivative(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D];
 

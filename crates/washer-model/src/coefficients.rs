@@ -54,6 +54,8 @@ lane_struct! {
         drum_i11, drum_i22, drum_i33, drum_i12,
         flexure_stiffness,
         bearing_front, bearing_rear, front_stiffness, rear_stiffness,
+        /// The bearings' stiffness over (offset, tilt) of their midpoint, inverted: offset by force, offset by moment, tilt by moment.
+        bearing_force_compliance, bearing_mixed_compliance, bearing_moment_compliance,
         tub_front, drum_hinge, hinge_to_front, clearance,
     }
 }
@@ -91,6 +93,9 @@ impl Bodies<f64> {
         let rotor_mass = m_s + m_d;
         let mu = m_s * m_d / rotor_mass;
         let l = drum.hinge_x_m - shaft.centre_x_m;
+        let (front, rear) = (bearings.front_x_m, bearings.rear_x_m);
+        let (k_f, k_r) = (bearings.front_stiffness_n_per_m, bearings.rear_stiffness_n_per_m);
+        let span = front - rear;
         Self {
             gravity: N(machine.gravity_m_per_s2),
             tub_mass: N(tub.mass_kg),
@@ -121,6 +126,9 @@ impl Bodies<f64> {
             bearing_rear: N(bearings.rear_x_m),
             front_stiffness: N(bearings.front_stiffness_n_per_m),
             rear_stiffness: N(bearings.rear_stiffness_n_per_m),
+            bearing_force_compliance: N((rear * rear / k_f + front * front / k_r) / (span * span)),
+            bearing_mixed_compliance: N((-rear / k_f - front / k_r) / (span * span)),
+            bearing_moment_compliance: N((1.0 / k_f + 1.0 / k_r) / (span * span)),
             tub_front: N(tub.front_x_m),
             drum_hinge: N(drum.hinge_x_m),
             hinge_to_front: N(drum.front_x_m - drum.hinge_x_m),

@@ -11,6 +11,7 @@
 //! with arm_r the partial velocity of the mass centre relative to the bearing midpoint, and drift that point's acceleration at
 //! constant speeds. This is the Schur complement of the block in closed form: J is 2x2 or 4x4.
 
+use crate::coupling::Response;
 use crate::forces::AxisLoad;
 use crate::lanes::SetLane;
 use lane_ode::{Lane, N, Real};
@@ -28,6 +29,8 @@ pub(crate) struct Floating<T, const R: usize> {
     pub(crate) arm: [[N<T>; 2]; R],
     /// Partial derivatives of the axis (a1) by yaw and pitch, y and z.
     pub(crate) axis: [[N<T>; 2]; 2],
+    /// Acceleration of the axis (a1) at constant speeds, y and z.
+    pub(crate) axis_drift: [N<T>; 2],
     /// Generalised forces less inertia forces at constant speeds, about the mass centre.
     pub(crate) torque: [N<T>; R],
 }
@@ -48,6 +51,52 @@ impl<T: Real, const R: usize> Floating<T, R> {
         for i in 0..2 {
             self.force[i] += load.force[i];
         }
+    }
+
+    /// How midpoint and axis accelerate, and would under forces on the axis. `inertia` is J.
+    #[inline(always)]
+    pub(crate) fn response(&self, inertia: &Factors<T, R>) -> Response<T> {
+        let zero = self.per_mass.lit(0.0);
+        // Rows of G: what `apply` adds to the torques per unit of force and moment; a motion's work is the same sum.
+        let mut half = [[zero; 4]; R];
+        for r in 0..R {
+            half[r][0] = -self.arm[r][0];
+            half[r][1] = -self.arm[r][1];
+        }
+        for r in 0..2 {
+            half[r][2] = self.axis[r][0];
+            half[r][3] = self.axis[r][1];
+        }
+        let mut start = self.torque;
+        // C = 1/m + G^T J^-1 G with J = L D L^T: half of the solution on either side.
+        for j in 0..R {
+            for i in j + 1..R {
+                let l = inertia.below(i, j);
+                start[i] -= l * start[j];
+                for k in 0..4 {
+                    half[i][k] -= l * half[j][k];
+                }
+            }
+        }
+        let mut free = [
+            self.force[0] * self.per_mass - self.drift[0],
+            self.force[1] * self.per_mass - self.drift[1],
+            self.axis_drift[0],
+            self.axis_drift[1],
+        ];
+        let mut compliance = [[zero; 4]; 4];
+        compliance[0][0] = self.per_mass;
+        compliance[1][1] = self.per_mass;
+        for r in 0..R {
+            for i in 0..4 {
+                let weighted = (half[r][i] * inertia.reciprocal_pivot(r)).v();
+                free[i] += weighted * start[r];
+                for j in 0..=i {
+                    compliance[i][j] += weighted * half[r][j];
+                }
+            }
+        }
+        Response { free, compliance }
     }
 
     /// Accelerations: y and z of the bearing midpoint, then the rotations. `inertia` is J.
@@ -111,6 +160,18 @@ impl<T: Real, const R: usize> Factors<T, R> {
             a[j][j] = pivot;
         }
         Self { packed: a }
+    }
+
+    /// Entry (row, column) of L, below its diagonal.
+    #[inline(always)]
+    fn below(&self, row: usize, column: usize) -> N<T> {
+        self.packed[row][column]
+    }
+
+    /// 1/D.
+    #[inline(always)]
+    fn reciprocal_pivot(&self, row: usize) -> N<T> {
+        self.packed[row][row]
     }
 
     /// Bit i: the matrix of lane i is positive definite.

@@ -1,8 +1,9 @@
 //! Forces: springs, dampers, bearings and the drum shaft's flexure (section 3 of the model page).
 
 use crate::coefficients::Bodies;
+use crate::coupling::Deflection;
 use crate::frame::{Tilt, Vec3, dot, plus_cross, scaled, sum};
-use crate::nonlinear::{COORDINATES, MachineView};
+use crate::nonlinear::MachineView;
 use lane_ode::{Dual, N, Real};
 
 /// Cabinet forces (y, z) on points of a body's axis.
@@ -37,35 +38,21 @@ pub(crate) struct SuspensionLoad<T> {
     pub(crate) moment: Vec3<T>,
 }
 
-/// Bearing forces on the shaft: linear in the relative displacement of the bearing centres in the y-z plane.
-#[inline(always)]
-pub(crate) fn bearing_load<T: Real>(
-    b: &Bodies<T>,
-    q: &[N<T>; COORDINATES],
-    tub: &Tilt<T>,
-    shaft: &Tilt<T>,
-) -> AxisLoad<T> {
-    let offset = [q[2] - q[0], q[3] - q[1]];
-    let tilt = [shaft.axis_c[1] - tub.axis_c[1], shaft.axis_c[2] - tub.axis_c[2]];
-    load_of_displacement(b, &offset, &tilt)
-}
-
-/// Bearing forces on the shaft when its midpoint is `offset` from the tub's and its axis `tilt` from the tub's (y, z).
-#[inline(always)]
-pub(crate) fn load_of_displacement<T: Real>(
-    b: &Bodies<T>,
-    offset: &[N<T>; 2],
-    tilt: &[N<T>; 2],
-) -> AxisLoad<T> {
-    let mut load = AxisLoad { force: [offset[0].lit(0.0); 2], moment: [offset[0].lit(0.0); 2] };
-    for (position, stiffness) in [(b.bearing_front, b.front_stiffness), (b.bearing_rear, b.rear_stiffness)] {
-        for i in 0..2 {
-            let force = -(stiffness * (offset[i] + position * tilt[i])).v();
-            load.force[i] += force;
-            load.moment[i] += position * force;
+impl<T: Real> Deflection<T> {
+    /// Bearing forces on the shaft.
+    #[inline(always)]
+    pub(crate) fn load(&self, b: &Bodies<T>) -> AxisLoad<T> {
+        let zero = b.front_stiffness.lit(0.0);
+        let mut load = AxisLoad { force: [zero; 2], moment: [zero; 2] };
+        for (position, stiffness) in [(b.bearing_front, b.front_stiffness), (b.bearing_rear, b.rear_stiffness)] {
+            for i in 0..2 {
+                let force = -(stiffness * (self.offset[i] + position * self.tilt[i])).v();
+                load.force[i] += force;
+                load.moment[i] += position * force;
+            }
         }
+        load
     }
-    load
 }
 
 /// Springs and dampers, worked out in tub axes, where their tub ends stand still.

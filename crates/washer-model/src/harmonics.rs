@@ -72,26 +72,35 @@ pub(crate) fn push_terms(
     });
 }
 
+/// Most terms that one entry can have: there are no more functions in any basis.
+const MOST_TERMS: usize = 33;
+
 /// The union of all lanes' terms, with zeros where a lane has none: a zero term leaves a sum as it was, so that a lane does not
 /// feel its neighbours.
+///
+/// Entries are kept by their number of terms, so that each loop over terms has a constant length.
 #[derive(Clone, Debug)]
 pub(crate) struct TermLanes<T> {
     zero: N<T>,
-    keys: Vec<(u16, u16)>,
-    /// How many terms each entry has, and the basis function of each.
-    counts: Vec<u16>,
+    /// Where the term of each key stands, if it does.
+    places: Vec<Option<u16>>,
+    /// Entries in the order of their sums, and how many have 0, 1, 2, ... terms.
+    entries: Vec<u16>,
+    with_terms: [usize; MOST_TERMS + 1],
+    /// Basis function and coefficient of each term, in that order.
     functions: Vec<u16>,
     coefficients: Vec<N<T>>,
     lanes: Vec<Vec<Term>>,
 }
 
 impl<T: Lane> TermLanes<T> {
-    /// The same terms in every lane; sums have `entries` entries.
-    pub(crate) fn splat(zero: N<T>, terms: &[Term], entries: usize) -> Self {
+    /// The same terms in every lane.
+    pub(crate) fn splat(zero: N<T>, terms: &[Term]) -> Self {
         let mut lanes = Self {
             zero,
-            keys: Vec::new(),
-            counts: vec![0; entries],
+            places: Vec::new(),
+            entries: Vec::new(),
+            with_terms: [0; MOST_TERMS + 1],
             functions: Vec::new(),
             coefficients: Vec::new(),
             lanes: vec![terms.to_vec(); T::LANES],
@@ -104,59 +113,144 @@ impl<T: Lane> TermLanes<T> {
     pub(crate) fn set_lane(&mut self, lane: usize, terms: &[Term]) {
         self.lanes[lane].clear();
         self.lanes[lane].extend_from_slice(terms);
-        if terms.iter().all(|term| self.keys.binary_search(&term.key).is_ok()) {
+        if terms.iter().all(|term| self.place(term.key).is_some()) {
             self.fill(lane);
         } else {
             self.rebuild();
         }
     }
 
+    /// Where the term of this key stands.
+    fn place(&self, key: (u16, u16)) -> Option<usize> {
+        self.places.get(flat(key)).copied().flatten().map(usize::from)
+    }
+
     fn rebuild(&mut self) {
-        self.keys.clear();
-        self.keys.extend(self.lanes.iter().flatten().map(|term| term.key));
-        self.keys.sort_unstable();
-        self.keys.dedup();
-        self.counts.fill(0);
-        for (entry, _) in &self.keys {
-            self.counts[usize::from(*entry)] += 1;
-        }
-        self.functions.clear();
-        self.functions.extend(self.keys.iter().map(|(_, function)| function));
+        let mut keys: Vec<_> = self.lanes.iter().flatten().map(|term| term.key).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let mut by_entry: Vec<&[(u16, u16)]> = keys.chunk_by(|a, b| a.0 == b.0).collect();
+        by_entry.sort_by_key(|terms| terms.len());
+        self.with_terms = [0; MOST_TERMS + 1];
+        by_entry.iter().for_each(|terms| self.with_terms[terms.len()] += 1);
+        self.entries = by_entry.iter().map(|terms| terms[0].0).collect();
+        let ordered = by_entry.concat();
+        self.places = vec![None; keys.last().map_or(0, |&(entry, _)| flat((entry + 1, 0)))];
+        (0..).zip(&ordered).for_each(|(place, &key)| self.places[flat(key)] = Some(place));
+        self.functions = ordered.iter().map(|key| key.1).collect();
         self.coefficients.clear();
-        self.coefficients.resize(self.keys.len(), self.zero);
+        self.coefficients.resize(ordered.len(), self.zero);
         (0..T::LANES).for_each(|lane| self.fill(lane));
     }
 
     fn fill(&mut self, lane: usize) {
         self.coefficients.iter_mut().for_each(|c| c.0.set(lane, 0.0));
-        for term in &self.lanes[lane] {
-            if let Ok(place) = self.keys.binary_search(&term.key) {
+        for i in 0..self.lanes[lane].len() {
+            let term = self.lanes[lane][i];
+            if let Some(place) = self.place(term.key) {
                 self.coefficients[place].0.set(lane, term.coefficient);
             }
         }
     }
 
-    /// For each entry the sum of coefficient times basis function, in each of `W` sets of basis functions.
+    /// For each entry that has terms, the sum of coefficient times basis function, in each of `W` sets of basis functions. Other
+    /// entries stay as they are.
     #[inline(always)]
     pub(crate) fn sum<const ENTRIES: usize, const B: usize, const W: usize>(
         &self,
         basis: &[[N<T>; W]; B],
-    ) -> [[N<T>; W]; ENTRIES] {
-        let mut entries = [[self.zero; W]; ENTRIES];
-        let mut first = 0;
-        for (entry, &count) in entries.iter_mut().zip(&self.counts) {
-            let terms = first..first + usize::from(count);
-            first = terms.end;
-            let mut sum = [self.zero; W];
-            for (&function, &coefficient) in self.functions[terms.clone()].iter().zip(&self.coefficients[terms]) {
-                let basis = &basis[usize::from(function)];
+        sums: &mut [[N<T>; W]; ENTRIES],
+    ) {
+        let mut rest = Rest { entries: &self.entries, functions: &self.functions, coefficients: &self.coefficients };
+        for terms in 1..=MOST_TERMS {
+            let entries = self.with_terms[terms];
+            if entries == 0 {
+                continue;
+            }
+            match terms {
+                1 => rest.sum_of::<1, ENTRIES, B, W>(entries, basis, sums),
+                2 => rest.sum_of::<2, ENTRIES, B, W>(entries, basis, sums),
+                3 => rest.sum_of::<3, ENTRIES, B, W>(entries, basis, sums),
+                4 => rest.sum_of::<4, ENTRIES, B, W>(entries, basis, sums),
+                5 => rest.sum_of::<5, ENTRIES, B, W>(entries, basis, sums),
+                6 => rest.sum_of::<6, ENTRIES, B, W>(entries, basis, sums),
+                7 => rest.sum_of::<7, ENTRIES, B, W>(entries, basis, sums),
+                8 => rest.sum_of::<8, ENTRIES, B, W>(entries, basis, sums),
+                _ => rest.sum_of_many(terms, entries, basis, sums),
+            }
+        }
+    }
+}
+
+/// A key as an index.
+fn flat((entry, function): (u16, u16)) -> usize {
+    usize::from(entry) * MOST_TERMS + usize::from(function)
+}
+
+/// What of the terms is still to be summed.
+struct Rest<'a, T> {
+    entries: &'a [u16],
+    functions: &'a [u16],
+    coefficients: &'a [N<T>],
+}
+
+impl<T: Lane> Rest<'_, T> {
+    /// The next `count` entries, which have `TERMS` terms each.
+    #[inline(always)]
+    fn sum_of<const TERMS: usize, const ENTRIES: usize, const B: usize, const W: usize>(
+        &mut self,
+        count: usize,
+        basis: &[[N<T>; W]; B],
+        sums: &mut [[N<T>; W]; ENTRIES],
+    ) {
+        for _ in 0..count {
+            let (Some((functions, later_functions)), Some((coefficients, later_coefficients))) =
+                (self.functions.split_first_chunk::<TERMS>(), self.coefficients.split_first_chunk::<TERMS>())
+            else {
+                return;
+            };
+            let Some((&entry, later_entries)) = self.entries.split_first() else { return };
+            let mut sum = basis[usize::from(functions[0])];
+            for w in 0..W {
+                sum[w] = (coefficients[0] * sum[w]).v();
+            }
+            for k in 1..TERMS {
+                let function = &basis[usize::from(functions[k])];
                 for w in 0..W {
-                    sum[w] += coefficient * basis[w];
+                    sum[w] += coefficients[k] * function[w];
                 }
             }
-            *entry = sum;
+            sums[usize::from(entry)] = sum;
+            *self = Rest { entries: later_entries, functions: later_functions, coefficients: later_coefficients };
         }
-        entries
+    }
+
+    /// The next `count` entries, which have `terms` terms each.
+    #[inline(always)]
+    fn sum_of_many<const ENTRIES: usize, const B: usize, const W: usize>(
+        &mut self,
+        terms: usize,
+        count: usize,
+        basis: &[[N<T>; W]; B],
+        sums: &mut [[N<T>; W]; ENTRIES],
+    ) {
+        for _ in 0..count {
+            let (functions, later_functions) = self.functions.split_at(terms);
+            let (coefficients, later_coefficients) = self.coefficients.split_at(terms);
+            let Some((&entry, later_entries)) = self.entries.split_first() else { return };
+            let mut sum = basis[usize::from(functions[0])];
+            for w in 0..W {
+                sum[w] = (coefficients[0] * sum[w]).v();
+            }
+            for k in 1..terms {
+                let function = &basis[usize::from(functions[k])];
+                for w in 0..W {
+                    sum[w] += coefficients[k] * function[w];
+                }
+            }
+            sums[usize::from(entry)] = sum;
+            *self = Rest { entries: later_entries, functions: later_functions, coefficients: later_coefficients };
+        }
     }
 }
 

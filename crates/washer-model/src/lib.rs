@@ -2,6 +2,7 @@
 
 mod channel;
 mod coefficients;
+mod coupling;
 mod equilibrium;
 mod floating;
 mod forces;

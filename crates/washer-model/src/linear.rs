@@ -5,10 +5,10 @@
 //! nonlinear model it is solved by halves, each about its mass centre; only the bearings couple them.
 
 use crate::coefficients::{Bodies, Coefficients};
+use crate::coupling::{Coupling, Deflection};
 use crate::floating::{Factors, Floating};
-use crate::forces::{AxisLoad, bearing_load, load_of_displacement};
 use crate::frame::Tilt;
-use crate::harmonics::{BASIS, Factor, HARMONICS, SAMPLES, Term, TermLanes, basis, push_terms};
+use crate::harmonics::{Factor, HARMONICS, SAMPLES, Term, TermLanes, basis, push_terms};
 use crate::lanes::{GetLane, SetLane, Splat};
 use crate::nonlinear::{COORDINATES, Half, rotor, tub};
 use crate::spin::SpinState;
@@ -28,7 +28,7 @@ const ARM: usize = INERTIA + 10;
 const FORCE: usize = ARM + 8;
 const STIFFNESS: usize = FORCE + ROTOR_ROWS;
 const DAMPING: usize = STIFFNESS + ROTOR_ROWS * 4;
-pub(crate) const ENTRIES: usize = DAMPING + ROTOR_ROWS * 4;
+const ENTRIES: usize = DAMPING + ROTOR_ROWS * 4;
 
 /// The linear model of one machine; `N<f64>` for one, `N<T>` for one per lane.
 #[derive(Clone, Copy, Debug)]
@@ -91,7 +91,7 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
     let zero = q[0].lit(0.0);
     let still = [zero; COORDINATES];
     let bodies = &machine.bodies;
-    let on_shaft = bearing_load(bodies, q, &Tilt::new(q[4], q[5]), &Tilt::new(q[6], q[7]));
+    let on_shaft = Deflection::new(q, &Tilt::new(q[4], q[5]), &Tilt::new(q[6], q[7])).load(bodies);
     let on_tub = on_shaft.reaction();
     let lifted = machine.constant();
 
@@ -238,48 +238,59 @@ impl<T: Copy> RotorAt<T> {
 /// What depends on time alone.
 #[inline(always)]
 pub(crate) fn rotor_at<T: Lane>(terms: &TermLanes<T>, spin: &SpinState<T>) -> RotorAt<T> {
-    let entries: [[N<T>; 1]; ENTRIES] = terms.sum::<ENTRIES, BASIS, 1>(&basis(spin));
     let zero = spin.sin.lit(0.0);
-    let mut inertia = [[zero; 4]; 4];
-    for row in 0..4 {
-        for column in 0..=row {
-            [inertia[row][column]] = entries[INERTIA + row * (row + 1) / 2 + column];
+    let mut rotor = RotorAt { entries: [[zero]; ENTRIES], inertia: Factors::new([[zero; 4]; 4]) };
+    rotor.renew(terms, spin);
+    rotor
+}
+
+impl<T: Lane> RotorAt<T> {
+    /// Overwrites the arrays by those of another instant; `terms` are the same.
+    #[inline(always)]
+    pub(crate) fn renew(&mut self, terms: &TermLanes<T>, spin: &SpinState<T>) {
+        terms.sum(&basis(spin), &mut self.entries);
+        let zero = spin.sin.lit(0.0);
+        let mut inertia = [[zero; 4]; 4];
+        for row in 0..4 {
+            for column in 0..=row {
+                [inertia[row][column]] = self.entries[INERTIA + row * (row + 1) / 2 + column];
+            }
         }
+        self.inertia = Factors::new(inertia);
     }
-    RotorAt { entries, inertia: Factors::new(inertia) }
 }
 
 /// Accelerations du/dt at deviations `q` from equilibrium and speeds `u`.
 #[inline(always)]
 pub(crate) fn accelerations<T: Lane>(
     bodies: &Bodies<T>,
+    coupling: &Coupling<T>,
     constants: &Constants<T>,
     tub_inertia: &Factors<T, 2>,
     rotor_at: &RotorAt<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
-    let c = constants;
-    let zero = q[0].lit(0.0);
-    let (mut tub, mut rotor) = unloaded(c, rotor_at, q, u, zero);
-    let on_shaft = linear_load(bodies, c, q);
-    tub.apply(&on_shaft.reaction());
-    rotor.apply(&on_shaft);
-    let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia);
-    let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(&rotor_at.inertia);
-    [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
+    let (tub, rotor) = unloaded(constants, rotor_at, q, u, q[0].lit(0.0));
+    coupling.accelerations(
+        bodies,
+        &deflection(constants, q),
+        (tub, tub_inertia),
+        (rotor, &rotor_at.inertia),
+    )
 }
 
-/// What the bearings add to their equilibrium load on the shaft.
+/// What deviations from equilibrium add to the bearings' deflection.
 #[inline(always)]
-fn linear_load<T: Real>(bodies: &Bodies<T>, c: &Constants<T>, q: &[N<T>; COORDINATES]) -> AxisLoad<T> {
-    let offset = [q[2] - q[0], q[3] - q[1]];
-    let tilt = [
-        c.rotor_axis[1][0] * q[7] - c.tub_axis[1][0] * q[5],
-        c.rotor_axis[0][1] * q[6] + c.rotor_axis[1][1] * q[7]
-            - (c.tub_axis[0][1] * q[4] + c.tub_axis[1][1] * q[5]),
-    ];
-    load_of_displacement(bodies, &offset, &tilt)
+fn deflection<T: Real>(c: &Constants<T>, q: &[N<T>; COORDINATES]) -> Deflection<T> {
+    Deflection {
+        offset: [q[2] - q[0], q[3] - q[1]],
+        tilt: [
+            c.rotor_axis[1][0] * q[7] - c.tub_axis[1][0] * q[5],
+            c.rotor_axis[0][1] * q[6] + c.rotor_axis[1][1] * q[7]
+                - (c.tub_axis[0][1] * q[4] + c.tub_axis[1][1] * q[5]),
+        ],
+    }
 }
 
 /// Both halves without what the bearings add to their equilibrium load.
@@ -314,6 +325,7 @@ fn unloaded<T: Lane>(
             drift: [zero; 2],
             arm: c.tub_arm,
             axis: c.tub_axis,
+            axis_drift: [zero; 2],
             torque: [tub[2], tub[3]],
         },
         Floating {
@@ -322,6 +334,7 @@ fn unloaded<T: Lane>(
             drift: [zero; 2],
             arm: rotor_at.arm(),
             axis: c.rotor_axis,
+            axis_drift: [zero; 2],
             torque: [rotor[2], rotor[3], rotor[4], rotor[5]],
         },
     )
@@ -351,12 +364,12 @@ impl LinearPoint {
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let zero = N(0.0);
         let c = &self.constants;
-        let rotor_at = rotor_at(&TermLanes::splat(zero, &self.terms, ENTRIES), spin);
+        let rotor_at = rotor_at(&TermLanes::splat(zero, &self.terms), spin);
         // Columns of C and K, and F, are forces of single deviations; the bearings' share comes back with them.
         let rows = |q: &[N<f64>; COORDINATES], u: &[N<f64>; COORDINATES], loaded: bool| {
             let (mut tub, mut rotor) = unloaded(c, &rotor_at, q, u, zero);
             if loaded {
-                let on_shaft = linear_load(bodies, c, q);
+                let on_shaft = deflection(c, q).load(bodies);
                 tub.apply(&on_shaft.reaction());
                 rotor.apply(&on_shaft);
             }

@@ -41,8 +41,8 @@ pub(crate) struct OutputLanes<T> {
 impl<T: Lane> OutputLanes<T> {
     pub(crate) fn splat(zero: N<T>, outputs: &LinearOutputs) -> Self {
         Self {
-            channels: TermLanes::splat(zero, &outputs.channels, CHANNELS),
-            radial: TermLanes::splat(zero, &outputs.radial, RADIAL),
+            channels: TermLanes::splat(zero, &outputs.channels),
+            radial: TermLanes::splat(zero, &outputs.radial),
         }
     }
 
@@ -54,18 +54,21 @@ impl<T: Lane> OutputLanes<T> {
     /// Deviations of the channels from equilibrium, where the features move.
     #[inline(always)]
     pub(crate) fn channels(&self, features: &Features<T>) -> [Sample<T>; CHANNELS] {
-        samples(&self.channels.sum(&features.0))
+        samples(&self.channels, features)
     }
 
     /// The drum's front centre from the tub axis, along t2 and t3.
     #[inline(always)]
     pub(crate) fn radial(&self, features: &Features<T>) -> [Sample<T>; RADIAL] {
-        samples(&self.radial.sum(&features.0))
+        samples(&self.radial, features)
     }
 }
 
 #[inline(always)]
-fn samples<T: Lane, const M: usize>(sums: &[[N<T>; 3]; M]) -> [Sample<T>; M] {
+fn samples<T: Lane, const M: usize>(terms: &TermLanes<T>, features: &Features<T>) -> [Sample<T>; M] {
+    let zero = features.0[0][1];
+    let mut sums = [[zero; 3]; M];
+    terms.sum(&features.0, &mut sums);
     core::array::from_fn(|i| Sample { value: sums[i][0], slope: sums[i][1], curvature: sums[i][2] })
 }
 

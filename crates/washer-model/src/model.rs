@@ -1,10 +1,11 @@
 //! The two models as systems over lanes, and what they have in common.
 
 use crate::coefficients::Coefficients;
+use crate::coupling::Coupling;
 use crate::floating::Factors;
 use crate::harmonics::TermLanes;
 use crate::lanes::SetLane;
-use crate::linear::{self, Constants, ENTRIES, RotorAt};
+use crate::linear::{self, Constants, RotorAt};
 use crate::linear_outputs::{Features, OutputLanes};
 use crate::nonlinear::{self, COORDINATES};
 use crate::outputs::{Axes, CHANNELS, Motion, RADIAL};
@@ -22,7 +23,7 @@ const FARTHEST_M: f64 = 10.0;
 /// One of the two models, over lanes.
 pub(crate) trait Model<T: Lane>: System<T, STATES> {
     /// The same point in every lane.
-    fn splat(zero: N<T>, point: &Point) -> Self;
+    fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self;
     /// Puts a point into one lane.
     fn set_point(&mut self, lane: usize, point: &Point);
     /// Puts a stretch of its spin into one lane.
@@ -73,6 +74,7 @@ fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
 
 /// The nonlinear model.
 pub(crate) struct Nonlinear<T> {
+    coupling: Coupling<T>,
     machine: Coefficients<T>,
     spin: SpinLanes<T>,
     /// Channels at the static equilibrium.
@@ -90,7 +92,7 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
     #[inline(always)]
     fn derivative(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
         let (q, u) = split(x);
-        joined(&u, &nonlinear::accelerations(&self.machine.view(), spin, &q, &u))
+        joined(&u, &nonlinear::accelerations(&self.machine.view(), &self.coupling, spin, &q, &u))
     }
 
     #[inline(always)]
@@ -101,8 +103,9 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
 
 impl<T: Lane> Model<T> for Nonlinear<T> {
     #[inline(always)]
-    fn splat(zero: N<T>, point: &Point) -> Self {
+    fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
         Self {
+            coupling,
             machine: Coefficients::splat(zero, &point.machine),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
             rest: point.rest.map(|y| zero.lit(y)),
@@ -147,6 +150,7 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
 
 /// The linear model.
 pub(crate) struct Linear<T> {
+    coupling: Coupling<T>,
     machine: Coefficients<T>,
     constants: Constants<T>,
     tub_inertia: Factors<T, 2>,
@@ -172,10 +176,18 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     }
 
     #[inline(always)]
+    fn renew(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
+        forcing.spin = self.spin.at(t_s);
+        forcing.rotor.renew(&self.terms, &forcing.spin);
+    }
+
+    #[inline(always)]
     fn derivative(&self, forcing: &LinearForcing<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
         let (q, u) = split(x);
         let bodies = &self.machine.bodies;
-        joined(&u, &linear::accelerations(bodies, &self.constants, &self.tub_inertia, &forcing.rotor, &q, &u))
+        let (constants, tub_inertia) = (&self.constants, &self.tub_inertia);
+        let a = linear::accelerations(bodies, &self.coupling, constants, tub_inertia, &forcing.rotor, &q, &u);
+        joined(&u, &a)
     }
 
     #[inline(always)]
@@ -186,13 +198,14 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
 
 impl<T: Lane> Model<T> for Linear<T> {
     #[inline(always)]
-    fn splat(zero: N<T>, point: &Point) -> Self {
+    fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
         let constants = Constants::splat(zero, &point.linear.constants);
         Self {
+            coupling,
             machine: Coefficients::splat(zero, &point.machine),
             tub_inertia: linear::tub_factors(&constants),
             constants,
-            terms: TermLanes::splat(zero, &point.linear.terms, ENTRIES),
+            terms: TermLanes::splat(zero, &point.linear.terms),
             outputs: OutputLanes::splat(zero, &point.linear_outputs),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
         }

@@ -4,8 +4,9 @@
 //! the spin (yaw q7, pitch q8), frame S spins with the shaft, frame E is S turned by q9, frame D by q10 more.
 
 use crate::coefficients::{Bodies, Coefficients, DamperOf, SpringOf};
+use crate::coupling::{Coupling, Deflection};
 use crate::floating::{Factors, Floating};
-use crate::forces::{Flexure, bearing_load, suspension_load};
+use crate::forces::{Flexure, suspension_load};
 use crate::frame::{Tilt, Vec3, combination, difference, scaled, sum};
 use crate::spin::SpinState;
 use lane_ode::{N, Real};
@@ -36,7 +37,7 @@ pub(crate) fn halves<T: Real>(
 ) -> Halves<T> {
     let mut tub = tub(machine, q, u);
     let mut rotor = rotor(machine.bodies, spin, q, u);
-    let on_shaft = bearing_load(machine.bodies, q, &tub.tilt, &rotor.tilt);
+    let on_shaft = Deflection::new(q, &tub.tilt, &rotor.tilt).load(machine.bodies);
     tub.floating.apply(&on_shaft.reaction());
     rotor.floating.apply(&on_shaft);
     Halves { tub, rotor }
@@ -60,14 +61,19 @@ impl<T> Coefficients<T> {
 #[inline(always)]
 pub(crate) fn accelerations<T: Real>(
     machine: &MachineView<'_, T>,
+    coupling: &Coupling<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
-    let Halves { tub, rotor } = halves(machine, spin, q, u);
-    let ([a1, a2], [a5, a6]) = tub.floating.accelerations(&Factors::new(tub.inertia));
-    let ([a3, a4], [a7, a8, a9, a10]) = rotor.floating.accelerations(&Factors::new(rotor.inertia));
-    [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
+    let tub = tub(machine, q, u);
+    let rotor = rotor(machine.bodies, spin, q, u);
+    coupling.accelerations(
+        machine.bodies,
+        &Deflection::new(q, &tub.tilt, &rotor.tilt),
+        (tub.floating, &Factors::new(tub.inertia)),
+        (rotor.floating, &Factors::new(rotor.inertia)),
+    )
 }
 
 /// Body T about its mass centre.
@@ -96,7 +102,8 @@ pub(crate) fn tub<T: Real>(
     let arm_yaw_x = (centre * tilt.axis_c[2]).v();
     let arm_yaw_z = (centre * tilt.axis_yaw_z()).v();
     let arm_pitch = scaled(centre, tilt.second_c);
-    let drift = scaled(centre, tilt.to_cabinet(&motion.axis_acceleration));
+    let axis_drift = tilt.to_cabinet(&motion.axis_acceleration);
+    let drift = scaled(centre, axis_drift);
 
     let force = suspension.force;
     let axial = (b.tub_mass * drift[0]).v();
@@ -114,6 +121,7 @@ pub(crate) fn tub<T: Real>(
             drift: [drift[1], drift[2]],
             arm: [[zero, arm_yaw_z], [arm_pitch[1], arm_pitch[2]]],
             axis: tilt.axis_partials(),
+            axis_drift: [axis_drift[1], axis_drift[2]],
             torque: [torque_yaw, torque_pitch],
         },
         inertia: [
@@ -224,6 +232,7 @@ pub(crate) fn rotor<T: Real>(
         -(flexure.about_10 + drum_moment_e[2]),
     ];
     let axial = (b.rotor_mass * drift[0]).v();
+    let axis_drift = tilt.to_cabinet(axis_acceleration);
 
     let mut inertia = rotor_inertia(b, spin, &tilt, &k, &rho_s, (s9, c9));
     for r in 0..4 {
@@ -239,6 +248,7 @@ pub(crate) fn rotor<T: Real>(
             drift: [drift[1], drift[2]],
             arm,
             axis: tilt.axis_partials(),
+            axis_drift: [axis_drift[1], axis_drift[2]],
             torque: difference(about_centre, &scaled(axial, axial_arm)),
         },
         inertia,

@@ -1,5 +1,6 @@
 //! Trajectories: points through the lanes of an integrator, and what is recorded of them.
 
+use crate::coupling::Coupling;
 use crate::model::{Linear, Model, Nonlinear, STATES};
 use crate::outputs::{CHANNELS, squared};
 use crate::point::{PlannedLeg, Point};
@@ -15,6 +16,13 @@ pub enum Method {
     Rk4 {
         /// Longest step.
         step_s: f64,
+    },
+    /// The same, with the bearings' mass scaled so that none of their modes is faster than a cap (see `coupling.rs`).
+    Rk4MassScaled {
+        /// Longest step.
+        step_s: f64,
+        /// The cap, rad/s.
+        cap_rad_per_s: f64,
     },
     /// Dormand-Prince 5(4).
     Dopri5(Tolerance),
@@ -88,11 +96,17 @@ impl<F: Family> Kernel for Simulate<'_, F> {
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Vec<Record> {
         let step_s = match self.method {
-            Method::Rk4 { step_s } => *step_s,
+            Method::Rk4 { step_s } | Method::Rk4MassScaled { step_s, .. } => *step_s,
             Method::Dopri5(_) => FIRST_STEP_S,
         };
+        let coupling = match self.method {
+            Method::Rk4MassScaled { cap_rad_per_s, .. } => {
+                Coupling::MassScaled(N(zero).lit(cap_rad_per_s * cap_rad_per_s))
+            }
+            Method::Rk4 { .. } | Method::Dopri5(_) => Coupling::Springs,
+        };
         let mut run = Run::<T, F::Over<T>> {
-            model: Model::splat(N(zero), self.points[0]),
+            model: Model::splat(N(zero), self.points[0], coupling),
             points: self.points,
             taken: 0,
             lanes: [LaneState::default(); MAX_LANES],
@@ -103,7 +117,7 @@ impl<F: Family> Kernel for Simulate<'_, F> {
             records: vec![EMPTY; self.points.len()],
         };
         match self.method {
-            Method::Rk4 { .. } => rk4::integrate(zero, &mut run),
+            Method::Rk4 { .. } | Method::Rk4MassScaled { .. } => rk4::integrate(zero, &mut run),
             Method::Dopri5(tolerance) => dopri5::integrate(zero, &mut run, tolerance),
         }
         run.records

@@ -1,0 +1,136 @@
+//! A trajectory that cannot go on ends with its reason and time; its neighbours do not notice.
+
+use super::{Equation, Method, Outcome, Trajectory, instruction_sets, solve};
+use crate::{Ended, Failure, Lane, Leg, N, Tolerance};
+
+/// x' = a x^2 + b / (c - t) + sqrt(d - t), y' = w z, z' = -w y: explodes, runs into a pole, has no value, or is fast.
+struct Mishaps;
+
+impl Equation<3, 5> for Mishaps {
+    const FARTHEST: f64 = 1e3;
+
+    #[inline(always)]
+    fn derivative<T: Lane>(&[a, b, c, d, w]: &[N<T>; 5], t_s: N<T>, x: &[N<T>; 3]) -> [N<T>; 3] {
+        [a * (x[0] * x[0]) + (b / (c - t_s) + (d - t_s).sqrt()), (w * x[2]).v(), -(w * x[1]).v()]
+    }
+}
+
+const LEG: Leg = Leg { start_s: 0.0, end_s: 2.0, step_s: 1e-3 };
+
+fn trajectory(parameters: [f64; 5]) -> Trajectory<3, 5> {
+    let legs = vec![Leg { end_s: 0.25, ..LEG }, Leg { start_s: 0.25, ..LEG }];
+    Trajectory { parameters, start: [1.0, 1.0, 0.0], legs }
+}
+
+/// Nothing happens to these.
+fn sound(i: usize) -> Trajectory<3, 5> {
+    trajectory([0.01, 0.0, 100.0, 100.0 + i as f64, 2.0 + 0.37 * i as f64])
+}
+
+fn explodes() -> Trajectory<3, 5> {
+    trajectory([1.0, 0.0, 100.0, 100.0, 2.0])
+}
+
+fn has_no_value_after(t_s: f64) -> Trajectory<3, 5> {
+    trajectory([0.01, 0.0, 100.0, t_s, 2.0])
+}
+
+fn runs_into_a_pole_at(t_s: f64) -> Trajectory<3, 5> {
+    trajectory([0.0, 1.0, t_s, 100.0, 2.0])
+}
+
+fn is_fast() -> Trajectory<3, 5> {
+    trajectory([0.01, 0.0, 100.0, 100.0, 1e4])
+}
+
+const DOPRI5: Method = Method::Dopri5(Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 2000 });
+
+/// Solves mishaps among sound trajectories, in every order of arrival, and the sound ones alone; asserts that these are the
+/// same bits, and returns what became of the mishaps.
+fn among_others(method: Method, mishaps: &[Trajectory<3, 5>]) -> Vec<Outcome<3>> {
+    let mut ends: Option<Vec<Outcome<3>>> = None;
+    for simd in instruction_sets() {
+        let alone: Vec<_> = (0..12).map(sound).collect();
+        let (alone, _) = solve::<Mishaps, 3, 5>(simd, method, &alone);
+        assert!(alone.iter().all(|o| matches!(o.ended, Ended::Arrived(_))));
+        for offset in 0..4 {
+            // Mishaps at every third place from `offset` on.
+            let mut mixed: Vec<_> = (0..12).map(sound).collect();
+            let mut places = Vec::new();
+            for (i, mishap) in mishaps.iter().enumerate() {
+                let place = offset + 3 * i;
+                mixed.insert(place, mishap.clone());
+                places.push(place);
+            }
+            let (outcomes, _) = solve::<Mishaps, 3, 5>(simd, method, &mixed);
+            let (mut bad, mut good) = (Vec::new(), Vec::new());
+            for (i, outcome) in outcomes.into_iter().enumerate() {
+                if places.contains(&i) { bad.push(outcome) } else { good.push(outcome) }
+            }
+            for (i, (with, without)) in good.iter().zip(&alone).enumerate() {
+                assert!(with.is_same(without), "{simd:?}, sound {i}: {with:?} against {without:?}");
+            }
+            let first = ends.get_or_insert_with(|| bad.clone());
+            for (now, then) in bad.iter().zip(first.iter()) {
+                assert_eq!((now.ended, now.count), (then.ended, then.count), "{simd:?}");
+            }
+        }
+    }
+    ends.unwrap()
+}
+
+fn failure(outcome: &Outcome<3>) -> (Failure, f64) {
+    let Ended::Failed { reason, time_s, .. } = outcome.ended else { panic!("it did not fail: {outcome:?}") };
+    (reason, time_s)
+}
+
+#[test]
+fn a_diverged_trajectory_ends_alone() {
+    for method in [Method::Rk4, DOPRI5] {
+        let outcomes = among_others(method, &[explodes()]);
+        let (reason, time_s) = failure(&outcomes[0]);
+        assert_eq!(reason, Failure::Diverged, "{method:?}");
+        // x' > x^2 + 9 from x = 1 is at infinity before t = (pi/2 - atan(1/3)) / 3 = 0.42.
+        assert!((0.1..0.42).contains(&time_s), "{method:?}: {time_s} s");
+    }
+}
+
+#[test]
+fn a_state_that_is_not_finite_ends_alone() {
+    for method in [Method::Rk4, DOPRI5] {
+        let outcomes = among_others(method, &[has_no_value_after(0.7), has_no_value_after(0.2)]);
+        for (outcome, at_s) in outcomes.iter().zip([0.7, 0.2]) {
+            let (reason, time_s) = failure(outcome);
+            assert_eq!(reason, Failure::Diverged, "{method:?}");
+            assert!((time_s - at_s).abs() < 2e-3, "{method:?}: {time_s} s");
+        }
+    }
+}
+
+#[test]
+fn a_step_too_small_for_time_ends_alone() {
+    let outcomes = among_others(DOPRI5, &[runs_into_a_pole_at(0.6), runs_into_a_pole_at(1.5)]);
+    for (outcome, at_s) in outcomes.iter().zip([0.6, 1.5]) {
+        let (reason, time_s) = failure(outcome);
+        assert_eq!(reason, Failure::StepTooSmall, "{outcome:?}");
+        assert!((time_s - at_s).abs() < 1e-9, "{time_s} s");
+    }
+}
+
+#[test]
+fn a_spent_allowance_of_steps_ends_alone() {
+    let outcomes = among_others(DOPRI5, &[is_fast(), is_fast()]);
+    for outcome in &outcomes {
+        let (reason, _) = failure(outcome);
+        assert_eq!(reason, Failure::StepLimit);
+        let Ended::Failed { count, .. } = outcome.ended else { unreachable!() };
+        assert_eq!(count.accepted + count.rejected, 2000);
+    }
+}
+
+#[test]
+fn all_mishaps_together_leave_the_others_as_they_are() {
+    let mishaps = [explodes(), has_no_value_after(0.3), runs_into_a_pole_at(0.9), is_fast()];
+    let reasons: Vec<_> = among_others(DOPRI5, &mishaps).iter().map(|o| failure(o).0).collect();
+    assert_eq!(reasons, [Failure::Diverged, Failure::Diverged, Failure::StepTooSmall, Failure::StepLimit]);
+}

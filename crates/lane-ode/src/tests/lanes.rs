@@ -1,0 +1,169 @@
+//! Each operation of each lane type gives the bits of plain `f64`, whatever stands in the other lanes.
+
+use super::instruction_sets;
+use crate::{Array, Kernel, Lane, N, trig};
+
+/// Operands of one lane.
+type Operands = [f64; 3];
+
+/// What is computed of them: ten numbers, sine and cosine twice, one truth value.
+const RESULTS: usize = 18;
+
+/// What IEEE 754 and the standard library say.
+fn expected([a, b, c]: Operands) -> [f64; RESULTS] {
+    let (sin, cos) = trig::sin_cos(a);
+    let (sin_turns, cos_turns) = trig::sin_cos_turns(N(a));
+    [
+        c,
+        a + b,
+        a - b,
+        a * b,
+        a / b,
+        -a,
+        a.mul_add(b, c),
+        a.mul_add(b, -c),
+        (-a).mul_add(b, c),
+        a.sqrt(),
+        a.abs(),
+        sin,
+        cos,
+        sin_turns.0,
+        cos_turns.0,
+        a.round_ties_even(),
+        if a < b { a } else { c },
+        if b < a { a } else { b },
+    ]
+}
+
+struct Operations<'a>(&'a [Operands]);
+
+impl Kernel for Operations<'_> {
+    type Output = Vec<[f64; RESULTS]>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
+        let mut all = Vec::new();
+        for group in self.0.chunks(T::LANES) {
+            let mut operands = [zero; 3];
+            for (lane, values) in group.iter().enumerate() {
+                for i in 0..3 {
+                    operands[i].set(lane, values[i]);
+                }
+            }
+            let [a, b, c] = operands;
+            let (sin, cos) = a.sin_cos();
+            let (sin_turns, cos_turns) = trig::sin_cos_turns(N(a));
+            let results = [
+                c,
+                a.add(b),
+                a.sub(b),
+                a.mul(b),
+                a.div(b),
+                a.neg(),
+                a.mul_add(b, c),
+                a.mul_sub(b, c),
+                a.neg_mul_add(b, c),
+                a.sqrt(),
+                a.abs(),
+                sin,
+                cos,
+                sin_turns.0,
+                cos_turns.0,
+                a.round(),
+                T::select(a.less(b), a, c),
+                a.larger(b),
+            ];
+            let less = T::bits(a.less(b));
+            let mut are_all_less = true;
+            for (lane, [a, b, _]) in group.iter().enumerate() {
+                assert_eq!(less >> lane & 1 == 1, a < b, "{a} < {b}");
+                are_all_less &= a < b;
+                all.push(results.map(|r| r.get(lane)));
+            }
+            if group.len() == T::LANES {
+                assert_eq!(T::all(a.less(b)), are_all_less);
+                assert_eq!(less >> T::LANES, 0, "bits beyond the last lane");
+            }
+            assert!((0..T::LANES).all(|lane| zero.lit(-1.5).get(lane) == -1.5));
+        }
+        all
+    }
+}
+
+/// Every pair of special values, then numbers of every size.
+fn operands() -> Vec<Operands> {
+    let special = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        0.5,
+        1.5,
+        2.5,
+        -2.5,
+        f64::MIN_POSITIVE,
+        -f64::MIN_POSITIVE,
+        5e-324,
+        f64::MAX,
+        f64::MIN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::NAN,
+        f64::EPSILON,
+        core::f64::consts::FRAC_PI_4,
+        -core::f64::consts::FRAC_PI_2,
+        4_503_599_627_370_497.5,
+    ];
+    let mut all = Vec::new();
+    for a in special {
+        for b in special {
+            all.push([a, b, special[(all.len() * 7) % special.len()]]);
+        }
+    }
+    let mut rng = fastrand::Rng::with_seed(1);
+    for _ in 0..20_000 {
+        let mut number = || (rng.f64() * 2.0 - 1.0) * 2.0_f64.powi(rng.i32(-40..40));
+        all.push([number(), number(), number()]);
+    }
+    // Products of numbers of a size, and their sums: where a fused operation and two rounded ones differ.
+    for _ in 0..20_000 {
+        let [a, b] = [rng.f64() + 0.5, rng.f64() + 0.5];
+        all.push([a, b, -a * b]);
+    }
+    all
+}
+
+/// The same bits, or both not a number: its sign and payload differ between processors.
+fn is_same(a: f64, b: f64) -> bool {
+    a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
+}
+
+fn check(name: &str, operands: &[Operands], results: &[[f64; RESULTS]]) {
+    assert_eq!(operands.len(), results.len());
+    for (operands, results) in operands.iter().zip(results) {
+        let expected = expected(*operands);
+        for i in 0..RESULTS {
+            assert!(
+                is_same(results[i], expected[i]),
+                "{name}, result {i} of {operands:?}: {} against {}",
+                results[i],
+                expected[i]
+            );
+        }
+    }
+}
+
+#[test]
+fn every_operation_of_every_instruction_set_gives_the_bits_of_plain_numbers() {
+    let operands = operands();
+    for simd in instruction_sets() {
+        check(simd.name(), &operands, &simd.dispatch(Operations(&operands)));
+    }
+}
+
+#[test]
+fn every_operation_of_plain_arrays_gives_the_bits_of_plain_numbers() {
+    let operands = operands();
+    check("Array<2>", &operands, &Operations(&operands).run(Array([0.0; 2])));
+    check("Array<3>", &operands, &Operations(&operands).run(Array([0.0; 3])));
+}

@@ -1,0 +1,223 @@
+//! What the integrators promise, shown on small equations whose solutions are known.
+
+mod allocation;
+mod dual;
+mod failures;
+mod lanes;
+mod order;
+mod peaks;
+mod trig;
+
+use crate::{
+    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, Tolerance, dopri5, rk4,
+};
+use core::marker::PhantomData;
+
+/// A family of equations x' = f(p, t, x), with `P` parameters of each lane's own.
+trait Equation<const D: usize, const P: usize> {
+    /// A component beyond this has left the range.
+    const FARTHEST: f64 = 1e6;
+    /// f
+    fn derivative<T: Lane>(p: &[N<T>; P], t_s: N<T>, x: &[N<T>; D]) -> [N<T>; D];
+    /// The solution, where it is known; NaN otherwise.
+    fn exact(_p: &[f64; P], _t_s: f64) -> [f64; D] {
+        [f64::NAN; D]
+    }
+}
+
+/// One member of the family, from where, and over which legs.
+#[derive(Clone, Debug)]
+struct Trajectory<const D: usize, const P: usize> {
+    parameters: [f64; P],
+    start: [f64; D],
+    legs: Vec<Leg>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Method {
+    Rk4,
+    Dopri5(Tolerance),
+}
+
+/// How a trajectory went.
+#[derive(Clone, Copy, Debug)]
+struct Outcome<const D: usize> {
+    /// Its last leg.
+    ended: Ended,
+    /// All legs.
+    count: Count,
+    /// State when it ended.
+    x: [f64; D],
+    /// End of the last step that an observer was shown.
+    observed_to_s: f64,
+    /// Largest error of [`Step::at`] inside a step.
+    error_inside: f64,
+}
+
+impl<const D: usize> Outcome<D> {
+    const NONE: Self = Self {
+        ended: Ended::Idle,
+        count: Count { accepted: 0, rejected: 0 },
+        x: [f64::NAN; D],
+        observed_to_s: f64::NAN,
+        error_inside: 0.0,
+    };
+
+    /// The same trajectory, bit for bit, step for step.
+    fn is_same(&self, other: &Self) -> bool {
+        self.x.map(f64::to_bits) == other.x.map(f64::to_bits)
+            && self.ended == other.ended
+            && self.count == other.count
+            && self.error_inside.to_bits() == other.error_inside.to_bits()
+            && self.observed_to_s.to_bits() == other.observed_to_s.to_bits()
+    }
+}
+
+/// Every instruction set of this processor.
+fn instruction_sets() -> Vec<Simd> {
+    Simd::ALL.into_iter().filter(|simd| simd.is_available()).collect()
+}
+
+/// Solves every trajectory; the outcomes, and how often the heap was asked while integrating.
+fn solve<E: Equation<D, P>, const D: usize, const P: usize>(
+    simd: Simd,
+    method: Method,
+    trajectories: &[Trajectory<D, P>],
+) -> (Vec<Outcome<D>>, u64) {
+    simd.dispatch(Solve::<E, D, P> { method, trajectories, equation: PhantomData })
+}
+
+struct Solve<'a, E, const D: usize, const P: usize> {
+    method: Method,
+    trajectories: &'a [Trajectory<D, P>],
+    equation: PhantomData<E>,
+}
+
+impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for Solve<'_, E, D, P> {
+    type Output = (Vec<Outcome<D>>, u64);
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
+        let mut batch = Batch::<'_, T, E, D, P> {
+            p: [N(zero); P],
+            trajectories: self.trajectories,
+            taken: 0,
+            at: [(0, 0); MAX_LANES],
+            outcomes: vec![Outcome::NONE; self.trajectories.len()],
+            equation: PhantomData,
+        };
+        let heap = allocation_counter::measure(|| match self.method {
+            Method::Rk4 => rk4::integrate(zero, &mut batch),
+            Method::Dopri5(tolerance) => dopri5::integrate(zero, &mut batch, &tolerance),
+        });
+        (batch.outcomes, heap.count_total)
+    }
+}
+
+/// Trajectories through lanes, one after another.
+struct Batch<'a, T, E, const D: usize, const P: usize> {
+    p: [N<T>; P],
+    trajectories: &'a [Trajectory<D, P>],
+    taken: usize,
+    /// Trajectory and leg of each lane.
+    at: [(usize, usize); MAX_LANES],
+    outcomes: Vec<Outcome<D>>,
+    equation: PhantomData<E>,
+}
+
+impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D> for Batch<'_, T, E, D, P> {
+    type Forcing = N<T>;
+
+    #[inline(always)]
+    fn forcing(&self, t_s: N<T>) -> N<T> {
+        t_s
+    }
+
+    #[inline(always)]
+    fn derivative(&self, t_s: &N<T>, x: &[N<T>; D]) -> [N<T>; D] {
+        E::derivative(&self.p, *t_s, x)
+    }
+
+    #[inline(always)]
+    fn in_range(&self, x: &[N<T>; D]) -> T::Mask {
+        let mut sum = x[0].lit(0.0);
+        for x in x {
+            let share = (*x * (1.0 / E::FARTHEST)).v();
+            sum += share * share;
+        }
+        sum.0.less(sum.lit(1.0).0)
+    }
+}
+
+impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D> for Batch<'_, T, E, D, P> {
+    fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; D]) -> Option<Leg> {
+        if ended != Ended::Idle {
+            let (trajectory, leg) = &mut self.at[lane];
+            let (legs, outcome) = (&self.trajectories[*trajectory].legs, &mut self.outcomes[*trajectory]);
+            outcome.ended = ended;
+            match ended {
+                Ended::Arrived(count) | Ended::Failed { count, .. } => outcome.count.add(count),
+                Ended::Idle => {}
+            }
+            if matches!(ended, Ended::Arrived(_)) && *leg + 1 < legs.len() {
+                *leg += 1;
+                return Some(legs[*leg]);
+            }
+            outcome.x = x.map(|x| x.0.get(lane));
+        }
+        let trajectory = self.trajectories.get(self.taken)?;
+        self.at[lane] = (self.taken, 0);
+        self.taken += 1;
+        for (p, value) in self.p.iter_mut().zip(trajectory.parameters) {
+            p.0.set(lane, value);
+        }
+        for (x, start) in x.iter_mut().zip(trajectory.start) {
+            x.0.set(lane, start);
+        }
+        Some(trajectory.legs[0])
+    }
+
+    fn begin(&mut self, _: &N<T>, _: &[N<T>; D], _: &[N<T>; D]) {}
+
+    fn observe(&mut self, _: &N<T>, step: &Step<'_, T, D>) {
+        for share in [0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875] {
+            let inside = step.at(step.length_s.lit(share));
+            for lane in (0..T::LANES).filter(|&lane| step.length_s.0.get(lane) > 0.0) {
+                let (trajectory, _) = self.at[lane];
+                let outcome = &mut self.outcomes[trajectory];
+                outcome.observed_to_s = step.end_s.0.get(lane);
+                let t_s = outcome.observed_to_s - (1.0 - share) * step.length_s.0.get(lane);
+                let exact = E::exact(&self.trajectories[trajectory].parameters, t_s);
+                for i in 0..D {
+                    // `max` drops a NaN: an unknown solution leaves no error.
+                    outcome.error_inside = outcome.error_inside.max((inside[i].0.get(lane) - exact[i]).abs());
+                }
+            }
+        }
+    }
+}
+
+/// A nonlinear equation driven by time, and an oscillator: x' = w x cos(w t), y' = w z, z' = -w y.
+struct Swing;
+
+impl Equation<3, 1> for Swing {
+    #[inline(always)]
+    fn derivative<T: Lane>(&[w]: &[N<T>; 1], t_s: N<T>, x: &[N<T>; 3]) -> [N<T>; 3] {
+        let (_, cos) = (w * t_s).v().sin_cos();
+        [(w * (x[0] * cos)).v(), (w * x[2]).v(), -(w * x[1]).v()]
+    }
+
+    fn exact(&[w]: &[f64; 1], t_s: f64) -> [f64; 3] {
+        let (sin, cos) = (w * t_s).sin_cos();
+        [sin.exp(), cos, -sin]
+    }
+}
+
+impl Trajectory<3, 1> {
+    /// From 0 to `end_s` in `legs` equal legs.
+    fn swing(w: f64, end_s: f64, legs: u32, step_s: f64) -> Self {
+        let edge = |i: u32| end_s * f64::from(i) / f64::from(legs);
+        let legs = (0..legs).map(|i| Leg { start_s: edge(i), end_s: edge(i + 1), step_s }).collect();
+        Self { parameters: [w], start: [1.0, 1.0, 0.0], legs }
+    }
+}

@@ -1,0 +1,128 @@
+//! Orders of convergence, of both methods and of what they say between steps.
+
+use super::{Equation, Method, Outcome, Swing, Trajectory, solve};
+use crate::{Ended, Leg, Simd, Tolerance};
+
+const END_S: f64 = 6.0;
+
+/// Accepts any step: with legs of one step each, an adaptive method becomes one of fixed step.
+const ANYTHING: Tolerance = Tolerance { relative: 1e30, absolute: 1e30, max_steps: u64::MAX };
+
+/// Error at the end, and the largest inside a step, for each number of steps.
+fn errors(method: Method, steps: &[u32]) -> Vec<[f64; 2]> {
+    let trajectories: Vec<_> = steps
+        .iter()
+        .map(|&n| match method {
+            Method::Rk4 => Trajectory::swing(1.0, END_S, 1, END_S / f64::from(n)),
+            Method::Dopri5(_) => Trajectory::swing(1.0, END_S, n, END_S),
+        })
+        .collect();
+    let (outcomes, _) = solve::<Swing, 3, 1>(Simd::best(), method, &trajectories);
+    let exact = Swing::exact(&[1.0], END_S);
+    let of = |(n, outcome): (&u32, Outcome<3>)| {
+        assert!(matches!(outcome.ended, Ended::Arrived(_)), "{outcome:?}");
+        assert_eq!((outcome.count.accepted, outcome.count.rejected), (u64::from(*n), 0));
+        let at_end = (0..3).map(|i| (outcome.x[i] - exact[i]).abs()).fold(0.0, f64::max);
+        [at_end, outcome.error_inside]
+    };
+    steps.iter().zip(outcomes).map(of).collect()
+}
+
+/// Slope of log error over log step, by least squares.
+fn slope(steps: &[u32], errors: impl Iterator<Item = f64>) -> f64 {
+    let points: Vec<_> = steps.iter().zip(errors).map(|(&n, e)| (-f64::from(n).ln(), e.ln())).collect();
+    let count = points.len() as f64;
+    let (mx, my) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / count, y + p.1 / count));
+    let (xy, xx) =
+        points.iter().fold((0.0, 0.0), |(xy, xx), p| (xy + (p.0 - mx) * (p.1 - my), xx + (p.0 - mx).powi(2)));
+    xy / xx
+}
+
+/// Measured slopes at the end and between steps.
+fn slopes(name: &str, method: Method, steps: &[u32]) -> [f64; 2] {
+    let errors = errors(method, steps);
+    let slopes = [0, 1].map(|which| slope(steps, errors.iter().map(|e| e[which])));
+    let [most, least] = [0, steps.len() - 1].map(|i| errors[i][0]);
+    eprintln!(
+        "{name}: order {:.3}, between steps {:.3}; errors {most:.1e} to {least:.1e}",
+        slopes[0], slopes[1]
+    );
+    slopes
+}
+
+#[test]
+fn rk4_has_order_4_and_so_has_the_cubic_between_its_steps() {
+    let [order, between] = slopes("rk4", Method::Rk4, &[200, 283, 400, 566, 800]);
+    assert!((order - 4.0).abs() < 0.1, "order {order}");
+    assert!((between - 4.0).abs() < 0.1, "between steps {between}");
+}
+
+#[test]
+fn dopri5_has_order_5_and_so_has_its_dense_output() {
+    // Dense output of order 4 has a local error of h^5, which is not summed up: it keeps pace with the method.
+    let [order, between] = slopes("dopri5", Method::Dopri5(ANYTHING), &[64, 91, 128, 181, 256]);
+    assert!((order - 5.0).abs() < 0.1, "order {order}");
+    assert!((between - 5.0).abs() < 0.1, "between steps {between}");
+}
+
+#[test]
+fn dopri5_keeps_the_tolerance_it_is_given_with_steps_by_the_fifth_root() {
+    let trajectory = Trajectory::swing(1.0, 20.0, 1, 1e-3);
+    let exact = Swing::exact(&[1.0], 20.0);
+    let mut steps = Vec::new();
+    for tolerance in [1e-5, 1e-7, 1e-9, 1e-11] {
+        let allowed = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 100_000 };
+        let (outcomes, _) =
+            solve::<Swing, 3, 1>(Simd::best(), Method::Dopri5(allowed), core::slice::from_ref(&trajectory));
+        let Outcome { ended, x, count, error_inside, .. } = outcomes[0];
+        assert!(matches!(ended, Ended::Arrived(_)));
+        let error = (0..3).map(|i| (x[i] - exact[i]).abs()).fold(error_inside, f64::max);
+        eprintln!("dopri5 at {tolerance:e}: error {error:.2e}, {count:?}");
+        assert!(error < 30.0 * tolerance, "{tolerance:e} gave {error:e}");
+        steps.push(count.accepted as f64);
+    }
+    // Local error is h^5 against the tolerance: a hundredth of it takes 100^(1/5) = 2.51 times as many steps.
+    for pair in steps.windows(2) {
+        assert!((2.1..2.9).contains(&(pair[1] / pair[0])), "{steps:?}");
+    }
+}
+
+#[test]
+fn every_leg_ends_where_it_should() {
+    // Ends and steps that binary fractions do not hit.
+    let ends = [0.1, 0.7, 1.0 / 3.0, 2.2, 5.3, 0.049, 7.77];
+    for method in
+        [Method::Rk4, Method::Dopri5(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 })]
+    {
+        let trajectories: Vec<_> = ends
+            .into_iter()
+            .map(|end_s| {
+                let edges = [0.0, 0.3 * end_s, 0.31 * end_s, end_s];
+                let leg = |pair: &[f64]| Leg { start_s: pair[0], end_s: pair[1], step_s: 0.007 };
+                Trajectory {
+                    legs: edges.windows(2).map(leg).collect(),
+                    ..Trajectory::swing(1.0, 1.0, 1, 1.0)
+                }
+            })
+            .collect();
+        for simd in super::instruction_sets() {
+            let (outcomes, _) = solve::<Swing, 3, 1>(simd, method, &trajectories);
+            for (end_s, outcome) in ends.into_iter().zip(outcomes) {
+                assert!(matches!(outcome.ended, Ended::Arrived(_)));
+                assert_eq!(outcome.observed_to_s.to_bits(), end_s.to_bits(), "{method:?} on {simd:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_fixed_step_fills_its_leg_with_the_fewest_equal_steps() {
+    let steps = |end_s: f64, step_s: f64| crate::rk4::fixed_steps(&Leg { start_s: 0.0, end_s, step_s });
+    assert_eq!(steps(50.0, 2e-4), 250_000);
+    assert_eq!(steps(1.0, 0.3), 4);
+    // 0.7 / 0.1 is a hair below 7, 0.3 / 0.1 a hair below 3, 4.35 / 0.01 a hair below 435: none is an eighth of a step off.
+    assert_eq!([steps(0.7, 0.1), steps(0.3, 0.1), steps(4.35, 0.01)], [7, 3, 435]);
+    // 1.1 / 0.1 is a hair above 11.
+    assert_eq!(steps(1.1, 0.1), 11);
+    assert_eq!(steps(0.01, 1.0), 1);
+}

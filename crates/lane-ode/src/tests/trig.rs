@@ -1,0 +1,128 @@
+//! Sine and cosine against arbitrary precision.
+
+use crate::{N, trig};
+use astro_float_num::{BigFloat, Consts, RoundingMode};
+use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+/// Bits of the reference: the closest that an argument here comes to a multiple of pi/2 costs some 60 to 80 of them.
+const BITS: usize = 320;
+const NEAREST: RoundingMode = RoundingMode::ToEven;
+
+struct Reference {
+    constants: Consts,
+}
+
+impl Reference {
+    fn new() -> Self {
+        Self { constants: Consts::new().unwrap() }
+    }
+
+    /// Errors of `computed` sine and cosine of `angle`, in units in the last place of the true values.
+    fn errors(&mut self, angle: &BigFloat, (sin, cos): (f64, f64)) -> f64 {
+        let true_sin = angle.sin(BITS, NEAREST, &mut self.constants);
+        let true_cos = angle.cos(BITS, NEAREST, &mut self.constants);
+        ulps(sin, &true_sin).max(ulps(cos, &true_cos))
+    }
+
+    /// Of an angle in radians.
+    fn radians(&mut self, x: f64) -> f64 {
+        self.errors(&BigFloat::from_f64(x, BITS), trig::sin_cos(x))
+    }
+
+    /// Of an angle in turns.
+    fn turns(&mut self, turns: f64) -> f64 {
+        let two_pi = self.constants.pi(BITS, NEAREST).mul(&BigFloat::from_f64(2.0, BITS), BITS, NEAREST);
+        let angle = BigFloat::from_f64(turns, BITS).mul(&two_pi, BITS, NEAREST);
+        let (sin, cos) = trig::sin_cos_turns(N(turns));
+        self.errors(&angle, (sin.0, cos.0))
+    }
+}
+
+/// Distance between `computed` and `exact` in units of the last place that a double of `exact`'s size has.
+fn ulps(computed: f64, exact: &BigFloat) -> f64 {
+    let difference = BigFloat::from_f64(computed, BITS).sub(exact, BITS, NEAREST);
+    if difference.is_zero() {
+        return 0.0;
+    }
+    // m 2^e with m from 1/2 to 1: the last of 53 places counts 2^(e - 53).
+    let place = exact.exponent().unwrap() - 53;
+    let (words, _, _, exponent, _) = difference.as_raw_parts().unwrap();
+    let leading = *words.last().unwrap() as f64 / 2.0_f64.powi(64);
+    leading * 2.0_f64.powi(exponent - place)
+}
+
+/// The largest error over many angles.
+fn largest(name: &str, angles: impl Iterator<Item = f64>, mut error: impl FnMut(f64) -> f64) -> f64 {
+    let (mut most, mut at) = (0.0_f64, 0.0);
+    for angle in angles {
+        let error = error(angle);
+        assert!(error.is_finite(), "{name}: {angle}");
+        if error > most {
+            (most, at) = (error, angle);
+        }
+    }
+    eprintln!("{name}: at most {most:.4} ulp, at {at:e}");
+    most
+}
+
+/// `count` numbers, as often of either sign, from a seed.
+fn random(seed: u64, count: usize, number: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    (0..count).map(move |_| number(rng.f64()).copysign(rng.f64() - 0.5))
+}
+
+#[test]
+fn sines_of_coordinates_are_within_1_5_ulp() {
+    let mut reference = Reference::new();
+    // Within a quarter turn on one path, up to where a trajectory has diverged on the other.
+    let narrow = random(1, 3000, |u| u * FRAC_PI_4).chain(random(2, 1000, |u| 10.0_f64.powf(-12.0 * u)));
+    assert!(largest("below pi/4", narrow, |x| reference.radians(x)) < 1.2);
+    let wide = random(3, 3000, |u| FRAC_PI_4 + u * FRAC_PI_4);
+    assert!(largest("pi/4 to pi/2", wide, |x| reference.radians(x)) < 1.5);
+}
+
+#[test]
+fn sines_of_any_angle_are_within_1_5_ulp() {
+    let mut reference = Reference::new();
+    let large = random(4, 3000, |u| 10.0_f64.powf(6.0 * u));
+    assert!(largest("up to 1e6", large, |x| reference.radians(x)) < 1.5);
+    // Where almost all digits cancel.
+    let close = (1..500_u32).map(|k| f64::from(k * k) * FRAC_PI_2).chain((1..500).map(|k| f64::from(k) * PI));
+    assert!(largest("near multiples of pi/2", close, |x| reference.radians(x)) < 1.5);
+}
+
+#[test]
+fn sines_of_turns_are_within_1_6_ulp_however_many() {
+    let mut reference = Reference::new();
+    assert!(largest("turns below 1/2", random(5, 3000, |u| 0.5 * u), |t| reference.turns(t)) < 1.6);
+    let many = random(6, 3000, |u| 10.0_f64.powf(9.0 * u));
+    assert!(largest("up to 1e9 turns", many, |t| reference.turns(t)) < 1.6);
+    // Not quarters themselves, where one of the two is zero and has no units.
+    let close = (0..2000_i32).map(|k| f64::from(k) * 0.125 + 1e-9 * (0.5 + f64::from(k % 7 - 3)));
+    assert!(largest("near eighths of a turn", close, |t| reference.turns(t)) < 1.6);
+}
+
+#[test]
+fn whole_turns_drop_out_exactly() {
+    for part in [0.0, 0.125, 0.2, -0.3, 0.499] {
+        let [a, b] = [1.0, 1048576.0].map(|turns| {
+            // What is left of `part` after the whole turns have been added and taken away again.
+            let kept: f64 = (part + turns) - turns;
+            (trig::sin_cos_turns(N(kept)), trig::sin_cos_turns(N(kept + turns)))
+        });
+        for ((sin, cos), (sin_later, cos_later)) in [a, b] {
+            assert_eq!(sin.0.to_bits(), sin_later.0.to_bits(), "{part}");
+            assert_eq!(cos.0.to_bits(), cos_later.0.to_bits(), "{part}");
+        }
+    }
+}
+
+#[test]
+fn quarter_turns_are_exact() {
+    for (turns, sin, cos) in
+        [(0.0, 0.0, 1.0), (0.25, 1.0, 0.0), (0.5, 0.0, -1.0), (0.75, -1.0, 0.0), (7.25, 1.0, 0.0)]
+    {
+        let (s, c) = trig::sin_cos_turns(N(turns));
+        assert_eq!((s.0, c.0), (sin, cos), "{turns} turns");
+    }
+}
