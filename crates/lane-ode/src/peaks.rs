@@ -74,7 +74,8 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
             let (last, now) = (self.last[i], &samples[i]);
             self.raise(i, now.value.abs(), counts);
             // How far the control polygon reaches above the peak.
-            let polygon = (last.value + third * last.slope).abs().0.larger((now.value - third * now.slope).abs().0);
+            let polygon =
+                (last.value + third * last.slope).abs().0.larger((now.value - third * now.slope).abs().0);
             rises[i] = N(polygon) - self.peak[i];
             highest = N(rises[i].0.larger(highest.0));
         }

@@ -59,8 +59,8 @@ impl<T: Real> Coupling<T> {
         &self,
         bodies: &Bodies<T>,
         deflection: &Deflection<T>,
-        (mut tub, tub_inertia): (Floating<T, 2>, &Factors<T, 2>),
-        (mut rotor, rotor_inertia): (Floating<T, 4>, &Factors<T, 4>),
+        (tub, tub_inertia): (&Floating<T, 2>, &Factors<T, 2>),
+        (rotor, rotor_inertia): (&Floating<T, 4>, &Factors<T, 4>),
     ) -> [N<T>; COORDINATES] {
         let on_shaft = match self {
             Self::Springs => deflection.load(bodies),
@@ -70,10 +70,8 @@ impl<T: Real> Coupling<T> {
                 mass_scaled_load(bodies, *cap_squared, deflection, &of_tub, &of_rotor)
             }
         };
-        tub.apply(&on_shaft.reaction());
-        rotor.apply(&on_shaft);
-        let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia);
-        let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(rotor_inertia);
+        let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia, &on_shaft.reaction());
+        let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(rotor_inertia, &on_shaft);
         [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
     }
 }

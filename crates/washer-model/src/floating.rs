@@ -39,18 +39,23 @@ impl<T: Real, const R: usize> Floating<T, R> {
     /// Adds forces on the axis.
     #[inline(always)]
     pub(crate) fn apply(&mut self, load: &AxisLoad<T>) {
+        (self.force, self.torque) = self.under(load);
+    }
+
+    /// Force and torques with forces on the axis.
+    #[inline(always)]
+    fn under(&self, load: &AxisLoad<T>) -> ([N<T>; 2], [N<T>; R]) {
         let [moment_y, moment_z] = load.moment;
-        self.torque[0] += self.axis[0][1] * moment_z;
-        self.torque[1] = self.torque[1] + self.axis[1][0] * moment_y + self.axis[1][1] * moment_z;
+        let mut torque = self.torque;
+        torque[0] += self.axis[0][1] * moment_z;
+        torque[1] = torque[1] + self.axis[1][0] * moment_y + self.axis[1][1] * moment_z;
         for r in 0..R {
             if r > 0 {
-                self.torque[r] -= self.arm[r][0] * load.force[0];
+                torque[r] -= self.arm[r][0] * load.force[0];
             }
-            self.torque[r] -= self.arm[r][1] * load.force[1];
+            torque[r] -= self.arm[r][1] * load.force[1];
         }
-        for i in 0..2 {
-            self.force[i] += load.force[i];
-        }
+        ([self.force[0] + load.force[0], self.force[1] + load.force[1]], torque)
     }
 
     /// How midpoint and axis accelerate, and would under forces on the axis. `inertia` is J.
@@ -99,12 +104,17 @@ impl<T: Real, const R: usize> Floating<T, R> {
         Response { free, compliance }
     }
 
-    /// Accelerations: y and z of the bearing midpoint, then the rotations. `inertia` is J.
+    /// Accelerations with forces on the axis: y and z of the bearing midpoint, then the rotations. `inertia` is J.
     #[inline(always)]
-    pub(crate) fn accelerations(&self, inertia: &Factors<T, R>) -> ([N<T>; 2], [N<T>; R]) {
-        let rotation = inertia.solve(self.torque);
+    pub(crate) fn accelerations(
+        &self,
+        inertia: &Factors<T, R>,
+        load: &AxisLoad<T>,
+    ) -> ([N<T>; 2], [N<T>; R]) {
+        let (force, torque) = self.under(load);
+        let rotation = inertia.solve(torque);
         let mut translation =
-            [self.force[0] * self.per_mass - self.drift[0], self.force[1] * self.per_mass - self.drift[1]];
+            [force[0] * self.per_mass - self.drift[0], force[1] * self.per_mass - self.drift[1]];
         for r in 0..R {
             if r > 0 {
                 translation[0] -= self.arm[r][0] * rotation[r];

@@ -44,7 +44,9 @@ impl<T: Real> Deflection<T> {
     pub(crate) fn load(&self, b: &Bodies<T>) -> AxisLoad<T> {
         let zero = b.front_stiffness.lit(0.0);
         let mut load = AxisLoad { force: [zero; 2], moment: [zero; 2] };
-        for (position, stiffness) in [(b.bearing_front, b.front_stiffness), (b.bearing_rear, b.rear_stiffness)] {
+        for (position, stiffness) in
+            [(b.bearing_front, b.front_stiffness), (b.bearing_rear, b.rear_stiffness)]
+        {
             for i in 0..2 {
                 let force = -(stiffness * (self.offset[i] + position * self.tilt[i])).v();
                 load.force[i] += force;

@@ -161,7 +161,8 @@ impl<T: Lane> TermLanes<T> {
         basis: &[[N<T>; W]; B],
         sums: &mut [[N<T>; W]; ENTRIES],
     ) {
-        let mut rest = Rest { entries: &self.entries, functions: &self.functions, coefficients: &self.coefficients };
+        let mut rest =
+            Rest { entries: &self.entries, functions: &self.functions, coefficients: &self.coefficients };
         for terms in 1..=MOST_TERMS {
             let entries = self.with_terms[terms];
             if entries == 0 {
@@ -221,7 +222,8 @@ impl<T: Lane> Rest<'_, T> {
                 }
             }
             sums[usize::from(entry)] = sum;
-            *self = Rest { entries: later_entries, functions: later_functions, coefficients: later_coefficients };
+            *self =
+                Rest { entries: later_entries, functions: later_functions, coefficients: later_coefficients };
         }
     }
 
@@ -249,7 +251,8 @@ impl<T: Lane> Rest<'_, T> {
                 }
             }
             sums[usize::from(entry)] = sum;
-            *self = Rest { entries: later_entries, functions: later_functions, coefficients: later_coefficients };
+            *self =
+                Rest { entries: later_entries, functions: later_functions, coefficients: later_coefficients };
         }
     }
 }

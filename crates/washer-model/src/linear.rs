@@ -275,8 +275,8 @@ pub(crate) fn accelerations<T: Lane>(
     coupling.accelerations(
         bodies,
         &deflection(constants, q),
-        (tub, tub_inertia),
-        (rotor, &rotor_at.inertia),
+        (&tub, tub_inertia),
+        (&rotor, &rotor_at.inertia),
     )
 }
 

@@ -23,7 +23,7 @@ const COLUMNS: usize = COORDINATES + 1;
 const NOISE: f64 = 1e-13;
 
 /// What the outputs are sums of: 1, cos and sin of theta, each times 1 and every coordinate.
-const FEATURES: usize = 3 * COLUMNS;
+pub(crate) const FEATURES: usize = 3 * COLUMNS;
 
 /// The outputs, as sparse terms.
 #[derive(Clone, Debug)]
@@ -66,35 +66,32 @@ impl<T: Lane> OutputLanes<T> {
 
 #[inline(always)]
 fn samples<T: Lane, const M: usize>(terms: &TermLanes<T>, features: &Features<T>) -> [Sample<T>; M] {
-    let zero = features.0[0][1];
+    let zero = features[0][1];
     let mut sums = [[zero; 3]; M];
-    terms.sum(&features.0, &mut sums);
+    terms.sum(features, &mut sums);
     core::array::from_fn(|i| Sample { value: sums[i][0], slope: sums[i][1], curvature: sums[i][2] })
 }
 
 /// The features with two time derivatives.
-pub(crate) struct Features<T>([[N<T>; 3]; FEATURES]);
+pub(crate) type Features<T> = [[N<T>; 3]; FEATURES];
 
-impl<T: Real> Features<T> {
-    /// At deviations from equilibrium in motion.
-    #[inline(always)]
-    pub(crate) fn new(spin: &SpinState<T>, motion: &Motion<T>) -> Self {
-        let zero = spin.sin.lit(0.0);
-        let (n, nn) = (spin.speed, (spin.speed * spin.speed).v());
-        let acceleration = spin.acceleration;
-        let one = [zero.lit(1.0), zero, zero];
-        let cos = [spin.cos, -(n * spin.sin).v(), -(acceleration * spin.sin + nn * spin.cos)];
-        let sin = [spin.sin, (n * spin.cos).v(), acceleration * spin.cos - nn * spin.sin];
-        let mut features = [one; FEATURES];
-        features[COLUMNS] = cos;
-        features[2 * COLUMNS] = sin;
-        for j in 0..COORDINATES {
-            let q = [motion.q[j], motion.u[j], motion.a[j]];
-            features[1 + j] = q;
-            features[COLUMNS + 1 + j] = product(&cos, &q);
-            features[2 * COLUMNS + 1 + j] = product(&sin, &q);
-        }
-        Self(features)
+/// The features at deviations from equilibrium in motion; written in place, because they are too many to be moved.
+#[inline(always)]
+pub(crate) fn write_features<T: Real>(spin: &SpinState<T>, motion: &Motion<T>, features: &mut Features<T>) {
+    let zero = spin.sin.lit(0.0);
+    let (n, nn) = (spin.speed, (spin.speed * spin.speed).v());
+    let acceleration = spin.acceleration;
+    let one = [zero.lit(1.0), zero, zero];
+    let cos = [spin.cos, -(n * spin.sin).v(), -(acceleration * spin.sin + nn * spin.cos)];
+    let sin = [spin.sin, (n * spin.cos).v(), acceleration * spin.cos - nn * spin.sin];
+    features[0] = one;
+    features[COLUMNS] = cos;
+    features[2 * COLUMNS] = sin;
+    for j in 0..COORDINATES {
+        let q = [motion.q[j], motion.u[j], motion.a[j]];
+        features[1 + j] = q;
+        features[COLUMNS + 1 + j] = product(&cos, &q);
+        features[2 * COLUMNS + 1 + j] = product(&sin, &q);
     }
 }
 

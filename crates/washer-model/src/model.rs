@@ -6,7 +6,7 @@ use crate::floating::Factors;
 use crate::harmonics::TermLanes;
 use crate::lanes::SetLane;
 use crate::linear::{self, Constants, RotorAt};
-use crate::linear_outputs::{Features, OutputLanes};
+use crate::linear_outputs::{FEATURES, OutputLanes, write_features};
 use crate::nonlinear::{self, COORDINATES};
 use crate::outputs::{Axes, CHANNELS, Motion, RADIAL};
 use crate::point::Point;
@@ -235,7 +235,8 @@ impl<T: Lane> Model<T> for Linear<T> {
         dx: &[N<T>; STATES],
         with_channels: bool,
     ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>) {
-        let features = Features::new(&forcing.spin, &motion(x, dx));
+        let mut features = [[x[0].lit(0.0); 3]; FEATURES];
+        write_features(&forcing.spin, &motion(x, dx), &mut features);
         let channels = if with_channels { Some(self.outputs.channels(&features)) } else { None };
         (self.outputs.radial(&features), channels)
     }

@@ -71,8 +71,8 @@ pub(crate) fn accelerations<T: Real>(
     coupling.accelerations(
         machine.bodies,
         &Deflection::new(q, &tub.tilt, &rotor.tilt),
-        (tub.floating, &Factors::new(tub.inertia)),
-        (rotor.floating, &Factors::new(rotor.inertia)),
+        (&tub.floating, &Factors::new(tub.inertia)),
+        (&rotor.floating, &Factors::new(rotor.inertia)),
     )
 }
 

@@ -193,7 +193,12 @@ fn angular_acceleration<T: Real>(tilt: &Tilt<T>, at: &TiltMotion<T>, yaw: N<T>, 
 
 /// The axis of a tilted frame.
 #[inline(always)]
-fn axis_course<T: Real>(tilt: &Tilt<T>, at: &TiltMotion<T>, rates: [N<T>; 2], seconds: [N<T>; 2]) -> Course<T> {
+fn axis_course<T: Real>(
+    tilt: &Tilt<T>,
+    at: &TiltMotion<T>,
+    rates: [N<T>; 2],
+    seconds: [N<T>; 2],
+) -> Course<T> {
     let zero = rates[0].lit(0.0);
     let by_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
     let by_pitch = &tilt.second_c;

@@ -6,7 +6,8 @@ use crate::outputs::{CHANNELS, squared};
 use crate::point::{PlannedLeg, Point};
 use core::marker::PhantomData;
 use lane_ode::{
-    Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Simd, Step, System, Task, Tolerance, dopri5, rk4,
+    Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Simd, Step, System, Task, Tolerance,
+    dopri5, rk4,
 };
 
 /// How trajectories are integrated.
@@ -155,6 +156,11 @@ impl<T: Lane, M: Model<T>> System<T, STATES> for Run<'_, T, M> {
     #[inline(always)]
     fn forcing(&self, t_s: N<T>) -> M::Forcing {
         self.model.forcing(t_s)
+    }
+
+    #[inline(always)]
+    fn renew(&self, t_s: N<T>, forcing: &mut M::Forcing) {
+        self.model.renew(t_s, forcing);
     }
 
     #[inline(always)]
