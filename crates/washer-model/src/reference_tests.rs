@@ -4,8 +4,11 @@ use crate::coefficients::Coefficients;
 use crate::machine::Machine;
 use crate::nonlinear::{self, COORDINATES};
 use crate::spin::SpinState;
-use crate::{Channel, Method, ModelKind, Spin, Timing, prepare, simulate};
+use crate::{
+    Channel, Method, ModelKind, Spin, Timing, highest_frequency_rad_per_s, modes, prepare, simulate,
+};
 use crate::{equilibrium, linear};
+use core::f64::consts::TAU;
 use lane_ode::{N, Simd};
 use serde_json::Value;
 
@@ -85,6 +88,26 @@ fn val_linear_matrices_match_an_independent_expansion() {
             let error = (ours.force[i] - theirs[i]).abs() / largest;
             assert!(error < 1e-9, "F[{i}]: {} against {}", ours.force[i], theirs[i]);
         }
+    }
+}
+
+#[test]
+fn val_eigenvalues_match_an_independent_solution() {
+    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0] };
+    for case in reference("modes.json")["cases"].as_array().unwrap() {
+        let spin = Spin::Ramp { peak_rpm: 100.0, ramp_s: 1.0 };
+        let point = prepare(Simd::Scalar, &[(machine(case), spin)], &timing).remove(0).unwrap();
+        let speed = case["speed_rpm"].as_f64().unwrap() * TAU / 60.0;
+        let ours = modes(&point, case["theta"].as_f64().unwrap(), speed).unwrap().modes;
+        for (ours, theirs) in ours.iter().zip(case["eigenvalues"].as_array().unwrap()) {
+            let [re, im] = numbers(theirs);
+            let error = (ours.re_per_s - re).hypot(ours.im_rad_per_s - im) / re.hypot(im);
+            assert!(error < 1e-7, "{} {} against {re} {im}", ours.re_per_s, ours.im_rad_per_s);
+        }
+        let highest = highest_frequency_rad_per_s(&point, speed).unwrap();
+        let [re, im] = numbers(case["eigenvalues"].as_array().unwrap().last().unwrap());
+        // Theirs is at theta = 0 only.
+        assert!((highest / f64::hypot(re, im) - 1.0).abs() < 2e-3, "{highest} against {im}");
     }
 }
 

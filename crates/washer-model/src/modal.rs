@@ -1,0 +1,200 @@
+//! Complex modal analysis of the linear model at one instant of the spin (Eqs. 43 to 45).
+//!
+//! With theta, its speed and so M, C and K frozen, M q'' + C q' + K q = 0 has solutions q = phi exp(s t).
+
+use crate::nonlinear::COORDINATES;
+use crate::point::Point;
+use core::f64::consts::TAU;
+use faer::linalg::solvers::{Llt, Solve as _};
+use faer::{Mat, Side, c64};
+
+/// States of the first-order system, two per coordinate.
+const STATES: usize = 2 * COORDINATES;
+
+/// Angles over a turn at which the highest frequency is looked for: M and K hold harmonics 0 to 2 of theta.
+const ANGLES: usize = 8;
+
+/// The eigenvalues of a machine could not be found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoModes {
+    /// A machine that is no rigid body system.
+    #[error("the mass matrix is not positive definite: some body has no inertia")]
+    Mass,
+    /// Not finite, or too far apart for double precision.
+    #[error("the eigenvalues cannot be found: masses and stiffnesses are too far apart for double precision")]
+    Eigenvalues,
+}
+
+/// One natural motion, q = Re(shape exp(s t)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mode {
+    /// Real part of s (1/s); negative when the motion decays.
+    pub re_per_s: f64,
+    /// Imaginary part of s (rad/s), the damped natural frequency; 0 for a motion that does not swing.
+    pub im_rad_per_s: f64,
+    /// Undamped natural frequency |s| (rad/s): for a motion that does not swing, the root of the product of its two rates.
+    pub magnitude_rad_per_s: f64,
+    /// Coordinates q1 to q10 (m, rad) as real and imaginary part, of unit modal mass: shape^H M shape = 1.
+    pub shape: [[f64; 2]; COORDINATES],
+}
+
+impl Mode {
+    /// Share of critical damping: below 1 the motion swings, below 0 it grows.
+    #[must_use]
+    pub fn damping_ratio(&self) -> f64 {
+        -self.re_per_s / self.magnitude_rad_per_s
+    }
+
+    /// Damped natural frequency in cycles per minute.
+    #[must_use]
+    pub fn frequency_rpm(&self) -> f64 {
+        self.im_rad_per_s * 60.0 / TAU
+    }
+}
+
+/// Every natural motion at one instant, the slowest first, and the mass matrix by which their shapes compare.
+#[derive(Clone, Debug)]
+pub struct Modes {
+    /// One per coordinate: pairs of conjugate eigenvalues count once, real ones two by two.
+    pub modes: [Mode; COORDINATES],
+    pub(crate) mass: [[f64; COORDINATES]; COORDINATES],
+}
+
+/// Modal assurance criterion of two shapes of unit modal mass, with the mass matrix as weight: 1 for the same motion, 0 for
+/// motions that share none.
+#[must_use]
+pub(crate) fn assurance(
+    mass: &[[f64; COORDINATES]; COORDINATES],
+    a: &[[f64; 2]; COORDINATES],
+    b: &[[f64; 2]; COORDINATES],
+) -> f64 {
+    let product = inner(mass, a, b);
+    product[0] * product[0] + product[1] * product[1]
+}
+
+/// a^H M b, real and imaginary part.
+pub(crate) fn inner(
+    mass: &[[f64; COORDINATES]; COORDINATES],
+    a: &[[f64; 2]; COORDINATES],
+    b: &[[f64; 2]; COORDINATES],
+) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for i in 0..COORDINATES {
+        for j in 0..COORDINATES {
+            let m = mass[i][j];
+            sum[0] += m * (a[i][0] * b[j][0] + a[i][1] * b[j][1]);
+            sum[1] += m * (a[i][0] * b[j][1] - a[i][1] * b[j][0]);
+        }
+    }
+    sum
+}
+
+/// The natural motions with theta frozen at `theta_rad` while the drum turns at `speed_rad_per_s`.
+///
+/// # Errors
+/// [`NoModes`] when the matrices are singular or not finite.
+pub fn modes(point: &Point, theta_rad: f64, speed_rad_per_s: f64) -> Result<Modes, NoModes> {
+    let (system, mass) = first_order(point, theta_rad, speed_rad_per_s)?;
+    let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
+    let values = decomposition.S().column_vector();
+    let vectors = decomposition.U();
+    let mut swinging = Vec::with_capacity(COORDINATES);
+    let mut steady = Vec::new();
+    for k in 0..STATES {
+        let s = values[k] * system.unit_per_s;
+        if !(s.re.is_finite() && s.im.is_finite()) {
+            return Err(NoModes::Eigenvalues);
+        }
+        let shape = || unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, k)]));
+        if s.im > 0.0 {
+            swinging.push(mode(s, s.norm(), shape()));
+        } else if s.im == 0.0 {
+            steady.push((s.re, shape()));
+        }
+    }
+    // Rates that belong together come apart symmetrically about their mean: the slowest with the fastest would not do.
+    steady.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+    for pair in steady.chunks_exact(2) {
+        let (slow, fast) = (pair[0].0, pair[1].0);
+        let s = c64::new(0.5 * (slow + fast), 0.0);
+        swinging.push(mode(s, (slow * fast).abs().sqrt(), pair[0].1));
+    }
+    swinging.sort_by(|a, b| a.magnitude_rad_per_s.total_cmp(&b.magnitude_rad_per_s));
+    let modes = swinging.try_into().map_err(|_| NoModes::Eigenvalues)?;
+    Ok(Modes { modes, mass })
+}
+
+fn mode(s: c64, magnitude: f64, shape: [[f64; 2]; COORDINATES]) -> Mode {
+    Mode { re_per_s: s.re, im_rad_per_s: s.im, magnitude_rad_per_s: magnitude, shape }
+}
+
+/// Of unit modal mass; its largest entry real and positive, so that phases read as lags behind it.
+fn unit_mass(
+    mass: &[[f64; COORDINATES]; COORDINATES],
+    vector: &[c64; COORDINATES],
+) -> [[f64; 2]; COORDINATES] {
+    let largest = vector.iter().fold(c64::new(0.0, 0.0), |m, v| if v.norm() > m.norm() { *v } else { m });
+    let turned = vector.map(|v| v * largest.conj() / largest.norm_sqr());
+    let pairs = turned.map(|v| [v.re, v.im]);
+    let scale = inner(mass, &pairs, &pairs)[0].sqrt();
+    pairs.map(|[re, im]| [re / scale, im / scale])
+}
+
+/// The largest |s| (rad/s) of a machine while its drum turns at `speed_rad_per_s`, over a turn of theta: what limits the step of
+/// an explicit method.
+///
+/// # Errors
+/// As [`modes`].
+pub fn highest_frequency_rad_per_s(point: &Point, speed_rad_per_s: f64) -> Result<f64, NoModes> {
+    let mut highest = 0.0_f64;
+    for angle in 0..ANGLES {
+        let theta = TAU * angle as f64 / ANGLES as f64;
+        let (system, _) = first_order(point, theta, speed_rad_per_s)?;
+        for s in system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)? {
+            let magnitude = s.norm() * system.unit_per_s;
+            if !magnitude.is_finite() {
+                return Err(NoModes::Eigenvalues);
+            }
+            highest = highest.max(magnitude);
+        }
+    }
+    Ok(highest)
+}
+
+/// x' = unit A x over x = (q, q' / unit).
+struct FirstOrder {
+    matrix: Mat<f64>,
+    /// A rate (1/s) that makes all of the matrix's blocks of one size: eigenvalues come out as precise as the fastest of them,
+    /// not as its square.
+    unit_per_s: f64,
+}
+
+fn first_order(
+    point: &Point,
+    theta_rad: f64,
+    speed_rad_per_s: f64,
+) -> Result<(FirstOrder, [[f64; COORDINATES]; COORDINATES]), NoModes> {
+    let matrices = point.matrices(theta_rad, speed_rad_per_s, 0.0);
+    let full = |m: &[[f64; COORDINATES]; COORDINATES]| Mat::from_fn(COORDINATES, COORDINATES, |i, j| m[i][j]);
+    let mass = full(&matrices.mass);
+    let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| NoModes::Mass)?;
+    let stiffness = factors.solve(full(&matrices.stiffness));
+    let damping = factors.solve(full(&matrices.damping));
+    let largest = (0..COORDINATES)
+        .flat_map(|i| (0..COORDINATES).map(move |j| (i, j)))
+        .fold(0.0_f64, |largest, at| largest.max(stiffness[at].abs()));
+    if !largest.is_finite() {
+        return Err(NoModes::Eigenvalues);
+    }
+    let unit_per_s = largest.sqrt().max(1.0);
+    let matrix = Mat::from_fn(STATES, STATES, |i, j| {
+        if i < COORDINATES {
+            f64::from(u8::from(j == i + COORDINATES))
+        } else if j < COORDINATES {
+            -stiffness[(i - COORDINATES, j)] / (unit_per_s * unit_per_s)
+        } else {
+            -damping[(i - COORDINATES, j - COORDINATES)] / unit_per_s
+        }
+    });
+    Ok((FirstOrder { matrix, unit_per_s }, matrices.mass))
+}
