@@ -4,6 +4,7 @@ pub mod cli;
 pub mod commands;
 pub mod config;
 pub mod engine;
+pub mod estimate;
 pub mod exit;
 pub mod interrupt;
 pub mod outcome;

@@ -280,7 +280,7 @@ fn panic_text(panic: &(dyn Any + Send)) -> &str {
 }
 
 /// The cores that Slurm gave this task, else those the process may use.
-fn default_threads(environment: Environment<'_>) -> usize {
+pub(crate) fn default_threads(environment: Environment<'_>) -> usize {
     environment("SLURM_CPUS_PER_TASK")
         .and_then(|cores| cores.parse().ok())
         .filter(|cores| *cores > 0)

@@ -1,10 +1,12 @@
-//! `sweep check GRID.toml`: every mistake, or what a run would do.
+//! `sweep check GRID.toml`: every mistake, or what a run would do and about how long it would take.
 
 use std::fmt::Write as _;
 
 use super::Grid;
+use crate::estimate::{Estimate, size};
 use crate::exit::{Error, Exit, print, tell};
 use crate::plan::{Axis, AxisValues, Integrator, Plan};
+use crate::progress::duration;
 
 /// Arguments of `sweep check`.
 #[derive(Debug, clap::Args)]
@@ -19,18 +21,19 @@ pub struct Args {
 /// Checks a grid and shows its plan.
 ///
 /// # Errors
-/// Mistakes in the grid file, or standard output that cannot be written.
+/// Mistakes in the grid file, no engine for it, or standard output that cannot be written.
 pub fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.grid.load()?;
     if args.json {
         return print(&format!("{:#}\n", plan.to_json()));
     }
-    tell(summary(&plan).trim_end());
+    let estimate = Estimate::of(&plan, &|name| std::env::var(name).ok())?;
+    tell(summary(&plan, &estimate).trim_end());
     Ok(Exit::Done)
 }
 
 /// The plan in a few lines.
-fn summary(plan: &Plan) -> String {
+fn summary(plan: &Plan, estimate: &Estimate) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         // Writing to a String cannot fail.
@@ -48,7 +51,34 @@ fn summary(plan: &Plan) -> String {
     line("channels", channels.join(", "));
     line("verdict", format!("reliable where every ratio is below {}", plan.reliability.ratio_limit));
     line("output", format!("results/{}.parquet", plan.name));
+    line(
+        "runs on",
+        format!(
+            "{} thread{}, instruction set {}",
+            estimate.threads,
+            plural(estimate.threads as u64),
+            estimate.simd
+        ),
+    );
+    line("takes", took(plan, estimate));
+    let (memory, disk) = (size(estimate.memory_bytes), size(estimate.disk_bytes));
+    line(
+        "",
+        format!("{memory} of memory; on disk {disk} while it runs, and at most as much again for the result"),
+    );
     text
+}
+
+/// The time, and what it was reckoned from.
+fn took(plan: &Plan, estimate: &Estimate) -> String {
+    let (points, whole) = (estimate.sampled_points, estimate.sampled_s >= plan.end_s);
+    let part = if whole { String::new() } else { format!(", the first {} s each", estimate.sampled_s) };
+    let about = duration(estimate.wall_s);
+    format!("about {about}: an estimate, from {points} point{} integrated just now{part}", plural(points))
+}
+
+fn plural(count: u64) -> &'static str {
+    if count == 1 { "" } else { "s" }
 }
 
 fn describe(axis: &Axis) -> String {

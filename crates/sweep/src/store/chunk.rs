@@ -65,7 +65,8 @@ fn reject(place: &Place, reason: String) -> StoreError {
     StoreError::Engine { first: place.first, last, reason }
 }
 
-const fn record_length(channels: usize) -> usize {
+/// What a point takes in a chunk's file, bytes.
+pub(crate) const fn bytes_a_point(channels: usize) -> usize {
     8 + 3 + 2 * (4 * 8 + 8 * channels)
 }
 
@@ -75,7 +76,7 @@ pub(crate) fn encode(place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, Sto
         return Err(reject(place, format!("{} outcomes for {} points", outcomes.len(), place.count)));
     }
     let channels = place.channels as usize;
-    let mut bytes = Vec::with_capacity(HEADER + outcomes.len() * record_length(channels) + HASH);
+    let mut bytes = Vec::with_capacity(HEADER + outcomes.len() * bytes_a_point(channels) + HASH);
     bytes.extend_from_slice(&header(place));
     for (outcome, point) in outcomes.iter().zip(place.first..) {
         if outcome.point != point {
@@ -112,7 +113,7 @@ pub(crate) fn decode(place: &Place, bytes: &[u8]) -> Result<Vec<Outcome>, Damage
         return Err(Damage::Foreign);
     }
     let channels = place.channels as usize;
-    let length = record_length(channels);
+    let length = bytes_a_point(channels);
     if records.len() as u64 != place.count.saturating_mul(length as u64) {
         return Err(Damage::Length);
     }

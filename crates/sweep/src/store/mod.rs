@@ -35,6 +35,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+pub(crate) use chunk::bytes_a_point as chunk_bytes;
 pub use error::{Holder, StoreError};
 pub use merge::Joined;
 pub use open::{Opened, Options, Run};

@@ -21,7 +21,7 @@ use crate::verdict::{ROW_STATUSES, Verdict, row_status};
 
 /// Rows in a row group: fixed, so that chunking leaves no trace in the file. A group of 25 columns takes about 30 MB
 /// in memory while it is written.
-const ROW_GROUP_ROWS: usize = 1 << 17;
+pub(crate) const ROW_GROUP_ROWS: usize = 1 << 17;
 
 /// Rows handed to the Parquet writer at once: fixed for the same reason, and a whole number of them makes a group.
 pub(crate) const BATCH_ROWS: usize = 1 << 12;

@@ -1,0 +1,212 @@
+//! What a run will take: time, from a few points integrated on the spot; memory and disk, from what is held at once.
+
+use std::time::{Duration, Instant};
+
+use lane_ode::MAX_LANES;
+
+use crate::engine::{EngineError, ModelEngine};
+use crate::interrupt::Interrupt;
+use crate::outcome::Outcome;
+use crate::plan::{Integrator, Plan};
+use crate::run::{Engine, Watch, default_threads};
+use crate::store::{Environment, Job, chunk_bytes, chunk_points};
+
+/// Integration goes on with longer and longer beginnings of a trajectory until one takes this long.
+const LONG_ENOUGH: Duration = Duration::from_millis(60);
+
+/// No further place of the grid is tried after this.
+const BUDGET: Duration = Duration::from_millis(350);
+
+/// Parts of the way through the grid at which points are tried.
+const PLACES: [f64; 3] = [0.5, 0.9, 0.1];
+
+/// The program, its libraries and its buffers, before any point (measured: docs/scaling.md).
+const BASE_BYTES: f64 = 24e6;
+
+/// What a cell of a row group takes while it is encoded, besides its own 8 bytes (measured: docs/scaling.md).
+const CELL_BYTES: f64 = 12.0;
+
+/// What a run will take. Every number is an estimate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Instruction set.
+    pub simd: String,
+    /// Worker threads.
+    pub threads: usize,
+    /// Time from start to end, if the threads have a core each to themselves.
+    pub wall_s: f64,
+    /// Time of one core for one point.
+    pub core_s_per_point: f64,
+    /// Points that were integrated for it.
+    pub sampled_points: u64,
+    /// How far, of the plan's `end_s`.
+    pub sampled_s: f64,
+    /// Memory at its peak.
+    pub memory_bytes: f64,
+    /// Disk for the run's folder, and at most as much again for the result.
+    pub disk_bytes: f64,
+}
+
+impl Estimate {
+    /// Integrates some points of the plan, for about half a second, and reckons from there.
+    ///
+    /// # Errors
+    /// What keeps a run from having an engine.
+    pub fn of(plan: &Plan, environment: Environment<'_>) -> Result<Self, EngineError> {
+        let threads = default_threads(environment);
+        let began = Instant::now();
+        let mut samples = Vec::new();
+        for place in PLACES {
+            if samples.is_empty() || began.elapsed() < BUDGET {
+                samples.push(Sample::take(plan, place)?);
+            }
+        }
+        let core_s_per_point =
+            samples.iter().map(|sample| sample.core_s_per_point).sum::<f64>() / samples.len() as f64;
+        let chunk = chunk_points(plan.points());
+        // A chunk is one thread's work, so the last round of chunks may leave threads without any.
+        let rounds = plan.points().div_ceil(chunk).div_ceil(threads as u64);
+        let points_a_thread = (rounds * chunk).min(plan.points());
+        Ok(Self {
+            simd: ModelEngine::new(plan)?.simd().to_owned(),
+            threads,
+            wall_s: points_a_thread as f64 * core_s_per_point,
+            core_s_per_point,
+            sampled_points: samples.iter().map(|sample| sample.points).sum(),
+            sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
+            memory_bytes: memory_bytes(plan, threads),
+            disk_bytes: plan.points() as f64 * chunk_bytes(plan.reliability.channels.len()) as f64,
+        })
+    }
+}
+
+/// What one place of the grid told.
+struct Sample {
+    core_s_per_point: f64,
+    points: u64,
+    integrated_s: f64,
+}
+
+impl Sample {
+    fn take(plan: &Plan, place: f64) -> Result<Self, EngineError> {
+        let points = plan.points().min(MAX_LANES as u64);
+        let first = (plan.points().saturating_sub(points) as f64 * place) as u64;
+        let mut shorter: Option<(f64, f64)> = None;
+        let mut end_s = first_end_s(plan);
+        loop {
+            let cost_s = cost_s(plan, first..first + points, end_s)?;
+            if end_s >= plan.end_s || cost_s >= LONG_ENOUGH.as_secs_f64() {
+                // What does not grow with the length (the equilibrium) must not be multiplied.
+                let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
+                let rate = ((cost_s - base_s) / (end_s - base_end_s)).max(0.0);
+                let whole_s = cost_s + rate * (plan.end_s - end_s);
+                return Ok(Self { core_s_per_point: whole_s / points as f64, points, integrated_s: end_s });
+            }
+            shorter = Some((end_s, cost_s));
+            end_s = (4.0 * end_s).min(plan.end_s);
+        }
+    }
+}
+
+/// A beginning of the run so short that any method is through it in milliseconds.
+fn first_end_s(plan: &Plan) -> f64 {
+    let short_s = match plan.integrator {
+        Integrator::Rk4 { step_s } => 100.0 * step_s,
+        Integrator::Dopri5 { .. } | Integrator::Rk4MassScaled { .. } => 1e-3,
+    };
+    short_s.min(plan.end_s)
+}
+
+/// Time that one core takes for the beginning of these points' runs.
+fn cost_s(plan: &Plan, points: std::ops::Range<u64>, end_s: f64) -> Result<f64, EngineError> {
+    let share = end_s / plan.end_s;
+    let window_s = plan.window_s.map(|edge_s| (edge_s * share).min(end_s));
+    let cut = Plan { end_s, window_s, ..plan.clone() };
+    let engine = ModelEngine::new(&cut)?;
+    let interrupt = Interrupt::new();
+    let began = Instant::now();
+    let outcomes = engine.evaluate(points, &Watch::new(&interrupt));
+    let cost_s = began.elapsed().as_secs_f64();
+    drop(outcomes);
+    Ok(cost_s)
+}
+
+/// Chunks in hand and on their way to the disk, then one row group of the result.
+fn memory_bytes(plan: &Plan, threads: usize) -> f64 {
+    let channels = plan.reliability.channels.len() as f64;
+    let outcome = size_of::<Outcome>() as f64 + 2.0 * 8.0 * channels;
+    let in_hand = (2 * threads + 1) as f64 * chunk_points(plan.points()) as f64 * outcome;
+    let columns = Job::of(plan).layout.schema().fields().len() as f64;
+    let row_group = crate::store::schema::ROW_GROUP_ROWS as f64;
+    let joining = row_group.min(plan.points() as f64) * columns * (8.0 + CELL_BYTES);
+    BASE_BYTES + in_hand.max(joining)
+}
+
+/// A size with three digits.
+#[must_use]
+pub(crate) fn size(bytes: f64) -> String {
+    const UNITS: [&str; 5] = ["bytes", "kB", "MB", "GB", "TB"];
+    let mut scaled = bytes;
+    let mut unit = 0;
+    while scaled >= 999.5 && unit + 1 < UNITS.len() {
+        scaled /= 1e3;
+        unit += 1;
+    }
+    let digits = if unit == 0 || scaled >= 99.95 { 0 } else { 1 };
+    format!("{scaled:.digits$} {}", UNITS[unit])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_read_as_people_say_them() {
+        let said = [0.0, 999.0, 1234.0, 56.7e6, 999.96e6, 2e9, 3e15].map(size);
+        assert_eq!(said, ["0 bytes", "999 bytes", "1.2 kB", "56.7 MB", "1.0 GB", "2.0 GB", "3000 TB"]);
+    }
+
+    /// A grid of `count` points over `end_s`.
+    fn plan(count: u64, end_s: f64) -> Plan {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("grid.toml");
+        let grid = format!(
+            "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = {end_s}\n\
+             [integrator]\nmethod = \"rk4\"\nstep_s = 2e-4\n\
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.0, count = {count} }}\n"
+        );
+        std::fs::write(&path, grid).unwrap();
+        crate::config::load(&path, &[]).unwrap()
+    }
+
+    fn one_thread(name: &str) -> Option<String> {
+        (name == "SLURM_CPUS_PER_TASK").then(|| "1".into())
+    }
+
+    #[test]
+    fn an_estimate_is_near_what_a_run_takes() {
+        // Whole trajectories, and beginnings of longer ones; a machine that does other things too is why the bounds are wide.
+        for end_s in [0.5, 20.0] {
+            let plan = plan(16, end_s);
+            let estimate = Estimate::of(&plan, &one_thread).unwrap();
+            let engine = ModelEngine::new(&plan).unwrap();
+            let began = Instant::now();
+            let interrupt = Interrupt::new();
+            assert_eq!(engine.evaluate(0..16, &Watch::new(&interrupt)).unwrap().len(), 16);
+            let took_s = began.elapsed().as_secs_f64();
+            let ratio = estimate.wall_s / took_s;
+            assert!((0.2..5.0).contains(&ratio), "end {end_s}: estimated {}, took {took_s}", estimate.wall_s);
+            assert_eq!(estimate.threads, 1);
+        }
+    }
+
+    #[test]
+    fn time_grows_with_points_and_memory_does_not() {
+        let (small, large) = (plan(1_000_000, 0.01), plan(1_000_000_000, 0.01));
+        let [small, large] = [&small, &large].map(|plan| Estimate::of(plan, &one_thread).unwrap());
+        assert!(large.wall_s > 100.0 * small.wall_s, "{small:?} {large:?}");
+        assert!(large.memory_bytes < 1.2 * small.memory_bytes, "{small:?} {large:?}");
+        assert!(large.memory_bytes < 200e6, "{large:?}");
+        assert_eq!(large.disk_bytes, 1000.0 * small.disk_bytes);
+    }
+}

@@ -1,0 +1,73 @@
+//! Any grid file, machine file and constants: either a plan whose corners can be prepared and integrated, or an explanation.
+
+#![no_main]
+
+mod input;
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use input::Input;
+use lane_ode::Simd;
+use libfuzzer_sys::{Corpus, fuzz_target};
+use sweep::plan::Plan;
+use sweep::store::Job;
+use tempfile::TempDir;
+use washer_model::{Method, ModelKind, Point, Timing, prepare, simulate};
+
+/// Mistakes are shown up to a number, each in a few lines.
+const LONGEST_EXPLANATION: usize = 200_000;
+
+/// Integrated time: a few dozen steps, so that an input costs a fraction of a millisecond.
+const END_S: f64 = 2e-3;
+const STEP_S: f64 = 1e-4;
+
+fuzz_target!(|bytes: &[u8]| -> Corpus {
+    let input = Input::new(bytes);
+    let Ok(grid) = input.write(folder()) else { return Corpus::Reject };
+    match sweep::config::load(&grid, &input.sets) {
+        Ok(plan) => try_out(&plan),
+        Err(mistakes) => {
+            let text = mistakes.to_string();
+            assert!(text.contains("nothing was done"), "{text}");
+            assert!(text.len() < LONGEST_EXPLANATION, "an explanation of {} bytes", text.len());
+        }
+    }
+    Corpus::Keep
+});
+
+/// A plan that was let through is one that everything behind it can take.
+fn try_out(plan: &Plan) {
+    assert!(plan.points() >= 1);
+    assert!(plan.window_s[0] < plan.window_s[1] && plan.window_s[1] <= plan.end_s);
+    assert_eq!(Job::of(plan).hash(), Job::of(plan).hash());
+    let scenarios: Vec<_> = plan
+        .corners()
+        .take(4)
+        .map(|point| {
+            assert!(point < plan.points());
+            let scenario = plan.scenario(point);
+            assert_eq!(scenario.machine.violations(), []);
+            assert_eq!(scenario.spin.violations(), []);
+            (scenario.machine, scenario.spin)
+        })
+        .collect();
+    let end_s = END_S.min(plan.end_s);
+    let timing = Timing { end_s, window_s: [0.0, end_s] };
+    let simd = Simd::ALL.into_iter().find(|simd| simd.name() == "scalar").unwrap_or_else(Simd::best);
+    let prepared = prepare(simd, &scenarios, &timing);
+    let ready: Vec<&Point> = prepared.iter().filter_map(|point| point.as_ref().ok()).collect();
+    for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        let records = simulate(simd, model, &Method::Rk4 { step_s: STEP_S }, &ready);
+        assert_eq!(records.len(), ready.len());
+        for record in records {
+            let is_finite = record.amplitudes.iter().all(|amplitude| amplitude.is_finite());
+            assert!(record.failure.is_some() || is_finite, "{record:?}");
+        }
+    }
+}
+
+fn folder() -> &'static Path {
+    static FOLDER: OnceLock<TempDir> = OnceLock::new();
+    FOLDER.get_or_init(|| tempfile::tempdir().expect("a temporary folder")).path()
+}
