@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{check, completions, init, merge, parameters, plot, run, schema, show, status};
+use crate::commands::{check, completions, init, merge, parameters, plot, run, schema, show, slurm, status};
 use crate::exit::{Error, Exit};
 
 /// Printed before everything else by `--help`: most readers want to see one line that works.
@@ -41,6 +41,8 @@ pub enum Command {
     Merge(merge::Args),
     /// Show how far a run is: done, missing, failed, running
     Status(status::Args),
+    /// Print the script that submits a run to a Slurm cluster: an array of shards, then their merge
+    Slurm(slurm::Args),
     /// Show what a result file holds: counts, verdicts, extremes, provenance
     Show(show::Args),
     /// Draw the figure that fits a file: map, boundary, time histories or Campbell diagram
@@ -66,6 +68,7 @@ impl Command {
             Self::Check(args) => check::run(args),
             Self::Merge(args) => merge::run(args),
             Self::Status(args) => status::run(args),
+            Self::Slurm(args) => slurm::run(args),
             Self::Show(args) => show::run(args),
             Self::Plot(args) => plot::run(args),
             Self::Parameters(args) => parameters::run(args),

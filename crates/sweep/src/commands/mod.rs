@@ -14,6 +14,7 @@ pub mod plot;
 pub mod run;
 pub mod schema;
 pub mod show;
+pub mod slurm;
 pub mod status;
 
 /// A grid file and changes to its constants, as most commands take them.

@@ -1,0 +1,268 @@
+//! `sweep slurm GRID.toml --shards N`: the script that submits a sweep to a Slurm cluster.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::{Target, quoted};
+use crate::exit::{Error, Exit, print, tell};
+use crate::plan::Plan;
+use crate::store::{ShardRequest, chunk_points};
+
+/// Tasks that a Slurm array may have unless its administrator allowed more (`MaxArraySize` 1001 counts from 0).
+const USUAL_MOST_TASKS: u64 = 1000;
+
+/// Arguments of `sweep slurm`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    target: Target,
+    /// Parts to compute side by side, each a task of the array
+    #[arg(long, value_name = "N", value_parser = shards)]
+    shards: u64,
+    /// Time limit of a task, as sbatch takes it: 30 (minutes), 4:00:00, 2-12
+    #[arg(long, value_name = "TIME", value_parser = word)]
+    time: Option<String>,
+    /// Partition to run in
+    #[arg(long, value_name = "NAME", value_parser = word)]
+    partition: Option<String>,
+    /// Account to charge
+    #[arg(long, value_name = "NAME", value_parser = word)]
+    account: Option<String>,
+    /// Cores a task, and so its threads
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    cpus_per_task: u32,
+    /// Memory a task, as sbatch takes it: 500M, 2G
+    #[arg(long, value_name = "SIZE", value_parser = word)]
+    mem: Option<String>,
+    /// Anything else for sbatch, after `--`: `-- --constraint=avx512 --qos=long`
+    #[arg(last = true, value_name = "SBATCH OPTION", value_parser = word)]
+    sbatch: Vec<String>,
+}
+
+fn shards(text: &str) -> Result<u64, String> {
+    match format!("auto/{text}").parse() {
+        Ok(ShardRequest::Auto { of }) => Ok(of),
+        _ => Err(format!("expected a number of shards from 1 to 1000000; got `{text}`")),
+    }
+}
+
+/// A word of a command line: a script has one line each.
+fn word(text: &str) -> Result<String, String> {
+    if text.is_empty() || text.chars().any(char::is_control) {
+        return Err("expected something on one line".into());
+    }
+    Ok(text.to_owned())
+}
+
+/// Prints the script.
+///
+/// # Errors
+/// Mistakes in the grid file, a working folder or program without a path, standard output that cannot be written.
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    let plan = args.target.grid.load()?;
+    let path_of = |what: &str, found: std::io::Result<PathBuf>| {
+        found.map_err(|source| Error::File { action: "find the path of", path: what.into(), source })
+    };
+    let folder = path_of("the working folder", std::env::current_dir())?;
+    let program = path_of("this program", std::env::current_exe())?;
+    let chunks = plan.points().div_ceil(chunk_points(plan.points()));
+    if args.shards > chunks {
+        tell(&format!(
+            "note: the run has {chunks} chunks, so only {chunks} of the {} shards have work",
+            args.shards
+        ));
+    }
+    if args.shards > USUAL_MOST_TASKS {
+        tell(
+            "note: many clusters allow arrays of 1000 tasks (scontrol show config | grep MaxArraySize); more --cpus-per-task \
+             need fewer shards",
+        );
+    }
+    print(&script(args, &plan, &folder, &program))
+}
+
+/// The script: the array, and the merge that waits for it.
+fn script(args: &Args, plan: &Plan, folder: &Path, program: &Path) -> String {
+    let name = quoted(&plan.name);
+    let output = args.target.output(plan);
+    let results = match output.parent() {
+        Some(parent) if parent != Path::new("") => parent.to_path_buf(),
+        _ => PathBuf::from("."),
+    };
+    // sbatch reads % as the start of a field.
+    let log = |field: &str| {
+        let stem = results.join(&plan.name).display().to_string().replace('%', "%%");
+        quoted_pattern(&format!("{stem}.slurm-{field}.log"))
+    };
+    let command = |verb: &str| {
+        let line = args.target.command(verb);
+        // `command` begins with the program's bare name; on a node only its path is sure to be found.
+        line.replacen("sweep", &quoted(&program.display().to_string()), 1)
+    };
+    let mut common = String::new();
+    for (option, value) in
+        [("time", &args.time), ("partition", &args.partition), ("account", &args.account), ("mem", &args.mem)]
+    {
+        if let Some(value) = value {
+            // Writing to a String cannot fail.
+            let _ = write!(common, " --{option}={}", quoted(value));
+        }
+    }
+    for option in &args.sbatch {
+        let _ = write!(common, " {}", quoted(option));
+    }
+    let (shards, cpus) = (args.shards, args.cpus_per_task);
+    let (folder, results) = (quoted(&folder.display().to_string()), quoted(&results.display().to_string()));
+    let (array_log, merge_log) = (log("%A_%a"), log("merge-%j"));
+    let (run, merge) = (command("run"), command("merge"));
+    format!(
+        r#"#!/bin/sh
+# Submits the sweep {name}: {shards} shards as one array, and their merge once all have ended. To be run where sbatch is:
+# arguments go to the array's sbatch, so `sh THIS_SCRIPT --array=3,7` submits the shards again that `sweep status` misses,
+# and the merge after them. A task that loses its node is queued again by Slurm and goes on from its finished chunks.
+set -eu
+cd {folder}
+mkdir -p {results}
+
+array=$(sbatch --parsable --job-name={name} --array=1-{shards} --requeue --open-mode=append --nodes=1 --ntasks=1 \
+    --cpus-per-task={cpus} --output={array_log}{common} "$@" <<'END'
+#!/bin/sh
+exec {run} --shard "$SLURM_ARRAY_TASK_ID/{shards}"
+END
+)
+array=${{array%%;*}}
+
+# Whatever became of the tasks: a merge that finds a chunk missing says of which shard, and leaves everything in place.
+merge=$(sbatch --parsable --job-name={name}-merge --dependency="afterany:$array" --requeue --open-mode=append --nodes=1 --ntasks=1 \
+    --output={merge_log}{common} <<'END'
+#!/bin/sh
+exec {merge}
+END
+)
+echo "array $array, merge ${{merge%%;*}}"
+"#
+    )
+}
+
+/// A file name pattern: its `%` is no reason for quotes.
+fn quoted_pattern(pattern: &str) -> String {
+    if quoted(&pattern.replace('%', "")) == pattern.replace('%', "") {
+        pattern.to_owned()
+    } else {
+        quoted(pattern)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::process::{Command, Stdio};
+
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(clap::Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn parse(words: &[&str]) -> Result<Args, clap::Error> {
+        Line::try_parse_from([&["slurm"], words].concat()).map(|line| line.args)
+    }
+
+    /// What the script's two calls of sbatch are given: arguments, then the batch script.
+    fn submitted(script: &str, arguments: &[&str], home: &Path) -> (Vec<String>, String) {
+        use std::io::Write;
+        let bin = home.join("bin");
+        std::fs::create_dir_all(&bin).unwrap();
+        let calls = home.join("calls");
+        let fake = format!(
+            "#!/bin/sh\nprintf '%s\\n' \"$@\" >> {0}\ncat >> {0}\necho '17;cluster'\n",
+            calls.display()
+        );
+        std::fs::write(bin.join("sbatch"), fake).unwrap();
+        std::fs::set_permissions(bin.join("sbatch"), std::os::unix::fs::PermissionsExt::from_mode(0o755))
+            .unwrap();
+        let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap());
+        let mut shell = Command::new("sh")
+            .args([&["-s", "--"], arguments].concat())
+            .env("PATH", path)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        shell.stdin.take().unwrap().write_all(script.as_bytes()).unwrap();
+        let told = shell.wait_with_output().unwrap();
+        assert!(told.status.success());
+        let calls = std::fs::read_to_string(calls).unwrap();
+        (calls.lines().map(str::to_owned).collect(), String::from_utf8(told.stdout).unwrap())
+    }
+
+    #[test]
+    fn the_shell_takes_the_script_as_it_was_meant_whatever_the_names() {
+        let home = tempfile::tempdir().unwrap();
+        let grid = home.path().join("it's a grid.toml");
+        let text = "name = \"50 % of it\"\n[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = 50\n";
+        std::fs::write(&grid, text).unwrap();
+        let grid = grid.to_str().unwrap();
+        let args = parse(&[
+            grid,
+            "--shards",
+            "8",
+            "--set",
+            "tub_mass_kg=20",
+            "--time",
+            "1:00:00",
+            "--cpus-per-task",
+            "4",
+            "--mem",
+            "1G",
+            "--",
+            "--comment=two words",
+        ])
+        .unwrap();
+        let plan = args.target.grid.load().unwrap();
+        let script = script(&args, &plan, home.path(), Path::new("/opt/my sweep"));
+        let (calls, told) = submitted(&script, &["--array=3,7"], home.path());
+        assert_eq!(told, "array 17, merge 17\n");
+        let place = |wanted: &str| {
+            calls
+                .iter()
+                .position(|line| line == wanted)
+                .unwrap_or_else(|| panic!("no {wanted} in\n{}", calls.join("\n")))
+        };
+        assert!(place("--array=1-8") < place("--array=3,7"), "the later one counts");
+        for wanted in [
+            "--job-name=50 % of it",
+            "--cpus-per-task=4",
+            "--requeue",
+            "--time=1:00:00",
+            "--mem=1G",
+            "--comment=two words",
+        ] {
+            place(wanted);
+        }
+        place("--output=results/50 %% of it.slurm-%A_%a.log");
+        place("--dependency=afterany:17");
+        let grid = grid.replace('\'', r"'\''");
+        place(&format!(
+            "exec '/opt/my sweep' run '{grid}' --set tub_mass_kg=20 --shard \"$SLURM_ARRAY_TASK_ID/8\""
+        ));
+        place(&format!("exec '/opt/my sweep' merge '{grid}' --set tub_mass_kg=20"));
+        assert!(home.path().join("results").is_dir(), "Slurm makes no folder for its logs");
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        for words in [
+            &["g.toml"] as &[&str],
+            &["g.toml", "--shards", "0"],
+            &["g.toml", "--shards", "x"],
+            &["g.toml", "--shards", "8", "--cpus-per-task", "0"],
+            &["g.toml", "--shards", "8", "--time", "1\n2"],
+        ] {
+            assert!(parse(words).is_err(), "{words:?}");
+        }
+    }
+}

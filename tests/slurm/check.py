@@ -1,0 +1,232 @@
+"""A sweep on a real Slurm cluster: an array over two nodes, a task killed, a node killed, the controller killed.
+
+usage: check.py SWEEP_BINARY
+
+Each time the merged file must be the single machine's, byte for byte. Needs root, slurm-wlm and munge; run.sh sees to that.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import cluster
+from cluster import Cluster
+
+SHARDS = 8
+
+# Sixteen chunks of eight points, two for each shard, each about half a second of work.
+GRID = """
+name = "array"
+machine = "paper"
+
+[spin]
+profile = "triangular"
+peak_rpm = 350.0
+ramp_s = 50.0
+
+[time]
+end_s = 5.0
+window_s = [2.0, 5.0]
+
+[integrator]
+method = "rk4"
+step_s = 4e-6
+
+[[axis]]
+parameter = "unbalance_mass_kg"
+range = { from = 0.05, to = 1.0, count = 16 }
+
+[[axis]]
+parameter = "damping_n_s_per_m"
+range = { from = 60.0, to = 300.0, count = 8 }
+
+[reliability]
+ratio_limit = 2.0
+channels = ["tub_front_y", "drum_front_z", "tub_yaw"]
+"""
+
+
+class Sweep:
+    """One grid in a folder of its own, on the cluster."""
+
+    def __init__(self, slurm: Cluster, binary: Path, folder: Path):
+        self.slurm, self.binary, self.folder = slurm, binary, folder
+        folder.mkdir()
+        (folder / "array.toml").write_text(GRID)
+        self.result = folder / "results/array.parquet"
+        self.partial = folder / "results/array.parquet.partial"
+
+    def sweep(self, *arguments: str, code: int = 0) -> subprocess.CompletedProcess:
+        command = [self.binary, *arguments]
+        done = subprocess.run(command, cwd=self.folder, env=self.slurm.environment, capture_output=True, text=True)
+        assert done.returncode == code, f"{arguments} ended with {done.returncode}, not {code}: {done.stderr}"
+        return done
+
+    def status(self) -> dict:
+        return json.loads(self.sweep("status", "array.toml", "--json").stdout)
+
+    def script(self) -> Path:
+        script = self.folder / "submit.sh"
+        text = self.sweep("slurm", "array.toml", "--shards", str(SHARDS), "--time", "10", "--mem", "200M").stdout
+        script.write_text(text)
+        return script
+
+    def submit(self, *arguments: str) -> tuple[str, str]:
+        """Runs the printed script; the ids of the array and of the merge."""
+        told = self.slurm.ask("sh", str(self.script()), *arguments)
+        words = told.replace(",", "").split()
+        assert words[0::2] == ["array", "merge"], told
+        return words[1], words[3]
+
+    def in_mid_shard(self) -> tuple[str, dict]:
+        """A task that has one of its two chunks: its number, and what the scheduler says of it."""
+        found = []
+        def look():
+            for task, facts in self.slurm.tasks(self.array).items():
+                if facts["state"] == "RUNNING" and self.chunks(int(task)) == 1:
+                    found.append((task, facts))
+                    return True
+            return False
+        self.slurm.wait_for("task with one chunk", look, 60, lambda: self.slurm.tasks(self.array))
+        return found[0]
+
+    def chunks(self, shard: int) -> int:
+        own = (self.partial / f"chunk-{chunk:08}.bin" for chunk in range(shard - 1, 16, SHARDS))
+        return sum(chunk.exists() for chunk in own)
+
+    def process(self, task: str) -> int:
+        """The sweep of a task."""
+        for pid, words in cluster.processes():
+            if words[0] == str(self.binary) and cluster.environment(pid).get("SLURM_ARRAY_TASK_ID") == task:
+                return pid
+        raise AssertionError(f"task {task} has no process")
+
+    def logs(self) -> str:
+        return "\n".join(f"--- {path.name}\n{path.read_text()}" for path in sorted(self.folder.rglob("*.log")))
+
+    def assert_same(self, expected: bytes):
+        assert self.result.exists(), f"no result\n{self.logs()}"
+        assert self.result.read_bytes() == expected, "other bytes than the single machine's"
+        assert not self.partial.exists(), "the run's folder stays behind"
+
+
+def array_over_two_nodes(sweep: Sweep, expected: bytes):
+    sweep.array, merge = sweep.submit()
+    nodes = set()
+    def watch():
+        tasks = sweep.slurm.tasks(sweep.array)
+        nodes.update(facts["node"] for facts in tasks.values() if facts["node"])
+        return sweep.slurm.tasks(merge).get("N/A", {}).get("state") in ("COMPLETED", "FAILED")
+    sweep.slurm.wait_for("merge", watch, 90, lambda: sweep.slurm.tasks(sweep.array))
+    assert nodes == {"n1", "n2"}, nodes
+    sessions = json.loads((sweep.folder / "results/array.run.json").read_text())["sessions"]
+    assert sorted(session["shard"] for session in sessions) == [f"{i}/{SHARDS}" for i in range(1, SHARDS + 1)]
+    assert {session["threads"] for session in sessions} == {1}, "threads are the cores that Slurm gave"
+    sweep.assert_same(expected)
+
+
+def plain_array_numbered_from_zero(sweep: Sweep, expected: bytes):
+    """The defaults alone: place and number from the environment, and a part of the array submitted again."""
+    wrap = f"--wrap={sweep.binary} run array.toml"
+    job = sweep.slurm.ask("sbatch", "--parsable", f"--array=0-{SHARDS - 1}", "--open-mode=append", wrap, cwd=sweep.folder).strip()
+    sweep.slurm.wait_for("beginning", lambda: (sweep.partial / "shards.json").exists(), 30)
+    sweep.slurm.ask("scancel", "--state=PENDING", job)
+    sweep.slurm.wait_for_job(job, 60)
+    status = sweep.status()
+    assert status["shards"] == SHARDS and status["missing_shards"], status
+    refused = sweep.sweep("merge", "array.toml", code=1).stderr
+    assert "is incomplete" in refused and "of shards" in refused, refused
+    again = sweep.slurm.ask("sbatch", "--parsable", f"--array={status['missing_shards']}", wrap, cwd=sweep.folder).strip()
+    assert set(sweep.slurm.wait_for_job(again, 90).values()) == {"COMPLETED"}, sweep.logs()
+    assert sweep.status()["state"] == "complete"
+    sweep.sweep("merge", "array.toml")
+    sweep.assert_same(expected)
+
+
+def task_killed(sweep: Sweep, expected: bytes):
+    sweep.array, merge = sweep.submit()
+    task, _ = sweep.in_mid_shard()
+    os.kill(sweep.process(task), 9)
+    states = sweep.slurm.wait_for_job(sweep.array, 90)
+    assert states.pop(task) == "FAILED" and set(states.values()) == {"COMPLETED"}, states
+    # The merge came, found the hole and said so.
+    assert sweep.slurm.wait_for_job(merge, 30) == {"N/A": "FAILED"}
+    log = (sweep.folder / f"results/array.slurm-merge-{merge}.log").read_text()
+    assert f"1 of 16 chunks are missing, of shards {task}" in log, log
+    status = sweep.status()
+    assert status["missing_shards"] == task and status["chunks_missing"] == 1, status
+    _, merge = sweep.submit(f"--array={status['missing_shards']}")
+    assert sweep.slurm.wait_for_job(merge, 60) == {"N/A": "COMPLETED"}, sweep.logs()
+    sweep.assert_same(expected)
+
+
+def node_killed(sweep: Sweep, expected: bytes):
+    slurm = sweep.slurm
+    sweep.array, merge = sweep.submit()
+    task, facts = sweep.in_mid_shard()
+    node = facts["node"]
+    victims = slurm.kill_node(node)
+    assert victims, "the node ran nothing"
+    down = lambda: slurm.ask("sinfo", "-h", "-n", node, "-o", "%T").strip().rstrip("*") == "down"
+    slurm.wait_for(f"word that {node} is down", down, 60)
+    slurm.wait_for("task queued again", lambda: slurm.tasks(sweep.array)[task]["state"] == "PENDING", 30)
+    # Slurm lets a task wait two minutes after its node failed; an administrator's word makes it now.
+    slurm.ask("scontrol", "update", f"JobId={sweep.array}_{task}", "StartTime=now")
+    assert set(slurm.wait_for_job(sweep.array, 120).values()) == {"COMPLETED"}, sweep.logs()
+    assert slurm.wait_for_job(merge, 60) == {"N/A": "COMPLETED"}, sweep.logs()
+    log = (sweep.folder / f"results/array.slurm-{sweep.array}_{task}.log").read_text()
+    assert "going on: 8 of 16 points are there" in log, f"the task did not go on from its chunk:\n{log}"
+    sweep.assert_same(expected)
+    slurm.start_node(node)
+    slurm.wait_for("node's return", lambda: slurm.node_states() == ["idle", "idle"], 60, slurm.node_states)
+
+
+def controller_killed(sweep: Sweep, expected: bytes):
+    slurm = sweep.slurm
+    sweep.array, merge = sweep.submit()
+    sweep.in_mid_shard()
+    slurm.kill("slurmctld")
+    # The nodes' tasks go on and end meanwhile.
+    time.sleep(2)
+    slurm.start_controller()
+    # A controller that lost a start may start it twice and then drain the node: an administrator's word again.
+    def merged():
+        for node in ("n1", "n2"):
+            if slurm.ask("sinfo", "-h", "-n", node, "-o", "%T").startswith("drain"):
+                slurm.ask("scontrol", "update", f"NodeName={node}", "State=RESUME")
+        return slurm.tasks(merge).get("N/A", {}).get("state") in ("COMPLETED", "FAILED")
+    slurm.wait_for("merge", merged, 120, lambda: slurm.tasks(sweep.array))
+    if not sweep.result.exists():
+        # A task that the controller lost is one that status finds.
+        _, merge = sweep.submit(f"--array={sweep.status()['missing_shards']}")
+        assert slurm.wait_for_job(merge, 90) == {"N/A": "COMPLETED"}, sweep.logs()
+    sweep.assert_same(expected)
+
+
+SCENARIOS = [array_over_two_nodes, plain_array_numbered_from_zero, task_killed, node_killed, controller_killed]
+
+
+def main(binary: Path, names: list[str]):
+    with tempfile.TemporaryDirectory(prefix="sweep-slurm-") as home:
+        home = Path(home)
+        (home / "cluster").mkdir()
+        with Cluster(home / "cluster") as slurm:
+            alone = Sweep(slurm, binary, home / "alone")
+            began = time.monotonic()
+            alone.sweep("run", "array.toml", "--progress", "none")
+            expected = alone.result.read_bytes()
+            print(f"single machine: {time.monotonic() - began:.0f} s", flush=True)
+            for scenario in SCENARIOS:
+                if names and scenario.__name__ not in names:
+                    continue
+                began = time.monotonic()
+                scenario(Sweep(slurm, binary, home / scenario.__name__), expected)
+                print(f"{scenario.__name__}: {time.monotonic() - began:.0f} s, the same bytes", flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]).resolve(), sys.argv[2:])
