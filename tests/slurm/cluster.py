@@ -35,8 +35,9 @@ class Cluster:
         self.stop()
 
     def configure(self):
-        # The daemon of a separate user must reach its socket's folder.
-        self.folder.chmod(0o755)
+        # Munge's own user must reach its folder.
+        for folder in (self.folder.parent, self.folder):
+            folder.chmod(0o755)
         for name in ("state", "spool-n1", "spool-n2", "munge"):
             (self.folder / name).mkdir(mode=0o755)
         host = socket.gethostname().split(".")[0]
@@ -97,17 +98,21 @@ class Cluster:
                 process.wait()
 
     def ask(self, *command: str, check: bool = True, **options) -> str:
-        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, **options)
-        if check and done.returncode != 0:
-            raise AssertionError(f"{' '.join(command)} failed: {done.stderr}")
-        return done.stdout
+        # On a busy host the controller now and then drops a connection; asking again is harmless, submitting again is not.
+        attempts = 5 if command[0] in ("squeue", "sinfo", "scontrol") and check else 1
+        for attempt in range(attempts):
+            done = subprocess.run(command, env=self.environment, capture_output=True, text=True, **options)
+            if done.returncode == 0 or not check:
+                return done.stdout
+            time.sleep(0.2 * (attempt + 1))
+        raise AssertionError(f"{' '.join(command)} failed: {done.stderr}")
 
     def node_states(self) -> list[str]:
-        return self.ask("sinfo", "-h", "-N", "-o", "%T", check=False).split()
+        return self.ask("sinfo", "-h", "-N", "-o", "%T").split()
 
     def tasks(self, job: str) -> dict[str, dict[str, str]]:
         """State and node of each task of an array (or of a job: task N/A) that the controller still knows."""
-        lines = self.ask("squeue", "-h", "-r", "-t", "all", "-j", job, "-o", "%K|%T|%N|%A", check=False).splitlines()
+        lines = self.ask("squeue", "-h", "-r", "-t", "all", "-j", job, "-o", "%K|%T|%N|%A").splitlines()
         return {t: {"state": s, "node": n, "id": i} for t, s, n, i in (line.split("|") for line in lines)}
 
     def wait_for_job(self, job: str, seconds: float) -> dict[str, str]:
@@ -128,7 +133,7 @@ class Cluster:
 
     def logs(self) -> str:
         tail = lambda path: "\n".join(path.read_text(errors="replace").splitlines()[-15:])
-        return "\n".join(f"--- {path.name}\n{tail(path)}" for path in sorted(self.folder.glob("*.log")))
+        return "\n".join(f"--- {path.name}\n{tail(path)}" for path in [*sorted(self.folder.glob("*.log")), *sorted(self.folder.glob("*.out"))])
 
 
 def free_ports(count: int) -> list[int]:
