@@ -68,23 +68,8 @@ impl<'a> ModelEngine<'a> {
         Ok(Self { plan, simd: simd_from_environment()?, method, timing })
     }
 
-    /// One outcome per point of a group. A panic in one point's evaluation must not cost the others theirs: then each is
-    /// evaluated alone, which gives the same bits.
     fn group(&self, points: Range<u64>) -> Vec<Outcome> {
-        let together = catch_unwind(AssertUnwindSafe(|| self.evaluate_together(points.clone())));
-        together.unwrap_or_else(|_| {
-            points
-                .map(|point| {
-                    let alone = catch_unwind(AssertUnwindSafe(|| self.evaluate_together(point..point + 1)));
-                    alone.ok().and_then(|mut outcomes| outcomes.pop()).unwrap_or_else(|| Outcome {
-                        point,
-                        nonlinear: failed(Status::Panicked),
-                        linear: failed(Status::Panicked),
-                        sensitive: None,
-                    })
-                })
-                .collect()
-        })
+        together_or_alone(points, &|points| self.evaluate_together(points))
     }
 
     fn evaluate_together(&self, points: Range<u64>) -> Vec<Outcome> {
@@ -134,6 +119,25 @@ impl<'a> ModelEngine<'a> {
     }
 }
 
+/// One outcome per point of a group. A panic in one point's evaluation must not cost the others theirs: then each is
+/// evaluated alone, which gives the same bits.
+fn together_or_alone(points: Range<u64>, evaluate: &dyn Fn(Range<u64>) -> Vec<Outcome>) -> Vec<Outcome> {
+    let together = catch_unwind(AssertUnwindSafe(|| evaluate(points.clone())));
+    together.unwrap_or_else(|_| {
+        points
+            .map(|point| {
+                let alone = catch_unwind(AssertUnwindSafe(|| evaluate(point..point + 1)));
+                alone.ok().and_then(|mut outcomes| outcomes.pop()).unwrap_or_else(|| Outcome {
+                    point,
+                    nonlinear: failed(Status::Panicked),
+                    linear: failed(Status::Panicked),
+                    sensitive: None,
+                })
+            })
+            .collect()
+    })
+}
+
 fn failed(status: Status) -> Trajectory {
     Trajectory { status, fail_time_s: None, amplitudes: Vec::new(), min_gap_m: None, steps: 0, rejected: 0 }
 }
@@ -158,3 +162,6 @@ impl Engine for ModelEngine<'_> {
         self.simd.name()
     }
 }
+
+#[cfg(test)]
+mod tests;
