@@ -1,6 +1,7 @@
 //! Physics of a front-loading washing machine: parameters, equations of motion, equilibrium, spin.
 
 mod campbell;
+mod capping;
 mod channel;
 mod coefficients;
 mod coupling;
@@ -25,6 +26,7 @@ mod spin;
 mod violations;
 
 pub use campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
+pub use capping::Capping;
 pub use channel::Channel;
 pub use linear::Matrices;
 pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};

@@ -7,6 +7,7 @@
 use crate::coefficients::{Bodies, Coefficients};
 use crate::coupling::{Coupling, Deflection};
 use crate::floating::{Factors, Floating};
+use crate::forces::AxisLoad;
 use crate::frame::Tilt;
 use crate::harmonics::{Factor, HARMONICS, SAMPLES, Term, TermLanes, basis, push_terms};
 use crate::lanes::{GetLane, SetLane, Splat};
@@ -360,6 +361,27 @@ pub struct Matrices {
 }
 
 impl LinearPoint {
+    /// The bearings' share of the stiffness matrix, without that of their static load.
+    pub(crate) fn bearing_stiffness(&self, bodies: &Bodies<f64>) -> [[f64; COORDINATES]; COORDINATES] {
+        let work = |i: usize, load: &AxisLoad<f64>| {
+            let mut unit = [N(0.0); COORDINATES];
+            unit[i] = N(1.0);
+            let Deflection { offset, tilt } = deflection(&self.constants, &unit);
+            let force = load.force[0] * offset[0] + load.force[1] * offset[1];
+            -(force + (load.moment[0] * tilt[0] + load.moment[1] * tilt[1])).0
+        };
+        let mut stiffness = [[0.0; COORDINATES]; COORDINATES];
+        for j in 0..COORDINATES {
+            let mut unit = [N(0.0); COORDINATES];
+            unit[j] = N(1.0);
+            let load = deflection(&self.constants, &unit).load(bodies);
+            for (i, row) in stiffness.iter_mut().enumerate() {
+                row[j] = work(i, &load);
+            }
+        }
+        stiffness
+    }
+
     /// The matrices at one instant; `bodies` is the same machine's.
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let zero = N(0.0);

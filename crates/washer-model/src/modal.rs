@@ -94,7 +94,17 @@ pub(crate) fn inner(
 /// # Errors
 /// [`NoModes`] when the matrices are singular or not finite.
 pub fn modes(point: &Point, theta_rad: f64, speed_rad_per_s: f64) -> Result<Modes, NoModes> {
-    let (system, mass) = first_order(point, theta_rad, speed_rad_per_s)?;
+    modes_with_cap(point, theta_rad, speed_rad_per_s, None)
+}
+
+/// The same; with a cap (rad/s), of the machine whose bearings' mass is scaled (`coupling.rs`).
+pub(crate) fn modes_with_cap(
+    point: &Point,
+    theta_rad: f64,
+    speed_rad_per_s: f64,
+    cap_rad_per_s: Option<f64>,
+) -> Result<Modes, NoModes> {
+    let (system, mass) = first_order(point, theta_rad, speed_rad_per_s, cap_rad_per_s)?;
     let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
     let values = decomposition.S().column_vector();
     let vectors = decomposition.U();
@@ -146,10 +156,19 @@ fn unit_mass(
 /// # Errors
 /// As [`modes`].
 pub fn highest_frequency_rad_per_s(point: &Point, speed_rad_per_s: f64) -> Result<f64, NoModes> {
+    highest_with_cap(point, speed_rad_per_s, None)
+}
+
+/// The same; with a cap (rad/s), of the machine whose bearings' mass is scaled (`coupling.rs`).
+pub(crate) fn highest_with_cap(
+    point: &Point,
+    speed_rad_per_s: f64,
+    cap_rad_per_s: Option<f64>,
+) -> Result<f64, NoModes> {
     let mut highest = 0.0_f64;
     for angle in 0..ANGLES {
         let theta = TAU * angle as f64 / ANGLES as f64;
-        let (system, _) = first_order(point, theta, speed_rad_per_s)?;
+        let (system, _) = first_order(point, theta, speed_rad_per_s, cap_rad_per_s)?;
         for s in system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)? {
             let magnitude = s.norm() * system.unit_per_s;
             if !magnitude.is_finite() {
@@ -173,8 +192,17 @@ fn first_order(
     point: &Point,
     theta_rad: f64,
     speed_rad_per_s: f64,
+    cap_rad_per_s: Option<f64>,
 ) -> Result<(FirstOrder, [[f64; COORDINATES]; COORDINATES]), NoModes> {
-    let matrices = point.matrices(theta_rad, speed_rad_per_s, 0.0);
+    let mut matrices = point.matrices(theta_rad, speed_rad_per_s, 0.0);
+    if let Some(cap) = cap_rad_per_s {
+        let bearings = point.linear.bearing_stiffness(&point.machine.bodies);
+        for i in 0..COORDINATES {
+            for j in 0..COORDINATES {
+                matrices.mass[i][j] += bearings[i][j] / (cap * cap);
+            }
+        }
+    }
     let full = |m: &[[f64; COORDINATES]; COORDINATES]| Mat::from_fn(COORDINATES, COORDINATES, |i, j| m[i][j]);
     let mass = full(&matrices.mass);
     let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| NoModes::Mass)?;

@@ -1,0 +1,132 @@
+//! How far the bearing modes may be capped, and how long the steps may then be: from the accuracy asked for, the spin and
+//! the machine's own frequencies.
+//!
+//! Three bounds hold a step h of RK4 with cap w:
+//!
+//! * Truncation. Over one memory of a lightly damped motion of frequency f, 1/(zeta f), RK4's local errors (h f)^5 / 120 add up to
+//!   (h f)^4 / (120 zeta). The motions to follow are the drum's turning and the suspension's modes; f is the fastest of them. With
+//!   zeta = 0.1, (h f)^4 / 12 is to stay below the accuracy.
+//! * Stability. h |s| stays within the method's limit for every mode s of the machine with its bearings capped, hinge and gyroscopic
+//!   effects included. The higher the cap the better, but the closer it comes to the hinge's modes from above, the more these
+//!   are pushed up by it: h w is the first of 2.6, 2.3, ... that leaves the step stable.
+//! * Fidelity. The cap moves the modes of suspension and hinge, by ds. A response at the drum's speed answers to ds over
+//!   the distance from resonance, or the resonance's half-width |Re s| if that is more. A mode faster than the drum by a factor r
+//!   takes part in the motion by 1/r^2 only, and of that its speed matters by 1/r^2 again, because static compliance stays exact.
+//!   The shift so weighted stays below a tenth of the accuracy.
+//!   Stiff bearings pass at once: they hold next to no strain energy of slow modes. Soft ones do not, and then the cap rises until it
+//!   caps nothing: plain RK4.
+
+use crate::modal::{NoModes, highest_with_cap, modes_with_cap};
+use crate::point::Point;
+use crate::run::Method;
+use crate::spin::Spin;
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
+
+/// Modes of the suspension: yaw, pitch, two translations.
+const SUSPENSION_MODES: usize = 4;
+
+/// These and the two of the hinge. The bearings' are the other four, and faster unless they are soft.
+const SLOW_MODES: usize = SUSPENSION_MODES + 2;
+
+/// Damping ratio of the motions that remember longest.
+const MEMORY_DAMPING_RATIO: f64 = 0.1;
+
+/// h times the cap, the best first.
+const STEP_TIMES_CAP: [f64; 4] = [2.6, 2.3, 2.0, 1.7];
+
+/// h times the fastest mode: within the limit by what nonlinear motion may add.
+const STEP_TIMES_FASTEST: f64 = 0.97 * RK4_STABILITY_LIMIT;
+
+/// Half-width of a resonance that has no damping, as a share of its frequency.
+const LEAST_HALF_WIDTH: f64 = 0.01;
+
+/// Share of the accuracy that the cap's shift of the followed modes may use up.
+const SHIFT_SHARE: f64 = 0.1;
+
+/// From one candidate step to the next.
+const SHORTER: f64 = 0.97;
+
+/// Step and cap for one accuracy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Capping {
+    /// Longest step.
+    pub step_s: f64,
+    /// The cap, if capping gains anything.
+    pub cap_rad_per_s: Option<f64>,
+}
+
+impl Capping {
+    /// The method of these numbers.
+    #[must_use]
+    pub const fn method(&self) -> Method {
+        match self.cap_rad_per_s {
+            Some(cap_rad_per_s) => Method::Rk4MassScaled { step_s: self.step_s, cap_rad_per_s },
+            None => Method::Rk4 { step_s: self.step_s },
+        }
+    }
+
+    /// The longest step, and its cap, at which amplitudes should be right to `accuracy` (relative) at each of `points`, whose drums
+    /// turn as their spins say until `end_s`.
+    ///
+    /// # Errors
+    /// [`NoModes`] of the first machine that has none.
+    pub fn choose<'a>(
+        points: impl IntoIterator<Item = (&'a Point, &'a Spin)>,
+        end_s: f64,
+        accuracy: f64,
+    ) -> Result<Self, NoModes> {
+        let mut cases = Vec::new();
+        let mut step_s = f64::INFINITY;
+        let mut plain_step_s = f64::INFINITY;
+        for (point, spin) in points {
+            let speed = spin.greatest_speed_rad_per_s(end_s);
+            let slow = modes_with_cap(point, 0.0, 0.0, None)?;
+            let followed = speed.max(slow.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s);
+            let hinge = slow.modes[SUSPENSION_MODES].magnitude_rad_per_s;
+            // A soft hinge takes part in the motion.
+            let followed = if hinge < 2.0 * followed { hinge } else { followed };
+            step_s = step_s.min((120.0 * MEMORY_DAMPING_RATIO * accuracy).powf(0.25) / followed);
+            let fastest = highest_with_cap(point, 0.0, None)?.max(highest_with_cap(point, speed, None)?);
+            plain_step_s = plain_step_s.min(STEP_TIMES_FASTEST / fastest);
+            cases.push((point, speed));
+        }
+        if step_s <= plain_step_s {
+            return Ok(Self { step_s, cap_rad_per_s: None });
+        }
+        while step_s > plain_step_s {
+            for step_times_cap in STEP_TIMES_CAP {
+                let cap = step_times_cap / step_s;
+                let mut holds = true;
+                for &(point, speed) in &cases {
+                    holds = holds && self::holds(point, speed, step_s, cap, accuracy)?;
+                }
+                if holds {
+                    return Ok(Self { step_s, cap_rad_per_s: Some(cap) });
+                }
+            }
+            step_s *= SHORTER;
+        }
+        Ok(Self { step_s: plain_step_s, cap_rad_per_s: None })
+    }
+}
+
+/// Whether a step is stable with a cap, and the slow modes stay where they are.
+fn holds(point: &Point, speed: f64, step_s: f64, cap: f64, accuracy: f64) -> Result<bool, NoModes> {
+    for turning in [speed, 0.0] {
+        if step_s * highest_with_cap(point, turning, Some(cap))? > STEP_TIMES_FASTEST {
+            return Ok(false);
+        }
+        let plain = modes_with_cap(point, 0.0, turning, None)?;
+        let capped = modes_with_cap(point, 0.0, turning, Some(cap))?;
+        for (plain, capped) in plain.modes.iter().zip(&capped.modes).take(SLOW_MODES) {
+            let half_width = plain.re_per_s.abs().max(LEAST_HALF_WIDTH * plain.magnitude_rad_per_s);
+            let distance = half_width.max(plain.magnitude_rad_per_s - speed);
+            let shift = (capped.re_per_s - plain.re_per_s).hypot(capped.im_rad_per_s - plain.im_rad_per_s);
+            let weight = (speed / plain.magnitude_rad_per_s).min(1.0).powi(4);
+            if weight * shift > SHIFT_SHARE * accuracy * distance {
+                return Ok(false);
+            }
+        }
+    }
+    Ok(true)
+}
