@@ -1,9 +1,15 @@
 //! The engine: a range of grid points through both models, in lanes.
 
+mod fast;
+
+pub use fast::Settled;
+
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::OnceLock;
 
 use lane_ode::{Failure, Simd, Tolerance};
+use serde_json::Value;
 use washer_model::{Method, ModelKind, Point, Record, Timing, prepare, simulate};
 
 use crate::outcome::{Outcome, Status, Trajectory};
@@ -22,20 +28,22 @@ pub enum EngineError {
     /// `SWEEP_SIMD` names nothing this machine has.
     #[error("SWEEP_SIMD={0}: expected one that this machine has: {1}")]
     Simd(String, String),
-    /// The method is not there yet.
-    #[error(
-        "method \"rk4-mass-scaled\" is not available in this version; set method = \"rk4\" with step_s = 2e-4 \
-         under [integrator], or \"dopri5\""
-    )]
-    Method,
 }
 
 /// Both models over a plan's points.
 pub struct ModelEngine<'a> {
     plan: &'a Plan,
     simd: Simd,
-    method: Method,
+    scheme: Scheme,
     timing: Timing,
+}
+
+/// How trajectories are integrated.
+enum Scheme {
+    /// By one method.
+    Direct(Method),
+    /// By the fast method and what makes up for its error.
+    Fast { accuracy: f64, settled: OnceLock<Settled> },
 }
 
 /// The instruction set that `SWEEP_SIMD` asks for, else the best.
@@ -57,15 +65,33 @@ impl<'a> ModelEngine<'a> {
     /// # Errors
     /// A method or an instruction set that is not there.
     pub fn new(plan: &'a Plan) -> Result<Self, EngineError> {
-        let method = match plan.integrator {
-            Integrator::Rk4 { step_s } => Method::Rk4 { step_s },
-            Integrator::Dopri5 { rtol, atol } => {
-                Method::Dopri5(Tolerance { relative: rtol, absolute: atol, max_steps: MAX_ADAPTIVE_STEPS })
-            }
-            Integrator::Rk4MassScaled { .. } => return Err(EngineError::Method),
+        let scheme = match plan.integrator {
+            Integrator::Rk4 { step_s } => Scheme::Direct(Method::Rk4 { step_s }),
+            Integrator::Dopri5 { rtol, atol } => Scheme::Direct(Method::Dopri5(Tolerance {
+                relative: rtol,
+                absolute: atol,
+                max_steps: MAX_ADAPTIVE_STEPS,
+            })),
+            Integrator::Rk4MassScaled { accuracy } => Scheme::Fast { accuracy, settled: OnceLock::new() },
         };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };
-        Ok(Self { plan, simd: simd_from_environment()?, method, timing })
+        Ok(Self { plan, simd: simd_from_environment()?, scheme, timing })
+    }
+
+    /// Takes over what the fast method works with from another engine; too late once it has been asked for.
+    pub fn assume(&self, known: Settled) {
+        if let Scheme::Fast { settled, .. } = &self.scheme {
+            settled.get_or_init(|| known);
+        }
+    }
+
+    /// What the fast method works with, if that is the plan's: as settled, or else as the rule says.
+    #[must_use]
+    pub fn settled(&self) -> Option<&Settled> {
+        match &self.scheme {
+            Scheme::Direct(_) => None,
+            Scheme::Fast { accuracy, settled } => Some(settled.get_or_init(|| self.unchecked(*accuracy))),
+        }
     }
 
     fn group(&self, points: Range<u64>) -> Vec<Outcome> {
@@ -73,28 +99,53 @@ impl<'a> ModelEngine<'a> {
     }
 
     fn evaluate_together(&self, points: Range<u64>) -> Vec<Outcome> {
-        let scenarios: Vec<_> = points
-            .clone()
-            .map(|point| {
-                let scenario = self.plan.scenario(point);
-                (scenario.machine, scenario.spin)
-            })
-            .collect();
-        let prepared = prepare(self.simd, &scenarios, &self.timing);
-        let ready: Vec<&Point> = prepared.iter().filter_map(|point| point.as_ref().ok()).collect();
-        let mut nonlinear = simulate(self.simd, ModelKind::Nonlinear, &self.method, &ready).into_iter();
-        let mut linear = simulate(self.simd, ModelKind::Linear, &self.method, &ready).into_iter();
+        match &self.scheme {
+            Scheme::Direct(method) => {
+                let points: Vec<u64> = points.collect();
+                self.all(&self.prepare(&points), method, &points)
+            }
+            Scheme::Fast { accuracy, settled } => {
+                let settled = settled.get_or_init(|| self.unchecked(*accuracy));
+                self.certain(*accuracy, settled, points)
+            }
+        }
+    }
+
+    /// Points made ready; `None` where there is no equilibrium.
+    fn prepare(&self, points: &[u64]) -> Vec<Option<Point>> {
+        let scenario = |&point: &u64| {
+            let scenario = self.plan.scenario(point);
+            (scenario.machine, scenario.spin)
+        };
+        let scenarios: Vec<_> = points.iter().map(scenario).collect();
+        prepare(self.simd, &scenarios, &self.timing).into_iter().map(Result::ok).collect()
+    }
+
+    /// Both models at every point, by one method.
+    fn all(&self, prepared: &[Option<Point>], method: &Method, points: &[u64]) -> Vec<Outcome> {
+        let ready: Vec<&Point> = prepared.iter().flatten().collect();
+        let mut nonlinear = self.trajectories(&ready, ModelKind::Nonlinear, method).into_iter();
+        let mut linear = self.trajectories(&ready, ModelKind::Linear, method).into_iter();
+        let next =
+            |trajectories: &mut std::vec::IntoIter<Trajectory>, prepared: &Option<Point>| match prepared {
+                Some(_) => trajectories.next().unwrap_or_else(|| failed(Status::Panicked)),
+                None => failed(Status::NoEquilibrium),
+            };
         points
-            .zip(&prepared)
-            .map(|(point, prepared)| {
-                let next = |records: &mut std::vec::IntoIter<Record>| match prepared {
-                    Ok(_) => records.next().map_or_else(|| failed(Status::Panicked), |r| self.trajectory(&r)),
-                    Err(_) => failed(Status::NoEquilibrium),
-                };
-                let (nonlinear, linear) = (next(&mut nonlinear), next(&mut linear));
-                Outcome { point, nonlinear, linear, sensitive: None }
+            .iter()
+            .zip(prepared)
+            .map(|(&point, prepared)| Outcome {
+                point,
+                nonlinear: next(&mut nonlinear, prepared),
+                linear: next(&mut linear, prepared),
+                sensitive: None,
             })
             .collect()
+    }
+
+    /// One model at every point, by one method.
+    fn trajectories(&self, points: &[&Point], model: ModelKind, method: &Method) -> Vec<Trajectory> {
+        simulate(self.simd, model, method, points).iter().map(|record| self.trajectory(record)).collect()
     }
 
     fn trajectory(&self, record: &Record) -> Trajectory {
@@ -127,15 +178,15 @@ fn together_or_alone(points: Range<u64>, evaluate: &dyn Fn(Range<u64>) -> Vec<Ou
         points
             .map(|point| {
                 let alone = catch_unwind(AssertUnwindSafe(|| evaluate(point..point + 1)));
-                alone.ok().and_then(|mut outcomes| outcomes.pop()).unwrap_or_else(|| Outcome {
-                    point,
-                    nonlinear: failed(Status::Panicked),
-                    linear: failed(Status::Panicked),
-                    sensitive: None,
-                })
+                alone.ok().and_then(|mut outcomes| outcomes.pop()).unwrap_or_else(|| panicked(point))
             })
             .collect()
     })
+}
+
+fn panicked(point: u64) -> Outcome {
+    let [nonlinear, linear] = [failed(Status::Panicked), failed(Status::Panicked)];
+    Outcome { point, nonlinear, linear, sensitive: None }
 }
 
 fn failed(status: Status) -> Trajectory {
@@ -160,6 +211,24 @@ impl Engine for ModelEngine<'_> {
 
     fn simd(&self) -> &str {
         self.simd.name()
+    }
+
+    fn settle(&self, remembered: Option<Value>, watch: &Watch<'_>) -> Option<Value> {
+        let Scheme::Fast { accuracy, settled } = &self.scheme else { return Some(Value::Null) };
+        let known = remembered.and_then(|value| serde_json::from_value(value).ok());
+        let found = match known {
+            Some(known) => known,
+            None => self.check(*accuracy, watch)?,
+        };
+        let found = settled.get_or_init(|| found);
+        Some(serde_json::to_value(found).unwrap_or_default())
+    }
+
+    fn observed_accuracy(&self) -> Option<f64> {
+        match &self.scheme {
+            Scheme::Direct(_) => None,
+            Scheme::Fast { settled, .. } => settled.get().and_then(|settled| settled.observed_error),
+        }
     }
 }
 

@@ -123,6 +123,10 @@ fn cost_s(plan: &Plan, points: std::ops::Range<u64>, end_s: f64) -> Result<f64, 
     let window_s = plan.window_s.map(|edge_s| (edge_s * share).min(end_s));
     let cut = Plan { end_s, window_s, ..plan.clone() };
     let engine = ModelEngine::new(&cut)?;
+    // A shorter run alone would be slower spin, and longer steps.
+    if let Some(settled) = ModelEngine::new(plan)?.settled() {
+        engine.assume(*settled);
+    }
     let interrupt = Interrupt::new();
     let began = Instant::now();
     let outcomes = engine.evaluate(points, &Watch::new(&interrupt));

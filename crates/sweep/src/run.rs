@@ -12,6 +12,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
+
 use crate::interrupt::Interrupt;
 use crate::outcome::Outcome;
 use crate::progress::{Mode, Progress};
@@ -29,6 +31,13 @@ pub trait Engine: Sync {
 
     /// The instruction set in use.
     fn simd(&self) -> &str;
+
+    /// Finds out, before the first point, what evaluating needs beyond the plan; on all threads of the rayon pool it is called in.
+    /// `remembered` is what this returned to an earlier process of the run. `None` if it put the work down.
+    fn settle(&self, remembered: Option<Value>, watch: &Watch<'_>) -> Option<Value> {
+        let _ = (remembered, watch);
+        Some(Value::Null)
+    }
 
     /// The largest relative error of an amplitude seen so far when checking itself, if it does.
     fn observed_accuracy(&self) -> Option<f64> {
@@ -210,6 +219,11 @@ fn compute(
         .build()
         .map_err(|error| StoreError::Threads { threads, reason: error.to_string() })?;
     let watch = Watch::new(interrupt);
+    let remembered = run.remembered()?;
+    let Some(settled) = pool.install(|| engine.settle(remembered.clone(), &watch)) else { return Ok(()) };
+    if !settled.is_null() && remembered.as_ref() != Some(&settled) {
+        run.remember(&settled)?;
+    }
     let (_, start) = run.own_points();
     let next = AtomicU64::new(0);
     // Bounded, so that a disk slower than the engine holds the engine up instead of filling memory.

@@ -65,6 +65,21 @@ impl Capping {
         }
     }
 
+    /// The longest step at which plain RK4 is stable at each of the points; `None` if there are none.
+    /// Machines without modes are left out.
+    #[must_use]
+    pub fn plain_step_s<'a>(
+        points: impl IntoIterator<Item = (&'a Point, &'a Spin)>,
+        end_s: f64,
+    ) -> Option<f64> {
+        let steps = points.into_iter().map(|(point, spin)| {
+            let speed = spin.greatest_speed_rad_per_s(end_s);
+            let fastest = highest_with_cap(point, 0.0, None)?.max(highest_with_cap(point, speed, None)?);
+            Ok::<_, NoModes>(STEP_TIMES_FASTEST / fastest)
+        });
+        steps.flatten().reduce(f64::min)
+    }
+
     /// The longest step, and its cap, at which amplitudes should be right to `accuracy` (relative) at each of `points`, whose drums
     /// turn as their spins say until `end_s`.
     ///

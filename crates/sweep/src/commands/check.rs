@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::Grid;
+use crate::engine::{ModelEngine, Settled};
 use crate::estimate::{Estimate, size};
 use crate::exit::{Error, Exit, print, tell};
 use crate::plan::{Axis, AxisValues, Integrator, Plan};
@@ -28,12 +29,13 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         return print(&format!("{:#}\n", plan.to_json()));
     }
     let estimate = Estimate::of(&plan, &|name| std::env::var(name).ok())?;
-    tell(summary(&plan, &estimate).trim_end());
+    let engine = ModelEngine::new(&plan)?;
+    tell(summary(&plan, &estimate, engine.settled()).trim_end());
     Ok(Exit::Done)
 }
 
 /// The plan in a few lines.
-fn summary(plan: &Plan, estimate: &Estimate) -> String {
+fn summary(plan: &Plan, estimate: &Estimate, settled: Option<&Settled>) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         // Writing to a String cannot fail.
@@ -46,7 +48,7 @@ fn summary(plan: &Plan, estimate: &Estimate) -> String {
     let points = plan.points();
     line("points", if points == 1 { "1 (no axes)".to_owned() } else { points.to_string() });
     line("time", format!("0 to {} s, window {} to {} s", plan.end_s, plan.window_s[0], plan.window_s[1]));
-    line("method", method(plan));
+    line("method", method(plan, settled));
     let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name()).collect();
     line("channels", channels.join(", "));
     line("verdict", format!("reliable where every ratio is below {}", plan.reliability.ratio_limit));
@@ -96,7 +98,7 @@ fn describe(axis: &Axis) -> String {
     }
 }
 
-fn method(plan: &Plan) -> String {
+fn method(plan: &Plan, settled: Option<&Settled>) -> String {
     match plan.integrator {
         Integrator::Rk4 { step_s } => {
             // Both window edges and the end are hit exactly, so each stretch rounds up.
@@ -107,6 +109,15 @@ fn method(plan: &Plan) -> String {
         Integrator::Dopri5 { rtol, atol } => {
             format!("dopri5, rtol {rtol:e}, atol {atol:e}: steps as it needs")
         }
-        Integrator::Rk4MassScaled { accuracy } => format!("rk4-mass-scaled, accuracy {accuracy:e}"),
+        Integrator::Rk4MassScaled { accuracy } => {
+            let chosen = settled.map_or_else(String::new, |settled| {
+                let cap = settled.cap_rad_per_s.map_or_else(
+                    || "bearings as they are".to_owned(),
+                    |cap| format!("bearing modes capped at {cap:.0} rad/s"),
+                );
+                format!(": step {:.3} ms, {cap}; checked against rk4 before the run", 1e3 * settled.step_s)
+            });
+            format!("rk4-mass-scaled, accuracy {accuracy:e}{chosen}")
+        }
     }
 }

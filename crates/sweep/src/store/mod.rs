@@ -24,6 +24,7 @@ mod plan_file;
 pub mod provenance;
 pub mod read;
 pub mod schema;
+mod settled;
 mod shard;
 mod status;
 #[cfg(test)]
@@ -95,7 +96,7 @@ impl<'a> Job<'a> {
 /// Points a chunk holds (the last may hold fewer), from the number of points alone.
 ///
 /// A power of two, so that chunks fill whole SIMD lane groups: 8 for the smallest grids, so that every core gets some;
-/// then 16 to 4096, for about a thousand chunks; then 4096 each, for chunks of a megabyte.
+/// then 32 to 4096, for about a thousand chunks; then 4096 each, for chunks of a megabyte.
 #[must_use]
 pub const fn chunk_points(points: u64) -> u64 {
     const SMALL_GRID: u64 = 128;
@@ -104,8 +105,8 @@ pub const fn chunk_points(points: u64) -> u64 {
         return 8;
     }
     let wanted = points.div_ceil(CHUNKS);
-    if wanted <= 16 {
-        16
+    if wanted <= 32 {
+        32
     } else if wanted >= 4096 {
         4096
     } else {

@@ -1,0 +1,277 @@
+//! The fast method, with an error that is looked at and verdicts that are certain.
+//!
+//! Trajectories run with the bearing modes capped (`washer_model::Capping`). Three things make up for that:
+//!
+//! * Before the first point, a sample of the grid is run by the reference method, plain RK4 at a converged step, as well. If the worst
+//!   amplitude error is above the accuracy asked for, step and cap are tightened for all points, and the sample is compared again.
+//! * A point whose ratio comes near the limit or passes it is run a second time with a shorter step. Where the two differ by more than
+//!   the accuracy, the motion amplifies small changes (most are chaotic): the row is flagged as sensitive.
+//! * A point whose ratio is within its error of the limit, or that failed, is run by the reference method, whose numbers its row
+//!   then holds. So the verdicts are those of the reference map.
+//!
+//! Everything follows from the plan alone, so that every process of a run comes to the same rows.
+
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use washer_model::{Capping, Method, ModelKind, Point};
+
+use super::{GROUP, ModelEngine, panicked};
+use crate::outcome::{Outcome, Status, Trajectory};
+use crate::plan::Plan;
+use crate::run::Watch;
+use crate::verdict::Verdict;
+
+/// Step of the reference method, where the machine allows it (s): amplitudes are converged to about 1e-9.
+const REFERENCE_STEP_S: f64 = 2e-4;
+
+/// Share of the longest stable step that the reference method may use.
+const REFERENCE_SHARE: f64 = 0.75;
+
+/// One point in so many is in the sample.
+const SAMPLED: u64 = 50;
+
+/// No sample is larger: it is held in memory.
+const MOST_SAMPLED: u64 = 1_000_000;
+
+/// The second run's step, as a share of the first's.
+const SECOND_STEP: f64 = 0.8;
+
+/// Ratios above this share of the limit are looked at twice.
+const SUSPECT_SHARE: f64 = 0.6;
+
+/// A ratio is uncertain within this many times its error.
+const UNCERTAINTY: f64 = 10.0;
+
+/// The most that a ratio is held uncertain by, as a factor: beyond it lies another regime of motion.
+const MOST_UNCERTAIN: f64 = 2.0;
+
+/// How often step and cap are tightened before the reference method does everything.
+const TIGHTENINGS: u32 = 4;
+
+/// Each time, the accuracy that they are chosen for is divided by this.
+const TIGHTENED_BY: f64 = 8.0;
+
+/// What was settled before the first point.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settled {
+    /// Longest step of the fast method.
+    pub step_s: f64,
+    /// Cap on the bearing modes; none if it gains nothing.
+    pub cap_rad_per_s: Option<f64>,
+    /// Step of the reference method.
+    pub reference_step_s: f64,
+    /// How often step and cap were tightened because the sample broke the accuracy.
+    pub tightened: u32,
+    /// Points in the sample.
+    pub sampled: u64,
+    /// Those of them that are sensitive; their digits say nothing about the method.
+    pub sampled_sensitive: u64,
+    /// Worst relative error of an amplitude over the rest of the sample; absent if nothing was compared.
+    pub observed_error: Option<f64>,
+}
+
+impl Settled {
+    fn fast(&self) -> Method {
+        Capping { step_s: self.step_s, cap_rad_per_s: self.cap_rad_per_s }.method()
+    }
+
+    fn second(&self) -> Method {
+        Capping { step_s: SECOND_STEP * self.step_s, cap_rad_per_s: self.cap_rad_per_s }.method()
+    }
+
+    fn reference(&self) -> Method {
+        Method::Rk4 { step_s: self.reference_step_s }
+    }
+}
+
+/// Fast and reference outcome of a sample point.
+type Pair = (Outcome, Outcome);
+
+impl ModelEngine<'_> {
+    /// Step and cap by the rule alone, from the corners of the grid.
+    pub(super) fn unchecked(&self, accuracy: f64) -> Settled {
+        let corners: Vec<_> = self.plan.corners().map(|point| self.plan.scenario(point)).collect();
+        let scenarios: Vec<_> = corners.iter().map(|s| (s.machine.clone(), s.spin.clone())).collect();
+        let prepared = washer_model::prepare(self.simd, &scenarios, &self.timing);
+        let ready: Vec<_> = prepared
+            .iter()
+            .zip(&scenarios)
+            .filter_map(|(point, (_, spin))| point.as_ref().ok().map(|point| (point, spin)))
+            .collect();
+        let plain_step_s = Capping::plain_step_s(ready.iter().copied(), self.plan.end_s);
+        let reference_step_s =
+            REFERENCE_STEP_S.min(plain_step_s.map_or(f64::INFINITY, |s| REFERENCE_SHARE * s));
+        // Corners without an equilibrium or without modes are rows that say so; the rest is integrated as the reference is.
+        let capping = Capping::choose(ready, self.plan.end_s, accuracy)
+            .unwrap_or(Capping { step_s: reference_step_s, cap_rad_per_s: None });
+        Settled {
+            step_s: capping.step_s,
+            cap_rad_per_s: capping.cap_rad_per_s,
+            reference_step_s,
+            tightened: 0,
+            sampled: 0,
+            sampled_sensitive: 0,
+            observed_error: None,
+        }
+    }
+
+    /// Step and cap, held against the reference on a sample; `None` when stopped.
+    pub(super) fn check(&self, accuracy: f64, watch: &Watch<'_>) -> Option<Settled> {
+        let sample = sample(self.plan);
+        let mut settled = self.unchecked(accuracy);
+        let reference = self.each(&sample, watch, &|points| self.by(&settled.reference(), points))?;
+        for tightened in 0..=TIGHTENINGS {
+            if tightened == TIGHTENINGS {
+                settled.step_s = settled.reference_step_s;
+                settled.cap_rad_per_s = None;
+            } else if tightened > 0 {
+                settled = self.unchecked(accuracy / TIGHTENED_BY.powi(tightened as i32));
+            }
+            let fast = self.each(&sample, watch, &|points| self.flagged(accuracy, &settled, points))?;
+            let pairs: Vec<Pair> = fast.into_iter().zip(reference.iter().cloned()).collect();
+            let errors = pairs.iter().filter(|(fast, _)| fast.sensitive != Some(true)).filter_map(error);
+            settled.tightened = tightened;
+            settled.sampled = sample.len() as u64;
+            settled.sampled_sensitive =
+                pairs.iter().filter(|(fast, _)| fast.sensitive == Some(true)).count() as u64;
+            settled.observed_error = errors.reduce(f64::max);
+            if settled.observed_error.is_none_or(|worst| worst <= accuracy) {
+                break;
+            }
+        }
+        Some(settled)
+    }
+
+    /// One outcome per point, on all threads of the pool.
+    fn each(
+        &self,
+        sample: &[u64],
+        watch: &Watch<'_>,
+        evaluate: &(dyn Fn(&[u64]) -> Vec<Outcome> + Sync),
+    ) -> Option<Vec<Outcome>> {
+        let groups: Option<Vec<_>> = sample
+            .par_chunks(GROUP as usize / 4)
+            .map(|points| {
+                let defect = |_| points.iter().map(|&point| panicked(point)).collect();
+                let outcomes = || catch_unwind(AssertUnwindSafe(|| evaluate(points))).unwrap_or_else(defect);
+                if watch.stopped() { None } else { Some(outcomes()) }
+            })
+            .collect();
+        groups.map(|groups| groups.concat())
+    }
+
+    /// Outcomes of neighbouring points, their verdicts certain.
+    pub(super) fn certain(&self, accuracy: f64, settled: &Settled, points: Range<u64>) -> Vec<Outcome> {
+        let points: Vec<u64> = points.collect();
+        let prepared = self.prepare(&points);
+        let mut outcomes = self.all(&prepared, &settled.fast(), &points);
+        let spreads = self.flag(accuracy, settled, &prepared, &mut outcomes);
+        let error = settled.observed_error.unwrap_or(0.0).max(accuracy);
+        let doubtful: Vec<usize> =
+            (0..outcomes.len()).filter(|&i| self.is_doubtful(&outcomes[i], error.max(spreads[i]))).collect();
+        let of_doubtful: Vec<&Point> = doubtful.iter().filter_map(|&i| prepared[i].as_ref()).collect();
+        let mut nonlinear =
+            self.trajectories(&of_doubtful, ModelKind::Nonlinear, &settled.reference()).into_iter();
+        let mut linear = self.trajectories(&of_doubtful, ModelKind::Linear, &settled.reference()).into_iter();
+        for i in doubtful {
+            if let (Some(nonlinear), Some(linear)) = (nonlinear.next(), linear.next()) {
+                outcomes[i].nonlinear = nonlinear;
+                outcomes[i].linear = linear;
+            }
+        }
+        outcomes
+    }
+
+    /// Outcomes by one method.
+    fn by(&self, method: &Method, points: &[u64]) -> Vec<Outcome> {
+        self.all(&self.prepare(points), method, points)
+    }
+
+    /// Outcomes by the fast method, with their flags.
+    fn flagged(&self, accuracy: f64, settled: &Settled, points: &[u64]) -> Vec<Outcome> {
+        let prepared = self.prepare(points);
+        let mut outcomes = self.all(&prepared, &settled.fast(), points);
+        self.flag(accuracy, settled, &prepared, &mut outcomes);
+        outcomes
+    }
+
+    /// Runs suspects a second time, flags those whose motion amplifies the difference, and returns the differences.
+    fn flag(
+        &self,
+        accuracy: f64,
+        settled: &Settled,
+        prepared: &[Option<Point>],
+        outcomes: &mut [Outcome],
+    ) -> Vec<f64> {
+        let mut spreads = vec![0.0; outcomes.len()];
+        let is_suspect = |outcome: &Outcome| {
+            self.ratio(outcome).is_some_and(|ratio| ratio > SUSPECT_SHARE * self.plan.reliability.ratio_limit)
+        };
+        let suspects: Vec<usize> = (0..outcomes.len()).filter(|&i| is_suspect(&outcomes[i])).collect();
+        let points: Vec<&Point> = suspects.iter().filter_map(|&i| prepared[i].as_ref()).collect();
+        let again = self.trajectories(&points, ModelKind::Nonlinear, &settled.second());
+        for outcome in outcomes.iter_mut() {
+            outcome.sensitive = (outcome.nonlinear.status == Status::Ok).then_some(false);
+        }
+        for (i, again) in suspects.into_iter().zip(again) {
+            spreads[i] = difference(&outcomes[i].nonlinear, &again).unwrap_or(f64::INFINITY);
+            outcomes[i].sensitive = Some(spreads[i] > accuracy);
+        }
+        spreads
+    }
+
+    /// Whether an error of this size (relative, of an amplitude) could turn the verdict, or the trajectory did not come to one.
+    fn is_doubtful(&self, outcome: &Outcome, error: f64) -> bool {
+        let failed = |model: &Trajectory| !matches!(model.status, Status::Ok | Status::NoEquilibrium);
+        if failed(&outcome.nonlinear) || failed(&outcome.linear) {
+            return true;
+        }
+        let margin = (1.0 + UNCERTAINTY * error).min(MOST_UNCERTAIN);
+        let limit = self.plan.reliability.ratio_limit;
+        self.ratio(outcome).is_some_and(|ratio| ratio < margin * limit && ratio * margin > limit)
+    }
+
+    fn ratio(&self, outcome: &Outcome) -> Option<f64> {
+        let reliability = &self.plan.reliability;
+        let verdict = Verdict::new(outcome, reliability.channels.len(), reliability.ratio_limit);
+        verdict.greatest.map(|(_, ratio)| ratio)
+    }
+}
+
+/// The corners of the grid, and one point in every [`SAMPLED`], drawn by its place alone.
+fn sample(plan: &Plan) -> Vec<u64> {
+    let points = plan.points();
+    let every = SAMPLED.max(points / MOST_SAMPLED);
+    let drawn = (0..points.div_ceil(every)).map(|block| {
+        let length = every.min(points - block * every);
+        let hash = blake3::hash(&block.to_le_bytes());
+        let draw = hash.as_bytes().iter().take(8).fold(0_u64, |draw, byte| draw << 8 | u64::from(*byte));
+        block * every + draw % length
+    });
+    let mut sample: Vec<u64> = plan.corners().chain(drawn).collect();
+    sample.sort_unstable();
+    sample.dedup();
+    sample
+}
+
+/// Worst relative error of a sample point's amplitudes, over both models; `None` if either run has none.
+fn error((fast, reference): &Pair) -> Option<f64> {
+    let nonlinear = difference(&reference.nonlinear, &fast.nonlinear)?;
+    let linear = difference(&reference.linear, &fast.linear)?;
+    Some(nonlinear.max(linear))
+}
+
+/// Greatest relative difference of two trajectories' amplitudes; `None` if either has none.
+fn difference(a: &Trajectory, b: &Trajectory) -> Option<f64> {
+    if a.status != Status::Ok || b.status != Status::Ok {
+        return None;
+    }
+    let relative = |(a, b): (&f64, &f64)| if a == b { 0.0 } else { (b - a).abs() / a.abs() };
+    Some(a.amplitudes.iter().zip(&b.amplitudes).map(relative).fold(0.0, f64::max))
+}
+
+#[cfg(test)]
+mod tests;
