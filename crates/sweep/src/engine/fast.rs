@@ -4,8 +4,8 @@
 //!
 //! * Before the first point, a sample of the grid is run by the reference method, plain RK4 at a converged step, as well. If the worst
 //!   amplitude error is above the accuracy asked for, step and cap are tightened for all points, and the sample is compared again.
-//! * A point whose ratio comes near the limit or passes it is run a second time with a shorter step. Where the two differ by more than
-//!   the accuracy, the motion amplifies small changes (most are chaotic): the row is flagged as sensitive.
+//! * A point whose ratio comes near the limit or passes it is run a second time with a shorter step and a higher cap. Where the two differ by more than
+//!   a third of the accuracy, the motion amplifies small changes (most are chaotic): the row is flagged as sensitive.
 //! * A point whose ratio is within its error of the limit, or that failed, is run by the reference method, whose numbers its row
 //!   then holds. So the verdicts are those of the reference map.
 //!
@@ -36,8 +36,12 @@ const SAMPLED: u64 = 50;
 /// No sample is larger: it is held in memory.
 const MOST_SAMPLED: u64 = 1_000_000;
 
-/// The second run's step, as a share of the first's.
+/// The second run's step, as a share of the first's; its cap is higher by as much.
 const SECOND_STEP: f64 = 0.8;
+
+/// A motion whose two runs differ by more than this share of the accuracy amplifies small changes. The difference of the runs
+/// is 0.36 (cap) to 0.59 (step) of the first one's error.
+const SENSITIVE_SHARE: f64 = 1.0 / 3.0;
 
 /// Ratios above this share of the limit are looked at twice.
 const SUSPECT_SHARE: f64 = 0.6;
@@ -79,7 +83,8 @@ impl Settled {
     }
 
     fn second(&self) -> Method {
-        Capping { step_s: SECOND_STEP * self.step_s, cap_rad_per_s: self.cap_rad_per_s }.method()
+        let cap_rad_per_s = self.cap_rad_per_s.map(|cap| cap / SECOND_STEP);
+        Capping { step_s: SECOND_STEP * self.step_s, cap_rad_per_s }.method()
     }
 
     fn reference(&self) -> Method {
@@ -120,8 +125,12 @@ impl ModelEngine<'_> {
 
     /// Step and cap, held against the reference on a sample; `None` when stopped.
     pub(super) fn check(&self, accuracy: f64, watch: &Watch<'_>) -> Option<Settled> {
+        self.check_from(self.unchecked(accuracy), accuracy, watch)
+    }
+
+    /// As [`Self::check`], with the first step and cap given.
+    fn check_from(&self, mut settled: Settled, accuracy: f64, watch: &Watch<'_>) -> Option<Settled> {
         let sample = sample(self.plan);
-        let mut settled = self.unchecked(accuracy);
         let reference = self.each(&sample, watch, &|points| self.by(&settled.reference(), points))?;
         for tightened in 0..=TIGHTENINGS {
             if tightened == TIGHTENINGS {
@@ -218,7 +227,7 @@ impl ModelEngine<'_> {
         }
         for (i, again) in suspects.into_iter().zip(again) {
             spreads[i] = difference(&outcomes[i].nonlinear, &again).unwrap_or(f64::INFINITY);
-            outcomes[i].sensitive = Some(spreads[i] > accuracy);
+            outcomes[i].sensitive = Some(spreads[i] > SENSITIVE_SHARE * accuracy);
         }
         spreads
     }
