@@ -194,20 +194,25 @@ def controller_killed(sweep: Sweep, expected: bytes):
     slurm = sweep.slurm
     sweep.array, merge = sweep.submit()
     _, process = sweep.stopped_in_mid_shard()
+    slurm.wait_until_saved("array-merge")
     slurm.kill("slurmctld")
+    # The nodes' tasks go on, and end with nobody to tell.
     os.kill(process, signal.SIGCONT)
-    # The nodes' tasks go on and end meanwhile.
     time.sleep(2)
     slurm.start_controller()
-    # A controller that lost a start may start it twice and then drain the node: an administrator's word again.
-    def merged():
+    # A controller that lost sight of tasks queues them again, to wait as above; one that lost a start may start it twice and
+    # then drain the node. An administrator's word in either case.
+    def over():
+        for task, facts in slurm.tasks(sweep.array).items():
+            if facts["state"] == "PENDING":
+                slurm.ask("scontrol", "update", f"JobId={sweep.array}_{task}", "StartTime=now", check=False)
         for node in ("n1", "n2"):
             if slurm.ask("sinfo", "-h", "-n", node, "-o", "%T").startswith("drain"):
                 slurm.ask("scontrol", "update", f"NodeName={node}", "State=RESUME")
-        return slurm.tasks(merge).get("N/A", {}).get("state") in ("COMPLETED", "FAILED")
-    slurm.wait_for("merge", merged, 120, lambda: slurm.tasks(sweep.array))
+        return slurm.is_over(sweep.array) and slurm.is_over(merge)
+    slurm.wait_for("end of array and merge", over, 120, lambda: slurm.tasks(sweep.array))
     if not sweep.result.exists():
-        # A task that the controller lost is one that status finds.
+        # What the controller forgot is what status finds.
         _, merge = sweep.submit(f"--array={sweep.status()['missing_shards']}")
         assert slurm.wait_for_job(merge, 90) == {"N/A": "COMPLETED"}, sweep.logs()
     sweep.assert_same(expected)

@@ -111,18 +111,25 @@ class Cluster:
         return self.ask("sinfo", "-h", "-N", "-o", "%T").split()
 
     def tasks(self, job: str) -> dict[str, dict[str, str]]:
-        """State and node of each task of an array (or of a job: task N/A) that the controller still knows."""
-        lines = self.ask("squeue", "-h", "-r", "-t", "all", "-j", job, "-o", "%K|%T|%N|%A").splitlines()
-        return {t: {"state": s, "node": n, "id": i} for t, s, n, i in (line.split("|") for line in lines)}
+        """State and node of each task of an array (of a job without tasks: N/A) that the controller still knows."""
+        lines = self.ask("squeue", "-h", "-r", "-t", "all", "-o", "%F|%K|%T|%N").splitlines()
+        rows = (line.split("|") for line in lines)
+        return {task: {"state": state, "node": node} for of, task, state, node in rows if of == job}
+
+    def is_over(self, job: str) -> bool:
+        """Whether no task of a job will do anything any more; so it is with one that the controller has lost."""
+        ended = {"COMPLETED", "FAILED", "CANCELLED", "TIMEOUT", "NODE_FAIL"}
+        return all(task["state"] in ended for task in self.tasks(job).values())
 
     def wait_for_job(self, job: str, seconds: float) -> dict[str, str]:
         """The end state of each task."""
-        ended = {"COMPLETED", "FAILED", "CANCELLED", "TIMEOUT", "NODE_FAIL"}
-        def all_ended():
-            tasks = self.tasks(job)
-            return tasks and all(task["state"] in ended for task in tasks.values())
-        self.wait_for(f"job {job}", all_ended, seconds, lambda: self.tasks(job))
+        self.wait_for(f"end of job {job}", lambda: self.is_over(job), seconds, lambda: self.tasks(job))
         return {task: facts["state"] for task, facts in self.tasks(job).items()}
+
+    def wait_until_saved(self, name: str):
+        """Waits until the controller's record on disk has a job of this name: it is written some seconds after a submission."""
+        state = self.folder / "state/job_state"
+        self.wait_for("record of the jobs", lambda: state.exists() and name.encode() in state.read_bytes(), 60)
 
     def wait_for(self, what, condition, seconds, show=lambda: ""):
         until = time.monotonic() + seconds

@@ -21,10 +21,10 @@ const BUDGET: Duration = Duration::from_millis(350);
 const PLACES: [f64; 3] = [0.5, 0.9, 0.1];
 
 /// The program, its libraries and its buffers, before any point (measured: docs/scaling.md).
-const BASE_BYTES: f64 = 24e6;
+const BASE_BYTES: f64 = 14e6;
 
 /// What a cell of a row group takes while it is encoded, besides its own 8 bytes (measured: docs/scaling.md).
-const CELL_BYTES: f64 = 12.0;
+const CELL_BYTES: f64 = 5.0;
 
 /// What a run will take. Every number is an estimate.
 #[derive(Clone, Debug, PartialEq)]

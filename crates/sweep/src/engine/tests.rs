@@ -10,16 +10,16 @@ profile = "ramp"
 peak_rpm = 1200
 ramp_s = 1
 [time]
-end_s = 1.5
+end_s = 3
 window_s = [0.5, 1]
 [integrator]
 method = "rk4"
 [[axis]]
 parameter = "spring_stiffness_n_per_m"
-values = [100, 1000, 7000]
+values = [500, 1000, 7000]
 [[axis]]
 parameter = "unbalance_mass_kg"
-values = [0.1, 10, 300]
+values = [0.1, 100, 300]
 "#;
 
 fn plan(text: &str) -> Plan {
