@@ -4,6 +4,7 @@ use std::path::Path;
 
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use lane_ode::{Failure, Simd};
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use serde_json::{Map, Value, json};
 use washer_model::{
     COORDINATES, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium, Point, Start, Timing,
@@ -27,6 +28,12 @@ const LONGEST_STEP_S: f64 = 2e-4;
 
 /// That step's share of the stability limit, which holds for small motions.
 const SHARE_OF_LIMIT: f64 = 0.7;
+
+/// Most points whose traces a run keeps: at some 300 kB each.
+pub const MOST_KEPT: u64 = 10_000;
+
+/// Instants of a kept trace: what a page shows of it.
+const KEPT_INSTANTS: f64 = 2000.0;
 
 /// What a trace holds beside channels, gap and speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -98,6 +105,37 @@ pub fn trace(
         }),
     );
     Ok(Trace { table, instants, failures: failures.into_iter().flatten().collect() })
+}
+
+/// Traces of every point of a plan, one file each (`point-<index>.parquet`) in `folder`, until `stop` says so. A point without
+/// equilibrium has none.
+///
+/// # Errors
+/// As `store`; and no more threads.
+pub fn keep(
+    plan: &Plan,
+    folder: &Path,
+    threads: usize,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<(), StoreError> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| StoreError::Threads { threads, reason: error.to_string() })?;
+    pool.install(|| {
+        (0..plan.points()).into_par_iter().try_for_each(|point| {
+            if stop() {
+                return Ok(());
+            }
+            let values = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
+            let at = values.zip(plan.axis_values(point).into_iter().map(Value::from)).collect();
+            let every_s = plan.end_s / KEPT_INSTANTS;
+            match trace(plan, plan.scenario(point), at, every_s, &Start::default(), Extras::default()) {
+                Ok(trace) => trace.write(&folder.join(format!("point-{point}.parquet"))),
+                Err(NoEquilibrium) => Ok(()),
+            }
+        })
+    })
 }
 
 impl Trace {
