@@ -22,7 +22,7 @@ pub use num::{N, Product};
 pub use peaks::{Peaks, Sample};
 pub use real::Real;
 pub use rk4::MAX_LANES;
-pub use simd::{Kernel, Simd};
+pub use simd::{Kernel, ScalarKernel, Simd};
 pub use system::{Count, Ended, Failure, Leg, Step, System, Task};
 
 #[cfg(test)]

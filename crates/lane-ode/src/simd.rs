@@ -28,6 +28,14 @@ pub trait Kernel {
     fn run<T: Lane>(self, zero: T) -> Self::Output;
 }
 
+/// Work on one lane, for what comes singly: compiled once, not for every width.
+pub trait ScalarKernel {
+    /// What the work gives.
+    type Output;
+    /// Does the work over `f64`. Mark it `#[inline(always)]` as [`Kernel::run`].
+    fn run(self) -> Self::Output;
+}
+
 impl Simd {
     /// Every instruction set, the widest first.
     pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Scalar];
@@ -95,12 +103,22 @@ impl Simd {
             _ => kernel.run(0.0_f64),
         }
     }
+
+    /// Runs the work on one lane, with the processor's fused multiply-add where it has one: the same bits as in any lane.
+    #[inline(never)]
+    pub fn one_lane<K: ScalarKernel>(kernel: K) -> K::Output {
+        #[cfg(target_arch = "x86_64")]
+        if Self::Avx2.is_available() {
+            return x86::one_lane(kernel);
+        }
+        kernel.run()
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod x86 {
-    use super::Kernel;
+    use super::{Kernel, ScalarKernel};
     use crate::x86::{F64x4, F64x8};
 
     /// An entry function with an instruction set, and a safe one around it that checks for it.
@@ -122,4 +140,17 @@ mod x86 {
     entry!(avx512, "avx2,fma,avx512f,avx512dq,avx512vl", super::Simd::Avx512, unsafe { F64x8::first(0.0) });
     entry!(avx2, "avx2,fma", super::Simd::Avx2, unsafe { F64x4::first(0.0) });
     entry!(scalar, "avx2,fma", super::Simd::Avx2, 0.0_f64);
+
+    pub(super) fn one_lane<K: ScalarKernel>(kernel: K) -> K::Output {
+        #[target_feature(enable = "avx2,fma")]
+        fn inner<K: ScalarKernel>(kernel: K) -> K::Output {
+            kernel.run()
+        }
+        assert!(
+            super::Simd::Avx2.is_available(),
+            "dispatched to an instruction set that this processor lacks"
+        );
+        // SAFETY: asserted above.
+        unsafe { inner(kernel) }
+    }
 }

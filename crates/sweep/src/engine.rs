@@ -59,6 +59,11 @@ pub fn simd_from_environment() -> Result<Simd, EngineError> {
     })
 }
 
+/// Dormand-Prince with a grid file's tolerances.
+pub(crate) fn dopri5(rtol: f64, atol: f64) -> Method {
+    Method::Dopri5(Tolerance { relative: rtol, absolute: atol, max_steps: MAX_ADAPTIVE_STEPS })
+}
+
 impl<'a> ModelEngine<'a> {
     /// An engine for a plan, on the best instruction set or the one asked for.
     ///
@@ -67,11 +72,7 @@ impl<'a> ModelEngine<'a> {
     pub fn new(plan: &'a Plan) -> Result<Self, EngineError> {
         let scheme = match plan.integrator {
             Integrator::Rk4 { step_s } => Scheme::Direct(Method::Rk4 { step_s }),
-            Integrator::Dopri5 { rtol, atol } => Scheme::Direct(Method::Dopri5(Tolerance {
-                relative: rtol,
-                absolute: atol,
-                max_steps: MAX_ADAPTIVE_STEPS,
-            })),
+            Integrator::Dopri5 { rtol, atol } => Scheme::Direct(dopri5(rtol, atol)),
             Integrator::Rk4MassScaled { accuracy } => Scheme::Fast { accuracy, settled: OnceLock::new() },
         };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };

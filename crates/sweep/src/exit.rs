@@ -9,6 +9,7 @@ use crate::config::Diagnostics;
 use crate::engine::EngineError;
 use crate::plot::PlotError;
 use crate::store::StoreError;
+use washer_model::{NoEquilibrium, NoModes};
 
 /// Exit codes, a contract with scripts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,6 +89,22 @@ pub enum Error {
     /// A figure.
     #[error(transparent)]
     Plot(#[from] PlotError),
+    /// A machine that cannot stand.
+    #[error(transparent)]
+    Equilibrium(#[from] NoEquilibrium),
+    /// A machine whose motions cannot be told.
+    #[error(transparent)]
+    Modes(#[from] NoModes),
+    /// An option whose value makes no sense here.
+    #[error("`{option} {given}`: expected {expected}")]
+    Option {
+        /// `"--every"`.
+        option: &'static str,
+        /// As typed.
+        given: String,
+        /// What it should have been.
+        expected: String,
+    },
     /// A file that could not be read or written.
     #[error("cannot {action} {}: {source}", path.display())]
     File {
@@ -109,7 +126,7 @@ impl Error {
     pub fn exit(&self) -> Exit {
         match self {
             Self::Input(_) => Exit::BadInput,
-            Self::Engine(_) => Exit::BadInput,
+            Self::Engine(_) | Self::Equilibrium(_) | Self::Modes(_) | Self::Option { .. } => Exit::BadInput,
             Self::Store(error) => error.exit(),
             Self::Plot(error) if error.is_usage() => Exit::BadInput,
             Self::Plot(_) => Exit::Failed,

@@ -13,4 +13,6 @@ pub mod plot;
 pub mod progress;
 pub mod run;
 pub mod store;
+mod table;
+pub mod trace;
 pub mod verdict;

@@ -10,6 +10,7 @@ mod floating;
 mod forces;
 mod frame;
 mod harmonics;
+mod history;
 mod lanes;
 mod linear;
 mod linear_outputs;
@@ -23,11 +24,13 @@ mod point;
 mod run;
 mod shape;
 mod spin;
+mod suspension;
 mod violations;
 
 pub use campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
 pub use capping::Capping;
 pub use channel::Channel;
+pub use history::{History, Instant, Start, history};
 pub use linear::Matrices;
 pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};
 pub use modal::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
@@ -37,9 +40,12 @@ pub use point::{NoEquilibrium, Point, Timing, prepare};
 pub use run::{Method, ModelKind, Record, simulate};
 pub use shape::{Motion, Movement, Plane};
 pub use spin::{Spin, SpinStretch};
+pub use suspension::Forces;
 pub use violations::Violation;
 
 #[cfg(test)]
 mod campbell_tests;
+#[cfg(test)]
+mod history_tests;
 #[cfg(test)]
 mod reference_tests;

@@ -41,6 +41,25 @@ pub enum ModelKind {
 /// First step that an adaptive method tries.
 const FIRST_STEP_S: f64 = 1e-5;
 
+/// The step that a leg starts with.
+pub(crate) fn first_step_s(method: &Method) -> f64 {
+    match method {
+        Method::Rk4 { step_s } | Method::Rk4MassScaled { step_s, .. } => *step_s,
+        Method::Dopri5(_) => FIRST_STEP_S,
+    }
+}
+
+/// How the bearings act.
+#[inline(always)]
+pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
+    match method {
+        Method::Rk4MassScaled { cap_rad_per_s, .. } => {
+            Coupling::MassScaled(zero.lit(cap_rad_per_s * cap_rad_per_s))
+        }
+        Method::Rk4 { .. } | Method::Dopri5(_) => Coupling::Springs,
+    }
+}
+
 /// How one trajectory went.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
@@ -96,22 +115,12 @@ impl<F: Family> Kernel for Simulate<'_, F> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Vec<Record> {
-        let step_s = match self.method {
-            Method::Rk4 { step_s } | Method::Rk4MassScaled { step_s, .. } => *step_s,
-            Method::Dopri5(_) => FIRST_STEP_S,
-        };
-        let coupling = match self.method {
-            Method::Rk4MassScaled { cap_rad_per_s, .. } => {
-                Coupling::MassScaled(N(zero).lit(cap_rad_per_s * cap_rad_per_s))
-            }
-            Method::Rk4 { .. } | Method::Dopri5(_) => Coupling::Springs,
-        };
         let mut run = Run::<T, F::Over<T>> {
-            model: Model::splat(N(zero), self.points[0], coupling),
+            model: Model::splat(N(zero), self.points[0], coupling(self.method, N(zero))),
             points: self.points,
             taken: 0,
             lanes: [LaneState::default(); MAX_LANES],
-            step_s,
+            step_s: first_step_s(self.method),
             channels: Peaks::new(N(zero)),
             radial: Peaks::new(N(zero)),
             windows: N(zero),

@@ -9,6 +9,7 @@ pub mod check;
 pub mod completions;
 pub mod init;
 pub mod merge;
+pub mod modes;
 pub mod parameters;
 pub mod plot;
 pub mod run;
@@ -16,6 +17,7 @@ pub mod schema;
 pub mod show;
 pub mod slurm;
 pub mod status;
+pub mod trace;
 
 /// A grid file and changes to its constants, as most commands take them.
 #[derive(Debug, clap::Args)]

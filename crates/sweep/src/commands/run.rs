@@ -13,6 +13,7 @@ use crate::run::{self as runner, Ended, Engine, Report, RunOptions};
 use crate::store::provenance::Session;
 use crate::store::read::Tally;
 use crate::store::{Job, ShardRequest};
+use crate::trace::{self, MOST_KEPT};
 
 /// Arguments of `sweep run`.
 #[derive(Debug, clap::Args)]
@@ -34,6 +35,10 @@ pub struct Args {
     /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every 5 s) or none
     #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
     pub progress: Mode,
+    /// Keep the time histories of every point too, decimated, in NAME.traces beside NAME.parquet: `sweep plot NAME.parquet
+    /// --traces NAME.traces -o MAP.html` shows them on a click. They take a run of their own, one trajectory at a time
+    #[arg(long)]
+    pub keep_traces: bool,
     /// Exit with 3 if any row of the finished result failed
     #[arg(long)]
     pub fail_on_error: bool,
@@ -62,6 +67,13 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
 /// # Errors
 /// Whatever of [`crate::store::StoreError`] kept it from its end; finished chunks are kept.
 pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Error> {
+    if args.keep_traces && plan.points() > MOST_KEPT {
+        return Err(Error::Option {
+            option: "--keep-traces",
+            given: format!("with {} points", plan.points()),
+            expected: format!("at most {MOST_KEPT}; `sweep trace` writes those of single points"),
+        });
+    }
     let interrupt = Interrupt::install().map_err(|source| Error::File {
         action: "install signal handlers for",
         path: PathBuf::from("this process"),
@@ -81,6 +93,17 @@ pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Er
         tell(note);
     }
     tell(summary(args, plan, &job, &output, &report).trim_end());
+    if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
+        let folder = output.with_extension("traces");
+        let threads =
+            args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+        trace::keep(plan, &folder, threads, &|| interrupt.stopped())?;
+        if let Some(signal) = interrupt.signal() {
+            tell("interrupted; the map is kept, and the traces so far");
+            return Ok(if signal == 15 { Exit::Terminated } else { Exit::Interrupted });
+        }
+        tell(&format!("traces      {}", folder.display()));
+    }
     Ok(match report.ended {
         Ended::Interrupted { signal: 15, .. } => Exit::Terminated,
         Ended::Interrupted { .. } => Exit::Interrupted,

@@ -68,7 +68,14 @@ fn resolve(
     finish(&mut draft, &mut report);
     validate::steps(&draft, &mut report);
     validate::scenarios(&draft, &mut report);
+    validate::stability(&draft, &mut report);
     report.finish(draft.plan)
+}
+
+/// A machine in full, as a result file carries it.
+#[must_use]
+pub fn machine_json(machine: &Machine) -> serde_json::Value {
+    machine::to_json(machine)
 }
 
 /// A machine as the text of a machine file: loading it gives the same machine, bit for bit.

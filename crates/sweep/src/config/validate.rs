@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use washer_model::{Parameter, Violation, decimal};
+use lane_ode::Simd;
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
+use washer_model::{Parameter, Timing, Violation, decimal, highest_frequency_rad_per_s, prepare};
 
 use super::grid::Draft;
 use super::report::{Diagnostic, Report};
@@ -87,13 +89,52 @@ pub(super) fn steps(draft: &Draft, report: &mut Report) {
         return;
     };
     let expected = format!("expected a step from {:e} s to {} s", end_s / MOST_STEPS, decimal(end_s));
-    report.push(refuse_step(draft, title, &expected));
+    let refusal = refuse_step(draft, title, &expected);
+    report
+        .push(draft.origins.get("time.end_s").into_iter().fold(refusal, |all, end| all.at(end, "and this")));
 }
 
-/// A refusal of the step, pointing at it, or at the section that leaves it out, and at the end it must reach.
+/// A fixed step with which some machine's fastest motion would grow without bounds, undamped bearings against their mass as
+/// a rule. Only a sound plan can be judged. The limit is sought at the grid's corners, on the machine at rest and turning at
+/// its greatest speed; a machine without equilibrium has none, and its rows will say so.
+pub(super) fn stability(draft: &Draft, report: &mut Report) {
+    let Integrator::Rk4 { step_s } = draft.plan.integrator else { return };
+    if !report.is_clean() {
+        return;
+    }
+    let Some(limit_s) = longest_stable_step_s(draft, step_s) else { return };
+    let title = format!(
+        "a step of {} s is past the stability limit of rk4 on this machine, {limit_s:.2e} s",
+        decimal(step_s)
+    );
+    let expected = format!("expected a step of at most {limit_s:.2e} s");
+    let axes = draft.plan.axes.iter().any(|axis| axis.values.len() > 1);
+    let at = if axes { ", at the grid's hardest corner" } else { "" };
+    let frequency = RK4_STABILITY_LIMIT / limit_s;
+    report.push(refuse_step(draft, title, &expected).help(format!(
+        "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural frequency{at}"
+    )));
+}
+
+/// The longest stable step over the grid's corners, if `step_s` is longer.
+fn longest_stable_step_s(draft: &Draft, step_s: f64) -> Option<f64> {
+    let plan = &draft.plan;
+    let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };
+    let mut highest = 0.0_f64;
+    for point in plan.corners() {
+        let Scenario { machine, spin } = plan.scenario(point);
+        let speed = spin.greatest_speed_rad_per_s(plan.end_s);
+        for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
+            // Matrices without eigenvalues leave it to the run to tell whether the machine can move.
+            highest = highest.max(highest_frequency_rad_per_s(&point, speed).unwrap_or(0.0));
+        }
+    }
+    let limit_s = RK4_STABILITY_LIMIT / highest;
+    (step_s > limit_s).then_some(limit_s)
+}
+
+/// A refusal of the step, pointing at it, or at the section that leaves it out.
 fn refuse_step(draft: &Draft, title: String, expected: &str) -> Diagnostic {
     let step = draft.origins.get("integrator.step_s").or_else(|| draft.origins.get("integrator"));
-    let end = draft.origins.get("time.end_s");
-    let places = step.into_iter().chain(end).zip([expected, "and this"]);
-    places.fold(Diagnostic::new(title), |diagnostic, (at, label)| diagnostic.at(at, label))
+    step.into_iter().fold(Diagnostic::new(title), |diagnostic, at| diagnostic.at(at, expected))
 }

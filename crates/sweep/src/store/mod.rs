@@ -47,6 +47,15 @@ pub use status::{FolderStatus, State, status};
 
 use crate::plan::{Axis, Plan};
 
+/// Writes a file whole or not at all, over an older one, and makes the folder that it is to be in.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    // For the checks of the name alone.
+    Folder::of(path)?;
+    let folder = atomic::parent(path);
+    std::fs::create_dir_all(folder).map_err(StoreError::io("make the folder", folder))?;
+    atomic::write(folder, path, bytes)
+}
+
 /// The values of the axes at a point of the grid, first axis first.
 pub type AxisValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
 

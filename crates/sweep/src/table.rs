@@ -1,0 +1,98 @@
+//! A small result file: columns with units and descriptions, metadata as in the map's file (`store::schema`), in one piece.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, DictionaryArray, Float64Array, RecordBatch, UInt64Array};
+use arrow::datatypes::{DataType, Field, Int32Type, Schema};
+use parquet::arrow::ArrowWriter;
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use serde_json::{Map, Value, json};
+
+use crate::store::schema::key;
+use crate::store::{StoreError, write_whole};
+
+/// Columns on their way to a file.
+#[derive(Default)]
+pub(crate) struct Table {
+    fields: Vec<Field>,
+    arrays: Vec<ArrayRef>,
+    dictionary: Map<String, Value>,
+    metadata: Vec<KeyValue>,
+}
+
+impl Table {
+    /// Adds numbers; what is not known is null.
+    pub(crate) fn numbers(
+        &mut self,
+        name: &str,
+        unit: &str,
+        description: &str,
+        values: impl IntoIterator<Item = Option<f64>>,
+    ) {
+        let array: Float64Array = values.into_iter().collect();
+        self.add(name, unit, description, "float64", Arc::new(array));
+    }
+
+    /// Adds counts.
+    pub(crate) fn counts(&mut self, name: &str, description: &str, values: impl IntoIterator<Item = u64>) {
+        self.add(name, "1", description, "uint64", Arc::new(UInt64Array::from_iter_values(values)));
+    }
+
+    /// Adds words of which there are few.
+    pub(crate) fn words<'a>(
+        &mut self,
+        name: &str,
+        description: &str,
+        values: impl IntoIterator<Item = &'a str>,
+    ) {
+        let array: DictionaryArray<Int32Type> = values.into_iter().collect();
+        self.add(name, "", description, "string", Arc::new(array));
+    }
+
+    fn add(&mut self, name: &str, unit: &str, description: &str, type_name: &str, array: ArrayRef) {
+        let facts = HashMap::from([
+            ("unit".to_owned(), unit.to_owned()),
+            ("description".to_owned(), description.to_owned()),
+        ]);
+        let nullable = matches!(array.data_type(), DataType::Float64);
+        self.fields.push(Field::new(name, array.data_type().clone(), nullable).with_metadata(facts));
+        self.arrays.push(array);
+        self.dictionary
+            .insert(name.to_owned(), json!({ "type": type_name, "unit": unit, "description": description }));
+    }
+
+    /// Adds an entry to the file's key-value metadata.
+    pub(crate) fn metadata(&mut self, key: &str, value: &Value) {
+        self.metadata.push(KeyValue::new(key.to_owned(), value.to_string()));
+    }
+
+    /// Writes the file whole, over an older one, and makes the folder that it is to be in.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`] and [`StoreError::Parquet`].
+    pub(crate) fn write(mut self, path: &Path) -> Result<(), StoreError> {
+        let version = env!("CARGO_PKG_VERSION");
+        self.metadata.push(KeyValue::new(key::VERSION.to_owned(), version.to_owned()));
+        self.metadata
+            .push(KeyValue::new(key::COLUMNS.to_owned(), Value::Object(self.dictionary).to_string()));
+        let properties = WriterProperties::builder()
+            .set_created_by(format!("sweep version {version}"))
+            .set_compression(Compression::ZSTD(ZstdLevel::default()))
+            .set_dictionary_enabled(false)
+            .set_key_value_metadata(Some(self.metadata))
+            .build();
+        let schema = Arc::new(Schema::new(self.fields));
+        let bytes =
+            RecordBatch::try_new(schema.clone(), self.arrays).map_err(ParquetError::from).and_then(|batch| {
+                let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;
+                writer.write(&batch)?;
+                writer.into_inner()
+            });
+        write_whole(path, &bytes.map_err(StoreError::parquet("write", path))?)
+    }
+}

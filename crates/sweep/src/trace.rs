@@ -1,0 +1,249 @@
+//! Time histories of both models at one point, as a table.
+
+use std::path::Path;
+
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
+use lane_ode::{Failure, Simd};
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
+use serde_json::{Map, Value, json};
+use washer_model::{
+    COORDINATES, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium, Point, Start, Timing,
+    highest_frequency_rad_per_s, history, prepare,
+};
+
+use crate::engine;
+use crate::plan::{Integrator, Plan, Scenario};
+use crate::store::StoreError;
+use crate::store::schema::key;
+use crate::table::Table;
+
+/// Key of the metadata that says which point, how often, how integrated, and how it ended.
+const TRACE: &str = "sweep.trace";
+
+/// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as many.
+pub const MOST_INSTANTS: f64 = 2e6;
+
+/// Longest step of a trace whose map scales the bearings' mass.
+const LONGEST_STEP_S: f64 = 2e-4;
+
+/// That step's share of the stability limit, which holds for small motions.
+const SHARE_OF_LIMIT: f64 = 0.7;
+
+/// Most points whose traces a run keeps: at some 300 kB each.
+pub const MOST_KEPT: u64 = 10_000;
+
+/// Instants of a kept trace: what a page shows of it.
+const KEPT_INSTANTS: f64 = 2000.0;
+
+/// What a trace holds beside channels, gap and speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Extras {
+    /// Coordinates and their speeds.
+    pub states: bool,
+    /// Forces of springs and dampers, and their sum.
+    pub forces: bool,
+}
+
+/// The histories of one point.
+pub struct Trace {
+    table: Table,
+    /// Instants.
+    pub instants: usize,
+    /// How each model failed that did, in words.
+    pub failures: Vec<String>,
+}
+
+/// Integrates both models of a scenario and reads them every `every_s` from 0 to the end.
+///
+/// `at` names the point: parameters with their values. Both models begin at `start`.
+///
+/// # Errors
+/// [`NoEquilibrium`].
+pub fn trace(
+    plan: &Plan,
+    scenario: Scenario,
+    at: Map<String, Value>,
+    every_s: f64,
+    start: &Start,
+    extras: Extras,
+) -> Result<Trace, NoEquilibrium> {
+    let Scenario { machine, spin } = scenario;
+    let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };
+    let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
+    let (method, method_json) = method(plan, &point, spin.greatest_speed_rad_per_s(plan.end_s));
+    let run = |model| history(model, &method, &point, start, every_s);
+    let (nonlinear, linear) = rayon::join(|| run(ModelKind::Nonlinear), || run(ModelKind::Linear));
+
+    // The quotient may come out a hair below the whole number that was meant.
+    let instants = 1 + (plan.end_s / every_s * (1.0 + 1e-12)).floor() as usize;
+    let time = |k: usize| k as f64 * every_s;
+    let mut table = Table::default();
+    table.numbers("time_s", "s", "time since the start", (0..instants).map(|k| Some(time(k))));
+    let speeds = (0..instants).map(|k| Some(spin.speed_rpm(time(k))));
+    table.numbers("speed_rpm", "rpm", "spin of the shaft", speeds);
+    let models = [Columns::new("nonlinear", &nonlinear, instants), Columns::new("linear", &linear, instants)];
+    models.iter().for_each(|model| model.channels(&mut table));
+    models.iter().for_each(|model| model.gap(&mut table));
+    if extras.states {
+        models.iter().for_each(|model| model.states(&mut table));
+    }
+    if extras.forces {
+        models.iter().for_each(|model| model.forces(&mut table));
+    }
+    let failures = models.iter().map(Columns::failure).collect::<Vec<_>>();
+    table.metadata(key::PLAN, &plan.to_json());
+    table.metadata(
+        TRACE,
+        &json!({
+            "at": at,
+            "every_s": every_s,
+            "equilibrium": named('q', point.equilibrium()),
+            "start": { "deviations": named('q', &start.deviations), "speeds": named('u', &start.speeds) },
+            "integrator": method_json,
+            "nonlinear_failure": failures[0],
+            "linear_failure": failures[1],
+        }),
+    );
+    Ok(Trace { table, instants, failures: failures.into_iter().flatten().collect() })
+}
+
+/// Traces of every point of a plan, one file each (`point-<index>.parquet`) in `folder`, until `stop` says so. A point without
+/// equilibrium has none.
+///
+/// # Errors
+/// As `store`; and no more threads.
+pub fn keep(
+    plan: &Plan,
+    folder: &Path,
+    threads: usize,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<(), StoreError> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| StoreError::Threads { threads, reason: error.to_string() })?;
+    pool.install(|| {
+        (0..plan.points()).into_par_iter().try_for_each(|point| {
+            if stop() {
+                return Ok(());
+            }
+            let values = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
+            let at = values.zip(plan.axis_values(point).into_iter().map(Value::from)).collect();
+            let every_s = plan.end_s / KEPT_INSTANTS;
+            match trace(plan, plan.scenario(point), at, every_s, &Start::default(), Extras::default()) {
+                Ok(trace) => trace.write(&folder.join(format!("point-{point}.parquet"))),
+                Err(NoEquilibrium) => Ok(()),
+            }
+        })
+    })
+}
+
+impl Trace {
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// As `store`.
+    pub fn write(self, path: &Path) -> Result<(), StoreError> {
+        self.table.write(path)
+    }
+}
+
+/// Ten numbers as q1 to q10 or u1 to u10.
+fn named(letter: char, values: &[f64; COORDINATES]) -> Value {
+    values.iter().enumerate().map(|(i, value)| (format!("{letter}{}", i + 1), json!(value))).collect()
+}
+
+/// The plan's method. A map may scale the bearings' mass to be quick; a single trajectory keeps them as they are, in stable steps.
+fn method(plan: &Plan, point: &Point, speed_rad_per_s: f64) -> (Method, Value) {
+    let rk4 = |step_s: f64| (Method::Rk4 { step_s }, json!({ "method": "rk4", "step_s": step_s }));
+    match plan.integrator {
+        Integrator::Rk4 { step_s } => rk4(step_s),
+        Integrator::Dopri5 { rtol, atol } => {
+            (engine::dopri5(rtol, atol), json!({ "method": "dopri5", "rtol": rtol, "atol": atol }))
+        }
+        Integrator::Rk4MassScaled { .. } => {
+            let highest = highest_frequency_rad_per_s(point, speed_rad_per_s).unwrap_or(0.0);
+            rk4(LONGEST_STEP_S.min(SHARE_OF_LIMIT * RK4_STABILITY_LIMIT / highest))
+        }
+    }
+}
+
+/// One model's columns.
+struct Columns<'a> {
+    model: &'static str,
+    history: &'a History<'a>,
+    instants: Vec<Option<Instant>>,
+}
+
+impl<'a> Columns<'a> {
+    fn new(model: &'static str, history: &'a History<'a>, instants: usize) -> Self {
+        Self { model, history, instants: (0..instants).map(|k| history.instant(k)).collect() }
+    }
+
+    fn column(
+        &self,
+        table: &mut Table,
+        (name, unit, description): (&str, &str, &str),
+        of: impl Fn(&Instant) -> f64,
+    ) {
+        let description = format!("{description}, {} model; null from where it failed", self.model);
+        let values = self.instants.iter().map(|instant| instant.as_ref().map(&of));
+        table.numbers(name, unit, &description, values);
+    }
+
+    fn channels(&self, table: &mut Table) {
+        for channel in Channel::ALL {
+            let name = format!("{}_{}", self.model, channel.name());
+            let description = format!("{} from equilibrium", channel.description());
+            self.column(table, (&name, channel.unit(), &description), |at| at.channels[channel.index()]);
+        }
+    }
+
+    fn gap(&self, table: &mut Table) {
+        let name = format!("gap_{}_m", self.model);
+        self.column(table, (&name, "m", "gap between drum and tub"), |at| at.gap_m);
+    }
+
+    fn states(&self, table: &mut Table) {
+        for i in 0..COORDINATES {
+            let (unit, per_s) = if i < 4 { ("m", "m/s") } else { ("rad", "rad/s") };
+            let name = format!("q{}_{}_{unit}", i + 1, self.model);
+            let description = format!("coordinate q{} from equilibrium", i + 1);
+            self.column(table, (&name, unit, &description), |at| at.deviations[i]);
+            let name = format!("u{}_{}_{unit}_per_s", i + 1, self.model);
+            self.column(table, (&name, per_s, &format!("speed of q{}", i + 1)), |at| at.speeds[i]);
+        }
+    }
+
+    fn forces(&self, table: &mut Table) {
+        let forces: Vec<Option<Forces>> = (0..self.instants.len()).map(|k| self.history.forces(k)).collect();
+        let mut add = |what: &str, description: &str, of: &dyn Fn(&Forces) -> f64| {
+            let name = format!("{what}_{}_n", self.model);
+            let description = format!("{description}, {} model; null from where it failed", self.model);
+            table.numbers(&name, "N", &description, forces.iter().map(|at| at.as_ref().map(of)));
+        };
+        let Some(first) = forces.first().and_then(Option::as_ref) else { return };
+        for k in 0..first.springs_n.len() {
+            let what = format!("spring_{}_tension", k + 1);
+            add(&what, "tension of the spring, negative where it pushes", &|at| at.springs_n[k]);
+        }
+        for k in 0..first.dampers_n.len() {
+            let what = format!("damper_{}_tension", k + 1);
+            add(&what, "tension of the damper, positive while it is drawn out", &|at| at.dampers_n[k]);
+        }
+        for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+            let description = format!("force of all springs and dampers on the cabinet along c{}", k + 1);
+            add(&format!("cabinet_force_{axis}"), &description, &|at| at.cabinet_n[k]);
+        }
+    }
+
+    fn failure(&self) -> Option<String> {
+        let (reason, time_s) = self.history.failure?;
+        let what = match reason {
+            Failure::Diverged => "diverged",
+            Failure::StepTooSmall => "needs steps too small for double precision",
+            Failure::StepLimit => "used up its allowance of steps",
+        };
+        Some(format!("the {} model {what} at {time_s:.4} s: its columns are null from there on", self.model))
+    }
+}

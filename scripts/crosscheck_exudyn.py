@@ -1,0 +1,300 @@
+#!/usr/bin/env python3
+"""The nonlinear model against the same machine put together from standard parts in Exudyn.
+
+    python scripts/crosscheck_exudyn.py [--sweep BINARY] [--step S] [--table FILE.md]
+
+Exudyn (https://exudyn.readthedocs.io) is a general multibody program: three rigid bodies in absolute coordinates, joints,
+connectors, an implicit integrator. Nothing of this project's derivation is in it, as little as the paper's was in the commercial
+program that it compared with. Three comparisons: the static equilibrium, a run-up to 600 rpm in 4 s, and a release from 0.1 rad
+of rocking at 270 rpm. Exit code 1 if any differs by more than its bound.
+"""
+
+import argparse
+import json
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+import tomllib
+
+import exudyn
+import numpy as np
+import pyarrow.parquet as pq
+from exudyn.utilities import (
+    MarkerBodyRigid,
+    ObjectConnectorRigidBodySpringDamper,
+    ObjectJointGeneric,
+    RigidBodyInertia,
+    SensorBody,
+)
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+RPM = math.tau / 60
+# Bounds on the difference, as a share of each coordinate's largest deviation. The second is what a second-order
+# integrator leaves at a step of 1e-4 s, where undamped bearings ring; it falls with the step's square.
+EQUILIBRIUM_BOUND = 1e-10
+MOTION_BOUND = 1e-5
+
+
+def turn(axis, angle):
+    """Rotation about cabinet axis 0, 1 or 2."""
+    s, c = math.sin(angle), math.cos(angle)
+    matrix = np.eye(3)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix[i, i] = matrix[j, j] = c
+    matrix[i, j], matrix[j, i] = -s, s
+    return matrix
+
+
+def spin_rate(axis_matrix, coordinates_rates):
+    """Angular velocity of a frame that is a product of elementary turns: sum of each rate about its own turned axis."""
+    total, frame = np.zeros(3), np.eye(3)
+    for axis, angle, rate in coordinates_rates:
+        total += frame[:, axis] * rate
+        frame = frame @ turn(axis, angle)
+    assert np.allclose(frame, axis_matrix)
+    return total
+
+
+def pose(q, theta):
+    """Rotations of tub, shaft and drum (the paper's Table 1), and positions of their reference points."""
+    tub = turn(1, q[4]) @ turn(2, q[5])
+    shaft = turn(1, q[6]) @ turn(2, q[7]) @ turn(0, theta)
+    drum = shaft @ turn(1, q[8]) @ turn(2, q[9])
+    return tub, shaft, drum, np.array([0, q[0], q[1]]), np.array([0, q[2], q[3]])
+
+
+def drum_with_unbalance(machine):
+    """Mass, mass centre from the hinge, and inertia about it, of bare drum and point mass: a function of the mass alone."""
+    drum, load = machine["drum"], machine["unbalance"]
+    m0, mu = drum["mass_kg"], load["mass_kg"]
+    arm = np.array([load["x_m"], load["radius_m"], 0.0])
+    bare = np.array([drum["centre_x_m"], 0.0, 0.0])
+    mass = m0 + mu
+    centre = (m0 * bare + mu * arm) / mass
+    inertia = np.diag(drum["inertia_kg_m2"])
+    for m, place in [(m0, bare), (mu, arm)]:
+        r = place - centre
+        inertia = inertia + m * (r @ r * np.eye(3) - np.outer(r, r))
+    return mass, centre, inertia
+
+
+def coordinates(places, rotations):
+    """q1 to q10 from the bodies' positions and rotation matrices."""
+    tub, shaft, drum = (np.reshape(rotation, (3, 3)) for rotation in rotations)
+
+    def angles(matrix):
+        return math.atan2(-matrix[2, 0], matrix[0, 0]), math.asin(matrix[1, 0])
+
+    return np.array([*places[0][1:], *places[1][1:], *angles(tub), *angles(shaft), *angles(shaft.T @ drum)])
+
+
+class Washer:
+    """The machine in Exudyn, starting in the pose q with speeds u; theta(t) is prescribed."""
+
+    def __init__(self, machine, q, u, theta, rate):
+        self.container = exudyn.SystemContainer()
+        self.mbs = mbs = self.container.AddSystem()
+        gravity = [0, -machine["gravity_m_per_s2"], 0]
+        hinge_x = machine["drum"]["hinge_x_m"]
+        tub, shaft, drum, tub_point, shaft_point = pose(q, theta(0.0))
+        hinge = shaft_point + shaft[:, 0] * hinge_x
+        tub_rate = spin_rate(tub, [(1, q[4], u[4]), (2, q[5], u[5])])
+        turns = [(1, q[6], u[6]), (2, q[7], u[7]), (0, theta(0.0), rate)]
+        shaft_rate = spin_rate(shaft, turns)
+        drum_rate = spin_rate(drum, turns + [(1, q[8], u[8]), (2, q[9], u[9])])
+        shaft_velocity = np.array([0, u[2], u[3]])
+
+        def body(mass, centre_x, inertia, position, rotation, velocity, angular):
+            parts = RigidBodyInertia(mass, inertia, [0, 0, 0]).Translated([centre_x[0], centre_x[1], 0])
+            # The start pose is the reference pose: small rotation coordinates, and no drift in their sum with it.
+            return mbs.CreateRigidBody(
+                referencePosition=list(position), referenceRotationMatrix=rotation, inertia=parts, gravity=gravity,
+                initialVelocity=list(velocity), initialAngularVelocity=list(angular),
+            )
+
+        drum_mass, drum_centre, drum_inertia = drum_with_unbalance(machine)
+        t, s = machine["tub"], machine["shaft"]
+        self.tub = body(t["mass_kg"], (t["centre_x_m"], 0), np.diag(t["inertia_kg_m2"]), tub_point, tub,
+                        [0, u[0], u[1]], tub_rate)
+        self.shaft = body(s["mass_kg"], (s["centre_x_m"], 0), np.diag(s["inertia_kg_m2"]), shaft_point, shaft,
+                          shaft_velocity, shaft_rate)
+        self.drum = body(drum_mass, (drum_centre[0] - hinge_x, drum_centre[1]), drum_inertia, hinge, drum,
+                         shaft_velocity + np.cross(shaft_rate, hinge - shaft_point), drum_rate)
+        ground = mbs.CreateGround()
+
+        def marker(number, place=(0, 0, 0)):
+            return mbs.AddMarker(MarkerBodyRigid(bodyNumber=number, localPosition=list(place)))
+
+        def joint(first, second, axes, rotation0=None, rotation1=None, offset=0):
+            mbs.AddObject(ObjectJointGeneric(
+                markerNumbers=[first, second], constrainedAxes=axes, offsetUserFunction=offset,
+                rotationMarker0=np.eye(3) if rotation0 is None else rotation0,
+                rotationMarker1=np.eye(3) if rotation1 is None else rotation1,
+            ))
+
+        # One blocked rotation about x means y of the first frame across z of the second. Tub: c2 . t3 = 0, and no motion
+        # along the cabinet's own axis.
+        origin = marker(ground)
+        joint(origin, marker(self.tub), [1, 0, 0, 1, 0, 0])
+        joint(origin, marker(self.shaft), [1, 0, 0, 0, 0, 0])
+        # Prescribed spin: c2 . (s3 turned back by theta) = 0, by frames whose y is s3 and whose z is c2.
+        joint(marker(self.shaft), origin, [0, 0, 0, 1, 0, 0], turn(0, math.pi / 2), turn(0, -math.pi / 2),
+              lambda mbs, time, item, parameters: [0, 0, 0, -theta(time), 0, 0])
+        # Universal joint: one point in common, and s2 . d3 = 0.
+        joint(marker(self.shaft, (hinge_x, 0, 0)), marker(self.drum), [1, 1, 1, 1, 0, 0])
+        flexure = machine["flexure"]["stiffness_n_m_per_rad"]
+        # The connector itself: what `mbs` creates from it would take the start pose as unbent.
+        mbs.AddObject(ObjectConnectorRigidBodySpringDamper(
+            markerNumbers=[marker(self.shaft, (hinge_x, 0, 0)), marker(self.drum)],
+            stiffness=np.diag([0, 0, 0, 0, flexure, flexure]), damping=np.zeros((6, 6)), useIntrinsicFormulation=True,
+        ))
+        for end in ["front", "rear"]:
+            place = [machine["bearings"][f"{end}_x_m"], 0, 0]
+            k = machine["bearings"][f"{end}_stiffness_n_per_m"]
+            mbs.CreateCartesianSpringDamper(itemNumbers=[self.tub, self.shaft], localPosition0=place,
+                                            localPosition1=place, stiffness=[0, k, k])
+        for spring in machine["springs"]:
+            ends = np.array(spring["cabinet_m"]), np.array(spring["tub_m"])
+            length = spring.get("free_length_m", np.linalg.norm(ends[1] - ends[0]))
+            mbs.CreateSpringDamper(itemNumbers=[ground, self.tub], localPosition0=list(ends[0]),
+                                   localPosition1=list(ends[1]), referenceLength=length,
+                                   stiffness=spring["stiffness_n_per_m"])
+        for damper in machine["dampers"]:
+            mbs.CreateSpringDamper(itemNumbers=[ground, self.tub], localPosition0=list(damper["cabinet_m"]),
+                                   localPosition1=list(damper["tub_m"]), referenceLength=1.0,
+                                   damping=damper["damping_n_s_per_m"])
+        mbs.Assemble()
+        self.settings = exudyn.SimulationSettings()
+        self.settings.solutionSettings.writeSolutionToFile = False
+
+    def rest_coordinates(self):
+        """q1 to q10 of the present configuration."""
+        def of(body, variable):
+            return np.array(self.mbs.GetObjectOutputBody(body, variable, [0, 0, 0]))
+
+        place, rotation = exudyn.OutputVariableType.Position, exudyn.OutputVariableType.RotationMatrix
+        bodies = [self.tub, self.shaft, self.drum]
+        return coordinates([of(b, place) for b in bodies], [of(b, rotation) for b in bodies])
+
+    def rest(self):
+        """Static equilibrium by Newton's method."""
+        self.settings.staticSolver.newton.relativeTolerance = 1e-9
+        self.settings.staticSolver.newton.absoluteTolerance = 1e-9
+        self.settings.staticSolver.newton.maxIterations = 50
+        self.mbs.SolveStatic(self.settings, updateInitialValues=True)
+        return self.rest_coordinates()
+
+    def run(self, theta, end_s, step_s, every_s):
+        """Coordinates at every multiple of `every_s`, by the generalised-alpha method on index 3."""
+        kinds = [exudyn.OutputVariableType.Position, exudyn.OutputVariableType.RotationMatrix]
+        sensors = [[self.mbs.AddSensor(SensorBody(bodyNumber=body, outputVariableType=kind, storeInternal=True))
+                    for body in (self.tub, self.shaft, self.drum)] for kind in kinds]
+        self.mbs.Assemble()
+        self.settings.solutionSettings.sensorsWritePeriod = every_s
+        integration = self.settings.timeIntegration
+        integration.numberOfSteps = round(end_s / step_s)
+        integration.endTime = end_s
+        integration.verboseMode = 0
+        integration.newton.useModifiedNewton = True
+        integration.newton.relativeTolerance = 1e-10
+        integration.newton.absoluteTolerance = 1e-11
+        # The user function gives an angle, not its rate, so index 3; and no numerical damping of the bearings.
+        integration.generalizedAlpha.useIndex2Constraints = False
+        integration.generalizedAlpha.useNewmark = False
+        integration.generalizedAlpha.spectralRadius = 1.0
+        integration.generalizedAlpha.computeInitialAccelerations = True
+        if not self.mbs.SolveDynamic(self.settings, solverType=exudyn.DynamicSolverType.GeneralizedAlpha):
+            sys.exit("Exudyn's integrator did not reach the end")
+        places, rotations = ([self.mbs.GetSensorStoredData(sensor) for sensor in row] for row in sensors)
+        times = places[0][:, 0]
+        assert np.allclose(times, every_s * np.arange(len(times)))
+        return np.array([
+            coordinates([place[k, 1:] for place in places], [rotation[k, 1:] for rotation in rotations])
+            for k in range(len(times))
+        ])
+
+
+def grid(spin, end_s):
+    """A grid file with accurate adaptive steps."""
+    lines = [f"{key} = {json.dumps(value)}" for key, value in spin.items()]
+    return "\n".join(["[spin]", *lines, "[time]", f"end_s = {end_s}", "[integrator]", 'method = "dopri5"',
+                      "rtol = 1e-10", "atol = 1e-13", ""])
+
+
+def ours(sweep, spin, end_s, every_s, start=()):
+    """Deviations q1 to q10 by `sweep trace`, and the machine as run."""
+    with tempfile.TemporaryDirectory() as folder:
+        grid_file, out = pathlib.Path(folder) / "check.toml", pathlib.Path(folder) / "check.parquet"
+        grid_file.write_text(grid(spin, end_s))
+        starts = [word for pair in start for word in ("--start", pair)]
+        subprocess.run([sweep, "trace", grid_file, "--every", str(every_s), "--states", *starts, "--out", out],
+                       check=True, stderr=subprocess.DEVNULL)
+        table = pq.read_table(out)
+    columns = [f"q{i}_nonlinear_{'m' if i <= 4 else 'rad'}" for i in range(1, 11)]
+    return np.array([table[name].to_numpy() for name in columns]).T, json.loads(table.schema.metadata[b"sweep.trace"])
+
+
+def main():
+    """Compare, print, judge."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sweep", default=str(ROOT / "target/release/sweep"), help="the binary")
+    parser.add_argument("--step", type=float, default=1e-4, help="Exudyn's step, s")
+    parser.add_argument("--table", help="also write the table to this Markdown file")
+    arguments = parser.parse_args()
+    exudyn.config.printToConsole = False
+    sweep = arguments.sweep
+    machine = tomllib.loads(
+        subprocess.run([sweep, "init", "--machine", "-"], check=True, capture_output=True, text=True).stdout)
+    every_s = 0.01
+    rows = []
+
+    still = np.zeros(10)
+    washer = Washer(machine, still, still, lambda t: 0.0, 0.0)
+    equilibrium = washer.rest()
+
+    # Run-up: 600 rpm on a cycloidal ramp of 4 s, then constant to 6 s.
+    peak, ramp = 600 * RPM, 4.0
+
+    def cycloidal(t):
+        if t < ramp:
+            return peak * (t * t / (2 * ramp) + ramp * (math.cos(math.tau * t / ramp) - 1) / math.tau**2)
+        return peak * (t - ramp / 2)
+
+    run_up, told = ours(sweep, {"profile": "cycloidal", "peak_rpm": 600, "ramp_s": ramp}, 6.0, every_s)
+    their_rest = np.array([told["equilibrium"][f"q{i}"] for i in range(1, 11)])
+    rows.append(("static equilibrium, ten coordinates", np.abs(their_rest - equilibrium).max(), EQUILIBRIUM_BOUND))
+    theirs = Washer(machine, equilibrium, still, cycloidal, 0.0).run(cycloidal, 6.0, arguments.step, every_s)
+    rows.append(("run-up to 600 rpm in 4 s, to 6 s", difference(run_up, theirs - equilibrium), MOTION_BOUND))
+
+    # Release: tub, shaft and drum tilted together by 0.1 rad of yaw while the drum turns at 270 rpm.
+    speed = 270 * RPM
+    start = np.zeros(10)
+    start[4] = start[6] = 0.1
+    release, _ = ours(sweep, {"profile": "table", "time_s": [0, 1], "speed_rpm": [270, 270]}, 2.0, every_s,
+                      ["q5=0.1", "q7=0.1"])
+    washer = Washer(machine, equilibrium + start, still, lambda t: speed * t, speed)
+    theirs = washer.run(lambda t: speed * t, 2.0, arguments.step, every_s)
+    rows.append(("release from 0.1 rad of yaw at 270 rpm, to 2 s", difference(release, theirs - equilibrium), MOTION_BOUND))
+
+    lines = ["| comparison | largest difference | bound |", "|---|---|---|"]
+    lines += [f"| {name} | {found:.1e} | {bound:.0e} |" for name, found, bound in rows]
+    print("\n".join(lines))
+    if arguments.table:
+        pathlib.Path(arguments.table).write_text("\n".join(lines) + "\n")
+    return 0 if all(found <= bound for _, found, bound in rows) else 1
+
+
+def difference(ours_q, theirs_q):
+    """Largest difference of any coordinate, as a share of the largest deviation among those of its kind (m, rad)."""
+    worst = 0.0
+    # The hinge's angles are microradians; they are judged against their own size.
+    for kind in [slice(0, 4), slice(4, 8), slice(8, 10)]:
+        size = np.abs(theirs_q[:, kind]).max()
+        worst = max(worst, np.abs(ours_q[:, kind] - theirs_q[:, kind]).max() / size)
+    return worst
+
+
+if __name__ == "__main__":
+    sys.exit(main())

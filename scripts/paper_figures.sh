@@ -1,0 +1,28 @@
+#!/bin/sh
+# The paper's result figures (6, 7, 9 to 12) from this program, into results/figures: scripts/paper_figures.sh
+#
+# Builds the release binary unless SWEEP names one. Traces, modes and the map stay in results/ as Parquet; the map of Fig. 12 is
+# the longest, and is taken as it is if it is there.
+set -eu
+root=$(cd "$(dirname "$0")/.." && pwd)
+cd "$root"
+if [ -z "${SWEEP:-}" ]; then
+    cargo build --release
+    SWEEP=$root/target/release/sweep
+fi
+figures=results/figures
+mkdir -p "$figures"
+
+"$SWEEP" modes --speed 0:1200:10 --out results/fig7.parquet
+"$SWEEP" plot results/fig7.parquet -o "$figures/fig7.svg"
+
+# Figs. 6 and 9 are one run: its motions, and the gap between drum and tub.
+for name in fig6 fig10 fig11; do
+    "$SWEEP" trace "sweeps/$name.toml" --out "results/$name.parquet"
+    "$SWEEP" plot "results/$name.parquet" --modes results/fig7.parquet -o "$figures/$name.svg"
+done
+"$SWEEP" plot results/fig6.parquet --channel drum_front_y --channel drum_front_z --modes results/fig7.parquet \
+    -o "$figures/fig9.svg"
+
+"$SWEEP" run sweeps/fig12.toml --progress plain
+"$SWEEP" plot results/fig12.parquet -o "$figures/fig12.svg"
