@@ -7,10 +7,13 @@ use crate::plan::Plan;
 
 pub mod check;
 pub mod completions;
+pub mod examples;
 pub mod init;
+pub mod man;
 pub mod merge;
 pub mod parameters;
 pub mod plot;
+pub mod reference;
 pub mod run;
 pub mod schema;
 pub mod show;
