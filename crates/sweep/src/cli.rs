@@ -3,7 +3,8 @@
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::commands::{
-    check, completions, examples, init, man, merge, parameters, plot, reference, run, schema, show, slurm, status,
+    check, completions, examples, init, man, merge, parameters, plot, reference, run, schema, show, slurm,
+    status,
 };
 use crate::exit::{Error, Exit};
 

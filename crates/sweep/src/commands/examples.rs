@@ -91,7 +91,11 @@ mod tests {
         for (name, lines) in EXAMPLES {
             for [line, _] in *lines {
                 let line = line.split(" 2>").next().unwrap_or_default();
-                assert!(name.is_empty() || line.starts_with(&format!("sweep {name} ")) || line == format!("sweep {name}"));
+                assert!(
+                    name.is_empty()
+                        || line.starts_with(&format!("sweep {name} "))
+                        || line == format!("sweep {name}")
+                );
                 let parsed = cli::command().try_get_matches_from(line.split_whitespace());
                 assert!(parsed.is_ok(), "{line}: {parsed:?}");
             }

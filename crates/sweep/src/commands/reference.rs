@@ -41,7 +41,9 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
 
 /// What stands at the head of a page, so that nobody edits it by hand.
 fn head(title: &str, page: &str) -> String {
-    format!("# {title}\n\n<!-- Made by `sweep reference {page}`; scripts/check_docs.py holds it against the program. -->\n\n")
+    format!(
+        "# {title}\n\n<!-- Made by `sweep reference {page}`; scripts/check_docs.py holds it against the program. -->\n\n"
+    )
 }
 
 /// A table row; a bar inside a cell would end it.
