@@ -1,5 +1,99 @@
 //! Integrators over SIMD lanes: each lane a trajectory with its own time, no heap after set-up, the same bits on
 //! every instruction set.
+//!
+//! One trajectory of a small system cannot fill a processor's vector units; eight trajectories side by side can. So a value
+//! here ([`Lane`]) carries 1, 2, 4 or 8 numbers, one per trajectory, and the lanes share nothing but the program: each has its
+//! own parameters, time, step and end, and takes up the next trajectory when it is done.
+//!
+//! What is yours to write, in this order:
+//!
+//! 1. [`System`]: x' = f(t, x), over values with operators ([`N`]). Products wait for the sum that they are part of and fuse
+//!    with it, the same way everywhere; [`Product::v`] rounds one that stands alone.
+//! 2. [`Task`]: which trajectories there are, each cut into [`Leg`]s at its kinks, and what is to be recorded of every
+//!    [`Step`]. [`Peaks`] finds largest magnitudes between steps as well as at them.
+//! 3. [`Kernel`]: the work as a whole, which [`Simd::dispatch`] compiles for every instruction set and starts on one.
+//!
+//! The methods are [`rk4`] (classical, fixed step) and [`dopri5`] (Dormand-Prince 5(4), adaptive, with dense output).
+//!
+//! # Example
+//!
+//! Twenty masses on springs, x'' = -k x, each with its own k, over one second.
+//!
+//! ```
+//! use lane_ode::{Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, rk4};
+//!
+//! struct Springs<'a, T> {
+//!     /// k of the trajectory in each lane (1/s^2).
+//!     stiffness: N<T>,
+//!     /// k of every trajectory.
+//!     all: &'a [f64],
+//!     /// How many have been given to lanes.
+//!     taken: usize,
+//!     /// Which trajectory each lane holds.
+//!     held: [usize; MAX_LANES],
+//!     /// Where each trajectory ended.
+//!     ends: Vec<f64>,
+//! }
+//!
+//! impl<T: Lane> System<T, 2> for Springs<'_, T> {
+//!     type Forcing = ();
+//!
+//!     #[inline(always)]
+//!     fn forcing(&self, _: N<T>) {}
+//!
+//!     #[inline(always)]
+//!     fn derivative(&self, (): &(), x: &[N<T>; 2]) -> [N<T>; 2] {
+//!         [x[1], -(self.stiffness * x[0]).v()]
+//!     }
+//!
+//!     #[inline(always)]
+//!     fn in_range(&self, x: &[N<T>; 2]) -> T::Mask {
+//!         x[0].abs().0.less(x[0].lit(1e3).0)
+//!     }
+//! }
+//!
+//! impl<T: Lane> Task<T, 2> for Springs<'_, T> {
+//!     fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; 2]) -> Option<Leg> {
+//!         if let Ended::Arrived(_) = ended {
+//!             self.ends[self.held[lane]] = x[0].0.get(lane);
+//!         }
+//!         let stiffness = *self.all.get(self.taken)?;
+//!         self.stiffness.0.set(lane, stiffness);
+//!         self.held[lane] = self.taken;
+//!         self.taken += 1;
+//!         x[0].0.set(lane, 1.0);
+//!         x[1].0.set(lane, 0.0);
+//!         Some(Leg { start_s: 0.0, end_s: 1.0, step_s: 0.01 })
+//!     }
+//!
+//!     fn begin(&mut self, (): &(), _: &[N<T>; 2], _: &[N<T>; 2]) {}
+//!
+//!     fn observe(&mut self, (): &(), _: &Step<'_, T, 2>) {}
+//! }
+//!
+//! struct Run<'a>(&'a [f64]);
+//!
+//! impl Kernel for Run<'_> {
+//!     type Output = Vec<f64>;
+//!
+//!     #[inline(always)]
+//!     fn run<T: Lane>(self, zero: T) -> Vec<f64> {
+//!         let ends = vec![f64::NAN; self.0.len()];
+//!         let (stiffness, held) = (N(zero), [0; MAX_LANES]);
+//!         let mut springs = Springs { stiffness, all: self.0, taken: 0, held, ends };
+//!         rk4::integrate(zero, &mut springs);
+//!         springs.ends
+//!     }
+//! }
+//!
+//! let stiffness: Vec<f64> = (1..=20).map(f64::from).collect();
+//! let ends = Simd::best().dispatch(Run(&stiffness));
+//! for (k, x) in stiffness.iter().zip(&ends) {
+//!     assert!((x - k.sqrt().cos()).abs() < 1e-6, "k = {k}: {x}");
+//! }
+//! // One lane or eight: the same bits.
+//! assert_eq!(ends, Simd::Scalar.dispatch(Run(&stiffness)));
+//! ```
 
 mod control;
 pub mod dopri5;

@@ -1,26 +1,18 @@
 //! The command line: one subcommand a module.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::commands::{
-    check, completions, init, merge, modes, parameters, plot, run, schema, show, slurm, status, trace,
+    check, completions, examples, init, man, merge, modes, parameters, plot, reference, run, schema, show,
+    slurm, status, trace,
 };
 use crate::exit::{Error, Exit};
-
-/// Printed before everything else by `--help`: most readers want to see one line that works.
-const EXAMPLES: &str = "\
-Examples:
-  sweep init my.toml                         a commented grid file to start from
-  sweep check my.toml                        every mistake in it, or what it would do
-  sweep check my.toml --set tub_mass_kg=20   the same with another tub
-  sweep parameters                           every number that can be set or swept";
 
 /// Maps where a washing machine's linear suspension model can be trusted.
 #[derive(Debug, Parser)]
 #[command(
     name = "sweep",
     version,
-    before_help = EXAMPLES,
     after_help = Exit::table(),
     subcommand_required = true,
     arg_required_else_help = true,
@@ -61,6 +53,35 @@ pub enum Command {
     Schema(schema::Args),
     /// Print shell completions
     Completions(completions::Args),
+    /// Write manual pages
+    #[command(hide = true)]
+    Man(man::Args),
+    /// Print a page of the guide that is made from this program's tables
+    #[command(hide = true)]
+    Reference(reference::Args),
+}
+
+/// The command line with everything that its help shows.
+#[must_use]
+pub fn command() -> clap::Command {
+    let with = |command: clap::Command, examples: Option<String>| match examples {
+        Some(examples) => command.before_help(examples),
+        None => command,
+    };
+    let program = with(Cli::command(), examples::of(""));
+    let names: Vec<String> = program.get_subcommands().map(|command| command.get_name().to_owned()).collect();
+    names.into_iter().fold(program, |program, name| {
+        program.mut_subcommand(&name, |command| with(command, examples::of(&name)))
+    })
+}
+
+impl Cli {
+    /// Reads this process's command line; on a mistake, or when asked for help, tells and ends the process.
+    #[must_use]
+    pub fn read() -> Self {
+        let matches = command().get_matches();
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    }
 }
 
 impl Command {
@@ -83,33 +104,24 @@ impl Command {
             Self::Init(args) => init::run(args),
             Self::Schema(args) => schema::run(args),
             Self::Completions(args) => completions::run(args),
+            Self::Man(args) => man::run(args),
+            Self::Reference(args) => reference::run(args),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]
     fn the_command_line_is_well_formed() {
-        Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn every_line_of_the_examples_parses() {
-        for line in EXAMPLES.lines().skip(1) {
-            let command = line.trim().split("  ").next().unwrap_or_default();
-            let parsed = Cli::try_parse_from(command.split_whitespace());
-            assert!(parsed.is_ok(), "{command}: {parsed:?}");
-        }
+        command().debug_assert();
     }
 
     #[test]
     fn help_shows_the_examples_before_the_usage_and_the_exit_codes_after() {
-        let help = Cli::command().render_help().to_string();
+        let help = command().render_help().to_string();
         let place = |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));
         assert!(place("Examples:") < place("Usage:") && place("Usage:") < place("Exit codes:"));
     }

@@ -1,5 +1,6 @@
 //! The sweep: from a grid file to a result file.
 
+mod cells;
 pub mod cli;
 pub mod commands;
 pub mod config;

@@ -2,11 +2,10 @@
 
 use std::process::ExitCode;
 
-use clap::Parser as _;
 use sweep::cli::Cli;
 
 fn main() -> ExitCode {
-    let exit = Cli::parse().command.run().unwrap_or_else(|error| {
+    let exit = Cli::read().command.run().unwrap_or_else(|error| {
         error.report();
         error.exit()
     });

@@ -1,4 +1,56 @@
-//! Physics of a front-loading washing machine: parameters, equations of motion, equilibrium, spin.
+//! Physics of a front-loading washing machine: parameters, equations of motion, equilibrium, modes, spin.
+//!
+//! A [`Machine`] is plain numbers in SI units; [`Machine::paper`] is the one of Park, Jeong and Yoo (2021). Every number also
+//! has a flat name ([`Parameter`]) by which it is read, set and swept, and [`Machine`]s are checked whole: every [`Violation`]
+//! at once. With a [`Spin`] it becomes a [`Point`]: [`prepare`] finds the static equilibrium and the linear model there. From a
+//! point go
+//!
+//! * [`simulate`]: time histories of the nonlinear or the linear model through the lanes of an integrator, and their [`Record`];
+//! * [`Point::matrices`]: M, C, K and F of the linear model at an instant;
+//! * [`modes`] and [`campbell`]: natural motions at an instant, and followed over spin speed to the resonances.
+//!
+//! The equations, numbered as the comments here cite them, stand in `docs/equations.md` of the repository ("the model page").
+//!
+//! # Example
+//!
+//! How a stiffer suspension moves the machine's first two resonances.
+//!
+//! ```
+//! use lane_ode::Simd;
+//! use washer_model::{Machine, Spin, Timing, campbell, modes, prepare};
+//!
+//! let standard = Machine::paper();
+//! let mut stiff = standard.clone();
+//! for spring in &mut stiff.springs {
+//!     spring.stiffness_n_per_m *= 2.0;
+//! }
+//! let spin = Spin::Ramp { peak_rpm: 400.0, ramp_s: 40.0 };
+//! let timing = Timing { end_s: 50.0, window_s: [0.0, 50.0] };
+//! let points = prepare(Simd::best(), &[(standard, spin.clone()), (stiff, spin)], &timing);
+//!
+//! let mut firsts = Vec::new();
+//! for point in points {
+//!     let point = point?;
+//!     // It sags under its weight (q1, m), less on stiffer springs.
+//!     let sag_m = -point.equilibrium()[0];
+//!     // The linear model at rest: a symmetric, positive stiffness.
+//!     let stiffness = point.matrices(0.0, 0.0, 0.0).stiffness;
+//!     assert!(stiffness[0][0] > 0.0 && (stiffness[4][0] - stiffness[0][4]).abs() < 1e-6 * stiffness[0][0]);
+//!     // Its natural motions at 100 rpm, the slowest first, decay.
+//!     let slowest = modes(&point, 0.0, 100.0 * std::f64::consts::TAU / 60.0)?.modes[0];
+//!     assert!(slowest.damping_ratio() > 0.0 && slowest.damping_ratio() < 1.0);
+//!     // And where the spin speed meets one of them.
+//!     let speeds_rpm: Vec<f64> = (2..=20).map(|k| 20.0 * f64::from(k)).collect();
+//!     let resonances = campbell(&point, &speeds_rpm)?.into_iter().flat_map(|mode| mode.resonances);
+//!     let first_rpm = resonances.map(|resonance| resonance.speed_rpm).fold(f64::INFINITY, f64::min);
+//!     firsts.push((sag_m, first_rpm));
+//! }
+//! let [(sag_m, first_rpm), (stiff_sag_m, stiff_first_rpm)] = firsts[..] else { unreachable!() };
+//! assert!((sag_m - 0.0141).abs() < 1e-4);
+//! assert!((first_rpm - 99.9).abs() < 0.5); // the paper: 99.9 rpm
+//! assert!(stiff_sag_m < 0.6 * sag_m && stiff_first_rpm > 1.2 * first_rpm);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod campbell;
 mod capping;

@@ -1,9 +1,8 @@
 //! `sweep completions SHELL`.
 
-use clap::CommandFactory as _;
 use clap_complete::Shell;
 
-use crate::cli::Cli;
+use crate::cli;
 use crate::exit::{Error, Exit, print};
 
 /// Arguments of `sweep completions`.
@@ -19,6 +18,6 @@ pub struct Args {
 /// When standard output cannot be written.
 pub fn run(args: &Args) -> Result<Exit, Error> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "sweep", &mut script);
+    clap_complete::generate(args.shell, &mut cli::command(), "sweep", &mut script);
     print(&String::from_utf8_lossy(&script))
 }

@@ -7,11 +7,14 @@ use crate::plan::Plan;
 
 pub mod check;
 pub mod completions;
+pub mod examples;
 pub mod init;
+pub mod man;
 pub mod merge;
 pub mod modes;
 pub mod parameters;
 pub mod plot;
+pub mod reference;
 pub mod run;
 pub mod schema;
 pub mod show;

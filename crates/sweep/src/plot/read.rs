@@ -3,14 +3,14 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use arrow::array::{Array, ArrayRef, AsArray, RecordBatch};
-use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Float64Type};
+use arrow_array::{ArrayRef, RecordBatch};
+use arrow_schema::{ArrowError, DataType, Field};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 
 use super::error::PlotError;
 use super::label;
+use crate::cells;
 
 /// What a file holds, told by its columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -253,33 +253,29 @@ fn column(field: &Field, values: Values) -> Column {
 }
 
 /// A column's values from its batches; `None` for types that none of our files has.
-fn values(data_type: &DataType, parts: &[&ArrayRef]) -> Result<Option<Values>, arrow::error::ArrowError> {
-    let text =
-        |data_type: &DataType| matches!(data_type, DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View);
+fn values(data_type: &DataType, parts: &[&ArrayRef]) -> Result<Option<Values>, ArrowError> {
     Ok(match data_type {
-        DataType::Boolean => Some(Values::Flag(
-            parts.iter().flat_map(|part| part.as_boolean().iter().collect::<Vec<_>>()).collect(),
-        )),
-        DataType::Dictionary(_, value) if text(value) => Some(Values::Text(texts(parts)?)),
-        data_type if text(data_type) => Some(Values::Text(texts(parts)?)),
-        data_type if data_type.is_numeric() => {
-            let mut numbers = Vec::with_capacity(parts.iter().map(|part| part.len()).sum());
+        DataType::Boolean => {
+            let mut flags = Vec::new();
             for part in parts {
-                let part = cast(part, &DataType::Float64)?;
-                numbers
-                    .extend(part.as_primitive::<Float64Type>().iter().map(|value| value.unwrap_or(f64::NAN)));
+                flags.extend(cells::flags(part)?);
+            }
+            Some(Values::Flag(flags))
+        }
+        text if cells::is_text(text) => {
+            let mut texts = Vec::new();
+            for part in parts {
+                texts.extend(cells::texts(part)?.into_iter().map(|text| text.map(str::to_owned)));
+            }
+            Some(Values::Text(texts))
+        }
+        number if cells::is_number(number) => {
+            let mut numbers = Vec::new();
+            for part in parts {
+                numbers.extend(cells::numbers(part)?.into_iter().map(|value| value.unwrap_or(f64::NAN)));
             }
             Some(Values::Number(numbers))
         }
         _ => None,
     })
-}
-
-fn texts(parts: &[&ArrayRef]) -> Result<Vec<Option<String>>, arrow::error::ArrowError> {
-    let mut texts = Vec::new();
-    for part in parts {
-        let part = cast(part, &DataType::Utf8)?;
-        texts.extend(part.as_string::<i32>().iter().map(|text| text.map(str::to_owned)));
-    }
-    Ok(texts)
 }

@@ -4,9 +4,10 @@ use std::fs::File;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use arrow::array::{Array, ArrayRef, AsArray, RecordBatch};
-use arrow::compute::{cast, max, min};
-use arrow::datatypes::{DataType, Float64Type};
+use arrow_array::cast::AsArray;
+use arrow_array::types::UInt64Type;
+use arrow_array::{Array, RecordBatch};
+use arrow_schema::{ArrowError, DataType};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::errors::ParquetError;
@@ -16,6 +17,7 @@ use serde_json::Value;
 
 use super::error::StoreError;
 use super::schema::key;
+use crate::cells;
 use crate::verdict::ROW_STATUSES;
 
 /// A finished result's own word about itself.
@@ -154,32 +156,30 @@ pub fn tally(path: &Path) -> Result<Tally, StoreError> {
 }
 
 fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
-    let column = |name: &str, as_type: &DataType| -> Result<ArrayRef, ParquetError> {
-        let column = batch
+    let column = |name: &str| {
+        batch
             .column_by_name(name)
-            .ok_or_else(|| ParquetError::General(format!("there is no column `{name}`")))?;
-        Ok(cast(column, as_type)?)
+            .ok_or_else(|| ParquetError::General(format!("there is no column `{name}`")))
     };
-    let points = column("point", &DataType::UInt64)?;
-    let points = points.as_primitive::<arrow::datatypes::UInt64Type>();
-    let status = column("status", &DataType::Utf8)?;
-    for name in status.as_string::<i32>().iter().flatten() {
+    let points = column("point")?;
+    let points = points
+        .as_primitive_opt::<UInt64Type>()
+        .ok_or_else(|| ParquetError::General(format!("column `point` is of type {}", points.data_type())))?;
+    for name in cells::texts(column("status")?)?.into_iter().flatten() {
         if let Some(status) = ROW_STATUSES.iter().position(|status| *status == name) {
             tally.by_status.add(status);
         }
     }
-    for reliable in column("reliable", &DataType::Boolean)?.as_boolean() {
+    for reliable in cells::flags(column("reliable")?)? {
         match reliable {
             Some(true) => tally.reliable += 1,
             Some(false) => tally.unreliable += 1,
             None => tally.undefined += 1,
         }
     }
-    let sensitive = column("sensitive", &DataType::Boolean)?;
-    tally.sensitive += sensitive.as_boolean().iter().flatten().filter(|sensitive| *sensitive).count() as u64;
+    tally.sensitive += cells::flags(column("sensitive")?)?.true_count() as u64;
     let extreme = |name: &str, best: &mut Option<Extreme>, better: fn(f64, f64) -> bool| {
-        let values = column(name, &DataType::Float64)?;
-        for (value, point) in values.as_primitive::<Float64Type>().iter().zip(points) {
+        for (value, point) in cells::numbers(column(name)?)?.into_iter().zip(points) {
             if let (Some(value), Some(point)) = (value, point)
                 && best.as_ref().is_none_or(|best| better(value, best.value))
             {
@@ -236,7 +236,7 @@ pub fn overview(path: &Path) -> Result<Overview, StoreError> {
     let (created_by, rows) =
         (file.created_by().map(str::to_owned), u64::try_from(file.num_rows()).unwrap_or(0));
     let result = own_word(&builder);
-    let new = |field: &std::sync::Arc<arrow::datatypes::Field>| ColumnRange {
+    let new = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
         name: field.name().clone(),
         unit: field.metadata().get("unit").cloned().filter(|unit| !unit.is_empty()),
         nulls: 0,
@@ -255,18 +255,25 @@ pub fn overview(path: &Path) -> Result<Overview, StoreError> {
 }
 
 impl ColumnRange {
-    fn widen(&mut self, array: &ArrayRef) -> Result<(), arrow::error::ArrowError> {
+    /// Takes in more rows. Of types that none of our files has, only the nulls are counted.
+    fn widen(&mut self, array: &dyn Array) -> Result<(), ArrowError> {
         self.nulls += array.null_count() as u64;
-        if !array.data_type().is_numeric() {
-            let names = cast(array, &DataType::Utf8)?;
-            names.as_string::<i32>().iter().flatten().for_each(|name| self.count(name));
-            return Ok(());
-        }
-        let numbers = cast(array, &DataType::Float64)?;
-        let numbers = numbers.as_primitive::<Float64Type>();
-        if let (Some(least), Some(greatest)) = (min(numbers), max(numbers)) {
-            let (a, b) = self.range.unwrap_or((least, greatest));
-            self.range = Some((a.min(least), b.max(greatest)));
+        match array.data_type() {
+            DataType::Boolean => {
+                for flag in cells::flags(array)?.iter().flatten() {
+                    self.count(if flag { "true" } else { "false" });
+                }
+            }
+            text if cells::is_text(text) => {
+                cells::texts(array)?.into_iter().flatten().for_each(|name| self.count(name));
+            }
+            number if cells::is_number(number) => {
+                for value in cells::numbers(array)?.into_iter().flatten() {
+                    let (least, greatest) = self.range.unwrap_or((value, value));
+                    self.range = Some((least.min(value), greatest.max(value)));
+                }
+            }
+            _ => {}
         }
         Ok(())
     }
@@ -295,8 +302,7 @@ pub fn row(path: &Path, row: u64, columns: &[&str]) -> Result<Vec<f64>, StoreErr
     let batch = batch.map_err(|error| failed(error.into()))?;
     let value = |name: &&str| {
         let column = batch.column_by_name(name).ok_or_else(absent)?;
-        let numbers = cast(column, &DataType::Float64)?;
-        numbers.as_primitive::<Float64Type>().iter().next().flatten().ok_or_else(absent)
+        cells::numbers(column)?.first().copied().flatten().ok_or_else(absent)
     };
     columns.iter().map(value).collect::<Result<_, _>>().map_err(failed)
 }

@@ -3,15 +3,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use arrow::array::{Array, AsArray, RecordBatch};
-use arrow::compute::cast;
-use arrow::datatypes::{DataType, Float64Type, UInt64Type};
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float64Type, UInt64Type};
+use arrow_array::{Array, RecordBatch};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use proptest::prelude::*;
 use serde_json::json;
 use tempfile::TempDir;
 
 use super::*;
+use crate::cells;
 use crate::exit::Exit;
 use crate::verdict::{ROW_STATUSES, Verdict, row_status};
 
@@ -104,9 +105,8 @@ fn every_cell_is_what_the_outcome_says() {
         column.is_valid(row).then(|| column.value(row))
     };
     let text = |name: &str, row: usize| {
-        let column = cast(batch.column_by_name(name).unwrap(), &DataType::Utf8).unwrap();
-        let column = column.as_string::<i32>();
-        column.is_valid(row).then(|| column.value(row).to_owned())
+        let column = cells::texts(batch.column_by_name(name).unwrap()).unwrap();
+        column[row].map(str::to_owned)
     };
     let flag = |name: &str, row: usize| {
         let column = batch.column_by_name(name).unwrap().as_boolean();

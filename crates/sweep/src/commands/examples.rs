@@ -1,0 +1,113 @@
+//! Examples, printed by `--help` before everything else: most readers want to see one line that works.
+
+/// Command, then lines with what each does. The empty name is the program's own help.
+const EXAMPLES: &[(&str, &[[&str; 2]])] = &[
+    (
+        "",
+        &[
+            ["sweep init my.toml", "a commented grid file to start from"],
+            ["sweep check my.toml", "every mistake in it, or what it would do"],
+            ["sweep run my.toml", "do it; again after an interruption, it goes on"],
+            ["sweep show results/first.parquet", "what came of it"],
+            ["sweep plot results/first.parquet", "the map as a picture"],
+            ["sweep parameters", "every number that can be set or swept"],
+        ],
+    ),
+    (
+        "run",
+        &[
+            ["sweep run my.toml", "to results/NAME.parquet, on every core"],
+            ["sweep run my.toml --set tub_mass_kg=20 --out light.parquet", "the same with another tub"],
+            ["sweep run my.toml --progress plain 2> run.log", "a line every 5 s, for a log"],
+            ["sweep run my.toml --shard 3/16", "one sixteenth; `sweep merge` joins them"],
+        ],
+    ),
+    (
+        "check",
+        &[
+            ["sweep check my.toml", "the plan, or every mistake with its place"],
+            ["sweep check my.toml --json", "the plan with every default in place"],
+        ],
+    ),
+    ("merge", &[["sweep merge my.toml", "when `sweep status my.toml` finds no shard missing"]]),
+    (
+        "status",
+        &[
+            ["sweep status my.toml", "how far it is"],
+            ["sweep status my.toml --json", "the same for a program, missing shards as a list"],
+        ],
+    ),
+    ("slurm", &[["sweep slurm my.toml --shards 16 --time 30", "the script that submits them"]]),
+    ("show", &[["sweep show results/first.parquet", "verdicts, extremes, columns with units and ranges"]]),
+    (
+        "plot",
+        &[
+            ["sweep plot results/first.parquet", "results/first.svg: ratios, and the line of the limit"],
+            ["sweep plot results/first.parquet -o map.html", "a page to point and click in"],
+            [
+                "sweep plot results/first.parquet --quantity nonlinear --channel tub_yaw",
+                "one channel's amplitude",
+            ],
+        ],
+    ),
+    (
+        "parameters",
+        &[
+            ["sweep parameters", "names, values, units, meaning and where each value is from"],
+            ["sweep parameters my.toml", "the same with the values of this grid's machine"],
+        ],
+    ),
+    (
+        "init",
+        &[
+            ["sweep init my.toml", "a commented grid file"],
+            ["sweep init --machine washer.toml", "the built-in machine, to be changed into one's own"],
+        ],
+    ),
+    ("schema", &[["sweep schema", "for editors that complete and check TOML"]]),
+    ("completions", &[["sweep completions bash", "to be sourced, or put where the shell looks"]]),
+];
+
+/// The examples of one command as its help shows them; `None` if it has none.
+#[must_use]
+pub fn of(command: &str) -> Option<String> {
+    let (_, lines) = EXAMPLES.iter().find(|(name, _)| *name == command)?;
+    let width = lines.iter().map(|[line, _]| line.len()).max().unwrap_or(0);
+    let shown: Vec<String> = lines.iter().map(|[line, does]| format!("  {line:width$}   {does}")).collect();
+    Some(format!("Examples:\n{}", shown.join("\n")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli;
+
+    #[test]
+    fn every_visible_command_has_examples_and_every_example_parses() {
+        let command = cli::command();
+        for visible in command.get_subcommands().filter(|command| !command.is_hide_set()) {
+            assert!(of(visible.get_name()).is_some(), "no example of `sweep {}`", visible.get_name());
+        }
+        for (name, lines) in EXAMPLES {
+            for [line, _] in *lines {
+                let line = line.split(" 2>").next().unwrap_or_default();
+                assert!(
+                    name.is_empty()
+                        || line.starts_with(&format!("sweep {name} "))
+                        || line == format!("sweep {name}")
+                );
+                let parsed = cli::command().try_get_matches_from(line.split_whitespace());
+                assert!(parsed.is_ok(), "{line}: {parsed:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn help_of_a_command_begins_with_its_examples() {
+        let mut command = cli::command();
+        let run = command.find_subcommand_mut("run").unwrap();
+        let help = run.render_help().to_string();
+        let place = |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));
+        assert!(place("--shard 3/16") < place("Usage:"));
+    }
+}

@@ -1,0 +1,190 @@
+//! `sweep reference PAGE`: pages of the guide that are made from the program's own tables, as Markdown.
+
+use std::fmt::Write as _;
+
+use washer_model::{Channel, Machine, Parameter, Range, Spin};
+
+use crate::cli;
+use crate::exit::{Error, Exit, print};
+use crate::store::schema::{AxisColumn, Layout};
+use crate::verdict::ROW_STATUSES;
+
+/// Arguments of `sweep reference`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Page to print
+    page: Page,
+}
+
+/// Pages made from tables of the code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Page {
+    /// Every parameter that can be set or swept.
+    Parameters,
+    /// Every column of a result file.
+    Columns,
+    /// Every command with its options.
+    Commands,
+}
+
+/// Prints a page.
+///
+/// # Errors
+/// Standard output that cannot be written.
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    print(&match args.page {
+        Page::Parameters => parameters(),
+        Page::Columns => columns(),
+        Page::Commands => commands(),
+    })
+}
+
+/// What stands at the head of a page, so that nobody edits it by hand.
+fn head(title: &str, page: &str) -> String {
+    format!(
+        "# {title}\n\n<!-- Made by `sweep reference {page}`; scripts/check_docs.py holds it against the program. -->\n\n"
+    )
+}
+
+/// A table row; a bar inside a cell would end it.
+fn row(text: &mut String, cells: &[&str]) {
+    let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "| {} |", cells.join(" | "));
+}
+
+fn parameters() -> String {
+    let mut text = head("Parameters", "parameters");
+    text.push_str(
+        "Every number of the machine and of the spin has one name, the same in `[set]`, in `--set NAME=VALUE` and as the\n\
+         `parameter` of an `[[axis]]`. Values are those of the built-in machine. *Paper* means printed there, *derived*\n\
+         follows from what is printed, *assumed* is this project's own choice where the paper is silent.\n\
+         Springs and dampers are numbered in the order of the machine file; the table shows the first of each.\n\n",
+    );
+    row(&mut text, &["name", "built in", "unit", "meaning", "values", "source"]);
+    row(&mut text, &["---"; 6]);
+    let machine = Machine::paper();
+    let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
+    for parameter in Parameter::all(&machine, &spin) {
+        let name = parameter.name();
+        if is_a_further_one(name) {
+            continue;
+        }
+        let of_spin = name.starts_with("spin_");
+        let value = parameter.get(&machine, &spin).filter(|_| !of_spin);
+        let value = value.map_or_else(|| "as the grid file says".to_owned(), |value| value.to_string());
+        row(
+            &mut text,
+            &[
+                &format!("`{name}`"),
+                &value,
+                parameter.unit(),
+                parameter.description(),
+                &allowed(parameter.range()),
+                &parameter.source().to_string(),
+            ],
+        );
+    }
+    text
+}
+
+/// Whether a name is that of the second or a later spring or damper.
+fn is_a_further_one(name: &str) -> bool {
+    ["spring_", "damper_"].into_iter().any(|kind| {
+        let number = name.strip_prefix(kind).and_then(|rest| rest.split('_').next());
+        number.and_then(|number| number.parse::<usize>().ok()).is_some_and(|number| number > 1)
+    })
+}
+
+fn allowed(range: Range) -> String {
+    match range {
+        Range::Any => "any".into(),
+        Range::Positive => "above 0".into(),
+        Range::NonNegative => "0 and above".into(),
+        Range::Negative => "below 0".into(),
+        Range::Within(least, greatest) => format!("{least:?} to {greatest:?}"),
+    }
+}
+
+fn columns() -> String {
+    let mut text = head("Columns of a result file", "columns");
+    text.push_str(
+        "One row per grid point, in grid order. Behind `point` stands one column per axis, named as its parameter (here the\n\
+         two axes of `sweeps/fig12.toml`); the channels are those of `[reliability]`, here all that exist. Each column's unit and\n\
+         description also stand in the file: in the Arrow field metadata (`unit`, `description`), and as JSON under the key\n\
+         `sweep.columns` of the file's key-value metadata. There stand too `sweep.plan` (the grid as run with the full machine),\n\
+         `sweep.plan_hash` and `sweep.version`.\n\n",
+    );
+    let (machine, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
+    let axes = Parameter::all(&machine, &spin)
+        .into_iter()
+        .filter(|parameter| ["unbalance_mass_kg", "damping_n_s_per_m"].contains(&parameter.name()))
+        .map(|parameter| AxisColumn {
+            name: parameter.name().to_owned(),
+            unit: parameter.unit().to_owned(),
+            description: parameter.description().to_owned(),
+        })
+        .collect();
+    let layout = Layout { axes, channels: Channel::ALL.to_vec(), ratio_limit: 2.0 };
+    row(&mut text, &["column", "type", "unit", "null", "meaning"]);
+    row(&mut text, &["---"; 5]);
+    for field in layout.schema().fields() {
+        let told = |key: &str| field.metadata().get(key).map_or("", String::as_str);
+        let data_type = match field.data_type() {
+            arrow_schema::DataType::Dictionary(..) => "text".to_owned(),
+            plain => plain.to_string().to_lowercase(),
+        };
+        let null = if field.is_nullable() { "may be" } else { "never" };
+        row(
+            &mut text,
+            &[&format!("`{}`", field.name()), &data_type, told("unit"), null, told("description")],
+        );
+    }
+    let statuses: Vec<String> = ROW_STATUSES.iter().map(|status| format!("`{status}`")).collect();
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "\nValues of `status`: {}.", statuses.join(", "));
+    text
+}
+
+fn commands() -> String {
+    let mut text = head("Commands", "commands");
+    let mut program = cli::command();
+    // The width of a terminal must not show in a file.
+    program = program.term_width(100);
+    program.build();
+    let mut part = |title: &str, help: String| {
+        let help: Vec<&str> = help.lines().map(str::trim_end).collect();
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "## {title}\n\n```text\n{}\n```\n", help.join("\n").trim());
+    };
+    part("sweep", program.clone().render_help().to_string());
+    for command in program.get_subcommands_mut().filter(|command| !command.is_hide_set()) {
+        part(&format!("sweep {}", command.get_name()), command.render_help().to_string());
+    }
+    text.truncate(text.trim_end().len());
+    text.push('\n');
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn further_springs_and_dampers_are_left_out_and_nothing_else() {
+        assert!(is_a_further_one("spring_2_tub_x_m") && is_a_further_one("damper_12_damping_n_s_per_m"));
+        assert!(!is_a_further_one("spring_1_tub_x_m") && !is_a_further_one("spring_stiffness_n_per_m"));
+    }
+
+    #[test]
+    fn pages_hold_what_the_tables_hold() {
+        let page = parameters();
+        for name in ["tub_mass_kg", "spring_1_free_length_m", "spin_peak_rpm"] {
+            assert!(page.contains(&format!("| `{name}` |")), "{name}");
+        }
+        assert!(columns().contains("| `ratio_max_channel` | text |"));
+        let page = commands();
+        assert!(page.contains("## sweep run\n") && page.contains("--fail-on-error"));
+        assert!(!page.contains("sweep reference PAGE"), "hidden commands stay hidden");
+    }
+}
