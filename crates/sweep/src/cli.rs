@@ -2,7 +2,9 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{check, completions, init, merge, parameters, plot, run, schema, show, slurm, status};
+use crate::commands::{
+    boundary, check, completions, init, merge, parameters, plot, run, schema, show, slurm, status,
+};
 use crate::exit::{Error, Exit};
 
 /// Printed before everything else by `--help`: most readers want to see one line that works.
@@ -45,6 +47,8 @@ pub enum Command {
     Slurm(slurm::Args),
     /// Show what a result file holds: counts, verdicts, extremes, provenance
     Show(show::Args),
+    /// Trace the curve where the ratio is at its limit, without filling the grid
+    Boundary(boundary::Args),
     /// Draw the figure that fits a file: map, boundary, time histories or Campbell diagram
     Plot(plot::Args),
     /// List every parameter that can be set or swept
@@ -70,6 +74,7 @@ impl Command {
             Self::Status(args) => status::run(args),
             Self::Slurm(args) => slurm::run(args),
             Self::Show(args) => show::run(args),
+            Self::Boundary(args) => boundary::run(args),
             Self::Plot(args) => plot::run(args),
             Self::Parameters(args) => parameters::run(args),
             Self::Init(args) => init::run(args),

@@ -7,7 +7,7 @@ use lane_ode::{Failure, Simd, Tolerance};
 use washer_model::{Method, ModelKind, Point, Record, Timing, prepare, simulate};
 
 use crate::outcome::{Outcome, Status, Trajectory};
-use crate::plan::{Integrator, Plan};
+use crate::plan::{Integrator, Plan, Scenario};
 use crate::run::{Engine, Watch};
 
 /// Points that go through the lanes together before progress is told and the stop flag is looked at.
@@ -68,15 +68,23 @@ impl<'a> ModelEngine<'a> {
         Ok(Self { plan, simd: simd_from_environment()?, method, timing })
     }
 
-    fn group(&self, points: Range<u64>) -> Vec<Outcome> {
-        together_or_alone(points, &|points| self.evaluate_together(points))
+    /// One outcome per point given by the values of its axes, on the grid or between its points; `point` of an outcome
+    /// is the position among them.
+    #[must_use]
+    pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
+        // Positions in a slice fit both.
+        self.group(0..axis_values.len() as u64, &|point| self.plan.scenario_at(&axis_values[point as usize]))
     }
 
-    fn evaluate_together(&self, points: Range<u64>) -> Vec<Outcome> {
+    fn group(&self, points: Range<u64>, scenario: &dyn Fn(u64) -> Scenario) -> Vec<Outcome> {
+        together_or_alone(points, &|points| self.evaluate_together(points, scenario))
+    }
+
+    fn evaluate_together(&self, points: Range<u64>, scenario: &dyn Fn(u64) -> Scenario) -> Vec<Outcome> {
         let scenarios: Vec<_> = points
             .clone()
             .map(|point| {
-                let scenario = self.plan.scenario(point);
+                let scenario = scenario(point);
                 (scenario.machine, scenario.spin)
             })
             .collect();
@@ -151,7 +159,7 @@ impl Engine for ModelEngine<'_> {
                 return None;
             }
             let end = (start + GROUP).min(points.end);
-            outcomes.extend(self.group(start..end));
+            outcomes.extend(self.group(start..end, &|point| self.plan.scenario(point)));
             watch.done(end - start);
             start = end;
         }

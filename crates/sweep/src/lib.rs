@@ -1,5 +1,6 @@
 //! The sweep: from a grid file to a result file.
 
+pub mod boundary;
 pub mod cli;
 pub mod commands;
 pub mod config;
