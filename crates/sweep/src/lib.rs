@@ -4,6 +4,7 @@ pub mod boundary;
 pub mod cli;
 pub mod commands;
 pub mod config;
+pub mod design;
 pub mod engine;
 pub mod estimate;
 pub mod exit;

@@ -86,6 +86,9 @@ impl Task {
     /// # Errors
     /// Everything of [`BoundaryError`] but [`BoundaryError::Threads`].
     pub fn new(plan: &Plan, tolerance: Option<f64>, lattice: usize) -> Result<Self, BoundaryError> {
+        if plan.design.is_some() {
+            return Err(BoundaryError::Design);
+        }
         let [first, second, further @ ..] = plan.axes.as_slice() else {
             return Err(BoundaryError::Axes(plan.axes.len()));
         };

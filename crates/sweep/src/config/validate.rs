@@ -17,8 +17,8 @@ pub(super) const MOST_STEPS: f64 = 1e10;
 /// left to the run, as a failed row.
 pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
     let mut reported = BTreeSet::new();
-    for point in draft.plan.corners() {
-        for (violation, of_spin) in violations(&draft.plan.scenario(point)) {
+    for values in draft.plan.corners() {
+        for (violation, of_spin) in violations(&draft.plan.scenario_at(&values)) {
             let concerns = keys(&violation, of_spin);
             let judged = !concerns.iter().any(|key| draft.origins.is_doubtful(key));
             if judged && reported.insert(concerns.clone()) {
