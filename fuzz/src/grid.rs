@@ -39,14 +39,14 @@ fuzz_target!(|bytes: &[u8]| -> Corpus {
 /// A plan that was let through is one that everything behind it can take.
 fn try_out(plan: &Plan) {
     assert!(plan.points() >= 1);
+    assert_eq!(plan.axis_values(plan.points() - 1).len(), plan.axes.len());
     assert!(plan.window_s[0] < plan.window_s[1] && plan.window_s[1] <= plan.end_s);
     assert_eq!(Job::of(plan).hash(), Job::of(plan).hash());
     let scenarios: Vec<_> = plan
         .corners()
         .take(4)
-        .map(|point| {
-            assert!(point < plan.points());
-            let scenario = plan.scenario(point);
+        .map(|values| {
+            let scenario = plan.scenario_at(&values);
             assert_eq!(scenario.machine.violations(), []);
             assert_eq!(scenario.spin.violations(), []);
             (scenario.machine, scenario.spin)

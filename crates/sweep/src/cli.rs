@@ -3,8 +3,8 @@
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::commands::{
-    check, completions, examples, init, man, merge, modes, parameters, plot, reference, run, schema, show,
-    slurm, status, trace,
+    boundary, check, completions, examples, init, man, merge, modes, parameters, plot, reference, run,
+    schema, show, slurm, status, trace,
 };
 use crate::exit::{Error, Exit};
 
@@ -43,6 +43,8 @@ pub enum Command {
     Trace(trace::Args),
     /// Find the natural frequencies over spin speed, the resonance speeds and the mode shapes
     Modes(modes::Args),
+    /// Trace the curve where the ratio is at its limit, without filling the grid
+    Boundary(boundary::Args),
     /// Draw the figure that fits a file: map, boundary, time histories or Campbell diagram
     Plot(plot::Args),
     /// List every parameter that can be set or swept
@@ -99,6 +101,7 @@ impl Command {
             Self::Show(args) => show::run(args),
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
+            Self::Boundary(args) => boundary::run(args),
             Self::Plot(args) => plot::run(args),
             Self::Parameters(args) => parameters::run(args),
             Self::Init(args) => init::run(args),

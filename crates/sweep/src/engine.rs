@@ -13,7 +13,7 @@ use serde_json::Value;
 use washer_model::{Method, ModelKind, Point, Record, Timing, prepare, simulate};
 
 use crate::outcome::{Outcome, Status, Trajectory};
-use crate::plan::{Integrator, Plan};
+use crate::plan::{Integrator, Plan, Scenario};
 use crate::run::{Engine, Watch};
 
 /// Points that go through the lanes together before progress is told and the stop flag is looked at.
@@ -95,30 +95,39 @@ impl<'a> ModelEngine<'a> {
         }
     }
 
-    fn group(&self, points: Range<u64>) -> Vec<Outcome> {
-        together_or_alone(points, &|points| self.evaluate_together(points))
+    /// One outcome per point given by the values of its axes, on the grid or between its points; `point` of an outcome
+    /// is the position among them.
+    #[must_use]
+    pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
+        // Positions in a slice fit both.
+        self.group(0..axis_values.len() as u64, &|point| self.plan.scenario_at(&axis_values[point as usize]))
     }
 
-    fn evaluate_together(&self, points: Range<u64>) -> Vec<Outcome> {
+    fn group(&self, points: Range<u64>, scenario: &dyn Fn(u64) -> Scenario) -> Vec<Outcome> {
+        together_or_alone(points, &|points| self.evaluate_together(points, scenario))
+    }
+
+    fn evaluate_together(&self, points: Range<u64>, scenario: &dyn Fn(u64) -> Scenario) -> Vec<Outcome> {
+        let points: Vec<u64> = points.collect();
+        let prepared = self.prepare(&points, scenario);
         match &self.scheme {
-            Scheme::Direct(method) => {
-                let points: Vec<u64> = points.collect();
-                self.all(&self.prepare(&points), method, &points)
-            }
+            Scheme::Direct(method) => self.all(&prepared, method, &points),
             Scheme::Fast { accuracy, settled } => {
                 let settled = settled.get_or_init(|| self.unchecked(*accuracy));
-                self.certain(*accuracy, settled, points)
+                self.certain(*accuracy, settled, &prepared, &points)
             }
         }
     }
 
     /// Points made ready; `None` where there is no equilibrium.
-    fn prepare(&self, points: &[u64]) -> Vec<Option<Point>> {
-        let scenario = |&point: &u64| {
-            let scenario = self.plan.scenario(point);
-            (scenario.machine, scenario.spin)
-        };
-        let scenarios: Vec<_> = points.iter().map(scenario).collect();
+    fn prepare(&self, points: &[u64], scenario: &dyn Fn(u64) -> Scenario) -> Vec<Option<Point>> {
+        let scenarios: Vec<_> = points
+            .iter()
+            .map(|&point| {
+                let scenario = scenario(point);
+                (scenario.machine, scenario.spin)
+            })
+            .collect();
         prepare(self.simd, &scenarios, &self.timing).into_iter().map(Result::ok).collect()
     }
 
@@ -203,7 +212,7 @@ impl Engine for ModelEngine<'_> {
                 return None;
             }
             let end = (start + GROUP).min(points.end);
-            outcomes.extend(self.group(start..end));
+            outcomes.extend(self.group(start..end, &|point| self.plan.scenario(point)));
             watch.done(end - start);
             start = end;
         }

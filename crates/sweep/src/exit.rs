@@ -5,6 +5,7 @@ use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use crate::boundary::product::BoundaryError;
 use crate::config::Diagnostics;
 use crate::engine::EngineError;
 use crate::plot::PlotError;
@@ -83,6 +84,9 @@ pub enum Error {
     /// No engine for what was asked.
     #[error(transparent)]
     Engine(#[from] EngineError),
+    /// A boundary that cannot be traced.
+    #[error(transparent)]
+    Boundary(#[from] BoundaryError),
     /// A run's files.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -127,6 +131,8 @@ impl Error {
         match self {
             Self::Input(_) => Exit::BadInput,
             Self::Engine(_) | Self::Equilibrium(_) | Self::Modes(_) | Self::Option { .. } => Exit::BadInput,
+            Self::Boundary(BoundaryError::Threads { .. }) => Exit::Failed,
+            Self::Boundary(_) => Exit::BadInput,
             Self::Store(error) => error.exit(),
             Self::Plot(error) if error.is_usage() => Exit::BadInput,
             Self::Plot(_) => Exit::Failed,

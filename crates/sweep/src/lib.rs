@@ -1,9 +1,11 @@
 //! The sweep: from a grid file to a result file.
 
+pub mod boundary;
 mod cells;
 pub mod cli;
 pub mod commands;
 pub mod config;
+pub mod design;
 pub mod engine;
 pub mod estimate;
 pub mod exit;

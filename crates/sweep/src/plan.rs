@@ -3,6 +3,8 @@
 
 use washer_model::{Channel, Machine, Parameter, Spin};
 
+use crate::design::Design;
+
 /// A validated run: every grid point of every axis, and how each is integrated.
 ///
 /// A plan can only be made by the configuration, which refuses bad input, so the rest of the program takes its
@@ -21,8 +23,10 @@ pub struct Plan {
     pub window_s: [f64; 2],
     /// Method and its settings.
     pub integrator: Integrator,
-    /// The grid's axes; the first varies slowest.
+    /// The grid's axes; the first varies slowest. Of a design, what its points are spread over.
     pub axes: Vec<Axis>,
+    /// How points are laid out if not as the grid of the axes.
+    pub design: Option<Design>,
     /// What counts as reliable.
     pub reliability: Reliability,
 }
@@ -129,6 +133,17 @@ impl AxisValues {
         }
     }
 
+    /// The value a part `place` (0 to 1) of the way from the first to the last, evenly or by the logarithm; a list has
+    /// no values between its own, and gives the nearest.
+    #[must_use]
+    pub fn between(&self, place: f64) -> f64 {
+        match *self {
+            Self::List(ref values) => values[((place * values.len() as f64) as usize).min(values.len() - 1)],
+            Self::Linear { from, to, .. } => from + place * (to - from),
+            Self::Log { from, to, .. } => from * libm::exp10(place * libm::log10(to / from)),
+        }
+    }
+
     /// Indices of the least and the greatest value.
     #[must_use]
     pub fn extremes(&self) -> [u64; 2] {
@@ -154,15 +169,25 @@ impl Plan {
     /// Axes beyond this many are held at their least value by [`Plan::corners`].
     const CORNER_AXES: usize = 8;
 
-    /// Number of grid points; 1 without axes.
+    /// Number of points, of the design or of the grid; 1 without axes.
     #[must_use]
     pub fn points(&self) -> u64 {
+        if let Some(design) = &self.design {
+            return design.points();
+        }
         self.axes.iter().map(|axis| axis.values.len()).product()
     }
 
-    /// Value of each axis at a grid point; the first axis varies slowest.
+    /// Value of each axis at a point; of a grid, the first axis varies slowest.
     #[must_use]
     pub fn axis_values(&self, point: u64) -> Vec<f64> {
+        if let Some(design) = &self.design {
+            let value = |(k, axis): (usize, &Axis)| match design.place(point, k) {
+                Some(place) => axis.values.between(place),
+                None => axis.values.value(point),
+            };
+            return self.axes.iter().enumerate().map(value).collect();
+        }
         let mut values = vec![0.0; self.axes.len()];
         let mut rest = point;
         for (value, axis) in values.iter_mut().zip(&self.axes).rev() {
@@ -188,16 +213,38 @@ impl Plan {
         scenario
     }
 
-    /// Points where every axis is at its least or greatest value: where a condition that is monotonic along each axis
-    /// is hardest to meet. One point without axes.
-    pub fn corners(&self) -> impl Iterator<Item = u64> + '_ {
+    /// Points of a grid where every axis is at its least or greatest value, beyond the eighth axis at its least; none of a
+    /// design, whose points need not be there.
+    #[must_use]
+    pub fn corner_points(&self) -> Vec<u64> {
+        if self.design.is_some() {
+            return Vec::new();
+        }
         let free = self.axes.len().min(Self::CORNER_AXES);
-        (0..1_u32 << free).map(move |sides| {
+        let corner = |sides: u32| {
             self.axes.iter().enumerate().fold(0, |point, (k, axis)| {
                 let greatest = k < free && sides >> k & 1 == 1;
                 point * axis.values.len() + axis.values.extremes()[usize::from(greatest)]
             })
-        })
+        };
+        (0..1_u32 << free).map(corner).collect()
+    }
+
+    /// Values of the axes where a condition that is monotonic along each of them is hardest to meet: every axis at its
+    /// least or greatest value, or every point of a list. One without axes.
+    #[must_use]
+    pub fn corners(&self) -> Box<dyn Iterator<Item = Vec<f64>> + '_> {
+        if matches!(self.design, Some(Design::List { .. })) {
+            return Box::new((0..self.points()).map(|point| self.axis_values(point)));
+        }
+        let free = self.axes.len().min(Self::CORNER_AXES);
+        Box::new((0..1_u32 << free).map(move |sides| {
+            let ends = self.axes.iter().enumerate().map(|(k, axis)| {
+                let greatest = k < free && sides >> k & 1 == 1;
+                axis.values.value(axis.values.extremes()[usize::from(greatest)])
+            });
+            ends.collect()
+        }))
     }
 }
 
@@ -233,6 +280,7 @@ mod tests {
         Plan {
             name: "test".to_owned(),
             axes: axes.iter().map(axis).collect(),
+            design: None,
             machine: machine.clone(),
             spin: spin.clone(),
             end_s: 50.0,
@@ -296,7 +344,7 @@ mod tests {
             ("unbalance_mass_kg", AxisValues::List(vec![0.3, 0.1, 0.2])),
             ("damping_n_s_per_m", AxisValues::Linear { from: 80.0, to: 60.0, count: 3 }),
         ]);
-        let corners: Vec<_> = plan.corners().map(|p| plan.axis_values(p)).collect();
+        let corners: Vec<_> = plan.corners().collect();
         assert_eq!(corners, [[0.1, 60.0], [0.3, 60.0], [0.1, 80.0], [0.3, 80.0]].map(Vec::from));
     }
 
@@ -304,7 +352,23 @@ mod tests {
     fn a_plan_without_axes_is_one_point() {
         let plan = plan(&[]);
         assert_eq!(plan.points(), 1);
-        assert_eq!(plan.corners().collect::<Vec<_>>(), [0]);
+        assert_eq!(plan.corners().collect::<Vec<_>>(), [Vec::<f64>::new()]);
         assert_eq!(plan.scenario(0).machine, plan.machine);
+    }
+
+    #[test]
+    fn a_design_spreads_its_points_over_the_axes_ranges() {
+        let mut plan = plan(&[
+            ("unbalance_mass_kg", AxisValues::Linear { from: 0.1, to: 0.9, count: 2 }),
+            ("bearing_stiffness_n_per_m", AxisValues::Log { from: 1e6, to: 1e8, count: 2 }),
+        ]);
+        plan.design = Some(Design::Sobol { points: 1024, seed: 1 });
+        assert_eq!(plan.points(), 1024);
+        let points: Vec<Vec<f64>> = (0..1024).map(|point| plan.axis_values(point)).collect();
+        let below = |axis: usize, middle: f64| points.iter().filter(|point| point[axis] < middle).count();
+        assert_eq!([below(0, 0.5), below(1, 1e7)], [512, 512]);
+        assert!(points.iter().all(|p| (0.1..0.9).contains(&p[0]) && (1e6..1e8).contains(&p[1])));
+        assert_eq!(plan.corners().count(), 4);
+        assert_eq!(plan.scenario(7).machine.unbalance.mass_kg, points[7][0]);
     }
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::Grid;
+use crate::design::Design;
 use crate::engine::{ModelEngine, Settled};
 use crate::estimate::{Estimate, size};
 use crate::exit::{Error, Exit, print, tell};
@@ -43,10 +44,16 @@ fn summary(plan: &Plan, estimate: &Estimate, settled: Option<&Settled>) -> Strin
     };
     line("name", plan.name.clone());
     for (k, axis) in plan.axes.iter().enumerate() {
-        line(if k == 0 { "axes" } else { "" }, describe(axis));
+        line(if k == 0 { "axes" } else { "" }, describe(axis, plan.design.as_ref()));
     }
     let points = plan.points();
-    line("points", if points == 1 { "1 (no axes)".to_owned() } else { points.to_string() });
+    let laid_out = match &plan.design {
+        Some(Design::List { file, .. }) => format!("{points}, as listed in {file}"),
+        Some(design) => format!("{points} by {}", design.method()),
+        None if plan.axes.is_empty() => "1 (no axes)".to_owned(),
+        None => points.to_string(),
+    };
+    line("points", laid_out);
     line("time", format!("0 to {} s, window {} to {} s", plan.end_s, plan.window_s[0], plan.window_s[1]));
     line("method", method(plan, settled));
     let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name()).collect();
@@ -83,9 +90,13 @@ fn plural(count: u64) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
 
-fn describe(axis: &Axis) -> String {
+fn describe(axis: &Axis, design: Option<&Design>) -> String {
     let (name, count) = (axis.parameter.name(), axis.values.len());
     match &axis.values {
+        AxisValues::Linear { from, to, .. } if design.is_some() => format!("{name}: from {from} to {to}"),
+        AxisValues::Log { from, to, .. } if design.is_some() => {
+            format!("{name}: from {from} to {to}, logarithmic")
+        }
         AxisValues::List(values) => {
             let shown: Vec<_> = values.iter().take(8).map(f64::to_string).collect();
             let more = if values.len() > shown.len() { ", ..." } else { "" };

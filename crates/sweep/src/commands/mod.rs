@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::config::{self, Diagnostics};
 use crate::plan::Plan;
 
+pub mod boundary;
 pub mod check;
 pub mod completions;
 pub mod examples;

@@ -45,7 +45,7 @@ pub struct Args {
 }
 
 /// As many threads as a process can sensibly ask for.
-fn threads(text: &str) -> Result<usize, String> {
+pub(super) fn threads(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(threads @ 1..=4096) => Ok(threads),
         _ => Err(format!("expected a number of threads from 1 to 4096; got `{text}`")),

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 use washer_model::{Channel, Spin};
 
 use super::machine;
+use crate::design::Design;
 use crate::plan::{Axis, AxisValues, Integrator, Plan};
 
 impl Plan {
@@ -14,18 +15,34 @@ impl Plan {
     /// so two plans are the same if and only if their texts are.
     #[must_use]
     pub fn to_json(&self) -> Value {
-        json!({
+        let mut plan = json!({
             "name": self.name,
             "machine": machine::to_json(&self.machine),
             "spin": spin(&self.spin),
             "time": { "end_s": self.end_s, "window_s": self.window_s },
             "integrator": integrator(&self.integrator),
-            "axis": self.axes.iter().map(axis).collect::<Value>(),
+            "axis": self.axes.iter().map(|axis| self::axis(axis, self.design.as_ref())).collect::<Value>(),
             "reliability": {
                 "ratio_limit": self.reliability.ratio_limit,
                 "channels": self.reliability.channels.iter().map(|channel| Channel::name(*channel)).collect::<Value>(),
             },
-        })
+        });
+        if let Some(design) = &self.design {
+            plan["design"] = self::design(design);
+        }
+        plan
+    }
+}
+
+fn design(design: &Design) -> Value {
+    let method = design.method();
+    match design {
+        Design::LatinHypercube { points, seed } | Design::Sobol { points, seed } => {
+            json!({ "method": method, "points": points, "seed": seed })
+        }
+        Design::List { file, points, hash } => {
+            json!({ "method": method, "file": file, "points": points, "hash": hash })
+        }
     }
 }
 
@@ -56,10 +73,17 @@ fn integrator(integrator: &Integrator) -> Value {
     }
 }
 
-fn axis(axis: &Axis) -> Value {
+fn axis(axis: &Axis, design: Option<&Design>) -> Value {
     let parameter = axis.parameter.name();
+    if let Some(Design::List { .. }) = design {
+        // The values are the result's own columns, and the design's hash is over them all.
+        return json!({ "parameter": parameter });
+    }
     let range = |from: f64, to: f64, count: u64, spacing: &str| {
-        let range = json!({ "from": from, "to": to, "count": count, "spacing": spacing });
+        let mut range = json!({ "from": from, "to": to, "spacing": spacing });
+        if design.is_none() {
+            range["count"] = count.into();
+        }
         json!({ "parameter": parameter, "range": range })
     };
     match axis.values {

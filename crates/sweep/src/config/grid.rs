@@ -10,7 +10,7 @@ use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, cut, listed, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
-use super::{machine, parameters};
+use super::{design, machine, parameters};
 use crate::plan::{Integrator, Plan, Reliability};
 
 /// `machine` when the grid names none.
@@ -105,11 +105,20 @@ pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option
         window_s: [from_s, to_s],
         integrator,
         axes: Vec::new(),
+        design: None,
         reliability,
     };
     let mut draft = Draft { plan, origins, constants: Vec::new() };
     parameters::constants(&mut root, sets, &mut draft, report);
-    parameters::axes(&mut root, &mut draft, report);
+    match design::read(&mut root, path, report) {
+        design::Written::None => parameters::axes(&mut root, &mut draft, report),
+        design::Written::Box(design) => parameters::box_of_axes(&mut root, design, &mut draft, report),
+        design::Written::List(list) => parameters::listed_axes(&mut root, list, &mut draft, report),
+        design::Written::Bad => {
+            // Which axes are right depends on what cannot be known.
+            let _ = root.tables("axis", report);
+        }
+    }
     root.finish(report);
     Some(draft)
 }

@@ -9,7 +9,10 @@
 //! `[reliability]` the ratio 2 over the six channels of tub and drum fronts and tub angles; without axes the grid is a
 //! single point. `[spin]` and `end_s` must be given, and a machine file is always whole.
 //!
-//! Bounds: files to 4 MiB, 1e12 grid points, 1e6 s, 1e10 fixed steps, numbers to 1e12 in magnitude, 1000 springs and 1000
+//! With `[design]` the axes are ranges without a count, over which `latin_hypercube` or `sobol` spreads `points` points;
+//! or there is no axis, and `list` takes points from a CSV or Parquet file whose columns are parameters.
+//!
+//! Bounds: files to 4 MiB (lists of points to 256 MiB), a Sobol design to 2^32 points over 32 axes, 1e12 grid points, 1e6 s, 1e10 fixed steps, numbers to 1e12 in magnitude, 1000 springs and 1000
 //! dampers.
 //!
 //! Precedence, later over earlier: machine file, `[set]`, `--set`, axes. Within each of them no number may be written
@@ -17,6 +20,7 @@
 //! would say which comes last.
 
 mod canonical;
+mod design;
 mod grid;
 mod machine;
 mod origins;

@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 
 use washer_model::{Machine, Parameter, Range, Spin, UnknownParameter, decimal};
 
+use super::design::List;
 use super::grid::Draft;
 use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, check_number, quoted, short};
 use super::source::{Located, Location};
+use crate::design::{Design, MOST_AXES};
 use crate::plan::{Axis, AxisValues};
 
 /// Most grid points that are accepted. A hundred thousand points a second would take four months.
@@ -67,6 +69,7 @@ pub(super) fn point(at: &[String], draft: &mut Draft, report: &mut Report) {
                 .push(Diagnostic::new(title).at(place, format!("expected --at {name}=VALUE for this axis")));
         }
     }
+    draft.plan.design = None;
     apply(&constants, draft, report);
 }
 
@@ -176,9 +179,146 @@ fn twice(second: &Located<&str>, first: &Located<&str>) -> Diagnostic {
     Diagnostic::new(title).at(&second.at, "expected each number once").at(&first.at, "first written here")
 }
 
-/// Reads every `[[axis]]`.
+/// What axes write so far, by the single numbers.
+type Swept = BTreeMap<Cow<'static, str>, Located<String>>;
+
+/// Takes note that an axis writes this parameter's numbers; not if another one does.
+fn claim(
+    name: &Located<&str>,
+    parameter: &Parameter,
+    swept: &mut Swept,
+    draft: &Draft,
+    report: &mut Report,
+) -> bool {
+    let parts = parameter.parts(&draft.plan.machine);
+    if let Some(first) = parts.iter().find_map(|part| swept.get(part)) {
+        let first = Located { value: first.value.as_str(), at: first.at.clone() };
+        report.push(twice(name, &first));
+        return false;
+    }
+    for constant in &draft.constants {
+        if constant.parts.iter().all(|part| parts.contains(part)) {
+            let title = format!("`{}` is swept by an axis: this constant has no effect", constant.name.value);
+            let diagnostic =
+                Diagnostic::new(title).at(&constant.name.at, "expected a parameter that no axis sweeps");
+            report.push(diagnostic.at(&name.at, "swept here"));
+        }
+    }
+    let own = Located { value: name.value.to_owned(), at: name.at.clone() };
+    swept.extend(parts.into_iter().map(|part| (part, own.clone())));
+    true
+}
+
+/// Reads every `[[axis]]` of a design that fills a box: a range each, without a count.
+pub(super) fn box_of_axes(
+    root: &mut Section<'_>,
+    design: Located<Design>,
+    draft: &mut Draft,
+    report: &mut Report,
+) {
+    let mut swept = Swept::new();
+    let sections = root.tables("axis", report);
+    let most = match &design.value {
+        Design::Sobol { .. } => MOST_AXES,
+        Design::LatinHypercube { .. } | Design::List { .. } => usize::MAX,
+    };
+    if sections.is_empty() || sections.len() > most {
+        let title = format!("a design by \"{}\" over {} axes", design.value.method(), sections.len());
+        let expected = match most {
+            usize::MAX => "expected at least one [[axis]] with a range".to_owned(),
+            most => format!("expected from 1 to {most} [[axis]], each with a range"),
+        };
+        report.push(Diagnostic::new(title).at(&design.at, expected));
+    }
+    for mut section in sections {
+        let field = section.text("parameter", report);
+        let name = section.require(field, "parameter", "the name of a parameter", report);
+        let parameter = name.as_ref().and_then(|name| find(name, draft, report));
+        let range = parameter.as_ref().map_or(Range::Any, Parameter::range);
+        section.misplace(&["values"], "a design spreads its points over `range = { from = ..., to = ... }`");
+        let field = section.table("range", "range = { from, to }", report);
+        let spaced = section.require(field, "range", "`range = { from = ..., to = ... }`", report);
+        let values = spaced.and_then(|spaced| extent(spaced.value, range, report));
+        section.finish(report);
+        let (Some(name), Some(parameter)) = (name, parameter) else { continue };
+        if claim(&name, &parameter, &mut swept, draft, report)
+            && let Some(values) = values
+        {
+            draft.origins.put(format!("axis[{}]", draft.plan.axes.len()), values.at);
+            draft.plan.axes.push(Axis { parameter, values: values.value });
+        }
+    }
+    draft.plan.design = Some(design.value);
+}
+
+/// The axes of a list: its columns.
+pub(super) fn listed_axes(root: &mut Section<'_>, list: List, draft: &mut Draft, report: &mut Report) {
+    for section in root.tables("axis", report) {
+        let diagnostic = Diagnostic::new("an [[axis]] beside a list of points");
+        report.push(diagnostic.at(section.at(), "the columns of the list are the axes; remove this"));
+    }
+    let mut swept = Swept::new();
+    for column in list.columns {
+        let name = Located { value: column.name.value.as_str(), at: column.name.at.clone() };
+        let Some(parameter) = find(&name, draft, report) else { continue };
+        let range = parameter.range();
+        let mut values = Vec::with_capacity(column.values.len());
+        for (k, value) in column.values.iter().enumerate() {
+            let what = format!("value {} of {}", k + 1, quoted(name.value));
+            let at = column.places.get(k).unwrap_or(&column.name.at);
+            if range.contains(*value) {
+                values.push(*value);
+            } else {
+                // Formatting a place a million times over would take minutes; wrong values are few, or beyond counting.
+                let _ = check_number(&what, *value, at.clone(), range, report);
+            }
+        }
+        if claim(&name, &parameter, &mut swept, draft, report) && values.len() == column.values.len() {
+            draft.origins.put(format!("axis[{}]", draft.plan.axes.len()), column.name.at.clone());
+            draft.plan.axes.push(Axis { parameter, values: AxisValues::List(values) });
+        }
+    }
+    draft.plan.design = Some(list.design);
+}
+
+/// A range without a count.
+fn extent(mut section: Section<'_>, range: Range, report: &mut Report) -> Option<Located<AxisValues>> {
+    let at = section.at().clone();
+    section.misplace(&["count"], "the number of points stands in [design], as `points`");
+    let [from, to] = ["from", "to"].map(|key| {
+        let field = section.number(key, range, report);
+        section.require(field, key, "a number", report)
+    });
+    let logarithmic = section.choice("spacing", &["linear", "log"], report).or(0);
+    section.finish(report);
+    let (from, to, logarithmic) = (from?, to?, logarithmic? == 1);
+    let refusal = if from.value == to.value {
+        let title = format!("a design cannot spread points from {0} to {0}", decimal(from.value));
+        Some((title, &to.at, "expected another number"))
+    } else if logarithmic && !(from.value > 0.0 && to.value > 0.0) {
+        let end = if from.value > 0.0 { &to } else { &from };
+        let title = format!("{} has no logarithm", decimal(end.value));
+        Some((title, &end.at, "expected a number greater than 0, or spacing = \"linear\""))
+    } else {
+        None
+    };
+    if let Some((title, at, expected)) = refusal {
+        report.push(Diagnostic::new(title).at(at, expected));
+        return None;
+    }
+    // Two values are the ends; the design finds the points between.
+    let (from, to, count) = (from.value, to.value, 2);
+    let value = if logarithmic {
+        AxisValues::Log { from, to, count }
+    } else {
+        AxisValues::Linear { from, to, count }
+    };
+    Some(Located { value, at })
+}
+
+/// Reads every `[[axis]]` of a grid.
 pub(super) fn axes(root: &mut Section<'_>, draft: &mut Draft, report: &mut Report) {
-    let mut swept: BTreeMap<Cow<'static, str>, Located<String>> = BTreeMap::new();
+    let mut swept = Swept::new();
     let mut points: Option<u64> = Some(1);
     for mut section in root.tables("axis", report) {
         let field = section.text("parameter", report);
@@ -200,23 +340,9 @@ pub(super) fn axes(root: &mut Section<'_>, draft: &mut Draft, report: &mut Repor
         points = product;
 
         let (Some(name), Some(parameter)) = (name, parameter) else { continue };
-        let parts = parameter.parts(&draft.plan.machine);
-        if let Some(first) = parts.iter().find_map(|part| swept.get(part)) {
-            let first = Located { value: first.value.as_str(), at: first.at.clone() };
-            report.push(twice(&name, &first));
+        if !claim(&name, &parameter, &mut swept, draft, report) {
             continue;
         }
-        for constant in &draft.constants {
-            if constant.parts.iter().all(|part| parts.contains(part)) {
-                let title =
-                    format!("`{}` is swept by an axis: this constant has no effect", constant.name.value);
-                let diagnostic =
-                    Diagnostic::new(title).at(&constant.name.at, "expected a parameter that no axis sweeps");
-                report.push(diagnostic.at(&name.at, "swept here"));
-            }
-        }
-        let own = Located { value: name.value.to_owned(), at: name.at };
-        swept.extend(parts.into_iter().map(|part| (part, own.clone())));
         if let (Some(values), Some(_)) = (values, product) {
             draft.origins.put(format!("axis[{}]", draft.plan.axes.len()), values.at);
             draft.plan.axes.push(Axis { parameter, values: values.value });

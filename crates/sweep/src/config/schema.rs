@@ -4,6 +4,7 @@
 use serde_json::{Map, Value, json};
 use washer_model::{Channel, Machine, Parameter, Range, Spin};
 
+use super::design::{DEFAULT_SEED, MOST_SEED, MOST_SOBOL};
 use super::grid::{
     ACCURACY, ATOL, DEFAULT_ACCURACY, DEFAULT_ATOL, DEFAULT_CHANNELS, DEFAULT_MACHINE, DEFAULT_METHOD,
     DEFAULT_RATIO_LIMIT, DEFAULT_RTOL, DEFAULT_STEP_S, LONGEST_S, METHODS, RTOL,
@@ -29,7 +30,7 @@ pub fn grid() -> Value {
     let axes = json!({
         "type": "array",
         "items": axis(),
-        "description": "swept parameters; the first varies slowest",
+        "description": "swept parameters; the first varies slowest. With [design] each has a range without a count",
     });
     let sections = [
         ("name", name),
@@ -39,9 +40,33 @@ pub fn grid() -> Value {
         ("time", time()),
         ("integrator", integrator()),
         ("axis", axes),
+        ("design", design()),
         ("reliability", reliability()),
     ];
-    document("Grid file of sweep", table(sections, &["spin", "time"]))
+    let mut schema = table(sections, &["spin", "time"]);
+    // Whether a range has a count depends on whether there is a design.
+    schema["if"] = json!({ "required": ["design"] });
+    schema["then"] = json!({ "properties": { "axis": { "items": { "not": { "properties": { "range": { "required": ["count"] } } } } } } });
+    schema["else"] = json!({ "properties": { "axis": { "items": { "properties": { "range": { "required": ["count"] } } } } } });
+    document("Grid file of sweep", schema)
+}
+
+fn design() -> Value {
+    let one = |method: &'static str, description: &str, most: u64| {
+        let method = json!({ "const": method, "description": description });
+        let points = json!({ "type": "integer", "minimum": 1, "maximum": most, "description": "how many" });
+        let seed = json!({ "type": "integer", "minimum": 0, "maximum": MOST_SEED, "default": DEFAULT_SEED, "description": "another seed, another draw" });
+        table([("method", method), ("points", points), ("seed", seed)], &["method", "points"])
+    };
+    let list = json!({ "const": "list", "description": "points as listed" });
+    let file = json!({ "type": "string", "description": "CSV or Parquet, relative to this file: one column a parameter, one row a point" });
+    json!({
+        "oneOf": [
+            one("latin_hypercube", "every axis cut into as many strata as there are points, one point in each", MOST_POINTS),
+            one("sobol", "a scrambled Sobol sequence; a power of two points is the most even", MOST_SOBOL),
+            table([("method", list), ("file", file)], &["method", "file"]),
+        ],
+    })
 }
 
 /// The schema of machine files.
@@ -244,7 +269,7 @@ fn axis() -> Value {
             ),
             ("spacing", json!({ "enum": ["linear", "log"], "default": "linear" })),
         ],
-        &["from", "to", "count"],
+        &["from", "to"],
     );
     let values = json!({ "type": "array", "items": number(Range::Any), "minItems": 1, "uniqueItems": true });
     json!({

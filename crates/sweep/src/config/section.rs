@@ -2,6 +2,7 @@
 //! on, so that one pass finds every mistake. Keys nobody asked for are reported at the end.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -113,12 +114,22 @@ impl<'a> Section<'a> {
 
     /// A whole number from 1 to `most`.
     pub(super) fn count(&mut self, key: &'static str, most: u64, report: &mut Report) -> Field<u64> {
+        self.whole(key, 1..=most, report)
+    }
+
+    /// A whole number within bounds.
+    pub(super) fn whole(
+        &mut self,
+        key: &'static str,
+        bounds: RangeInclusive<u64>,
+        report: &mut Report,
+    ) -> Field<u64> {
         let Some(value) = self.get(key) else { return Field::Absent };
         let at = self.place(value.span());
-        let expected = format!("expected a whole number from 1 to {most}");
+        let expected = format!("expected a whole number from {} to {}", bounds.start(), bounds.end());
         match value.get_ref() {
             DeValue::Integer(integer) => match u64::from_str_radix(integer.as_str(), integer.radix()) {
-                Ok(count) if (1..=most).contains(&count) => Field::Given(Located { value: count, at }),
+                Ok(count) if bounds.contains(&count) => Field::Given(Located { value: count, at }),
                 _ => {
                     let title = format!("`{key}` = {integer} is out of range");
                     report.push(Diagnostic::new(title).at(&at, expected));

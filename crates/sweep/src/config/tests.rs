@@ -9,6 +9,7 @@ use proptest::prelude::*;
 use washer_model::{Machine, Spin};
 
 use super::*;
+use crate::design::Design;
 use crate::plan::{AxisValues, Integrator};
 
 fn testdata() -> PathBuf {
@@ -284,8 +285,8 @@ const PIECES: [&str; 24] = [
 fn loads_or_explains(text: &[u8]) {
     match load_text(text, &[]) {
         Ok(plan) => {
-            for point in plan.corners() {
-                let scenario = plan.scenario(point);
+            for values in plan.corners() {
+                let scenario = plan.scenario_at(&values);
                 assert_eq!(scenario.machine.violations(), []);
                 assert_eq!(scenario.spin.violations(), []);
             }
@@ -354,4 +355,39 @@ proptest! {
             Err(mistakes) => assert!(mistakes.count() >= 1),
         }
     }
+}
+
+#[test]
+fn a_design_is_ranges_and_a_number_of_points() {
+    let axes = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = { from = 0.1, to = 1.0 }\n\
+                [[axis]]\nparameter = \"bearing_stiffness_n_per_m\"\nrange = { from = 1e6, to = 1e9, spacing = \"log\" }\n";
+    let plan = |design: &str| load_text(format!("{SMALLEST}[design]\n{design}\n{axes}"), &[]).unwrap();
+    let sobol = plan("method = \"sobol\"\npoints = 64\nseed = 3");
+    assert_eq!(sobol.design, Some(Design::Sobol { points: 64, seed: 3 }));
+    let latin = plan("method = \"latin_hypercube\"\npoints = 64");
+    assert_eq!((latin.points(), latin.to_json()["design"]["seed"].as_u64()), (64, Some(0)));
+    assert_ne!(latin.axis_values(0), sobol.axis_values(0));
+    assert_eq!(latin.to_json()["axis"][0]["range"].get("count"), None);
+    assert_eq!(load_text(SMALLEST, &[]).unwrap().to_json().get("design"), None);
+}
+
+#[test]
+fn a_list_is_a_file_of_points_whose_content_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = folder.path().join("grid.toml");
+    std::fs::write(&grid, format!("{SMALLEST}[design]\nmethod = \"list\"\nfile = \"points.csv\"\n")).unwrap();
+    let load_list = |csv: &str| {
+        std::fs::write(folder.path().join("points.csv"), csv).unwrap();
+        load(&grid, &[]).unwrap()
+    };
+    let text = "\u{feff}# by hand\n\"unbalance_mass_kg\", spin_ramp_s\r\n0.25, 5e1\r\n\r\n0.5, 40\r\n";
+    let plan = load_list(text);
+    assert_eq!(plan.points(), 2);
+    assert_eq!([plan.axis_values(0), plan.axis_values(1)], [[0.25, 50.0], [0.5, 40.0]].map(Vec::from));
+    assert_eq!(plan.scenario(1).spin, Spin::Triangular { peak_rpm: 350.0, ramp_s: 40.0 });
+    let other = load_list(&text.replace("40", "41"));
+    assert_ne!(plan.to_json()["design"]["hash"], other.to_json()["design"]["hash"]);
+    assert_eq!(plan.to_json()["axis"], other.to_json()["axis"]);
+    let point = load_point(&grid, &[], &["unbalance_mass_kg=0.1".into(), "spin_ramp_s=9".into()]).unwrap();
+    assert_eq!((point.points(), point.design), (1, None));
 }

@@ -19,8 +19,8 @@ pub(super) const MOST_STEPS: f64 = 1e10;
 /// left to the run, as a failed row.
 pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
     let mut reported = BTreeSet::new();
-    for point in draft.plan.corners() {
-        for (violation, of_spin) in violations(&draft.plan.scenario(point)) {
+    for values in draft.plan.corners() {
+        for (violation, of_spin) in violations(&draft.plan.scenario_at(&values)) {
             let concerns = keys(&violation, of_spin);
             let judged = !concerns.iter().any(|key| draft.origins.is_doubtful(key));
             if judged && reported.insert(concerns.clone()) {
@@ -121,8 +121,8 @@ fn longest_stable_step_s(draft: &Draft, step_s: f64) -> Option<f64> {
     let plan = &draft.plan;
     let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };
     let mut highest = 0.0_f64;
-    for point in plan.corners() {
-        let Scenario { machine, spin } = plan.scenario(point);
+    for values in plan.corners() {
+        let Scenario { machine, spin } = plan.scenario_at(&values);
         let speed = spin.greatest_speed_rad_per_s(plan.end_s);
         for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
             // Matrices without eigenvalues leave it to the run to tell whether the machine can move.

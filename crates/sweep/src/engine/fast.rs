@@ -11,7 +11,6 @@
 //!
 //! Everything follows from the plan alone, so that every process of a run comes to the same rows.
 
-use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rayon::prelude::*;
@@ -20,7 +19,7 @@ use washer_model::{Capping, Method, ModelKind, Point};
 
 use super::{GROUP, ModelEngine, panicked};
 use crate::outcome::{Outcome, Status, Trajectory};
-use crate::plan::Plan;
+use crate::plan::{Plan, Scenario};
 use crate::run::Watch;
 use crate::verdict::Verdict;
 
@@ -32,6 +31,9 @@ const REFERENCE_SHARE: f64 = 0.75;
 
 /// One point in so many is in the sample.
 const SAMPLED: u64 = 50;
+
+/// No more places are looked at for step and cap.
+const MOST_CORNERS: usize = 256;
 
 /// No sample is larger: it is held in memory.
 const MOST_SAMPLED: u64 = 1_000_000;
@@ -98,8 +100,16 @@ type Pair = (Outcome, Outcome);
 impl ModelEngine<'_> {
     /// Step and cap by the rule alone, from the corners of the grid.
     pub(super) fn unchecked(&self, accuracy: f64) -> Settled {
-        let corners: Vec<_> = self.plan.corners().map(|point| self.plan.scenario(point)).collect();
-        let scenarios: Vec<_> = corners.iter().map(|s| (s.machine.clone(), s.spin.clone())).collect();
+        // A list has no corners but its points: some of them must do.
+        let values: Vec<_> = self.plan.corners().collect();
+        let scenarios: Vec<_> = values
+            .iter()
+            .step_by(values.len().div_ceil(MOST_CORNERS))
+            .map(|values| {
+                let Scenario { machine, spin } = self.plan.scenario_at(values);
+                (machine, spin)
+            })
+            .collect();
         let prepared = washer_model::prepare(self.simd, &scenarios, &self.timing);
         let ready: Vec<_> = prepared
             .iter()
@@ -172,12 +182,16 @@ impl ModelEngine<'_> {
         groups.map(|groups| groups.concat())
     }
 
-    /// Outcomes of neighbouring points, their verdicts certain.
-    pub(super) fn certain(&self, accuracy: f64, settled: &Settled, points: Range<u64>) -> Vec<Outcome> {
-        let points: Vec<u64> = points.collect();
-        let prepared = self.prepare(&points);
-        let mut outcomes = self.all(&prepared, &settled.fast(), &points);
-        let spreads = self.flag(accuracy, settled, &prepared, &mut outcomes);
+    /// Outcomes of some points, their verdicts certain.
+    pub(super) fn certain(
+        &self,
+        accuracy: f64,
+        settled: &Settled,
+        prepared: &[Option<Point>],
+        points: &[u64],
+    ) -> Vec<Outcome> {
+        let mut outcomes = self.all(prepared, &settled.fast(), points);
+        let spreads = self.flag(accuracy, settled, prepared, &mut outcomes);
         let error = settled.observed_error.unwrap_or(0.0).max(accuracy);
         let doubtful: Vec<usize> =
             (0..outcomes.len()).filter(|&i| self.is_doubtful(&outcomes[i], error.max(spreads[i]))).collect();
@@ -196,12 +210,12 @@ impl ModelEngine<'_> {
 
     /// Outcomes by one method.
     fn by(&self, method: &Method, points: &[u64]) -> Vec<Outcome> {
-        self.all(&self.prepare(points), method, points)
+        self.all(&self.prepare(points, &|point| self.plan.scenario(point)), method, points)
     }
 
     /// Outcomes by the fast method, with their flags.
     fn flagged(&self, accuracy: f64, settled: &Settled, points: &[u64]) -> Vec<Outcome> {
-        let prepared = self.prepare(points);
+        let prepared = self.prepare(points, &|point| self.plan.scenario(point));
         let mut outcomes = self.all(&prepared, &settled.fast(), points);
         self.flag(accuracy, settled, &prepared, &mut outcomes);
         outcomes
@@ -260,7 +274,7 @@ fn sample(plan: &Plan) -> Vec<u64> {
         let draw = hash.as_bytes().iter().take(8).fold(0_u64, |draw, byte| draw << 8 | u64::from(*byte));
         block * every + draw % length
     });
-    let mut sample: Vec<u64> = plan.corners().chain(drawn).collect();
+    let mut sample: Vec<u64> = plan.corner_points().into_iter().chain(drawn).collect();
     sample.sort_unstable();
     sample.dedup();
     sample

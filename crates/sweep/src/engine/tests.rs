@@ -56,14 +56,14 @@ fn a_panic_in_one_points_evaluation_is_that_points_row() {
     let engine = ModelEngine::new(&plan).unwrap();
     let evaluate = |points: Range<u64>| {
         assert!(!points.contains(&7), "a defect at point seven");
-        engine.evaluate_together(points)
+        engine.evaluate_together(points, &|point| plan.scenario(point))
     };
     let outcomes = together_or_alone(5..9, &evaluate);
     assert_eq!(outcomes.iter().map(|outcome| outcome.point).collect::<Vec<_>>(), [5, 6, 7, 8]);
     let panicked = &outcomes[2];
     assert_eq!((panicked.nonlinear.status, panicked.linear.status), (Status::Panicked, Status::Panicked));
     assert!(panicked.nonlinear.amplitudes.is_empty() && panicked.nonlinear.fail_time_s.is_none());
-    let undisturbed = engine.evaluate_together(5..9);
+    let undisturbed = engine.evaluate_together(5..9, &|point| plan.scenario(point));
     for k in [0, 1, 3] {
         assert_eq!(outcomes[k], undisturbed[k]);
     }

@@ -14,7 +14,7 @@
 //! When every chunk is there they are joined into the one Parquet file (`merge`), and the folder goes. The store
 //! knows points, axis names and outcomes; it does not know the engine that makes them.
 
-mod atomic;
+pub(crate) mod atomic;
 mod chunk;
 mod error;
 mod lock;

@@ -88,7 +88,7 @@ fn the_sample_holds_the_corners_and_two_percent() {
     let mut plan = load(include_str!("../../../../../sweeps/fig12.toml"));
     let drawn = sample(&plan);
     assert!(drawn.len() as u64 * SAMPLED >= plan.points());
-    assert!(plan.corners().all(|corner| drawn.contains(&corner)));
+    assert!(plan.corner_points().iter().all(|corner| drawn.contains(corner)));
     assert!(drawn.is_sorted() && drawn.iter().all(|&point| point < plan.points()));
     plan.axes[0].values = AxisValues::Linear { from: 0.05, to: 1.0, count: 1_000_000_000_000 };
     assert!(sample(&plan).len() as u64 <= MOST_SAMPLED + 8);

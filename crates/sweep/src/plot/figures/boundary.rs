@@ -1,13 +1,25 @@
-//! The traced curve on which the ratio is at its limit, with the bracket it is known to lie in.
+//! The traced curve on which a quantity is at its limit, with the bracket it is known to lie in.
+
+use serde_json::Value;
 
 use crate::plot::axis::evenly_by_log;
 use crate::plot::chart::{Chart, ChartPanel, Series, Style};
-use crate::plot::colour::NONLINEAR;
+use crate::plot::colour::DISTINCT;
 use crate::plot::error::PlotError;
 use crate::plot::label;
 use crate::plot::read::{Column, Table, bracket};
 
-/// The chart of a boundary file: its first column across, its second up, the bracket shaded.
+/// One place of the file: where it is, and the bracket it lies in. The place is NaN where there is no such number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Place {
+    x: f64,
+    y: f64,
+    low: f64,
+    high: f64,
+}
+
+/// The chart of a boundary file: its first column across, its second up, the bracket shaded; a curve for every
+/// combination of the axes beyond the second.
 ///
 /// # Errors
 /// [`PlotError::Empty`] with fewer than two points.
@@ -17,33 +29,45 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let empty = || PlotError::Empty { path: table.path.clone(), reason: "a curve needs at least two points" };
     let (low, high) = bracket(&names).ok_or_else(empty)?;
     let (x, y) = (columns[0], columns[1]);
-    let mut rows: Vec<usize> = (0..table.rows).collect();
-    let values = table.numbers(&x.name)?;
-    rows.retain(|&row| values[row].is_finite());
-    rows.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
-    if rows.len() < 2 {
+    let [xs, ys, lows, highs] =
+        [table.numbers(&x.name)?, table.numbers(&y.name)?, table.numbers(low)?, table.numbers(high)?];
+    let mut grid: Vec<f64> = xs.iter().copied().filter(|x| x.is_finite()).collect();
+    grid.sort_by(f64::total_cmp);
+    grid.dedup();
+    if grid.len() < 2 {
         return Err(empty());
     }
-    let pick = |name: &str| -> Result<Vec<f64>, PlotError> {
-        let values = table.numbers(name)?;
-        Ok(rows.iter().map(|&row| values[row]).collect())
-    };
-    let xs = pick(&x.name)?;
-    let limit = label::significant(table.ratio_limit(), 4);
-    let series = Series {
-        name: format!("boundary: ratio {limit}, bracket shaded"),
-        colour: NONLINEAR,
-        grid: 0,
-        y: pick(&y.name)?,
-        style: Style::Band(pick(low)?, pick(high)?),
-    };
+    let mut curves: Vec<(String, Vec<Place>)> = Vec::new();
+    for row in 0..table.rows {
+        let place = Place { x: xs[row], y: ys[row], low: lows[row], high: highs[row] };
+        let further = further(table, row);
+        match curves.iter_mut().find(|(name, _)| *name == further) {
+            Some((_, places)) => places.push(place),
+            None => curves.push((further, vec![place])),
+        }
+    }
+    let said = limit(table);
+    let mut series = Vec::new();
+    for (k, (further, places)) in curves.iter().enumerate() {
+        let name = if further.is_empty() {
+            format!("boundary: {said}, bracket shaded")
+        } else {
+            format!("{said}, {further}")
+        };
+        let colour = DISTINCT[k % DISTINCT.len()];
+        series.extend(branches(&grid, places).into_iter().map(|branch| {
+            let pick = |of: fn(&Place) -> f64| branch.iter().map(of).collect::<Vec<f64>>();
+            let style = Style::Band(pick(|place| place.low), pick(|place| place.high));
+            Series { name: name.clone(), colour, grid: 0, y: pick(|place| place.y), style }
+        }));
+    }
     let run = table.run_name().map_or(String::new(), |name| format!("{name} · "));
     Ok(Chart {
         title: "Boundary of the linear model's reliability".to_owned(),
-        subtitle: format!("{run}{} points", rows.len()),
+        subtitle: format!("{run}{} values of {}", grid.len(), label::words(&x.name)),
         x_label: label::with_unit(&label::words(&x.name), &x.unit),
-        x_log: evenly_by_log(&xs),
-        grids: vec![xs],
+        x_log: evenly_by_log(&grid),
+        grids: vec![grid],
         panels: vec![ChartPanel {
             name: "boundary".to_owned(),
             label: label::with_unit(&label::words(&y.name), &y.unit),
@@ -51,11 +75,105 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
             log: false,
             range: None,
             height: 440.0,
-            series: vec![series],
+            series,
             levels: Vec::new(),
             stars: Vec::new(),
         }],
         marks: Vec::new(),
         mark_meaning: String::new(),
     })
+}
+
+/// What is at its limit, as the file says, or else the ratio.
+fn limit(table: &Table) -> String {
+    let quantity = table.find("quantity").and_then(Value::as_str).unwrap_or("ratio_max");
+    let ratio = label::significant(table.ratio_limit(), 4);
+    match quantity {
+        "ratio_max" => format!("ratio {ratio}"),
+        gap if gap.starts_with("min_gap") => format!("{} 0", label::words(gap)),
+        other => format!("{} {ratio}", label::words(other)),
+    }
+}
+
+/// The values of the axes beyond the second, which the plan in the file names.
+fn further(table: &Table, row: usize) -> String {
+    let axes = table.find("axis").and_then(Value::as_array);
+    let names = axes.into_iter().flatten().skip(2).filter_map(|axis| axis.get("parameter")?.as_str());
+    let said = names.filter_map(|name| {
+        let column = table.column(name)?;
+        let value = label::significant(*column.numbers()?.get(row)?, 4);
+        Some(format!("{} {value} {}", label::words(name), column.unit))
+    });
+    said.collect::<Vec<_>>().join(", ").trim_end().to_owned()
+}
+
+/// A curve's places as lines that have one each along the grid: where there are several, each goes on from the line whose
+/// last place is nearest.
+fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
+    let nowhere = |x: f64| Place { x, y: f64::NAN, low: f64::NAN, high: f64::NAN };
+    let height = |place: &Place| if place.y.is_nan() { 0.5 * (place.low + place.high) } else { place.y };
+    let mut lines: Vec<Vec<Place>> = Vec::new();
+    for (k, &x) in grid.iter().enumerate() {
+        let mut here: Vec<Place> =
+            places.iter().copied().filter(|place| place.x == x && height(place).is_finite()).collect();
+        // Pairs of a line that was there at the last value and a place here, nearest first.
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        for (line, known) in lines.iter().enumerate() {
+            for (place, new) in here.iter().enumerate() {
+                let apart = known.last().map_or(f64::NAN, |last| (height(last) - height(new)).abs());
+                if apart.is_finite() {
+                    pairs.push((apart, line, place));
+                }
+            }
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut taken = vec![None; here.len()];
+        for (_, line, place) in pairs {
+            if taken[place].is_none() && !taken.contains(&Some(line)) {
+                taken[place] = Some(line);
+            }
+        }
+        for (place, line) in here.drain(..).zip(taken) {
+            match line {
+                Some(line) => lines[line].push(place),
+                None => {
+                    let mut line: Vec<Place> = grid[..k].iter().map(|x| nowhere(*x)).collect();
+                    line.push(place);
+                    lines.push(line);
+                }
+            }
+        }
+        for line in &mut lines {
+            if line.len() == k {
+                line.push(nowhere(x));
+            }
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fold_goes_on_from_the_nearest_line() {
+        let place = |x: f64, y: f64| Place { x, y, low: y - 0.1, high: y + 0.1 };
+        let places = [
+            place(1.0, 250.0),
+            place(2.0, 238.0),
+            place(2.0, 239.0),
+            place(2.0, 259.0),
+            place(3.0, 243.0),
+            place(3.0, 265.0),
+        ];
+        let lines: Vec<Vec<f64>> = branches(&[1.0, 2.0, 3.0], &places)
+            .iter()
+            .map(|line| line.iter().map(|place| place.y).collect())
+            .collect();
+        assert_eq!(lines[0], [250.0, 259.0, 265.0]);
+        assert_eq!(lines.len(), 3);
+        assert!(lines[1][0].is_nan() && lines[1][1] == 238.0 && lines[1][2].is_nan());
+        assert_eq!(lines[2][1..], [239.0, 243.0]);
+    }
 }
