@@ -171,7 +171,7 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
     let mut how = Ended::Idle;
 
     while let Some(leg) = task.next_leg(0, how, &mut x) {
-        control.start(0, Some(leg.step_s), !matches!(how, Ended::Arrived(_)));
+        control.start(0, leg.step_s);
         let mut t = leg.start_s;
         let mut count = Count::default();
         let mut is_fresh = true;
@@ -190,7 +190,8 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
 
             let mut stages = [[N(0.0); D]; STAGES];
             let mut y = x;
-            let mut forcing = task.forcing(N(t));
+            let at_start = task.forcing(N(t));
+            let mut forcing = at_start;
             // A matrix without factors makes no step: the error stays NaN and the next try is shorter.
             let mut error = N(f64::NAN);
             if let Some(eliminated) = &eliminated {
@@ -198,7 +199,7 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
                 for stage in 0..STAGES {
                     if stage > 0 && NODE[stage] != NODE[stage - 1] {
                         let time = if NODE[stage] == 1.0 { N(reached) } else { h * NODE[stage] + N(t) };
-                        forcing = task.forcing(time);
+                        task.renew(time, &mut forcing);
                     }
                     y = x;
                     let mut earlier = [N(0.0); D];
@@ -210,10 +211,6 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
                         }
                     }
                     let slope = task.derivative(&forcing, &y);
-                    if is_fresh {
-                        task.begin(&forcing, &x, &slope);
-                        is_fresh = false;
-                    }
                     let time_weight = (h * TIME[stage]).v();
                     let mut b = slope;
                     for i in 0..D {
@@ -236,7 +233,23 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
             if error.0 < 1.0 {
                 count.accepted += 1;
                 control.settle(0, Verdict::Accepted, &next);
-                observe(task, &forcing, (reached, h), (&x, &y), &stages);
+                let dense = Dense::new(h, &x, &y, &stages);
+                if is_fresh {
+                    task.begin(&at_start, &x, &dense.slope_before);
+                    is_fresh = false;
+                }
+                task.observe(
+                    &forcing,
+                    &Step {
+                        end_s: N(reached),
+                        length_s: h,
+                        before: &x,
+                        slope_before: &dense.slope_before,
+                        after: &y,
+                        slope_after: &dense.slope_after,
+                        dense: Some(&dense.fourth),
+                    },
+                );
                 x = y;
                 t = reached;
                 is_known = false;
@@ -261,43 +274,34 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
     }
 }
 
-/// Shows the task a step. Slopes at its ends are those of the dense output: the right-hand side itself would multiply what is
-/// left of the fast vibrations by their squared frequency.
-#[inline(always)]
-fn observe<const D: usize, P: Task<f64, D>>(
-    task: &mut P,
-    forcing: &P::Forcing,
-    (end_s, length_s): (f64, N<f64>),
-    (before, after): (&[N<f64>; D], &[N<f64>; D]),
-    stages: &[[N<f64>; D]; STAGES],
-) {
-    let mut slope_before = *before;
-    let mut slope_after = *before;
-    let mut dense = *before;
-    let per_h = length_s.recip();
-    for i in 0..D {
-        let mut d = [N(0.0); 3];
-        for r in 0..3 {
-            for stage in 0..STAGES {
-                d[r] += stages[stage][i] * DENSE[r][stage];
+/// The dense output of one step, in the terms of [`Step`]. Slopes at the ends are its own: the right-hand side itself would
+/// multiply what is left of the fast vibrations by their squared frequency.
+struct Dense<const D: usize> {
+    slope_before: [N<f64>; D],
+    slope_after: [N<f64>; D],
+    fourth: [N<f64>; D],
+}
+
+impl<const D: usize> Dense<D> {
+    #[inline(always)]
+    fn new(h: N<f64>, before: &[N<f64>; D], after: &[N<f64>; D], stages: &[[N<f64>; D]; STAGES]) -> Self {
+        let mut dense = Self { slope_before: *before, slope_after: *before, fourth: *before };
+        let per_h = h.recip();
+        for i in 0..D {
+            let mut d = [N(0.0); 3];
+            for r in 0..3 {
+                for stage in 0..STAGES {
+                    d[r] += stages[stage][i] * DENSE[r][stage];
+                }
             }
+            let difference = after[i] - before[i];
+            dense.slope_before[i] = (per_h * (difference + d[0])).v();
+            dense.slope_after[i] = (per_h * (difference - (d[0] + d[1] + d[2]))).v();
+            // `Step::at` writes the polynomial with 1 - s where this one has s.
+            dense.fourth[i] = -d[2];
         }
-        let difference = after[i] - before[i];
-        slope_before[i] = (per_h * (difference + d[0])).v();
-        slope_after[i] = (per_h * (difference - (d[0] + d[1] + d[2]))).v();
-        // `Step::at` writes the polynomial with 1 - s where this one has s.
-        dense[i] = -d[2];
+        dense
     }
-    let step = Step {
-        end_s: N(end_s),
-        length_s,
-        before,
-        slope_before: &slope_before,
-        after,
-        slope_after: &slope_after,
-        dense: Some(&dense),
-    };
-    task.observe(forcing, &step);
 }
 
 #[cfg(test)]
