@@ -20,14 +20,7 @@ enum { YAW = 4, YAW_RATE = 14 };
 static inline washer *paper_trajectory(void) {
     static const char *const names[] = {"unbalance_mass_kg", "damping_n_s_per_m"};
     static const double values[] = {0.4, 140.0};
-    washer_setup setup = {0};
-    setup.model = "nonlinear";
-    setup.profile = "triangular";
-    setup.peak_rpm = 350.0;
-    setup.ramp_s = 50.0;
-    setup.names = names;
-    setup.values = values;
-    setup.constants = 2;
+    const washer_setup setup = {"nonlinear", "triangular", 350.0, 50.0, NULL, NULL, 0, names, values, 2};
     washer *made = NULL;
     enum washer_status status = washer_new(&setup, &made);
     if (status != WASHER_OK || washer_dimension() != DIMENSION) {

@@ -1,5 +1,5 @@
 //! This project's own methods on the trajectory of `scripts/peers/trajectory.h`, in the same words: `trajectory SIMD METHOD SETTINGS`, with
-//! rk4 STEP, dopri5 RTOL ATOL or rodas5p RTOL ATOL. Lanes are filled with copies, and the time is that of one of them.
+//! rk4 STEP, rk4-mass-scaled STEP CAP, dopri5 RTOL ATOL or rodas5p RTOL ATOL. Lanes are filled with copies, and the time is that of one of them.
 #![allow(clippy::print_stdout)]
 
 use std::process::ExitCode;
@@ -17,6 +17,11 @@ fn main() -> ExitCode {
     };
     let parsed = match words[..] {
         [simd, "rk4", step] => number(step).map(|step_s| (simd, "RK4", Method::Rk4 { step_s })),
+        [simd, "rk4-mass-scaled", step, cap] => {
+            number(step).zip(number(cap)).map(|(step_s, cap_rad_per_s)| {
+                (simd, "mass-scaled RK4", Method::Rk4MassScaled { step_s, cap_rad_per_s })
+            })
+        }
         [simd, "dopri5", rtol, atol] => tolerance(rtol, atol).map(|t| (simd, "dopri5", Method::Dopri5(t))),
         [simd, "rodas5p", rtol, atol] => tolerance(rtol, atol).map(|t| (simd, "Rodas5P", Method::Rodas5p(t))),
         _ => None,
@@ -26,7 +31,7 @@ fn main() -> ExitCode {
         parsed.and_then(|(simd, name, method)| Some((known(simd)?, name, method)))
     else {
         eprintln!(
-            "usage: trajectory scalar|avx2|avx512|neon rk4 STEP | dopri5 RTOL ATOL | rodas5p RTOL ATOL"
+            "usage: trajectory scalar|avx2|avx512|neon rk4 STEP | rk4-mass-scaled STEP CAP | dopri5 RTOL ATOL | rodas5p RTOL ATOL"
         );
         return ExitCode::from(2);
     };
@@ -52,6 +57,9 @@ fn main() -> ExitCode {
     }
     let settings = match method {
         Method::Rk4 { step_s } => format!("step {step_s:e} s"),
+        Method::Rk4MassScaled { step_s, cap_rad_per_s } => {
+            format!("step {step_s:e} s, cap {cap_rad_per_s} rad/s")
+        }
         Method::Dopri5(t) | Method::Rodas5p(t) => format!("rtol {:.0e}, atol {:.0e}", t.relative, t.absolute),
     };
     let lanes =
