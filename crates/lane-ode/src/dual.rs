@@ -1,5 +1,6 @@
 //! Forward automatic differentiation: the same source, with one derivative carried along.
 
+use crate::lane::Lane;
 use crate::num::N;
 use crate::real::Real;
 
@@ -106,5 +107,29 @@ impl<T: Real> Real for Dual<T> {
     #[inline(always)]
     fn all(mask: Self::Mask) -> bool {
         T::all(mask)
+    }
+}
+
+/// Lanes of dual numbers: whole systems run on them, so that each lane can carry a derivative along a direction of its own.
+impl<T: Lane> Lane for Dual<T> {
+    const LANES: usize = T::LANES;
+    #[inline(always)]
+    fn get(self, i: usize) -> f64 {
+        self.value.get(i)
+    }
+    /// Writes a constant.
+    #[inline(always)]
+    fn set(&mut self, i: usize, value: f64) {
+        self.value.set(i, value);
+        self.slope.set(i, 0.0);
+    }
+    /// A step function: its derivative is zero wherever it has one.
+    #[inline(always)]
+    fn round(self) -> Self {
+        Self::constant(self.value.round())
+    }
+    #[inline(always)]
+    fn bits(mask: Self::Mask) -> u32 {
+        T::bits(mask)
     }
 }

@@ -113,6 +113,17 @@ impl Simd {
         }
         kernel.run()
     }
+
+    /// Runs a kernel that follows one trajectory and uses lanes for something else, on a few lanes. The result is the same on
+    /// any number of them; few are enough, and the kernel is compiled for one instruction set instead of all.
+    #[inline(never)]
+    pub fn dispatch_narrow<K: Kernel>(kernel: K) -> K::Output {
+        #[cfg(target_arch = "x86_64")]
+        if Self::Avx2.is_available() {
+            return x86::avx2(kernel);
+        }
+        kernel.run(0.0_f64)
+    }
 }
 
 #[cfg(target_arch = "x86_64")]

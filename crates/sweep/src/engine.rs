@@ -64,6 +64,11 @@ pub(crate) fn dopri5(rtol: f64, atol: f64) -> Method {
     Method::Dopri5(Tolerance { relative: rtol, absolute: atol, max_steps: MAX_ADAPTIVE_STEPS })
 }
 
+/// The stiff method with a grid file's tolerances.
+pub(crate) fn rodas5p(rtol: f64, atol: f64) -> Method {
+    Method::Rodas5p(Tolerance { relative: rtol, absolute: atol, max_steps: MAX_ADAPTIVE_STEPS })
+}
+
 impl<'a> ModelEngine<'a> {
     /// An engine for a plan, on the best instruction set or the one asked for.
     ///
@@ -73,6 +78,7 @@ impl<'a> ModelEngine<'a> {
         let scheme = match plan.integrator {
             Integrator::Rk4 { step_s } => Scheme::Direct(Method::Rk4 { step_s }),
             Integrator::Dopri5 { rtol, atol } => Scheme::Direct(dopri5(rtol, atol)),
+            Integrator::Rodas5p { rtol, atol } => Scheme::Direct(rodas5p(rtol, atol)),
             Integrator::Rk4MassScaled { accuracy } => Scheme::Fast { accuracy, settled: OnceLock::new() },
         };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };

@@ -112,7 +112,7 @@ impl Sample {
 fn first_end_s(plan: &Plan) -> f64 {
     let short_s = match plan.integrator {
         Integrator::Rk4 { step_s } => 100.0 * step_s,
-        Integrator::Dopri5 { .. } | Integrator::Rk4MassScaled { .. } => 1e-3,
+        Integrator::Dopri5 { .. } | Integrator::Rodas5p { .. } | Integrator::Rk4MassScaled { .. } => 1e-3,
     };
     short_s.min(plan.end_s)
 }

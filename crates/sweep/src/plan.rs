@@ -46,6 +46,13 @@ pub enum Integrator {
         /// Absolute tolerance per component (m, rad, m/s, rad/s).
         atol: f64,
     },
+    /// Rodas5P, linearly implicit, adaptive: for machines too stiff for the others.
+    Rodas5p {
+        /// Relative tolerance per component.
+        rtol: f64,
+        /// Absolute tolerance per component (m, rad, m/s, rad/s).
+        atol: f64,
+    },
     /// Classical Runge-Kutta over the mass-scaled bearings.
     Rk4MassScaled {
         /// Relative error asked of every amplitude.

@@ -52,11 +52,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#[doc(hidden)]
+pub mod bench;
 mod campbell;
 mod capping;
 mod channel;
 mod coefficients;
 mod coupling;
+mod equations;
 mod equilibrium;
 mod floating;
 mod forces;
@@ -83,6 +86,7 @@ pub use campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
 pub use capping::Capping;
 pub use channel::Channel;
 pub use history::{History, Instant, Start, history};
+pub use equations::{Equations, STATE_LEN};
 pub use linear::Matrices;
 pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};
 pub use modal::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};

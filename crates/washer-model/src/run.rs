@@ -1,5 +1,7 @@
 //! Trajectories: points through the lanes of an integrator, and what is recorded of them.
 
+mod stiff;
+
 use crate::coupling::Coupling;
 use crate::model::{Linear, Model, Nonlinear, STATES};
 use crate::outputs::{CHANNELS, squared};
@@ -27,6 +29,8 @@ pub enum Method {
     },
     /// Dormand-Prince 5(4).
     Dopri5(Tolerance),
+    /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others. One trajectory at a time.
+    Rodas5p(Tolerance),
 }
 
 /// Which of the two models.
@@ -45,7 +49,7 @@ const FIRST_STEP_S: f64 = 1e-5;
 pub(crate) fn first_step_s(method: &Method) -> f64 {
     match method {
         Method::Rk4 { step_s } | Method::Rk4MassScaled { step_s, .. } => *step_s,
-        Method::Dopri5(_) => FIRST_STEP_S,
+        Method::Dopri5(_) | Method::Rodas5p(_) => FIRST_STEP_S,
     }
 }
 
@@ -56,7 +60,7 @@ pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
         Method::Rk4MassScaled { cap_rad_per_s, .. } => {
             Coupling::MassScaled(zero.lit(cap_rad_per_s * cap_rad_per_s))
         }
-        Method::Rk4 { .. } | Method::Dopri5(_) => Coupling::Springs,
+        Method::Rk4 { .. } | Method::Dopri5(_) | Method::Rodas5p(_) => Coupling::Springs,
     }
 }
 
@@ -82,21 +86,34 @@ pub fn simulate(simd: Simd, model: ModelKind, method: &Method, points: &[&Point]
     if points.is_empty() {
         return Vec::new();
     }
+    let stepper = match method {
+        Method::Rk4 { .. } | Method::Rk4MassScaled { .. } => Stepper::Rk4,
+        Method::Dopri5(tolerance) => Stepper::Dopri5(*tolerance),
+        Method::Rodas5p(tolerance) => return stiff::simulate(model, tolerance, points),
+    };
     match model {
         ModelKind::Nonlinear => {
-            simd.dispatch(Simulate::<OfNonlinear> { points, method, family: PhantomData })
+            simd.dispatch(Simulate::<OfNonlinear> { points, method, stepper, family: PhantomData })
         }
-        ModelKind::Linear => simd.dispatch(Simulate::<OfLinear> { points, method, family: PhantomData }),
+        ModelKind::Linear => {
+            simd.dispatch(Simulate::<OfLinear> { points, method, stepper, family: PhantomData })
+        }
     }
 }
 
+/// The integrators whose lanes are trajectories.
+enum Stepper {
+    Rk4,
+    Dopri5(Tolerance),
+}
+
 /// A model before the lanes' type is known.
-trait Family {
+pub(crate) trait Family {
     type Over<T: Lane>: Model<T>;
 }
 
-enum OfNonlinear {}
-enum OfLinear {}
+pub(crate) enum OfNonlinear {}
+pub(crate) enum OfLinear {}
 impl Family for OfNonlinear {
     type Over<T: Lane> = Nonlinear<T>;
 }
@@ -107,6 +124,7 @@ impl Family for OfLinear {
 struct Simulate<'a, F> {
     points: &'a [&'a Point],
     method: &'a Method,
+    stepper: Stepper,
     family: PhantomData<F>,
 }
 
@@ -115,20 +133,11 @@ impl<F: Family> Kernel for Simulate<'_, F> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Vec<Record> {
-        let mut run = Run::<T, F::Over<T>> {
-            model: Model::splat(N(zero), self.points[0], coupling(self.method, N(zero))),
-            points: self.points,
-            taken: 0,
-            lanes: [LaneState::default(); MAX_LANES],
-            step_s: first_step_s(self.method),
-            channels: Peaks::new(N(zero)),
-            radial: Peaks::new(N(zero)),
-            windows: N(zero),
-            records: vec![EMPTY; self.points.len()],
-        };
-        match self.method {
-            Method::Rk4 { .. } | Method::Rk4MassScaled { .. } => rk4::integrate(zero, &mut run),
-            Method::Dopri5(tolerance) => dopri5::integrate(zero, &mut run, tolerance),
+        let (step_s, coupling) = (first_step_s(self.method), coupling(self.method, N(zero)));
+        let mut run = Run::<T, F::Over<T>>::new(N(zero), self.points, coupling, step_s);
+        match self.stepper {
+            Stepper::Rk4 => rk4::integrate(zero, &mut run),
+            Stepper::Dopri5(tolerance) => dopri5::integrate(zero, &mut run, &tolerance),
         }
         run.records
     }
@@ -240,7 +249,23 @@ fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
     like.lit(0.0).0.less(like.lit(1.0).0)
 }
 
-impl<T: Lane, M: Model<T>> Run<'_, T, M> {
+impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
+    /// Every point still to be taken up; there is at least one.
+    #[inline(always)]
+    fn new(zero: N<T>, points: &'a [&'a Point], coupling: Coupling<T>, step_s: f64) -> Self {
+        Self {
+            model: M::splat(zero, points[0], coupling),
+            points,
+            taken: 0,
+            lanes: [LaneState::default(); MAX_LANES],
+            step_s,
+            channels: Peaks::new(zero),
+            radial: Peaks::new(zero),
+            windows: zero,
+            records: vec![EMPTY; points.len()],
+        }
+    }
+
     #[inline(always)]
     fn inside(&self) -> T::Mask {
         self.windows.lit(0.0).0.less(self.windows.0)

@@ -120,6 +120,9 @@ fn method(plan: &Plan, settled: Option<&Settled>) -> String {
         Integrator::Dopri5 { rtol, atol } => {
             format!("dopri5, rtol {rtol:e}, atol {atol:e}: steps as it needs")
         }
+        Integrator::Rodas5p { rtol, atol } => {
+            format!("rodas5p, rtol {rtol:e}, atol {atol:e}: steps as it needs, one trajectory at a time")
+        }
         Integrator::Rk4MassScaled { accuracy } => {
             let chosen = settled.map_or_else(String::new, |settled| {
                 let cap = settled.cap_rad_per_s.map_or_else(

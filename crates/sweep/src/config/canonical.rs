@@ -67,6 +67,7 @@ fn integrator(integrator: &Integrator) -> Value {
     match integrator {
         Integrator::Rk4 { step_s } => json!({ "method": "rk4", "step_s": step_s }),
         Integrator::Dopri5 { rtol, atol } => json!({ "method": "dopri5", "rtol": rtol, "atol": atol }),
+        Integrator::Rodas5p { rtol, atol } => json!({ "method": "rodas5p", "rtol": rtol, "atol": atol }),
         Integrator::Rk4MassScaled { accuracy } => {
             json!({ "method": "rk4-mass-scaled", "accuracy": accuracy })
         }

@@ -21,9 +21,9 @@ pub(super) const DEFAULT_METHOD: &str = "rk4-mass-scaled";
 pub(super) const DEFAULT_ACCURACY: f64 = 1e-3;
 /// `step_s` of `rk4`.
 pub(super) const DEFAULT_STEP_S: f64 = 2e-4;
-/// `rtol` of `dopri5`.
+/// `rtol` of `dopri5` and `rodas5p`.
 pub(super) const DEFAULT_RTOL: f64 = 1e-6;
-/// `atol` of `dopri5`.
+/// `atol` of `dopri5` and `rodas5p`.
 pub(super) const DEFAULT_ATOL: f64 = 1e-9;
 /// `ratio_limit` of `[reliability]`.
 pub(super) const DEFAULT_RATIO_LIMIT: f64 = 2.0;
@@ -49,7 +49,7 @@ pub(super) const RTOL: Range = Range::Within(1e-14, 1e-1);
 pub(super) const ATOL: Range = Range::Within(1e-18, 1e-1);
 
 /// The methods, in the order of [`Integrator`].
-pub(super) const METHODS: [&str; 3] = ["rk4", "dopri5", "rk4-mass-scaled"];
+pub(super) const METHODS: [&str; 4] = ["rk4", "dopri5", "rodas5p", "rk4-mass-scaled"];
 /// The profiles, in the order of [`Spin`].
 pub(super) const PROFILES: [&str; 4] = ["cycloidal", "triangular", "ramp", "table"];
 /// Names of machines that need no file.
@@ -292,18 +292,16 @@ fn integrator(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report
         // Which keys belong to a method that is none cannot be said.
         Field::Bad => return stand_in,
     };
-    let mut misplace = |keys: &[&'static str], owner: &str| {
-        section.misplace(keys, &format!("only the method \"{owner}\" has it, not \"{method}\""));
+    let mut misplace = |keys: &[&'static str], owners: &[&str]| {
+        if !owners.contains(&method) {
+            let (noun, verb) = if owners.len() == 1 { ("method", "has") } else { ("methods", "have") };
+            let owners = owners.join("\" and \"");
+            section.misplace(keys, &format!("only the {noun} \"{owners}\" {verb} it, not \"{method}\""));
+        }
     };
-    if method != "rk4" {
-        misplace(&["step_s"], "rk4");
-    }
-    if method != "dopri5" {
-        misplace(&["rtol", "atol"], "dopri5");
-    }
-    if method != "rk4-mass-scaled" {
-        misplace(&["accuracy"], "rk4-mass-scaled");
-    }
+    misplace(&["step_s"], &["rk4"]);
+    misplace(&["rtol", "atol"], &["dopri5", "rodas5p"]);
+    misplace(&["accuracy"], &["rk4-mass-scaled"]);
     let mut number = |key: &'static str, range: Range, default: f64| {
         if let Some(at) = section.key_at(key) {
             origins.put(format!("integrator.{key}"), at);
@@ -313,6 +311,10 @@ fn integrator(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report
     let integrator = match method {
         "rk4" => Integrator::Rk4 { step_s: number("step_s", Range::Positive, DEFAULT_STEP_S) },
         "dopri5" => Integrator::Dopri5 {
+            rtol: number("rtol", RTOL, DEFAULT_RTOL),
+            atol: number("atol", ATOL, DEFAULT_ATOL),
+        },
+        "rodas5p" => Integrator::Rodas5p {
             rtol: number("rtol", RTOL, DEFAULT_RTOL),
             atol: number("atol", ATOL, DEFAULT_ATOL),
         },

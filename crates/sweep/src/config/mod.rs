@@ -5,7 +5,7 @@
 //! finds every mistake; a plan comes out only if there is none.
 //!
 //! Left out: `name` is the file's own name, `machine` is `"paper"`, `window_s` the whole run, `[integrator]`
-//! `rk4-mass-scaled` with `accuracy = 1e-3` (`rk4`: `step_s = 2e-4`; `dopri5`: `rtol = 1e-6`, `atol = 1e-9`),
+//! `rk4-mass-scaled` with `accuracy = 1e-3` (`rk4`: `step_s = 2e-4`; `dopri5` and `rodas5p`: `rtol = 1e-6`, `atol = 1e-9`),
 //! `[reliability]` the ratio 2 over the six channels of tub and drum fronts and tub angles; without axes the grid is a
 //! single point. `[spin]` and `end_s` must be given, and a machine file is always whole.
 //!

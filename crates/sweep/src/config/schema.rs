@@ -236,7 +236,7 @@ fn integrator() -> Value {
         let required: &[&str] = if name == DEFAULT_METHOD { &[] } else { &["method"] };
         match name {
             "rk4" => table([method, ("step_s", step_s.clone())], required),
-            "dopri5" => table([method, ("rtol", rtol.clone()), ("atol", atol.clone())], required),
+            "dopri5" | "rodas5p" => table([method, ("rtol", rtol.clone()), ("atol", atol.clone())], required),
             _ => table([method, ("accuracy", accuracy.clone())], required),
         }
     };

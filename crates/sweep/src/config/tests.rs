@@ -102,6 +102,7 @@ fn what_is_left_out_has_its_default() {
     let method = |text: &str| load_text(format!("{SMALLEST}[integrator]\n{text}"), &[]).unwrap().integrator;
     assert_eq!(method("method = \"rk4\""), Integrator::Rk4 { step_s: 2e-4 });
     assert_eq!(method("method = \"dopri5\""), Integrator::Dopri5 { rtol: 1e-6, atol: 1e-9 });
+    assert_eq!(method("method = \"rodas5p\"\nrtol = 1e-8"), Integrator::Rodas5p { rtol: 1e-8, atol: 1e-9 });
     assert_eq!(method("accuracy = 1e-5"), Integrator::Rk4MassScaled { accuracy: 1e-5 });
 }
 

@@ -1,0 +1,94 @@
+//! Linear equations of a fixed size: Gauss's elimination, on the stack.
+
+use crate::num::N;
+
+/// Row-pivoted triangular factors of a square matrix.
+pub(crate) struct Lu<const C: usize> {
+    /// L below the diagonal (its unit diagonal not stored), U above it, the reciprocals of U's diagonal on it.
+    packed: [[N<f64>; C]; C],
+    /// Row `i` of the factors comes from row `order[i]` of the matrix.
+    order: [usize; C],
+}
+
+impl<const C: usize> Lu<C> {
+    /// Factors `a`, always with the largest remaining entry of a column as pivot (Golub and Van Loan, Matrix Computations,
+    /// Algorithm 3.4.1). `None` if a column has nothing left but zeros, or something not finite.
+    #[inline(always)]
+    pub(crate) fn new(mut a: [[N<f64>; C]; C]) -> Option<Self> {
+        let mut order = [0; C];
+        for i in 0..C {
+            order[i] = i;
+        }
+        for j in 0..C {
+            let mut pivot = j;
+            for i in j + 1..C {
+                if a[i][j].0.abs() > a[pivot][j].0.abs() {
+                    pivot = i;
+                }
+            }
+            let size = a[pivot][j].0.abs();
+            if !(size > 0.0 && size.is_finite()) {
+                return None;
+            }
+            a.swap(j, pivot);
+            order.swap(j, pivot);
+            let reciprocal = a[j][j].recip();
+            let above = a[j];
+            for i in j + 1..C {
+                let l = (a[i][j] * reciprocal).v();
+                for k in j + 1..C {
+                    a[i][k] -= l * above[k];
+                }
+                a[i][j] = l;
+            }
+            a[j][j] = reciprocal;
+        }
+        Some(Self { packed: a, order })
+    }
+
+    /// Solves for one right-hand side.
+    #[inline(always)]
+    pub(crate) fn solve(&self, b: &[N<f64>; C]) -> [N<f64>; C] {
+        let mut x = *b;
+        for i in 0..C {
+            x[i] = b[self.order[i]];
+        }
+        // By columns: each pass is independent over the rows.
+        for j in 0..C {
+            for i in j + 1..C {
+                x[i] -= self.packed[i][j] * x[j];
+            }
+        }
+        for j in (0..C).rev() {
+            x[j] = (x[j] * self.packed[j][j]).v();
+            for i in 0..j {
+                x[i] -= self.packed[i][j] * x[j];
+            }
+        }
+        x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn solutions_solve() {
+        // Zero pivots on the way: only exchanges of rows get through.
+        let a = [[0.0, 2.0, -1.0, 3.0], [0.0, 0.0, 4.0, 1e-3], [5.0, -1.0, 0.5, 2.0], [1.0, 1e6, 0.0, 7.0]];
+        let x = [1.5, -2.0, 0.25, 3.0];
+        let b = core::array::from_fn(|i| N((0..4).map(|j| a[i][j] * x[j]).sum::<f64>()));
+        let solved = Lu::new(a.map(|row| row.map(N))).unwrap().solve(&b);
+        for i in 0..4 {
+            assert!((solved[i].0 - x[i]).abs() < 1e-12, "{i}: {} for {}", solved[i].0, x[i]);
+        }
+    }
+
+    #[test]
+    fn what_has_no_solution_has_no_factors() {
+        assert!(Lu::new([[1.0, 2.0], [2.0, 4.0]].map(|row| row.map(N))).is_none());
+        assert!(Lu::new([[1.0, 2.0], [f64::NAN, 4.0]].map(|row| row.map(N))).is_none());
+        assert!(Lu::new([[f64::INFINITY, 2.0], [1.0, 4.0]].map(|row| row.map(N))).is_none());
+    }
+}

@@ -1,0 +1,113 @@
+//! The ratios that are published, all from one run: `cargo bench --bench ratios [-- ROUNDS]` writes Markdown. What is compared takes
+//! turns, round by round, so that a slow moment of the machine falls on all; figures are medians over the rounds.
+#![allow(clippy::print_stdout)]
+
+use std::process::Command;
+use std::time::Instant;
+
+use lane_ode::Simd;
+use washer_model::{Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
+
+/// As many as the widest lanes hold.
+const TRAJECTORIES: usize = 8;
+const STEP_S: f64 = 2.5e-4;
+const ROUNDS: usize = 5;
+
+fn main() {
+    // Cargo passes `--bench` along.
+    let rounds = std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(ROUNDS);
+    trajectories(rounds);
+    threads(rounds);
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}
+
+/// A row per subject: every round, then the median.
+fn table(unit: &str, subjects: &[String], rounds: &[Vec<f64>]) -> Vec<f64> {
+    println!("| {unit} | {} median |", "| ".repeat(rounds[0].len()));
+    println!("|---|{}---|", "---|".repeat(rounds[0].len()));
+    let medians: Vec<_> = rounds.iter().map(|values| median(values)).collect();
+    for ((subject, values), median) in subjects.iter().zip(rounds).zip(&medians) {
+        let raw: String = values.iter().map(|value| format!(" {value:.3} |")).collect();
+        println!("| {subject} |{raw} **{median:.3}** |");
+    }
+    println!();
+    medians
+}
+
+/// One core, every instruction set and model.
+fn trajectories(rounds: usize) {
+    let scenario = (Machine::paper(), Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 });
+    let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0] };
+    let points: Vec<Point> = prepare(Simd::best(), &vec![scenario; TRAJECTORIES], &timing)
+        .into_iter()
+        .map(|point| point.expect("the paper's machine has an equilibrium"))
+        .collect();
+    let points: Vec<_> = points.iter().collect();
+    let available: Vec<_> = Simd::ALL.into_iter().filter(|simd| simd.is_available()).collect();
+    let models = [("nonlinear", ModelKind::Nonlinear), ("linear", ModelKind::Linear)];
+    let subjects: Vec<_> =
+        available.iter().flat_map(|&simd| models.map(|(name, model)| (simd, name, model))).collect();
+    let mut times = vec![Vec::new(); subjects.len()];
+    for _ in 0..rounds {
+        for (&(simd, _, model), times) in subjects.iter().zip(&mut times) {
+            let begin = Instant::now();
+            let records = simulate(simd, model, &Method::Rk4 { step_s: STEP_S }, &points);
+            times.push(begin.elapsed().as_secs_f64() * 1e3 / TRAJECTORIES as f64);
+            assert!(records.iter().all(|record| record.failure.is_none()));
+        }
+    }
+    println!("One core, {TRAJECTORIES} trajectories of 50 s by RK4 at {STEP_S:e} s, with peaks:\n");
+    let names: Vec<_> = subjects.iter().map(|(simd, name, _)| format!("{name}, {}", simd.name())).collect();
+    let medians = table("ms a trajectory", &names, &times);
+    let of = |simd: Simd, name: &str| {
+        subjects.iter().position(|subject| subject.0 == simd && subject.1 == name).map(|at| medians[at])
+    };
+    println!("| ratio | |\n|---|---|");
+    for (name, _) in models {
+        for simd in available.iter().filter(|simd| **simd != Simd::Scalar) {
+            if let (Some(wide), Some(scalar)) = (of(*simd, name), of(Simd::Scalar, name)) {
+                println!("| {name}: {} against scalar | {:.2} |", simd.name(), scalar / wide);
+            }
+        }
+    }
+    for simd in &available {
+        if let (Some(nonlinear), Some(linear)) = (of(*simd, "nonlinear"), of(*simd, "linear")) {
+            let both = (nonlinear + linear) / nonlinear;
+            println!("| both models against the nonlinear alone, {} | {both:.2} |", simd.name());
+        }
+    }
+    println!();
+}
+
+/// The quick map by the program itself.
+fn threads(rounds: usize) {
+    let grid = concat!(env!("CARGO_MANIFEST_DIR"), "/../../sweeps/quick.toml");
+    let output = std::env::temp_dir().join(format!("sweep-ratios-{}.parquet", std::process::id()));
+    let counts = ["1", "2"];
+    let mut times = vec![Vec::new(); counts.len()];
+    for _ in 0..rounds {
+        for (count, times) in counts.iter().zip(&mut times) {
+            let begin = Instant::now();
+            let status = Command::new(env!("CARGO_BIN_EXE_sweep"))
+                .args(["run", grid, "--fresh", "--progress", "none", "--threads", count, "--out"])
+                .arg(&output)
+                .output();
+            times.push(begin.elapsed().as_secs_f64());
+            let status = status.expect("the sweep program starts");
+            assert!(status.status.success(), "{}", String::from_utf8_lossy(&status.stderr));
+        }
+    }
+    for made in [output.clone(), output.with_extension("run.json")] {
+        // What is left in the temporary folder harms nobody.
+        let _ = std::fs::remove_file(made);
+    }
+    println!("`sweep run sweeps/quick.toml` (81 points, both models), start of the program included:\n");
+    let names: Vec<_> = counts.iter().map(|count| format!("--threads {count}")).collect();
+    let medians = table("s a map", &names, &times);
+    println!("| ratio | |\n|---|---|\n| two threads against one | {:.2} |\n", medians[0] / medians[1]);
+}

@@ -1,0 +1,332 @@
+//! The washing machine's equations behind a C ABI: right-hand side, Jacobian and outputs at given parameters, for integrators in other
+//! languages. `include/washer.h` is the contract.
+//!
+//! Pointers come from the other side of the border, where the compiler cannot look: that is why there is `unsafe` here. What each
+//! function asks of its pointers stands with it; a panic ends the process instead of unwinding into foreign frames.
+#![allow(unsafe_code)]
+
+use core::ffi::{CStr, c_char};
+use core::ptr;
+use core::slice;
+use lane_ode::Simd;
+use washer_model::{Channel, Equations, Machine, ModelKind, Parameter, STATE_LEN, Spin, Timing, prepare};
+
+/// The equations of one machine and its spin.
+pub struct Washer(Equations);
+
+/// What to make: see `washer_setup` in `washer.h`.
+#[repr(C)]
+pub struct Setup {
+    /// "nonlinear" or "linear".
+    pub model: *const c_char,
+    /// "cycloidal", "triangular", "ramp" or "table".
+    pub profile: *const c_char,
+    /// Greatest speed (rpm) of every profile but "table".
+    pub peak_rpm: f64,
+    /// Duration of their run-up (s).
+    pub ramp_s: f64,
+    /// Times (s) of "table".
+    pub time_s: *const f64,
+    /// Speeds (rpm) of "table" at these times.
+    pub speed_rpm: *const f64,
+    /// How many of both.
+    pub spin_points: usize,
+    /// Names of parameters that differ from the paper's machine.
+    pub names: *const *const c_char,
+    /// Their values.
+    pub values: *const f64,
+    /// How many of both.
+    pub constants: usize,
+}
+
+/// How a call went.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// Made.
+    Ok = 0,
+    /// A pointer that must not be null is, or a text is not UTF-8.
+    Null = 1,
+    /// No such model, profile or parameter.
+    UnknownName = 2,
+    /// A machine or spin that cannot be.
+    OutOfRange = 3,
+    /// The springs cannot carry the machine.
+    NoEquilibrium = 4,
+}
+
+/// Text that ends with a zero byte.
+///
+/// # Safety
+/// `text` is null or points at such a text.
+unsafe fn text<'a>(text: *const c_char) -> Result<&'a str, Status> {
+    if text.is_null() {
+        return Err(Status::Null);
+    }
+    // SAFETY: not null, and the caller's promise.
+    unsafe { CStr::from_ptr(text) }.to_str().map_err(|_| Status::Null)
+}
+
+/// An array; an empty one may be null.
+///
+/// # Safety
+/// `first` is null or points at `count` values.
+unsafe fn array<'a, T>(first: *const T, count: usize) -> Result<&'a [T], Status> {
+    match (first.is_null(), count) {
+        (_, 0) => Ok(&[]),
+        (true, _) => Err(Status::Null),
+        // SAFETY: not null, and the caller's promise.
+        (false, _) => Ok(unsafe { slice::from_raw_parts(first, count) }),
+    }
+}
+
+/// # Safety
+/// What `setup` points at is as `washer_new` asks.
+unsafe fn make(setup: &Setup) -> Result<Washer, Status> {
+    // SAFETY (of all five): the caller's promise.
+    let (model, profile) = unsafe { (text(setup.model)?, text(setup.profile)?) };
+    let time_s = unsafe { array(setup.time_s, setup.spin_points)? };
+    let speed_rpm = unsafe { array(setup.speed_rpm, setup.spin_points)? };
+    let names = unsafe { array(setup.names, setup.constants)? };
+    let values = unsafe { array(setup.values, setup.constants)? };
+
+    let model = match model {
+        "nonlinear" => ModelKind::Nonlinear,
+        "linear" => ModelKind::Linear,
+        _ => return Err(Status::UnknownName),
+    };
+    let (peak_rpm, ramp_s) = (setup.peak_rpm, setup.ramp_s);
+    let mut spin = match profile {
+        "cycloidal" => Spin::Cycloidal { peak_rpm, ramp_s },
+        "triangular" => Spin::Triangular { peak_rpm, ramp_s },
+        "ramp" => Spin::Ramp { peak_rpm, ramp_s },
+        "table" => Spin::Table { time_s: time_s.to_vec(), speed_rpm: speed_rpm.to_vec() },
+        _ => return Err(Status::UnknownName),
+    };
+    let mut machine = Machine::paper();
+    for (&name, &value) in names.iter().zip(values) {
+        // SAFETY: the caller's promise.
+        let name = unsafe { text(name)? };
+        let parameter = Parameter::find(name, &machine, &spin).map_err(|_| Status::UnknownName)?;
+        parameter.set(&mut machine, &mut spin, value);
+    }
+    if !machine.violations().is_empty() || !spin.violations().is_empty() {
+        return Err(Status::OutOfRange);
+    }
+    // Only the equations are wanted: any time serves.
+    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0] };
+    let point = prepare(Simd::best(), &[(machine, spin)], &timing).pop();
+    match point {
+        Some(Ok(point)) => Ok(Washer(Equations::new(&point, model))),
+        _ => Err(Status::NoEquilibrium),
+    }
+}
+
+/// Makes a machine.
+///
+/// # Safety
+/// `setup` is null or points at a setup whose texts and arrays are null or valid; `made` is null or can be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn washer_new(setup: *const Setup, made: *mut *mut Washer) -> Status {
+    if setup.is_null() || made.is_null() {
+        return Status::Null;
+    }
+    // SAFETY: not null, and the caller's promise.
+    match unsafe { make(&*setup) } {
+        Ok(washer) => {
+            // SAFETY: not null, and the caller's promise.
+            unsafe { *made = Box::into_raw(Box::new(washer)) };
+            Status::Ok
+        }
+        Err(status) => status,
+    }
+}
+
+/// Frees a machine; null is none.
+///
+/// # Safety
+/// `machine` comes from `washer_new` and is not used again.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn washer_free(machine: *mut Washer) {
+    if !machine.is_null() {
+        // SAFETY: the caller's promise.
+        drop(unsafe { Box::from_raw(machine) });
+    }
+}
+
+/// Numbers of a state.
+#[unsafe(no_mangle)]
+pub extern "C" fn washer_dimension() -> usize {
+    STATE_LEN
+}
+
+/// Writes the state at rest.
+///
+/// # Safety
+/// `machine` is alive and `x` has room for a state.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn washer_initial_state(machine: *const Washer, x: *mut f64) {
+    // SAFETY: the caller's promise.
+    unsafe { ptr::copy_nonoverlapping((*machine).0.at_rest().as_ptr(), x, STATE_LEN) };
+}
+
+/// dx = f(t, x).
+///
+/// # Safety
+/// `machine` is alive and in no other thread's call, `x` holds a state and `dx` has room for one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn washer_rhs(t_s: f64, x: *const f64, dx: *mut f64, machine: *mut Washer) {
+    // SAFETY: the caller's promise; `x` is copied, so that `dx` may be the same array.
+    let (machine, x) = unsafe { (&mut *machine, *x.cast::<[f64; STATE_LEN]>()) };
+    // SAFETY: the caller's promise.
+    unsafe { *dx.cast::<[f64; STATE_LEN]>() = machine.0.derivative(t_s, &x) };
+}
+
+/// The Jacobian df/dx, row by row.
+///
+/// # Safety
+/// As [`washer_rhs`]; `jacobian` has room for the square of the dimension.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn washer_jacobian(t_s: f64, x: *const f64, jacobian: *mut f64, machine: *mut Washer) {
+    // SAFETY: the caller's promise.
+    let (machine, x) = unsafe { (&mut *machine, *x.cast::<[f64; STATE_LEN]>()) };
+    // SAFETY: the caller's promise.
+    unsafe { *jacobian.cast::<[[f64; STATE_LEN]; STATE_LEN]>() = machine.0.jacobian(t_s, &x) };
+}
+
+/// Number of channels.
+#[unsafe(no_mangle)]
+pub extern "C" fn washer_channels() -> usize {
+    Channel::ALL.len()
+}
+
+/// Names with the zero byte that C wants, in the order of `Channel::ALL`.
+const CHANNEL_NAMES: [&CStr; Channel::ALL.len()] = [
+    c"tub_front_y",
+    c"tub_front_z",
+    c"drum_front_y",
+    c"drum_front_z",
+    c"total_centre_y",
+    c"total_centre_z",
+    c"tub_yaw",
+    c"tub_pitch",
+];
+
+/// A channel's name; null beyond the last.
+#[unsafe(no_mangle)]
+pub extern "C" fn washer_channel_name(channel: usize) -> *const c_char {
+    CHANNEL_NAMES.get(channel).map_or(ptr::null(), |name| name.as_ptr())
+}
+
+/// Channels and their rates.
+///
+/// # Safety
+/// As [`washer_rhs`]; `values` and `rates` have room for every channel.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn washer_outputs(
+    t_s: f64,
+    x: *const f64,
+    values: *mut f64,
+    rates: *mut f64,
+    machine: *mut Washer,
+) {
+    // SAFETY: the caller's promise.
+    let (machine, x) = unsafe { (&mut *machine, *x.cast::<[f64; STATE_LEN]>()) };
+    let (value, rate) = machine.0.channels(t_s, &x);
+    // SAFETY: the caller's promise.
+    unsafe {
+        ptr::copy_nonoverlapping(value.as_ptr(), values, value.len());
+        ptr::copy_nonoverlapping(rate.as_ptr(), rates, rate.len());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn setup() -> Setup {
+        Setup {
+            model: c"nonlinear".as_ptr(),
+            profile: c"triangular".as_ptr(),
+            peak_rpm: 350.0,
+            ramp_s: 50.0,
+            time_s: ptr::null(),
+            speed_rpm: ptr::null(),
+            spin_points: 0,
+            names: ptr::null(),
+            values: ptr::null(),
+            constants: 0,
+        }
+    }
+
+    fn status(setup: &Setup) -> Status {
+        let mut made = ptr::null_mut();
+        // SAFETY: everything that the setup points at lives until here.
+        let status = unsafe { washer_new(setup, &raw mut made) };
+        assert_eq!(status == Status::Ok, !made.is_null());
+        // SAFETY: made above, or null.
+        unsafe { washer_free(made) };
+        status
+    }
+
+    #[test]
+    fn what_cannot_be_made_says_why() {
+        assert_eq!(status(&setup()), Status::Ok);
+        assert_eq!(status(&Setup { model: ptr::null(), ..setup() }), Status::Null);
+        assert_eq!(status(&Setup { profile: c"spiral".as_ptr(), ..setup() }), Status::UnknownName);
+        let names = [c"unbalance_mass_kg".as_ptr()];
+        let with = |names: &[*const c_char; 1], value: &f64| {
+            status(&Setup { names: names.as_ptr(), values: value, constants: 1, ..setup() })
+        };
+        assert_eq!(with(&names, &0.7), Status::Ok);
+        assert_eq!(with(&names, &-0.7), Status::OutOfRange);
+        assert_eq!(with(&[c"unbalance".as_ptr()], &0.7), Status::UnknownName);
+        assert_eq!(with(&[c"spring_stiffness_n_per_m".as_ptr()], &1e-3), Status::NoEquilibrium);
+        assert_eq!(status(&Setup { constants: 1, ..setup() }), Status::Null);
+        assert_eq!(status(&Setup { profile: c"table".as_ptr(), ..setup() }), Status::OutOfRange);
+    }
+
+    #[test]
+    fn channels_have_the_names_of_the_model() {
+        for (k, channel) in Channel::ALL.into_iter().enumerate() {
+            // SAFETY: the names end with a zero byte.
+            let name = unsafe { CStr::from_ptr(washer_channel_name(k)) };
+            assert_eq!(name.to_str().unwrap(), channel.name());
+        }
+        assert_eq!(washer_channels(), Channel::ALL.len());
+        assert!(washer_channel_name(washer_channels()).is_null());
+    }
+
+    #[test]
+    fn the_jacobian_is_that_of_the_right_hand_side() {
+        for model in [c"nonlinear", c"linear"] {
+            let mut made = ptr::null_mut();
+            let setup = Setup { model: model.as_ptr(), ..setup() };
+            // SAFETY: setup and arrays live until the machine is freed.
+            unsafe {
+                assert_eq!(washer_new(&raw const setup, &raw mut made), Status::Ok);
+                let mut x = [0.0; STATE_LEN];
+                washer_initial_state(made, x.as_mut_ptr());
+                x.iter_mut().enumerate().for_each(|(i, x)| *x += 1e-3 * (i as f64).sin());
+                let mut jacobian = [[0.0; STATE_LEN]; STATE_LEN];
+                washer_jacobian(20.0, x.as_ptr(), jacobian.as_mut_ptr().cast(), made);
+                for j in 0..STATE_LEN {
+                    let step = 1e-5;
+                    let mut column = [[0.0; STATE_LEN]; 2];
+                    for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+                        let mut moved = x;
+                        moved[j] += sign * step;
+                        washer_rhs(20.0, moved.as_ptr(), column[side].as_mut_ptr(), made);
+                    }
+                    let largest = (0..STATE_LEN).fold(1.0_f64, |m, i| m.max(jacobian[i][j].abs()));
+                    for i in 0..STATE_LEN {
+                        let slope = (column[0][i] - column[1][i]) / (2.0 * step);
+                        let error = (jacobian[i][j] - slope).abs() / largest;
+                        assert!(error < 1e-6, "{model:?} [{i}][{j}]: {} {slope}", jacobian[i][j]);
+                    }
+                }
+                washer_free(made);
+            }
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! A narrow door for benchmarks: parts of a step that the public interface has no word for.
+
+use crate::coupling::Coupling;
+use crate::model::{Model, STATES};
+use crate::point::Point;
+use crate::run::{Family, ModelKind, OfLinear, OfNonlinear};
+use core::hint::black_box;
+use core::marker::PhantomData;
+use lane_ode::{Kernel, Lane, N, Simd, System};
+
+/// A part of the right-hand side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// What depends on time alone: twice an RK4 step.
+    Forcing,
+    /// The rest: four times an RK4 step.
+    Derivative,
+}
+
+/// Evaluates a part of one model's right-hand side `evaluations` times in a row, each after the one before, with the same point in
+/// every lane; with the bearings' modes capped if a cap is given.
+pub fn evaluate(
+    simd: Simd,
+    model: ModelKind,
+    part: Part,
+    point: &Point,
+    cap_rad_per_s: Option<f64>,
+    evaluations: u64,
+) {
+    let subject = Subject { point, part, cap_rad_per_s, evaluations };
+    match model {
+        ModelKind::Nonlinear => simd.dispatch(Evaluate::<OfNonlinear> { subject, family: PhantomData }),
+        ModelKind::Linear => simd.dispatch(Evaluate::<OfLinear> { subject, family: PhantomData }),
+    }
+}
+
+struct Subject<'a> {
+    point: &'a Point,
+    part: Part,
+    cap_rad_per_s: Option<f64>,
+    evaluations: u64,
+}
+
+struct Evaluate<'a, F> {
+    subject: Subject<'a>,
+    family: PhantomData<F>,
+}
+
+impl<F: Family> Kernel for Evaluate<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) {
+        let zero = N(zero);
+        let Subject { point, part, cap_rad_per_s, evaluations } = self.subject;
+        let coupling = match cap_rad_per_s {
+            Some(cap) => Coupling::MassScaled(zero.lit(cap * cap)),
+            None => Coupling::Springs,
+        };
+        let model = <F::Over<T> as Model<T>>::splat(zero, point, coupling);
+        let mut x = [zero; STATES];
+        for (x, at_rest) in x.iter_mut().zip(<F::Over<T> as Model<T>>::at_rest(point)) {
+            *x = zero.lit(at_rest);
+        }
+        let mut t = zero.lit(10.0);
+        match part {
+            Part::Forcing => {
+                let mut forcing = model.forcing(t);
+                for _ in 0..evaluations {
+                    t += zero.lit(1e-4);
+                    model.renew(t, &mut forcing);
+                    black_box(&forcing);
+                }
+            }
+            Part::Derivative => {
+                let forcing = model.forcing(t);
+                for _ in 0..evaluations {
+                    // Opaque, so that nothing is found once for all.
+                    let slope = model.derivative(black_box(&forcing), &x);
+                    for i in 0..STATES {
+                        x[i] += slope[i] * 1e-9;
+                    }
+                }
+                black_box(&x);
+            }
+        }
+    }
+}

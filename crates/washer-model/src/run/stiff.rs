@@ -1,0 +1,186 @@
+//! Trajectories by the stiff method: one at a time, its derivatives by lanes of dual numbers.
+
+use super::{FIRST_STEP_S, Family, ModelKind, OfLinear, OfNonlinear, Record, Run};
+use crate::coupling::Coupling;
+use crate::model::{Model, STATES};
+use crate::nonlinear::COORDINATES;
+use crate::point::Point;
+use core::marker::PhantomData;
+use lane_ode::{Dual, Ended, Kernel, Lane, Leg, N, Partials, Simd, Step, System, Task, Tolerance, rodas};
+
+/// Integrates one model at every point and records peaks.
+pub(super) fn simulate(model: ModelKind, tolerance: &Tolerance, points: &[&Point]) -> Vec<Record> {
+    match model {
+        ModelKind::Nonlinear => {
+            Simd::dispatch_narrow(Simulate::<OfNonlinear> { points, tolerance, family: PhantomData })
+        }
+        ModelKind::Linear => {
+            Simd::dispatch_narrow(Simulate::<OfLinear> { points, tolerance, family: PhantomData })
+        }
+    }
+}
+
+struct Simulate<'a, F> {
+    points: &'a [&'a Point],
+    tolerance: &'a Tolerance,
+    family: PhantomData<F>,
+}
+
+impl<F: Family> Kernel for Simulate<'_, F> {
+    type Output = Vec<Record>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Vec<Record> {
+        let mut run = StiffRun::<T, F::Over<f64>, F::Over<Dual<T>>> {
+            zero,
+            run: Run::new(N(0.0), self.points, Coupling::Springs, FIRST_STEP_S),
+            tangent: Model::splat(N(zero).constant(), self.points[0], Coupling::Springs),
+        };
+        rodas::integrate(&mut run, self.tolerance);
+        run.run.records
+    }
+}
+
+/// The task of `Run`, with the same model once more over dual numbers.
+struct StiffRun<'a, T, M, J> {
+    zero: T,
+    run: Run<'a, f64, M>,
+    /// Holds the current trajectory in every lane.
+    tangent: J,
+}
+
+impl<T, M: Model<f64>, J> System<f64, STATES> for StiffRun<'_, T, M, J> {
+    type Forcing = M::Forcing;
+
+    #[inline(always)]
+    fn forcing(&self, t_s: N<f64>) -> M::Forcing {
+        self.run.forcing(t_s)
+    }
+
+    #[inline(always)]
+    fn renew(&self, t_s: N<f64>, forcing: &mut M::Forcing) {
+        self.run.renew(t_s, forcing);
+    }
+
+    #[inline(always)]
+    fn derivative(&self, forcing: &M::Forcing, x: &[N<f64>; STATES]) -> [N<f64>; STATES] {
+        self.run.derivative(forcing, x)
+    }
+
+    #[inline(always)]
+    fn in_range(&self, x: &[N<f64>; STATES]) -> bool {
+        self.run.in_range(x)
+    }
+}
+
+impl<T: Lane, M: Model<f64>, J: Model<Dual<T>>> Task<f64, STATES> for StiffRun<'_, T, M, J> {
+    #[inline(never)]
+    fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<f64>; STATES]) -> Option<Leg> {
+        let leg = self.run.next_leg(lane, ended, x)?;
+        let state = &self.run.lanes[lane];
+        let point = self.run.points[state.point];
+        for column in 0..T::LANES {
+            if state.leg == 0 {
+                self.tangent.set_point(column, point);
+            }
+            self.tangent.set_spin(column, &point.stretches[point.legs[state.leg].stretch]);
+        }
+        Some(leg)
+    }
+
+    #[inline(always)]
+    fn begin(&mut self, forcing: &M::Forcing, x: &[N<f64>; STATES], dx: &[N<f64>; STATES]) {
+        self.run.begin(forcing, x, dx);
+    }
+
+    #[inline(always)]
+    fn observe(&mut self, forcing: &M::Forcing, step: &Step<'_, f64, STATES>) {
+        self.run.observe(forcing, step);
+    }
+}
+
+impl<T: Lane, M: Model<f64>, J: Model<Dual<T>>> rodas::Stiff<STATES, COORDINATES> for StiffRun<'_, T, M, J> {
+    #[inline(always)]
+    fn partials(&self, t_s: f64, x: &[N<f64>; STATES], partials: &mut Partials<COORDINATES>) {
+        partials.find(self.zero, &self.tangent, t_s, x);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Channel, Machine, Method, Spin, Timing, prepare};
+
+    const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
+    const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.7, 2.9] };
+
+    /// A run-up past the resonances, with kinks inside and outside of the window.
+    fn point(bearing_stiffness_n_per_m: f64) -> Point {
+        let mut machine = Machine::paper();
+        machine.bearings.front_stiffness_n_per_m = bearing_stiffness_n_per_m;
+        machine.bearings.rear_stiffness_n_per_m = bearing_stiffness_n_per_m;
+        let spin =
+            Spin::Table { time_s: vec![0.0, 0.5, 1.5, 2.5], speed_rpm: vec![0.0, 100.0, 400.0, 300.0] };
+        prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
+    }
+
+    fn rodas(relative: f64) -> Method {
+        Method::Rodas5p(Tolerance { relative, absolute: 1e-3 * relative, max_steps: 1_000_000 })
+    }
+
+    /// Largest relative difference of two records' amplitudes.
+    fn apart(a: &Record, b: &Record) -> f64 {
+        assert_eq!((a.failure, b.failure), (None, None));
+        let gap = (a.min_gap_m - b.min_gap_m).abs() / b.min_gap_m;
+        Channel::ALL
+            .iter()
+            .map(|c| c.index())
+            .fold(gap, |worst, i| worst.max((a.amplitudes[i] - b.amplitudes[i]).abs() / b.amplitudes[i]))
+    }
+
+    #[test]
+    fn agrees_with_converged_rk4() {
+        let point = point(2e8);
+        for model in MODELS {
+            let run = |method: &Method| crate::simulate(Simd::best(), model, method, &[&point]).remove(0);
+            let reference = run(&Method::Rk4 { step_s: 5e-5 });
+            for (relative, allowed) in [(1e-5, 1e-4), (1e-7, 1e-6)] {
+                let ours = run(&rodas(relative));
+                let error = apart(&ours, &reference);
+                assert!(error < allowed, "{model:?} at {relative}: {error:e} after {} steps", ours.steps);
+            }
+        }
+    }
+
+    #[test]
+    fn serves_bearings_on_which_explicit_methods_crawl() {
+        let [stiff, rigid] = [2e9, 1e11].map(point);
+        for model in MODELS {
+            let run =
+                |method: &Method, point| crate::simulate(Simd::best(), model, method, &[point]).remove(0);
+            assert!(run(&Method::Rk4 { step_s: 5e-5 }, &rigid).failure.is_some());
+            let ours = run(&rodas(1e-6), &rigid);
+            // Bearings give way by a tenth of a micrometre, so rigid ones change little.
+            let error = apart(&ours, &run(&Method::Rk4 { step_s: 5e-5 }, &stiff));
+            assert!(error < 5e-4, "{model:?}: {error:e}");
+            assert!(ours.steps + ours.rejected < 10_000, "{model:?}: {} steps", ours.steps);
+        }
+    }
+
+    #[test]
+    fn records_do_not_depend_on_company() {
+        let points = [2e8, 1e7, 1e8].map(point);
+        let all = [&points[0], &points[1], &points[2]];
+        let tolerance = Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 };
+        // One lane takes the points one after another; another instruction set may have them side by side.
+        for method in [rodas(1e-5), Method::Dopri5(tolerance), Method::Rk4 { step_s: 2e-4 }] {
+            for model in MODELS {
+                let together = crate::simulate(Simd::Scalar, model, &method, &all);
+                for (point, record) in all.iter().zip(together) {
+                    let alone = crate::simulate(Simd::best(), model, &method, &[point]);
+                    assert_eq!(alone, [record], "{model:?} by {method:?}");
+                }
+            }
+        }
+    }
+}

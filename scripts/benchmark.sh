@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# Everything that is measured of this project alone, in one command: ratios, kernels by instruction set, instruction counts. Writes
+# results/benchmarks/NAME.md with machine, versions and commands.
+#
+#     scripts/benchmark.sh [NAME] [ROUNDS]
+set -euo pipefail
+cd "$(dirname "$0")/.."
+name=${1:-kernels}
+rounds=${2:-5}
+out=results/benchmarks/$name.md
+mkdir -p results/benchmarks
+cargo build --release --package sweep --bin sweep --benches
+
+fact() { lscpu | sed -n "s/^$1: *//p"; }
+{
+  echo "# Benchmarks"
+  echo
+  echo "Machine: $(fact 'Model name') (family $(fact 'CPU family'), model $(fact Model)), $(nproc) cores, $(uname -sr);"
+  echo "load when it began: $(cut -d' ' -f1 /proc/loadavg). $(rustc --version), commit $(git describe --always --dirty)."
+  echo "Command: \`scripts/benchmark.sh $name $rounds\`."
+  echo
+  echo "## Ratios"
+  echo
+  echo "\`cargo bench --bench ratios -- $rounds\`"
+  echo
+  cargo bench --quiet --bench ratios -- "$rounds"
+  echo "## Instructions"
+  echo
+  echo "\`scripts/instructions.sh\`"
+  echo
+  scripts/instructions.sh
+  echo
+  echo "## Kernels"
+  echo
+  echo "\`cargo bench --bench kernels\`; items are evaluations or trajectories of single lanes"
+  echo
+  echo '```text'
+  cargo bench --quiet --bench kernels -- --color never
+  echo '```'
+} > "$out.partial"
+mv "$out.partial" "$out"
+echo "$out"

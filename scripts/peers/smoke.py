@@ -1,0 +1,45 @@
+#!/usr/bin/env python3
+"""The C ABI against the reference right-hand sides of crates/washer-model/tests/reference/rhs.json; standard library only.
+
+    python3 scripts/peers/smoke.py [LIBRARY]
+"""
+
+import json
+import math
+import sys
+
+import washer
+
+# As the reference's README asks: of the largest acceleration.
+ALLOWED = 1e-9
+
+
+def main():
+    library = washer.load(*sys.argv[1:])
+    cases = json.loads((washer.ROOT / "crates/washer-model/tests/reference/rhs.json").read_text())["cases"]
+    worst = 0.0
+    for case in cases:
+        theta, speed, acceleration = case["theta"], case["theta_dot"], case["theta_ddot"]
+        # A spin of constant acceleration that begins at speed w and passes theta, modulo whole turns, at time t with the speed asked for:
+        # theta = (speed^2 - w^2) / 2 acceleration.
+        turn = math.tau * (1 if acceleration > 0 else -1)
+        angle = theta % turn
+        start = math.sqrt(speed * speed - 2 * acceleration * angle)
+        time = (speed - start) / acceleration
+        end = start + acceleration * 2 * time
+        rpm = 60 / math.tau
+        machine = washer.Washer(
+            library,
+            {"unbalance_mass_kg": case["unbalance_mass"], "damping_n_s_per_m": case["damping"]},
+            table=([0.0, 2 * time], [start * rpm, end * rpm]),
+        )
+        slopes = machine.rhs(time, case["q"] + case["u"])
+        assert slopes[:10] == case["u"], "q' is not u"
+        largest = max(map(abs, case["acceleration"]))
+        worst = max([worst] + [abs(a - b) / largest for a, b in zip(slopes[10:], case["acceleration"])])
+    print(f"{len(cases)} right-hand sides through the C ABI, within {worst:.1e} of the largest acceleration")
+    return 0 if worst < ALLOWED else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

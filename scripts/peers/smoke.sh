@@ -1,0 +1,9 @@
+#!/usr/bin/env bash
+# The C ABI builds, its header is C and C++, and it gives the reference right-hand sides.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+cargo build --release -p washer-capi
+for language in c c++; do
+  cc -x "$language" -Wall -Wextra -Werror -fsyntax-only crates/washer-capi/include/washer.h
+done
+python3 scripts/peers/smoke.py
