@@ -43,3 +43,5 @@ pub use violations::Violation;
 mod campbell_tests;
 #[cfg(test)]
 mod reference_tests;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,11 @@
+//! What the model promises, and the instruments to show it.
+
+mod allocation;
+mod bits;
+mod cost;
+mod energy;
+mod expansion;
+mod findings;
+mod histories;
+mod instruments;
+mod mass;
