@@ -9,8 +9,9 @@ type Scenario = (Machine, Spin);
 const END_S: f64 = 1.0;
 const TIMING: Timing = Timing { end_s: END_S, window_s: [0.4, 0.9] };
 const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
-const METHODS: [Method; 2] = [
+const METHODS: [Method; 3] = [
     Method::Rk4 { step_s: 1e-4 },
+    Method::Rk4MassScaled { step_s: 1e-3, cap_rad_per_s: 1500.0 },
     Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
 

@@ -3,9 +3,10 @@
 
 use super::instruments::{equations, random_machine, ready};
 use crate::Spin;
-use crate::model::{Linear, Model, STATES};
+use crate::coupling::Coupling;
+use crate::model::{Linear, Model, Nonlinear, STATES};
 use crate::nonlinear::COORDINATES;
-use crate::outputs::{CHANNELS, outputs};
+use crate::outputs::{Axes, Motion};
 use crate::point::Point;
 use crate::spin::SpinState;
 use lane_ode::{Dual, N, System};
@@ -28,9 +29,10 @@ impl Instant {
         let mut rpm = || 1200.0 * (2.0 * rng.f64() - 1.0);
         let spin = Spin::Table { time_s: vec![0.0, 10.0], speed_rpm: vec![rpm(), rpm()] };
         let point = ready(random_machine(rng), spin, 10.0);
-        let model = Linear::splat(N(0.0), &point);
+        let model = Linear::splat(N(0.0), &point, Coupling::Springs);
         let t_s = 10.0 * rng.f64();
-        Self { spin: model.spin_at(N(t_s)), point, t_s, model }
+        let spin = Nonlinear::splat(N(0.0), &point, Coupling::Springs).forcing(N(t_s));
+        Self { point, t_s, model, spin }
     }
 
     /// M a - f at equilibrium, and its derivative along deviations `q`, speeds `u` and accelerations `a`.
@@ -124,16 +126,21 @@ fn outputs_are_the_derivatives_of_the_nonlinear_outputs() {
     at_random_instants(23, |instant, rng| {
         let q = random(rng, 0.02);
         let x: [N<f64>; STATES] = core::array::from_fn(|i| N(if i < COORDINATES { q[i] } else { 0.0 }));
-        let spin = &instant.spin;
-        let ours = instant.model.rates(spin, &x);
-        let at: [_; COORDINATES] =
-            core::array::from_fn(|i| N(Dual { value: instant.point.equilibrium[i], slope: q[i] }));
+        let still = [N(0.0); STATES];
+        let (radial, channels) =
+            instant.model.observe(&instant.model.forcing(N(instant.t_s)), &x, &still, true);
+        let at = core::array::from_fn(|i| N(Dual { value: instant.point.equilibrium[i], slope: q[i] }));
+        let still = [N(0.0).constant(); COORDINATES];
+        let motion = Motion { q: at, u: still, a: still };
         let bodies = instant.point.machine.bodies.constant();
-        let theirs = outputs(&bodies, (spin.sin.constant(), spin.cos.constant()), &at);
-        for (i, (ours, theirs)) in ours.iter().zip(&theirs).enumerate() {
-            // The radial distance is whole: what it has at rest, and its slope.
-            let at_rest = if i < CHANNELS { 0.0 } else { theirs.0.value };
-            worst = worst.max((ours.0.value - at_rest - theirs.0.slope).abs() / 0.02);
+        let axes = Axes::new(&instant.spin.constant(), &motion);
+        // The radial distance is whole: what it has at rest, and its slope.
+        let of_channels =
+            channels.unwrap().into_iter().zip(axes.channels(&bodies, &motion)).map(|c| (c, 0.0));
+        let of_radial = radial.into_iter().zip(axes.radial(&bodies, &motion)).map(|r| (r, 1.0));
+        for ((ours, theirs), whole) in of_channels.chain(of_radial) {
+            let theirs = whole * theirs.value.0.value + theirs.value.0.slope;
+            worst = worst.max((ours.value.0 - theirs).abs() / 0.02);
         }
     });
     eprintln!("linear outputs: at most {worst:.1e} of the deviations");

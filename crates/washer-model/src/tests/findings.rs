@@ -11,7 +11,7 @@ fn both(points: &[(f64, f64)]) -> Vec<[Record; 2]> {
     let simd = Simd::best();
     let ready: Vec<_> = prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let ready: Vec<_> = ready.iter().collect();
-    let method = Method::Rk4 { step_s: 2.5e-4 };
+    let method = Method::Rk4 { step_s: 2e-4 };
     let of = |model| simulate(simd, model, &method, &ready);
     of(ModelKind::Nonlinear).into_iter().zip(of(ModelKind::Linear)).map(|(n, l)| [n, l]).collect()
 }

@@ -1,10 +1,11 @@
 //! Machines drawn from a seed, states over time, and the equations as a residual.
 
 use crate::coefficients::Coefficients;
+use crate::coupling::Coupling;
 use crate::equilibrium;
 use crate::floating::Floating;
 use crate::model::{Model, STATES};
-use crate::nonlinear::{COORDINATES, Half, halves};
+use crate::nonlinear::{COORDINATES, Half, Halves, halves};
 use crate::outputs::CHANNELS;
 use crate::point::Point;
 use crate::spin::SpinState;
@@ -77,7 +78,7 @@ pub(super) struct Sampler<'a, M> {
 impl<'a, M: Model<f64>> Sampler<'a, M> {
     /// Runs from `start` by RK4; the spin's kinks must be at samples.
     pub(super) fn run(point: &'a Point, start: [f64; STATES], every_s: f64, end_s: f64, step_s: f64) -> Self {
-        let model = M::splat(N(0.0), point);
+        let model = M::splat(N(0.0), point, Coupling::Springs);
         let mut sampler = Self { model, point, start, every_s, end_s, step_s, states: vec![start] };
         rk4::integrate(0.0, &mut sampler);
         sampler
@@ -88,8 +89,10 @@ impl<'a, M: Model<f64>> Sampler<'a, M> {
         let leg = self.leg(i.saturating_sub(1));
         self.enter(&leg);
         let t_s = if i == 0 { 0.0 } else { leg.end_s };
-        let y = self.model.rates(&self.model.spin_at(N(t_s)), &self.states[i].map(N));
-        core::array::from_fn(|channel| y[channel].0.value)
+        let (forcing, x) = (self.model.forcing(N(t_s)), self.states[i].map(N));
+        let dx = self.model.derivative(&forcing, &x);
+        let (_, channels) = self.model.observe(&forcing, &x, &dx, true);
+        channels.unwrap().map(|sample| sample.value.0)
     }
 
     fn leg(&self, i: usize) -> Leg {
@@ -156,6 +159,15 @@ fn inertia_forces<T: Real, const R: usize>(
     (centre, about)
 }
 
+/// M a and f of the equations M a = f of both halves, as they are loaded.
+pub(super) fn equations_of<T: Real>(both: &Halves<T>, a: &[N<T>; COORDINATES]) -> [[N<T>; COORDINATES]; 2] {
+    let ([i1, i2], [i5, i6]) = inertia_forces(&both.tub, [a[0], a[1]], [a[4], a[5]]);
+    let ([i3, i4], [i7, i8, i9, i10]) = inertia_forces(&both.rotor, [a[2], a[3]], [a[6], a[7], a[8], a[9]]);
+    let ([f1, f2], [f5, f6]) = both.tub.floating.generalised_forces();
+    let ([f3, f4], [f7, f8, f9, f10]) = both.rotor.floating.generalised_forces();
+    [[i1, i2, i3, i4, i5, i6, i7, i8, i9, i10], [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]]
+}
+
 /// M(q, theta) a and f(q, u, theta, theta', theta'') of the nonlinear equations M a = f.
 pub(super) fn equations<T: Real>(
     machine: &Coefficients<T>,
@@ -164,12 +176,7 @@ pub(super) fn equations<T: Real>(
     u: &[N<T>; COORDINATES],
     a: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; 2] {
-    let both = halves(&machine.view(), spin, q, u);
-    let ([i1, i2], [i5, i6]) = inertia_forces(&both.tub, [a[0], a[1]], [a[4], a[5]]);
-    let ([i3, i4], [i7, i8, i9, i10]) = inertia_forces(&both.rotor, [a[2], a[3]], [a[6], a[7], a[8], a[9]]);
-    let ([f1, f2], [f5, f6]) = both.tub.floating.generalised_forces();
-    let ([f3, f4], [f7, f8, f9, f10]) = both.rotor.floating.generalised_forces();
-    [[i1, i2, i3, i4, i5, i6, i7, i8, i9, i10], [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]]
+    equations_of(&halves(&machine.view(), spin, q, u), a)
 }
 
 /// The mass matrix of the nonlinear model, column by column from unit accelerations.

@@ -9,3 +9,4 @@ mod findings;
 mod histories;
 mod instruments;
 mod mass;
+mod observation;
