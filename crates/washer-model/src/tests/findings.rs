@@ -48,8 +48,9 @@ fn at_a_damping_of_140_the_linear_model_is_reliable_and_at_100_it_misses_violent
 
 #[test]
 fn the_boundary_rises_with_the_unbalance_mass() {
-    // Below its bracket the linear model fails, above it holds; each bracket lies above the one before.
-    let brackets = [(0.15, [55.0, 75.0]), (0.4, [110.0, 135.0]), (1.0, [250.0, 290.0])];
+    // Below its bracket the linear model fails, above it holds; each bracket lies above the one before. (At 1 kg there is a
+    // reliable pocket inside the bracket, at 250 N s/m: the edge is not everywhere a single curve.)
+    let brackets = [(0.15, [55.0, 75.0]), (0.4, [110.0, 135.0]), (1.0, [240.0, 290.0])];
     let points: Vec<_> = brackets.iter().flat_map(|&(m, [low, high])| [(m, low), (m, high)]).collect();
     let ratios: Vec<_> = both(&points).iter().map(ratio).collect();
     for ((m, [low, high]), pair) in brackets.into_iter().zip(ratios.chunks(2)) {
