@@ -13,7 +13,9 @@ use crate::point::{PlannedLeg, Point};
 use crate::run::{Method, ModelKind, coupling, first_step_s};
 use crate::suspension::{Forces, forces};
 use core::marker::PhantomData;
-use lane_ode::{Ended, Failure, Leg, N, ScalarKernel, Simd, Step, System, Task, dopri5, rk4};
+use lane_ode::{
+    Dual, Ended, Failure, Leg, N, Partials, ScalarKernel, Simd, Step, System, Task, dopri5, rk4, rodas,
+};
 
 /// An instant this share of a step past its end is its end.
 const SLACK: f64 = 1e-9;
@@ -61,12 +63,20 @@ pub fn history<'a>(
     every_s: f64,
 ) -> History<'a> {
     let (states, failure) = match model {
-        ModelKind::Nonlinear => {
-            Simd::one_lane(Sample::<Nonlinear<f64>> { point, method, start, every_s, model: PhantomData })
-        }
-        ModelKind::Linear => {
-            Simd::one_lane(Sample::<Linear<f64>> { point, method, start, every_s, model: PhantomData })
-        }
+        ModelKind::Nonlinear => Simd::one_lane(Sample::<Nonlinear<f64>, Nonlinear<Dual<f64>>> {
+            point,
+            method,
+            start,
+            every_s,
+            model: PhantomData,
+        }),
+        ModelKind::Linear => Simd::one_lane(Sample::<Linear<f64>, Linear<Dual<f64>>> {
+            point,
+            method,
+            start,
+            every_s,
+            model: PhantomData,
+        }),
     };
     History { failure, point, model, every_s, states }
 }
@@ -123,15 +133,16 @@ fn observed<M: Model<f64>>(point: &Point, time_s: f64, state: &[f64; STATES]) ->
     (channels.map_or([f64::NAN; CHANNELS], |channels| channels.map(|sample| sample.value.0)), gap_m)
 }
 
-struct Sample<'a, M> {
+/// `J` is the model `M` over dual numbers, for the stiff method's derivatives.
+struct Sample<'a, M, J> {
     point: &'a Point,
     method: &'a Method,
     start: &'a Start,
     every_s: f64,
-    model: PhantomData<M>,
+    model: PhantomData<(M, J)>,
 }
 
-impl<M: Model<f64>> ScalarKernel for Sample<'_, M> {
+impl<M: Model<f64>, J: Model<Dual<f64>>> ScalarKernel for Sample<'_, M, J> {
     type Output = (Vec<[f64; STATES]>, Option<(Failure, f64)>);
 
     #[inline(always)]
@@ -141,8 +152,9 @@ impl<M: Model<f64>> ScalarKernel for Sample<'_, M> {
             start[i] += self.start.deviations[i];
             start[COORDINATES + i] += self.start.speeds[i];
         }
-        let mut sampling = Sampling::<M> {
+        let mut sampling = Sampling::<M, J> {
             model: M::splat(N(0.0), self.point, coupling(self.method, N(0.0))),
+            tangent: J::splat(N(0.0).constant(), self.point, Coupling::Springs),
             point: self.point,
             every_s: self.every_s,
             first_step_s: first_step_s(self.method),
@@ -154,14 +166,16 @@ impl<M: Model<f64>> ScalarKernel for Sample<'_, M> {
         match self.method {
             Method::Rk4 { .. } | Method::Rk4MassScaled { .. } => rk4::integrate(0.0, &mut sampling),
             Method::Dopri5(tolerance) => dopri5::integrate(0.0, &mut sampling, tolerance),
+            Method::Rodas5p(tolerance) => rodas::integrate(&mut sampling, tolerance),
         }
         (sampling.states, sampling.failure)
     }
 }
 
 /// The task: one trajectory, its states kept where instants fall.
-struct Sampling<'a, M> {
+struct Sampling<'a, M, J> {
     model: M,
+    tangent: J,
     point: &'a Point,
     every_s: f64,
     first_step_s: f64,
@@ -172,7 +186,7 @@ struct Sampling<'a, M> {
     failure: Option<(Failure, f64)>,
 }
 
-impl<M: Model<f64>> System<f64, STATES> for Sampling<'_, M> {
+impl<M: Model<f64>, J> System<f64, STATES> for Sampling<'_, M, J> {
     type Forcing = M::Forcing;
 
     #[inline(always)]
@@ -191,7 +205,7 @@ impl<M: Model<f64>> System<f64, STATES> for Sampling<'_, M> {
     }
 }
 
-impl<M: Model<f64>> Task<f64, STATES> for Sampling<'_, M> {
+impl<M: Model<f64>, J: Model<Dual<f64>>> Task<f64, STATES> for Sampling<'_, M, J> {
     #[inline(never)]
     fn next_leg(&mut self, _: usize, ended: Ended, x: &mut [N<f64>; STATES]) -> Option<Leg> {
         let next = match ended {
@@ -208,6 +222,7 @@ impl<M: Model<f64>> Task<f64, STATES> for Sampling<'_, M> {
         self.leg = Some(next);
         let &PlannedLeg { start_s, end_s, stretch, .. } = self.point.legs.get(next)?;
         self.model.set_spin(0, &self.point.stretches[stretch]);
+        self.tangent.set_spin(0, &self.point.stretches[stretch]);
         Some(Leg { start_s, end_s, step_s: self.first_step_s })
     }
 
@@ -229,5 +244,12 @@ impl<M: Model<f64>> Task<f64, STATES> for Sampling<'_, M> {
             let share = (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0);
             self.states.push(step.at(N(share)).map(|x| x.0));
         }
+    }
+}
+
+impl<M: Model<f64>, J: Model<Dual<f64>>> rodas::Stiff<STATES, COORDINATES> for Sampling<'_, M, J> {
+    #[inline(always)]
+    fn partials(&self, t_s: f64, x: &[N<f64>; STATES], partials: &mut Partials<COORDINATES>) {
+        partials.find(0.0, &self.tangent, t_s, x);
     }
 }

@@ -85,8 +85,8 @@ mod violations;
 pub use campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
 pub use capping::Capping;
 pub use channel::Channel;
-pub use history::{History, Instant, Start, history};
 pub use equations::{Equations, STATE_LEN};
+pub use history::{History, Instant, Start, history};
 pub use linear::Matrices;
 pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};
 pub use modal::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
@@ -105,3 +105,5 @@ mod campbell_tests;
 mod history_tests;
 #[cfg(test)]
 mod reference_tests;
+#[cfg(test)]
+mod tests;

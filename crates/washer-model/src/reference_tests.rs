@@ -12,18 +12,18 @@ use core::f64::consts::TAU;
 use lane_ode::{N, Simd};
 use serde_json::Value;
 
-fn reference(file: &str) -> Value {
+pub(crate) fn reference(file: &str) -> Value {
     let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-fn numbers<const K: usize>(value: &Value) -> [f64; K] {
+pub(crate) fn numbers<const K: usize>(value: &Value) -> [f64; K] {
     let list = value.as_array().unwrap();
     std::array::from_fn(|i| list[i].as_f64().unwrap())
 }
 
 /// The paper's machine at a case's unbalance mass and damping.
-fn machine(case: &Value) -> Machine {
+pub(crate) fn machine(case: &Value) -> Machine {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = case["unbalance_mass"].as_f64().unwrap();
     if let Some(damping) = case["damping"].as_f64() {
@@ -32,7 +32,7 @@ fn machine(case: &Value) -> Machine {
     machine
 }
 
-fn spin(case: &Value) -> SpinState<f64> {
+pub(crate) fn spin(case: &Value) -> SpinState<f64> {
     let number = |name: &str| N(case[name].as_f64().unwrap());
     SpinState::new(number("theta").sin_cos(), number("theta_dot"), number("theta_ddot"))
 }
@@ -118,7 +118,7 @@ fn val_eigenvalues_match_an_independent_solution() {
 }
 
 /// Columns of a reference CSV by name.
-fn table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+pub(crate) fn table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();

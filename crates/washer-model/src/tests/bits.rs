@@ -1,0 +1,133 @@
+//! The same bits: on every instruction set, at any position in a batch, in any company.
+
+use super::instruments::{paper, random_machine, random_spin};
+use crate::{Machine, Method, ModelKind, Point, Record, Spin, Timing, prepare, simulate};
+use lane_ode::{Simd, Tolerance};
+
+type Scenario = (Machine, Spin);
+
+const END_S: f64 = 1.0;
+const TIMING: Timing = Timing { end_s: END_S, window_s: [0.4, 0.9] };
+const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
+const METHODS: [Method; 3] = [
+    Method::Rk4 { step_s: 1e-4 },
+    Method::Rk4MassScaled { step_s: 1e-3, cap_rad_per_s: 1500.0 },
+    Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
+];
+
+/// Corners, edges and middle of the quick map and a few between, its spin in a second: eleven points, so that lanes of
+/// four and eight are left part empty.
+fn quick_map() -> Vec<Scenario> {
+    let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 0.6 };
+    let corners = [0.05, 0.525, 1.0].into_iter().flat_map(|m| [60.0, 180.0, 300.0].map(|c| (m, c)));
+    corners.chain([(0.4, 90.0), (0.7, 120.0)]).map(|(m, c)| (paper(m, c), spin.clone())).collect()
+}
+
+/// Machines and spins of all kinds from a seed.
+fn random_machines() -> Vec<Scenario> {
+    let mut rng = fastrand::Rng::with_seed(31);
+    (0..11).map(|i| (random_machine(&mut rng), random_spin(&mut rng, i, END_S))).collect()
+}
+
+fn points(simd: Simd, scenarios: &[Scenario]) -> Vec<Point> {
+    prepare(simd, scenarios, &TIMING).into_iter().map(Result::unwrap).collect()
+}
+
+/// Every number of a record as its bits.
+fn bits(record: &Record) -> Vec<u64> {
+    let Record { failure, amplitudes, min_gap_m, steps, rejected } = record;
+    let mut bits: Vec<_> = amplitudes.iter().map(|a| a.to_bits()).collect();
+    bits.extend([min_gap_m.to_bits(), *steps, *rejected]);
+    bits.extend(failure.iter().flat_map(|(reason, time_s)| [*reason as u64, time_s.to_bits()]));
+    bits
+}
+
+/// For each model and method, the bits of every scenario, prepared and simulated as one batch.
+fn batch(simd: Simd, scenarios: &[Scenario]) -> Vec<Vec<Vec<u64>>> {
+    let points = points(simd, scenarios);
+    let points: Vec<_> = points.iter().collect();
+    let mut all = Vec::new();
+    for model in MODELS {
+        for method in &METHODS {
+            let records = simulate(simd, model, method, &points);
+            assert_eq!(records.len(), scenarios.len());
+            all.push(records.iter().map(bits).collect());
+        }
+    }
+    all
+}
+
+/// Picks the same scenarios out of every model and method.
+fn picked(all: &[Vec<Vec<u64>>], indices: &[usize]) -> Vec<Vec<Vec<u64>>> {
+    all.iter().map(|records| indices.iter().map(|&i| records[i].clone()).collect()).collect()
+}
+
+fn same_on_every_instruction_set(scenarios: &[Scenario]) {
+    let scalar = batch(Simd::Scalar, scenarios);
+    for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
+        assert!(batch(simd, scenarios) == scalar, "{} gives other bits than scalar", simd.name());
+    }
+    // Plain arrays run anywhere, on fused operations in software.
+    assert!(batch(Simd::Neon, &scenarios[..2]) == picked(&scalar, &[0, 1]), "plain arrays give other bits");
+}
+
+fn same_at_any_position(scenarios: &[Scenario]) {
+    let count = scenarios.len();
+    let as_given = batch(Simd::best(), scenarios);
+    for turn in [1, 2, 3, 5, 7] {
+        let order: Vec<_> = (0..count).map(|i| (i + turn) % count).collect();
+        let moved: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
+        assert!(batch(Simd::best(), &moved) == picked(&as_given, &order), "moved by {turn}");
+    }
+    let order: Vec<_> = (0..count).rev().collect();
+    let moved: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
+    assert!(batch(Simd::best(), &moved) == picked(&as_given, &order), "backwards");
+}
+
+fn same_in_any_company(scenarios: &[Scenario]) {
+    let together = batch(Simd::best(), scenarios);
+    for (i, scenario) in scenarios.iter().enumerate() {
+        let alone = batch(Simd::best(), core::slice::from_ref(scenario));
+        assert!(alone == picked(&together, &[i]), "scenario {i} alone");
+    }
+    // Neighbours of which two fail, one early and one late, and whose lanes others take up.
+    let wild = |ramp_s: f64| (paper(30.0, 0.0), Spin::Ramp { peak_rpm: 9e4, ramp_s });
+    let mut mixed = scenarios.to_vec();
+    mixed.insert(1, wild(0.02));
+    mixed.insert(5, wild(0.3));
+    let others: Vec<_> = (0..mixed.len()).filter(|i| ![1, 5].contains(i)).collect();
+    let with_wild = batch(Simd::best(), &mixed);
+    let nonlinear = &with_wild[0];
+    assert!([1, 5].iter().all(|&i| nonlinear[i].len() > nonlinear[0].len()), "the wild ones fail");
+    assert!(picked(&with_wild, &others) == together, "beside failing neighbours");
+}
+
+#[test]
+fn same_bits_on_every_instruction_set_quick_map() {
+    same_on_every_instruction_set(&quick_map());
+}
+
+#[test]
+fn same_bits_on_every_instruction_set_random_machines() {
+    same_on_every_instruction_set(&random_machines());
+}
+
+#[test]
+fn same_bits_at_any_position_in_a_batch_quick_map() {
+    same_at_any_position(&quick_map());
+}
+
+#[test]
+fn same_bits_at_any_position_in_a_batch_random_machines() {
+    same_at_any_position(&random_machines());
+}
+
+#[test]
+fn same_bits_in_any_company_quick_map() {
+    same_in_any_company(&quick_map());
+}
+
+#[test]
+fn same_bits_in_any_company_random_machines() {
+    same_in_any_company(&random_machines());
+}

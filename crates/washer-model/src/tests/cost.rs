@@ -1,0 +1,212 @@
+//! Operations of one right-hand side, counted by a number that counts.
+
+use super::instruments::{paper, ready, triangular};
+use crate::coupling::Coupling;
+use crate::model::{Linear, Model, Nonlinear, STATES};
+use core::cell::Cell;
+use lane_ode::{Lane, N, Real};
+
+/// Arithmetic operations. A fused one counts as one multiplication and one addition; signs are free.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Operations {
+    multiplications: u32,
+    additions: u32,
+    /// Of the two above, fused in one.
+    fused: u32,
+    divisions: u32,
+    square_roots: u32,
+    /// Sine and cosine of one angle together; not counted above.
+    sine_cosine_pairs: u32,
+}
+
+thread_local! {
+    static COUNT: Cell<Operations> = const { Cell::new(Operations {
+        multiplications: 0, additions: 0, fused: 0, divisions: 0, square_roots: 0, sine_cosine_pairs: 0,
+    }) };
+}
+
+fn count(change: impl FnOnce(&mut Operations)) {
+    COUNT.with(|cell| {
+        let mut operations = cell.get();
+        change(&mut operations);
+        cell.set(operations);
+    });
+}
+
+/// What `work` takes.
+fn counted<R>(work: impl FnOnce() -> R) -> (R, Operations) {
+    COUNT.with(|cell| cell.set(Operations::default()));
+    let result = work();
+    (result, COUNT.with(Cell::get))
+}
+
+fn count_fused() {
+    count(|o| {
+        o.multiplications += 1;
+        o.additions += 1;
+        o.fused += 1;
+    });
+}
+
+/// A number that counts.
+#[derive(Clone, Copy, Debug)]
+struct Counting(f64);
+
+impl Real for Counting {
+    type Mask = bool;
+    fn lit(self, value: f64) -> Self {
+        Self(value)
+    }
+    fn add(self, b: Self) -> Self {
+        count(|o| o.additions += 1);
+        Self(self.0 + b.0)
+    }
+    fn sub(self, b: Self) -> Self {
+        count(|o| o.additions += 1);
+        Self(self.0 - b.0)
+    }
+    fn mul(self, b: Self) -> Self {
+        count(|o| o.multiplications += 1);
+        Self(self.0 * b.0)
+    }
+    fn div(self, b: Self) -> Self {
+        count(|o| o.divisions += 1);
+        Self(self.0 / b.0)
+    }
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        count_fused();
+        Self(self.0.mul_add(b.0, c.0))
+    }
+    fn mul_sub(self, b: Self, c: Self) -> Self {
+        count_fused();
+        Self(self.0.mul_add(b.0, -c.0))
+    }
+    fn neg_mul_add(self, b: Self, c: Self) -> Self {
+        count_fused();
+        Self((-self.0).mul_add(b.0, c.0))
+    }
+    fn sqrt(self) -> Self {
+        count(|o| o.square_roots += 1);
+        Self(self.0.sqrt())
+    }
+    fn abs(self) -> Self {
+        Self(self.0.abs())
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        count(|o| o.sine_cosine_pairs += 1);
+        let (sin, cos) = Real::sin_cos(self.0);
+        (Self(sin), Self(cos))
+    }
+    fn less(self, b: Self) -> bool {
+        self.0 < b.0
+    }
+    fn select(mask: bool, a: Self, b: Self) -> Self {
+        if mask { a } else { b }
+    }
+    fn all(mask: bool) -> bool {
+        mask
+    }
+}
+
+impl Lane for Counting {
+    const LANES: usize = 1;
+    fn get(self, _: usize) -> f64 {
+        self.0
+    }
+    fn set(&mut self, _: usize, value: f64) {
+        self.0 = value;
+    }
+    fn round(self) -> Self {
+        Self(self.0.round_ties_even())
+    }
+    fn bits(mask: bool) -> u32 {
+        u32::from(mask)
+    }
+}
+
+fn coupling<T>(cap_squared: Option<T>) -> Coupling<T> {
+    cap_squared.map_or(Coupling::Springs, |squared| Coupling::MassScaled(N(squared)))
+}
+
+/// Counts of the forcing, which stages at one time share, and of the derivative; the derivative's values are plain numbers'.
+fn of_model<M: Model<Counting>, P: Model<f64>>(cap_rad_per_s: Option<f64>) -> [Operations; 2] {
+    let point = ready(paper(0.4, 140.0), triangular(), 50.0);
+    let squared = cap_rad_per_s.map(|cap| cap * cap);
+    let model = M::splat(N(Counting(0.0)), &point, coupling(squared.map(Counting)));
+    let mut x = P::at_rest(&point);
+    for (i, x) in x.iter_mut().enumerate() {
+        *x += 1e-4 * i as f64;
+    }
+    let (forcing, of_forcing) = counted(|| model.forcing(N(Counting(7.3))));
+    let (dx, of_derivative) = counted(|| model.derivative(&forcing, &x.map(|x| N(Counting(x)))));
+    let plain = P::splat(N(0.0), &point, coupling(squared));
+    let expected = plain.derivative(&plain.forcing(N(7.3)), &x.map(N));
+    for i in 0..STATES {
+        assert_eq!(dx[i].0.0.to_bits(), expected[i].0.to_bits(), "state {i}");
+    }
+    [of_forcing, of_derivative]
+}
+
+fn of_nonlinear(cap_rad_per_s: Option<f64>) -> [Operations; 2] {
+    of_model::<Nonlinear<Counting>, Nonlinear<f64>>(cap_rad_per_s)
+}
+
+fn of_linear(cap_rad_per_s: Option<f64>) -> [Operations; 2] {
+    of_model::<Linear<Counting>, Linear<f64>>(cap_rad_per_s)
+}
+
+/// All arithmetic but sines and cosines.
+fn flops(o: Operations) -> u32 {
+    o.multiplications + o.additions + o.divisions + o.square_roots
+}
+
+/// What a counted function took, in the order of [`Operations`].
+const fn operations(
+    [multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs]: [u32; 6],
+) -> Operations {
+    Operations { multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs }
+}
+
+/// The cost as it stands: forcing, right-hand side. Cheaper is better: whoever changes it writes the new numbers here.
+const NONLINEAR: [Operations; 2] = [operations([31, 34, 18, 0, 0, 0]), operations([557, 410, 319, 12, 4, 6])];
+const LINEAR: [Operations; 2] = [operations([282, 187, 171, 8, 0, 0]), operations([148, 146, 135, 0, 0, 0])];
+const NONLINEAR_MASS_SCALED: Operations = operations([734, 567, 466, 16, 4, 6]);
+const LINEAR_MASS_SCALED: Operations = operations([325, 303, 282, 4, 0, 0]);
+
+#[test]
+fn the_nonlinear_right_hand_side_stays_below_the_naive_formulation() {
+    let [forcing, derivative] = of_nonlinear(None);
+    eprintln!("nonlinear: right-hand side {derivative:?}; spin {forcing:?}");
+    let Operations { multiplications, additions, divisions, square_roots, .. } = derivative;
+    assert!(multiplications < 825 && additions < 605 && divisions <= 14 && square_roots <= 4);
+    assert_eq!([forcing, derivative], NONLINEAR);
+}
+
+#[test]
+fn the_linear_right_hand_side_costs_what_it_did() {
+    let [forcing, derivative] = of_linear(None);
+    eprintln!("linear: right-hand side {derivative:?}; spin and matrices {forcing:?}");
+    assert_eq!([forcing, derivative], LINEAR);
+}
+
+#[test]
+fn mass_scaling_costs_what_it_did() {
+    let cap = Some(700.0);
+    let [nonlinear, linear] = [of_nonlinear(cap)[1], of_linear(cap)[1]];
+    eprintln!("mass-scaled: nonlinear right-hand side {nonlinear:?}; linear {linear:?}");
+    assert_eq!([nonlinear, linear], [NONLINEAR_MASS_SCALED, LINEAR_MASS_SCALED]);
+}
+
+#[test]
+fn a_linear_step_costs_less_than_a_nonlinear_one() {
+    for cap in [None, Some(700.0)] {
+        // A step of RK4: four right-hand sides, the forcing at two new times.
+        let step = |[forcing, derivative]: [Operations; 2]| 4 * flops(derivative) + 2 * flops(forcing);
+        let [nonlinear, linear] = [of_nonlinear(cap), of_linear(cap)].map(step);
+        eprintln!("RK4 step, cap {cap:?}: {nonlinear} operations nonlinear, {linear} linear");
+        assert!(linear < nonlinear);
+    }
+}

@@ -1,0 +1,176 @@
+//! The linear model is the first-order expansion of the nonlinear one: against automatic differentiation of the equations
+//! of motion, for random machines at random spins.
+
+use super::instruments::{equations, random_machine, ready};
+use crate::Spin;
+use crate::coupling::Coupling;
+use crate::model::{Linear, Model, Nonlinear, STATES};
+use crate::nonlinear::COORDINATES;
+use crate::outputs::{Axes, Motion};
+use crate::point::Point;
+use crate::spin::SpinState;
+use lane_ode::{Dual, N, System};
+
+/// Random machines, each at one instant.
+const INSTANTS: usize = 100;
+
+type Vector = [f64; COORDINATES];
+
+/// The linear model of a machine at a time of its spin.
+struct Instant {
+    point: Point,
+    t_s: f64,
+    model: Linear<f64>,
+    spin: SpinState<f64>,
+}
+
+impl Instant {
+    fn random(rng: &mut fastrand::Rng) -> Self {
+        let mut rpm = || 1200.0 * (2.0 * rng.f64() - 1.0);
+        let spin = Spin::Table { time_s: vec![0.0, 10.0], speed_rpm: vec![rpm(), rpm()] };
+        let point = ready(random_machine(rng), spin, 10.0);
+        let model = Linear::splat(N(0.0), &point, Coupling::Springs);
+        let t_s = 10.0 * rng.f64();
+        let spin = Nonlinear::splat(N(0.0), &point, Coupling::Springs).forcing(N(t_s));
+        Self { point, t_s, model, spin }
+    }
+
+    /// M a - f at equilibrium, and its derivative along deviations `q`, speeds `u` and accelerations `a`.
+    fn residual(&self, q: &Vector, u: &Vector, a: &Vector) -> [Vector; 2] {
+        let along = |value: f64, slope: f64| N(Dual { value, slope });
+        let at: [_; COORDINATES] = core::array::from_fn(|i| along(self.point.equilibrium[i], q[i]));
+        let [u, a] = [u, a].map(|v| v.map(|v| along(0.0, v)));
+        let [inertia, force] = equations(&self.point.machine.constant(), &self.spin.constant(), &at, &u, &a);
+        let residual: [_; COORDINATES] = core::array::from_fn(|i| inertia[i] - force[i]);
+        [residual.map(|r| r.0.value), residual.map(|r| r.0.slope)]
+    }
+}
+
+/// Calls `check` at random instants of random machines.
+fn at_random_instants(seed: u64, mut check: impl FnMut(&Instant, &mut fastrand::Rng)) {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    for _ in 0..INSTANTS {
+        let instant = Instant::random(&mut rng);
+        check(&instant, &mut rng);
+    }
+}
+
+/// Numbers between -size and size.
+fn random(rng: &mut fastrand::Rng, size: f64) -> Vector {
+    core::array::from_fn(|_| size * (2.0 * rng.f64() - 1.0))
+}
+
+const STILL: Vector = [0.0; COORDINATES];
+
+#[test]
+fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
+    let mut worst = [0.0_f64; 4];
+    at_random_instants(21, |instant, _| {
+        let SpinState { sin, cos, speed, acceleration, .. } = instant.spin;
+        let ours = instant.point.matrices(sin.0.atan2(cos.0), speed.0, acceleration.0);
+        let [mut mass, mut damping, mut stiffness] = [[[0.0; COORDINATES]; COORDINATES]; 3];
+        let mut force = STILL;
+        for j in 0..COORDINATES {
+            let mut unit = STILL;
+            unit[j] = 1.0;
+            let [at_rest, of_a] = instant.residual(&STILL, &STILL, &unit);
+            let [_, of_u] = instant.residual(&STILL, &unit, &STILL);
+            let [_, of_q] = instant.residual(&unit, &STILL, &STILL);
+            for i in 0..COORDINATES {
+                (mass[i][j], damping[i][j], stiffness[i][j]) = (of_a[i], of_u[i], of_q[i]);
+                force[i] = -at_rest[i];
+            }
+        }
+        let pairs = [(ours.mass, mass), (ours.damping, damping), (ours.stiffness, stiffness)];
+        for (kind, (ours, theirs)) in pairs.into_iter().enumerate() {
+            let largest = theirs.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
+            let difference = ours.iter().flatten().zip(theirs.iter().flatten());
+            worst[kind] = difference.fold(worst[kind], |m, (a, b)| m.max((a - b).abs() / largest));
+        }
+        // Of F, the weight is what the bearings' load leaves over.
+        let bodies = &instant.point.machine.bodies;
+        let weight = bodies.gravity.0 * bodies.rotor_mass.0;
+        let largest = force.iter().fold(weight, |m, a| m.max(a.abs()));
+        let difference = ours.force.iter().zip(&force);
+        worst[3] = difference.fold(worst[3], |m, (a, b)| m.max((a - b).abs() / largest));
+    });
+    let [m, c, k, f] = worst;
+    eprintln!(
+        "against automatic differentiation: M {m:.1e}, C {c:.1e}, K {k:.1e}, F {f:.1e} of the largest entry"
+    );
+    assert!(m < 1e-14 && c < 1e-14 && k < 1e-14 && f < 1e-10);
+}
+
+#[test]
+fn accelerations_solve_the_expanded_equations() {
+    let mut worst = 0.0_f64;
+    at_random_instants(22, |instant, rng| {
+        let (mut q, u) = (random(rng, 0.02), random(rng, 0.5));
+        // Tub and shaft move alike within the bearings' play.
+        for (rotor, tub) in [(2, 0), (3, 1), (6, 4), (7, 5)] {
+            q[rotor] = q[tub] + 1e-5 * (rng.f64() - 0.5);
+        }
+        let x: [N<f64>; STATES] =
+            core::array::from_fn(|i| N(if i < COORDINATES { q[i] } else { u[i - COORDINATES] }));
+        let dx = instant.model.derivative(&instant.model.forcing(N(instant.t_s)), &x);
+        let a: Vector = core::array::from_fn(|i| dx[COORDINATES + i].0);
+        let [at_rest, slope] = instant.residual(&q, &u, &a);
+        let scale = instant.residual(&q, &u, &STILL)[1];
+        let scale = (0..COORDINATES).fold(0.0_f64, |m, i| m.max((at_rest[i] + scale[i]).abs()));
+        for i in 0..COORDINATES {
+            assert_eq!(dx[i].0, u[i]);
+            worst = worst.max((at_rest[i] + slope[i]).abs() / scale);
+        }
+    });
+    eprintln!("M q'' + C q' + K q - F: at most {worst:.1e} of the largest force");
+    assert!(worst < 1e-10, "{worst:e}");
+}
+
+#[test]
+fn outputs_are_the_derivatives_of_the_nonlinear_outputs() {
+    let mut worst = 0.0_f64;
+    at_random_instants(23, |instant, rng| {
+        let q = random(rng, 0.02);
+        let x: [N<f64>; STATES] = core::array::from_fn(|i| N(if i < COORDINATES { q[i] } else { 0.0 }));
+        let still = [N(0.0); STATES];
+        let (radial, channels) =
+            instant.model.observe(&instant.model.forcing(N(instant.t_s)), &x, &still, true);
+        let at = core::array::from_fn(|i| N(Dual { value: instant.point.equilibrium[i], slope: q[i] }));
+        let still = [N(0.0).constant(); COORDINATES];
+        let motion = Motion { q: at, u: still, a: still };
+        let bodies = instant.point.machine.bodies.constant();
+        let axes = Axes::new(&instant.spin.constant(), &motion);
+        // The radial distance is whole: what it has at rest, and its slope.
+        let of_channels =
+            channels.unwrap().into_iter().zip(axes.channels(&bodies, &motion)).map(|c| (c, 0.0));
+        let of_radial = radial.into_iter().zip(axes.radial(&bodies, &motion)).map(|r| (r, 1.0));
+        for ((ours, theirs), whole) in of_channels.chain(of_radial) {
+            let theirs = whole * theirs.value.0.value + theirs.value.0.slope;
+            worst = worst.max((ours.value.0 - theirs).abs());
+        }
+    });
+    eprintln!("linear outputs at deviations of 20 mm and 20 mrad: within {worst:.1e} m or rad");
+    assert!(worst < 1e-12, "{worst:e}");
+}
+
+#[test]
+fn the_models_differ_by_second_order_in_the_deviation() {
+    // Half the deviation, a quarter of what the expansion leaves out, over the whole right-hand side of M a = f.
+    let mut slopes = Vec::new();
+    at_random_instants(24, |instant, rng| {
+        let (q, u, a) = (random(rng, 1.0), random(rng, 10.0), random(rng, 100.0));
+        let left_out = |size: f64| {
+            let [q, u, a] = [&q, &u, &a].map(|v| v.map(|v| size * v));
+            let [at_rest, slope] = instant.residual(&q, &u, &a);
+            let at = core::array::from_fn(|i| N(instant.point.equilibrium[i] + q[i]));
+            let [inertia, force] =
+                equations(&instant.point.machine, &instant.spin, &at, &u.map(N), &a.map(N));
+            let difference = |i: usize| (inertia[i] - force[i]).0 - at_rest[i] - slope[i];
+            (0..COORDINATES).fold(0.0_f64, |m, i| m.max(difference(i).abs()))
+        };
+        slopes.push((left_out(2e-3) / left_out(1e-3)).log2());
+    });
+    let (least, greatest) = slopes.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), &s| (l.min(s), g.max(s)));
+    eprintln!("order of what the expansion leaves out: {least:.3} to {greatest:.3}");
+    assert!((1.9..2.1).contains(&least) && (1.9..2.1).contains(&greatest));
+}

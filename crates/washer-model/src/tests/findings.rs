@@ -1,0 +1,60 @@
+//! What the paper found (its Figs. 10 to 12), as the model page retells it.
+
+use super::instruments::{paper, triangular};
+use crate::{Channel, Method, ModelKind, Record, Timing, prepare, simulate};
+use lane_ode::Simd;
+
+/// Both models at each (unbalance mass in kg, damping in N s/m).
+fn both(points: &[(f64, f64)]) -> Vec<[Record; 2]> {
+    let scenarios: Vec<_> = points.iter().map(|&(m, c)| (paper(m, c), triangular())).collect();
+    let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0] };
+    let simd = Simd::best();
+    let ready: Vec<_> = prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
+    let ready: Vec<_> = ready.iter().collect();
+    let method = Method::Rk4 { step_s: 2e-4 };
+    let of = |model| simulate(simd, model, &method, &ready);
+    of(ModelKind::Nonlinear).into_iter().zip(of(ModelKind::Linear)).map(|(n, l)| [n, l]).collect()
+}
+
+/// The largest ratio of amplitudes over the paper's channels.
+fn ratio([nonlinear, linear]: &[Record; 2]) -> f64 {
+    let channels = [
+        Channel::TubFrontY,
+        Channel::TubFrontZ,
+        Channel::DrumFrontY,
+        Channel::DrumFrontZ,
+        Channel::TubYaw,
+        Channel::TubPitch,
+    ];
+    assert!(nonlinear.failure.is_none() && linear.failure.is_none());
+    let of = |c: Channel| nonlinear.amplitudes[c.index()] / linear.amplitudes[c.index()];
+    channels.into_iter().map(of).fold(0.0, f64::max)
+}
+
+#[test]
+fn at_a_damping_of_140_the_linear_model_is_reliable_and_at_100_it_misses_violent_yaw() {
+    let records = both(&[(0.4, 140.0), (0.4, 100.0)]);
+    let [reliable, missed] = [&records[0], &records[1]].map(ratio);
+    let yaw = records[1].map(|r| r.amplitudes[Channel::TubYaw.index()]);
+    eprintln!(
+        "C = 140: ratio {reliable:.3}; C = 100: ratio {missed:.2}, yaw {:.1} mrad nonlinear, {:.2} mrad linear",
+        1e3 * yaw[0],
+        1e3 * yaw[1]
+    );
+    assert!(reliable < 2.0, "{reliable}");
+    assert!(missed >= 2.0, "{missed}");
+    assert!(yaw[0] > 0.060 && yaw[1] < 0.010, "{yaw:?}");
+}
+
+#[test]
+fn the_boundary_rises_with_the_unbalance_mass() {
+    // Below its bracket the linear model fails, above it holds; each bracket lies above the one before. (At 1 kg there is a
+    // reliable pocket inside the bracket, at 250 N s/m: the edge is not everywhere a single curve.)
+    let brackets = [(0.15, [55.0, 75.0]), (0.4, [110.0, 135.0]), (1.0, [240.0, 290.0])];
+    let points: Vec<_> = brackets.iter().flat_map(|&(m, [low, high])| [(m, low), (m, high)]).collect();
+    let ratios: Vec<_> = both(&points).iter().map(ratio).collect();
+    for ((m, [low, high]), pair) in brackets.into_iter().zip(ratios.chunks(2)) {
+        eprintln!("m_u = {m} kg: ratio {:.2} at {low} N s/m, {:.2} at {high}", pair[0], pair[1]);
+        assert!(pair[0] >= 2.0 && pair[1] < 2.0, "m_u = {m} kg: {pair:?}");
+    }
+}

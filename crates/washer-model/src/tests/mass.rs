@@ -1,0 +1,90 @@
+//! The mass matrix: against independent numbers, and against the accelerations it belongs to.
+
+use super::instruments::{equations, equations_of, mass_matrix, random_machine};
+use crate::coefficients::Coefficients;
+use crate::coupling::{Coupling, Deflection};
+use crate::frame::Tilt;
+use crate::nonlinear::{COORDINATES, accelerations, halves};
+use crate::reference_tests::{machine, numbers, reference, spin};
+use crate::spin::SpinState;
+use lane_ode::{Dual, N};
+
+#[test]
+fn val_mass_matrix_matches_an_independent_one() {
+    let mut worst = 0.0_f64;
+    for case in reference("rhs.json")["cases"].as_array().unwrap() {
+        let ours = mass_matrix(&Coefficients::new(&machine(case)), &spin(case), &numbers(&case["q"]));
+        let theirs: [[f64; COORDINATES]; COORDINATES] =
+            std::array::from_fn(|i| numbers(&case["mass_matrix"].as_array().unwrap()[i]));
+        let largest = theirs.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
+        for i in 0..COORDINATES {
+            for j in 0..COORDINATES {
+                let error = (ours[i][j] - theirs[i][j]).abs() / largest;
+                assert!(error < 1e-14, "M[{i}][{j}]: {} against {}", ours[i][j], theirs[i][j]);
+                worst = worst.max(error);
+            }
+        }
+    }
+    eprintln!("mass matrix: at most {worst:.1e} of the largest entry");
+}
+
+/// Machines in motion: tub and shaft within the bearings' play.
+fn in_motion(seed: u64, mut check: impl FnMut(&Coefficients<f64>, &SpinState<f64>, &Vector, &Vector)) {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    for _ in 0..200 {
+        let coefficients = Coefficients::new(&random_machine(&mut rng));
+        let mut draw = |size: f64| N(size * (2.0 * rng.f64() - 1.0));
+        let spin = SpinState::new(draw(40.0).sin_cos(), draw(130.0), draw(10.0));
+        let mut q: Vector = core::array::from_fn(|_| draw(0.05));
+        for (rotor, tub) in [(2, 0), (3, 1), (6, 4), (7, 5)] {
+            q[rotor] = q[tub] + draw(1e-5);
+        }
+        let u = core::array::from_fn(|_| draw(0.5));
+        check(&coefficients, &spin, &q, &u);
+    }
+}
+
+type Vector = [N<f64>; COORDINATES];
+
+/// What is left of M a - f, over the largest force.
+fn left([inertia, force]: &[Vector; 2]) -> f64 {
+    let scale = force.iter().fold(0.0_f64, |m, f| m.max(f.0.abs()));
+    (0..COORDINATES).fold(0.0, |m, i| m.max((inertia[i] - force[i]).0.abs() / scale))
+}
+
+#[test]
+fn accelerations_solve_the_equations_of_motion_of_any_machine() {
+    let mut worst = 0.0_f64;
+    in_motion(11, |machine, spin, q, u| {
+        let a = accelerations(&machine.view(), &Coupling::Springs, spin, q, u);
+        worst = worst.max(left(&equations(machine, spin, q, u, &a)));
+    });
+    eprintln!("M a - f: at most {worst:.1e} of the largest force");
+    assert!(worst < 1e-12, "{worst:e}");
+}
+
+#[test]
+fn mass_scaling_adds_the_bearings_inertia_and_nothing_else() {
+    let mut worst = 0.0_f64;
+    for cap in [300.0_f64, 1500.0] {
+        in_motion(12, |machine, spin, q, u| {
+            let a = accelerations(&machine.view(), &Coupling::MassScaled(N(cap * cap)), spin, q, u);
+            // d'' of the true deflection, by two derivatives carried along the motion.
+            let course: [_; COORDINATES] = core::array::from_fn(|i| {
+                let [q, u, a] = [q[i].0, u[i].0, a[i].0];
+                N(Dual { value: Dual { value: q, slope: u }, slope: Dual { value: u, slope: a } })
+            });
+            let [tub, shaft] = [4, 6].map(|i| Tilt::new(course[i], course[i + 1]));
+            let d = Deflection::new(&course, &tub, &shaft);
+            let per_cap_squared = |d: [N<Dual<Dual<f64>>>; 2]| d.map(|d| N(d.0.slope.slope / (cap * cap)));
+            let extra = Deflection { offset: per_cap_squared(d.offset), tilt: per_cap_squared(d.tilt) };
+            let extra = extra.load(&machine.bodies);
+            let mut both = halves(&machine.view(), spin, q, u);
+            both.tub.floating.apply(&extra.reaction());
+            both.rotor.floating.apply(&extra);
+            worst = worst.max(left(&equations_of(&both, &a)));
+        });
+    }
+    eprintln!("(M + K/w^2) a - f: at most {worst:.1e} of the largest force");
+    assert!(worst < 1e-11, "{worst:e}");
+}

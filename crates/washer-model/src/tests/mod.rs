@@ -1,0 +1,12 @@
+//! What the model promises, and the instruments to show it.
+
+mod allocation;
+mod bits;
+mod cost;
+mod energy;
+mod expansion;
+mod findings;
+mod histories;
+mod instruments;
+mod mass;
+mod observation;
