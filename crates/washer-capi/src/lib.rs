@@ -318,7 +318,7 @@ mod tests {
                         moved[j] += sign * step;
                         washer_rhs(20.0, moved.as_ptr(), column[side].as_mut_ptr(), made);
                     }
-                    let largest = (0..STATE_LEN).fold(1.0_f64, |m, i| m.max(jacobian[i][j].abs()));
+                    let largest = (0..STATE_LEN).fold(1.0_f64, |m, i| m.max(f64::abs(jacobian[i][j])));
                     for i in 0..STATE_LEN {
                         let slope = (column[0][i] - column[1][i]) / (2.0 * step);
                         let error = (jacobian[i][j] - slope).abs() / largest;
