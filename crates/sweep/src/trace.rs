@@ -161,6 +161,9 @@ fn method(plan: &Plan, point: &Point, speed_rad_per_s: f64) -> (Method, Value) {
         Integrator::Dopri5 { rtol, atol } => {
             (engine::dopri5(rtol, atol), json!({ "method": "dopri5", "rtol": rtol, "atol": atol }))
         }
+        Integrator::Rodas5p { rtol, atol } => {
+            (engine::rodas5p(rtol, atol), json!({ "method": "rodas5p", "rtol": rtol, "atol": atol }))
+        }
         Integrator::Rk4MassScaled { .. } => {
             let highest = highest_frequency_rad_per_s(point, speed_rad_per_s).unwrap_or(0.0);
             rk4(LONGEST_STEP_S.min(SHARE_OF_LIMIT * RK4_STABILITY_LIMIT / highest))

@@ -10,10 +10,11 @@ use crate::model::{Linear, Model, Nonlinear, STATES};
 use crate::nonlinear::COORDINATES;
 use crate::outputs::{CHANNELS, squared};
 use crate::point::{PlannedLeg, Point};
-use crate::run::{Method, ModelKind, coupling, first_step_s};
+use crate::run::stiff::{OnLeg, WithTangent};
+use crate::run::{Family, Method, ModelKind, OfLinear, OfNonlinear, coupling, first_step_s};
 use crate::suspension::{Forces, forces};
 use core::marker::PhantomData;
-use lane_ode::{Ended, Failure, Leg, N, ScalarKernel, Simd, Step, System, Task, dopri5, rk4};
+use lane_ode::{Dual, Ended, Failure, Leg, N, ScalarKernel, Simd, Step, System, Task, dopri5, rk4, rodas};
 
 /// An instant this share of a step past its end is its end.
 const SLACK: f64 = 1e-9;
@@ -62,10 +63,10 @@ pub fn history<'a>(
 ) -> History<'a> {
     let (states, failure) = match model {
         ModelKind::Nonlinear => {
-            Simd::one_lane(Sample::<Nonlinear<f64>> { point, method, start, every_s, model: PhantomData })
+            Simd::one_lane(Sample::<OfNonlinear> { point, method, start, every_s, family: PhantomData })
         }
         ModelKind::Linear => {
-            Simd::one_lane(Sample::<Linear<f64>> { point, method, start, every_s, model: PhantomData })
+            Simd::one_lane(Sample::<OfLinear> { point, method, start, every_s, family: PhantomData })
         }
     };
     History { failure, point, model, every_s, states }
@@ -123,26 +124,26 @@ fn observed<M: Model<f64>>(point: &Point, time_s: f64, state: &[f64; STATES]) ->
     (channels.map_or([f64::NAN; CHANNELS], |channels| channels.map(|sample| sample.value.0)), gap_m)
 }
 
-struct Sample<'a, M> {
+struct Sample<'a, F> {
     point: &'a Point,
     method: &'a Method,
     start: &'a Start,
     every_s: f64,
-    model: PhantomData<M>,
+    family: PhantomData<F>,
 }
 
-impl<M: Model<f64>> ScalarKernel for Sample<'_, M> {
+impl<F: Family> ScalarKernel for Sample<'_, F> {
     type Output = (Vec<[f64; STATES]>, Option<(Failure, f64)>);
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let mut start = M::at_rest(self.point);
+        let mut start = <F::Over<f64> as Model<f64>>::at_rest(self.point);
         for i in 0..COORDINATES {
             start[i] += self.start.deviations[i];
             start[COORDINATES + i] += self.start.speeds[i];
         }
-        let mut sampling = Sampling::<M> {
-            model: M::splat(N(0.0), self.point, coupling(self.method, N(0.0))),
+        let mut sampling = Sampling::<F::Over<f64>> {
+            model: Model::splat(N(0.0), self.point, coupling(self.method, N(0.0))),
             point: self.point,
             every_s: self.every_s,
             first_step_s: first_step_s(self.method),
@@ -154,6 +155,11 @@ impl<M: Model<f64>> ScalarKernel for Sample<'_, M> {
         match self.method {
             Method::Rk4 { .. } | Method::Rk4MassScaled { .. } => rk4::integrate(0.0, &mut sampling),
             Method::Dopri5(tolerance) => dopri5::integrate(0.0, &mut sampling, tolerance),
+            Method::Rodas5p(tolerance) => {
+                let mut task = WithTangent::<f64, _, F::Over<Dual<f64>>>::new(0.0, sampling, self.point);
+                rodas::integrate(&mut task, tolerance);
+                sampling = task.task;
+            }
         }
         (sampling.states, sampling.failure)
     }
@@ -188,6 +194,12 @@ impl<M: Model<f64>> System<f64, STATES> for Sampling<'_, M> {
     #[inline(always)]
     fn in_range(&self, x: &[N<f64>; STATES]) -> bool {
         self.model.in_range(x)
+    }
+}
+
+impl<M: Model<f64>> OnLeg for Sampling<'_, M> {
+    fn place(&self) -> (&Point, usize) {
+        (self.point, self.leg.unwrap_or(0))
     }
 }
 
