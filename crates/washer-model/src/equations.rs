@@ -7,7 +7,7 @@ use crate::outputs::CHANNELS;
 use crate::point::Point;
 use crate::run::ModelKind;
 use crate::spin::SpinStretch;
-use lane_ode::{Dual, Kernel, Lane, N, Partials, Simd, System};
+use lane_ode::{Dual, N, Partials, ScalarKernel, Simd, System};
 
 /// Numbers of a state: the ten coordinates q1 to q10 (m, rad), then their speeds.
 pub const STATE_LEN: usize = STATES;
@@ -64,8 +64,8 @@ impl Equations {
     pub fn derivative(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [f64; STATE_LEN] {
         self.move_to(t_s);
         match &self.model {
-            Either::Nonlinear(of) => Simd::dispatch_narrow(Derivative { model: &of.model, t_s, x }),
-            Either::Linear(of) => Simd::dispatch_narrow(Derivative { model: &of.model, t_s, x }),
+            Either::Nonlinear(of) => Simd::one_lane(Derivative { model: &of.model, t_s, x }),
+            Either::Linear(of) => Simd::one_lane(Derivative { model: &of.model, t_s, x }),
         }
     }
 
@@ -74,8 +74,8 @@ impl Equations {
     pub fn jacobian(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [[f64; STATE_LEN]; STATE_LEN] {
         self.move_to(t_s);
         let partials = match &self.model {
-            Either::Nonlinear(of) => Simd::dispatch_narrow(Jacobian { tangent: &of.tangent, t_s, x }),
-            Either::Linear(of) => Simd::dispatch_narrow(Jacobian { tangent: &of.tangent, t_s, x }),
+            Either::Nonlinear(of) => Simd::one_lane(Jacobian { tangent: &of.tangent, t_s, x }),
+            Either::Linear(of) => Simd::one_lane(Jacobian { tangent: &of.tangent, t_s, x }),
         };
         let mut rows = [[0.0; STATES]; STATES];
         for i in 0..COORDINATES {
@@ -93,8 +93,8 @@ impl Equations {
     pub fn channels(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> ([f64; CHANNELS], [f64; CHANNELS]) {
         self.move_to(t_s);
         match &self.model {
-            Either::Nonlinear(of) => Simd::dispatch_narrow(Outputs { model: &of.model, t_s, x }),
-            Either::Linear(of) => Simd::dispatch_narrow(Outputs { model: &of.model, t_s, x }),
+            Either::Nonlinear(of) => Simd::one_lane(Outputs { model: &of.model, t_s, x }),
+            Either::Linear(of) => Simd::one_lane(Outputs { model: &of.model, t_s, x }),
         }
     }
 
@@ -133,10 +133,10 @@ struct Derivative<'a, M> {
     x: &'a [f64; STATES],
 }
 
-impl<M: Model<f64>> Kernel for Derivative<'_, M> {
+impl<M: Model<f64>> ScalarKernel for Derivative<'_, M> {
     type Output = [f64; STATES];
     #[inline(always)]
-    fn run<T: Lane>(self, _: T) -> [f64; STATES] {
+    fn run(self) -> [f64; STATES] {
         let forcing = self.model.forcing(N(self.t_s));
         plain(&self.model.derivative(&forcing, &numbers(self.x)))
     }
@@ -148,10 +148,10 @@ struct Jacobian<'a, J> {
     x: &'a [f64; STATES],
 }
 
-impl<J: System<Dual<f64>, STATES>> Kernel for Jacobian<'_, J> {
+impl<J: System<Dual<f64>, STATES>> ScalarKernel for Jacobian<'_, J> {
     type Output = Partials<COORDINATES>;
     #[inline(always)]
-    fn run<T: Lane>(self, _: T) -> Partials<COORDINATES> {
+    fn run(self) -> Partials<COORDINATES> {
         let mut partials = Partials::zero();
         partials.find(0.0, self.tangent, self.t_s, &numbers(self.x));
         partials
@@ -164,10 +164,10 @@ struct Outputs<'a, M> {
     x: &'a [f64; STATES],
 }
 
-impl<M: Model<f64>> Kernel for Outputs<'_, M> {
+impl<M: Model<f64>> ScalarKernel for Outputs<'_, M> {
     type Output = ([f64; CHANNELS], [f64; CHANNELS]);
     #[inline(always)]
-    fn run<T: Lane>(self, _: T) -> Self::Output {
+    fn run(self) -> Self::Output {
         let x = numbers(self.x);
         let forcing = self.model.forcing(N(self.t_s));
         let dx = self.model.derivative(&forcing, &x);

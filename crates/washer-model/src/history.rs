@@ -10,12 +10,11 @@ use crate::model::{Linear, Model, Nonlinear, STATES};
 use crate::nonlinear::COORDINATES;
 use crate::outputs::{CHANNELS, squared};
 use crate::point::{PlannedLeg, Point};
-use crate::run::{Method, ModelKind, coupling, first_step_s};
+use crate::run::stiff::{OnLeg, WithTangent};
+use crate::run::{Family, Method, ModelKind, OfLinear, OfNonlinear, coupling, first_step_s};
 use crate::suspension::{Forces, forces};
 use core::marker::PhantomData;
-use lane_ode::{
-    Dual, Ended, Failure, Leg, N, Partials, ScalarKernel, Simd, Step, System, Task, dopri5, rk4, rodas,
-};
+use lane_ode::{Dual, Ended, Failure, Leg, N, ScalarKernel, Simd, Step, System, Task, dopri5, rk4, rodas};
 
 /// An instant this share of a step past its end is its end.
 const SLACK: f64 = 1e-9;
@@ -63,20 +62,12 @@ pub fn history<'a>(
     every_s: f64,
 ) -> History<'a> {
     let (states, failure) = match model {
-        ModelKind::Nonlinear => Simd::one_lane(Sample::<Nonlinear<f64>, Nonlinear<Dual<f64>>> {
-            point,
-            method,
-            start,
-            every_s,
-            model: PhantomData,
-        }),
-        ModelKind::Linear => Simd::one_lane(Sample::<Linear<f64>, Linear<Dual<f64>>> {
-            point,
-            method,
-            start,
-            every_s,
-            model: PhantomData,
-        }),
+        ModelKind::Nonlinear => {
+            Simd::one_lane(Sample::<OfNonlinear> { point, method, start, every_s, family: PhantomData })
+        }
+        ModelKind::Linear => {
+            Simd::one_lane(Sample::<OfLinear> { point, method, start, every_s, family: PhantomData })
+        }
     };
     History { failure, point, model, every_s, states }
 }
@@ -133,28 +124,26 @@ fn observed<M: Model<f64>>(point: &Point, time_s: f64, state: &[f64; STATES]) ->
     (channels.map_or([f64::NAN; CHANNELS], |channels| channels.map(|sample| sample.value.0)), gap_m)
 }
 
-/// `J` is the model `M` over dual numbers, for the stiff method's derivatives.
-struct Sample<'a, M, J> {
+struct Sample<'a, F> {
     point: &'a Point,
     method: &'a Method,
     start: &'a Start,
     every_s: f64,
-    model: PhantomData<(M, J)>,
+    family: PhantomData<F>,
 }
 
-impl<M: Model<f64>, J: Model<Dual<f64>>> ScalarKernel for Sample<'_, M, J> {
+impl<F: Family> ScalarKernel for Sample<'_, F> {
     type Output = (Vec<[f64; STATES]>, Option<(Failure, f64)>);
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let mut start = M::at_rest(self.point);
+        let mut start = <F::Over<f64> as Model<f64>>::at_rest(self.point);
         for i in 0..COORDINATES {
             start[i] += self.start.deviations[i];
             start[COORDINATES + i] += self.start.speeds[i];
         }
-        let mut sampling = Sampling::<M, J> {
-            model: M::splat(N(0.0), self.point, coupling(self.method, N(0.0))),
-            tangent: J::splat(N(0.0).constant(), self.point, Coupling::Springs),
+        let mut sampling = Sampling::<F::Over<f64>> {
+            model: Model::splat(N(0.0), self.point, coupling(self.method, N(0.0))),
             point: self.point,
             every_s: self.every_s,
             first_step_s: first_step_s(self.method),
@@ -166,16 +155,19 @@ impl<M: Model<f64>, J: Model<Dual<f64>>> ScalarKernel for Sample<'_, M, J> {
         match self.method {
             Method::Rk4 { .. } | Method::Rk4MassScaled { .. } => rk4::integrate(0.0, &mut sampling),
             Method::Dopri5(tolerance) => dopri5::integrate(0.0, &mut sampling, tolerance),
-            Method::Rodas5p(tolerance) => rodas::integrate(&mut sampling, tolerance),
+            Method::Rodas5p(tolerance) => {
+                let mut task = WithTangent::<f64, _, F::Over<Dual<f64>>>::new(0.0, sampling, self.point);
+                rodas::integrate(&mut task, tolerance);
+                sampling = task.task;
+            }
         }
         (sampling.states, sampling.failure)
     }
 }
 
 /// The task: one trajectory, its states kept where instants fall.
-struct Sampling<'a, M, J> {
+struct Sampling<'a, M> {
     model: M,
-    tangent: J,
     point: &'a Point,
     every_s: f64,
     first_step_s: f64,
@@ -186,7 +178,7 @@ struct Sampling<'a, M, J> {
     failure: Option<(Failure, f64)>,
 }
 
-impl<M: Model<f64>, J> System<f64, STATES> for Sampling<'_, M, J> {
+impl<M: Model<f64>> System<f64, STATES> for Sampling<'_, M> {
     type Forcing = M::Forcing;
 
     #[inline(always)]
@@ -205,7 +197,13 @@ impl<M: Model<f64>, J> System<f64, STATES> for Sampling<'_, M, J> {
     }
 }
 
-impl<M: Model<f64>, J: Model<Dual<f64>>> Task<f64, STATES> for Sampling<'_, M, J> {
+impl<M: Model<f64>> OnLeg for Sampling<'_, M> {
+    fn place(&self) -> (&Point, usize) {
+        (self.point, self.leg.unwrap_or(0))
+    }
+}
+
+impl<M: Model<f64>> Task<f64, STATES> for Sampling<'_, M> {
     #[inline(never)]
     fn next_leg(&mut self, _: usize, ended: Ended, x: &mut [N<f64>; STATES]) -> Option<Leg> {
         let next = match ended {
@@ -222,7 +220,6 @@ impl<M: Model<f64>, J: Model<Dual<f64>>> Task<f64, STATES> for Sampling<'_, M, J
         self.leg = Some(next);
         let &PlannedLeg { start_s, end_s, stretch, .. } = self.point.legs.get(next)?;
         self.model.set_spin(0, &self.point.stretches[stretch]);
-        self.tangent.set_spin(0, &self.point.stretches[stretch]);
         Some(Leg { start_s, end_s, step_s: self.first_step_s })
     }
 
@@ -244,12 +241,5 @@ impl<M: Model<f64>, J: Model<Dual<f64>>> Task<f64, STATES> for Sampling<'_, M, J
             let share = (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0);
             self.states.push(step.at(N(share)).map(|x| x.0));
         }
-    }
-}
-
-impl<M: Model<f64>, J: Model<Dual<f64>>> rodas::Stiff<STATES, COORDINATES> for Sampling<'_, M, J> {
-    #[inline(always)]
-    fn partials(&self, t_s: f64, x: &[N<f64>; STATES], partials: &mut Partials<COORDINATES>) {
-        partials.find(0.0, &self.tangent, t_s, x);
     }
 }

@@ -62,7 +62,7 @@ fn val_a_run_up_and_down_matches_an_independent_one() {
 fn a_trajectory_does_not_depend_on_how_often_it_is_read() {
     let point = point(Machine::paper(), Spin::Ramp { peak_rpm: 300.0, ramp_s: 1.0 }, 1.0);
     let adaptive = lane_ode::Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: 1_000_000 };
-    for method in [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(adaptive)] {
+    for method in [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(adaptive), Method::Rodas5p(adaptive)] {
         let read = |every_s: f64| history(ModelKind::Nonlinear, &method, &point, &Start::default(), every_s);
         let (seldom, often) = (read(0.25), read(0.25 / 1024.0));
         assert_eq!((seldom.len(), often.len()), (5, 4097));

@@ -1,6 +1,6 @@
 //! Trajectories: points through the lanes of an integrator, and what is recorded of them.
 
-mod stiff;
+pub(crate) mod stiff;
 
 use crate::coupling::Coupling;
 use crate::model::{Linear, Model, Nonlinear, STATES};

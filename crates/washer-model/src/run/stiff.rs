@@ -31,75 +31,92 @@ impl<F: Family> Kernel for Simulate<'_, F> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Vec<Record> {
-        let mut run = StiffRun::<T, F::Over<f64>, F::Over<Dual<T>>> {
-            zero,
-            run: Run::new(N(0.0), self.points, Coupling::Springs, FIRST_STEP_S),
-            tangent: Model::splat(N(zero).constant(), self.points[0], Coupling::Springs),
-        };
+        let run = Run::<f64, F::Over<f64>>::new(N(0.0), self.points, Coupling::Springs, FIRST_STEP_S);
+        let mut run = WithTangent::<T, _, F::Over<Dual<T>>>::new(zero, run, self.points[0]);
         rodas::integrate(&mut run, self.tolerance);
-        run.run.records
+        run.task.records
     }
 }
 
-/// The task of `Run`, with the same model once more over dual numbers.
-struct StiffRun<'a, T, M, J> {
+/// A task of one lane that says where it is.
+pub(crate) trait OnLeg: Task<f64, STATES> {
+    /// The current trajectory's point, and which of its legs it is on.
+    fn place(&self) -> (&Point, usize);
+}
+
+impl<M: Model<f64>> OnLeg for Run<'_, f64, M> {
+    fn place(&self) -> (&Point, usize) {
+        let state = &self.lanes[0];
+        (self.points[state.point], state.leg)
+    }
+}
+
+/// A task, with its model once more over dual numbers.
+pub(crate) struct WithTangent<T, R, J> {
     zero: T,
-    run: Run<'a, f64, M>,
+    pub(crate) task: R,
     /// Holds the current trajectory in every lane.
     tangent: J,
 }
 
-impl<T, M: Model<f64>, J> System<f64, STATES> for StiffRun<'_, T, M, J> {
-    type Forcing = M::Forcing;
+impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> WithTangent<T, R, J> {
+    /// `point` is the first that the task takes up, or any.
+    #[inline(always)]
+    pub(crate) fn new(zero: T, task: R, point: &Point) -> Self {
+        Self { zero, task, tangent: J::splat(N(zero).constant(), point, Coupling::Springs) }
+    }
+}
+
+impl<T, R: OnLeg, J> System<f64, STATES> for WithTangent<T, R, J> {
+    type Forcing = R::Forcing;
 
     #[inline(always)]
-    fn forcing(&self, t_s: N<f64>) -> M::Forcing {
-        self.run.forcing(t_s)
+    fn forcing(&self, t_s: N<f64>) -> R::Forcing {
+        self.task.forcing(t_s)
     }
 
     #[inline(always)]
-    fn renew(&self, t_s: N<f64>, forcing: &mut M::Forcing) {
-        self.run.renew(t_s, forcing);
+    fn renew(&self, t_s: N<f64>, forcing: &mut R::Forcing) {
+        self.task.renew(t_s, forcing);
     }
 
     #[inline(always)]
-    fn derivative(&self, forcing: &M::Forcing, x: &[N<f64>; STATES]) -> [N<f64>; STATES] {
-        self.run.derivative(forcing, x)
+    fn derivative(&self, forcing: &R::Forcing, x: &[N<f64>; STATES]) -> [N<f64>; STATES] {
+        self.task.derivative(forcing, x)
     }
 
     #[inline(always)]
     fn in_range(&self, x: &[N<f64>; STATES]) -> bool {
-        self.run.in_range(x)
+        self.task.in_range(x)
     }
 }
 
-impl<T: Lane, M: Model<f64>, J: Model<Dual<T>>> Task<f64, STATES> for StiffRun<'_, T, M, J> {
+impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> Task<f64, STATES> for WithTangent<T, R, J> {
     #[inline(never)]
     fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<f64>; STATES]) -> Option<Leg> {
-        let leg = self.run.next_leg(lane, ended, x)?;
-        let state = &self.run.lanes[lane];
-        let point = self.run.points[state.point];
+        let leg = self.task.next_leg(lane, ended, x)?;
+        let (point, index) = self.task.place();
         for column in 0..T::LANES {
-            if state.leg == 0 {
+            if index == 0 {
                 self.tangent.set_point(column, point);
             }
-            self.tangent.set_spin(column, &point.stretches[point.legs[state.leg].stretch]);
+            self.tangent.set_spin(column, &point.stretches[point.legs[index].stretch]);
         }
         Some(leg)
     }
 
     #[inline(always)]
-    fn begin(&mut self, forcing: &M::Forcing, x: &[N<f64>; STATES], dx: &[N<f64>; STATES]) {
-        self.run.begin(forcing, x, dx);
+    fn begin(&mut self, forcing: &R::Forcing, x: &[N<f64>; STATES], dx: &[N<f64>; STATES]) {
+        self.task.begin(forcing, x, dx);
     }
 
     #[inline(always)]
-    fn observe(&mut self, forcing: &M::Forcing, step: &Step<'_, f64, STATES>) {
-        self.run.observe(forcing, step);
+    fn observe(&mut self, forcing: &R::Forcing, step: &Step<'_, f64, STATES>) {
+        self.task.observe(forcing, step);
     }
 }
 
-impl<T: Lane, M: Model<f64>, J: Model<Dual<T>>> rodas::Stiff<STATES, COORDINATES> for StiffRun<'_, T, M, J> {
+impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> rodas::Stiff<STATES, COORDINATES> for WithTangent<T, R, J> {
     #[inline(always)]
     fn partials(&self, t_s: f64, x: &[N<f64>; STATES], partials: &mut Partials<COORDINATES>) {
         partials.find(self.zero, &self.tangent, t_s, x);
