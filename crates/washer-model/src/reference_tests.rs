@@ -118,7 +118,7 @@ fn val_eigenvalues_match_an_independent_solution() {
 }
 
 /// Columns of a reference CSV by name.
-pub(crate) fn table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+fn table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();

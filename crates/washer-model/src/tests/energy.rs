@@ -1,11 +1,11 @@
 //! Energy of the machine without dampers and spin, written down apart from the equations of motion.
 
-use super::instruments::{Sampler, mass_matrix, ready};
+use super::instruments::{mass_matrix, ready};
 use crate::coefficients::Coefficients;
 use crate::machine::Machine;
-use crate::model::{Model, Nonlinear, STATES};
 use crate::nonlinear::COORDINATES;
 use crate::spin::{Spin, SpinState};
+use crate::{Method, ModelKind, Start, history};
 use lane_ode::N;
 
 type Vec3 = [f64; 3];
@@ -73,19 +73,20 @@ fn energies_j(step_s: f64) -> Vec<f64> {
     machine.dampers.clear();
     let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     let point = ready(machine.clone(), still, 10.0);
-    let mut start = Nonlinear::<f64>::at_rest(&point);
     // 0.1 and 0.15 m/s, 0.5 and -0.4 rad/s: some 20 mm and 40 mrad.
+    let mut start = Start::default();
     for (tub, rotor, speed) in [(0, 2, 0.1), (1, 3, 0.15), (4, 6, 0.5), (5, 7, -0.4)] {
-        (start[COORDINATES + tub], start[COORDINATES + rotor]) = (speed, speed);
+        (start.speeds[tub], start.speeds[rotor]) = (speed, speed);
     }
-    let states = Sampler::<Nonlinear<f64>>::run(&point, start, 0.05, 10.0, step_s).states;
+    let history = history(ModelKind::Nonlinear, &Method::Rk4 { step_s }, &point, &start, 0.05);
     let coefficients = Coefficients::new(&machine);
     let at_rest = potential_j(&machine, &point.equilibrium);
-    let energy = |x: &[f64; STATES]| {
-        let (q, u) = (std::array::from_fn(|i| x[i]), std::array::from_fn(|i| x[COORDINATES + i]));
-        potential_j(&machine, &q) - at_rest + kinetic_j(&coefficients, &q, &u)
+    let energy = |k| {
+        let instant = history.instant(k).unwrap();
+        let q = std::array::from_fn(|i| point.equilibrium[i] + instant.deviations[i]);
+        potential_j(&machine, &q) - at_rest + kinetic_j(&coefficients, &q, &instant.speeds)
     };
-    states.iter().map(energy).collect()
+    (0..history.len()).map(energy).collect()
 }
 
 #[test]

@@ -1,16 +1,13 @@
-//! Machines drawn from a seed, states over time, and the equations as a residual.
+//! Machines drawn from a seed, and the equations as a residual.
 
 use crate::coefficients::Coefficients;
-use crate::coupling::Coupling;
 use crate::equilibrium;
 use crate::floating::Floating;
-use crate::model::{Model, STATES};
 use crate::nonlinear::{COORDINATES, Half, Halves, halves};
-use crate::outputs::CHANNELS;
 use crate::point::Point;
 use crate::spin::SpinState;
 use crate::{Machine, Parameter, Source, Spin, Timing, prepare};
-use lane_ode::{Ended, Leg, N, Real, Simd, Step, System, Task, rk4};
+use lane_ode::{N, Real, Simd};
 
 /// Fig. 12's spin.
 pub(super) fn triangular() -> Spin {
@@ -61,78 +58,6 @@ pub(super) fn random_spin(rng: &mut fastrand::Rng, kind: usize, end_s: f64) -> S
 pub(super) fn ready(machine: Machine, spin: Spin, end_s: f64) -> Point {
     let timing = Timing { end_s, window_s: [0.0, end_s] };
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
-}
-
-/// One trajectory's state at equal intervals.
-pub(super) struct Sampler<'a, M> {
-    pub(super) model: M,
-    point: &'a Point,
-    start: [f64; STATES],
-    every_s: f64,
-    end_s: f64,
-    step_s: f64,
-    /// State at each sample, the first at 0.
-    pub(super) states: Vec<[f64; STATES]>,
-}
-
-impl<'a, M: Model<f64>> Sampler<'a, M> {
-    /// Runs from `start` by RK4; the spin's kinks must be at samples.
-    pub(super) fn run(point: &'a Point, start: [f64; STATES], every_s: f64, end_s: f64, step_s: f64) -> Self {
-        let model = M::splat(N(0.0), point, Coupling::Springs);
-        let mut sampler = Self { model, point, start, every_s, end_s, step_s, states: vec![start] };
-        rk4::integrate(0.0, &mut sampler);
-        sampler
-    }
-
-    /// Channels at sample `i`.
-    pub(super) fn channels(&mut self, i: usize) -> [f64; CHANNELS] {
-        let leg = self.leg(i.saturating_sub(1));
-        self.enter(&leg);
-        let t_s = if i == 0 { 0.0 } else { leg.end_s };
-        let (forcing, x) = (self.model.forcing(N(t_s)), self.states[i].map(N));
-        let dx = self.model.derivative(&forcing, &x);
-        let (_, channels) = self.model.observe(&forcing, &x, &dx, true);
-        channels.unwrap().map(|sample| sample.value.0)
-    }
-
-    fn leg(&self, i: usize) -> Leg {
-        let [start_s, end_s] = [i, i + 1].map(|i| i as f64 * self.every_s);
-        Leg { start_s, end_s, step_s: self.step_s }
-    }
-
-    fn enter(&mut self, leg: &Leg) {
-        let middle_s = 0.5 * (leg.start_s + leg.end_s);
-        let stretch = self.point.stretches.iter().rfind(|s| s.start_s <= middle_s).unwrap();
-        self.model.set_spin(0, stretch);
-    }
-}
-
-impl<M: Model<f64>> System<f64, STATES> for Sampler<'_, M> {
-    type Forcing = M::Forcing;
-    fn forcing(&self, t_s: N<f64>) -> M::Forcing {
-        self.model.forcing(t_s)
-    }
-    fn derivative(&self, forcing: &M::Forcing, x: &[N<f64>; STATES]) -> [N<f64>; STATES] {
-        self.model.derivative(forcing, x)
-    }
-    fn in_range(&self, x: &[N<f64>; STATES]) -> bool {
-        self.model.in_range(x)
-    }
-}
-
-impl<M: Model<f64>> Task<f64, STATES> for Sampler<'_, M> {
-    fn next_leg(&mut self, _: usize, ended: Ended, x: &mut [N<f64>; STATES]) -> Option<Leg> {
-        match ended {
-            Ended::Idle => *x = self.start.map(N),
-            Ended::Arrived(_) => self.states.push(x.map(|x| x.0)),
-            Ended::Failed { reason, time_s, .. } => panic!("{reason:?} at {time_s} s"),
-        }
-        let leg = self.leg(self.states.len() - 1);
-        self.enter(&leg);
-        (leg.end_s < self.end_s + 0.5 * self.every_s).then_some(leg)
-    }
-    fn begin(&mut self, _: &M::Forcing, _: &[N<f64>; STATES], _: &[N<f64>; STATES]) {}
-    fn observe(&mut self, _: &M::Forcing, _: &Step<'_, f64, STATES>) {}
 }
 
 /// M a of one half: y and z of its midpoint, then its rotations.

@@ -6,7 +6,6 @@ mod cost;
 mod energy;
 mod expansion;
 mod findings;
-mod histories;
 mod instruments;
 mod mass;
 mod observation;
