@@ -199,7 +199,7 @@ mod tests {
             assert_eq!(engine.evaluate(0..16, &Watch::new(&interrupt)).unwrap().len(), 16);
             let took_s = began.elapsed().as_secs_f64();
             let ratio = estimate.wall_s / took_s;
-            assert!((0.2..5.0).contains(&ratio), "end {end_s}: estimated {}, took {took_s}", estimate.wall_s);
+            assert!((0.1..10.0).contains(&ratio), "end {end_s}: estimated {}, took {took_s}", estimate.wall_s);
             assert_eq!(estimate.threads, 1);
         }
     }

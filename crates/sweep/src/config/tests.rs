@@ -12,6 +12,10 @@ use super::*;
 use crate::design::Design;
 use crate::plan::{AxisValues, Integrator};
 
+/// What the fuzzer's inputs stand for.
+#[path = "../../../../fuzz/src/input.rs"]
+mod input;
+
 fn testdata() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata")
 }
@@ -295,6 +299,25 @@ fn loads_or_explains(text: &[u8]) {
         }
         Err(mistakes) => assert!(mistakes.contains("nothing was done")),
     }
+}
+
+#[test]
+fn the_fuzzers_corpus_loads_or_is_explained() {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus");
+    let mut loaded = 0;
+    for entry in std::fs::read_dir(corpus).unwrap() {
+        let bytes = std::fs::read(entry.unwrap().path()).unwrap();
+        let input = input::Input::new(&bytes);
+        let folder = tempfile::tempdir().unwrap();
+        match load(&input.write(folder.path()).unwrap(), &input.sets) {
+            Ok(plan) => {
+                loaded += 1;
+                assert_eq!(plan.scenario(plan.points() - 1).machine.violations(), []);
+            }
+            Err(mistakes) => assert!(mistakes.to_string().contains("nothing was done")),
+        }
+    }
+    assert!(loaded >= 2, "the seeds themselves are sound");
 }
 
 proptest! {
