@@ -8,7 +8,7 @@
 # not built twice.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
-pages=(README.md docs/quickstart.md docs/machine.md docs/method.md docs/verdict.md docs/reading.md)
+pages=(README.md docs/quickstart.md docs/machine.md docs/method.md docs/verdict.md docs/reading.md docs/building.md)
 tour=$(mktemp -d)
 trap 'rm -rf "$tour"' EXIT
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}

@@ -40,6 +40,26 @@ const EXAMPLES: &[(&str, &[[&str; 2]])] = &[
     ("slurm", &[["sweep slurm my.toml --shards 16 --time 30", "the script that submits them"]]),
     ("show", &[["sweep show results/first.parquet", "verdicts, extremes, columns with units and ranges"]]),
     (
+        "trace",
+        &[
+            [
+                "sweep trace my.toml --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=100 --out rocking.parquet",
+                "both models at one point",
+            ],
+            ["sweep plot rocking.parquet", "drawn over time and spin speed"],
+        ],
+    ),
+    (
+        "modes",
+        &[
+            ["sweep modes", "resonance speeds of the built-in machine"],
+            [
+                "sweep modes my.toml --speed 0:400:10 --out modes.parquet",
+                "a Campbell diagram's data, for `sweep plot`",
+            ],
+        ],
+    ),
+    (
         "plot",
         &[
             ["sweep plot results/first.parquet", "results/first.svg: ratios, and the line of the limit"],
