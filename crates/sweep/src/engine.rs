@@ -125,16 +125,17 @@ impl<'a> ModelEngine<'a> {
         }
     }
 
-    /// Points made ready; `None` where there is no equilibrium.
+    /// Points made ready, those of one window together; `None` where there is no equilibrium.
     fn prepare(&self, points: &[u64], scenario: &dyn Fn(u64) -> Scenario) -> Vec<Option<Point>> {
-        let scenarios: Vec<_> = points
-            .iter()
-            .map(|&point| {
-                let scenario = scenario(point);
-                (scenario.machine, scenario.spin)
-            })
-            .collect();
-        prepare(self.simd, &scenarios, &self.timing).into_iter().map(Result::ok).collect()
+        let scenarios: Vec<Scenario> = points.iter().map(|&point| scenario(point)).collect();
+        let mut prepared = Vec::with_capacity(scenarios.len());
+        for alike in scenarios.chunk_by(|a, b| a.window_s == b.window_s) {
+            let machines: Vec<_> =
+                alike.iter().map(|scenario| (scenario.machine.clone(), scenario.spin.clone())).collect();
+            let timing = Timing { window_s: alike[0].window_s, ..self.timing };
+            prepared.extend(prepare(self.simd, &machines, &timing).into_iter().map(Result::ok));
+        }
+        prepared
     }
 
     /// Both models at every point, by one method.

@@ -213,9 +213,11 @@ impl Plan {
     /// Machine and spin at the given value of each axis, on the grid or between its points.
     #[must_use]
     pub fn scenario_at(&self, axis_values: &[f64]) -> Scenario {
-        let mut scenario = Scenario { machine: self.machine.clone(), spin: self.spin.clone() };
+        let mut scenario =
+            Scenario { machine: self.machine.clone(), spin: self.spin.clone(), window_s: self.window_s };
         for (axis, &value) in self.axes.iter().zip(axis_values) {
-            axis.parameter.set(&mut scenario.machine, &mut scenario.spin, value);
+            let Scenario { machine, spin, window_s } = &mut scenario;
+            write(&axis.parameter, machine, spin, window_s, value);
         }
         scenario
     }
@@ -264,13 +266,29 @@ pub struct Reliability {
     pub channels: Vec<Channel>,
 }
 
-/// One grid point's input: the machine and spin with that point's axis values in place.
+/// Writes a parameter wherever it belongs.
+pub(crate) fn write(
+    parameter: &Parameter,
+    machine: &mut Machine,
+    spin: &mut Spin,
+    window_s: &mut [f64; 2],
+    value: f64,
+) {
+    match parameter.window_edge() {
+        Some(edge) => window_s[edge] = value,
+        None => parameter.set(machine, spin, value),
+    }
+}
+
+/// One grid point's input: machine, spin and window with that point's axis values in place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenario {
     /// The machine.
     pub machine: Machine,
     /// The spin.
     pub spin: Spin,
+    /// Amplitudes are taken over this closed interval.
+    pub window_s: [f64; 2],
 }
 
 #[cfg(test)]

@@ -67,8 +67,8 @@ pub fn trace(
     start: &Start,
     extras: Extras,
 ) -> Result<Trace, NoEquilibrium> {
-    let Scenario { machine, spin } = scenario;
-    let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };
+    let Scenario { machine, spin, window_s } = scenario;
+    let timing = Timing { end_s: plan.end_s, window_s };
     let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
     let (method, method_json) = method(plan, &point, spin.greatest_speed_rad_per_s(plan.end_s));
     let run = |model| history(model, &method, &point, start, every_s);

@@ -1,4 +1,4 @@
-//! The one table of parameters: every number of machine and spin under one flat, unit-suffixed name, with its
+//! The one table of parameters: every number of machine, spin and window under one flat, unit-suffixed name, with its
 //! unit, meaning, source and range. Grid axes, `[set]`, `--set`, reports and the machine file's checks all read it.
 
 use std::borrow::Cow;
@@ -6,7 +6,7 @@ use std::fmt;
 
 use crate::{Damper, Machine, Spin, Spring};
 
-/// A number of the machine or the spin that a user can name, set and sweep.
+/// A number of the machine, the spin or the window that a user can name, set and sweep.
 ///
 /// Most write one number. Three write several at once: `bearing_stiffness_n_per_m` (both bearings),
 /// `spring_stiffness_n_per_m` (all springs) and `damping_n_s_per_m` (all dampers); see [`Parameter::parts`].
@@ -31,6 +31,8 @@ pub enum Source {
     Convention,
     /// Has no default: the grid file's `[spin]` gives it.
     Grid,
+    /// Has no default of its own: the grid file's `[time]` gives it.
+    Time,
 }
 
 /// Values a parameter may take. Beyond [`Range::LARGEST`] in magnitude nothing is accepted anywhere, so that
@@ -61,6 +63,12 @@ pub enum UnknownParameter {
         /// `"spring"` or `"damper"`.
         element: &'static str,
         /// How many there are.
+        count: usize,
+    },
+    /// The name is one of a numbered point of the spin's table that is not there.
+    #[error("the spin's table has {count} points, numbered from 1")]
+    TablePoint {
+        /// How many there are; 0 if the spin is not given as a table.
         count: usize,
     },
     /// A spin given as a table has no peak and no ramp.
@@ -140,6 +148,7 @@ impl fmt::Display for Source {
             Self::Assumed(why) => write!(f, "assumed: {why}"),
             Self::Convention => f.write_str("convention"),
             Self::Grid => f.write_str("the grid file's [spin]"),
+            Self::Time => f.write_str("the grid file's [time]"),
         }
     }
 }
@@ -168,7 +177,9 @@ impl Parameter {
             (0..machine.springs.len()).flat_map(|k| SPRING.iter().map(move |row| Self::spring(row, k)));
         let dampers =
             (0..machine.dampers.len()).flat_map(|k| DAMPER.iter().map(move |row| Self::damper(row, k)));
-        single.chain(springs).chain(dampers).collect()
+        let points =
+            (0..table_points(spin)).flat_map(|k| SPIN_POINT.iter().map(move |row| Self::spin_point(row, k)));
+        single.chain(springs).chain(dampers).chain(points).collect()
     }
 
     /// The parameter of this name.
@@ -181,6 +192,15 @@ impl Parameter {
                 Err(UnknownParameter::TableSpin)
             } else {
                 Ok(Self::single(row))
+            };
+        }
+        if let Some((k, rest)) = numbered(name, "spin_table_") {
+            let row = SPIN_POINT.iter().find(|row| row.name == rest).ok_or(UnknownParameter::Name)?;
+            let count = table_points(spin);
+            return if k < count {
+                Ok(Self::spin_point(row, k))
+            } else {
+                Err(UnknownParameter::TablePoint { count })
             };
         }
         if let Some((k, rest)) = numbered(name, "spring_") {
@@ -232,6 +252,13 @@ impl Parameter {
         self.row.range
     }
 
+    /// Which edge of the window it is (0: the beginning, 1: the end), if it is one: neither machine nor spin holds it, so
+    /// [`Parameter::get`] finds nothing and [`Parameter::set`] writes nothing.
+    #[must_use]
+    pub fn window_edge(&self) -> Option<usize> {
+        (self.row.source == Source::Time).then_some(usize::from(self.name == "window_to_s"))
+    }
+
     /// Its value; `None` if it stands for several numbers that differ, or the machine has no such number.
     #[must_use]
     pub fn get(&self, machine: &Machine, spin: &Spin) -> Option<f64> {
@@ -277,6 +304,18 @@ impl Parameter {
 
     fn damper(row: &'static Row, index: usize) -> Self {
         Self { name: Cow::Owned(format!("damper_{}_{}", index + 1, row.name)), row, index }
+    }
+
+    fn spin_point(row: &'static Row, index: usize) -> Self {
+        Self { name: Cow::Owned(format!("spin_table_{}_{}", index + 1, row.name)), row, index }
+    }
+}
+
+/// Points of a spin given as a table.
+fn table_points(spin: &Spin) -> usize {
+    match spin {
+        Spin::Table { time_s, speed_rpm } => time_s.len().min(speed_rpm.len()),
+        Spin::Cycloidal { .. } | Spin::Triangular { .. } | Spin::Ramp { .. } => 0,
     }
 }
 
@@ -346,6 +385,11 @@ macro_rules! row {
     ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, by $get:expr, $set:expr) => {
         row!(@ $name, $unit, $range, $source, $description, $get, $set)
     };
+    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, table $field:ident) => {
+        row!(@ $name, $unit, $range, $source, $description,
+            |_, spin, k| if let Spin::Table { $field, .. } = spin { $field.get(k).copied() } else { None },
+            |_, spin, k, v| if let Spin::Table { $field, .. } = spin && let Some(entry) = $field.get_mut(k) { *entry = v })
+    };
     (@ $name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, $get:expr, $set:expr) => {
         Row {
             name: $name, unit: $unit, range: $range, source: $source, description: $description, get: $get, set: $set,
@@ -354,7 +398,7 @@ macro_rules! row {
 }
 
 use Range::{Any, Negative, NonNegative, Positive};
-use Source::{Assumed, Convention, Derived, Grid, Paper};
+use Source::{Assumed, Convention, Derived, Grid, Paper, Time};
 
 const TABLE_2: Source = Paper("Table 2");
 const TABLE_3: Source = Paper("Table 3");
@@ -402,6 +446,8 @@ static TABLE: &[Row] = &[
         |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = v)),
     row!("spin_peak_rpm", "rpm", Range::Within(-1e5, 1e5), Grid, "greatest spin speed; negative turns backwards", spin peak_rpm),
     row!("spin_ramp_s", "s", Positive, Grid, "duration of the run-up, and of a triangle's run-down", spin ramp_s),
+    row!("window_from_s", "s", NonNegative, Time, "when amplitudes begin to be taken", by |_, _, _| None, |_, _, _, _| ()),
+    row!("window_to_s", "s", NonNegative, Time, "when amplitudes cease to be taken", by |_, _, _| None, |_, _, _, _| ()),
 ];
 
 /// Rows of each spring, after `spring_1_`.
@@ -431,6 +477,13 @@ static DAMPER: &[Row] = &[
     row!("tub_z_m", "m", Any, TABLE_3, "tub end of this damper, sideways", damper tub_m[2]),
 ];
 
+/// Rows of each point of a spin's table, after `spin_table_1_`.
+#[rustfmt::skip]
+static SPIN_POINT: &[Row] = &[
+    row!("time_s", "s", NonNegative, Grid, "time of this point of the spin's table; the first is 0", table time_s),
+    row!("speed_rpm", "rpm", Range::Within(-1e5, 1e5), Grid, "speed at this point of the spin's table", table speed_rpm),
+];
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -444,6 +497,10 @@ mod tests {
         for parameter in Parameter::all(&Machine::paper(), &spin()) {
             let (mut machine, mut spin) = (Machine::paper(), spin());
             assert_eq!(Parameter::find(parameter.name(), &machine, &spin).as_ref(), Ok(&parameter));
+            if parameter.window_edge().is_some() {
+                assert_eq!(parameter.get(&machine, &spin), None);
+                continue;
+            }
             let before = parameter.get(&machine, &spin).expect("the paper's machine has one value for each");
             assert!(parameter.range().contains(before), "{parameter:?} = {before}");
             parameter.set(&mut machine, &mut spin, before + 0.125);
@@ -517,7 +574,28 @@ mod tests {
         }
         let table = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 100.0] };
         assert_eq!(Parameter::find("spin_ramp_s", &machine, &table), Err(UnknownParameter::TableSpin));
-        assert!(Parameter::all(&machine, &table).iter().all(|p| p.source() != Source::Grid));
+        let points: Vec<_> =
+            Parameter::all(&machine, &table).into_iter().filter(|p| p.source() == Source::Grid).collect();
+        let names: Vec<_> = points.iter().map(Parameter::name).collect();
+        assert_eq!(
+            names,
+            [
+                "spin_table_1_time_s",
+                "spin_table_1_speed_rpm",
+                "spin_table_2_time_s",
+                "spin_table_2_speed_rpm"
+            ]
+        );
+        let mut changed = table.clone();
+        points[3].set(&mut machine.clone(), &mut changed, 90.0);
+        assert_eq!(changed, Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 90.0] });
+        assert_eq!(
+            Parameter::find("spin_table_3_time_s", &machine, &table),
+            Err(UnknownParameter::TablePoint { count: 2 })
+        );
+        let edges = ["window_from_s", "window_to_s", "tub_mass_kg"];
+        let edges = edges.map(|name| Parameter::find(name, &machine, &table).unwrap().window_edge());
+        assert_eq!(edges, [Some(0), Some(1), None]);
     }
 
     #[test]

@@ -14,6 +14,8 @@
 //! input.
 
 pub mod file;
+#[cfg(test)]
+mod model_tests;
 pub mod product;
 pub mod quantity;
 mod row;

@@ -36,21 +36,25 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     let rows = match &args.grid {
         Some(grid) => {
             let plan = config::load(grid, &[])?;
-            rows(&plan.machine, &plan.spin, true)
+            rows(&plan.machine, &plan.spin, Some(plan.window_s))
         }
         // The spin's parameters exist without a grid, but have no value.
-        None => rows(&Machine::paper(), &Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 }, false),
+        None => rows(&Machine::paper(), &Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 }, None),
     };
     print(&if args.json { as_json(&rows) } else { as_text(&rows) })
 }
 
-fn rows(machine: &Machine, spin: &Spin, from_grid: bool) -> Vec<Row> {
+/// Every parameter with its value; those of spin and window have one only if a grid gives its window.
+fn rows(machine: &Machine, spin: &Spin, window_s: Option<[f64; 2]>) -> Vec<Row> {
     let built_in = Machine::paper();
     let row = |parameter: Parameter| {
-        let of_spin = parameter.source() == Source::Grid;
-        let value = parameter.get(machine, spin).filter(|_| from_grid || !of_spin);
+        let of_grid = matches!(parameter.source(), Source::Grid | Source::Time);
+        let value = match parameter.window_edge() {
+            Some(edge) => window_s.map(|window_s| window_s[edge]),
+            None => parameter.get(machine, spin).filter(|_| window_s.is_some() || !of_grid),
+        };
         let as_built_in = parameter.get(&built_in, spin) == value;
-        let source = if of_spin || as_built_in { parameter.source().to_string() } else { "given".to_owned() };
+        let source = if of_grid || as_built_in { parameter.source().to_string() } else { "given".to_owned() };
         Row { parameter, value, source }
     };
     Parameter::all(machine, spin).into_iter().map(row).collect()
@@ -111,7 +115,7 @@ mod tests {
     #[test]
     fn text_and_json_hold_every_parameter() {
         let spin = Spin::Ramp { peak_rpm: 120.0, ramp_s: 2.0 };
-        let rows = rows(&Machine::paper(), &spin, true);
+        let rows = rows(&Machine::paper(), &spin, Some([0.0, 1.0]));
         let text = as_text(&rows);
         assert_eq!(text.lines().count(), rows.len());
         assert!(text.contains("tub_mass_kg") && text.contains("23.87 kg"), "{text}");
@@ -124,7 +128,7 @@ mod tests {
     fn a_value_of_the_users_own_is_not_ascribed_to_the_paper() {
         let mut machine = Machine::paper();
         machine.tub.mass_kg = 20.0;
-        let rows = rows(&machine, &Spin::Ramp { peak_rpm: 120.0, ramp_s: 2.0 }, false);
+        let rows = rows(&machine, &Spin::Ramp { peak_rpm: 120.0, ramp_s: 2.0 }, None);
         let row = |name: &str| rows.iter().find(|row| row.parameter.name() == name).unwrap();
         assert_eq!(row("tub_mass_kg").source, "given");
         assert_eq!(row("shaft_mass_kg").source, "paper, Table 2");

@@ -244,6 +244,12 @@ fn time(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> [
         sound
     });
     let window = section.numbers("window_s", Range::NonNegative, report).given();
+    if let Some(Located { value, .. }) = &window
+        && let [from, to] = value.as_slice()
+    {
+        origins.put("window_from_s".to_owned(), from.at.clone());
+        origins.put("window_to_s".to_owned(), to.at.clone());
+    }
     let window = window.and_then(|window| self::window(window, end.as_ref(), report));
     section.finish(report);
     let Some(end) = end else { return STAND_IN };

@@ -11,7 +11,7 @@ use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, check_number, quoted, short};
 use super::source::{Located, Location};
 use crate::design::{Design, MOST_AXES};
-use crate::plan::{Axis, AxisValues};
+use crate::plan::{Axis, AxisValues, Plan};
 
 /// Most grid points that are accepted. A hundred thousand points a second would take four months.
 pub(super) const MOST_POINTS: u64 = 1_000_000_000_000;
@@ -61,7 +61,7 @@ pub(super) fn point(at: &[String], draft: &mut Draft, report: &mut Report) {
             continue;
         }
         if axis.values.len() == 1 {
-            axis.parameter.set(&mut draft.plan.machine, &mut draft.plan.spin, axis.values.value(0));
+            write(&axis.parameter, &mut draft.plan, axis.values.value(0));
         } else if let Some(place) = draft.origins.get(&format!("axis[{k}]")) {
             let name = axis.parameter.name();
             let title = format!("a point of the grid needs a value of `{name}`");
@@ -131,7 +131,8 @@ fn unknown(name: &Located<&str>, error: &UnknownParameter, machine: &Machine, sp
     let title = format!("unknown parameter {}", quoted(name.value));
     let diagnostic = Diagnostic::new(title).at(&name.at, error.to_string());
     let section = match name.value {
-        "end_s" | "window_s" => Some("[time]"),
+        "window_s" => Some("[time], or as `window_from_s` and `window_to_s` here"),
+        "end_s" => Some("[time]"),
         "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator]"),
         "ratio_limit" | "channels" => Some("[reliability]"),
         _ => None,
@@ -146,7 +147,12 @@ fn unknown(name: &Located<&str>, error: &UnknownParameter, machine: &Machine, sp
             let near = diagnostic.nearest(name.value, all.iter().take(COMPARED).map(Parameter::name));
             near.help("`sweep parameters` lists every name")
         }
-        (UnknownParameter::Number { .. } | UnknownParameter::TableSpin, _) => diagnostic,
+        (
+            UnknownParameter::Number { .. }
+            | UnknownParameter::TablePoint { .. }
+            | UnknownParameter::TableSpin,
+            _,
+        ) => diagnostic,
     }
 }
 
@@ -158,7 +164,7 @@ fn apply(constants: &[Constant<'_>], draft: &mut Draft, report: &mut Report) {
         match parts.iter().find_map(|part| written.get(part)) {
             Some(first) => report.push(twice(&constant.name, &first.name)),
             None => {
-                constant.parameter.set(&mut draft.plan.machine, &mut draft.plan.spin, constant.value.value);
+                write(&constant.parameter, &mut draft.plan, constant.value.value);
                 for part in &parts {
                     draft.origins.put(part.clone().into_owned(), constant.value.at.clone());
                     written.insert(part.clone(), constant);
@@ -168,6 +174,10 @@ fn apply(constants: &[Constant<'_>], draft: &mut Draft, report: &mut Report) {
             }
         }
     }
+}
+
+fn write(parameter: &Parameter, plan: &mut Plan, value: f64) {
+    crate::plan::write(parameter, &mut plan.machine, &mut plan.spin, &mut plan.window_s, value);
 }
 
 fn twice(second: &Located<&str>, first: &Located<&str>) -> Diagnostic {

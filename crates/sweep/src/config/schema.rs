@@ -157,11 +157,16 @@ fn block_schema(block: &Block, prefix: &str, optional: &[(&'static str, Value)])
 /// Names of the table as properties; those of numbered springs and dampers as patterns.
 fn set() -> Value {
     let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
-    let all = Parameter::all(&Machine::paper(), &spin);
+    let mut all = Parameter::all(&Machine::paper(), &spin);
+    let table = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
+    all.extend(Parameter::all(&Machine::paper(), &table));
     let (mut properties, mut patterns) = (Map::new(), Map::new());
     for parameter in &all {
         let name = parameter.name();
-        match ["spring_", "damper_"].iter().find_map(|prefix| Some((prefix, name.strip_prefix(prefix)?))) {
+        match ["spring_", "damper_", "spin_table_"]
+            .iter()
+            .find_map(|prefix| Some((prefix, name.strip_prefix(prefix)?)))
+        {
             Some((prefix, rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => {
                 let suffix = rest.trim_start_matches(|c: char| c.is_ascii_digit());
                 patterns.insert(format!("^{prefix}[1-9][0-9]*{suffix}$"), of(parameter));

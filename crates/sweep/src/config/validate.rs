@@ -14,12 +14,16 @@ use crate::plan::{Integrator, Scenario};
 /// Most fixed steps of a trajectory that are accepted; an hour or more of computing for one point.
 pub(super) const MOST_STEPS: f64 = 1e10;
 
+/// Most corners of the grid that are made ready to look for the longest stable step.
+const MOST_PREPARED: usize = 1 << 8;
+
 /// A machine or spin that cannot be, at any corner of the grid. Ranges, inertia and bearings are linear conditions, so
 /// a machine that meets them at the corners meets them between; a spring that shrinks to nothing only in between is
 /// left to the run, as a failed row.
 pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
     let mut reported = BTreeSet::new();
     for values in draft.plan.corners() {
+        window(draft, &draft.plan.scenario_at(&values), &mut reported, report);
         for (violation, of_spin) in violations(&draft.plan.scenario_at(&values)) {
             let concerns = keys(&violation, of_spin);
             let judged = !concerns.iter().any(|key| draft.origins.is_doubtful(key));
@@ -28,6 +32,33 @@ pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
             }
         }
     }
+}
+
+/// A window that constants or axes have turned round, or moved past the end.
+fn window(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String>>, report: &mut Report) {
+    let [from_s, to_s] = scenario.window_s;
+    let end_s = draft.plan.end_s;
+    if from_s < to_s && to_s <= end_s {
+        return;
+    }
+    let concerns = ["window_from_s", "window_to_s", "time.end_s"].map(str::to_owned).to_vec();
+    if !reported.insert(concerns.clone()) {
+        return;
+    }
+    let title = format!(
+        "the window from {} s to {} s does not fit into a run to {} s",
+        decimal(from_s),
+        decimal(to_s),
+        decimal(end_s)
+    );
+    report.push_with(|sources| {
+        let mut diagnostic = Diagnostic::new(title);
+        for (k, place) in places(draft, &concerns, sources).iter().enumerate() {
+            let label = if k == 0 { "expected window_from_s < window_to_s <= end_s" } else { "and this" };
+            diagnostic = diagnostic.at(place, label);
+        }
+        diagnostic
+    });
 }
 
 /// What is wrong with one scenario, and whether it is the spin.
@@ -121,8 +152,10 @@ fn longest_stable_step_s(draft: &Draft, step_s: f64) -> Option<f64> {
     let plan = &draft.plan;
     let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };
     let mut highest = 0.0_f64;
-    for values in plan.corners() {
-        let Scenario { machine, spin } = plan.scenario_at(&values);
+    // Of a list of points, which has no corners, some: this is the dear check.
+    let corners: Vec<_> = plan.corners().collect();
+    for values in corners.iter().step_by(corners.len().div_ceil(MOST_PREPARED)) {
+        let Scenario { machine, spin, .. } = plan.scenario_at(values);
         let speed = spin.greatest_speed_rad_per_s(plan.end_s);
         for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
             // Matrices without eigenvalues leave it to the run to tell whether the machine can move.

@@ -106,7 +106,7 @@ impl ModelEngine<'_> {
             .iter()
             .step_by(values.len().div_ceil(MOST_CORNERS))
             .map(|values| {
-                let Scenario { machine, spin } = self.plan.scenario_at(values);
+                let Scenario { machine, spin, .. } = self.plan.scenario_at(values);
                 (machine, spin)
             })
             .collect();

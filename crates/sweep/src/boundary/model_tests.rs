@@ -1,0 +1,149 @@
+//! The search over the real models, against the grid it stands for.
+
+use std::path::Path;
+
+use super::file::{may_replace, write};
+use super::product::{BoundaryError, Models, Task};
+use super::quantity::Quantity;
+use super::{Kind, Stopped, Traced, trace};
+use crate::config;
+use crate::engine::ModelEngine;
+use crate::interrupt::Interrupt;
+use crate::plan::Plan;
+use crate::run::{Engine, Watch};
+use crate::verdict::Verdict;
+
+const HEAD: &str = r#"
+name = "short"
+[spin]
+profile = "triangular"
+peak_rpm = 350.0
+ramp_s = 50.0
+[time]
+end_s = 50.0
+window_s = [30.0, 50.0]
+[integrator]
+method = "rk4"
+step_s = 2.5e-4
+"#;
+
+/// Fig. 12 at three masses, every 12 N s/m.
+const GRID: &str = r#"
+[[axis]]
+parameter = "unbalance_mass_kg"
+values = [0.1, 0.35, 0.6]
+[[axis]]
+parameter = "damping_n_s_per_m"
+range = { from = 60.0, to = 300.0, count = 21 }
+"#;
+
+fn plan(text: &str) -> Plan {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grid.toml");
+    std::fs::write(&path, text).unwrap();
+    config::load(&path, &[]).unwrap_or_else(|mistakes| panic!("{mistakes}"))
+}
+
+fn traced(plan: &Plan, task: &Task, threads: usize, interrupt: &Interrupt) -> Result<Traced, Stopped> {
+    let engine = ModelEngine::new(plan).unwrap();
+    let models = Models::new(plan, engine, Quantity::RatioMax, threads, interrupt, &|_| {}).unwrap();
+    trace(&models, &task.firsts, task.curves, &task.search)
+}
+
+#[test]
+fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads() {
+    let plan = plan(&format!("{HEAD}{GRID}"));
+    let task = Task::new(&plan, Some(0.5), 3).unwrap();
+    let interrupt = Interrupt::new();
+    let traced = [1, 3].map(|threads| traced(&plan, &task, threads, &interrupt).unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = [0, 1].map(|k| {
+        let path = folder.path().join(format!("{k}.parquet"));
+        write(&path, &plan, Quantity::RatioMax, &task, &traced[k]).unwrap();
+        may_replace(&path).unwrap();
+        std::fs::read(path).unwrap()
+    });
+    assert!(bytes[0] == bytes[1], "other bytes on three threads");
+
+    let engine = ModelEngine::new(&plan).unwrap();
+    let outcomes = engine.evaluate(0..plan.points(), &Watch::new(&interrupt)).unwrap();
+    let channels = plan.reliability.channels.len();
+    for (row, outcomes) in traced[0].curves[0].iter().zip(outcomes.chunks(21)) {
+        assert!(row.trials < 21, "{row:?}");
+        let edge = row.edges[0];
+        let logs: Vec<(f64, f64)> = outcomes
+            .iter()
+            .map(|outcome| {
+                let verdict = Verdict::new(outcome, channels, 2.0);
+                let [_, damping] = plan.axis_values(outcome.point)[..] else { panic!("two axes") };
+                (damping, (verdict.greatest.unwrap().1 / 2.0).ln())
+            })
+            .collect();
+        let Some([low, high]) = edge.bracket else {
+            assert_eq!((row.first, edge.kind), (0.1, Kind::NoneReliable));
+            assert!(logs.iter().all(|(_, log)| *log < 0.0));
+            continue;
+        };
+        assert_eq!((row.edges.len(), edge.kind), (1, Kind::Crossing));
+        assert!(high - low <= 0.5);
+        for (damping, log) in &logs {
+            let reliable = *log < 0.0;
+            assert!(if reliable { *damping > low } else { *damping < high }, "{damping} {log} {edge:?}");
+        }
+        let contour = logs.windows(2).find_map(|pair| {
+            let [(a, from), (b, to)] = [pair[0], pair[1]];
+            (from >= 0.0 && to < 0.0).then(|| a + (b - a) * from / (from - to))
+        });
+        assert!((contour.unwrap() - edge.at.unwrap()).abs() < 1.0, "{contour:?} {edge:?}");
+    }
+}
+
+#[test]
+fn a_stop_is_heeded_before_the_next_group() {
+    let plan = plan(&format!("{HEAD}{GRID}"));
+    let task = Task::new(&plan, None, 6).unwrap();
+    assert_eq!(task.search.tolerance, 0.5, "1/480 of 240 N s/m");
+    let interrupt = Interrupt::new();
+    interrupt.raise(2);
+    assert_eq!(traced(&plan, &task, 2, &interrupt), Err(Stopped));
+}
+
+#[test]
+fn plans_without_a_boundary_say_why() {
+    let mass = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.2]\n";
+    let refused = |text: &str, tolerance: Option<f64>| {
+        Task::new(&plan(&format!("{HEAD}{text}")), tolerance, 6).unwrap_err()
+    };
+    assert_eq!(refused(mass, None), BoundaryError::Axes(1));
+    let one = format!("{mass}[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100.0]\n");
+    assert_eq!(refused(&one, None), BoundaryError::NoRange("damping_n_s_per_m".into()));
+    for tolerance in [0.0, -1.0, f64::NAN, 1e9] {
+        let error = refused(GRID, Some(tolerance)).to_string();
+        assert!(error.contains("--tolerance") && error.contains("240"), "{error}");
+    }
+    let design = "[design]\nmethod = \"sobol\"\npoints = 8\n[[axis]]\nparameter = \"unbalance_mass_kg\"\n\
+                  range = { from = 0.1, to = 0.2 }\n";
+    assert_eq!(refused(design, None), BoundaryError::Design);
+}
+
+#[test]
+fn a_file_of_another_kind_is_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let notes = folder.path().join("notes.parquet");
+    std::fs::write(&notes, "mine").unwrap();
+    assert!(may_replace(&notes).unwrap_err().to_string().contains("no boundary file"));
+    assert!(may_replace(folder.path()).is_err());
+    assert!(may_replace(Path::new("/")).is_err());
+    may_replace(&folder.path().join("new.parquet")).unwrap();
+}
+
+#[test]
+fn every_quantity_is_found_by_its_name_and_back_from_its_distance() {
+    let plan = plan(&format!("{HEAD}{GRID}"));
+    for quantity in Quantity::all() {
+        assert_eq!(quantity.name().parse(), Ok(quantity));
+        assert_eq!(quantity.value(0.0, &plan), quantity.limit(&plan));
+    }
+    assert!("ratio_tub".parse::<Quantity>().unwrap_err().contains("ratio_tub_yaw"));
+    assert_eq!(Quantity::Ratio(washer_model::Channel::TubYaw).plan(&plan).reliability.channels.len(), 1);
+}
