@@ -9,7 +9,8 @@ name=${1:-kernels}
 rounds=${2:-5}
 out=results/benchmarks/$name.md
 mkdir -p results/benchmarks
-cargo build --release --package sweep --bin sweep --benches
+cargo build --release --bin sweep
+cargo bench --no-run
 
 fact() { lscpu | sed -n "s/^$1: *//p"; }
 {

@@ -26,8 +26,8 @@ count() { # SET END_S
 echo "| instruction set | instructions a step and trajectory, mean of both models |"
 echo "|---|---|"
 for set in scalar avx2; do
-  short=$(count $set 0.1)
-  long=$(count $set 0.3)
-  # 0.2 s more at 2e-4 s, eight points, two models.
-  echo "| $set | $(((long - short) / (1000 * 8 * 2))) |"
+  short=$(count $set 0.02)
+  long=$(count $set 0.07)
+  # 0.05 s more at 2e-4 s, eight points, two models.
+  echo "| $set | $(((long - short) / (250 * 8 * 2))) |"
 done

@@ -1,74 +1,103 @@
 //! This project's own methods on the trajectory of `scripts/peers/trajectory.h`, in the same words: `trajectory SIMD METHOD SETTINGS`, with
-//! rk4 STEP, rk4-mass-scaled STEP CAP, dopri5 RTOL ATOL or rodas5p RTOL ATOL. Lanes are filled with copies, and the time is that of one of them.
+//! rk4 STEP, rk4-mass-scaled ACCURACY, dopri5 RTOL ATOL or rodas5p RTOL ATOL. Lanes are filled with copies, and the time is that of
+//! one of them.
 #![allow(clippy::print_stdout)]
 
 use std::process::ExitCode;
 use std::time::Instant;
 
 use lane_ode::{Simd, Tolerance};
-use washer_model::{Channel, Machine, Method, ModelKind, Spin, Timing, prepare, simulate};
+use washer_model::{Capping, Channel, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
+
+const END_S: f64 = 50.0;
+const USAGE: &str = "usage: trajectory scalar|avx2|avx512|neon \
+    rk4 STEP | rk4-mass-scaled ACCURACY | dopri5 RTOL ATOL | rodas5p RTOL ATOL";
 
 fn main() -> ExitCode {
+    match run() {
+        Ok(line) => {
+            println!("{line}");
+            ExitCode::SUCCESS
+        }
+        Err(Failed::Usage) => {
+            eprintln!("{USAGE}");
+            ExitCode::from(2)
+        }
+        Err(Failed::Because(what)) => {
+            eprintln!("{what}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+enum Failed {
+    Usage,
+    Because(String),
+}
+
+fn number(word: &str) -> Result<f64, Failed> {
+    word.parse().map_err(|_| Failed::Usage)
+}
+
+/// The method that the words name, and how the table calls it.
+fn method(words: &[&str], point: &Point, spin: &Spin) -> Result<(Method, &'static str), Failed> {
+    let tolerance = |relative: &str, absolute: &str| {
+        Ok(Tolerance { relative: number(relative)?, absolute: number(absolute)?, max_steps: u64::MAX })
+    };
+    match words {
+        ["rk4", step] => Ok((Method::Rk4 { step_s: number(step)? }, "RK4")),
+        ["rk4-mass-scaled", accuracy] => {
+            let capping = Capping::choose([(point, spin)], END_S, number(accuracy)?);
+            let capping = capping.map_err(|error| Failed::Because(error.to_string()))?;
+            Ok((capping.method(), "mass-scaled RK4"))
+        }
+        ["dopri5", rtol, atol] => Ok((Method::Dopri5(tolerance(rtol, atol)?), "dopri5")),
+        ["rodas5p", rtol, atol] => Ok((Method::Rodas5p(tolerance(rtol, atol)?), "Rodas5P")),
+        _ => Err(Failed::Usage),
+    }
+}
+
+fn run() -> Result<String, Failed> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     let words: Vec<_> = arguments.iter().map(String::as_str).collect();
-    let number = |word: &str| word.parse::<f64>().ok();
-    let tolerance = |rtol: &str, atol: &str| {
-        Some(Tolerance { relative: number(rtol)?, absolute: number(atol)?, max_steps: u64::MAX })
-    };
-    let parsed = match words[..] {
-        [simd, "rk4", step] => number(step).map(|step_s| (simd, "RK4", Method::Rk4 { step_s })),
-        [simd, "rk4-mass-scaled", step, cap] => {
-            number(step).zip(number(cap)).map(|(step_s, cap_rad_per_s)| {
-                (simd, "mass-scaled RK4", Method::Rk4MassScaled { step_s, cap_rad_per_s })
-            })
-        }
-        [simd, "dopri5", rtol, atol] => tolerance(rtol, atol).map(|t| (simd, "dopri5", Method::Dopri5(t))),
-        [simd, "rodas5p", rtol, atol] => tolerance(rtol, atol).map(|t| (simd, "Rodas5P", Method::Rodas5p(t))),
-        _ => None,
-    };
-    let known = |name: &str| Simd::ALL.into_iter().find(|simd| simd.name() == name && simd.is_available());
-    let Some((simd, name, method)) =
-        parsed.and_then(|(simd, name, method)| Some((known(simd)?, name, method)))
-    else {
-        eprintln!(
-            "usage: trajectory scalar|avx2|avx512|neon rk4 STEP | rk4-mass-scaled STEP CAP | dopri5 RTOL ATOL | rodas5p RTOL ATOL"
-        );
-        return ExitCode::from(2);
-    };
-    // The stiff method uses lanes for its derivatives.
-    let copies = if matches!(method, Method::Rodas5p(_)) { 1 } else { simd.lanes() };
+    let (name, words) = words.split_first().ok_or(Failed::Usage)?;
+    let known = Simd::ALL.into_iter().find(|simd| simd.name() == *name && simd.is_available());
+    let simd = known.ok_or(Failed::Usage)?;
 
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = 0.4;
     machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 140.0);
-    let scenario = (machine, Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 });
-    let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0] };
-    let Some(Ok(point)) = prepare(simd, &[scenario], &timing).pop() else {
-        eprintln!("no equilibrium");
-        return ExitCode::FAILURE;
+    let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+    let timing = Timing { end_s: END_S, window_s: [30.0, END_S] };
+    let Some(Ok(point)) = prepare(simd, &[(machine, spin.clone())], &timing).pop() else {
+        return Err(Failed::Because("no equilibrium".to_owned()));
     };
+    let (method, name) = method(words, &point, &spin)?;
+    // The stiff method uses lanes for its derivatives.
+    let copies = if matches!(method, Method::Rodas5p(_)) { 1 } else { simd.lanes() };
+
     let begin = Instant::now();
     let records = simulate(simd, ModelKind::Nonlinear, &method, &vec![&point; copies]);
     let seconds = begin.elapsed().as_secs_f64() / copies as f64;
     let record = records[0];
     if let Some((reason, time_s)) = record.failure {
-        eprintln!("{reason:?} at {time_s} s");
-        return ExitCode::FAILURE;
+        return Err(Failed::Because(format!("{reason:?} at {time_s} s")));
     }
     let settings = match method {
         Method::Rk4 { step_s } => format!("step {step_s:e} s"),
         Method::Rk4MassScaled { step_s, cap_rad_per_s } => {
-            format!("step {step_s:e} s, cap {cap_rad_per_s} rad/s")
+            format!("accuracy {}: step {step_s:.2e} s, cap {cap_rad_per_s:.0} rad/s", words[1])
         }
         Method::Dopri5(t) | Method::Rodas5p(t) => format!("rtol {:.0e}, atol {:.0e}", t.relative, t.absolute),
     };
-    let lanes =
-        if copies == 1 { "one trajectory".to_owned() } else { format!("{copies} lanes, {}", simd.name()) };
-    println!(
+    let lanes = match copies {
+        1 => "one trajectory".to_owned(),
+        _ => format!("{copies} lanes, {}", simd.name()),
+    };
+    Ok(format!(
         r#"{{"program": "sweep {}", "method": "{name}, {lanes}", "settings": "{settings}", "yaw_rad": {:e}, "seconds": {seconds}, "evaluations": 0, "steps": {}}}"#,
         env!("CARGO_PKG_VERSION"),
         record.amplitudes[Channel::TubYaw.index()],
         record.steps,
-    );
-    ExitCode::SUCCESS
+    ))
 }

@@ -308,7 +308,7 @@ mod tests {
                 let mut x = [0.0; STATE_LEN];
                 washer_initial_state(made, x.as_mut_ptr());
                 x.iter_mut().enumerate().for_each(|(i, x)| *x += 1e-3 * (i as f64).sin());
-                let mut jacobian = [[0.0; STATE_LEN]; STATE_LEN];
+                let mut jacobian = [[0.0_f64; STATE_LEN]; STATE_LEN];
                 washer_jacobian(20.0, x.as_ptr(), jacobian.as_mut_ptr().cast(), made);
                 for j in 0..STATE_LEN {
                     let step = 1e-5;
