@@ -13,7 +13,7 @@
 //!    [`Step`]. [`Peaks`] finds largest magnitudes between steps as well as at them.
 //! 3. [`Kernel`]: the work as a whole, which [`Simd::dispatch`] compiles for every instruction set and starts on one.
 //!
-//! The methods are [`rk4`] (classical, fixed step), [`dopri5`] (Dormand-Prince 5(4), adaptive, with dense output) and [`rodas5p`]
+//! The methods are [`rk4`] (classical, fixed step), [`dopri5`] (Dormand-Prince 5(4), adaptive, with dense output) and `rodas5p`
 //! (linearly implicit, for stiff systems).
 //!
 //! # Example

@@ -6,8 +6,8 @@
 //!
 //! 1. A coarse lattice: every value of the second axis's lattice at evenly spread rows. It finds what lies in range, and
 //!    guards against islands wider than its cells.
-//! 2. In those rows, bracketed root finding ([`row`]): secants within brackets, then two trials a tolerance apart.
-//! 3. The rows between, from the middle of each gap outwards, start from where their neighbours' roots point ([`warm`]):
+//! 2. In those rows, bracketed root finding (`row`): secants within brackets, then two trials a tolerance apart.
+//! 3. The rows between, from the middle of each gap outwards, start from where their neighbours' roots point (`warm`):
 //!    where the curve is smooth, two trials a row are enough.
 //!
 //! Which trials are made depends on values alone, never on threads or lanes, so the result is a pure function of the

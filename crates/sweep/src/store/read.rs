@@ -205,7 +205,7 @@ pub struct ColumnRange {
     pub nulls: u64,
     /// Least and greatest value of a numeric column that has any.
     pub range: Option<(f64, f64)>,
-    /// How often each value of a text or bool column occurs; the first [`NAMES_SHOWN`] to appear.
+    /// How often each value of a text or bool column occurs; the first `NAMES_SHOWN` to appear.
     pub names: Vec<(String, u64)>,
 }
 
