@@ -193,8 +193,9 @@ def node_killed(sweep: Sweep, expected: bytes):
 def controller_killed(sweep: Sweep, expected: bytes):
     slurm = sweep.slurm
     sweep.array, merge = sweep.submit()
+    submitted = time.time()
     _, process = sweep.stopped_in_mid_shard()
-    slurm.wait_until_saved("array-merge")
+    slurm.wait_until_saved(submitted)
     slurm.kill("slurmctld")
     # The nodes' tasks go on, and end with nobody to tell.
     os.kill(process, signal.SIGCONT)

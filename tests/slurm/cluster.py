@@ -126,10 +126,11 @@ class Cluster:
         self.wait_for(f"end of job {job}", lambda: self.is_over(job), seconds, lambda: self.tasks(job))
         return {task: facts["state"] for task, facts in self.tasks(job).items()}
 
-    def wait_until_saved(self, name: str):
-        """Waits until the controller's record on disk has a job of this name: it is written some seconds after a submission."""
+    def wait_until_saved(self, since: float):
+        """Waits until the controller has written its record of the jobs anew, which it does some seconds after a change."""
         state = self.folder / "state/job_state"
-        self.wait_for("record of the jobs", lambda: state.exists() and name.encode() in state.read_bytes(), 60)
+        # Half a second for the snapshot that was under way.
+        self.wait_for("record of the jobs", lambda: state.exists() and state.stat().st_mtime > since + 0.5, 60)
 
     def wait_for(self, what, condition, seconds, show=lambda: ""):
         until = time.monotonic() + seconds

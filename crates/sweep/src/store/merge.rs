@@ -59,8 +59,8 @@ impl Run {
         if rows.len() > 0 {
             writer.write(&rows.take().map_err(from_arrow)?).map_err(failed)?;
         }
-        let buffer = writer.into_inner().map_err(failed)?;
-        buffer.into_inner().map_err(|error| StoreError::io("write", &output)(error.into_error()))?;
+        // Flushes to the file. (Taking the file back out of the writer would tell a full disk as text only.)
+        writer.close().map_err(failed)?;
         // Read back before it takes its place: what cannot be read must not replace anything.
         let tally = read::tally(file.path())?;
         atomic::publish(file, &output)?;
