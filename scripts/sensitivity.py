@@ -72,7 +72,7 @@ def cell(rows: list[dict], base: list[dict] | None) -> str:
     said = ", ".join(f"{place:.1f}" for place in places)
     known = [row[SECOND] for row in base or [] if row["kind"] == "crossing"]
     if len(places) == len(known) == 1:
-        said += f" ({places[0] - known[0]:+.1f})"
+        said += f" ({places[0] - known[0]:+.1f})".replace("-0.0", "+0.0")
     return said
 
 

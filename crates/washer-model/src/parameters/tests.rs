@@ -1,0 +1,129 @@
+//! Names, ranges and what each parameter writes.
+
+use super::*;
+
+fn spin() -> Spin {
+    Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 }
+}
+
+#[test]
+fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
+    for parameter in Parameter::all(&Machine::paper(), &spin()) {
+        let (mut machine, mut spin) = (Machine::paper(), spin());
+        assert_eq!(Parameter::find(parameter.name(), &machine, &spin).as_ref(), Ok(&parameter));
+        if parameter.window_edge().is_some() {
+            assert_eq!(parameter.get(&machine, &spin), None);
+            continue;
+        }
+        let before = parameter.get(&machine, &spin).expect("the paper's machine has one value for each");
+        assert!(parameter.range().contains(before), "{parameter:?} = {before}");
+        parameter.set(&mut machine, &mut spin, before + 0.125);
+        assert_eq!(parameter.get(&machine, &spin), Some(before + 0.125), "{parameter:?}");
+    }
+}
+
+#[test]
+fn each_parameter_writes_its_parts_and_nothing_else() {
+    let everything = Parameter::all(&Machine::paper(), &spin());
+    for parameter in &everything {
+        let (mut machine, mut spin) = (Machine::paper(), spin());
+        let before: Vec<_> = everything.iter().map(|p| p.get(&machine, &spin)).collect();
+        parameter.set(&mut machine, &mut spin, 0.875);
+        let parts = parameter.parts(&machine);
+        for (other, before) in everything.iter().zip(before) {
+            if other.parts(&machine).iter().all(|part| !parts.contains(part)) {
+                // A default free length follows the ends of its spring.
+                let follows = other.name().ends_with("free_length_m") && other.index == parameter.index;
+                assert!(follows || other.get(&machine, &spin) == before, "{parameter:?} wrote {other:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn names_end_with_their_unit_and_are_unique() {
+    let everything = Parameter::all(&Machine::paper(), &spin());
+    let mut names: Vec<_> = everything.iter().map(Parameter::name).collect();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), everything.len());
+    for parameter in &everything {
+        let suffix = match parameter.unit() {
+            "m" => "_m",
+            "kg" => "_kg",
+            "s" => "_s",
+            "rpm" => "_rpm",
+            "N/m" => "_n_per_m",
+            "N s/m" => "_n_s_per_m",
+            "N m/rad" => "_n_m_per_rad",
+            "kg m^2" => "_kg_m2",
+            "m/s^2" => "_m_per_s2",
+            other => panic!("no suffix is known for {other}"),
+        };
+        assert!(parameter.name().ends_with(suffix), "{parameter:?}");
+    }
+}
+
+#[test]
+fn numbers_beyond_the_machine_are_told_from_misspellings() {
+    let (machine, spin) = (Machine::paper(), spin());
+    let find = |name: &str| Parameter::find(name, &machine, &spin).map(|p| p.index);
+    assert_eq!(find("spring_4_tub_z_m"), Ok(3));
+    assert_eq!(find("spring_5_tub_z_m"), Err(UnknownParameter::Number { element: "spring", count: 4 }));
+    assert_eq!(
+        find("damper_3_damping_n_s_per_m"),
+        Err(UnknownParameter::Number { element: "damper", count: 2 })
+    );
+    for name in [
+        "spring_0_tub_z_m",
+        "spring_01_tub_z_m",
+        "spring_+1_tub_z_m",
+        "spring__tub_z_m",
+        "spring_99999999999999999999_tub_z_m",
+        "spring_1_tub_w_m",
+        "tub_mass",
+        "",
+    ] {
+        assert_eq!(find(name), Err(UnknownParameter::Name), "{name}");
+    }
+    let table = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 100.0] };
+    assert_eq!(Parameter::find("spin_ramp_s", &machine, &table), Err(UnknownParameter::TableSpin));
+    let points: Vec<_> =
+        Parameter::all(&machine, &table).into_iter().filter(|p| p.source() == Source::Grid).collect();
+    let names: Vec<_> = points.iter().map(Parameter::name).collect();
+    assert_eq!(
+        names,
+        ["spin_table_1_time_s", "spin_table_1_speed_rpm", "spin_table_2_time_s", "spin_table_2_speed_rpm"]
+    );
+    let mut changed = table.clone();
+    points[3].set(&mut machine.clone(), &mut changed, 90.0);
+    assert_eq!(changed, Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 90.0] });
+    assert_eq!(
+        Parameter::find("spin_table_3_time_s", &machine, &table),
+        Err(UnknownParameter::TablePoint { count: 2 })
+    );
+    let edges = ["window_from_s", "window_to_s", "tub_mass_kg"];
+    let edges = edges.map(|name| Parameter::find(name, &machine, &table).unwrap().window_edge());
+    assert_eq!(edges, [Some(0), Some(1), None]);
+}
+
+#[test]
+fn a_parameter_of_several_numbers_has_no_value_when_they_differ() {
+    let (mut machine, spin) = (Machine::paper(), spin());
+    let all = Parameter::find("damping_n_s_per_m", &machine, &spin).unwrap();
+    assert_eq!(all.get(&machine, &spin), Some(140.0));
+    machine.dampers[1].damping_n_s_per_m = 100.0;
+    assert_eq!(all.get(&machine, &spin), None);
+}
+
+#[test]
+fn ranges_refuse_what_is_not_a_number() {
+    for range in [Any, Positive, NonNegative, Negative, Range::Within(-1e5, 1e5)] {
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e13, -1e13] {
+            assert!(!range.contains(value), "{range:?} {value}");
+        }
+    }
+    assert!(!Positive.contains(0.0) && Positive.contains(1e-9));
+    assert!(NonNegative.contains(0.0) && !NonNegative.contains(-1e-9));
+    assert!(!Negative.contains(0.0) && Negative.contains(-1e-9));
+}
