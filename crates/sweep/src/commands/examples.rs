@@ -60,6 +60,16 @@ const EXAMPLES: &[(&str, &[[&str; 2]])] = &[
         ],
     ),
     (
+        "boundary",
+        &[
+            [
+                "sweep boundary my.toml --out line.parquet",
+                "the line on which the ratio is at its limit, without the map",
+            ],
+            ["sweep plot line.parquet", "drawn with the brackets it is known to lie in"],
+        ],
+    ),
+    (
         "plot",
         &[
             ["sweep plot results/first.parquet", "results/first.svg: ratios, and the line of the limit"],
