@@ -20,11 +20,13 @@ def main():
     worst = 0.0
     for case in cases:
         theta, speed, acceleration = case["theta"], case["theta_dot"], case["theta_ddot"]
-        # A spin of constant acceleration that begins at speed w and passes theta, modulo whole turns, at time t with the speed asked for:
-        # theta = (speed^2 - w^2) / 2 acceleration.
-        turn = math.tau * (1 if acceleration > 0 else -1)
-        angle = theta % turn
-        start = math.sqrt(speed * speed - 2 * acceleration * angle)
+        # A spin of constant acceleration that begins at speed w and passes theta, modulo whole turns, later with the speed asked for:
+        # 2 acceleration theta = speed^2 - w^2. Where that leaves no w, it comes from the other side.
+        angle = theta % math.tau
+        if speed * speed >= 2 * acceleration * angle:
+            start = math.sqrt(speed * speed - 2 * acceleration * angle)
+        else:
+            start = -math.sqrt(speed * speed - 2 * acceleration * (angle - math.tau))
         time = (speed - start) / acceleration
         end = start + acceleration * 2 * time
         rpm = 60 / math.tau
