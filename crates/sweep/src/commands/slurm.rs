@@ -203,7 +203,7 @@ mod tests {
     fn the_shell_takes_the_script_as_it_was_meant_whatever_the_names() {
         let home = tempfile::tempdir().unwrap();
         let grid = home.path().join("it's a grid.toml");
-        let text = "name = \"50 % of it\"\n[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = 50\n";
+        let text = "name = \"half.of-it\"\n[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = 50\n";
         std::fs::write(&grid, text).unwrap();
         let grid = grid.to_str().unwrap();
         let args = parse(&[
@@ -234,7 +234,7 @@ mod tests {
         };
         assert!(place("--array=1-8") < place("--array=3,7"), "the later one counts");
         for wanted in [
-            "--job-name=50 % of it",
+            "--job-name=half.of-it",
             "--cpus-per-task=4",
             "--requeue",
             "--time=1:00:00",
@@ -243,7 +243,7 @@ mod tests {
         ] {
             place(wanted);
         }
-        place("--output=results/50 %% of it.slurm-%A_%a.log");
+        place("--output=results/half.of-it.slurm-%A_%a.log");
         place("--dependency=afterany:17");
         let grid = grid.replace('\'', r"'\''");
         place(&format!(

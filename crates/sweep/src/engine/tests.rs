@@ -16,10 +16,10 @@ window_s = [0.5, 1]
 method = "rk4"
 [[axis]]
 parameter = "spring_stiffness_n_per_m"
-values = [500, 1000, 7000]
+values = [1, 500, 7000]
 [[axis]]
 parameter = "unbalance_mass_kg"
-values = [0.1, 100, 300]
+values = [0.1, 10, 300]
 "#;
 
 fn plan(text: &str) -> Plan {

@@ -79,7 +79,7 @@ fn batches(path: &Path) -> Vec<RecordBatch> {
 fn chunk_sizes_feed_small_grids_to_all_cores_and_bound_large_ones() {
     let sizes: Vec<u64> =
         [1, 81, 128, 129, 1287, 100_000, 1_000_000, 1 << 40, u64::MAX].map(chunk_points).to_vec();
-    assert_eq!(sizes, [8, 8, 8, 16, 16, 128, 1024, 4096, 4096]);
+    assert_eq!(sizes, [8, 8, 8, 32, 32, 128, 1024, 4096, 4096]);
 }
 
 #[test]

@@ -66,7 +66,7 @@ fn verdicts_are_the_references_on_other_machines() {
         "bearing_stiffness_n_per_m = 2e6\nflexure_stiffness_n_m_per_rad = 15000",
         "bearing_stiffness_n_per_m = 3e5\ntub_mass_kg = 18",
         "flexure_stiffness_n_m_per_rad = 2500\nunbalance_radius_m = 0.25",
-        "bearings_front_x_m = 0.09\nbearings_rear_x_m = -0.02\nspin_peak_rpm = 1100",
+        "bearing_front_x_m = 0.09\nbearing_rear_x_m = -0.02\nspin_peak_rpm = 1100",
         "damper_1_damping_n_s_per_m = 60\nspring_2_stiffness_n_per_m = 6000\ndrum_mass_kg = 5",
     ];
     for (k, set) in machines.into_iter().enumerate() {
