@@ -151,7 +151,7 @@ def main():
         "",
         f"Machine: {machine()}; one core (`taskset`). {version(['rustc', '--version'])}; {version(['c++', '--version'])}, `-O3 -march=native`; "
         f"Python {platform.python_version()}. Load when it began: {load:.1f} on {os.cpu_count()} cores. Commit {version(['git', 'describe', '--always', '--dirty'])}.",
-        f"Command: `scripts/peers/run.sh {repeats}`; medians of {repeats} round{"s" if repeats > 1 else ""} in which all take turns, of one where a run takes more than "
+        f"Command: `scripts/peers/run.sh {repeats}`; medians of {repeats} round(s) in which all take turns, of one where a run takes more than "
         f"{SLOW_S:.0f} s. Raw runs: `peers.jsonl`.",
         "Times in lanes are a trajectory's share of a full lane group.",
         "",
