@@ -232,8 +232,9 @@ def ours(sweep, spin, end_s, every_s, start=()):
         subprocess.run([sweep, "trace", grid_file, "--every", str(every_s), "--states", *starts, "--out", out],
                        check=True, stderr=subprocess.DEVNULL)
         table = pq.read_table(out)
+        told = json.loads(pq.read_metadata(out).metadata[b"sweep.trace"])
     columns = [f"q{i}_nonlinear_{'m' if i <= 4 else 'rad'}" for i in range(1, 11)]
-    return np.array([table[name].to_numpy() for name in columns]).T, json.loads(table.schema.metadata[b"sweep.trace"])
+    return np.array([table[name].to_numpy() for name in columns]).T, told
 
 
 def main():
