@@ -168,16 +168,17 @@ impl<T: Lane> TermLanes<T> {
             if entries == 0 {
                 continue;
             }
+            // Lengths known when compiling are unrolled.
             match terms {
-                1 => rest.sum_of::<1, ENTRIES, B, W>(entries, basis, sums),
-                2 => rest.sum_of::<2, ENTRIES, B, W>(entries, basis, sums),
-                3 => rest.sum_of::<3, ENTRIES, B, W>(entries, basis, sums),
-                4 => rest.sum_of::<4, ENTRIES, B, W>(entries, basis, sums),
-                5 => rest.sum_of::<5, ENTRIES, B, W>(entries, basis, sums),
-                6 => rest.sum_of::<6, ENTRIES, B, W>(entries, basis, sums),
-                7 => rest.sum_of::<7, ENTRIES, B, W>(entries, basis, sums),
-                8 => rest.sum_of::<8, ENTRIES, B, W>(entries, basis, sums),
-                _ => rest.sum_of_many(terms, entries, basis, sums),
+                1 => rest.sum(1, entries, basis, sums),
+                2 => rest.sum(2, entries, basis, sums),
+                3 => rest.sum(3, entries, basis, sums),
+                4 => rest.sum(4, entries, basis, sums),
+                5 => rest.sum(5, entries, basis, sums),
+                6 => rest.sum(6, entries, basis, sums),
+                7 => rest.sum(7, entries, basis, sums),
+                8 => rest.sum(8, entries, basis, sums),
+                _ => rest.sum(terms, entries, basis, sums),
             }
         }
     }
@@ -196,40 +197,9 @@ struct Rest<'a, T> {
 }
 
 impl<T: Lane> Rest<'_, T> {
-    /// The next `count` entries, which have `TERMS` terms each.
-    #[inline(always)]
-    fn sum_of<const TERMS: usize, const ENTRIES: usize, const B: usize, const W: usize>(
-        &mut self,
-        count: usize,
-        basis: &[[N<T>; W]; B],
-        sums: &mut [[N<T>; W]; ENTRIES],
-    ) {
-        for _ in 0..count {
-            let (Some((functions, later_functions)), Some((coefficients, later_coefficients))) =
-                (self.functions.split_first_chunk::<TERMS>(), self.coefficients.split_first_chunk::<TERMS>())
-            else {
-                return;
-            };
-            let Some((&entry, later_entries)) = self.entries.split_first() else { return };
-            let mut sum = basis[usize::from(functions[0])];
-            for w in 0..W {
-                sum[w] = (coefficients[0] * sum[w]).v();
-            }
-            for k in 1..TERMS {
-                let function = &basis[usize::from(functions[k])];
-                for w in 0..W {
-                    sum[w] += coefficients[k] * function[w];
-                }
-            }
-            sums[usize::from(entry)] = sum;
-            *self =
-                Rest { entries: later_entries, functions: later_functions, coefficients: later_coefficients };
-        }
-    }
-
     /// The next `count` entries, which have `terms` terms each.
     #[inline(always)]
-    fn sum_of_many<const ENTRIES: usize, const B: usize, const W: usize>(
+    fn sum<const ENTRIES: usize, const B: usize, const W: usize>(
         &mut self,
         terms: usize,
         count: usize,
