@@ -9,9 +9,10 @@ use crate::coupling::{Coupling, Deflection};
 use crate::floating::{Factors, Floating};
 use crate::forces::AxisLoad;
 use crate::frame::Tilt;
-use crate::harmonics::{Factor, HARMONICS, SAMPLES, Term, TermLanes, basis, push_terms};
+use crate::harmonics::{self, FUNCTIONS, HARMONICS, SAMPLES};
 use crate::lanes::{GetLane, SetLane, Splat};
 use crate::nonlinear::{COORDINATES, Half, rotor, tub};
+use crate::rotor_terms::{self as entry, ENTRIES, ROWS, RotorTerms};
 use crate::spin::SpinState;
 use lane_ode::{Dual, Lane, N, Real};
 
@@ -19,17 +20,6 @@ use lane_ode::{Dual, Lane, N, Real};
 const TUB: [usize; 4] = [0, 1, 4, 5];
 /// Coordinates that turn the rotor: q7 to q10. Its forces do not depend on q3 and q4 but through the bearings.
 const TURNS: [usize; 4] = [6, 7, 8, 9];
-
-/// Rows of one half: y, z of its midpoint, then its rotations about the mass centre.
-const ROTOR_ROWS: usize = 6;
-
-// Entries of the rotor's theta-dependent arrays, in this order.
-const INERTIA: usize = 0;
-const ARM: usize = INERTIA + 10;
-const FORCE: usize = ARM + 8;
-const STIFFNESS: usize = FORCE + ROTOR_ROWS;
-const DAMPING: usize = STIFFNESS + ROTOR_ROWS * 4;
-const ENTRIES: usize = DAMPING + ROTOR_ROWS * 4;
 
 /// The linear model of one machine; `N<f64>` for one, `N<T>` for one per lane.
 #[derive(Clone, Copy, Debug)]
@@ -83,7 +73,7 @@ impl<T: Lane> Constants<T> {
 #[derive(Clone, Debug)]
 pub(crate) struct LinearPoint {
     pub(crate) constants: Constants<f64>,
-    pub(crate) terms: Vec<Term>,
+    pub(crate) terms: RotorTerms<f64>,
 }
 
 /// Linearises one machine per lane about the equilibrium `q`.
@@ -124,26 +114,28 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
             // Stiffness at every kind of spin, damping only at unit speed: without spin the rotor has none.
             let directions = if kind == 1 { 8 } else { 4 };
             for direction in 0..directions {
-                let (first, column) = ([STIFFNESS, DAMPING][direction / 4], direction % 4);
+                let column = direction % 4;
+                let entry = if direction < 4 { entry::stiffness } else { entry::damping };
                 let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
                 let (q, u) = (seeded(q, TURNS[column], dq), seeded(&still, TURNS[column], du));
                 let Half { mut floating, .. } = rotor(&lifted.bodies, &lifted_spin, &q, &u);
                 floating.apply(&on_shaft.constant());
-                let rows: [_; ROTOR_ROWS] = about_centre(floating.generalised_forces(), &arm);
-                for row in 0..ROTOR_ROWS {
-                    samples[kind][first + row * 4 + column][k] = -rows[row];
+                let rows: [_; ROWS] = about_centre(floating.generalised_forces(), &arm);
+                for row in 0..ROWS {
+                    samples[kind][entry(row, column)][k] = -rows[row];
                 }
             }
             for i in 0..2 {
-                samples[kind][FORCE + i][k] = force[i];
+                samples[kind][entry::force(i)][k] = force[i];
             }
             for r in 0..4 {
-                samples[kind][FORCE + 2 + r][k] = torque[r] - arm[r][0] * force[0] - arm[r][1] * force[1];
+                samples[kind][entry::force(2 + r)][k] =
+                    torque[r] - arm[r][0] * force[0] - arm[r][1] * force[1];
                 for s in 0..=r {
-                    samples[kind][INERTIA + r * (r + 1) / 2 + s][k] = inertia[r][s];
+                    samples[kind][entry::inertia(r, s)][k] = inertia[r][s];
                 }
-                samples[kind][ARM + 2 * r][k] = arm[r][0];
-                samples[kind][ARM + 2 * r + 1][k] = arm[r][1];
+                samples[kind][entry::arm(r, 0)][k] = arm[r][0];
+                samples[kind][entry::arm(r, 1)][k] = arm[r][1];
             }
         }
     }
@@ -159,7 +151,10 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
         rotor_axis: Tilt::new(q[6], q[7]).axis_partials(),
     };
     (0..T::LANES)
-        .map(|lane| LinearPoint { constants: constants.lane(lane), terms: terms_of_lane(&samples, lane) })
+        .map(|lane| LinearPoint {
+            constants: constants.lane(lane),
+            terms: RotorTerms::new(&coefficients_of_lane(&samples, lane)),
+        })
         .collect()
 }
 
@@ -194,25 +189,26 @@ fn about_centre<T: Real, const R: usize, const ROWS: usize>(
     rows
 }
 
-/// The rotor's terms of one lane, from samples at no spin, unit speed and unit acceleration.
-fn terms_of_lane<T: Lane>(samples: &[[[N<T>; HARMONICS]; ENTRIES]; 3], lane: usize) -> Vec<Term> {
-    let at = |kind: usize, entry: usize| -> [f64; HARMONICS] { samples[kind][entry].map(|v| v.0.get(lane)) };
-    let above_rest = |kind: usize, entry: usize| -> [f64; HARMONICS] {
-        let (value, rest) = (at(kind, entry), at(0, entry));
-        core::array::from_fn(|k| value[k] - rest[k])
-    };
-    let mut terms = Vec::with_capacity(256);
-    push_terms(&mut terms, INERTIA, Factor::One, (INERTIA..ARM).map(|e| at(0, e)));
-    push_terms(&mut terms, ARM, Factor::One, (ARM..FORCE).map(|e| at(0, e)));
-    // Forces and stiffness come together: a share of the larger tells rounding from physics for both.
-    for (first, past) in [(FORCE, STIFFNESS), (STIFFNESS, DAMPING)] {
-        push_terms(&mut terms, first, Factor::One, (first..past).map(|e| at(0, e)));
-        push_terms(&mut terms, first, Factor::SpeedSquared, (first..past).map(|e| above_rest(1, e)));
-        push_terms(&mut terms, first, Factor::Acceleration, (first..past).map(|e| above_rest(2, e)));
+/// Coefficients of all functions in each entry of one lane, from samples at no spin, unit speed and unit acceleration.
+fn coefficients_of_lane<T: Lane>(
+    samples: &[[[N<T>; HARMONICS]; ENTRIES]; 3],
+    lane: usize,
+) -> [[f64; FUNCTIONS]; ENTRIES] {
+    let mut all = [[0.0; FUNCTIONS]; ENTRIES];
+    for (entry, functions) in all.iter_mut().enumerate() {
+        let of = |kind: usize| harmonics::coefficients(samples[kind][entry].map(|v| v.0.get(lane)));
+        let [rest, at_speed, accelerated] = [of(0), of(1), of(2)];
+        functions[harmonics::ONE..harmonics::SPEED].copy_from_slice(&rest);
+        if entry >= entry::damping(0, 0) {
+            functions[harmonics::SPEED..harmonics::SPIN].copy_from_slice(&at_speed);
+        } else {
+            for harmonic in 0..HARMONICS {
+                functions[harmonics::SPIN + harmonic] = at_speed[harmonic] - rest[harmonic];
+            }
+            functions[harmonics::ACCELERATION] = accelerated[0] - rest[0];
+        }
     }
-    push_terms(&mut terms, DAMPING, Factor::Speed, (DAMPING..ENTRIES).map(|e| at(1, e)));
-    terms.sort_unstable_by_key(|term| term.key);
-    terms
+    all
 }
 
 /// The rotor's arrays at one instant.
@@ -227,18 +223,17 @@ impl<T: Copy> RotorAt<T> {
     #[inline(always)]
     fn arm(&self) -> [[N<T>; 2]; 4] {
         let e = &self.entries;
-        [
-            [e[ARM][0], e[ARM + 1][0]],
-            [e[ARM + 2][0], e[ARM + 3][0]],
-            [e[ARM + 4][0], e[ARM + 5][0]],
-            [e[ARM + 6][0], e[ARM + 7][0]],
-        ]
+        let mut arm = [[e[0][0]; 2]; 4];
+        for r in 0..4 {
+            arm[r] = [e[entry::arm(r, 0)][0], e[entry::arm(r, 1)][0]];
+        }
+        arm
     }
 }
 
 /// What depends on time alone.
 #[inline(always)]
-pub(crate) fn rotor_at<T: Lane>(terms: &TermLanes<T>, spin: &SpinState<T>) -> RotorAt<T> {
+pub(crate) fn rotor_at<T: Lane>(terms: &RotorTerms<T>, spin: &SpinState<T>) -> RotorAt<T> {
     let zero = spin.sin.lit(0.0);
     let mut rotor = RotorAt { entries: [[zero]; ENTRIES], inertia: Factors::new([[zero; 4]; 4]) };
     rotor.renew(terms, spin);
@@ -248,13 +243,13 @@ pub(crate) fn rotor_at<T: Lane>(terms: &TermLanes<T>, spin: &SpinState<T>) -> Ro
 impl<T: Lane> RotorAt<T> {
     /// Overwrites the arrays by those of another instant; `terms` are the same.
     #[inline(always)]
-    pub(crate) fn renew(&mut self, terms: &TermLanes<T>, spin: &SpinState<T>) {
-        terms.sum(&basis(spin), &mut self.entries);
+    pub(crate) fn renew(&mut self, terms: &RotorTerms<T>, spin: &SpinState<T>) {
+        terms.sum(&harmonics::functions(spin), &mut self.entries);
         let zero = spin.sin.lit(0.0);
         let mut inertia = [[zero; 4]; 4];
         for row in 0..4 {
             for column in 0..=row {
-                [inertia[row][column]] = self.entries[INERTIA + row * (row + 1) / 2 + column];
+                [inertia[row][column]] = self.entries[entry::inertia(row, column)];
             }
         }
         self.inertia = Factors::new(inertia);
@@ -311,12 +306,13 @@ fn unloaded<T: Lane>(
         }
     }
     let e = &rotor_at.entries;
-    let mut rotor = [zero; ROTOR_ROWS];
-    for row in 0..ROTOR_ROWS {
-        [rotor[row]] = e[FORCE + row];
+    let mut rotor = [zero; ROWS];
+    for row in 0..ROWS {
+        [rotor[row]] = e[entry::force(row)];
         for column in 0..4 {
-            let (entry, j) = (row * 4 + column, TURNS[column]);
-            rotor[row] = rotor[row] - e[STIFFNESS + entry][0] * q[j] - e[DAMPING + entry][0] * u[j];
+            let ([stiffness], [damping]) = (e[entry::stiffness(row, column)], e[entry::damping(row, column)]);
+            let j = TURNS[column];
+            rotor[row] = rotor[row] - stiffness * q[j] - damping * u[j];
         }
     }
     (
@@ -386,7 +382,7 @@ impl LinearPoint {
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let zero = N(0.0);
         let c = &self.constants;
-        let rotor_at = rotor_at(&TermLanes::splat(zero, &self.terms), spin);
+        let rotor_at = rotor_at(&RotorTerms::splat(zero, &self.terms), spin);
         // Columns of C and K, and F, are forces of single deviations; the bearings' share comes back with them.
         let rows = |q: &[N<f64>; COORDINATES], u: &[N<f64>; COORDINATES], loaded: bool| {
             let (mut tub, mut rotor) = unloaded(c, &rotor_at, q, u, zero);
@@ -418,7 +414,7 @@ impl LinearPoint {
         }
         let e = &rotor_at.entries;
         let rotor_arm = rotor_at.arm();
-        let rotor_inertia = |r: usize, s: usize| e[INERTIA + r * (r + 1) / 2 + s][0].0;
+        let rotor_inertia = |r: usize, s: usize| e[entry::inertia(r, s)][0].0;
         fill_mass(&mut matrices.mass, [0, 1], &[4, 5], c.tub_per_mass, &c.tub_arm, |r, s| {
             c.tub_inertia[r][s].0
         });

@@ -1,11 +1,12 @@
 //! The linear model's outputs: first order in the coordinates, harmonics 0 and 1 in theta.
 
 use crate::coefficients::Bodies;
-use crate::harmonics::{Term, TermLanes};
-use crate::lanes::GetLane;
+
+use crate::lanes::{GetLane, SetLane};
 use crate::linear::seeded;
 use crate::nonlinear::COORDINATES;
 use crate::outputs::{Axes, CHANNELS, Motion, RADIAL};
+use crate::sparse::sparse_sums;
 use crate::spin::SpinState;
 use lane_ode::{Lane, N, Real, Sample};
 
@@ -16,82 +17,153 @@ const OUTPUTS: usize = CHANNELS + RADIAL;
 const SAMPLES: [(f64, f64); 3] =
     [(1.0, 0.0), (-0.5, 0.866_025_403_784_438_6), (-0.5, -0.866_025_403_784_438_6)];
 
-/// A constant column, then one per coordinate.
+/// A constant column, then one per coordinate: the functions that the terms are of.
 const COLUMNS: usize = COORDINATES + 1;
 
-/// Below this share of the largest coefficient a term is the sampling's rounding.
-const NOISE: f64 = 1e-13;
+/// Channels in which the drum turns: its front centre, and the mass centre of the machine.
+const TURNING: core::ops::Range<usize> = 2..6;
 
-/// What the outputs are sums of: 1, cos and sin of theta, each times 1 and every coordinate.
-pub(crate) const FEATURES: usize = 3 * COLUMNS;
+/// Entries of the channels' terms: each channel, then the cos and sin parts of those that turn.
+const CHANNEL_ENTRIES: usize = CHANNELS + 2 * (TURNING.end - TURNING.start);
+/// Likewise of the radial distance; both components turn.
+const RADIAL_ENTRIES: usize = 3 * RADIAL;
 
-/// The outputs, as sparse terms.
-#[derive(Clone, Debug)]
-pub(crate) struct LinearOutputs {
-    channels: Vec<Term>,
-    radial: Vec<Term>,
+// The functions that the terms are of.
+const ONE: usize = 0;
+const Q1: usize = 1;
+const Q2: usize = 2;
+const Q3: usize = 3;
+const Q4: usize = 4;
+const Q5: usize = 5;
+const Q6: usize = 6;
+const Q7: usize = 7;
+const Q8: usize = 8;
+const Q9: usize = 9;
+const Q10: usize = 10;
+
+sparse_sums! {
+    /// Coefficients of the channels.
+    ChannelTerms: COLUMNS => CHANNEL_ENTRIES;
+    0 => Q1 Q6;
+    1 => Q2 Q5 Q6;
+    2 => Q3 Q8 Q10;
+    3 => Q4 Q7 Q8 Q10;
+    4 => Q1 Q3 Q6 Q8 Q10;
+    5 => Q2 Q4 Q5 Q6 Q7 Q8 Q10;
+    6 => Q5;
+    7 => Q6;
+    8 => Q8 Q10;
+    9 => Q9;
+    10 => Q7 Q8 Q9 Q10;
+    11 => Q7 Q9 Q10;
+    12 => Q8 Q10;
+    13 => Q9;
+    14 => Q7 Q8 Q9 Q10;
+    15 => Q7 Q9 Q10;
 }
 
-/// One machine's outputs per lane.
-pub(crate) struct OutputLanes<T> {
-    channels: TermLanes<T>,
-    radial: TermLanes<T>,
+sparse_sums! {
+    /// Coefficients of the radial distance.
+    RadialTerms: COLUMNS => RADIAL_ENTRIES;
+    0 => ONE Q1 Q2 Q3 Q4 Q5 Q6 Q7 Q8 Q10;
+    1 => ONE Q2 Q4 Q5 Q7 Q8 Q10;
+    2 => ONE Q5 Q6 Q7 Q8 Q9 Q10;
+    3 => ONE Q5 Q6 Q7 Q9 Q10;
+    4 => ONE Q5 Q7 Q8 Q9 Q10;
+    5 => ONE Q5 Q7 Q9 Q10;
 }
 
-impl<T: Lane> OutputLanes<T> {
-    pub(crate) fn splat(zero: N<T>, outputs: &LinearOutputs) -> Self {
+/// The outputs of one machine in `f64`, of one per lane in `T`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LinearOutputs<T> {
+    channels: ChannelTerms<T>,
+    radial: RadialTerms<T>,
+}
+
+impl<T: Lane> SetLane<LinearOutputs<f64>> for LinearOutputs<T> {
+    fn set_lane(&mut self, lane: usize, from: &LinearOutputs<f64>) {
+        self.channels.set_lane(lane, &from.channels);
+        self.radial.set_lane(lane, &from.radial);
+    }
+}
+
+impl<T: Lane> LinearOutputs<T> {
+    #[inline(always)]
+    pub(crate) fn splat(zero: N<T>, outputs: &LinearOutputs<f64>) -> Self {
         Self {
-            channels: TermLanes::splat(zero, &outputs.channels),
-            radial: TermLanes::splat(zero, &outputs.radial),
+            channels: ChannelTerms::splat(zero, &outputs.channels),
+            radial: RadialTerms::splat(zero, &outputs.radial),
         }
     }
 
-    pub(crate) fn set_lane(&mut self, lane: usize, outputs: &LinearOutputs) {
-        self.channels.set_lane(lane, &outputs.channels);
-        self.radial.set_lane(lane, &outputs.radial);
-    }
-
-    /// Deviations of the channels from equilibrium, where the features move.
+    /// Deviations of the channels from equilibrium.
     #[inline(always)]
-    pub(crate) fn channels(&self, features: &Features<T>) -> [Sample<T>; CHANNELS] {
-        samples(&self.channels, features)
+    pub(crate) fn channels(&self, of: &LinearMotion<T>) -> [Sample<T>; CHANNELS] {
+        let mut sums = [[of.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
+        self.channels.sum(&of.columns, &mut sums);
+        of.turned::<CHANNEL_ENTRIES, CHANNELS>(sums, TURNING)
     }
 
     /// The drum's front centre from the tub axis, along t2 and t3.
     #[inline(always)]
-    pub(crate) fn radial(&self, features: &Features<T>) -> [Sample<T>; RADIAL] {
-        samples(&self.radial, features)
+    pub(crate) fn radial(&self, of: &LinearMotion<T>) -> [Sample<T>; RADIAL] {
+        let mut sums = [[of.cos[0].lit(0.0); 3]; RADIAL_ENTRIES];
+        self.radial.sum(&of.columns, &mut sums);
+        of.turned::<RADIAL_ENTRIES, RADIAL>(sums, 0..RADIAL)
     }
 }
 
-#[inline(always)]
-fn samples<T: Lane, const M: usize>(terms: &TermLanes<T>, features: &Features<T>) -> [Sample<T>; M] {
-    let zero = features[0][1];
-    let mut sums = [[zero; 3]; M];
-    terms.sum(features, &mut sums);
-    core::array::from_fn(|i| Sample { value: sums[i][0], slope: sums[i][1], curvature: sums[i][2] })
+/// What the outputs are made of, each with two time derivatives.
+pub(crate) struct LinearMotion<T> {
+    /// 1, then the coordinates.
+    columns: [[N<T>; 3]; COLUMNS],
+    /// Of theta.
+    cos: [N<T>; 3],
+    sin: [N<T>; 3],
 }
 
-/// The features with two time derivatives.
-pub(crate) type Features<T> = [[N<T>; 3]; FEATURES];
+impl<T: Real> LinearMotion<T> {
+    /// Deviations from equilibrium at an instant.
+    #[inline(always)]
+    pub(crate) fn new(spin: &SpinState<T>, motion: &Motion<T>) -> Self {
+        let zero = spin.sin.lit(0.0);
+        let (n, nn, acceleration) = (spin.speed, (spin.speed * spin.speed).v(), spin.acceleration);
+        let mut columns = [[zero; 3]; COLUMNS];
+        columns[ONE][0] = zero.lit(1.0);
+        for j in 0..COORDINATES {
+            columns[Q1 + j] = [motion.q[j], motion.u[j], motion.a[j]];
+        }
+        Self {
+            columns,
+            cos: [spin.cos, -(n * spin.sin).v(), -(acceleration * spin.sin + nn * spin.cos)],
+            sin: [spin.sin, (n * spin.cos).v(), acceleration * spin.cos - nn * spin.sin],
+        }
+    }
 
-/// The features at deviations from equilibrium in motion; written in place, because they are too many to be moved.
-#[inline(always)]
-pub(crate) fn write_features<T: Real>(spin: &SpinState<T>, motion: &Motion<T>, features: &mut Features<T>) {
-    let zero = spin.sin.lit(0.0);
-    let (n, nn) = (spin.speed, (spin.speed * spin.speed).v());
-    let acceleration = spin.acceleration;
-    let one = [zero.lit(1.0), zero, zero];
-    let cos = [spin.cos, -(n * spin.sin).v(), -(acceleration * spin.sin + nn * spin.cos)];
-    let sin = [spin.sin, (n * spin.cos).v(), acceleration * spin.cos - nn * spin.sin];
-    features[0] = one;
-    features[COLUMNS] = cos;
-    features[2 * COLUMNS] = sin;
-    for j in 0..COORDINATES {
-        let q = [motion.q[j], motion.u[j], motion.a[j]];
-        features[1 + j] = q;
-        features[COLUMNS + 1 + j] = product(&cos, &q);
-        features[2 * COLUMNS + 1 + j] = product(&sin, &q);
+    /// Outputs from their sums, cos and sin parts after all others.
+    #[inline(always)]
+    fn turned<const ENTRIES: usize, const M: usize>(
+        &self,
+        mut sums: [[N<T>; 3]; ENTRIES],
+        turning: core::ops::Range<usize>,
+    ) -> [Sample<T>; M] {
+        let zero = self.cos[0].lit(0.0);
+        let mut part = M;
+        for output in turning {
+            for turn in [&self.cos, &self.sin] {
+                let product = product(turn, &sums[part]);
+                part += 1;
+                for w in 0..3 {
+                    sums[output][w] += product[w];
+                }
+            }
+        }
+        let mut outputs = [Sample::still(zero, zero); M];
+        for i in 0..M {
+            let [value, slope, curvature] = sums[i];
+            outputs[i] = Sample { value, slope, curvature };
+        }
+        outputs
     }
 }
 
@@ -105,7 +177,10 @@ fn product<T: Real>(a: &[N<T>; 3], b: &[N<T>; 3]) -> [N<T>; 3] {
 
 /// Expands the nonlinear outputs of one machine per lane about the equilibrium `q`.
 #[inline(always)]
-pub(crate) fn linearise_outputs<T: Lane>(bodies: &Bodies<T>, q: &[N<T>; COORDINATES]) -> Vec<LinearOutputs> {
+pub(crate) fn linearise_outputs<T: Lane>(
+    bodies: &Bodies<T>,
+    q: &[N<T>; COORDINATES],
+) -> Vec<LinearOutputs<f64>> {
     let zero = q[0].lit(0.0);
     let lifted = bodies.constant();
     let still = [zero.constant(); COORDINATES];
@@ -125,30 +200,40 @@ pub(crate) fn linearise_outputs<T: Lane>(bodies: &Bodies<T>, q: &[N<T>; COORDINA
     (0..T::LANES).map(|lane| of_lane(&samples.get_lane(lane))).collect()
 }
 
-fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs {
-    let mut terms = Vec::with_capacity(128);
+fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64> {
+    let (channels, radial) = coefficients(samples);
+    LinearOutputs { channels: ChannelTerms::gather(&channels), radial: RadialTerms::gather(&radial) }
+}
+
+/// Coefficients of all functions in each entry, from the samples.
+fn coefficients(
+    samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3],
+) -> ([[f64; COLUMNS]; CHANNEL_ENTRIES], [[f64; COLUMNS]; RADIAL_ENTRIES]) {
+    let mut channels = [[0.0; COLUMNS]; CHANNEL_ENTRIES];
+    let mut radial = [[0.0; COLUMNS]; RADIAL_ENTRIES];
     for output in 0..OUTPUTS {
         for column in 0..COLUMNS {
+            // Outputs of the linear model are linear in q: channels have no constant (model page, section 5).
+            if column == ONE && output < CHANNELS {
+                continue;
+            }
             let values = samples.map(|sample| sample[output][column].0);
             let mean = (values[0] + values[1] + values[2]) / 3.0;
             let cos = (2.0 * values[0] - values[1] - values[2]) / 3.0;
             let sin = (values[1] - values[2]) * 2.0 * SAMPLES[1].1 / 3.0;
-            // Outputs of the linear model are linear in q: channels have no constant (model page, section 5).
-            if column == 0 && output < CHANNELS {
-                continue;
-            }
-            for (harmonic, coefficient) in [mean, cos, sin].into_iter().enumerate() {
-                let key = (output as u16, (harmonic * COLUMNS + column) as u16);
-                terms.push(Term { key, coefficient });
+            for (part, coefficient) in [mean, cos, sin].into_iter().enumerate() {
+                if output >= CHANNELS {
+                    radial[entry(output - CHANNELS, part, RADIAL, 0)][column] = coefficient;
+                } else if part == 0 || TURNING.contains(&output) {
+                    channels[entry(output, part, CHANNELS, TURNING.start)][column] = coefficient;
+                }
             }
         }
     }
-    let largest = terms.iter().fold(0.0_f64, |m, t| m.max(t.coefficient.abs()));
-    terms.retain(|term| term.coefficient.abs() > NOISE * largest);
-    terms.sort_unstable_by_key(|term| term.key);
-    let mut radial = terms.split_off(terms.partition_point(|term| usize::from(term.key.0) < CHANNELS));
-    for term in &mut radial {
-        term.key.0 -= CHANNELS as u16;
-    }
-    LinearOutputs { channels: terms, radial }
+    (channels, radial)
+}
+
+/// Where a part (0: steady, 1: cos, 2: sin) of an output stands among `count` of them, the first of which that turns is `first`.
+const fn entry(output: usize, part: usize, count: usize, first: usize) -> usize {
+    if part == 0 { output } else { count + 2 * (output - first) + part - 1 }
 }

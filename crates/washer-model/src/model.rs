@@ -3,13 +3,13 @@
 use crate::coefficients::Coefficients;
 use crate::coupling::Coupling;
 use crate::floating::Factors;
-use crate::harmonics::TermLanes;
 use crate::lanes::SetLane;
 use crate::linear::{self, Constants, RotorAt};
-use crate::linear_outputs::{FEATURES, OutputLanes, write_features};
+use crate::linear_outputs::{LinearMotion, LinearOutputs};
 use crate::nonlinear::{self, COORDINATES};
 use crate::outputs::{Axes, CHANNELS, Motion, RADIAL};
 use crate::point::Point;
+use crate::rotor_terms::RotorTerms;
 use crate::spin::{SpinLanes, SpinState, SpinStretch};
 use core::f64::consts::FRAC_PI_2;
 use lane_ode::{Lane, N, Sample, System};
@@ -154,8 +154,8 @@ pub(crate) struct Linear<T> {
     machine: Coefficients<T>,
     constants: Constants<T>,
     tub_inertia: Factors<T, 2>,
-    terms: TermLanes<T>,
-    outputs: OutputLanes<T>,
+    terms: RotorTerms<T>,
+    outputs: LinearOutputs<T>,
     spin: SpinLanes<T>,
 }
 
@@ -205,8 +205,8 @@ impl<T: Lane> Model<T> for Linear<T> {
             machine: Coefficients::splat(zero, &point.machine),
             tub_inertia: linear::tub_factors(&constants),
             constants,
-            terms: TermLanes::splat(zero, &point.linear.terms),
-            outputs: OutputLanes::splat(zero, &point.linear_outputs),
+            terms: RotorTerms::splat(zero, &point.linear.terms),
+            outputs: LinearOutputs::splat(zero, &point.linear_outputs),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
         }
     }
@@ -235,9 +235,8 @@ impl<T: Lane> Model<T> for Linear<T> {
         dx: &[N<T>; STATES],
         with_channels: bool,
     ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>) {
-        let mut features = [[x[0].lit(0.0); 3]; FEATURES];
-        write_features(&forcing.spin, &motion(x, dx), &mut features);
-        let channels = if with_channels { Some(self.outputs.channels(&features)) } else { None };
-        (self.outputs.radial(&features), channels)
+        let motion = LinearMotion::new(&forcing.spin, &motion(x, dx));
+        let channels = if with_channels { Some(self.outputs.channels(&motion)) } else { None };
+        (self.outputs.radial(&motion), channels)
     }
 }

@@ -32,7 +32,7 @@ pub struct Point {
     /// Channels at the equilibrium.
     pub(crate) rest: [f64; CHANNELS],
     pub(crate) linear: LinearPoint,
-    pub(crate) linear_outputs: LinearOutputs,
+    pub(crate) linear_outputs: LinearOutputs<f64>,
     pub(crate) stretches: Vec<SpinStretch>,
     pub(crate) legs: Vec<PlannedLeg>,
 }

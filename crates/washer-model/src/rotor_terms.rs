@@ -1,0 +1,130 @@
+//! Which terms the rotor's linear equations have: the nonzero harmonics of its arrays, by entry.
+//!
+//! Rows are those of one half: y, z of its midpoint, then its rotations about the mass centre. Columns are q7 to q10, because the
+//! rotor's forces do not depend on q3 and q4 but through the bearings. Places hold for every machine: the drum's mass centre lies
+//! in the plane of d1 and d2, which stands upright where the machine rests.
+
+use crate::harmonics::{
+    ACCELERATION, COS, COS_2, FUNCTIONS, ONE, SIN, SIN_2, SPEED, SPEED_COS, SPEED_COS_2, SPEED_SIN,
+    SPEED_SIN_2, SPIN, SPIN_COS, SPIN_COS_2, SPIN_SIN, SPIN_SIN_2,
+};
+use crate::sparse::sparse_sums;
+
+/// Rows of the rotor.
+pub(crate) const ROWS: usize = 6;
+/// Its rotations.
+pub(crate) const TURNS: usize = 4;
+
+const ARM: usize = TURNS * (TURNS + 1) / 2;
+const FORCE: usize = ARM + 2 * TURNS;
+const STIFFNESS: usize = FORCE + ROWS;
+const DAMPING: usize = STIFFNESS + ROWS * TURNS;
+
+/// Entries of all arrays of the rotor together.
+pub(crate) const ENTRIES: usize = DAMPING + ROWS * TURNS;
+
+/// Entry of the inertia matrix about the mass centre, `row` not less than `column`.
+pub(crate) const fn inertia(row: usize, column: usize) -> usize {
+    row * (row + 1) / 2 + column
+}
+
+/// Entry of the mass centre's partial velocity by a rotation, along y (0) or z (1).
+pub(crate) const fn arm(rotation: usize, direction: usize) -> usize {
+    ARM + 2 * rotation + direction
+}
+
+/// Entry of the force.
+pub(crate) const fn force(row: usize) -> usize {
+    FORCE + row
+}
+
+/// Entry of the stiffness matrix.
+pub(crate) const fn stiffness(row: usize, column: usize) -> usize {
+    STIFFNESS + row * TURNS + column
+}
+
+/// Entry of the damping and gyroscopic matrix.
+pub(crate) const fn damping(row: usize, column: usize) -> usize {
+    DAMPING + row * TURNS + column
+}
+
+sparse_sums! {
+    /// Coefficients of the rotor's terms.
+    RotorTerms: FUNCTIONS => ENTRIES;
+    inertia(0, 0) => ONE COS SIN COS_2 SIN_2;
+    inertia(1, 0) => ONE COS SIN COS_2 SIN_2;
+    inertia(1, 1) => ONE COS COS_2;
+    inertia(2, 0) => ONE COS SIN COS_2 SIN_2;
+    inertia(2, 1) => ONE COS SIN COS_2 SIN_2;
+    inertia(2, 2) => ONE COS_2 SIN_2;
+    inertia(3, 0) => ONE COS SIN COS_2 SIN_2;
+    inertia(3, 1) => ONE COS SIN COS_2 SIN_2;
+    inertia(3, 2) => COS SIN COS_2 SIN_2;
+    inertia(3, 3) => ONE COS SIN COS_2 SIN_2;
+    arm(0, 1) => ONE COS SIN;
+    arm(1, 0) => ONE COS;
+    arm(1, 1) => ONE COS;
+    arm(2, 0) => SIN;
+    arm(2, 1) => COS SIN;
+    arm(3, 0) => ONE COS;
+    arm(3, 1) => ONE COS SIN;
+    force(0) => SPIN_COS;
+    force(1) => SPIN_COS SPIN_SIN;
+    force(2) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    force(3) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    force(4) => SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    force(5) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
+    stiffness(0, 1) => SPIN_COS;
+    stiffness(0, 2) => SPIN_SIN;
+    stiffness(0, 3) => SPIN_COS;
+    stiffness(1, 0) => SPIN_COS SPIN_SIN;
+    stiffness(1, 1) => SPIN_COS;
+    stiffness(1, 2) => SPIN_COS SPIN_SIN;
+    stiffness(1, 3) => SPIN_COS SPIN_SIN;
+    stiffness(2, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
+    stiffness(2, 1) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(2, 2) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(2, 3) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(3, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(3, 1) => ONE COS SPIN SPIN_COS SPIN_COS_2;
+    stiffness(3, 2) => SIN SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(3, 3) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(4, 0) => SPIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(4, 1) => SIN SPIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(4, 2) => ONE SPIN SPIN_COS_2 SPIN_SIN_2;
+    stiffness(4, 3) => SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(5, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(5, 1) => ONE COS SPIN SPIN_COS SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(5, 2) => SIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(5, 3) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
+    damping(0, 1) => SPEED_SIN;
+    damping(0, 2) => SPEED_COS;
+    damping(0, 3) => SPEED_SIN;
+    damping(1, 0) => SPEED_COS SPEED_SIN;
+    damping(1, 1) => SPEED_SIN;
+    damping(1, 2) => SPEED_COS SPEED_SIN;
+    damping(1, 3) => SPEED_COS SPEED_SIN;
+    damping(2, 0) => SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(2, 1) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(2, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(2, 3) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(3, 0) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(3, 1) => SPEED_SIN SPEED_SIN_2;
+    damping(3, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(3, 3) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(4, 0) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(4, 1) => SPEED SPEED_COS SPEED_COS_2 SPEED_SIN_2;
+    damping(4, 2) => SPEED_COS_2 SPEED_SIN_2;
+    damping(4, 3) => SPEED SPEED_COS_2 SPEED_SIN_2;
+    damping(5, 0) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(5, 1) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(5, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(5, 3) => SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+}
+
+impl RotorTerms<f64> {
+    /// From the coefficients of all functions in each entry.
+    pub(crate) fn new(all: &[[f64; FUNCTIONS]; ENTRIES]) -> Self {
+        Self::gather(all)
+    }
+}
