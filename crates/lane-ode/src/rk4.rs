@@ -82,8 +82,10 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         // At three times: the step's start, middle and end; start and end change places from step to step.
         let mut forcing = [task.forcing(time); 3];
         let (mut start, middle, mut end) = (0, 1, 2);
-        let mut before = x;
-        let mut slope_before = x;
+        // States and slopes of this step's start and of the last one's, which change places too.
+        let (mut states, mut slopes) = ([x; 2], [x; 2]);
+        let (mut now, mut last) = (0, 1);
+        let (mut y, mut sum) = (x, x);
         let mut is_fresh = true;
         let mut done = 0;
         loop {
@@ -98,23 +100,19 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                 }
             }
             let places = [start, middle, middle, end];
-            let mut y = x;
-            let mut sum = [zero; D];
-            let mut first_slope = [zero; D];
             // One copy of the right-hand side: four would not fit the instruction cache.
             for stage in 0..stages {
                 let forcing = &forcing[places[stage]];
-                let slope = task.derivative(forcing, &y);
+                let slope = task.derivative(forcing, if stage == 0 { &states[now] } else { &y });
                 let reach = (h * REACH[stage]).v();
-                let weight = zero.lit(WEIGHT[stage]);
-                for i in 0..D {
-                    y[i] = x[i] + reach * slope[i];
-                    sum[i] += weight * slope[i];
-                }
                 if stage == 0 {
-                    first_slope = slope;
+                    for i in 0..D {
+                        y[i] = states[now][i] + reach * slope[i];
+                        sum[i] = slope[i];
+                    }
+                    slopes[now] = slope;
                     if is_fresh {
-                        task.begin(forcing, &x, &slope);
+                        task.begin(forcing, &states[now], &slopes[now]);
                         is_fresh = false;
                     } else {
                         task.observe(
@@ -122,29 +120,34 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                             &Step {
                                 end_s: time,
                                 length_s: h,
-                                before: &before,
-                                slope_before: &slope_before,
-                                after: &x,
-                                slope_after: &slope,
+                                before: &states[last],
+                                slope_before: &slopes[last],
+                                after: &states[now],
+                                slope_after: &slopes[now],
                                 dense: None,
                             },
                         );
+                    }
+                } else {
+                    let weight = zero.lit(WEIGHT[stage]);
+                    for i in 0..D {
+                        y[i] = states[now][i] + reach * slope[i];
+                        sum[i] += weight * slope[i];
                     }
                 }
             }
             if is_last {
                 break;
             }
-            before = x;
-            slope_before = first_slope;
             for i in 0..D {
-                x[i] += sixth * sum[i];
+                states[last][i] = states[now][i] + sixth * sum[i];
             }
+            (now, last) = (last, now);
             index = index + 1.0;
             time = next_time;
             (start, end) = (end, start);
             done += 1;
-            let in_range = task.in_range(&x);
+            let in_range = task.in_range(&states[now]);
             if !T::all(in_range) {
                 let out = !T::bits(in_range);
                 for lane in (0..T::LANES).filter(|lane| lanes[*lane].is_active && out >> lane & 1 == 1) {
@@ -160,6 +163,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                 }
             }
         }
+        x = states[now];
         for lane in 0..T::LANES {
             let progress = &mut lanes[lane];
             if progress.is_active {
