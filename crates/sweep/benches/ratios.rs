@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use lane_ode::Simd;
-use washer_model::{Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
+use washer_model::{Capping, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
 
 /// As many as the widest lanes hold.
 const TRAJECTORIES: usize = 8;
@@ -17,6 +17,7 @@ fn main() {
     // Cargo passes `--bench` along.
     let rounds = std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(ROUNDS);
     trajectories(rounds);
+    methods(rounds);
     threads(rounds);
 }
 
@@ -84,9 +85,76 @@ fn trajectories(rounds: usize) {
     println!();
 }
 
-/// The quick map by the program itself.
+/// One core, the whole grid of Fig. 12: plain steps and the fast method.
+fn methods(rounds: usize) {
+    let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+    let (end_s, window_s) = (50.0, [30.0, 50.0]);
+    let mut scenarios = Vec::new();
+    for mass in 0..39 {
+        for damping in 0..33 {
+            let mut machine = Machine::paper();
+            machine.unbalance.mass_kg = 0.05 + 0.025 * f64::from(mass);
+            for damper in &mut machine.dampers {
+                damper.damping_n_s_per_m = 60.0 + 7.5 * f64::from(damping);
+            }
+            scenarios.push((machine, spin.clone()));
+        }
+    }
+    let points: Vec<Point> = prepare(Simd::best(), &scenarios, &Timing { end_s, window_s })
+        .into_iter()
+        .map(|point| point.expect("the paper's machine has an equilibrium"))
+        .collect();
+    let last = points.len() - 1;
+    let corners = [0, 32, last - 32, last].map(|corner| (&points[corner], &spin));
+    let fast =
+        |accuracy| Capping::choose(corners, end_s, accuracy).expect("the paper's machine has modes").method();
+    let methods = [
+        (format!("rk4, {STEP_S:e} s"), Method::Rk4 { step_s: STEP_S }),
+        ("rk4-mass-scaled, 1e-3".to_owned(), fast(1e-3)),
+        ("rk4-mass-scaled, 1e-6".to_owned(), fast(1e-6)),
+    ];
+    let models = [("nonlinear", ModelKind::Nonlinear), ("linear", ModelKind::Linear)];
+    let subjects: Vec<_> = methods
+        .iter()
+        .flat_map(|(name, method)| models.map(|(model, kind)| (format!("{model}, {name}"), kind, *method)))
+        .collect();
+    let points: Vec<_> = points.iter().collect();
+    let mut times = vec![Vec::new(); subjects.len()];
+    for _ in 0..rounds {
+        for ((_, model, method), times) in subjects.iter().zip(&mut times) {
+            let begin = Instant::now();
+            let records = simulate(Simd::best(), *model, method, &points);
+            times.push(begin.elapsed().as_secs_f64());
+            assert!(records.iter().all(|record| record.failure.is_none()));
+        }
+    }
+    println!(
+        "One core, {}, the {} points of Fig. 12, each trajectory once; what a run adds (sample, second runs, recomputed points) is below:\n",
+        Simd::best().name(),
+        points.len()
+    );
+    let names: Vec<_> = subjects.iter().map(|subject| subject.0.clone()).collect();
+    let medians = table("s a grid", &names, &times);
+    println!("| ratio | |\n|---|---|");
+    for (model, _) in models.iter().enumerate() {
+        for method in 1..methods.len() {
+            let ratio = medians[model] / medians[2 * method + model];
+            println!("| {} against {} | {ratio:.1} |", names[2 * method + model], methods[0].0);
+        }
+    }
+    for (method, (name, _)) in methods.iter().enumerate() {
+        let [nonlinear, linear] = [medians[2 * method], medians[2 * method + 1]];
+        println!(
+            "| both models against the nonlinear alone, {name} | {:.2} |",
+            (nonlinear + linear) / nonlinear
+        );
+    }
+    println!();
+}
+
+/// Fig. 12 by the program itself.
 fn threads(rounds: usize) {
-    let grid = concat!(env!("CARGO_MANIFEST_DIR"), "/../../sweeps/quick.toml");
+    let grid = concat!(env!("CARGO_MANIFEST_DIR"), "/../../sweeps/fig12.toml");
     let output = std::env::temp_dir().join(format!("sweep-ratios-{}.parquet", std::process::id()));
     let counts = ["1", "2"];
     let mut times = vec![Vec::new(); counts.len()];
@@ -106,7 +174,7 @@ fn threads(rounds: usize) {
         // What is left in the temporary folder harms nobody.
         let _ = std::fs::remove_file(made);
     }
-    println!("`sweep run sweeps/quick.toml` (81 points, both models), start of the program included:\n");
+    println!("`sweep run sweeps/fig12.toml` (1287 points, both models), start of the program included:\n");
     let names: Vec<_> = counts.iter().map(|count| format!("--threads {count}")).collect();
     let medians = table("s a map", &names, &times);
     println!("| ratio | |\n|---|---|\n| two threads against one | {:.2} |\n", medians[0] / medians[1]);
