@@ -148,7 +148,9 @@ fn holds(point: &Point, speed: f64, step_s: f64, cap: f64, accuracy: f64) -> Res
         for (plain, capped) in plain.modes.iter().zip(&capped.modes).take(SLOW_MODES) {
             let half_width = plain.re_per_s.abs().max(LEAST_HALF_WIDTH * plain.magnitude_rad_per_s);
             let distance = half_width.max(plain.magnitude_rad_per_s - speed);
-            let shift = (capped.re_per_s - plain.re_per_s).hypot(capped.im_rad_per_s - plain.im_rad_per_s);
+            let (slower, detuned) =
+                (capped.re_per_s - plain.re_per_s, capped.im_rad_per_s - plain.im_rad_per_s);
+            let shift = (slower * slower + detuned * detuned).sqrt();
             let weight = (speed / plain.magnitude_rad_per_s).min(1.0).powi(4);
             if weight * shift > SHIFT_SHARE * accuracy * distance {
                 return Ok(false);
