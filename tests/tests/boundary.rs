@@ -61,7 +61,10 @@ fn a_curve_for_every_combination_of_further_axes_in_a_figure() {
     let sweep = |arguments: &[&str]| {
         let done = Command::new(sweep_binary()).current_dir(folder.path()).args(arguments).output();
         let done = done.expect("it starts");
-        (done.status.code(), [done.stdout, done.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()))
+        (
+            done.status.code(),
+            [done.stdout, done.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()),
+        )
     };
     let (code, [shown, said]) = sweep(&["show", file]);
     assert_eq!(code, Some(0), "{said}");

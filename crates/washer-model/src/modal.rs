@@ -148,7 +148,8 @@ fn unit_mass(
     mass: &[[f64; COORDINATES]; COORDINATES],
     vector: &[c64; COORDINATES],
 ) -> [[f64; 2]; COORDINATES] {
-    let largest = vector.iter().fold(c64::new(0.0, 0.0), |m, v| if v.norm_sqr() > m.norm_sqr() { *v } else { m });
+    let largest =
+        vector.iter().fold(c64::new(0.0, 0.0), |m, v| if v.norm_sqr() > m.norm_sqr() { *v } else { m });
     let turned = vector.map(|v| v * largest.conj() / largest.norm_sqr());
     let pairs = turned.map(|v| [v.re, v.im]);
     let scale = inner(mass, &pairs, &pairs)[0].sqrt();

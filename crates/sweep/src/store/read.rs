@@ -54,7 +54,9 @@ pub(crate) fn finished(path: &Path) -> Result<Finished, StoreError> {
     };
     Ok(match own_word(&reader) {
         Some(result) => Finished::Result(Box::new(result)),
-        None if has_points(&reader) => Finished::Foreign(format!("it has no `{}` in its metadata", key::PLAN)),
+        None if has_points(&reader) => {
+            Finished::Foreign(format!("it has no `{}` in its metadata", key::PLAN))
+        }
         None => Finished::Foreign("it has no column `point`, as the result of a run has".into()),
     })
 }
