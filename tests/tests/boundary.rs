@@ -58,6 +58,21 @@ fn a_curve_for_every_combination_of_further_axes_in_a_figure() {
         .output()
         .expect("it starts");
     assert_eq!(drawn.status.code(), Some(0), "{}", String::from_utf8_lossy(&drawn.stderr));
+    let sweep = |arguments: &[&str]| {
+        let done = Command::new(sweep_binary()).current_dir(folder.path()).args(arguments).output();
+        let done = done.expect("it starts");
+        (
+            done.status.code(),
+            [done.stdout, done.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()),
+        )
+    };
+    let (code, [shown, said]) = sweep(&["show", file]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(shown.contains("6 none_in_range_reliable"), "{shown}");
+    // It carries the grid's plan, but is not that grid's map.
+    let (code, [_, said]) = sweep(&["run", "grid.toml", "--out", file]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("no column `point`"), "{said}");
 }
 
 #[test]

@@ -56,7 +56,6 @@ pub enum Command {
     /// Print shell completions
     Completions(completions::Args),
     /// Write manual pages
-    #[command(hide = true)]
     Man(man::Args),
     /// Print a page of the guide that is made from this program's tables
     #[command(hide = true)]

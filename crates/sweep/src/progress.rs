@@ -78,13 +78,40 @@ impl Progress {
         }
     }
 
+    /// Says that the method is being looked at before the first point, which on a large grid takes a while.
+    pub(crate) fn settling(&mut self) {
+        let seconds = self.began.elapsed().as_secs_f64();
+        match &mut self.shown {
+            Shown::Bar(bar) => {
+                bar.set_style(style("{spinner} checking the method on a sample of the grid  {elapsed}"));
+                bar.tick();
+            }
+            Shown::Lines { every, next } if Instant::now() >= *next => {
+                *next = Instant::now() + *every;
+                // As in `show`.
+                let _ = writeln!(
+                    std::io::stderr(),
+                    "checking the method on a sample of the grid, {} so far",
+                    duration(seconds)
+                );
+            }
+            Shown::Lines { .. } | Shown::Nothing => {}
+        }
+    }
+
+    /// Says that points begin now: what was before does not count towards their rate.
+    pub(crate) fn computing(&mut self) {
+        self.began = Instant::now();
+        if let Shown::Bar(bar) = &self.shown {
+            bar.set_style(style(BAR));
+            bar.reset_eta();
+        }
+    }
+
     /// Says that the chunks are being joined.
     pub(crate) fn joining(&self) {
         if let Shown::Bar(bar) = &self.shown {
-            bar.set_style(
-                ProgressStyle::with_template("{spinner} joining {human_len} points")
-                    .unwrap_or_else(|_| ProgressStyle::default_spinner()),
-            );
+            bar.set_style(style("{spinner} joining {human_len} points"));
             bar.tick();
         }
     }
@@ -109,10 +136,16 @@ impl Progress {
     }
 }
 
+/// The bar with its numbers.
+const BAR: &str = "{wide_bar} {human_pos}/{human_len} points  {per_sec}  {eta} left";
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
 fn bar(total: u64, start: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(8));
-    let template = "{wide_bar} {human_pos}/{human_len} points  {per_sec}  {eta} left";
-    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_style(style(BAR));
     bar.set_position(start);
     bar.reset_eta();
     bar

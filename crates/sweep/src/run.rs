@@ -220,7 +220,8 @@ fn compute(
         .map_err(|error| StoreError::Threads { threads, reason: error.to_string() })?;
     let watch = Watch::new(interrupt);
     let remembered = run.remembered()?;
-    let Some(settled) = pool.install(|| engine.settle(remembered.clone(), &watch)) else { return Ok(()) };
+    let Some(settled) = settle(engine, remembered.clone(), &pool, &watch, progress) else { return Ok(()) };
+    progress.computing();
     if !settled.is_null() && remembered.as_ref() != Some(&settled) {
         run.remember(&settled)?;
     }
@@ -253,6 +254,28 @@ fn compute(
         }
     });
     result
+}
+
+/// Has the engine settle on a thread of its own, so that this one can tell how long it takes.
+fn settle(
+    engine: &dyn Engine,
+    remembered: Option<Value>,
+    pool: &rayon::ThreadPool,
+    watch: &Watch<'_>,
+    progress: &mut Progress,
+) -> Option<Value> {
+    let (sender, receiver) = sync_channel(1);
+    std::thread::scope(|scope| {
+        scope.spawn(move || sender.send(pool.install(|| engine.settle(remembered, watch))));
+        loop {
+            match receiver.recv_timeout(Duration::from_millis(100)) {
+                Ok(settled) => return settled,
+                Err(RecvTimeoutError::Timeout) => progress.settling(),
+                // It panicked, and the scope goes on with that.
+                Err(RecvTimeoutError::Disconnected) => return None,
+            }
+        }
+    })
 }
 
 type Computed = (u64, Result<Vec<Outcome>, StoreError>);

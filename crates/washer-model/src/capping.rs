@@ -43,6 +43,9 @@ const LEAST_HALF_WIDTH: f64 = 0.01;
 /// Share of the accuracy that the cap's shift of the followed modes may use up.
 const SHIFT_SHARE: f64 = 0.1;
 
+/// Bits of a step's fraction that count: 1e-6 of the step.
+const STEP_BITS: u32 = 20;
+
 /// From one candidate step to the next.
 const SHORTER: f64 = 0.97;
 
@@ -77,7 +80,7 @@ impl Capping {
             let fastest = highest_with_cap(point, 0.0, None)?.max(highest_with_cap(point, speed, None)?);
             Ok::<_, NoModes>(STEP_TIMES_FASTEST / fastest)
         });
-        steps.flatten().reduce(f64::min)
+        steps.flatten().reduce(f64::min).map(rounded_down)
     }
 
     /// The longest step, and its cap, at which amplitudes should be right to `accuracy` (relative) at each of `points`, whose drums
@@ -105,6 +108,7 @@ impl Capping {
             plain_step_s = plain_step_s.min(STEP_TIMES_FASTEST / fastest);
             cases.push((point, speed));
         }
+        (step_s, plain_step_s) = (rounded_down(step_s), rounded_down(plain_step_s));
         if step_s <= plain_step_s {
             return Ok(Self { step_s, cap_rad_per_s: None });
         }
@@ -125,6 +129,14 @@ impl Capping {
     }
 }
 
+/// A step of few digits. The last ones of an eigenvalue are the processor's and the system's mathematical library's own, and a result must not
+/// depend on either.
+fn rounded_down(step_s: f64) -> f64 {
+    f64::from_bits(
+        step_s.to_bits() >> (f64::MANTISSA_DIGITS - 1 - STEP_BITS) << (f64::MANTISSA_DIGITS - 1 - STEP_BITS),
+    )
+}
+
 /// Whether a step is stable with a cap, and the slow modes stay where they are.
 fn holds(point: &Point, speed: f64, step_s: f64, cap: f64, accuracy: f64) -> Result<bool, NoModes> {
     for turning in [speed, 0.0] {
@@ -136,7 +148,9 @@ fn holds(point: &Point, speed: f64, step_s: f64, cap: f64, accuracy: f64) -> Res
         for (plain, capped) in plain.modes.iter().zip(&capped.modes).take(SLOW_MODES) {
             let half_width = plain.re_per_s.abs().max(LEAST_HALF_WIDTH * plain.magnitude_rad_per_s);
             let distance = half_width.max(plain.magnitude_rad_per_s - speed);
-            let shift = (capped.re_per_s - plain.re_per_s).hypot(capped.im_rad_per_s - plain.im_rad_per_s);
+            let (slower, detuned) =
+                (capped.re_per_s - plain.re_per_s, capped.im_rad_per_s - plain.im_rad_per_s);
+            let shift = (slower * slower + detuned * detuned).sqrt();
             let weight = (speed / plain.magnitude_rad_per_s).min(1.0).powi(4);
             if weight * shift > SHIFT_SHARE * accuracy * distance {
                 return Ok(false);
@@ -144,4 +158,43 @@ fn holds(point: &Point, speed: f64, step_s: f64, cap: f64, accuracy: f64) -> Res
         }
     }
     Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Machine, Timing, prepare};
+    use lane_ode::Simd;
+
+    /// Run up slowly enough for the fastest suspension mode, an eigenvalue, to decide the step.
+    fn chosen(stiffer: f64) -> (Capping, Option<f64>) {
+        let mut machine = Machine::paper();
+        for spring in &mut machine.springs {
+            spring.stiffness_n_per_m *= stiffer;
+        }
+        let spin = Spin::Ramp { peak_rpm: 100.0, ramp_s: 4.0 };
+        let timing = Timing { end_s: 4.0, window_s: [3.0, 4.0] };
+        let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
+        let ready: Vec<_> = points.iter().flatten().map(|point| (point, &spin)).collect();
+        let plain_step_s = Capping::plain_step_s(ready.iter().copied(), timing.end_s);
+        (Capping::choose(ready, timing.end_s, 1e-3).unwrap(), plain_step_s)
+    }
+
+    #[test]
+    fn the_last_digits_of_eigenvalues_change_neither_step_nor_cap() {
+        let (capping, plain_step_s) = chosen(1.0);
+        assert_eq!(chosen(1.0 + 1e-10), (capping, plain_step_s));
+        assert_eq!(chosen(1.0 - 1e-10), (capping, plain_step_s));
+        let stiffer = chosen(1.01).0;
+        assert!(stiffer.step_s < capping.step_s && stiffer.cap_rad_per_s > capping.cap_rad_per_s);
+    }
+
+    #[test]
+    fn a_step_is_rounded_down_by_less_than_a_millionth() {
+        for step_s in [2e-4, 1.0 / 3.0, 5.9e-3, 1e-300] {
+            let rounded = rounded_down(step_s);
+            assert!(rounded <= step_s && rounded > step_s * (1.0 - 1e-6), "{step_s}: {rounded}");
+        }
+        assert_eq!(rounded_down(0.25), 0.25);
+    }
 }

@@ -117,7 +117,7 @@ pub(crate) fn modes_with_cap(
         }
         let shape = || unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, k)]));
         if s.im > 0.0 {
-            swinging.push(mode(s, s.norm(), shape()));
+            swinging.push(mode(s, magnitude(s), shape()));
         } else if s.im == 0.0 {
             steady.push((s.re, shape()));
         }
@@ -134,6 +134,11 @@ pub(crate) fn modes_with_cap(
     Ok(Modes { modes, mass })
 }
 
+/// |s| from operations that round the same everywhere; `hypot` is each system's own.
+fn magnitude(s: c64) -> f64 {
+    s.norm_sqr().sqrt()
+}
+
 fn mode(s: c64, magnitude: f64, shape: [[f64; 2]; COORDINATES]) -> Mode {
     Mode { re_per_s: s.re, im_rad_per_s: s.im, magnitude_rad_per_s: magnitude, shape }
 }
@@ -143,7 +148,8 @@ fn unit_mass(
     mass: &[[f64; COORDINATES]; COORDINATES],
     vector: &[c64; COORDINATES],
 ) -> [[f64; 2]; COORDINATES] {
-    let largest = vector.iter().fold(c64::new(0.0, 0.0), |m, v| if v.norm() > m.norm() { *v } else { m });
+    let largest =
+        vector.iter().fold(c64::new(0.0, 0.0), |m, v| if v.norm_sqr() > m.norm_sqr() { *v } else { m });
     let turned = vector.map(|v| v * largest.conj() / largest.norm_sqr());
     let pairs = turned.map(|v| [v.re, v.im]);
     let scale = inner(mass, &pairs, &pairs)[0].sqrt();
@@ -170,7 +176,7 @@ pub(crate) fn highest_with_cap(
         let theta = TAU * angle as f64 / ANGLES as f64;
         let (system, _) = first_order(point, theta, speed_rad_per_s, cap_rad_per_s)?;
         for s in system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)? {
-            let magnitude = s.norm() * system.unit_per_s;
+            let magnitude = magnitude(s) * system.unit_per_s;
             if !magnitude.is_finite() {
                 return Err(NoModes::Eigenvalues);
             }

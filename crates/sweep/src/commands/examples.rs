@@ -1,5 +1,8 @@
 //! Examples, printed by `--help` before everything else: most readers want to see one line that works.
 
+/// Widest line of help that an ordinary terminal shows as it is.
+const WIDEST: usize = 80;
+
 /// Command, then lines with what each does. The empty name is the program's own help.
 const EXAMPLES: &[(&str, &[[&str; 2]])] = &[
     (
@@ -96,15 +99,45 @@ const EXAMPLES: &[(&str, &[[&str; 2]])] = &[
     ),
     ("schema", &[["sweep schema", "for editors that complete and check TOML"]]),
     ("completions", &[["sweep completions bash", "to be sourced, or put where the shell looks"]]),
+    ("man", &[["sweep man ~/.local/share/man/man1", "then `man sweep`, `man sweep-run`"]]),
 ];
+
+/// The examples of one command: each a line to type, and what it does.
+pub(super) fn lines(command: &str) -> &'static [[&'static str; 2]] {
+    EXAMPLES.iter().find(|(name, _)| *name == command).map_or(&[], |(_, lines)| lines)
+}
 
 /// The examples of one command as its help shows them; `None` if it has none.
 #[must_use]
 pub fn of(command: &str) -> Option<String> {
-    let (_, lines) = EXAMPLES.iter().find(|(name, _)| *name == command)?;
-    let width = lines.iter().map(|[line, _]| line.len()).max().unwrap_or(0);
-    let shown: Vec<String> = lines.iter().map(|[line, does]| format!("  {line:width$}   {does}")).collect();
-    Some(format!("Examples:\n{}", shown.join("\n")))
+    let lines = lines(command);
+    let width = lines.iter().map(|[line, _]| line.len()).max()?;
+    let fits = lines.iter().all(|[_, does]| 2 + width + 3 + does.len() <= WIDEST);
+    let mut text = String::from("Examples:");
+    for [line, does] in lines {
+        text += &if fits {
+            format!("\n  {line:width$}   {does}")
+        } else {
+            format!("\n  {}\n      {does}", folded(line))
+        };
+    }
+    Some(text)
+}
+
+/// A line to type, on as many as it takes, so that it can still be copied.
+fn folded(line: &str) -> String {
+    let mut text = String::new();
+    let mut column = 2;
+    for (i, part) in line.split(" --").enumerate() {
+        let part = if i == 0 { part.to_owned() } else { format!(" --{part}") };
+        if i > 0 && column + part.len() + 2 > WIDEST {
+            text += " \\\n   ";
+            column = 3;
+        }
+        column += part.len();
+        text += &part;
+    }
+    text
 }
 
 #[cfg(test)]
@@ -127,6 +160,17 @@ mod tests {
                 let parsed = cli::command().try_get_matches_from(line.split_whitespace());
                 assert!(parsed.is_ok(), "{line}: {parsed:?}");
             }
+        }
+    }
+
+    #[test]
+    fn no_example_is_wider_than_a_terminal_or_changed_by_folding() {
+        for (name, lines) in EXAMPLES {
+            let shown = of(name).unwrap();
+            assert!(shown.lines().all(|line| line.len() <= WIDEST), "{shown}");
+            // As a shell reads it, which takes a folded line for one.
+            let words = shown.replace("\\\n", "").split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(lines.iter().all(|[line, _]| words.contains(line)), "{shown}");
         }
     }
 

@@ -1,7 +1,12 @@
 //! `sweep man DIR`: manual pages, for packagers.
 
+use std::io;
 use std::path::PathBuf;
 
+use clap_mangen::Man;
+use clap_mangen::roff::{Roff, bold, roman};
+
+use super::examples;
 use crate::cli;
 use crate::exit::{Error, Exit};
 
@@ -19,6 +24,63 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<Exit, Error> {
     let failed = |source| Error::File { action: "write manual pages to", path: args.folder.clone(), source };
     std::fs::create_dir_all(&args.folder).map_err(failed)?;
-    clap_mangen::generate_to(cli::command(), &args.folder).map_err(failed)?;
+    let mut program = cli::command();
+    // Tells each command its full name.
+    program.build();
+    for command in program.get_subcommands().filter(|command| !command.is_hide_set()) {
+        let name = command.get_name();
+        std::fs::write(args.folder.join(format!("sweep-{name}.1")), page(command, name).map_err(failed)?)
+            .map_err(failed)?;
+    }
+    std::fs::write(args.folder.join("sweep.1"), page(&program, "").map_err(failed)?).map_err(failed)?;
     Ok(Exit::Done)
+}
+
+/// One page, as manual pages are ordered; examples, which help begins with, stand where `man` readers look for them.
+fn page(command: &clap::Command, name: &str) -> io::Result<Vec<u8>> {
+    let title = if name.is_empty() { "sweep".to_owned() } else { format!("sweep-{name}") };
+    let man = Man::new(command.clone()).title(title).source(concat!("sweep ", env!("CARGO_PKG_VERSION")));
+    let mut text = Vec::new();
+    man.render_title(&mut text)?;
+    man.render_name_section(&mut text)?;
+    man.render_synopsis_section(&mut text)?;
+    man.render_description_section(&mut text)?;
+    man.render_options_section(&mut text)?;
+    if name.is_empty() {
+        man.render_subcommands_section(&mut text)?;
+    }
+    let mut rest = Roff::new();
+    rest.control("SH", ["EXIT STATUS"]);
+    for exit in Exit::ALL {
+        rest.control("TP", []).text([bold((exit as u8).to_string())]).text([roman(exit.meaning())]);
+    }
+    rest.control("SH", ["EXAMPLES"]);
+    for [line, does] in examples::lines(name) {
+        rest.control("TP", []).text([bold(*line)]).text([roman(*does)]);
+    }
+    rest.to_writer(&mut text)?;
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pages_have_their_name_examples_and_exit_codes() {
+        let mut program = cli::command();
+        program.build();
+        let run = program.find_subcommand("run").unwrap();
+        let text = String::from_utf8(page(run, "run").unwrap()).unwrap();
+        for part in [
+            ".TH sweep\\-run 1",
+            "sweep run",
+            ".SH EXAMPLES",
+            "\\-\\-shard 3/16",
+            ".SH \"EXIT STATUS\"",
+            "75",
+        ] {
+            assert!(text.contains(part), "no {part} in\n{text}");
+        }
+    }
 }

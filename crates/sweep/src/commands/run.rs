@@ -148,7 +148,11 @@ fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &Repo
         Ended::Interrupted { .. } | Ended::Shard(_) => {}
     }
     if let Some(accuracy) = report.session.as_ref().and_then(|session| session.observed_accuracy) {
-        line(&mut text, "accuracy", &format!("{accuracy:.1e} of the amplitude, as observed"));
+        let told = match accuracy {
+            0.0 => "that of rk4 itself: nothing faster was accurate enough".to_owned(),
+            accuracy => format!("{accuracy:.1e} of the amplitude, as observed"),
+        };
+        line(&mut text, "accuracy", &told);
     }
     let out = quoted(&output.display().to_string());
     match &report.ended {
@@ -205,8 +209,8 @@ pub(super) fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String
         line(&mut text, "failed", &list.join(", "));
     }
     if tally.sensitive > 0 {
-        let chaotic = format!("{}: their verdict holds, their ratio's digits do not", tally.sensitive);
-        line(&mut text, "chaotic", &chaotic);
+        let told = format!("{}: their verdict holds, their ratio's digits do not", tally.sensitive);
+        line(&mut text, "sensitive", &told);
     }
     let place = |point: u64| match at(point) {
         place if place.is_empty() => place,

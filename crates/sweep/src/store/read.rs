@@ -54,11 +54,22 @@ pub(crate) fn finished(path: &Path) -> Result<Finished, StoreError> {
     };
     Ok(match own_word(&reader) {
         Some(result) => Finished::Result(Box::new(result)),
-        None => Finished::Foreign(format!("it has no `{}` in its metadata", key::PLAN)),
+        None if has_points(&reader) => {
+            Finished::Foreign(format!("it has no `{}` in its metadata", key::PLAN))
+        }
+        None => Finished::Foreign("it has no column `point`, as the result of a run has".into()),
     })
 }
 
+/// Other files of this program carry the plan too: a boundary's rows are not points.
+fn has_points(reader: &ParquetRecordBatchReaderBuilder<File>) -> bool {
+    reader.schema().column_with_name("point").is_some()
+}
+
 fn own_word(reader: &ParquetRecordBatchReaderBuilder<File>) -> Option<ResultFile> {
+    if !has_points(reader) {
+        return None;
+    }
     let plan = metadata(reader, key::PLAN)?;
     Some(ResultFile {
         plan: serde_json::from_str(&plan).ok()?,
