@@ -307,7 +307,7 @@ def table(step_s, equilibrium, motions):
     """Lines of the table, and whether every difference is within its bound."""
     sound = equilibrium <= EQUILIBRIUM_BOUND
     lines = [
-        f"| comparison | coordinates | at {step_s:g} s | at {step_s / 2:g} s | extrapolated | bounds |",
+        f"| comparison | coordinates | at {step_s * 1e6:g} µs | at {step_s * 5e5:g} µs | extrapolated | bounds |",
         "|---|---|---|---|---|---|",
         f"| static equilibrium (m, rad) | all ten | {equilibrium:.1e} | | | {EQUILIBRIUM_BOUND:.0e} |",
     ]
