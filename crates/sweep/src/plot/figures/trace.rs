@@ -1,6 +1,9 @@
 //! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
 
+use serde_json::Value;
+
 use crate::plot::PlotOptions;
+use crate::plot::axis::extremes;
 use crate::plot::chart::{Chart, ChartPanel, Mark, Series, Style};
 use crate::plot::colour::{LINEAR, NONLINEAR};
 use crate::plot::error::PlotError;
@@ -43,7 +46,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     };
 
     let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
-        let models = [("nonlinear model", NONLINEAR), ("linear model", LINEAR)];
+        // The linear model lies in front; where it hides the nonlinear one, this must shine through.
+        let models = [("nonlinear model", NONLINEAR), ("linear model", LINEAR.with_alpha(165))];
         columns
             .iter()
             .zip(models)
@@ -69,14 +73,18 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         })
         .collect();
     let gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
+    let least = least_gaps(&gaps);
     if !gaps.is_empty() {
-        let levels = vec![(0.0, "gap closed".to_owned())];
+        // A gap that stays wide would be a flat line at the top of a panel that reaches down to contact.
+        let widest = gaps.iter().flat_map(|series| &series.y).copied().fold(0.0, f64::max);
+        let near = least.iter().any(|(_, gap)| *gap < 0.5 * widest);
+        let levels = if near { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() };
         panels.push(ChartPanel { levels, ..panel("gap", "gap, drum to tub (mm)".to_owned(), true, gaps) });
     }
     let mut marks = Vec::new();
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
         for (x, resonance) in passages(&time, speed, &resonances(options)?) {
-            marks.push(Mark { x, label: format!("{} rpm", label::significant(resonance, 4)) });
+            marks.push(Mark { x, label: format!("{} rpm", label::trimmed(&format!("{resonance:.1}"))) });
         }
         let y = speed.to_vec();
         let series = Series { name: String::new(), colour: INK, grid: 0, y, style: Style::Solid(2.0) };
@@ -84,8 +92,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         panels.push(ChartPanel { height, ..panel("speed", "spin (rpm)".to_owned(), true, vec![series]) });
     }
     Ok(Chart {
-        title: "Time histories of the nonlinear and the linear model".to_owned(),
-        subtitle: subtitle(table),
+        title: "Motion of both models from static equilibrium".to_owned(),
+        subtitle: subtitle(table, &least),
         x_label: "Time (s)".to_owned(),
         x_log: false,
         grids: vec![time],
@@ -103,19 +111,47 @@ fn unit_of_channel(name: &str) -> &'static str {
         .map_or("", |channel| channel.unit())
 }
 
-/// Name of the run, and the point if the file says which.
-fn subtitle(table: &Table) -> String {
+/// The least gap of each model that has one, in the unit shown.
+fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
+    gaps.iter()
+        .filter_map(|series| {
+            let (least, _) = extremes(series.y.iter().copied())?;
+            Some((series.name.trim_end_matches(" model").to_owned(), least))
+        })
+        .collect()
+}
+
+/// Name of the run, its unbalance and damping, the rest of the point if the file says which, and the least gaps (mm).
+fn subtitle(table: &Table, least_gaps_mm: &[(String, f64)]) -> String {
     let mut parts: Vec<String> = table.run_name().map(str::to_owned).into_iter().collect();
-    if let Some(at) = table.find("at").and_then(|at| at.as_object()) {
-        for (name, value) in at {
-            if let Some(value) = value.as_f64() {
-                let unit = label::unit_of_name(name);
-                parts.push(format!("{} {} {unit}", label::words(name), label::significant(value, 4)));
-            }
+    let mut said: Vec<(&str, f64)> = machine(table);
+    for (name, value) in table.find("at").and_then(Value::as_object).into_iter().flatten() {
+        if let Some(value) = value.as_f64().filter(|_| !said.iter().any(|(known, _)| known == name)) {
+            said.push((name, value));
         }
     }
-    parts.push("deviation from the static equilibrium".to_owned());
+    for (name, value) in said {
+        let (words, unit) = (label::words(name).to_lowercase(), label::unit_of_name(name));
+        parts.push(format!("{words} {} {unit}", label::significant(value, 4)));
+    }
+    let gaps: Vec<String> = least_gaps_mm.iter().map(|(model, gap)| format!("{gap:.2} mm {model}")).collect();
+    if !gaps.is_empty() {
+        parts.push(format!("least gap {}", gaps.join(", ")));
+    }
     parts.join(" · ")
+}
+
+/// The two numbers of the machine that reliability turns on, as far as the file has them and all dampers are alike.
+fn machine(table: &Table) -> Vec<(&'static str, f64)> {
+    let Some(machine) = table.find("machine") else { return Vec::new() };
+    let unbalance = machine.pointer("/unbalance/mass_kg").and_then(Value::as_f64);
+    let dampers = machine.get("dampers").and_then(Value::as_array).into_iter().flatten();
+    let mut dampings: Vec<f64> =
+        dampers.filter_map(|damper| damper.get("damping_n_s_per_m").and_then(Value::as_f64)).collect();
+    dampings.dedup();
+    let damping = (dampings.len() == 1).then(|| dampings[0]);
+    let named = [("unbalance_mass_kg", unbalance), ("damping_n_s_per_m", damping)];
+    named.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
 }
 
 fn resonances(options: &PlotOptions) -> Result<Vec<f64>, PlotError> {
