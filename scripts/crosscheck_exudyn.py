@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """The nonlinear model against the same machine put together from standard parts in Exudyn.
 
-    python scripts/crosscheck_exudyn.py [--sweep BINARY] [--step S] [--table PAGE.md]
+    python scripts/crosscheck_exudyn.py [--sweep BINARY] [--step S] [--table PAGE.md | --trace FILE.parquet]
 
 Exudyn (https://exudyn.readthedocs.io) is a general multibody program: three rigid bodies in absolute coordinates, joints,
 connectors, an implicit integrator. Nothing of this project's derivation is in it, as little as the paper's was in the commercial
 program that it compared with. Three comparisons: the static equilibrium, a run-up to 600 rpm in 4 s, and a release from 0.1 rad
 of rocking at 270 rpm; the motions at two steps of Exudyn's and extrapolated from these. Exit code 1 if any differs by more than
-its bound.
+its bound. With --trace no comparison: Exudyn's run-up of the paper's Fig. 6 as a trace file, for `sweep plot --against`.
 """
 
 import argparse
@@ -21,6 +21,7 @@ import tomllib
 
 import exudyn
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 from exudyn.utilities import (
     MarkerBodyRigid,
@@ -243,6 +244,18 @@ class Washer:
         return np.concatenate([shaft - tub, shaft_turn - tub_turn, drum_turn - shaft_turn])
 
 
+def cycloidal(peak_rpm, ramp_s):
+    """The angle over time of Eq. 42: a cycloidal ramp from rest, then constant speed."""
+    peak = peak_rpm * RPM
+
+    def theta(t):
+        if t < ramp_s:
+            return peak * (t * t / (2 * ramp_s) + ramp_s * (math.cos(math.tau * t / ramp_s) - 1) / math.tau**2)
+        return peak * (t - ramp_s / 2)
+
+    return theta
+
+
 # Coordinates of shaft and drum: held to the tub by bearings and flexure.
 HELD = [2, 3, 6, 7, 8, 9]
 
@@ -321,12 +334,32 @@ def table(step_s, equilibrium, motions):
     return lines, sound
 
 
+def write_trace(path, machine, rest, step_s):
+    """The run-up of sweeps/fig6.toml in Exudyn: the tub's channels, as deviations from equilibrium."""
+    spin = tomllib.loads((ROOT / "sweeps/fig6.toml").read_text())
+    peak_rpm, ramp_s, end_s = spin["spin"]["peak_rpm"], spin["spin"]["ramp_s"], spin["time"]["end_s"]
+    every_s, front_m = 0.002, machine["tub"]["front_x_m"]
+    washer = Washer(machine, rest, np.zeros(10), cycloidal(peak_rpm, ramp_s), 0.0)
+    q = np.vstack([rest, washer.run(end_s, step_s, every_s)])
+    front = {
+        "tub_front_y": q[:, 0] + front_m * np.sin(q[:, 5]),
+        "tub_front_z": q[:, 1] - front_m * np.sin(q[:, 4]) * np.cos(q[:, 5]),
+        "tub_yaw": q[:, 4], "tub_pitch": q[:, 5],
+    }
+    # The first row is equilibrium.
+    columns = {f"nonlinear_{name}": values[1:] - values[0] for name, values in front.items()}
+    told = {"sweep.plan": json.dumps({"name": f"Exudyn {exudyn.GetVersionString()}", "machine": machine})}
+    table = pa.table({"time_s": every_s * np.arange(len(q) - 1), **columns})
+    pq.write_table(table.replace_schema_metadata(told), path)
+
+
 def main():
     """Compare, print, judge."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sweep", default=str(ROOT / "target/release/sweep"), help="the binary")
     parser.add_argument("--step", type=float, default=1e-4, help="Exudyn's longer step, s")
     parser.add_argument("--table", help="renew the table in this page, between its two comments")
+    parser.add_argument("--trace", help="write Exudyn's run-up of Fig. 6 to this file and compare nothing")
     arguments = parser.parse_args()
     exudyn.config.printToConsole = False
     sweep, every_s = arguments.sweep, 0.01
@@ -336,18 +369,17 @@ def main():
     still = np.zeros(10)
     rest = Washer(machine, still, still, lambda t: 0.0, 0.0).rest()
 
+    if arguments.trace:
+        write_trace(arguments.trace, machine, rest, arguments.step)
+        return 0
+
     # Run-up: 600 rpm on a cycloidal ramp of 4 s, then constant.
-    peak, ramp, end_s = 600 * RPM, 4.0, 4.5
-
-    def cycloidal(t):
-        if t < ramp:
-            return peak * (t * t / (2 * ramp) + ramp * (math.cos(math.tau * t / ramp) - 1) / math.tau**2)
-        return peak * (t - ramp / 2)
-
-    run_up, told = ours(sweep, {"profile": "cycloidal", "peak_rpm": 600, "ramp_s": ramp}, end_s, every_s)
+    peak_rpm, ramp_s, end_s = 600, 4.0, 4.5
+    theta = cycloidal(peak_rpm, ramp_s)
+    run_up, told = ours(sweep, {"profile": "cycloidal", "peak_rpm": peak_rpm, "ramp_s": ramp_s}, end_s, every_s)
     our_rest = np.array([told["equilibrium"][f"q{i}"] for i in range(1, 11)])
-    motions = {("run-up", f"run-up to 600 rpm in {ramp:g} s, to {end_s:g} s"): compare(
-        run_up, lambda step_s: Washer(machine, rest, still, cycloidal, 0.0).run(end_s, step_s, every_s) - rest,
+    motions = {("run-up", f"run-up to {peak_rpm} rpm in {ramp_s:g} s, to {end_s:g} s"): compare(
+        run_up, lambda step_s: Washer(machine, rest, still, theta, 0.0).run(end_s, step_s, every_s) - rest,
         arguments.step)}
 
     # Release: tub, shaft and drum tilted together by 0.1 rad of yaw while the drum turns at 270 rpm.

@@ -1,5 +1,7 @@
 //! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
 
+use std::path::Path;
+
 use serde_json::Value;
 
 use crate::plot::PlotOptions;
@@ -9,7 +11,7 @@ use crate::plot::colour::{LINEAR, NONLINEAR};
 use crate::plot::error::PlotError;
 use crate::plot::figures::campbell;
 use crate::plot::label;
-use crate::plot::read::Table;
+use crate::plot::read::{Kind, Table};
 use crate::plot::scene::INK;
 
 /// Channels that a picture shows unless told otherwise: one a way the tub can move.
@@ -45,15 +47,23 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         (asked, _) => asked.iter().map(String::as_str).collect(),
     };
 
+    let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
     let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
-        // The linear model lies in front; where it hides the nonlinear one, this must shine through.
-        let models = [("nonlinear model", NONLINEAR), ("linear model", LINEAR.with_alpha(165))];
-        columns
-            .iter()
-            .zip(models)
-            .filter_map(|(column, (name, colour))| {
+        // The second curve lies in front; where it hides the first one, this must shine through.
+        let front = LINEAR.with_alpha(165);
+        let [first, second] = &columns;
+        let curves = match &other {
+            Some(other) => [(table, first, said(table), NONLINEAR, 0), (other, first, said(other), front, 1)],
+            None => [
+                (table, first, "nonlinear model".to_owned(), NONLINEAR, 0),
+                (table, second, "linear model".to_owned(), front, 0),
+            ],
+        };
+        curves
+            .into_iter()
+            .filter_map(|(table, column, name, colour, grid)| {
                 let y = table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
-                Some(Series { name: name.to_owned(), colour, grid: 0, y, style: Style::Solid(1.3) })
+                Some(Series { name, colour, grid, y, style: Style::Solid(1.3) })
             })
             .collect()
     };
@@ -92,15 +102,39 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         panels.push(ChartPanel { height, ..panel("speed", "spin (rpm)".to_owned(), true, vec![series]) });
     }
     Ok(Chart {
-        title: "Motion of both models from static equilibrium".to_owned(),
+        title: match &other {
+            Some(other) => {
+                format!("Nonlinear motion from static equilibrium: {} and {}", said(table), said(other))
+            }
+            None => "Motion of both models from static equilibrium".to_owned(),
+        },
         subtitle: subtitle(table, &least),
         x_label: "Time (s)".to_owned(),
         x_log: false,
-        grids: vec![time],
+        grids: match &other {
+            Some(other) => vec![time, other.numbers("time_s")?.to_vec()],
+            None => vec![time],
+        },
         panels,
         marks,
         mark_meaning: "resonance speed passed".to_owned(),
     })
+}
+
+/// The trace whose nonlinear model is drawn in place of the linear one.
+fn other_trace(path: &Path) -> Result<Table, PlotError> {
+    let table = Table::open(path)?;
+    if table.kind == Kind::Trace {
+        return Ok(table);
+    }
+    let kind = table.kind.name();
+    Err(PlotError::Unfit(format!("`--against {}`: this is a {kind} file, expected a trace", path.display())))
+}
+
+/// What a run is called: its name, or else its file's.
+fn said(table: &Table) -> String {
+    let file = || table.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    table.run_name().map_or_else(file, str::to_owned)
 }
 
 /// The unit of a channel whose file does not say it.
