@@ -348,9 +348,9 @@ def write_trace(path, machine, rest, step_s):
     }
     # The first row is equilibrium.
     columns = {f"nonlinear_{name}": values[1:] - values[0] for name, values in front.items()}
-    told = {"sweep.plan": json.dumps({"name": f"Exudyn {exudyn.GetVersionString()}", "machine": machine})}
+    told = {"sweep.plan": json.dumps({"name": f"Exudyn {exudyn.__version__}", "machine": machine})}
     table = pa.table({"time_s": every_s * np.arange(len(q) - 1), **columns})
-    pq.write_table(table.replace_schema_metadata(told), path)
+    pq.write_table(table.replace_schema_metadata(told), path, compression="zstd")
 
 
 def main():

@@ -82,7 +82,10 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             )
         })
         .collect();
-    let gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
+    let mut gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
+    if other.is_some() && gaps.len() < 2 {
+        gaps.clear();
+    }
     let least = least_gaps(&gaps);
     if !gaps.is_empty() {
         // A gap that stays wide would be a flat line at the top of a panel that reaches down to contact.
