@@ -177,6 +177,21 @@ fn a_trace_shows_the_asked_channels_and_the_resonances_passed() {
 }
 
 #[test]
+fn a_trace_shows_forces_and_states_when_asked() {
+    let with_forces = || {
+        trace().numbers("cabinet_force_y_nonlinear_n", "N", (0..=6000).map(f64::from)).numbers(
+            "cabinet_force_y_linear_n",
+            "N",
+            (0..=6000).map(f64::from),
+        )
+    };
+    let force = PlotOptions { channels: vec!["cabinet_force_y".to_owned()], ..PlotOptions::default() };
+    let figure = svg(with_forces(), &force);
+    assert!(figure.contains(">Cabinet force y (N)<") && figure.contains(">linear model<"));
+    assert!(!svg(with_forces(), &PlotOptions::default()).contains("Cabinet force"));
+}
+
+#[test]
 fn a_trace_is_held_against_another() {
     let folder = tempfile::tempdir().unwrap();
     let other = Sample::default()
@@ -189,6 +204,9 @@ fn a_trace_is_held_against_another() {
     let named = |k: usize| (yaw[k]["name"].as_str().unwrap().to_owned(), yaw[k]["grid"].as_u64().unwrap());
     assert_eq!(named(0), ("input".to_owned(), 0), "by its file where it has no name");
     assert_eq!((named(1), yaw.as_array().unwrap().len()), (("another program".to_owned(), 1), 2));
+    assert!(
+        svg(trace(), &against(trace().write(folder.path(), "same.parquet"))).contains("difference 0.0e0 of")
+    );
     let modes = against(modes().write(folder.path(), "modes.parquet"));
     assert!(message(draw(trace(), &modes, "a.svg")).contains("this is a modes file, expected a trace"));
 }

@@ -30,7 +30,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             reason: "a trace needs at least two instants",
         });
     }
-    let channels: Vec<&str> = table.with_prefix("nonlinear_").into_iter().map(|(name, _)| name).collect();
+    let found = quantities(table);
+    let channels: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
     if let Some(unknown) = options.channels.iter().find(|asked| !channels.contains(&asked.as_str())) {
         return Err(PlotError::NotThere {
             option: "--channel",
@@ -42,7 +43,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     }
     let usual: Vec<&str> = USUAL.into_iter().filter(|name| channels.contains(name)).collect();
     let shown: Vec<&str> = match (&options.channels[..], &usual[..]) {
-        ([], []) => channels.clone(),
+        ([], []) => found.iter().filter(|quantity| quantity.channel).map(|quantity| quantity.name).collect(),
         ([], usual) => usual.to_vec(),
         (asked, _) => asked.iter().map(String::as_str).collect(),
     };
@@ -67,21 +68,21 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             })
             .collect()
     };
-    let mut panels: Vec<ChartPanel> = channels
+    let mut panels: Vec<ChartPanel> = found
         .iter()
-        .map(|name| {
-            let columns = [format!("nonlinear_{name}"), format!("linear_{name}")];
-            let unit = table.column(&columns[0]).map_or("", |column| column.unit.as_str());
-            let unit = if unit.is_empty() { unit_of_channel(name) } else { unit };
-            let (unit, factor) = label::shown(unit);
+        .map(|quantity| {
+            let (unit, factor) = label::shown(quantity.unit);
+            let words =
+                if quantity.channel { label::channel(quantity.name) } else { label::words(quantity.name) };
             panel(
-                name,
-                label::with_unit(&label::channel(name), unit),
-                shown.contains(name),
-                pair(columns, factor),
+                quantity.name,
+                label::with_unit(&words, unit),
+                shown.contains(&quantity.name),
+                pair(quantity.columns(), factor),
             )
         })
         .collect();
+    let apart = if other.is_some() { difference(&panels) } else { None };
     let mut gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
     if other.is_some() && gaps.len() < 2 {
         gaps.clear();
@@ -111,7 +112,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             }
             None => "Motion of both models from static equilibrium".to_owned(),
         },
-        subtitle: subtitle(table, &least),
+        subtitle: subtitle(table, &least, apart),
         x_label: "Time (s)".to_owned(),
         x_log: false,
         grids: match &other {
@@ -122,6 +123,53 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         marks,
         mark_meaning: "resonance speed passed".to_owned(),
     })
+}
+
+/// What a trace holds of both models over time.
+struct Quantity<'a> {
+    /// A channel's name; of a coordinate, a speed or a force what stands before the model's name: `spring_1_tension`.
+    name: &'a str,
+    unit: &'a str,
+    /// The column's end after the model's name; empty for a channel.
+    end: &'a str,
+    channel: bool,
+}
+
+impl Quantity<'_> {
+    /// Columns of the nonlinear and of the linear model.
+    fn columns(&self) -> [String; 2] {
+        ["nonlinear", "linear"].map(|model| {
+            if self.channel {
+                format!("{model}_{}", self.name)
+            } else {
+                format!("{}_{model}_{}", self.name, self.end)
+            }
+        })
+    }
+}
+
+/// Channels first, then states and forces; the gap has its own panel.
+fn quantities(table: &Table) -> Vec<Quantity<'_>> {
+    let channels = table.with_prefix("nonlinear_").into_iter().map(|(name, column)| {
+        let unit = if column.unit.is_empty() { unit_of_channel(name) } else { &column.unit };
+        Quantity { name, unit, end: "", channel: true }
+    });
+    let further = table.columns.iter().filter(|column| column.numbers().is_some()).filter_map(|column| {
+        let (name, end) = column.name.split_once("_nonlinear_").filter(|(name, _)| *name != "gap")?;
+        Some(Quantity { name, unit: &column.unit, end, channel: false })
+    });
+    channels.chain(further).collect()
+}
+
+/// The largest difference of two curves over the same instants in any panel shown, as a share of the first one's peak.
+fn difference(panels: &[ChartPanel]) -> Option<f64> {
+    let shares = panels.iter().filter(|panel| panel.shown).filter_map(|panel| {
+        let [first, second] = &panel.series[..] else { return None };
+        let peak = first.y.iter().fold(0.0_f64, |peak, y| peak.max(y.abs()));
+        let apart = first.y.iter().zip(&second.y).map(|(a, b)| (a - b).abs()).fold(0.0_f64, f64::max);
+        (first.y.len() == second.y.len() && peak > 0.0).then(|| apart / peak)
+    });
+    shares.reduce(f64::max)
 }
 
 /// The trace whose nonlinear model is drawn in place of the linear one.
@@ -158,8 +206,9 @@ fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// Name of the run, its unbalance and damping, the rest of the point if the file says which, and the least gaps (mm).
-fn subtitle(table: &Table, least_gaps_mm: &[(String, f64)]) -> String {
+/// Name of the run, its unbalance and damping, the rest of the point if the file says which, the least gaps (mm), and how
+/// far two runs are apart.
+fn subtitle(table: &Table, least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> String {
     let mut parts: Vec<String> = table.run_name().map(str::to_owned).into_iter().collect();
     let mut said: Vec<(&str, f64)> = machine(table);
     for (name, value) in table.find("at").and_then(Value::as_object).into_iter().flatten() {
@@ -174,6 +223,9 @@ fn subtitle(table: &Table, least_gaps_mm: &[(String, f64)]) -> String {
     let gaps: Vec<String> = least_gaps_mm.iter().map(|(model, gap)| format!("{gap:.2} mm {model}")).collect();
     if !gaps.is_empty() {
         parts.push(format!("least gap {}", gaps.join(", ")));
+    }
+    if let Some(apart) = apart {
+        parts.push(format!("largest difference {apart:.1e} of the peak"));
     }
     parts.join(" · ")
 }
