@@ -80,7 +80,7 @@ class Page:
         self.driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
         self.screenshots = screenshots
         self.driver.get(pathlib.Path(path).resolve().as_uri())
-        self.wait(lambda: self.figure().get_attribute("data-area"), "the map was never drawn")
+        self.wait(self.drawn, "the figure was never drawn")
 
     def close(self):
         """End the browser."""
@@ -93,6 +93,10 @@ class Page:
             WebDriverWait(self.driver, 5, poll_frequency=0.02).until(lambda _: condition())
         except Exception as error:
             raise Wrong(f"{what} ({type(error).__name__})") from error
+
+    def drawn(self):
+        """Whether the figure is there."""
+        return self.figure().get_attribute("data-area")
 
     def frame(self):
         """Let the page draw what is due."""

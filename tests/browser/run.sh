@@ -1,5 +1,5 @@
 #!/bin/sh
-# The page of a map in a real browser: tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
+# The pages of a map and of a trace in a real browser: tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
 #
 # Needs chromium and chromedriver on the PATH, and on Debian installs them if they are not there; and Python 3. What else it
 # needs goes into a virtual environment under target/. SWEEP names another binary than the release build, SHOTS a folder for screenshots.
@@ -25,3 +25,9 @@ else
     "$sweep" plot "$map" -o "$work/page.html"
 fi
 "$venv/bin/python" "$here/check_page.py" "$map" "$work/page.html" ${SHOTS:+--screenshots "$SHOTS"}
+
+# The page of a trace: curves, with resonance passages marked.
+"$sweep" modes --speed 0:400:50 --out "$work/modes.parquet" 2> /dev/null
+"$sweep" trace "$root/sweeps/fig11.toml" --every 0.02 --out "$work/trace.parquet"
+"$sweep" plot "$work/trace.parquet" --modes "$work/modes.parquet" -o "$work/trace.html"
+"$venv/bin/python" "$here/check_chart.py" "$work/trace.parquet" "$work/trace.html" ${SHOTS:+--screenshots "$SHOTS"}

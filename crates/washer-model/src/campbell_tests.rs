@@ -1,6 +1,6 @@
 //! What the paper says of the modes (its Fig. 7 and Table 4), and what must hold of any.
 
-use crate::campbell::{ModeOverSpeed, campbell};
+use crate::campbell::{ModeAtSpeed, ModeOverSpeed, campbell};
 use crate::machine::Machine;
 use crate::shape::{Movement, Plane};
 use crate::{Point, Spin, Timing, modes, prepare};
@@ -38,20 +38,36 @@ fn val_resonances_are_the_papers() {
         assert!((speed - independent).abs() < 0.02, "{speed} against {independent}");
         assert!((resonance.mode.frequency_rpm - speed).abs() < 1e-6);
         assert_eq!((mode.motion.movement, mode.motion.plane), (movement, plane), "{}", mode.motion);
-        let swing = 0.5 * (resonance.mode.greatest_rpm - resonance.mode.least_rpm) / speed;
-        assert!(swing < 3e-3, "{swing} over a turn at {speed}");
+        assert!(swing(&resonance.mode) < 3e-3, "{} over a turn at {speed}", swing(&resonance.mode));
     }
     assert!(modes[4..].iter().all(|mode| mode.resonances.is_empty()));
 }
 
+/// Half the distance from least to greatest frequency over a turn, as a share of the mean.
+fn swing(at: &ModeAtSpeed) -> f64 {
+    0.5 * (at.greatest_rpm - at.least_rpm) / at.frequency_rpm
+}
+
 #[test]
 fn val_frequencies_hardly_vary_over_a_turn() {
-    for mode in &paper()[..4] {
-        for at in &mode.at_speed {
-            let swing = 0.5 * (at.greatest_rpm - at.least_rpm) / at.frequency_rpm;
-            // The paper: less than 0.3 % up to 1200 rpm. Ours reaches 0.301 % there, in the first mode.
-            assert!(swing < 3.05e-3, "{}: {swing} at {} rpm", mode.motion, at.frequency_rpm);
+    // The paper: less than 0.3 % up to 1200 rpm. So it is, but for the first mode at the very end.
+    for (k, mode) in paper()[..4].iter().enumerate() {
+        for (at, step) in mode.at_speed.iter().zip(0..) {
+            let speed = 50 * step;
+            if (k, speed) == (0, 1200) {
+                assert!((swing(at) - 3.0133e-3).abs() < 2e-6, "{} at {speed} rpm", swing(at));
+            } else {
+                assert!(swing(at) < 3e-3, "{}: {} at {speed} rpm", mode.motion, swing(at));
+            }
         }
+    }
+    // The dampers are what carries it over: the tenth of a percent that the paper prints holds without them.
+    let mut undamped = Machine::paper();
+    for damper in &mut undamped.dampers {
+        damper.damping_n_s_per_m = 0.0;
+    }
+    for mode in &campbell(&point(undamped), &[1200.0]).unwrap()[..4] {
+        assert!(swing(&mode.at_speed[0]) < 2.97e-3, "{}: {}", mode.motion, swing(&mode.at_speed[0]));
     }
 }
 

@@ -144,7 +144,28 @@ fn table(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
             line(speed, format!("{swing:.3}"), &resonance.mode, mode.motion.to_string());
         }
     }
+    if let Some((swing, mode, speed)) = widest_swing(speeds, modes) {
+        let (percent, speed) = (100.0 * swing, decimal(speed));
+        let _ = writeln!(
+            text,
+            "Over a turn, resonant modes vary by up to +-{percent:.3} % of their mean frequency (mode {mode}, {speed} rpm)."
+        );
+    }
     text
+}
+
+/// Where the frequency of a mode that has a resonance varies most over a turn: half the distance from least to greatest as a
+/// share of the mean, the mode's number, the speed (rpm).
+fn widest_swing(speeds: &[f64], modes: &[ModeOverSpeed]) -> Option<(f64, usize, f64)> {
+    let resonant = modes.iter().enumerate().filter(|(_, mode)| !mode.resonances.is_empty());
+    resonant
+        .flat_map(|(k, mode)| {
+            mode.at_speed.iter().zip(speeds).map(move |(at, &speed)| {
+                (0.5 * (at.greatest_rpm - at.least_rpm) / at.frequency_rpm, k + 1, speed)
+            })
+        })
+        .filter(|(swing, ..)| swing.is_finite())
+        .max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 fn to_json(name: &str, speeds: &[f64], modes: &[ModeOverSpeed]) -> Value {

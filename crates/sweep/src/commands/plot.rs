@@ -36,6 +36,10 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub modes: Option<PathBuf>,
 
+    /// Trace: compare with this trace: both nonlinear models, the linear one left out
+    #[arg(long, value_name = "FILE")]
+    pub against: Option<PathBuf>,
+
     /// Map as .html: folder of trace files; clicking a point that has one shows its time histories
     #[arg(long, value_name = "FOLDER")]
     pub traces: Option<PathBuf>,
@@ -53,6 +57,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         at: args.at.clone(),
         resonances_rpm: args.resonances.clone(),
         modes: args.modes.clone(),
+        against: args.against.clone(),
         traces: args.traces.clone(),
     };
     render(&args.file, &options, &output)?;

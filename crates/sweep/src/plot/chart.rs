@@ -94,6 +94,9 @@ const GAP: f64 = 14.0;
 /// What a star stands for, in the legend.
 const STARS: &str = "resonance speed";
 
+/// What the colour stands for where a translucent curve lies over another, in the legend.
+const BOTH: &str = "both, one over the other";
+
 /// Draws the panels that are shown.
 pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
     let panels: Vec<&ChartPanel> = chart.panels.iter().filter(|panel| panel.shown).collect();
@@ -164,7 +167,7 @@ fn draw_panel(scene: &mut Scene, chart: &Chart, content: &ChartPanel, panel: &Pa
             outline.add_polygon(&area);
             scene.fill(outline, series.colour.with_alpha(90));
         }
-        let kept = envelope(xs, &series.y, panel.xs.from, panel.xs.to, panel.width as usize / 2);
+        let kept = envelope(xs, &series.y, panel.xs.from, panel.xs.to, panel.width as usize);
         let mut outline = Outline::default();
         let mut line = Vec::new();
         for k in kept {
@@ -261,6 +264,12 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
             let mut stroke = stroke(series);
             stroke.width = stroke.width.max(2.2);
             add(Sign::Line(stroke), &series.name);
+        }
+        if let [.., under, over] = &panel.series[..]
+            && over.colour.alpha < 255
+        {
+            let both = Stroke::solid(over.colour.over(under.colour), 2.2);
+            add(Sign::Line(both), BOTH);
         }
         for (_, meaning) in &panel.levels {
             add(Sign::Line(level_stroke()), meaning);

@@ -70,6 +70,8 @@ pub struct PlotOptions {
     pub resonances_rpm: Vec<f64>,
     /// Trace: a modes file whose resonance speeds are marked too.
     pub modes: Option<PathBuf>,
+    /// Trace: another trace file, whose nonlinear model is drawn in place of the linear one.
+    pub against: Option<PathBuf>,
     /// Map as a page: a folder of trace files; clicking a point that has one shows it.
     pub traces: Option<PathBuf>,
 }
@@ -159,6 +161,7 @@ fn check_options(table: &Table, options: &PlotOptions, format: Format) -> Result
         ("--at", !options.at.is_empty(), map, "maps"),
         ("--resonances", !options.resonances_rpm.is_empty(), trace, "traces"),
         ("--modes", options.modes.is_some(), trace, "traces"),
+        ("--against", options.against.is_some(), trace, "traces"),
         ("--traces", options.traces.is_some(), map && format == Format::Html, "maps drawn as .html"),
     ];
     for (option, given, fits, where_it_does) in rules {

@@ -20,6 +20,14 @@ impl Colour {
         Self { alpha, ..self }
     }
 
+    /// What this colour makes over an opaque one.
+    pub(crate) fn over(self, under: Self) -> Self {
+        let part = f64::from(self.alpha) / 255.0;
+        let [r, g, b] = [0, 1, 2]
+            .map(|k| (part * f64::from(self.rgb[k]) + (1.0 - part) * f64::from(under.rgb[k])).round() as u8);
+        Self { rgb: [r, g, b], alpha: 255 }
+    }
+
     /// `#rrggbb`.
     pub(crate) fn css(self) -> String {
         let [r, g, b] = self.rgb;

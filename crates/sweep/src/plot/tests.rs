@@ -177,6 +177,41 @@ fn a_trace_shows_the_asked_channels_and_the_resonances_passed() {
 }
 
 #[test]
+fn a_trace_shows_forces_and_states_when_asked() {
+    let with_forces = || {
+        trace().numbers("cabinet_force_y_nonlinear_n", "N", (0..=6000).map(f64::from)).numbers(
+            "cabinet_force_y_linear_n",
+            "N",
+            (0..=6000).map(f64::from),
+        )
+    };
+    let force = PlotOptions { channels: vec!["cabinet_force_y".to_owned()], ..PlotOptions::default() };
+    let figure = svg(with_forces(), &force);
+    assert!(figure.contains(">Cabinet force y (N)<") && figure.contains(">linear model<"));
+    assert!(!svg(with_forces(), &PlotOptions::default()).contains("Cabinet force"));
+}
+
+#[test]
+fn a_trace_is_held_against_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = Sample::default()
+        .numbers("time_s", "s", [0.0, 6.0, 12.0])
+        .numbers("nonlinear_tub_yaw", "rad", [0.0, 0.09, 0.0])
+        .metadata("sweep.plan", r#"{"name": "another program"}"#);
+    let against = |path| PlotOptions { against: Some(path), ..PlotOptions::default() };
+    let data = data(trace(), &against(other.write(folder.path(), "other.parquet")));
+    let yaw = &data["chart"]["panels"][0]["series"];
+    let named = |k: usize| (yaw[k]["name"].as_str().unwrap().to_owned(), yaw[k]["grid"].as_u64().unwrap());
+    assert_eq!(named(0), ("input".to_owned(), 0), "by its file where it has no name");
+    assert_eq!((named(1), yaw.as_array().unwrap().len()), (("another program".to_owned(), 1), 2));
+    assert!(
+        svg(trace(), &against(trace().write(folder.path(), "same.parquet"))).contains("difference 0.0e0 of")
+    );
+    let modes = against(modes().write(folder.path(), "modes.parquet"));
+    assert!(message(draw(trace(), &modes, "a.svg")).contains("this is a modes file, expected a trace"));
+}
+
+#[test]
 fn a_campbell_diagram_stars_the_resonances() {
     let figure = svg(modes(), &PlotOptions::default());
     for said in [">100.0 rpm<", ">200.0 rpm<", ">frequency = spin speed<", "1 mode lies above"] {

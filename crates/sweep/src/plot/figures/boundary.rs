@@ -16,6 +16,8 @@ struct Place {
     y: f64,
     low: f64,
     high: f64,
+    /// The quantity is above its limit on the far side, where the file says so: a curve keeps its sides.
+    rising: Option<bool>,
 }
 
 /// The chart of a boundary file: its first column across, its second up, the bracket shaded; a curve for every
@@ -37,9 +39,14 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     if grid.len() < 2 {
         return Err(empty());
     }
+    let sides = ["quantity_low", "quantity_high"].map(|name| table.column(name).and_then(Column::numbers));
+    let rising = |row: usize| {
+        let [below, above] = sides.map(|values| values.map_or(f64::NAN, |values| values[row]));
+        below.partial_cmp(&above).map(std::cmp::Ordering::is_lt)
+    };
     let mut curves: Vec<(String, Vec<Place>)> = Vec::new();
     for row in 0..table.rows {
-        let place = Place { x: xs[row], y: ys[row], low: lows[row], high: highs[row] };
+        let place = Place { x: xs[row], y: ys[row], low: lows[row], high: highs[row], rising: rising(row) };
         let further = further(table, row);
         match curves.iter_mut().find(|(name, _)| *name == further) {
             Some((_, places)) => places.push(place),
@@ -61,10 +68,11 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
             Series { name: name.clone(), colour, grid: 0, y: pick(|place| place.y), style }
         }));
     }
+    let side = far_side(&curves, quantity(table).starts_with("min_gap"));
     let run = table.run_name().map_or(String::new(), |name| format!("{name} · "));
     Ok(Chart {
         title: "Boundary of the linear model's reliability".to_owned(),
-        subtitle: format!("{run}{} values of {}", grid.len(), label::words(&x.name)),
+        subtitle: format!("{run}{} values of {}{side}", grid.len(), label::words(&x.name).to_lowercase()),
         x_label: label::with_unit(&label::words(&x.name), &x.unit),
         x_log: evenly_by_log(&grid),
         grids: vec![grid],
@@ -84,11 +92,40 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     })
 }
 
+/// What the region above the uppermost places is, where all of these say the same.
+fn far_side(curves: &[(String, Vec<Place>)], gap: bool) -> String {
+    let mut uppermost: Vec<Place> = Vec::new();
+    for place in curves.iter().flat_map(|(_, places)| places).filter(|place| place.y.is_finite()) {
+        match uppermost.iter_mut().find(|known| known.x == place.x) {
+            Some(known) if known.y < place.y => *known = *place,
+            Some(_) => {}
+            None => uppermost.push(*place),
+        }
+    }
+    let all =
+        |rising: bool| !uppermost.is_empty() && uppermost.iter().all(|place| place.rising == Some(rising));
+    let side = match (gap, all(true), all(false)) {
+        (false, false, true) => "reliable",
+        (false, true, false) => "unreliable",
+        (true, true, false) => "gap open",
+        (true, false, true) => "gap closed",
+        _ => return String::new(),
+    };
+    let places: usize =
+        curves.iter().map(|(_, places)| places.iter().filter(|place| place.y.is_finite()).count()).sum();
+    let line = if places > uppermost.len() { "highest line" } else { "line" };
+    format!(" · {side} above the {line}")
+}
+
+/// The quantity that is at its limit: its column's name in a map.
+fn quantity(table: &Table) -> &str {
+    table.find("quantity").and_then(Value::as_str).unwrap_or("ratio_max")
+}
+
 /// What is at its limit, as the file says, or else the ratio.
 fn limit(table: &Table) -> String {
-    let quantity = table.find("quantity").and_then(Value::as_str).unwrap_or("ratio_max");
     let ratio = label::significant(table.ratio_limit(), 4);
-    match quantity {
+    match quantity(table) {
         "ratio_max" => format!("ratio {ratio}"),
         gap if gap.starts_with("min_gap") => format!("{} 0", label::words(gap)),
         other => format!("{} {ratio}", label::words(other)),
@@ -107,10 +144,10 @@ fn further(table: &Table, row: usize) -> String {
     said.collect::<Vec<_>>().join(", ").trim_end().to_owned()
 }
 
-/// A curve's places as lines that have one each along the grid: where there are several, each goes on from the line whose
-/// last place is nearest.
+/// A curve's places as lines that have one each along the grid: where there are several, each goes on from the line, of those
+/// with the same sides, whose last place is nearest.
 fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
-    let nowhere = |x: f64| Place { x, y: f64::NAN, low: f64::NAN, high: f64::NAN };
+    let nowhere = |x: f64| Place { x, y: f64::NAN, low: f64::NAN, high: f64::NAN, rising: None };
     let height = |place: &Place| if place.y.is_nan() { 0.5 * (place.low + place.high) } else { place.y };
     let mut lines: Vec<Vec<Place>> = Vec::new();
     for (k, &x) in grid.iter().enumerate() {
@@ -120,8 +157,9 @@ fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (line, known) in lines.iter().enumerate() {
             for (place, new) in here.iter().enumerate() {
-                let apart = known.last().map_or(f64::NAN, |last| (height(last) - height(new)).abs());
-                if apart.is_finite() {
+                let Some(last) = known.last() else { continue };
+                let apart = (height(last) - height(new)).abs();
+                if apart.is_finite() && last.rising == new.rising {
                     pairs.push((apart, line, place));
                 }
             }
@@ -158,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_fold_goes_on_from_the_nearest_line() {
-        let place = |x: f64, y: f64| Place { x, y, low: y - 0.1, high: y + 0.1 };
+        let place = |x: f64, y: f64| Place { x, y, low: y - 0.1, high: y + 0.1, rising: None };
         let places = [
             place(1.0, 250.0),
             place(2.0, 238.0),
@@ -175,5 +213,22 @@ mod tests {
         assert_eq!(lines.len(), 3);
         assert!(lines[1][0].is_nan() && lines[1][1] == 238.0 && lines[1][2].is_nan());
         assert_eq!(lines[2][1..], [239.0, 243.0]);
+    }
+
+    #[test]
+    fn the_edges_of_a_pocket_do_not_cross() {
+        let place =
+            |x: f64, y: f64, rising| Place { x, y, low: y - 0.1, high: y + 0.1, rising: Some(rising) };
+        let places = [
+            place(1.0, 238.5, false),
+            place(1.0, 239.6, true),
+            place(2.0, 240.0, false),
+            place(2.0, 245.4, true),
+        ];
+        let lines: Vec<Vec<f64>> = branches(&[1.0, 2.0], &places)
+            .iter()
+            .map(|line| line.iter().map(|place| place.y).collect())
+            .collect();
+        assert_eq!(lines, [[238.5, 240.0], [239.6, 245.4]]);
     }
 }

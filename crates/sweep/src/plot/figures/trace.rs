@@ -1,12 +1,17 @@
 //! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
 
+use std::path::Path;
+
+use serde_json::Value;
+
 use crate::plot::PlotOptions;
+use crate::plot::axis::extremes;
 use crate::plot::chart::{Chart, ChartPanel, Mark, Series, Style};
 use crate::plot::colour::{LINEAR, NONLINEAR};
 use crate::plot::error::PlotError;
 use crate::plot::figures::campbell;
 use crate::plot::label;
-use crate::plot::read::Table;
+use crate::plot::read::{Kind, Table};
 use crate::plot::scene::INK;
 
 /// Channels that a picture shows unless told otherwise: one a way the tub can move.
@@ -25,7 +30,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             reason: "a trace needs at least two instants",
         });
     }
-    let channels: Vec<&str> = table.with_prefix("nonlinear_").into_iter().map(|(name, _)| name).collect();
+    let found = quantities(table);
+    let channels: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
     if let Some(unknown) = options.channels.iter().find(|asked| !channels.contains(&asked.as_str())) {
         return Err(PlotError::NotThere {
             option: "--channel",
@@ -37,46 +43,62 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     }
     let usual: Vec<&str> = USUAL.into_iter().filter(|name| channels.contains(name)).collect();
     let shown: Vec<&str> = match (&options.channels[..], &usual[..]) {
-        ([], []) => channels.clone(),
+        ([], []) => found.iter().filter(|quantity| quantity.channel).map(|quantity| quantity.name).collect(),
         ([], usual) => usual.to_vec(),
         (asked, _) => asked.iter().map(String::as_str).collect(),
     };
 
+    let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
     let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
-        let models = [("nonlinear model", NONLINEAR), ("linear model", LINEAR)];
-        columns
-            .iter()
-            .zip(models)
-            .filter_map(|(column, (name, colour))| {
+        // The second curve lies in front; where it hides the first one, this must shine through.
+        let front = LINEAR.with_alpha(165);
+        let [first, second] = &columns;
+        let curves = match &other {
+            Some(other) => [(table, first, said(table), NONLINEAR, 0), (other, first, said(other), front, 1)],
+            None => [
+                (table, first, "nonlinear model".to_owned(), NONLINEAR, 0),
+                (table, second, "linear model".to_owned(), front, 0),
+            ],
+        };
+        curves
+            .into_iter()
+            .filter_map(|(table, column, name, colour, grid)| {
                 let y = table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
-                Some(Series { name: name.to_owned(), colour, grid: 0, y, style: Style::Solid(1.3) })
+                Some(Series { name, colour, grid, y, style: Style::Solid(1.3) })
             })
             .collect()
     };
-    let mut panels: Vec<ChartPanel> = channels
+    let mut panels: Vec<ChartPanel> = found
         .iter()
-        .map(|name| {
-            let columns = [format!("nonlinear_{name}"), format!("linear_{name}")];
-            let unit = table.column(&columns[0]).map_or("", |column| column.unit.as_str());
-            let unit = if unit.is_empty() { unit_of_channel(name) } else { unit };
-            let (unit, factor) = label::shown(unit);
+        .map(|quantity| {
+            let (unit, factor) = label::shown(quantity.unit);
+            let words =
+                if quantity.channel { label::channel(quantity.name) } else { label::words(quantity.name) };
             panel(
-                name,
-                label::with_unit(&label::channel(name), unit),
-                shown.contains(name),
-                pair(columns, factor),
+                quantity.name,
+                label::with_unit(&words, unit),
+                shown.contains(&quantity.name),
+                pair(quantity.columns(), factor),
             )
         })
         .collect();
-    let gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
+    let apart = if other.is_some() { difference(&panels) } else { None };
+    let mut gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
+    if other.is_some() && gaps.len() < 2 {
+        gaps.clear();
+    }
+    let least = least_gaps(&gaps);
     if !gaps.is_empty() {
-        let levels = vec![(0.0, "gap closed".to_owned())];
+        // A gap that stays wide would be a flat line at the top of a panel that reaches down to contact.
+        let widest = gaps.iter().flat_map(|series| &series.y).copied().fold(0.0, f64::max);
+        let near = least.iter().any(|(_, gap)| *gap < 0.5 * widest);
+        let levels = if near { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() };
         panels.push(ChartPanel { levels, ..panel("gap", "gap, drum to tub (mm)".to_owned(), true, gaps) });
     }
     let mut marks = Vec::new();
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
         for (x, resonance) in passages(&time, speed, &resonances(options)?) {
-            marks.push(Mark { x, label: format!("{} rpm", label::significant(resonance, 4)) });
+            marks.push(Mark { x, label: format!("{} rpm", label::trimmed(&format!("{resonance:.1}"))) });
         }
         let y = speed.to_vec();
         let series = Series { name: String::new(), colour: INK, grid: 0, y, style: Style::Solid(2.0) };
@@ -84,15 +106,86 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         panels.push(ChartPanel { height, ..panel("speed", "spin (rpm)".to_owned(), true, vec![series]) });
     }
     Ok(Chart {
-        title: "Time histories of the nonlinear and the linear model".to_owned(),
-        subtitle: subtitle(table),
+        title: match &other {
+            Some(other) => {
+                format!("Nonlinear motion from static equilibrium: {} and {}", said(table), said(other))
+            }
+            None => "Motion of both models from static equilibrium".to_owned(),
+        },
+        subtitle: subtitle(table, &least, apart),
         x_label: "Time (s)".to_owned(),
         x_log: false,
-        grids: vec![time],
+        grids: match &other {
+            Some(other) => vec![time, other.numbers("time_s")?.to_vec()],
+            None => vec![time],
+        },
         panels,
         marks,
         mark_meaning: "resonance speed passed".to_owned(),
     })
+}
+
+/// What a trace holds of both models over time.
+struct Quantity<'a> {
+    /// A channel's name; of a coordinate, a speed or a force what stands before the model's name: `spring_1_tension`.
+    name: &'a str,
+    unit: &'a str,
+    /// The column's end after the model's name; empty for a channel.
+    end: &'a str,
+    channel: bool,
+}
+
+impl Quantity<'_> {
+    /// Columns of the nonlinear and of the linear model.
+    fn columns(&self) -> [String; 2] {
+        ["nonlinear", "linear"].map(|model| {
+            if self.channel {
+                format!("{model}_{}", self.name)
+            } else {
+                format!("{}_{model}_{}", self.name, self.end)
+            }
+        })
+    }
+}
+
+/// Channels first, then states and forces; the gap has its own panel.
+fn quantities(table: &Table) -> Vec<Quantity<'_>> {
+    let channels = table.with_prefix("nonlinear_").into_iter().map(|(name, column)| {
+        let unit = if column.unit.is_empty() { unit_of_channel(name) } else { &column.unit };
+        Quantity { name, unit, end: "", channel: true }
+    });
+    let further = table.columns.iter().filter(|column| column.numbers().is_some()).filter_map(|column| {
+        let (name, end) = column.name.split_once("_nonlinear_").filter(|(name, _)| *name != "gap")?;
+        Some(Quantity { name, unit: &column.unit, end, channel: false })
+    });
+    channels.chain(further).collect()
+}
+
+/// The largest difference of two curves over the same instants in any panel shown, as a share of the first one's peak.
+fn difference(panels: &[ChartPanel]) -> Option<f64> {
+    let shares = panels.iter().filter(|panel| panel.shown).filter_map(|panel| {
+        let [first, second] = &panel.series[..] else { return None };
+        let peak = first.y.iter().fold(0.0_f64, |peak, y| peak.max(y.abs()));
+        let apart = first.y.iter().zip(&second.y).map(|(a, b)| (a - b).abs()).fold(0.0_f64, f64::max);
+        (first.y.len() == second.y.len() && peak > 0.0).then(|| apart / peak)
+    });
+    shares.reduce(f64::max)
+}
+
+/// The trace whose nonlinear model is drawn in place of the linear one.
+fn other_trace(path: &Path) -> Result<Table, PlotError> {
+    let table = Table::open(path)?;
+    if table.kind == Kind::Trace {
+        return Ok(table);
+    }
+    let kind = table.kind.name();
+    Err(PlotError::Unfit(format!("`--against {}`: this is a {kind} file, expected a trace", path.display())))
+}
+
+/// What a run is called: its name, or else its file's.
+fn said(table: &Table) -> String {
+    let file = || table.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    table.run_name().map_or_else(file, str::to_owned)
 }
 
 /// The unit of a channel whose file does not say it.
@@ -103,19 +196,51 @@ fn unit_of_channel(name: &str) -> &'static str {
         .map_or("", |channel| channel.unit())
 }
 
-/// Name of the run, and the point if the file says which.
-fn subtitle(table: &Table) -> String {
+/// The least gap of each model that has one, in the unit shown.
+fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
+    gaps.iter()
+        .filter_map(|series| {
+            let (least, _) = extremes(series.y.iter().copied())?;
+            Some((series.name.trim_end_matches(" model").to_owned(), least))
+        })
+        .collect()
+}
+
+/// Name of the run, its unbalance and damping, the rest of the point if the file says which, the least gaps (mm), and how
+/// far two runs are apart.
+fn subtitle(table: &Table, least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> String {
     let mut parts: Vec<String> = table.run_name().map(str::to_owned).into_iter().collect();
-    if let Some(at) = table.find("at").and_then(|at| at.as_object()) {
-        for (name, value) in at {
-            if let Some(value) = value.as_f64() {
-                let unit = label::unit_of_name(name);
-                parts.push(format!("{} {} {unit}", label::words(name), label::significant(value, 4)));
-            }
+    let mut said: Vec<(&str, f64)> = machine(table);
+    for (name, value) in table.find("at").and_then(Value::as_object).into_iter().flatten() {
+        if let Some(value) = value.as_f64().filter(|_| !said.iter().any(|(known, _)| known == name)) {
+            said.push((name, value));
         }
     }
-    parts.push("deviation from the static equilibrium".to_owned());
+    for (name, value) in said {
+        let (words, unit) = (label::words(name).to_lowercase(), label::unit_of_name(name));
+        parts.push(format!("{words} {} {unit}", label::significant(value, 4)));
+    }
+    let gaps: Vec<String> = least_gaps_mm.iter().map(|(model, gap)| format!("{gap:.2} mm {model}")).collect();
+    if !gaps.is_empty() {
+        parts.push(format!("least gap {}", gaps.join(", ")));
+    }
+    if let Some(apart) = apart {
+        parts.push(format!("largest difference {apart:.1e} of the peak"));
+    }
     parts.join(" · ")
+}
+
+/// The two numbers of the machine that reliability turns on, as far as the file has them and all dampers are alike.
+fn machine(table: &Table) -> Vec<(&'static str, f64)> {
+    let Some(machine) = table.find("machine") else { return Vec::new() };
+    let unbalance = machine.pointer("/unbalance/mass_kg").and_then(Value::as_f64);
+    let dampers = machine.get("dampers").and_then(Value::as_array).into_iter().flatten();
+    let mut dampings: Vec<f64> =
+        dampers.filter_map(|damper| damper.get("damping_n_s_per_m").and_then(Value::as_f64)).collect();
+    dampings.dedup();
+    let damping = (dampings.len() == 1).then(|| dampings[0]);
+    let named = [("unbalance_mass_kg", unbalance), ("damping_n_s_per_m", damping)];
+    named.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
 }
 
 fn resonances(options: &PlotOptions) -> Result<Vec<f64>, PlotError> {

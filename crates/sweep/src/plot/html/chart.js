@@ -34,9 +34,11 @@ function createChart(host, spec, name) {
     "Hover to read values, wheel to zoom, drag to move, double-click to reset; or focus and use the arrow keys, + and -.");
   host.append(picker, figure, legend, said, help);
 
+  // Labels of marks stand above the panels, not on the curves.
+  const strip = spec.marks.length ? 66 : 0;
   const shown = () => spec.panels.filter((panel) => panel.shown);
   const heights = () => shown().reduce((sum, panel) => sum + panel.height + CHART.gap, 0);
-  const { request, canvas } = surface(figure, () => CHART.top + heights() + CHART.bottom, paint);
+  const { request, canvas } = surface(figure, () => CHART.top + strip + heights() + CHART.bottom, paint);
   const area = () => ({ left: CHART.left, width: figure.clientWidth - CHART.left - CHART.right });
   const atX = (x) => area().left + ((even(x) - view[0]) / (view[1] - view[0])) * area().width;
   const toX = (px) => back(view[0] + ((px - area().left) / area().width) * (view[1] - view[0]));
@@ -82,7 +84,8 @@ function createChart(host, spec, name) {
 
   function paint(context, width) {
     const box = area();
-    let top = CHART.top;
+    let top = CHART.top + strip;
+    drawMarkLabels(context, box, top);
     context.lineJoin = "round";
     const panels = shown();
     panels.forEach((panel, index) => {
@@ -96,10 +99,7 @@ function createChart(host, spec, name) {
       context.clip();
       for (const series of panel.series) drawSeries(context, series, atY, box);
       for (const [value] of panel.levels) drawLine(context, box.left, atY(value), box.left + box.width, atY(value), [3, 3], themed("ink"));
-      for (const [x, label] of spec.marks) {
-        drawLine(context, atX(x), top, atX(x), top + panel.height, [6, 4], themed("muted"));
-        if (index === 0) upright(context, label, atX(x) - box.left < 20 ? atX(x) + 13 : atX(x) - 5, top + 5);
-      }
+      for (const [x] of spec.marks) drawLine(context, atX(x), top, atX(x), top + panel.height, [6, 4], themed("muted"));
       context.restore();
       for (const [x, y, label] of panel.stars) drawStar(context, atX(x), atY(y), label, box, top, panel.height);
       if (cursor !== null) drawLine(context, atX(cursor), top, atX(cursor), top + panel.height, [], themed("accent"));
@@ -109,6 +109,19 @@ function createChart(host, spec, name) {
     context.font = `15px ${FONT}`;
     context.textAlign = "center";
     context.fillText(spec.xLabel, box.left + box.width / 2, top - CHART.gap + 40, width);
+  }
+
+  // Moved aside where they would cover each other.
+  function drawMarkLabels(context, box, top) {
+    let free = -Infinity;
+    for (const [x, label] of spec.marks) {
+      const at = atX(x);
+      if (at < box.left || at > box.left + box.width) continue;
+      const aside = Math.max(at, free);
+      free = aside + 15;
+      drawLine(context, at, top, aside, top - 8, [], themed("muted"));
+      upright(context, label, aside + 4, top - 11);
+    }
   }
 
   function drawFrame(context, panel, box, top, low, high, atY, last) {
@@ -152,6 +165,7 @@ function createChart(host, spec, name) {
       context.fill();
       context.globalAlpha = 1;
     }
+    context.globalAlpha = series.alpha ?? 1;
     context.lineWidth = series.width;
     context.setLineDash(series.dashed ? [8, 5] : []);
     context.beginPath();
@@ -185,6 +199,7 @@ function createChart(host, spec, name) {
     }
     context.stroke();
     context.setLineDash([]);
+    context.globalAlpha = 1;
   }
 
   function drawStar(context, x, y, label, box, top, height) {
@@ -224,6 +239,21 @@ function createChart(host, spec, name) {
         if (value) words.push(entry);
       }
     }
+    const swatch = (style) => {
+      const made = element("i");
+      made.style.cssText = style;
+      return made;
+    };
+    const over = shown().map((panel) => panel.series.at(-1)).find((series) => series?.alpha < 1);
+    if (over) {
+      const under = shown().find((panel) => panel.series.includes(over)).series.at(-2);
+      const mixed = `color-mix(in srgb, ${lineColour(over.colour)} ${100 * over.alpha}%, ${lineColour(under?.colour ?? over.colour)})`;
+      legend.append(element("li", {}, swatch(`height:0;border-top:3px solid ${mixed}`), "both, one over the other"));
+    }
+    const further = new Set(shown().flatMap((panel) => panel.levels.map(([, meaning]) => meaning)));
+    for (const meaning of further) legend.append(element("li", {}, swatch("height:0;border-top:2px dotted currentColor"), meaning));
+    if (spec.marks.length) legend.append(element("li", {}, swatch("height:0;border-top:2px dashed currentColor"), spec.markMeaning));
+    if (shown().some((panel) => panel.stars.length)) legend.append(element("li", {}, "★ resonance speed"));
     said.textContent = words.join("; ");
   }
 
@@ -288,11 +318,8 @@ function upright(context, text, x, y) {
   context.translate(x, y);
   context.rotate(-Math.PI / 2);
   context.font = `12px ${FONT}`;
-  context.textAlign = "right";
-  context.lineWidth = 4;
-  context.strokeStyle = themed("paper");
-  context.strokeText(text, 0, 0);
-  context.fillStyle = themed("muted");
+  context.textAlign = "left";
+  context.fillStyle = themed("ink");
   context.fillText(text, 0, 0);
   context.restore();
 }

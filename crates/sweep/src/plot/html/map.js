@@ -436,11 +436,11 @@ function createMap(host, data) {
       const { data: text, unit, factor } = trace.series[name];
       return quantised(text, unit * factor);
     };
-    const series = (name, title, colour) => ({ name: title, colour, grid: 0, width: 1.3, dashed: false, y: values(name) });
-    const panel = (name, label, lines, levels = []) => ({ name, label, shown: true, log: false, range: null, height: 150, series: lines, levels, stars: [] });
-    const both = (name, [nonlinear, linear], words, levels) => {
-      const lines = [[nonlinear, "nonlinear model", "#0072b2"], [linear, "linear model", "#d55e00"]].filter(([column]) => names.includes(column));
-      return panel(name, `${words} (${trace.series[nonlinear].shown})`, lines.map((line) => series(...line)), levels);
+    const series = (name, title, colour, alpha = 1) => ({ name: title, colour, alpha, grid: 0, width: 1.3, dashed: false, y: values(name) });
+    const panel = (name, label, lines) => ({ name, label, shown: true, log: false, range: null, height: 150, series: lines, levels: [], stars: [] });
+    const both = (name, [nonlinear, linear], words) => {
+      const lines = [[nonlinear, "nonlinear model", "#0072b2"], [linear, "linear model", "#d55e00", 0.65]].filter(([column]) => names.includes(column));
+      return panel(name, `${words} (${trace.series[nonlinear].shown})`, lines.map((line) => series(...line)));
     };
     const words = Object.fromEntries(data.layers.map((layer) => [layer.channel, layer.channelWords]));
     const panels = names.filter((name) => name.startsWith("nonlinear_")).map((column) => {
@@ -450,7 +450,12 @@ function createMap(host, data) {
       return one;
     });
     if (panels.length && !panels.some((one) => one.shown)) panels[0].shown = true;
-    if (names.includes("gap_nonlinear_m")) panels.push(both("gap", ["gap_nonlinear_m", "gap_linear_m"], "Gap, drum to tub", [[0, "gap closed"]]));
+    if (names.includes("gap_nonlinear_m")) {
+      const gaps = both("gap", ["gap_nonlinear_m", "gap_linear_m"], "Gap, drum to tub");
+      const [least, widest] = extremes(gaps.series.flatMap((one) => [...one.y]).filter(Number.isFinite));
+      if (least < 0.5 * widest) gaps.levels = [[0, "gap closed"]];
+      panels.push(gaps);
+    }
     if (names.includes("speed_rpm")) panels.push(panel("speed", "Spin (rpm)", [series("speed_rpm", "", "ink")]));
     histories.append(element("h2", {}, `Time histories at ${coordinates(pinned).join(", ")}`));
     createChart(histories, { xLabel: "Time (s)", xLog: false, grids: [floats(trace.time_s)], panels, marks: [], markMeaning: "" }, "Time histories");

@@ -280,6 +280,7 @@ fn series_json(series: &Series) -> Value {
         "name": series.name,
         "colour": if series.colour == INK { "ink".to_owned() } else { series.colour.css() },
         "grid": series.grid,
+        "alpha": embed::short(f64::from(series.colour.alpha) / 255.0),
         "width": width,
         "dashed": dashed,
         "y": data(&series.y),
