@@ -126,7 +126,7 @@ pub use partials::Partials;
 pub use peaks::{Peaks, Sample};
 pub use real::Real;
 pub use rk4::MAX_LANES;
-pub use simd::{Kernel, ScalarKernel, Simd};
+pub use simd::{Aside, Kernel, ScalarKernel, Simd};
 pub use squares::SquareIntegrals;
 pub use system::{Count, Ended, Failure, Leg, Step, System, Task};
 pub use time_above::TimeAbove;
