@@ -66,23 +66,27 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
         loop {
             let cut = self.part_end_s.0.less(end_s.0);
             let lanes_cut = T::bits(cut);
-            if lanes_cut == 0 {
-                break;
-            }
-            // Lanes that are not cut go to the step's end; from there on nothing is left of it.
-            let to_cut = self.part_end_s - (end_s - rest_s);
-            let share = N(T::select(cut, within_step(to_cut / rest_s).0, rest_s.lit(1.0).0));
             let mut there = *samples;
-            for i in 0..M {
-                let inside = Quintic::new(rest_s, &self.peaks.last[i], &samples[i]).sample(share, rest_s);
-                there[i] = Sample {
-                    value: N(T::select(cut, inside.value.0, there[i].value.0)),
-                    slope: N(T::select(cut, inside.slope.0, there[i].slope.0)),
-                    curvature: N(T::select(cut, inside.curvature.0, there[i].curvature.0)),
-                };
+            let mut part_s = rest_s;
+            if lanes_cut != 0 {
+                // Lanes that are not cut go to the step's end; from there on nothing is left of it.
+                let to_cut = self.part_end_s - (end_s - rest_s);
+                let share = N(T::select(cut, within_step(to_cut / rest_s).0, rest_s.lit(1.0).0));
+                for i in 0..M {
+                    let inside = Quintic::new(rest_s, &self.peaks.last[i], &samples[i]).sample(share, rest_s);
+                    there[i] = Sample {
+                        value: N(T::select(cut, inside.value.0, there[i].value.0)),
+                        slope: N(T::select(cut, inside.slope.0, there[i].slope.0)),
+                        curvature: N(T::select(cut, inside.curvature.0, there[i].curvature.0)),
+                    };
+                }
+                part_s = (share * rest_s).v();
             }
-            self.peaks.advance((share * rest_s).v(), &there, counts);
-            rest_s = rest_s - share * rest_s;
+            self.peaks.advance(part_s, &there, counts);
+            if lanes_cut == 0 {
+                return;
+            }
+            rest_s = rest_s - part_s;
             for lane in (0..T::LANES).filter(|lane| lanes_cut >> lane & 1 == 1) {
                 self.parts[lane].push(self.peaks.lane(lane));
                 self.peaks.reset(lane);
@@ -91,6 +95,5 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
             }
             self.peaks.begin(&there, cut);
         }
-        self.peaks.advance(rest_s, samples, counts);
     }
 }

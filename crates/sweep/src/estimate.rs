@@ -9,7 +9,7 @@ use crate::interrupt::Interrupt;
 use crate::outcome::Outcome;
 use crate::plan::{Integrator, Plan};
 use crate::run::{Engine, Watch, default_threads};
-use crate::store::{Environment, Job, chunk_bytes, chunk_points};
+use crate::store::{Environment, Job, Shape, chunk_points};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long.
 const LONG_ENOUGH: Duration = Duration::from_millis(60);
@@ -75,7 +75,7 @@ impl Estimate {
             sampled_points: samples.iter().map(|sample| sample.points).sum(),
             sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
             memory_bytes: memory_bytes(plan, threads),
-            disk_bytes: plan.points() as f64 * chunk_bytes(plan.reliability.channels.len()) as f64,
+            disk_bytes: plan.points() as f64 * Shape::of(&Job::of(plan).layout).bytes_a_point() as f64,
         })
     }
 }

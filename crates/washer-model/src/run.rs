@@ -13,8 +13,8 @@ use crate::point::{PlannedLeg, Point};
 use core::marker::PhantomData;
 use extras::{Extras, Seen};
 use lane_ode::{
-    Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, System, Task, Tolerance,
-    dopri5, rk4,
+    Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, System, Task,
+    Tolerance, dopri5, rk4,
 };
 
 /// How trajectories are integrated.

@@ -6,6 +6,7 @@ use washer_model::{Channel, Machine, Parameter, Range, Spin};
 
 use crate::cli;
 use crate::exit::{Error, Exit, print};
+use crate::measures::{Criterion, Measures, Metric};
 use crate::store::schema::{AxisColumn, Layout};
 use crate::verdict::ROW_STATUSES;
 
@@ -125,7 +126,8 @@ fn columns() -> String {
             description: parameter.description().to_owned(),
         })
         .collect();
-    let layout = Layout { axes, channels: Channel::ALL.to_vec(), ratio_limit: 2.0 };
+    let measures = Measures { metrics: Metric::ALL.to_vec(), ..Measures::default() };
+    let layout = Layout { axes, channels: Channel::ALL.to_vec(), ratio_limit: 2.0, measures };
     row(&mut text, &["column", "type", "unit", "null", "meaning"]);
     row(&mut text, &["---"; 5]);
     for field in layout.schema().fields() {
@@ -140,6 +142,19 @@ fn columns() -> String {
             &[&format!("`{}`", field.name()), &data_type, told("unit"), null, told("description")],
         );
     }
+    text.push_str("\nWhat `criterion` in `[reliability]` makes of a channel's columns:\n\n");
+    row(&mut text, &["criterion", "`nonlinear_` and `linear_`", "`ratio_`"]);
+    row(&mut text, &["---"; 3]);
+    for criterion in Criterion::ALL {
+        row(&mut text, &[&format!("`{}`", criterion.name()), criterion.amplitude(), criterion.ratio()]);
+    }
+    let metrics: Vec<String> = Metric::ALL.iter().map(|metric| format!("`{}`", metric.name())).collect();
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "\nThe columns of a metric ({}) are there only where the grid file's `metrics` names it, in its order.",
+        metrics.join(", ")
+    );
     let statuses: Vec<String> = ROW_STATUSES.iter().map(|status| format!("`{status}`")).collect();
     // Writing to a String cannot fail.
     let _ = writeln!(text, "\nValues of `status`: {}.", statuses.join(", "));

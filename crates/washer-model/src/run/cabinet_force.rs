@@ -37,9 +37,7 @@ impl<T: Lane> CabinetForce<T> {
     #[inline(always)]
     pub(crate) fn splat(zero: N<T>, model: ModelKind, point: &Point) -> Self {
         match model {
-            ModelKind::Nonlinear => {
-                Self::Nonlinear(Coefficients::splat(zero.constant(), &point.machine))
-            }
+            ModelKind::Nonlinear => Self::Nonlinear(Coefficients::splat(zero.constant(), &point.machine)),
             ModelKind::Linear => {
                 let mut expansion =
                     Expansion { rest: [zero; 3], by_place: [[zero; 4]; 3], by_speed: [[zero; 4]; 3] };
