@@ -60,7 +60,9 @@ fn parameters() -> String {
         "Every number of the machine and of the spin has one name, the same in `[set]`, in `--set NAME=VALUE` and as the\n\
          `parameter` of an `[[axis]]`. Values are those of the built-in machine. *Paper* means printed there, *derived*\n\
          follows from what is printed, *assumed* is this project's own choice where the paper is silent.\n\
-         Springs and dampers are numbered in the order of the machine file; the table shows the first of each.\n\n",
+         Springs and dampers are numbered in the order of the machine file; the table shows the first of each. The end of the run\n\
+         (`end_s`) and the integrator's settings are no parameters: `[time]` and `[integrator]` set them once, because rows whose\n\
+         runs differ in length or method would not compare. The window's edges are.\n\n",
     );
     row(&mut text, &["name", "built in", "unit", "meaning", "values", "source"]);
     row(&mut text, &["---"; 6]);

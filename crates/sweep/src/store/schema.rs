@@ -368,6 +368,7 @@ impl<'a> Rows<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measures::{Criterion, Metric};
     use crate::store::synthetic;
 
     #[test]
@@ -400,6 +401,37 @@ mod tests {
                 "rejected_linear",
             ]
         );
+    }
+
+    #[test]
+    fn metrics_have_columns_in_the_order_asked_for_and_criteria_say_what_they_are() {
+        let mut layout = synthetic::layout();
+        let plain = layout.schema().fields().len();
+        let metrics = vec![Metric::StaticSag, Metric::ClashTime, Metric::CabinetForce];
+        layout.measures = Measures { criterion: Criterion::Rms, metrics };
+        let mut rows = Rows::new(&layout);
+        let mut outcome = synthetic::outcome(0, 2);
+        outcome.static_sag_m = Some(0.013);
+        outcome.nonlinear.metrics = vec![1.5, 400.0];
+        outcome.linear.metrics = vec![0.5, 300.0];
+        rows.push(vec![0.1, 60.0], outcome);
+        let batch = rows.take().unwrap();
+        assert_eq!(batch.num_columns(), plain + 5);
+        let expected = [
+            ("static_sag_m", 0.013),
+            ("clash_time_nonlinear_s", 1.5),
+            ("clash_time_linear_s", 0.5),
+            ("cabinet_force_nonlinear_n", 400.0),
+            ("cabinet_force_linear_n", 300.0),
+        ];
+        let first = batch.schema().index_of("static_sag_m").unwrap();
+        for (k, (name, value)) in expected.into_iter().enumerate() {
+            assert_eq!(batch.schema().field(first + k).name(), name);
+            let column = batch.column(first + k).as_any().downcast_ref::<Float64Array>().unwrap();
+            assert_eq!(column.value(0), value, "{name}");
+        }
+        let description = &layout.dictionary()["nonlinear_tub_yaw"]["description"];
+        assert!(description.as_str().unwrap().contains("root mean square"), "{description}");
     }
 
     #[test]
