@@ -18,7 +18,7 @@ use crate::plan::{Integrator, Plan, Scenario};
 use crate::run::{Engine, Watch};
 
 /// Points that go through the lanes together before progress is told and the stop flag is looked at.
-const GROUP: u64 = 64;
+pub(crate) const GROUP: u64 = 64;
 
 /// Steps that one leg of an adaptive trajectory may take.
 const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;

@@ -3,8 +3,9 @@
 use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
+use washer_model::Channel;
 
-use crate::engine::{EngineError, ModelEngine};
+use crate::engine::{EngineError, GROUP, ModelEngine};
 use crate::interrupt::Interrupt;
 use crate::outcome::Outcome;
 use crate::plan::{Integrator, Plan};
@@ -143,7 +144,16 @@ fn memory_bytes(plan: &Plan, threads: usize) -> f64 {
     let columns = Job::of(plan).layout.schema().fields().len() as f64;
     let row_group = crate::store::schema::ROW_GROUP_ROWS as f64;
     let joining = row_group.min(plan.points() as f64) * columns * (8.0 + CELL_BYTES);
-    BASE_BYTES + in_hand.max(joining)
+    BASE_BYTES + in_hand.max(joining) + turn_bytes(plan, threads)
+}
+
+/// Peaks by turn of the drum, both models', of the points that go through each thread's lanes together.
+fn turn_bytes(plan: &Plan, threads: usize) -> f64 {
+    if !plan.measures.wanted().turns {
+        return 0.0;
+    }
+    let turns = plan.spin.turns_within(plan.window_s);
+    (threads as u64 * GROUP) as f64 * 2.0 * turns * size_of::<[f64; Channel::ALL.len()]>() as f64
 }
 
 /// A size with three digits.

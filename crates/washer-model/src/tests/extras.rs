@@ -11,7 +11,7 @@ use lane_ode::{Simd, Tolerance};
 const EVERYTHING: Wanted =
     Wanted { root_mean_squares: true, turns: true, cabinet_force: true, clash_time: true };
 const TIMING: Timing = Timing { end_s: 4.0, window_s: [1.3, 3.9] };
-const EVERY_S: f64 = 1e-4;
+const EVERY_S: f64 = 2.5e-4;
 
 /// Through the resonances in four seconds, with so little room between drum and tub that they clash at times.
 fn point() -> Point {
@@ -64,37 +64,52 @@ fn close(what: &str, found: f64, expected: f64, allowed: f64) {
 #[test]
 fn they_are_what_a_densely_sampled_history_shows() {
     let point = point();
-    let tolerance = Tolerance { relative: 1e-8, absolute: 1e-11, max_steps: 1_000_000 };
-    for method in [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(tolerance), Method::Rodas5p(tolerance)] {
-        for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-            let (records, extras) = simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING);
-            assert_eq!(records, simulate(Simd::best(), model, &method, &[&point]), "the rest is as ever");
-            let (extra, expected) = (&extras[0], sampled(&point, model, &method));
-            let rms = extra.root_mean_squares.unwrap();
-            assert!(extra.turns.len() > 10);
-            assert_eq!(extra.turns.len(), expected.turns.len());
-            for channel in Channel::ALL {
-                let (i, name) = (channel.index(), channel.name());
-                close(name, rms[i], expected.root_mean_squares[i], 1e-6);
-                let mut exact = 0;
-                for (found, expected) in extra.turns.iter().zip(&expected.turns) {
-                    // A sample beside a crest is as good as the crest; one beside the end of a turn, on a flank, is not.
-                    close(name, found[i], expected[i], 5e-3);
-                    exact += usize::from((found[i] - expected[i]).abs() < 1e-5 * found[i]);
-                }
-                assert!(2 * exact > extra.turns.len(), "{name}: {exact} of {} turns", extra.turns.len());
-                let greatest = extra.turns.iter().fold(0.0_f64, |greatest, turn| greatest.max(turn[i]));
-                close(name, greatest, records[0].amplitudes[i], 1e-9);
+    let method = Method::Rk4 { step_s: 2e-4 };
+    for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        let (records, extras) = simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING);
+        assert_eq!(records, simulate(Simd::best(), model, &method, &[&point]), "the rest is as ever");
+        let (extra, expected) = (&extras[0], sampled(&point, model, &method));
+        let rms = extra.root_mean_squares.unwrap();
+        assert!(extra.turns.len() > 10);
+        assert_eq!(extra.turns.len(), expected.turns.len());
+        for channel in Channel::ALL {
+            let (i, name) = (channel.index(), channel.name());
+            close(name, rms[i], expected.root_mean_squares[i], 1e-5);
+            let mut exact = 0;
+            for (found, expected) in extra.turns.iter().zip(&expected.turns) {
+                // A sample beside a crest is as good as the crest; one beside the end of a turn, on a flank, is not.
+                close(name, found[i], expected[i], 2e-2);
+                exact += usize::from((found[i] - expected[i]).abs() < 1e-4 * found[i]);
             }
-            close("force", extra.cabinet_force_n.unwrap(), expected.cabinet_force_n, 1e-5);
-            let clash_s = extra.clash_time_s.unwrap();
-            assert!(clash_s > 0.05 && clash_s < 2.5, "{clash_s} s, least gap {}", records[0].min_gap_m);
-            // Each touch is a sample too long or too short.
-            assert!(
-                (clash_s - expected.clash_time_s).abs() < 40.0 * EVERY_S,
-                "{clash_s} {}",
-                expected.clash_time_s
-            );
+            assert!(2 * exact > extra.turns.len(), "{name}: {exact} of {} turns", extra.turns.len());
+            let greatest = extra.turns.iter().fold(0.0_f64, |greatest, turn| greatest.max(turn[i]));
+            close(name, greatest, records[0].amplitudes[i], 1e-9);
+        }
+        close("force", extra.cabinet_force_n.unwrap(), expected.cabinet_force_n, 1e-4);
+        let clash_s = extra.clash_time_s.unwrap();
+        assert!(clash_s > 0.05 && clash_s < 2.5, "{clash_s} s, least gap {}", records[0].min_gap_m);
+        // Each touch is a sample too long or too short.
+        let off_s = (clash_s - expected.clash_time_s).abs();
+        assert!(off_s < 20.0 * EVERY_S, "{clash_s} for {}", expected.clash_time_s);
+    }
+}
+
+#[test]
+fn methods_whose_steps_lie_elsewhere_find_the_same() {
+    let point = point();
+    let tolerance = Tolerance { relative: 1e-7, absolute: 1e-10, max_steps: 1_000_000 };
+    for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        let run = |method| simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING).1.remove(0);
+        let reference = run(Method::Rk4 { step_s: 2e-4 });
+        for other in [run(Method::Dopri5(tolerance)), run(Method::Rodas5p(tolerance))] {
+            let rms = [&other, &reference].map(|extra| extra.root_mean_squares.unwrap());
+            rms[0].iter().zip(rms[1]).for_each(|(found, expected)| close("rms", *found, expected, 1e-4));
+            assert_eq!(other.turns.len(), reference.turns.len());
+            for (found, expected) in other.turns.iter().flatten().zip(reference.turns.iter().flatten()) {
+                close("turn", *found, *expected, 1e-3);
+            }
+            close("force", other.cabinet_force_n.unwrap(), reference.cabinet_force_n.unwrap(), 1e-4);
+            close("clash", other.clash_time_s.unwrap(), reference.clash_time_s.unwrap(), 1e-3);
         }
     }
 }
