@@ -3,6 +3,7 @@
 use crate::lane::Lane;
 use crate::num::N;
 use crate::real::Real;
+use crate::simd::Aside;
 
 /// A value and its derivative along one direction. Nest it for second derivatives.
 #[derive(Clone, Copy, Debug)]
@@ -131,5 +132,9 @@ impl<T: Lane> Lane for Dual<T> {
     #[inline(always)]
     fn bits(mask: Self::Mask) -> u32 {
         T::bits(mask)
+    }
+    #[inline(always)]
+    fn aside<W: Aside>(self, work: W) {
+        self.value.aside(work);
     }
 }

@@ -1,6 +1,7 @@
 //! Lanes: independent trajectories side by side in one number.
 
 use crate::real::Real;
+use crate::simd::{Aside, Simd, out_of_line};
 use crate::trig;
 
 /// A [`Real`] whose lanes can be reached one by one.
@@ -27,6 +28,11 @@ pub trait Lane: Real {
     #[must_use]
     fn larger(self, b: Self) -> Self {
         Self::select(b.less(self), self, b)
+    }
+    /// Runs work over lanes of this type as a function of its own, compiled with the type's instructions once for all callers.
+    #[inline(always)]
+    fn aside<W: Aside>(self, work: W) {
+        out_of_line(work);
     }
 }
 
@@ -113,6 +119,10 @@ impl Lane for f64 {
     #[inline(always)]
     fn bits(mask: bool) -> u32 {
         u32::from(mask)
+    }
+    #[inline(always)]
+    fn aside<W: Aside>(self, work: W) {
+        Simd::aside(work);
     }
 }
 

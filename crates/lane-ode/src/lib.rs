@@ -102,13 +102,17 @@ mod dual;
 mod lane;
 mod linear_solve;
 mod num;
+mod part_peaks;
 mod partials;
 mod peaks;
+mod quintic;
 mod real;
 pub mod rk4;
 pub mod rodas;
 mod simd;
+mod squares;
 mod system;
+mod time_above;
 pub mod trig;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -117,12 +121,15 @@ pub use control::Tolerance;
 pub use dual::Dual;
 pub use lane::{Array, Lane};
 pub use num::{N, Product};
+pub use part_peaks::PartPeaks;
 pub use partials::Partials;
 pub use peaks::{Peaks, Sample};
 pub use real::Real;
 pub use rk4::MAX_LANES;
-pub use simd::{Kernel, ScalarKernel, Simd};
+pub use simd::{Aside, Kernel, ScalarKernel, Simd};
+pub use squares::SquareIntegrals;
 pub use system::{Count, Ended, Failure, Leg, Step, System, Task};
+pub use time_above::TimeAbove;
 
 #[cfg(test)]
 mod tests;

@@ -2,6 +2,7 @@
 
 use crate::lane::Lane;
 use crate::num::N;
+use crate::quintic::Quintic;
 
 /// An output with its first two derivatives in time.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +31,7 @@ impl<T: Copy> Sample<T> {
 #[derive(Clone, Copy, Debug)]
 pub struct Peaks<T, const M: usize> {
     peak: [N<T>; M],
-    last: [Sample<T>; M],
+    pub(crate) last: [Sample<T>; M],
 }
 
 impl<T: Lane, const M: usize> Peaks<T, M> {
@@ -92,52 +93,23 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         self.last = *samples;
     }
 
+    /// As [`Peaks::advance`], for outputs whose curvatures are not known: then a step is the cubic through values and slopes, and
+    /// the sampling error is of fourth order.
+    #[inline(always)]
+    pub fn advance_by_slopes(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
+        let mut samples = *samples;
+        for i in 0..M {
+            let (last, now) = (&mut self.last[i], &mut samples[i]);
+            let mean_slope = (now.value - last.value) / length_s;
+            last.curvature = (6.0 * mean_slope - (4.0 * last.slope + 2.0 * now.slope)) / length_s;
+            now.curvature = (2.0 * last.slope + 4.0 * now.slope - 6.0 * mean_slope) / length_s;
+        }
+        self.advance(length_s, &samples, counts);
+    }
+
     #[inline(always)]
     fn raise(&mut self, i: usize, size: N<T>, counts: T::Mask) {
         let raised = size.0.larger(self.peak[i].0);
         self.peak[i] = N(T::select(counts, raised, self.peak[i].0));
     }
-}
-
-/// The polynomial of degree 5 that meets values, slopes and curvatures at both ends of a step; over s from 0 to 1.
-struct Quintic<T> {
-    c: [N<T>; 6],
-}
-
-impl<T: Lane> Quintic<T> {
-    #[inline(always)]
-    fn new(h: N<T>, start: &Sample<T>, end: &Sample<T>) -> Self {
-        let (Sample { value: y0, slope: d0, curvature: e0 }, Sample { value: y1, slope: d1, curvature: e1 }) =
-            (*start, *end);
-        let hh = (h * h).v();
-        let (v0, v1) = ((h * d0).v(), (h * d1).v());
-        let (a0, a1) = ((0.5 * (hh * e0).v()).v(), (0.5 * (hh * e1).v()).v());
-        // Residuals at s = 1 of value, slope and half curvature, after the terms fixed at s = 0.
-        let r = y1 - y0 - v0 - a0;
-        let s = v1 - v0 - 2.0 * a0;
-        let t = a1 - a0;
-        Self { c: [y0, v0, a0, 10.0 * r - 4.0 * s + t, 7.0 * s - 15.0 * r - 2.0 * t, 6.0 * r - 3.0 * s + t] }
-    }
-
-    /// The value where the slope vanishes, by Newton's method from where the cubic's slope would; at worst an end's.
-    #[inline(always)]
-    fn extremum(&self) -> N<T> {
-        let c = &self.c;
-        let slope_end = c[1] + 2.0 * c[2] + 3.0 * c[3] + 4.0 * c[4] + 5.0 * c[5];
-        // Secant start: where a straight slope would cross zero.
-        let mut s = within_step(c[1] / (c[1] - slope_end));
-        for _ in 0..4 {
-            let slope = c[1] + s * (2.0 * c[2] + s * (3.0 * c[3] + s * (4.0 * c[4] + (5.0 * s) * c[5])));
-            let curvature = 2.0 * c[2] + s * (6.0 * c[3] + s * (12.0 * c[4] + (20.0 * s) * c[5]));
-            s = within_step(s - slope / curvature);
-        }
-        c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5]))))
-    }
-}
-
-/// Between 0 and 1; NaN becomes 1.
-#[inline(always)]
-fn within_step<T: Lane>(s: N<T>) -> N<T> {
-    let s = s.where_less(s.lit(1.0), s, s.lit(1.0));
-    s.lit(0.0).where_less(s, s, s.lit(0.0))
 }

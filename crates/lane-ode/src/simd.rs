@@ -36,6 +36,19 @@ pub trait ScalarKernel {
     fn run(self) -> Self::Output;
 }
 
+/// Work over lanes of one type that is compiled once, as a function of its own, not wherever it is called from: for what is long
+/// and runs seldom beside what surrounds it. [`Lane::aside`] runs it.
+pub trait Aside {
+    /// Does the work. Mark it `#[inline(always)]` as [`Kernel::run`].
+    fn run(self);
+}
+
+/// Work without any instruction set of its own.
+#[inline(never)]
+pub(crate) fn out_of_line<W: Aside>(work: W) {
+    work.run();
+}
+
 impl Simd {
     /// Every instruction set, the widest first.
     pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Scalar];
@@ -114,6 +127,16 @@ impl Simd {
         kernel.run()
     }
 
+    /// Runs work over `f64` as a function of its own, with the processor's fused multiply-add where it has one.
+    #[inline(always)]
+    pub(crate) fn aside<W: Aside>(work: W) {
+        #[cfg(target_arch = "x86_64")]
+        if Self::Avx2.is_available() {
+            return x86::aside(work);
+        }
+        out_of_line(work);
+    }
+
     /// Runs a kernel that follows one trajectory and uses lanes for something else, on a few lanes. The result is the same on
     /// any number of them; few are enough, and the kernel is compiled for one instruction set instead of all.
     #[inline(never)]
@@ -129,7 +152,7 @@ impl Simd {
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod x86 {
-    use super::{Kernel, ScalarKernel};
+    use super::{Aside, Kernel, ScalarKernel};
     use crate::x86::{F64x4, F64x8};
 
     /// An entry function with an instruction set, and a safe one around it that checks for it.
@@ -151,6 +174,20 @@ mod x86 {
     entry!(avx512, "avx2,fma,avx512f,avx512dq,avx512vl", super::Simd::Avx512, unsafe { F64x8::first(0.0) });
     entry!(avx2, "avx2,fma", super::Simd::Avx2, unsafe { F64x4::first(0.0) });
     entry!(scalar, "avx2,fma", super::Simd::Avx2, 0.0_f64);
+
+    pub(super) fn aside<W: Aside>(work: W) {
+        #[inline(never)]
+        #[target_feature(enable = "avx2,fma")]
+        fn inner<W: Aside>(work: W) {
+            work.run();
+        }
+        assert!(
+            super::Simd::Avx2.is_available(),
+            "dispatched to an instruction set that this processor lacks"
+        );
+        // SAFETY: asserted above.
+        unsafe { inner(work) }
+    }
 
     pub(super) fn one_lane<K: ScalarKernel>(kernel: K) -> K::Output {
         #[target_feature(enable = "avx2,fma")]

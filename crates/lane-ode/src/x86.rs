@@ -7,11 +7,12 @@
 
 use crate::lane::Lane;
 use crate::real::Real;
+use crate::simd::Aside;
 use crate::trig;
 use core::arch::x86_64::*;
 
 macro_rules! vector {
-    ($name:ident, $raw:ty, $lanes:literal, $mask:ty, $doc:literal,
+    ($name:ident, $raw:ty, $lanes:literal, $mask:ty, $features:literal, $doc:literal,
      set1 $set1:ident, add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident, sqrt $sqrt:ident,
      fmadd $fmadd:ident, fmsub $fmsub:ident, fnmadd $fnmadd:ident,
      neg |$n:ident| $neg:expr, abs |$ab:ident| $abs:expr, round |$r:ident| $round:expr,
@@ -139,12 +140,22 @@ macro_rules! vector {
             fn bits($b: $mask) -> u32 {
                 $bits
             }
+            #[inline(always)]
+            fn aside<W: Aside>(self, work: W) {
+                #[inline(never)]
+                #[target_feature(enable = $features)]
+                fn inner<W: Aside>(work: W) {
+                    work.run();
+                }
+                // SAFETY: as in `lit`.
+                unsafe { inner(work) }
+            }
         }
     };
 }
 
 vector!(
-    F64x4, __m256d, 4, __m256d, "Four lanes of AVX2 with FMA.",
+    F64x4, __m256d, 4, __m256d, "avx2,fma", "Four lanes of AVX2 with FMA.",
     set1 _mm256_set1_pd, add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd, div _mm256_div_pd,
     sqrt _mm256_sqrt_pd, fmadd _mm256_fmadd_pd, fmsub _mm256_fmsub_pd, fnmadd _mm256_fnmadd_pd,
     neg |a| _mm256_xor_pd(a, _mm256_set1_pd(-0.0)),
@@ -159,7 +170,7 @@ vector!(
 );
 
 vector!(
-    F64x8, __m512d, 8, __mmask8, "Eight lanes of AVX-512.",
+    F64x8, __m512d, 8, __mmask8, "avx2,fma,avx512f,avx512dq,avx512vl", "Eight lanes of AVX-512.",
     set1 _mm512_set1_pd, add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd, div _mm512_div_pd,
     sqrt _mm512_sqrt_pd, fmadd _mm512_fmadd_pd, fmsub _mm512_fmsub_pd, fnmadd _mm512_fnmadd_pd,
     neg |a| _mm512_castsi512_pd(_mm512_xor_si512(

@@ -10,14 +10,15 @@ use std::sync::OnceLock;
 
 use lane_ode::{Failure, Simd, Tolerance};
 use serde_json::Value;
-use washer_model::{Method, ModelKind, Point, Record, Timing, prepare, simulate};
+use washer_model::{Extra, Method, ModelKind, Point, Record, Timing, Wanted, prepare, simulate_with};
 
+use crate::measures::{Criterion, Metric};
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::plan::{Integrator, Plan, Scenario};
 use crate::run::{Engine, Watch};
 
 /// Points that go through the lanes together before progress is told and the stop flag is looked at.
-const GROUP: u64 = 64;
+pub(crate) const GROUP: u64 = 64;
 
 /// Steps that one leg of an adaptive trajectory may take.
 const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
@@ -36,6 +37,7 @@ pub struct ModelEngine<'a> {
     simd: Simd,
     scheme: Scheme,
     timing: Timing,
+    wanted: Wanted,
 }
 
 /// How trajectories are integrated.
@@ -82,7 +84,8 @@ impl<'a> ModelEngine<'a> {
             Integrator::Rk4MassScaled { accuracy } => Scheme::Fast { accuracy, settled: OnceLock::new() },
         };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };
-        Ok(Self { plan, simd: simd_from_environment()?, scheme, timing })
+        let wanted = plan.measures.wanted();
+        Ok(Self { plan, simd: simd_from_environment()?, scheme, timing, wanted })
     }
 
     /// Takes over what the fast method works with from another engine; too late once it has been asked for.
@@ -116,13 +119,15 @@ impl<'a> ModelEngine<'a> {
     fn evaluate_together(&self, points: Range<u64>, scenario: &dyn Fn(u64) -> Scenario) -> Vec<Outcome> {
         let points: Vec<u64> = points.collect();
         let prepared = self.prepare(&points, scenario);
-        match &self.scheme {
+        let mut outcomes = match &self.scheme {
             Scheme::Direct(method) => self.all(&prepared, method, &points),
             Scheme::Fast { accuracy, settled } => {
                 let settled = settled.get_or_init(|| self.unchecked(*accuracy));
                 self.certain(*accuracy, settled, &prepared, &points)
             }
-        }
+        };
+        outcomes.iter_mut().for_each(Outcome::forget_turns);
+        outcomes
     }
 
     /// Points made ready, those of one window together; `None` where there is no equilibrium.
@@ -145,27 +150,33 @@ impl<'a> ModelEngine<'a> {
         let mut linear = self.trajectories(&ready, ModelKind::Linear, method).into_iter();
         let next =
             |trajectories: &mut std::vec::IntoIter<Trajectory>, prepared: &Option<Point>| match prepared {
-                Some(_) => trajectories.next().unwrap_or_else(|| failed(Status::Panicked)),
-                None => failed(Status::NoEquilibrium),
+                Some(_) => trajectories.next().unwrap_or(Trajectory::failed(Status::Panicked)),
+                None => Trajectory::failed(Status::NoEquilibrium),
             };
         points
             .iter()
             .zip(prepared)
-            .map(|(&point, prepared)| Outcome {
-                point,
-                nonlinear: next(&mut nonlinear, prepared),
-                linear: next(&mut linear, prepared),
-                sensitive: None,
+            .map(|(&point, prepared)| {
+                let (nonlinear, linear) = (next(&mut nonlinear, prepared), next(&mut linear, prepared));
+                let mut outcome = Outcome::new(point, nonlinear, linear);
+                outcome.compare_turns(&self.plan.reliability.channels);
+                if self.plan.measures.metrics.contains(&Metric::StaticSag) {
+                    outcome.static_sag_m = prepared.as_ref().map(Point::static_sag_m);
+                }
+                outcome
             })
             .collect()
     }
 
     /// One model at every point, by one method.
     fn trajectories(&self, points: &[&Point], model: ModelKind, method: &Method) -> Vec<Trajectory> {
-        simulate(self.simd, model, method, points).iter().map(|record| self.trajectory(record)).collect()
+        let (records, extras) = simulate_with(self.simd, model, method, points, self.wanted);
+        // None at all if nothing was wanted.
+        let mut extras = extras.into_iter();
+        records.iter().map(|record| self.trajectory(record, extras.next().unwrap_or_default())).collect()
     }
 
-    fn trajectory(&self, record: &Record) -> Trajectory {
+    fn trajectory(&self, record: &Record, extra: Extra) -> Trajectory {
         let Record { failure, steps, rejected, .. } = *record;
         if let Some((reason, time_s)) = failure {
             let status = match reason {
@@ -173,16 +184,27 @@ impl<'a> ModelEngine<'a> {
                 Failure::StepTooSmall => Status::StepTooSmall,
                 Failure::StepLimit => Status::StepLimit,
             };
-            return Trajectory { fail_time_s: Some(time_s), steps, rejected, ..failed(status) };
+            return Trajectory { fail_time_s: Some(time_s), steps, rejected, ..Trajectory::failed(status) };
         }
         let channels = &self.plan.reliability.channels;
+        let amplitudes = match self.plan.measures.criterion {
+            Criterion::Peak | Criterion::Envelope => record.amplitudes,
+            Criterion::Rms => extra.root_mean_squares.unwrap_or(record.amplitudes),
+        };
+        let metrics = self.plan.measures.of_model().filter_map(|metric| match metric {
+            Metric::CabinetForce => extra.cabinet_force_n,
+            Metric::ClashTime => extra.clash_time_s,
+            Metric::StaticSag => None,
+        });
         Trajectory {
             status: Status::Ok,
             fail_time_s: None,
-            amplitudes: channels.iter().map(|channel| record.amplitudes[channel.index()]).collect(),
+            amplitudes: channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
             min_gap_m: Some(record.min_gap_m),
             steps,
             rejected,
+            metrics: metrics.collect(),
+            turns: extra.turns,
         }
     }
 }
@@ -202,12 +224,7 @@ fn together_or_alone(points: Range<u64>, evaluate: &dyn Fn(Range<u64>) -> Vec<Ou
 }
 
 fn panicked(point: u64) -> Outcome {
-    let [nonlinear, linear] = [failed(Status::Panicked), failed(Status::Panicked)];
-    Outcome { point, nonlinear, linear, sensitive: None }
-}
-
-fn failed(status: Status) -> Trajectory {
-    Trajectory { status, fail_time_s: None, amplitudes: Vec::new(), min_gap_m: None, steps: 0, rejected: 0 }
+    Outcome::new(point, Trajectory::failed(Status::Panicked), Trajectory::failed(Status::Panicked))
 }
 
 impl Engine for ModelEngine<'_> {

@@ -3,13 +3,14 @@
 use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
+use washer_model::Channel;
 
-use crate::engine::{EngineError, ModelEngine};
+use crate::engine::{EngineError, GROUP, ModelEngine};
 use crate::interrupt::Interrupt;
 use crate::outcome::Outcome;
 use crate::plan::{Integrator, Plan};
 use crate::run::{Engine, Watch, default_threads};
-use crate::store::{Environment, Job, chunk_bytes, chunk_points};
+use crate::store::{Environment, Job, Shape, chunk_points};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long.
 const LONG_ENOUGH: Duration = Duration::from_millis(60);
@@ -75,7 +76,7 @@ impl Estimate {
             sampled_points: samples.iter().map(|sample| sample.points).sum(),
             sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
             memory_bytes: memory_bytes(plan, threads),
-            disk_bytes: plan.points() as f64 * chunk_bytes(plan.reliability.channels.len()) as f64,
+            disk_bytes: plan.points() as f64 * Shape::of(&Job::of(plan).layout).bytes_a_point() as f64,
         })
     }
 }
@@ -143,7 +144,16 @@ fn memory_bytes(plan: &Plan, threads: usize) -> f64 {
     let columns = Job::of(plan).layout.schema().fields().len() as f64;
     let row_group = crate::store::schema::ROW_GROUP_ROWS as f64;
     let joining = row_group.min(plan.points() as f64) * columns * (8.0 + CELL_BYTES);
-    BASE_BYTES + in_hand.max(joining)
+    BASE_BYTES + in_hand.max(joining) + turn_bytes(plan, threads)
+}
+
+/// Peaks by turn of the drum, both models', of the points that go through each thread's lanes together.
+fn turn_bytes(plan: &Plan, threads: usize) -> f64 {
+    if !plan.measures.wanted().turns {
+        return 0.0;
+    }
+    let turns = plan.spin.turns_within(plan.window_s);
+    (threads as u64 * GROUP) as f64 * 2.0 * turns * size_of::<[f64; Channel::ALL.len()]>() as f64
 }
 
 /// A size with three digits.

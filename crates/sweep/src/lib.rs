@@ -38,6 +38,7 @@ pub mod engine;
 pub mod estimate;
 pub mod exit;
 pub mod interrupt;
+pub mod measures;
 pub mod outcome;
 pub mod plan;
 pub mod plot;

@@ -38,6 +38,27 @@ pub struct Trajectory {
     pub steps: u64,
     /// Rejected steps.
     pub rejected: u64,
+    /// The model's metrics that the plan asks for, in column order; empty if the model failed.
+    pub metrics: Vec<f64>,
+    /// Largest deviations by turn of the drum, in the order of `Channel::ALL`: while the two models are being compared by them.
+    pub turns: Vec<[f64; 8]>,
+}
+
+impl Trajectory {
+    /// Nothing but a status.
+    #[must_use]
+    pub const fn failed(status: Status) -> Self {
+        Self {
+            status,
+            fail_time_s: None,
+            amplitudes: Vec::new(),
+            min_gap_m: None,
+            steps: 0,
+            rejected: 0,
+            metrics: Vec::new(),
+            turns: Vec::new(),
+        }
+    }
 }
 
 /// Both models at one grid point.
@@ -52,4 +73,17 @@ pub struct Outcome {
     /// Whether the nonlinear motion is chaotic, so that the verdict is stable but the ratio's digits are not;
     /// `None` where it was not assessed.
     pub sensitive: Option<bool>,
+    /// Ratios per channel of the plan where they are found turn by turn; `None` where undefined. Empty where the amplitudes' quotients
+    /// are the ratios, or a model failed.
+    pub turn_ratios: Vec<Option<f64>>,
+    /// How far the machine sinks to its equilibrium, if the plan asks for it and there is one.
+    pub static_sag_m: Option<f64>,
+}
+
+impl Outcome {
+    /// Both models' trajectories, not yet assessed together.
+    #[must_use]
+    pub const fn new(point: u64, nonlinear: Trajectory, linear: Trajectory) -> Self {
+        Self { point, nonlinear, linear, sensitive: None, turn_ratios: Vec::new(), static_sag_m: None }
+    }
 }

@@ -4,6 +4,7 @@
 use washer_model::{Channel, Machine, Parameter, Spin};
 
 use crate::design::Design;
+use crate::measures::Measures;
 
 /// A validated run: every grid point of every axis, and how each is integrated.
 ///
@@ -29,6 +30,8 @@ pub struct Plan {
     pub design: Option<Design>,
     /// What counts as reliable.
     pub reliability: Reliability,
+    /// What is measured of the motions.
+    pub measures: Measures,
 }
 
 /// How a trajectory is integrated.
@@ -312,6 +315,7 @@ mod tests {
             window_s: [30.0, 50.0],
             integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 },
             reliability: Reliability { ratio_limit: 2.0, channels: Channel::ALL.to_vec() },
+            measures: Measures::default(),
         }
     }
 

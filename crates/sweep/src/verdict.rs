@@ -36,8 +36,8 @@ pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
 /// How the two models compare at one grid point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// Nonlinear over linear amplitude per channel of the plan; `None` where the linear amplitude is zero or a model
-    /// failed.
+    /// Nonlinear over linear amplitude per channel of the plan, or the greatest such ratio over the drum's turns; `None` where
+    /// the linear amplitude is zero or a model failed.
     pub ratios: Vec<Option<f64>>,
     /// The greatest defined ratio and its channel's position in the plan; the first channel wins a tie.
     pub greatest: Option<(usize, f64)>,
@@ -50,11 +50,14 @@ impl Verdict {
     #[must_use]
     pub fn new(outcome: &Outcome, channels: usize, ratio_limit: f64) -> Self {
         let (nonlinear, linear) = (&outcome.nonlinear.amplitudes, &outcome.linear.amplitudes);
+        let by_turns = &outcome.turn_ratios;
         let ratios: Vec<Option<f64>> = (0..channels)
             .map(|i| match (nonlinear.get(i), linear.get(i)) {
                 (Some(nonlinear), Some(linear)) if *linear != 0.0 => Some(nonlinear / linear),
                 _ => None,
             })
+            .enumerate()
+            .map(|(i, of_amplitudes)| by_turns.get(i).copied().unwrap_or(of_amplitudes))
             .collect();
         let mut greatest: Option<(usize, f64)> = None;
         for (channel, ratio) in ratios.iter().enumerate() {
@@ -74,18 +77,11 @@ mod tests {
     use crate::outcome::Trajectory;
 
     fn trajectory(status: Status, amplitudes: &[f64], fail_time_s: Option<f64>) -> Trajectory {
-        Trajectory {
-            status,
-            fail_time_s,
-            amplitudes: amplitudes.to_vec(),
-            min_gap_m: None,
-            steps: 0,
-            rejected: 0,
-        }
+        Trajectory { fail_time_s, amplitudes: amplitudes.to_vec(), ..Trajectory::failed(status) }
     }
 
     fn outcome(nonlinear: Trajectory, linear: Trajectory) -> Outcome {
-        Outcome { point: 0, nonlinear, linear, sensitive: None }
+        Outcome::new(0, nonlinear, linear)
     }
 
     #[test]
@@ -99,6 +95,16 @@ mod tests {
         assert_eq!(verdict.greatest, Some((1, 3.0)));
         assert_eq!(verdict.reliable, Some(false), "reliable means below the limit, not at it");
         assert_eq!(Verdict::new(&row, 3, 3.5).reliable, Some(true));
+    }
+
+    #[test]
+    fn ratios_by_turns_stand_in_the_place_of_the_amplitudes() {
+        let mut row =
+            outcome(trajectory(Status::Ok, &[2.0, 3.0], None), trajectory(Status::Ok, &[2.0, 1.0], None));
+        row.turn_ratios = vec![Some(4.0), None];
+        let verdict = Verdict::new(&row, 2, 3.5);
+        assert_eq!((verdict.ratios, verdict.greatest), (vec![Some(4.0), None], Some((0, 4.0))));
+        assert_eq!(verdict.reliable, Some(false));
     }
 
     #[test]

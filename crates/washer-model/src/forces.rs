@@ -57,7 +57,7 @@ impl<T: Real> Deflection<T> {
     }
 }
 
-/// Springs and dampers, worked out in tub axes, where their tub ends stand still.
+/// Springs and dampers.
 #[inline(always)]
 pub(crate) fn suspension_load<T: Real>(
     machine: &MachineView<'_, T>,
@@ -66,6 +66,26 @@ pub(crate) fn suspension_load<T: Real>(
     midpoint_velocity: &[N<T>; 2],
     rate: &Vec3<T>,
 ) -> SuspensionLoad<T> {
+    let (force, moment) = suspension_on_tub(machine, tilt, midpoint, midpoint_velocity, rate);
+    SuspensionLoad {
+        force: [
+            tilt.axis_c[1] * force[0] + tilt.second_c[1] * force[1],
+            tilt.axis_c[2] * force[0] + tilt.second_c[2] * force[1] + tilt.cos_yaw * force[2],
+        ],
+        moment,
+    }
+}
+
+/// Force of springs and dampers on the tub, and its moment about the bearing midpoint P_T; in tub axes, where their tub ends
+/// stand still.
+#[inline(always)]
+pub(crate) fn suspension_on_tub<T: Real>(
+    machine: &MachineView<'_, T>,
+    tilt: &Tilt<T>,
+    midpoint: &[N<T>; 2],
+    midpoint_velocity: &[N<T>; 2],
+    rate: &Vec3<T>,
+) -> (Vec3<T>, Vec3<T>) {
     let zero = midpoint[0].lit(0.0);
     let mut force = [zero; 3];
     let mut moment = [zero; 3];
@@ -95,13 +115,7 @@ pub(crate) fn suspension_load<T: Real>(
             moment = plus_cross(&moment, &end, &f);
         }
     }
-    SuspensionLoad {
-        force: [
-            tilt.axis_c[1] * force[0] + tilt.second_c[1] * force[1],
-            tilt.axis_c[2] * force[0] + tilt.second_c[2] * force[1] + tilt.cos_yaw * force[2],
-        ],
-        moment,
-    }
+    (force, moment)
 }
 
 /// From a cabinet end to a tub end, in tub axes. t3 has no y component.

@@ -95,7 +95,7 @@ pub use modal::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
 pub use nonlinear::COORDINATES;
 pub use parameters::{Parameter, Range, Source, UnknownParameter, decimal};
 pub use point::{NoEquilibrium, Point, Timing, prepare};
-pub use run::{Method, ModelKind, Record, simulate};
+pub use run::{Extra, Method, ModelKind, Record, Wanted, simulate, simulate_with};
 pub use shape::{Motion, Movement, Plane};
 pub use spin::{Spin, SpinStretch};
 pub use suspension::Forces;

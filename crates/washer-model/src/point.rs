@@ -55,6 +55,21 @@ impl Point {
         &self.equilibrium
     }
 
+    /// How far the tub's mass centre has sunk (m) from where the machine file draws it, its springs without load unless they have free
+    /// lengths of their own, to the static equilibrium.
+    #[must_use]
+    pub fn static_sag_m(&self) -> f64 {
+        let (sin_pitch, _) = N(self.equilibrium[5]).sin_cos();
+        -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[0])).0
+    }
+
+    /// The window's edges (s).
+    pub(crate) fn window_s(&self) -> [f64; 2] {
+        let inside = || self.legs.iter().filter(|leg| leg.in_window);
+        let from = inside().next().map_or(0.0, |leg| leg.start_s);
+        [from, inside().next_back().map_or(from, |leg| leg.end_s)]
+    }
+
     /// M, C, K and F of the linear model (Eq. 41) at spin angle `theta_rad`, speed and acceleration.
     #[must_use]
     pub fn matrices(&self, theta_rad: f64, speed_rad_per_s: f64, acceleration_rad_per_s2: f64) -> Matrices {

@@ -1,15 +1,20 @@
 //! Trajectories: points through the lanes of an integrator, and what is recorded of them.
 
+mod cabinet_force;
+mod extras;
 pub(crate) mod stiff;
+
+pub use extras::{Extra, Wanted};
 
 use crate::coupling::Coupling;
 use crate::model::{Linear, Model, Nonlinear, STATES};
-use crate::outputs::{CHANNELS, squared};
+use crate::outputs::{CHANNELS, RADIAL, squared};
 use crate::point::{PlannedLeg, Point};
 use core::marker::PhantomData;
+use extras::{Extras, Seen};
 use lane_ode::{
-    Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Simd, Step, System, Task, Tolerance,
-    dopri5, rk4,
+    Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, System, Task,
+    Tolerance, dopri5, rk4,
 };
 
 /// How trajectories are integrated.
@@ -83,20 +88,32 @@ pub struct Record {
 /// points come together.
 #[must_use]
 pub fn simulate(simd: Simd, model: ModelKind, method: &Method, points: &[&Point]) -> Vec<Record> {
+    simulate_with(simd, model, method, points, Wanted::default()).0
+}
+
+/// As [`simulate`], and records what else is wanted: one [`Extra`] a point, or none at all if nothing is.
+#[must_use]
+pub fn simulate_with(
+    simd: Simd,
+    model: ModelKind,
+    method: &Method,
+    points: &[&Point],
+    wanted: Wanted,
+) -> (Vec<Record>, Vec<Extra>) {
     if points.is_empty() {
-        return Vec::new();
+        return (Vec::new(), Vec::new());
     }
     let stepper = match method {
         Method::Rk4 { .. } | Method::Rk4MassScaled { .. } => Stepper::Rk4,
         Method::Dopri5(tolerance) => Stepper::Dopri5(*tolerance),
-        Method::Rodas5p(tolerance) => return stiff::simulate(model, tolerance, points),
+        Method::Rodas5p(tolerance) => return stiff::simulate(model, tolerance, points, wanted),
     };
     match model {
         ModelKind::Nonlinear => {
-            simd.dispatch(Simulate::<OfNonlinear> { points, method, stepper, family: PhantomData })
+            simd.dispatch(Simulate::<OfNonlinear> { points, method, stepper, wanted, family: PhantomData })
         }
         ModelKind::Linear => {
-            simd.dispatch(Simulate::<OfLinear> { points, method, stepper, family: PhantomData })
+            simd.dispatch(Simulate::<OfLinear> { points, method, stepper, wanted, family: PhantomData })
         }
     }
 }
@@ -110,36 +127,41 @@ enum Stepper {
 /// A model before the lanes' type is known.
 pub(crate) trait Family {
     type Over<T: Lane>: Model<T>;
+    const KIND: ModelKind;
 }
 
 pub(crate) enum OfNonlinear {}
 pub(crate) enum OfLinear {}
 impl Family for OfNonlinear {
     type Over<T: Lane> = Nonlinear<T>;
+    const KIND: ModelKind = ModelKind::Nonlinear;
 }
 impl Family for OfLinear {
     type Over<T: Lane> = Linear<T>;
+    const KIND: ModelKind = ModelKind::Linear;
 }
 
 struct Simulate<'a, F> {
     points: &'a [&'a Point],
     method: &'a Method,
     stepper: Stepper,
+    wanted: Wanted,
     family: PhantomData<F>,
 }
 
 impl<F: Family> Kernel for Simulate<'_, F> {
-    type Output = Vec<Record>;
+    type Output = (Vec<Record>, Vec<Extra>);
 
     #[inline(always)]
-    fn run<T: Lane>(self, zero: T) -> Vec<Record> {
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
         let (step_s, coupling) = (first_step_s(self.method), coupling(self.method, N(zero)));
         let mut run = Run::<T, F::Over<T>>::new(N(zero), self.points, coupling, step_s);
+        run.extras = Extras::new(N(zero), self.wanted, F::KIND, self.points[0], self.points.len());
         match self.stepper {
             Stepper::Rk4 => rk4::integrate(zero, &mut run),
             Stepper::Dopri5(tolerance) => dopri5::integrate(zero, &mut run, &tolerance),
         }
-        run.records
+        run.recorded()
     }
 }
 
@@ -166,6 +188,7 @@ struct Run<'a, T, M> {
     /// 1 where a lane is inside its window, else 0.
     windows: N<T>,
     records: Vec<Record>,
+    extras: Option<Extras<T>>,
 }
 
 impl<T: Lane, M: Model<T>> System<T, STATES> for Run<'_, T, M> {
@@ -218,6 +241,9 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
             let [radial_squared] = self.radial.lane(lane);
             record.min_gap_m = point.machine.bodies.clearance.0 - radial_squared.sqrt();
         }
+        if let Some(extras) = &mut self.extras {
+            extras.finish(lane, state.point, point, failure.is_some());
+        }
         self.next_point(lane, x)
     }
 
@@ -227,6 +253,7 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
         let (radial, channels) = self.model.observe(forcing, x, dx, T::bits(inside) != 0);
         if let Some(channels) = channels {
             self.channels.begin(&channels, inside);
+            self.show(None, (x, dx), &radial, &channels, inside);
         }
         self.radial.begin(&[squared(&radial)], everywhere(self.windows));
     }
@@ -238,6 +265,8 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
             self.model.observe(forcing, step.after, step.slope_after, T::bits(inside) != 0);
         if let Some(channels) = channels {
             self.channels.advance(step.length_s, &channels, inside);
+            let times = Some((step.end_s, step.length_s));
+            self.show(times, (step.after, step.slope_after), &radial, &channels, inside);
         }
         self.radial.advance(step.length_s, &[squared(&radial)], everywhere(self.windows));
     }
@@ -263,6 +292,27 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
             radial: Peaks::new(zero),
             windows: zero,
             records: vec![EMPTY; points.len()],
+            extras: None,
+        }
+    }
+
+    /// Everything that was recorded.
+    fn recorded(self) -> (Vec<Record>, Vec<Extra>) {
+        (self.records, self.extras.map_or_else(Vec::new, |extras| extras.found))
+    }
+
+    /// Shows an instant to the recorders that were asked for.
+    #[inline(always)]
+    fn show(
+        &mut self,
+        step: Option<(N<T>, N<T>)>,
+        (x, dx): (&[N<T>; STATES], &[N<T>; STATES]),
+        radial: &[Sample<T>; RADIAL],
+        channels: &[Sample<T>; CHANNELS],
+        inside: T::Mask,
+    ) {
+        if let Some(extras) = &mut self.extras {
+            self.windows.0.aside(Seen { extras, step, x, dx, radial, channels, inside });
         }
     }
 
@@ -289,6 +339,9 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
         self.model.set_point(lane, point);
         self.channels.reset(lane);
         self.radial.reset(lane);
+        if let Some(extras) = &mut self.extras {
+            extras.set_point(lane, point);
+        }
         Some(self.enter(lane))
     }
 

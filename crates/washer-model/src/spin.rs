@@ -1,5 +1,9 @@
 //! Prescribed spin of the shaft: angle, speed and acceleration as functions of time.
 
+mod turns;
+
+pub(crate) use turns::cuts_s;
+
 use core::f64::consts::TAU;
 use lane_ode::{Dual, Lane, N, Real, trig};
 

@@ -6,6 +6,7 @@ mod failures;
 mod lanes;
 mod order;
 mod peaks;
+mod recorders;
 mod trig;
 
 use crate::{

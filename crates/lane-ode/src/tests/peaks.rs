@@ -5,10 +5,10 @@ use core::f64::consts::TAU;
 
 /// A sum of two waves: value and two derivatives.
 #[derive(Clone, Copy, Debug)]
-struct Waves {
-    amplitude: [f64; 2],
-    frequency: [f64; 2],
-    phase: [f64; 2],
+pub(super) struct Waves {
+    pub(super) amplitude: [f64; 2],
+    pub(super) frequency: [f64; 2],
+    pub(super) phase: [f64; 2],
 }
 
 impl Waves {
@@ -39,25 +39,37 @@ impl Waves {
         if is_inside { self.at(t)[0].abs().max(size(best)) } else { size(best) }
     }
 
-    fn sample(&self, t: f64) -> Sample<f64> {
+    pub(super) fn sample(&self, t: f64) -> Sample<f64> {
         let [value, slope, curvature] = self.at(t).map(N);
         Sample { value, slope, curvature }
     }
 
     /// What [`Peaks`] finds in `steps` equal steps.
     fn found(&self, end: f64, steps: u32) -> f64 {
+        self.found_by(Peaks::advance, end, steps)
+    }
+
+    /// Likewise with another way to take a step.
+    fn found_by(&self, advance: Advance, end: f64, steps: u32) -> f64 {
         let h = end / f64::from(steps);
         let mut peaks = Peaks::<f64, 1>::new(N(0.0));
         peaks.begin(&[self.sample(0.0)], true);
         for i in 1..=steps {
-            peaks.advance(N(h), &[self.sample(h * f64::from(i))], true);
+            advance(&mut peaks, N(h), &[self.sample(h * f64::from(i))], true);
         }
         peaks.lane(0)[0]
     }
 }
 
+type Advance = fn(&mut Peaks<f64, 1>, N<f64>, &[Sample<f64>; 1], bool);
+
 /// The largest error, as a share of the amplitude, over many waves of unit frequency and a slower or faster companion.
 fn largest_error(steps_per_period: u32) -> f64 {
+    largest_error_by(Peaks::advance, steps_per_period)
+}
+
+/// Likewise with another way to take a step.
+fn largest_error_by(advance: Advance, steps_per_period: u32) -> f64 {
     let mut rng = fastrand::Rng::with_seed(7);
     let mut most = 0.0_f64;
     for _ in 0..400 {
@@ -68,7 +80,7 @@ fn largest_error(steps_per_period: u32) -> f64 {
         };
         let periods = 3;
         let peak = waves.peak(f64::from(periods));
-        let found = waves.found(f64::from(periods), periods * steps_per_period);
+        let found = waves.found_by(advance, f64::from(periods), periods * steps_per_period);
         most = most.max((found - peak).abs() / peak);
     }
     most
@@ -90,6 +102,14 @@ fn the_sampling_error_is_of_sixth_order() {
     let order = (coarse / fine).log2();
     eprintln!("order of a peak's sampling error: {order:.2}");
     assert!(order > 5.5, "{order}");
+}
+
+#[test]
+fn without_curvatures_the_sampling_error_is_of_fourth_order() {
+    let [coarse, fine] = [24, 48].map(|steps| largest_error_by(Peaks::advance_by_slopes, steps));
+    let order = (coarse / fine).log2();
+    eprintln!("without curvatures, 48 steps a period: {fine:.2e} of the amplitude, order {order:.2}");
+    assert!(order > 3.5 && fine < 1e-5, "{order} {fine:e}");
 }
 
 #[test]

@@ -9,7 +9,10 @@ use super::{Kind, Stopped, Traced, trace};
 use crate::config;
 use crate::engine::ModelEngine;
 use crate::interrupt::Interrupt;
+use crate::measures::Criterion;
+use crate::outcome::Outcome;
 use crate::plan::Plan;
+use crate::plot::contour::zero_lines;
 use crate::run::{Engine, Watch};
 use crate::verdict::Verdict;
 
@@ -95,6 +98,51 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
             (from >= 0.0 && to < 0.0).then(|| a + (b - a) * from / (from - to))
         });
         assert!((contour.unwrap() - edge.at.unwrap()).abs() < 1.0, "{contour:?} {edge:?}");
+    }
+}
+
+/// The logarithm of a grid's greatest ratios over the limit, its columns by the first axis.
+fn grid_logs(plan: &Plan) -> Vec<Vec<f64>> {
+    let engine = ModelEngine::new(plan).unwrap();
+    let outcomes = engine.evaluate(0..plan.points(), &Watch::new(&Interrupt::new())).unwrap();
+    let log = |outcome: &Outcome| Quantity::RatioMax.distance(outcome, plan).unwrap();
+    outcomes.chunks(plan.axes[1].values.len() as usize).map(|row| row.iter().map(log).collect()).collect()
+}
+
+#[test]
+fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
+    // Around 0.4 kg, and one mass between the grid's columns.
+    let head = HEAD.split("[integrator]").next().unwrap();
+    let masses = [0.39, 0.40, 0.41];
+    let axes = |masses: &[f64], from: f64, to: f64, count: u32| {
+        format!(
+            "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = {masses:?}\n[[axis]]\nparameter = \"damping_n_s_per_m\"\n\
+             range = {{ from = {from:?}, to = {to:?}, count = {count} }}\n"
+        )
+    };
+    for criterion in Criterion::ALL {
+        let told = format!("{head}[reliability]\ncriterion = \"{}\"\n", criterion.name());
+        let wide = plan(&format!("{told}{}", axes(&[0.39, 0.395, 0.41], 60.0, 300.0, 33)));
+        let task = Task::new(&wide, Some(0.5), 4).unwrap();
+        let rows = traced(&wide, &task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+        let edges: Vec<_> = rows.iter().map(|row| row.edges.last().copied().unwrap()).collect();
+        assert!(edges.iter().all(|edge| edge.kind == Kind::Crossing), "{criterion:?}: {edges:?}");
+        // Dampings 0.5 N s/m apart around the last crossing.
+        let middle = edges[0].at.unwrap().round();
+        let (from, count) = (middle - 4.0, 29);
+        let fine = plan(&format!("{told}{}", axes(&masses, from, from + 14.0, count)));
+        let dampings: Vec<f64> = (0..count).map(|k| from + 0.5 * f64::from(k)).collect();
+        let logs = grid_logs(&fine);
+        let contour = zero_lines(&masses, &dampings, |i, j| logs[i][j]).concat();
+        for (row, edge) in rows.iter().zip(&edges) {
+            let nearest = contour.windows(2).find_map(|pair| {
+                let [[x0, y0], [x1, y1]] = [pair[0], pair[1]];
+                let inside = (x0.min(x1)..=x0.max(x1)).contains(&row.first) && x0 != x1;
+                inside.then(|| y0 + (y1 - y0) * (row.first - x0) / (x1 - x0))
+            });
+            let (contour, at) = (nearest.unwrap(), edge.at.unwrap());
+            assert!((contour - at).abs() < 0.25, "{criterion:?} at {} kg: {contour} and {at}", row.first);
+        }
     }
 }
 

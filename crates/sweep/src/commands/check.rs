@@ -7,6 +7,7 @@ use crate::design::Design;
 use crate::engine::{ModelEngine, Settled};
 use crate::estimate::{Estimate, size};
 use crate::exit::{Error, Exit, print, tell};
+use crate::measures::Criterion;
 use crate::plan::{Axis, AxisValues, Integrator, Plan};
 use crate::progress::duration;
 
@@ -56,9 +57,18 @@ fn summary(plan: &Plan, estimate: &Estimate, settled: Option<&Settled>) -> Strin
     line("points", laid_out);
     line("time", format!("0 to {} s, window {} to {} s", plan.end_s, plan.window_s[0], plan.window_s[1]));
     line("method", method(plan, settled));
+    let metrics: Vec<_> = plan.measures.metrics.iter().map(|metric| metric.name()).collect();
+    if !metrics.is_empty() {
+        line("metrics", metrics.join(", "));
+    }
     let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name()).collect();
     line("channels", channels.join(", "));
-    line("verdict", format!("reliable where every ratio is below {}", plan.reliability.ratio_limit));
+    let by = match plan.measures.criterion {
+        Criterion::Peak => "",
+        Criterion::Envelope => ", turn by turn of the drum",
+        Criterion::Rms => ", of root mean squares",
+    };
+    line("verdict", format!("reliable where every ratio is below {}{by}", plan.reliability.ratio_limit));
     line("output", format!("results/{}.parquet", plan.name));
     line(
         "runs on",

@@ -6,6 +6,7 @@ use washer_model::{Channel, Machine, Parameter, Range, Spin};
 
 use crate::cli;
 use crate::exit::{Error, Exit, print};
+use crate::measures::{Criterion, Measures, Metric};
 use crate::store::schema::{AxisColumn, Layout};
 use crate::verdict::ROW_STATUSES;
 
@@ -59,7 +60,9 @@ fn parameters() -> String {
         "Every number of the machine and of the spin has one name, the same in `[set]`, in `--set NAME=VALUE` and as the\n\
          `parameter` of an `[[axis]]`. Values are those of the built-in machine. *Paper* means printed there, *derived*\n\
          follows from what is printed, *assumed* is this project's own choice where the paper is silent.\n\
-         Springs and dampers are numbered in the order of the machine file; the table shows the first of each.\n\n",
+         Springs and dampers are numbered in the order of the machine file; the table shows the first of each. The end of the run\n\
+         (`end_s`) and the integrator's settings are no parameters: `[time]` and `[integrator]` set them once, because rows whose\n\
+         runs differ in length or method would not compare. The window's edges are.\n\n",
     );
     row(&mut text, &["name", "built in", "unit", "meaning", "values", "source"]);
     row(&mut text, &["---"; 6]);
@@ -125,7 +128,8 @@ fn columns() -> String {
             description: parameter.description().to_owned(),
         })
         .collect();
-    let layout = Layout { axes, channels: Channel::ALL.to_vec(), ratio_limit: 2.0 };
+    let measures = Measures { metrics: Metric::ALL.to_vec(), ..Measures::default() };
+    let layout = Layout { axes, channels: Channel::ALL.to_vec(), ratio_limit: 2.0, measures };
     row(&mut text, &["column", "type", "unit", "null", "meaning"]);
     row(&mut text, &["---"; 5]);
     for field in layout.schema().fields() {
@@ -140,6 +144,19 @@ fn columns() -> String {
             &[&format!("`{}`", field.name()), &data_type, told("unit"), null, told("description")],
         );
     }
+    text.push_str("\nWhat `criterion` in `[reliability]` makes of a channel's columns:\n\n");
+    row(&mut text, &["criterion", "`nonlinear_` and `linear_`", "`ratio_`"]);
+    row(&mut text, &["---"; 3]);
+    for criterion in Criterion::ALL {
+        row(&mut text, &[&format!("`{}`", criterion.name()), criterion.amplitude(), criterion.ratio()]);
+    }
+    let metrics: Vec<String> = Metric::ALL.iter().map(|metric| format!("`{}`", metric.name())).collect();
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "\nThe columns of a metric ({}) are there only where the grid file's `metrics` names it, in its order.",
+        metrics.join(", ")
+    );
     let statuses: Vec<String> = ROW_STATUSES.iter().map(|status| format!("`{status}`")).collect();
     // Writing to a String cannot fail.
     let _ = writeln!(text, "\nValues of `status`: {}.", statuses.join(", "));

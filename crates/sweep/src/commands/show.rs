@@ -51,6 +51,9 @@ fn provenance(text: &mut String, result: &ResultFile) {
     for (name, key) in [("spin", "spin"), ("time", "time"), ("method", "integrator")] {
         line(text, name, &brief(&plan[key]));
     }
+    if let Some(criterion) = plan["reliability"]["criterion"].as_str() {
+        line(text, "criterion", criterion);
+    }
     for axis in axes(plan) {
         let values = axis.get("range").or(axis.get("values")).map(brief).unwrap_or_default();
         line(text, "axis", &format!("{}: {values}", axis["parameter"].as_str().unwrap_or_default()));

@@ -5,6 +5,7 @@ use washer_model::{Channel, Spin};
 
 use super::machine;
 use crate::design::Design;
+use crate::measures::{Criterion, Measures};
 use crate::plan::{Axis, AxisValues, Integrator, Plan};
 
 impl Plan {
@@ -29,6 +30,14 @@ impl Plan {
         });
         if let Some(design) = &self.design {
             plan["design"] = self::design(design);
+        }
+        // What is left out stands for the default, so that plans which do not ask for more read as ever.
+        let Measures { criterion, metrics } = &self.measures;
+        if *criterion != Criterion::default() {
+            plan["reliability"]["criterion"] = criterion.name().into();
+        }
+        if !metrics.is_empty() {
+            plan["metrics"] = metrics.iter().map(|metric| metric.name()).collect();
         }
         plan
     }

@@ -83,18 +83,11 @@ pub(super) fn read(root: &mut Section<'_>, grid: &Path, report: &mut Report) -> 
         let field = section.count("points", if sobol { MOST_SOBOL } else { MOST_POINTS }, report);
         let points = section.require(field, "points", "the number of points", report);
         let seed = section.whole("seed", 0..=MOST_SEED, report).or(DEFAULT_SEED);
-        match (points, seed) {
-            (Some(points), Some(seed)) => {
-                let points = points.value;
-                let design = if sobol {
-                    Design::Sobol { points, seed }
-                } else {
-                    Design::LatinHypercube { points, seed }
-                };
-                Written::Box(Located { value: design, at })
-            }
-            _ => Written::Bad,
-        }
+        // Stand-ins for what was refused, so that the axes are read all the same.
+        let (points, seed) = (points.map_or(1, |points| points.value), seed.unwrap_or(DEFAULT_SEED));
+        let design =
+            if sobol { Design::Sobol { points, seed } } else { Design::LatinHypercube { points, seed } };
+        Written::Box(Located { value: design, at })
     };
     section.finish(report);
     written
@@ -133,7 +126,10 @@ fn list(file: &Located<&str>, grid: &Path, report: &mut Report) -> Option<List> 
     let points = columns.first().map_or(0, |column| column.values.len());
     if points == 0 {
         let title = format!("the list of points {shown} is empty");
-        report.push(Diagnostic::new(title).at(&file.at, "expected a row of numbers at least"));
+        report.push(
+            Diagnostic::new(title)
+                .at(&file.at, "expected a line of parameter names, and under it a row of numbers a point"),
+        );
         return None;
     }
     let design = Design::List { file: file.value.to_owned(), points: points as u64, hash };
@@ -187,8 +183,12 @@ fn csv(shown: &str, text: String, report: &mut Report) -> Option<Vec<ListColumn>
             sound = false;
             report.push_with(|_| {
                 let at = Location::new(source, offset..offset + body.len());
-                let title = format!("a row of {} numbers under {} names", cells.len(), columns.len());
-                Diagnostic::new(title).at(&at, format!("expected {} numbers", columns.len()))
+                let count =
+                    |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+                let (numbers, names) = (count(cells.len(), "number"), count(columns.len(), "name"));
+                let title = format!("a row of {numbers} under {names}");
+                let expected = count(columns.len(), "number");
+                Diagnostic::new(title).at(&at, format!("expected {expected}, separated by commas"))
             });
             continue;
         }
@@ -203,7 +203,7 @@ fn csv(shown: &str, text: String, report: &mut Report) -> Option<Vec<ListColumn>
                     sound = false;
                     report.push_with(|_| {
                         let title = format!("`{}` is not a number", short(cell));
-                        Diagnostic::new(title).at(&at, "expected a number with a decimal point")
+                        Diagnostic::new(title).at(&at, "expected a number such as 0.25, 80 or 1e7")
                     });
                 }
             }

@@ -11,6 +11,7 @@ use super::section::{Field, Section, cut, listed, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
 use super::{design, machine, parameters};
+use crate::measures::{Criterion, Measures, Metric};
 use crate::plan::{Integrator, Plan, Reliability};
 
 /// `machine` when the grid names none.
@@ -96,7 +97,8 @@ pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option
     let spin = spin(&mut root, &mut origins, report);
     let [end_s, from_s, to_s] = time(&mut root, &mut origins, report);
     let integrator = integrator(&mut root, &mut origins, report);
-    let reliability = reliability(&mut root, report);
+    let metrics = names(&mut root, "metrics", "metric", &Metric::ALL, Metric::name, report);
+    let (reliability, criterion) = reliability(&mut root, &mut origins, report);
     let plan = Plan {
         name,
         machine,
@@ -107,6 +109,7 @@ pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option
         axes: Vec::new(),
         design: None,
         reliability,
+        measures: Measures { criterion, metrics: metrics.unwrap_or_default() },
     };
     let mut draft = Draft { plan, origins, constants: Vec::new() };
     parameters::constants(&mut root, sets, &mut draft, report);
@@ -330,40 +333,60 @@ fn integrator(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report
     integrator
 }
 
-fn reliability(root: &mut Section<'_>, report: &mut Report) -> Reliability {
+fn reliability(
+    root: &mut Section<'_>,
+    origins: &mut Origins,
+    report: &mut Report,
+) -> (Reliability, Criterion) {
     let stand_in = Reliability { ratio_limit: DEFAULT_RATIO_LIMIT, channels: DEFAULT_CHANNELS.to_vec() };
-    let Some(section) = root.table("reliability", "[reliability]", report).given() else { return stand_in };
+    let Some(section) = root.table("reliability", "[reliability]", report).given() else {
+        return (stand_in, Criterion::default());
+    };
     let mut section = section.value;
+    section.misplace(&["metrics"], "it stands at the top of the file, before the first [section]");
+    let criterion = section.choice("criterion", &Criterion::ALL.map(Criterion::name), report).given();
+    if let Some(criterion) = &criterion {
+        origins.put("reliability.criterion".to_owned(), criterion.at.clone());
+    }
     let ratio_limit = section.number("ratio_limit", Range::Positive, report).or(DEFAULT_RATIO_LIMIT);
-    let channels = channels(&mut section, report);
+    let channels = names(&mut section, "channels", "channel", &Channel::ALL, Channel::name, report);
     section.finish(report);
-    Reliability {
+    let reliability = Reliability {
         ratio_limit: ratio_limit.unwrap_or(DEFAULT_RATIO_LIMIT),
         channels: channels.unwrap_or(stand_in.channels),
-    }
+    };
+    (reliability, criterion.map(|found| Criterion::ALL[found.value]).unwrap_or_default())
 }
 
-fn channels(section: &mut Section<'_>, report: &mut Report) -> Option<Vec<Channel>> {
-    let names = Channel::ALL.map(Channel::name);
-    let list = section.texts("channels", report).given()?;
+/// A list of some of `all`, each once, by their names; an empty one is a mistake.
+fn names<T: Copy + PartialEq>(
+    section: &mut Section<'_>,
+    key: &'static str,
+    what: &str,
+    all: &[T],
+    name: fn(T) -> &'static str,
+    report: &mut Report,
+) -> Option<Vec<T>> {
+    let known: Vec<&str> = all.iter().copied().map(name).collect();
+    let list = section.texts(key, report).given()?;
     if list.value.is_empty() {
-        let expected = format!("expected at least one of `{}`", names.join("`, `"));
-        report.push(Diagnostic::new("`channels` is empty").at(&list.at, expected));
+        let expected = format!("expected at least one of `{}`", known.join("`, `"));
+        report.push(Diagnostic::new(format!("`{key}` is empty")).at(&list.at, expected));
     }
-    let mut channels: Vec<Located<Channel>> = Vec::new();
+    let mut chosen: Vec<Located<T>> = Vec::new();
     for found in list.value {
-        let Some(&channel) = Channel::ALL.iter().find(|channel| channel.name() == found.value) else {
-            report.push_with(|_| unknown_word("channel", &found, &names));
+        let Some(&one) = all.iter().find(|one| name(**one) == found.value) else {
+            report.push_with(|_| unknown_word(what, &found, &known));
             continue;
         };
-        match channels.iter().find(|other| other.value == channel) {
+        match chosen.iter().find(|other| other.value == one) {
             Some(first) => report.push(
-                Diagnostic::new(format!("the channel \"{}\" is given twice", found.value))
-                    .at(&found.at, "expected each channel once")
+                Diagnostic::new(format!("the {what} \"{}\" is given twice", found.value))
+                    .at(&found.at, format!("expected each {what} once"))
                     .at(&first.at, "first given here"),
             ),
-            None => channels.push(Located { value: channel, at: found.at }),
+            None => chosen.push(Located { value: one, at: found.at }),
         }
     }
-    Some(channels.into_iter().map(|channel| channel.value).collect())
+    Some(chosen.into_iter().map(|one| one.value).collect())
 }

@@ -11,6 +11,7 @@ use super::grid::{
 };
 use super::machine::{BLOCKS, Block, DAMPERS, FREE_LENGTH, SPRINGS, no_spin};
 use super::parameters::MOST_POINTS;
+use crate::measures::{Criterion, Metric};
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
@@ -35,6 +36,7 @@ pub fn grid() -> Value {
     let sections = [
         ("name", name),
         ("machine", machine),
+        ("metrics", metrics()),
         ("set", set()),
         ("spin", spin()),
         ("time", time()),
@@ -248,7 +250,22 @@ fn integrator() -> Value {
     json!({ "oneOf": METHODS.map(one) })
 }
 
+fn metrics() -> Value {
+    json!({
+        "type": "array",
+        "items": { "enum": Metric::ALL.map(Metric::name) },
+        "minItems": 1,
+        "uniqueItems": true,
+        "description": "further columns of the result",
+    })
+}
+
 fn reliability() -> Value {
+    let criterion = json!({
+        "enum": Criterion::ALL.map(Criterion::name),
+        "default": Criterion::default().name(),
+        "description": "what the models are compared by: largest deviations, the same turn by turn of the drum, or root mean squares",
+    });
     let limit = "a point is reliable where every ratio is below this";
     let channels = json!({
         "type": "array",
@@ -259,7 +276,7 @@ fn reliability() -> Value {
         "description": "motions that are compared",
     });
     let ratio_limit = described(number(Range::Positive), DEFAULT_RATIO_LIMIT, limit);
-    table([("ratio_limit", ratio_limit), ("channels", channels)], &[])
+    table([("ratio_limit", ratio_limit), ("channels", channels), ("criterion", criterion)], &[])
 }
 
 fn axis() -> Value {

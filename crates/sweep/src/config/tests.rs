@@ -10,6 +10,7 @@ use washer_model::{Machine, Spin};
 
 use super::*;
 use crate::design::Design;
+use crate::measures::{Measures, Metric};
 use crate::plan::{AxisValues, Integrator};
 
 /// What the fuzzer's inputs stand for.
@@ -116,7 +117,23 @@ fn a_starter_grid_is_the_documented_one() {
     assert_eq!(starter.points(), 16);
     let bare = load_text(SMALLEST, &[]).unwrap();
     assert_eq!((starter.integrator, starter.reliability), (bare.integrator, bare.reliability));
-    assert_eq!(starter.machine, bare.machine);
+    assert_eq!((starter.machine, starter.measures), (bare.machine, bare.measures));
+}
+
+#[test]
+fn what_is_measured_is_part_of_the_plan_only_where_it_is_not_the_default() {
+    let plain = load_text(SMALLEST, &[]).unwrap();
+    assert_eq!(plain.measures, Measures::default());
+    let told = load_text(format!("{SMALLEST}[reliability]\ncriterion = \"peak\"\n"), &[]).unwrap();
+    assert_eq!(told.to_json(), plain.to_json());
+    let more = format!(
+        "metrics = [\"static_sag\", \"cabinet_force\"]\n{SMALLEST}[reliability]\ncriterion = \"rms\"\n"
+    );
+    let more = load_text(more, &[]).unwrap();
+    assert_eq!(more.measures.metrics, [Metric::StaticSag, Metric::CabinetForce]);
+    let json = more.to_json();
+    assert_eq!(json["reliability"]["criterion"], "rms");
+    assert_eq!(json["metrics"], serde_json::json!(["static_sag", "cabinet_force"]));
 }
 
 #[test]

@@ -9,6 +9,7 @@ use washer_model::{Parameter, Timing, Violation, decimal, highest_frequency_rad_
 use super::grid::Draft;
 use super::report::{Diagnostic, Report};
 use super::source::{Location, Sources};
+use crate::measures::{Criterion, MOST_TURNS};
 use crate::plan::{Integrator, Scenario};
 
 /// Most fixed steps of a trajectory that are accepted; an hour or more of computing for one point.
@@ -24,6 +25,7 @@ pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
     let mut reported = BTreeSet::new();
     for values in draft.plan.corners() {
         window(draft, &draft.plan.scenario_at(&values), &mut reported, report);
+        turns(draft, &draft.plan.scenario_at(&values), &mut reported, report);
         for (violation, of_spin) in violations(&draft.plan.scenario_at(&values)) {
             let concerns = keys(&violation, of_spin);
             let judged = !concerns.iter().any(|key| draft.origins.is_doubtful(key));
@@ -59,6 +61,24 @@ fn window(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String
         }
         diagnostic
     });
+}
+
+/// More turns of the drum in the window than are compared one by one.
+fn turns(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String>>, report: &mut Report) {
+    let Some(criterion) = draft.origins.get("reliability.criterion") else { return };
+    if draft.plan.measures.criterion != Criterion::Envelope || !scenario.spin.violations().is_empty() {
+        return;
+    }
+    let turns = scenario.spin.turns_within(scenario.window_s);
+    if turns <= MOST_TURNS || !reported.insert(vec!["reliability.criterion".to_owned()]) {
+        return;
+    }
+    let title = format!("the drum makes {turns:.0} turns in the window, too many to compare one by one");
+    let expected = format!(
+        "expected at most {MOST_TURNS} turns for \"{}\": shorten the window",
+        Criterion::Envelope.name()
+    );
+    report.push(Diagnostic::new(title).at(criterion, expected));
 }
 
 /// What is wrong with one scenario, and whether it is the spin.

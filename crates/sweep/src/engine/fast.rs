@@ -203,6 +203,7 @@ impl ModelEngine<'_> {
             if let (Some(nonlinear), Some(linear)) = (nonlinear.next(), linear.next()) {
                 outcomes[i].nonlinear = nonlinear;
                 outcomes[i].linear = linear;
+                outcomes[i].compare_turns(&self.plan.reliability.channels);
             }
         }
         outcomes
@@ -210,7 +211,10 @@ impl ModelEngine<'_> {
 
     /// Outcomes by one method.
     fn by(&self, method: &Method, points: &[u64]) -> Vec<Outcome> {
-        self.all(&self.prepare(points, &|point| self.plan.scenario(point)), method, points)
+        let prepared = self.prepare(points, &|point| self.plan.scenario(point));
+        let mut outcomes = self.all(&prepared, method, points);
+        outcomes.iter_mut().for_each(Outcome::forget_turns);
+        outcomes
     }
 
     /// Outcomes by the fast method, with their flags.
@@ -218,6 +222,7 @@ impl ModelEngine<'_> {
         let prepared = self.prepare(points, &|point| self.plan.scenario(point));
         let mut outcomes = self.all(&prepared, &settled.fast(), points);
         self.flag(accuracy, settled, &prepared, &mut outcomes);
+        outcomes.iter_mut().for_each(Outcome::forget_turns);
         outcomes
     }
 
@@ -240,10 +245,21 @@ impl ModelEngine<'_> {
             outcome.sensitive = (outcome.nonlinear.status == Status::Ok).then_some(false);
         }
         for (i, again) in suspects.into_iter().zip(again) {
-            spreads[i] = difference(&outcomes[i].nonlinear, &again).unwrap_or(f64::INFINITY);
+            spreads[i] = self.spread(&outcomes[i], again).unwrap_or(f64::INFINITY);
             outcomes[i].sensitive = Some(spreads[i] > SENSITIVE_SHARE * accuracy);
         }
         spreads
+    }
+
+    /// Relative difference of an outcome from that with another run of the nonlinear model; `None` if either has none.
+    fn spread(&self, outcome: &Outcome, again: Trajectory) -> Option<f64> {
+        let of_amplitudes = difference(&outcome.nonlinear, &again)?;
+        if outcome.turn_ratios.is_empty() {
+            return Some(of_amplitudes);
+        }
+        let mut other = Outcome::new(outcome.point, again, outcome.linear.clone());
+        other.compare_turns(&self.plan.reliability.channels);
+        Some(of_amplitudes.max(ratio_difference(outcome, &other)))
     }
 
     /// Whether an error of this size (relative, of an amplitude) could turn the verdict, or the trajectory did not come to one.
@@ -284,7 +300,13 @@ fn sample(plan: &Plan) -> Vec<u64> {
 fn error((fast, reference): &Pair) -> Option<f64> {
     let nonlinear = difference(&reference.nonlinear, &fast.nonlinear)?;
     let linear = difference(&reference.linear, &fast.linear)?;
-    Some(nonlinear.max(linear))
+    Some(nonlinear.max(linear).max(ratio_difference(reference, fast)))
+}
+
+/// Greatest relative difference of two outcomes' ratios by turns, where both have them.
+fn ratio_difference(a: &Outcome, b: &Outcome) -> f64 {
+    let relative = |(a, b): (&Option<f64>, &Option<f64>)| a.zip(*b).map_or(0.0, |(a, b)| (b - a).abs() / a);
+    a.turn_ratios.iter().zip(&b.turn_ratios).map(relative).fold(0.0, f64::max)
 }
 
 /// Greatest relative difference of two trajectories' amplitudes; `None` if either has none.

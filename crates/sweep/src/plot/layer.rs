@@ -115,16 +115,17 @@ fn ratio(table: &Table, channel: Option<&str>) -> Result<Layer, PlotError> {
     let values: Vec<f64> =
         values.into_iter().map(|v| if v > 0.0 && v.is_finite() { v } else { f64::NAN }).collect();
     let said = label::significant(limit, 4);
+    let compared = table.compared();
     let (title, label, above, below) = match channel {
         None => (
             "Where the linear model can be trusted".to_owned(),
-            "largest ratio of amplitudes, nonlinear / linear".to_owned(),
+            format!("largest ratio of {compared}, nonlinear / linear"),
             ["linear model unreliable".to_owned(), format!("unreliable: ratio {said} or more")],
             ["linear model reliable".to_owned(), format!("reliable: below {said}")],
         ),
         Some(channel) => (
-            format!("Ratio of amplitudes: {}", label::channel(channel)),
-            "ratio of amplitudes, nonlinear / linear".to_owned(),
+            format!("Ratio of {compared}: {}", label::channel(channel)),
+            format!("ratio of {compared}, nonlinear / linear"),
             [format!("ratio above {said}"), format!("ratio {said} or more")],
             [format!("ratio below {said}"), format!("ratio below {said}")],
         ),

@@ -7,7 +7,7 @@
 mod axis;
 mod chart;
 mod colour;
-mod contour;
+pub(crate) mod contour;
 mod decimate;
 mod error;
 mod figures;

@@ -182,6 +182,16 @@ impl Table {
         texts.iter().map(|text| text.as_deref().unwrap_or("unknown"))
     }
 
+    /// What its ratios are ratios of, by the criterion that the run was told.
+    #[must_use]
+    pub fn compared(&self) -> &'static str {
+        match self.find("criterion").and_then(Value::as_str) {
+            Some("envelope") => "amplitudes by turn",
+            Some("rms") => "root mean squares",
+            _ => "amplitudes",
+        }
+    }
+
     /// The ratio from which on a point is unreliable: as the run was told, or else 2 as in the paper.
     #[must_use]
     pub fn ratio_limit(&self) -> f64 {

@@ -9,13 +9,17 @@
 //! | 4 | channels C, u32 |
 //! | 32 | hash of the plan |
 //! | 8, 8, 8 | chunk index, first point, number of points, u64 |
-//! | points x (11 + 2 x (32 + 8 C)) | records |
+//! | points x (11 + 2 x (32 + 8 C + 8 M) + 8 B) | records |
 //! | 32 | blake3 of everything before |
 //!
 //! A record is the point (u64), flags, the two models' status codes (u8 each), then for the nonlinear and the linear
-//! model: fail time, least gap (f64), steps, rejected (u64), C amplitudes (f64). What a flag says is absent is zero.
+//! model: fail time, least gap (f64), steps, rejected (u64), C amplitudes and M metrics (f64). What a flag says is absent is zero.
+//! Behind both models stand B numbers (f64) of both together: ratios by turns, then the static sag; NaN where there is none. M and B
+//! follow from the plan, and are zero unless it asks for more than peaks.
 
 use super::error::StoreError;
+use super::schema::Layout;
+use crate::measures::{Criterion, Metric};
 use crate::outcome::{Outcome, Status, Trajectory};
 
 const MAGIC: [u8; 8] = *b"SWEEPCHK";
@@ -31,13 +35,46 @@ const LINEAR_SHIFT: u32 = 3;
 const SENSITIVE_KNOWN: u8 = 1 << 6;
 const SENSITIVE: u8 = 1 << 7;
 
+/// How many numbers a record holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Shape {
+    /// Amplitudes a model.
+    pub(crate) channels: u32,
+    /// Metrics a model.
+    pub(crate) metrics: u32,
+    /// Whether there are ratios by turns, one a channel.
+    pub(crate) by_turns: bool,
+    /// Whether there is a static sag.
+    pub(crate) with_sag: bool,
+}
+
+impl Shape {
+    /// That of a result file's outcomes.
+    pub(crate) fn of(layout: &Layout) -> Self {
+        let count = |many: usize| u32::try_from(many).unwrap_or(u32::MAX);
+        Self {
+            channels: count(layout.channels.len()),
+            metrics: count(layout.measures.of_model().count()),
+            by_turns: layout.measures.criterion == Criterion::Envelope,
+            with_sag: layout.measures.metrics.contains(&Metric::StaticSag),
+        }
+    }
+
+    /// Bytes of a record.
+    pub(crate) const fn bytes_a_point(&self) -> usize {
+        let turn_ratios = if self.by_turns { self.channels as usize } else { 0 };
+        let of_both = turn_ratios + self.with_sag as usize;
+        8 + 3 + 2 * (4 * 8 + 8 * (self.channels + self.metrics) as usize) + 8 * of_both
+    }
+}
+
 /// What a chunk's header must say to be the chunk that is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     /// Hash of the plan.
     pub(crate) plan: blake3::Hash,
-    /// Amplitudes a model.
-    pub(crate) channels: u32,
+    /// Numbers of a record; the hash tells shapes with as many channels apart.
+    pub(crate) shape: Shape,
     /// Index of the chunk.
     pub(crate) chunk: u64,
     /// Its first point.
@@ -65,18 +102,13 @@ fn reject(place: &Place, reason: String) -> StoreError {
     StoreError::Engine { first: place.first, last, reason }
 }
 
-/// What a point takes in a chunk's file, bytes.
-pub(crate) const fn bytes_a_point(channels: usize) -> usize {
-    8 + 3 + 2 * (4 * 8 + 8 * channels)
-}
-
 /// The chunk's file.
 pub(crate) fn encode(place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, StoreError> {
     if outcomes.len() as u64 != place.count {
         return Err(reject(place, format!("{} outcomes for {} points", outcomes.len(), place.count)));
     }
-    let channels = place.channels as usize;
-    let mut bytes = Vec::with_capacity(HEADER + outcomes.len() * bytes_a_point(channels) + HASH);
+    let shape = &place.shape;
+    let mut bytes = Vec::with_capacity(HEADER + outcomes.len() * shape.bytes_a_point() + HASH);
     bytes.extend_from_slice(&header(place));
     for (outcome, point) in outcomes.iter().zip(place.first..) {
         if outcome.point != point {
@@ -86,16 +118,21 @@ pub(crate) fn encode(place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, Sto
             ));
         }
         for (model, name) in [(&outcome.nonlinear, "nonlinear"), (&outcome.linear, "linear")] {
-            let expected = if model.status == Status::Ok { channels } else { 0 };
-            if model.amplitudes.len() != expected {
-                let got = model.amplitudes.len();
-                return Err(reject(
-                    place,
-                    format!("point {point}, {name} model: {got} amplitudes where {expected} belong"),
-                ));
+            let is_ok = model.status == Status::Ok;
+            for (got, many, what) in [
+                (model.amplitudes.len(), shape.channels, "amplitudes"),
+                (model.metrics.len(), shape.metrics, "metrics"),
+            ] {
+                let expected = if is_ok { many as usize } else { 0 };
+                if got != expected {
+                    return Err(reject(
+                        place,
+                        format!("point {point}, {name} model: {got} {what} where {expected} belong"),
+                    ));
+                }
             }
         }
-        record(outcome, channels, &mut bytes);
+        record(outcome, shape, &mut bytes);
     }
     let hash = blake3::hash(&bytes);
     bytes.extend_from_slice(hash.as_bytes());
@@ -112,8 +149,8 @@ pub(crate) fn decode(place: &Place, bytes: &[u8]) -> Result<Vec<Outcome>, Damage
     if found != header(place) {
         return Err(Damage::Foreign);
     }
-    let channels = place.channels as usize;
-    let length = bytes_a_point(channels);
+    let shape = &place.shape;
+    let length = shape.bytes_a_point();
     if records.len() as u64 != place.count.saturating_mul(length as u64) {
         return Err(Damage::Length);
     }
@@ -121,7 +158,7 @@ pub(crate) fn decode(place: &Place, bytes: &[u8]) -> Result<Vec<Outcome>, Damage
         .chunks_exact(length)
         .zip(place.first..)
         .map(|(bytes, point)| {
-            let outcome = read_record(bytes, channels).ok_or(Damage::Record)?;
+            let outcome = read_record(bytes, shape).ok_or(Damage::Record)?;
             if outcome.point == point { Ok(outcome) } else { Err(Damage::Record) }
         })
         .collect()
@@ -131,7 +168,7 @@ fn header(place: &Place) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER);
     bytes.extend_from_slice(&MAGIC);
     bytes.extend_from_slice(&FORMAT.to_le_bytes());
-    bytes.extend_from_slice(&place.channels.to_le_bytes());
+    bytes.extend_from_slice(&place.shape.channels.to_le_bytes());
     bytes.extend_from_slice(place.plan.as_bytes());
     for number in [place.chunk, place.first, place.count] {
         bytes.extend_from_slice(&number.to_le_bytes());
@@ -146,7 +183,7 @@ fn flags(model: &Trajectory) -> u8 {
         | bit(model.fail_time_s.is_some(), FAIL_TIME)
 }
 
-fn record(outcome: &Outcome, channels: usize, bytes: &mut Vec<u8>) {
+fn record(outcome: &Outcome, shape: &Shape, bytes: &mut Vec<u8>) {
     let sensitive = match outcome.sensitive {
         None => 0,
         Some(false) => SENSITIVE_KNOWN,
@@ -162,24 +199,56 @@ fn record(outcome: &Outcome, channels: usize, bytes: &mut Vec<u8>) {
         for number in [model.steps, model.rejected] {
             bytes.extend_from_slice(&number.to_le_bytes());
         }
-        for i in 0..channels {
-            bytes.extend_from_slice(&model.amplitudes.get(i).copied().unwrap_or(0.0).to_le_bytes());
+        for (numbers, many) in [(&model.amplitudes, shape.channels), (&model.metrics, shape.metrics)] {
+            for i in 0..many as usize {
+                bytes.extend_from_slice(&numbers.get(i).copied().unwrap_or(0.0).to_le_bytes());
+            }
         }
+    }
+    let mut optional = |number: Option<f64>| {
+        bytes.extend_from_slice(&number.unwrap_or(f64::NAN).to_le_bytes());
+    };
+    if shape.by_turns {
+        for i in 0..shape.channels as usize {
+            optional(outcome.turn_ratios.get(i).copied().flatten());
+        }
+    }
+    if shape.with_sag {
+        optional(outcome.static_sag_m);
     }
 }
 
 /// Takes a fixed-length record apart; `None` where it makes no sense.
-fn read_record(bytes: &[u8], channels: usize) -> Option<Outcome> {
+fn read_record(bytes: &[u8], shape: &Shape) -> Option<Outcome> {
     let mut rest = bytes;
     let point = u64::from_le_bytes(take(&mut rest)?);
     let [flags, nonlinear, linear] = take(&mut rest)?;
-    let nonlinear = read_model(&mut rest, nonlinear, flags, channels)?;
-    let linear = read_model(&mut rest, linear, flags >> LINEAR_SHIFT, channels)?;
-    let sensitive = (flags & SENSITIVE_KNOWN != 0).then_some(flags & SENSITIVE != 0);
-    Some(Outcome { point, nonlinear, linear, sensitive })
+    let nonlinear = read_model(&mut rest, nonlinear, flags, shape)?;
+    let linear = read_model(&mut rest, linear, flags >> LINEAR_SHIFT, shape)?;
+    let both_ok = nonlinear.status == Status::Ok && linear.status == Status::Ok;
+    let mut outcome = Outcome::new(point, nonlinear, linear);
+    outcome.sensitive = (flags & SENSITIVE_KNOWN != 0).then_some(flags & SENSITIVE != 0);
+    if shape.by_turns {
+        for _ in 0..shape.channels {
+            let ratio = optional(&mut rest)?;
+            if both_ok {
+                outcome.turn_ratios.push(ratio);
+            }
+        }
+    }
+    if shape.with_sag {
+        outcome.static_sag_m = optional(&mut rest)?;
+    }
+    Some(outcome)
 }
 
-fn read_model(rest: &mut &[u8], status: u8, flags: u8, channels: usize) -> Option<Trajectory> {
+/// A number, or none where NaN stands; nothing at all at the end of the bytes.
+fn optional(rest: &mut &[u8]) -> Option<Option<f64>> {
+    let number = f64::from_le_bytes(take(rest)?);
+    Some((!number.is_nan()).then_some(number))
+}
+
+fn read_model(rest: &mut &[u8], status: u8, flags: u8, shape: &Shape) -> Option<Trajectory> {
     let status = *Status::ALL.get(usize::from(status))?;
     let mut number = |present: u8| {
         let value = f64::from_le_bytes(take(rest)?);
@@ -188,17 +257,27 @@ fn read_model(rest: &mut &[u8], status: u8, flags: u8, channels: usize) -> Optio
     let (fail_time_s, min_gap_m) = (number(FAIL_TIME)?, number(GAP)?);
     let mut count = || Some(u64::from_le_bytes(take(rest)?));
     let (steps, rejected) = (count()?, count()?);
-    let mut amplitudes = Vec::with_capacity(channels);
-    for _ in 0..channels {
-        amplitudes.push(f64::from_le_bytes(take(rest)?));
-    }
-    if flags & AMPLITUDES == 0 {
-        amplitudes = Vec::new();
-    }
+    let mut numbers = |many: u32| {
+        let mut numbers = Vec::with_capacity(many as usize);
+        for _ in 0..many {
+            numbers.push(f64::from_le_bytes(take(rest)?));
+        }
+        Some(if flags & AMPLITUDES == 0 { Vec::new() } else { numbers })
+    };
+    let (amplitudes, metrics) = (numbers(shape.channels)?, numbers(shape.metrics)?);
     if (flags & AMPLITUDES != 0) != (status == Status::Ok) {
         return None;
     }
-    Some(Trajectory { status, fail_time_s, amplitudes, min_gap_m, steps, rejected })
+    Some(Trajectory {
+        status,
+        fail_time_s,
+        amplitudes,
+        min_gap_m,
+        steps,
+        rejected,
+        metrics,
+        turns: Vec::new(),
+    })
 }
 
 fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
@@ -214,12 +293,13 @@ mod tests {
     use proptest::prelude::*;
 
     fn place(count: u64, channels: u32) -> Place {
-        Place { plan: blake3::hash(b"plan"), channels, chunk: 3, first: 48, count }
+        let shape = Shape { channels, metrics: 0, by_turns: false, with_sag: false };
+        Place { plan: blake3::hash(b"plan"), shape, chunk: 3, first: 48, count }
     }
 
     fn outcomes(place: &Place) -> Vec<Outcome> {
         (place.first..place.first + place.count)
-            .map(|point| synthetic::outcome(point, place.channels as usize))
+            .map(|point| synthetic::outcome(point, place.shape.channels as usize))
             .collect()
     }
 
@@ -256,7 +336,7 @@ mod tests {
             Place { chunk: 4, ..ours },
             Place { first: 49, ..ours },
             Place { count: 3, ..ours },
-            Place { channels: 3, ..ours },
+            Place { shape: Shape { channels: 3, ..ours.shape }, ..ours },
         ];
         for other in others {
             assert_eq!(decode(&other, &bytes), Err(Damage::Foreign));
@@ -274,41 +354,63 @@ mod tests {
         let mut short = good.clone();
         short[0].nonlinear.amplitudes = vec![1.0];
         assert!(reason(&short).contains("1 amplitudes"), "{}", reason(&short));
+        let mut more = good.clone();
+        more[0].nonlinear.metrics = vec![1.0];
+        assert!(reason(&more).contains("1 metrics where 0 belong"), "{}", reason(&more));
     }
 
-    fn model(channels: usize) -> impl Strategy<Value = Trajectory> {
+    fn model(channels: usize, metrics: usize) -> impl Strategy<Value = Trajectory> {
         (
             prop::sample::select(Status::ALL.to_vec()),
             prop::option::of(any::<f64>()),
             prop::collection::vec(any::<f64>(), channels),
+            prop::collection::vec(any::<f64>(), metrics),
             prop::option::of(any::<f64>()),
             any::<(u64, u64)>(),
         )
-            .prop_map(|(status, fail_time_s, amplitudes, min_gap_m, (steps, rejected))| Trajectory {
-                status,
-                fail_time_s,
-                amplitudes: if status == Status::Ok { amplitudes } else { Vec::new() },
-                min_gap_m,
-                steps,
-                rejected,
+            .prop_map(|(status, fail_time_s, amplitudes, metrics, min_gap_m, (steps, rejected))| {
+                let is_ok = status == Status::Ok;
+                let kept = |numbers: Vec<f64>| if is_ok { numbers } else { Vec::new() };
+                let (amplitudes, metrics) = (kept(amplitudes), kept(metrics));
+                let turns = Vec::new();
+                Trajectory { status, fail_time_s, amplitudes, min_gap_m, steps, rejected, metrics, turns }
             })
     }
 
     proptest! {
         #[test]
         fn whatever_goes_in_comes_out(
-            rows in prop::collection::vec((model(3), model(3), any::<Option<bool>>()), 0..20)
+            rows in prop::collection::vec(
+                (model(3, 2), model(3, 2), any::<Option<bool>>(), any::<[Option<f64>; 3]>(), any::<Option<f64>>()),
+                0..20,
+            ),
+            by_turns: bool,
+            with_sag: bool,
         ) {
-            let place = place(rows.len() as u64, 3);
+            let mut place = place(rows.len() as u64, 3);
+            place.shape = Shape { metrics: 2, by_turns, with_sag, ..place.shape };
             let outcomes: Vec<Outcome> = rows
                 .into_iter()
                 .zip(place.first..)
-                .map(|((nonlinear, linear, sensitive), point)| Outcome { point, nonlinear, linear, sensitive })
+                .map(|((nonlinear, linear, sensitive, turn_ratios, static_sag_m), point)| {
+                    let mut outcome = Outcome::new(point, nonlinear, linear);
+                    outcome.sensitive = sensitive;
+                    let both_ok = [&outcome.nonlinear, &outcome.linear].iter().all(|m| m.status == Status::Ok);
+                    if by_turns && both_ok {
+                        outcome.turn_ratios = turn_ratios.map(|r| r.filter(|r| !r.is_nan())).to_vec();
+                    }
+                    outcome.static_sag_m = static_sag_m.filter(|sag_m| with_sag && !sag_m.is_nan());
+                    outcome
+                })
                 .collect();
             let bytes = encode(&place, &outcomes).unwrap();
             let back = decode(&place, &bytes).unwrap();
             // Through bytes, because NaN is not equal to itself.
             prop_assert_eq!(encode(&place, &back).unwrap(), bytes);
+            let ratios = |outcomes: &[Outcome]| -> Vec<_> {
+                outcomes.iter().map(|o| (o.turn_ratios.clone(), o.static_sag_m)).collect()
+            };
+            prop_assert_eq!(ratios(&back), ratios(&outcomes));
         }
 
         #[test]

@@ -36,7 +36,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-pub(crate) use chunk::bytes_a_point as chunk_bytes;
+pub(crate) use chunk::Shape;
 pub use error::{Holder, StoreError};
 pub use merge::Joined;
 pub use open::{Opened, Options, Run};
@@ -90,6 +90,7 @@ impl<'a> Job<'a> {
                 axes: plan.axes.iter().map(column).collect(),
                 channels: plan.reliability.channels.clone(),
                 ratio_limit: plan.reliability.ratio_limit,
+                measures: plan.measures.clone(),
             },
             axis_values: Box::new(|point| plan.axis_values(point)),
         }

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::chunk::{self, Damage, Place};
+use super::chunk::{self, Damage, Place, Shape};
 use super::error::StoreError;
 use super::lock::Lock;
 use super::plan_file::{Found, PlanFile, set_aside};
@@ -113,13 +113,7 @@ impl Run {
             let frozen = dealing.freeze(&folder)?;
             dealt = shard::resolve(options.shard, options.environment, Some(frozen))?;
         }
-        let place = Place {
-            plan: job.hash(),
-            channels: u32::try_from(job.layout.channels.len()).unwrap_or(u32::MAX),
-            chunk: 0,
-            first: 0,
-            count: 0,
-        };
+        let place = Place { plan: job.hash(), shape: Shape::of(&job.layout), chunk: 0, first: 0, count: 0 };
         let mut run = Self {
             folder,
             lock,

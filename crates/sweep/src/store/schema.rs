@@ -17,6 +17,7 @@ use serde_json::{Map, Value, json};
 use washer_model::Channel;
 
 use super::Job;
+use crate::measures::Measures;
 use crate::outcome::{Outcome, Trajectory};
 use crate::verdict::{ROW_STATUSES, Verdict, row_status};
 
@@ -59,6 +60,8 @@ pub struct Layout {
     pub channels: Vec<Channel>,
     /// A point is reliable when its greatest ratio is below this.
     pub ratio_limit: f64,
+    /// What is measured of the motions.
+    pub measures: Measures,
 }
 
 /// What a row's cells are taken from.
@@ -156,6 +159,8 @@ impl Layout {
         }
         columns.extend(self.amplitude_columns());
         columns.extend(self.verdict_columns());
+        columns.extend(gap_columns());
+        columns.extend(self.metric_columns());
         columns.extend(run_columns());
         columns
     }
@@ -164,19 +169,14 @@ impl Layout {
         let mut columns = Vec::new();
         for (model, of) in MODELS {
             for (i, channel) in self.channels.iter().enumerate() {
-                let text = format!(
-                    "{}: largest deviation from equilibrium in the window, {model} model; null if it failed",
-                    channel.description()
-                );
+                let (what, amplitude) = (channel.description(), self.measures.criterion.amplitude());
+                let text = format!("{what}: {amplitude}, {model} model; null if it failed");
                 let cell = Cell::Measured(Box::new(move |row| of(&row.outcome).amplitudes.get(i).copied()));
                 columns.push(Column::new(format!("{model}_{}", channel.name()), channel.unit(), text, cell));
             }
         }
         for (i, channel) in self.channels.iter().enumerate() {
-            let text = format!(
-                "{}: nonlinear over linear amplitude; null where the linear one is zero or a model failed",
-                channel.description()
-            );
+            let text = format!("{}: {}", channel.description(), self.measures.criterion.ratio());
             let cell = Cell::Measured(Box::new(move |row| row.verdict.ratios.get(i).copied().flatten()));
             columns.push(Column::new(format!("ratio_{}", channel.name()), "1", text, cell));
         }
@@ -214,6 +214,27 @@ impl Layout {
         ]
     }
 
+    /// Columns of the metrics that are asked for, and no others.
+    fn metric_columns(&self) -> Vec<Column> {
+        let mut columns = Vec::new();
+        let mut position = 0;
+        for metric in &self.measures.metrics {
+            if !metric.is_of_model() {
+                let cell = Cell::Measured(Box::new(|row| row.outcome.static_sag_m));
+                columns.push(Column::new(metric.column(""), metric.unit(), metric.description(), cell));
+                continue;
+            }
+            for (model, of) in MODELS {
+                let text = format!("{}, {model} model; null if it failed", metric.description());
+                let cell =
+                    Cell::Measured(Box::new(move |row| of(&row.outcome).metrics.get(position).copied()));
+                columns.push(Column::new(metric.column(model), metric.unit(), text, cell));
+            }
+            position += 1;
+        }
+        columns
+    }
+
     /// The Arrow schema.
     #[must_use]
     pub fn schema(&self) -> SchemaRef {
@@ -234,8 +255,8 @@ impl Layout {
     }
 }
 
-/// Columns about the two integrations, the same for every plan.
-fn run_columns() -> Vec<Column> {
+/// Columns of the least gaps, the same for every plan.
+fn gap_columns() -> Vec<Column> {
     let mut columns = Vec::new();
     for (model, of) in MODELS {
         let text = format!(
@@ -245,6 +266,12 @@ fn run_columns() -> Vec<Column> {
         let cell = Cell::Measured(Box::new(move |row| of(&row.outcome).min_gap_m));
         columns.push(Column::new(format!("min_gap_{model}_m"), "m", text, cell));
     }
+    columns
+}
+
+/// Columns about the two integrations, the same for every plan.
+fn run_columns() -> Vec<Column> {
+    let mut columns = Vec::new();
     columns.push(Column::new(
         "status",
         "",
@@ -341,6 +368,7 @@ impl<'a> Rows<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measures::{Criterion, Metric};
     use crate::store::synthetic;
 
     #[test]
@@ -373,6 +401,37 @@ mod tests {
                 "rejected_linear",
             ]
         );
+    }
+
+    #[test]
+    fn metrics_have_columns_in_the_order_asked_for_and_criteria_say_what_they_are() {
+        let mut layout = synthetic::layout();
+        let plain = layout.schema().fields().len();
+        let metrics = vec![Metric::StaticSag, Metric::ClashTime, Metric::CabinetForce];
+        layout.measures = Measures { criterion: Criterion::Rms, metrics };
+        let mut rows = Rows::new(&layout);
+        let mut outcome = synthetic::outcome(0, 2);
+        outcome.static_sag_m = Some(0.013);
+        outcome.nonlinear.metrics = vec![1.5, 400.0];
+        outcome.linear.metrics = vec![0.5, 300.0];
+        rows.push(vec![0.1, 60.0], outcome);
+        let batch = rows.take().unwrap();
+        assert_eq!(batch.num_columns(), plain + 5);
+        let expected = [
+            ("static_sag_m", 0.013),
+            ("clash_time_nonlinear_s", 1.5),
+            ("clash_time_linear_s", 0.5),
+            ("cabinet_force_nonlinear_n", 400.0),
+            ("cabinet_force_linear_n", 300.0),
+        ];
+        let first = batch.schema().index_of("static_sag_m").unwrap();
+        for (k, (name, value)) in expected.into_iter().enumerate() {
+            assert_eq!(batch.schema().field(first + k).name(), name);
+            let column = batch.column(first + k).as_any().downcast_ref::<Float64Array>().unwrap();
+            assert_eq!(column.value(0), value, "{name}");
+        }
+        let description = &layout.dictionary()["nonlinear_tub_yaw"]["description"];
+        assert!(description.as_str().unwrap().contains("root mean square"), "{description}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::chunk::Place;
+use super::chunk::{Place, Shape};
 use super::error::{Holder, StoreError};
 use super::open::{ChunkFile, chunks_named, read_chunk};
 use super::plan_file::{Found, PlanFile};
@@ -96,8 +96,8 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     }
     let place = |chunk: u64| {
         let first = chunk * points_a_chunk;
-        let channels = u32::try_from(job.layout.channels.len()).unwrap_or(u32::MAX);
-        Place { plan: hash, channels, chunk, first, count: points_a_chunk.min(job.points - first) }
+        let shape = Shape::of(&job.layout);
+        Place { plan: hash, shape, chunk, first, count: points_a_chunk.min(job.points - first) }
     };
     let mut present = BTreeSet::new();
     for chunk in chunks_named(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {

@@ -4,6 +4,7 @@ use serde_json::json;
 use washer_model::Channel;
 
 use super::{AxisColumn, Job, Layout};
+use crate::measures::Measures;
 use crate::outcome::{Outcome, Status, Trajectory};
 
 /// Two axes, two channels.
@@ -17,6 +18,7 @@ pub(crate) fn layout() -> Layout {
         axes: vec![axis("unbalance_mass_kg", "kg"), axis("damping_n_s_per_m", "N s/m")],
         channels: vec![Channel::TubFrontY, Channel::TubYaw],
         ratio_limit: 2.0,
+        measures: Measures::default(),
     }
 }
 
@@ -44,16 +46,15 @@ pub(crate) fn outcome(point: u64, channels: usize) -> Outcome {
         min_gap_m: (status == Status::Ok).then_some(0.01 - scale * 1e-3),
         steps: 1000 + point,
         rejected: point % 3,
+        ..Trajectory::failed(status)
     };
     let failing = |salt: u64| match (point + salt) % 20 {
         7 => Status::ALL[((point + salt) / 20 % 5) as usize + 1],
         _ => Status::Ok,
     };
     let still = if point % 30 == 11 { 0.0 } else { 1.0 };
-    Outcome {
-        point,
-        nonlinear: model(still * (0.5 + x % 5.0), failing(0)),
-        linear: model(still, failing(3)),
-        sensitive: [None, Some(false), Some(true)][(point % 3) as usize],
-    }
+    let mut outcome =
+        Outcome::new(point, model(still * (0.5 + x % 5.0), failing(0)), model(still, failing(3)));
+    outcome.sensitive = [None, Some(false), Some(true)][(point % 3) as usize];
+    outcome
 }

@@ -1,6 +1,7 @@
 //! Trajectories by the stiff method: one at a time, its derivatives by lanes of dual numbers.
 
-use super::{FIRST_STEP_S, Family, ModelKind, OfLinear, OfNonlinear, Record, Run};
+use super::extras::Extras;
+use super::{Extra, FIRST_STEP_S, Family, ModelKind, OfLinear, OfNonlinear, Record, Run, Wanted};
 use crate::coupling::Coupling;
 use crate::model::{Model, STATES};
 use crate::nonlinear::COORDINATES;
@@ -9,13 +10,18 @@ use core::marker::PhantomData;
 use lane_ode::{Dual, Ended, Kernel, Lane, Leg, N, Partials, Simd, Step, System, Task, Tolerance, rodas};
 
 /// Integrates one model at every point and records peaks.
-pub(super) fn simulate(model: ModelKind, tolerance: &Tolerance, points: &[&Point]) -> Vec<Record> {
+pub(super) fn simulate(
+    model: ModelKind,
+    tolerance: &Tolerance,
+    points: &[&Point],
+    wanted: Wanted,
+) -> (Vec<Record>, Vec<Extra>) {
     match model {
         ModelKind::Nonlinear => {
-            Simd::dispatch_narrow(Simulate::<OfNonlinear> { points, tolerance, family: PhantomData })
+            Simd::dispatch_narrow(Simulate::<OfNonlinear> { points, tolerance, wanted, family: PhantomData })
         }
         ModelKind::Linear => {
-            Simd::dispatch_narrow(Simulate::<OfLinear> { points, tolerance, family: PhantomData })
+            Simd::dispatch_narrow(Simulate::<OfLinear> { points, tolerance, wanted, family: PhantomData })
         }
     }
 }
@@ -23,18 +29,20 @@ pub(super) fn simulate(model: ModelKind, tolerance: &Tolerance, points: &[&Point
 struct Simulate<'a, F> {
     points: &'a [&'a Point],
     tolerance: &'a Tolerance,
+    wanted: Wanted,
     family: PhantomData<F>,
 }
 
 impl<F: Family> Kernel for Simulate<'_, F> {
-    type Output = Vec<Record>;
+    type Output = (Vec<Record>, Vec<Extra>);
 
     #[inline(always)]
-    fn run<T: Lane>(self, zero: T) -> Vec<Record> {
-        let run = Run::<f64, F::Over<f64>>::new(N(0.0), self.points, Coupling::Springs, FIRST_STEP_S);
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
+        let mut run = Run::<f64, F::Over<f64>>::new(N(0.0), self.points, Coupling::Springs, FIRST_STEP_S);
+        run.extras = Extras::new(N(0.0), self.wanted, F::KIND, self.points[0], self.points.len());
         let mut run = WithTangent::<T, _, F::Over<Dual<T>>>::new(zero, run, self.points[0]);
         rodas::integrate(&mut run, self.tolerance);
-        run.task.records
+        run.task.recorded()
     }
 }
 

@@ -5,6 +5,7 @@ mod bits;
 mod cost;
 mod energy;
 mod expansion;
+mod extras;
 mod findings;
 mod instruments;
 mod mass;

@@ -84,6 +84,46 @@ fn verdicts_are_the_references_on_other_machines() {
 }
 
 #[test]
+fn verdicts_by_other_criteria_are_the_references() {
+    for criterion in ["envelope", "rms"] {
+        let plan = load(&format!(
+            "name = \"{criterion}\"\nmetrics = [\"cabinet_force\", \"static_sag\", \"clash_time\"]\n\
+             [set]\nradial_clearance_m = 5e-4\n\
+             [spin]\nprofile = \"ramp\"\npeak_rpm = 350\nramp_s = 12\n[time]\nend_s = 14\nwindow_s = [4, 14]\n\
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.2, count = 6 }}\n\
+             [[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = {{ from = 40, to = 240, count = 5 }}\n\
+             [reliability]\ncriterion = \"{criterion}\"\n"
+        ));
+        let by_peaks = Plan { measures: Default::default(), ..plan.clone() };
+        let rows = hold_against_reference(&plan, 1e-3);
+        let (peaks, _) =
+            outcomes(&Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..by_peaks });
+        let clashing = rows.iter().filter(|row| row.nonlinear.metrics[1] > 0.0).count();
+        assert!((1..rows.len()).contains(&clashing), "{clashing} of {} rows", rows.len());
+        for (row, peak) in rows.iter().zip(&peaks) {
+            assert!(
+                row.nonlinear.turns.is_empty() && row.linear.turns.is_empty(),
+                "nothing is held for long"
+            );
+            assert!(row.static_sag_m.is_some_and(|sag_m| (0.012..0.016).contains(&sag_m)), "{row:?}");
+            let [force_n, clash_s] = row.nonlinear.metrics[..] else { panic!("{row:?}") };
+            assert!(force_n > 300.0 && (0.0..=10.0).contains(&clash_s), "{row:?}");
+            assert!(clash_s == 0.0 || row.nonlinear.min_gap_m.unwrap() < 0.0, "{row:?}");
+            if criterion == "rms" {
+                let smaller = row.linear.amplitudes.iter().zip(&peak.linear.amplitudes);
+                assert!(smaller.into_iter().all(|(rms, peak)| 0.1 * peak < *rms && rms < peak), "{row:?}");
+                continue;
+            }
+            // In the turn in which the nonlinear motion is greatest the linear one is at most as great as it ever is.
+            let of_peaks = Verdict::new(peak, 6, 2.0).ratios;
+            for (by_turn, of_peaks) in row.turn_ratios.iter().zip(of_peaks) {
+                assert!(by_turn.unwrap() > 0.99 * of_peaks.unwrap(), "{row:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_sample_holds_the_corners_and_two_percent() {
     let mut plan = load(include_str!("../../../../../sweeps/fig12.toml"));
     let drawn = sample(&plan);

@@ -117,7 +117,7 @@ fn ratios(
         series.push(largest);
     }
     ChartPanel {
-        label: "Ratio of amplitudes, nonlinear / linear".to_owned(),
+        label: format!("Ratio of {}, nonlinear / linear", table.compared()),
         shown,
         log: spans_decades(series.iter().flat_map(|series| series.y.iter().copied())),
         levels: vec![(limit, format!("unreliable from ratio {} on", label::significant(limit, 4)))],

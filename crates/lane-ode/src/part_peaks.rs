@@ -1,0 +1,99 @@
+//! Peaks of every part of a trajectory that is cut at known instants.
+
+use crate::lane::Lane;
+use crate::num::N;
+use crate::peaks::{Peaks, Sample};
+use crate::quintic::{Quintic, within_step};
+use crate::rk4::MAX_LANES;
+
+/// Largest magnitude of `M` outputs in every part of each lane's trajectory, parts being divided by instants of the lane's own.
+///
+/// Steps need not end at the instants: a step that spans one is taken in two, at the polynomial of degree 5 through values,
+/// slopes and curvatures at its ends. Heap is asked for when a lane takes up a trajectory, not by steps.
+#[derive(Clone, Debug)]
+pub struct PartPeaks<T, const M: usize> {
+    peaks: Peaks<T, M>,
+    /// Where each lane's current part ends; infinity in its last.
+    part_end_s: N<T>,
+    /// Later cuts of each lane, the next one last.
+    cuts_s: [Vec<f64>; MAX_LANES],
+    /// Peaks of the parts that each lane has behind it.
+    parts: [Vec<[f64; M]>; MAX_LANES],
+}
+
+impl<T: Lane, const M: usize> PartPeaks<T, M> {
+    /// Uncut trajectories of which nothing has been seen yet.
+    #[inline(always)]
+    #[must_use]
+    pub fn new(zero: N<T>) -> Self {
+        Self {
+            peaks: Peaks::new(zero),
+            part_end_s: zero.lit(f64::INFINITY),
+            cuts_s: [const { Vec::new() }; MAX_LANES],
+            parts: [const { Vec::new() }; MAX_LANES],
+        }
+    }
+
+    /// Begins another trajectory in one lane; `cuts_s` increase, and lie where the outputs count.
+    pub fn reset(&mut self, lane: usize, cuts_s: &[f64]) {
+        self.peaks.reset(lane);
+        self.cuts_s[lane].clear();
+        self.cuts_s[lane].extend(cuts_s.iter().rev());
+        self.parts[lane].clear();
+        self.parts[lane].reserve(cuts_s.len());
+        let first = self.cuts_s[lane].pop().unwrap_or(f64::INFINITY);
+        self.part_end_s.0.set(lane, first);
+    }
+
+    /// Peaks of one lane's parts, the last one as far as it has come; the lane's trajectory ends here.
+    pub fn finish(&mut self, lane: usize) -> Vec<[f64; M]> {
+        self.part_end_s.0.set(lane, f64::INFINITY);
+        let mut parts = core::mem::take(&mut self.parts[lane]);
+        parts.push(self.peaks.lane(lane));
+        parts
+    }
+
+    /// Samples that no step leads to; `counts` says in which lanes they count.
+    #[inline(always)]
+    pub fn begin(&mut self, samples: &[Sample<T>; M], counts: T::Mask) {
+        self.peaks.begin(samples, counts);
+    }
+
+    /// The samples at `end_s`, the end of a step of `length_s` that began at the last ones.
+    #[inline(always)]
+    pub fn advance(&mut self, end_s: N<T>, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
+        let mut rest_s = length_s;
+        loop {
+            let cut = self.part_end_s.0.less(end_s.0);
+            let lanes_cut = T::bits(cut);
+            let mut there = *samples;
+            let mut part_s = rest_s;
+            if lanes_cut != 0 {
+                // Lanes that are not cut go to the step's end; from there on nothing is left of it.
+                let to_cut = self.part_end_s - (end_s - rest_s);
+                let share = N(T::select(cut, within_step(to_cut / rest_s).0, rest_s.lit(1.0).0));
+                for i in 0..M {
+                    let inside = Quintic::new(rest_s, &self.peaks.last[i], &samples[i]).sample(share, rest_s);
+                    there[i] = Sample {
+                        value: N(T::select(cut, inside.value.0, there[i].value.0)),
+                        slope: N(T::select(cut, inside.slope.0, there[i].slope.0)),
+                        curvature: N(T::select(cut, inside.curvature.0, there[i].curvature.0)),
+                    };
+                }
+                part_s = (share * rest_s).v();
+            }
+            self.peaks.advance(part_s, &there, counts);
+            if lanes_cut == 0 {
+                return;
+            }
+            rest_s = rest_s - part_s;
+            for lane in (0..T::LANES).filter(|lane| lanes_cut >> lane & 1 == 1) {
+                self.parts[lane].push(self.peaks.lane(lane));
+                self.peaks.reset(lane);
+                let next = self.cuts_s[lane].pop().unwrap_or(f64::INFINITY);
+                self.part_end_s.0.set(lane, next);
+            }
+            self.peaks.begin(&there, cut);
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Between the ends of a step: the polynomial through values, slopes and curvatures.
+
+use crate::lane::Lane;
+use crate::num::N;
+use crate::peaks::Sample;
+
+/// The polynomial of degree 5 that meets values, slopes and curvatures at both ends of a step; over s from 0 to 1.
+pub(crate) struct Quintic<T> {
+    c: [N<T>; 6],
+}
+
+impl<T: Lane> Quintic<T> {
+    #[inline(always)]
+    pub(crate) fn new(h: N<T>, start: &Sample<T>, end: &Sample<T>) -> Self {
+        let (Sample { value: y0, slope: d0, curvature: e0 }, Sample { value: y1, slope: d1, curvature: e1 }) =
+            (*start, *end);
+        let hh = (h * h).v();
+        let (v0, v1) = ((h * d0).v(), (h * d1).v());
+        let (a0, a1) = ((0.5 * (hh * e0).v()).v(), (0.5 * (hh * e1).v()).v());
+        // Residuals at s = 1 of value, slope and half curvature, after the terms fixed at s = 0.
+        let r = y1 - y0 - v0 - a0;
+        let s = v1 - v0 - 2.0 * a0;
+        let t = a1 - a0;
+        Self { c: [y0, v0, a0, 10.0 * r - 4.0 * s + t, 7.0 * s - 15.0 * r - 2.0 * t, 6.0 * r - 3.0 * s + t] }
+    }
+
+    /// The value where the slope vanishes; at worst an end's.
+    #[inline(always)]
+    pub(crate) fn extremum(&self) -> N<T> {
+        self.value(self.extremum_at())
+    }
+
+    /// Where the slope vanishes, by Newton's method from where a straight slope would; at worst an end.
+    #[inline(always)]
+    pub(crate) fn extremum_at(&self) -> N<T> {
+        let c = &self.c;
+        let slope_end = c[1] + 2.0 * c[2] + 3.0 * c[3] + 4.0 * c[4] + 5.0 * c[5];
+        let mut s = within_step(c[1] / (c[1] - slope_end));
+        for _ in 0..4 {
+            let slope = c[1] + s * (2.0 * c[2] + s * (3.0 * c[3] + s * (4.0 * c[4] + (5.0 * s) * c[5])));
+            let curvature = 2.0 * c[2] + s * (6.0 * c[3] + s * (12.0 * c[4] + (20.0 * s) * c[5]));
+            s = within_step(s - slope / curvature);
+        }
+        s
+    }
+
+    /// The value at s.
+    #[inline(always)]
+    pub(crate) fn value(&self, s: N<T>) -> N<T> {
+        let c = &self.c;
+        c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5]))))
+    }
+
+    /// Value and time derivatives at s, of a step of length `h`.
+    #[inline(always)]
+    pub(crate) fn sample(&self, s: N<T>, h: N<T>) -> Sample<T> {
+        let c = &self.c;
+        let slope = c[1] + s * (2.0 * c[2] + s * (3.0 * c[3] + s * (4.0 * c[4] + (5.0 * s) * c[5])));
+        let curvature = 2.0 * c[2] + s * (6.0 * c[3] + s * (12.0 * c[4] + (20.0 * s) * c[5]));
+        Sample { value: self.value(s), slope: slope / h, curvature: curvature / h / h }
+    }
+}
+
+/// Between 0 and 1; NaN becomes 1.
+#[inline(always)]
+pub(crate) fn within_step<T: Lane>(s: N<T>) -> N<T> {
+    let s = s.where_less(s.lit(1.0), s, s.lit(1.0));
+    s.lit(0.0).where_less(s, s, s.lit(0.0))
+}

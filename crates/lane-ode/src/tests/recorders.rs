@@ -1,0 +1,159 @@
+//! Peaks of parts, mean squares and times above zero, on waves of which all that is known.
+
+use super::peaks::Waves;
+use crate::{Array, Lane, N, PartPeaks, Peaks, Sample, SquareIntegrals, TimeAbove};
+use core::f64::consts::TAU;
+
+fn waves(seed: u64) -> Waves {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    Waves {
+        amplitude: [1.0, 0.3 * rng.f64()],
+        frequency: [TAU, TAU * (0.2 + 0.8 * rng.f64())],
+        phase: [TAU * rng.f64(), TAU * rng.f64()],
+    }
+}
+
+/// Peaks of the parts, in `steps` equal steps from 0 to `end`.
+fn parts(waves: &Waves, cuts: &[f64], end: f64, steps: u32) -> Vec<f64> {
+    let h = end / f64::from(steps);
+    let mut peaks = PartPeaks::<f64, 1>::new(N(0.0));
+    peaks.reset(0, cuts);
+    peaks.begin(&[waves.sample(0.0)], true);
+    for i in 1..=steps {
+        let t = h * f64::from(i);
+        peaks.advance(N(t), N(h), &[waves.sample(t)], true);
+    }
+    peaks.finish(0).into_iter().map(|[peak]| peak).collect()
+}
+
+/// The peak from `from` to `to`, in steps that end at both.
+fn peak_between(waves: &Waves, from: f64, to: f64) -> f64 {
+    const STEPS: u32 = 4000;
+    let h = (to - from) / f64::from(STEPS);
+    let mut peaks = Peaks::<f64, 1>::new(N(0.0));
+    peaks.begin(&[waves.sample(from)], true);
+    for i in 1..=STEPS {
+        peaks.advance(N(h), &[waves.sample(from + h * f64::from(i))], true);
+    }
+    peaks.lane(0)[0]
+}
+
+#[test]
+fn parts_peak_as_if_each_were_a_trajectory_of_its_own() {
+    // Cuts at a step's end, one step apart, several within a step, and none for long.
+    let cuts = [0.5, 0.71, 0.775, 0.78, 0.79, 1.7, 4.3];
+    let edges: Vec<f64> = [0.0].into_iter().chain(cuts).chain([5.0]).collect();
+    for seed in 0..20 {
+        let waves = waves(seed);
+        let found = parts(&waves, &cuts, 5.0, 100);
+        assert_eq!(found.len(), cuts.len() + 1);
+        for (found, edge) in found.iter().zip(edges.windows(2)) {
+            let expected = peak_between(&waves, edge[0], edge[1]);
+            assert!((found - expected).abs() < 1e-6, "{edge:?}: {found} for {expected}");
+        }
+    }
+    assert_eq!(parts(&waves(1), &[], 5.0, 100).len(), 1);
+}
+
+#[test]
+fn a_lane_does_not_feel_where_others_are_cut() {
+    let cuts = [vec![0.3, 0.33, 2.0], vec![], vec![0.301, 1.999]];
+    let mut together = PartPeaks::<Array<3>, 1>::new(N(Array([0.0; 3])));
+    let all: Vec<Waves> = (0..3).map(waves).collect();
+    let sample = |t: f64| {
+        let mut lanes = Sample::still(N(Array([0.0; 3])), N(Array([0.0; 3])));
+        for (lane, waves) in all.iter().enumerate() {
+            let one = waves.sample(t);
+            lanes.value.0.set(lane, one.value.0);
+            lanes.slope.0.set(lane, one.slope.0);
+            lanes.curvature.0.set(lane, one.curvature.0);
+        }
+        [lanes]
+    };
+    for (lane, cuts) in cuts.iter().enumerate() {
+        together.reset(lane, cuts);
+    }
+    together.begin(&sample(0.0), [true; 3]);
+    for i in 1..=60 {
+        let (t, h) = (0.05 * f64::from(i), N(Array([0.05; 3])));
+        together.advance(N(Array([t; 3])), h, &sample(t), [true; 3]);
+    }
+    for lane in 0..3 {
+        let mut alone = PartPeaks::<f64, 1>::new(N(0.0));
+        alone.reset(0, &cuts[lane]);
+        alone.begin(&[all[lane].sample(0.0)], true);
+        for i in 1..=60 {
+            let t = 0.05 * f64::from(i);
+            alone.advance(N(t), N(0.05), &[all[lane].sample(t)], true);
+        }
+        assert_eq!(together.finish(lane), alone.finish(0), "lane {lane}");
+    }
+}
+
+/// Relative error of the integral of the square over two periods and a bit.
+fn square_error(steps: u32) -> f64 {
+    let (amplitude, phase, end) = (1.5, 0.4, 2.3);
+    let waves = Waves { amplitude: [amplitude, 0.0], frequency: [TAU, 1.0], phase: [phase, 0.0] };
+    let h = end / f64::from(steps);
+    let mut squares = SquareIntegrals::<f64, 1>::new(N(0.0));
+    squares.begin(&[waves.sample(0.0)]);
+    for i in 1..=steps {
+        // Steps that do not count leave the integral alone.
+        squares.advance(N(h), &[waves.sample(h * f64::from(i))], true);
+        squares.advance(N(0.0), &[waves.sample(h * f64::from(i))], true);
+    }
+    squares.advance(N(1.0), &[waves.sample(end + 1.0)], false);
+    let half = |t: f64| t / 2.0 - (2.0 * (TAU * t + phase)).sin() / (4.0 * TAU);
+    let exact = amplitude * amplitude * (half(end) - half(0.0));
+    (squares.lane(0)[0] - exact).abs() / exact
+}
+
+#[test]
+fn integrals_of_squares_are_of_sixth_order() {
+    let [coarse, fine] = [30, 60].map(square_error);
+    let order = (coarse / fine).log2();
+    eprintln!("integral of a square: {fine:.1e} at 26 steps a period, order {order:.2}");
+    assert!(order > 5.5 && fine < 1e-6, "{order} {fine:e}");
+}
+
+/// Time above zero of a sine wave less `height`, from 0 to `end` in `steps` steps, and the exact one for whole periods.
+fn above(height: f64, phase: f64, periods: u32, steps: u32) -> [f64; 2] {
+    let waves = Waves { amplitude: [1.0, 0.0], frequency: [TAU, 1.0], phase: [phase, 0.0] };
+    let sample = |t: f64| {
+        let sample = waves.sample(t);
+        Sample { value: N(sample.value.0 - height), ..sample }
+    };
+    let h = f64::from(periods) / f64::from(steps);
+    let mut time = TimeAbove::<f64>::new(N(0.0));
+    time.begin(&sample(0.0));
+    for i in 1..=steps {
+        time.advance(N(h), &sample(h * f64::from(i)), true);
+    }
+    let exact = f64::from(periods) * (core::f64::consts::PI - 2.0 * height.clamp(-1.0, 1.0).asin()) / TAU;
+    [time.lane(0), exact]
+}
+
+#[test]
+fn time_above_zero_is_found_between_steps() {
+    for phase in [0.0, 0.3, 1.0, 2.2, 4.0] {
+        for height in [-1.5, -0.999, -0.3, 0.0, 0.5, 0.97, 0.999, 1.5] {
+            // At 0.999 the wave is above zero for a seventieth of a period: a seventh of a step.
+            let [found, exact] = above(height, phase, 3, 30);
+            assert!((found - exact).abs() < 1e-3, "{height} at {phase}: {found} for {exact}");
+            let [finer, exact] = above(height, phase, 3, 300);
+            assert!((finer - exact).abs() < 1e-6, "{height} at {phase}: {finer} for {exact}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_count_takes_no_time() {
+    let mut time = TimeAbove::<f64>::new(N(0.0));
+    let high = Sample::still(N(1.0), N(0.0));
+    time.begin(&high);
+    time.advance(N(1.0), &high, false);
+    time.advance(N(0.25), &high, true);
+    assert_eq!(time.lane(0), 0.25);
+    time.reset(0);
+    assert_eq!(time.lane(0), 0.0);
+}

@@ -1,0 +1,227 @@
+//! What a run measures of its motions: which amplitude the two models are compared by, and metrics beside it.
+
+use washer_model::{Channel, Wanted};
+
+use crate::outcome::Outcome;
+
+/// Deviations below this count as this (m, rad) where turns are compared: neither 0 over 0 nor what no machine feels decides.
+pub const TURN_FLOOR: f64 = 1e-5;
+
+/// Most turns of the drum in a window that are compared one by one: 20 minutes at 1000 rpm. They stay in memory for a group of points.
+pub const MOST_TURNS: f64 = 20_000.0;
+
+/// What counts as the amplitude of a motion, and so as a ratio of two.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Criterion {
+    /// The largest deviation from equilibrium in the window.
+    #[default]
+    Peak,
+    /// The same in every turn of the drum; of the ratios by turn the largest.
+    Envelope,
+    /// The root mean square of the deviation from equilibrium over the window.
+    Rms,
+}
+
+impl Criterion {
+    /// Every criterion.
+    pub const ALL: [Self; 3] = [Self::Peak, Self::Envelope, Self::Rms];
+
+    /// Name in grid files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Peak => "peak",
+            Self::Envelope => "envelope",
+            Self::Rms => "rms",
+        }
+    }
+
+    /// What a channel's column of one model holds.
+    #[must_use]
+    pub const fn amplitude(self) -> &'static str {
+        match self {
+            Self::Peak | Self::Envelope => "largest deviation from equilibrium in the window",
+            Self::Rms => "root mean square of the deviation from equilibrium in the window",
+        }
+    }
+
+    /// What a channel's ratio is, and where there is none.
+    #[must_use]
+    pub const fn ratio(self) -> &'static str {
+        match self {
+            Self::Peak => {
+                "nonlinear over linear amplitude; null where the linear one is zero or a model failed"
+            }
+            Self::Envelope => {
+                "greatest ratio over the drum's turns in the window, nonlinear over linear largest deviation in the same turn, \
+                 both counted as 1e-5 at least; null where the linear motion is zero in all of them or a model failed"
+            }
+            Self::Rms => {
+                "nonlinear over linear root mean square; null where the linear one is zero or a model failed"
+            }
+        }
+    }
+}
+
+/// A number beside the amplitudes, in columns of its own when asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Metric {
+    /// The greatest force on the cabinet.
+    CabinetForce,
+    /// How long drum and tub overlap.
+    ClashTime,
+    /// How far the machine sinks under its weight.
+    StaticSag,
+}
+
+impl Metric {
+    /// Every metric.
+    pub const ALL: [Self; 3] = [Self::CabinetForce, Self::ClashTime, Self::StaticSag];
+
+    /// Name in grid files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::CabinetForce => "cabinet_force",
+            Self::ClashTime => "clash_time",
+            Self::StaticSag => "static_sag",
+        }
+    }
+
+    /// Whether each model has its own; else it belongs to the machine.
+    #[must_use]
+    pub const fn is_of_model(self) -> bool {
+        !matches!(self, Self::StaticSag)
+    }
+
+    /// Unit.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::CabinetForce => "N",
+            Self::ClashTime => "s",
+            Self::StaticSag => "m",
+        }
+    }
+
+    /// The column's name; `model` only if each has its own.
+    #[must_use]
+    pub fn column(self, model: &str) -> String {
+        match self {
+            Self::CabinetForce => format!("cabinet_force_{model}_n"),
+            Self::ClashTime => format!("clash_time_{model}_s"),
+            Self::StaticSag => "static_sag_m".to_owned(),
+        }
+    }
+
+    /// One line for column dictionaries and docs.
+    #[must_use]
+    pub const fn description(self) -> &'static str {
+        match self {
+            Self::CabinetForce => {
+                "greatest magnitude in the window of the sum of all spring and damper forces on the cabinet; at rest it is the weight"
+            }
+            Self::ClashTime => "time in the window with a gap between drum and tub below zero",
+            Self::StaticSag => {
+                "how far the tub's mass centre sinks from where the machine file draws it to the static equilibrium; null if \
+                 there is none"
+            }
+        }
+    }
+}
+
+/// What a run measures beyond peaks and gaps.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Measures {
+    /// What the models are compared by.
+    pub criterion: Criterion,
+    /// Metrics asked for, in column order.
+    pub metrics: Vec<Metric>,
+}
+
+impl Measures {
+    /// Metrics that each model has its own of, in column order.
+    pub fn of_model(&self) -> impl Iterator<Item = Metric> + '_ {
+        self.metrics.iter().copied().filter(|metric| metric.is_of_model())
+    }
+
+    /// What trajectories must record.
+    #[must_use]
+    pub fn wanted(&self) -> Wanted {
+        Wanted {
+            root_mean_squares: self.criterion == Criterion::Rms,
+            turns: self.criterion == Criterion::Envelope,
+            cabinet_force: self.metrics.contains(&Metric::CabinetForce),
+            clash_time: self.metrics.contains(&Metric::ClashTime),
+        }
+    }
+}
+
+impl Outcome {
+    /// Compares the two models turn by turn, if both have turns.
+    pub(crate) fn compare_turns(&mut self, channels: &[Channel]) {
+        let (nonlinear, linear) = (&self.nonlinear.turns, &self.linear.turns);
+        self.turn_ratios.clear();
+        if nonlinear.is_empty() || linear.is_empty() {
+            return;
+        }
+        self.turn_ratios.extend(channels.iter().map(|channel| {
+            let i = channel.index();
+            let moves = linear.iter().any(|turn| turn[i] != 0.0);
+            let ratio = |(nonlinear, linear): (&[f64; 8], &[f64; 8])| {
+                nonlinear[i].max(TURN_FLOOR) / linear[i].max(TURN_FLOOR)
+            };
+            moves.then(|| nonlinear.iter().zip(linear).map(ratio).fold(0.0, f64::max))
+        }));
+    }
+
+    /// Lets go of what only the comparison needs.
+    pub(crate) fn forget_turns(&mut self) {
+        self.nonlinear.turns = Vec::new();
+        self.linear.turns = Vec::new();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::{Status, Trajectory};
+
+    fn outcome(nonlinear: &[[f64; 2]], linear: &[[f64; 2]]) -> Outcome {
+        let model = |turns: &[[f64; 2]]| {
+            let turn = |&[first, second]: &[f64; 2]| [first, 0.0, second, 0.0, 0.0, 0.0, 0.0, 0.0];
+            Trajectory { turns: turns.iter().map(turn).collect(), ..Trajectory::failed(Status::Ok) }
+        };
+        let mut outcome = Outcome::new(0, model(nonlinear), model(linear));
+        outcome.compare_turns(&[Channel::TubFrontY, Channel::DrumFrontY]);
+        outcome
+    }
+
+    #[test]
+    fn the_greatest_ratio_over_the_turns_counts_wherever_the_peaks_are() {
+        let compared = outcome(&[[5e-3, 1e-3], [3e-3, 1e-3]], &[[4e-3, 1e-3], [1e-3, 5e-3]]);
+        assert_eq!(compared.turn_ratios, [Some(3.0), Some(1.0)]);
+    }
+
+    #[test]
+    fn motions_below_the_floor_decide_nothing() {
+        // A thousand times as large, and still nothing that counts; then from the floor upwards without a leap.
+        let compared = outcome(&[[1e-6, 4e-5], [1e-3, 1e-3]], &[[1e-9, 1e-9], [1e-3, 1e-3]]);
+        let [Some(first), Some(second)] = compared.turn_ratios[..] else { panic!("{compared:?}") };
+        assert_eq!(first, 1.0);
+        assert!((second - 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn without_any_linear_motion_there_is_no_ratio() {
+        assert_eq!(outcome(&[[1e-3, 1e-3]; 3], &[[0.0, 1e-3]; 3]).turn_ratios, [None, Some(1.0)]);
+        assert!(outcome(&[], &[[1.0, 1.0]]).turn_ratios.is_empty(), "a model failed");
+    }
+
+    #[test]
+    fn what_is_not_asked_for_is_not_recorded() {
+        assert_eq!(Measures::default().wanted(), Wanted::default());
+        let sag = Measures { metrics: vec![Metric::StaticSag], ..Measures::default() };
+        assert_eq!(sag.wanted(), Wanted::default(), "the equilibrium is known without a trajectory");
+    }
+}

@@ -1,0 +1,160 @@
+//! What is recorded only when asked for, against the same numbers from densely sampled time histories.
+
+use super::instruments::paper;
+use crate::spin::cuts_s;
+use crate::{
+    Channel, Machine, Method, ModelKind, Point, Spin, Start, Timing, Wanted, history, prepare, simulate,
+    simulate_with,
+};
+use lane_ode::{Simd, Tolerance};
+
+const EVERYTHING: Wanted =
+    Wanted { root_mean_squares: true, turns: true, cabinet_force: true, clash_time: true };
+const TIMING: Timing = Timing { end_s: 4.0, window_s: [1.3, 3.9] };
+const EVERY_S: f64 = 2.5e-4;
+
+/// Through the resonances in four seconds, with so little room between drum and tub that they clash at times.
+fn point() -> Point {
+    let machine = Machine { radial_clearance_m: 0.4e-3, ..paper(0.8, 120.0) };
+    let spin = Spin::Table { time_s: vec![0.0, 1.0, 3.0, 4.0], speed_rpm: vec![0.0, 100.0, 420.0, 300.0] };
+    prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
+}
+
+/// The same from a history.
+struct Sampled {
+    root_mean_squares: [f64; 8],
+    turns: Vec<[f64; 8]>,
+    cabinet_force_n: f64,
+    clash_time_s: f64,
+}
+
+fn sampled(point: &Point, model: ModelKind, method: &Method) -> Sampled {
+    let history = history(model, method, point, &Start::default(), EVERY_S);
+    let cuts = cuts_s(&point.stretches, TIMING.window_s);
+    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
+    let mut found = Sampled {
+        root_mean_squares: [0.0; 8],
+        turns: vec![[0.0; 8]; cuts.len() + 1],
+        cabinet_force_n: 0.0,
+        clash_time_s: 0.0,
+    };
+    for k in first..=last {
+        // The trapezoidal rule.
+        let weight = if k == first || k == last { 0.5 * EVERY_S } else { EVERY_S };
+        let instant = history.instant(k).unwrap();
+        let turn = cuts.partition_point(|cut_s| *cut_s < k as f64 * EVERY_S);
+        for (i, y) in instant.channels.into_iter().enumerate() {
+            found.root_mean_squares[i] += weight * y * y;
+            found.turns[turn][i] = found.turns[turn][i].max(y.abs());
+        }
+        let force_n = history.forces(k).unwrap().cabinet_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        found.cabinet_force_n = found.cabinet_force_n.max(force_n);
+        found.clash_time_s += if instant.gap_m < 0.0 { weight } else { 0.0 };
+    }
+    let length_s = TIMING.window_s[1] - TIMING.window_s[0];
+    found.root_mean_squares = found.root_mean_squares.map(|integral| (integral / length_s).sqrt());
+    found
+}
+
+fn close(what: &str, found: f64, expected: f64, allowed: f64) {
+    let error = (found - expected).abs() / expected.abs();
+    assert!(error <= allowed, "{what}: {found} for {expected}, off by {error:e}");
+}
+
+#[test]
+fn they_are_what_a_densely_sampled_history_shows() {
+    let point = point();
+    let method = Method::Rk4 { step_s: 2e-4 };
+    for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        let (records, extras) = simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING);
+        assert_eq!(records, simulate(Simd::best(), model, &method, &[&point]), "the rest is as ever");
+        let (extra, expected) = (&extras[0], sampled(&point, model, &method));
+        let rms = extra.root_mean_squares.unwrap();
+        assert!(extra.turns.len() > 10);
+        assert_eq!(extra.turns.len(), expected.turns.len());
+        for channel in Channel::ALL {
+            let (i, name) = (channel.index(), channel.name());
+            close(name, rms[i], expected.root_mean_squares[i], 1e-5);
+            let mut exact = 0;
+            for (found, expected) in extra.turns.iter().zip(&expected.turns) {
+                // A sample beside a crest is as good as the crest; one beside the end of a turn, on a flank, is not.
+                close(name, found[i], expected[i], 2e-2);
+                exact += usize::from((found[i] - expected[i]).abs() < 1e-4 * found[i]);
+            }
+            assert!(2 * exact > extra.turns.len(), "{name}: {exact} of {} turns", extra.turns.len());
+            let greatest = extra.turns.iter().fold(0.0_f64, |greatest, turn| greatest.max(turn[i]));
+            close(name, greatest, records[0].amplitudes[i], 1e-9);
+        }
+        close("force", extra.cabinet_force_n.unwrap(), expected.cabinet_force_n, 1e-4);
+        let clash_s = extra.clash_time_s.unwrap();
+        assert!(clash_s > 0.05 && clash_s < 2.5, "{clash_s} s, least gap {}", records[0].min_gap_m);
+        // Each touch is a sample too long or too short.
+        let off_s = (clash_s - expected.clash_time_s).abs();
+        assert!(off_s < 20.0 * EVERY_S, "{clash_s} for {}", expected.clash_time_s);
+    }
+}
+
+#[test]
+fn methods_whose_steps_lie_elsewhere_find_the_same() {
+    let point = point();
+    let tolerance = Tolerance { relative: 1e-7, absolute: 1e-10, max_steps: 1_000_000 };
+    for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        let run = |method| simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING).1.remove(0);
+        let reference = run(Method::Rk4 { step_s: 2e-4 });
+        for other in [run(Method::Dopri5(tolerance)), run(Method::Rodas5p(tolerance))] {
+            let rms = [&other, &reference].map(|extra| extra.root_mean_squares.unwrap());
+            rms[0].iter().zip(rms[1]).for_each(|(found, expected)| close("rms", *found, expected, 1e-4));
+            assert_eq!(other.turns.len(), reference.turns.len());
+            for (found, expected) in other.turns.iter().flatten().zip(reference.turns.iter().flatten()) {
+                close("turn", *found, *expected, 1e-3);
+            }
+            close("force", other.cabinet_force_n.unwrap(), reference.cabinet_force_n.unwrap(), 1e-4);
+            close("clash", other.clash_time_s.unwrap(), reference.clash_time_s.unwrap(), 1e-3);
+        }
+    }
+}
+
+#[test]
+fn only_what_is_asked_for_is_there() {
+    let point = point();
+    let method = Method::Rk4MassScaled { step_s: 1e-3, cap_rad_per_s: 1500.0 };
+    let run = |wanted| simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], wanted);
+    assert!(run(Wanted::default()).1.is_empty());
+    let (_, extras) = run(Wanted { clash_time: true, ..Wanted::default() });
+    assert_eq!(extras.len(), 2);
+    for extra in extras {
+        assert!(extra.clash_time_s.is_some() && extra.turns.is_empty());
+        assert_eq!((extra.root_mean_squares, extra.cabinet_force_n), (None, None));
+    }
+}
+
+#[test]
+fn at_rest_the_cabinet_carries_the_weight() {
+    let mut machine = Machine::paper();
+    // Springs that carry the machine straight down: nothing along the drum's axis.
+    machine.unbalance.mass_kg = 0.0;
+    let weight_n =
+        machine.gravity_m_per_s2 * (machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg);
+    let timing = Timing { end_s: 0.02, window_s: [0.0, 0.02] };
+    let still = Spin::Ramp { peak_rpm: 0.0, ramp_s: 1.0 };
+    let point = prepare(Simd::best(), &[(machine, still)], &timing).remove(0).unwrap();
+    for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        let (_, extras) =
+            simulate_with(Simd::best(), model, &Method::Rk4 { step_s: 2e-4 }, &[&point], EVERYTHING);
+        // Springs hold the tub back along c1, where the drum's bearings do: a force that the weight does not have.
+        close("force", extras[0].cabinet_force_n.unwrap(), weight_n, 1e-4);
+        assert_eq!(extras[0].clash_time_s, Some(0.0));
+        assert_eq!(extras[0].turns.len(), 1);
+    }
+}
+
+#[test]
+fn the_built_in_machine_sags_as_the_model_page_says() {
+    let spin = Spin::Ramp { peak_rpm: 0.0, ramp_s: 1.0 };
+    let machine = Machine::paper();
+    let centre_m = machine.tub.centre_x_m;
+    let point = prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap();
+    // q1 = -14.0969 mm, and the tub's front lifted by q6 = 3.3526 mrad.
+    let expected = 14.0969e-3 - centre_m * 3.3526e-3_f64.sin();
+    assert!((point.static_sag_m() - expected).abs() < 1e-7, "{}", point.static_sag_m());
+}
