@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use lane_ode::Simd;
-use washer_model::{Capping, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
+use washer_model::{Cases, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
 
 /// As many as the widest lanes hold.
 const TRAJECTORIES: usize = 8;
@@ -106,8 +106,8 @@ fn methods(rounds: usize) {
         .collect();
     let last = points.len() - 1;
     let corners = [0, 32, last - 32, last].map(|corner| (&points[corner], &spin));
-    let fast =
-        |accuracy| Capping::choose(corners, end_s, accuracy).expect("the paper's machine has modes").method();
+    let cases = Cases::new(corners, end_s);
+    let fast = |accuracy| cases.choose(accuracy).expect("the paper's machine has modes").method();
     let methods = [
         (format!("rk4, {STEP_S:e} s"), Method::Rk4 { step_s: STEP_S }),
         ("rk4-mass-scaled, 1e-3".to_owned(), fast(1e-3)),

@@ -3,6 +3,7 @@
 mod fast;
 
 pub use fast::Settled;
+pub(crate) use fast::reference_step_s;
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};

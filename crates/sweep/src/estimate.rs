@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use lane_ode::MAX_LANES;
 use washer_model::Channel;
 
-use crate::engine::{EngineError, GROUP, ModelEngine};
+use crate::engine::{EngineError, GROUP, ModelEngine, Settled};
 use crate::interrupt::Interrupt;
 use crate::outcome::Outcome;
 use crate::plan::{Integrator, Plan};
@@ -46,6 +46,8 @@ pub struct Estimate {
     pub memory_bytes: f64,
     /// Disk for the run's folder, and at most as much again for the result.
     pub disk_bytes: f64,
+    /// What the fast method would work with, if that is the plan's.
+    pub settled: Option<Settled>,
 }
 
 impl Estimate {
@@ -55,11 +57,13 @@ impl Estimate {
     /// What keeps a run from having an engine.
     pub fn of(plan: &Plan, environment: Environment<'_>) -> Result<Self, EngineError> {
         let threads = default_threads(environment);
+        let engine = ModelEngine::new(plan)?;
+        let settled = engine.settled().copied();
         let began = Instant::now();
         let mut samples = Vec::new();
         for place in PLACES {
             if samples.is_empty() || began.elapsed() < BUDGET {
-                samples.push(Sample::take(plan, place)?);
+                samples.push(Sample::take(plan, settled, place)?);
             }
         }
         let core_s_per_point =
@@ -69,7 +73,7 @@ impl Estimate {
         let rounds = plan.points().div_ceil(chunk).div_ceil(threads as u64);
         let points_a_thread = (rounds * chunk).min(plan.points());
         Ok(Self {
-            simd: ModelEngine::new(plan)?.simd().to_owned(),
+            simd: engine.simd().to_owned(),
             threads,
             wall_s: points_a_thread as f64 * core_s_per_point,
             core_s_per_point,
@@ -77,6 +81,7 @@ impl Estimate {
             sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
             memory_bytes: memory_bytes(plan, threads),
             disk_bytes: plan.points() as f64 * Shape::of(&Job::of(plan).layout).bytes_a_point() as f64,
+            settled,
         })
     }
 }
@@ -89,13 +94,13 @@ struct Sample {
 }
 
 impl Sample {
-    fn take(plan: &Plan, place: f64) -> Result<Self, EngineError> {
+    fn take(plan: &Plan, settled: Option<Settled>, place: f64) -> Result<Self, EngineError> {
         let points = plan.points().min(MAX_LANES as u64);
         let first = (plan.points().saturating_sub(points) as f64 * place) as u64;
         let mut shorter: Option<(f64, f64)> = None;
         let mut end_s = first_end_s(plan);
         loop {
-            let cost_s = cost_s(plan, first..first + points, end_s)?;
+            let cost_s = cost_s(plan, settled, first..first + points, end_s)?;
             if end_s >= plan.end_s || cost_s >= LONG_ENOUGH.as_secs_f64() {
                 // What does not grow with the length (the equilibrium) must not be multiplied.
                 let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
@@ -119,14 +124,19 @@ fn first_end_s(plan: &Plan) -> f64 {
 }
 
 /// Time that one core takes for the beginning of these points' runs.
-fn cost_s(plan: &Plan, points: std::ops::Range<u64>, end_s: f64) -> Result<f64, EngineError> {
+fn cost_s(
+    plan: &Plan,
+    settled: Option<Settled>,
+    points: std::ops::Range<u64>,
+    end_s: f64,
+) -> Result<f64, EngineError> {
     let share = end_s / plan.end_s;
     let window_s = plan.window_s.map(|edge_s| (edge_s * share).min(end_s));
     let cut = Plan { end_s, window_s, ..plan.clone() };
     let engine = ModelEngine::new(&cut)?;
     // A shorter run alone would be slower spin, and longer steps.
-    if let Some(settled) = ModelEngine::new(plan)?.settled() {
-        engine.assume(*settled);
+    if let Some(settled) = settled {
+        engine.assume(settled);
     }
     let interrupt = Interrupt::new();
     let began = Instant::now();

@@ -179,6 +179,9 @@ impl Plan {
     /// Axes beyond this many are held at their least value by [`Plan::corners`].
     const CORNER_AXES: usize = 8;
 
+    /// Most corners at which machines are made ready before a run.
+    const MOST_PREPARED: usize = 256;
+
     /// Number of points, of the design or of the grid; 1 without axes.
     #[must_use]
     pub fn points(&self) -> u64 {
@@ -257,6 +260,15 @@ impl Plan {
             });
             ends.collect()
         }))
+    }
+
+    /// Of the corners not more than [`Self::MOST_PREPARED`], spread evenly: a list has no corners but its points, and looking at a machine's
+    /// modes is dear.
+    #[must_use]
+    pub fn some_corners(&self) -> Vec<Vec<f64>> {
+        let corners: Vec<_> = self.corners().collect();
+        let every = corners.len().div_ceil(Self::MOST_PREPARED);
+        corners.into_iter().step_by(every).collect()
     }
 }
 

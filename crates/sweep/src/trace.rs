@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use lane_ode::{Failure, Simd};
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use serde_json::{Map, Value, json};
 use washer_model::{
-    COORDINATES, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium, Point, Start, Timing,
-    highest_frequency_rad_per_s, history, prepare,
+    COORDINATES, Cases, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium, Point, Spin,
+    Start, Timing, history, prepare,
 };
 
 use crate::engine;
@@ -22,12 +21,6 @@ const TRACE: &str = "sweep.trace";
 
 /// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as many.
 pub const MOST_INSTANTS: f64 = 2e6;
-
-/// Longest step of a trace whose map scales the bearings' mass.
-const LONGEST_STEP_S: f64 = 2e-4;
-
-/// That step's share of the stability limit, which holds for small motions.
-const SHARE_OF_LIMIT: f64 = 0.7;
 
 /// Most points whose traces a run keeps: at some 300 kB each.
 pub const MOST_KEPT: u64 = 10_000;
@@ -70,7 +63,7 @@ pub fn trace(
     let Scenario { machine, spin, window_s } = scenario;
     let timing = Timing { end_s: plan.end_s, window_s };
     let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
-    let (method, method_json) = method(plan, &point, spin.greatest_speed_rad_per_s(plan.end_s));
+    let (method, method_json) = method(plan, &point, &spin);
     let run = |model| history(model, &method, &point, start, every_s);
     let (nonlinear, linear) = rayon::join(|| run(ModelKind::Nonlinear), || run(ModelKind::Linear));
 
@@ -154,7 +147,7 @@ fn named(letter: char, values: &[f64; COORDINATES]) -> Value {
 }
 
 /// The plan's method. A map may scale the bearings' mass to be quick; a single trajectory keeps them as they are, in stable steps.
-fn method(plan: &Plan, point: &Point, speed_rad_per_s: f64) -> (Method, Value) {
+fn method(plan: &Plan, point: &Point, spin: &Spin) -> (Method, Value) {
     let rk4 = |step_s: f64| (Method::Rk4 { step_s }, json!({ "method": "rk4", "step_s": step_s }));
     match plan.integrator {
         Integrator::Rk4 { step_s } => rk4(step_s),
@@ -165,8 +158,7 @@ fn method(plan: &Plan, point: &Point, speed_rad_per_s: f64) -> (Method, Value) {
             (engine::rodas5p(rtol, atol), json!({ "method": "rodas5p", "rtol": rtol, "atol": atol }))
         }
         Integrator::Rk4MassScaled { .. } => {
-            let highest = highest_frequency_rad_per_s(point, speed_rad_per_s).unwrap_or(0.0);
-            rk4(LONGEST_STEP_S.min(SHARE_OF_LIMIT * RK4_STABILITY_LIMIT / highest))
+            rk4(engine::reference_step_s(&Cases::new([(point, spin)], plan.end_s)))
         }
     }
 }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use lane_ode::{Simd, Tolerance};
-use washer_model::{Capping, Channel, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
+use washer_model::{Cases, Channel, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
 
 const END_S: f64 = 50.0;
 const USAGE: &str = "usage: trajectory scalar|avx2|avx512|neon \
@@ -47,7 +47,7 @@ fn method(words: &[&str], point: &Point, spin: &Spin) -> Result<(Method, &'stati
     match words {
         ["rk4", step] => Ok((Method::Rk4 { step_s: number(step)? }, "RK4")),
         ["rk4-mass-scaled", accuracy] => {
-            let capping = Capping::choose([(point, spin)], END_S, number(accuracy)?);
+            let capping = Cases::new([(point, spin)], END_S).choose(number(accuracy)?);
             let capping = capping.map_err(|error| Failed::Because(error.to_string()))?;
             Ok((capping.method(), "mass-scaled RK4"))
         }

@@ -16,7 +16,7 @@
 //!   Stiff bearings pass at once: they hold next to no strain energy of slow modes. Soft ones do not, and then the cap rises until it
 //!   caps nothing: plain RK4.
 
-use crate::modal::{NoModes, highest_with_cap, modes_with_cap};
+use crate::modal::{Modes, NoModes, highest_with_cap, modes_with_cap};
 use crate::point::Point;
 use crate::run::Method;
 use crate::spin::Spin;
@@ -67,65 +67,107 @@ impl Capping {
             None => Method::Rk4 { step_s: self.step_s },
         }
     }
+}
+
+/// Machines on whose account a run's step and cap are chosen, with what is known of them without a cap.
+pub struct Cases<'a>(Vec<Result<Case<'a>, NoModes>>);
+
+struct Case<'a> {
+    point: &'a Point,
+    /// The drum's greatest.
+    speed_rad_per_s: f64,
+    /// Of the motions to follow.
+    fastest_followed_rad_per_s: f64,
+    /// Of all modes, at rest and turning.
+    fastest_rad_per_s: f64,
+    /// At the drum's greatest speed, and at rest.
+    modes: [Modes; 2],
+}
+
+impl<'a> Case<'a> {
+    fn new(point: &'a Point, spin: &Spin, end_s: f64) -> Result<Self, NoModes> {
+        let speed = spin.greatest_speed_rad_per_s(end_s);
+        let modes = [modes_with_cap(point, 0.0, speed, None)?, modes_with_cap(point, 0.0, 0.0, None)?];
+        let slow = &modes[1].modes;
+        let followed = speed.max(slow[SUSPENSION_MODES - 1].magnitude_rad_per_s);
+        let hinge = slow[SUSPENSION_MODES].magnitude_rad_per_s;
+        Ok(Self {
+            point,
+            speed_rad_per_s: speed,
+            // A soft hinge takes part in the motion.
+            fastest_followed_rad_per_s: if hinge < 2.0 * followed { hinge } else { followed },
+            fastest_rad_per_s: highest_with_cap(point, 0.0, None)?.max(highest_with_cap(point, speed, None)?),
+            modes,
+        })
+    }
+
+    /// Whether a step is stable with a cap, and the slow modes stay where they are.
+    fn holds(&self, step_s: f64, cap: f64, accuracy: f64) -> Result<bool, NoModes> {
+        let speed = self.speed_rad_per_s;
+        for (turning, plain) in [speed, 0.0].into_iter().zip(&self.modes) {
+            if step_s * highest_with_cap(self.point, turning, Some(cap))? > STEP_TIMES_FASTEST {
+                return Ok(false);
+            }
+            let capped = modes_with_cap(self.point, 0.0, turning, Some(cap))?;
+            for (plain, capped) in plain.modes.iter().zip(&capped.modes).take(SLOW_MODES) {
+                let half_width = plain.re_per_s.abs().max(LEAST_HALF_WIDTH * plain.magnitude_rad_per_s);
+                let distance = half_width.max(plain.magnitude_rad_per_s - speed);
+                let (slower, detuned) =
+                    (capped.re_per_s - plain.re_per_s, capped.im_rad_per_s - plain.im_rad_per_s);
+                let shift = (slower * slower + detuned * detuned).sqrt();
+                let weight = (speed / plain.magnitude_rad_per_s).min(1.0).powi(4);
+                if weight * shift > SHIFT_SHARE * accuracy * distance {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+}
+
+impl<'a> Cases<'a> {
+    /// Points whose drums turn as their spins say until `end_s`.
+    #[must_use]
+    pub fn new(points: impl IntoIterator<Item = (&'a Point, &'a Spin)>, end_s: f64) -> Self {
+        Self(points.into_iter().map(|(point, spin)| Case::new(point, spin, end_s)).collect())
+    }
 
     /// The longest step at which plain RK4 is stable at each of the points; `None` if there are none.
     /// Machines without modes are left out.
     #[must_use]
-    pub fn plain_step_s<'a>(
-        points: impl IntoIterator<Item = (&'a Point, &'a Spin)>,
-        end_s: f64,
-    ) -> Option<f64> {
-        let steps = points.into_iter().map(|(point, spin)| {
-            let speed = spin.greatest_speed_rad_per_s(end_s);
-            let fastest = highest_with_cap(point, 0.0, None)?.max(highest_with_cap(point, speed, None)?);
-            Ok::<_, NoModes>(STEP_TIMES_FASTEST / fastest)
-        });
-        steps.flatten().reduce(f64::min).map(rounded_down)
+    pub fn plain_step_s(&self) -> Option<f64> {
+        let steps = self.0.iter().flatten().map(|case| STEP_TIMES_FASTEST / case.fastest_rad_per_s);
+        steps.reduce(f64::min).map(rounded_down)
     }
 
-    /// The longest step, and its cap, at which amplitudes should be right to `accuracy` (relative) at each of `points`, whose drums
-    /// turn as their spins say until `end_s`.
+    /// The longest step, and its cap, at which amplitudes should be right to `accuracy` (relative) at each of the points.
     ///
     /// # Errors
     /// [`NoModes`] of the first machine that has none.
-    pub fn choose<'a>(
-        points: impl IntoIterator<Item = (&'a Point, &'a Spin)>,
-        end_s: f64,
-        accuracy: f64,
-    ) -> Result<Self, NoModes> {
-        let mut cases = Vec::new();
-        let mut step_s = f64::INFINITY;
-        let mut plain_step_s = f64::INFINITY;
-        for (point, spin) in points {
-            let speed = spin.greatest_speed_rad_per_s(end_s);
-            let slow = modes_with_cap(point, 0.0, 0.0, None)?;
-            let followed = speed.max(slow.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s);
-            let hinge = slow.modes[SUSPENSION_MODES].magnitude_rad_per_s;
-            // A soft hinge takes part in the motion.
-            let followed = if hinge < 2.0 * followed { hinge } else { followed };
-            step_s = step_s.min((120.0 * MEMORY_DAMPING_RATIO * accuracy).powf(0.25) / followed);
-            let fastest = highest_with_cap(point, 0.0, None)?.max(highest_with_cap(point, speed, None)?);
-            plain_step_s = plain_step_s.min(STEP_TIMES_FASTEST / fastest);
-            cases.push((point, speed));
-        }
-        (step_s, plain_step_s) = (rounded_down(step_s), rounded_down(plain_step_s));
+    pub fn choose(&self, accuracy: f64) -> Result<Capping, NoModes> {
+        let cases = self.0.iter().map(|case| case.as_ref().map_err(|none| *none));
+        let cases = cases.collect::<Result<Vec<_>, _>>()?;
+        let fastest_followed = cases.iter().map(|case| case.fastest_followed_rad_per_s).fold(0.0, f64::max);
+        let mut step_s =
+            rounded_down((120.0 * MEMORY_DAMPING_RATIO * accuracy).powf(0.25) / fastest_followed);
+        let plain_step_s = self.plain_step_s().unwrap_or(f64::INFINITY);
         if step_s <= plain_step_s {
-            return Ok(Self { step_s, cap_rad_per_s: None });
+            return Ok(Capping { step_s, cap_rad_per_s: None });
         }
         while step_s > plain_step_s {
             for step_times_cap in STEP_TIMES_CAP {
                 let cap = step_times_cap / step_s;
                 let mut holds = true;
-                for &(point, speed) in &cases {
-                    holds = holds && self::holds(point, speed, step_s, cap, accuracy)?;
+                for case in &cases {
+                    holds = holds && case.holds(step_s, cap, accuracy)?;
                 }
                 if holds {
-                    return Ok(Self { step_s, cap_rad_per_s: Some(cap) });
+                    return Ok(Capping { step_s, cap_rad_per_s: Some(cap) });
                 }
             }
             step_s *= SHORTER;
         }
-        Ok(Self { step_s: plain_step_s, cap_rad_per_s: None })
+        Ok(Capping { step_s: plain_step_s, cap_rad_per_s: None })
     }
 }
 
@@ -135,29 +177,6 @@ fn rounded_down(step_s: f64) -> f64 {
     f64::from_bits(
         step_s.to_bits() >> (f64::MANTISSA_DIGITS - 1 - STEP_BITS) << (f64::MANTISSA_DIGITS - 1 - STEP_BITS),
     )
-}
-
-/// Whether a step is stable with a cap, and the slow modes stay where they are.
-fn holds(point: &Point, speed: f64, step_s: f64, cap: f64, accuracy: f64) -> Result<bool, NoModes> {
-    for turning in [speed, 0.0] {
-        if step_s * highest_with_cap(point, turning, Some(cap))? > STEP_TIMES_FASTEST {
-            return Ok(false);
-        }
-        let plain = modes_with_cap(point, 0.0, turning, None)?;
-        let capped = modes_with_cap(point, 0.0, turning, Some(cap))?;
-        for (plain, capped) in plain.modes.iter().zip(&capped.modes).take(SLOW_MODES) {
-            let half_width = plain.re_per_s.abs().max(LEAST_HALF_WIDTH * plain.magnitude_rad_per_s);
-            let distance = half_width.max(plain.magnitude_rad_per_s - speed);
-            let (slower, detuned) =
-                (capped.re_per_s - plain.re_per_s, capped.im_rad_per_s - plain.im_rad_per_s);
-            let shift = (slower * slower + detuned * detuned).sqrt();
-            let weight = (speed / plain.magnitude_rad_per_s).min(1.0).powi(4);
-            if weight * shift > SHIFT_SHARE * accuracy * distance {
-                return Ok(false);
-            }
-        }
-    }
-    Ok(true)
 }
 
 #[cfg(test)]
@@ -176,8 +195,8 @@ mod tests {
         let timing = Timing { end_s: 4.0, window_s: [3.0, 4.0] };
         let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
         let ready: Vec<_> = points.iter().flatten().map(|point| (point, &spin)).collect();
-        let plain_step_s = Capping::plain_step_s(ready.iter().copied(), timing.end_s);
-        (Capping::choose(ready, timing.end_s, 1e-3).unwrap(), plain_step_s)
+        let cases = Cases::new(ready, timing.end_s);
+        (cases.choose(1e-3).unwrap(), cases.plain_step_s())
     }
 
     #[test]

@@ -85,7 +85,7 @@ mod suspension;
 mod violations;
 
 pub use campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
-pub use capping::Capping;
+pub use capping::{Capping, Cases};
 pub use channel::Channel;
 pub use equations::{Equations, STATE_LEN};
 pub use history::{History, Instant, Start, history};

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::Grid;
 use crate::design::Design;
-use crate::engine::{ModelEngine, Settled};
+use crate::engine::Settled;
 use crate::estimate::{Estimate, size};
 use crate::exit::{Error, Exit, print, tell};
 use crate::measures::Criterion;
@@ -31,13 +31,12 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         return print(&format!("{:#}\n", plan.to_json()));
     }
     let estimate = Estimate::of(&plan, &|name| std::env::var(name).ok())?;
-    let engine = ModelEngine::new(&plan)?;
-    tell(summary(&plan, &estimate, engine.settled()).trim_end());
+    tell(summary(&plan, &estimate).trim_end());
     Ok(Exit::Done)
 }
 
 /// The plan in a few lines.
-fn summary(plan: &Plan, estimate: &Estimate, settled: Option<&Settled>) -> String {
+fn summary(plan: &Plan, estimate: &Estimate) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         // Writing to a String cannot fail.
@@ -56,7 +55,7 @@ fn summary(plan: &Plan, estimate: &Estimate, settled: Option<&Settled>) -> Strin
     };
     line("points", laid_out);
     line("time", format!("0 to {} s, window {} to {} s", plan.end_s, plan.window_s[0], plan.window_s[1]));
-    line("method", method(plan, settled));
+    line("method", method(plan, estimate.settled.as_ref()));
     let metrics: Vec<_> = plan.measures.metrics.iter().map(|metric| metric.name()).collect();
     if !metrics.is_empty() {
         line("metrics", metrics.join(", "));

@@ -15,9 +15,6 @@ use crate::plan::{Integrator, Scenario};
 /// Most fixed steps of a trajectory that are accepted; an hour or more of computing for one point.
 pub(super) const MOST_STEPS: f64 = 1e10;
 
-/// Most corners of the grid that are made ready to look for the longest stable step.
-const MOST_PREPARED: usize = 1 << 8;
-
 /// A machine or spin that cannot be, at any corner of the grid. Ranges, inertia and bearings are linear conditions, so
 /// a machine that meets them at the corners meets them between; a spring that shrinks to nothing only in between is
 /// left to the run, as a failed row.
@@ -172,10 +169,8 @@ fn longest_stable_step_s(draft: &Draft, step_s: f64) -> Option<f64> {
     let plan = &draft.plan;
     let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };
     let mut highest = 0.0_f64;
-    // Of a list of points, which has no corners, some: this is the dear check.
-    let corners: Vec<_> = plan.corners().collect();
-    for values in corners.iter().step_by(corners.len().div_ceil(MOST_PREPARED)) {
-        let Scenario { machine, spin, .. } = plan.scenario_at(values);
+    for values in plan.some_corners() {
+        let Scenario { machine, spin, .. } = plan.scenario_at(&values);
         let speed = spin.greatest_speed_rad_per_s(plan.end_s);
         for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
             // Matrices without eigenvalues leave it to the run to tell whether the machine can move.

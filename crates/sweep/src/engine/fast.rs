@@ -15,7 +15,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use washer_model::{Capping, Method, ModelKind, Point};
+use washer_model::{Capping, Cases, Method, ModelKind, Point};
 
 use super::{GROUP, ModelEngine, panicked};
 use crate::outcome::{Outcome, Status, Trajectory};
@@ -31,9 +31,6 @@ const REFERENCE_SHARE: f64 = 0.75;
 
 /// One point in so many is in the sample.
 const SAMPLED: u64 = 50;
-
-/// No more places are looked at for step and cap.
-const MOST_CORNERS: usize = 256;
 
 /// No sample is larger: it is held in memory.
 const MOST_SAMPLED: u64 = 1_000_000;
@@ -94,17 +91,21 @@ impl Settled {
     }
 }
 
+/// Step of the reference method.
+pub(crate) fn reference_step_s(cases: &Cases<'_>) -> f64 {
+    REFERENCE_STEP_S.min(cases.plain_step_s().map_or(f64::INFINITY, |longest_s| REFERENCE_SHARE * longest_s))
+}
+
 /// Fast and reference outcome of a sample point.
 type Pair = (Outcome, Outcome);
 
 impl ModelEngine<'_> {
     /// Step and cap by the rule alone, from the corners of the grid.
     pub(super) fn unchecked(&self, accuracy: f64) -> Settled {
-        // A list has no corners but its points: some of them must do.
-        let values: Vec<_> = self.plan.corners().collect();
-        let scenarios: Vec<_> = values
+        let scenarios: Vec<_> = self
+            .plan
+            .some_corners()
             .iter()
-            .step_by(values.len().div_ceil(MOST_CORNERS))
             .map(|values| {
                 let Scenario { machine, spin, .. } = self.plan.scenario_at(values);
                 (machine, spin)
@@ -116,12 +117,11 @@ impl ModelEngine<'_> {
             .zip(&scenarios)
             .filter_map(|(point, (_, spin))| point.as_ref().ok().map(|point| (point, spin)))
             .collect();
-        let plain_step_s = Capping::plain_step_s(ready.iter().copied(), self.plan.end_s);
-        let reference_step_s =
-            REFERENCE_STEP_S.min(plain_step_s.map_or(f64::INFINITY, |s| REFERENCE_SHARE * s));
+        let cases = Cases::new(ready, self.plan.end_s);
+        let reference_step_s = reference_step_s(&cases);
         // Corners without an equilibrium or without modes are rows that say so; the rest is integrated as the reference is.
-        let capping = Capping::choose(ready, self.plan.end_s, accuracy)
-            .unwrap_or(Capping { step_s: reference_step_s, cap_rad_per_s: None });
+        let capping =
+            cases.choose(accuracy).unwrap_or(Capping { step_s: reference_step_s, cap_rad_per_s: None });
         Settled {
             step_s: capping.step_s,
             cap_rad_per_s: capping.cap_rad_per_s,
