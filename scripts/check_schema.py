@@ -18,14 +18,14 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 BROKEN = ROOT / "crates/sweep/testdata/broken"
 # Mistakes that are within a schema's reach: one file, one value at a time.
 REFUSED = [
-    "axis_single_brackets", "axis_spacing_unknown", "axis_values_and_range",
-    "axis_values_empty", "channels_empty", "channels_unknown_and_repeated", "count_fraction", "count_negative",
-    "count_overflow", "count_zero", "dotted_keys", "end_beyond_reason", "end_zero", "key_missing", "key_unknown",
-    "key_unknown_in_every_section", "method_left_out_with_keys_of_others", "method_unknown",
-    "method_with_keys_of_others", "name_is_a_path", "name_is_hidden", "number_huge", "profile_unknown",
-    "profile_with_keys_of_the_table", "section_missing", "set_out_of_range", "set_with_a_string",
-    "spin_out_of_range", "spin_table_empty", "spin_table_with_keys_of_a_ramp", "step_zero", "type_wrong",
-    "type_wrong_in_array", "window_negative", "window_of_three",
+    "axis_single_brackets", "axis_spacing_unknown", "axis_values_and_range", "axis_values_empty",
+    "channels_empty", "channels_unknown_and_repeated", "count_fraction", "count_negative", "count_overflow",
+    "count_zero", "dotted_keys", "end_beyond_reason", "end_zero", "key_missing", "key_unknown",
+    "key_unknown_in_every_section", "measures_empty", "measures_unknown", "method_left_out_with_keys_of_others",
+    "method_unknown", "method_with_keys_of_others", "name_is_a_path", "name_is_hidden", "number_huge",
+    "profile_unknown", "profile_with_keys_of_the_table", "section_missing", "set_out_of_range",
+    "set_with_a_string", "spin_out_of_range", "spin_table_empty", "spin_table_with_keys_of_a_ramp", "step_zero",
+    "type_wrong", "type_wrong_in_array", "window_negative", "window_of_three",
 ]
 
 

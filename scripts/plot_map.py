@@ -127,7 +127,7 @@ def draw(path, output):
 
     marks = np.array([0.1, 0.2, 0.5, 1, 1.2, 1.5, 2, 3, 5, 10, 20, 50, 100, 1000])
     marks = marks[(np.log(marks / limit) >= reach[0]) & (np.log(marks / limit) <= reach[1])]
-    label = "largest ratio of amplitudes, nonlinear / linear"
+    label = "largest ratio, nonlinear / linear"
     bar = figure.colorbar(mesh, ax=plot, ticks=np.log(marks / limit), label=label)
     bar.ax.set_yticklabels([f"{mark:g}" for mark in marks])
     bar.ax.minorticks_off()

@@ -86,7 +86,7 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
             if lanes_cut == 0 {
                 return;
             }
-            rest_s = rest_s - part_s;
+            rest_s -= part_s;
             for lane in (0..T::LANES).filter(|lane| lanes_cut >> lane & 1 == 1) {
                 self.parts[lane].push(self.peaks.lane(lane));
                 self.peaks.reset(lane);

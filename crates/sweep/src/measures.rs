@@ -119,7 +119,7 @@ impl Metric {
     pub const fn description(self) -> &'static str {
         match self {
             Self::CabinetForce => {
-                "greatest magnitude in the window of the sum of all spring and damper forces on the cabinet; at rest it is the weight"
+                "greatest magnitude in the window of the sum of all spring and damper forces on the cabinet (at rest the weight)"
             }
             Self::ClashTime => "time in the window with a gap between drum and tub below zero",
             Self::StaticSag => {
