@@ -147,8 +147,8 @@ impl<'a> ModelEngine<'a> {
     /// Both models at every point, by one method.
     fn all(&self, prepared: &[Option<Point>], method: &Method, points: &[u64]) -> Vec<Outcome> {
         let ready: Vec<&Point> = prepared.iter().flatten().collect();
-        let mut nonlinear = self.trajectories(&ready, ModelKind::Nonlinear, method).into_iter();
-        let mut linear = self.trajectories(&ready, ModelKind::Linear, method).into_iter();
+        let (nonlinear, linear) = self.both(&ready, method);
+        let (mut nonlinear, mut linear) = (nonlinear.into_iter(), linear.into_iter());
         let next =
             |trajectories: &mut std::vec::IntoIter<Trajectory>, prepared: &Option<Point>| match prepared {
                 Some(_) => trajectories.next().unwrap_or(Trajectory::failed(Status::Panicked)),
@@ -167,6 +167,17 @@ impl<'a> ModelEngine<'a> {
                 outcome
             })
             .collect()
+    }
+
+    /// Both models at every point; in a pool, a thread that has run out of work takes one of them.
+    fn both(&self, points: &[&Point], method: &Method) -> (Vec<Trajectory>, Vec<Trajectory>) {
+        let nonlinear = || self.trajectories(points, ModelKind::Nonlinear, method);
+        let linear = || self.trajectories(points, ModelKind::Linear, method);
+        match rayon::current_thread_index() {
+            Some(_) => rayon::join(nonlinear, linear),
+            // An estimate is of one thread.
+            None => (nonlinear(), linear()),
+        }
     }
 
     /// One model at every point, by one method.

@@ -196,11 +196,10 @@ impl ModelEngine<'_> {
         let doubtful: Vec<usize> =
             (0..outcomes.len()).filter(|&i| self.is_doubtful(&outcomes[i], error.max(spreads[i]))).collect();
         let of_doubtful: Vec<&Point> = doubtful.iter().filter_map(|&i| prepared[i].as_ref()).collect();
-        let mut nonlinear =
-            self.trajectories(&of_doubtful, ModelKind::Nonlinear, &settled.reference()).into_iter();
-        let mut linear = self.trajectories(&of_doubtful, ModelKind::Linear, &settled.reference()).into_iter();
+        let (nonlinear, linear) = self.both(&of_doubtful, &settled.reference());
+        let mut again = nonlinear.into_iter().zip(linear);
         for i in doubtful {
-            if let (Some(nonlinear), Some(linear)) = (nonlinear.next(), linear.next()) {
+            if let Some((nonlinear, linear)) = again.next() {
                 outcomes[i].nonlinear = nonlinear;
                 outcomes[i].linear = linear;
                 outcomes[i].compare_turns(&self.plan.reliability.channels);
