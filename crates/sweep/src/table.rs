@@ -69,7 +69,12 @@ impl Table {
 
     /// Adds an entry to the file's key-value metadata.
     pub(crate) fn metadata(&mut self, key: &str, value: &Value) {
-        self.metadata.push(KeyValue::new(key.to_owned(), value.to_string()));
+        self.text(key, value.to_string());
+    }
+
+    /// Adds an entry that is no JSON.
+    pub(crate) fn text(&mut self, key: &str, value: String) {
+        self.metadata.push(KeyValue::new(key.to_owned(), value));
     }
 
     /// Writes the file whole, over an older one, and makes the folder that it is to be in.
