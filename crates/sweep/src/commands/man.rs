@@ -72,14 +72,9 @@ mod tests {
         program.build();
         let run = program.find_subcommand("run").unwrap();
         let text = String::from_utf8(page(run, "run").unwrap()).unwrap();
-        for part in [
-            ".TH sweep\\-run 1",
-            "sweep run",
-            ".SH EXAMPLES",
-            "\\-\\-shard 3/16",
-            ".SH \"EXIT STATUS\"",
-            "75",
-        ] {
+        for part in
+            [".TH sweep-run 1", "sweep run", ".SH EXAMPLES", "\\-\\-shard 3/16", ".SH \"EXIT STATUS\"", "75"]
+        {
             assert!(text.contains(part), "no {part} in\n{text}");
         }
     }
