@@ -262,7 +262,7 @@ impl Plan {
         }))
     }
 
-    /// Of the corners not more than [`Self::MOST_PREPARED`], spread evenly: a list has no corners but its points, and looking at a machine's
+    /// Of the corners not more than 256, spread evenly: a list has no corners but its points, and looking at a machine's
     /// modes is dear.
     #[must_use]
     pub fn some_corners(&self) -> Vec<Vec<f64>> {
