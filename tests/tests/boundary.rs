@@ -97,7 +97,7 @@ fn what_cannot_be_traced_is_refused_before_any_work() {
 #[test]
 fn an_interrupt_leaves_nothing_half_written() {
     // Long enough that the signal comes in the middle, on any machine.
-    let folder = folder_with("2000");
+    let folder = folder_with("200");
     let child = boundary(&folder, &["--out", "x.parquet"]).stderr(Stdio::piped()).spawn().expect("it starts");
     std::thread::sleep(Duration::from_millis(500));
     let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
