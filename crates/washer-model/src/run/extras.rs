@@ -68,8 +68,12 @@ impl<T: Lane> Extras<T> {
         point: &Point,
         count: usize,
     ) -> Option<Self> {
+        // No closure: it would be compiled without the instruction set.
+        if !wanted.anything() {
+            return None;
+        }
         let force = if wanted.cabinet_force { Some(CabinetForce::splat(zero, model, point)) } else { None };
-        wanted.anything().then(|| Self {
+        Some(Self {
             wanted,
             squares: SquareIntegrals::new(zero),
             turns: PartPeaks::new(zero),
