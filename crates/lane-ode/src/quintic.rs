@@ -37,9 +37,7 @@ impl<T: Lane> Quintic<T> {
         let slope_end = c[1] + 2.0 * c[2] + 3.0 * c[3] + 4.0 * c[4] + 5.0 * c[5];
         let mut s = within_step(c[1] / (c[1] - slope_end));
         for _ in 0..4 {
-            let slope = c[1] + s * (2.0 * c[2] + s * (3.0 * c[3] + s * (4.0 * c[4] + (5.0 * s) * c[5])));
-            let curvature = 2.0 * c[2] + s * (6.0 * c[3] + s * (12.0 * c[4] + (20.0 * s) * c[5]));
-            s = within_step(s - slope / curvature);
+            s = within_step(s - self.slope(s) / self.curvature(s));
         }
         s
     }
@@ -54,10 +52,21 @@ impl<T: Lane> Quintic<T> {
     /// Value and time derivatives at s, of a step of length `h`.
     #[inline(always)]
     pub(crate) fn sample(&self, s: N<T>, h: N<T>) -> Sample<T> {
+        Sample { value: self.value(s), slope: self.slope(s) / h, curvature: self.curvature(s) / h / h }
+    }
+
+    /// The first derivative by s.
+    #[inline(always)]
+    fn slope(&self, s: N<T>) -> N<T> {
         let c = &self.c;
-        let slope = c[1] + s * (2.0 * c[2] + s * (3.0 * c[3] + s * (4.0 * c[4] + (5.0 * s) * c[5])));
-        let curvature = 2.0 * c[2] + s * (6.0 * c[3] + s * (12.0 * c[4] + (20.0 * s) * c[5]));
-        Sample { value: self.value(s), slope: slope / h, curvature: curvature / h / h }
+        c[1] + s * (2.0 * c[2] + s * (3.0 * c[3] + s * (4.0 * c[4] + (5.0 * s) * c[5])))
+    }
+
+    /// The second derivative by s.
+    #[inline(always)]
+    fn curvature(&self, s: N<T>) -> N<T> {
+        let c = &self.c;
+        2.0 * c[2] + s * (6.0 * c[3] + s * (12.0 * c[4] + (20.0 * s) * c[5]))
     }
 }
 

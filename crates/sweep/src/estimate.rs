@@ -3,11 +3,10 @@
 use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
-use washer_model::Channel;
 
 use crate::engine::{EngineError, GROUP, ModelEngine, Settled};
 use crate::interrupt::Interrupt;
-use crate::outcome::Outcome;
+use crate::outcome::{Deviations, Outcome};
 use crate::plan::{Integrator, Plan};
 use crate::run::{Engine, Watch, default_threads};
 use crate::store::{Environment, Job, Shape, chunk_points};
@@ -163,7 +162,7 @@ fn turn_bytes(plan: &Plan, threads: usize) -> f64 {
         return 0.0;
     }
     let turns = plan.spin.turns_within(plan.window_s);
-    (threads as u64 * GROUP) as f64 * 2.0 * turns * size_of::<[f64; Channel::ALL.len()]>() as f64
+    (threads as u64 * GROUP) as f64 * 2.0 * turns * size_of::<Deviations>() as f64
 }
 
 /// A size with three digits.

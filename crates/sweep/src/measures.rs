@@ -2,7 +2,7 @@
 
 use washer_model::{Channel, Wanted};
 
-use crate::outcome::Outcome;
+use crate::outcome::{Deviations, Outcome};
 
 /// Deviations below this count as this (m, rad) where turns are compared: neither 0 over 0 nor what no machine feels decides.
 pub const TURN_FLOOR: f64 = 1e-5;
@@ -168,7 +168,7 @@ impl Outcome {
         self.turn_ratios.extend(channels.iter().map(|channel| {
             let i = channel.index();
             let moves = linear.iter().any(|turn| turn[i] != 0.0);
-            let ratio = |(nonlinear, linear): (&[f64; 8], &[f64; 8])| {
+            let ratio = |(nonlinear, linear): (&Deviations, &Deviations)| {
                 nonlinear[i].max(TURN_FLOOR) / linear[i].max(TURN_FLOOR)
             };
             moves.then(|| nonlinear.iter().zip(linear).map(ratio).fold(0.0, f64::max))

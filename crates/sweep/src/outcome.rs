@@ -1,5 +1,7 @@
 //! What came of a grid point: one row of the result file.
 
+use washer_model::Channel;
+
 /// Why a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
@@ -41,8 +43,11 @@ pub struct Trajectory {
     /// The model's metrics that the plan asks for, in column order; empty if the model failed.
     pub metrics: Vec<f64>,
     /// Largest deviations by turn of the drum, in the order of `Channel::ALL`: while the two models are being compared by them.
-    pub turns: Vec<[f64; 8]>,
+    pub turns: Vec<Deviations>,
 }
+
+/// Of every channel, in the order of `Channel::ALL` (m, rad).
+pub type Deviations = [f64; Channel::ALL.len()];
 
 impl Trajectory {
     /// Nothing but a status.

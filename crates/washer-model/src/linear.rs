@@ -17,7 +17,7 @@ use crate::spin::SpinState;
 use lane_ode::{Dual, Lane, N, Real};
 
 /// Coordinates of the tub: q1, q2, q5, q6.
-const TUB: [usize; 4] = [0, 1, 4, 5];
+pub(crate) const TUB: [usize; 4] = [0, 1, 4, 5];
 /// Coordinates that turn the rotor: q7 to q10. Its forces do not depend on q3 and q4 but through the bearings.
 const TURNS: [usize; 4] = [6, 7, 8, 9];
 
@@ -153,7 +153,7 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
     (0..T::LANES)
         .map(|lane| LinearPoint {
             constants: constants.lane(lane),
-            terms: RotorTerms::new(&coefficients_of_lane(&samples, lane)),
+            terms: RotorTerms::gather(&coefficients_of_lane(&samples, lane)),
         })
         .collect()
 }

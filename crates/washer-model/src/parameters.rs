@@ -167,6 +167,23 @@ impl fmt::Debug for Parameter {
     }
 }
 
+/// How a name ends whose number is in this unit; `None` where names say nothing of it.
+#[must_use]
+pub fn unit_suffix(unit: &str) -> Option<&'static str> {
+    Some(match unit {
+        "m" => "_m",
+        "kg" => "_kg",
+        "s" => "_s",
+        "rpm" => "_rpm",
+        "N/m" => "_n_per_m",
+        "N s/m" => "_n_s_per_m",
+        "N m/rad" => "_n_m_per_rad",
+        "kg m^2" => "_kg_m2",
+        "m/s^2" => "_m_per_s2",
+        _ => return None,
+    })
+}
+
 impl Parameter {
     /// Every parameter of this machine and spin, in the table's order, springs and dampers one by one.
     #[must_use]

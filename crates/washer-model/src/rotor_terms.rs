@@ -121,10 +121,3 @@ sparse_sums! {
     damping(5, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
     damping(5, 3) => SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
 }
-
-impl RotorTerms<f64> {
-    /// From the coefficients of all functions in each entry.
-    pub(crate) fn new(all: &[[f64; FUNCTIONS]; ENTRIES]) -> Self {
-        Self::gather(all)
-    }
-}

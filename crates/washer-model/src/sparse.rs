@@ -24,7 +24,7 @@ macro_rules! sparse_sums {
                 [$(($entry, $first) $(, ($entry, $other))*),+];
 
             /// The terms that the table names, of all coefficients: by entry, then function.
-            fn gather(all: &[[f64; $functions]; $entries]) -> Self {
+            pub(crate) fn gather(all: &[[f64; $functions]; $entries]) -> Self {
                 Self(Self::PLACES.map(|(entry, function)| lane_ode::N(all[entry][function])))
             }
         }

@@ -5,6 +5,7 @@ use std::path::Path;
 use parquet::file::reader::FileReader;
 use parquet::file::serialized_reader::SerializedFileReader;
 use serde_json::json;
+use washer_model::unit_suffix;
 
 use super::product::{Task, further_values};
 use super::quantity::Quantity;
@@ -28,18 +29,7 @@ struct Line<'a> {
 
 /// A name with something before its unit's suffix: `damping_n_s_per_m` and `low` give `damping_low_n_s_per_m`.
 fn within(name: &str, unit: &str, word: &str) -> String {
-    let suffix = match unit {
-        "m" => "_m",
-        "kg" => "_kg",
-        "s" => "_s",
-        "rpm" => "_rpm",
-        "N/m" => "_n_per_m",
-        "N s/m" => "_n_s_per_m",
-        "N m/rad" => "_n_m_per_rad",
-        "kg m^2" => "_kg_m2",
-        "m/s^2" => "_m_per_s2",
-        _ => "",
-    };
+    let suffix = unit_suffix(unit).unwrap_or_default();
     let stem = name.strip_suffix(suffix).unwrap_or(name);
     format!("{stem}_{word}{}", &name[stem.len()..])
 }

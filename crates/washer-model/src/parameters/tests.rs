@@ -48,18 +48,8 @@ fn names_end_with_their_unit_and_are_unique() {
     names.dedup();
     assert_eq!(names.len(), everything.len());
     for parameter in &everything {
-        let suffix = match parameter.unit() {
-            "m" => "_m",
-            "kg" => "_kg",
-            "s" => "_s",
-            "rpm" => "_rpm",
-            "N/m" => "_n_per_m",
-            "N s/m" => "_n_s_per_m",
-            "N m/rad" => "_n_m_per_rad",
-            "kg m^2" => "_kg_m2",
-            "m/s^2" => "_m_per_s2",
-            other => panic!("no suffix is known for {other}"),
-        };
+        let unit = parameter.unit();
+        let suffix = unit_suffix(unit).unwrap_or_else(|| panic!("no suffix is known for {unit}"));
         assert!(parameter.name().ends_with(suffix), "{parameter:?}");
     }
 }

@@ -4,15 +4,13 @@ use crate::coefficients::Coefficients;
 use crate::forces::suspension_on_tub;
 use crate::frame::{Tilt, dot};
 use crate::lanes::SetLane;
+use crate::linear::TUB;
 use crate::model::STATES;
 use crate::nonlinear::COORDINATES;
 use crate::point::Point;
 use crate::run::ModelKind;
 use crate::suspension::forces;
 use lane_ode::{Dual, Lane, N, Sample};
-
-/// The coordinates that move the tub: q1, q2, q5, q6.
-const TUB: [usize; 4] = [0, 1, 4, 5];
 
 /// One of the two models' force.
 pub(crate) enum CabinetForce<T> {
