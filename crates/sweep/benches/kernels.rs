@@ -4,14 +4,14 @@
 use divan::{Bencher, counter::ItemsCount};
 use lane_ode::{Simd, Tolerance};
 use washer_model::bench::{Part, evaluate};
-use washer_model::{Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
+use washer_model::{Caps, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
 
 fn main() {
     divan::main();
 }
 
 /// About what `rk4-mass-scaled` takes for 1e-3; its cost does not depend on it.
-const CAP_RAD_PER_S: f64 = 400.0;
+const CAPS: Caps = Caps { bearings_rad_per_s: 400.0, hinge_rad_per_s: Some(400.0) };
 
 const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
 
@@ -33,10 +33,10 @@ fn derivative(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     part(bencher, model, simd, Part::Derivative, None);
 }
 
-/// With the bearings' modes capped.
+/// With the modes of bearings and hinge capped.
 #[divan::bench(args = kernels())]
 fn derivative_mass_scaled(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
-    part(bencher, model, simd, Part::Derivative, Some(CAP_RAD_PER_S));
+    part(bencher, model, simd, Part::Derivative, Some(CAPS));
 }
 
 #[divan::bench(args = kernels())]
@@ -44,12 +44,12 @@ fn forcing(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     part(bencher, model, simd, Part::Forcing, None);
 }
 
-fn part(bencher: Bencher<'_, '_>, model: ModelKind, simd: Simd, part: Part, cap_rad_per_s: Option<f64>) {
+fn part(bencher: Bencher<'_, '_>, model: ModelKind, simd: Simd, part: Part, caps: Option<Caps>) {
     const EVALUATIONS: u64 = 10_000;
     let point = &points(simd, 1.0)[0];
     bencher
         .counter(ItemsCount::new(EVALUATIONS * simd.lanes() as u64))
-        .bench(|| evaluate(simd, model, part, point, cap_rad_per_s, EVALUATIONS));
+        .bench(|| evaluate(simd, model, part, point, caps, EVALUATIONS));
 }
 
 /// A thousand RK4 steps with what is observed of them, the last half inside the window.

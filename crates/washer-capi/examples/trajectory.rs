@@ -85,8 +85,10 @@ fn run() -> Result<String, Failed> {
     }
     let settings = match method {
         Method::Rk4 { step_s } => format!("step {step_s:e} s"),
-        Method::Rk4MassScaled { step_s, cap_rad_per_s } => {
-            format!("accuracy {}: step {step_s:.2e} s, cap {cap_rad_per_s:.0} rad/s", words[1])
+        Method::Rk4MassScaled { step_s, caps } => {
+            let hinge = if caps.hinge_rad_per_s.is_some() { ", hinge too" } else { "" };
+            let cap = caps.bearings_rad_per_s;
+            format!("accuracy {}: step {step_s:.2e} s, cap {cap:.0} rad/s{hinge}", words[1])
         }
         Method::Dopri5(t) | Method::Rodas5p(t) => format!("rtol {:.0e}, atol {:.0e}", t.relative, t.absolute),
     };

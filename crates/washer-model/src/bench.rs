@@ -1,6 +1,6 @@
 //! A narrow door for benchmarks: parts of a step that the public interface has no word for.
 
-use crate::coupling::Coupling;
+use crate::coupling::{Caps, Coupling};
 use crate::model::{Model, STATES};
 use crate::point::Point;
 use crate::run::{Family, ModelKind, OfLinear, OfNonlinear};
@@ -18,16 +18,16 @@ pub enum Part {
 }
 
 /// Evaluates a part of one model's right-hand side `evaluations` times in a row, each after the one before, with the same point in
-/// every lane; with the bearings' modes capped if a cap is given.
+/// every lane; with modes capped if caps are given.
 pub fn evaluate(
     simd: Simd,
     model: ModelKind,
     part: Part,
     point: &Point,
-    cap_rad_per_s: Option<f64>,
+    caps: Option<Caps>,
     evaluations: u64,
 ) {
-    let subject = Subject { point, part, cap_rad_per_s, evaluations };
+    let subject = Subject { point, part, caps, evaluations };
     match model {
         ModelKind::Nonlinear => simd.dispatch(Evaluate::<OfNonlinear> { subject, family: PhantomData }),
         ModelKind::Linear => simd.dispatch(Evaluate::<OfLinear> { subject, family: PhantomData }),
@@ -37,7 +37,7 @@ pub fn evaluate(
 struct Subject<'a> {
     point: &'a Point,
     part: Part,
-    cap_rad_per_s: Option<f64>,
+    caps: Option<Caps>,
     evaluations: u64,
 }
 
@@ -52,11 +52,8 @@ impl<F: Family> Kernel for Evaluate<'_, F> {
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) {
         let zero = N(zero);
-        let Subject { point, part, cap_rad_per_s, evaluations } = self.subject;
-        let coupling = match cap_rad_per_s {
-            Some(cap) => Coupling::MassScaled(zero.lit(cap * cap)),
-            None => Coupling::Springs,
-        };
+        let Subject { point, part, caps, evaluations } = self.subject;
+        let coupling = Coupling::new(zero, caps.as_ref());
         let model = <F::Over<T> as Model<T>>::splat(zero, point, coupling);
         let mut x = [zero; STATES];
         for (x, at_rest) in x.iter_mut().zip(<F::Over<T> as Model<T>>::at_rest(point)) {

@@ -1,22 +1,29 @@
-//! How far the bearing modes may be capped, and how long the steps may then be: from the accuracy asked for, the spin and
-//! the machine's own frequencies.
+//! How far the modes of bearings and hinge may be capped, and how long the steps may then be: from the accuracy asked for, the spin
+//! and the machine's own frequencies.
 //!
 //! Three bounds hold a step h of RK4 with cap w:
 //!
 //! * Truncation. Over one memory of a lightly damped motion of frequency f, 1/(zeta f), RK4's local errors (h f)^5 / 120 add up to
 //!   (h f)^4 / (120 zeta). The motions to follow are the drum's turning and the suspension's modes; f is the fastest of them. With
 //!   zeta = 0.1, (h f)^4 / 12 is to stay below the accuracy.
-//! * Stability. h |s| stays within the method's limit for every mode s of the machine with its bearings capped, hinge and gyroscopic
+//! * Stability. h |s| stays within the method's limit for every mode s of the machine with its caps, hinge and gyroscopic
 //!   effects included. The higher the cap the better, but the closer it comes to the hinge's modes from above, the more these
-//!   are pushed up by it: h w is the first of 2.6, 2.3, ... that leaves the step stable.
-//! * Fidelity. The cap moves the modes of suspension and hinge, by ds. A response at the drum's speed answers to ds over
-//!   the distance from resonance, or the resonance's half-width |Re s| if that is more. A mode faster than the drum by a factor r
+//!   are pushed up by it: h w is the first of 2.6, 2.3, ... that leaves the step stable, with the hinge as it is or, if that does not do,
+//!   capped too.
+//! * Fidelity. What turns with the drum is exact under the caps (`coupling.rs`); other motion is not, and so the modes of suspension and hinge
+//!   move, by ds. A response at the drum's speed would answer to ds over
+//!   the distance from resonance, or the resonance's half-width |Re s| if that is more; that it is exact leaves free and nonlinear motion to
+//!   answer, which is less. A mode faster than the drum by a factor r
 //!   takes part in the motion by 1/r^2 only, and of that its speed matters by 1/r^2 again, because static compliance stays exact.
-//!   The shift so weighted stays below a tenth of the accuracy.
+//!   The shift so weighted stays below the accuracy.
 //!   Stiff bearings pass at once: they hold next to no strain energy of slow modes. Soft ones do not, and then the cap rises until it
 //!   caps nothing: plain RK4.
+//!
+//! The hinge turns with the shaft: a motion of frequency f has frequencies up to f + theta' in it, which modes with theta frozen do not show.
+//! A hinge that holds the share e of a mode's strain energy moves it by e f / 2 times ((f + theta') / w)^2. That is added to ds.
 
-use crate::modal::{Modes, NoModes, highest_with_cap, modes_with_cap};
+use crate::coupling::Caps;
+use crate::modal::{Modes, NoModes, highest_with_caps, modes_with_caps};
 use crate::point::Point;
 use crate::run::Method;
 use crate::spin::Spin;
@@ -40,9 +47,6 @@ const STEP_TIMES_FASTEST: f64 = 0.97 * RK4_STABILITY_LIMIT;
 /// Half-width of a resonance that has no damping, as a share of its frequency.
 const LEAST_HALF_WIDTH: f64 = 0.01;
 
-/// Share of the accuracy that the cap's shift of the followed modes may use up.
-const SHIFT_SHARE: f64 = 0.1;
-
 /// Bits of a step's fraction that count: 1e-6 of the step.
 const STEP_BITS: u32 = 20;
 
@@ -54,16 +58,16 @@ const SHORTER: f64 = 0.97;
 pub struct Capping {
     /// Longest step.
     pub step_s: f64,
-    /// The cap, if capping gains anything.
-    pub cap_rad_per_s: Option<f64>,
+    /// The caps, if capping gains anything.
+    pub caps: Option<Caps>,
 }
 
 impl Capping {
     /// The method of these numbers.
     #[must_use]
     pub const fn method(&self) -> Method {
-        match self.cap_rad_per_s {
-            Some(cap_rad_per_s) => Method::Rk4MassScaled { step_s: self.step_s, cap_rad_per_s },
+        match self.caps {
+            Some(caps) => Method::Rk4MassScaled { step_s: self.step_s, caps },
             None => Method::Rk4 { step_s: self.step_s },
         }
     }
@@ -87,7 +91,7 @@ struct Case<'a> {
 impl<'a> Case<'a> {
     fn new(point: &'a Point, spin: &Spin, end_s: f64) -> Result<Self, NoModes> {
         let speed = spin.greatest_speed_rad_per_s(end_s);
-        let modes = [modes_with_cap(point, 0.0, speed, None)?, modes_with_cap(point, 0.0, 0.0, None)?];
+        let modes = [modes_with_caps(point, 0.0, speed, None)?, modes_with_caps(point, 0.0, 0.0, None)?];
         let slow = &modes[1].modes;
         let followed = speed.max(slow[SUSPENSION_MODES - 1].magnitude_rad_per_s);
         let hinge = slow[SUSPENSION_MODES].magnitude_rad_per_s;
@@ -96,27 +100,34 @@ impl<'a> Case<'a> {
             speed_rad_per_s: speed,
             // A soft hinge takes part in the motion.
             fastest_followed_rad_per_s: if hinge < 2.0 * followed { hinge } else { followed },
-            fastest_rad_per_s: highest_with_cap(point, 0.0, None)?.max(highest_with_cap(point, speed, None)?),
+            fastest_rad_per_s: highest_with_caps(point, 0.0, None)?
+                .max(highest_with_caps(point, speed, None)?),
             modes,
         })
     }
 
-    /// Whether a step is stable with a cap, and the slow modes stay where they are.
-    fn holds(&self, step_s: f64, cap: f64, accuracy: f64) -> Result<bool, NoModes> {
+    /// Whether a step is stable with these caps, and the slow modes stay where they are.
+    fn holds(&self, step_s: f64, caps: &Caps, accuracy: f64) -> Result<bool, NoModes> {
         let speed = self.speed_rad_per_s;
         for (turning, plain) in [speed, 0.0].into_iter().zip(&self.modes) {
-            if step_s * highest_with_cap(self.point, turning, Some(cap))? > STEP_TIMES_FASTEST {
+            if step_s * highest_with_caps(self.point, turning, Some(caps))? > STEP_TIMES_FASTEST {
                 return Ok(false);
             }
-            let capped = modes_with_cap(self.point, 0.0, turning, Some(cap))?;
-            for (plain, capped) in plain.modes.iter().zip(&capped.modes).take(SLOW_MODES) {
-                let half_width = plain.re_per_s.abs().max(LEAST_HALF_WIDTH * plain.magnitude_rad_per_s);
-                let distance = half_width.max(plain.magnitude_rad_per_s - speed);
+            let capped = modes_with_caps(self.point, 0.0, turning, Some(caps))?;
+            for (index, (plain, capped)) in plain.modes.iter().zip(&capped.modes).take(SLOW_MODES).enumerate()
+            {
+                let frequency = plain.magnitude_rad_per_s;
+                let half_width = plain.re_per_s.abs().max(LEAST_HALF_WIDTH * frequency);
+                let distance = half_width.max(frequency - speed);
                 let (slower, detuned) =
                     (capped.re_per_s - plain.re_per_s, capped.im_rad_per_s - plain.im_rad_per_s);
-                let shift = (slower * slower + detuned * detuned).sqrt();
-                let weight = (speed / plain.magnitude_rad_per_s).min(1.0).powi(4);
-                if weight * shift > SHIFT_SHARE * accuracy * distance {
+                let mut shift = (slower * slower + detuned * detuned).sqrt();
+                if let Some(cap) = caps.hinge_rad_per_s.filter(|_| index < SUSPENSION_MODES) {
+                    let in_hinge = (frequency + turning) / cap;
+                    shift += 0.5 * plain.hinge_share(self.point) * frequency * in_hinge * in_hinge;
+                }
+                let weight = (speed / frequency).min(1.0).powi(4);
+                if weight * shift > accuracy * distance {
                     return Ok(false);
                 }
             }
@@ -152,22 +163,25 @@ impl<'a> Cases<'a> {
             rounded_down((120.0 * MEMORY_DAMPING_RATIO * accuracy).powf(0.25) / fastest_followed);
         let plain_step_s = self.plain_step_s().unwrap_or(f64::INFINITY);
         if step_s <= plain_step_s {
-            return Ok(Capping { step_s, cap_rad_per_s: None });
+            return Ok(Capping { step_s, caps: None });
         }
         while step_s > plain_step_s {
             for step_times_cap in STEP_TIMES_CAP {
                 let cap = step_times_cap / step_s;
-                let mut holds = true;
-                for case in &cases {
-                    holds = holds && case.holds(step_s, cap, accuracy)?;
-                }
-                if holds {
-                    return Ok(Capping { step_s, cap_rad_per_s: Some(cap) });
+                for hinge_rad_per_s in [None, Some(cap)] {
+                    let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s };
+                    let mut holds = true;
+                    for case in &cases {
+                        holds = holds && case.holds(step_s, &caps, accuracy)?;
+                    }
+                    if holds {
+                        return Ok(Capping { step_s, caps: Some(caps) });
+                    }
                 }
             }
             step_s *= SHORTER;
         }
-        Ok(Capping { step_s: plain_step_s, cap_rad_per_s: None })
+        Ok(Capping { step_s: plain_step_s, caps: None })
     }
 }
 
@@ -205,7 +219,8 @@ mod tests {
         assert_eq!(chosen(1.0 + 1e-10), (capping, plain_step_s));
         assert_eq!(chosen(1.0 - 1e-10), (capping, plain_step_s));
         let stiffer = chosen(1.01).0;
-        assert!(stiffer.step_s < capping.step_s && stiffer.cap_rad_per_s > capping.cap_rad_per_s);
+        let cap = |capping: &Capping| capping.caps.unwrap().bearings_rad_per_s;
+        assert!(stiffer.step_s < capping.step_s && cap(&stiffer) > cap(&capping));
     }
 
     #[test]

@@ -1,32 +1,45 @@
-//! How the bearings couple tub and rotor: as springs, or as springs with inertia.
+//! How the bearings couple tub and rotor: as springs, or as springs with inertia; and likewise the hinge.
 //!
 //! Bearings are so stiff that their modes (up to 1e4 rad/s, hardly damped) force an explicit method to steps far below what
 //! the motion of interest needs. Selective mass scaling caps those modes: a bearing force
 //!
 //! ```text
-//! lambda = -K (d + d'' / w^2)
+//! lambda = -K (d + (d'' + theta'^2 (d - d0)) / w^2)
 //! ```
 //!
-//! adds the mass K / w^2 to the relative motion d of the bearing centres and to nothing else. No bearing mode is then faster than the cap w;
-//! static deflections, and with them the equilibrium, stay exact; motion at a frequency f sees the bearings softer by
-//! (f/w)^2. Since d'' is taken of the true deflection, velocities included, it is K / w^2 in the mass matrix of the nonlinear model
+//! adds the mass K / w^2 to the relative motion d of the bearing centres and to nothing else. No bearing mode is then faster than the cap w.
+//! The static deflection d0, and with it the equilibrium, stays exact. What turns with the drum has d'' = -theta'^2 (d - d0) and
+//! is exact too; motion at another frequency f sees the bearings softer by (f^2 - theta'^2) / w^2. Since d'' is taken of the true deflection, velocities
+//! included, it is K / w^2 in the mass matrix of the nonlinear model
 //! and its first-order expansion in the linear one. Compare L. Olovsson, K. Simonsson, M. Unosson, Int. J. Numer. Meth. Engng 63
 //! (2005) 1436.
 //!
 //! With d'' = e + C lambda, e and C found by solving the halves, only a symmetric positive definite system of four is left:
 //!
 //! ```text
-//! (w^2 K^-1 + C) lambda = -(w^2 d + e)
+//! (w^2 K^-1 + C) lambda = -(w^2 d + theta'^2 (d - d0) + e)
 //! ```
+//!
+//! The hinge's modes come next. Its angles p = (q9, q10) turn with the shaft, so that a whirl at the drum's speed is at rest in them, and the
+//! weight's sag p0 turns backwards, p0'' = -theta'^2 p0. The moment
+//!
+//! ```text
+//! -k (p + (p'' + theta'^2 p0(theta)) / w^2)
+//! ```
+//!
+//! leaves both exact. It adds k / w^2 to two entries of the rotor's inertia and a known torque.
 
 use crate::coefficients::Bodies;
 use crate::floating::{Factors, Floating};
 use crate::forces::AxisLoad;
 use crate::frame::Tilt;
+use crate::lanes::{SetLane, Splat};
 use crate::nonlinear::COORDINATES;
-use lane_ode::{N, Real};
+use crate::spin::SpinState;
+use lane_ode::{Lane, N, Real};
 
 /// Where the shaft's bearing midpoint is from the tub's, and its axis from the tub's axis; y and z.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Deflection<T> {
     pub(crate) offset: [N<T>; 2],
     pub(crate) tilt: [N<T>; 2],
@@ -41,6 +54,12 @@ impl<T: Real> Deflection<T> {
             tilt: [shaft.axis_c[1] - tub.axis_c[1], shaft.axis_c[2] - tub.axis_c[2]],
         }
     }
+
+    /// Offset, then tilt.
+    #[inline(always)]
+    fn rows(&self) -> [N<T>; 4] {
+        [self.offset[0], self.offset[1], self.tilt[0], self.tilt[1]]
+    }
 }
 
 /// The bearings as a model treats them.
@@ -48,26 +67,124 @@ impl<T: Real> Deflection<T> {
 pub(crate) enum Coupling<T> {
     /// Springs, as they are.
     Springs,
-    /// With mass, so that no bearing mode is faster than a cap; its square, rad^2/s^2.
-    MassScaled(N<T>),
+    /// With mass, so that no mode of theirs is faster than a cap.
+    MassScaled(Scaling<T>),
+}
+
+/// Caps on the fast modes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Caps {
+    /// On the modes of the bearings.
+    pub bearings_rad_per_s: f64,
+    /// On those of the hinge, unless it is left as it is.
+    pub hinge_rad_per_s: Option<f64>,
+}
+
+/// Caps as the equations use them.
+#[derive(Clone, Copy)]
+pub(crate) struct Scaling<T> {
+    /// Square of the bearings' cap, rad^2/s^2.
+    bearings_squared: N<T>,
+    /// Reciprocal square of the hinge's; 0 if it is left alone.
+    per_hinge_squared: N<T>,
+}
+
+/// How weight deflects bearings and hinge at the static equilibrium, unbalance up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sag<T> {
+    pub(crate) bearings: Deflection<T>,
+    /// q9, q10.
+    pub(crate) hinge: [N<T>; 2],
+}
+
+impl Sag<f64> {
+    /// At the equilibrium `q`.
+    pub(crate) fn new(q: &[f64; COORDINATES]) -> Self {
+        let q = q.map(N);
+        let bearings = Deflection::new(&q, &Tilt::new(q[4], q[5]), &Tilt::new(q[6], q[7]));
+        Self { bearings, hinge: [q[8], q[9]] }
+    }
+
+    /// The same in every lane.
+    #[inline(always)]
+    pub(crate) fn splat<T: Lane>(&self, zero: N<T>) -> Sag<T> {
+        let Deflection { offset, tilt } = &self.bearings;
+        Sag {
+            bearings: Deflection { offset: Splat::splat(zero, offset), tilt: Splat::splat(zero, tilt) },
+            hinge: Splat::splat(zero, &self.hinge),
+        }
+    }
+}
+
+impl<T: Lane> SetLane<Sag<f64>> for Sag<T> {
+    fn set_lane(&mut self, lane: usize, from: &Sag<f64>) {
+        self.bearings.offset.set_lane(lane, &from.bearings.offset);
+        self.bearings.tilt.set_lane(lane, &from.bearings.tilt);
+        self.hinge.set_lane(lane, &from.hinge);
+    }
+}
+
+/// What scaled mass at the hinge changes in the rotor's equations, for each of q9 and q10.
+pub(crate) struct HingeMass<T> {
+    /// Added to the inertia's diagonal.
+    pub(crate) inertia: N<T>,
+    /// Added to the torque.
+    pub(crate) torque: [N<T>; 2],
 }
 
 impl<T: Real> Coupling<T> {
-    /// Accelerations du/dt of both halves, given without the bearings' forces.
+    /// With these caps, if any.
+    #[inline(always)]
+    pub(crate) fn new(zero: N<T>, caps: Option<&Caps>) -> Self {
+        let Some(caps) = caps else { return Self::Springs };
+        let hinge = caps.hinge_rad_per_s.unwrap_or(f64::INFINITY);
+        Self::MassScaled(Scaling {
+            bearings_squared: zero.lit(caps.bearings_rad_per_s * caps.bearings_rad_per_s),
+            per_hinge_squared: zero.lit(1.0 / (hinge * hinge)),
+        })
+    }
+
+    /// The hinge's scaled mass, if modes are capped.
+    #[inline(always)]
+    pub(crate) fn hinge_mass(
+        &self,
+        bodies: &Bodies<T>,
+        spin: &SpinState<T>,
+        sag: &Sag<T>,
+    ) -> Option<HingeMass<T>> {
+        let Self::MassScaled(scaling) = self else { return None };
+        let inertia = (scaling.per_hinge_squared * bodies.flexure_stiffness).v();
+        let [sag_9, sag_10] = sag.hinge;
+        let centrifugal = -(inertia * (spin.speed * spin.speed).v()).v();
+        Some(HingeMass {
+            inertia,
+            torque: [
+                (centrifugal * (spin.cos * sag_9 + spin.sin * sag_10)).v(),
+                (centrifugal * (spin.cos * sag_10 - spin.sin * sag_9)).v(),
+            ],
+        })
+    }
+
+    /// Accelerations du/dt of both halves, given without the bearings' forces, at theta' = `speed`. `sag` is the part of the deflection
+    /// that does not turn with the drum, if it is counted from there.
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,
         bodies: &Bodies<T>,
+        speed: N<T>,
         deflection: &Deflection<T>,
+        sag: Option<&Deflection<T>>,
         (tub, tub_inertia): (&Floating<T, 2>, &Factors<T, 2>),
         (rotor, rotor_inertia): (&Floating<T, 4>, &Factors<T, 4>),
     ) -> [N<T>; COORDINATES] {
         let on_shaft = match self {
             Self::Springs => deflection.load(bodies),
-            Self::MassScaled(cap_squared) => {
+            Self::MassScaled(scaling) => {
                 let of_tub = tub.response(tub_inertia);
                 let of_rotor = rotor.response(rotor_inertia);
-                mass_scaled_load(bodies, *cap_squared, deflection, &of_tub, &of_rotor)
+                let speed_squared = (speed * speed).v();
+                let squares = (scaling.bearings_squared, speed_squared);
+                mass_scaled_load(bodies, squares, deflection, sag, &of_tub, &of_rotor)
             }
         };
         let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia, &on_shaft.reaction());
@@ -86,8 +203,9 @@ pub(crate) struct Response<T> {
 #[inline(always)]
 fn mass_scaled_load<T: Real>(
     b: &Bodies<T>,
-    cap_squared: N<T>,
+    (cap_squared, speed_squared): (N<T>, N<T>),
     deflection: &Deflection<T>,
+    sag: Option<&Deflection<T>>,
     tub: &Response<T>,
     rotor: &Response<T>,
 ) -> AxisLoad<T> {
@@ -103,10 +221,17 @@ fn mass_scaled_load<T: Real>(
         system[2 + i][2 + i] += cap_squared * b.bearing_moment_compliance;
         system[2 + i][i] += cap_squared * b.bearing_mixed_compliance;
     }
-    let d = [deflection.offset[0], deflection.offset[1], deflection.tilt[0], deflection.tilt[1]];
+    let both_squared = cap_squared + speed_squared;
+    let d = deflection.rows();
     let mut load = d;
     for i in 0..4 {
-        load[i] = tub.free[i] - (cap_squared * d[i] + rotor.free[i]);
+        load[i] = tub.free[i] - (both_squared * d[i] + rotor.free[i]);
+    }
+    if let Some(sag) = sag {
+        let sag = sag.rows();
+        for i in 0..4 {
+            load[i] += speed_squared * sag[i];
+        }
     }
     let [force_y, force_z, moment_y, moment_z] = Factors::new(system).solve(load);
     AxisLoad { force: [force_y, force_z], moment: [moment_y, moment_z] }

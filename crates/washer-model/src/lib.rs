@@ -87,6 +87,7 @@ mod violations;
 pub use campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
 pub use capping::{Capping, Cases};
 pub use channel::Channel;
+pub use coupling::Caps;
 pub use equations::{Equations, STATE_LEN};
 pub use history::{History, Instant, Start, history};
 pub use linear::Matrices;

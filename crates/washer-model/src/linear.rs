@@ -5,7 +5,7 @@
 //! nonlinear model it is solved by halves, each about its mass centre; only the bearings couple them.
 
 use crate::coefficients::{Bodies, Coefficients};
-use crate::coupling::{Coupling, Deflection};
+use crate::coupling::{Coupling, Deflection, HingeMass};
 use crate::floating::{Factors, Floating};
 use crate::forces::AxisLoad;
 use crate::frame::Tilt;
@@ -233,17 +233,26 @@ impl<T: Copy> RotorAt<T> {
 
 /// What depends on time alone.
 #[inline(always)]
-pub(crate) fn rotor_at<T: Lane>(terms: &RotorTerms<T>, spin: &SpinState<T>) -> RotorAt<T> {
+pub(crate) fn rotor_at<T: Lane>(
+    terms: &RotorTerms<T>,
+    spin: &SpinState<T>,
+    hinge_mass: Option<HingeMass<T>>,
+) -> RotorAt<T> {
     let zero = spin.sin.lit(0.0);
     let mut rotor = RotorAt { entries: [[zero]; ENTRIES], inertia: Factors::new([[zero; 4]; 4]) };
-    rotor.renew(terms, spin);
+    rotor.renew(terms, spin, hinge_mass);
     rotor
 }
 
 impl<T: Lane> RotorAt<T> {
     /// Overwrites the arrays by those of another instant; `terms` are the same.
     #[inline(always)]
-    pub(crate) fn renew(&mut self, terms: &RotorTerms<T>, spin: &SpinState<T>) {
+    pub(crate) fn renew(
+        &mut self,
+        terms: &RotorTerms<T>,
+        spin: &SpinState<T>,
+        hinge_mass: Option<HingeMass<T>>,
+    ) {
         terms.sum(&harmonics::functions(spin), &mut self.entries);
         let zero = spin.sin.lit(0.0);
         let mut inertia = [[zero; 4]; 4];
@@ -252,25 +261,33 @@ impl<T: Lane> RotorAt<T> {
                 [inertia[row][column]] = self.entries[entry::inertia(row, column)];
             }
         }
+        if let Some(mass) = hinge_mass {
+            for (place, r) in [2, 3].into_iter().enumerate() {
+                inertia[r][r] += mass.inertia;
+                self.entries[entry::force(2 + r)][0] += mass.torque[place];
+            }
+        }
         self.inertia = Factors::new(inertia);
     }
 }
 
-/// Accelerations du/dt at deviations `q` from equilibrium and speeds `u`.
+/// Accelerations du/dt at deviations `q` from equilibrium, speeds `u` and theta' = `speed`.
 #[inline(always)]
 pub(crate) fn accelerations<T: Lane>(
     bodies: &Bodies<T>,
     coupling: &Coupling<T>,
     constants: &Constants<T>,
     tub_inertia: &Factors<T, 2>,
-    rotor_at: &RotorAt<T>,
+    (rotor_at, speed): (&RotorAt<T>, N<T>),
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
     let (tub, rotor) = unloaded(constants, rotor_at, q, u, q[0].lit(0.0));
     coupling.accelerations(
         bodies,
+        speed,
         &deflection(constants, q),
+        None,
         (&tub, tub_inertia),
         (&rotor, &rotor_at.inertia),
     )
@@ -382,7 +399,7 @@ impl LinearPoint {
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let zero = N(0.0);
         let c = &self.constants;
-        let rotor_at = rotor_at(&RotorTerms::splat(zero, &self.terms), spin);
+        let rotor_at = rotor_at(&RotorTerms::splat(zero, &self.terms), spin, None);
         // Columns of C and K, and F, are forces of single deviations; the bearings' share comes back with them.
         let rows = |q: &[N<f64>; COORDINATES], u: &[N<f64>; COORDINATES], loaded: bool| {
             let (mut tub, mut rotor) = unloaded(c, &rotor_at, q, u, zero);

@@ -2,6 +2,7 @@
 //!
 //! With theta, its speed and so M, C and K frozen, M q'' + C q' + K q = 0 has solutions q = phi exp(s t).
 
+use crate::coupling::Caps;
 use crate::nonlinear::COORDINATES;
 use crate::point::Point;
 use core::f64::consts::TAU;
@@ -10,6 +11,9 @@ use faer::{Mat, Side, c64};
 
 /// States of the first-order system, two per coordinate.
 const STATES: usize = 2 * COORDINATES;
+
+/// Coordinates of the hinge: q9, q10.
+const HINGE: [usize; 2] = [8, 9];
 
 /// Angles over a turn at which the highest frequency is looked for: M and K hold harmonics 0 to 2 of theta.
 const ANGLES: usize = 8;
@@ -43,6 +47,14 @@ impl Mode {
     #[must_use]
     pub fn damping_ratio(&self) -> f64 {
         -self.re_per_s / self.magnitude_rad_per_s
+    }
+
+    /// Share of the hinge in the strain energy at a motion's outermost points.
+    pub(crate) fn hinge_share(&self, point: &Point) -> f64 {
+        let squared =
+            HINGE.map(|q| self.shape[q][0] * self.shape[q][0] + self.shape[q][1] * self.shape[q][1]);
+        let stiffness = point.machine.bodies.flexure_stiffness.0;
+        stiffness * (squared[0] + squared[1]) / (self.magnitude_rad_per_s * self.magnitude_rad_per_s)
     }
 
     /// Damped natural frequency in cycles per minute.
@@ -94,17 +106,17 @@ pub(crate) fn inner(
 /// # Errors
 /// [`NoModes`] when the matrices are singular or not finite.
 pub fn modes(point: &Point, theta_rad: f64, speed_rad_per_s: f64) -> Result<Modes, NoModes> {
-    modes_with_cap(point, theta_rad, speed_rad_per_s, None)
+    modes_with_caps(point, theta_rad, speed_rad_per_s, None)
 }
 
-/// The same; with a cap (rad/s), of the machine whose bearings' mass is scaled (`coupling.rs`).
-pub(crate) fn modes_with_cap(
+/// The same; with caps, of the machine whose bearings and hinge have scaled mass (`coupling.rs`).
+pub(crate) fn modes_with_caps(
     point: &Point,
     theta_rad: f64,
     speed_rad_per_s: f64,
-    cap_rad_per_s: Option<f64>,
+    caps: Option<&Caps>,
 ) -> Result<Modes, NoModes> {
-    let (system, mass) = first_order(point, theta_rad, speed_rad_per_s, cap_rad_per_s)?;
+    let (system, mass) = first_order(point, theta_rad, speed_rad_per_s, caps)?;
     let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
     let values = decomposition.S().column_vector();
     let vectors = decomposition.U();
@@ -162,19 +174,19 @@ fn unit_mass(
 /// # Errors
 /// As [`modes`].
 pub fn highest_frequency_rad_per_s(point: &Point, speed_rad_per_s: f64) -> Result<f64, NoModes> {
-    highest_with_cap(point, speed_rad_per_s, None)
+    highest_with_caps(point, speed_rad_per_s, None)
 }
 
-/// The same; with a cap (rad/s), of the machine whose bearings' mass is scaled (`coupling.rs`).
-pub(crate) fn highest_with_cap(
+/// The same; with caps, of the machine whose bearings and hinge have scaled mass (`coupling.rs`).
+pub(crate) fn highest_with_caps(
     point: &Point,
     speed_rad_per_s: f64,
-    cap_rad_per_s: Option<f64>,
+    caps: Option<&Caps>,
 ) -> Result<f64, NoModes> {
     let mut highest = 0.0_f64;
     for angle in 0..ANGLES {
         let theta = TAU * angle as f64 / ANGLES as f64;
-        let (system, _) = first_order(point, theta, speed_rad_per_s, cap_rad_per_s)?;
+        let (system, _) = first_order(point, theta, speed_rad_per_s, caps)?;
         for s in system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)? {
             let magnitude = magnitude(s) * system.unit_per_s;
             if !magnitude.is_finite() {
@@ -198,14 +210,23 @@ fn first_order(
     point: &Point,
     theta_rad: f64,
     speed_rad_per_s: f64,
-    cap_rad_per_s: Option<f64>,
+    caps: Option<&Caps>,
 ) -> Result<(FirstOrder, [[f64; COORDINATES]; COORDINATES]), NoModes> {
     let mut matrices = point.matrices(theta_rad, speed_rad_per_s, 0.0);
-    if let Some(cap) = cap_rad_per_s {
-        let bearings = point.linear.bearing_stiffness(&point.machine.bodies);
+    if let Some(caps) = caps {
+        let bodies = &point.machine.bodies;
+        let bearings = point.linear.bearing_stiffness(bodies);
+        let cap_squared = caps.bearings_rad_per_s * caps.bearings_rad_per_s;
+        let speed_squared = speed_rad_per_s * speed_rad_per_s;
         for i in 0..COORDINATES {
             for j in 0..COORDINATES {
-                matrices.mass[i][j] += bearings[i][j] / (cap * cap);
+                matrices.mass[i][j] += bearings[i][j] / cap_squared;
+                matrices.stiffness[i][j] += bearings[i][j] * (speed_squared / cap_squared);
+            }
+        }
+        if let Some(cap) = caps.hinge_rad_per_s {
+            for q in HINGE {
+                matrices.mass[q][q] += bodies.flexure_stiffness.0 / (cap * cap);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The two models as systems over lanes, and what they have in common.
 
 use crate::coefficients::Coefficients;
-use crate::coupling::Coupling;
+use crate::coupling::{Coupling, Sag};
 use crate::floating::Factors;
 use crate::lanes::SetLane;
 use crate::linear::{self, Constants, RotorAt};
@@ -79,6 +79,7 @@ pub(crate) struct Nonlinear<T> {
     spin: SpinLanes<T>,
     /// Channels at the static equilibrium.
     rest: [N<T>; CHANNELS],
+    sag: Sag<T>,
 }
 
 impl<T: Lane> System<T, STATES> for Nonlinear<T> {
@@ -92,7 +93,8 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
     #[inline(always)]
     fn derivative(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
         let (q, u) = split(x);
-        joined(&u, &nonlinear::accelerations(&self.machine.view(), &self.coupling, spin, &q, &u))
+        let machine = self.machine.view();
+        joined(&u, &nonlinear::accelerations(&machine, &self.coupling, &self.sag, spin, &q, &u))
     }
 
     #[inline(always)]
@@ -109,12 +111,14 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
             machine: Coefficients::splat(zero, &point.machine),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
             rest: point.rest.map(|y| zero.lit(y)),
+            sag: Sag::new(&point.equilibrium).splat(zero),
         }
     }
 
     fn set_point(&mut self, lane: usize, point: &Point) {
         self.machine.set_lane(lane, &point.machine);
         self.rest.set_lane(lane, &point.rest.map(N));
+        self.sag.set_lane(lane, &Sag::new(&point.equilibrium));
     }
 
     fn set_spin(&mut self, lane: usize, stretch: &SpinStretch) {
@@ -155,6 +159,7 @@ pub(crate) struct Linear<T> {
     constants: Constants<T>,
     tub_inertia: Factors<T, 2>,
     terms: RotorTerms<T>,
+    sag: Sag<T>,
     outputs: LinearOutputs<T>,
     spin: SpinLanes<T>,
 }
@@ -172,13 +177,16 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     #[inline(always)]
     fn forcing(&self, t_s: N<T>) -> LinearForcing<T> {
         let spin = self.spin.at(t_s);
-        LinearForcing { rotor: linear::rotor_at(&self.terms, &spin), spin }
+        let hinge_mass = self.coupling.hinge_mass(&self.machine.bodies, &spin, &self.sag);
+        let rotor = linear::rotor_at(&self.terms, &spin, hinge_mass);
+        LinearForcing { rotor, spin }
     }
 
     #[inline(always)]
     fn renew(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
         forcing.spin = self.spin.at(t_s);
-        forcing.rotor.renew(&self.terms, &forcing.spin);
+        let hinge_mass = self.coupling.hinge_mass(&self.machine.bodies, &forcing.spin, &self.sag);
+        forcing.rotor.renew(&self.terms, &forcing.spin, hinge_mass);
     }
 
     #[inline(always)]
@@ -186,7 +194,8 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
         let (q, u) = split(x);
         let bodies = &self.machine.bodies;
         let (constants, tub_inertia) = (&self.constants, &self.tub_inertia);
-        let a = linear::accelerations(bodies, &self.coupling, constants, tub_inertia, &forcing.rotor, &q, &u);
+        let rotor = (&forcing.rotor, forcing.spin.speed);
+        let a = linear::accelerations(bodies, &self.coupling, constants, tub_inertia, rotor, &q, &u);
         joined(&u, &a)
     }
 
@@ -206,6 +215,7 @@ impl<T: Lane> Model<T> for Linear<T> {
             tub_inertia: linear::tub_factors(&constants),
             constants,
             terms: RotorTerms::splat(zero, &point.linear.terms),
+            sag: Sag::new(&point.equilibrium).splat(zero),
             outputs: LinearOutputs::splat(zero, &point.linear_outputs),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
         }
@@ -216,6 +226,7 @@ impl<T: Lane> Model<T> for Linear<T> {
         self.constants.set_lane(lane, &point.linear.constants);
         self.tub_inertia.set_lane(lane, &linear::tub_factors(&point.linear.constants));
         self.terms.set_lane(lane, &point.linear.terms);
+        self.sag.set_lane(lane, &Sag::new(&point.equilibrium));
         self.outputs.set_lane(lane, &point.linear_outputs);
     }
 

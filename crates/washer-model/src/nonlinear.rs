@@ -4,7 +4,7 @@
 //! the spin (yaw q7, pitch q8), frame S spins with the shaft, frame E is S turned by q9, frame D by q10 more.
 
 use crate::coefficients::{Bodies, Coefficients, DamperOf, SpringOf};
-use crate::coupling::{Coupling, Deflection};
+use crate::coupling::{Coupling, Deflection, Sag};
 use crate::floating::{Factors, Floating};
 use crate::forces::{Flexure, suspension_load};
 use crate::frame::{Tilt, Vec3, combination, difference, scaled, sum};
@@ -57,20 +57,29 @@ impl<T> Coefficients<T> {
     }
 }
 
-/// Accelerations du/dt of all ten coordinates.
+/// Accelerations du/dt of all ten coordinates; `sag` at the same machine's equilibrium.
 #[inline(always)]
 pub(crate) fn accelerations<T: Real>(
     machine: &MachineView<'_, T>,
     coupling: &Coupling<T>,
+    sag: &Sag<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
     let tub = tub(machine, q, u);
-    let rotor = rotor(machine.bodies, spin, q, u);
+    let mut rotor = rotor(machine.bodies, spin, q, u);
+    if let Some(mass) = coupling.hinge_mass(machine.bodies, spin, sag) {
+        for (place, r) in [2, 3].into_iter().enumerate() {
+            rotor.inertia[r][r] += mass.inertia;
+            rotor.floating.torque[r] += mass.torque[place];
+        }
+    }
     coupling.accelerations(
         machine.bodies,
+        spin.speed,
         &Deflection::new(q, &tub.tilt, &rotor.tilt),
+        Some(&sag.bearings),
         (&tub.floating, &Factors::new(tub.inertia)),
         (&rotor.floating, &Factors::new(rotor.inertia)),
     )

@@ -1,6 +1,7 @@
 //! Against numbers from programs independent of this one (`tests/reference/README.md` says how they were made).
 
 use crate::coefficients::Coefficients;
+use crate::coupling::{Coupling, Sag};
 use crate::machine::Machine;
 use crate::nonlinear::{self, COORDINATES};
 use crate::spin::SpinState;
@@ -44,7 +45,8 @@ fn val_accelerations_match_an_independent_right_hand_side() {
         let [q, u] = ["q", "u"].map(|name| numbers::<COORDINATES>(&case[name]).map(N));
         let ours = nonlinear::accelerations(
             &coefficients.view(),
-            &crate::coupling::Coupling::Springs,
+            &Coupling::Springs,
+            &Sag::new(&[0.0; COORDINATES]),
             &spin(case),
             &q,
             &u,

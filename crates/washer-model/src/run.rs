@@ -6,7 +6,7 @@ pub(crate) mod stiff;
 
 pub use extras::{Extra, Wanted};
 
-use crate::coupling::Coupling;
+use crate::coupling::{Caps, Coupling};
 use crate::model::{Linear, Model, Nonlinear, STATES};
 use crate::outputs::{CHANNELS, RADIAL, squared};
 use crate::point::{PlannedLeg, Point};
@@ -25,12 +25,12 @@ pub enum Method {
         /// Longest step.
         step_s: f64,
     },
-    /// The same, with the bearings' mass scaled so that none of their modes is faster than a cap (see `coupling.rs`).
+    /// The same, with mass of bearings and hinge scaled so that none of their modes is faster than a cap (see `coupling.rs`).
     Rk4MassScaled {
         /// Longest step.
         step_s: f64,
-        /// The cap, rad/s.
-        cap_rad_per_s: f64,
+        /// The caps.
+        caps: Caps,
     },
     /// Dormand-Prince 5(4).
     Dopri5(Tolerance),
@@ -58,13 +58,11 @@ pub(crate) fn first_step_s(method: &Method) -> f64 {
     }
 }
 
-/// How the bearings act.
+/// How bearings and hinge act.
 #[inline(always)]
 pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
     match method {
-        Method::Rk4MassScaled { cap_rad_per_s, .. } => {
-            Coupling::MassScaled(zero.lit(cap_rad_per_s * cap_rad_per_s))
-        }
+        Method::Rk4MassScaled { caps, .. } => Coupling::new(zero, Some(caps)),
         Method::Rk4 { .. } | Method::Dopri5(_) | Method::Rodas5p(_) => Coupling::Springs,
     }
 }

@@ -134,10 +134,13 @@ fn method(plan: &Plan, settled: Option<&Settled>) -> String {
         }
         Integrator::Rk4MassScaled { accuracy } => {
             let chosen = settled.map_or_else(String::new, |settled| {
-                let cap = settled.cap_rad_per_s.map_or_else(
-                    || "bearings as they are".to_owned(),
-                    |cap| format!("bearing modes capped at {cap:.0} rad/s"),
-                );
+                let cap = match (settled.cap_rad_per_s, settled.hinge_cap_rad_per_s) {
+                    (None, _) => "bearings as they are".to_owned(),
+                    (Some(cap), None) => format!("bearing modes capped at {cap:.0} rad/s"),
+                    (Some(cap), Some(hinge)) => {
+                        format!("bearing modes capped at {cap:.0} rad/s, the hinge's at {hinge:.0} rad/s")
+                    }
+                };
                 format!(": step {:.3} ms, {cap}; checked against rk4 before the run", 1e3 * settled.step_s)
             });
             format!("rk4-mass-scaled, accuracy {accuracy:e}{chosen}")

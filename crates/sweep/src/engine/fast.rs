@@ -1,6 +1,6 @@
 //! The fast method, with an error that is looked at and verdicts that are certain.
 //!
-//! Trajectories run with the bearing modes capped (`washer_model::Capping`). Three things make up for that:
+//! Trajectories run with the modes of bearings and hinge capped (`washer_model::Capping`). Three things make up for that:
 //!
 //! * Before the first point, a sample of the grid is run by the reference method, plain RK4 at a converged step, as well. If the worst
 //!   amplitude error is above the accuracy asked for, step and cap are tightened for all points, and the sample is compared again.
@@ -15,7 +15,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use washer_model::{Capping, Cases, Method, ModelKind, Point};
+use washer_model::{Capping, Caps, Cases, Method, ModelKind, Point};
 
 use super::{GROUP, ModelEngine, panicked};
 use crate::outcome::{Outcome, Status, Trajectory};
@@ -64,6 +64,8 @@ pub struct Settled {
     pub step_s: f64,
     /// Cap on the bearing modes; none if it gains nothing.
     pub cap_rad_per_s: Option<f64>,
+    /// Cap on those of the hinge, if they have one.
+    pub hinge_cap_rad_per_s: Option<f64>,
     /// Step of the reference method.
     pub reference_step_s: f64,
     /// How often step and cap were tightened because the sample broke the accuracy.
@@ -78,12 +80,20 @@ pub struct Settled {
 
 impl Settled {
     fn fast(&self) -> Method {
-        Capping { step_s: self.step_s, cap_rad_per_s: self.cap_rad_per_s }.method()
+        self.at_share(1.0)
     }
 
     fn second(&self) -> Method {
-        let cap_rad_per_s = self.cap_rad_per_s.map(|cap| cap / SECOND_STEP);
-        Capping { step_s: SECOND_STEP * self.step_s, cap_rad_per_s }.method()
+        self.at_share(SECOND_STEP)
+    }
+
+    /// With a step of this share, and caps higher by as much.
+    fn at_share(&self, share: f64) -> Method {
+        let caps = self.cap_rad_per_s.map(|cap| Caps {
+            bearings_rad_per_s: cap / share,
+            hinge_rad_per_s: self.hinge_cap_rad_per_s.map(|cap| cap / share),
+        });
+        Capping { step_s: share * self.step_s, caps }.method()
     }
 
     fn reference(&self) -> Method {
@@ -120,11 +130,11 @@ impl ModelEngine<'_> {
         let cases = Cases::new(ready, self.plan.end_s);
         let reference_step_s = reference_step_s(&cases);
         // Corners without an equilibrium or without modes are rows that say so; the rest is integrated as the reference is.
-        let capping =
-            cases.choose(accuracy).unwrap_or(Capping { step_s: reference_step_s, cap_rad_per_s: None });
+        let capping = cases.choose(accuracy).unwrap_or(Capping { step_s: reference_step_s, caps: None });
         Settled {
             step_s: capping.step_s,
-            cap_rad_per_s: capping.cap_rad_per_s,
+            cap_rad_per_s: capping.caps.map(|caps| caps.bearings_rad_per_s),
+            hinge_cap_rad_per_s: capping.caps.and_then(|caps| caps.hinge_rad_per_s),
             reference_step_s,
             tightened: 0,
             sampled: 0,
@@ -146,6 +156,7 @@ impl ModelEngine<'_> {
             if tightened == TIGHTENINGS {
                 settled.step_s = settled.reference_step_s;
                 settled.cap_rad_per_s = None;
+                settled.hinge_cap_rad_per_s = None;
             } else if tightened > 0 {
                 settled = self.unchecked(accuracy / TIGHTENED_BY.powi(tightened as i32));
             }

@@ -1,7 +1,9 @@
 //! The same bits: on every instruction set, at any position in a batch, in any company.
 
 use super::instruments::{paper, random_machine, random_spin};
-use crate::{Extra, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted, prepare, simulate_with};
+use crate::{
+    Caps, Extra, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted, prepare, simulate_with,
+};
 use lane_ode::{Simd, Tolerance};
 
 type Scenario = (Machine, Spin);
@@ -11,7 +13,10 @@ const TIMING: Timing = Timing { end_s: END_S, window_s: [0.4, 0.9] };
 const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
 const METHODS: [Method; 3] = [
     Method::Rk4 { step_s: 1e-4 },
-    Method::Rk4MassScaled { step_s: 1e-3, cap_rad_per_s: 1500.0 },
+    Method::Rk4MassScaled {
+        step_s: 1e-3,
+        caps: Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: Some(1200.0) },
+    },
     Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
 

@@ -3,8 +3,8 @@
 use super::instruments::paper;
 use crate::spin::cuts_s;
 use crate::{
-    Channel, Machine, Method, ModelKind, Point, Spin, Start, Timing, Wanted, history, prepare, simulate,
-    simulate_with,
+    Caps, Channel, Machine, Method, ModelKind, Point, Spin, Start, Timing, Wanted, history, prepare,
+    simulate, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
@@ -117,7 +117,10 @@ fn methods_whose_steps_lie_elsewhere_find_the_same() {
 #[test]
 fn only_what_is_asked_for_is_there() {
     let point = point();
-    let method = Method::Rk4MassScaled { step_s: 1e-3, cap_rad_per_s: 1500.0 };
+    let method = Method::Rk4MassScaled {
+        step_s: 1e-3,
+        caps: Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: None },
+    };
     let run = |wanted| simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], wanted);
     assert!(run(Wanted::default()).1.is_empty());
     let (_, extras) = run(Wanted { clash_time: true, ..Wanted::default() });

@@ -2,7 +2,7 @@
 
 use super::instruments::{equations, equations_of, mass_matrix, random_machine};
 use crate::coefficients::Coefficients;
-use crate::coupling::{Coupling, Deflection};
+use crate::coupling::{Caps, Coupling, Deflection, Sag};
 use crate::frame::Tilt;
 use crate::nonlinear::{COORDINATES, accelerations, halves};
 use crate::reference_tests::{machine, numbers, reference, spin};
@@ -56,19 +56,27 @@ fn left([inertia, force]: &[Vector; 2]) -> f64 {
 fn accelerations_solve_the_equations_of_motion_of_any_machine() {
     let mut worst = 0.0_f64;
     in_motion(11, |machine, spin, q, u| {
-        let a = accelerations(&machine.view(), &Coupling::Springs, spin, q, u);
+        let a = accelerations(&machine.view(), &Coupling::Springs, &sag(), spin, q, u);
         worst = worst.max(left(&equations(machine, spin, q, u, &a)));
     });
     eprintln!("M a - f: at most {worst:.1e} of the largest force");
     assert!(worst < 1e-12, "{worst:e}");
 }
 
+/// Of some size: the mass scaling's law holds about any.
+fn sag() -> Sag<f64> {
+    let bearings = Deflection { offset: [N(-3e-6), N(1e-6)], tilt: [N(2e-5), N(-1e-5)] };
+    Sag { bearings, hinge: [N(2e-4), N(-7e-4)] }
+}
+
 #[test]
-fn mass_scaling_adds_the_bearings_inertia_and_nothing_else() {
+fn mass_scaling_changes_the_forces_of_bearings_and_hinge_and_nothing_else() {
     let mut worst = 0.0_f64;
-    for cap in [300.0_f64, 1500.0] {
+    for (cap, hinge_rad_per_s) in [(300.0_f64, Some(400.0)), (1500.0, None)] {
+        let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s };
         in_motion(12, |machine, spin, q, u| {
-            let a = accelerations(&machine.view(), &Coupling::MassScaled(N(cap * cap)), spin, q, u);
+            let sag = sag();
+            let a = accelerations(&machine.view(), &Coupling::new(N(0.0), Some(&caps)), &sag, spin, q, u);
             // d'' of the true deflection, by two derivatives carried along the motion.
             let course: [_; COORDINATES] = core::array::from_fn(|i| {
                 let [q, u, a] = [q[i].0, u[i].0, a[i].0];
@@ -76,12 +84,29 @@ fn mass_scaling_adds_the_bearings_inertia_and_nothing_else() {
             });
             let [tub, shaft] = [4, 6].map(|i| Tilt::new(course[i], course[i + 1]));
             let d = Deflection::new(&course, &tub, &shaft);
-            let per_cap_squared = |d: [N<Dual<Dual<f64>>>; 2]| d.map(|d| N(d.0.slope.slope / (cap * cap)));
-            let extra = Deflection { offset: per_cap_squared(d.offset), tilt: per_cap_squared(d.tilt) };
+            let speed_squared = spin.speed.0 * spin.speed.0;
+            let added = |d: [N<Dual<Dual<f64>>>; 2], sag: [N<f64>; 2]| {
+                let of_one = |i: usize| {
+                    let Dual { value, slope } = d[i].0;
+                    N((slope.slope + speed_squared * (value.value - sag[i].0)) / (cap * cap))
+                };
+                [of_one(0), of_one(1)]
+            };
+            let Deflection { offset, tilt } = sag.bearings;
+            let extra = Deflection { offset: added(d.offset, offset), tilt: added(d.tilt, tilt) };
             let extra = extra.load(&machine.bodies);
             let mut both = halves(&machine.view(), spin, q, u);
             both.tub.floating.apply(&extra.reaction());
             both.rotor.floating.apply(&extra);
+            if let Some(cap) = hinge_rad_per_s {
+                // The weight's sag hangs still: seen from the shaft it turns backwards.
+                let [nine, ten] = sag.hinge;
+                let turned = [spin.cos * nine + spin.sin * ten, spin.cos * ten - spin.sin * nine];
+                let mass = N(machine.bodies.flexure_stiffness.0 / (cap * cap));
+                for i in 0..2 {
+                    both.rotor.floating.torque[2 + i] -= mass * (a[8 + i] + N(speed_squared) * turned[i]);
+                }
+            }
             worst = worst.max(left(&equations_of(&both, &a)));
         });
     }
