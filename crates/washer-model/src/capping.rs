@@ -20,7 +20,7 @@
 //!   caps nothing: plain RK4.
 //!
 //! The hinge turns with the shaft: a motion of frequency f has frequencies up to f + theta' in it, which modes with theta frozen do not show.
-//! A hinge that holds the share e of a mode's strain energy moves it by e f / 2 times ((f + theta') / w)^2. Twice that is added to ds: violent
+//! A hinge that holds the share e of a mode's strain energy moves it by e f / 2 times ((f + theta') / w)^2. Two and a half times that is added to ds: violent
 //! motion, which does not keep to the drum's speed, answers to it as well.
 
 use crate::coupling::Caps;
@@ -52,7 +52,7 @@ const STEP_TIMES_FASTEST: f64 = 0.97 * RK4_STABILITY_LIMIT;
 const LEAST_HALF_WIDTH: f64 = 0.01;
 
 /// By how much the shift that a turning hinge adds counts more than another.
-const HINGE_WEIGHT: f64 = 2.0;
+const HINGE_WEIGHT: f64 = 2.5;
 
 /// Bits of a step's fraction that count: 1e-6 of the step.
 const STEP_BITS: u32 = 20;
