@@ -173,9 +173,10 @@ impl<'a> Models<'a> {
 
 impl Evaluate for Models<'_> {
     fn evaluate(&self, trials: &[Trial]) -> Option<Vec<Option<f64>>> {
-        // Every thread gets whole lane groups; how trials are grouped leaves no trace in what comes out.
+        // Every thread gets whole lane groups, few at a time so that an interrupt is not waited for long; how trials are grouped leaves no
+        // trace in what comes out.
         let each = trials.len().div_ceil(self.pool.current_num_threads().max(1));
-        let group = each.next_multiple_of(lane_ode::MAX_LANES).min(64);
+        let group = each.next_multiple_of(lane_ode::MAX_LANES).min(2 * lane_ode::MAX_LANES);
         let distances: Option<Vec<Vec<Option<f64>>>> = self.pool.install(|| {
             trials
                 .par_chunks(group)
