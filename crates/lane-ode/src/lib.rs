@@ -96,12 +96,16 @@
 //! assert_eq!(ends, Simd::Scalar.dispatch(Run(&stiffness)));
 //! ```
 
+#[cfg(target_arch = "aarch64")]
+mod aarch64;
 mod control;
 pub mod dopri5;
 mod dual;
 mod lane;
 mod linear_solve;
 mod num;
+#[cfg(any(target_arch = "aarch64", test))]
+mod pair;
 mod part_peaks;
 mod partials;
 mod peaks;
@@ -114,12 +118,14 @@ mod squares;
 mod system;
 mod time_above;
 pub mod trig;
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+mod vector;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 pub use control::Tolerance;
 pub use dual::Dual;
-pub use lane::{Array, Lane};
+pub use lane::Lane;
 pub use num::{N, Product};
 pub use part_peaks::PartPeaks;
 pub use partials::Partials;

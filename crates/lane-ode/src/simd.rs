@@ -1,6 +1,5 @@
 //! Which instruction set runs, decided when the program runs.
 
-use crate::lane::Array;
 use crate::lane::Lane;
 
 /// An instruction set the integrators can run on. Results are the same bits on all of them.
@@ -13,7 +12,7 @@ pub enum Simd {
     Avx2,
     /// Eight lanes of AVX-512.
     Avx512,
-    /// Two lanes of NEON.
+    /// Four lanes in two registers of NEON.
     Neon,
 }
 
@@ -95,13 +94,12 @@ impl Simd {
     pub const fn lanes(self) -> usize {
         match self {
             Self::Scalar => 1,
-            Self::Avx2 => 4,
+            Self::Avx2 | Self::Neon => 4,
             Self::Avx512 => 8,
-            Self::Neon => 2,
         }
     }
 
-    /// Runs the kernel on this instruction set, or on [`Simd::Scalar`] if this processor lacks it: the result is the
+    /// Runs the kernel on this instruction set, or on one lane without any if this processor lacks it: the result is the
     /// same.
     #[inline(never)]
     pub fn dispatch<K: Kernel>(self, kernel: K) -> K::Output {
@@ -112,7 +110,8 @@ impl Simd {
             Self::Avx2 if self.is_available() => x86::avx2(kernel),
             #[cfg(target_arch = "x86_64")]
             Self::Scalar if Self::Avx2.is_available() => x86::scalar(kernel),
-            Self::Neon => kernel.run(Array([0.0; 2])),
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => aarch64::neon(kernel),
             _ => kernel.run(0.0_f64),
         }
     }
@@ -145,8 +144,29 @@ impl Simd {
         if Self::Avx2.is_available() {
             return x86::avx2(kernel);
         }
+        #[cfg(target_arch = "aarch64")]
+        {
+            aarch64::neon(kernel)
+        }
+        #[cfg(not(target_arch = "aarch64"))]
         kernel.run(0.0_f64)
     }
+}
+
+/// An entry function with an instruction set, and a safe one around it that checks for it.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+macro_rules! entry {
+    ($name:ident, $features:literal, $simd:expr, $first:expr) => {
+        pub(super) fn $name<K: Kernel>(kernel: K) -> K::Output {
+            #[target_feature(enable = $features)]
+            fn inner<K: Kernel>(kernel: K) -> K::Output {
+                kernel.run($first)
+            }
+            assert!($simd.is_available(), "dispatched to an instruction set that this processor lacks");
+            // SAFETY: asserted above.
+            unsafe { inner(kernel) }
+        }
+    };
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -154,21 +174,6 @@ impl Simd {
 mod x86 {
     use super::{Aside, Kernel, ScalarKernel};
     use crate::x86::{F64x4, F64x8};
-
-    /// An entry function with an instruction set, and a safe one around it that checks for it.
-    macro_rules! entry {
-        ($name:ident, $features:literal, $simd:expr, $first:expr) => {
-            pub(super) fn $name<K: Kernel>(kernel: K) -> K::Output {
-                #[target_feature(enable = $features)]
-                fn inner<K: Kernel>(kernel: K) -> K::Output {
-                    kernel.run($first)
-                }
-                assert!($simd.is_available(), "dispatched to an instruction set that this processor lacks");
-                // SAFETY: asserted above.
-                unsafe { inner(kernel) }
-            }
-        };
-    }
 
     // SAFETY (of the two `first`): inside the entry function of their instruction set.
     entry!(avx512, "avx2,fma,avx512f,avx512dq,avx512vl", super::Simd::Avx512, unsafe { F64x8::first(0.0) });
@@ -201,4 +206,15 @@ mod x86 {
         // SAFETY: asserted above.
         unsafe { inner(kernel) }
     }
+}
+
+#[cfg(target_arch = "aarch64")]
+#[allow(unsafe_code)]
+mod aarch64 {
+    use super::Kernel;
+    use crate::aarch64::F64x2;
+    use crate::pair::Pair;
+
+    // SAFETY (of `first`): inside the entry function of its instruction set.
+    entry!(neon, "neon", super::Simd::Neon, Pair::first(unsafe { F64x2::first(0.0) }));
 }

@@ -1,0 +1,29 @@
+//! NEON lanes: intrinsics behind a newtype.
+//!
+//! Every processor that this target is compiled for has NEON. The entry function is there all the same, and makes the first
+//! value, as on other architectures: a value of this type exists only where the instructions do, which is why the `unsafe`
+//! below is sound.
+#![allow(unsafe_code)]
+
+use crate::vector::vector;
+use core::arch::aarch64::*;
+
+vector!(
+    F64x2, float64x2_t, 2, uint64x2_t, "neon", "Two lanes of NEON.",
+    set1 vdupq_n_f64, add vaddq_f64, sub vsubq_f64, mul vmulq_f64, div vdivq_f64,
+    sqrt vsqrtq_f64,
+    mul_add |a, b, c| vfmaq_f64(c, a, b),
+    // There is no a b - c, and -(c - a b) is -0 where the others give 0.
+    mul_sub |a, b, c| vfmaq_f64(vnegq_f64(c), a, b),
+    neg_mul_add |a, b, c| vfmsq_f64(c, a, b),
+    neg |a| vnegq_f64(a),
+    abs |a| vabsq_f64(a),
+    round |a| vrndnq_f64(a),
+    less |a, b| vcltq_f64(a, b),
+    select |m, a, b| vbslq_f64(m, a, b),
+    bits |m| {
+        // SAFETY: as in `lit`.
+        let [first, second] = unsafe { [vgetq_lane_u64::<0>(m), vgetq_lane_u64::<1>(m)] };
+        (first & 1 | second & 2) as u32
+    }
+);

@@ -1,0 +1,155 @@
+//! Lane types out of vector registers: what is the same for every instruction set.
+//!
+//! The module that invokes the macro says what each operation is in its instructions, and why its values exist only where the
+//! instructions do: on that rests the `unsafe` below, which is that module's.
+
+/// Makes `$name`, `$lanes` numbers in one register of type `$raw`, a [`Lane`](crate::Lane) compiled with `$features`.
+macro_rules! vector {
+    ($name:ident, $raw:ty, $lanes:literal, $mask:ty, $features:literal, $doc:literal,
+     set1 $set1:ident, add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident, sqrt $sqrt:ident,
+     mul_add |$p1:ident, $p2:ident, $p3:ident| $mul_add:expr,
+     mul_sub |$q1:ident, $q2:ident, $q3:ident| $mul_sub:expr,
+     neg_mul_add |$o1:ident, $o2:ident, $o3:ident| $neg_mul_add:expr,
+     neg |$n:ident| $neg:expr, abs |$ab:ident| $abs:expr, round |$r:ident| $round:expr,
+     less |$l1:ident, $l2:ident| $less:expr, select |$m:ident, $s1:ident, $s2:ident| $select:expr,
+     bits |$b:ident| $bits:expr) => {
+        #[doc = $doc]
+        #[derive(Clone, Copy, Debug)]
+        #[repr(transparent)]
+        pub(crate) struct $name($raw);
+
+        impl $name {
+            /// The constant `value` in every lane.
+            ///
+            /// # Safety
+            /// The processor must have this type's instruction set.
+            #[inline(always)]
+            pub(crate) unsafe fn first(value: f64) -> Self {
+                // SAFETY: the caller's promise.
+                Self(unsafe { $set1(value) })
+            }
+        }
+
+        impl $crate::Real for $name {
+            type Mask = $mask;
+            #[inline(always)]
+            fn lit(self, value: f64) -> Self {
+                // SAFETY: `self` exists, so its instruction set does (module docs of the invocation); likewise below.
+                Self(unsafe { $set1(value) })
+            }
+            #[inline(always)]
+            fn add(self, b: Self) -> Self {
+                // SAFETY: as in `lit`.
+                Self(unsafe { $add(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn sub(self, b: Self) -> Self {
+                // SAFETY: as in `lit`.
+                Self(unsafe { $sub(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn mul(self, b: Self) -> Self {
+                // SAFETY: as in `lit`.
+                Self(unsafe { $mul(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn div(self, b: Self) -> Self {
+                // SAFETY: as in `lit`.
+                Self(unsafe { $div(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn neg(self) -> Self {
+                let $n = self.0;
+                // SAFETY: as in `lit`.
+                Self(unsafe { $neg })
+            }
+            #[inline(always)]
+            fn mul_add(self, b: Self, c: Self) -> Self {
+                let ($p1, $p2, $p3) = (self.0, b.0, c.0);
+                // SAFETY: as in `lit`.
+                Self(unsafe { $mul_add })
+            }
+            #[inline(always)]
+            fn mul_sub(self, b: Self, c: Self) -> Self {
+                let ($q1, $q2, $q3) = (self.0, b.0, c.0);
+                // SAFETY: as in `lit`.
+                Self(unsafe { $mul_sub })
+            }
+            #[inline(always)]
+            fn neg_mul_add(self, b: Self, c: Self) -> Self {
+                let ($o1, $o2, $o3) = (self.0, b.0, c.0);
+                // SAFETY: as in `lit`.
+                Self(unsafe { $neg_mul_add })
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                // SAFETY: as in `lit`.
+                Self(unsafe { $sqrt(self.0) })
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                let $ab = self.0;
+                // SAFETY: as in `lit`.
+                Self(unsafe { $abs })
+            }
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                $crate::trig::sin_cos(self)
+            }
+            #[inline(always)]
+            fn less(self, b: Self) -> $mask {
+                let ($l1, $l2) = (self.0, b.0);
+                // SAFETY: as in `lit`.
+                unsafe { $less }
+            }
+            #[inline(always)]
+            fn select($m: $mask, a: Self, b: Self) -> Self {
+                let ($s1, $s2) = (a.0, b.0);
+                // SAFETY: as in `lit`.
+                Self(unsafe { $select })
+            }
+            #[inline(always)]
+            fn all(mask: $mask) -> bool {
+                <Self as $crate::Lane>::bits(mask) == (1 << $lanes) - 1
+            }
+        }
+
+        impl $crate::Lane for $name {
+            const LANES: usize = $lanes;
+            #[inline(always)]
+            fn get(self, i: usize) -> f64 {
+                // SAFETY: the two types have the same size and no invalid bit patterns.
+                let lanes = unsafe { core::mem::transmute::<$raw, [f64; $lanes]>(self.0) };
+                lanes[i]
+            }
+            #[inline(always)]
+            fn set(&mut self, i: usize, value: f64) {
+                // SAFETY: as in `get`.
+                let lanes = unsafe { &mut *(&raw mut self.0).cast::<[f64; $lanes]>() };
+                lanes[i] = value;
+            }
+            #[inline(always)]
+            fn round(self) -> Self {
+                let $r = self.0;
+                // SAFETY: as in `lit`.
+                Self(unsafe { $round })
+            }
+            #[inline(always)]
+            fn bits($b: $mask) -> u32 {
+                $bits
+            }
+            #[inline(always)]
+            fn aside<W: $crate::Aside>(self, work: W) {
+                #[inline(never)]
+                #[target_feature(enable = $features)]
+                fn inner<W: $crate::Aside>(work: W) {
+                    work.run();
+                }
+                // SAFETY: as in `lit`.
+                unsafe { inner(work) }
+            }
+        }
+    };
+}
+
+pub(crate) use vector;
