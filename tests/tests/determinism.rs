@@ -63,7 +63,7 @@ fn same_bytes(integrator: &str) {
     for threads in [2, 4] {
         assert!(bytes(integrator, threads, "scalar").as_ref() == Some(&one), "{threads} threads");
     }
-    for simd in ["avx2", "avx512"] {
+    for simd in ["avx2", "avx512", "neon"] {
         for threads in [1, 2, 4] {
             if let Some(other) = bytes(integrator, threads, simd) {
                 assert!(other == one, "{simd} on {threads} threads");

@@ -2,7 +2,7 @@
 
 use super::instruction_sets;
 use crate::pair::Pair;
-use crate::{Kernel, Lane, N, trig};
+use crate::{Kernel, Lane, N, Simd, trig};
 
 /// Operands of one lane.
 type Operands = [f64; 3];
@@ -168,4 +168,26 @@ fn every_operation_of_paired_registers_gives_the_bits_of_plain_numbers() {
     let two = Pair::first(0.0);
     check("two lanes", &operands, &Operations(&operands).run(two));
     check("four lanes", &operands, &Operations(&operands).run(Pair::first(two)));
+}
+
+struct CountLanes;
+
+impl Kernel for CountLanes {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, _: T) -> usize {
+        T::LANES
+    }
+}
+
+#[test]
+fn every_instruction_set_has_the_lanes_it_says() {
+    for simd in instruction_sets() {
+        assert_eq!(simd.dispatch(CountLanes), simd.lanes(), "{}", simd.name());
+    }
+    let baseline = if cfg!(target_arch = "aarch64") { Simd::Neon } else { Simd::Scalar };
+    assert!(instruction_sets().contains(&baseline), "every processor of this architecture has {baseline:?}");
+    let absent = Simd::ALL.into_iter().filter(|simd| !simd.is_available());
+    assert!(absent.into_iter().all(|simd| simd.dispatch(CountLanes) == 1), "what is absent runs on one lane");
 }
