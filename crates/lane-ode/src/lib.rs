@@ -104,8 +104,6 @@ mod dual;
 mod lane;
 mod linear_solve;
 mod num;
-#[cfg(any(target_arch = "aarch64", test))]
-mod pair;
 mod part_peaks;
 mod partials;
 mod peaks;

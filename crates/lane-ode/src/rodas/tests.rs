@@ -1,7 +1,7 @@
 use super::*;
 use crate::lane::Lane;
-use crate::pair::Pair;
 use crate::system::{Leg, System};
+use crate::tests::array::Array;
 
 type Matrix = [[f64; STAGES]; STAGES];
 
@@ -237,7 +237,7 @@ impl Task<f64, 4> for Coupled {
 
 impl Stiff<4, 2> for Coupled {
     fn partials(&self, t_s: f64, x: &[N<f64>; 4], partials: &mut Partials<2>) {
-        partials.find(Pair::first(Pair::first(0.0)), &self, t_s, x);
+        partials.find(Array([0.0; 4]), &self, t_s, x);
     }
 }
 
@@ -265,7 +265,7 @@ fn partials_are_exact_and_do_not_depend_on_the_lanes() {
     let mut one = Partials::<2>::zero();
     one.find(0.0, &&task, 2.0, &x);
     let mut four = Partials::<2>::zero();
-    four.find(Pair::first(Pair::first(0.0)), &&task, 2.0, &x);
+    four.find(Array([0.0; 4]), &&task, 2.0, &x);
     assert_eq!(format!("{one:?}"), format!("{four:?}"));
     let close = |ours: N<f64>, exact: f64| assert!((ours.0 - exact).abs() < 1e-13, "{} {exact}", ours.0);
     let [[aa, ab], [ba, bb]] = one.by_coordinate;

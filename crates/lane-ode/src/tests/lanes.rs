@@ -1,7 +1,7 @@
 //! Each operation of each lane type gives the bits of plain `f64`, whatever stands in the other lanes.
 
+use super::array::Array;
 use super::instruction_sets;
-use crate::pair::Pair;
 use crate::{Kernel, Lane, N, Simd, trig};
 
 /// Operands of one lane.
@@ -163,11 +163,10 @@ fn every_operation_of_every_instruction_set_gives_the_bits_of_plain_numbers() {
 }
 
 #[test]
-fn every_operation_of_paired_registers_gives_the_bits_of_plain_numbers() {
+fn every_operation_of_plain_arrays_gives_the_bits_of_plain_numbers() {
     let operands = operands();
-    let two = Pair::first(0.0);
-    check("two lanes", &operands, &Operations(&operands).run(two));
-    check("four lanes", &operands, &Operations(&operands).run(Pair::first(two)));
+    check("Array<2>", &operands, &Operations(&operands).run(Array([0.0; 2])));
+    check("Array<3>", &operands, &Operations(&operands).run(Array([0.0; 3])));
 }
 
 struct CountLanes;

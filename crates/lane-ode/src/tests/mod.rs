@@ -1,6 +1,7 @@
 //! What the integrators promise, shown on small equations whose solutions are known.
 
 mod allocation;
+pub(crate) mod array;
 mod dual;
 mod failures;
 mod lanes;

@@ -1,7 +1,7 @@
 //! Peaks of parts, mean squares and times above zero, on waves of which all that is known.
 
+use super::array::Array;
 use super::peaks::Waves;
-use crate::pair::Pair;
 use crate::{Lane, N, PartPeaks, Peaks, Sample, SquareIntegrals, TimeAbove};
 use core::f64::consts::TAU;
 
@@ -58,13 +58,11 @@ fn parts_peak_as_if_each_were_a_trajectory_of_its_own() {
 
 #[test]
 fn a_lane_does_not_feel_where_others_are_cut() {
-    let zero = N(Pair::first(Pair::first(0.0)));
-    let every_lane = ((true, true), (true, true));
-    let cuts = [vec![0.3, 0.33, 2.0], vec![], vec![0.301, 1.999], vec![1.0]];
-    let mut together = PartPeaks::<_, 1>::new(zero);
-    let all: Vec<Waves> = (0..4).map(waves).collect();
+    let cuts = [vec![0.3, 0.33, 2.0], vec![], vec![0.301, 1.999]];
+    let mut together = PartPeaks::<Array<3>, 1>::new(N(Array([0.0; 3])));
+    let all: Vec<Waves> = (0..3).map(waves).collect();
     let sample = |t: f64| {
-        let mut lanes = Sample::still(zero, zero);
+        let mut lanes = Sample::still(N(Array([0.0; 3])), N(Array([0.0; 3])));
         for (lane, waves) in all.iter().enumerate() {
             let one = waves.sample(t);
             lanes.value.0.set(lane, one.value.0);
@@ -76,12 +74,12 @@ fn a_lane_does_not_feel_where_others_are_cut() {
     for (lane, cuts) in cuts.iter().enumerate() {
         together.reset(lane, cuts);
     }
-    together.begin(&sample(0.0), every_lane);
+    together.begin(&sample(0.0), [true; 3]);
     for i in 1..=60 {
-        let (t, h) = (0.05 * f64::from(i), zero.lit(0.05));
-        together.advance(zero.lit(t), h, &sample(t), every_lane);
+        let (t, h) = (0.05 * f64::from(i), N(Array([0.05; 3])));
+        together.advance(N(Array([t; 3])), h, &sample(t), [true; 3]);
     }
-    for lane in 0..4 {
+    for lane in 0..3 {
         let mut alone = PartPeaks::<f64, 1>::new(N(0.0));
         alone.reset(0, &cuts[lane]);
         alone.begin(&[all[lane].sample(0.0)], true);
