@@ -60,6 +60,11 @@ impl Real for f64 {
     }
     #[inline(always)]
     fn neg(self) -> Self {
+        #[cfg(target_arch = "aarch64")]
+        {
+            crate::aarch64::negated(self)
+        }
+        #[cfg(not(target_arch = "aarch64"))]
         -self
     }
     #[inline(always)]

@@ -43,7 +43,7 @@ impl<const W: usize> Real for Array<W> {
     }
     #[inline(always)]
     fn neg(self) -> Self {
-        self.map(|a| -a)
+        self.map(Real::neg)
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {

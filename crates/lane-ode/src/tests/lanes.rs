@@ -3,14 +3,15 @@
 use super::array::Array;
 use super::instruction_sets;
 use crate::{Kernel, Lane, N, Simd, trig};
+use core::hint::black_box;
 
 /// Operands of one lane.
 type Operands = [f64; 3];
 
-/// What is computed of them: ten numbers, sine and cosine twice, one truth value.
-const RESULTS: usize = 18;
+/// What is computed of them: numbers, sine and cosine twice, two choices.
+const RESULTS: usize = 21;
 
-/// What IEEE 754 and the standard library say.
+/// What IEEE 754 and the standard library say; of a negated sum, without the compiler's eye on both at once (`aarch64::negated`).
 fn expected([a, b, c]: Operands) -> [f64; RESULTS] {
     let (sin, cos) = trig::sin_cos(a);
     let (sin_turns, cos_turns) = trig::sin_cos_turns(N(a));
@@ -24,6 +25,9 @@ fn expected([a, b, c]: Operands) -> [f64; RESULTS] {
         a.mul_add(b, c),
         a.mul_add(b, -c),
         (-a).mul_add(b, c),
+        -black_box(a.mul_add(b, c)),
+        -black_box(a.mul_add(b, -c)),
+        -black_box((-a).mul_add(b, c)),
         a.sqrt(),
         a.abs(),
         sin,
@@ -64,6 +68,9 @@ impl Kernel for Operations<'_> {
                 a.mul_add(b, c),
                 a.mul_sub(b, c),
                 a.neg_mul_add(b, c),
+                a.mul_add(b, c).neg(),
+                a.mul_sub(b, c).neg(),
+                a.neg_mul_add(b, c).neg(),
                 a.sqrt(),
                 a.abs(),
                 sin,
