@@ -62,7 +62,10 @@ def traced(binary, simd, first, last):
         run.kill()
         run.wait()
     found = (re.search(r"\[[0-9a-f]+/([0-9a-f]+)/", line) for line in tail)
-    return [int(address[1], 16) - BASE for address in found if address]
+    addresses = [int(address[1], 16) - BASE for address in found if address]
+    if not addresses:
+        sys.exit(f"{binary} {simd} ran nothing between {BASE + first:#x} and {BASE + last:#x}: does this qemu put it elsewhere?")
+    return addresses
 
 
 def step(addresses):
