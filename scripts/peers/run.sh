@@ -23,6 +23,7 @@ fi
 "$work/venv/bin/pip" install --quiet --requirement scripts/peers/requirements.txt
 
 cargo build --release -p washer-capi --lib --example trajectory
+cargo build --release --bin sweep
 flags=(-O3 -march=native -Icrates/washer-capi/include -Ltarget/release -Wl,-rpath,"$PWD/target/release")
 cc "${flags[@]}" -o "$work/cvode" scripts/peers/cvode.c \
   -lwasher_capi -lsundials_cvode -lsundials_nvecserial -lsundials_sunmatrixdense -lsundials_sunlinsoldense -lm

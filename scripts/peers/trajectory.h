@@ -20,7 +20,9 @@ enum { YAW = 4, YAW_RATE = 14 };
 static inline washer *paper_trajectory(void) {
     static const char *const names[] = {"unbalance_mass_kg", "damping_n_s_per_m"};
     static const double values[] = {0.4, 140.0};
-    const washer_setup setup = {"nonlinear", "triangular", 350.0, 50.0, NULL, NULL, 0, names, values, 2};
+    const char *linear = getenv("LINEAR");
+    const char *model = linear && *linear ? "linear" : "nonlinear";
+    const washer_setup setup = {model, "triangular", 350.0, 50.0, NULL, NULL, 0, names, values, 2};
     washer *made = NULL;
     enum washer_status status = washer_new(&setup, &made);
     if (status != WASHER_OK || washer_dimension() != DIMENSION) {
