@@ -6,6 +6,7 @@
 use crate::lane::Lane;
 use crate::num::N;
 use crate::system::{Count, Ended, Failure, Leg, Step, Task};
+use core::hint::black_box;
 
 /// On the imaginary axis the method is stable up to |h w| = 2 sqrt(2).
 pub const RK4_STABILITY_LIMIT: f64 = 2.828_427_124_746_190_3;
@@ -13,9 +14,8 @@ pub const RK4_STABILITY_LIMIT: f64 = 2.828_427_124_746_190_3;
 /// The most lanes any instruction set has here.
 pub const MAX_LANES: usize = 8;
 
-/// Nodes and weights, over one step: each stage starts `REACH` of the last slope away, and adds `WEIGHT` of its own.
-const REACH: [f64; 4] = [0.5, 0.5, 1.0, 0.0];
-const WEIGHT: [f64; 4] = [1.0, 2.0, 2.0, 1.0];
+/// How far along its slope each stage but the last goes to the next one's state, in steps.
+const REACH: [f64; 3] = [0.5, 0.5, 1.0];
 
 /// Steps of one lane's leg: the smallest whole number of equal steps not above the leg's own.
 #[must_use]
@@ -77,39 +77,46 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let Some(mut run) = active().map(|lane| lane.left).min() else { return };
 
         let h = clock.h;
-        let sixth = h / zero.lit(6.0);
+        let (one_third, one_sixth) = (zero.lit(1.0 / 3.0), h / zero.lit(6.0));
         let mut time = clock.at(index);
-        // At three times: the step's start, middle and end; start and end change places from step to step.
-        let mut forcing = [task.forcing(time); 3];
-        let (mut start, middle, mut end) = (0, 1, 2);
-        // States and slopes of this step's start and of the last one's, which change places too.
-        let (mut states, mut slopes) = ([x; 2], [x; 2]);
+        // At the step's start, then its middle, then its end, which is the next one's start. Hidden from the compiler, which would
+        // hold it in variables, and copy all of them from place to place in every step.
+        let mut forcing = task.forcing(time);
+        let forcing = black_box(&mut forcing);
+        // States and slopes of this step's start and of the last one's, which change places too; then two more for the states of
+        // stages. All states in one array, so that a stage's is one address away. Few places, for the first cache is small.
+        let (mut states, mut slopes) = ([x; 4], [x; 2]);
         let (mut now, mut last) = (0, 1);
-        let (mut y, mut sum) = (x, x);
         let mut is_fresh = true;
         let mut done = 0;
         loop {
             // The one after the last is an evaluation only: observers want the slope at both ends of a step.
             let is_last = done == run;
             let next_time = clock.at(index + 1.0);
-            let stages = if is_last { 1 } else { 4 };
-            if !is_last {
-                // One copy of the code for both, as below.
-                for (place, at) in [(middle, clock.at(index + 0.5)), (end, next_time)] {
-                    task.renew(at, &mut forcing[place]);
-                }
-            }
-            let places = [start, middle, middle, end];
+            // Nobody asks for the last step's start any more once this one's has been observed.
+            let (second, third, fourth) = (2, last, 3);
             // One copy of the right-hand side: four would not fit the instruction cache.
-            for stage in 0..stages {
-                let forcing = &forcing[places[stage]];
-                let slope = task.derivative(forcing, if stage == 0 { &states[now] } else { &y });
-                let reach = (h * REACH[stage]).v();
-                if stage == 0 {
+            for (stage, from) in [now, second, third, fourth].into_iter().enumerate() {
+                if stage % 2 == 1 {
+                    task.renew(if stage == 1 { clock.at(index + 0.5) } else { next_time }, forcing);
+                }
+                let slope = task.derivative(forcing, &states[from]);
+                if stage == 3 {
+                    // x + h (k1 + 2 k2 + 2 k3 + k4) / 6, where the later stages' states tell what h k1 to h k3 are: no sum of
+                    // slopes is kept, for stores are what this loop has least room for.
                     for i in 0..D {
-                        y[i] = states[now][i] + reach * slope[i];
-                        sum[i] = slope[i];
+                        let x = states[now][i];
+                        let moved = states[second][i] + states[fourth][i] + 2.0 * states[third][i] - 4.0 * x;
+                        states[last][i] = x + one_third * moved + one_sixth * slope[i];
                     }
+                    break;
+                }
+                let to = [second, third, fourth][stage];
+                let reach = (h * REACH[stage]).v();
+                for i in 0..D {
+                    states[to][i] = states[now][i] + reach * slope[i];
+                }
+                if stage == 0 {
                     slopes[now] = slope;
                     if is_fresh {
                         task.begin(forcing, &states[now], &slopes[now]);
@@ -128,24 +135,17 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                             },
                         );
                     }
-                } else {
-                    let weight = zero.lit(WEIGHT[stage]);
-                    for i in 0..D {
-                        y[i] = states[now][i] + reach * slope[i];
-                        sum[i] += weight * slope[i];
+                    if is_last {
+                        break;
                     }
                 }
             }
             if is_last {
                 break;
             }
-            for i in 0..D {
-                states[last][i] = states[now][i] + sixth * sum[i];
-            }
             (now, last) = (last, now);
             index = index + 1.0;
             time = next_time;
-            (start, end) = (end, start);
             done += 1;
             let in_range = task.in_range(&states[now]);
             if !T::all(in_range) {
