@@ -84,7 +84,7 @@ pub struct Caps {
 #[derive(Clone, Copy)]
 pub(crate) struct Scaling<T> {
     /// Square of the bearings' cap, rad^2/s^2.
-    bearings_squared: N<T>,
+    pub(crate) bearings_squared: N<T>,
     /// Reciprocal square of the hinge's; 0 if it is left alone.
     per_hinge_squared: N<T>,
 }
@@ -166,14 +166,14 @@ impl<T: Real> Coupling<T> {
     }
 
     /// Accelerations du/dt of both halves, given without the bearings' forces, at theta' = `speed`. `sag` is the part of the deflection
-    /// that does not turn with the drum, if it is counted from there.
+    /// that does not turn with the drum. The linear model's are in `linear_step.rs`.
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,
         bodies: &Bodies<T>,
         speed: N<T>,
         deflection: &Deflection<T>,
-        sag: Option<&Deflection<T>>,
+        sag: &Deflection<T>,
         (tub, tub_inertia): (&Floating<T, 2>, &Factors<T, 2>),
         (rotor, rotor_inertia): (&Floating<T, 4>, &Factors<T, 4>),
     ) -> [N<T>; COORDINATES] {
@@ -205,7 +205,7 @@ fn mass_scaled_load<T: Real>(
     b: &Bodies<T>,
     (cap_squared, speed_squared): (N<T>, N<T>),
     deflection: &Deflection<T>,
-    sag: Option<&Deflection<T>>,
+    sag: &Deflection<T>,
     tub: &Response<T>,
     rotor: &Response<T>,
 ) -> AxisLoad<T> {
@@ -227,11 +227,9 @@ fn mass_scaled_load<T: Real>(
     for i in 0..4 {
         load[i] = tub.free[i] - (both_squared * d[i] + rotor.free[i]);
     }
-    if let Some(sag) = sag {
-        let sag = sag.rows();
-        for i in 0..4 {
-            load[i] += speed_squared * sag[i];
-        }
+    let sag = sag.rows();
+    for i in 0..4 {
+        load[i] += speed_squared * sag[i];
     }
     let [force_y, force_z, moment_y, moment_z] = Factors::new(system).solve(load);
     AxisLoad { force: [force_y, force_z], moment: [moment_y, moment_z] }

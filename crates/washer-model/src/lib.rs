@@ -69,6 +69,7 @@ mod history;
 mod lanes;
 mod linear;
 mod linear_outputs;
+mod linear_step;
 mod machine;
 mod modal;
 mod model;
@@ -82,6 +83,7 @@ mod shape;
 mod sparse;
 mod spin;
 mod suspension;
+mod symmetric;
 mod violations;
 
 pub use campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};

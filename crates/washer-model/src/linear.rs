@@ -5,67 +5,52 @@
 //! nonlinear model it is solved by halves, each about its mass centre; only the bearings couple them.
 
 use crate::coefficients::{Bodies, Coefficients};
-use crate::coupling::{Coupling, Deflection, HingeMass};
-use crate::floating::{Factors, Floating};
+use crate::coupling::Deflection;
 use crate::forces::AxisLoad;
 use crate::frame::Tilt;
 use crate::harmonics::{self, FUNCTIONS, HARMONICS, SAMPLES};
-use crate::lanes::{GetLane, SetLane, Splat};
+use crate::lanes::GetLane;
 use crate::nonlinear::{COORDINATES, Half, rotor, tub};
-use crate::rotor_terms::{self as entry, ENTRIES, ROWS, RotorTerms};
+use crate::rotor_terms::{self as entry, ENTRIES, INERTIA_ENTRIES, InertiaTerms, ROWS, RotorTerms, Terms};
 use crate::spin::SpinState;
 use lane_ode::{Dual, Lane, N, Real};
 
 /// Coordinates of the tub: q1, q2, q5, q6.
 pub(crate) const TUB: [usize; 4] = [0, 1, 4, 5];
+/// Those that turn it.
+const TUB_TURNS: [usize; 2] = [4, 5];
 /// Coordinates that turn the rotor: q7 to q10. Its forces do not depend on q3 and q4 but through the bearings.
-const TURNS: [usize; 4] = [6, 7, 8, 9];
+pub(crate) const TURNS: [usize; 4] = [6, 7, 8, 9];
 
-/// The linear model of one machine; `N<f64>` for one, `N<T>` for one per lane.
+/// Entries of all arrays of the rotor, its inertia after all others.
+const ALL_ENTRIES: usize = ENTRIES + INERTIA_ENTRIES;
+
+/// What does not depend on the spin. Rows are forces (y, z) and torques about a half's mass centre, columns those of `TUB`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Constants<T> {
-    tub_per_mass: N<T>,
-    tub_arm: [[N<T>; 2]; 2],
-    tub_axis: [[N<T>; 2]; 2],
-    tub_inertia: [[N<T>; 2]; 2],
-    tub_stiffness: [[N<T>; 4]; 4],
-    tub_damping: [[N<T>; 4]; 4],
-    rotor_per_mass: N<T>,
-    rotor_axis: [[N<T>; 2]; 2],
-}
-
-macro_rules! each_field {
-    ($mac:ident) => {
-        $mac!(
-            tub_per_mass,
-            tub_arm,
-            tub_axis,
-            tub_inertia,
-            tub_stiffness,
-            tub_damping,
-            rotor_per_mass,
-            rotor_axis
-        )
-    };
-}
-
-impl<T: Lane> SetLane<Constants<f64>> for Constants<T> {
-    fn set_lane(&mut self, lane: usize, from: &Constants<f64>) {
-        macro_rules! set { ($($f:ident),*) => { $(self.$f.set_lane(lane, &from.$f);)* }; }
-        each_field!(set);
-    }
+    pub(crate) tub_per_mass: N<T>,
+    /// Partial velocities of the tub's mass centre.
+    pub(crate) tub_arm: [[N<T>; 2]; 2],
+    pub(crate) tub_axis: [[N<T>; 2]; 2],
+    pub(crate) tub_inertia: [[N<T>; 2]; 2],
+    pub(crate) tub_stiffness: [[N<T>; 4]; 4],
+    pub(crate) tub_damping: [[N<T>; 4]; 4],
+    pub(crate) rotor_per_mass: N<T>,
+    pub(crate) rotor_axis: [[N<T>; 2]; 2],
 }
 
 impl<T: Lane> Constants<T> {
     fn lane(&self, lane: usize) -> Constants<f64> {
-        macro_rules! get { ($($f:ident),*) => { Constants { $($f: self.$f.get_lane(lane),)* } }; }
-        each_field!(get)
-    }
-
-    #[inline(always)]
-    pub(crate) fn splat(zero: N<T>, from: &Constants<f64>) -> Self {
-        macro_rules! splat { ($($f:ident),*) => { Self { $($f: Splat::splat(zero, &from.$f),)* } }; }
-        each_field!(splat)
+        Constants {
+            tub_per_mass: self.tub_per_mass.get_lane(lane),
+            tub_arm: self.tub_arm.get_lane(lane),
+            tub_axis: self.tub_axis.get_lane(lane),
+            tub_inertia: self.tub_inertia.get_lane(lane),
+            tub_stiffness: self.tub_stiffness.get_lane(lane),
+            tub_damping: self.tub_damping.get_lane(lane),
+            rotor_per_mass: self.rotor_per_mass.get_lane(lane),
+            rotor_axis: self.rotor_axis.get_lane(lane),
+        }
     }
 }
 
@@ -73,7 +58,7 @@ impl<T: Lane> Constants<T> {
 #[derive(Clone, Debug)]
 pub(crate) struct LinearPoint {
     pub(crate) constants: Constants<f64>,
-    pub(crate) terms: RotorTerms<f64>,
+    pub(crate) terms: Terms<f64>,
 }
 
 /// Linearises one machine per lane about the equilibrium `q`.
@@ -101,7 +86,7 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
         }
     }
 
-    let mut samples = [[[zero; HARMONICS]; ENTRIES]; 3];
+    let mut samples = [[[zero; HARMONICS]; ALL_ENTRIES]; 3];
     for (k, &(cos, sin)) in SAMPLES.iter().enumerate() {
         for (kind, (speed, acceleration)) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
             let spin =
@@ -132,7 +117,7 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
                 samples[kind][entry::force(2 + r)][k] =
                     torque[r] - arm[r][0] * force[0] - arm[r][1] * force[1];
                 for s in 0..=r {
-                    samples[kind][entry::inertia(r, s)][k] = inertia[r][s];
+                    samples[kind][ENTRIES + entry::inertia(r, s)][k] = inertia[r][s];
                 }
                 samples[kind][entry::arm(r, 0)][k] = arm[r][0];
                 samples[kind][entry::arm(r, 1)][k] = arm[r][1];
@@ -151,10 +136,7 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
         rotor_axis: Tilt::new(q[6], q[7]).axis_partials(),
     };
     (0..T::LANES)
-        .map(|lane| LinearPoint {
-            constants: constants.lane(lane),
-            terms: RotorTerms::gather(&coefficients_of_lane(&samples, lane)),
-        })
+        .map(|lane| LinearPoint { constants: constants.lane(lane), terms: terms_of_lane(&samples, lane) })
         .collect()
 }
 
@@ -189,17 +171,14 @@ fn about_centre<T: Real, const R: usize, const ROWS: usize>(
     rows
 }
 
-/// Coefficients of all functions in each entry of one lane, from samples at no spin, unit speed and unit acceleration.
-fn coefficients_of_lane<T: Lane>(
-    samples: &[[[N<T>; HARMONICS]; ENTRIES]; 3],
-    lane: usize,
-) -> [[f64; FUNCTIONS]; ENTRIES] {
-    let mut all = [[0.0; FUNCTIONS]; ENTRIES];
-    for (entry, functions) in all.iter_mut().enumerate() {
+/// Terms of one lane, from samples at no spin, unit speed and unit acceleration.
+fn terms_of_lane<T: Lane>(samples: &[[[N<T>; HARMONICS]; ALL_ENTRIES]; 3], lane: usize) -> Terms<f64> {
+    let coefficients = |entry: usize| {
+        let mut functions = [0.0; FUNCTIONS];
         let of = |kind: usize| harmonics::coefficients(samples[kind][entry].map(|v| v.0.get(lane)));
         let [rest, at_speed, accelerated] = [of(0), of(1), of(2)];
         functions[harmonics::ONE..harmonics::SPEED].copy_from_slice(&rest);
-        if entry >= entry::damping(0, 0) {
+        if (entry::damping(0, 0)..ENTRIES).contains(&entry) {
             functions[harmonics::SPEED..harmonics::SPIN].copy_from_slice(&at_speed);
         } else {
             for harmonic in 0..HARMONICS {
@@ -207,90 +186,12 @@ fn coefficients_of_lane<T: Lane>(
             }
             functions[harmonics::ACCELERATION] = accelerated[0] - rest[0];
         }
+        functions
+    };
+    Terms {
+        inertia: InertiaTerms::gather(&core::array::from_fn(|entry| coefficients(ENTRIES + entry))),
+        others: RotorTerms::gather(&core::array::from_fn(coefficients)),
     }
-    all
-}
-
-/// The rotor's arrays at one instant.
-#[derive(Clone, Copy)]
-pub(crate) struct RotorAt<T> {
-    entries: [[N<T>; 1]; ENTRIES],
-    inertia: Factors<T, 4>,
-}
-
-impl<T: Copy> RotorAt<T> {
-    /// Partial velocities of the rotor's mass centre.
-    #[inline(always)]
-    fn arm(&self) -> [[N<T>; 2]; 4] {
-        let e = &self.entries;
-        let mut arm = [[e[0][0]; 2]; 4];
-        for r in 0..4 {
-            arm[r] = [e[entry::arm(r, 0)][0], e[entry::arm(r, 1)][0]];
-        }
-        arm
-    }
-}
-
-/// What depends on time alone.
-#[inline(always)]
-pub(crate) fn rotor_at<T: Lane>(
-    terms: &RotorTerms<T>,
-    spin: &SpinState<T>,
-    hinge_mass: Option<HingeMass<T>>,
-) -> RotorAt<T> {
-    let zero = spin.sin.lit(0.0);
-    let mut rotor = RotorAt { entries: [[zero]; ENTRIES], inertia: Factors::new([[zero; 4]; 4]) };
-    rotor.renew(terms, spin, hinge_mass);
-    rotor
-}
-
-impl<T: Lane> RotorAt<T> {
-    /// Overwrites the arrays by those of another instant; `terms` are the same.
-    #[inline(always)]
-    pub(crate) fn renew(
-        &mut self,
-        terms: &RotorTerms<T>,
-        spin: &SpinState<T>,
-        hinge_mass: Option<HingeMass<T>>,
-    ) {
-        terms.sum(&harmonics::functions(spin), &mut self.entries);
-        let zero = spin.sin.lit(0.0);
-        let mut inertia = [[zero; 4]; 4];
-        for row in 0..4 {
-            for column in 0..=row {
-                [inertia[row][column]] = self.entries[entry::inertia(row, column)];
-            }
-        }
-        if let Some(mass) = hinge_mass {
-            for (place, r) in [2, 3].into_iter().enumerate() {
-                inertia[r][r] += mass.inertia;
-                self.entries[entry::force(2 + r)][0] += mass.torque[place];
-            }
-        }
-        self.inertia = Factors::new(inertia);
-    }
-}
-
-/// Accelerations du/dt at deviations `q` from equilibrium, speeds `u` and theta' = `speed`.
-#[inline(always)]
-pub(crate) fn accelerations<T: Lane>(
-    bodies: &Bodies<T>,
-    coupling: &Coupling<T>,
-    constants: &Constants<T>,
-    tub_inertia: &Factors<T, 2>,
-    (rotor_at, speed): (&RotorAt<T>, N<T>),
-    q: &[N<T>; COORDINATES],
-    u: &[N<T>; COORDINATES],
-) -> [N<T>; COORDINATES] {
-    let (tub, rotor) = unloaded(constants, rotor_at, q, u, q[0].lit(0.0));
-    coupling.accelerations(
-        bodies,
-        speed,
-        &deflection(constants, q),
-        None,
-        (&tub, tub_inertia),
-        (&rotor, &rotor_at.inertia),
-    )
 }
 
 /// What deviations from equilibrium add to the bearings' deflection.
@@ -304,60 +205,6 @@ fn deflection<T: Real>(c: &Constants<T>, q: &[N<T>; COORDINATES]) -> Deflection<
                 - (c.tub_axis[0][1] * q[4] + c.tub_axis[1][1] * q[5]),
         ],
     }
-}
-
-/// Both halves without what the bearings add to their equilibrium load.
-#[inline(always)]
-fn unloaded<T: Lane>(
-    c: &Constants<T>,
-    rotor_at: &RotorAt<T>,
-    q: &[N<T>; COORDINATES],
-    u: &[N<T>; COORDINATES],
-    zero: N<T>,
-) -> (Floating<T, 2>, Floating<T, 4>) {
-    let mut tub = [zero; 4];
-    for row in 0..4 {
-        for column in 0..4 {
-            let j = TUB[column];
-            tub[row] = tub[row] - c.tub_stiffness[row][column] * q[j] - c.tub_damping[row][column] * u[j];
-        }
-    }
-    let e = &rotor_at.entries;
-    let mut rotor = [zero; ROWS];
-    for row in 0..ROWS {
-        [rotor[row]] = e[entry::force(row)];
-        for column in 0..4 {
-            let ([stiffness], [damping]) = (e[entry::stiffness(row, column)], e[entry::damping(row, column)]);
-            let j = TURNS[column];
-            rotor[row] = rotor[row] - stiffness * q[j] - damping * u[j];
-        }
-    }
-    (
-        Floating {
-            per_mass: c.tub_per_mass,
-            force: [tub[0], tub[1]],
-            drift: [zero; 2],
-            arm: c.tub_arm,
-            axis: c.tub_axis,
-            axis_drift: [zero; 2],
-            torque: [tub[2], tub[3]],
-        },
-        Floating {
-            per_mass: c.rotor_per_mass,
-            force: [rotor[0], rotor[1]],
-            drift: [zero; 2],
-            arm: rotor_at.arm(),
-            axis: c.rotor_axis,
-            axis_drift: [zero; 2],
-            torque: [rotor[2], rotor[3], rotor[4], rotor[5]],
-        },
-    )
-}
-
-/// The tub's inertia, factored once.
-#[inline(always)]
-pub(crate) fn tub_factors<T: Real>(constants: &Constants<T>) -> Factors<T, 2> {
-    Factors::new(constants.tub_inertia)
 }
 
 /// M, C, K and F of Eq. 41 in the coordinates q, as full matrices; for one machine, at one instant.
@@ -397,47 +244,59 @@ impl LinearPoint {
 
     /// The matrices at one instant; `bodies` is the same machine's.
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
-        let zero = N(0.0);
         let c = &self.constants;
-        let rotor_at = rotor_at(&RotorTerms::splat(zero, &self.terms), spin, None);
-        // Columns of C and K, and F, are forces of single deviations; the bearings' share comes back with them.
-        let rows = |q: &[N<f64>; COORDINATES], u: &[N<f64>; COORDINATES], loaded: bool| {
-            let (mut tub, mut rotor) = unloaded(c, &rotor_at, q, u, zero);
-            if loaded {
-                let on_shaft = deflection(c, q).load(bodies);
-                tub.apply(&on_shaft.reaction());
-                rotor.apply(&on_shaft);
-            }
-            let ([f1, f2], [f5, f6]) = tub.generalised_forces();
-            let ([f3, f4], [f7, f8, f9, f10]) = rotor.generalised_forces();
-            [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10].map(|f| f.0)
-        };
-        let still = [zero; COORDINATES];
-        let force = rows(&still, &still, false);
+        let (inertia, e) = self.terms.at(&harmonics::functions(spin));
+        let rotor_arm = entry::arms(&e);
         let mut matrices = Matrices {
             mass: [[0.0; COORDINATES]; COORDINATES],
             damping: [[0.0; COORDINATES]; COORDINATES],
-            stiffness: [[0.0; COORDINATES]; COORDINATES],
-            force,
+            stiffness: self.bearing_stiffness(bodies),
+            force: about_midpoint([2, 3], &TURNS, &rotor_arm, |row| e[entry::force(row)][0]),
         };
-        for j in 0..COORDINATES {
-            let mut unit = still;
-            unit[j] = N(1.0);
-            let (of_q, of_u) = (rows(&unit, &still, true), rows(&still, &unit, false));
+        let mut add = |j: usize, stiffness: [f64; COORDINATES], damping: [f64; COORDINATES]| {
             for i in 0..COORDINATES {
-                matrices.stiffness[i][j] = force[i] - of_q[i];
-                matrices.damping[i][j] = force[i] - of_u[i];
+                matrices.stiffness[i][j] += stiffness[i];
+                matrices.damping[i][j] += damping[i];
             }
+        };
+        for column in 0..4 {
+            add(
+                TUB[column],
+                about_midpoint([0, 1], &TUB_TURNS, &c.tub_arm, |row| c.tub_stiffness[row][column]),
+                about_midpoint([0, 1], &TUB_TURNS, &c.tub_arm, |row| c.tub_damping[row][column]),
+            );
+            add(
+                TURNS[column],
+                about_midpoint([2, 3], &TURNS, &rotor_arm, |row| e[entry::stiffness(row, column)][0]),
+                about_midpoint([2, 3], &TURNS, &rotor_arm, |row| e[entry::damping(row, column)][0]),
+            );
         }
-        let e = &rotor_at.entries;
-        let rotor_arm = rotor_at.arm();
-        let rotor_inertia = |r: usize, s: usize| e[entry::inertia(r, s)][0].0;
-        fill_mass(&mut matrices.mass, [0, 1], &[4, 5], c.tub_per_mass, &c.tub_arm, |r, s| {
+        fill_mass(&mut matrices.mass, [0, 1], &TUB_TURNS, c.tub_per_mass, &c.tub_arm, |r, s| {
             c.tub_inertia[r][s].0
         });
-        fill_mass(&mut matrices.mass, [2, 3], &TURNS, c.rotor_per_mass, &rotor_arm, rotor_inertia);
+        fill_mass(&mut matrices.mass, [2, 3], &TURNS, c.rotor_per_mass, &rotor_arm, |r, s| {
+            inertia[entry::inertia(r, s)][0].0
+        });
         matrices
     }
+}
+
+/// Forces that the coordinates see, from a half's force (y, z) and torques about its mass centre: the inverse of `about_centre`.
+fn about_midpoint<const R: usize>(
+    midpoint: [usize; 2],
+    turns: &[usize; R],
+    arm: &[[N<f64>; 2]; R],
+    rows: impl Fn(usize) -> N<f64>,
+) -> [f64; COORDINATES] {
+    let mut forces = [0.0; COORDINATES];
+    let force = [rows(0), rows(1)];
+    for i in 0..2 {
+        forces[midpoint[i]] = force[i].0;
+    }
+    for r in 0..R {
+        forces[turns[r]] = (rows(2 + r) + arm[r][0] * force[0] + arm[r][1] * force[1]).0;
+    }
+    forces
 }
 
 /// One block of the mass matrix: J^T M J of the transformation in `floating`.

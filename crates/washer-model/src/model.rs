@@ -1,15 +1,14 @@
 //! The two models as systems over lanes, and what they have in common.
 
-use crate::coefficients::Coefficients;
+use crate::coefficients::{Bodies, Coefficients};
 use crate::coupling::{Coupling, Sag};
-use crate::floating::Factors;
 use crate::lanes::SetLane;
-use crate::linear::{self, Constants, RotorAt};
 use crate::linear_outputs::{LinearMotion, LinearOutputs};
+use crate::linear_step::{self, RotorAt, StepConstants};
 use crate::nonlinear::{self, COORDINATES};
 use crate::outputs::{Axes, CHANNELS, Motion, RADIAL};
 use crate::point::Point;
-use crate::rotor_terms::RotorTerms;
+use crate::rotor_terms::Terms;
 use crate::spin::{SpinLanes, SpinState, SpinStretch};
 use core::f64::consts::FRAC_PI_2;
 use lane_ode::{Lane, N, Sample, System};
@@ -155,10 +154,9 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
 /// The linear model.
 pub(crate) struct Linear<T> {
     coupling: Coupling<T>,
-    machine: Coefficients<T>,
-    constants: Constants<T>,
-    tub_inertia: Factors<T, 2>,
-    terms: RotorTerms<T>,
+    bodies: Bodies<T>,
+    constants: StepConstants<T>,
+    terms: Terms<T>,
     sag: Sag<T>,
     outputs: LinearOutputs<T>,
     spin: SpinLanes<T>,
@@ -177,26 +175,22 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     #[inline(always)]
     fn forcing(&self, t_s: N<T>) -> LinearForcing<T> {
         let spin = self.spin.at(t_s);
-        let hinge_mass = self.coupling.hinge_mass(&self.machine.bodies, &spin, &self.sag);
-        let rotor = linear::rotor_at(&self.terms, &spin, hinge_mass);
-        LinearForcing { rotor, spin }
+        let hinge_mass = self.coupling.hinge_mass(&self.bodies, &spin, &self.sag);
+        let rotor = RotorAt::new(&self.constants, &self.coupling, &self.terms, &spin, hinge_mass);
+        LinearForcing { spin, rotor }
     }
 
     #[inline(always)]
     fn renew(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
         forcing.spin = self.spin.at(t_s);
-        let hinge_mass = self.coupling.hinge_mass(&self.machine.bodies, &forcing.spin, &self.sag);
-        forcing.rotor.renew(&self.terms, &forcing.spin, hinge_mass);
+        let hinge_mass = self.coupling.hinge_mass(&self.bodies, &forcing.spin, &self.sag);
+        forcing.rotor.renew(&self.constants, &self.coupling, &self.terms, &forcing.spin, hinge_mass);
     }
 
     #[inline(always)]
     fn derivative(&self, forcing: &LinearForcing<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
         let (q, u) = split(x);
-        let bodies = &self.machine.bodies;
-        let (constants, tub_inertia) = (&self.constants, &self.tub_inertia);
-        let rotor = (&forcing.rotor, forcing.spin.speed);
-        let a = linear::accelerations(bodies, &self.coupling, constants, tub_inertia, rotor, &q, &u);
-        joined(&u, &a)
+        joined(&u, &linear_step::accelerations(&self.constants, &self.coupling, &forcing.rotor, &q, &u))
     }
 
     #[inline(always)]
@@ -205,16 +199,18 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     }
 }
 
+fn step_constants(point: &Point) -> StepConstants<f64> {
+    StepConstants::new(&point.machine.bodies, &point.linear.constants)
+}
+
 impl<T: Lane> Model<T> for Linear<T> {
     #[inline(always)]
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
-        let constants = Constants::splat(zero, &point.linear.constants);
         Self {
             coupling,
-            machine: Coefficients::splat(zero, &point.machine),
-            tub_inertia: linear::tub_factors(&constants),
-            constants,
-            terms: RotorTerms::splat(zero, &point.linear.terms),
+            bodies: Bodies::splat(zero, &point.machine.bodies),
+            constants: StepConstants::splat(zero, &step_constants(point)),
+            terms: Terms::splat(zero, &point.linear.terms),
             sag: Sag::new(&point.equilibrium).splat(zero),
             outputs: LinearOutputs::splat(zero, &point.linear_outputs),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
@@ -222,11 +218,10 @@ impl<T: Lane> Model<T> for Linear<T> {
     }
 
     fn set_point(&mut self, lane: usize, point: &Point) {
-        self.machine.set_lane(lane, &point.machine);
-        self.constants.set_lane(lane, &point.linear.constants);
-        self.tub_inertia.set_lane(lane, &linear::tub_factors(&point.linear.constants));
-        self.terms.set_lane(lane, &point.linear.terms);
+        self.bodies.set_lane(lane, &point.machine.bodies);
+        self.constants.set_lane(lane, &step_constants(point));
         self.sag.set_lane(lane, &Sag::new(&point.equilibrium));
+        self.terms.set_lane(lane, &point.linear.terms);
         self.outputs.set_lane(lane, &point.linear_outputs);
     }
 

@@ -79,7 +79,7 @@ pub(crate) fn accelerations<T: Real>(
         machine.bodies,
         spin.speed,
         &Deflection::new(q, &tub.tilt, &rotor.tilt),
-        Some(&sag.bearings),
+        &sag.bearings,
         (&tub.floating, &Factors::new(tub.inertia)),
         (&rotor.floating, &Factors::new(rotor.inertia)),
     )

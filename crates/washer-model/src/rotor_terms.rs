@@ -8,22 +8,26 @@ use crate::harmonics::{
     ACCELERATION, COS, COS_2, FUNCTIONS, ONE, SIN, SIN_2, SPEED, SPEED_COS, SPEED_COS_2, SPEED_SIN,
     SPEED_SIN_2, SPIN, SPIN_COS, SPIN_COS_2, SPIN_SIN, SPIN_SIN_2,
 };
+use crate::lanes::SetLane;
 use crate::sparse::sparse_sums;
+use lane_ode::{Lane, N};
 
 /// Rows of the rotor.
 pub(crate) const ROWS: usize = 6;
 /// Its rotations.
 pub(crate) const TURNS: usize = 4;
 
-const ARM: usize = TURNS * (TURNS + 1) / 2;
+const ARM: usize = 0;
 const FORCE: usize = ARM + 2 * TURNS;
 const STIFFNESS: usize = FORCE + ROWS;
 const DAMPING: usize = STIFFNESS + ROWS * TURNS;
 
-/// Entries of all arrays of the rotor together.
+/// Entries of all arrays of the rotor together but its inertia.
 pub(crate) const ENTRIES: usize = DAMPING + ROWS * TURNS;
+/// Entries of its inertia: the lower triangle.
+pub(crate) const INERTIA_ENTRIES: usize = TURNS * (TURNS + 1) / 2;
 
-/// Entry of the inertia matrix about the mass centre, `row` not less than `column`.
+/// Entry of the inertia matrix about the mass centre, `row` not less than `column`, among those of the inertia.
 pub(crate) const fn inertia(row: usize, column: usize) -> usize {
     row * (row + 1) / 2 + column
 }
@@ -38,6 +42,11 @@ pub(crate) const fn force(row: usize) -> usize {
     FORCE + row
 }
 
+/// Whether a force depends on a rotation and its speed: y of the midpoint's does not on the yaw.
+pub(crate) const fn moves(row: usize, column: usize) -> bool {
+    row > 0 || column > 0
+}
+
 /// Entry of the stiffness matrix.
 pub(crate) const fn stiffness(row: usize, column: usize) -> usize {
     STIFFNESS + row * TURNS + column
@@ -48,9 +57,56 @@ pub(crate) const fn damping(row: usize, column: usize) -> usize {
     DAMPING + row * TURNS + column
 }
 
+/// Coefficients of all terms of the rotor, of one machine in `f64`, of one per lane in `T`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Terms<T> {
+    pub(crate) inertia: InertiaTerms<T>,
+    pub(crate) others: RotorTerms<T>,
+}
+
+impl<T: Lane> Terms<T> {
+    #[inline(always)]
+    pub(crate) fn splat(zero: N<T>, from: &Terms<f64>) -> Self {
+        Self {
+            inertia: InertiaTerms::splat(zero, &from.inertia),
+            others: RotorTerms::splat(zero, &from.others),
+        }
+    }
+}
+
+impl Terms<f64> {
+    /// The inertia's entries and all others, at the functions of an instant.
+    pub(crate) fn at(
+        &self,
+        functions: &[[N<f64>; 1]; FUNCTIONS],
+    ) -> ([[N<f64>; 1]; INERTIA_ENTRIES], [[N<f64>; 1]; ENTRIES]) {
+        let (mut inertia, mut others) = ([[N(0.0)]; INERTIA_ENTRIES], [[N(0.0)]; ENTRIES]);
+        self.inertia.sum(functions, &mut inertia);
+        self.others.sum(functions, &mut others);
+        (inertia, others)
+    }
+}
+
+/// Partial velocities of the mass centre, among all entries.
+#[inline(always)]
+pub(crate) fn arms<T: Copy>(entries: &[[N<T>; 1]; ENTRIES]) -> [[N<T>; 2]; TURNS] {
+    let mut arms = [[entries[0][0]; 2]; TURNS];
+    for r in 0..TURNS {
+        arms[r] = [entries[arm(r, 0)][0], entries[arm(r, 1)][0]];
+    }
+    arms
+}
+
+impl<T: Lane> SetLane<Terms<f64>> for Terms<T> {
+    fn set_lane(&mut self, lane: usize, from: &Terms<f64>) {
+        self.inertia.set_lane(lane, &from.inertia);
+        self.others.set_lane(lane, &from.others);
+    }
+}
+
 sparse_sums! {
-    /// Coefficients of the rotor's terms.
-    RotorTerms: FUNCTIONS => ENTRIES;
+    /// Coefficients of the inertia's terms.
+    InertiaTerms: FUNCTIONS => INERTIA_ENTRIES;
     inertia(0, 0) => ONE COS SIN COS_2 SIN_2;
     inertia(1, 0) => ONE COS SIN COS_2 SIN_2;
     inertia(1, 1) => ONE COS COS_2;
@@ -61,6 +117,11 @@ sparse_sums! {
     inertia(3, 1) => ONE COS SIN COS_2 SIN_2;
     inertia(3, 2) => COS SIN COS_2 SIN_2;
     inertia(3, 3) => ONE COS SIN COS_2 SIN_2;
+}
+
+sparse_sums! {
+    /// Coefficients of all other terms.
+    RotorTerms: FUNCTIONS => ENTRIES;
     arm(0, 1) => ONE COS SIN;
     arm(1, 0) => ONE COS;
     arm(1, 1) => ONE COS;
