@@ -96,11 +96,12 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             // Nobody asks for the last step's start any more once this one's has been observed.
             let (second, third, fourth) = (2, last, 3);
             // One copy of the right-hand side: four would not fit the instruction cache.
-            for (stage, from) in [now, second, third, fourth].into_iter().enumerate() {
+            let from = [now, second, third, fourth];
+            for stage in 0..4 {
                 if stage % 2 == 1 {
                     task.renew(if stage == 1 { clock.at(index + 0.5) } else { next_time }, forcing);
                 }
-                let slope = task.derivative(forcing, &states[from]);
+                let slope = task.derivative(forcing, &states[from[stage]]);
                 if stage == 3 {
                     // x + h (k1 + 2 k2 + 2 k3 + k4) / 6, where the later stages' states tell what h k1 to h k3 are: no sum of
                     // slopes is kept, for stores are what this loop has least room for.
