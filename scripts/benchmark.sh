@@ -31,6 +31,12 @@ fact() { lscpu | sed -n "s/^$1: *//p"; }
   echo
   scripts/instructions.sh
   echo
+  echo "## What a step executes"
+  echo
+  echo "\`scripts/kernel_profile.py\`"
+  echo
+  python3 scripts/kernel_profile.py
+  echo
   echo "## Kernels"
   echo
   echo "\`cargo bench --bench kernels\`; items are evaluations or trajectories of single lanes"
