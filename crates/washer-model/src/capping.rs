@@ -24,7 +24,8 @@
 //! motion, which does not keep to the drum's speed, answers to it as well.
 
 use crate::coupling::Caps;
-use crate::modal::{Modes, NoModes, highest_with_caps, modes_with_caps};
+use crate::modal::{Mode, Modes, NoModes, highest_with_caps, modes_with_caps};
+use crate::nonlinear::COORDINATES;
 use crate::point::Point;
 use crate::run::Method;
 use crate::spin::Spin;
@@ -113,34 +114,55 @@ impl<'a> Case<'a> {
         })
     }
 
-    /// Whether a step is stable with these caps, and the slow modes stay where they are.
+    /// Whether a step is stable with these caps, and the slow modes stay where they are. What refuses most is asked first, and what needs
+    /// eigenvalues at every angle last.
     fn holds(&self, step_s: f64, caps: &Caps, accuracy: f64) -> Result<bool, NoModes> {
-        let speed = self.speed_rad_per_s;
-        for (turning, plain) in [speed, 0.0].into_iter().zip(&self.modes) {
-            if step_s * highest_with_caps(self.point, turning, Some(caps))? > STEP_TIMES_FASTEST {
+        let speeds = [self.speed_rad_per_s, 0.0];
+        for (turning, plain) in speeds.into_iter().zip(&self.modes) {
+            let slow = &plain.modes[..SLOW_MODES];
+            let added: [f64; SLOW_MODES] = core::array::from_fn(|i| match caps.hinge_rad_per_s {
+                Some(cap) if i < SUSPENSION_MODES => {
+                    HINGE_WEIGHT * self.turning_shift(&slow[i], turning, cap)
+                }
+                _ => 0.0,
+            });
+            if slow.iter().zip(added).any(|(mode, added)| !self.allows(mode, added, accuracy)) {
                 return Ok(false);
             }
             let capped = modes_with_caps(self.point, 0.0, turning, Some(caps))?;
-            for (index, (plain, capped)) in plain.modes.iter().zip(&capped.modes).take(SLOW_MODES).enumerate()
-            {
-                let frequency = plain.magnitude_rad_per_s;
-                let half_width = plain.re_per_s.abs().max(LEAST_HALF_WIDTH * frequency);
-                let distance = half_width.max(frequency - speed);
+            if step_s * capped.modes[COORDINATES - 1].magnitude_rad_per_s > STEP_TIMES_FASTEST {
+                return Ok(false);
+            }
+            for ((plain, capped), added) in slow.iter().zip(&capped.modes).zip(added) {
                 let (slower, detuned) =
                     (capped.re_per_s - plain.re_per_s, capped.im_rad_per_s - plain.im_rad_per_s);
-                let mut shift = (slower * slower + detuned * detuned).sqrt();
-                if let Some(cap) = caps.hinge_rad_per_s.filter(|_| index < SUSPENSION_MODES) {
-                    let in_hinge = (frequency + turning) / cap;
-                    let turning_shift = 0.5 * plain.hinge_share(self.point) * frequency * in_hinge * in_hinge;
-                    shift += HINGE_WEIGHT * turning_shift;
-                }
-                let weight = (speed / frequency).min(1.0).powi(4);
-                if weight * shift > accuracy * distance {
+                if !self.allows(plain, (slower * slower + detuned * detuned).sqrt() + added, accuracy) {
                     return Ok(false);
                 }
             }
         }
+        for turning in speeds {
+            if step_s * highest_with_caps(self.point, turning, Some(caps))? > STEP_TIMES_FASTEST {
+                return Ok(false);
+            }
+        }
         Ok(true)
+    }
+
+    /// By how much a hinge with a cap moves a mode while the drum turns (rad/s).
+    fn turning_shift(&self, mode: &Mode, turning_rad_per_s: f64, cap_rad_per_s: f64) -> f64 {
+        let frequency = mode.magnitude_rad_per_s;
+        let in_hinge = (frequency + turning_rad_per_s) / cap_rad_per_s;
+        0.5 * mode.hinge_share(self.point) * frequency * in_hinge * in_hinge
+    }
+
+    /// Whether a mode may move so far (rad/s).
+    fn allows(&self, mode: &Mode, shift_rad_per_s: f64, accuracy: f64) -> bool {
+        let frequency = mode.magnitude_rad_per_s;
+        let half_width = mode.re_per_s.abs().max(LEAST_HALF_WIDTH * frequency);
+        let distance = half_width.max(frequency - self.speed_rad_per_s);
+        let weight = (self.speed_rad_per_s / frequency).min(1.0).powi(4);
+        weight * shift_rad_per_s <= accuracy * distance
     }
 }
 
