@@ -13,9 +13,10 @@ fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Instructions of a run of eight points to a given end.
+# Instructions of a run of eight points to a given end, by plain RK4.
 count() { # SET END_S
-  sed -e "s/^end_s = .*/end_s = $2/" -e 's/^window_s = .*//' -e 's/count = 9/count = 2/; t; ' sweeps/quick.toml > "$work/grid.toml"
+  sed -e "s/^end_s = .*/end_s = $2/" -e 's/^window_s = .*//' -e 's/count = 9/count = 2/' \
+      -e 's/^method = .*/method = "rk4"\nstep_s = 2e-4/' -e '/^accuracy = /d' sweeps/quick.toml > "$work/grid.toml"
   printf '\n[[axis]]\nparameter = "tub_front_x_m"\nvalues = [0.45, 0.46]\n' >> "$work/grid.toml"
   SWEEP_SIMD=$1 valgrind --tool=callgrind --callgrind-out-file="$work/out" \
     "$sweep" run "$work/grid.toml" --out "$work/out.parquet" --fresh --threads 1 --progress none > "$work/log" 2>&1 \
