@@ -55,9 +55,26 @@ impl<T: Real> Deflection<T> {
         }
     }
 
+    /// Of the linear model, by deviations from equilibrium (or, alike, by accelerations) and the partial derivatives of both axes.
+    #[inline(always)]
+    pub(crate) fn linear(
+        q: &[N<T>; COORDINATES],
+        tub_axis: &[[N<T>; 2]; 2],
+        rotor_axis: &[[N<T>; 2]; 2],
+    ) -> Self {
+        let [tub, rotor] = [tub_axis, rotor_axis];
+        Self {
+            offset: [q[2] - q[0], q[3] - q[1]],
+            tilt: [
+                rotor[1][0] * q[7] - tub[1][0] * q[5],
+                rotor[0][1] * q[6] + rotor[1][1] * q[7] - tub[0][1] * q[4] - tub[1][1] * q[5],
+            ],
+        }
+    }
+
     /// Offset, then tilt.
     #[inline(always)]
-    fn rows(&self) -> [N<T>; 4] {
+    pub(crate) fn rows(&self) -> [N<T>; 4] {
         [self.offset[0], self.offset[1], self.tilt[0], self.tilt[1]]
     }
 }
@@ -144,17 +161,16 @@ impl<T: Real> Coupling<T> {
         })
     }
 
-    /// The hinge's scaled mass, if modes are capped.
+    /// The hinge's scaled mass, if modes are capped; the hinge sags by these q9 and q10.
     #[inline(always)]
     pub(crate) fn hinge_mass(
         &self,
-        bodies: &Bodies<T>,
+        flexure_stiffness: N<T>,
         spin: &SpinState<T>,
-        sag: &Sag<T>,
+        [sag_9, sag_10]: [N<T>; 2],
     ) -> Option<HingeMass<T>> {
         let Self::MassScaled(scaling) = self else { return None };
-        let inertia = (scaling.per_hinge_squared * bodies.flexure_stiffness).v();
-        let [sag_9, sag_10] = sag.hinge;
+        let inertia = (scaling.per_hinge_squared * flexure_stiffness).v();
         let centrifugal = -(inertia * (spin.speed * spin.speed).v()).v();
         Some(HingeMass {
             inertia,
@@ -200,6 +216,30 @@ pub(crate) struct Response<T> {
     pub(crate) compliance: [[N<T>; 4]; 4],
 }
 
+/// w^2 K^-1 + C, lower triangle: from the compliances of the bearings in one direction (offset by force, offset by moment, tilt by moment) and
+/// of both halves.
+#[inline(always)]
+pub(crate) fn mass_scaled_system<T: Real>(
+    cap_squared: N<T>,
+    [by_force, mixed, by_moment]: [N<T>; 3],
+    tub: &[[N<T>; 4]; 4],
+    rotor: &[[N<T>; 4]; 4],
+) -> [[N<T>; 4]; 4] {
+    let mut system = *rotor;
+    for row in 0..4 {
+        for column in 0..=row {
+            system[row][column] += tub[row][column];
+        }
+    }
+    // K^-1 couples force and moment of one direction.
+    for i in 0..2 {
+        system[i][i] += cap_squared * by_force;
+        system[2 + i][2 + i] += cap_squared * by_moment;
+        system[2 + i][i] += cap_squared * mixed;
+    }
+    system
+}
+
 #[inline(always)]
 fn mass_scaled_load<T: Real>(
     b: &Bodies<T>,
@@ -209,27 +249,13 @@ fn mass_scaled_load<T: Real>(
     tub: &Response<T>,
     rotor: &Response<T>,
 ) -> AxisLoad<T> {
-    let mut system = rotor.compliance;
-    for row in 0..4 {
-        for column in 0..=row {
-            system[row][column] += tub.compliance[row][column];
-        }
-    }
-    // K^-1 couples force and moment of one direction.
-    for i in 0..2 {
-        system[i][i] += cap_squared * b.bearing_force_compliance;
-        system[2 + i][2 + i] += cap_squared * b.bearing_moment_compliance;
-        system[2 + i][i] += cap_squared * b.bearing_mixed_compliance;
-    }
+    let of_bearings = [b.bearing_force_compliance, b.bearing_mixed_compliance, b.bearing_moment_compliance];
+    let system = mass_scaled_system(cap_squared, of_bearings, &tub.compliance, &rotor.compliance);
     let both_squared = cap_squared + speed_squared;
-    let d = deflection.rows();
+    let (d, sag) = (deflection.rows(), sag.rows());
     let mut load = d;
     for i in 0..4 {
-        load[i] = tub.free[i] - (both_squared * d[i] + rotor.free[i]);
-    }
-    let sag = sag.rows();
-    for i in 0..4 {
-        load[i] += speed_squared * sag[i];
+        load[i] = tub.free[i] - (both_squared * d[i] + rotor.free[i]) + speed_squared * sag[i];
     }
     let [force_y, force_z, moment_y, moment_z] = Factors::new(system).solve(load);
     AxisLoad { force: [force_y, force_z], moment: [moment_y, moment_z] }

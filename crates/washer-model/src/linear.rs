@@ -194,19 +194,6 @@ fn terms_of_lane<T: Lane>(samples: &[[[N<T>; HARMONICS]; ALL_ENTRIES]; 3], lane:
     }
 }
 
-/// What deviations from equilibrium add to the bearings' deflection.
-#[inline(always)]
-fn deflection<T: Real>(c: &Constants<T>, q: &[N<T>; COORDINATES]) -> Deflection<T> {
-    Deflection {
-        offset: [q[2] - q[0], q[3] - q[1]],
-        tilt: [
-            c.rotor_axis[1][0] * q[7] - c.tub_axis[1][0] * q[5],
-            c.rotor_axis[0][1] * q[6] + c.rotor_axis[1][1] * q[7]
-                - (c.tub_axis[0][1] * q[4] + c.tub_axis[1][1] * q[5]),
-        ],
-    }
-}
-
 /// M, C, K and F of Eq. 41 in the coordinates q, as full matrices; for one machine, at one instant.
 #[derive(Clone, Debug)]
 pub struct Matrices {
@@ -223,18 +210,20 @@ pub struct Matrices {
 impl LinearPoint {
     /// The bearings' share of the stiffness matrix, without that of their static load.
     pub(crate) fn bearing_stiffness(&self, bodies: &Bodies<f64>) -> [[f64; COORDINATES]; COORDINATES] {
-        let work = |i: usize, load: &AxisLoad<f64>| {
+        let Constants { tub_axis, rotor_axis, .. } = &self.constants;
+        let by_unit = |i: usize| {
             let mut unit = [N(0.0); COORDINATES];
             unit[i] = N(1.0);
-            let Deflection { offset, tilt } = deflection(&self.constants, &unit);
+            Deflection::linear(&unit, tub_axis, rotor_axis)
+        };
+        let work = |i: usize, load: &AxisLoad<f64>| {
+            let Deflection { offset, tilt } = by_unit(i);
             let force = load.force[0] * offset[0] + load.force[1] * offset[1];
             -(force + (load.moment[0] * tilt[0] + load.moment[1] * tilt[1])).0
         };
         let mut stiffness = [[0.0; COORDINATES]; COORDINATES];
         for j in 0..COORDINATES {
-            let mut unit = [N(0.0); COORDINATES];
-            unit[j] = N(1.0);
-            let load = deflection(&self.constants, &unit).load(bodies);
+            let load = by_unit(j).load(bodies);
             for (i, row) in stiffness.iter_mut().enumerate() {
                 row[j] = work(i, &load);
             }

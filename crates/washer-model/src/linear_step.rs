@@ -5,7 +5,7 @@
 //! of a stage are known one stage earlier, so that only few operations wait for the accelerations of the stage before.
 
 use crate::coefficients::Bodies;
-use crate::coupling::{Coupling, HingeMass};
+use crate::coupling::{Coupling, Deflection, HingeMass, mass_scaled_system};
 use crate::floating::{Factors, Floating};
 use crate::forces::AxisLoad;
 use crate::harmonics;
@@ -130,13 +130,7 @@ impl<T: Lane> StepConstants<T> {
     /// Offset (y, z) and tilt (y, z) that the bearings feel of coordinates; of accelerations alike.
     #[inline(always)]
     fn deflection(&self, q: &[N<T>; COORDINATES]) -> [N<T>; 4] {
-        let [tub, rotor] = [&self.tub_axis, &self.rotor_axis];
-        [
-            q[2] - q[0],
-            q[3] - q[1],
-            rotor[1][0] * q[7] - tub[1][0] * q[5],
-            rotor[0][1] * q[6] + rotor[1][1] * q[7] - tub[0][1] * q[4] - tub[1][1] * q[5],
-        ]
+        Deflection::linear(q, &self.tub_axis, &self.rotor_axis).rows()
     }
 
     /// What the bearings, as springs, do to the shaft.
@@ -278,18 +272,7 @@ impl<T: Lane> BearingsAt<T> {
             compliance[3][column] = axis[0][1] * rotation[0][column] + axis[1][1] * rotation[1][column];
         }
         let compliance = Symmetric4(compliance);
-        let mut system = compliance.0;
-        for row in 0..4 {
-            for column in 0..=row {
-                system[row][column] += c.tub_compliance[row][column];
-            }
-        }
-        let [by_force, mixed, by_moment] = c.bearing_compliance;
-        for i in 0..2 {
-            system[i][i] += cap_squared * by_force;
-            system[2 + i][i] += cap_squared * mixed;
-            system[2 + i][2 + i] += cap_squared * by_moment;
-        }
+        let system = mass_scaled_system(cap_squared, c.bearing_compliance, &c.tub_compliance, &compliance.0);
         let mut translation = [[zero; 4]; 2];
         for i in 0..2 {
             for column in 0..4 {

@@ -1,6 +1,6 @@
 //! The two models as systems over lanes, and what they have in common.
 
-use crate::coefficients::{Bodies, Coefficients};
+use crate::coefficients::Coefficients;
 use crate::coupling::{Coupling, Sag};
 use crate::lanes::SetLane;
 use crate::linear_outputs::{LinearMotion, LinearOutputs};
@@ -154,10 +154,11 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
 /// The linear model.
 pub(crate) struct Linear<T> {
     coupling: Coupling<T>,
-    bodies: Bodies<T>,
+    flexure_stiffness: N<T>,
     constants: StepConstants<T>,
     terms: Terms<T>,
-    sag: Sag<T>,
+    /// Of the hinge: q9, q10.
+    sag: [N<T>; 2],
     outputs: LinearOutputs<T>,
     spin: SpinLanes<T>,
 }
@@ -175,7 +176,7 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     #[inline(always)]
     fn forcing(&self, t_s: N<T>) -> LinearForcing<T> {
         let spin = self.spin.at(t_s);
-        let hinge_mass = self.coupling.hinge_mass(&self.bodies, &spin, &self.sag);
+        let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &spin, self.sag);
         let rotor = RotorAt::new(&self.constants, &self.coupling, &self.terms, &spin, hinge_mass);
         LinearForcing { spin, rotor }
     }
@@ -183,7 +184,7 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     #[inline(always)]
     fn renew(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
         forcing.spin = self.spin.at(t_s);
-        let hinge_mass = self.coupling.hinge_mass(&self.bodies, &forcing.spin, &self.sag);
+        let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &forcing.spin, self.sag);
         forcing.rotor.renew(&self.constants, &self.coupling, &self.terms, &forcing.spin, hinge_mass);
     }
 
@@ -208,19 +209,19 @@ impl<T: Lane> Model<T> for Linear<T> {
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
         Self {
             coupling,
-            bodies: Bodies::splat(zero, &point.machine.bodies),
+            flexure_stiffness: zero.lit(point.machine.bodies.flexure_stiffness.0),
             constants: StepConstants::splat(zero, &step_constants(point)),
             terms: Terms::splat(zero, &point.linear.terms),
-            sag: Sag::new(&point.equilibrium).splat(zero),
+            sag: Sag::new(&point.equilibrium).splat(zero).hinge,
             outputs: LinearOutputs::splat(zero, &point.linear_outputs),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
         }
     }
 
     fn set_point(&mut self, lane: usize, point: &Point) {
-        self.bodies.set_lane(lane, &point.machine.bodies);
+        self.flexure_stiffness.set_lane(lane, &point.machine.bodies.flexure_stiffness);
         self.constants.set_lane(lane, &step_constants(point));
-        self.sag.set_lane(lane, &Sag::new(&point.equilibrium));
+        self.sag.set_lane(lane, &Sag::new(&point.equilibrium).hinge);
         self.terms.set_lane(lane, &point.linear.terms);
         self.outputs.set_lane(lane, &point.linear_outputs);
     }

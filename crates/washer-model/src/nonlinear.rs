@@ -69,7 +69,7 @@ pub(crate) fn accelerations<T: Real>(
 ) -> [N<T>; COORDINATES] {
     let tub = tub(machine, q, u);
     let mut rotor = rotor(machine.bodies, spin, q, u);
-    if let Some(mass) = coupling.hinge_mass(machine.bodies, spin, sag) {
+    if let Some(mass) = coupling.hinge_mass(machine.bodies.flexure_stiffness, spin, sag.hinge) {
         for (place, r) in [2, 3].into_iter().enumerate() {
             rotor.inertia[r][r] += mass.inertia;
             rotor.floating.torque[r] += mass.torque[place];
