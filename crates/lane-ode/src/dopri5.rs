@@ -4,9 +4,9 @@
 //! Norsett, Wanner, Solving Ordinary Differential Equations I, sections II.4 to II.6.
 
 use crate::control::{StepControl, Tolerance, Verdict};
+use crate::fixed::MAX_LANES;
 use crate::lane::Lane;
 use crate::num::N;
-use crate::rk4::MAX_LANES;
 use crate::system::{Count, Ended, Failure, Step, Task};
 
 /// On the imaginary axis the method is stable up to about |h w| = 1.

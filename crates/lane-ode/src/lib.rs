@@ -99,8 +99,10 @@
 #[cfg(target_arch = "aarch64")]
 mod aarch64;
 mod control;
+pub mod dop853;
 pub mod dopri5;
 mod dual;
+mod fixed;
 mod lane;
 mod linear_solve;
 mod num;
@@ -123,13 +125,13 @@ mod x86;
 
 pub use control::Tolerance;
 pub use dual::Dual;
+pub use fixed::{MAX_LANES, fixed_steps};
 pub use lane::Lane;
 pub use num::{N, Product};
 pub use part_peaks::PartPeaks;
 pub use partials::Partials;
 pub use peaks::{Peaks, Sample};
 pub use real::Real;
-pub use rk4::MAX_LANES;
 pub use simd::{Aside, Kernel, ScalarKernel, Simd};
 pub use squares::SquareIntegrals;
 pub use system::{Count, Ended, Failure, Leg, Step, System, Task};

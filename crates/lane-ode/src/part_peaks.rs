@@ -1,10 +1,10 @@
 //! Peaks of every part of a trajectory that is cut at known instants.
 
+use crate::fixed::MAX_LANES;
 use crate::lane::Lane;
 use crate::num::N;
 use crate::peaks::{Peaks, Sample};
 use crate::quintic::{Quintic, within_step};
-use crate::rk4::MAX_LANES;
 
 /// Largest magnitude of `M` outputs in every part of each lane's trajectory, parts being divided by instants of the lane's own.
 ///

@@ -3,79 +3,27 @@
 //! W. Kutta, Zeitschrift fuer Mathematik und Physik 46 (1901) 435; Hairer, Norsett, Wanner, Solving Ordinary
 //! Differential Equations I, Table II.1.2.
 
+use crate::fixed::Legs;
 use crate::lane::Lane;
 use crate::num::N;
-use crate::system::{Count, Ended, Failure, Leg, Step, Task};
+use crate::system::{Step, Task};
 use core::hint::black_box;
 
 /// On the imaginary axis the method is stable up to |h w| = 2 sqrt(2).
 pub const RK4_STABILITY_LIMIT: f64 = 2.828_427_124_746_190_3;
 
-/// The most lanes any instruction set has here.
-pub const MAX_LANES: usize = 8;
-
 /// How far along its slope each stage but the last goes to the next one's state, in steps.
 const REACH: [f64; 3] = [0.5, 0.5, 1.0];
-
-/// Steps of one lane's leg: the smallest whole number of equal steps not above the leg's own.
-#[must_use]
-pub fn fixed_steps(leg: &Leg) -> u64 {
-    // The quotient may come out a hair above a whole number that was meant.
-    let steps = ((leg.end_s - leg.start_s) / leg.step_s * (1.0 - 1e-12)).ceil().max(1.0);
-    steps as u64
-}
-
-/// Where each lane's leg is in time; its end is exact, whatever the rounding error of the step.
-struct Clock<T> {
-    start: N<T>,
-    end: N<T>,
-    h: N<T>,
-    /// Steps in the leg.
-    total: N<T>,
-}
-
-impl<T: Lane> Clock<T> {
-    /// Time after `index` steps.
-    #[inline(always)]
-    fn at(&self, index: N<T>) -> N<T> {
-        index.where_less(self.total, index * self.h + self.start, self.end)
-    }
-}
-
-/// Where a lane stands in its leg.
-#[derive(Clone, Copy, Default)]
-struct Progress {
-    is_active: bool,
-    total: u64,
-    left: u64,
-}
 
 /// Runs every trajectory that the task has, lanes full as long as there are any.
 #[inline(always)]
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) {
     let zero = N(zero);
     let mut x = [zero; D];
-    let mut clock = Clock { start: zero, end: zero, h: zero, total: zero };
-    let mut index = zero;
-    let mut lanes = [Progress::default(); MAX_LANES];
-    let mut ended = [Some(Ended::Idle); MAX_LANES];
-
-    loop {
-        for lane in 0..T::LANES {
-            let Some(how) = ended[lane].take() else { continue };
-            let leg = task.next_leg(lane, how, &mut x);
-            let steps = leg.as_ref().map_or(0, fixed_steps);
-            lanes[lane] = Progress { is_active: leg.is_some(), total: steps, left: steps };
-            let (from, to) = leg.map_or((0.0, 0.0), |l| (l.start_s, l.end_s));
-            clock.start.0.set(lane, from);
-            clock.end.0.set(lane, to);
-            clock.h.0.set(lane, (to - from) / steps.max(1) as f64);
-            clock.total.0.set(lane, steps as f64);
-            index.0.set(lane, 0.0);
-        }
-        let active = || lanes[..T::LANES].iter().filter(|lane| lane.is_active);
-        let Some(mut run) = active().map(|lane| lane.left).min() else { return };
-
+    let mut legs = Legs::new(zero);
+    while let Some(mut run) = legs.take_up(task, &mut x) {
+        let clock = legs.clock;
+        let mut index = legs.index;
         let h = clock.h;
         let (one_third, one_sixth) = (zero.lit(1.0 / 3.0), h / zero.lit(6.0));
         let mut time = clock.at(index);
@@ -149,30 +97,12 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             time = next_time;
             done += 1;
             let in_range = task.in_range(&states[now]);
-            if !T::all(in_range) {
-                let out = !T::bits(in_range);
-                for lane in (0..T::LANES).filter(|lane| lanes[*lane].is_active && out >> lane & 1 == 1) {
-                    let made = lanes[lane].total - lanes[lane].left + done;
-                    ended[lane] = Some(Ended::Failed {
-                        reason: Failure::Diverged,
-                        time_s: time.0.get(lane),
-                        count: Count { accepted: made, rejected: 0 },
-                    });
-                }
-                if ended.iter().any(Option::is_some) {
-                    run = done;
-                }
+            if !T::all(in_range) && legs.fail(in_range, time, done) {
+                run = done;
             }
         }
         x = states[now];
-        for lane in 0..T::LANES {
-            let progress = &mut lanes[lane];
-            if progress.is_active {
-                progress.left -= done;
-                if progress.left == 0 && ended[lane].is_none() {
-                    ended[lane] = Some(Ended::Arrived(Count { accepted: progress.total, rejected: 0 }));
-                }
-            }
-        }
+        legs.index = index;
+        legs.arrive(done);
     }
 }

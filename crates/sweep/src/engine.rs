@@ -1,28 +1,32 @@
-//! The engine: a range of grid points through both models, in lanes.
+//! The engine: points through both models, in lanes, as far up the ladder of methods as each needs.
 
-mod fast;
+mod climb;
+mod ladder;
+mod pool;
 
-pub use fast::Settled;
-pub(crate) use fast::reference_step_s;
+pub(crate) use climb::Demand;
+pub use ladder::Level;
+pub(crate) use ladder::{Ladder, reference_step_s};
+pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
 
-use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
+use climb::{MODELS, Run};
 use lane_ode::{Failure, Simd, Tolerance};
-use serde_json::Value;
-use washer_model::{Extra, Method, ModelKind, Point, Record, Timing, Wanted, prepare, simulate_with};
+use pool::{Feed, Keep, Pool, Shared};
+use washer_model::{Cases, Extra, Method, ModelKind, Point, Record, Timing, Wanted, prepare, simulate_with};
 
 use crate::measures::{Criterion, Metric};
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::plan::{Integrator, Plan, Scenario};
 use crate::run::{Engine, Watch};
 
-/// Points that go through the lanes together before progress is told and the stop flag is looked at.
-pub(crate) const GROUP: u64 = 64;
-
 /// Steps that one leg of an adaptive trajectory may take.
 const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
+
+/// Parts of a run at whose ends two runs of a trajectory are compared.
+const CHECKPOINTS: u32 = 128;
 
 /// Why there is no engine for a plan.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -36,17 +40,10 @@ pub enum EngineError {
 pub struct ModelEngine<'a> {
     plan: &'a Plan,
     simd: Simd,
-    scheme: Scheme,
     timing: Timing,
     wanted: Wanted,
-}
-
-/// How trajectories are integrated.
-enum Scheme {
-    /// By one method.
-    Direct(Method),
-    /// By the fast method and what makes up for its error.
-    Fast { accuracy: f64, settled: OnceLock<Settled> },
+    /// Of both models; found when first asked for.
+    ladders: OnceLock<[Ladder; 2]>,
 }
 
 /// The instruction set that `SWEEP_SIMD` asks for, else the best.
@@ -78,62 +75,90 @@ impl<'a> ModelEngine<'a> {
     /// # Errors
     /// A method or an instruction set that is not there.
     pub fn new(plan: &'a Plan) -> Result<Self, EngineError> {
-        let scheme = match plan.integrator {
-            Integrator::Rk4 { step_s } => Scheme::Direct(Method::Rk4 { step_s }),
-            Integrator::Dopri5 { rtol, atol } => Scheme::Direct(dopri5(rtol, atol)),
-            Integrator::Rodas5p { rtol, atol } => Scheme::Direct(rodas5p(rtol, atol)),
-            Integrator::Rk4MassScaled { accuracy } => Scheme::Fast { accuracy, settled: OnceLock::new() },
-        };
-        let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };
-        let wanted = plan.measures.wanted();
-        Ok(Self { plan, simd: simd_from_environment()?, scheme, timing, wanted })
+        let is_checked = matches!(plan.integrator, Integrator::Rk4MassScaled { .. });
+        let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
+        let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
+        let wanted = Wanted { course: is_checked, ..plan.measures.wanted() };
+        Ok(Self { plan, simd: simd_from_environment()?, timing, wanted, ladders: OnceLock::new() })
     }
 
-    /// Takes over what the fast method works with from another engine; too late once it has been asked for.
-    pub fn assume(&self, known: Settled) {
-        if let Scheme::Fast { settled, .. } = &self.scheme {
-            settled.get_or_init(|| known);
-        }
+    /// As [`Self::new`], with the rungs of another engine.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn with_ladders(plan: &'a Plan, ladders: [Ladder; 2]) -> Result<Self, EngineError> {
+        Ok(Self { ladders: OnceLock::from(ladders), ..Self::new(plan)? })
     }
 
-    /// What the fast method works with, if that is the plan's: as settled, or else as the rule says.
-    #[must_use]
-    pub fn settled(&self) -> Option<&Settled> {
-        match &self.scheme {
-            Scheme::Direct(_) => None,
-            Scheme::Fast { accuracy, settled } => Some(settled.get_or_init(|| self.unchecked(*accuracy))),
+    /// The rungs of both models.
+    pub(crate) fn ladders(&self) -> &[Ladder; 2] {
+        self.ladders.get_or_init(|| {
+            let direct = |level, method| [Ladder::direct(level, method), Ladder::direct(level, method)];
+            match self.plan.integrator {
+                Integrator::Rk4 { step_s } => direct(Level::Rk4, Method::Rk4 { step_s }),
+                Integrator::Dopri5 { rtol, atol } => direct(Level::Dopri5, dopri5(rtol, atol)),
+                Integrator::Rodas5p { rtol, atol } => direct(Level::Rodas5p, rodas5p(rtol, atol)),
+                Integrator::Rk4MassScaled { accuracy } => self.checked(accuracy),
+            }
+        })
+    }
+
+    /// The fast method's ladders, by the corners of the grid.
+    fn checked(&self, accuracy: f64) -> [Ladder; 2] {
+        let scenarios: Vec<_> = self.plan.some_corners().iter().map(|at| self.plan.scenario_at(at)).collect();
+        let prepared = self.prepare(&scenarios);
+        let ready = prepared.iter().zip(&scenarios);
+        let ready = ready.filter_map(|(point, scenario)| Some((point.as_ref()?, &scenario.spin)));
+        let cases = Cases::new(ready, self.plan.end_s);
+        MODELS.map(|model| Ladder::new(&cases, model, accuracy))
+    }
+
+    /// What amplitudes must be good for; of one method alone nothing is asked.
+    fn accuracy(&self) -> f64 {
+        match self.plan.integrator {
+            Integrator::Rk4MassScaled { accuracy } => accuracy,
+            Integrator::Rk4 { .. } | Integrator::Dopri5 { .. } | Integrator::Rodas5p { .. } => f64::INFINITY,
         }
     }
 
     /// One outcome per point given by the values of its axes, on the grid or between its points; `point` of an outcome
-    /// is the position among them.
+    /// is the position among them. On all threads of the rayon pool it is called in. `None` if it was told to stop.
     #[must_use]
-    pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
-        // Positions in a slice fit both.
-        self.group(0..axis_values.len() as u64, &|point| self.plan.scenario_at(&axis_values[point as usize]))
-    }
-
-    fn group(&self, points: Range<u64>, scenario: &dyn Fn(u64) -> Scenario) -> Vec<Outcome> {
-        together_or_alone(points, &|points| self.evaluate_together(points, scenario))
-    }
-
-    fn evaluate_together(&self, points: Range<u64>, scenario: &dyn Fn(u64) -> Scenario) -> Vec<Outcome> {
-        let points: Vec<u64> = points.collect();
-        let prepared = self.prepare(&points, scenario);
-        let mut outcomes = match &self.scheme {
-            Scheme::Direct(method) => self.all(&prepared, method, &points),
-            Scheme::Fast { accuracy, settled } => {
-                let settled = settled.get_or_init(|| self.unchecked(*accuracy));
-                self.certain(*accuracy, settled, &prepared, &points)
-            }
+    pub fn evaluate_at(
+        &self,
+        axis_values: &[Vec<f64>],
+        demand: Demand,
+        watch: &Watch<'_>,
+    ) -> Option<Vec<Outcome>> {
+        let next = Mutex::new(0..axis_values.len());
+        let feed = |most: usize| {
+            let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
+            let positions: Vec<usize> = next.by_ref().take(most).collect();
+            positions.into_iter().map(|i| (i as u64, self.plan.scenario_at(&axis_values[i]))).collect()
         };
-        outcomes.iter_mut().for_each(Outcome::forget_turns);
-        outcomes
+        let found = Mutex::new(Vec::with_capacity(axis_values.len()));
+        let keep = |outcome: Outcome| {
+            watch.done(1);
+            found.lock().unwrap_or_else(PoisonError::into_inner).push(outcome);
+        };
+        self.through_lanes(demand, &feed, &keep, watch);
+        let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+        found.sort_by_key(|outcome| outcome.point);
+        (found.len() == axis_values.len()).then_some(found)
+    }
+
+    /// Rows from a feed to a keeper, on all threads of the rayon pool this is called in.
+    fn through_lanes(&self, demand: Demand, feed: &Feed<'_>, keep: &Keep<'_>, watch: &Watch<'_>) {
+        let pool = Pool { engine: self, demand, feed, keep, watch, shared: Shared::default() };
+        match rayon::current_thread_index() {
+            Some(_) => drop(rayon::broadcast(|_| pool.work())),
+            // An estimate is of one thread.
+            None => pool.work(),
+        }
     }
 
     /// Points made ready, those of one window together; `None` where there is no equilibrium.
-    fn prepare(&self, points: &[u64], scenario: &dyn Fn(u64) -> Scenario) -> Vec<Option<Point>> {
-        let scenarios: Vec<Scenario> = points.iter().map(|&point| scenario(point)).collect();
+    fn prepare(&self, scenarios: &[Scenario]) -> Vec<Option<Point>> {
         let mut prepared = Vec::with_capacity(scenarios.len());
         for alike in scenarios.chunk_by(|a, b| a.window_s == b.window_s) {
             let machines: Vec<_> =
@@ -144,48 +169,31 @@ impl<'a> ModelEngine<'a> {
         prepared
     }
 
-    /// Both models at every point, by one method.
-    fn all(&self, prepared: &[Option<Point>], method: &Method, points: &[u64]) -> Vec<Outcome> {
-        let ready: Vec<&Point> = prepared.iter().flatten().collect();
-        let (nonlinear, linear) = self.both(&ready, method);
-        let (mut nonlinear, mut linear) = (nonlinear.into_iter(), linear.into_iter());
-        let next =
-            |trajectories: &mut std::vec::IntoIter<Trajectory>, prepared: &Option<Point>| match prepared {
-                Some(_) => trajectories.next().unwrap_or(Trajectory::failed(Status::Panicked)),
-                None => Trajectory::failed(Status::NoEquilibrium),
-            };
-        points
-            .iter()
-            .zip(prepared)
-            .map(|(&point, prepared)| {
-                let (nonlinear, linear) = (next(&mut nonlinear, prepared), next(&mut linear, prepared));
-                let mut outcome = Outcome::new(point, nonlinear, linear);
-                outcome.compare_turns(&self.plan.reliability.channels);
-                if self.plan.measures.metrics.contains(&Metric::StaticSag) {
-                    outcome.static_sag_m = prepared.as_ref().map(Point::static_sag_m);
-                }
-                outcome
-            })
-            .collect()
+    /// One model at every point, by one rung. A panic in one point's trajectory must not cost the others theirs: then each
+    /// runs alone, which gives the same bits.
+    fn runs(&self, model: usize, rung: usize, points: &[&Point]) -> Vec<Run> {
+        let method = &self.ladders()[model].rungs[rung].method;
+        let together = |points: &[&Point]| {
+            catch_unwind(AssertUnwindSafe(|| self.trajectories(points, MODELS[model], method))).ok()
+        };
+        together(points).unwrap_or_else(|| {
+            let alone = |point| together(&[point]).and_then(|mut runs| runs.pop());
+            points.iter().map(|point| alone(*point).unwrap_or_else(panicked)).collect()
+        })
     }
 
-    /// Both models at every point; in a pool, a thread that has run out of work takes one of them.
-    fn both(&self, points: &[&Point], method: &Method) -> (Vec<Trajectory>, Vec<Trajectory>) {
-        let nonlinear = || self.trajectories(points, ModelKind::Nonlinear, method);
-        let linear = || self.trajectories(points, ModelKind::Linear, method);
-        match rayon::current_thread_index() {
-            Some(_) => rayon::join(nonlinear, linear),
-            // An estimate is of one thread.
-            None => (nonlinear(), linear()),
-        }
-    }
-
-    /// One model at every point, by one method.
-    fn trajectories(&self, points: &[&Point], model: ModelKind, method: &Method) -> Vec<Trajectory> {
+    fn trajectories(&self, points: &[&Point], model: ModelKind, method: &Method) -> Vec<Run> {
         let (records, extras) = simulate_with(self.simd, model, method, points, self.wanted);
         // None at all if nothing was wanted.
         let mut extras = extras.into_iter();
-        records.iter().map(|record| self.trajectory(record, extras.next().unwrap_or_default())).collect()
+        records
+            .iter()
+            .map(|record| {
+                let mut extra = extras.next().unwrap_or_default();
+                let course = std::mem::take(&mut extra.course);
+                Run { trajectory: self.trajectory(record, extra), course }
+            })
+            .collect()
     }
 
     fn trajectory(&self, record: &Record, extra: Extra) -> Trajectory {
@@ -221,60 +229,21 @@ impl<'a> ModelEngine<'a> {
     }
 }
 
-/// One outcome per point of a group. A panic in one point's evaluation must not cost the others theirs: then each is
-/// evaluated alone, which gives the same bits.
-fn together_or_alone(points: Range<u64>, evaluate: &dyn Fn(Range<u64>) -> Vec<Outcome>) -> Vec<Outcome> {
-    let together = catch_unwind(AssertUnwindSafe(|| evaluate(points.clone())));
-    together.unwrap_or_else(|_| {
-        points
-            .map(|point| {
-                let alone = catch_unwind(AssertUnwindSafe(|| evaluate(point..point + 1)));
-                alone.ok().and_then(|mut outcomes| outcomes.pop()).unwrap_or_else(|| panicked(point))
-            })
-            .collect()
-    })
-}
-
-fn panicked(point: u64) -> Outcome {
-    Outcome::new(point, Trajectory::failed(Status::Panicked), Trajectory::failed(Status::Panicked))
+fn panicked() -> Run {
+    Run { trajectory: Trajectory::failed(Status::Panicked), course: Vec::new() }
 }
 
 impl Engine for ModelEngine<'_> {
-    fn evaluate(&self, points: Range<u64>, watch: &Watch<'_>) -> Option<Vec<Outcome>> {
-        let mut outcomes = Vec::new();
-        let mut start = points.start;
-        while start < points.end {
-            if watch.stopped() {
-                return None;
-            }
-            let end = (start + GROUP).min(points.end);
-            outcomes.extend(self.group(start..end, &|point| self.plan.scenario(point)));
-            watch.done(end - start);
-            start = end;
-        }
-        Some(outcomes)
+    fn evaluate(&self, feed: &(dyn Fn() -> Option<u64> + Sync), keep: &Keep<'_>, watch: &Watch<'_>) {
+        let feed = |most: usize| {
+            let points = std::iter::from_fn(feed).take(most);
+            points.map(|point| (point, self.plan.scenario(point))).collect()
+        };
+        self.through_lanes(Demand::Row, &feed, keep, watch);
     }
 
     fn simd(&self) -> &str {
         self.simd.name()
-    }
-
-    fn settle(&self, remembered: Option<Value>, watch: &Watch<'_>) -> Option<Value> {
-        let Scheme::Fast { accuracy, settled } = &self.scheme else { return Some(Value::Null) };
-        let known = remembered.and_then(|value| serde_json::from_value(value).ok());
-        let found = match known {
-            Some(known) => known,
-            None => self.check(*accuracy, watch)?,
-        };
-        let found = settled.get_or_init(|| found);
-        Some(serde_json::to_value(found).unwrap_or_default())
-    }
-
-    fn observed_accuracy(&self) -> Option<f64> {
-        match &self.scheme {
-            Scheme::Direct(_) => None,
-            Scheme::Fast { settled, .. } => settled.get().and_then(|settled| settled.observed_error),
-        }
     }
 }
 

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
 
-use crate::engine::{EngineError, GROUP, ModelEngine, Settled};
+use crate::engine::{Demand, EngineError, Ladder, MOST_WAITING, ModelEngine, ROWS_A_THREAD};
 use crate::interrupt::Interrupt;
 use crate::outcome::{Deviations, Outcome};
 use crate::plan::{Integrator, Plan};
@@ -45,8 +45,8 @@ pub struct Estimate {
     pub memory_bytes: f64,
     /// Disk for the run's folder, and at most as much again for the result.
     pub disk_bytes: f64,
-    /// What the fast method would work with, if that is the plan's.
-    pub settled: Option<Settled>,
+    /// The nonlinear model's rungs.
+    pub(crate) ladder: Ladder,
 }
 
 impl Estimate {
@@ -57,12 +57,12 @@ impl Estimate {
     pub fn of(plan: &Plan, environment: Environment<'_>) -> Result<Self, EngineError> {
         let threads = default_threads(environment);
         let engine = ModelEngine::new(plan)?;
-        let settled = engine.settled().copied();
+        let ladders = engine.ladders();
         let began = Instant::now();
         let mut samples = Vec::new();
         for place in PLACES {
             if samples.is_empty() || began.elapsed() < BUDGET {
-                samples.push(Sample::take(plan, settled, place)?);
+                samples.push(Sample::take(plan, ladders, place)?);
             }
         }
         let core_s_per_point =
@@ -80,7 +80,7 @@ impl Estimate {
             sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
             memory_bytes: memory_bytes(plan, threads),
             disk_bytes: plan.points() as f64 * Shape::of(&Job::of(plan).layout).bytes_a_point() as f64,
-            settled,
+            ladder: ladders[0].clone(),
         })
     }
 }
@@ -93,13 +93,13 @@ struct Sample {
 }
 
 impl Sample {
-    fn take(plan: &Plan, settled: Option<Settled>, place: f64) -> Result<Self, EngineError> {
+    fn take(plan: &Plan, ladders: &[Ladder; 2], place: f64) -> Result<Self, EngineError> {
         let points = plan.points().min(MAX_LANES as u64);
         let first = (plan.points().saturating_sub(points) as f64 * place) as u64;
         let mut shorter: Option<(f64, f64)> = None;
         let mut end_s = first_end_s(plan);
         loop {
-            let cost_s = cost_s(plan, settled, first..first + points, end_s)?;
+            let cost_s = cost_s(plan, ladders, first..first + points, end_s)?;
             if end_s >= plan.end_s || cost_s >= LONG_ENOUGH.as_secs_f64() {
                 // What does not grow with the length (the equilibrium) must not be multiplied.
                 let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
@@ -125,21 +125,19 @@ fn first_end_s(plan: &Plan) -> f64 {
 /// Time that one core takes for the beginning of these points' runs.
 fn cost_s(
     plan: &Plan,
-    settled: Option<Settled>,
+    ladders: &[Ladder; 2],
     points: std::ops::Range<u64>,
     end_s: f64,
 ) -> Result<f64, EngineError> {
     let share = end_s / plan.end_s;
     let window_s = plan.window_s.map(|edge_s| (edge_s * share).min(end_s));
     let cut = Plan { end_s, window_s, ..plan.clone() };
-    let engine = ModelEngine::new(&cut)?;
     // A shorter run alone would be slower spin, and longer steps.
-    if let Some(settled) = settled {
-        engine.assume(settled);
-    }
+    let engine = ModelEngine::with_ladders(&cut, ladders.clone())?;
+    let axis_values: Vec<Vec<f64>> = points.map(|point| plan.axis_values(point)).collect();
     let interrupt = Interrupt::new();
     let began = Instant::now();
-    let outcomes = engine.evaluate(points, &Watch::new(&interrupt));
+    let outcomes = engine.evaluate_at(&axis_values, Demand::Row, &Watch::new(&interrupt));
     let cost_s = began.elapsed().as_secs_f64();
     drop(outcomes);
     Ok(cost_s)
@@ -162,7 +160,7 @@ fn turn_bytes(plan: &Plan, threads: usize) -> f64 {
         return 0.0;
     }
     let turns = plan.spin.turns_within(plan.window_s);
-    (threads as u64 * GROUP) as f64 * 2.0 * turns * size_of::<Deviations>() as f64
+    (MOST_WAITING + threads * ROWS_A_THREAD) as f64 * 2.0 * turns * size_of::<Deviations>() as f64
 }
 
 /// A size with three digits.

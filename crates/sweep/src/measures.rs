@@ -153,6 +153,7 @@ impl Measures {
             turns: self.criterion == Criterion::Envelope,
             cabinet_force: self.metrics.contains(&Metric::CabinetForce),
             clash_time: self.metrics.contains(&Metric::ClashTime),
+            course: false,
         }
     }
 }

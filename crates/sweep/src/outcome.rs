@@ -2,6 +2,8 @@
 
 use washer_model::Channel;
 
+use crate::engine::Level;
+
 /// Why a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
@@ -75,8 +77,11 @@ pub struct Outcome {
     pub nonlinear: Trajectory,
     /// The linear model.
     pub linear: Trajectory,
-    /// Whether the nonlinear motion is chaotic, so that the verdict is stable but the ratio's digits are not;
-    /// `None` where it was not assessed.
+    /// Which rung of which method the nonlinear model's numbers come from.
+    pub method: Level,
+    /// The relative error left in the row's numbers, at most, as seen by comparing rungs; `None` where nothing was compared.
+    pub error: Option<f64>,
+    /// Whether plain RK4 does not agree with itself at two steps: the motion is chaotic. `None` where nothing was compared.
     pub sensitive: Option<bool>,
     /// Ratios per channel of the plan where they are found turn by turn; `None` where undefined. Empty where the amplitudes' quotients
     /// are the ratios, or a model failed.
@@ -89,6 +94,15 @@ impl Outcome {
     /// Both models' trajectories, not yet assessed together.
     #[must_use]
     pub const fn new(point: u64, nonlinear: Trajectory, linear: Trajectory) -> Self {
-        Self { point, nonlinear, linear, sensitive: None, turn_ratios: Vec::new(), static_sag_m: None }
+        Self {
+            point,
+            nonlinear,
+            linear,
+            method: Level::Rk4,
+            error: None,
+            sensitive: None,
+            turn_ratios: Vec::new(),
+            static_sag_m: None,
+        }
     }
 }

@@ -78,36 +78,6 @@ impl Progress {
         }
     }
 
-    /// Says that the method is being looked at before the first point, which on a large grid takes a while.
-    pub(crate) fn settling(&mut self) {
-        let seconds = self.began.elapsed().as_secs_f64();
-        match &mut self.shown {
-            Shown::Bar(bar) => {
-                bar.set_style(style("{spinner} checking the method on a sample of the grid  {elapsed}"));
-                bar.tick();
-            }
-            Shown::Lines { every, next } if Instant::now() >= *next => {
-                *next = Instant::now() + *every;
-                // As in `show`.
-                let _ = writeln!(
-                    std::io::stderr(),
-                    "checking the method on a sample of the grid, {} so far",
-                    duration(seconds)
-                );
-            }
-            Shown::Lines { .. } | Shown::Nothing => {}
-        }
-    }
-
-    /// Says that points begin now: what was before does not count towards their rate.
-    pub(crate) fn computing(&mut self) {
-        self.began = Instant::now();
-        if let Shown::Bar(bar) = &self.shown {
-            bar.set_style(style(BAR));
-            bar.reset_eta();
-        }
-    }
-
     /// Says that the chunks are being joined.
     pub(crate) fn joining(&self) {
         if let Shown::Bar(bar) = &self.shown {

@@ -5,14 +5,13 @@
 //! disk, then about 40 MB for the join; nothing grows with the number of points but one set entry a chunk.
 
 use std::any::Any;
-use std::ops::Range;
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-
-use serde_json::Value;
 
 use crate::interrupt::Interrupt;
 use crate::outcome::Outcome;
@@ -23,26 +22,20 @@ use crate::store::{Environment, Job, Opened, Options, Run, Shard, ShardRequest, 
 
 /// What computes points.
 pub trait Engine: Sync {
-    /// Evaluates neighbouring points and returns one outcome each, in order; `None` if it put the work down because
-    /// [`Watch::stopped`] said so. Called from several threads of one rayon pool at once, which it may use itself.
+    /// Evaluates points until `next` gives none, and hands each outcome to `keep`, in any order; fewer if it put the work
+    /// down because [`Watch::stopped`] said so. Works on all threads of the rayon pool that it is called in, and calls
+    /// both from any of them.
     ///
-    /// A point that fails, even by a panic, is an outcome; a panic that leaves this function costs the whole chunk.
-    fn evaluate(&self, points: Range<u64>, watch: &Watch<'_>) -> Option<Vec<Outcome>>;
+    /// A point that fails, even by a panic, is an outcome; a panic that leaves this function costs all that is in hand.
+    fn evaluate(
+        &self,
+        next: &(dyn Fn() -> Option<u64> + Sync),
+        keep: &(dyn Fn(Outcome) + Sync),
+        watch: &Watch<'_>,
+    );
 
     /// The instruction set in use.
     fn simd(&self) -> &str;
-
-    /// Finds out, before the first point, what evaluating needs beyond the plan; on all threads of the rayon pool it is called in.
-    /// `remembered` is what this returned to an earlier process of the run. `None` if it put the work down.
-    fn settle(&self, remembered: Option<Value>, watch: &Watch<'_>) -> Option<Value> {
-        let _ = (remembered, watch);
-        Some(Value::Null)
-    }
-
-    /// The largest relative error of an amplitude seen so far when checking itself, if it does.
-    fn observed_accuracy(&self) -> Option<f64> {
-        None
-    }
 }
 
 /// The engine's view of the run it serves.
@@ -219,32 +212,23 @@ fn compute(
         .build()
         .map_err(|error| StoreError::Threads { threads, reason: error.to_string() })?;
     let watch = Watch::new(interrupt);
-    let remembered = run.remembered()?;
-    let Some(settled) = settle(engine, remembered.clone(), &pool, &watch, progress) else { return Ok(()) };
-    progress.computing();
-    if !settled.is_null() && remembered.as_ref() != Some(&settled) {
-        run.remember(&settled)?;
-    }
     let (_, start) = run.own_points();
-    let next = AtomicU64::new(0);
     // Bounded, so that a disk slower than the engine holds the engine up instead of filling memory.
     let (sender, receiver) = sync_channel(threads);
+    let hand = Hand::new(run, sender);
     let mut result = Ok(());
     std::thread::scope(|scope| {
-        let (watch, next, pool) = (&watch, &next, &pool);
-        scope.spawn(move || pool.broadcast(|_| work(engine, run, next, watch, &sender)));
+        let (watch, pool) = (&watch, &pool);
+        let work = scope.spawn(move || pool.install(|| hand.fill(engine, watch)));
         loop {
             match receiver.recv_timeout(Duration::from_millis(100)) {
-                Ok((chunk, computed)) => {
-                    let kept = computed.and_then(|outcomes: Vec<Outcome>| run.write_chunk(chunk, &outcomes));
-                    if let Err(error) = kept {
-                        // An engine's defect costs its chunk; a disk that fails would cost them all.
+                Ok((chunk, outcomes)) => {
+                    if let Err(error) = run.write_chunk(chunk, &outcomes) {
+                        // A chunk that makes no sense costs itself; a disk that fails would cost them all.
                         if !matches!(error, StoreError::Engine { .. }) {
                             watch.abort.store(true, Ordering::Relaxed);
                         }
-                        if result.is_ok() {
-                            result = Err(error);
-                        }
+                        result = std::mem::replace(&mut result, Ok(())).and(Err(error));
                     }
                 }
                 Err(RecvTimeoutError::Timeout) => {}
@@ -252,60 +236,72 @@ fn compute(
             }
             progress.show(start + watch.done.load(Ordering::Relaxed));
         }
+        if let Ok(Err(error)) = work.join() {
+            result = std::mem::replace(&mut result, Ok(())).and(Err(error));
+        }
     });
     result
 }
 
-/// Has the engine settle on a thread of its own, so that this one can tell how long it takes.
-fn settle(
-    engine: &dyn Engine,
-    remembered: Option<Value>,
-    pool: &rayon::ThreadPool,
-    watch: &Watch<'_>,
-    progress: &mut Progress,
-) -> Option<Value> {
-    let (sender, receiver) = sync_channel(1);
-    std::thread::scope(|scope| {
-        scope.spawn(move || sender.send(pool.install(|| engine.settle(remembered, watch))));
-        loop {
-            match receiver.recv_timeout(Duration::from_millis(100)) {
-                Ok(settled) => return settled,
-                Err(RecvTimeoutError::Timeout) => progress.settling(),
-                // It panicked, and the scope goes on with that.
-                Err(RecvTimeoutError::Disconnected) => return None,
-            }
-        }
-    })
+/// Chunks in hand: points go out one by one, outcomes come back in any order, whole chunks go on.
+struct Hand<'a> {
+    run: &'a Run,
+    /// Points of missing chunks that have not gone out.
+    left: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
+    /// Outcomes of chunks that are not whole.
+    parts: Mutex<BTreeMap<u64, Vec<Outcome>>>,
+    whole: SyncSender<(u64, Vec<Outcome>)>,
 }
 
-type Computed = (u64, Result<Vec<Outcome>, StoreError>);
+impl<'a> Hand<'a> {
+    fn new(run: &'a Run, whole: SyncSender<(u64, Vec<Outcome>)>) -> Self {
+        let missing = (0..run.chunks()).filter(|&chunk| run.is_missing(chunk));
+        let left = missing.flat_map(|chunk| run.chunk_range(chunk));
+        Self { run, left: Mutex::new(Box::new(left)), parts: Mutex::default(), whole }
+    }
 
-/// One worker: the next missing chunk, and the next, until none is left or someone said stop.
-fn work(engine: &dyn Engine, run: &Run, next: &AtomicU64, watch: &Watch<'_>, sender: &SyncSender<Computed>) {
-    while !watch.stopped() {
-        let chunk = next.fetch_add(1, Ordering::Relaxed);
-        if chunk >= run.chunks() {
-            return;
-        }
-        if !run.is_missing(chunk) {
-            continue;
-        }
-        let points = run.chunk_range(chunk);
-        let defect = |reason| {
-            let (first, last) = (points.start, points.end.saturating_sub(1));
-            Err(StoreError::Engine { first, last, reason })
+    /// Has the engine evaluate everything that is missing.
+    fn fill(self, engine: &dyn Engine, watch: &Watch<'_>) -> Result<(), StoreError> {
+        let next = || if watch.stopped() { None } else { lock(&self.left).next() };
+        let keep = |outcome| self.keep(outcome, watch);
+        let panic = catch_unwind(AssertUnwindSafe(|| engine.evaluate(&next, &keep, watch))).err();
+        let reason = match panic {
+            Some(panic) => format!("the engine panicked: {}", panic_text(panic.as_ref())),
+            None if watch.stopped() => return Ok(()),
+            None => "the engine put its work down unasked".to_owned(),
         };
-        let computed = match catch_unwind(AssertUnwindSafe(|| engine.evaluate(points.clone(), watch))) {
-            Ok(Some(outcomes)) => Ok(outcomes),
-            Ok(None) if watch.stopped() => return,
-            Ok(None) => defect("the engine put its work down unasked".into()),
-            Err(panic) => defect(format!("the engine panicked: {}", panic_text(panic.as_ref()))),
-        };
-        // The receiver outlives the workers.
-        if sender.send((chunk, computed)).is_err() {
-            return;
+        let parts = lock(&self.parts);
+        let unfinished = parts.keys().next().map(|&chunk| self.run.chunk_range(chunk));
+        let untouched = lock(&self.left).next();
+        match (unfinished, untouched) {
+            (None, None) => Ok(()),
+            (Some(points), _) => {
+                Err(StoreError::Engine { first: points.start, last: points.end.saturating_sub(1), reason })
+            }
+            (None, Some(point)) => Err(StoreError::Engine { first: point, last: point, reason }),
         }
     }
+
+    fn keep(&self, outcome: Outcome, watch: &Watch<'_>) {
+        watch.done(1);
+        let chunk = self.run.chunk_of(outcome.point);
+        let points = self.run.chunk_range(chunk);
+        let mut parts = lock(&self.parts);
+        let part = parts.entry(chunk).or_default();
+        part.push(outcome);
+        if (part.len() as u64) < points.end - points.start {
+            return;
+        }
+        let mut outcomes = parts.remove(&chunk).unwrap_or_default();
+        drop(parts);
+        outcomes.sort_by_key(|outcome| outcome.point);
+        // The receiver outlives the engine's work.
+        let _ = self.whole.send((chunk, outcomes));
+    }
+}
+
+fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn panic_text(panic: &(dyn Any + Send)) -> &str {
@@ -353,7 +349,6 @@ impl Clock {
             shard: run.shard().map(|shard| format!("{}/{}", shard.index, shard.of)),
             points,
             points_per_s: if wall_s > 0.0 { points as f64 / wall_s } else { 0.0 },
-            observed_accuracy: engine.observed_accuracy(),
             version: job.version.to_owned(),
         }
     }

@@ -61,7 +61,7 @@ pub fn trace(
     extras: Extras,
 ) -> Result<Trace, NoEquilibrium> {
     let Scenario { machine, spin, window_s } = scenario;
-    let timing = Timing { end_s: plan.end_s, window_s };
+    let timing = Timing { end_s: plan.end_s, window_s, checkpoints: 0 };
     let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
     let (method, method_json) = method(plan, &point, &spin);
     let run = |model| history(model, &method, &point, start, every_s);

@@ -1,14 +1,16 @@
 //! How far the modes of bearings and hinge may be capped, and how long the steps may then be: from the accuracy asked for, the spin
 //! and the machine's own frequencies.
 //!
-//! Three bounds hold a step h of RK4 with cap w:
+//! Three bounds hold a step h with cap w:
 //!
-//! * Truncation. Over one memory of a lightly damped motion of frequency f, 1/(zeta f), RK4's local errors (h f)^5 / 120 add up to
-//!   (h f)^4 / (120 zeta). The motions to follow are the drum's turning and the suspension's modes; f is the fastest of them. With
-//!   zeta = 0.1, (h f)^4 / 12 is to stay below the accuracy.
+//! * Truncation. Over one memory of a lightly damped motion of frequency f, 1/(zeta f), the local errors of RK4,
+//!   (h f)^5 / 120, add up to (h f)^4 / (120 zeta), and those of the formula of order 8 to (h f)^8 / (9! zeta). The
+//!   motions to follow are the drum's turning and the suspension's modes; f is the fastest of them. With zeta = 0.1 the
+//!   sum is to stay below the accuracy.
 //! * Stability. h |s| stays within the method's limit for every mode s of the machine with its caps, hinge and gyroscopic
 //!   effects included. The higher the cap the better, but the closer it comes to the hinge's modes from above, the more these
-//!   are pushed up by it: h w is the first of 2.6, 2.3, ... that leaves the step stable, with the hinge as it is or, if that does not do,
+//!   are pushed up by it: h w is the first of 0.92, 0.81, ... times the
+//!   formula's limit that leaves the step stable, with the hinge as it is or, if that does not do,
 //!   capped too.
 //! * Fidelity. What turns with the drum is exact under the caps (`coupling.rs`); other motion is not, and so the modes of suspension and hinge
 //!   move, by ds. A response at the drum's speed would answer to ds over
@@ -24,12 +26,11 @@
 //! motion, which does not keep to the drum's speed, answers to it as well.
 
 use crate::coupling::Caps;
+use crate::geared::{Formula, GEARS, Gear, Geared};
 use crate::modal::{Mode, Modes, NoModes, highest_with_caps, modes_with_caps};
 use crate::nonlinear::COORDINATES;
 use crate::point::Point;
-use crate::run::Method;
 use crate::spin::Spin;
-use lane_ode::rk4::RK4_STABILITY_LIMIT;
 
 /// Modes of the suspension: yaw, pitch, two translations.
 const SUSPENSION_MODES: usize = 4;
@@ -40,14 +41,14 @@ const SLOW_MODES: usize = SUSPENSION_MODES + 2;
 /// Damping ratio of the motions that remember longest.
 const MEMORY_DAMPING_RATIO: f64 = 0.1;
 
-/// h times the cap, the best first.
-const STEP_TIMES_CAP: [f64; 4] = [2.6, 2.3, 2.0, 1.7];
+/// h times the cap as a share of the formula's limit, the best first.
+const STEP_TIMES_CAP: [f64; 4] = [0.92, 0.81, 0.71, 0.6];
 
 /// The hinge's cap as a multiple of the bearings', the best first; the best of all is none.
 const HINGE_CAP: [Option<f64>; 3] = [None, Some(1.5), Some(1.0)];
 
-/// h times the fastest mode: within the limit by what nonlinear motion may add.
-const STEP_TIMES_FASTEST: f64 = 0.97 * RK4_STABILITY_LIMIT;
+/// h times the fastest mode, as a share of the formula's limit: less by what nonlinear motion may add.
+const STEP_TIMES_FASTEST: f64 = 0.97;
 
 /// Half-width of a resonance that has no damping, as a share of its frequency.
 const LEAST_HALF_WIDTH: f64 = 0.01;
@@ -61,109 +62,137 @@ const STEP_BITS: u32 = 20;
 /// From one candidate step to the next.
 const SHORTER: f64 = 0.97;
 
-/// Step and cap for one accuracy.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Capping {
-    /// Longest step.
-    pub step_s: f64,
-    /// The caps, if capping gains anything.
-    pub caps: Option<Caps>,
-}
+/// Greatest speeds of the drum in each gear, as shares of the greatest of all.
+///
+/// A slower drum drives slower motions, and modes faster than it are hardly driven at all: the step may be longer by as
+/// much. Modes that the drum has passed still ring, so a gear is never changed back.
+const GEAR_SHARES: [f64; GEARS] = [0.5, 0.71, 1.0];
 
-impl Capping {
-    /// The method of these numbers.
-    #[must_use]
-    pub const fn method(&self) -> Method {
-        match self.caps {
-            Some(caps) => Method::Rk4MassScaled { step_s: self.step_s, caps },
-            None => Method::Rk4 { step_s: self.step_s },
-        }
-    }
-}
+/// A lower gear is taken if its step is longer by this.
+const WORTH_A_GEAR: f64 = 1.1;
 
-/// Machines on whose account a run's step and cap are chosen, with what is known of them without a cap.
+/// Machines on whose account a run's steps and caps are chosen, with what is known of them without a cap.
 pub struct Cases<'a>(Vec<Result<Case<'a>, NoModes>>);
 
 struct Case<'a> {
     point: &'a Point,
-    /// The drum's greatest.
-    speed_rad_per_s: f64,
     /// Of the motions to follow.
     fastest_followed_rad_per_s: f64,
     /// Of all modes, at rest and turning.
     fastest_rad_per_s: f64,
-    /// At the drum's greatest speed, and at rest.
-    modes: [Modes; 2],
+    /// The drum at the greatest speed of each gear.
+    turning: [State; GEARS],
+    rest: State,
+}
+
+/// The machine while its drum turns at one speed.
+struct State {
+    speed_rad_per_s: f64,
+    modes: Modes,
+}
+
+impl State {
+    fn new(point: &Point, speed_rad_per_s: f64) -> Result<Self, NoModes> {
+        Ok(Self { speed_rad_per_s, modes: modes_with_caps(point, 0.0, speed_rad_per_s, None)? })
+    }
+}
+
+/// A step and its caps, for a formula.
+#[derive(Clone, Copy)]
+struct Trial {
+    formula: Formula,
+    step_s: f64,
+    caps: Caps,
+}
+
+impl Trial {
+    fn is_stable(&self, frequency_rad_per_s: f64) -> bool {
+        self.step_s * frequency_rad_per_s <= STEP_TIMES_FASTEST * self.formula.stability_limit()
+    }
 }
 
 impl<'a> Case<'a> {
     fn new(point: &'a Point, spin: &Spin, end_s: f64) -> Result<Self, NoModes> {
-        let speed = spin.greatest_speed_rad_per_s(end_s);
-        let modes = [modes_with_caps(point, 0.0, speed, None)?, modes_with_caps(point, 0.0, 0.0, None)?];
-        let slow = &modes[1].modes;
-        let followed = speed.max(slow[SUSPENSION_MODES - 1].magnitude_rad_per_s);
+        let top = spin.greatest_speed_rad_per_s(end_s);
+        let rest = State::new(point, 0.0)?;
+        let [first, second, third] = GEAR_SHARES.map(|share| State::new(point, share * top));
+        let slow = &rest.modes.modes;
+        let followed = top.max(slow[SUSPENSION_MODES - 1].magnitude_rad_per_s);
         let hinge = slow[SUSPENSION_MODES].magnitude_rad_per_s;
         Ok(Self {
             point,
-            speed_rad_per_s: speed,
             // A soft hinge takes part in the motion.
             fastest_followed_rad_per_s: if hinge < 2.0 * followed { hinge } else { followed },
             fastest_rad_per_s: highest_with_caps(point, 0.0, None)?
-                .max(highest_with_caps(point, speed, None)?),
-            modes,
+                .max(highest_with_caps(point, top, None)?),
+            turning: [first?, second?, third?],
+            rest,
         })
     }
 
-    /// Whether a step is stable with these caps, and the slow modes stay where they are. What refuses most is asked first, and what needs
-    /// eigenvalues at every angle last.
-    fn holds(&self, step_s: f64, caps: &Caps, accuracy: f64) -> Result<bool, NoModes> {
-        let speeds = [self.speed_rad_per_s, 0.0];
-        for (turning, plain) in speeds.into_iter().zip(&self.modes) {
-            let slow = &plain.modes[..SLOW_MODES];
-            let added: [f64; SLOW_MODES] = core::array::from_fn(|i| match caps.hinge_rad_per_s {
-                Some(cap) if i < SUSPENSION_MODES => {
-                    HINGE_WEIGHT * self.turning_shift(&slow[i], turning, cap)
-                }
-                _ => 0.0,
-            });
-            if slow.iter().zip(added).any(|(mode, added)| !self.allows(mode, added, accuracy)) {
+    /// Whether a step is stable with these caps in a gear, and the slow modes stay where they are. What refuses most is
+    /// asked first, and what needs eigenvalues at every angle last.
+    fn holds(&self, trial: &Trial, gear: usize, accuracy: f64) -> Result<bool, NoModes> {
+        let top_rad_per_s = self.turning[gear].speed_rad_per_s;
+        for state in [&self.turning[gear], &self.rest] {
+            let hinge = |mode| self.hinge_shift(mode, state.speed_rad_per_s, &trial.caps);
+            let slow = &state.modes.modes[..SLOW_MODES];
+            if slow.iter().any(|mode| error_of_shift(mode, hinge(mode), top_rad_per_s) > accuracy) {
                 return Ok(false);
             }
-            let capped = modes_with_caps(self.point, 0.0, turning, Some(caps))?;
-            if step_s * capped.modes[COORDINATES - 1].magnitude_rad_per_s > STEP_TIMES_FASTEST {
+            let capped = modes_with_caps(self.point, 0.0, state.speed_rad_per_s, Some(&trial.caps))?;
+            if !trial.is_stable(capped.modes[COORDINATES - 1].magnitude_rad_per_s)
+                || self.error_of_caps(state, &capped, trial, top_rad_per_s) > accuracy
+            {
                 return Ok(false);
-            }
-            for ((plain, capped), added) in slow.iter().zip(&capped.modes).zip(added) {
-                let (slower, detuned) =
-                    (capped.re_per_s - plain.re_per_s, capped.im_rad_per_s - plain.im_rad_per_s);
-                if !self.allows(plain, (slower * slower + detuned * detuned).sqrt() + added, accuracy) {
-                    return Ok(false);
-                }
             }
         }
-        for turning in speeds {
-            if step_s * highest_with_caps(self.point, turning, Some(caps))? > STEP_TIMES_FASTEST {
+        for state in [&self.turning[gear], &self.rest] {
+            if !trial.is_stable(highest_with_caps(self.point, state.speed_rad_per_s, Some(&trial.caps))?) {
                 return Ok(false);
             }
         }
         Ok(true)
     }
 
-    /// By how much a hinge with a cap moves a mode while the drum turns (rad/s).
-    fn turning_shift(&self, mode: &Mode, turning_rad_per_s: f64, cap_rad_per_s: f64) -> f64 {
-        let frequency = mode.magnitude_rad_per_s;
-        let in_hinge = (frequency + turning_rad_per_s) / cap_rad_per_s;
-        0.5 * mode.hinge_share(self.point) * frequency * in_hinge * in_hinge
+    /// What the shifts of slow modes do to amplitudes.
+    fn error_of_caps(&self, state: &State, capped: &Modes, trial: &Trial, top_rad_per_s: f64) -> f64 {
+        let mut error = 0.0_f64;
+        for (plain, capped) in state.modes.modes[..SLOW_MODES].iter().zip(&capped.modes) {
+            let (slower, detuned) =
+                (capped.re_per_s - plain.re_per_s, capped.im_rad_per_s - plain.im_rad_per_s);
+            let shift = (slower * slower + detuned * detuned).sqrt()
+                + self.hinge_shift(plain, state.speed_rad_per_s, &trial.caps);
+            error = error.max(error_of_shift(plain, shift, top_rad_per_s));
+        }
+        error
     }
 
-    /// Whether a mode may move so far (rad/s).
-    fn allows(&self, mode: &Mode, shift_rad_per_s: f64, accuracy: f64) -> bool {
+    /// What a hinge with a cap adds to a suspension mode's shift while the drum turns (rad/s), as it counts.
+    fn hinge_shift(&self, mode: &Mode, turning_rad_per_s: f64, caps: &Caps) -> f64 {
+        let Some(cap_rad_per_s) = caps.hinge_rad_per_s else { return 0.0 };
         let frequency = mode.magnitude_rad_per_s;
-        let half_width = mode.re_per_s.abs().max(LEAST_HALF_WIDTH * frequency);
-        let distance = half_width.max(frequency - self.speed_rad_per_s);
-        let weight = (self.speed_rad_per_s / frequency).min(1.0).powi(4);
-        weight * shift_rad_per_s <= accuracy * distance
+        let is_of_suspension = frequency <= self.rest.modes.modes[SUSPENSION_MODES].magnitude_rad_per_s;
+        if !is_of_suspension {
+            return 0.0;
+        }
+        let in_hinge = (frequency + turning_rad_per_s) / cap_rad_per_s;
+        HINGE_WEIGHT * 0.5 * mode.hinge_share(self.point) * frequency * in_hinge * in_hinge
     }
+
+    /// What truncation does to amplitudes.
+    fn error_of_truncation(&self, formula: Formula, step_s: f64) -> f64 {
+        formula.error_per_radian(step_s * self.fastest_followed_rad_per_s) / MEMORY_DAMPING_RATIO
+    }
+}
+
+/// Relative error of an amplitude if a mode moves so far (rad/s).
+fn error_of_shift(mode: &Mode, shift_rad_per_s: f64, speed_rad_per_s: f64) -> f64 {
+    let frequency = mode.magnitude_rad_per_s;
+    let half_width = mode.re_per_s.abs().max(LEAST_HALF_WIDTH * frequency);
+    let distance = half_width.max(frequency - speed_rad_per_s);
+    let weight = (speed_rad_per_s / frequency).min(1.0).powi(4);
+    weight * shift_rad_per_s / distance
 }
 
 impl<'a> Cases<'a> {
@@ -177,47 +206,117 @@ impl<'a> Cases<'a> {
     /// Machines without modes are left out.
     #[must_use]
     pub fn plain_step_s(&self) -> Option<f64> {
-        let steps = self.0.iter().flatten().map(|case| STEP_TIMES_FASTEST / case.fastest_rad_per_s);
+        self.plain_step_of(Formula::Rk4)
+    }
+
+    fn plain_step_of(&self, formula: Formula) -> Option<f64> {
+        let limit = STEP_TIMES_FASTEST * formula.stability_limit();
+        let steps = self.0.iter().flatten().map(|case| limit / case.fastest_rad_per_s);
         steps.reduce(f64::min).map(rounded_down)
     }
 
-    /// The longest step, and its cap, at which amplitudes should be right to `accuracy` (relative) at each of the points.
+    fn all(&self) -> Result<Vec<&Case<'a>>, NoModes> {
+        self.0.iter().map(|case| case.as_ref().map_err(|none| *none)).collect()
+    }
+
+    /// The cheapest formula, steps and caps at which amplitudes should be right to `accuracy` (relative) at each of the
+    /// points; `None` if plain RK4 at its longest stable step is cheaper.
     ///
     /// # Errors
     /// [`NoModes`] of the first machine that has none.
-    pub fn choose(&self, accuracy: f64) -> Result<Capping, NoModes> {
-        let cases = self.0.iter().map(|case| case.as_ref().map_err(|none| *none));
-        let cases = cases.collect::<Result<Vec<_>, _>>()?;
-        let fastest_followed = cases.iter().map(|case| case.fastest_followed_rad_per_s).fold(0.0, f64::max);
-        let mut step_s =
-            rounded_down((120.0 * MEMORY_DAMPING_RATIO * accuracy).powf(0.25) / fastest_followed);
-        let plain_step_s = self.plain_step_s().unwrap_or(f64::INFINITY);
-        if step_s <= plain_step_s {
-            return Ok(Capping { step_s, caps: None });
-        }
-        while step_s > plain_step_s {
-            for step_times_cap in STEP_TIMES_CAP {
-                let cap = step_times_cap / step_s;
-                for multiple in HINGE_CAP {
-                    let hinge_rad_per_s = multiple.map(|multiple| multiple * cap);
-                    let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s };
-                    let mut holds = true;
-                    for case in &cases {
-                        holds = holds && case.holds(step_s, &caps, accuracy)?;
-                    }
-                    if holds {
-                        return Ok(Capping { step_s, caps: Some(caps) });
-                    }
-                }
+    pub fn choose(&self, accuracy: f64) -> Result<Option<Geared>, NoModes> {
+        let cases = self.all()?;
+        let plain = self.plain_step_s().map(|step_s| Formula::Rk4.evaluations_per_s(step_s));
+        let (mut best, mut least) = (None, plain.unwrap_or(0.0));
+        for formula in Formula::ALL {
+            if let Some(geared) = self.choose_for(&cases, formula, accuracy)?
+                && geared.evaluations_per_s() < least
+            {
+                (best, least) = (Some(geared), geared.evaluations_per_s());
             }
-            step_s *= SHORTER;
         }
-        Ok(Capping { step_s: plain_step_s, caps: None })
+        Ok(best)
+    }
+
+    fn choose_for(
+        &self,
+        cases: &[&Case<'a>],
+        formula: Formula,
+        accuracy: f64,
+    ) -> Result<Option<Geared>, NoModes> {
+        let followed = cases.iter().map(|case| case.fastest_followed_rad_per_s).fold(0.0, f64::max);
+        let longest_s = formula.step_phase(MEMORY_DAMPING_RATIO * accuracy) / followed;
+        let plain_step_s = self.plain_step_of(formula).unwrap_or(f64::INFINITY);
+        let top = GEARS - 1;
+        let Some(trial) = longest(cases, formula, top, [plain_step_s, longest_s], accuracy)? else {
+            return Ok(None);
+        };
+        let mut geared = Geared::steady(formula, trial.step_s, trial.caps);
+        for gear in 0..top {
+            let steps_s = [WORTH_A_GEAR * trial.step_s, longest_s / GEAR_SHARES[gear]];
+            if let Some(Trial { step_s, caps, .. }) = longest(cases, formula, gear, steps_s, accuracy)? {
+                let speeds = cases.iter().map(|case| case.turning[gear].speed_rad_per_s);
+                let up_to_rad_per_s = speeds.fold(f64::INFINITY, f64::min);
+                geared.gears[gear] = Gear { up_to_rad_per_s, step_s, caps };
+            } else {
+                // The next gear serves here too.
+                geared.gears[gear].up_to_rad_per_s = 0.0;
+            }
+        }
+        Ok(Some(geared))
+    }
+
+    /// The relative error of amplitudes that the rule expects of a choice: the greatest of what truncation and caps do
+    /// at any of the points.
+    ///
+    /// # Errors
+    /// [`NoModes`] of the first machine that has none.
+    pub fn expected_error(&self, geared: &Geared) -> Result<f64, NoModes> {
+        let Gear { step_s, caps, .. } = *geared.top();
+        let trial = Trial { formula: geared.formula, step_s, caps };
+        let mut error = 0.0_f64;
+        for case in self.all()? {
+            error = error.max(case.error_of_truncation(trial.formula, step_s));
+            let state = &case.turning[GEARS - 1];
+            let capped = modes_with_caps(case.point, 0.0, state.speed_rad_per_s, Some(&caps))?;
+            error = error.max(case.error_of_caps(state, &capped, &trial, state.speed_rad_per_s));
+        }
+        Ok(error)
     }
 }
 
-/// A step of few digits. The last ones of an eigenvalue are the processor's and the system's mathematical library's own, and a result must not
-/// depend on either.
+/// The longest step above the shorter of two, and up to the longer one, that holds in a gear, with its caps.
+fn longest(
+    cases: &[&Case<'_>],
+    formula: Formula,
+    gear: usize,
+    [above_s, up_to_s]: [f64; 2],
+    accuracy: f64,
+) -> Result<Option<Trial>, NoModes> {
+    let mut step_s = rounded_down(up_to_s);
+    while step_s > above_s {
+        for step_times_cap in STEP_TIMES_CAP {
+            let cap = step_times_cap * formula.stability_limit() / step_s;
+            for multiple in HINGE_CAP {
+                let hinge_rad_per_s = multiple.map(|multiple| multiple * cap);
+                let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s };
+                let trial = Trial { formula, step_s, caps };
+                let mut holds = true;
+                for case in cases {
+                    holds = holds && case.holds(&trial, gear, accuracy)?;
+                }
+                if holds {
+                    return Ok(Some(trial));
+                }
+            }
+        }
+        step_s *= SHORTER;
+    }
+    Ok(None)
+}
+
+/// A step of few digits. The last ones of an eigenvalue are the processor's and the system's mathematical library's own, and a
+/// result must not depend on either.
 fn rounded_down(step_s: f64) -> f64 {
     f64::from_bits(
         step_s.to_bits() >> (f64::MANTISSA_DIGITS - 1 - STEP_BITS) << (f64::MANTISSA_DIGITS - 1 - STEP_BITS),
@@ -231,7 +330,7 @@ mod tests {
     use lane_ode::Simd;
 
     /// Run up slowly enough for the fastest suspension mode, an eigenvalue, to decide the step.
-    fn chosen(stiffer: f64) -> (Capping, Option<f64>) {
+    fn chosen(stiffer: f64) -> (Geared, Option<f64>) {
         let mut machine = Machine::paper();
         for spring in &mut machine.springs {
             spring.stiffness_n_per_m *= stiffer;
@@ -241,7 +340,7 @@ mod tests {
         let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
         let ready: Vec<_> = points.iter().flatten().map(|point| (point, &spin)).collect();
         let cases = Cases::new(ready, timing.end_s);
-        (cases.choose(1e-3).unwrap(), cases.plain_step_s())
+        (cases.choose(1e-3).unwrap().unwrap(), cases.plain_step_s())
     }
 
     #[test]
@@ -250,8 +349,8 @@ mod tests {
         assert_eq!(chosen(1.0 + 1e-10), (capping, plain_step_s));
         assert_eq!(chosen(1.0 - 1e-10), (capping, plain_step_s));
         let stiffer = chosen(1.01).0;
-        let cap = |capping: &Capping| capping.caps.unwrap().bearings_rad_per_s;
-        assert!(stiffer.step_s < capping.step_s && cap(&stiffer) > cap(&capping));
+        let cap = |geared: &Geared| geared.top().caps.bearings_rad_per_s;
+        assert!(stiffer.top().step_s < capping.top().step_s && cap(&stiffer) > cap(&capping));
     }
 
     #[test]

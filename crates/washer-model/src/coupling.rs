@@ -97,6 +97,14 @@ pub struct Caps {
     pub hinge_rad_per_s: Option<f64>,
 }
 
+impl Caps {
+    /// The bearings' cap squared, and the reciprocal square of the hinge's; 0 if that is left alone.
+    fn squares(&self) -> [f64; 2] {
+        let hinge = self.hinge_rad_per_s.unwrap_or(f64::INFINITY);
+        [self.bearings_rad_per_s * self.bearings_rad_per_s, 1.0 / (hinge * hinge)]
+    }
+}
+
 /// Caps as the equations use them.
 #[derive(Clone, Copy)]
 pub(crate) struct Scaling<T> {
@@ -154,11 +162,20 @@ impl<T: Real> Coupling<T> {
     #[inline(always)]
     pub(crate) fn new(zero: N<T>, caps: Option<&Caps>) -> Self {
         let Some(caps) = caps else { return Self::Springs };
-        let hinge = caps.hinge_rad_per_s.unwrap_or(f64::INFINITY);
-        Self::MassScaled(Scaling {
-            bearings_squared: zero.lit(caps.bearings_rad_per_s * caps.bearings_rad_per_s),
-            per_hinge_squared: zero.lit(1.0 / (hinge * hinge)),
-        })
+        let [bearings_squared, per_hinge_squared] = caps.squares().map(|square| zero.lit(square));
+        Self::MassScaled(Scaling { bearings_squared, per_hinge_squared })
+    }
+
+    /// Other caps in one lane; for bearings that are springs there are none to set.
+    pub(crate) fn set_caps(&mut self, lane: usize, caps: &Caps)
+    where
+        T: Lane,
+    {
+        if let Self::MassScaled(scaling) = self {
+            let [bearings_squared, per_hinge_squared] = caps.squares();
+            scaling.bearings_squared.0.set(lane, bearings_squared);
+            scaling.per_hinge_squared.0.set(lane, per_hinge_squared);
+        }
     }
 
     /// The hinge's scaled mass, if modes are capped; the hinge sags by these q9 and q10.

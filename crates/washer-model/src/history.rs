@@ -6,15 +6,16 @@
 //! (h w)^4 / 384 of a motion of frequency w. At 1200 rpm and a step of 2e-4 s that is 1e-9.
 
 use crate::coupling::Coupling;
+use crate::geared::{Formula, Geared};
 use crate::model::{Linear, Model, Nonlinear, STATES};
 use crate::nonlinear::COORDINATES;
 use crate::outputs::{CHANNELS, squared};
-use crate::point::{PlannedLeg, Point};
+use crate::point::Point;
 use crate::run::stiff::{OnLeg, WithTangent};
-use crate::run::{Family, Method, ModelKind, OfLinear, OfNonlinear, coupling, first_step_s};
+use crate::run::{Family, Method, ModelKind, OfLinear, OfNonlinear, coupling, first_step};
 use crate::suspension::{Forces, forces};
 use core::marker::PhantomData;
-use lane_ode::{Dual, Ended, Failure, Leg, N, ScalarKernel, Simd, Step, System, Task, dopri5, rk4, rodas};
+use lane_ode::{Dual, Ended, Failure, Leg, N, ScalarKernel, Simd, Step, System, Task, dop853, dopri5, rk4, rodas};
 
 /// An instant this share of a step past its end is its end.
 const SLACK: f64 = 1e-9;
@@ -146,14 +147,19 @@ impl<F: Family> ScalarKernel for Sample<'_, F> {
             model: Model::splat(N(0.0), self.point, coupling(self.method, N(0.0))),
             point: self.point,
             every_s: self.every_s,
-            first_step_s: first_step_s(self.method),
+            method: self.method,
             leg: None,
             start,
             states: vec![start],
             failure: None,
         };
         match self.method {
-            Method::Rk4 { .. } | Method::Rk4MassScaled { .. } => rk4::integrate(0.0, &mut sampling),
+            Method::Rk4 { .. } | Method::Geared(Geared { formula: Formula::Rk4, .. }) => {
+                rk4::integrate(0.0, &mut sampling);
+            }
+            Method::Geared(Geared { formula: Formula::Dop853, .. }) => {
+                dop853::integrate(0.0, &mut sampling);
+            }
             Method::Dopri5(tolerance) => dopri5::integrate(0.0, &mut sampling, tolerance),
             Method::Rodas5p(tolerance) => {
                 let mut task = WithTangent::<f64, _, F::Over<Dual<f64>>>::new(0.0, sampling, self.point);
@@ -170,7 +176,7 @@ struct Sampling<'a, M> {
     model: M,
     point: &'a Point,
     every_s: f64,
-    first_step_s: f64,
+    method: &'a Method,
     /// Which leg it is on, once it has begun.
     leg: Option<usize>,
     start: [f64; STATES],
@@ -218,9 +224,13 @@ impl<M: Model<f64>> Task<f64, STATES> for Sampling<'_, M> {
             *x = self.start.map(N);
         }
         self.leg = Some(next);
-        let &PlannedLeg { start_s, end_s, stretch, .. } = self.point.legs.get(next)?;
-        self.model.set_spin(0, &self.point.stretches[stretch]);
-        Some(Leg { start_s, end_s, step_s: self.first_step_s })
+        let leg = self.point.legs.get(next)?;
+        let (step_s, caps) = first_step(self.method, leg);
+        self.model.set_spin(0, &self.point.stretches[leg.stretch]);
+        if let Some(caps) = caps {
+            self.model.set_caps(0, &caps);
+        }
+        Some(Leg { start_s: leg.start_s, end_s: leg.end_s, step_s })
     }
 
     #[inline(always)]

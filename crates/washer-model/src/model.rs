@@ -1,7 +1,7 @@
 //! The two models as systems over lanes, and what they have in common.
 
 use crate::coefficients::Coefficients;
-use crate::coupling::{Coupling, Sag};
+use crate::coupling::{Caps, Coupling, Sag};
 use crate::lanes::SetLane;
 use crate::linear_outputs::{LinearMotion, LinearOutputs};
 use crate::linear_step::{self, RotorAt, StepConstants};
@@ -27,6 +27,8 @@ pub(crate) trait Model<T: Lane>: System<T, STATES> {
     fn set_point(&mut self, lane: usize, point: &Point);
     /// Puts a stretch of its spin into one lane.
     fn set_spin(&mut self, lane: usize, stretch: &SpinStretch);
+    /// Puts other caps into one lane.
+    fn set_caps(&mut self, lane: usize, caps: &Caps);
     /// State at rest.
     fn at_rest(point: &Point) -> [f64; STATES];
     /// Where the drum's front centre stands from the tub axis, and how far the channels are from equilibrium; these only if
@@ -122,6 +124,10 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
 
     fn set_spin(&mut self, lane: usize, stretch: &SpinStretch) {
         self.spin.set_lane(lane, stretch);
+    }
+
+    fn set_caps(&mut self, lane: usize, caps: &Caps) {
+        self.coupling.set_caps(lane, caps);
     }
 
     fn at_rest(point: &Point) -> [f64; STATES] {
@@ -228,6 +234,10 @@ impl<T: Lane> Model<T> for Linear<T> {
 
     fn set_spin(&mut self, lane: usize, stretch: &SpinStretch) {
         self.spin.set_lane(lane, stretch);
+    }
+
+    fn set_caps(&mut self, lane: usize, caps: &Caps) {
+        self.coupling.set_caps(lane, caps);
     }
 
     fn at_rest(_: &Point) -> [f64; STATES] {

@@ -17,6 +17,8 @@ pub struct Timing {
     pub end_s: f64,
     /// Amplitudes are taken over this closed interval within the run.
     pub window_s: [f64; 2],
+    /// Into how many even parts the run is cut, so that states at their ends can be compared; 0 for none.
+    pub checkpoints: u32,
 }
 
 /// The machine has no static equilibrium, or none that is stable.
@@ -46,6 +48,8 @@ pub(crate) struct PlannedLeg {
     pub(crate) stretch: usize,
     /// Whether amplitudes are taken.
     pub(crate) in_window: bool,
+    /// The drum's greatest speed so far, at its end (rad/s).
+    pub(crate) fastest_rad_per_s: f64,
 }
 
 impl Point {
@@ -61,6 +65,12 @@ impl Point {
     pub fn static_sag_m(&self) -> f64 {
         let (sin_pitch, _) = N(self.equilibrium[5]).sin_cos();
         -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[0])).0
+    }
+
+    /// The gap between drum and tub at rest (m).
+    #[must_use]
+    pub const fn clearance_m(&self) -> f64 {
+        self.machine.bodies.clearance.0
     }
 
     /// The window's edges (s).
@@ -139,19 +149,24 @@ impl Kernel for Prepare<'_> {
 fn legs(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedLeg> {
     let [from, to] = timing.window_s;
     let kinks = stretches.iter().map(|s| s.start_s).chain([0.0, from, to, timing.end_s]);
+    let parts = f64::from(timing.checkpoints);
+    let kinks = kinks.chain((1..timing.checkpoints).map(|k| timing.end_s * (f64::from(k) / parts)));
     let mut times: Vec<f64> = kinks.filter(|t| (0.0..=timing.end_s).contains(t)).collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
+    let mut fastest_rad_per_s = 0.0_f64;
     times
         .windows(2)
         .map(|pair| {
             let (start_s, end_s) = (pair[0], pair[1]);
-            PlannedLeg {
-                start_s,
-                end_s,
-                stretch: stretches.iter().rposition(|s| s.start_s <= start_s).unwrap_or(0),
-                in_window: from <= start_s && end_s <= to,
+            let stretch = stretches.iter().rposition(|s| s.start_s <= start_s).unwrap_or(0);
+            // Within a stretch the speed rises or falls all the way.
+            for time_s in [start_s, end_s] {
+                fastest_rad_per_s =
+                    fastest_rad_per_s.max(stretches[stretch].speed_rad_per_s(time_s).abs());
             }
+            let in_window = from <= start_s && end_s <= to;
+            PlannedLeg { start_s, end_s, stretch, in_window, fastest_rad_per_s }
         })
         .collect()
 }

@@ -1,20 +1,23 @@
 //! Trajectories: points through the lanes of an integrator, and what is recorded of them.
 
 mod cabinet_force;
+mod course;
 mod extras;
 pub(crate) mod stiff;
 
 pub use extras::{Extra, Wanted};
 
 use crate::coupling::{Caps, Coupling};
+use crate::geared::{Formula, Geared};
 use crate::model::{Linear, Model, Nonlinear, STATES};
+use crate::nonlinear::COORDINATES;
 use crate::outputs::{CHANNELS, RADIAL, squared};
 use crate::point::{PlannedLeg, Point};
 use core::marker::PhantomData;
 use extras::{Extras, Seen};
 use lane_ode::{
     Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, System, Task,
-    Tolerance, dopri5, rk4,
+    Tolerance, dop853, dopri5, rk4,
 };
 
 /// How trajectories are integrated.
@@ -25,13 +28,9 @@ pub enum Method {
         /// Longest step.
         step_s: f64,
     },
-    /// The same, with mass of bearings and hinge scaled so that none of their modes is faster than a cap (see `coupling.rs`).
-    Rk4MassScaled {
-        /// Longest step.
-        step_s: f64,
-        /// The caps.
-        caps: Caps,
-    },
+    /// An explicit formula on the machine whose bearings and hinge have scaled mass, so that none of their modes is
+    /// faster than a cap (see `coupling.rs`).
+    Geared(Geared),
     /// Dormand-Prince 5(4).
     Dopri5(Tolerance),
     /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others. One trajectory at a time.
@@ -50,22 +49,29 @@ pub enum ModelKind {
 /// First step that an adaptive method tries.
 const FIRST_STEP_S: f64 = 1e-5;
 
-/// The step that a leg starts with.
-pub(crate) fn first_step_s(method: &Method) -> f64 {
+/// The step that a leg starts with, and its caps if modes are capped.
+pub(crate) fn first_step(method: &Method, leg: &PlannedLeg) -> (f64, Option<Caps>) {
     match method {
-        Method::Rk4 { step_s } | Method::Rk4MassScaled { step_s, .. } => *step_s,
-        Method::Dopri5(_) | Method::Rodas5p(_) => FIRST_STEP_S,
+        Method::Rk4 { step_s } => (*step_s, None),
+        Method::Geared(geared) => {
+            let gear = geared.gear(leg.fastest_rad_per_s);
+            (gear.step_s, Some(gear.caps))
+        }
+        Method::Dopri5(_) | Method::Rodas5p(_) => (FIRST_STEP_S, None),
     }
 }
 
-/// How bearings and hinge act.
+/// How bearings and hinge act where a trajectory starts.
 #[inline(always)]
 pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
     match method {
-        Method::Rk4MassScaled { caps, .. } => Coupling::new(zero, Some(caps)),
+        Method::Geared(geared) => Coupling::new(zero, Some(&geared.top().caps)),
         Method::Rk4 { .. } | Method::Dopri5(_) | Method::Rodas5p(_) => Coupling::Springs,
     }
 }
+
+/// Coordinates (m, rad) at the ends of a trajectory's legs, as far as it came.
+pub type Course = Vec<[f64; COORDINATES]>;
 
 /// How one trajectory went.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,7 +108,8 @@ pub fn simulate_with(
         return (Vec::new(), Vec::new());
     }
     let stepper = match method {
-        Method::Rk4 { .. } | Method::Rk4MassScaled { .. } => Stepper::Rk4,
+        Method::Rk4 { .. } | Method::Geared(Geared { formula: Formula::Rk4, .. }) => Stepper::Rk4,
+        Method::Geared(Geared { formula: Formula::Dop853, .. }) => Stepper::Dop853,
         Method::Dopri5(tolerance) => Stepper::Dopri5(*tolerance),
         Method::Rodas5p(tolerance) => return stiff::simulate(model, tolerance, points, wanted),
     };
@@ -119,6 +126,7 @@ pub fn simulate_with(
 /// The integrators whose lanes are trajectories.
 enum Stepper {
     Rk4,
+    Dop853,
     Dopri5(Tolerance),
 }
 
@@ -152,11 +160,11 @@ impl<F: Family> Kernel for Simulate<'_, F> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let (step_s, coupling) = (first_step_s(self.method), coupling(self.method, N(zero)));
-        let mut run = Run::<T, F::Over<T>>::new(N(zero), self.points, coupling, step_s);
-        run.extras = Extras::new(N(zero), self.wanted, F::KIND, self.points[0], self.points.len());
+        let mut run = Run::<T, F::Over<T>>::new(N(zero), self.points, self.method);
+        run.record(N(zero), self.wanted, F::KIND);
         match self.stepper {
             Stepper::Rk4 => rk4::integrate(zero, &mut run),
+            Stepper::Dop853 => dop853::integrate(zero, &mut run),
             Stepper::Dopri5(tolerance) => dopri5::integrate(zero, &mut run, &tolerance),
         }
         run.recorded()
@@ -180,13 +188,15 @@ struct Run<'a, T, M> {
     points: &'a [&'a Point],
     taken: usize,
     lanes: [LaneState; MAX_LANES],
-    step_s: f64,
+    method: &'a Method,
     channels: Peaks<T, CHANNELS>,
     radial: Peaks<T, 1>,
     /// 1 where a lane is inside its window, else 0.
     windows: N<T>,
     records: Vec<Record>,
     extras: Option<Extras<T>>,
+    /// Coordinates at the ends of each point's legs; empty unless wanted.
+    courses: Vec<Course>,
 }
 
 impl<T: Lane, M: Model<T>> System<T, STATES> for Run<'_, T, M> {
@@ -227,6 +237,9 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
             }
         }
         let point = self.points[state.point];
+        if let Some(course) = self.courses.get_mut(state.point) {
+            course.push(core::array::from_fn(|i| x[i].0.get(lane)));
+        }
         if failure.is_none() && state.leg + 1 < point.legs.len() {
             state.leg += 1;
             return Some(self.enter(lane));
@@ -279,24 +292,41 @@ fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
 impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     /// Every point still to be taken up; there is at least one.
     #[inline(always)]
-    fn new(zero: N<T>, points: &'a [&'a Point], coupling: Coupling<T>, step_s: f64) -> Self {
+    fn new(zero: N<T>, points: &'a [&'a Point], method: &'a Method) -> Self {
         Self {
-            model: M::splat(zero, points[0], coupling),
+            model: M::splat(zero, points[0], coupling(method, zero)),
             points,
             taken: 0,
             lanes: [LaneState::default(); MAX_LANES],
-            step_s,
+            method,
             channels: Peaks::new(zero),
             radial: Peaks::new(zero),
             windows: zero,
             records: vec![EMPTY; points.len()],
             extras: None,
+            courses: Vec::new(),
+        }
+    }
+
+    /// Has more recorded than the peaks.
+    #[inline(always)]
+    fn record(&mut self, zero: N<T>, wanted: Wanted, model: ModelKind) {
+        self.extras = Extras::new(zero, wanted, model, self.points[0], self.points.len());
+        if wanted.course {
+            self.courses = self.points.iter().map(|point| Vec::with_capacity(point.legs.len())).collect();
         }
     }
 
     /// Everything that was recorded.
     fn recorded(self) -> (Vec<Record>, Vec<Extra>) {
-        (self.records, self.extras.map_or_else(Vec::new, |extras| extras.found))
+        let mut found = self.extras.map_or_else(Vec::new, |extras| extras.found);
+        if !self.courses.is_empty() {
+            found.resize(self.courses.len(), Extra::default());
+        }
+        for (extra, course) in found.iter_mut().zip(self.courses) {
+            extra.course = course;
+        }
+        (self.records, found)
     }
 
     /// Shows an instant to the recorders that were asked for.
@@ -347,9 +377,13 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     fn enter(&mut self, lane: usize) -> Leg {
         let state = &self.lanes[lane];
         let point = self.points[state.point];
-        let PlannedLeg { start_s, end_s, stretch, in_window } = point.legs[state.leg];
-        self.model.set_spin(lane, &point.stretches[stretch]);
-        self.windows.0.set(lane, f64::from(u8::from(in_window)));
-        Leg { start_s, end_s, step_s: self.step_s }
+        let leg = &point.legs[state.leg];
+        let (step_s, caps) = first_step(self.method, leg);
+        self.model.set_spin(lane, &point.stretches[leg.stretch]);
+        if let Some(caps) = caps {
+            self.model.set_caps(lane, &caps);
+        }
+        self.windows.0.set(lane, f64::from(u8::from(leg.in_window)));
+        Leg { start_s: leg.start_s, end_s: leg.end_s, step_s }
     }
 }

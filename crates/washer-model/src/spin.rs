@@ -95,6 +95,13 @@ pub struct SpinStretch {
     wave_hz: f64,
 }
 
+impl SpinStretch {
+    /// Speed at a time within the stretch.
+    pub(crate) fn speed_rad_per_s(&self, t_s: f64) -> f64 {
+        SpinLanes::splat(N(0.0), self).at(N(t_s)).speed.0
+    }
+}
+
 impl Spin {
     /// The profile as stretches in order of time, the first from 0.
     #[must_use]
@@ -140,7 +147,7 @@ impl Spin {
     pub fn speed_rpm(&self, t_s: f64) -> f64 {
         let stretches = self.stretches();
         let current = stretches.iter().rev().find(|s| s.start_s <= t_s).or(stretches.first());
-        current.map_or(0.0, |stretch| SpinLanes::splat(N(0.0), stretch).at(N(t_s)).speed.0 * 60.0 / TAU)
+        current.map_or(0.0, |stretch| stretch.speed_rad_per_s(t_s) * 60.0 / TAU)
     }
 }
 

@@ -86,7 +86,7 @@ fn failure(outcome: &Outcome<3>) -> (Failure, f64) {
 
 #[test]
 fn a_diverged_trajectory_ends_alone() {
-    for method in [Method::Rk4, DOPRI5] {
+    for method in [Method::Rk4, Method::Dop853, DOPRI5] {
         let outcomes = among_others(method, &[explodes()]);
         let (reason, time_s) = failure(&outcomes[0]);
         assert_eq!(reason, Failure::Diverged, "{method:?}");
@@ -97,7 +97,7 @@ fn a_diverged_trajectory_ends_alone() {
 
 #[test]
 fn a_state_that_is_not_finite_ends_alone() {
-    for method in [Method::Rk4, DOPRI5] {
+    for method in [Method::Rk4, Method::Dop853, DOPRI5] {
         let outcomes = among_others(method, &[has_no_value_after(0.7), has_no_value_after(0.2)]);
         for (outcome, at_s) in outcomes.iter().zip([0.7, 0.2]) {
             let (reason, time_s) = failure(outcome);

@@ -11,7 +11,8 @@ mod recorders;
 mod trig;
 
 use crate::{
-    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, Tolerance, dopri5, rk4,
+    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, Tolerance, dop853,
+    dopri5, rk4,
 };
 use core::marker::PhantomData;
 
@@ -38,6 +39,7 @@ struct Trajectory<const D: usize, const P: usize> {
 #[derive(Clone, Copy, Debug)]
 enum Method {
     Rk4,
+    Dop853,
     Dopri5(Tolerance),
 }
 
@@ -110,6 +112,7 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for Solve<'_, E, 
         };
         let heap = allocation_counter::measure(|| match self.method {
             Method::Rk4 => rk4::integrate(zero, &mut batch),
+            Method::Dop853 => dop853::integrate(zero, &mut batch),
             Method::Dopri5(tolerance) => dopri5::integrate(zero, &mut batch, &tolerance),
         });
         (batch.outcomes, heap.count_total)

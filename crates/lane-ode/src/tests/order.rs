@@ -13,7 +13,7 @@ fn errors(method: Method, steps: &[u32]) -> Vec<[f64; 2]> {
     let trajectories: Vec<_> = steps
         .iter()
         .map(|&n| match method {
-            Method::Rk4 => Trajectory::swing(1.0, END_S, 1, END_S / f64::from(n)),
+            Method::Rk4 | Method::Dop853 => Trajectory::swing(1.0, END_S, 1, END_S / f64::from(n)),
             Method::Dopri5(_) => Trajectory::swing(1.0, END_S, n, END_S),
         })
         .collect();
@@ -58,6 +58,22 @@ fn rk4_has_order_4_and_so_has_the_cubic_between_its_steps() {
 }
 
 #[test]
+fn dop853_has_order_8_and_its_coefficients_are_consistent() {
+    let [order, _] = slopes("dop853", Method::Dop853, &[10, 14, 20, 28]);
+    assert!((7.7..9.3).contains(&order), "order {order}");
+}
+
+#[test]
+fn dop853_is_stable_on_the_imaginary_axis_to_its_limit() {
+    let limit = crate::dop853::DOP853_STABILITY_LIMIT;
+    for k in 1..=1000 {
+        let y = limit * f64::from(k) / 1000.0;
+        assert!(crate::dop853::amplification(y) <= 1.0 + 1e-9, "{y}");
+    }
+    assert!(crate::dop853::amplification(1.001 * limit) > 1.0);
+}
+
+#[test]
 fn dopri5_has_order_5_and_so_has_its_dense_output() {
     // Dense output of order 4 has a local error of h^5, which is not summed up: it keeps pace with the method.
     let [order, between] = slopes("dopri5", Method::Dopri5(ANYTHING), &[64, 91, 128, 181, 256]);
@@ -92,7 +108,7 @@ fn every_leg_ends_where_it_should() {
     // Ends and steps that binary fractions do not hit.
     let ends = [0.1, 0.7, 1.0 / 3.0, 2.2, 5.3, 0.049, 7.77];
     for method in
-        [Method::Rk4, Method::Dopri5(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 })]
+        [Method::Rk4, Method::Dop853, Method::Dopri5(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 })]
     {
         let trajectories: Vec<_> = ends
             .into_iter()
@@ -117,7 +133,7 @@ fn every_leg_ends_where_it_should() {
 
 #[test]
 fn a_fixed_step_fills_its_leg_with_the_fewest_equal_steps() {
-    let steps = |end_s: f64, step_s: f64| crate::rk4::fixed_steps(&Leg { start_s: 0.0, end_s, step_s });
+    let steps = |end_s: f64, step_s: f64| crate::fixed_steps(&Leg { start_s: 0.0, end_s, step_s });
     assert_eq!(steps(50.0, 2e-4), 250_000);
     assert_eq!(steps(1.0, 0.3), 4);
     // 0.7 / 0.1 is a hair below 7, 0.3 / 0.1 a hair below 3, 4.35 / 0.01 a hair below 435: none is an eighth of a step off.

@@ -2,13 +2,13 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use rayon::prelude::*;
 
 use super::quantity::Quantity;
 use super::{Evaluate, Search, Trial};
-use crate::engine::ModelEngine;
+use crate::engine::{Demand, ModelEngine};
 use crate::interrupt::Interrupt;
 use crate::plan::{Axis, AxisValues, Plan};
+use crate::run::Watch;
 
 /// Rows of all curves together that are accepted: what is known of them stays in memory.
 const MOST_ROWS: u64 = 1_000_000;
@@ -173,31 +173,17 @@ impl<'a> Models<'a> {
 
 impl Evaluate for Models<'_> {
     fn evaluate(&self, trials: &[Trial]) -> Option<Vec<Option<f64>>> {
-        // Every thread gets whole lane groups, few at a time so that an interrupt is not waited for long; how trials are grouped leaves no
-        // trace in what comes out.
-        let each = trials.len().div_ceil(self.pool.current_num_threads().max(1));
-        let group = each.next_multiple_of(lane_ode::MAX_LANES).min(2 * lane_ode::MAX_LANES);
-        let distances: Option<Vec<Vec<Option<f64>>>> = self.pool.install(|| {
-            trials
-                .par_chunks(group)
-                .map(|group| {
-                    if self.interrupt.stopped() {
-                        return None;
-                    }
-                    let axis_values: Vec<Vec<f64>> = group
-                        .iter()
-                        .map(|trial| {
-                            let further = further_values(self.plan, trial.curve);
-                            [trial.first, trial.second].into_iter().chain(further).collect()
-                        })
-                        .collect();
-                    let outcomes = self.engine.evaluate_at(&axis_values);
-                    let done = self.done.fetch_add(group.len() as u64, Ordering::Relaxed);
-                    (self.tell)(done + group.len() as u64);
-                    Some(outcomes.iter().map(|outcome| self.quantity.distance(outcome, self.plan)).collect())
-                })
-                .collect()
-        });
-        distances.map(|groups| groups.concat())
+        let axis_values: Vec<Vec<f64>> = trials
+            .iter()
+            .map(|trial| {
+                let further = further_values(self.plan, trial.curve);
+                [trial.first, trial.second].into_iter().chain(further).collect()
+            })
+            .collect();
+        let watch = Watch::new(self.interrupt);
+        let outcomes = self.pool.install(|| self.engine.evaluate_at(&axis_values, Demand::Side, &watch))?;
+        let done = self.done.fetch_add(trials.len() as u64, Ordering::Relaxed);
+        (self.tell)(done + trials.len() as u64);
+        Some(outcomes.iter().map(|outcome| self.quantity.distance(outcome, self.plan)).collect())
     }
 }

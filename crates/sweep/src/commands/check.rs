@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::Grid;
 use crate::design::Design;
-use crate::engine::Settled;
+use crate::engine::Ladder;
 use crate::estimate::{Estimate, size};
 use crate::exit::{Error, Exit, print, tell};
 use crate::measures::Criterion;
@@ -55,7 +55,7 @@ fn summary(plan: &Plan, estimate: &Estimate) -> String {
     };
     line("points", laid_out);
     line("time", format!("0 to {} s, window {} to {} s", plan.end_s, plan.window_s[0], plan.window_s[1]));
-    line("method", method(plan, estimate.settled.as_ref()));
+    line("method", method(plan, &estimate.ladder));
     let metrics: Vec<_> = plan.measures.metrics.iter().map(|metric| metric.name()).collect();
     if !metrics.is_empty() {
         line("metrics", metrics.join(", "));
@@ -118,7 +118,7 @@ fn describe(axis: &Axis, design: Option<&Design>) -> String {
     }
 }
 
-fn method(plan: &Plan, settled: Option<&Settled>) -> String {
+fn method(plan: &Plan, ladder: &Ladder) -> String {
     match plan.integrator {
         Integrator::Rk4 { step_s } => {
             // Both window edges and the end are hit exactly, so each stretch rounds up.
@@ -133,17 +133,9 @@ fn method(plan: &Plan, settled: Option<&Settled>) -> String {
             format!("rodas5p, rtol {rtol:e}, atol {atol:e}: steps as it needs, one trajectory at a time")
         }
         Integrator::Rk4MassScaled { accuracy } => {
-            let chosen = settled.map_or_else(String::new, |settled| {
-                let cap = match (settled.cap_rad_per_s, settled.hinge_cap_rad_per_s) {
-                    (None, _) => "bearings as they are".to_owned(),
-                    (Some(cap), None) => format!("bearing modes capped at {cap:.0} rad/s"),
-                    (Some(cap), Some(hinge)) => {
-                        format!("bearing modes capped at {cap:.0} rad/s, the hinge's at {hinge:.0} rad/s")
-                    }
-                };
-                format!(": step {:.3} ms, {cap}; checked against rk4 before the run", 1e3 * settled.step_s)
-            });
-            format!("rk4-mass-scaled, accuracy {accuracy:e}{chosen}")
+            let rungs: Vec<String> = ladder.rungs.iter().skip(1).map(|rung| rung.to_string()).collect();
+            let rungs = rungs.join("\n            then ");
+            format!("rk4-mass-scaled, accuracy {accuracy:e}, until two rungs agree: {rungs}")
         }
     }
 }

@@ -98,7 +98,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
             (plan.name, plan.machine, plan.spin)
         }
     };
-    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0] };
+    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     let point = prepare(Simd::Scalar, &[(machine.clone(), spin)], &timing).remove(0)?;
     let speeds = args.speed.values();
     let modes = campbell(&point, &speeds)?;

@@ -147,13 +147,6 @@ fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &Repo
         Ended::Already(_, tally) | Ended::Finished(tally) => text.push_str(&rows(tally, job)),
         Ended::Interrupted { .. } | Ended::Shard(_) => {}
     }
-    if let Some(accuracy) = report.session.as_ref().and_then(|session| session.observed_accuracy) {
-        let told = match accuracy {
-            0.0 => "that of rk4 itself: nothing faster was accurate enough".to_owned(),
-            accuracy => format!("{accuracy:.1e} of the amplitude, as observed"),
-        };
-        line(&mut text, "accuracy", &told);
-    }
     let out = quoted(&output.display().to_string());
     match &report.ended {
         Ended::Already(..) | Ended::Finished(_) => {
@@ -209,8 +202,14 @@ pub(super) fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String
         line(&mut text, "failed", &list.join(", "));
     }
     if tally.sensitive > 0 {
-        let told = format!("{}: their verdict holds, their ratio's digits do not", tally.sensitive);
+        let told = format!("{}: chaotic, rk4 does not agree with itself at two steps", tally.sensitive);
         line(&mut text, "sensitive", &told);
+    }
+    if let Some(greatest) = &tally.greatest_error {
+        let methods: Vec<String> =
+            tally.by_method.iter().map(|(method, count)| format!("{count} {method}")).collect();
+        let told = format!("at most {:.1e} left in a row; rows by method: {}", greatest.value, methods.join(", "));
+        line(&mut text, "error", &told);
     }
     let place = |point: u64| match at(point) {
         place if place.is_empty() => place,

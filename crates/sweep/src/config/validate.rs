@@ -167,7 +167,7 @@ pub(super) fn stability(draft: &Draft, report: &mut Report) {
 /// The longest stable step over the grid's corners, if `step_s` is longer.
 fn longest_stable_step_s(draft: &Draft, step_s: f64) -> Option<f64> {
     let plan = &draft.plan;
-    let timing = Timing { end_s: plan.end_s, window_s: plan.window_s };
+    let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
     let mut highest = 0.0_f64;
     for values in plan.some_corners() {
         let Scenario { machine, spin, .. } = plan.scenario_at(&values);

@@ -23,18 +23,22 @@ impl<F: Fn(u64) + Sync> Formula<F> {
 }
 
 impl<F: Fn(u64) + Sync> Engine for Formula<F> {
-    fn evaluate(&self, points: Range<u64>, watch: &Watch<'_>) -> Option<Vec<Outcome>> {
-        let mut outcomes = Vec::new();
-        for point in points {
-            (self.on_point)(point);
-            if watch.stopped() {
-                return None;
+    fn evaluate(
+        &self,
+        next: &(dyn Fn() -> Option<u64> + Sync),
+        keep: &(dyn Fn(Outcome) + Sync),
+        watch: &Watch<'_>,
+    ) {
+        rayon::broadcast(|_| {
+            while let Some(point) = next() {
+                (self.on_point)(point);
+                if watch.stopped() {
+                    return;
+                }
+                self.evaluated.fetch_add(1, Ordering::Relaxed);
+                keep(synthetic::outcome(point, 2));
             }
-            self.evaluated.fetch_add(1, Ordering::Relaxed);
-            watch.done(1);
-            outcomes.push(synthetic::outcome(point, 2));
-        }
-        Some(outcomes)
+        });
     }
 
     fn simd(&self) -> &str {
@@ -138,16 +142,16 @@ fn done_is_done() {
 }
 
 #[test]
-fn a_panic_that_leaves_the_engine_costs_its_chunk_alone() {
+fn a_panic_that_leaves_the_engine_costs_what_is_in_hand() {
     let (home, job) = (tempfile::tempdir().unwrap(), synthetic::job(POINTS));
     let engine = Formula::new(|point| assert_ne!(point, 20, "twenty is too much"));
-    let error = run(&engine, &job, &output(&home), options(2), &Interrupt::new()).unwrap_err();
+    let error = run(&engine, &job, &output(&home), options(1), &Interrupt::new()).unwrap_err();
     assert_eq!(error.exit(), Exit::Failed);
     let text = error.to_string();
     assert!(text.contains("points 16 to 23") && text.contains("twenty is too much"), "{text}");
     let mended = Formula::new(|_| {});
     run(&mended, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-    assert_eq!(mended.evaluated.into_inner(), 8);
+    assert_eq!(mended.evaluated.into_inner(), POINTS - 16, "the chunks before it are kept");
     assert!(fs::read(output(&home)).unwrap() == whole(POINTS, 1));
 }
 

@@ -9,21 +9,23 @@
 //! | 4 | channels C, u32 |
 //! | 32 | hash of the plan |
 //! | 8, 8, 8 | chunk index, first point, number of points, u64 |
-//! | points x (11 + 2 x (32 + 8 C + 8 M) + 8 B) | records |
+//! | points x (20 + 2 x (32 + 8 C + 8 M) + 8 B) | records |
 //! | 32 | blake3 of everything before |
 //!
-//! A record is the point (u64), flags, the two models' status codes (u8 each), then for the nonlinear and the linear
+//! A record is the point (u64), flags, the two models' status codes and that of the method's level (u8 each), the error (f64,
+//! NaN where there is none), then for the nonlinear and the linear
 //! model: fail time, least gap (f64), steps, rejected (u64), C amplitudes and M metrics (f64). What a flag says is absent is zero.
 //! Behind both models stand B numbers (f64) of both together: ratios by turns, then the static sag; NaN where there is none. M and B
 //! follow from the plan, and are zero unless it asks for more than peaks.
 
 use super::error::StoreError;
 use super::schema::Layout;
+use crate::engine::Level;
 use crate::measures::{Criterion, Metric};
 use crate::outcome::{Outcome, Status, Trajectory};
 
 const MAGIC: [u8; 8] = *b"SWEEPCHK";
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 const HEADER: usize = 8 + 4 + 4 + 32 + 3 * 8;
 const HASH: usize = blake3::OUT_LEN;
 
@@ -64,7 +66,7 @@ impl Shape {
     pub(crate) const fn bytes_a_point(&self) -> usize {
         let turn_ratios = if self.by_turns { self.channels as usize } else { 0 };
         let of_both = turn_ratios + self.with_sag as usize;
-        8 + 3 + 2 * (4 * 8 + 8 * (self.channels + self.metrics) as usize) + 8 * of_both
+        8 + 4 + 8 + 2 * (4 * 8 + 8 * (self.channels + self.metrics) as usize) + 8 * of_both
     }
 }
 
@@ -191,7 +193,12 @@ fn record(outcome: &Outcome, shape: &Shape, bytes: &mut Vec<u8>) {
     };
     bytes.extend_from_slice(&outcome.point.to_le_bytes());
     bytes.push(flags(&outcome.nonlinear) | flags(&outcome.linear) << LINEAR_SHIFT | sensitive);
-    bytes.extend_from_slice(&[outcome.nonlinear.status as u8, outcome.linear.status as u8]);
+    bytes.extend_from_slice(&[
+        outcome.nonlinear.status as u8,
+        outcome.linear.status as u8,
+        outcome.method as u8,
+    ]);
+    bytes.extend_from_slice(&outcome.error.unwrap_or(f64::NAN).to_le_bytes());
     for model in [&outcome.nonlinear, &outcome.linear] {
         for number in [model.fail_time_s, model.min_gap_m] {
             bytes.extend_from_slice(&number.unwrap_or(0.0).to_le_bytes());
@@ -222,11 +229,14 @@ fn record(outcome: &Outcome, shape: &Shape, bytes: &mut Vec<u8>) {
 fn read_record(bytes: &[u8], shape: &Shape) -> Option<Outcome> {
     let mut rest = bytes;
     let point = u64::from_le_bytes(take(&mut rest)?);
-    let [flags, nonlinear, linear] = take(&mut rest)?;
+    let [flags, nonlinear, linear, level] = take(&mut rest)?;
+    let error = optional(&mut rest)?;
     let nonlinear = read_model(&mut rest, nonlinear, flags, shape)?;
     let linear = read_model(&mut rest, linear, flags >> LINEAR_SHIFT, shape)?;
     let both_ok = nonlinear.status == Status::Ok && linear.status == Status::Ok;
     let mut outcome = Outcome::new(point, nonlinear, linear);
+    outcome.method = *Level::ALL.get(usize::from(level))?;
+    outcome.error = error;
     outcome.sensitive = (flags & SENSITIVE_KNOWN != 0).then_some(flags & SENSITIVE != 0);
     if shape.by_turns {
         for _ in 0..shape.channels {

@@ -24,7 +24,6 @@ mod plan_file;
 pub mod provenance;
 pub mod read;
 pub mod schema;
-mod settled;
 mod shard;
 mod status;
 #[cfg(test)]

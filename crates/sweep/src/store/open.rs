@@ -201,6 +201,12 @@ impl Run {
         first..first.saturating_add(self.chunk_points).min(self.points)
     }
 
+    /// The chunk that a point is in.
+    #[must_use]
+    pub const fn chunk_of(&self, point: u64) -> u64 {
+        point / self.chunk_points
+    }
+
     /// The part this process computes, if not the whole.
     #[must_use]
     pub fn shard(&self) -> Option<Shard> {
@@ -329,8 +335,8 @@ fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Resu
 
 /// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers' files stay.
 fn clear(folder: &Folder) -> Result<(), StoreError> {
-    const OURS: [&str; 7] =
-        ["plan.json", "shards.json", "settled.json", "chunk-", "session-", "shard-", ".sweep-"];
+    const OURS: [&str; 6] =
+        ["plan.json", "shards.json", "chunk-", "session-", "shard-", ".sweep-"];
     atomic::remove(&folder.plan())?;
     for entry in fs::read_dir(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         let entry = entry.map_err(StoreError::io("list", &folder.path))?;

@@ -36,8 +36,6 @@ pub struct Session {
     pub points: u64,
     /// Those, over `wall_s`.
     pub points_per_s: f64,
-    /// Largest relative error of an amplitude that the engine saw when checking itself, if it did.
-    pub observed_accuracy: Option<f64>,
     /// Version of the program.
     pub version: String,
 }
@@ -57,7 +55,6 @@ struct Sidecar<'a> {
     cpu_model: Option<&'a str>,
     simd: &'a str,
     threads: usize,
-    observed_accuracy: Option<f64>,
     rows: &'a Tally,
     sessions: &'a [Session],
 }
@@ -102,7 +99,6 @@ pub(super) fn sidecar(
         cpu_model: last.and_then(|session| session.cpu_model.as_deref()),
         simd: last.map_or("", |session| &session.simd),
         threads: last.map_or(0, |session| session.threads),
-        observed_accuracy: sessions.iter().filter_map(|session| session.observed_accuracy).reduce(f64::max),
         rows: tally,
         sessions: &sessions,
     };

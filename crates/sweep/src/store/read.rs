@@ -1,5 +1,6 @@
 //! Reading Parquet files back: whose plan a result is of, what it holds, what any file's columns range over.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -106,8 +107,12 @@ pub struct Tally {
     pub unreliable: u64,
     /// Rows without a verdict: a model failed, or nothing moves.
     pub undefined: u64,
-    /// Rows known to be chaotic.
+    /// Rows known to be chaotic: plain RK4 does not agree with itself.
     pub sensitive: u64,
+    /// Rows by the method that their numbers come from, where the file says so.
+    pub by_method: BTreeMap<String, u64>,
+    /// The greatest error left in a row that is not sensitive.
+    pub greatest_error: Option<Extreme>,
     /// The greatest ratio.
     pub greatest_ratio: Option<Extreme>,
     /// The least gap of the nonlinear model, m.
@@ -152,8 +157,16 @@ impl Serialize for StatusCounts {
 /// # Errors
 /// [`StoreError::Io`] and [`StoreError::Parquet`], the latter also for a file that lacks a result's columns.
 pub fn tally(path: &Path) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 6] =
-        ["point", "status", "reliable", "sensitive", "ratio_max", "min_gap_nonlinear_m"];
+    const COLUMNS: [&str; 8] = [
+        "point",
+        "status",
+        "reliable",
+        "sensitive",
+        "method",
+        "error",
+        "ratio_max",
+        "min_gap_nonlinear_m",
+    ];
     let failed = |error| StoreError::parquet("read", path)(error);
     let builder = builder(path)?;
     let mask = ProjectionMask::columns(builder.parquet_schema(), COLUMNS);
@@ -188,7 +201,20 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
             None => tally.undefined += 1,
         }
     }
-    tally.sensitive += cells::flags(column("sensitive")?)?.true_count() as u64;
+    let sensitive = cells::flags(column("sensitive")?)?;
+    tally.sensitive += sensitive.true_count() as u64;
+    for name in cells::texts(column("method")?)?.into_iter().flatten() {
+        *tally.by_method.entry(name.to_owned()).or_default() += 1;
+    }
+    let errors = cells::numbers(column("error")?)?.into_iter().zip(sensitive.iter()).zip(points);
+    for ((error, sensitive), point) in errors {
+        if let (Some(value), Some(point)) = (error, point)
+            && sensitive != Some(true)
+            && tally.greatest_error.as_ref().is_none_or(|greatest| value > greatest.value)
+        {
+            tally.greatest_error = Some(Extreme { value, point });
+        }
+    }
     let extreme = |name: &str, best: &mut Option<Extreme>, better: fn(f64, f64) -> bool| {
         for (value, point) in cells::numbers(column(name)?)?.into_iter().zip(points) {
             if let (Some(value), Some(point)) = (value, point)

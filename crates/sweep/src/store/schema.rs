@@ -17,6 +17,7 @@ use serde_json::{Map, Value, json};
 use washer_model::Channel;
 
 use super::Job;
+use crate::engine::Level;
 use crate::measures::Measures;
 use crate::outcome::{Outcome, Trajectory};
 use crate::verdict::{ROW_STATUSES, Verdict, row_status};
@@ -183,7 +184,7 @@ impl Layout {
         columns
     }
 
-    fn verdict_columns(&self) -> [Column; 4] {
+    fn verdict_columns(&self) -> [Column; 6] {
         let channels = self.channels.iter().map(|channel| channel.name()).collect();
         [
             Column::new(
@@ -207,9 +208,26 @@ impl Layout {
             Column::new(
                 "sensitive",
                 "",
-                "true where the nonlinear motion is chaotic: the verdict holds, the ratio's digits depend on the \
-                 integrator; null where not assessed",
+                "true where plain rk4 does not agree with itself at two steps: the motion is chaotic, and the row's \
+                 digits are those of one trajectory; null where nothing was compared",
                 Cell::Flag(Box::new(|row| row.outcome.sensitive)),
+            ),
+            Column::new(
+                "method",
+                "",
+                "what the row's numbers come from: fast, fine and finest are rungs of the fast method, the others \
+                 methods of that name",
+                Cell::Name(
+                    Level::ALL.map(Level::name).to_vec(),
+                    Box::new(|row| Some(row.outcome.method as usize)),
+                ),
+            ),
+            Column::new(
+                "error",
+                "1",
+                "greatest relative error left in the row's numbers, from comparing two rungs of its method; null where \
+                 nothing was compared",
+                Cell::Measured(Box::new(|row| row.outcome.error)),
             ),
         ]
     }
@@ -391,6 +409,8 @@ mod tests {
                 "ratio_max_channel",
                 "reliable",
                 "sensitive",
+                "method",
+                "error",
                 "min_gap_nonlinear_m",
                 "min_gap_linear_m",
                 "status",

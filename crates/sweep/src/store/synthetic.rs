@@ -4,6 +4,7 @@ use serde_json::json;
 use washer_model::Channel;
 
 use super::{AxisColumn, Job, Layout};
+use crate::engine::Level;
 use crate::measures::Measures;
 use crate::outcome::{Outcome, Status, Trajectory};
 
@@ -55,6 +56,8 @@ pub(crate) fn outcome(point: u64, channels: usize) -> Outcome {
     let still = if point % 30 == 11 { 0.0 } else { 1.0 };
     let mut outcome =
         Outcome::new(point, model(still * (0.5 + x % 5.0), failing(0)), model(still, failing(3)));
+    outcome.method = Level::ALL[(point % 4) as usize];
+    outcome.error = (point % 5 > 0).then_some(1e-5 * (1.0 + x));
     outcome.sensitive = [None, Some(false), Some(true)][(point % 3) as usize];
     outcome
 }

@@ -132,6 +132,8 @@ fn every_cell_is_what_the_outcome_says() {
         assert_eq!(text("ratio_max_channel", row), channel);
         assert_eq!(flag("reliable", row), verdict.reliable);
         assert_eq!(flag("sensitive", row), outcome.sensitive);
+        assert_eq!(text("method", row).as_deref(), Some(outcome.method.name()));
+        assert_eq!(number("error", row), outcome.error);
         assert_eq!(number("min_gap_linear_m", row), outcome.linear.min_gap_m);
         assert_eq!(text("status", row).as_deref(), Some(ROW_STATUSES[status]));
         assert_eq!(number("fail_time_s", row), fail_time_s);
@@ -461,7 +463,7 @@ fn status_counts_without_touching_anything() {
 #[test]
 fn the_sidecar_adds_up_the_sessions() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
-    let session = |pid, points, accuracy| provenance::Session {
+    let session = |pid, points| provenance::Session {
         started_unix_s: 1_700_000_000 + u64::from(pid),
         wall_s: 2.0,
         host: "node/1".into(),
@@ -473,20 +475,18 @@ fn the_sidecar_adds_up_the_sessions() {
         shard: None,
         points,
         points_per_s: points as f64 / 2.0,
-        observed_accuracy: accuracy,
         version: "0.0.0-test".into(),
     };
     let mut run = open(&home.output(), &job);
-    run.record(&session(7, 40, Some(3e-4))).unwrap();
+    run.record(&session(7, 40)).unwrap();
     write_missing(&run);
     let tally = run.join(&job, &|| false).unwrap().unwrap();
-    run.complete(&job, tally, Some(session(9, 41, Some(1e-4)))).unwrap();
+    run.complete(&job, tally, Some(session(9, 41))).unwrap();
     let text = fs::read_to_string(home.0.path().join("x.run.json")).unwrap();
     let sidecar: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(sidecar["file"], "x.parquet");
     assert_eq!(sidecar["wall_s"], 4.0);
     assert_eq!(sidecar["points_per_s"], 81.0 / 4.0);
-    assert_eq!(sidecar["observed_accuracy"], 3e-4);
     assert_eq!(sidecar["sessions"].as_array().unwrap().len(), 2);
     assert_eq!(sidecar["rows"]["points"], POINTS);
     let by_status: u64 =

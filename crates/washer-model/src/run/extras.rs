@@ -3,7 +3,7 @@
 //! All of it is found in the lanes, step by step, in a function of its own ([`Lane::aside`]): what nobody asks for leaves the loop over
 //! steps as it is.
 
-use super::ModelKind;
+use super::{Course, ModelKind};
 use super::cabinet_force::CabinetForce;
 use crate::model::STATES;
 use crate::outputs::{CHANNELS, RADIAL, squared};
@@ -22,6 +22,8 @@ pub struct Wanted {
     pub cabinet_force: bool,
     /// How long drum and tub overlap.
     pub clash_time: bool,
+    /// The coordinates at the ends of legs ([`Timing::checkpoints`](crate::Timing)).
+    pub course: bool,
 }
 
 /// What was asked for by [`Wanted`], of one trajectory, within the window.
@@ -37,11 +39,14 @@ pub struct Extra {
     pub cabinet_force_n: Option<f64>,
     /// Time with a gap below zero (s).
     pub clash_time_s: Option<f64>,
+    /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed. Empty unless asked for.
+    pub course: Course,
 }
 
 impl Wanted {
+    /// Whether anything is to be looked at between the ends of legs.
     fn anything(self) -> bool {
-        self != Self::default()
+        Self { course: false, ..self } != Self::default()
     }
 }
 
@@ -116,6 +121,7 @@ impl<T: Lane> Extras<T> {
             turns,
             cabinet_force_n: wanted.cabinet_force.then(|| force_squared.sqrt()),
             clash_time_s: wanted.clash_time.then(|| self.clash.lane(lane)),
+            course: Course::new(),
         };
     }
 }

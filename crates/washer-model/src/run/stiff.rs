@@ -1,7 +1,6 @@
 //! Trajectories by the stiff method: one at a time, its derivatives by lanes of dual numbers.
 
-use super::extras::Extras;
-use super::{Extra, FIRST_STEP_S, Family, ModelKind, OfLinear, OfNonlinear, Record, Run, Wanted};
+use super::{Extra, Family, Method, ModelKind, OfLinear, OfNonlinear, Record, Run, Wanted};
 use crate::coupling::Coupling;
 use crate::model::{Model, STATES};
 use crate::nonlinear::COORDINATES;
@@ -38,8 +37,9 @@ impl<F: Family> Kernel for Simulate<'_, F> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut run = Run::<f64, F::Over<f64>>::new(N(0.0), self.points, Coupling::Springs, FIRST_STEP_S);
-        run.extras = Extras::new(N(0.0), self.wanted, F::KIND, self.points[0], self.points.len());
+        let method = Method::Rodas5p(*self.tolerance);
+        let mut run = Run::<f64, F::Over<f64>>::new(N(0.0), self.points, &method);
+        run.record(N(0.0), self.wanted, F::KIND);
         let mut run = WithTangent::<T, _, F::Over<Dual<T>>>::new(zero, run, self.points[0]);
         rodas::integrate(&mut run, self.tolerance);
         run.task.recorded()
@@ -134,7 +134,7 @@ impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> rodas::Stiff<STATES, COORDINATES> for
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Channel, Machine, Method, Spin, Timing, prepare};
+    use crate::{Channel, Machine, Spin, Timing, prepare};
 
     const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
     const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.7, 2.9] };

@@ -1,0 +1,259 @@
+//! A row on its way: both models' trajectories, each as far up its ladder as it has come.
+
+use std::sync::Arc;
+
+use washer_model::{Course, ModelKind, Point};
+
+use super::ladder::Ladder;
+use super::pool::Kind;
+use crate::measures::{Metric, TURN_FLOOR};
+use crate::outcome::{Outcome, Status, Trajectory};
+use crate::plan::Plan;
+use crate::verdict::Verdict;
+
+/// What an outcome must be good for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Demand {
+    /// A row: every number within the accuracy, and the verdict.
+    Row,
+    /// On which side of the limit the ratio is, and near the limit the ratio.
+    Side,
+}
+
+/// Ratios further from the limit than this many times their error are on their side of it.
+const SURE: f64 = 2.0;
+
+/// An amplitude is within this many times the difference of two runs that have left their common course.
+const ROUGHLY: f64 = 2.0;
+
+/// Fail times that differ by less than this share of the run are one.
+const SAME_TIME: f64 = 0.01;
+
+/// Differences of metrics are shares of the greater of their value and this part of what they are measured against.
+const METRIC_FLOOR: f64 = 1e-3;
+
+/// Both models in the order in which this module holds them.
+pub(super) const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
+
+/// A trajectory as a rung gave it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Run {
+    pub(super) trajectory: Trajectory,
+    pub(super) course: Course,
+}
+
+/// One model's trajectory on its ladder.
+#[derive(Clone, Debug, Default)]
+struct Climb {
+    /// The rung of `run`.
+    rung: usize,
+    /// The last run; at the top, the reference's.
+    run: Option<Run>,
+    /// The error left in it; absent where nothing says so.
+    error: Option<f64>,
+    /// How far the numbers of the row were from those of the run before.
+    spread: Option<f64>,
+    /// The reference and its probe have been compared.
+    is_at_top: bool,
+}
+
+impl Climb {
+    fn take(&mut self, rung: usize, now: Run, ladder: &Ladder, point: &Point, model: ModelKind, plan: &Plan) {
+        let Some(before) = self.run.take() else {
+            (self.rung, self.run) = (rung, Some(now));
+            return;
+        };
+        let found = difference(&before, &now, point, model, plan);
+        self.error = found.map(|found| ladder.error_left(rung, found.greatest()));
+        self.spread = found.map(|found| found.of_numbers);
+        if ladder.reference().is_some_and(|reference| rung > reference) {
+            self.is_at_top = true;
+            self.run = Some(before);
+        } else {
+            (self.rung, self.run) = (rung, Some(now));
+        }
+    }
+
+    /// The error left, also where errors are not of first order any more.
+    fn roughly(&self) -> Option<f64> {
+        self.error.zip(self.spread).map(|(error, spread)| error.min(ROUGHLY * spread))
+    }
+
+    fn failed(&self) -> bool {
+        self.run.as_ref().is_some_and(|run| run.trajectory.status != Status::Ok)
+    }
+}
+
+/// A point's row in the making.
+pub(super) struct Row {
+    /// What the caller knows it by.
+    pub(super) id: u64,
+    /// Absent where the machine has no equilibrium.
+    pub(super) point: Option<Arc<Point>>,
+    climbs: [Climb; 2],
+    /// Runs that have been asked for and are not there yet.
+    pub(super) pending: usize,
+    /// How many rows came before it.
+    pub(super) came_as: u64,
+}
+
+/// What a row needs next.
+pub(super) enum Next {
+    /// These runs.
+    Runs(Vec<Kind>),
+    /// Nothing.
+    Done(Box<Outcome>),
+}
+
+impl Row {
+    pub(super) fn new(id: u64, point: Option<Arc<Point>>) -> Self {
+        Self { id, point, climbs: Default::default(), pending: 0, came_as: 0 }
+    }
+
+    /// A run of a model that was asked for.
+    pub(super) fn take(&mut self, model: usize, rung: usize, run: Run, ladder: &Ladder, plan: &Plan) {
+        self.pending -= 1;
+        if let Some(point) = &self.point {
+            self.climbs[model].take(rung, run, ladder, point, MODELS[model], plan);
+        }
+    }
+
+    /// What is to be done once nothing is pending.
+    pub(super) fn next(&mut self, ladders: &[Ladder; 2], demand: Demand, accuracy: f64, plan: &Plan) -> Next {
+        if self.point.is_none() {
+            let none = || Trajectory::failed(Status::NoEquilibrium);
+            return Next::Done(Box::new(Outcome::new(self.id, none(), none())));
+        }
+        let outcome = self.outcome(ladders, accuracy, plan);
+        let margin = outcome.as_ref().and_then(|outcome| margin(outcome, plan));
+        let is_sure = |climb: &Climb| match (demand, margin) {
+            (Demand::Side, Some(margin)) => climb.roughly().is_some_and(|error| SURE * error <= margin),
+            _ => false,
+        };
+        let higher = |(model, climb): (usize, &Climb)| {
+            let rung = climb.higher(&ladders[model], accuracy)?;
+            (!is_sure(climb)).then_some((model, rung))
+        };
+        let mut runs: Vec<_> = self.climbs.iter().enumerate().filter_map(higher).collect();
+        let Some(outcome) = outcome.filter(|_| runs.is_empty()) else { return Next::Runs(runs) };
+        // The verdict is plain RK4's: where the error left could turn it, RK4 has the word.
+        let errors: f64 = self.climbs.iter().filter_map(|climb| climb.error).sum();
+        if margin.is_some_and(|margin| margin <= errors) {
+            for (model, climb) in self.climbs.iter().enumerate() {
+                if let Some(reference) = ladders[model].reference()
+                    && climb.rung < reference
+                {
+                    runs.push((model, reference));
+                }
+            }
+        }
+        if runs.is_empty() { Next::Done(Box::new(outcome)) } else { Next::Runs(runs) }
+    }
+
+    /// The row as it is now, once both models have run.
+    fn outcome(&self, ladders: &[Ladder; 2], accuracy: f64, plan: &Plan) -> Option<Outcome> {
+        let [nonlinear, linear] = &self.climbs;
+        let trajectory = |climb: &Climb| climb.run.as_ref().map(|run| run.trajectory.clone());
+        let mut outcome = Outcome::new(self.id, trajectory(nonlinear)?, trajectory(linear)?);
+        outcome.compare_turns(&plan.reliability.channels);
+        outcome.method = ladders[0].rungs[nonlinear.rung].level;
+        if plan.measures.metrics.contains(&Metric::StaticSag) {
+            outcome.static_sag_m = self.point.as_ref().map(|point| point.static_sag_m());
+        }
+        if ladders[0].reference().is_some() {
+            let is_chaotic = |climb: &Climb| climb.is_at_top && climb.error.is_none_or(|error| error > accuracy);
+            outcome.sensitive = Some(is_chaotic(nonlinear) || is_chaotic(linear));
+            let errors = nonlinear.error.zip(linear.error);
+            outcome.error = errors.map(|(nonlinear, linear)| nonlinear.max(linear));
+        }
+        Some(outcome)
+    }
+}
+
+/// How far the greatest ratio is from the limit, as a share of the limit.
+fn margin(outcome: &Outcome, plan: &Plan) -> Option<f64> {
+    let rule = &plan.reliability;
+    let verdict = Verdict::new(outcome, rule.channels.len(), rule.ratio_limit);
+    verdict.greatest.map(|(_, ratio)| (ratio / rule.ratio_limit - 1.0).abs())
+}
+
+impl Climb {
+    /// The rung to go to for an error of at most `tolerance`; none if it is there, or at the top.
+    fn higher(&self, ladder: &Ladder, tolerance: f64) -> Option<usize> {
+        if self.run.is_none() {
+            return Some(0);
+        }
+        let reference = ladder.reference()?;
+        if self.failed() && self.rung < reference {
+            // It may be the caps that do not hold: RK4 has the word.
+            return Some(reference);
+        }
+        let is_settled = self.is_at_top || self.error.is_some_and(|error| error <= tolerance);
+        (!is_settled).then_some(self.rung + 1)
+    }
+}
+
+/// How far two runs are apart, relative.
+#[derive(Clone, Copy)]
+struct Difference {
+    /// Over the course of the motion.
+    of_course: f64,
+    /// In every number that a row takes from it.
+    of_numbers: f64,
+}
+
+impl Difference {
+    const NONE: Self = Self { of_course: 0.0, of_numbers: 0.0 };
+
+    fn greatest(self) -> f64 {
+        self.of_course.max(self.of_numbers)
+    }
+}
+
+/// How far two runs are apart; `None` if one of them failed, or both at different times.
+fn difference(a: &Run, b: &Run, point: &Point, model: ModelKind, plan: &Plan) -> Option<Difference> {
+    let (of_a, of_b) = (&a.trajectory, &b.trajectory);
+    if of_a.status != of_b.status {
+        return None;
+    }
+    if of_b.status != Status::Ok {
+        let (a_s, b_s) = of_a.fail_time_s.zip(of_b.fail_time_s)?;
+        return ((a_s - b_s).abs() <= SAME_TIME * plan.end_s).then_some(Difference::NONE);
+    }
+    let of_course = point.course_difference(model, &a.course, &b.course);
+    Some(Difference { of_course, of_numbers: of_numbers(of_a, of_b, point, plan) })
+}
+
+/// The greatest relative difference of what a row takes from two trajectories.
+fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, plan: &Plan) -> f64 {
+    let mut greatest = 0.0_f64;
+    let mut compare = |a: f64, b: f64, least: f64| {
+        if a != b {
+            // A quotient that is no number must not pass for none.
+            let share = (a - b).abs() / b.abs().max(least);
+            greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
+        }
+    };
+    for (a, b) in a.amplitudes.iter().zip(&b.amplitudes) {
+        compare(*a, *b, 0.0);
+    }
+    if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
+        compare(a, b, point.clearance_m());
+    }
+    let [from_s, to_s] = plan.window_s;
+    for ((a, b), metric) in a.metrics.iter().zip(&b.metrics).zip(plan.measures.of_model()) {
+        let least = match metric {
+            // A clash that just happens is a time that just is not zero.
+            Metric::ClashTime => METRIC_FLOOR * (to_s - from_s),
+            Metric::CabinetForce | Metric::StaticSag => 0.0,
+        };
+        compare(*a, *b, least);
+    }
+    for (a, b) in a.turns.iter().zip(&b.turns) {
+        for channel in &plan.reliability.channels {
+            let i = channel.index();
+            compare(a[i].max(TURN_FLOOR), b[i].max(TURN_FLOOR), 0.0);
+        }
+    }
+    greatest
+}

@@ -1,0 +1,223 @@
+//! The pool: rows from a feed, runs that wait for lanes, threads that take whole lane groups of them.
+//!
+//! A lane group costs the same with one trajectory as with eight. So runs of one rung and model wait for each other, whichever rows
+//! they belong to, and a thread takes a group as soon as there is a whole one, the highest rung first: rows that are nearly done
+//! leave. Only when nothing more can come are groups taken that are not full.
+//!
+//! What a lane computes does not depend on its company, so neither does a row.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use lane_ode::MAX_LANES;
+use washer_model::Point;
+
+use super::climb::{Demand, Next, Row};
+use super::{ModelEngine, Watch};
+use crate::outcome::Outcome;
+use crate::plan::Scenario;
+
+/// Points that are made ready together.
+const FED: usize = 2 * MAX_LANES;
+
+/// Rows that are on their way at once, beside those in the hands of threads: less than a group of each kind.
+pub(crate) const MOST_WAITING: usize = 12 * FED;
+
+/// Rows on their way in a thread's hands.
+pub(crate) const ROWS_A_THREAD: usize = FED;
+
+/// A row that has seen so many others come after it waits no longer: the group is taken as it is, so that chunks become whole and
+/// an interrupt loses little.
+const PATIENCE: u64 = 1024;
+
+/// Where points come from: at most so many, none at the end. Each with what the caller knows it by.
+pub(super) type Feed<'a> = dyn Fn(usize) -> Vec<(u64, Scenario)> + Sync + 'a;
+
+/// Where rows go, in no particular order.
+pub(super) type Keep<'a> = dyn Fn(Outcome) + Sync + 'a;
+
+/// How long a thread that waits for others goes without a look at the stop flag.
+const LOOK_UP: Duration = Duration::from_millis(50);
+
+/// Runs of one rung of one model: positions in `MODELS` and on its ladder.
+pub(super) type Kind = (usize, usize);
+
+/// Where a rung is among what threads work at; below all of them is the feed.
+const fn above(rung: usize) -> usize {
+    rung + 1
+}
+
+const BELOW_ALL: usize = 0;
+
+/// Rows and the runs that they wait for.
+#[derive(Default)]
+struct State {
+    /// Rows on their way, by what the caller knows them by.
+    rows: HashMap<u64, Row>,
+    /// Points that the feed has given.
+    fed: u64,
+    /// Rows that wait for a run, by its kind.
+    waiting: HashMap<Kind, Vec<u64>>,
+    /// What threads are at work on ([`above`]), one entry each.
+    at_work: Vec<usize>,
+    /// The feed has run dry.
+    is_dry: bool,
+}
+
+/// What a thread does next.
+enum Work {
+    Feed,
+    Runs(Kind, Vec<(u64, Arc<Point>)>),
+    Wait,
+    End,
+}
+
+/// Rows on their way through the lanes.
+pub(super) struct Pool<'a> {
+    pub(super) engine: &'a ModelEngine<'a>,
+    pub(super) demand: Demand,
+    pub(super) feed: &'a Feed<'a>,
+    pub(super) keep: &'a Keep<'a>,
+    pub(super) watch: &'a Watch<'a>,
+    pub(super) shared: Shared,
+}
+
+/// What the threads of a pool share.
+#[derive(Default)]
+pub(super) struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+impl Pool<'_> {
+    /// What one thread does until nothing is left, or it is told to stop.
+    pub(super) fn work(&self) {
+        while !self.watch.stopped() {
+            let mut state = self.lock();
+            match state.choose() {
+                Work::End => break,
+                Work::Wait => drop(self.shared.changed.wait_timeout(state, LOOK_UP)),
+                Work::Feed => {
+                    state.at_work.push(BELOW_ALL);
+                    drop(state);
+                    let mut rows = self.fed();
+                    let mut state = self.lock();
+                    state.is_dry |= rows.is_empty();
+                    for row in &mut rows {
+                        row.came_as = state.fed;
+                        state.fed += 1;
+                    }
+                    self.advance(state, rows, BELOW_ALL);
+                }
+                Work::Runs((model, rung), taken) => {
+                    state.at_work.push(above(rung));
+                    drop(state);
+                    let points: Vec<&Point> = taken.iter().map(|(_, point)| point.as_ref()).collect();
+                    let t0 = std::time::Instant::now();
+                    let runs = self.engine.runs(model, rung, &points);
+                    if std::env::var_os("DBG").is_some() { eprintln!("RUN {model} {rung} {} {}", points.len(), t0.elapsed().as_secs_f64()); }
+                    let mut state = self.lock();
+                    let mut rows = Vec::with_capacity(taken.len());
+                    for ((position, _), run) in taken.iter().zip(runs) {
+                        let Some(mut row) = state.rows.remove(position) else { continue };
+                        row.take(model, rung, run, &self.engine.ladders()[model], self.engine.plan);
+                        rows.push(row);
+                    }
+                    self.advance(state, rows, above(rung));
+                }
+            }
+        }
+        self.shared.changed.notify_all();
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// New rows from the feed; none at its end.
+    fn fed(&self) -> Vec<Row> {
+        let (ids, scenarios): (Vec<u64>, Vec<Scenario>) = (self.feed)(FED).into_iter().unzip();
+        let points = self.engine.prepare(&scenarios);
+        ids.into_iter().zip(points).map(|(id, point)| Row::new(id, point.map(Arc::new))).collect()
+    }
+
+    /// Asks for what rows need next, and hands over those that need nothing.
+    fn advance(&self, mut state: MutexGuard<'_, State>, rows: Vec<Row>, finished: usize) {
+        let mut done = Vec::new();
+        for mut row in rows {
+            let next = if row.pending > 0 {
+                Next::Runs(Vec::new())
+            } else {
+                row.next(self.engine.ladders(), self.demand, self.engine.accuracy(), self.engine.plan)
+            };
+            match next {
+                Next::Runs(kinds) => {
+                    let position = row.id;
+                    row.pending += kinds.len();
+                    for kind in kinds {
+                        state.waiting.entry(kind).or_default().push(position);
+                    }
+                    state.rows.insert(position, row);
+                }
+                Next::Done(outcome) => done.push(*outcome),
+            }
+        }
+        if let Some(at) = state.at_work.iter().position(|&level| level == finished) {
+            state.at_work.swap_remove(at);
+        }
+        drop(state);
+        self.shared.changed.notify_all();
+        for mut outcome in done {
+            outcome.forget_turns();
+            (self.keep)(outcome);
+        }
+    }
+}
+
+impl State {
+    fn choose(&mut self) -> Work {
+        let full = |kind: &Kind, waiting: &Vec<u64>| waiting.len() >= group(*kind);
+        let best = self.waiting.iter().filter(|(kind, waiting)| full(kind, waiting)).map(|(kind, _)| *kind);
+        if let Some(kind) = best.max_by_key(|&(model, rung)| (rung, model)) {
+            return self.take(kind);
+        }
+        if let Some(kind) = self.overdue() {
+            return self.take(kind);
+        }
+        if !self.is_dry {
+            return Work::Feed;
+        }
+        let lowest = self.waiting.iter().filter(|(_, waiting)| !waiting.is_empty()).map(|(kind, _)| *kind);
+        let lowest = lowest.min_by_key(|&(model, rung)| (rung, model));
+        match lowest {
+            // What is at work below may fill the group.
+            Some((_, rung)) if self.at_work.iter().any(|&level| level < above(rung)) => Work::Wait,
+            Some(kind) => self.take(kind),
+            None if self.at_work.is_empty() => Work::End,
+            None => Work::Wait,
+        }
+    }
+
+    /// The kind of runs that a row has waited for too long, if any.
+    fn overdue(&self) -> Option<Kind> {
+        let latest = self.fed.checked_sub(PATIENCE)?;
+        let is_overdue = |id: &u64| self.rows.get(id).is_some_and(|row| row.came_as < latest);
+        let overdue = self.waiting.iter().filter(|(_, waiting)| waiting.first().is_some_and(is_overdue));
+        overdue.map(|(kind, _)| *kind).max_by_key(|&(model, rung)| (rung, model))
+    }
+
+    /// Takes a group of what waits, the first come first.
+    fn take(&mut self, kind: Kind) -> Work {
+        let waiting = self.waiting.entry(kind).or_default();
+        let positions: Vec<u64> = waiting.drain(..waiting.len().min(group(kind))).collect();
+        let point = |position: &u64| Some((*position, self.rows.get(position)?.point.clone()?));
+        Work::Runs(kind, positions.iter().filter_map(point).collect())
+    }
+}
+
+/// Runs that are taken together: on the quick rungs two lane groups, of which the second fills the lanes as those of the
+/// first come free.
+const fn group((_, rung): Kind) -> usize {
+    if rung < 2 { 2 * MAX_LANES } else { MAX_LANES }
+}

@@ -1,0 +1,102 @@
+//! A method on the machine with capped modes, whose step and caps follow the drum's speed.
+
+use crate::coupling::Caps;
+use lane_ode::dop853::{DOP853_STABILITY_LIMIT, DOP853_STAGES};
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
+
+/// An explicit Runge-Kutta formula with a fixed step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Formula {
+    /// The classical one of order 4.
+    Rk4,
+    /// Dormand's and Prince's of order 8.
+    Dop853,
+}
+
+impl Formula {
+    /// Every formula.
+    pub(crate) const ALL: [Self; 2] = [Self::Rk4, Self::Dop853];
+
+    /// Evaluations of the right-hand side per second of motion.
+    #[must_use]
+    pub fn evaluations_per_s(self, step_s: f64) -> f64 {
+        let stages = match self {
+            Self::Rk4 => 4.0,
+            Self::Dop853 => DOP853_STAGES as f64,
+        };
+        stages / step_s
+    }
+
+    /// Up to which h w it is stable without damping.
+    pub(crate) const fn stability_limit(self) -> f64 {
+        match self {
+            Self::Rk4 => RK4_STABILITY_LIMIT,
+            Self::Dop853 => DOP853_STABILITY_LIMIT,
+        }
+    }
+
+    /// Relative error of a motion with `step_phase` = h w, added up over a radian of it.
+    pub(crate) fn error_per_radian(self, step_phase: f64) -> f64 {
+        match self {
+            Self::Rk4 => step_phase.powi(4) / 120.0,
+            // Of the nonlinear terms of order 9; for a linear oscillation it is a tenth of this.
+            Self::Dop853 => step_phase.powi(8) / 362_880.0,
+        }
+    }
+
+    /// The step phase h w at which that error is `error`.
+    pub(crate) fn step_phase(self, error: f64) -> f64 {
+        match self {
+            Self::Rk4 => (120.0 * error).powf(0.25),
+            Self::Dop853 => (362_880.0 * error).powf(0.125),
+        }
+    }
+}
+
+/// Step and caps up to a speed of the drum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gear {
+    /// It serves until the drum has turned faster than this (rad/s).
+    pub up_to_rad_per_s: f64,
+    /// Longest step (s).
+    pub step_s: f64,
+    /// The caps.
+    pub caps: Caps,
+}
+
+/// How many gears there are.
+pub(crate) const GEARS: usize = 3;
+
+/// A formula with its gears.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Geared {
+    /// What steps are made of.
+    pub formula: Formula,
+    /// From the slowest drum to the fastest; the last serves whatever comes.
+    pub gears: [Gear; GEARS],
+}
+
+impl Geared {
+    /// The same step and caps at every speed.
+    #[must_use]
+    pub const fn steady(formula: Formula, step_s: f64, caps: Caps) -> Self {
+        Self { formula, gears: [Gear { up_to_rad_per_s: f64::INFINITY, step_s, caps }; GEARS] }
+    }
+
+    /// The gear of the fastest drum.
+    #[must_use]
+    pub const fn top(&self) -> &Gear {
+        &self.gears[GEARS - 1]
+    }
+
+    /// Evaluations of the right-hand side per second of motion in the top gear.
+    #[must_use]
+    pub fn evaluations_per_s(&self) -> f64 {
+        self.formula.evaluations_per_s(self.top().step_s)
+    }
+
+    /// The gear for a drum that has not turned faster than `fastest_rad_per_s` so far.
+    pub(crate) fn gear(&self, fastest_rad_per_s: f64) -> &Gear {
+        self.gears.iter().find(|gear| fastest_rad_per_s <= gear.up_to_rad_per_s).unwrap_or(self.top())
+    }
+}
