@@ -4,7 +4,7 @@ mod climb;
 mod ladder;
 mod pool;
 
-pub(crate) use climb::Demand;
+pub use climb::Demand;
 pub use ladder::Level;
 pub(crate) use ladder::{Ladder, reference_step_s};
 pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
@@ -15,8 +15,11 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use climb::{MODELS, Run};
 use lane_ode::{Failure, Simd, Tolerance};
 use pool::{Feed, Keep, Pool, Shared};
-use washer_model::{Cases, Extra, Method, ModelKind, Point, Record, Timing, Wanted, prepare, simulate_with};
+use washer_model::{
+    Cases, Extra, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted, prepare, simulate_with,
+};
 
+use crate::interrupt::Interrupt;
 use crate::measures::{Criterion, Metric};
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::plan::{Integrator, Plan, Scenario};
@@ -108,7 +111,7 @@ impl<'a> ModelEngine<'a> {
         let scenarios: Vec<_> = self.plan.some_corners().iter().map(|at| self.plan.scenario_at(at)).collect();
         let prepared = self.prepare(&scenarios);
         let ready = prepared.iter().zip(&scenarios);
-        let ready = ready.filter_map(|(point, scenario)| Some((point.as_ref()?, &scenario.spin)));
+        let ready = ready.filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.spin)));
         let cases = Cases::new(ready, self.plan.end_s);
         MODELS.map(|model| Ladder::new(&cases, model, accuracy))
     }
@@ -121,10 +124,17 @@ impl<'a> ModelEngine<'a> {
         }
     }
 
-    /// One outcome per point given by the values of its axes, on the grid or between its points; `point` of an outcome
-    /// is the position among them. On all threads of the rayon pool it is called in. `None` if it was told to stop.
+    /// One row per point given by the values of its axes, on the grid or between its points; `point` of an outcome is the
+    /// position among them. On all threads of the rayon pool it is called in, if in one.
     #[must_use]
-    pub fn evaluate_at(
+    pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
+        let interrupt = Interrupt::new();
+        self.evaluate_for(axis_values, Demand::Row, &Watch::new(&interrupt)).unwrap_or_default()
+    }
+
+    /// As [`Self::evaluate_at`], with outcomes good for what is asked; `None` if it was told to stop.
+    #[must_use]
+    pub fn evaluate_for(
         &self,
         axis_values: &[Vec<f64>],
         demand: Demand,
@@ -157,29 +167,28 @@ impl<'a> ModelEngine<'a> {
         }
     }
 
-    /// Points made ready, those of one window together; `None` where there is no equilibrium.
-    fn prepare(&self, scenarios: &[Scenario]) -> Vec<Option<Point>> {
+    /// Points made ready, those of one window together; or why there is none.
+    fn prepare(&self, scenarios: &[Scenario]) -> Vec<Result<Point, Status>> {
         let mut prepared = Vec::with_capacity(scenarios.len());
         for alike in scenarios.chunk_by(|a, b| a.window_s == b.window_s) {
             let machines: Vec<_> =
                 alike.iter().map(|scenario| (scenario.machine.clone(), scenario.spin.clone())).collect();
             let timing = Timing { window_s: alike[0].window_s, ..self.timing };
-            prepared.extend(prepare(self.simd, &machines, &timing).into_iter().map(Result::ok));
+            let together = |machines: &[(Machine, Spin)]| {
+                let points = prepare(self.simd, machines, &timing);
+                points.into_iter().map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
+            };
+            prepared.extend(together_or_alone(&machines, together, || Err(Status::Panicked)));
         }
         prepared
     }
 
-    /// One model at every point, by one rung. A panic in one point's trajectory must not cost the others theirs: then each
-    /// runs alone, which gives the same bits.
+    /// One model at every point, by one rung.
     fn runs(&self, model: usize, rung: usize, points: &[&Point]) -> Vec<Run> {
         let method = &self.ladders()[model].rungs[rung].method;
-        let together = |points: &[&Point]| {
-            catch_unwind(AssertUnwindSafe(|| self.trajectories(points, MODELS[model], method))).ok()
-        };
-        together(points).unwrap_or_else(|| {
-            let alone = |point| together(&[point]).and_then(|mut runs| runs.pop());
-            points.iter().map(|point| alone(*point).unwrap_or_else(panicked)).collect()
-        })
+        let together = |points: &[&Point]| self.trajectories(points, MODELS[model], method);
+        let panicked = || Run { trajectory: Trajectory::failed(Status::Panicked), course: Vec::new() };
+        together_or_alone(points, together, panicked)
     }
 
     fn trajectories(&self, points: &[&Point], model: ModelKind, method: &Method) -> Vec<Run> {
@@ -229,8 +238,14 @@ impl<'a> ModelEngine<'a> {
     }
 }
 
-fn panicked() -> Run {
-    Run { trajectory: Trajectory::failed(Status::Panicked), course: Vec::new() }
+/// One result per item of a group. A panic over one item must not cost the others theirs: then each is done alone, which
+/// gives the same bits, and the one is a defect.
+fn together_or_alone<I, R>(items: &[I], together: impl Fn(&[I]) -> Vec<R>, defect: impl Fn() -> R) -> Vec<R> {
+    let caught = |items: &[I]| catch_unwind(AssertUnwindSafe(|| together(items))).ok();
+    caught(items).unwrap_or_else(|| {
+        let alone = |item: &I| caught(std::slice::from_ref(item)).and_then(|mut results| results.pop());
+        items.iter().map(|item| alone(item).unwrap_or_else(&defect)).collect()
+    })
 }
 
 impl Engine for ModelEngine<'_> {
@@ -247,5 +262,7 @@ impl Engine for ModelEngine<'_> {
     }
 }
 
+#[cfg(test)]
+mod fast_tests;
 #[cfg(test)]
 mod tests;

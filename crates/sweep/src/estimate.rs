@@ -137,7 +137,7 @@ fn cost_s(
     let axis_values: Vec<Vec<f64>> = points.map(|point| plan.axis_values(point)).collect();
     let interrupt = Interrupt::new();
     let began = Instant::now();
-    let outcomes = engine.evaluate_at(&axis_values, Demand::Row, &Watch::new(&interrupt));
+    let outcomes = engine.evaluate_for(&axis_values, Demand::Row, &Watch::new(&interrupt));
     let cost_s = began.elapsed().as_secs_f64();
     drop(outcomes);
     Ok(cost_s)

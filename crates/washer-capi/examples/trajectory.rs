@@ -7,7 +7,9 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use lane_ode::{Simd, Tolerance};
-use washer_model::{Cases, Channel, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
+use washer_model::{
+    Cases, Channel, Gear, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate,
+};
 
 const END_S: f64 = 50.0;
 const USAGE: &str = "usage: trajectory scalar|avx2|avx512|neon \
@@ -47,9 +49,10 @@ fn method(words: &[&str], point: &Point, spin: &Spin) -> Result<(Method, &'stati
     match words {
         ["rk4", step] => Ok((Method::Rk4 { step_s: number(step)? }, "RK4")),
         ["rk4-mass-scaled", accuracy] => {
-            let capping = Cases::new([(point, spin)], END_S).choose(number(accuracy)?);
-            let capping = capping.map_err(|error| Failed::Because(error.to_string()))?;
-            Ok((capping.method(), "mass-scaled RK4"))
+            let geared = Cases::new([(point, spin)], END_S).choose(number(accuracy)?);
+            let geared = geared.map_err(|error| Failed::Because(error.to_string()))?;
+            let geared = geared.ok_or_else(|| Failed::Because("plain RK4 is cheaper".to_owned()))?;
+            Ok((Method::Geared(geared), "mass-scaled RK"))
         }
         ["dopri5", rtol, atol] => Ok((Method::Dopri5(tolerance(rtol, atol)?), "dopri5")),
         ["rodas5p", rtol, atol] => Ok((Method::Rodas5p(tolerance(rtol, atol)?), "Rodas5P")),
@@ -68,7 +71,7 @@ fn run() -> Result<String, Failed> {
     machine.unbalance.mass_kg = 0.4;
     machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 140.0);
     let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
-    let timing = Timing { end_s: END_S, window_s: [30.0, END_S] };
+    let timing = Timing { end_s: END_S, window_s: [30.0, END_S], checkpoints: 0 };
     let Some(Ok(point)) = prepare(simd, &[(machine, spin.clone())], &timing).pop() else {
         return Err(Failed::Because("no equilibrium".to_owned()));
     };
@@ -85,7 +88,8 @@ fn run() -> Result<String, Failed> {
     }
     let settings = match method {
         Method::Rk4 { step_s } => format!("step {step_s:e} s"),
-        Method::Rk4MassScaled { step_s, caps } => {
+        Method::Geared(geared) => {
+            let Gear { step_s, caps, .. } = *geared.top();
             let hinge = if caps.hinge_rad_per_s.is_some() { ", hinge too" } else { "" };
             let cap = caps.bearings_rad_per_s;
             format!("accuracy {}: step {step_s:.2e} s, cap {cap:.0} rad/s{hinge}", words[1])

@@ -114,7 +114,7 @@ unsafe fn make(setup: &Setup) -> Result<Washer, Status> {
         return Err(Status::OutOfRange);
     }
     // Only the equations are wanted: any time serves.
-    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0] };
+    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     let point = prepare(Simd::best(), &[(machine, spin)], &timing).pop();
     match point {
         Some(Ok(point)) => Ok(Washer(Equations::new(&point, model))),

@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 
 fn point(machine: Machine) -> Point {
     let spin = Spin::Ramp { peak_rpm: 1200.0, ramp_s: 20.0 };
-    let timing = Timing { end_s: 20.0, window_s: [0.0, 20.0] };
+    let timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints: 0 };
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
 }
 

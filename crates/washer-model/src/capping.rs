@@ -9,7 +9,7 @@
 //!   sum is to stay below the accuracy.
 //! * Stability. h |s| stays within the method's limit for every mode s of the machine with its caps, hinge and gyroscopic
 //!   effects included. The higher the cap the better, but the closer it comes to the hinge's modes from above, the more these
-//!   are pushed up by it: h w is the first of 0.92, 0.81, ... times the
+//!   are pushed up by it: h w is the first of 0.95, 0.84, ... times the
 //!   formula's limit that leaves the step stable, with the hinge as it is or, if that does not do,
 //!   capped too.
 //! * Fidelity. What turns with the drum is exact under the caps (`coupling.rs`); other motion is not, and so the modes of suspension and hinge
@@ -42,13 +42,10 @@ const SLOW_MODES: usize = SUSPENSION_MODES + 2;
 const MEMORY_DAMPING_RATIO: f64 = 0.1;
 
 /// h times the cap as a share of the formula's limit, the best first.
-const STEP_TIMES_CAP: [f64; 4] = [0.92, 0.81, 0.71, 0.6];
+const STEP_TIMES_CAP: [f64; 4] = [0.95, 0.84, 0.73, 0.62];
 
 /// The hinge's cap as a multiple of the bearings', the best first; the best of all is none.
 const HINGE_CAP: [Option<f64>; 3] = [None, Some(1.5), Some(1.0)];
-
-/// h times the fastest mode, as a share of the formula's limit: less by what nonlinear motion may add.
-const STEP_TIMES_FASTEST: f64 = 0.97;
 
 /// Half-width of a resonance that has no damping, as a share of its frequency.
 const LEAST_HALF_WIDTH: f64 = 0.01;
@@ -61,6 +58,9 @@ const STEP_BITS: u32 = 20;
 
 /// From one candidate step to the next.
 const SHORTER: f64 = 0.97;
+
+/// The part of a shift's effect that motions answer to that do not turn with the drum, which is exact.
+const FREE_SHARE: f64 = 0.1;
 
 /// Greatest speeds of the drum in each gear, as shares of the greatest of all.
 ///
@@ -107,7 +107,7 @@ struct Trial {
 
 impl Trial {
     fn is_stable(&self, frequency_rad_per_s: f64) -> bool {
-        self.step_s * frequency_rad_per_s <= STEP_TIMES_FASTEST * self.formula.stability_limit()
+        self.step_s * frequency_rad_per_s <= self.formula.limit()
     }
 }
 
@@ -123,8 +123,7 @@ impl<'a> Case<'a> {
             point,
             // A soft hinge takes part in the motion.
             fastest_followed_rad_per_s: if hinge < 2.0 * followed { hinge } else { followed },
-            fastest_rad_per_s: highest_with_caps(point, 0.0, None)?
-                .max(highest_with_caps(point, top, None)?),
+            fastest_rad_per_s: highest_with_caps(point, 0.0, None)?.max(highest_with_caps(point, top, None)?),
             turning: [first?, second?, third?],
             rest,
         })
@@ -210,8 +209,7 @@ impl<'a> Cases<'a> {
     }
 
     fn plain_step_of(&self, formula: Formula) -> Option<f64> {
-        let limit = STEP_TIMES_FASTEST * formula.stability_limit();
-        let steps = self.0.iter().flatten().map(|case| limit / case.fastest_rad_per_s);
+        let steps = self.0.iter().flatten().map(|case| formula.limit() / case.fastest_rad_per_s);
         steps.reduce(f64::min).map(rounded_down)
     }
 
@@ -229,7 +227,7 @@ impl<'a> Cases<'a> {
         let plain = self.plain_step_s().map(|step_s| Formula::Rk4.evaluations_per_s(step_s));
         let (mut best, mut least) = (None, plain.unwrap_or(0.0));
         for formula in Formula::ALL {
-            if let Some(geared) = self.choose_for(&cases, formula, accuracy)?
+            if let Some(geared) = self.choose_for(&cases, formula, accuracy, least)?
                 && geared.evaluations_per_s() < least
             {
                 (best, least) = (Some(geared), geared.evaluations_per_s());
@@ -243,12 +241,15 @@ impl<'a> Cases<'a> {
         cases: &[&Case<'a>],
         formula: Formula,
         accuracy: f64,
+        most_evaluations_per_s: f64,
     ) -> Result<Option<Geared>, NoModes> {
         let followed = cases.iter().map(|case| case.fastest_followed_rad_per_s).fold(0.0, f64::max);
         let longest_s = formula.step_phase(MEMORY_DAMPING_RATIO * accuracy) / followed;
         let plain_step_s = self.plain_step_of(formula).unwrap_or(f64::INFINITY);
         let top = GEARS - 1;
-        let Some(trial) = longest(cases, formula, top, [plain_step_s, longest_s], accuracy)? else {
+        // Steps so short that another formula is cheaper are not looked at.
+        let shortest_s = plain_step_s.max(formula.evaluations_per_s(1.0) / most_evaluations_per_s);
+        let Some(trial) = longest(cases, formula, top, [shortest_s, longest_s], accuracy)? else {
             return Ok(None);
         };
         let mut geared = Geared::steady(formula, trial.step_s, trial.caps);
@@ -279,7 +280,8 @@ impl<'a> Cases<'a> {
             error = error.max(case.error_of_truncation(trial.formula, step_s));
             let state = &case.turning[GEARS - 1];
             let capped = modes_with_caps(case.point, 0.0, state.speed_rad_per_s, Some(&caps))?;
-            error = error.max(case.error_of_caps(state, &capped, &trial, state.speed_rad_per_s));
+            let of_caps = case.error_of_caps(state, &capped, &trial, state.speed_rad_per_s);
+            error = error.max(FREE_SHARE * of_caps);
         }
         Ok(error)
     }
@@ -296,7 +298,7 @@ fn longest(
     let mut step_s = rounded_down(up_to_s);
     while step_s > above_s {
         for step_times_cap in STEP_TIMES_CAP {
-            let cap = step_times_cap * formula.stability_limit() / step_s;
+            let cap = step_times_cap * formula.limit() / step_s;
             for multiple in HINGE_CAP {
                 let hinge_rad_per_s = multiple.map(|multiple| multiple * cap);
                 let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s };
@@ -336,7 +338,7 @@ mod tests {
             spring.stiffness_n_per_m *= stiffer;
         }
         let spin = Spin::Ramp { peak_rpm: 100.0, ramp_s: 4.0 };
-        let timing = Timing { end_s: 4.0, window_s: [3.0, 4.0] };
+        let timing = Timing { end_s: 4.0, window_s: [3.0, 4.0], checkpoints: 0 };
         let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
         let ready: Vec<_> = points.iter().flatten().map(|point| (point, &spin)).collect();
         let cases = Cases::new(ready, timing.end_s);

@@ -27,11 +27,13 @@ impl Formula {
         stages / step_s
     }
 
-    /// Up to which h w it is stable without damping.
-    pub(crate) const fn stability_limit(self) -> f64 {
+    /// Up to which h w it serves: for classical Runge-Kutta, which damps what is near its limit of stability, nearly up to
+    /// that; for the formula of order 8, which hardly does, less. With 0.97 of the limit instead of 0.83 its errors were
+    /// twenty times as large.
+    pub(crate) const fn limit(self) -> f64 {
         match self {
-            Self::Rk4 => RK4_STABILITY_LIMIT,
-            Self::Dop853 => DOP853_STABILITY_LIMIT,
+            Self::Rk4 => 0.97 * RK4_STABILITY_LIMIT,
+            Self::Dop853 => 0.83 * DOP853_STABILITY_LIMIT,
         }
     }
 

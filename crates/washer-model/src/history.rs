@@ -15,7 +15,9 @@ use crate::run::stiff::{OnLeg, WithTangent};
 use crate::run::{Family, Method, ModelKind, OfLinear, OfNonlinear, coupling, first_step};
 use crate::suspension::{Forces, forces};
 use core::marker::PhantomData;
-use lane_ode::{Dual, Ended, Failure, Leg, N, ScalarKernel, Simd, Step, System, Task, dop853, dopri5, rk4, rodas};
+use lane_ode::{
+    Dual, Ended, Failure, Leg, N, ScalarKernel, Simd, Step, System, Task, dop853, dopri5, rk4, rodas,
+};
 
 /// An instant this share of a step past its end is its end.
 const SLACK: f64 = 1e-9;

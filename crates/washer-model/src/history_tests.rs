@@ -5,7 +5,7 @@ use crate::{Channel, History, Machine, Method, ModelKind, Point, Spin, Start, Ti
 use lane_ode::Simd;
 
 fn point(machine: Machine, spin: Spin, end_s: f64) -> Point {
-    let timing = Timing { end_s, window_s: [0.0, end_s] };
+    let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
 }
 

@@ -25,7 +25,7 @@
 //!     spring.stiffness_n_per_m *= 2.0;
 //! }
 //! let spin = Spin::Ramp { peak_rpm: 400.0, ramp_s: 40.0 };
-//! let timing = Timing { end_s: 50.0, window_s: [0.0, 50.0] };
+//! let timing = Timing { end_s: 50.0, window_s: [0.0, 50.0], checkpoints: 0 };
 //! let points = prepare(Simd::best(), &[(standard, spin.clone()), (stiff, spin)], &timing);
 //!
 //! let mut firsts = Vec::new();
@@ -91,8 +91,8 @@ pub use campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
 pub use capping::Cases;
 pub use channel::Channel;
 pub use coupling::Caps;
-pub use geared::{Formula, Gear, Geared};
 pub use equations::{Equations, STATE_LEN};
+pub use geared::{Formula, Gear, Geared};
 pub use history::{History, Instant, Start, history};
 pub use linear::Matrices;
 pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};

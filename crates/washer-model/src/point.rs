@@ -162,8 +162,7 @@ fn legs(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedLeg> {
             let stretch = stretches.iter().rposition(|s| s.start_s <= start_s).unwrap_or(0);
             // Within a stretch the speed rises or falls all the way.
             for time_s in [start_s, end_s] {
-                fastest_rad_per_s =
-                    fastest_rad_per_s.max(stretches[stretch].speed_rad_per_s(time_s).abs());
+                fastest_rad_per_s = fastest_rad_per_s.max(stretches[stretch].speed_rad_per_s(time_s).abs());
             }
             let in_window = from <= start_s && end_s <= to;
             PlannedLeg { start_s, end_s, stretch, in_window, fastest_rad_per_s }

@@ -101,7 +101,7 @@ fn val_linear_matrices_match_an_independent_expansion() {
 
 #[test]
 fn val_eigenvalues_match_an_independent_solution() {
-    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0] };
+    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     for case in reference("modes.json")["cases"].as_array().unwrap() {
         let spin = Spin::Ramp { peak_rpm: 100.0, ramp_s: 1.0 };
         let point = prepare(Simd::Scalar, &[(machine(case), spin)], &timing).remove(0).unwrap();
@@ -141,7 +141,7 @@ fn val_reliability_map_matches_an_independent_one() {
             (machine, Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 })
         })
         .collect();
-    let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0] };
+    let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
     let simd = Simd::best();
     let points: Vec<_> = prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let points: Vec<_> = points.iter().collect();

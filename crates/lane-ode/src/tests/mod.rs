@@ -11,8 +11,7 @@ mod recorders;
 mod trig;
 
 use crate::{
-    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, Tolerance, dop853,
-    dopri5, rk4,
+    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, Tolerance, dop853, dopri5, rk4,
 };
 use core::marker::PhantomData;
 

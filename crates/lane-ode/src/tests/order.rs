@@ -107,9 +107,11 @@ fn dopri5_keeps_the_tolerance_it_is_given_with_steps_by_the_fifth_root() {
 fn every_leg_ends_where_it_should() {
     // Ends and steps that binary fractions do not hit.
     let ends = [0.1, 0.7, 1.0 / 3.0, 2.2, 5.3, 0.049, 7.77];
-    for method in
-        [Method::Rk4, Method::Dop853, Method::Dopri5(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 })]
-    {
+    for method in [
+        Method::Rk4,
+        Method::Dop853,
+        Method::Dopri5(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
+    ] {
         let trajectories: Vec<_> = ends
             .into_iter()
             .map(|end_s| {

@@ -13,7 +13,6 @@ use crate::measures::Criterion;
 use crate::outcome::Outcome;
 use crate::plan::Plan;
 use crate::plot::contour::zero_lines;
-use crate::run::{Engine, Watch};
 use crate::verdict::Verdict;
 
 const HEAD: &str = r#"
@@ -53,6 +52,11 @@ fn traced(plan: &Plan, task: &Task, threads: usize, interrupt: &Interrupt) -> Re
     trace(&models, &task.firsts, task.curves, &task.search)
 }
 
+/// Axis values of every point of the grid.
+fn all_points(plan: &Plan) -> Vec<Vec<f64>> {
+    (0..plan.points()).map(|point| plan.axis_values(point)).collect()
+}
+
 #[test]
 fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads() {
     let plan = plan(&format!("{HEAD}{GRID}"));
@@ -69,7 +73,7 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
     assert!(bytes[0] == bytes[1], "other bytes on three threads");
 
     let engine = ModelEngine::new(&plan).unwrap();
-    let outcomes = engine.evaluate(0..plan.points(), &Watch::new(&interrupt)).unwrap();
+    let outcomes = engine.evaluate_at(&all_points(plan));
     let channels = plan.reliability.channels.len();
     for (row, outcomes) in traced[0].curves[0].iter().zip(outcomes.chunks(21)) {
         assert!(row.trials < 21, "{row:?}");
@@ -104,7 +108,7 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
 /// The logarithm of a grid's greatest ratios over the limit, its columns by the first axis.
 fn grid_logs(plan: &Plan) -> Vec<Vec<f64>> {
     let engine = ModelEngine::new(plan).unwrap();
-    let outcomes = engine.evaluate(0..plan.points(), &Watch::new(&Interrupt::new())).unwrap();
+    let outcomes = engine.evaluate_at(&all_points(plan));
     let log = |outcome: &Outcome| Quantity::RatioMax.distance(outcome, plan).unwrap();
     outcomes.chunks(plan.axes[1].values.len() as usize).map(|row| row.iter().map(log).collect()).collect()
 }

@@ -2,7 +2,6 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-
 use super::quantity::Quantity;
 use super::{Evaluate, Search, Trial};
 use crate::engine::{Demand, ModelEngine};
@@ -181,7 +180,7 @@ impl Evaluate for Models<'_> {
             })
             .collect();
         let watch = Watch::new(self.interrupt);
-        let outcomes = self.pool.install(|| self.engine.evaluate_at(&axis_values, Demand::Side, &watch))?;
+        let outcomes = self.pool.install(|| self.engine.evaluate_for(&axis_values, Demand::Side, &watch))?;
         let done = self.done.fetch_add(trials.len() as u64, Ordering::Relaxed);
         (self.tell)(done + trials.len() as u64);
         Some(outcomes.iter().map(|outcome| self.quantity.distance(outcome, self.plan)).collect())

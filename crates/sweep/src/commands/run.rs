@@ -208,7 +208,8 @@ pub(super) fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String
     if let Some(greatest) = &tally.greatest_error {
         let methods: Vec<String> =
             tally.by_method.iter().map(|(method, count)| format!("{count} {method}")).collect();
-        let told = format!("at most {:.1e} left in a row; rows by method: {}", greatest.value, methods.join(", "));
+        let told =
+            format!("at most {:.1e} left in a row; rows by method: {}", greatest.value, methods.join(", "));
         line(&mut text, "error", &told);
     }
     let place = |point: u64| match at(point) {

@@ -13,7 +13,7 @@ use crate::verdict::Verdict;
 
 /// What an outcome must be good for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Demand {
+pub enum Demand {
     /// A row: every number within the accuracy, and the verdict.
     Row,
     /// On which side of the limit the ratio is, and near the limit the ratio.
@@ -47,14 +47,12 @@ pub(super) struct Run {
 struct Climb {
     /// The rung of `run`.
     rung: usize,
-    /// The last run; at the top, the reference's.
+    /// The last run.
     run: Option<Run>,
     /// The error left in it; absent where nothing says so.
     error: Option<f64>,
     /// How far the numbers of the row were from those of the run before.
     spread: Option<f64>,
-    /// The reference and its probe have been compared.
-    is_at_top: bool,
 }
 
 impl Climb {
@@ -66,12 +64,7 @@ impl Climb {
         let found = difference(&before, &now, point, model, plan);
         self.error = found.map(|found| ladder.error_left(rung, found.greatest()));
         self.spread = found.map(|found| found.of_numbers);
-        if ladder.reference().is_some_and(|reference| rung > reference) {
-            self.is_at_top = true;
-            self.run = Some(before);
-        } else {
-            (self.rung, self.run) = (rung, Some(now));
-        }
+        (self.rung, self.run) = (rung, Some(now));
     }
 
     /// The error left, also where errors are not of first order any more.
@@ -88,8 +81,8 @@ impl Climb {
 pub(super) struct Row {
     /// What the caller knows it by.
     pub(super) id: u64,
-    /// Absent where the machine has no equilibrium.
-    pub(super) point: Option<Arc<Point>>,
+    /// Or why there is none.
+    pub(super) point: Result<Arc<Point>, Status>,
     climbs: [Climb; 2],
     /// Runs that have been asked for and are not there yet.
     pub(super) pending: usize,
@@ -106,23 +99,25 @@ pub(super) enum Next {
 }
 
 impl Row {
-    pub(super) fn new(id: u64, point: Option<Arc<Point>>) -> Self {
+    pub(super) fn new(id: u64, point: Result<Arc<Point>, Status>) -> Self {
         Self { id, point, climbs: Default::default(), pending: 0, came_as: 0 }
     }
 
     /// A run of a model that was asked for.
     pub(super) fn take(&mut self, model: usize, rung: usize, run: Run, ladder: &Ladder, plan: &Plan) {
         self.pending -= 1;
-        if let Some(point) = &self.point {
+        if let Ok(point) = &self.point {
             self.climbs[model].take(rung, run, ladder, point, MODELS[model], plan);
         }
     }
 
     /// What is to be done once nothing is pending.
     pub(super) fn next(&mut self, ladders: &[Ladder; 2], demand: Demand, accuracy: f64, plan: &Plan) -> Next {
-        if self.point.is_none() {
-            let none = || Trajectory::failed(Status::NoEquilibrium);
-            return Next::Done(Box::new(Outcome::new(self.id, none(), none())));
+        if let Err(status) = self.point {
+            let none = || Trajectory::failed(status);
+            let outcome =
+                Outcome { method: ladders[0].rungs[0].level, ..Outcome::new(self.id, none(), none()) };
+            return Next::Done(Box::new(outcome));
         }
         let outcome = self.outcome(ladders, accuracy, plan);
         let margin = outcome.as_ref().and_then(|outcome| margin(outcome, plan));
@@ -140,10 +135,10 @@ impl Row {
         let errors: f64 = self.climbs.iter().filter_map(|climb| climb.error).sum();
         if margin.is_some_and(|margin| margin <= errors) {
             for (model, climb) in self.climbs.iter().enumerate() {
-                if let Some(reference) = ladders[model].reference()
-                    && climb.rung < reference
+                if let Some(top) = ladders[model].top()
+                    && climb.rung < top
                 {
-                    runs.push((model, reference));
+                    runs.push((model, top));
                 }
             }
         }
@@ -158,11 +153,13 @@ impl Row {
         outcome.compare_turns(&plan.reliability.channels);
         outcome.method = ladders[0].rungs[nonlinear.rung].level;
         if plan.measures.metrics.contains(&Metric::StaticSag) {
-            outcome.static_sag_m = self.point.as_ref().map(|point| point.static_sag_m());
+            outcome.static_sag_m = self.point.as_ref().ok().map(|point| point.static_sag_m());
         }
-        if ladders[0].reference().is_some() {
-            let is_chaotic = |climb: &Climb| climb.is_at_top && climb.error.is_none_or(|error| error > accuracy);
-            outcome.sensitive = Some(is_chaotic(nonlinear) || is_chaotic(linear));
+        if let [Some(nonlinear_top), Some(linear_top)] = [ladders[0].top(), ladders[1].top()] {
+            let is_chaotic = |climb: &Climb, top: usize| {
+                climb.rung == top && climb.error.is_none_or(|error| error > accuracy)
+            };
+            outcome.sensitive = Some(is_chaotic(nonlinear, nonlinear_top) || is_chaotic(linear, linear_top));
             let errors = nonlinear.error.zip(linear.error);
             outcome.error = errors.map(|(nonlinear, linear)| nonlinear.max(linear));
         }
@@ -183,12 +180,12 @@ impl Climb {
         if self.run.is_none() {
             return Some(0);
         }
-        let reference = ladder.reference()?;
-        if self.failed() && self.rung < reference {
-            // It may be the caps that do not hold: RK4 has the word.
-            return Some(reference);
+        let top = ladder.top()?;
+        if self.failed() && self.rung + 1 < top {
+            // It may be the caps that do not hold: RK4 has the word, and at both steps.
+            return Some(top - 1);
         }
-        let is_settled = self.is_at_top || self.error.is_some_and(|error| error <= tolerance);
+        let is_settled = self.rung == top || self.error.is_some_and(|error| error <= tolerance);
         (!is_settled).then_some(self.rung + 1)
     }
 }

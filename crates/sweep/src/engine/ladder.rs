@@ -1,7 +1,7 @@
 //! The fast method as a ladder: the same trajectory by finer and finer rungs, until two of them agree.
 //!
 //! The lower rungs cap the modes of bearings and hinge (`washer_model::Cases`), each for a smaller error than the one
-//! before; the last two are plain RK4, the reference and one with a longer step. What a rung leaves of error shows in how far its
+//! before; the last two are plain RK4 at two steps, the shorter one the reference. What a rung leaves of error shows in how far its
 //! trajectory is from the rung's before: the first-order difference of the two, over the whole course of the motion and in every
 //! number of the row. The rule knows by how much the rung's error is smaller than that of the one before, so the difference times
 //! that share is the error left, as long as errors are small enough to be of first order. Motions that pass through bands of
@@ -33,8 +33,7 @@ pub enum Level {
 
 impl Level {
     /// Every level; the position is its code in chunk files, so new ones go to the end.
-    pub const ALL: [Self; 6] =
-        [Self::Fast, Self::Fine, Self::Finest, Self::Rk4, Self::Dopri5, Self::Rodas5p];
+    pub const ALL: [Self; 6] = [Self::Fast, Self::Fine, Self::Finest, Self::Rk4, Self::Dopri5, Self::Rodas5p];
 
     /// As in the file.
     #[must_use]
@@ -56,14 +55,14 @@ const REFERENCE_STEP_S: f64 = 2e-4;
 /// Share of the longest stable step that the reference method may use.
 const REFERENCE_SHARE: f64 = 0.75;
 
-/// Step of the probe, as a multiple of the reference's.
-const PROBE_STEP: f64 = 1.25;
+/// Step of plain RK4 where it is run first, as a multiple of the reference's.
+const LONGER_STEP: f64 = 1.25;
 
-/// Error of the reference as a share of its difference from the probe: 1 / (1.25^4 - 1).
-const PROBE_CONTRACTION: f64 = 0.7;
+/// Error of the reference as a share of its difference from that: 1 / (1.25^4 - 1).
+const REFERENCE_CONTRACTION: f64 = 0.7;
 
-/// By how much the finest capped rung's steps are shorter, and its caps higher, than the fine one's.
-const FINEST: f64 = 3.0;
+/// By how much the finest capped rung's steps are shorter than the fine one's, and its caps higher.
+const FINEST: [f64; 2] = [2.5, 3.0];
 
 /// A finest rung is climbed if it costs less than this share of the reference.
 const WORTH_IT: f64 = 0.5;
@@ -78,9 +77,9 @@ const fn aims(model: ModelKind) -> [f64; 3] {
     }
 }
 
-/// The same of the reference and the rung before, whose error is what the difference shows: that of the reference is smaller by
-/// orders of magnitude.
-const FIRST_ORDER_OF_REFERENCE: f64 = 0.2;
+/// The same of plain RK4 and the finest capped rung, whose error is what the difference shows: RK4's is smaller by orders of
+/// magnitude.
+const FIRST_ORDER_OF_RK4: f64 = 0.2;
 
 /// Up to which difference of two rungs errors are of first order.
 const fn first_order(model: ModelKind) -> f64 {
@@ -115,7 +114,11 @@ impl fmt::Display for Rung {
                     Formula::Dop853 => 8,
                 };
                 let bearings = caps.bearings_rad_per_s;
-                write!(f, "{name} (order {order}, step {:.3} ms, bearings capped at {bearings:.0}", 1e3 * step_s)?;
+                write!(
+                    f,
+                    "{name} (order {order}, step {:.3} ms, bearings capped at {bearings:.0}",
+                    1e3 * step_s
+                )?;
                 match caps.hinge_rad_per_s {
                     Some(hinge) => write!(f, " and hinge at {hinge:.0} rad/s)"),
                     None => write!(f, " rad/s)"),
@@ -132,7 +135,7 @@ impl fmt::Display for Rung {
 pub(crate) struct Ladder {
     pub(crate) rungs: Vec<Rung>,
     first_order: f64,
-    /// Whether the last two rungs are the reference and its probe.
+    /// Whether there is more than one, and the last two are plain RK4.
     is_checked: bool,
 }
 
@@ -164,40 +167,45 @@ impl Ladder {
                 last = Some((geared, expected));
             }
         }
-        let finest = last.map(|(geared, expected)| (refined(&geared, FINEST), expected));
+        let finest = last.map(|(geared, expected)| (refined(&geared), expected));
         if let Some((finest, expected)) = finest
             && finest.evaluations_per_s() < WORTH_IT * Formula::Rk4.evaluations_per_s(reference_step_s)
         {
-            push(Level::Finest, Method::Geared(finest), expected / (FINEST * FINEST));
+            let [_, caps] = FINEST;
+            push(Level::Finest, Method::Geared(finest), expected / (caps * caps));
         }
+        push(Level::Rk4, Method::Rk4 { step_s: LONGER_STEP * reference_step_s }, 0.0);
         push(Level::Rk4, Method::Rk4 { step_s: reference_step_s }, 0.0);
-        push(Level::Rk4, Method::Rk4 { step_s: PROBE_STEP * reference_step_s }, 0.0);
+        if let Some(last) = rungs.last_mut() {
+            last.contraction = REFERENCE_CONTRACTION;
+        }
         Self { rungs, first_order: first_order(model), is_checked: true }
     }
 
-    /// The reference's place, if rungs are compared.
-    pub(crate) fn reference(&self) -> Option<usize> {
-        self.is_checked.then(|| self.rungs.len() - 2)
+    /// The last rung, if there are others below it.
+    pub(crate) fn top(&self) -> Option<usize> {
+        self.is_checked.then(|| self.rungs.len() - 1)
     }
 
     /// The error left at a rung whose run differs so much from that of the rung before.
     pub(crate) fn error_left(&self, rung: usize, difference: f64) -> f64 {
-        if Some(rung) == self.reference().map(|reference| reference + 1) {
-            return PROBE_CONTRACTION * difference;
-        }
-        let first_order =
-            if Some(rung) == self.reference() { FIRST_ORDER_OF_REFERENCE } else { self.first_order };
+        let first_order = match self.top() {
+            Some(top) if rung == top => f64::INFINITY,
+            Some(top) if rung + 1 == top => FIRST_ORDER_OF_RK4,
+            _ => self.first_order,
+        };
         if difference <= first_order { self.rungs[rung].contraction * difference } else { difference }
     }
 }
 
-/// Shorter steps by a factor, and caps higher by as much.
-fn refined(geared: &Geared, factor: f64) -> Geared {
+/// With shorter steps and higher caps.
+fn refined(geared: &Geared) -> Geared {
+    let [steps, factor] = FINEST;
     let gears = geared.gears.map(|gear| {
         let mut caps = gear.caps;
         caps.bearings_rad_per_s *= factor;
         caps.hinge_rad_per_s = caps.hinge_rad_per_s.map(|cap| factor * cap);
-        Gear { step_s: gear.step_s / factor, caps, ..gear }
+        Gear { step_s: gear.step_s / steps, caps, ..gear }
     });
     Geared { gears, ..*geared }
 }

@@ -114,9 +114,7 @@ impl Pool<'_> {
                     state.at_work.push(above(rung));
                     drop(state);
                     let points: Vec<&Point> = taken.iter().map(|(_, point)| point.as_ref()).collect();
-                    let t0 = std::time::Instant::now();
                     let runs = self.engine.runs(model, rung, &points);
-                    if std::env::var_os("DBG").is_some() { eprintln!("RUN {model} {rung} {} {}", points.len(), t0.elapsed().as_secs_f64()); }
                     let mut state = self.lock();
                     let mut rows = Vec::with_capacity(taken.len());
                     for ((position, _), run) in taken.iter().zip(runs) {
@@ -211,7 +209,7 @@ impl State {
     fn take(&mut self, kind: Kind) -> Work {
         let waiting = self.waiting.entry(kind).or_default();
         let positions: Vec<u64> = waiting.drain(..waiting.len().min(group(kind))).collect();
-        let point = |position: &u64| Some((*position, self.rows.get(position)?.point.clone()?));
+        let point = |position: &u64| Some((*position, self.rows.get(position)?.point.clone().ok()?));
         Work::Runs(kind, positions.iter().filter_map(point).collect())
     }
 }

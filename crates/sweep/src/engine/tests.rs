@@ -1,7 +1,6 @@
 //! Failures are rows, each its own: the others are the same bits with and without them.
 
 use super::*;
-use crate::interrupt::Interrupt;
 
 /// Springs too soft to carry the machine, unbalances that throw it out of the model's range, and points that go well.
 const GRID: &str = r#"
@@ -29,8 +28,12 @@ fn plan(text: &str) -> Plan {
     crate::config::load(&path, &[]).unwrap()
 }
 
-fn evaluate(engine: &ModelEngine<'_>, points: Range<u64>) -> Vec<Outcome> {
-    engine.evaluate(points, &Watch::new(&Interrupt::new())).unwrap()
+fn evaluate(engine: &ModelEngine<'_>, points: std::ops::Range<u64>) -> Vec<Outcome> {
+    let first = points.start;
+    let values: Vec<_> = points.map(|point| engine.plan.axis_values(point)).collect();
+    let mut outcomes = engine.evaluate_at(&values);
+    outcomes.iter_mut().for_each(|outcome| outcome.point += first);
+    outcomes
 }
 
 #[test]
@@ -51,20 +54,11 @@ fn a_failed_point_is_a_row_and_leaves_the_others_bits_alone() {
 }
 
 #[test]
-fn a_panic_in_one_points_evaluation_is_that_points_row() {
-    let plan = plan(GRID);
-    let engine = ModelEngine::new(&plan).unwrap();
-    let evaluate = |points: Range<u64>| {
-        assert!(!points.contains(&7), "a defect at point seven");
-        engine.evaluate_together(points, &|point| plan.scenario(point))
+fn a_panic_over_one_item_is_that_items_defect() {
+    let twice = |items: &[u32]| {
+        assert!(!items.contains(&7), "a defect at seven");
+        items.iter().map(|item| Some(2 * item)).collect()
     };
-    let outcomes = together_or_alone(5..9, &evaluate);
-    assert_eq!(outcomes.iter().map(|outcome| outcome.point).collect::<Vec<_>>(), [5, 6, 7, 8]);
-    let panicked = &outcomes[2];
-    assert_eq!((panicked.nonlinear.status, panicked.linear.status), (Status::Panicked, Status::Panicked));
-    assert!(panicked.nonlinear.amplitudes.is_empty() && panicked.nonlinear.fail_time_s.is_none());
-    let undisturbed = engine.evaluate_together(5..9, &|point| plan.scenario(point));
-    for k in [0, 1, 3] {
-        assert_eq!(outcomes[k], undisturbed[k]);
-    }
+    let results = together_or_alone(&[5, 6, 7, 8], twice, || None);
+    assert_eq!(results, [Some(10), Some(12), None, Some(16)]);
 }

@@ -335,8 +335,7 @@ fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Resu
 
 /// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers' files stay.
 fn clear(folder: &Folder) -> Result<(), StoreError> {
-    const OURS: [&str; 6] =
-        ["plan.json", "shards.json", "chunk-", "session-", "shard-", ".sweep-"];
+    const OURS: [&str; 6] = ["plan.json", "shards.json", "chunk-", "session-", "shard-", ".sweep-"];
     atomic::remove(&folder.plan())?;
     for entry in fs::read_dir(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         let entry = entry.map_err(StoreError::io("list", &folder.path))?;

@@ -157,16 +157,8 @@ impl Serialize for StatusCounts {
 /// # Errors
 /// [`StoreError::Io`] and [`StoreError::Parquet`], the latter also for a file that lacks a result's columns.
 pub fn tally(path: &Path) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 8] = [
-        "point",
-        "status",
-        "reliable",
-        "sensitive",
-        "method",
-        "error",
-        "ratio_max",
-        "min_gap_nonlinear_m",
-    ];
+    const COLUMNS: [&str; 8] =
+        ["point", "status", "reliable", "sensitive", "method", "error", "ratio_max", "min_gap_nonlinear_m"];
     let failed = |error| StoreError::parquet("read", path)(error);
     let builder = builder(path)?;
     let mask = ProjectionMask::columns(builder.parquet_schema(), COLUMNS);

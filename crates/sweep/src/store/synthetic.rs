@@ -57,7 +57,7 @@ pub(crate) fn outcome(point: u64, channels: usize) -> Outcome {
     let mut outcome =
         Outcome::new(point, model(still * (0.5 + x % 5.0), failing(0)), model(still, failing(3)));
     outcome.method = Level::ALL[(point % 4) as usize];
-    outcome.error = (point % 5 > 0).then_some(1e-5 * (1.0 + x));
+    outcome.error = (!point.is_multiple_of(5)).then_some(1e-5 * (1.0 + x));
     outcome.sensitive = [None, Some(false), Some(true)][(point % 3) as usize];
     outcome
 }

@@ -3,8 +3,8 @@
 //! All of it is found in the lanes, step by step, in a function of its own ([`Lane::aside`]): what nobody asks for leaves the loop over
 //! steps as it is.
 
-use super::{Course, ModelKind};
 use super::cabinet_force::CabinetForce;
+use super::{Course, ModelKind};
 use crate::model::STATES;
 use crate::outputs::{CHANNELS, RADIAL, squared};
 use crate::point::Point;

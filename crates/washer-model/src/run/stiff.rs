@@ -137,7 +137,7 @@ mod tests {
     use crate::{Channel, Machine, Spin, Timing, prepare};
 
     const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
-    const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.7, 2.9] };
+    const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.7, 2.9], checkpoints: 0 };
 
     /// A run-up past the resonances, with kinks inside and outside of the window.
     fn point(bearing_stiffness_n_per_m: f64) -> Point {

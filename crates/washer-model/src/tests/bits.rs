@@ -2,21 +2,27 @@
 
 use super::instruments::{paper, random_machine, random_spin};
 use crate::{
-    Caps, Extra, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted, prepare, simulate_with,
+    Caps, Extra, Formula, Gear, Geared, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted,
+    prepare, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
 type Scenario = (Machine, Spin);
 
 const END_S: f64 = 1.0;
-const TIMING: Timing = Timing { end_s: END_S, window_s: [0.4, 0.9] };
+const TIMING: Timing = Timing { end_s: END_S, window_s: [0.4, 0.9], checkpoints: 8 };
 const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
-const METHODS: [Method; 3] = [
+const CAPS: Caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: Some(1200.0) };
+/// Two gears, of which spins of all kinds see both.
+const GEARED: Geared = {
+    let mut geared = Geared::steady(Formula::Rk4, 1e-3, CAPS);
+    geared.gears[0] = Gear { up_to_rad_per_s: 15.0, step_s: 1.3e-3, caps: CAPS };
+    geared
+};
+const METHODS: [Method; 4] = [
     Method::Rk4 { step_s: 1e-4 },
-    Method::Rk4MassScaled {
-        step_s: 1e-3,
-        caps: Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: Some(1200.0) },
-    },
+    Method::Geared(GEARED),
+    Method::Geared(Geared::steady(Formula::Dop853, 2e-3, CAPS)),
     Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
 
@@ -39,7 +45,7 @@ fn points(simd: Simd, scenarios: &[Scenario]) -> Vec<Point> {
 }
 
 const EVERYTHING: Wanted =
-    Wanted { root_mean_squares: true, turns: true, cabinet_force: true, clash_time: true };
+    Wanted { root_mean_squares: true, turns: true, cabinet_force: true, clash_time: true, course: true };
 
 /// Every number that was recorded as its bits.
 fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
@@ -47,8 +53,9 @@ fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
     let mut bits: Vec<_> = amplitudes.iter().map(|a| a.to_bits()).collect();
     bits.extend([min_gap_m.to_bits(), *steps, *rejected]);
     bits.extend(failure.iter().flat_map(|(reason, time_s)| [*reason as u64, time_s.to_bits()]));
-    let Extra { root_mean_squares, turns, cabinet_force_n, clash_time_s } = extra;
+    let Extra { root_mean_squares, turns, cabinet_force_n, clash_time_s, course } = extra;
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
+    bits.extend(course.iter().flatten().map(|q| q.to_bits()));
     bits.extend(cabinet_force_n.iter().chain(clash_time_s).map(|metric| metric.to_bits()));
     bits
 }

@@ -3,14 +3,14 @@
 use super::instruments::paper;
 use crate::spin::cuts_s;
 use crate::{
-    Caps, Channel, Machine, Method, ModelKind, Point, Spin, Start, Timing, Wanted, history, prepare,
-    simulate, simulate_with,
+    Caps, Channel, Formula, Geared, Machine, Method, ModelKind, Point, Spin, Start, Timing, Wanted, history,
+    prepare, simulate, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
 const EVERYTHING: Wanted =
-    Wanted { root_mean_squares: true, turns: true, cabinet_force: true, clash_time: true };
-const TIMING: Timing = Timing { end_s: 4.0, window_s: [1.3, 3.9] };
+    Wanted { root_mean_squares: true, turns: true, cabinet_force: true, clash_time: true, course: true };
+const TIMING: Timing = Timing { end_s: 4.0, window_s: [1.3, 3.9], checkpoints: 0 };
 const EVERY_S: f64 = 2.5e-4;
 
 /// Through the resonances in four seconds, with so little room between drum and tub that they clash at times.
@@ -117,10 +117,8 @@ fn methods_whose_steps_lie_elsewhere_find_the_same() {
 #[test]
 fn only_what_is_asked_for_is_there() {
     let point = point();
-    let method = Method::Rk4MassScaled {
-        step_s: 1e-3,
-        caps: Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: None },
-    };
+    let caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: None };
+    let method = Method::Geared(Geared::steady(Formula::Rk4, 1e-3, caps));
     let run = |wanted| simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], wanted);
     assert!(run(Wanted::default()).1.is_empty());
     let (_, extras) = run(Wanted { clash_time: true, ..Wanted::default() });
@@ -138,7 +136,7 @@ fn at_rest_the_cabinet_carries_the_weight() {
     machine.unbalance.mass_kg = 0.0;
     let weight_n =
         machine.gravity_m_per_s2 * (machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg);
-    let timing = Timing { end_s: 0.02, window_s: [0.0, 0.02] };
+    let timing = Timing { end_s: 0.02, window_s: [0.0, 0.02], checkpoints: 0 };
     let still = Spin::Ramp { peak_rpm: 0.0, ramp_s: 1.0 };
     let point = prepare(Simd::best(), &[(machine, still)], &timing).remove(0).unwrap();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {

@@ -56,7 +56,7 @@ pub(super) fn random_spin(rng: &mut fastrand::Rng, kind: usize, end_s: f64) -> S
 
 /// One scenario made ready.
 pub(super) fn ready(machine: Machine, spin: Spin, end_s: f64) -> Point {
-    let timing = Timing { end_s, window_s: [0.0, end_s] };
+    let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
 }
 

@@ -1,0 +1,261 @@
+//! Attacks the fast method's promise: random machines, spin profiles, windows, channels, limits and criteria, each row against
+//! plain RK4.
+//!
+//! ```sh
+//! cargo run --release -p sweep --example attack -- 20000 1    # rows, seed
+//! ```
+//!
+//! The promise: every row that is not flagged as sensitive has RK4's status, RK4's verdict and RK4's amplitudes within the
+//! accuracy; a row is flagged only where RK4 does not agree with itself. RK4 runs here at half the step that the fast method's top
+//! rung has. Where the two differ, RK4 at that very step has the word on the verdict. Exits with 1 if a row breaks the promise.
+
+use std::process::ExitCode;
+
+use rayon::prelude::*;
+use sweep::config;
+use sweep::engine::ModelEngine;
+use sweep::outcome::{Outcome, Status};
+use sweep::plan::{Integrator, Plan};
+use sweep::verdict::Verdict;
+
+/// What is asked of the fast method.
+const ACCURACIES: [f64; 3] = [1e-3, 1e-3, 1e-4];
+
+/// Step of RK4 where the bearings are as stiff as the paper's (s); softer ones make it no longer.
+const STEP_S: f64 = 1e-4;
+
+const CHANNELS: [&str; 8] = [
+    "tub_front_y",
+    "tub_front_z",
+    "drum_front_y",
+    "drum_front_z",
+    "total_centre_y",
+    "total_centre_z",
+    "tub_yaw",
+    "tub_pitch",
+];
+
+/// Numbers of a machine that vary, by factors up to which.
+const VARIED: [(&str, f64, f64); 14] = [
+    ("spring_stiffness_n_per_m", 8000.0, 2.0),
+    ("bearing_stiffness_n_per_m", 2e8, 1.0),
+    ("flexure_stiffness_n_m_per_rad", 29670.0, 3.0),
+    ("tub_mass_kg", 23.87, 1.8),
+    ("shaft_mass_kg", 4.34, 1.8),
+    ("drum_mass_kg", 3.64, 1.8),
+    ("unbalance_x_m", 0.3, 1.5),
+    ("unbalance_radius_m", 0.2, 1.4),
+    ("tub_centre_x_m", 0.24061, 1.3),
+    ("bearing_front_x_m", 0.05, 1.6),
+    ("spring_1_stiffness_n_per_m", 8000.0, 1.6),
+    ("damper_1_cabinet_z_m", 0.28, 1.6),
+    ("tub_inertia_22_kg_m2", 1.61, 1.5),
+    ("radial_clearance_m", 0.01, 2.0),
+];
+
+/// Numbers from a seed: splitmix64.
+struct Rng(u64);
+
+impl Rng {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn between(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * self.next()
+    }
+
+    /// Even in the logarithm.
+    fn factor(&mut self, most: f64) -> f64 {
+        most.powf(self.between(-1.0, 1.0))
+    }
+
+    fn one<'a, T>(&mut self, of: &'a [T]) -> &'a T {
+        &of[(self.next() * of.len() as f64) as usize]
+    }
+}
+
+/// A grid of nine points, as a user would write it.
+fn grid(seed: u64) -> String {
+    let mut rng = Rng(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
+    let end_s = rng.between(4.0, 26.0);
+    let peak_rpm = *rng.one(&[120.0, 300.0, 350.0, 350.0, 500.0, 900.0]) * rng.factor(1.3);
+    let spin = match (rng.next() * 4.0) as u32 {
+        0 => format!("profile = \"cycloidal\"\nramp_s = {}", end_s * rng.between(0.5, 1.2)),
+        1 => format!("profile = \"triangular\"\nramp_s = {}", end_s * rng.between(0.3, 1.2)),
+        2 => format!("profile = \"ramp\"\nramp_s = {}", end_s * rng.between(0.3, 1.2)),
+        _ => {
+            let [a, b] = [end_s * rng.between(0.2, 0.4), end_s * rng.between(0.5, 0.9)];
+            let [low, high] = [peak_rpm * rng.between(0.2, 0.9), peak_rpm];
+            format!(
+                "profile = \"table\"\ntime_s = [0, {a}, {b}, {end_s}]\nspeed_rpm = [0, {low}, {low}, {high}]"
+            )
+        }
+    };
+    let peak = if spin.contains("table") { String::new() } else { format!("\npeak_rpm = {peak_rpm}") };
+    let from_s = end_s * rng.between(0.0, 0.8);
+    let to_s = rng.between(from_s + 0.1 * (end_s - from_s), end_s);
+    let mut set = String::new();
+    for (name, value, most) in VARIED {
+        if rng.next() < 0.4 && most > 1.0 {
+            set += &format!("{name} = {}\n", value * rng.factor(most));
+        }
+    }
+    if rng.next() < 0.15 {
+        set += &format!("bearing_stiffness_n_per_m = {}\n", 2e8 * 10f64.powf(rng.between(-2.5, 0.0)));
+    }
+    let mut channels: Vec<_> = CHANNELS.into_iter().filter(|_| rng.next() < 0.35).collect();
+    if channels.is_empty() {
+        channels.push(*rng.one(&CHANNELS));
+    }
+    let criterion = *rng.one(&["peak", "peak", "peak", "envelope", "rms"]);
+    let limit = *rng.one(&[1.2, 1.5, 2.0, 2.0, 3.0, 5.0]);
+    let masses = [0.05, 0.4, 1.0].map(|mass| mass * rng.factor(1.6));
+    let dampings = [60.0, 120.0, 240.0].map(|damping| damping * rng.factor(1.5));
+    format!(
+        "name = \"attack-{seed}\"\nmetrics = [\"cabinet_force\"]\n[set]\n{set}[spin]\n{spin}{peak}\n\
+         [time]\nend_s = {end_s}\nwindow_s = [{from_s}, {to_s}]\n\
+         [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = {masses:?}\n\
+         [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = {dampings:?}\n\
+         [reliability]\ncriterion = \"{criterion}\"\nratio_limit = {limit}\nchannels = {channels:?}\n"
+    )
+}
+
+/// What was found; counts of rows.
+#[derive(Clone, Debug, Default)]
+struct Found {
+    rows: u64,
+    refused: u64,
+    sensitive: u64,
+    /// Flagged although RK4 at both steps agrees within the accuracy.
+    needlessly: u64,
+    failed: u64,
+    wrong_status: u64,
+    wrong_verdict: u64,
+    /// Amplitudes off by more than the accuracy.
+    inaccurate: u64,
+    /// By more than the row's own `error` says, though not by more than the accuracy.
+    above_error: u64,
+    worst: f64,
+    by_method: [u64; 6],
+    exceptions: Vec<String>,
+}
+
+impl Found {
+    fn plus(mut self, other: Self) -> Self {
+        self.rows += other.rows;
+        self.refused += other.refused;
+        self.sensitive += other.sensitive;
+        self.needlessly += other.needlessly;
+        self.failed += other.failed;
+        self.wrong_status += other.wrong_status;
+        self.wrong_verdict += other.wrong_verdict;
+        self.inaccurate += other.inaccurate;
+        self.above_error += other.above_error;
+        self.worst = self.worst.max(other.worst);
+        for (count, more) in self.by_method.iter_mut().zip(other.by_method) {
+            *count += more;
+        }
+        self.exceptions.extend(other.exceptions);
+        self
+    }
+}
+
+fn difference(a: &Outcome, b: &Outcome) -> f64 {
+    let relative = |(a, b): (&f64, &f64)| if a == b { 0.0 } else { (a - b).abs() / b.abs() };
+    let models = [(&a.nonlinear, &b.nonlinear), (&a.linear, &b.linear)];
+    let amplitudes = models.iter().flat_map(|(a, b)| a.amplitudes.iter().zip(&b.amplitudes));
+    let metrics = models.iter().flat_map(|(a, b)| a.metrics.iter().zip(&b.metrics));
+    let turns = a.turn_ratios.iter().flatten().zip(b.turn_ratios.iter().flatten());
+    amplitudes.chain(metrics).chain(turns).map(relative).fold(0.0, f64::max)
+}
+
+fn verdict(plan: &Plan, outcome: &Outcome) -> Option<bool> {
+    let rule = &plan.reliability;
+    Verdict::new(outcome, rule.channels.len(), rule.ratio_limit).reliable
+}
+
+fn statuses(outcome: &Outcome) -> [Status; 2] {
+    [outcome.nonlinear.status, outcome.linear.status]
+}
+
+/// One grid's rows against RK4.
+fn attack(seed: u64, folder: &std::path::Path) -> Found {
+    let path = folder.join(format!("{seed}.toml"));
+    let text = grid(seed);
+    let accuracy = ACCURACIES[(seed % 3) as usize];
+    std::fs::write(&path, &text).expect("the temporary folder can be written to");
+    let Ok(plan) = config::load(&path, &[]) else { return Found { refused: 1, ..Found::default() } };
+    let evaluate = |integrator: Integrator| {
+        let plan = Plan { integrator, ..plan.clone() };
+        let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
+        ModelEngine::new(&plan).expect("an instruction set").evaluate_at(&values)
+    };
+    let rows = evaluate(Integrator::Rk4MassScaled { accuracy });
+    let halved = evaluate(Integrator::Rk4 { step_s: STEP_S });
+    let mut reference = None;
+    let mut found = Found { rows: rows.len() as u64, ..Found::default() };
+    for (i, (row, halved)) in rows.iter().zip(&halved).enumerate() {
+        found.by_method[row.method as usize] += 1;
+        found.failed += u64::from(statuses(row) != [Status::Ok; 2]);
+        let mut at_reference =
+            || reference.get_or_insert_with(|| evaluate(Integrator::Rk4 { step_s: 2.0 * STEP_S }))[i].clone();
+        if row.sensitive == Some(true) {
+            found.sensitive += 1;
+            let same = at_reference();
+            let agrees = statuses(&same) == statuses(halved) && difference(&same, halved) <= 0.1 * accuracy;
+            found.needlessly += u64::from(agrees);
+            continue;
+        }
+        let error = difference(row, halved);
+        let mut complain = |count: fn(&mut Found) -> &mut u64, what: &str| {
+            *count(&mut found) += 1;
+            let error_left = row.error;
+            found.exceptions.push(format!("seed {seed}, row {i}: {what}; {error:.2e}, said {error_left:?}"));
+        };
+        if statuses(row) != statuses(halved) {
+            complain(|found| &mut found.wrong_status, "status");
+        } else if error > accuracy {
+            complain(|found| &mut found.inaccurate, "amplitudes");
+        } else if verdict(&plan, row) != verdict(&plan, halved)
+            && verdict(&plan, row) != verdict(&plan, &at_reference())
+        {
+            complain(|found| &mut found.wrong_verdict, "verdict");
+        } else {
+            found.worst = found.worst.max(error / accuracy);
+            found.above_error += u64::from(row.error.is_some_and(|said| error > said.max(1e-6)));
+        }
+    }
+    found
+}
+
+fn main() -> ExitCode {
+    let mut arguments = std::env::args().skip(1).map(|argument| argument.parse::<u64>());
+    let (Some(Ok(rows)), Some(Ok(first))) = (arguments.next(), arguments.next()) else {
+        eprintln!("usage: attack ROWS SEED");
+        return ExitCode::from(2);
+    };
+    let folder = std::env::temp_dir().join(format!("sweep-attack-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a temporary folder");
+    let grids = rows.div_ceil(9);
+    let seeds = first * 1_000_000..first * 1_000_000 + grids;
+    let found = seeds.into_par_iter().map(|seed| attack(seed, &folder)).reduce(Found::default, Found::plus);
+    // What is left in the temporary folder harms nobody.
+    let _ = std::fs::remove_dir_all(&folder);
+    eprintln!("{} rows of {grids} grids ({} refused), seed {first}", found.rows, found.refused);
+    eprintln!("  by method fast, fine, finest, rk4: {:?}", &found.by_method[..4]);
+    eprintln!(
+        "  failed {}, sensitive {} ({} of them needlessly)",
+        found.failed, found.sensitive, found.needlessly
+    );
+    eprintln!(
+        "  wrong: status {}, verdict {}, amplitudes {}; worst of the rest {:.2} of the accuracy; {} above their `error`",
+        found.wrong_status, found.wrong_verdict, found.inaccurate, found.worst, found.above_error
+    );
+    found.exceptions.iter().for_each(|line| eprintln!("  {line}"));
+    if found.exceptions.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
