@@ -78,6 +78,7 @@ mod nonlinear;
 mod outputs;
 mod parameters;
 mod point;
+mod ringing;
 mod rotor_terms;
 mod run;
 mod shape;

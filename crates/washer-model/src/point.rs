@@ -7,6 +7,7 @@ use crate::linear_outputs::{LinearOutputs, linearise_outputs};
 use crate::machine::Machine;
 use crate::nonlinear::COORDINATES;
 use crate::outputs::{Axes, CHANNELS, Motion};
+use crate::ringing::Ringing;
 use crate::spin::{Spin, SpinState, SpinStretch};
 use lane_ode::{Kernel, Lane, N, Simd};
 
@@ -37,6 +38,7 @@ pub struct Point {
     pub(crate) linear_outputs: LinearOutputs<f64>,
     pub(crate) stretches: Vec<SpinStretch>,
     pub(crate) legs: Vec<PlannedLeg>,
+    pub(crate) ringing: Ringing,
 }
 
 /// A stretch of the run between two kinks: of the spin, or of what is recorded.
@@ -65,6 +67,14 @@ impl Point {
     pub fn static_sag_m(&self) -> f64 {
         let (sin_pitch, _) = N(self.equilibrium[5]).sin_cos();
         -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[0])).0
+    }
+
+    /// By how much each channel (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) may swing with the modes of
+    /// bearings and hinge that jumps of the drum's acceleration leave swinging until the window ends. Steps longer than
+    /// their periods leave that out; `with_hinge` says whether the hinge's are among them.
+    #[must_use]
+    pub fn ringing(&self, with_hinge: bool) -> [f64; CHANNELS] {
+        self.ringing.channels(with_hinge)
     }
 
     /// The gap between drum and tub at rest (m).
@@ -124,13 +134,14 @@ impl Kernel for Prepare<'_> {
             let rest = Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
             let parts = machines.into_iter().zip(linear).zip(linear_outputs).zip(group);
             ready.extend(parts.enumerate().map(
-                |(lane, (((machine, linear), linear_outputs), (_, spin)))| {
+                |(lane, (((coefficients, linear), linear_outputs), (machine, spin)))| {
                     if found >> lane & 1 == 0 {
                         return Err(NoEquilibrium);
                     }
                     let stretches = spin.stretches();
                     Ok(Point {
-                        machine,
+                        ringing: Ringing::new(machine, &stretches, self.timing.window_s[1]),
+                        machine: coefficients,
                         equilibrium: q.map(|q| q.0.get(lane)),
                         rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),
                         linear,

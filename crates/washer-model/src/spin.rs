@@ -96,6 +96,11 @@ pub struct SpinStretch {
 }
 
 impl SpinStretch {
+    /// Acceleration at a time within the stretch.
+    pub(crate) fn acceleration_rad_per_s2(&self, t_s: f64) -> f64 {
+        SpinLanes::splat(N(0.0), self).at(N(t_s)).acceleration.0
+    }
+
     /// Speed at a time within the stretch.
     pub(crate) fn speed_rad_per_s(&self, t_s: f64) -> f64 {
         SpinLanes::splat(N(0.0), self).at(N(t_s)).speed.0

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use washer_model::{Course, ModelKind, Point};
 
-use super::ladder::Ladder;
+use super::ladder::{Ladder, Level};
 use super::pool::Kind;
 use crate::measures::{Metric, TURN_FLOOR};
 use crate::outcome::{Outcome, Status, Trajectory};
@@ -62,7 +62,8 @@ impl Climb {
             return;
         };
         let found = difference(&before, &now, point, model, plan);
-        self.error = found.map(|found| ladder.error_left(rung, found.greatest()));
+        let unseen = unseen(&now.trajectory, ladder.rungs[rung].level, point, plan);
+        self.error = found.map(|found| ladder.error_left(rung, found.greatest()).max(unseen));
         self.spread = found.map(|found| found.of_numbers);
         (self.rung, self.run) = (rung, Some(now));
     }
@@ -219,6 +220,23 @@ fn difference(a: &Run, b: &Run, point: &Point, model: ModelKind, plan: &Plan) ->
     }
     let of_course = point.course_difference(model, &a.course, &b.course);
     Some(Difference { of_course, of_numbers: of_numbers(of_a, of_b, point, plan) })
+}
+
+/// The error that rungs of this level have in common, so that no comparison shows it: bearings and hinge that are left swinging.
+fn unseen(numbers: &Trajectory, level: Level, point: &Point, plan: &Plan) -> f64 {
+    let swings = match level {
+        Level::Fast | Level::Fine => point.ringing(true),
+        Level::Finest => point.ringing(false),
+        Level::Rk4 | Level::Dopri5 | Level::Rodas5p => return 0.0,
+    };
+    let share = |swing: f64, of: f64| if swing == 0.0 { 0.0 } else { swing / of };
+    let channels = &plan.reliability.channels;
+    let of_amplitudes = channels.iter().zip(&numbers.amplitudes);
+    let of_amplitudes = of_amplitudes.map(|(channel, of)| share(swings[channel.index()], *of));
+    let of_turns = numbers.turns.iter().flat_map(|turn| {
+        channels.iter().map(|channel| share(swings[channel.index()], turn[channel.index()].max(TURN_FLOOR)))
+    });
+    of_amplitudes.chain(of_turns).fold(0.0, f64::max)
 }
 
 /// The greatest relative difference of what a row takes from two trajectories.
