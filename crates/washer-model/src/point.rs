@@ -71,10 +71,10 @@ impl Point {
 
     /// By how much each channel (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) may swing with the modes of
     /// bearings and hinge that jumps of the drum's acceleration leave swinging until the window ends. Steps longer than
-    /// their periods leave that out; `with_hinge` says whether the hinge's are among them.
+    /// their periods leave that out.
     #[must_use]
-    pub fn ringing(&self, with_hinge: bool) -> [f64; CHANNELS] {
-        self.ringing.channels(with_hinge)
+    pub fn ringing(&self) -> [f64; CHANNELS] {
+        self.ringing.channels()
     }
 
     /// The gap between drum and tub at rest (m).

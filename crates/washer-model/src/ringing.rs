@@ -52,11 +52,9 @@ impl Ringing {
         }
     }
 
-    /// By how much each channel swings at most (m, rad), in the order of `Channel::ALL`; without the hinge's part if that is
-    /// followed.
-    pub(crate) fn channels(&self, with_hinge: bool) -> [f64; CHANNELS] {
-        let hinge_rad = if with_hinge { self.hinge_rad } else { 0.0 };
-        let tilt_rad = hinge_rad + self.bearings_m / self.span_m;
+    /// By how much each channel swings at most (m, rad), in the order of `Channel::ALL`.
+    pub(crate) fn channels(&self) -> [f64; CHANNELS] {
+        let tilt_rad = self.hinge_rad + self.bearings_m / self.span_m;
         Channel::ALL.map(|channel| {
             let swing = match channel {
                 Channel::DrumFrontY | Channel::DrumFrontZ => self.bearings_m + self.reach_m * tilt_rad,

@@ -225,8 +225,7 @@ fn difference(a: &Run, b: &Run, point: &Point, model: ModelKind, plan: &Plan) ->
 /// The error that rungs of this level have in common, so that no comparison shows it: bearings and hinge that are left swinging.
 fn unseen(numbers: &Trajectory, level: Level, point: &Point, plan: &Plan) -> f64 {
     let swings = match level {
-        Level::Fast | Level::Fine => point.ringing(true),
-        Level::Finest => point.ringing(false),
+        Level::Fast | Level::Fine | Level::Finest => point.ringing(),
         Level::Rk4 | Level::Dopri5 | Level::Rodas5p => return 0.0,
     };
     let share = |swing: f64, of: f64| if swing == 0.0 { 0.0 } else { swing / of };
