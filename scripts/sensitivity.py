@@ -8,6 +8,8 @@ hold the table that came out. Needs pyarrow.
 """
 
 import argparse
+import json
+import math
 import pathlib
 import subprocess
 import sys
@@ -48,6 +50,33 @@ def trace(sweep: str, grid: pathlib.Path, constants: list[str]) -> tuple[dict[fl
     for row in rows:
         by_mass.setdefault(row[FIRST], []).append(row)
     return by_mass, sum(rows[0]["points"] for rows in by_mass.values())
+
+
+def loaded_springs(sweep: str) -> list[str]:
+    """Free lengths by which the tabulated place is that of the loaded machine.
+
+    By the law of the lever each spring carries its share of the weight there.
+    """
+    command = [sweep, "parameters", "--json"]
+    listed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    value = {row["name"]: row["value"] for row in json.loads(listed)}
+    places = {"tub": "centre_x_m", "shaft": "centre_x_m", "drum": "centre_x_m", "unbalance": "x_m"}
+    masses = {body: value[f"{body}_mass_kg"] for body in places}
+    mass = sum(masses.values())
+    centre = sum(masses[body] * value[f"{body}_{place}"] for body, place in places.items()) / mass
+    constants = []
+    for spring, other in [(1, 3), (2, 4), (3, 1), (4, 2)]:
+        cabinet, tub = (
+            [value[f"spring_{spring}_{end}_{axis}_m"] for axis in "xyz"] for end in ["cabinet", "tub"]
+        )
+        lever = value[f"spring_{other}_tub_x_m"]
+        share = (centre - lever) / (tub[0] - lever) / 2
+        length = math.dist(cabinet, tub)
+        upwards = (cabinet[1] - tub[1]) / length
+        tension = share * mass * value["gravity_m_per_s2"] / upwards
+        free = length - tension / value["spring_stiffness_n_per_m"]
+        constants.append(f"spring_{spring}_free_length_m={free!r}")
+    return constants
 
 
 def ramped(ramp_s: float) -> str:
@@ -100,6 +129,9 @@ def main() -> int:
             found, more = trace(options.sweep, GRID, [f"{name}={value}"])
             points += more
             add(what, f"{assumed * 1000:g} to {value * 1000:g} mm", found)
+    found, more = trace(options.sweep, GRID, loaded_springs(options.sweep))
+    points += more
+    add("springs' ends in Table 4", "without load to with it", found)
     for ramp_s in RAMPS_S:
         with tempfile.TemporaryDirectory() as folder:
             grid = pathlib.Path(folder) / "sensitivity.toml"

@@ -1,4 +1,4 @@
-//! What the paper says of the modes (its Fig. 7 and Table 4), and what must hold of any.
+//! What the paper says of the modes (its Fig. 7), and what must hold of any.
 
 use crate::campbell::{ModeAtSpeed, ModeOverSpeed, campbell};
 use crate::machine::Machine;
@@ -41,6 +41,42 @@ fn val_resonances_are_the_papers() {
         assert!(swing(&resonance.mode) < 3e-3, "{} over a turn at {speed}", swing(&resonance.mode));
     }
     assert!(modes[4..].iter().all(|mode| mode.resonances.is_empty()));
+}
+
+#[test]
+fn springs_without_load_where_the_tables_draw_them_decide_the_resonances() {
+    // The other reading: the tabulated place is that of the loaded machine. By the law of the lever each spring
+    // carries its share of the weight there, and is so much shorter without it.
+    let mut machine = Machine::paper();
+    let (drum, unbalance) = (&machine.drum, &machine.unbalance);
+    let bodies = [
+        (machine.tub.mass_kg, machine.tub.centre_x_m),
+        (machine.shaft.mass_kg, machine.shaft.centre_x_m),
+        (drum.mass_kg, drum.centre_x_m),
+        (unbalance.mass_kg, unbalance.x_m),
+    ];
+    let mass_kg: f64 = bodies.iter().map(|(mass, _)| mass).sum();
+    let centre_x_m = bodies.iter().map(|(mass, x)| mass * x).sum::<f64>() / mass_kg;
+    let [front_x_m, rear_x_m] = [0, 2].map(|k| machine.springs[k].tub_m[0]);
+    let weight_n = mass_kg * machine.gravity_m_per_s2;
+    for (k, spring) in machine.springs.iter_mut().enumerate() {
+        let other_x_m = if k < 2 { rear_x_m } else { front_x_m };
+        let share = (centre_x_m - other_x_m) / (spring.tub_m[0] - other_x_m);
+        let upwards = (spring.cabinet_m[1] - spring.tub_m[1]) / spring.given_length_m();
+        let tension_n = 0.5 * share * weight_n / upwards;
+        spring.free_length_m = Some(spring.given_length_m() - tension_n / spring.stiffness_n_per_m);
+    }
+    let point = point(machine);
+    assert!(point.equilibrium()[0].abs() < 1e-6 && point.static_sag_m().abs() < 1e-6);
+    let speeds: Vec<f64> = (0..=12).map(|k| 25.0 * f64::from(k)).collect();
+    let modes = campbell(&point, &speeds).unwrap();
+    for (mode, (paper, other)) in
+        modes.iter().zip([(99.9, 104.96), (147.6, 146.46), (162.3, 173.26), (261.6, 255.49)])
+    {
+        let [resonance] = mode.resonances[..] else { panic!("{:?}", mode.resonances) };
+        assert!((resonance.speed_rpm - other).abs() < 0.01, "{}", resonance.speed_rpm);
+        assert!((resonance.speed_rpm / paper - 1.0).abs() > 7e-3, "{} against {paper}", resonance.speed_rpm);
+    }
 }
 
 /// Half the distance from least to greatest frequency over a turn, as a share of the mean.

@@ -76,7 +76,7 @@ impl Bodies<f64> {
         let m_0 = drum.mass_kg;
         let m_u = unbalance.mass_kg;
         let m_d = m_0 + m_u;
-        // Section 2: the drum's row of Table 2 as a function of the unbalance mass.
+        // Section 2: the drum of Tables 2 and 3 as a function of the unbalance mass.
         let dx = unbalance.x_m - drum.centre_x_m;
         let r_u = unbalance.radius_m;
         let mu_r = m_u * m_0 / m_d;

@@ -1,8 +1,10 @@
-//! The linear model's outputs: first order in the coordinates, harmonics 0 and 1 in theta.
+//! The linear model's outputs: exact first order in the coordinates, harmonics 0 and 1 in theta.
+//!
+//! The part of order zero is what turns with the drum while the machine rests at its equilibrium.
 
 use crate::coefficients::Bodies;
 
-use crate::lanes::{GetLane, SetLane};
+use crate::lanes::{GetLane, SetLane, Splat};
 use crate::linear::seeded;
 use crate::nonlinear::COORDINATES;
 use crate::outputs::{Axes, CHANNELS, Motion, RADIAL};
@@ -10,15 +12,16 @@ use crate::sparse::sparse_sums;
 use crate::spin::SpinState;
 use lane_ode::{Lane, N, Real, Sample};
 
+/// Columns of an expansion: the slope along each coordinate, then the value at equilibrium.
+const COLUMNS: usize = COORDINATES + 1;
+const AT_REST: usize = COORDINATES;
+
 /// Every channel, then the two components of the radial distance.
 const OUTPUTS: usize = CHANNELS + RADIAL;
 
 /// Angles that determine harmonics 0 and 1: cos and sin of 2 pi k / 3.
 const SAMPLES: [(f64, f64); 3] =
     [(1.0, 0.0), (-0.5, 0.866_025_403_784_438_6), (-0.5, -0.866_025_403_784_438_6)];
-
-/// A constant column, then one per coordinate: the functions that the terms are of.
-const COLUMNS: usize = COORDINATES + 1;
 
 /// Channels in which the drum turns: its front centre, and the mass centre of the machine.
 const TURNING: core::ops::Range<usize> = 2..6;
@@ -28,22 +31,27 @@ const CHANNEL_ENTRIES: usize = CHANNELS + 2 * (TURNING.end - TURNING.start);
 /// Likewise of the radial distance; both components turn.
 const RADIAL_ENTRIES: usize = 3 * RADIAL;
 
+/// Entries of the channels that hold a part of order zero. The equilibrium has the unbalance up and the hinge bent in the
+/// vertical plane alone, so that nothing of it moves along c2 with the sine.
+const CHANNELS_AT_REST: [usize; 10] = [2, 3, 4, 5, 8, 10, 11, 12, 14, 15];
+/// Likewise of the radial distance: all.
+const RADIAL_AT_REST: [usize; RADIAL_ENTRIES] = [0, 1, 2, 3, 4, 5];
+
 // The functions that the terms are of.
-const ONE: usize = 0;
-const Q1: usize = 1;
-const Q2: usize = 2;
-const Q3: usize = 3;
-const Q4: usize = 4;
-const Q5: usize = 5;
-const Q6: usize = 6;
-const Q7: usize = 7;
-const Q8: usize = 8;
-const Q9: usize = 9;
-const Q10: usize = 10;
+const Q1: usize = 0;
+const Q2: usize = 1;
+const Q3: usize = 2;
+const Q4: usize = 3;
+const Q5: usize = 4;
+const Q6: usize = 5;
+const Q7: usize = 6;
+const Q8: usize = 7;
+const Q9: usize = 8;
+const Q10: usize = 9;
 
 sparse_sums! {
     /// Coefficients of the channels.
-    ChannelTerms: COLUMNS => CHANNEL_ENTRIES;
+    ChannelTerms: COORDINATES => CHANNEL_ENTRIES;
     0 => Q1 Q6;
     1 => Q2 Q5 Q6;
     2 => Q3 Q8 Q10;
@@ -64,26 +72,30 @@ sparse_sums! {
 
 sparse_sums! {
     /// Coefficients of the radial distance.
-    RadialTerms: COLUMNS => RADIAL_ENTRIES;
-    0 => ONE Q1 Q2 Q3 Q4 Q5 Q6 Q7 Q8 Q10;
-    1 => ONE Q2 Q4 Q5 Q7 Q8 Q10;
-    2 => ONE Q5 Q6 Q7 Q8 Q9 Q10;
-    3 => ONE Q5 Q6 Q7 Q9 Q10;
-    4 => ONE Q5 Q7 Q8 Q9 Q10;
-    5 => ONE Q5 Q7 Q9 Q10;
+    RadialTerms: COORDINATES => RADIAL_ENTRIES;
+    0 => Q1 Q2 Q3 Q4 Q5 Q6 Q7 Q8 Q10;
+    1 => Q2 Q4 Q5 Q7 Q8 Q10;
+    2 => Q5 Q6 Q7 Q8 Q9 Q10;
+    3 => Q5 Q6 Q7 Q9 Q10;
+    4 => Q5 Q7 Q8 Q9 Q10;
+    5 => Q5 Q7 Q9 Q10;
 }
 
 /// The outputs of one machine in `f64`, of one per lane in `T`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LinearOutputs<T> {
     channels: ChannelTerms<T>,
+    channels_at_rest: [N<T>; CHANNELS_AT_REST.len()],
     radial: RadialTerms<T>,
+    radial_at_rest: [N<T>; RADIAL_AT_REST.len()],
 }
 
 impl<T: Lane> SetLane<LinearOutputs<f64>> for LinearOutputs<T> {
     fn set_lane(&mut self, lane: usize, from: &LinearOutputs<f64>) {
         self.channels.set_lane(lane, &from.channels);
+        self.channels_at_rest.set_lane(lane, &from.channels_at_rest);
         self.radial.set_lane(lane, &from.radial);
+        self.radial_at_rest.set_lane(lane, &from.radial_at_rest);
     }
 }
 
@@ -92,15 +104,18 @@ impl<T: Lane> LinearOutputs<T> {
     pub(crate) fn splat(zero: N<T>, outputs: &LinearOutputs<f64>) -> Self {
         Self {
             channels: ChannelTerms::splat(zero, &outputs.channels),
+            channels_at_rest: Splat::splat(zero, &outputs.channels_at_rest),
             radial: RadialTerms::splat(zero, &outputs.radial),
+            radial_at_rest: Splat::splat(zero, &outputs.radial_at_rest),
         }
     }
 
-    /// Deviations of the channels from equilibrium.
+    /// Deviations of the channels from equilibrium, unbalance up.
     #[inline(always)]
     pub(crate) fn channels(&self, of: &LinearMotion<T>) -> [Sample<T>; CHANNELS] {
         let mut sums = [[of.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
-        self.channels.sum(&of.columns, &mut sums);
+        self.channels.sum(&of.coordinates, &mut sums);
+        add_at_rest(&mut sums, &CHANNELS_AT_REST, &self.channels_at_rest);
         of.turned::<CHANNEL_ENTRIES, CHANNELS>(sums, TURNING)
     }
 
@@ -108,15 +123,28 @@ impl<T: Lane> LinearOutputs<T> {
     #[inline(always)]
     pub(crate) fn radial(&self, of: &LinearMotion<T>) -> [Sample<T>; RADIAL] {
         let mut sums = [[of.cos[0].lit(0.0); 3]; RADIAL_ENTRIES];
-        self.radial.sum(&of.columns, &mut sums);
+        self.radial.sum(&of.coordinates, &mut sums);
+        add_at_rest(&mut sums, &RADIAL_AT_REST, &self.radial_at_rest);
         of.turned::<RADIAL_ENTRIES, RADIAL>(sums, 0..RADIAL)
+    }
+}
+
+/// Adds the parts of order zero, which have no derivatives of their own: an entry's turn brings them.
+#[inline(always)]
+fn add_at_rest<T: Real, const ENTRIES: usize, const K: usize>(
+    sums: &mut [[N<T>; 3]; ENTRIES],
+    places: &[usize; K],
+    at_rest: &[N<T>; K],
+) {
+    for i in 0..K {
+        sums[places[i]][0] += at_rest[i];
     }
 }
 
 /// What the outputs are made of, each with two time derivatives.
 pub(crate) struct LinearMotion<T> {
-    /// 1, then the coordinates.
-    columns: [[N<T>; 3]; COLUMNS],
+    /// Deviations from equilibrium.
+    coordinates: [[N<T>; 3]; COORDINATES],
     /// Of theta.
     cos: [N<T>; 3],
     sin: [N<T>; 3],
@@ -128,13 +156,12 @@ impl<T: Real> LinearMotion<T> {
     pub(crate) fn new(spin: &SpinState<T>, motion: &Motion<T>) -> Self {
         let zero = spin.sin.lit(0.0);
         let (n, nn, acceleration) = (spin.speed, (spin.speed * spin.speed).v(), spin.acceleration);
-        let mut columns = [[zero; 3]; COLUMNS];
-        columns[ONE][0] = zero.lit(1.0);
+        let mut coordinates = [[zero; 3]; COORDINATES];
         for j in 0..COORDINATES {
-            columns[Q1 + j] = [motion.q[j], motion.u[j], motion.a[j]];
+            coordinates[j] = [motion.q[j], motion.u[j], motion.a[j]];
         }
         Self {
-            columns,
+            coordinates,
             cos: [spin.cos, -(n * spin.sin).v(), -(acceleration * spin.sin + nn * spin.cos)],
             sin: [spin.sin, (n * spin.cos).v(), acceleration * spin.cos - nn * spin.sin],
         }
@@ -192,8 +219,8 @@ pub(crate) fn linearise_outputs<T: Lane>(
             let axes = Axes::new(&spin, &motion);
             let (channels, radial) = (axes.channels(&lifted, &motion), axes.radial(&lifted, &motion));
             for (output, y) in channels.iter().chain(&radial).enumerate() {
-                samples[k][output][0] = N(y.value.0.value);
-                samples[k][output][1 + j] = N(y.value.0.slope);
+                samples[k][output][AT_REST] = N(y.value.0.value);
+                samples[k][output][j] = N(y.value.0.slope);
             }
         }
     }
@@ -201,39 +228,46 @@ pub(crate) fn linearise_outputs<T: Lane>(
 }
 
 fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64> {
-    let (channels, radial) = coefficients(samples);
-    LinearOutputs { channels: ChannelTerms::gather(&channels), radial: RadialTerms::gather(&radial) }
-}
-
-/// Coefficients of all functions in each entry, from the samples.
-fn coefficients(
-    samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3],
-) -> ([[f64; COLUMNS]; CHANNEL_ENTRIES], [[f64; COLUMNS]; RADIAL_ENTRIES]) {
-    let mut channels = [[0.0; COLUMNS]; CHANNEL_ENTRIES];
-    let mut radial = [[0.0; COLUMNS]; RADIAL_ENTRIES];
+    let mut channels = [[0.0; COORDINATES]; CHANNEL_ENTRIES];
+    let mut channels_at_rest = [0.0; CHANNEL_ENTRIES];
+    let mut radial = [[0.0; COORDINATES]; RADIAL_ENTRIES];
+    let mut radial_at_rest = [0.0; RADIAL_ENTRIES];
     for output in 0..OUTPUTS {
         for column in 0..COLUMNS {
-            // Outputs of the linear model are linear in q: channels have no constant (model page, section 5).
-            if column == ONE && output < CHANNELS {
-                continue;
-            }
             let values = samples.map(|sample| sample[output][column].0);
             let mean = (values[0] + values[1] + values[2]) / 3.0;
             let cos = (2.0 * values[0] - values[1] - values[2]) / 3.0;
             let sin = (values[1] - values[2]) * 2.0 * SAMPLES[1].1 / 3.0;
-            for (part, coefficient) in [mean, cos, sin].into_iter().enumerate() {
-                if output >= CHANNELS {
-                    radial[entry(output - CHANNELS, part, RADIAL, 0)][column] = coefficient;
+            // Channels are deviations from their values at theta = 0, where the cosine's part is whole.
+            let steady = if column == AT_REST && output < CHANNELS { -cos } else { mean };
+            for (part, coefficient) in [steady, cos, sin].into_iter().enumerate() {
+                let (entry, terms, at_rest) = if output >= CHANNELS {
+                    let entry = entry(output - CHANNELS, part, RADIAL, 0);
+                    (entry, &mut radial[..], &mut radial_at_rest[..])
                 } else if part == 0 || TURNING.contains(&output) {
-                    channels[entry(output, part, CHANNELS, TURNING.start)][column] = coefficient;
+                    let entry = entry(output, part, CHANNELS, TURNING.start);
+                    (entry, &mut channels[..], &mut channels_at_rest[..])
+                } else {
+                    continue;
+                };
+                if column == AT_REST {
+                    at_rest[entry] = coefficient;
+                } else {
+                    terms[entry][column] = coefficient;
                 }
             }
         }
     }
-    (channels, radial)
+    LinearOutputs {
+        channels: ChannelTerms::gather(&channels),
+        channels_at_rest: CHANNELS_AT_REST.map(|entry| N(channels_at_rest[entry])),
+        radial: RadialTerms::gather(&radial),
+        radial_at_rest: RADIAL_AT_REST.map(|entry| N(radial_at_rest[entry])),
+    }
 }
 
-/// Where a part (0: steady, 1: cos, 2: sin) of an output stands among `count` of them, the first of which that turns is `first`.
+/// Where a part (0: steady, 1: cos, 2: sin) of an output stands among `count` of them, the first of
+/// which that turns is `first`.
 const fn entry(output: usize, part: usize, count: usize, first: usize) -> usize {
     if part == 0 { output } else { count + 2 * (output - first) + part - 1 }
 }

@@ -121,14 +121,14 @@ pub struct Damper {
 }
 
 impl Machine {
-    /// The machine of Park, Jeong and Yoo (Machines 2021, 9(11), 289): Tables 2 and 3, the bare drum and unbalance
-    /// split of the equations page, and this project's assumptions where the paper is silent (bearing positions,
-    /// hinge, fronts, clearance).
+    /// The machine of Park, Jeong and Yoo (Machines 2021, 9(11), 289): Tables 2 to 4 and section 3.1, the bare drum
+    /// and unbalance split of the equations page, and this project's assumptions where the paper is silent (bearing
+    /// positions, hinge, fronts, clearance, free lengths of the springs).
     #[must_use]
     pub fn paper() -> Self {
         let [unbalance_mass_kg, drum_mass_kg, drum_x_m] = [0.4, 3.64, 0.200];
         let unbalance = Unbalance { mass_kg: unbalance_mass_kg, x_m: 0.300, radius_m: 0.200 };
-        // Table 2 prints the drum with its 0.4 kg unbalance; take the point mass out (model page, section 2).
+        // Tables 2 and 3 print the drum with its 0.4 kg unbalance; take the point mass out (model page, section 2).
         let reduced_mass_kg = unbalance_mass_kg * drum_mass_kg / (unbalance_mass_kg + drum_mass_kg);
         let (dx, r) = (unbalance.x_m - drum_x_m, unbalance.radius_m);
         let with_unbalance = [0.196, 0.162, 0.177];

@@ -419,7 +419,9 @@ use Source::{Assumed, Convention, Derived, Grid, Paper, Time};
 
 const TABLE_2: Source = Paper("Table 2");
 const TABLE_3: Source = Paper("Table 3");
-const SPLIT: Source = Derived("Table 2's drum less its 0.4 kg unbalance");
+const TABLE_4: Source = Paper("Table 4");
+const SECTION_3_1: Source = Paper("section 3.1");
+const SPLIT: Source = Derived("the drum of Tables 2 and 3 less its 0.4 kg unbalance");
 
 /// Rows with a single number each, and the three that write several.
 #[rustfmt::skip]
@@ -428,15 +430,15 @@ static TABLE: &[Row] = &[
     row!("radial_clearance_m", "m", NonNegative, Assumed("a usual gap"), "radial gap between drum and tub at rest", machine radial_clearance_m),
     row!("tub_mass_kg", "kg", Positive, TABLE_2, "mass of the tub", machine tub.mass_kg),
     row!("tub_centre_x_m", "m", Any, TABLE_2, "mass centre of the tub on its axis (L_T)", machine tub.centre_x_m),
-    row!("tub_inertia_11_kg_m2", "kg m^2", Positive, TABLE_2, "tub's moment of inertia about its axis", machine tub.inertia_kg_m2[0]),
-    row!("tub_inertia_22_kg_m2", "kg m^2", Positive, TABLE_2, "tub's moment of inertia about the vertical", machine tub.inertia_kg_m2[1]),
-    row!("tub_inertia_33_kg_m2", "kg m^2", Positive, TABLE_2, "tub's moment of inertia about the horizontal cross axis", machine tub.inertia_kg_m2[2]),
+    row!("tub_inertia_11_kg_m2", "kg m^2", Positive, TABLE_3, "tub's moment of inertia about its axis", machine tub.inertia_kg_m2[0]),
+    row!("tub_inertia_22_kg_m2", "kg m^2", Positive, TABLE_3, "tub's moment of inertia about the vertical", machine tub.inertia_kg_m2[1]),
+    row!("tub_inertia_33_kg_m2", "kg m^2", Positive, TABLE_3, "tub's moment of inertia about the horizontal cross axis", machine tub.inertia_kg_m2[2]),
     row!("tub_front_x_m", "m", Any, Assumed("level with the drum's front"), "front centre of the tub on its axis (P_TE)", machine tub.front_x_m),
     row!("shaft_mass_kg", "kg", Positive, TABLE_2, "mass of shaft and rotor", machine shaft.mass_kg),
     row!("shaft_centre_x_m", "m", Any, TABLE_2, "mass centre of shaft and rotor on their axis (-L_S)", machine shaft.centre_x_m),
-    row!("shaft_inertia_11_kg_m2", "kg m^2", Positive, TABLE_2, "shaft's moment of inertia about its axis", machine shaft.inertia_kg_m2[0]),
-    row!("shaft_inertia_22_kg_m2", "kg m^2", Positive, TABLE_2, "shaft's moment of inertia across its axis, along s2", machine shaft.inertia_kg_m2[1]),
-    row!("shaft_inertia_33_kg_m2", "kg m^2", Positive, TABLE_2, "shaft's moment of inertia across its axis, along s3", machine shaft.inertia_kg_m2[2]),
+    row!("shaft_inertia_11_kg_m2", "kg m^2", Positive, TABLE_3, "shaft's moment of inertia about its axis", machine shaft.inertia_kg_m2[0]),
+    row!("shaft_inertia_22_kg_m2", "kg m^2", Positive, TABLE_3, "shaft's moment of inertia across its axis, along s2", machine shaft.inertia_kg_m2[1]),
+    row!("shaft_inertia_33_kg_m2", "kg m^2", Positive, TABLE_3, "shaft's moment of inertia across its axis, along s3", machine shaft.inertia_kg_m2[2]),
     row!("drum_mass_kg", "kg", Positive, SPLIT, "mass of the drum without unbalance (m_0)", machine drum.mass_kg),
     row!("drum_centre_x_m", "m", Any, SPLIT, "mass centre of the drum without unbalance, on its axis (x_0)", machine drum.centre_x_m),
     row!("drum_inertia_11_kg_m2", "kg m^2", Positive, SPLIT, "bare drum's moment of inertia about its axis", machine drum.inertia_kg_m2[0]),
@@ -446,23 +448,23 @@ static TABLE: &[Row] = &[
     row!("drum_front_x_m", "m", Any, Assumed("the drum's middle is at the unbalance"), "front centre of the drum on its axis (P_DE, L_D + L_DE)", machine drum.front_x_m),
     row!("unbalance_mass_kg", "kg", NonNegative, TABLE_2, "point mass stuck to the drum's wall (m_u)", machine unbalance.mass_kg),
     row!("unbalance_x_m", "m", Any, SPLIT, "position of the unbalance along the axis (x_u)", machine unbalance.x_m),
-    row!("unbalance_radius_m", "m", NonNegative, SPLIT, "distance of the unbalance from the axis (r_u)", machine unbalance.radius_m),
-    row!("flexure_stiffness_n_m_per_rad", "N m/rad", Positive, TABLE_3, "bending stiffness between shaft and drum (K_D)", machine flexure.stiffness_n_m_per_rad),
-    row!("bearing_stiffness_n_per_m", "N/m", Positive, TABLE_3, "radial stiffness of both bearings (K_fb, K_rb)",
+    row!("unbalance_radius_m", "m", NonNegative, Paper("its text"), "distance of the unbalance from the axis (r_u)", machine unbalance.radius_m),
+    row!("flexure_stiffness_n_m_per_rad", "N m/rad", Positive, SECTION_3_1, "bending stiffness between shaft and drum (K_D)", machine flexure.stiffness_n_m_per_rad),
+    row!("bearing_stiffness_n_per_m", "N/m", Positive, SECTION_3_1, "radial stiffness of both bearings (K_fb, K_rb)",
         by |m, _, _| common(&[m.bearings.front_stiffness_n_per_m, m.bearings.rear_stiffness_n_per_m], |k| *k),
         |m, _, _, v| [m.bearings.front_stiffness_n_per_m, m.bearings.rear_stiffness_n_per_m] = [v; 2]),
     row!("bearing_front_x_m", "m", Positive, Assumed("a usual length"), "front bearing centre (L_fb)", machine bearings.front_x_m),
     row!("bearing_rear_x_m", "m", Negative, Assumed("O is midway between the bearings"), "rear bearing centre (-L_rb)", machine bearings.rear_x_m),
-    row!("bearing_front_stiffness_n_per_m", "N/m", Positive, TABLE_3, "radial stiffness of the front bearing (K_fb)", machine bearings.front_stiffness_n_per_m),
-    row!("bearing_rear_stiffness_n_per_m", "N/m", Positive, TABLE_3, "radial stiffness of the rear bearing (K_rb)", machine bearings.rear_stiffness_n_per_m),
-    row!("spring_stiffness_n_per_m", "N/m", NonNegative, TABLE_3, "stiffness of all springs (K_k)",
+    row!("bearing_front_stiffness_n_per_m", "N/m", Positive, SECTION_3_1, "radial stiffness of the front bearing (K_fb)", machine bearings.front_stiffness_n_per_m),
+    row!("bearing_rear_stiffness_n_per_m", "N/m", Positive, SECTION_3_1, "radial stiffness of the rear bearing (K_rb)", machine bearings.rear_stiffness_n_per_m),
+    row!("spring_stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1, "stiffness of all springs (K_k)",
         by |m, _, _| common(&m.springs, |s| s.stiffness_n_per_m),
         |m, _, _, v| m.springs.iter_mut().for_each(|s| s.stiffness_n_per_m = v)),
-    row!("damping_n_s_per_m", "N s/m", NonNegative, TABLE_3, "damping of all dampers (C)",
+    row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1, "damping of all dampers (C)",
         by |m, _, _| common(&m.dampers, |d| d.damping_n_s_per_m),
         |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = v)),
     row!("spin_peak_rpm", "rpm", Range::Within(-1e5, 1e5), Grid, "greatest spin speed; negative turns backwards", spin peak_rpm),
-    row!("spin_ramp_s", "s", Positive, Grid, "duration of the run-up, and of a triangle's run-down", spin ramp_s),
+    row!("spin_ramp_s", "s", Positive, Grid, "duration of the run-up, and of a triangle's run-down (Figs. 10 to 12: 50 s, assumed)", spin ramp_s),
     row!("window_from_s", "s", NonNegative, Time, "when amplitudes begin to be taken", by |_, _, _| None, |_, _, _, _| ()),
     row!("window_to_s", "s", NonNegative, Time, "when amplitudes cease to be taken", by |_, _, _| None, |_, _, _, _| ()),
 ];
@@ -470,28 +472,28 @@ static TABLE: &[Row] = &[
 /// Rows of each spring, after `spring_1_`.
 #[rustfmt::skip]
 static SPRING: &[Row] = &[
-    row!("stiffness_n_per_m", "N/m", NonNegative, TABLE_3, "stiffness of this spring", spring stiffness_n_per_m),
-    row!("free_length_m", "m", NonNegative, Derived("the distance between the ends as given"), "length of this spring without force",
+    row!("stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1, "stiffness of this spring", spring stiffness_n_per_m),
+    row!("free_length_m", "m", NonNegative, Assumed("the distance between the ends as given"), "length of this spring without force",
         by |m, _, k| m.springs.get(k).map(|s| s.free_length_m.unwrap_or_else(|| s.given_length_m())),
         |m, _, k, v| if let Some(s) = m.springs.get_mut(k) { s.free_length_m = Some(v) }),
-    row!("cabinet_x_m", "m", Any, TABLE_3, "cabinet end of this spring, towards the door", spring cabinet_m[0]),
-    row!("cabinet_y_m", "m", Any, TABLE_3, "cabinet end of this spring, upwards", spring cabinet_m[1]),
-    row!("cabinet_z_m", "m", Any, TABLE_3, "cabinet end of this spring, sideways", spring cabinet_m[2]),
-    row!("tub_x_m", "m", Any, TABLE_3, "tub end of this spring, towards the door", spring tub_m[0]),
-    row!("tub_y_m", "m", Any, TABLE_3, "tub end of this spring, upwards", spring tub_m[1]),
-    row!("tub_z_m", "m", Any, TABLE_3, "tub end of this spring, sideways", spring tub_m[2]),
+    row!("cabinet_x_m", "m", Any, TABLE_4, "cabinet end of this spring, towards the door", spring cabinet_m[0]),
+    row!("cabinet_y_m", "m", Any, TABLE_4, "cabinet end of this spring, upwards", spring cabinet_m[1]),
+    row!("cabinet_z_m", "m", Any, TABLE_4, "cabinet end of this spring, sideways", spring cabinet_m[2]),
+    row!("tub_x_m", "m", Any, TABLE_4, "tub end of this spring, towards the door", spring tub_m[0]),
+    row!("tub_y_m", "m", Any, TABLE_4, "tub end of this spring, upwards", spring tub_m[1]),
+    row!("tub_z_m", "m", Any, TABLE_4, "tub end of this spring, sideways", spring tub_m[2]),
 ];
 
 /// Rows of each damper, after `damper_1_`.
 #[rustfmt::skip]
 static DAMPER: &[Row] = &[
-    row!("damping_n_s_per_m", "N s/m", NonNegative, TABLE_3, "damping of this damper", damper damping_n_s_per_m),
-    row!("cabinet_x_m", "m", Any, TABLE_3, "cabinet end of this damper, towards the door", damper cabinet_m[0]),
-    row!("cabinet_y_m", "m", Any, TABLE_3, "cabinet end of this damper, upwards", damper cabinet_m[1]),
-    row!("cabinet_z_m", "m", Any, TABLE_3, "cabinet end of this damper, sideways", damper cabinet_m[2]),
-    row!("tub_x_m", "m", Any, TABLE_3, "tub end of this damper, towards the door", damper tub_m[0]),
-    row!("tub_y_m", "m", Any, TABLE_3, "tub end of this damper, upwards", damper tub_m[1]),
-    row!("tub_z_m", "m", Any, TABLE_3, "tub end of this damper, sideways", damper tub_m[2]),
+    row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1, "damping of this damper", damper damping_n_s_per_m),
+    row!("cabinet_x_m", "m", Any, TABLE_4, "cabinet end of this damper, towards the door", damper cabinet_m[0]),
+    row!("cabinet_y_m", "m", Any, TABLE_4, "cabinet end of this damper, upwards", damper cabinet_m[1]),
+    row!("cabinet_z_m", "m", Any, TABLE_4, "cabinet end of this damper, sideways", damper cabinet_m[2]),
+    row!("tub_x_m", "m", Any, TABLE_4, "tub end of this damper, towards the door", damper tub_m[0]),
+    row!("tub_y_m", "m", Any, TABLE_4, "tub end of this damper, upwards", damper tub_m[1]),
+    row!("tub_z_m", "m", Any, TABLE_4, "tub end of this damper, sideways", damper tub_m[2]),
 ];
 
 /// Rows of each point of a spin's table, after `spin_table_1_`.

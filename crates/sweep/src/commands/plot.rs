@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::exit::{Error, Exit, tell};
-use crate::plot::{PlotOptions, Quantity, render};
+use crate::plot::{PlotOptions, Quantity, View, render};
 
 /// Arguments of `sweep plot`.
 #[derive(Debug, clap::Args)]
@@ -15,6 +15,10 @@ pub struct Args {
     /// Where to write; the ending .svg, .png or .html says how [default: FILE with .svg]
     #[arg(short, long, value_name = "IMAGE")]
     pub output: Option<PathBuf>,
+
+    /// Modes, trace: which of its figures [default: frequencies, time]
+    #[arg(long, value_enum)]
+    pub view: Option<View>,
 
     /// Map: what the colours show
     #[arg(long, value_enum, default_value_t)]
@@ -52,6 +56,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<Exit, Error> {
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.file));
     let options = PlotOptions {
+        view: args.view,
         quantity: args.quantity,
         channels: args.channels.clone(),
         at: args.at.clone(),

@@ -57,9 +57,36 @@ pub enum Quantity {
     Status,
 }
 
+/// Which figure of a file that has several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum View {
+    /// Modes: natural frequencies over spin speed, and where they meet it
+    Frequencies,
+    /// Modes: how far frequencies vary over a turn of the drum
+    Variation,
+    /// Modes: what moves at each resonance speed
+    Shapes,
+    /// Trace: motion over time
+    Time,
+    /// Trace: greatest deviation in each turn over spin speed, on the way up and down
+    Passages,
+}
+
+impl View {
+    /// The kind of file that it is a figure of.
+    const fn of(self) -> Kind {
+        match self {
+            Self::Frequencies | Self::Variation | Self::Shapes => Kind::Modes,
+            Self::Time | Self::Passages => Kind::Trace,
+        }
+    }
+}
+
 /// What to show; the default is the figure that fits the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlotOptions {
+    /// Modes, trace: which figure; by default the first.
+    pub view: Option<View>,
     /// Map: what the colours are.
     pub quantity: Quantity,
     /// Map: the channel of the quantity. Trace: the channels shown.
@@ -139,8 +166,15 @@ fn figure(table: &Table, options: &PlotOptions) -> Result<Figure, PlotError> {
                 Figure::Map(grid)
             }
         }
-        Kind::Trace => Figure::Chart(figures::trace::chart(table, options)?),
-        Kind::Modes => Figure::Chart(figures::campbell::chart(table)?),
+        Kind::Trace => Figure::Chart(match options.view {
+            Some(View::Passages) => figures::passages::chart(table, options)?,
+            _ => figures::trace::chart(table, options)?,
+        }),
+        Kind::Modes => Figure::Chart(match options.view {
+            Some(View::Variation) => figures::turn::chart(table)?,
+            Some(View::Shapes) => figures::shapes::chart(table)?,
+            _ => figures::campbell::chart(table)?,
+        }),
         Kind::Boundary => Figure::Chart(figures::boundary::chart(table)?),
     })
 }
@@ -152,16 +186,27 @@ fn image(scene: &Scene, format: Format) -> Result<Vec<u8>, PlotError> {
     }
 }
 
+/// What the view asked for is a figure of.
+fn view_of(options: &PlotOptions) -> &'static str {
+    match options.view.map(View::of) {
+        Some(Kind::Modes) => "modes files",
+        _ => "traces",
+    }
+}
+
 /// Refuses options that the file's kind or the output's format would leave without effect.
 fn check_options(table: &Table, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
     let (map, trace) = (table.kind == Kind::Map, table.kind == Kind::Trace);
+    let view_fits = options.view.is_some_and(|view| view.of() == table.kind);
+    let over_time = trace && options.view != Some(View::Passages);
     let rules = [
         ("--quantity", options.quantity != Quantity::default(), map, "maps"),
         ("--channel", !options.channels.is_empty(), map || trace, "maps and traces"),
         ("--at", !options.at.is_empty(), map, "maps"),
         ("--resonances", !options.resonances_rpm.is_empty(), trace, "traces"),
         ("--modes", options.modes.is_some(), trace, "traces"),
-        ("--against", options.against.is_some(), trace, "traces"),
+        ("--view", options.view.is_some(), view_fits, view_of(options)),
+        ("--against", options.against.is_some(), over_time, "traces over time"),
         ("--traces", options.traces.is_some(), map && format == Format::Html, "maps drawn as .html"),
     ];
     for (option, given, fits, where_it_does) in rules {

@@ -26,6 +26,13 @@ fn data(sample: Sample, options: &PlotOptions) -> Value {
     serde_json::from_str(&page[start..start + page[start..].find("</script>").unwrap()]).unwrap()
 }
 
+/// A curve as a page carries it.
+fn curve(series: &Value) -> Vec<f64> {
+    use base64::Engine as _;
+    let bytes = base64::engine::general_purpose::STANDARD.decode(series["y"].as_str().unwrap()).unwrap();
+    bytes.chunks(4).map(|four| f64::from(f32::from_le_bytes(four.try_into().unwrap()))).collect()
+}
+
 fn message(result: Result<Vec<u8>, PlotError>) -> String {
     result.unwrap_err().to_string()
 }
@@ -219,6 +226,84 @@ fn a_campbell_diagram_stars_the_resonances() {
     }
 }
 
+fn viewed(view: View) -> PlotOptions {
+    PlotOptions { view: Some(view), ..PlotOptions::default() }
+}
+
+#[test]
+fn the_variation_over_a_turn_is_half_of_least_to_greatest() {
+    let figure = svg(modes(), &viewed(View::Variation));
+    for said in [">Variation over a turn (± % of the mean)<", ">100.0 rpm<", ">200.0 rpm<"] {
+        assert!(figure.contains(said), "{said}");
+    }
+    let data = data(modes(), &viewed(View::Variation));
+    let series = data["chart"]["panels"][0]["series"].as_array().unwrap();
+    // The third mode meets no speed.
+    assert_eq!(series.len(), 2);
+    for series in series {
+        let curve = curve(series);
+        assert!(curve.len() == 31 && curve.iter().all(|y| (y - 1.0).abs() < 1e-6), "{curve:?}");
+    }
+}
+
+#[test]
+fn mode_shapes_are_those_of_the_file() {
+    let q = |i: usize, re: f64| if [5, 7].contains(&i) { [re, 0.0] } else { [0.0, 0.0] };
+    let shape: serde_json::Map<String, Value> =
+        (1..=10).map(|i| (format!("q{i}"), serde_json::json!(q(i, -0.3)))).collect();
+    let facts = serde_json::json!([
+        { "name": "rocking, horizontal plane", "resonances": [{ "speed_rpm": 100.0, "shape": shape }] },
+        { "name": "drum bending on its shaft", "resonances": [] },
+    ]);
+    let machine = serde_json::json!({ "machine": {
+        "bearings": { "rear_x_m": -0.05 }, "tub": { "front_x_m": 0.45 },
+        "drum": { "hinge_x_m": 0.15, "front_x_m": 0.45 },
+    } });
+    let file = || modes().metadata("sweep.plan", &machine.to_string());
+    let with_shapes = || file().metadata("sweep.modes", &facts.to_string());
+    let figure = svg(with_shapes(), &viewed(View::Shapes));
+    for said in [">Rocking, horizontal plane,<", ">100.0 rpm<", ">horizontal, a quarter of a period later<"] {
+        assert!(figure.contains(said), "{said}");
+    }
+    let carried = data(with_shapes(), &viewed(View::Shapes));
+    let panels = carried["chart"]["panels"].as_array().unwrap();
+    assert_eq!(panels.len(), 1);
+    assert_eq!(curve(&panels[0]["series"][2])[1], 1.0);
+    assert!(message(draw(file(), &viewed(View::Shapes), "a.svg")).contains("holds no resonance"));
+    assert!(message(draw(modes(), &viewed(View::Shapes), "a.svg")).contains("where the machine's parts are"));
+}
+
+#[test]
+fn passages_are_drawn_over_speed_both_ways() {
+    let options = PlotOptions {
+        channels: vec!["tub_yaw".to_owned()],
+        resonances_rpm: vec![150.0],
+        ..viewed(View::Passages)
+    };
+    let figure = svg(trace(), &options);
+    for said in [
+        ">Spin speed (rpm)<",
+        ">nonlinear model, speed rising<",
+        ">linear model, speed falling<",
+        ">150 rpm<",
+    ] {
+        assert!(figure.contains(said), "{said}");
+    }
+    assert!(!figure.contains(">Gap, drum to tub<"));
+    let data = data(trace(), &options);
+    let chart = &data["chart"];
+    let panels = chart["panels"].as_array().unwrap();
+    let yaw = panels.iter().find(|panel| panel["name"] == "tub_yaw").unwrap();
+    // The sample swings faster than it turns and grows with time: on the way down it is at its end at rest.
+    let [up, down] = [0, 1].map(|series| curve(&yaw["series"][series]));
+    assert!(up.is_sorted() && down.is_sorted_by(|a, b| a >= b) && up.len() > 10, "{up:?} {down:?}");
+    let still = Sample::default()
+        .numbers("time_s", "s", [0.0, 1.0, 2.0])
+        .numbers("speed_rpm", "rpm", [60.0, 60.0, 60.0])
+        .numbers("nonlinear_tub_yaw", "rad", [0.0, 0.1, 0.0]);
+    assert!(message(draw(still, &viewed(View::Passages), "a.svg")).contains("no whole turn while"));
+}
+
 #[test]
 fn a_boundary_is_drawn_with_its_bracket() {
     assert!(svg(boundary(), &PlotOptions::default()).contains(">boundary: ratio 2, bracket shaded<"));
@@ -287,6 +372,16 @@ fn mistakes_are_told_apart_and_nothing_is_written() {
         (draw(trace(), &channel("tub_pitch"), "a.svg"), "it has tub_yaw, drum_front_y"),
         (draw(map(), &at, "a.svg"), "it has none"),
         (draw(map(), &resonances, "a.svg"), "`--resonances` is for traces"),
+        (draw(map(), &viewed(View::Time), "a.svg"), "`--view` is for traces"),
+        (draw(trace(), &viewed(View::Shapes), "a.svg"), "`--view` is for modes files"),
+        (
+            draw(
+                trace(),
+                &PlotOptions { against: Some("b.parquet".into()), ..viewed(View::Passages) },
+                "a.svg",
+            ),
+            "`--against` is for traces over time",
+        ),
         (draw(map(), &amplitude, "a.svg"), "add `--channel NAME`"),
         (draw(map(), &traces, "a.svg"), "maps drawn as .html"),
         (draw(map(), &traces, "a.html"), "no trace files"),

@@ -55,6 +55,35 @@ fn names_end_with_their_unit_and_are_unique() {
 }
 
 #[test]
+fn sources_are_the_papers_own_places() {
+    let silent =
+        ["tub_front_x_m", "drum_hinge_x_m", "drum_front_x_m", "bearing_front_x_m", "bearing_rear_x_m"];
+    let mut counts = [0; 5];
+    for parameter in Parameter::all(&Machine::paper(), &spin()) {
+        let name = parameter.name();
+        let body = ["tub_", "shaft_"].iter().any(|body| name.starts_with(body));
+        let (expected, count) = if body && name.contains("_inertia_") {
+            (Paper("Table 3"), &mut counts[0])
+        } else if name.contains("_cabinet_") || (name.contains("_tub_") && !body) {
+            (Paper("Table 4"), &mut counts[1])
+        } else if ["n_per_m", "n_s_per_m", "n_m_per_rad"].iter().any(|unit| name.ends_with(unit)) {
+            (Paper("section 3.1"), &mut counts[2])
+        } else if body && !silent.contains(&name) {
+            (Paper("Table 2"), &mut counts[3])
+        } else if silent.contains(&name) || name.ends_with("free_length_m") || name == "radial_clearance_m" {
+            assert!(matches!(parameter.source(), Assumed(_)), "{parameter:?}");
+            counts[4] += 1;
+            continue;
+        } else {
+            continue;
+        };
+        assert_eq!(parameter.source(), expected, "{parameter:?}");
+        *count += 1;
+    }
+    assert_eq!(counts, [6, 36, 12, 4, 10]);
+}
+
+#[test]
 fn numbers_beyond_the_machine_are_told_from_misspellings() {
     let (machine, spin) = (Machine::paper(), spin());
     let find = |name: &str| Parameter::find(name, &machine, &spin).map(|p| p.index);

@@ -145,6 +145,15 @@ fn of_model<M: Model<Counting>, P: Model<f64>>(caps: Option<Caps>) -> [Operation
     [of_forcing, of_derivative]
 }
 
+/// Counts of what is observed at the end of a step within the window: channels and radial distance.
+fn of_observation<M: Model<Counting>>() -> Operations {
+    let point = ready(paper(0.4, 140.0), triangular(), 50.0);
+    let model = M::splat(N(Counting(0.0)), &point, Coupling::Springs);
+    let x = core::array::from_fn(|i| N(Counting(1e-4 * i as f64)));
+    let forcing = model.forcing(N(Counting(7.3)));
+    counted(|| model.observe(&forcing, &x, &x, true)).1
+}
+
 const CAPPED: Option<Caps> = Some(Caps { bearings_rad_per_s: 700.0, hinge_rad_per_s: Some(700.0) });
 
 fn of_nonlinear(caps: Option<Caps>) -> [Operations; 2] {
@@ -172,6 +181,8 @@ const NONLINEAR: [Operations; 2] = [operations([31, 34, 18, 0, 0, 0]), operation
 const LINEAR: [Operations; 2] = [operations([348, 257, 241, 2, 0, 0]), operations([143, 135, 131, 0, 0, 0])];
 const NONLINEAR_MASS_SCALED: Operations = operations([748, 578, 472, 16, 4, 6]);
 const LINEAR_MASS_SCALED: Operations = operations([175, 161, 157, 0, 0, 0]);
+const OBSERVED_NONLINEAR: Operations = operations([410, 278, 209, 0, 0, 6]);
+const OBSERVED_LINEAR: Operations = operations([334, 267, 215, 0, 0, 0]);
 
 #[test]
 fn the_nonlinear_right_hand_side_stays_below_the_naive_formulation() {
@@ -194,6 +205,13 @@ fn mass_scaling_costs_what_it_did() {
     let [nonlinear, linear] = [of_nonlinear(CAPPED)[1], of_linear(CAPPED)[1]];
     eprintln!("mass-scaled: nonlinear right-hand side {nonlinear:?}; linear {linear:?}");
     assert_eq!([nonlinear, linear], [NONLINEAR_MASS_SCALED, LINEAR_MASS_SCALED]);
+}
+
+#[test]
+fn observing_costs_what_it_did() {
+    let observed = [of_observation::<Nonlinear<Counting>>(), of_observation::<Linear<Counting>>()];
+    eprintln!("observed: nonlinear {:?}; linear {:?}", observed[0], observed[1]);
+    assert_eq!(observed, [OBSERVED_NONLINEAR, OBSERVED_LINEAR]);
 }
 
 #[test]

@@ -8,12 +8,12 @@ use crate::plot::read::Table;
 use crate::plot::scene::INK;
 
 /// One mode over speed.
-struct Mode {
-    name: String,
-    speed: Vec<f64>,
-    frequency: Vec<f64>,
+pub(super) struct Mode {
+    pub(super) name: String,
+    pub(super) speed: Vec<f64>,
+    pub(super) frequency: Vec<f64>,
     /// Least and greatest over a turn, if the file has them.
-    band: Option<(Vec<f64>, Vec<f64>)>,
+    pub(super) band: Option<(Vec<f64>, Vec<f64>)>,
 }
 
 /// The chart of a modes file. Modes that lie wholly above the greatest speed are left out, and counted.
@@ -109,7 +109,8 @@ pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
     Ok(speeds)
 }
 
-fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
+/// Every mode of a file, by number.
+pub(super) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
     let speed = table.numbers("speed_rpm")?;
     let number = table.numbers("mode")?;
     let frequency = table.numbers("frequency_rpm")?;
@@ -145,7 +146,7 @@ fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
 }
 
 /// Speeds at which the mode's frequency, taken as linear between the given speeds, is the speed.
-fn crossings(mode: &Mode) -> Vec<f64> {
+pub(super) fn crossings(mode: &Mode) -> Vec<f64> {
     let excess: Vec<f64> =
         mode.frequency.iter().zip(&mode.speed).map(|(frequency, speed)| frequency - speed).collect();
     (1..excess.len())

@@ -4,4 +4,7 @@ pub(crate) mod boundary;
 pub(crate) mod campbell;
 pub(crate) mod curves;
 pub(crate) mod map;
+pub(crate) mod passages;
+pub(crate) mod shapes;
 pub(crate) mod trace;
+pub(crate) mod turn;

@@ -208,7 +208,7 @@ fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
 
 /// Name of the run, its unbalance and damping, the rest of the point if the file says which, the least gaps (mm), and how
 /// far two runs are apart.
-fn subtitle(table: &Table, least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> String {
+pub(super) fn subtitle(table: &Table, least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> String {
     let mut parts: Vec<String> = table.run_name().map(str::to_owned).into_iter().collect();
     let mut said: Vec<(&str, f64)> = machine(table);
     for (name, value) in table.find("at").and_then(Value::as_object).into_iter().flatten() {
@@ -243,7 +243,8 @@ fn machine(table: &Table) -> Vec<(&'static str, f64)> {
     named.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
 }
 
-fn resonances(options: &PlotOptions) -> Result<Vec<f64>, PlotError> {
+/// The resonance speeds that the options name, rpm.
+pub(super) fn resonances(options: &PlotOptions) -> Result<Vec<f64>, PlotError> {
     let mut speeds = options.resonances_rpm.clone();
     if let Some(path) = &options.modes {
         speeds.extend(campbell::resonances(&Table::open(path)?)?);
