@@ -4,7 +4,6 @@
 //! Memory: a chunk (at most 4096 points, about 2 MB) in hand for each thread and as many again on their way to the
 //! disk, then about 40 MB for the join; nothing grows with the number of points but one set entry a chunk.
 
-use std::any::Any;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -16,10 +15,12 @@ use serde_json::Value;
 
 use crate::interrupt::Interrupt;
 use crate::outcome::Outcome;
+use crate::panics;
 use crate::progress::{Mode, Progress};
 use crate::store::provenance::{self, Session};
 use crate::store::read::{ResultFile, Tally};
-use crate::store::{Environment, Job, Opened, Options, Run, Shard, ShardRequest, StoreError};
+use crate::store::{Job, Opened, Options, Run, Shard, ShardRequest, StoreError};
+use crate::threads::{self, Environment, ThreadsError};
 
 /// What computes points.
 pub trait Engine: Sync {
@@ -132,15 +133,14 @@ pub fn run(
     interrupt: &Interrupt,
 ) -> Result<Report, StoreError> {
     let RunOptions { fresh, shard, environment, .. } = options;
+    let threads = threads::count(options.threads, environment)?;
     let mut run = match Run::open(output, job, Options { fresh, shard, environment })? {
-        Opened::Finished(file) => {
-            let tally = crate::store::read::tally(output)?;
-            let ended = Ended::Already(file, Box::new(tally));
+        Opened::Finished(file, tally) => {
+            let ended = Ended::Already(file, tally);
             return Ok(Report { ended, session: None, notes: Vec::new() });
         }
         Opened::Run(run) => *run,
     };
-    let threads = options.threads.unwrap_or_else(|| default_threads(environment));
     let (points, there) = run.own_points();
     if let Some(shard) = run.shard() {
         (options.tell)(&format!("shard {} of {}", shard.index, shard.of));
@@ -213,11 +213,7 @@ fn compute(
     progress: &mut Progress,
     interrupt: &Interrupt,
 ) -> Result<(), StoreError> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .thread_name(|i| format!("sweep-{i}"))
-        .build()
-        .map_err(|error| StoreError::Threads { threads, reason: error.to_string() })?;
+    let pool = threads::pool(threads)?;
     let watch = Watch::new(interrupt);
     let remembered = run.remembered()?;
     let Some(settled) = settle(engine, remembered.clone(), &pool, &watch, progress) else { return Ok(()) };
@@ -232,7 +228,13 @@ fn compute(
     let mut result = Ok(());
     std::thread::scope(|scope| {
         let (watch, next, pool) = (&watch, &next, &pool);
-        scope.spawn(move || pool.broadcast(|_| work(engine, run, next, watch, &sender)));
+        let workers = move || {
+            pool.broadcast(|_| work(engine, run, next, watch, &sender));
+        };
+        // Where it cannot be started, the sender goes with it, and the loop below ends.
+        if let Err(error) = std::thread::Builder::new().spawn_scoped(scope, workers) {
+            result = Err(ThreadsError::start(threads + 1)(&error).into());
+        }
         loop {
             match receiver.recv_timeout(Duration::from_millis(100)) {
                 Ok((chunk, computed)) => {
@@ -299,33 +301,13 @@ fn work(engine: &dyn Engine, run: &Run, next: &AtomicU64, watch: &Watch<'_>, sen
             Ok(Some(outcomes)) => Ok(outcomes),
             Ok(None) if watch.stopped() => return,
             Ok(None) => defect("the engine put its work down unasked".into()),
-            Err(panic) => defect(format!("the engine panicked: {}", panic_text(panic.as_ref()))),
+            Err(panic) => defect(format!("the engine panicked: {}", panics::text(panic.as_ref()))),
         };
         // The receiver outlives the workers.
         if sender.send((chunk, computed)).is_err() {
             return;
         }
     }
-}
-
-fn panic_text(panic: &(dyn Any + Send)) -> &str {
-    panic
-        .downcast_ref::<&str>()
-        .copied()
-        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("without a message")
-}
-
-/// The cores that Slurm gave this task, else those the process may use.
-pub(crate) fn default_threads(environment: Environment<'_>) -> usize {
-    environment("SLURM_CPUS_PER_TASK")
-        .and_then(|cores| cores.parse().ok())
-        .filter(|cores| *cores > 0)
-        .unwrap_or_else(cpus)
-}
-
-fn cpus() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// What a session is made of besides the engine's word.
@@ -346,7 +328,7 @@ impl Clock {
             wall_s,
             host: provenance::host(),
             pid: std::process::id(),
-            cpus: cpus(),
+            cpus: threads::cores(),
             cpu_model: provenance::cpu_model(),
             simd: engine.simd().to_owned(),
             threads: self.threads,

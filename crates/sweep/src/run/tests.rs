@@ -175,9 +175,12 @@ fn a_folder_that_vanishes_ends_the_run_with_its_path_and_advice() {
 }
 
 #[test]
-fn threads_default_to_what_slurm_gave() {
-    assert_eq!(default_threads(&|name| (name == "SLURM_CPUS_PER_TASK").then(|| "3".into())), 3);
-    for nonsense in ["0", "x", ""] {
-        assert_eq!(default_threads(&|_| Some(nonsense.into())), cpus());
-    }
+fn a_scheduler_that_gives_no_number_of_cores_is_told_before_any_work() {
+    let (home, job) = (tempfile::tempdir().unwrap(), synthetic::job(POINTS));
+    let slurm = |name: &str| (name == "SLURM_CPUS_PER_TASK").then(|| "99999999".to_owned());
+    let options = RunOptions { threads: None, environment: &slurm, ..options(1) };
+    let error = run(&Formula::new(|_| {}), &job, &output(&home), options, &Interrupt::new()).unwrap_err();
+    assert_eq!(error.exit(), Exit::BadInput);
+    assert!(error.to_string().contains("give --threads"), "{error}");
+    assert_eq!(fs::read_dir(home.path()).unwrap().count(), 0);
 }

@@ -5,7 +5,8 @@ use std::io;
 
 use serde_json::Value;
 
-use super::{Run, StoreError, atomic};
+use super::{Run, StoreError};
+use crate::files::atomic;
 
 const NAME: &str = "settled.json";
 
@@ -13,7 +14,7 @@ impl Run {
     /// What an earlier process of this run left by [`Run::remember`]; a file that cannot be understood counts as none.
     ///
     /// # Errors
-    /// [`StoreError::Io`].
+    /// [`StoreError::File`].
     pub fn remembered(&self) -> Result<Option<Value>, StoreError> {
         let path = self.folder().join(NAME);
         match fs::read(&path) {
@@ -26,9 +27,9 @@ impl Run {
     /// Leaves something for later processes of this run. Whoever comes first or last writes the same.
     ///
     /// # Errors
-    /// [`StoreError::Io`].
+    /// [`StoreError::File`].
     pub fn remember(&self, settled: &Value) -> Result<(), StoreError> {
         let text = super::plan_file::pretty(settled);
-        atomic::write(self.folder(), &self.folder().join(NAME), &text)
+        Ok(atomic::write(self.folder(), &self.folder().join(NAME), &text)?)
     }
 }
