@@ -76,8 +76,8 @@ impl<'a> Watch<'a> {
 /// How to run.
 #[derive(Clone, Copy)]
 pub struct RunOptions<'a> {
-    /// Worker threads; `None` takes the cores that Slurm gave (`SLURM_CPUS_PER_TASK`), else those the process may use.
-    pub threads: Option<usize>,
+    /// Worker threads ([`crate::threads::count`]).
+    pub threads: usize,
     /// Start over.
     pub fresh: bool,
     /// Which part.
@@ -132,8 +132,7 @@ pub fn run(
     options: RunOptions<'_>,
     interrupt: &Interrupt,
 ) -> Result<Report, StoreError> {
-    let RunOptions { fresh, shard, environment, .. } = options;
-    let threads = threads::count(options.threads, environment)?;
+    let RunOptions { threads, fresh, shard, environment, .. } = options;
     let mut run = match Run::open(output, job, Options { fresh, shard, environment })? {
         Opened::Finished(file, tally) => {
             let ended = Ended::Already(file, tally);

@@ -13,7 +13,7 @@ use crate::run::{self as runner, Ended, Engine, Report, RunOptions};
 use crate::store::provenance::Session;
 use crate::store::read::Tally;
 use crate::store::{Job, ShardRequest, beside};
-use crate::threads;
+use crate::threads::{self, Environment};
 use crate::trace::{self, MOST_KEPT};
 
 /// Arguments of `sweep run`.
@@ -73,12 +73,13 @@ pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Er
         source,
     })?;
     let (job, output) = (Job::of(plan), args.target.output(plan));
+    let environment: Environment<'_> = &|name| std::env::var(name).ok();
     let options = RunOptions {
-        threads: args.threads,
+        threads: threads::count(args.threads, environment)?,
         fresh: args.fresh,
         shard: args.shard,
         progress: args.progress,
-        environment: &|name| std::env::var(name).ok(),
+        environment,
         tell: &tell,
     };
     let report = runner::run(engine, &job, &output, options, &interrupt)?;
@@ -88,8 +89,7 @@ pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Er
     tell(summary(args, plan, &job, &output, &report).trim_end());
     if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
         let folder = beside(&output, "traces");
-        let threads = threads::count(args.threads, options.environment)?;
-        trace::keep(plan, &folder, threads, &|| interrupt.stopped())?;
+        trace::keep(plan, &folder, options.threads, &|| interrupt.stopped())?;
         if let Some(signal) = interrupt.signal() {
             tell("interrupted; the map is kept, and the traces so far");
             return Ok(if signal == 15 { Exit::Terminated } else { Exit::Interrupted });

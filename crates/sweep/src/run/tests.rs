@@ -44,7 +44,7 @@ impl<F: Fn(u64) + Sync> Engine for Formula<F> {
 
 fn options(threads: usize) -> RunOptions<'static> {
     RunOptions {
-        threads: Some(threads),
+        threads,
         fresh: false,
         shard: None,
         progress: Mode::None,
@@ -172,15 +172,4 @@ fn a_folder_that_vanishes_ends_the_run_with_its_path_and_advice() {
     run(&resumed, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
     assert!(resumed.evaluated.into_inner() < 1000, "what came back is used");
     assert!(fs::read(output(&home)).unwrap() == whole(1000, 1));
-}
-
-#[test]
-fn a_scheduler_that_gives_no_number_of_cores_is_told_before_any_work() {
-    let (home, job) = (tempfile::tempdir().unwrap(), synthetic::job(POINTS));
-    let slurm = |name: &str| (name == "SLURM_CPUS_PER_TASK").then(|| "99999999".to_owned());
-    let options = RunOptions { threads: None, environment: &slurm, ..options(1) };
-    let error = run(&Formula::new(|_| {}), &job, &output(&home), options, &Interrupt::new()).unwrap_err();
-    assert_eq!(error.exit(), Exit::BadInput);
-    assert!(error.to_string().contains("give --threads"), "{error}");
-    assert_eq!(fs::read_dir(home.path()).unwrap().count(), 0);
 }
