@@ -1,13 +1,13 @@
 #!/bin/sh
 # Fuzzes what reads files, with libFuzzer: scripts/fuzz.sh [SECONDS] [grid|result|folder]
 #
-# grid: grid files, machine files and constants. result: Parquet files, in place of results and lists. folder: the files of an
-# unfinished run.
+# grid: grid files, machine files and constants. result: Parquet files, in place of results and
+# lists. folder: the files of an unfinished run.
 #
-# Needs a C++ compiler (for libFuzzer itself) and the ordinary stable toolchain: the coverage counters are an LLVM pass that stable
-# takes too. What is found stands in target/fuzz/findings; new inputs of interest in target/fuzz/corpus-TARGET, beside the
-# seeds of the repository (fuzz/corpus, fuzz/corpus-result, fuzz/corpus-folder; for grids sweeps/ and the broken files of
-# the tests too).
+# Needs a C++ compiler (for libFuzzer itself) and the ordinary stable toolchain: the coverage
+# counters are an LLVM pass that stable takes too. What is found stands in target/fuzz/findings; new
+# inputs of interest in target/fuzz/corpus-TARGET, beside the seeds of the repository (fuzz/corpus,
+# fuzz/corpus-result, fuzz/corpus-folder; for grids sweeps/ and the broken files of the tests too).
 set -eu
 cd "$(dirname "$0")/.."
 seconds=${1:-60}
@@ -27,11 +27,14 @@ RUSTFLAGS="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 -Cllvm
 if [ -d /dev/shm ]; then export TMPDIR=/dev/shm; fi
 case $name in
     grid)
-        cp sweeps/*.toml crates/sweep/testdata/broken/*.toml crates/sweep/src/commands/starter.toml "$work/seeds/"
+        cp sweeps/*.toml crates/sweep/testdata/broken/*.toml "$work/seeds/"
+        cp crates/sweep/src/commands/starter.toml "$work/seeds/"
         set -- -dict=fuzz/grid.dict -max_len=8192 "$work/corpus-$name" fuzz/corpus "$work/seeds"
         ;;
     # Commands print what they find.
-    result | folder) set -- -close_fd_mask=3 -max_len=65536 "$work/corpus-$name" "fuzz/corpus-$name" ;;
+    result | folder)
+        set -- -close_fd_mask=3 -max_len=65536 "$work/corpus-$name" "fuzz/corpus-$name"
+        ;;
     *) echo "no target $name: expected grid, result or folder" >&2 && exit 2 ;;
 esac
 exec "$work/$target/release/$name" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 \

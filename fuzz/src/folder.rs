@@ -1,8 +1,9 @@
-//! Any bytes in place of one file of an unfinished run: the run is refused, or goes on and ends in a result whose bytes
-//! are those of the undisturbed one, unless the file is a chunk that passes for one.
+//! Any bytes in place of one file of an unfinished run: the run is refused, or goes on and ends in
+//! a result whose bytes are those of the undisturbed one, unless the file is a chunk that passes
+//! for one.
 //!
-//! The first byte of an input says which file it is for. A chunk gets the right header and the right hash, so that the
-//! fuzzer has records to change.
+//! The first byte of an input says which file it is for. A chunk gets the right header and the
+//! right hash, so that the fuzzer has records to change.
 
 #![no_main]
 

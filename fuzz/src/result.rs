@@ -1,5 +1,5 @@
-//! Any bytes in place of a result, through everything that reads one: shown and drawn, or explained; never taken for
-//! the result of a plan that it is not.
+//! Any bytes in place of a result, through everything that reads one: shown and drawn, or
+//! explained; never taken for the result of a plan that it is not.
 
 #![no_main]
 

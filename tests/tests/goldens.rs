@@ -1,5 +1,5 @@
-//! The bytes that this build writes, by every method and command that writes results: hashes that change when any
-//! byte does, together with the version of the numerics or not at all.
+//! The bytes that this build writes, by every method and command that writes results: hashes that
+//! change when any byte does, together with the version of the numerics or not at all.
 //!
 //! `scripts/raise_numerics.sh` raises that version and writes the new hashes.
 
@@ -13,7 +13,8 @@ use sweep::identity::{NUMERICS_VERSION, VERSION};
 use sweep_tests::sweep_binary;
 use tempfile::TempDir;
 
-/// The spin and the window of every golden: a run-up that is short, but passes the lowest resonances.
+/// The spin and the window of every golden: a run-up that is short, but passes the lowest
+/// resonances.
 const SPIN: &str = "machine = \"paper\"\n\
     spin = { profile = \"triangular\", peak_rpm = 350.0, ramp_s = 0.6 }\n\
     time = { end_s = 1.0, window_s = [0.4, 0.9] }\n";
@@ -31,7 +32,8 @@ const RK4: &str = "integrator = { method = \"rk4\", step_s = 2e-4 }\n";
 /// Metrics and a design stand for everything that adds or changes columns.
 const METRICS: &str = "metrics = [\"cabinet_force\", \"clash_time\", \"static_sag\"]\n";
 
-/// How far frequencies may be from those on record: linear algebra is rounded by each processor in its own way.
+/// How far frequencies may be from those on record: linear algebra is rounded by each processor in
+/// its own way.
 const MODES_TOLERANCE: f64 = 1e-9;
 
 /// What is on record.

@@ -1,5 +1,6 @@
-//! A system that gives less than is asked for: threads, memory, random numbers, closed folders. Every refusal is an
-//! error that says what and what to do, never a panic, and nothing that was computed is lost.
+//! A system that gives less than is asked for: threads, memory, random numbers, closed folders.
+//! Every refusal is an error that says what and what to do, never a panic, and nothing that was
+//! computed is lost.
 
 #![cfg(target_os = "linux")]
 

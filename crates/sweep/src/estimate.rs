@@ -50,7 +50,8 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Integrates some points of the plan, for about half a second, and reckons from there for so many threads.
+    /// Integrates some points of the plan, for about half a second, and reckons from there for so
+    /// many threads.
     ///
     /// # Errors
     /// What keeps a run from having an engine.

@@ -202,8 +202,8 @@ fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> Cow<'_, str> {
     Cow::Owned(safe)
 }
 
-/// Writes what people read, or JSON, to standard output. What a file has put into it that is no text cannot reach the
-/// terminal.
+/// Writes what people read, or JSON, to standard output. What a file has put into it that is no
+/// text cannot reach the terminal.
 ///
 /// # Errors
 /// As [`print`].
@@ -211,8 +211,8 @@ pub fn show(text: &str) -> Result<Exit, Error> {
     print(&escaped(text, is_unsafe))
 }
 
-/// Writes a command's product to standard output, as it is: a script, a file. A reader that has seen enough (`| head`)
-/// is no failure.
+/// Writes a command's product to standard output, as it is: a script, a file. A reader that has
+/// seen enough (`| head`) is no failure.
 ///
 /// # Errors
 /// When standard output cannot be written for any other reason.

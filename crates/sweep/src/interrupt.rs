@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// Takes SIGXFSZ, whose default is death, so that a file-size limit (`ulimit -f`) is met as a failed write with a path
-/// and advice.
+/// Takes SIGXFSZ, whose default is death, so that a file-size limit (`ulimit -f`) is met as a
+/// failed write with a path and advice.
 ///
 /// # Errors
 /// When the system refuses a handler.

@@ -10,8 +10,8 @@ thread_local! {
     static CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Calls `work`; a panic comes back as its message, and nothing is printed. What `work` has changed must not be
-/// used after that.
+/// Calls `work`; a panic comes back as its message, and nothing is printed. What `work` has changed
+/// must not be used after that.
 pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

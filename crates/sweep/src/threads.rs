@@ -24,7 +24,8 @@ pub enum ThreadsError {
     },
     /// The scheduler's number is none, or beyond reason.
     #[error(
-        "{SLURM_CORES} is `{given}`: expected a number of cores from 1 to {MOST}\n  = help: give --threads"
+        "{SLURM_CORES} is `{given}`: expected a number of cores from 1 to {MOST}\n  = help: give \
+         --threads"
     )]
     Scheduler {
         /// As it stands in the environment.
@@ -49,8 +50,8 @@ pub(crate) fn parse(text: &str) -> Result<usize, String> {
     }
 }
 
-/// The threads to work with: those asked for by `--threads`, else the cores that Slurm gave this task, else those that
-/// the process may use.
+/// The threads to work with: those asked for by `--threads`, else the cores that Slurm gave this
+/// task, else those that the process may use.
 ///
 /// # Errors
 /// [`ThreadsError::Scheduler`].

@@ -44,7 +44,8 @@ pub struct Trace {
     pub failures: Vec<String>,
 }
 
-/// Integrates both models of a scenario and reads them every `every_s` from 0 to the end; in a pool, both at once.
+/// Integrates both models of a scenario and reads them every `every_s` from 0 to the end; in a
+/// pool, both at once.
 ///
 /// `at` names the point: parameters with their values. Both models begin at `start`.
 ///

@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 use super::{Target, quoted};
 use crate::engine::ModelEngine;
 use crate::exit::{Error, Exit, tell};
+use crate::files;
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
 use crate::progress::{self, Mode, duration, per_second};
 use crate::run::{self as runner, Ended, Engine, Report, RunOptions};
 use crate::store::provenance::Session;
 use crate::store::read::Tally;
-use crate::store::{Job, ShardRequest, beside};
+use crate::store::{Job, ShardRequest};
 use crate::threads::{self, Environment};
 use crate::trace::{self, MOST_KEPT};
 
@@ -88,7 +89,7 @@ pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Er
     }
     tell(summary(args, plan, &job, &output, &report).trim_end());
     if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
-        let folder = beside(&output, "traces");
+        let folder = files::beside(&output, "traces");
         trace::keep(plan, &folder, options.threads, &|| interrupt.stopped())?;
         if let Some(signal) = interrupt.signal() {
             tell("interrupted; the map is kept, and the traces so far");

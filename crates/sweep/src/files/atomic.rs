@@ -76,7 +76,8 @@ pub(crate) fn write(folder: &Path, target: &Path, bytes: &[u8]) -> Result<(), Fi
     publish(file, target)
 }
 
-/// Writes a file whole unless something is there; says whether this process was the one that wrote it.
+/// Writes a file whole unless something is there; says whether this process was the one that wrote
+/// it.
 pub(crate) fn create(folder: &Path, target: &Path, bytes: &[u8]) -> Result<bool, FileError> {
     let mut file = begin(folder)?;
     file.write_all(bytes).map_err(FileError::io("write", target))?;
@@ -100,8 +101,8 @@ pub(crate) fn sync_folder(folder: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Deletes what killed processes left in a folder: temporary files that nobody holds locked. A leftover that
-/// cannot be deleted hinders nobody, so nothing of this is an error.
+/// Deletes what killed processes left in a folder: temporary files that nobody holds locked. A
+/// leftover that cannot be deleted hinders nobody, so nothing of this is an error.
 pub(crate) fn clear_leftovers(folder: &Path) {
     let names = regular::names(folder).unwrap_or_default();
     for name in names.iter().filter(|name| name.to_str().is_some_and(is_temporary)) {

@@ -71,33 +71,36 @@ impl FileError {
     }
 }
 
-/// What a user can do about an I/O failure. Finished chunks are whole whatever happened, so it ends alike.
+/// What a user can do about an I/O failure. Finished chunks are whole whatever happened, so it ends
+/// alike.
 fn advice(source: &io::Error) -> &'static str {
     match source.kind() {
         io::ErrorKind::StorageFull => {
-            "the disk is full: free some space and run the same command again; finished chunks are kept"
+            "the disk is full: free some space and run the same command again; finished chunks \
+             are kept"
         }
         io::ErrorKind::QuotaExceeded => {
-            "the quota is used up: free some space and run the same command again; finished chunks are kept"
+            "the quota is used up: free some space and run the same command again; finished chunks \
+             are kept"
         }
         io::ErrorKind::FileTooLarge => {
-            "a file-size limit was hit: raise it (ulimit -f) and run the same command again; finished \
-             chunks are kept"
+            "a file-size limit was hit: raise it (ulimit -f) and run the same command again; \
+             finished chunks are kept"
         }
         io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied => {
             "make it writable for this user, or write elsewhere with --out"
         }
         io::ErrorKind::NotFound => {
-            "it was there and has vanished, or its folder cannot be reached: bring it back and run the \
-             same command again; chunks that are still there are used"
+            "it was there and has vanished, or its folder cannot be reached: bring it back and run \
+             the same command again; chunks that are still there are used"
         }
         io::ErrorKind::NotADirectory => {
             "a part of that path is a file, not a folder: move it, or write elsewhere with --out"
         }
         io::ErrorKind::InvalidInput => "give the name of a regular file",
         _ => {
-            "check the disk (the system's log may say more) and run the same command again; finished \
-             chunks are kept"
+            "check the disk (the system's log may say more) and run the same command again; \
+             finished chunks are kept"
         }
     }
 }

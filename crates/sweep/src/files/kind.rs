@@ -19,7 +19,8 @@ pub mod key {
     pub const NUMERICS: &str = "sweep.numerics";
     /// JSON object: column name to `type`, `unit`, `description`.
     pub const COLUMNS: &str = "sweep.columns";
-    /// What was traced: quantity, limit, tolerance, lattice, trials, rounds. In boundary files alone.
+    /// What was traced: quantity, limit, tolerance, lattice, trials, rounds. In boundary files
+    /// alone.
     pub const BOUNDARY: &str = "sweep.boundary";
     /// Which point, how often, how integrated, and how it ended. In traces alone.
     pub const TRACE: &str = "sweep.trace";
@@ -55,7 +56,8 @@ pub enum FileKind<'a> {
     ManPage,
 }
 
-/// Longer accounts are no accounts: a session takes some hundred bytes, a run has thousands at most.
+/// Longer accounts are no accounts: a session takes some hundred bytes, a run has thousands at
+/// most.
 const LONGEST_ACCOUNT_BYTES: u64 = 64 << 20;
 
 impl FileKind<'_> {

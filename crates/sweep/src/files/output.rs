@@ -2,14 +2,14 @@
 
 use std::fs;
 use std::io::{self, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
 use super::{FileError, FileKind, atomic, regular};
 
-/// A file in the making. It is judged, and its temporary file is open, before the command does any work:
-/// a folder that is not there is made, one that cannot be written is found out.
+/// A file in the making. It is judged, and its temporary file is open, before the command does any
+/// work: a folder that is not there is made, one that cannot be written is found out.
 #[derive(Debug)]
 pub struct Output<'a> {
     path: &'a Path,
@@ -54,6 +54,20 @@ pub(crate) fn ready(folder: &Path) -> Result<(), FileError> {
     Ok(())
 }
 
+/// What stands beside a result under its name: `x.run.json` beside `x.parquet`, `v1.5.run.json`
+/// beside `v1.5`.
+pub(crate) fn beside(output: &Path, ending: &str) -> PathBuf {
+    let stem = if output.extension().is_some_and(|extension| extension == "parquet") {
+        output.file_stem()
+    } else {
+        output.file_name()
+    };
+    let mut name = stem.unwrap_or_default().to_owned();
+    name.push(".");
+    name.push(ending);
+    output.with_file_name(name)
+}
+
 /// The rule of what a file may be written over.
 pub(crate) fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
     let refuse = |reason: &str, help| {
@@ -94,7 +108,6 @@ pub(crate) fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
 #[cfg(test)]
 mod tests {
     use std::ffi::OsStr;
-    use std::path::PathBuf;
 
     use serde_json::json;
 
@@ -173,6 +186,14 @@ mod tests {
             Output::begin(&path, kind).unwrap().finish(b"over an empty file").unwrap();
         }
         assert_eq!(names(home.path()), ["file"]);
+    }
+
+    #[test]
+    fn names_that_differ_have_neighbours_that_differ() {
+        let named = |output| beside(Path::new(output), "svg");
+        assert_eq!(named("maps/x.parquet"), Path::new("maps/x.svg"));
+        assert_eq!(named("v1.0"), Path::new("v1.0.svg"));
+        assert_eq!(named("v1.5.parquet"), Path::new("v1.5.svg"));
     }
 
     #[test]

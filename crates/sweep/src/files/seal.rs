@@ -1,9 +1,9 @@
 //! The digest by which a Parquet file of ours shows that its bytes are those that were written.
 //!
-//! It is the last entry of the file's key-value metadata ([`key::DIGEST`]): the BLAKE3 hash of the whole file
-//! with zeros in the digest's own place. So it covers the columns, the metadata and the file's structure, and
-//! it is found and checked without trusting any of them. It depends on the other bytes alone: the file stays
-//! a pure function of its input.
+//! It is the last entry of the file's key-value metadata ([`key::DIGEST`]): the BLAKE3 hash of the
+//! whole file with zeros in the digest's own place. So it covers the columns, the metadata and the
+//! file's structure, and it is found and checked without trusting any of them. It depends on the
+//! other bytes alone: the file stays a pure function of its input.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
@@ -15,7 +15,8 @@ use super::key;
 const DIGITS: usize = 2 * blake3::OUT_LEN;
 const BLANK: [u8; DIGITS] = [b'0'; DIGITS];
 
-/// How far from the file's end a digest can begin: what follows it grows with the number of columns only.
+/// How far from the file's end a digest can begin: what follows it grows with the number of columns
+/// only.
 const TAIL_BYTES: u64 = 1 << 16;
 
 /// What a digest says of its file.

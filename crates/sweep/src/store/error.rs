@@ -25,8 +25,9 @@ pub enum StoreError {
     },
     /// The run folder belongs to another plan, or was begun by a build that computes other numbers.
     #[error(
-        "{} was begun with another plan or by another build:\n{}  = help: end it with that plan and build, give \
-         another --out, or start over with --fresh (which deletes that folder's finished chunks)",
+        "{} was begun with another plan or by another build:\n{}  = help: end it with that plan and \
+         build, give another --out, or start over with --fresh (which deletes that folder's \
+         finished chunks)",
         folder.display(),
         Differences(differences)
     )]
@@ -38,7 +39,8 @@ pub enum StoreError {
     },
     /// The finished output belongs to another plan, or is of a build that computes other numbers.
     #[error(
-        "{} already holds the result of another plan or build:\n{}  = help: give another --out, or replace it with --fresh",
+        "{} already holds the result of another plan or build:\n{}  = help: give another --out, or \
+         replace it with --fresh",
         output.display(),
         Differences(differences)
     )]

@@ -59,7 +59,8 @@ impl Run {
         if rows.len() > 0 {
             writer.write(&rows.take().map_err(from_arrow)?).map_err(failed)?;
         }
-        // Closing flushes to the file. (Taking the file back out of the writer would tell a full disk as text only.)
+        // Closing flushes to the file. (Taking the file back out of the writer would tell a full
+        // disk as text only.)
         writer.append_key_value_metadata(seal::blank());
         writer.close().map_err(failed)?;
         seal::seal(file.as_file_mut()).map_err(StoreError::io("write", &output))?;

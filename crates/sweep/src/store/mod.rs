@@ -53,11 +53,13 @@ pub type AxisValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
 
 /// What the store must know of a plan.
 pub struct Job<'a> {
-    /// Grid as run, full machine and method. Two runs are the same when this, `version` and `numerics` are.
+    /// Grid as run, full machine and method. Two runs are the same when this, `version` and
+    /// `numerics` are.
     pub plan: Value,
     /// Version of the program; other versions may round differently, so their chunks do not mix.
     pub version: &'a str,
-    /// Version of its numerics ([`identity::NUMERICS_VERSION`]): so may other builds of one version.
+    /// Version of its numerics ([`identity::NUMERICS_VERSION`]): so may other builds of one
+    /// version.
     pub numerics: u32,
     /// Rows of the result.
     pub points: u64,
@@ -129,7 +131,8 @@ pub(crate) struct Folder {
 }
 
 impl Folder {
-    /// Those of the run with this output. Neither it nor its sidecar is anything but absent or ours.
+    /// Those of the run with this output. Neither it nor its sidecar is anything but absent or
+    /// ours.
     pub(crate) fn of(output: &Path) -> Result<Self, StoreError> {
         files::judge(output, FileKind::Map)?;
         let mut name = output.file_name().unwrap_or_default().to_owned();
@@ -161,26 +164,13 @@ impl Folder {
 
     /// The sidecar that says how the run went.
     fn sidecar(&self) -> PathBuf {
-        beside(&self.output, "run.json")
+        files::beside(&self.output, "run.json")
     }
 
     /// What kind of file that is.
     fn account(&self) -> FileKind<'_> {
         FileKind::Account { of: self.output.file_name().unwrap_or_default() }
     }
-}
-
-/// What stands beside a result under its name: `x.run.json` beside `x.parquet`, `v1.5.run.json` beside `v1.5`.
-pub(crate) fn beside(output: &Path, ending: &str) -> PathBuf {
-    let stem = if output.extension().is_some_and(|extension| extension == "parquet") {
-        output.file_stem()
-    } else {
-        output.file_name()
-    };
-    let mut name = stem.unwrap_or_default().to_owned();
-    name.push(".");
-    name.push(ending);
-    output.with_file_name(name)
 }
 
 fn chunk_name(chunk: u64) -> String {

@@ -57,8 +57,9 @@ impl Run {
     ///
     /// # Errors
     /// [`StoreError::Busy`] when another run holds the output, [`StoreError::PlanDiffers`],
-    /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::Shard`] for a part that does
-    /// not fit, [`StoreError::File`] for anything else at the output that is not ours, and for the file system.
+    /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::Shard`]
+    /// for a part that does not fit, [`StoreError::File`] for anything else at the output that is
+    /// not ours, and for the file system.
     pub fn open(output: &Path, job: &Job<'_>, options: Options<'_>) -> Result<Opened, StoreError> {
         let folder = Folder::of(output)?;
         if !options.fresh
@@ -180,7 +181,8 @@ impl Run {
     /// Keeps a chunk for good: when this returns, it outlives a power cut.
     ///
     /// # Errors
-    /// [`StoreError::Engine`] when the outcomes are not this chunk's points in order, [`StoreError::File`].
+    /// [`StoreError::Engine`] when the outcomes are not this chunk's points in order,
+    /// [`StoreError::File`].
     pub fn write_chunk(&self, chunk: u64, outcomes: &[Outcome]) -> Result<(), StoreError> {
         let bytes = chunk::encode(&self.place(chunk), outcomes)?;
         atomic::write(&self.folder.path, &self.folder.chunk(chunk), &bytes)?;

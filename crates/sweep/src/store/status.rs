@@ -60,8 +60,8 @@ pub struct FolderStatus {
     pub missing_shards: String,
 }
 
-/// Looks at an output and its folder. What would stop a run is an error here too: another plan in the folder, another
-/// result or another file at the output, a damaged result.
+/// Looks at an output and its folder. What would stop a run is an error here too: another plan in
+/// the folder, another result or another file at the output, a damaged result.
 ///
 /// # Errors
 /// As [`super::Run::open`], but never [`StoreError::Busy`].

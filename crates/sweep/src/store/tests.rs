@@ -385,7 +385,8 @@ fn no_flipped_bit_of_a_result_is_taken_for_it() {
         assert!(status(&home.output(), &job).is_err() && Run::open_for_merge(&home.output(), &job).is_err());
         assert!(fs::read(home.output()).unwrap() == bytes && !home.partial().exists(), "byte {at}");
     }
-    // The others have lost what makes them a result of ours: the end of the file, a key of the metadata.
+    // The others have lost what makes them a result of ours: the end of the file, a key of the
+    // metadata.
     assert!(damaged * 100 > whole.len() as u64 * 98, "{damaged} of {} bytes", whole.len());
 }
 

@@ -26,8 +26,8 @@ const BUCKETS: usize = 500;
 /// greatest in the order in which they occur, at the stretch's first and middle instant.
 ///
 /// # Errors
-/// [`PlotError::File`] for the folder; as [`Table::open`] for its files; [`PlotError::Unfit`] for a file that is no trace
-/// or belongs to no point of the grid, and for a folder without any.
+/// [`PlotError::File`] for the folder; as [`Table::open`] for its files; [`PlotError::Unfit`] for a
+/// file that is no trace or belongs to no point of the grid, and for a folder without any.
 pub(crate) fn read(folder: &Path, map: &Table, grid: &Grid) -> Result<Value, PlotError> {
     let names = regular::names(folder).map_err(FileError::io("list", folder))?;
     let mut files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
