@@ -8,8 +8,8 @@ use crate::engine::{Demand, EngineError, Ladder, MOST_WAITING, ModelEngine, ROWS
 use crate::interrupt::Interrupt;
 use crate::outcome::{Deviations, Outcome};
 use crate::plan::{Integrator, Plan};
-use crate::run::{Engine, Watch, default_threads};
-use crate::store::{Environment, Job, Shape, chunk_points};
+use crate::run::{Engine, Watch};
+use crate::store::{Job, Shape, chunk_points};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long.
 const LONG_ENOUGH: Duration = Duration::from_millis(60);
@@ -50,12 +50,12 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Integrates some points of the plan, for about half a second, and reckons from there.
+    /// Integrates some points of the plan, for about half a second, and reckons from there for so
+    /// many threads.
     ///
     /// # Errors
     /// What keeps a run from having an engine.
-    pub fn of(plan: &Plan, environment: Environment<'_>) -> Result<Self, EngineError> {
-        let threads = default_threads(environment);
+    pub fn of(plan: &Plan, threads: usize) -> Result<Self, EngineError> {
         let engine = ModelEngine::new(plan)?;
         let ladders = engine.ladders();
         let began = Instant::now();
@@ -200,16 +200,12 @@ mod tests {
         crate::config::load(&path, &[]).unwrap()
     }
 
-    fn one_thread(name: &str) -> Option<String> {
-        (name == "SLURM_CPUS_PER_TASK").then(|| "1".into())
-    }
-
     #[test]
     fn an_estimate_tells_what_it_was_made_from() {
         // Whole trajectories, and beginnings of longer ones.
         for (end_s, sampled_whole) in [(0.01, true), (1e5, false)] {
             let plan = plan(16, end_s);
-            let estimate = Estimate::of(&plan, &one_thread).unwrap();
+            let estimate = Estimate::of(&plan, 1).unwrap();
             assert!(estimate.wall_s.is_finite() && estimate.wall_s > 0.0, "{estimate:?}");
             assert_eq!(estimate.sampled_s >= end_s, sampled_whole, "{estimate:?}");
             assert_eq!(estimate.threads, 1);
@@ -219,7 +215,7 @@ mod tests {
     #[test]
     fn time_grows_with_points_and_memory_does_not() {
         let (small, large) = (plan(1_000_000, 0.01), plan(1_000_000_000, 0.01));
-        let [small, large] = [&small, &large].map(|plan| Estimate::of(plan, &one_thread).unwrap());
+        let [small, large] = [&small, &large].map(|plan| Estimate::of(plan, 1).unwrap());
         assert!(large.wall_s > small.wall_s, "{small:?} {large:?}");
         assert!(large.memory_bytes < 1.2 * small.memory_bytes, "{small:?} {large:?}");
         assert!(large.memory_bytes < 200e6, "{large:?}");

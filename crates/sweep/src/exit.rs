@@ -1,5 +1,6 @@
 //! How the program ends, and why it could not go on.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
@@ -8,8 +9,10 @@ use std::process::ExitCode;
 use crate::boundary::product::BoundaryError;
 use crate::config::Diagnostics;
 use crate::engine::EngineError;
+use crate::files::FileError;
 use crate::plot::PlotError;
 use crate::store::StoreError;
+use crate::threads::ThreadsError;
 use washer_model::{NoEquilibrium, NoModes};
 
 /// Exit codes, a contract with scripts.
@@ -109,6 +112,12 @@ pub enum Error {
         /// What it should have been.
         expected: String,
     },
+    /// A file of this program's.
+    #[error(transparent)]
+    Files(#[from] FileError),
+    /// No threads.
+    #[error(transparent)]
+    Threads(#[from] ThreadsError),
     /// A file that could not be read or written.
     #[error("cannot {action} {}: {source}", path.display())]
     File {
@@ -131,12 +140,13 @@ impl Error {
         match self {
             Self::Input(_) => Exit::BadInput,
             Self::Engine(_) | Self::Equilibrium(_) | Self::Modes(_) | Self::Option { .. } => Exit::BadInput,
-            Self::Boundary(BoundaryError::Threads { .. }) => Exit::Failed,
             Self::Boundary(_) => Exit::BadInput,
+            Self::Files(error) if error.is_refusal() => Exit::BadInput,
+            Self::Threads(ThreadsError::Scheduler { .. }) => Exit::BadInput,
             Self::Store(error) => error.exit(),
             Self::Plot(error) if error.is_usage() => Exit::BadInput,
             Self::Plot(_) => Exit::Failed,
-            Self::File { .. } | Self::Stdout(_) => Exit::Failed,
+            Self::Files(_) | Self::Threads(_) | Self::File { .. } | Self::Stdout(_) => Exit::Failed,
         }
     }
 
@@ -153,19 +163,56 @@ impl Error {
 
     /// Tells the user, on standard error, in colour on a terminal unless `NO_COLOR` is set.
     pub fn report(&self) {
-        let text = match self {
-            Self::Input(diagnostics) => diagnostics.styled(),
+        match self {
+            Self::Input(diagnostics) => {
+                let text = diagnostics.styled();
+                // Its own escapes are colours, and its renderer replaces those of what it quotes.
+                let text = escaped(&text, |c| c != '\x1b' && is_unsafe(c));
+                // With standard error gone there is nobody left to tell; the exit code still does.
+                let _ = writeln!(anstream::stderr(), "{text}");
+            }
             other => match other.hint() {
-                Some(hint) => format!("error: {other}\n  = help: {hint}"),
-                None => format!("error: {other}"),
+                Some(hint) => tell(&format!("error: {other}\n  = help: {hint}")),
+                None => tell(&format!("error: {other}")),
             },
-        };
-        // With standard error gone there is nobody left to tell; the exit code still does.
-        let _ = writeln!(anstream::stderr(), "{text}");
+        }
     }
 }
 
-/// Writes a command's product to standard output. A reader that has seen enough (`| head`) is no failure.
+/// Whether a character can do something to a terminal, or to the order of the text in it.
+fn is_unsafe(c: char) -> bool {
+    let is_control = c.is_control() && !matches!(c, '\n' | '\t');
+    is_control || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// A text with some characters written as `\u001b`, which is their form in JSON too.
+fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> Cow<'_, str> {
+    if !text.contains(&is_bad) {
+        return Cow::Borrowed(text);
+    }
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_bad(c) {
+            // Writing to a String cannot fail.
+            let _ = write!(safe, "\\u{:04x}", u32::from(c));
+        } else {
+            safe.push(c);
+        }
+    }
+    Cow::Owned(safe)
+}
+
+/// Writes what people read, or JSON, to standard output. What a file has put into it that is no
+/// text cannot reach the terminal.
+///
+/// # Errors
+/// As [`print`].
+pub fn show(text: &str) -> Result<Exit, Error> {
+    print(&escaped(text, is_unsafe))
+}
+
+/// Writes a command's product to standard output, as it is: a script, a file. A reader that has
+/// seen enough (`| head`) is no failure.
 ///
 /// # Errors
 /// When standard output cannot be written for any other reason.
@@ -177,10 +224,10 @@ pub fn print(text: &str) -> Result<Exit, Error> {
     }
 }
 
-/// Writes a message for a human to standard error.
+/// Writes a message for people to standard error; as in [`show`], text only.
 pub fn tell(text: &str) {
     // As in `Error::report`: nobody is left to tell.
-    let _ = writeln!(anstream::stderr(), "{text}");
+    let _ = writeln!(anstream::stderr(), "{}", escaped(text, is_unsafe));
 }
 
 #[cfg(test)]
@@ -193,6 +240,16 @@ mod tests {
         for exit in Exit::ALL {
             assert!(Exit::table().contains(exit.meaning()));
         }
+    }
+
+    #[test]
+    fn what_moves_a_cursor_is_written_out_and_text_stays() {
+        let told = escaped("a\x1b[2J\u{9b}3m\r\u{202e}é\tb\n", is_unsafe);
+        assert_eq!(told, "a\\u001b[2J\\u009b3m\\u000d\\u202eé\tb\n");
+        let json = serde_json::json!({ "host": "a\u{9b}\x07b" }).to_string();
+        let back: serde_json::Value = serde_json::from_str(&escaped(&json, is_unsafe)).unwrap();
+        assert_eq!(back["host"], "a\u{9b}\x07b");
+        assert!(matches!(escaped("plain", is_unsafe), Cow::Borrowed("plain")));
     }
 
     #[test]

@@ -7,6 +7,17 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
+/// Takes SIGXFSZ, whose default is death, so that a file-size limit (`ulimit -f`) is met as a
+/// failed write with a path and advice.
+///
+/// # Errors
+/// When the system refuses a handler.
+pub fn survive_file_size_limits() -> io::Result<()> {
+    #[cfg(unix)]
+    flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
+    Ok(())
+}
+
 /// The stop flag, shared with whoever has work to put down.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
@@ -23,9 +34,6 @@ impl Interrupt {
 
     /// Installs the handlers for this process. A second signal ends it at once with 130 or 143.
     ///
-    /// Also takes SIGXFSZ, whose default is death, so that a file-size limit (`ulimit -f`) is met as a failed
-    /// write with a path and advice.
-    ///
     /// # Errors
     /// When the system refuses a handler.
     pub fn install() -> io::Result<Self> {
@@ -40,8 +48,6 @@ impl Interrupt {
             )?;
             flag::register(signal, Arc::clone(&interrupt.stop))?;
         }
-        #[cfg(unix)]
-        flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
         Ok(interrupt)
     }
 

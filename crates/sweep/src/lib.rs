@@ -3,8 +3,9 @@
 //! * [`config`] reads a grid file into a [`plan::Plan`], or says every mistake in it. [`design`] places points that are no grid.
 //! * [`engine`] takes points of a plan through both models of `washer_model`, and returns an [`outcome::Outcome`] each; [`verdict`]
 //!   makes ratios and a verdict of it. [`estimate`] says beforehand what a run will take.
-//! * [`run`] does a plan's points on all cores and keeps them as they come; [`store`] is what stands on disk meanwhile, and the result file,
-//!   written and read.
+//! * [`run`] does a plan's points on all cores and keeps them as they come; [`store`] is what
+//!   stands on disk meanwhile, and the result file, written and read; [`files`] is the rule by
+//!   which any file is written or read. [`identity`] says which builds write the same bytes.
 //! * [`boundary`] traces the curve where the ratio is at its limit, [`trace`] writes one point's time histories, [`plot`] draws any file
 //!   of the others.
 //! * [`cli`] and [`commands`] are the command line, with [`progress`], [`interrupt`] and [`exit`] for its manners.
@@ -37,14 +38,18 @@ pub mod design;
 pub mod engine;
 pub mod estimate;
 pub mod exit;
+pub mod files;
+pub mod identity;
 pub mod interrupt;
 pub mod measures;
 pub mod outcome;
+mod panics;
 pub mod plan;
 pub mod plot;
 pub mod progress;
 pub mod run;
 pub mod store;
 mod table;
+pub mod threads;
 pub mod trace;
 pub mod verdict;

@@ -3,11 +3,23 @@
 use std::process::ExitCode;
 
 use sweep::cli::Cli;
+use sweep::exit::{Error, Exit};
+use sweep::interrupt::survive_file_size_limits;
 
 fn main() -> ExitCode {
-    let exit = Cli::read().command.run().unwrap_or_else(|error| {
+    let exit = run().unwrap_or_else(|error| {
         error.report();
         error.exit()
     });
     exit.into()
+}
+
+fn run() -> Result<Exit, Error> {
+    let cli = Cli::read();
+    survive_file_size_limits().map_err(|source| Error::File {
+        action: "install signal handlers for",
+        path: "this process".into(),
+        source,
+    })?;
+    cli.command.run()
 }

@@ -4,7 +4,6 @@
 //! Memory: a chunk (at most 4096 points, about 2 MB) in hand for each thread and as many again on their way to the
 //! disk, then about 40 MB for the join; nothing grows with the number of points but one set entry a chunk.
 
-use std::any::Any;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -15,10 +14,12 @@ use std::time::{Duration, Instant};
 
 use crate::interrupt::Interrupt;
 use crate::outcome::Outcome;
+use crate::panics;
 use crate::progress::{Mode, Progress};
 use crate::store::provenance::{self, Session};
 use crate::store::read::{ResultFile, Tally};
-use crate::store::{Environment, Job, Opened, Options, Run, Shard, ShardRequest, StoreError};
+use crate::store::{Job, Opened, Options, Run, Shard, ShardRequest, StoreError};
+use crate::threads::{self, Environment, ThreadsError};
 
 /// What computes points.
 pub trait Engine: Sync {
@@ -68,8 +69,8 @@ impl<'a> Watch<'a> {
 /// How to run.
 #[derive(Clone, Copy)]
 pub struct RunOptions<'a> {
-    /// Worker threads; `None` takes the cores that Slurm gave (`SLURM_CPUS_PER_TASK`), else those the process may use.
-    pub threads: Option<usize>,
+    /// Worker threads ([`crate::threads::count`]).
+    pub threads: usize,
     /// Start over.
     pub fresh: bool,
     /// Which part.
@@ -124,16 +125,14 @@ pub fn run(
     options: RunOptions<'_>,
     interrupt: &Interrupt,
 ) -> Result<Report, StoreError> {
-    let RunOptions { fresh, shard, environment, .. } = options;
+    let RunOptions { threads, fresh, shard, environment, .. } = options;
     let mut run = match Run::open(output, job, Options { fresh, shard, environment })? {
-        Opened::Finished(file) => {
-            let tally = crate::store::read::tally(output)?;
-            let ended = Ended::Already(file, Box::new(tally));
+        Opened::Finished(file, tally) => {
+            let ended = Ended::Already(file, tally);
             return Ok(Report { ended, session: None, notes: Vec::new() });
         }
         Opened::Run(run) => *run,
     };
-    let threads = options.threads.unwrap_or_else(|| default_threads(environment));
     let (points, there) = run.own_points();
     if let Some(shard) = run.shard() {
         (options.tell)(&format!("shard {} of {}", shard.index, shard.of));
@@ -206,11 +205,7 @@ fn compute(
     progress: &mut Progress,
     interrupt: &Interrupt,
 ) -> Result<(), StoreError> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .thread_name(|i| format!("sweep-{i}"))
-        .build()
-        .map_err(|error| StoreError::Threads { threads, reason: error.to_string() })?;
+    let pool = threads::pool(threads)?;
     let watch = Watch::new(interrupt);
     let (_, start) = run.own_points();
     // Bounded, so that a disk slower than the engine holds the engine up instead of filling memory.
@@ -219,7 +214,15 @@ fn compute(
     let mut result = Ok(());
     std::thread::scope(|scope| {
         let (watch, pool) = (&watch, &pool);
-        let work = scope.spawn(move || pool.install(|| hand.fill(engine, watch)));
+        let work = move || pool.install(|| hand.fill(engine, watch));
+        // Where it cannot be started, the sender goes with it, and the loop below ends.
+        let work = match std::thread::Builder::new().spawn_scoped(scope, work) {
+            Ok(work) => Some(work),
+            Err(error) => {
+                result = Err(ThreadsError::start(threads + 1)(&error).into());
+                None
+            }
+        };
         loop {
             match receiver.recv_timeout(Duration::from_millis(100)) {
                 Ok((chunk, outcomes)) => {
@@ -236,7 +239,7 @@ fn compute(
             }
             progress.show(start + watch.done.load(Ordering::Relaxed));
         }
-        if let Ok(Err(error)) = work.join() {
+        if let Some(Ok(Err(error))) = work.map(std::thread::ScopedJoinHandle::join) {
             result = std::mem::replace(&mut result, Ok(())).and(Err(error));
         }
     });
@@ -266,7 +269,7 @@ impl<'a> Hand<'a> {
         let keep = |outcome| self.keep(outcome, watch);
         let panic = catch_unwind(AssertUnwindSafe(|| engine.evaluate(&next, &keep, watch))).err();
         let reason = match panic {
-            Some(panic) => format!("the engine panicked: {}", panic_text(panic.as_ref())),
+            Some(panic) => format!("the engine panicked: {}", panics::text(panic.as_ref())),
             None if watch.stopped() => return Ok(()),
             None => "the engine put its work down unasked".to_owned(),
         };
@@ -304,26 +307,6 @@ fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn panic_text(panic: &(dyn Any + Send)) -> &str {
-    panic
-        .downcast_ref::<&str>()
-        .copied()
-        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("without a message")
-}
-
-/// The cores that Slurm gave this task, else those the process may use.
-pub(crate) fn default_threads(environment: Environment<'_>) -> usize {
-    environment("SLURM_CPUS_PER_TASK")
-        .and_then(|cores| cores.parse().ok())
-        .filter(|cores| *cores > 0)
-        .unwrap_or_else(cpus)
-}
-
-fn cpus() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
-}
-
 /// What a session is made of besides the engine's word.
 struct Clock {
     began: Instant,
@@ -342,7 +325,7 @@ impl Clock {
             wall_s,
             host: provenance::host(),
             pid: std::process::id(),
-            cpus: cpus(),
+            cpus: threads::cores(),
             cpu_model: provenance::cpu_model(),
             simd: engine.simd().to_owned(),
             threads: self.threads,

@@ -1,7 +1,7 @@
 //! A small result file: columns with units and descriptions, metadata as in the map's file (`store::schema`), in one piece.
 
 use std::collections::HashMap;
-use std::path::Path;
+use std::io::Cursor;
 use std::sync::Arc;
 
 use arrow_array::types::Int32Type;
@@ -14,8 +14,8 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde_json::{Map, Value, json};
 
-use crate::store::schema::key;
-use crate::store::{StoreError, write_whole};
+use crate::files::{key, seal};
+use crate::identity;
 
 /// Columns on their way to a file.
 #[derive(Default)]
@@ -77,13 +77,14 @@ impl Table {
         self.metadata.push(KeyValue::new(key.to_owned(), value));
     }
 
-    /// Writes the file whole, over an older one, and makes the folder that it is to be in.
+    /// The file's bytes.
     ///
     /// # Errors
-    /// [`StoreError::Io`] and [`StoreError::Parquet`].
-    pub(crate) fn write(mut self, path: &Path) -> Result<(), StoreError> {
-        let version = env!("CARGO_PKG_VERSION");
-        self.metadata.push(KeyValue::new(key::VERSION.to_owned(), version.to_owned()));
+    /// What the Parquet library refuses: a defect of whoever filled the table.
+    pub(crate) fn into_bytes(mut self) -> Result<Vec<u8>, ParquetError> {
+        let version = identity::VERSION;
+        self.text(key::VERSION, version.to_owned());
+        self.text(key::NUMERICS, identity::NUMERICS_VERSION.to_string());
         self.metadata
             .push(KeyValue::new(key::COLUMNS.to_owned(), Value::Object(self.dictionary).to_string()));
         let properties = WriterProperties::builder()
@@ -93,12 +94,12 @@ impl Table {
             .set_key_value_metadata(Some(self.metadata))
             .build();
         let schema = Arc::new(Schema::new(self.fields));
-        let bytes =
-            RecordBatch::try_new(schema.clone(), self.arrays).map_err(ParquetError::from).and_then(|batch| {
-                let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;
-                writer.write(&batch)?;
-                writer.into_inner()
-            });
-        write_whole(path, &bytes.map_err(StoreError::parquet("write", path))?)
+        let batch = RecordBatch::try_new(schema.clone(), self.arrays)?;
+        let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;
+        writer.write(&batch)?;
+        writer.append_key_value_metadata(seal::blank());
+        let mut file = Cursor::new(writer.into_inner()?);
+        seal::seal(&mut file)?;
+        Ok(file.into_inner())
     }
 }

@@ -11,13 +11,11 @@ use washer_model::{
 };
 
 use crate::engine;
+use crate::files::{self, FileKind, key};
 use crate::plan::{Integrator, Plan, Scenario};
 use crate::store::StoreError;
-use crate::store::schema::key;
 use crate::table::Table;
-
-/// Key of the metadata that says which point, how often, how integrated, and how it ended.
-const TRACE: &str = "sweep.trace";
+use crate::threads;
 
 /// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as many.
 pub const MOST_INSTANTS: f64 = 2e6;
@@ -46,7 +44,8 @@ pub struct Trace {
     pub failures: Vec<String>,
 }
 
-/// Integrates both models of a scenario and reads them every `every_s` from 0 to the end.
+/// Integrates both models of a scenario and reads them every `every_s` from 0 to the end; in a
+/// pool, both at once.
 ///
 /// `at` names the point: parameters with their values. Both models begin at `start`.
 ///
@@ -65,7 +64,11 @@ pub fn trace(
     let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
     let (method, method_json) = method(plan, &point, &spin);
     let run = |model| history(model, &method, &point, start, every_s);
-    let (nonlinear, linear) = rayon::join(|| run(ModelKind::Nonlinear), || run(ModelKind::Linear));
+    let (nonlinear, linear) = match rayon::current_thread_index() {
+        Some(_) => rayon::join(|| run(ModelKind::Nonlinear), || run(ModelKind::Linear)),
+        // rayon's own pool is not sure to start, and it panics if it does not.
+        None => (run(ModelKind::Nonlinear), run(ModelKind::Linear)),
+    };
 
     // The quotient may come out a hair below the whole number that was meant.
     let instants = 1 + (plan.end_s / every_s * (1.0 + 1e-12)).floor() as usize;
@@ -86,7 +89,7 @@ pub fn trace(
     let failures = models.iter().map(Columns::failure).collect::<Vec<_>>();
     table.metadata(key::PLAN, &plan.to_json());
     table.metadata(
-        TRACE,
+        key::TRACE,
         &json!({
             "at": at,
             "every_s": every_s,
@@ -111,11 +114,8 @@ pub fn keep(
     threads: usize,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), StoreError> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|error| StoreError::Threads { threads, reason: error.to_string() })?;
-    pool.install(|| {
+    files::ready(folder)?;
+    threads::pool(threads)?.install(|| {
         (0..plan.points()).into_par_iter().try_for_each(|point| {
             if stop() {
                 return Ok(());
@@ -124,7 +124,10 @@ pub fn keep(
             let at = values.zip(plan.axis_values(point).into_iter().map(Value::from)).collect();
             let every_s = plan.end_s / KEPT_INSTANTS;
             match trace(plan, plan.scenario(point), at, every_s, &Start::default(), Extras::default()) {
-                Ok(trace) => trace.write(&folder.join(format!("point-{point}.parquet"))),
+                Ok(trace) => {
+                    let path = folder.join(format!("point-{point}.parquet"));
+                    Ok(files::write(&path, FileKind::Trace, &trace.into_bytes(&path)?)?)
+                }
                 Err(NoEquilibrium) => Ok(()),
             }
         })
@@ -132,12 +135,12 @@ pub fn keep(
 }
 
 impl Trace {
-    /// Writes the file.
+    /// The bytes of its file, which is to be at `path`.
     ///
     /// # Errors
-    /// As `store`.
-    pub fn write(self, path: &Path) -> Result<(), StoreError> {
-        self.table.write(path)
+    /// What the Parquet library refuses: a defect of this program.
+    pub fn into_bytes(self, path: &Path) -> Result<Vec<u8>, StoreError> {
+        self.table.into_bytes().map_err(StoreError::parquet("write", path))
     }
 }
 

@@ -1,22 +1,16 @@
 //! The boundary file: one row per place where the side changes, or per row of the first axis that has none.
 
-use std::path::Path;
-
-use parquet::file::reader::FileReader;
-use parquet::file::serialized_reader::SerializedFileReader;
+use parquet::errors::ParquetError;
 use serde_json::json;
 use washer_model::unit_suffix;
 
 use super::product::{Task, further_values};
 use super::quantity::Quantity;
 use super::{Edge, Traced, TracedRow};
+use crate::files::key;
 use crate::plan::Plan;
-use crate::store::schema::key;
-use crate::store::{Job, StoreError};
+use crate::store::Job;
 use crate::table::Table;
-
-/// Key of the file's metadata that says what was traced: quantity, limit, tolerance, lattice, trials, rounds.
-pub const BOUNDARY: &str = "sweep.boundary";
 
 /// One line of the file.
 struct Line<'a> {
@@ -34,17 +28,11 @@ fn within(name: &str, unit: &str, word: &str) -> String {
     format!("{stem}_{word}{}", &name[stem.len()..])
 }
 
-/// Writes the file whole, or not at all.
+/// The file's bytes.
 ///
 /// # Errors
-/// [`StoreError::Io`].
-pub fn write(
-    path: &Path,
-    plan: &Plan,
-    quantity: Quantity,
-    task: &Task,
-    traced: &Traced,
-) -> Result<(), StoreError> {
+/// What the Parquet library refuses: a defect of this program.
+pub fn bytes(plan: &Plan, quantity: Quantity, task: &Task, traced: &Traced) -> Result<Vec<u8>, ParquetError> {
     let job = Job::of(plan);
     let about = json!({
         "quantity": quantity.name(),
@@ -58,30 +46,8 @@ pub fn write(
     add_columns(&mut table, plan, quantity, traced);
     table.metadata(key::PLAN, &job.plan);
     table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
-    table.metadata(BOUNDARY, &about);
-    table.write(path)
-}
-
-/// Whether this path may be written: nothing is there, or a boundary file.
-///
-/// # Errors
-/// [`StoreError::BadOutput`] when something else is.
-pub fn may_replace(path: &Path) -> Result<(), StoreError> {
-    let bad = |reason| StoreError::BadOutput { output: path.to_path_buf(), reason };
-    if path.file_name().is_none() {
-        return Err(bad("it has no file name"));
-    }
-    if path.is_dir() {
-        return Err(bad("it is a folder"));
-    }
-    let Ok(file) = std::fs::File::open(path) else { return Ok(()) };
-    let reader = SerializedFileReader::new(file).ok();
-    let metadata = reader.as_ref().and_then(|reader| reader.metadata().file_metadata().key_value_metadata());
-    if metadata.is_some_and(|pairs| pairs.iter().any(|pair| pair.key == BOUNDARY)) {
-        Ok(())
-    } else {
-        Err(bad("a file that is no boundary file is there; give another name, or remove it first"))
-    }
+    table.metadata(key::BOUNDARY, &about);
+    table.into_bytes()
 }
 
 fn add_columns(table: &mut Table, plan: &Plan, quantity: Quantity, traced: &Traced) {

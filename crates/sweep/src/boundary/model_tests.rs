@@ -1,8 +1,6 @@
 //! The search over the real models, against the grid it stands for.
 
-use std::path::Path;
-
-use super::file::{may_replace, write};
+use super::file::bytes;
 use super::product::{BoundaryError, Models, Task};
 use super::quantity::Quantity;
 use super::{Kind, Stopped, Traced, trace};
@@ -63,17 +61,11 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
     let task = Task::new(&plan, Some(0.5), 3).unwrap();
     let interrupt = Interrupt::new();
     let traced = [1, 3].map(|threads| traced(&plan, &task, threads, &interrupt).unwrap());
-    let folder = tempfile::tempdir().unwrap();
-    let bytes = [0, 1].map(|k| {
-        let path = folder.path().join(format!("{k}.parquet"));
-        write(&path, &plan, Quantity::RatioMax, &task, &traced[k]).unwrap();
-        may_replace(&path).unwrap();
-        std::fs::read(path).unwrap()
-    });
-    assert!(bytes[0] == bytes[1], "other bytes on three threads");
+    let [one, three] = [0, 1].map(|k| bytes(&plan, Quantity::RatioMax, &task, &traced[k]).unwrap());
+    assert!(one == three, "other bytes on three threads");
 
     let engine = ModelEngine::new(&plan).unwrap();
-    let outcomes = engine.evaluate_at(&all_points(plan));
+    let outcomes = engine.evaluate_at(&all_points(&plan));
     let channels = plan.reliability.channels.len();
     for (row, outcomes) in traced[0].curves[0].iter().zip(outcomes.chunks(21)) {
         assert!(row.trials < 21, "{row:?}");
@@ -176,17 +168,6 @@ fn plans_without_a_boundary_say_why() {
     let design = "[design]\nmethod = \"sobol\"\npoints = 8\n[[axis]]\nparameter = \"unbalance_mass_kg\"\n\
                   range = { from = 0.1, to = 0.2 }\n";
     assert_eq!(refused(design, None), BoundaryError::Design);
-}
-
-#[test]
-fn a_file_of_another_kind_is_not_replaced() {
-    let folder = tempfile::tempdir().unwrap();
-    let notes = folder.path().join("notes.parquet");
-    std::fs::write(&notes, "mine").unwrap();
-    assert!(may_replace(&notes).unwrap_err().to_string().contains("no boundary file"));
-    assert!(may_replace(folder.path()).is_err());
-    assert!(may_replace(Path::new("/")).is_err());
-    may_replace(&folder.path().join("new.parquet")).unwrap();
 }
 
 #[test]

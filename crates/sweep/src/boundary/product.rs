@@ -8,6 +8,7 @@ use crate::engine::{Demand, ModelEngine};
 use crate::interrupt::Interrupt;
 use crate::plan::{Axis, AxisValues, Plan};
 use crate::run::Watch;
+use crate::threads::{self, ThreadsError};
 
 /// Rows of all curves together that are accepted: what is known of them stays in memory.
 const MOST_ROWS: u64 = 1_000_000;
@@ -57,14 +58,6 @@ pub enum BoundaryError {
         /// Greatest.
         greatest: f64,
     },
-    /// No threads.
-    #[error("cannot start {threads} threads: {reason}; ask for fewer with --threads")]
-    Threads {
-        /// How many were asked for.
-        threads: usize,
-        /// What the system said.
-        reason: String,
-    },
 }
 
 /// What is traced over which values.
@@ -83,7 +76,7 @@ impl Task {
     /// logarithmic; the default is 1/480 of the range.
     ///
     /// # Errors
-    /// Everything of [`BoundaryError`] but [`BoundaryError::Threads`].
+    /// Any [`BoundaryError`].
     pub fn new(plan: &Plan, tolerance: Option<f64>, lattice: usize) -> Result<Self, BoundaryError> {
         if plan.design.is_some() {
             return Err(BoundaryError::Design);
@@ -152,7 +145,7 @@ impl<'a> Models<'a> {
     /// An evaluator of `quantity` over [`Quantity::plan`]; `tell` hears how many trials are done.
     ///
     /// # Errors
-    /// [`BoundaryError::Threads`].
+    /// [`ThreadsError::Start`].
     pub fn new(
         plan: &'a Plan,
         engine: ModelEngine<'a>,
@@ -160,12 +153,8 @@ impl<'a> Models<'a> {
         threads: usize,
         interrupt: &'a Interrupt,
         tell: &'a (dyn Fn(u64) + Sync),
-    ) -> Result<Self, BoundaryError> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|i| format!("boundary-{i}"))
-            .build()
-            .map_err(|error| BoundaryError::Threads { threads, reason: error.to_string() })?;
+    ) -> Result<Self, ThreadsError> {
+        let pool = threads::pool(threads)?;
         Ok(Self { plan, engine, quantity, pool, interrupt, done: AtomicU64::new(0), tell })
     }
 }

@@ -5,18 +5,20 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use super::run::{line, threads};
+use super::run::line;
 use super::{Grid, quoted};
-use crate::boundary::file::{may_replace, write};
+use crate::boundary::file::bytes;
 use crate::boundary::product::{Models, Task};
 use crate::boundary::quantity::Quantity;
 use crate::boundary::{Kind, Traced, trace};
 use crate::engine::ModelEngine;
 use crate::exit::{Error, Exit, tell};
+use crate::files::{FileKind, Output};
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
 use crate::progress::duration;
-use crate::run::default_threads;
+use crate::store::StoreError;
+use crate::threads;
 
 /// Arguments of `sweep boundary`.
 #[derive(Debug, clap::Args)]
@@ -40,7 +42,7 @@ pub struct Args {
     #[arg(long, value_name = "CELLS", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub lattice: u16,
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads)]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
     pub threads: Option<usize>,
 }
 
@@ -63,14 +65,14 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     let task = Task::new(&plan, args.tolerance, usize::from(args.lattice))?;
     let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
     let output = args.out.clone().unwrap_or_else(default);
-    may_replace(&output)?;
+    let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
+    let file = Output::begin(&output, FileKind::Boundary)?;
     let interrupt = Interrupt::install().map_err(|source| Error::File {
         action: "install signal handlers for",
         path: PathBuf::from("this process"),
         source,
     })?;
     let engine = ModelEngine::new(&plan)?;
-    let threads = args.threads.unwrap_or_else(|| default_threads(&|name| std::env::var(name).ok()));
     let began = Instant::now();
     let told = Mutex::new(began);
     let progress = |points: u64| {
@@ -90,7 +92,8 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
             _ => Exit::Interrupted,
         });
     };
-    write(&output, &plan, args.quantity, &task, &traced)?;
+    let bytes = bytes(&plan, args.quantity, &task, &traced);
+    file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;
     let mut text = summary(&plan, args.quantity, &task, &traced, began.elapsed().as_secs_f64());
     let shown = output.display().to_string();
     line(&mut text, "file", &shown);

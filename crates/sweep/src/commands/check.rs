@@ -6,10 +6,11 @@ use super::Grid;
 use crate::design::Design;
 use crate::engine::Ladder;
 use crate::estimate::{Estimate, size};
-use crate::exit::{Error, Exit, print, tell};
+use crate::exit::{Error, Exit, show, tell};
 use crate::measures::Criterion;
 use crate::plan::{Axis, AxisValues, Integrator, Plan};
 use crate::progress::duration;
+use crate::threads;
 
 /// Arguments of `sweep check`.
 #[derive(Debug, clap::Args)]
@@ -28,9 +29,9 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.grid.load()?;
     if args.json {
-        return print(&format!("{:#}\n", plan.to_json()));
+        return show(&format!("{:#}\n", plan.to_json()));
     }
-    let estimate = Estimate::of(&plan, &|name| std::env::var(name).ok())?;
+    let estimate = Estimate::of(&plan, threads::count(None, &|name| std::env::var(name).ok())?)?;
     tell(summary(&plan, &estimate).trim_end());
     Ok(Exit::Done)
 }

@@ -1,13 +1,13 @@
 //! `sweep init`: a grid or machine file to start from.
 
-use std::fs::OpenOptions;
-use std::io::Write as _;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use washer_model::Machine;
 
 use crate::config;
 use crate::exit::{Error, Exit, print, tell};
+use crate::files::atomic;
 
 /// The commented grid file.
 const GRID: &str = include_str!("starter.toml");
@@ -33,11 +33,10 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     if path == Path::new("-") {
         return print(&text);
     }
-    let written = OpenOptions::new().write(true).create_new(true).open(path).and_then(|mut file| {
-        file.write_all(text.as_bytes())?;
-        file.sync_all()
-    });
-    written.map_err(|source| Error::File { action: "write", path: path.to_owned(), source })?;
+    if !atomic::create(atomic::parent(path), path, text.as_bytes())? {
+        let source = io::ErrorKind::AlreadyExists.into();
+        return Err(Error::File { action: "write", path: path.to_owned(), source });
+    }
     let shown = path.display();
     tell(&if args.machine {
         format!(

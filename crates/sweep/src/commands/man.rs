@@ -9,6 +9,7 @@ use clap_mangen::roff::{Roff, bold, roman};
 use super::examples;
 use crate::cli;
 use crate::exit::{Error, Exit};
+use crate::files::{self, FileKind};
 
 /// Arguments of `sweep man`.
 #[derive(Debug, clap::Args)]
@@ -23,16 +24,16 @@ pub struct Args {
 /// A folder that cannot be written to.
 pub fn run(args: &Args) -> Result<Exit, Error> {
     let failed = |source| Error::File { action: "write manual pages to", path: args.folder.clone(), source };
-    std::fs::create_dir_all(&args.folder).map_err(failed)?;
+    files::ready(&args.folder)?;
+    let write = |name: &str, page: &[u8]| files::write(&args.folder.join(name), FileKind::ManPage, page);
     let mut program = cli::command();
     // Tells each command its full name.
     program.build();
     for command in program.get_subcommands().filter(|command| !command.is_hide_set()) {
         let name = command.get_name();
-        std::fs::write(args.folder.join(format!("sweep-{name}.1")), page(command, name).map_err(failed)?)
-            .map_err(failed)?;
+        write(&format!("sweep-{name}.1"), &page(command, name).map_err(failed)?)?;
     }
-    std::fs::write(args.folder.join("sweep.1"), page(&program, "").map_err(failed)?).map_err(failed)?;
+    write("sweep.1", &page(&program, "").map_err(failed)?)?;
     Ok(Exit::Done)
 }
 

@@ -4,7 +4,6 @@ use super::Target;
 use super::run::{line, rows};
 use crate::exit::{Error, Exit, tell};
 use crate::interrupt::Interrupt;
-use crate::store::read::tally;
 use crate::store::{Job, Opened, Run};
 
 /// Arguments of `sweep merge`.
@@ -28,9 +27,9 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     })?;
     let mut run = match Run::open_for_merge(&output, &job)? {
         Opened::Run(run) => run,
-        Opened::Finished(file) => {
+        Opened::Finished(file, tally) => {
             let mut text = format!("{}: all {} points are there already\n", plan.name, file.points);
-            text.push_str(&rows(&tally(&output)?, &job));
+            text.push_str(&rows(&tally, &job));
             tell(text.trim_end());
             return Ok(Exit::Done);
         }

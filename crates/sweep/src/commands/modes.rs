@@ -1,26 +1,24 @@
 //! `sweep modes [GRID.toml]`: natural frequencies over spin speed, resonance speeds, mode shapes.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use lane_ode::Simd;
+use parquet::errors::ParquetError;
 use serde_json::{Value, json};
 use washer_model::{
     COORDINATES, Machine, ModeAtSpeed, ModeOverSpeed, Spin, Timing, campbell, decimal, prepare,
 };
 
 use crate::config;
-use crate::exit::{Error, Exit, print, tell};
+use crate::exit::{Error, Exit, show, tell};
+use crate::files::{FileKind, Output, key};
 use crate::store::StoreError;
-use crate::store::schema::key;
 use crate::table::Table;
 
 /// Most speeds that are accepted: an hour of computing.
 const MOST_SPEEDS: f64 = 100_000.0;
-
-/// Key of the metadata that holds resonances and shapes.
-const MODES: &str = "sweep.modes";
 
 /// Arguments of `sweep modes`.
 #[derive(Debug, clap::Args)]
@@ -99,15 +97,17 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         }
     };
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
+    let output = args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
     let point = prepare(Simd::Scalar, &[(machine.clone(), spin)], &timing).remove(0)?;
     let speeds = args.speed.values();
     let modes = campbell(&point, &speeds)?;
-    if let Some(path) = &args.out {
-        write(path, &name, &machine, &speeds, &modes)?;
+    if let (Some(path), Some(output)) = (&args.out, output) {
+        let bytes = bytes(&name, &machine, &speeds, &modes).map_err(StoreError::parquet("write", path))?;
+        output.finish(&bytes)?;
         tell(&format!("wrote {}: {} modes at {} speeds", path.display(), modes.len(), speeds.len()));
     }
     if args.json {
-        return print(&format!("{:#}\n", to_json(&name, &speeds, &modes)));
+        return show(&format!("{:#}\n", to_json(&name, &speeds, &modes)));
     }
     tell(table(&speeds, &modes).trim_end());
     Ok(Exit::Done)
@@ -208,13 +208,12 @@ fn at_speed(speed_rpm: f64, at: &ModeAtSpeed) -> Value {
     })
 }
 
-fn write(
-    path: &Path,
+fn bytes(
     name: &str,
     machine: &Machine,
     speeds: &[f64],
     modes: &[ModeOverSpeed],
-) -> Result<(), StoreError> {
+) -> Result<Vec<u8>, ParquetError> {
     let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
     let mut table = Table::default();
     table.numbers("speed_rpm", "rpm", "spin of the shaft", rows().map(|(k, _)| Some(speeds[k])));
@@ -248,8 +247,8 @@ fn write(
     let plan = json!({ "name": name, "machine": config::machine_json(machine) });
     table.metadata(key::PLAN, &plan);
     let all: Value = modes.iter().enumerate().map(|(k, mode)| facts(k, mode)).collect();
-    table.metadata(MODES, &all);
-    table.write(path)
+    table.metadata(key::MODES, &all);
+    table.into_bytes()
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use washer_model::{Machine, Parameter, Range, Source, Spin};
 
 use crate::config;
-use crate::exit::{Error, Exit, print};
+use crate::exit::{Error, Exit, show};
 
 /// Arguments of `sweep parameters`.
 #[derive(Debug, clap::Args)]
@@ -41,7 +41,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         // The spin's parameters exist without a grid, but have no value.
         None => rows(&Machine::paper(), &Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 }, None),
     };
-    print(&if args.json { as_json(&rows) } else { as_text(&rows) })
+    show(&if args.json { as_json(&rows) } else { as_text(&rows) })
 }
 
 /// Every parameter with its value; those of spin and window have one only if a grid gives its window.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::exit::{Error, Exit, tell};
+use crate::files::beside;
 use crate::plot::{PlotOptions, Quantity, View, render};
 
 /// Arguments of `sweep plot`.
@@ -72,7 +73,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
 
 /// Beside the input, under its name.
 fn default_output(file: &Path) -> PathBuf {
-    file.with_extension("svg")
+    beside(file, "svg")
 }
 
 fn assignment(text: &str) -> Result<(String, f64), String> {

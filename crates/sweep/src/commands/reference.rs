@@ -112,11 +112,13 @@ fn allowed(range: Range) -> String {
 fn columns() -> String {
     let mut text = head("Columns of a result file", "columns");
     text.push_str(
-        "One row per grid point, in grid order. Behind `point` stands one column per axis, named as its parameter (here the\n\
-         two axes of `sweeps/fig12.toml`); the channels are those of `[reliability]`, here all that exist. Each column's unit and\n\
-         description also stand in the file: in the Arrow field metadata (`unit`, `description`), and as JSON under the key\n\
-         `sweep.columns` of the file's key-value metadata. There stand too `sweep.plan` (the grid as run with the full machine),\n\
-         `sweep.plan_hash` and `sweep.version`.\n\n",
+        "One row per grid point, in grid order. Behind `point` stands one column per axis, named as its\n\
+         parameter (here the two axes of `sweeps/fig12.toml`); the channels are those of `[reliability]`,\n\
+         here all that exist. Each column's unit and description also stand in the file: in the Arrow field\n\
+         metadata (`unit`, `description`), and as JSON under the key `sweep.columns` of the file's key-value\n\
+         metadata. There stand too `sweep.plan` (the grid as run with the full machine), `sweep.plan_hash`,\n\
+         `sweep.version` and `sweep.numerics` (together they say which build made it), and last\n\
+         `sweep.digest`, by which every command that reads the file knows that no bit of it has changed.\n\n",
     );
     let (machine, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
     let axes = Parameter::all(&machine, &spin)

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::{Target, quoted};
 use crate::engine::ModelEngine;
 use crate::exit::{Error, Exit, tell};
+use crate::files;
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
 use crate::progress::{self, Mode, duration, per_second};
@@ -13,6 +14,7 @@ use crate::run::{self as runner, Ended, Engine, Report, RunOptions};
 use crate::store::provenance::Session;
 use crate::store::read::Tally;
 use crate::store::{Job, ShardRequest};
+use crate::threads::{self, Environment};
 use crate::trace::{self, MOST_KEPT};
 
 /// Arguments of `sweep run`.
@@ -22,7 +24,7 @@ pub struct Args {
     #[command(flatten)]
     pub target: Target,
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads)]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
     pub threads: Option<usize>,
     /// Compute one of N equal shards only, to be joined by `sweep merge`; `auto/N` takes the place from
     /// SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX. In a Slurm array the default is that array's task and count
@@ -42,14 +44,6 @@ pub struct Args {
     /// Exit with 3 if any row of the finished result failed
     #[arg(long)]
     pub fail_on_error: bool,
-}
-
-/// As many threads as a process can sensibly ask for.
-pub(super) fn threads(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(threads @ 1..=4096) => Ok(threads),
-        _ => Err(format!("expected a number of threads from 1 to 4096; got `{text}`")),
-    }
 }
 
 /// Runs a grid.
@@ -80,12 +74,13 @@ pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Er
         source,
     })?;
     let (job, output) = (Job::of(plan), args.target.output(plan));
+    let environment: Environment<'_> = &|name| std::env::var(name).ok();
     let options = RunOptions {
-        threads: args.threads,
+        threads: threads::count(args.threads, environment)?,
         fresh: args.fresh,
         shard: args.shard,
         progress: args.progress,
-        environment: &|name| std::env::var(name).ok(),
+        environment,
         tell: &tell,
     };
     let report = runner::run(engine, &job, &output, options, &interrupt)?;
@@ -94,10 +89,8 @@ pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Er
     }
     tell(summary(args, plan, &job, &output, &report).trim_end());
     if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
-        let folder = output.with_extension("traces");
-        let threads =
-            args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-        trace::keep(plan, &folder, threads, &|| interrupt.stopped())?;
+        let folder = files::beside(&output, "traces");
+        trace::keep(plan, &folder, options.threads, &|| interrupt.stopped())?;
         if let Some(signal) = interrupt.signal() {
             tell("interrupted; the map is kept, and the traces so far");
             return Ok(if signal == 15 { Exit::Terminated } else { Exit::Interrupted });
@@ -156,9 +149,22 @@ fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &Repo
         Ended::Shard(_) => {
             line(&mut text, "next", &format!("{}, when all shards are done", args.target.command("merge")));
         }
-        Ended::Interrupted { .. } => line(&mut text, "go on", &args.target.command("run")),
+        Ended::Interrupted { .. } => line(&mut text, "go on", &go_on(args, report.session.as_ref())),
     }
     text
+}
+
+/// The command that goes on with an interrupted run, or with this shard of it.
+fn go_on(args: &Args, session: Option<&Session>) -> String {
+    let mut line = args.target.command("run");
+    if let Some(shard) = session.and_then(|session| session.shard.as_deref()) {
+        // Writing to a String cannot fail.
+        let _ = write!(line, " --shard {shard}");
+    }
+    if args.keep_traces {
+        line.push_str(" --keep-traces");
+    }
+    line
 }
 
 /// What this process did.

@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use serde_json::Value;
 
 use super::run::{counts, line};
-use crate::exit::{Error, Exit, print};
+use crate::exit::{Error, Exit, show};
+use crate::files::ParquetFile;
+use crate::identity;
 use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, overview, row, tally};
 
 /// Arguments of `sweep show`.
@@ -22,32 +24,37 @@ pub struct Args {
 /// # Errors
 /// A file that cannot be read, or is not Parquet.
 pub fn run(args: &Args) -> Result<Exit, Error> {
-    let file = overview(&args.file)?;
+    let opened = ParquetFile::open(&args.file)?;
+    let file = overview(&opened)?;
     let mut text = String::new();
     line(&mut text, "file", &args.file.display().to_string());
     match &file.result {
         Some(result) => {
             provenance(&mut text, result);
-            let tally = tally(&args.file)?;
+            if !opened.is_sealed() {
+                line(&mut text, "checked", "no: it carries no digest, as files of older builds do not");
+            }
+            let tally = tally(&opened)?;
             let limit = result.plan["reliability"]["ratio_limit"].as_f64().unwrap_or(f64::NAN);
             let axes: Vec<&str> =
                 axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
-            let places = places(&args.file, &axes, &[&tally.greatest_ratio, &tally.least_gap_nonlinear_m])?;
+            let places = places(&opened, &axes, &[&tally.greatest_ratio, &tally.least_gap_nonlinear_m])?;
             let at = |point| {
                 places.iter().find(|(known, _)| *known == point).map_or(String::new(), |(_, at)| at.clone())
             };
             text.push_str(&counts(&tally, limit, &at));
         }
-        None => line(&mut text, "made by", file.created_by.as_deref().unwrap_or("unknown")),
+        None => line(&mut text, "made by", opened.created_by().unwrap_or("unknown")),
     }
     columns(&mut text, &file);
-    print(&text)
+    show(&text)
 }
 
 fn provenance(text: &mut String, result: &ResultFile) {
     let plan = &result.plan;
     line(text, "name", plan["name"].as_str().unwrap_or_default());
-    line(text, "made by", &format!("sweep {}, plan {}", result.version, &result.plan_hash));
+    let build = identity::words(&result.version, result.numerics);
+    line(text, "made by", &format!("{build}, plan {}", &result.plan_hash));
     for (name, key) in [("spin", "spin"), ("time", "time"), ("method", "integrator")] {
         line(text, name, &brief(&plan[key]));
     }
@@ -84,13 +91,13 @@ fn axes(plan: &Value) -> &[Value] {
 
 /// Where the extremes lie, in axis values.
 fn places(
-    path: &std::path::Path,
+    file: &ParquetFile,
     axes: &[&str],
     extremes: &[&Option<Extreme>],
 ) -> Result<Vec<(u64, String)>, Error> {
     let mut places = Vec::new();
     for extreme in extremes.iter().filter_map(|extreme| extreme.as_ref()) {
-        let values = row(path, extreme.point, axes)?;
+        let values = row(file, extreme.point, axes)?;
         let at: Vec<String> =
             axes.iter().zip(values).map(|(axis, value)| format!("{axis} {value}")).collect();
         places.push((extreme.point, at.join(", ")));

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::Target;
 use super::run::line;
-use crate::exit::{Error, Exit, print, tell};
+use crate::exit::{Error, Exit, show, tell};
 use crate::store::{FolderStatus, Job, State, status};
 
 /// Arguments of `sweep status`.
@@ -26,7 +26,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     let output = args.target.output(&plan);
     let found = status(&output, &Job::of(&plan))?;
     if args.json {
-        return print(&format!("{:#}\n", json!(found)));
+        return show(&format!("{:#}\n", json!(found)));
     }
     tell(summary(args, &found).trim_end());
     Ok(Exit::Done)

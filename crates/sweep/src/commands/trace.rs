@@ -8,7 +8,9 @@ use washer_model::{COORDINATES, Start};
 
 use crate::config;
 use crate::exit::{Error, Exit, tell};
+use crate::files::{FileKind, Output};
 use crate::plan::Plan;
+use crate::threads;
 use crate::trace::{Extras, MOST_INSTANTS, trace};
 
 /// Arguments of `sweep trace`.
@@ -78,10 +80,16 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     for StartValue { is_speed, index, value } in &args.start {
         if *is_speed { start.speeds[*index] = *value } else { start.deviations[*index] = *value }
     }
-    let trace = trace(&plan, plan.scenario(0), point(&args.at), every_s, &start, extras)?;
+    let output = Output::begin(&args.out, FileKind::Trace)?;
+    let work = || trace(&plan, plan.scenario(0), point(&args.at), every_s, &start, extras);
+    // A thread for each model, where there may be two; they write the same bytes as one.
+    let trace = match threads::pool(2) {
+        Ok(pool) => pool.install(work)?,
+        Err(_) => work()?,
+    };
     trace.failures.iter().for_each(|failure| tell(failure));
     let instants = trace.instants;
-    trace.write(&args.out)?;
+    output.finish(&trace.into_bytes(&args.out)?)?;
     tell(&format!("wrote {}: {instants} instants from 0 to {} s", args.out.display(), plan.end_s));
     Ok(Exit::Done)
 }

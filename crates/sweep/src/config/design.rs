@@ -10,7 +10,6 @@ use arrow_array::types::{
 };
 use arrow_array::{Array, ArrayRef};
 use arrow_schema::DataType;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use washer_model::decimal;
 
 use super::machine::beside;
@@ -19,6 +18,7 @@ use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, cut, short};
 use super::source::{Located, Location};
 use crate::design::Design;
+use crate::files::ParquetFile;
 
 /// The methods by name.
 pub(super) const METHODS: [&str; 3] = ["latin_hypercube", "sobol", "list"];
@@ -230,10 +230,8 @@ fn cells(line: &str, offset: usize) -> Vec<(&str, std::ops::Range<usize>)> {
 
 /// Columns of numbers.
 fn parquet(path: &Path, at: &Location) -> Result<Vec<ListColumn>, String> {
-    let text = |error: &dyn std::fmt::Display| error.to_string().trim().to_owned();
-    let file = File::open(path).map_err(|error| text(&error))?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|error| text(&error))?;
-    let fields = builder.schema().fields().clone();
+    let file = ParquetFile::open(path).map_err(|error| error.reason())?;
+    let fields = file.schema().fields().clone();
     if fields.len() > MOST_COLUMNS {
         return Err(format!("it has {} columns, more than {MOST_COLUMNS}", fields.len()));
     }
@@ -250,8 +248,8 @@ fn parquet(path: &Path, at: &Location) -> Result<Vec<ListColumn>, String> {
         places: Vec::new(),
     };
     let mut columns: Vec<ListColumn> = fields.iter().map(|field| column(field.name())).collect();
-    for batch in builder.build().map_err(|error| text(&error))? {
-        let batch = batch.map_err(|error| text(&error))?;
+    for batch in file.batches(|builder| builder).map_err(|error| error.reason())? {
+        let batch = batch.map_err(|error| error.reason())?;
         for (column, array) in columns.iter_mut().zip(batch.columns()) {
             column.values.extend(numbers(array, &column.name.value, column.values.len())?);
         }

@@ -2,26 +2,15 @@
 
 use std::path::PathBuf;
 
+use crate::files::FileError;
+
 /// What went wrong, where, and what to do about it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
-    /// The file cannot be opened or read.
-    #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// Which file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file is no readable Parquet file.
-    #[error("{}: not a readable Parquet file ({reason}); `sweep run`, `trace`, `modes` and `boundary` write what can be plotted", path.display())]
-    NotParquet {
-        /// Which file.
-        path: PathBuf,
-        /// The reader's words.
-        reason: String,
-    },
+    /// A file that cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A Parquet file, but none that this program writes.
     #[error(
         "{}: its columns ({columns}) are those of no map, trace, modes or boundary file, so there is no figure that fits it",
@@ -84,14 +73,6 @@ pub enum PlotError {
         /// The output as given.
         path: PathBuf,
     },
-    /// The figure cannot be written.
-    #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// Which file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
     /// The figure cannot be drawn.
     #[error("cannot draw the figure: {0}")]
     Drawing(String),
@@ -101,6 +82,9 @@ impl PlotError {
     /// Whether the command line is at fault rather than a file or the machine.
     #[must_use]
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::NotThere { .. } | Self::Unfit(_) | Self::Format { .. })
+        match self {
+            Self::File(error) => error.is_refusal(),
+            _ => matches!(self, Self::NotThere { .. } | Self::Unfit(_) | Self::Format { .. }),
+        }
     }
 }

@@ -36,6 +36,8 @@ use grid::Grid;
 use raster::Typeface;
 use scene::Scene;
 
+use crate::files::{self, Output};
+
 /// Image pixels to a scene pixel in a PNG: sharp on dense screens and in print.
 const PNG_SCALE: f64 = 2.0;
 
@@ -121,6 +123,15 @@ impl Format {
             _ => Err(PlotError::Format { path: path.to_owned() }),
         }
     }
+
+    /// What such a figure may be written over.
+    const fn kind(self) -> files::FileKind<'static> {
+        match self {
+            Self::Svg => files::FileKind::Svg,
+            Self::Png => files::FileKind::Png,
+            Self::Html => files::FileKind::Html,
+        }
+    }
 }
 
 /// Draws the figure that fits `input` to `output`, whose ending (`.svg`, `.png`, `.html`) says how.
@@ -130,9 +141,7 @@ impl Format {
 /// name and the options are judged before the output is touched.
 pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), PlotError> {
     let format = Format::of(output)?;
-    if input == output {
-        return Err(PlotError::Unfit(format!("{} would be overwritten by its own figure", input.display())));
-    }
+    let file = Output::begin(output, format.kind())?;
     let table = Table::open(input)?;
     check_options(&table, options, format)?;
     let bytes = match figure(&table, options)? {
@@ -148,7 +157,7 @@ pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), 
             Format::Svg | Format::Png => image(&chart::draw(&chart, &Typeface::load()?), format)?,
         },
     };
-    std::fs::write(output, bytes).map_err(|source| PlotError::Write { path: output.to_owned(), source })
+    Ok(file.finish(&bytes)?)
 }
 
 enum Figure {

@@ -1,16 +1,15 @@
 //! One of this program's Parquet files: its columns as typed vectors, what they mean, and where they came from.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Field};
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 
 use super::error::PlotError;
 use super::label;
 use crate::cells;
+use crate::files::{FileError, ParquetFile};
 
 /// What a file holds, told by its columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,41 +83,27 @@ impl Table {
     /// Reads a file whole.
     ///
     /// # Errors
-    /// [`PlotError::Read`], [`PlotError::NotParquet`], or [`PlotError::UnknownKind`] when the columns are not those of
+    /// [`PlotError::File`], or [`PlotError::UnknownKind`] when the columns are not those of
     /// a file of ours.
     pub fn open(path: &Path) -> Result<Self, PlotError> {
-        let file = File::open(path).map_err(|source| PlotError::Read { path: path.to_owned(), source })?;
-        let damaged = |reason: String| PlotError::NotParquet {
-            path: path.to_owned(),
-            reason: reason.trim().to_owned(),
-        };
-        let reader =
-            ParquetRecordBatchReaderBuilder::try_new(file).map_err(|error| damaged(error.to_string()))?;
-        let provenance = reader
-            .metadata()
-            .file_metadata()
-            .key_value_metadata()
-            .into_iter()
-            .flatten()
+        let file = ParquetFile::open(path)?;
+        let damaged =
+            |error: ArrowError| FileError::NotParquet { path: path.to_owned(), reason: error.to_string() };
+        let provenance = file
+            .pairs()
             .filter(|entry| entry.key != ARROW_SCHEMA)
             .map(|entry| {
                 let text = entry.value.clone().unwrap_or_default();
                 (entry.key.clone(), serde_json::from_str(&text).unwrap_or(Value::String(text)))
             })
             .collect();
-        let schema = reader.schema().clone();
-        let batches = reader
-            .build()
-            .map_err(|error| damaged(error.to_string()))?
-            .collect::<Result<Vec<RecordBatch>, _>>()
-            .map_err(|error| damaged(error.to_string()))?;
+        let schema = file.schema().clone();
+        let batches = file.batches(|builder| builder)?.collect::<Result<Vec<RecordBatch>, _>>()?;
 
         let mut columns = Vec::with_capacity(schema.fields().len());
         for (index, field) in schema.fields().iter().enumerate() {
             let parts: Vec<&ArrayRef> = batches.iter().map(|batch| batch.column(index)).collect();
-            if let Some(values) =
-                values(field.data_type(), &parts).map_err(|error| damaged(error.to_string()))?
-            {
+            if let Some(values) = values(field.data_type(), &parts).map_err(damaged)? {
                 columns.push(column(field, values));
             }
         }

@@ -48,7 +48,7 @@ impl<F: Fn(u64) + Sync> Engine for Formula<F> {
 
 fn options(threads: usize) -> RunOptions<'static> {
     RunOptions {
-        threads: Some(threads),
+        threads,
         fresh: false,
         shard: None,
         progress: Mode::None,
@@ -176,12 +176,4 @@ fn a_folder_that_vanishes_ends_the_run_with_its_path_and_advice() {
     run(&resumed, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
     assert!(resumed.evaluated.into_inner() < 1000, "what came back is used");
     assert!(fs::read(output(&home)).unwrap() == whole(1000, 1));
-}
-
-#[test]
-fn threads_default_to_what_slurm_gave() {
-    assert_eq!(default_threads(&|name| (name == "SLURM_CPUS_PER_TASK").then(|| "3".into())), 3);
-    for nonsense in ["0", "x", ""] {
-        assert_eq!(default_threads(&|_| Some(nonsense.into())), cpus());
-    }
 }

@@ -85,6 +85,13 @@ pub(crate) struct Place {
     pub(crate) count: u64,
 }
 
+impl Place {
+    /// Bytes of the whole file.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.count.saturating_mul(self.shape.bytes_a_point() as u64).saturating_add((HEADER + HASH) as u64)
+    }
+}
+
 /// Why bytes are not the chunk that is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Damage {

@@ -6,20 +6,15 @@ use std::path::{Path, PathBuf};
 
 use super::plan_file::Difference;
 use crate::exit::Exit;
+use crate::files::FileError;
+use crate::threads::ThreadsError;
 
 /// A failure of the store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The file system said no.
-    #[error("cannot {action} {}: {source}\n  = help: {}", path.display(), advice(source))]
-    Io {
-        /// What was being done, in the infinitive.
-        action: &'static str,
-        /// To which file or folder.
-        path: PathBuf,
-        /// What the system answered.
-        source: io::Error,
-    },
+    /// A file that cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// Another process runs on this output.
     #[error("{} is in use by {}\n  = help: wait for it to end, or give another --out", output.display(), Holders(holders))]
     Busy {
@@ -28,10 +23,11 @@ pub enum StoreError {
         /// Who holds it, as far as they could be read.
         holders: Vec<Holder>,
     },
-    /// The run folder belongs to another plan.
+    /// The run folder belongs to another plan, or was begun by a build that computes other numbers.
     #[error(
-        "{} was begun with another plan:\n{}  = help: run the old plan to its end, give another --out, or start over \
-         with --fresh (which deletes that folder's finished chunks)",
+        "{} was begun with another plan or by another build:\n{}  = help: end it with that plan and \
+         build, give another --out, or start over with --fresh (which deletes that folder's \
+         finished chunks)",
         folder.display(),
         Differences(differences)
     )]
@@ -41,9 +37,10 @@ pub enum StoreError {
         /// Where the plans part.
         differences: Vec<Difference>,
     },
-    /// The finished output belongs to another plan.
+    /// The finished output belongs to another plan, or is of a build that computes other numbers.
     #[error(
-        "{} already holds the result of another plan:\n{}  = help: give another --out, or replace it with --fresh",
+        "{} already holds the result of another plan or build:\n{}  = help: give another --out, or \
+         replace it with --fresh",
         output.display(),
         Differences(differences)
     )]
@@ -52,23 +49,6 @@ pub enum StoreError {
         output: PathBuf,
         /// Where the plans part.
         differences: Vec<Difference>,
-    },
-    /// Something that this program did not write stands where the output should go.
-    #[error("{} exists and is not a result of `sweep run` ({reason})\n  = help: give another --out, or replace it with --fresh",
-        output.display())]
-    OutputForeign {
-        /// The file in the way.
-        output: PathBuf,
-        /// Why it was not recognised.
-        reason: String,
-    },
-    /// The output's path cannot name a file.
-    #[error("{} cannot be an output: {reason}", output.display())]
-    BadOutput {
-        /// The path as given.
-        output: PathBuf,
-        /// Why not.
-        reason: &'static str,
     },
     /// A shard that does not fit.
     #[error("{0}")]
@@ -108,7 +88,7 @@ pub enum StoreError {
         /// What was wrong.
         reason: String,
     },
-    /// Arrow or Parquet refused; a defect of this program or a file that is no Parquet.
+    /// Arrow or Parquet refused; a defect of this program or a file that lacks what is looked for.
     #[error("cannot {action} {}: {source}", path.display())]
     Parquet {
         /// What was being done, in the infinitive.
@@ -118,14 +98,9 @@ pub enum StoreError {
         /// What the library answered.
         source: parquet::errors::ParquetError,
     },
-    /// The worker threads could not be started.
-    #[error("cannot start {threads} threads: {reason}\n  = help: try fewer with --threads")]
-    Threads {
-        /// How many were asked for.
-        threads: usize,
-        /// What the system answered.
-        reason: String,
-    },
+    /// There are no threads to work with.
+    #[error(transparent)]
+    Threads(#[from] ThreadsError),
 }
 
 /// A process that holds an output.
@@ -141,8 +116,8 @@ pub struct Holder {
 
 impl StoreError {
     pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
-        let path = path.to_path_buf();
-        move |source| Self::Io { action, path, source }
+        let failed = FileError::io(action, path);
+        move |source| Self::File(failed(source))
     }
 
     /// Wraps what the Parquet library reported, as a plain I/O failure where it was one.
@@ -153,7 +128,7 @@ impl StoreError {
         let path = path.to_path_buf();
         move |error| match error {
             parquet::errors::ParquetError::External(inner) => match inner.downcast::<io::Error>() {
-                Ok(source) => Self::Io { action, path: path.clone(), source: *source },
+                Ok(source) => FileError::Io { action, path: path.clone(), source: *source }.into(),
                 Err(inner) => Self::Parquet {
                     action,
                     path: path.clone(),
@@ -170,45 +145,15 @@ impl StoreError {
         match self {
             Self::Busy { .. } => Exit::Busy,
             // Nothing was begun: the request does not fit what is there.
-            Self::PlanDiffers { .. }
-            | Self::OutputDiffers { .. }
-            | Self::OutputForeign { .. }
-            | Self::BadOutput { .. }
-            | Self::Shard(_) => Exit::BadInput,
-            Self::Io { .. }
+            Self::PlanDiffers { .. } | Self::OutputDiffers { .. } | Self::Shard(_) => Exit::BadInput,
+            Self::Threads(ThreadsError::Scheduler { .. }) => Exit::BadInput,
+            Self::File(error) if error.is_refusal() => Exit::BadInput,
+            Self::File(_)
             | Self::Incomplete { .. }
             | Self::NoRun { .. }
             | Self::Engine { .. }
             | Self::Parquet { .. }
-            | Self::Threads { .. } => Exit::Failed,
-        }
-    }
-}
-
-/// What a user can do about an I/O failure. Finished chunks are whole whatever happened, so it ends alike.
-fn advice(source: &io::Error) -> &'static str {
-    match source.kind() {
-        io::ErrorKind::StorageFull => {
-            "the disk is full: free some space and run the same command again; finished chunks are kept"
-        }
-        io::ErrorKind::QuotaExceeded => {
-            "the quota is used up: free some space and run the same command again; finished chunks are kept"
-        }
-        io::ErrorKind::FileTooLarge => {
-            "a file-size limit was hit: raise it (ulimit -f) and run the same command again; finished chunks are kept"
-        }
-        io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied => {
-            "make it writable for this user, or write elsewhere with --out"
-        }
-        io::ErrorKind::NotFound => {
-            "it was there and has vanished, or its folder cannot be reached: bring it back and run the same command \
-             again; chunks that are still there are used"
-        }
-        io::ErrorKind::NotADirectory => {
-            "a part of that path is a file, not a folder: move it, or write elsewhere with --out"
-        }
-        _ => {
-            "check the disk (the system's log may say more) and run the same command again; finished chunks are kept"
+            | Self::Threads(ThreadsError::Start { .. }) => Exit::Failed,
         }
     }
 }

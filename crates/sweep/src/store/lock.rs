@@ -5,13 +5,14 @@
 //! running. The same shard started twice is harmless and not refused: a scheduler that lost sight of a node does
 //! exactly that, and must not wait for the lost node's lock to expire.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Seek, Write};
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::Folder;
 use super::error::{Holder, StoreError};
+use crate::files::{FileError, atomic, regular};
 
 /// How long a lock is asked for before it counts as held: `sweep status` holds it for an instant when it looks.
 const ATTEMPTS: u32 = 5;
@@ -36,15 +37,16 @@ impl Lock {
                 std::thread::sleep(PAUSE);
             }
             fs::create_dir_all(&folder.path).map_err(StoreError::io("make the folder", &folder.path))?;
-            let mut file = match open(&path) {
+            let mut file = match regular::open_or_create(&path) {
                 Ok(file) => file,
                 // A run that just finished removed the folder between the two lines above.
                 Err(error) if error.kind() == io::ErrorKind::NotFound && attempt + 1 < ATTEMPTS => continue,
                 Err(error) => return Err(StoreError::io("open the lock", &path)(error)),
             };
+            refuse_strangers(&mut file, &path)?;
             let taken = if shard.is_some() { file.try_lock_shared() } else { file.try_lock() };
             match taken {
-                Ok(()) if !still_there(&file, &path) => continue,
+                Ok(()) if !atomic::is_named(&file, &path) => continue,
                 Ok(()) => {
                     if shard.is_none() {
                         sign(&mut file, &path)?;
@@ -67,7 +69,7 @@ impl Lock {
 
     /// Deletes the lock's file while it is still held, so that no one can take it over, then lets go.
     pub(crate) fn retire(self) -> Result<(), StoreError> {
-        super::atomic::remove(&self.path)
+        Ok(atomic::remove(&self.path)?)
     }
 }
 
@@ -82,13 +84,28 @@ pub(crate) fn holders(folder: &Folder) -> Vec<Holder> {
     found
 }
 
-fn open(path: &Path) -> io::Result<File> {
-    OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)
+/// A lock holds nothing, or the name that [`sign`] writes. Anything else is somebody's file.
+fn refuse_strangers(file: &mut File, path: &Path) -> Result<(), StoreError> {
+    const LONGEST_NAME: u64 = 300;
+    let mut name = Vec::new();
+    file.take(LONGEST_NAME + 1).read_to_end(&mut name).map_err(StoreError::io("read", path))?;
+    let process = name.split(|byte| *byte == b' ').next().unwrap_or_default();
+    let is_ours = name.len() as u64 <= LONGEST_NAME && process.iter().all(u8::is_ascii_digit);
+    if is_ours {
+        return Ok(());
+    }
+    Err(FileError::Refused {
+        path: path.to_path_buf(),
+        reason: "the file there is no lock of `sweep run`".to_owned(),
+        help: "give another name with --out, or move that file away first",
+    }
+    .into())
 }
 
 fn take_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
     let path = folder.shard_lock(shard);
-    let mut file = open(&path).map_err(StoreError::io("open the lock", &path))?;
+    let mut file = regular::open_or_create(&path).map_err(StoreError::io("open the lock", &path))?;
+    refuse_strangers(&mut file, &path)?;
     if file.try_lock().is_err() {
         return Ok(None);
     }
@@ -105,22 +122,6 @@ fn sign(file: &mut File, path: &Path) -> Result<(), StoreError> {
         .map_err(StoreError::io("write the process id to", path))
 }
 
-/// Whether the locked file is the one that the path names: a run that finishes deletes its lock.
-#[cfg(unix)]
-fn still_there(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    match (file.metadata(), fs::metadata(path)) {
-        (Ok(held), Ok(named)) => (held.dev(), held.ino()) == (named.dev(), named.ino()),
-        _ => false,
-    }
-}
-
-/// Elsewhere an open file cannot be deleted, so it is.
-#[cfg(not(unix))]
-fn still_there(_file: &File, path: &Path) -> bool {
-    path.exists()
-}
-
 /// Some cluster file systems are mounted without locks.
 fn no_locks_here(error: &io::Error) -> bool {
     const ENOLCK: i32 = 37;
@@ -129,26 +130,28 @@ fn no_locks_here(error: &io::Error) -> bool {
 }
 
 fn shard_locks(folder: &Folder) -> Vec<(u64, PathBuf)> {
-    let Ok(entries) = fs::read_dir(&folder.path) else { return Vec::new() };
-    let mut found: Vec<(u64, PathBuf)> = entries
-        .flatten()
-        .filter_map(|entry| {
-            let name = entry.file_name();
-            let shard = name.to_str()?.strip_prefix("shard-")?.strip_suffix(".lock")?.parse().ok()?;
-            Some((shard, entry.path()))
-        })
+    let names = regular::names(&folder.path).unwrap_or_default();
+    let mut found: Vec<(u64, PathBuf)> = names
+        .iter()
+        .filter_map(|name| Some((shard_of_name(name.to_str()?)?, folder.path.join(name))))
         .collect();
     found.sort_unstable();
     found
 }
 
+/// The shard a lock's name stands for, if it stands for one.
+pub(super) fn shard_of_name(name: &str) -> Option<u64> {
+    name.strip_prefix("shard-")?.strip_suffix(".lock")?.parse().ok()
+}
+
 /// The holder named in a lock file, if someone holds it.
 fn held_by(path: &Path, shard: Option<u64>) -> Option<Holder> {
-    let file = File::open(path).ok()?;
+    let mut file = regular::open(path).ok()?;
     if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
         return None;
     }
-    let text = fs::read_to_string(path).ok()?;
+    let mut text = String::new();
+    file.read_to_string(&mut text).ok()?;
     let (pid, host) = text.trim_end().split_once(' ')?;
     Some(Holder { pid: pid.parse().ok()?, host: host.to_owned(), shard })
 }
@@ -200,15 +203,38 @@ mod tests {
         assert!(super::holders(&folder).is_empty());
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_is_not_written_through_a_link_nor_over_a_strangers_file() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = folder(&home);
+        fs::create_dir_all(&folder.path).unwrap();
+        let mine = home.path().join("thesis.tex");
+        fs::write(&mine, "my thesis").unwrap();
+        for (name, shard) in [(folder.lock(), None), (folder.shard_lock(3), Some(3))] {
+            std::os::unix::fs::symlink(&mine, &name).unwrap();
+            let error = Lock::acquire(&folder, shard).unwrap_err().to_string();
+            assert!(error.contains("it is a symbolic link"), "{error}");
+            fs::remove_file(&name).unwrap();
+            fs::hard_link(&mine, &name).unwrap();
+            let error = Lock::acquire(&folder, shard).unwrap_err();
+            assert!(error.to_string().contains("is no lock of `sweep run`"), "{error}");
+            assert_eq!(error.exit(), Exit::BadInput);
+            fs::remove_file(&name).unwrap();
+        }
+        assert_eq!(fs::read_to_string(&mine).unwrap(), "my thesis");
+        Lock::acquire(&folder, Some(3)).unwrap();
+    }
+
     #[test]
     fn a_lock_that_was_removed_with_its_folder_is_not_taken_for_held() {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
         let first = Lock::acquire(&folder, None).unwrap();
-        let stale = open(&folder.lock()).unwrap();
+        let stale = regular::open_or_create(&folder.lock()).unwrap();
         first.retire().unwrap();
         stale.try_lock().unwrap();
-        assert!(!still_there(&stale, &folder.lock()));
+        assert!(!atomic::is_named(&stale, &folder.lock()));
         Lock::acquire(&folder, None).unwrap();
     }
 }

@@ -6,12 +6,12 @@ use parquet::arrow::ArrowWriter;
 use parquet::errors::ParquetError;
 
 use super::Job;
-use super::atomic;
 use super::error::StoreError;
 use super::open::{Run, remove};
 use super::provenance::{self, Session};
 use super::read::{self, Tally};
 use super::schema::{self, BATCH_ROWS, Rows};
+use crate::files::{self, FileKind, ParquetFile, atomic, seal};
 
 /// A finished result.
 #[derive(Debug)]
@@ -31,10 +31,10 @@ impl Run {
     ///
     /// # Errors
     /// [`StoreError::Incomplete`] when a chunk is missing or was found damaged (it is then set aside, and
-    /// [`Run::is_missing`]); [`StoreError::Io`].
+    /// [`Run::is_missing`]); [`StoreError::File`].
     pub fn join(&mut self, job: &Job<'_>, stop: &dyn Fn() -> bool) -> Result<Option<Tally>, StoreError> {
         let output = self.output().to_path_buf();
-        let file = atomic::begin(self.folder())?;
+        let mut file = atomic::begin(self.folder())?;
         let failed = |error| StoreError::parquet("write", &output)(error);
         let from_arrow = |error| failed(ParquetError::from(error));
         let mut rows = Rows::new(&job.layout);
@@ -59,10 +59,14 @@ impl Run {
         if rows.len() > 0 {
             writer.write(&rows.take().map_err(from_arrow)?).map_err(failed)?;
         }
-        // Flushes to the file. (Taking the file back out of the writer would tell a full disk as text only.)
+        // Closing flushes to the file. (Taking the file back out of the writer would tell a full
+        // disk as text only.)
+        writer.append_key_value_metadata(seal::blank());
         writer.close().map_err(failed)?;
+        seal::seal(file.as_file_mut()).map_err(StoreError::io("write", &output))?;
         // Read back before it takes its place: what cannot be read must not replace anything.
-        let tally = read::tally(file.path())?;
+        let tally = read::tally(&ParquetFile::open(file.path())?)?;
+        files::judge(&output, FileKind::Map)?;
         atomic::publish(file, &output)?;
         Ok(Some(tally))
     }
@@ -70,7 +74,7 @@ impl Run {
     /// Ends a run whose output is in place: writes the sidecar and removes the folder.
     ///
     /// # Errors
-    /// [`StoreError::Io`] when the sidecar cannot be written.
+    /// [`StoreError::File`] when the sidecar cannot be written.
     pub fn complete(
         mut self,
         job: &Job<'_>,
@@ -78,7 +82,9 @@ impl Run {
         session: Option<Session>,
     ) -> Result<Joined, StoreError> {
         let sidecar = provenance::sidecar(&self.folder, job, &tally, session)?;
-        atomic::write(self.folder(), &self.folder.sidecar(), &sidecar)?;
+        let path = self.folder.sidecar();
+        files::judge(&path, self.folder.account())?;
+        atomic::write(self.folder(), &path, &sidecar)?;
         let mut notes = self.take_notes();
         notes.extend(remove(&self.folder, self.lock));
         Ok(Joined { tally, notes })

@@ -14,7 +14,6 @@
 //! When every chunk is there they are joined into the one Parquet file (`merge`), and the folder goes. The store
 //! knows points, axis names and outcomes; it does not know the engine that makes them.
 
-pub(crate) mod atomic;
 mod chunk;
 mod error;
 mod lock;
@@ -41,29 +40,26 @@ pub use merge::Joined;
 pub use open::{Opened, Options, Run};
 pub use plan_file::Difference;
 pub use schema::{AxisColumn, Layout};
-pub use shard::{Environment, Shard, ShardRequest};
+pub use shard::{Shard, ShardRequest};
 pub use status::{FolderStatus, State, status};
 
+use crate::files::{self, FileKind};
+use crate::identity;
 use crate::plan::{Axis, Plan};
-
-/// Writes a file whole or not at all, over an older one, and makes the folder that it is to be in.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    // For the checks of the name alone.
-    Folder::of(path)?;
-    let folder = atomic::parent(path);
-    std::fs::create_dir_all(folder).map_err(StoreError::io("make the folder", folder))?;
-    atomic::write(folder, path, bytes)
-}
 
 /// The values of the axes at a point of the grid, first axis first.
 pub type AxisValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
 
 /// What the store must know of a plan.
 pub struct Job<'a> {
-    /// Grid as run, full machine and method. Two runs are the same when this and `version` are.
+    /// Grid as run, full machine and method. Two runs are the same when this, `version` and
+    /// `numerics` are.
     pub plan: Value,
     /// Version of the program; other versions may round differently, so their chunks do not mix.
     pub version: &'a str,
+    /// Version of its numerics ([`identity::NUMERICS_VERSION`]): so may other builds of one
+    /// version.
+    pub numerics: u32,
     /// Rows of the result.
     pub points: u64,
     /// What the columns depend on.
@@ -83,7 +79,8 @@ impl<'a> Job<'a> {
         };
         Self {
             plan: plan.to_json(),
-            version: env!("CARGO_PKG_VERSION"),
+            version: identity::VERSION,
+            numerics: identity::NUMERICS_VERSION,
             points: plan.points(),
             layout: Layout {
                 axes: plan.axes.iter().map(column).collect(),
@@ -95,10 +92,10 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Hash of version and plan.
+    /// Hash of version, numerics and plan.
     #[must_use]
     pub fn hash(&self) -> blake3::Hash {
-        plan_file::plan_hash(self.version, &self.plan)
+        plan_file::plan_hash(self.version, self.numerics, &self.plan)
     }
 }
 
@@ -133,15 +130,15 @@ pub(crate) struct Folder {
 }
 
 impl Folder {
+    /// Those of the run with this output. Neither it nor its sidecar is anything but absent or
+    /// ours.
     pub(crate) fn of(output: &Path) -> Result<Self, StoreError> {
-        let bad = |reason| StoreError::BadOutput { output: output.to_path_buf(), reason };
-        let Some(name) = output.file_name() else { return Err(bad("it has no file name")) };
-        if output.is_dir() {
-            return Err(bad("it is a folder"));
-        }
-        let mut name = name.to_owned();
+        files::judge(output, FileKind::Map)?;
+        let mut name = output.file_name().unwrap_or_default().to_owned();
         name.push(".partial");
-        Ok(Self { output: output.to_path_buf(), path: output.with_file_name(name) })
+        let folder = Self { output: output.to_path_buf(), path: output.with_file_name(name) };
+        files::judge(&folder.sidecar(), folder.account())?;
+        Ok(folder)
     }
 
     fn plan(&self) -> PathBuf {
@@ -166,7 +163,12 @@ impl Folder {
 
     /// The sidecar that says how the run went.
     fn sidecar(&self) -> PathBuf {
-        self.output.with_extension("run.json")
+        files::beside(&self.output, "run.json")
+    }
+
+    /// What kind of file that is.
+    fn account(&self) -> FileKind<'_> {
+        FileKind::Account { of: self.output.file_name().unwrap_or_default() }
     }
 }
 

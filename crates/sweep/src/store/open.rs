@@ -2,19 +2,21 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::io::{self, ErrorKind};
+use std::io::{self, ErrorKind, Read as _};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::chunk::{self, Damage, Place, Shape};
 use super::error::StoreError;
-use super::lock::Lock;
+use super::lock::{self, Lock};
 use super::plan_file::{Found, PlanFile, set_aside};
-use super::read::{self, Finished, ResultFile};
-use super::shard::{self, Dealing, Environment, Shard, ShardRequest};
-use super::{Folder, Job, atomic, chunk_of_name, chunk_points};
+use super::read::{self, ResultFile, Tally};
+use super::shard::{self, Dealing, Shard, ShardRequest};
+use super::{Folder, Job, chunk_of_name, chunk_points, provenance};
+use crate::files::{FileError, atomic, regular};
 use crate::outcome::Outcome;
+use crate::threads::Environment;
 
 /// How a run is opened.
 #[derive(Clone, Copy)]
@@ -30,8 +32,8 @@ pub struct Options<'a> {
 /// What opening an output came to.
 #[derive(Debug)]
 pub enum Opened {
-    /// The output is there, and of this very plan.
-    Finished(Box<ResultFile>),
+    /// The output is there, whole, and of this very plan.
+    Finished(Box<ResultFile>, Box<Tally>),
     /// There is something to do; the run holds its lock.
     Run(Box<Run>),
 }
@@ -55,15 +57,16 @@ impl Run {
     ///
     /// # Errors
     /// [`StoreError::Busy`] when another run holds the output, [`StoreError::PlanDiffers`],
-    /// [`StoreError::OutputDiffers`] and [`StoreError::OutputForeign`] when something else is there already,
-    /// [`StoreError::Shard`] for a part that does not fit, [`StoreError::Io`] for the file system.
+    /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::Shard`]
+    /// for a part that does not fit, [`StoreError::File`] for anything else at the output that is
+    /// not ours, and for the file system.
     pub fn open(output: &Path, job: &Job<'_>, options: Options<'_>) -> Result<Opened, StoreError> {
         let folder = Folder::of(output)?;
         if !options.fresh
             && !folder.path.exists()
-            && let Some(file) = finished(&folder, job)?
+            && let Some((file, tally)) = finished(&folder, job)?
         {
-            return Ok(Opened::Finished(Box::new(file)));
+            return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
         }
         let mut dealt = shard::resolve(options.shard, options.environment, Dealing::read(&folder)?)?;
         if options.fresh && dealt.is_some() {
@@ -83,9 +86,7 @@ impl Run {
         if options.fresh {
             clear(&folder)?;
         }
-        if dealt.is_none() {
-            atomic::sweep_leftovers(&folder.path)?;
-        }
+        atomic::clear_leftovers(&folder.path);
         let ours = PlanFile::of(job);
         match PlanFile::read(&folder)? {
             Found::Plan(found) => refuse_other_plan(&folder, &found, &ours)?,
@@ -96,11 +97,11 @@ impl Run {
             }
             Found::Nothing => {
                 if !options.fresh
-                    && let Some(file) = finished(&folder, job)?
+                    && let Some((file, tally)) = finished(&folder, job)?
                 {
                     // What a run leaves that dies between publishing its file and removing its folder.
                     remove(&folder, lock);
-                    return Ok(Opened::Finished(Box::new(file)));
+                    return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
                 }
                 ours.freeze(&folder)?;
                 // Another shard may have been first, with another plan.
@@ -143,7 +144,7 @@ impl Run {
     /// Looks through the chunks again, setting aside what is not whole.
     ///
     /// # Errors
-    /// [`StoreError::Io`].
+    /// [`StoreError::File`].
     pub fn rescan(&mut self) -> Result<(), StoreError> {
         let mut present = BTreeSet::new();
         for chunk in chunks_named(&self.folder)? {
@@ -180,7 +181,8 @@ impl Run {
     /// Keeps a chunk for good: when this returns, it outlives a power cut.
     ///
     /// # Errors
-    /// [`StoreError::Engine`] when the outcomes are not this chunk's points in order, [`StoreError::Io`].
+    /// [`StoreError::Engine`] when the outcomes are not this chunk's points in order,
+    /// [`StoreError::File`].
     pub fn write_chunk(&self, chunk: u64, outcomes: &[Outcome]) -> Result<(), StoreError> {
         let bytes = chunk::encode(&self.place(chunk), outcomes)?;
         atomic::write(&self.folder.path, &self.folder.chunk(chunk), &bytes)?;
@@ -291,11 +293,14 @@ pub(super) enum ChunkFile {
 /// Reads and verifies a chunk, leaving the file alone.
 pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
     let path = folder.chunk(place.chunk);
-    let bytes = match fs::read(&path) {
-        Ok(bytes) => bytes,
+    let mut bytes = Vec::new();
+    // A byte too many is enough to know that it is too long.
+    let read = regular::open(&path).and_then(|file| file.take(place.bytes() + 1).read_to_end(&mut bytes));
+    match read {
+        Ok(_) => {}
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(ChunkFile::Absent),
         Err(error) => return Err(StoreError::io("read", &path)(error)),
-    };
+    }
     Ok(match chunk::decode(place, &bytes) {
         Ok(outcomes) => ChunkFile::Whole(outcomes),
         Err(damage) => ChunkFile::Damaged(damage),
@@ -305,25 +310,32 @@ pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, St
 /// Chunks that a folder has by name, unread.
 pub(super) fn chunks_named(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
     let mut chunks = BTreeSet::new();
-    for entry in fs::read_dir(&folder.path).map_err(StoreError::io("list", &folder.path))? {
-        let entry = entry.map_err(StoreError::io("list", &folder.path))?;
-        chunks.extend(entry.file_name().to_str().and_then(chunk_of_name));
+    for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
+        chunks.extend(name.to_str().and_then(chunk_of_name));
     }
     Ok(chunks)
 }
 
-/// The finished file, if it is of this plan.
-fn finished(folder: &Folder, job: &Job<'_>) -> Result<Option<ResultFile>, StoreError> {
-    match read::finished(&folder.output)? {
-        Finished::Absent => Ok(None),
-        Finished::Result(file) if file.plan_hash == job.hash().to_hex().as_str() => Ok(Some(*file)),
-        Finished::Result(file) => {
-            let was = PlanFile { plan: file.plan, version: file.version, ..PlanFile::of(job) };
-            let differences = was.differences(&PlanFile::of(job));
-            Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
+/// The finished file, whole, if it is of this plan and build.
+pub(super) fn finished(folder: &Folder, job: &Job<'_>) -> Result<Option<(ResultFile, Tally)>, StoreError> {
+    let Some(file) = read::finished(&folder.output)? else { return Ok(None) };
+    let result = ResultFile::of(&file)?;
+    if result.plan_hash == job.hash().to_hex().as_str() {
+        // Files of this build carry a digest.
+        if !file.is_sealed() {
+            return Err(FileError::Damaged { path: folder.output.clone() }.into());
         }
-        Finished::Foreign(reason) => Err(StoreError::OutputForeign { output: folder.output.clone(), reason }),
+        let tally = read::tally(&file)?;
+        return Ok(Some((result, tally)));
     }
+    let was = PlanFile {
+        plan: result.plan,
+        version: result.version,
+        numerics: result.numerics,
+        ..PlanFile::of(job)
+    };
+    let differences = was.differences(&PlanFile::of(job));
+    Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
 }
 
 fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Result<(), StoreError> {
@@ -335,16 +347,23 @@ fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Resu
 
 /// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers' files stay.
 fn clear(folder: &Folder) -> Result<(), StoreError> {
-    const OURS: [&str; 6] = ["plan.json", "shards.json", "chunk-", "session-", "shard-", ".sweep-"];
     atomic::remove(&folder.plan())?;
-    for entry in fs::read_dir(&folder.path).map_err(StoreError::io("list", &folder.path))? {
-        let entry = entry.map_err(StoreError::io("list", &folder.path))?;
-        let name = entry.file_name();
-        if name.to_str().is_some_and(|name| OURS.iter().any(|ours| name.starts_with(ours))) {
-            atomic::remove(&entry.path())?;
+    for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
+        if name.to_str().is_some_and(is_ours) {
+            atomic::remove(&folder.path.join(name))?;
         }
     }
-    atomic::sync_folder(&folder.path)
+    Ok(atomic::sync_folder(&folder.path)?)
+}
+
+/// Whether a run writes files of this name into its folder, the lock aside.
+fn is_ours(name: &str) -> bool {
+    let whole = name.strip_suffix(".damaged").unwrap_or(name);
+    ["plan.json", "shards.json"].contains(&whole)
+        || chunk_of_name(whole).is_some()
+        || lock::shard_of_name(name).is_some()
+        || provenance::is_session(name)
+        || atomic::is_temporary(name)
 }
 
 /// Removes a folder that has served; the result does not depend on it, so a failure is only worth a note.

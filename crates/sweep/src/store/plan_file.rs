@@ -8,12 +8,12 @@ use std::path::Path;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::atomic;
 use super::error::StoreError;
 use super::{Folder, Job};
+use crate::files::{atomic, regular};
 
 /// Format of `plan.json`; a folder of another format is another plan.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// What `plan.json` says.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -23,7 +23,10 @@ pub(crate) struct PlanFile {
     pub(crate) format: u32,
     /// Version of the program that began the run; another one might round differently.
     pub(crate) version: String,
-    /// Hash of version and plan, hexadecimal, as in every chunk's header.
+    /// Version of its numerics; files of format 1 had none.
+    #[serde(default)]
+    pub(crate) numerics: u32,
+    /// Hash of version, numerics and plan, hexadecimal, as in every chunk's header.
     pub(crate) plan_hash: String,
     /// Rows of the result.
     pub(crate) points: u64,
@@ -48,6 +51,7 @@ impl PlanFile {
         Self {
             format: FORMAT,
             version: job.version.to_owned(),
+            numerics: job.numerics,
             plan_hash: job.hash().to_hex().to_string(),
             points: job.points,
             chunk_points: super::chunk_points(job.points),
@@ -58,13 +62,16 @@ impl PlanFile {
     /// Reads the plan of a run folder.
     pub(crate) fn read(folder: &Folder) -> Result<Found, StoreError> {
         let path = folder.plan();
-        let text = match fs::read(&path) {
+        let text = match regular::read(&path) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
             Err(error) => return Err(StoreError::io("read", &path)(error)),
         };
-        let whole =
-            |found: &Self| plan_hash(&found.version, &found.plan).to_hex().as_str() == found.plan_hash;
+        // Of another format it is enough that it is one: the run is refused with what differs.
+        let whole = |found: &Self| {
+            let hash = plan_hash(&found.version, found.numerics, &found.plan);
+            found.format != FORMAT || hash.to_hex().as_str() == found.plan_hash
+        };
         Ok(match serde_json::from_slice::<Self>(&text) {
             Ok(found) if whole(&found) => Found::Plan(Box::new(found)),
             _ => Found::Damaged,
@@ -76,12 +83,14 @@ impl PlanFile {
         let value = json!({
             "format": self.format,
             "version": self.version,
+            "numerics": self.numerics,
             "plan_hash": self.plan_hash,
             "points": self.points,
             "chunk_points": self.chunk_points,
             "plan": self.plan,
         });
-        atomic::create(&folder.path, &folder.plan(), &pretty(&value)).map(|_first| ())
+        atomic::create(&folder.path, &folder.plan(), &pretty(&value))?;
+        Ok(())
     }
 
     /// Where the plans part; empty if they are the same.
@@ -98,10 +107,12 @@ pub(crate) fn pretty(value: &Value) -> Vec<u8> {
     format!("{value:#}\n").into_bytes()
 }
 
-/// Hash of the version that runs and the plan it runs.
-pub(crate) fn plan_hash(version: &str, plan: &Value) -> blake3::Hash {
+/// Hash of the build that runs and the plan it runs.
+pub(crate) fn plan_hash(version: &str, numerics: u32, plan: &Value) -> blake3::Hash {
     let mut hasher = blake3::Hasher::new();
     hasher.update(version.as_bytes());
+    hasher.update(b"\n");
+    hasher.update(numerics.to_string().as_bytes());
     hasher.update(b"\n");
     hasher.update(plan.to_string().as_bytes());
     hasher.finalize()
@@ -112,6 +123,7 @@ fn comparable(file: &PlanFile) -> Value {
     let mut value = file.plan.clone();
     if let Value::Object(map) = &mut value {
         map.insert("sweep_version".into(), file.version.clone().into());
+        map.insert("numerics".into(), file.numerics.into());
         map.insert("store_format".into(), file.format.into());
         map.insert("chunk_points".into(), file.chunk_points.into());
     }
@@ -227,7 +239,8 @@ mod tests {
     fn floats_survive_the_file_so_the_hash_does() {
         let plan = json!({ "x": 0.1 + 0.2, "y": 1e-300 / 3.0, "z": 2.0e-4, "n": 5e-324 });
         let back: Value = serde_json::from_slice(&serde_json::to_vec_pretty(&plan).unwrap()).unwrap();
-        assert_eq!(plan_hash("1", &plan), plan_hash("1", &back));
-        assert_ne!(plan_hash("1", &plan), plan_hash("2", &plan));
+        assert_eq!(plan_hash("1", 1, &plan), plan_hash("1", 1, &back));
+        assert_ne!(plan_hash("1", 1, &plan), plan_hash("2", 1, &plan));
+        assert_ne!(plan_hash("1", 1, &plan), plan_hash("1", 2, &plan));
     }
 }

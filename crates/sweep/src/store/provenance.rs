@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::error::StoreError;
 use super::open::Run;
 use super::read::Tally;
-use super::{Folder, Job, atomic};
+use super::{Folder, Job};
+use crate::files::{atomic, regular};
 
 /// How one process worked on a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,6 +46,7 @@ pub struct Session {
 struct Sidecar<'a> {
     file: String,
     version: &'a str,
+    numerics: u32,
     plan_hash: String,
     points: u64,
     /// Sum over the sessions, so shards count as if one after the other.
@@ -63,14 +65,14 @@ impl Run {
     /// Leaves a word about this process's work in the folder, for the sidecar of whoever finishes the run.
     ///
     /// # Errors
-    /// [`StoreError::Io`].
+    /// [`StoreError::File`].
     pub fn record(&self, session: &Session) -> Result<(), StoreError> {
         let name = format!("session-{}-{}-{}.json", session.host, session.pid, session.started_unix_s);
         let path = self.folder().join(name.replace(['/', '\0'], "_"));
         let text = serde_json::to_vec_pretty(session)
             .map_err(io::Error::from)
             .map_err(StoreError::io("write", &path))?;
-        atomic::write(self.folder(), &path, &text)
+        Ok(atomic::write(self.folder(), &path, &text)?)
     }
 }
 
@@ -90,6 +92,7 @@ pub(super) fn sidecar(
     let sidecar = Sidecar {
         file: folder.output.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         version: job.version,
+        numerics: job.numerics,
         plan_hash: job.hash().to_hex().to_string(),
         points: job.points,
         wall_s,
@@ -113,14 +116,18 @@ pub(super) fn sidecar(
 /// Sessions on record; one that cannot be read tells nothing.
 fn recorded(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     let mut sessions = Vec::new();
-    for entry in fs::read_dir(&folder.path).map_err(StoreError::io("list", &folder.path))? {
-        let entry = entry.map_err(StoreError::io("list", &folder.path))?;
-        if entry.file_name().to_str().is_some_and(|name| name.starts_with("session-")) {
-            let text = fs::read(entry.path()).unwrap_or_default();
+    for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
+        if name.to_str().is_some_and(is_session) {
+            let text = regular::read(&folder.path.join(name)).unwrap_or_default();
             sessions.extend(serde_json::from_slice::<Session>(&text).ok());
         }
     }
     Ok(sessions)
+}
+
+/// Whether [`Run::record`] writes files of this name.
+pub(super) fn is_session(name: &str) -> bool {
+    name.starts_with("session-") && name.ends_with(".json")
 }
 
 /// This machine's name.

@@ -1,7 +1,7 @@
 //! Reading Parquet files back: whose plan a result is of, what it holds, what any file's columns range over.
 
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -10,15 +10,14 @@ use arrow_array::types::UInt64Type;
 use arrow_array::{Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType};
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::errors::ParquetError;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 use serde_json::Value;
 
 use super::error::StoreError;
-use super::schema::key;
 use crate::cells;
+use crate::files::{FileKind, ParquetFile, key};
 use crate::verdict::ROW_STATUSES;
 
 /// A finished result's own word about itself.
@@ -26,63 +25,51 @@ use crate::verdict::ROW_STATUSES;
 pub struct ResultFile {
     /// Grid as run, full machine, method.
     pub plan: Value,
-    /// Hash over version and plan, hexadecimal.
+    /// Hash over version, numerics and plan, hexadecimal.
     pub plan_hash: String,
     /// Version of the program that made it.
     pub version: String,
+    /// Version of its numerics; 0 in files older than that.
+    pub numerics: u32,
     /// Rows.
     pub points: u64,
 }
 
-/// What stands where a result may be.
-pub(crate) enum Finished {
-    Absent,
-    Result(Box<ResultFile>),
-    /// Not a result of a sweep, and why.
-    Foreign(String),
+impl ResultFile {
+    /// What the metadata says.
+    ///
+    /// # Errors
+    /// [`StoreError::Parquet`] for a file that is no result of a run.
+    pub(crate) fn of(file: &ParquetFile) -> Result<Self, StoreError> {
+        own_word(file).ok_or_else(|| {
+            let reason = "its metadata is not that of a result of `sweep run`";
+            StoreError::parquet("read", file.path())(ParquetError::General(reason.into()))
+        })
+    }
 }
 
-/// Looks at an output's metadata alone.
-pub(crate) fn finished(path: &Path) -> Result<Finished, StoreError> {
-    let file = match File::open(path) {
-        Ok(file) => file,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Finished::Absent),
-        Err(error) => return Err(StoreError::io("open", path)(error)),
-    };
-    let reader = match ParquetRecordBatchReaderBuilder::try_new(file) {
-        Ok(reader) => reader,
-        Err(error) => return Ok(Finished::Foreign(error.to_string())),
-    };
-    Ok(match own_word(&reader) {
-        Some(result) => Finished::Result(Box::new(result)),
-        None if has_points(&reader) => {
-            Finished::Foreign(format!("it has no `{}` in its metadata", key::PLAN))
-        }
-        None => Finished::Foreign("it has no column `point`, as the result of a run has".into()),
-    })
-}
-
-/// Other files of this program carry the plan too: a boundary's rows are not points.
-fn has_points(reader: &ParquetRecordBatchReaderBuilder<File>) -> bool {
-    reader.schema().column_with_name("point").is_some()
-}
-
-fn own_word(reader: &ParquetRecordBatchReaderBuilder<File>) -> Option<ResultFile> {
-    if !has_points(reader) {
+fn own_word(file: &ParquetFile) -> Option<ResultFile> {
+    // Other files of this program carry the plan too: a boundary's rows are not points.
+    if !FileKind::Map.has_keys(&|key| file.value(key).is_some()) {
         return None;
     }
-    let plan = metadata(reader, key::PLAN)?;
     Some(ResultFile {
-        plan: serde_json::from_str(&plan).ok()?,
-        plan_hash: metadata(reader, key::PLAN_HASH)?,
-        version: metadata(reader, key::VERSION)?,
-        points: u64::try_from(reader.metadata().file_metadata().num_rows()).ok()?,
+        plan: serde_json::from_str(file.value(key::PLAN)?).ok()?,
+        plan_hash: file.value(key::PLAN_HASH)?.to_owned(),
+        version: file.value(key::VERSION)?.to_owned(),
+        numerics: file.value(key::NUMERICS).and_then(|numerics| numerics.parse().ok()).unwrap_or(0),
+        points: file.rows(),
     })
 }
 
-fn metadata(reader: &ParquetRecordBatchReaderBuilder<File>, key: &str) -> Option<String> {
-    let pairs = reader.metadata().file_metadata().key_value_metadata()?;
-    pairs.iter().find(|pair| pair.key == key)?.value.clone()
+/// The finished file at an output, checked; `None` if nothing is there yet.
+pub(crate) fn finished(path: &Path) -> Result<Option<ParquetFile>, StoreError> {
+    match fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        // What some programs make of a file before its content.
+        Ok(found) if found.len() == 0 => Ok(None),
+        _ => Ok(Some(ParquetFile::open(path)?)),
+    }
 }
 
 /// A value that stands out, and where.
@@ -155,18 +142,18 @@ impl Serialize for StatusCounts {
 /// Counts a result file's rows, in bounded memory.
 ///
 /// # Errors
-/// [`StoreError::Io`] and [`StoreError::Parquet`], the latter also for a file that lacks a result's columns.
-pub fn tally(path: &Path) -> Result<Tally, StoreError> {
+/// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
+pub(crate) fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
     const COLUMNS: [&str; 8] =
         ["point", "status", "reliable", "sensitive", "method", "error", "ratio_max", "min_gap_nonlinear_m"];
-    let failed = |error| StoreError::parquet("read", path)(error);
-    let builder = builder(path)?;
-    let mask = ProjectionMask::columns(builder.parquet_schema(), COLUMNS);
-    let reader = builder.with_projection(mask).build().map_err(failed)?;
+    let failed = StoreError::parquet("read", file.path());
     let mut tally = Tally::default();
-    for batch in reader {
-        let batch = batch.map_err(|error| failed(error.into()))?;
-        count(&batch, &mut tally).map_err(failed)?;
+    let batches = file.batches(|builder| {
+        let mask = ProjectionMask::columns(builder.parquet_schema(), COLUMNS);
+        builder.with_projection(mask)
+    })?;
+    for batch in batches {
+        count(&batch?, &mut tally).map_err(&failed)?;
     }
     Ok(tally)
 }
@@ -225,17 +212,17 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
 
 /// What one column of any file holds.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ColumnRange {
+pub(crate) struct ColumnRange {
     /// Name.
-    pub name: String,
+    pub(crate) name: String,
     /// Unit from the field's metadata, if it carries one.
-    pub unit: Option<String>,
+    pub(crate) unit: Option<String>,
     /// Rows without a value.
-    pub nulls: u64,
+    pub(crate) nulls: u64,
     /// Least and greatest value of a numeric column that has any.
-    pub range: Option<(f64, f64)>,
+    pub(crate) range: Option<(f64, f64)>,
     /// How often each value of a text or bool column occurs; the first `NAMES_SHOWN` to appear.
-    pub names: Vec<(String, u64)>,
+    pub(crate) names: Vec<(String, u64)>,
 }
 
 /// A text column of more different values is not a list of names.
@@ -243,28 +230,21 @@ const NAMES_SHOWN: usize = 16;
 
 /// What any Parquet file holds.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Overview {
+pub(crate) struct Overview {
     /// Its own word, if it is a result of a sweep.
-    pub result: Option<ResultFile>,
+    pub(crate) result: Option<ResultFile>,
     /// Rows.
-    pub rows: u64,
+    pub(crate) rows: u64,
     /// Columns in order.
-    pub columns: Vec<ColumnRange>,
-    /// The program that wrote it.
-    pub created_by: Option<String>,
+    pub(crate) columns: Vec<ColumnRange>,
 }
 
 /// Reads through a file, in bounded memory.
 ///
 /// # Errors
-/// [`StoreError::Io`] and [`StoreError::Parquet`].
-pub fn overview(path: &Path) -> Result<Overview, StoreError> {
-    let failed = |error| StoreError::parquet("read", path)(error);
-    let builder = builder(path)?;
-    let file = builder.metadata().file_metadata();
-    let (created_by, rows) =
-        (file.created_by().map(str::to_owned), u64::try_from(file.num_rows()).unwrap_or(0));
-    let result = own_word(&builder);
+/// [`StoreError::File`] and [`StoreError::Parquet`].
+pub(crate) fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
+    let failed = StoreError::parquet("read", file.path());
     let new = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
         name: field.name().clone(),
         unit: field.metadata().get("unit").cloned().filter(|unit| !unit.is_empty()),
@@ -272,15 +252,13 @@ pub fn overview(path: &Path) -> Result<Overview, StoreError> {
         range: None,
         names: Vec::new(),
     };
-    let mut columns: Vec<ColumnRange> = builder.schema().fields().iter().map(new).collect();
-    let reader: ParquetRecordBatchReader = builder.build().map_err(failed)?;
-    for batch in reader {
-        let batch = batch.map_err(|error| failed(error.into()))?;
-        for (column, array) in columns.iter_mut().zip(batch.columns()) {
+    let mut columns: Vec<ColumnRange> = file.schema().fields().iter().map(new).collect();
+    for batch in file.batches(|builder| builder)? {
+        for (column, array) in columns.iter_mut().zip(batch?.columns()) {
             column.widen(array).map_err(|error| failed(error.into()))?;
         }
     }
-    Ok(Overview { result, rows, columns, created_by })
+    Ok(Overview { result: own_word(file), rows: file.rows(), columns })
 }
 
 impl ColumnRange {
@@ -319,24 +297,18 @@ impl ColumnRange {
 /// Numeric columns of one row, counted from 0.
 ///
 /// # Errors
-/// [`StoreError::Io`] and [`StoreError::Parquet`], the latter also for a row or column that is not there.
-pub fn row(path: &Path, row: u64, columns: &[&str]) -> Result<Vec<f64>, StoreError> {
-    let failed = |error| StoreError::parquet("read", path)(error);
+/// [`StoreError::File`], and [`StoreError::Parquet`] for a row or column that is not there.
+pub(crate) fn row(file: &ParquetFile, row: u64, columns: &[&str]) -> Result<Vec<f64>, StoreError> {
+    let failed = StoreError::parquet("read", file.path());
     let absent = || ParquetError::General(format!("there is no row {row} with all of {columns:?}"));
-    let builder = builder(path)?;
-    let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().copied());
-    let reader =
-        builder.with_projection(mask).with_offset(usize::try_from(row).unwrap_or(usize::MAX)).with_limit(1);
-    let batch = reader.build().map_err(failed)?.next().ok_or_else(absent).map_err(failed)?;
-    let batch = batch.map_err(|error| failed(error.into()))?;
+    let mut batches = file.batches(|builder| {
+        let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().copied());
+        builder.with_projection(mask).with_offset(usize::try_from(row).unwrap_or(usize::MAX)).with_limit(1)
+    })?;
+    let batch = batches.next().ok_or_else(absent).map_err(&failed)??;
     let value = |name: &&str| {
         let column = batch.column_by_name(name).ok_or_else(absent)?;
         cells::numbers(column)?.first().copied().flatten().ok_or_else(absent)
     };
-    columns.iter().map(value).collect::<Result<_, _>>().map_err(failed)
-}
-
-fn builder(path: &Path) -> Result<ParquetRecordBatchReaderBuilder<File>, StoreError> {
-    let file = File::open(path).map_err(StoreError::io("open", path))?;
-    ParquetRecordBatchReaderBuilder::try_new(file).map_err(StoreError::parquet("read", path))
+    columns.iter().map(value).collect::<Result<_, _>>().map_err(&failed)
 }

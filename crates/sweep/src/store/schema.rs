@@ -18,6 +18,7 @@ use washer_model::Channel;
 
 use super::Job;
 use crate::engine::Level;
+use crate::files::key;
 use crate::measures::Measures;
 use crate::outcome::{Outcome, Trajectory};
 use crate::verdict::{ROW_STATUSES, Verdict, row_status};
@@ -28,18 +29,6 @@ pub(crate) const ROW_GROUP_ROWS: usize = 1 << 17;
 
 /// Rows handed to the Parquet writer at once: fixed for the same reason, and a whole number of them makes a group.
 pub(crate) const BATCH_ROWS: usize = 1 << 12;
-
-/// Keys of the file's own key-value metadata.
-pub mod key {
-    /// The plan as JSON: grid as run, full machine, method.
-    pub const PLAN: &str = "sweep.plan";
-    /// Hash over version and plan, hexadecimal.
-    pub const PLAN_HASH: &str = "sweep.plan_hash";
-    /// Version of the program.
-    pub const VERSION: &str = "sweep.version";
-    /// JSON object: column name to `type`, `unit`, `description`.
-    pub const COLUMNS: &str = "sweep.columns";
-}
 
 /// A swept parameter as a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -321,6 +310,7 @@ pub(crate) fn properties(job: &Job<'_>) -> WriterProperties {
         pair(key::PLAN, job.plan.to_string()),
         pair(key::PLAN_HASH, job.hash().to_hex().to_string()),
         pair(key::VERSION, job.version.to_owned()),
+        pair(key::NUMERICS, job.numerics.to_string()),
         pair(key::COLUMNS, job.layout.dictionary().to_string()),
     ];
     let builder = WriterProperties::builder()

@@ -10,9 +10,11 @@ use std::str::FromStr;
 use serde::Deserialize;
 use serde_json::json;
 
+use super::Folder;
 use super::error::StoreError;
 use super::plan_file::pretty;
-use super::{Folder, atomic};
+use crate::files::{atomic, regular};
+use crate::threads::Environment;
 
 /// More parts than any scheduler's array has tasks; a bound for loops over them.
 const MAX_SHARDS: u64 = 1_000_000;
@@ -87,7 +89,7 @@ impl Dealing {
     /// only says who computes a chunk, never what is in it.
     pub(crate) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
         let path = folder.shards();
-        match std::fs::read(&path) {
+        match regular::read(&path) {
             Ok(text) => Ok(serde_json::from_slice(&text)
                 .ok()
                 .filter(|dealing: &Self| (1..=MAX_SHARDS).contains(&dealing.shards))),
@@ -118,13 +120,13 @@ impl Dealing {
         }
         match Self::read(folder)? {
             Some(frozen) => Ok(frozen),
-            None => atomic::write(&folder.path, &path, &text).map(|()| self),
+            None => {
+                atomic::write(&folder.path, &path, &text)?;
+                Ok(self)
+            }
         }
     }
 }
-
-/// Where a scheduler's word is looked up; the process environment outside tests.
-pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 /// The part this process is to compute and the dealing it assumes: from the request, else from a Slurm array or a
 /// Kubernetes Indexed Job, read against what is already frozen. `None` means the whole run.

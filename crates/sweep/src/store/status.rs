@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::chunk::{Place, Shape};
 use super::error::{Holder, StoreError};
-use super::open::{ChunkFile, chunks_named, read_chunk};
+use super::open::{self, ChunkFile, chunks_named, read_chunk};
 use super::plan_file::{Found, PlanFile};
-use super::read::{self, Finished, StatusCounts};
+use super::read::StatusCounts;
 use super::shard::{self, Dealing};
 use super::{Folder, Job, chunk_points, lock};
 use crate::verdict::row_status;
@@ -60,7 +60,8 @@ pub struct FolderStatus {
     pub missing_shards: String,
 }
 
-/// Looks at an output and its folder. A folder that holds another plan is an error, as it would be for a run.
+/// Looks at an output and its folder. What would stop a run is an error here too: another plan in
+/// the folder, another result or another file at the output, a damaged result.
 ///
 /// # Errors
 /// As [`super::Run::open`], but never [`StoreError::Busy`].
@@ -127,17 +128,13 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
 }
 
 fn finished(folder: &Folder, job: &Job<'_>, mut status: FolderStatus) -> Result<FolderStatus, StoreError> {
-    match read::finished(&folder.output)? {
-        Finished::Result(file) if file.plan_hash == job.hash().to_hex().as_str() => {
-            let tally = read::tally(&folder.output)?;
-            status.state = State::Finished;
-            status.points_done = tally.points;
-            status.points_failed = tally.by_status.failed();
-            status.by_status = tally.by_status;
-            status.chunks_done = status.chunks;
-            status.chunks_missing = 0;
-            Ok(status)
-        }
-        _ => Ok(status),
+    if let Some((_, tally)) = open::finished(folder, job)? {
+        status.state = State::Finished;
+        status.points_done = tally.points;
+        status.points_failed = tally.by_status.failed();
+        status.by_status = tally.by_status;
+        status.chunks_done = status.chunks;
+        status.chunks_missing = 0;
     }
+    Ok(status)
 }

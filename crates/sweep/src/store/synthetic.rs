@@ -27,6 +27,7 @@ pub(crate) fn job(points: u64) -> Job<'static> {
     Job {
         plan: json!({ "name": "synthetic", "points": points, "step_s": 2.0e-4 }),
         version: "0.0.0-test",
+        numerics: 1,
         points,
         layout: layout(),
         axis_values: Box::new(|point| vec![0.05 * (point / 9 + 1) as f64, 60.0 + 10.0 * (point % 9) as f64]),

@@ -14,6 +14,7 @@ use tempfile::TempDir;
 use super::*;
 use crate::cells;
 use crate::exit::Exit;
+use crate::files::FileError;
 use crate::verdict::{ROW_STATUSES, Verdict, row_status};
 
 const POINTS: u64 = 81;
@@ -41,7 +42,7 @@ fn options() -> Options<'static> {
 fn open(output: &Path, job: &Job<'_>) -> Run {
     match Run::open(output, job, options()).unwrap() {
         Opened::Run(run) => *run,
-        Opened::Finished(file) => panic!("finished: {file:?}"),
+        Opened::Finished(file, _) => panic!("finished: {file:?}"),
     }
 }
 
@@ -154,7 +155,16 @@ fn the_file_says_what_it_is_and_nothing_of_where_or_when() {
     assert_eq!(file.created_by(), Some("sweep version 0.0.0-test"));
     let pairs = file.key_value_metadata().unwrap();
     let keys: Vec<&str> = pairs.iter().map(|pair| pair.key.as_str()).collect();
-    assert_eq!(keys, ["sweep.plan", "sweep.plan_hash", "sweep.version", "sweep.columns", "ARROW:schema"]);
+    let expected = [
+        "sweep.plan",
+        "sweep.plan_hash",
+        "sweep.version",
+        "sweep.numerics",
+        "sweep.columns",
+        "ARROW:schema",
+        "sweep.digest",
+    ];
+    assert_eq!(keys, expected);
     assert_eq!(serde_json::from_str::<Value>(pairs[0].value.as_ref().unwrap()).unwrap(), job.plan);
     assert_eq!(reader.schema().field(1).metadata()["unit"], "kg");
     let bytes = fs::read(home.output()).unwrap();
@@ -289,10 +299,11 @@ fn a_finished_output_is_left_alone() {
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
-    let Opened::Finished(file) = Run::open(&home.output(), &job, options()).unwrap() else {
+    let Opened::Finished(file, tally) = Run::open(&home.output(), &job, options()).unwrap() else {
         panic!("is done")
     };
     assert_eq!((file.points, &file.plan), (POINTS, &job.plan));
+    assert_eq!((file.numerics, tally.points), (1, POINTS));
     assert!(!home.partial().exists());
 
     let other = Job { plan: json!({ "name": "other" }), ..synthetic::job(POINTS) };
@@ -312,11 +323,154 @@ fn a_finished_output_is_left_alone() {
 }
 
 #[test]
+fn another_build_of_the_version_is_another_run() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let other = Job { numerics: 2, ..synthetic::job(POINTS) };
+    let refusal = |what: Result<Opened, StoreError>| {
+        let error = what.unwrap_err();
+        assert_eq!(error.exit(), Exit::BadInput);
+        assert!(error.to_string().contains("/numerics: was 1, is 2"), "{error}");
+    };
+    let run = open(&home.output(), &job);
+    write(&run, 0);
+    drop(run);
+    refusal(Run::open(&home.output(), &other, options()));
+    refusal(Run::open_for_merge(&home.output(), &other));
+    assert!(status(&home.output(), &other).unwrap_err().to_string().contains("/numerics: was 1, is 2"));
+
+    // A chunk of that build under this one's plan.
+    let foreign = write_bytes(&other, 3);
+    fs::write(home.partial().join(chunk_name(3)), foreign).unwrap();
+    let mut run = open(&home.output(), &job);
+    assert!(run.is_missing(3) && !run.is_missing(0));
+    let notes = run.take_notes();
+    assert!(notes[0].contains("another plan, place or version"), "{notes:?}");
+
+    write_missing(&run);
+    finish(run, &job);
+    refusal(Run::open(&home.output(), &other, options()));
+    let fresh = Options { fresh: true, ..options() };
+    assert!(matches!(Run::open(&home.output(), &other, fresh).unwrap(), Opened::Run(_)));
+}
+
+#[test]
+fn a_folder_of_an_older_format_is_refused_as_such() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    fs::create_dir(home.partial()).unwrap();
+    let old = json!({
+        "format": 1, "version": job.version, "plan_hash": "00", "points": POINTS, "chunk_points": 8,
+        "plan": job.plan,
+    });
+    fs::write(home.partial().join("plan.json"), old.to_string()).unwrap();
+    let error = Run::open(&home.output(), &job, options()).unwrap_err();
+    assert_eq!(error.exit(), Exit::BadInput);
+    let text = error.to_string();
+    assert!(text.contains("/store_format: was 1, is 2") && text.contains("/numerics: was 0"), "{text}");
+}
+
+#[test]
+fn no_flipped_bit_of_a_result_is_taken_for_it() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let run = open(&home.output(), &job);
+    write_missing(&run);
+    finish(run, &job);
+    let whole = fs::read(home.output()).unwrap();
+    let mut damaged = 0;
+    for at in 0..whole.len() {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 1 << (at % 8);
+        fs::write(home.output(), &bytes).unwrap();
+        let error = Run::open(&home.output(), &job, options()).unwrap_err();
+        let text = error.to_string();
+        damaged += u64::from(matches!(error, StoreError::File(FileError::Damaged { .. })));
+        assert!(text.contains("x.parquet") && text.contains("= help: "), "byte {at}: {text}");
+        assert!(status(&home.output(), &job).is_err() && Run::open_for_merge(&home.output(), &job).is_err());
+        assert!(fs::read(home.output()).unwrap() == bytes && !home.partial().exists(), "byte {at}");
+    }
+    // The others have lost what makes them a result of ours: the end of the file, a key of the
+    // metadata.
+    assert!(damaged * 100 > whole.len() as u64 * 98, "{damaged} of {} bytes", whole.len());
+}
+
+#[test]
+fn a_result_whose_digest_is_cut_out_is_no_result_of_this_build() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let run = open(&home.output(), &job);
+    write_missing(&run);
+    finish(run, &job);
+    let mut bytes = fs::read(home.output()).unwrap();
+    let at = bytes.windows(12).rposition(|window| window == b"sweep.digest").unwrap();
+    bytes[at + 6] = b'D';
+    fs::write(home.output(), &bytes).unwrap();
+    let error = Run::open(&home.output(), &job, options()).unwrap_err();
+    assert!(matches!(error, StoreError::File(FileError::Damaged { .. })), "{error}");
+}
+
+#[test]
+fn results_that_differ_after_a_dot_have_a_sidecar_each() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    for (name, sidecar) in [("v1.0", "v1.0.run.json"), ("v1.5", "v1.5.run.json"), ("x.parquet", "x.run.json")]
+    {
+        let output = home.0.path().join(name);
+        let run = open(&output, &job);
+        write_missing(&run);
+        finish(run, &job);
+        let text = fs::read_to_string(home.0.path().join(sidecar)).unwrap();
+        assert_eq!(serde_json::from_str::<Value>(&text).unwrap()["file"], name);
+    }
+    // A result whose sidecar would be another's, and a stranger's file of its name.
+    let refused = |output: &Path| {
+        let error = Run::open(output, &job, options()).unwrap_err();
+        assert_eq!(error.exit(), Exit::BadInput);
+        assert!(error.to_string().contains("is no account of the run with this --out"), "{error}");
+    };
+    refused(&home.0.path().join("x"));
+    let mine = home.0.path().join("y.run.json");
+    fs::write(&mine, r#"{ "mine": true }"#).unwrap();
+    refused(&home.0.path().join("y.parquet"));
+    assert_eq!(fs::read_to_string(mine).unwrap(), r#"{ "mine": true }"#);
+    assert!(!home.0.path().join("y.parquet.partial").exists());
+}
+
+#[test]
+fn starting_over_deletes_what_a_run_wrote_and_nothing_else() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let run = open(&home.output(), &job);
+    write_missing(&run);
+    drop(run);
+    let damaged = format!("{}.damaged", chunk_name(2));
+    let theirs = ["chunk-notes.txt", "session-notes.md", "shard-plan.txt", "plan.json.old"];
+    for name in theirs.into_iter().chain([damaged.as_str(), "shard-3.lock"]) {
+        fs::write(home.partial().join(name), "").unwrap();
+    }
+    let fresh = Options { fresh: true, ..options() };
+    drop(Run::open(&home.output(), &job, fresh).unwrap());
+    let mut left: Vec<String> = fs::read_dir(home.partial())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    left.sort();
+    assert_eq!(
+        left,
+        ["chunk-notes.txt", "lock", "plan.json", "plan.json.old", "session-notes.md", "shard-plan.txt"]
+    );
+}
+
+#[test]
 fn a_strangers_file_is_not_overwritten() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     fs::write(home.output(), "my thesis").unwrap();
-    let error = Run::open(&home.output(), &job, options()).unwrap_err();
-    assert!(matches!(error, StoreError::OutputForeign { .. }) && error.exit() == Exit::BadInput, "{error}");
+    for fresh in [false, true] {
+        let error = Run::open(&home.output(), &job, Options { fresh, ..options() }).unwrap_err();
+        assert_eq!(error.exit(), Exit::BadInput);
+        assert!(error.to_string().contains("is no result of `sweep run`"), "{error}");
+    }
+    for error in
+        [Run::open_for_merge(&home.output(), &job).unwrap_err(), status(&home.output(), &job).unwrap_err()]
+    {
+        assert!(error.to_string().contains("is no result of `sweep run`"), "{error}");
+    }
+    assert_eq!(fs::read(home.output()).unwrap(), b"my thesis");
     assert!(!home.partial().exists());
     let error = Run::open(home.0.path(), &job, options()).unwrap_err();
     assert!(error.to_string().contains("it is a folder"), "{error}");
@@ -338,7 +492,7 @@ fn death_between_publishing_and_removing_the_folder_loses_nothing() {
     // The same, half-way through the removal: the plan goes first.
     fs::create_dir(home.partial()).unwrap();
     fs::write(home.partial().join(chunk_name(3)), "left").unwrap();
-    assert!(matches!(Run::open(&home.output(), &job, options()).unwrap(), Opened::Finished(_)));
+    assert!(matches!(Run::open(&home.output(), &job, options()).unwrap(), Opened::Finished(..)));
     assert!(!home.partial().exists());
 }
 
@@ -391,7 +545,7 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
         let shard = Some(ShardRequest::Given(Shard { index, of: 4 }));
         match Run::open(&home.output(), &job, Options { shard, ..options() }).unwrap() {
             Opened::Run(run) => *run,
-            Opened::Finished(_) => panic!("is not done"),
+            Opened::Finished(..) => panic!("is not done"),
         }
     };
     assert!(matches!(Run::open_for_merge(&home.output(), &job).unwrap_err(), StoreError::NoRun { .. }));

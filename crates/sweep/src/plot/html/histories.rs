@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use super::embed;
+use crate::files::{FileError, regular};
 use crate::plot::error::PlotError;
 use crate::plot::grid::Grid;
 use crate::plot::label;
@@ -25,17 +26,12 @@ const BUCKETS: usize = 500;
 /// greatest in the order in which they occur, at the stretch's first and middle instant.
 ///
 /// # Errors
-/// [`PlotError::Read`] for the folder; as [`Table::open`] for its files; [`PlotError::Unfit`] for a file that is no trace
-/// or belongs to no point of the grid, and for a folder without any.
+/// [`PlotError::File`] for the folder; as [`Table::open`] for its files; [`PlotError::Unfit`] for a
+/// file that is no trace or belongs to no point of the grid, and for a folder without any.
 pub(crate) fn read(folder: &Path, map: &Table, grid: &Grid) -> Result<Value, PlotError> {
-    let unreadable = |source| PlotError::Read { path: folder.to_owned(), source };
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
-        .map_err(unreadable)?
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<Result<_, _>>()
-        .map_err(unreadable)?;
+    let names = regular::names(folder).map_err(FileError::io("list", folder))?;
+    let mut files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     files.retain(|file| file.extension().is_some_and(|ending| ending == "parquet"));
-    files.sort();
     if files.is_empty() {
         return Err(PlotError::Unfit(format!(
             "`--traces {}`: no trace files (.parquet) in it",

@@ -1,0 +1,17 @@
+//! Which build of the program made a file: what decides its bytes besides the plan.
+
+/// Version of the program.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Version of everything that decides a byte of a result: the models, the integrators, what is
+/// derived from their motions, the columns. It is raised with every change to such bytes.
+///
+/// Builds of one `VERSION` and one `NUMERICS_VERSION` write the same bytes for the same input;
+/// chunks of others are never mixed with theirs. `tests/tests/goldens.rs` fails when bytes change
+/// and this number does not; `scripts/raise_numerics.sh` raises it and writes the new hashes.
+pub const NUMERICS_VERSION: u32 = 1;
+
+/// Both, as `sweep show` prints them.
+pub(crate) fn words(version: &str, numerics: u32) -> String {
+    format!("sweep {version}, numerics {numerics}")
+}

@@ -1,0 +1,145 @@
+//! The bytes that this build writes, by every method and command that writes results: hashes that
+//! change when any byte does, together with the version of the numerics or not at all.
+//!
+//! `scripts/raise_numerics.sh` raises that version and writes the new hashes.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::{Value, json};
+use sweep::identity::{NUMERICS_VERSION, VERSION};
+use sweep_tests::sweep_binary;
+use tempfile::TempDir;
+
+/// The spin and the window of every golden: a run-up that is short, but passes the lowest
+/// resonances.
+const SPIN: &str = "machine = \"paper\"\n\
+    spin = { profile = \"triangular\", peak_rpm = 350.0, ramp_s = 0.6 }\n\
+    time = { end_s = 1.0, window_s = [0.4, 0.9] }\n";
+
+/// Three masses by three dampings.
+const AXES: &str = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.4, 0.9]\n\
+    [[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = { from = 60.0, to = 300.0, count = 3 }\n";
+
+/// A range of either parameter, for designs.
+const BOX: &str = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = { from = 0.1, to = 0.9 }\n\
+    [[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = { from = 60.0, to = 300.0 }\n";
+
+const RK4: &str = "integrator = { method = \"rk4\", step_s = 2e-4 }\n";
+
+/// Metrics and a design stand for everything that adds or changes columns.
+const METRICS: &str = "metrics = [\"cabinet_force\", \"clash_time\", \"static_sag\"]\n";
+
+/// How far frequencies may be from those on record: linear algebra is rounded by each processor in
+/// its own way.
+const MODES_TOLERANCE: f64 = 1e-9;
+
+/// What is on record.
+fn record() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("goldens.json")
+}
+
+/// Runs a command in `home` and returns what it prints.
+fn sweep(home: &TempDir, words: &[&str]) -> Vec<u8> {
+    let done = Command::new(sweep_binary())
+        .args(words)
+        .current_dir(home.path())
+        .env_remove("SLURM_ARRAY_TASK_ID")
+        .env_remove("SLURM_CPUS_PER_TASK")
+        .env_remove("JOB_COMPLETION_INDEX")
+        .output()
+        .expect("the command starts");
+    assert!(done.status.success(), "{words:?}: {}", String::from_utf8_lossy(&done.stderr));
+    done.stdout
+}
+
+/// The hash of the file that a command writes for a grid.
+fn hash(grid: &str, command: &[&str]) -> String {
+    let home = tempfile::tempdir().expect("a temporary folder");
+    fs::write(home.path().join("grid.toml"), grid).expect("the grid is written");
+    let list = "unbalance_mass_kg,damping_n_s_per_m\n0.1,80\n0.7,211.5\n0.33,120\n";
+    fs::write(home.path().join("list.csv"), list).expect("the list is written");
+    let (verb, options) = command.split_first().expect("a command has a name");
+    sweep(&home, &[&[*verb, "grid.toml", "--out", "out.parquet"], options].concat());
+    let bytes = fs::read(home.path().join("out.parquet")).expect("the command has written its file");
+    blake3::hash(&bytes).to_hex().to_string()
+}
+
+fn hashes() -> BTreeMap<&'static str, String> {
+    let run: &[&str] = &["run", "--progress", "none"];
+    let map = |integrator: &str| hash(&format!("{SPIN}integrator = {{ {integrator} }}\n{AXES}"), run);
+    let design = |design: &str| hash(&format!("{SPIN}{RK4}design = {{ {design} }}\n{BOX}"), run);
+    let judged = |criterion: &str| {
+        hash(&format!("{METRICS}{SPIN}{RK4}reliability = {{ criterion = \"{criterion}\" }}\n{AXES}"), run)
+    };
+    let point = ["--at", "unbalance_mass_kg=0.4", "--at", "damping_n_s_per_m=100"];
+    let trace: &[&str] = &["trace", "--every", "0.02", "--states", "--forces"];
+    let boundary: &[&str] = &["boundary", "--lattice", "2", "--tolerance", "2"];
+    BTreeMap::from([
+        ("map by rk4", map("method = \"rk4\", step_s = 2e-4")),
+        ("map by dopri5", map("method = \"dopri5\", rtol = 1e-5, atol = 1e-8")),
+        ("map by rodas5p", map("method = \"rodas5p\", rtol = 1e-4, atol = 1e-7")),
+        ("map by rk4-mass-scaled", map("method = \"rk4-mass-scaled\", accuracy = 1e-3")),
+        ("map by envelopes, with every metric", judged("envelope")),
+        ("map by root mean squares, with every metric", judged("rms")),
+        ("map of a latin hypercube", design("method = \"latin_hypercube\", points = 5, seed = 3")),
+        ("map of sobol's sequence", design("method = \"sobol\", points = 8, seed = 3")),
+        (
+            "map of a list",
+            hash(&format!("{SPIN}{RK4}design = {{ method = \"list\", file = \"list.csv\" }}\n"), run),
+        ),
+        ("boundary", hash(&format!("{SPIN}{RK4}{AXES}"), boundary)),
+        ("trace", hash(&format!("{SPIN}{RK4}{AXES}"), &[trace, &point].concat())),
+    ])
+}
+
+/// Frequency and damping of every mode at some speeds.
+fn modes() -> Vec<f64> {
+    let home = tempfile::tempdir().expect("a temporary folder");
+    let printed = sweep(&home, &["modes", "--speed", "0:400:200", "--json"]);
+    let found: Value = serde_json::from_slice(&printed).expect("the modes are JSON");
+    let modes = found["modes"].as_array().expect("a list of modes");
+    modes
+        .iter()
+        .flat_map(|mode| mode["at_speed"].as_array().expect("a list of speeds"))
+        .flat_map(|at| ["frequency_rpm", "damping_ratio"].map(|key| at[key].as_f64().expect("a number")))
+        .collect()
+}
+
+#[test]
+fn bytes_change_with_the_version_of_the_numerics_or_not_at_all() {
+    let (hashes, modes) = (hashes(), modes());
+    let now = json!({ "version": VERSION, "numerics": NUMERICS_VERSION, "hashes": hashes, "modes": modes });
+    let update = std::env::var_os("UPDATE_GOLDENS").is_some();
+    let text = fs::read_to_string(record()).unwrap_or_default();
+    let was: Value = serde_json::from_str(&text).unwrap_or_default();
+    let same_build = was["version"] == now["version"] && was["numerics"] == now["numerics"];
+
+    let mut changed: Vec<&str> =
+        hashes.iter().filter(|(name, hash)| was["hashes"][**name] != **hash).map(|(name, _)| *name).collect();
+    let recorded = was["modes"].as_array().cloned().unwrap_or_default();
+    let near = |was: &Value, is: &f64| {
+        was.as_f64().is_some_and(|was| (was - is).abs() <= MODES_TOLERANCE * was.abs().max(1e-3))
+    };
+    if recorded.len() != modes.len() || !recorded.iter().zip(&modes).all(|(was, is)| near(was, is)) {
+        changed.push("modes");
+    }
+    if changed.is_empty() && same_build {
+        return;
+    }
+    assert!(
+        !same_build,
+        "these bytes have changed, and NUMERICS_VERSION is still {NUMERICS_VERSION}: {}.\n\
+         If they were meant to, raise it and write the new hashes by scripts/raise_numerics.sh",
+        changed.join(", ")
+    );
+    assert!(
+        update,
+        "tests/goldens.json is of sweep {}, numerics {}; this is sweep {VERSION}, numerics {NUMERICS_VERSION}.\n\
+         Write its hashes by UPDATE_GOLDENS=1 cargo test --release -p sweep-tests --test goldens",
+        was["version"], was["numerics"]
+    );
+    fs::write(record(), format!("{now:#}\n")).expect("tests/goldens.json is written");
+}

@@ -1,0 +1,216 @@
+//! A system that gives less than is asked for: threads, memory, random numbers, closed folders.
+//! Every refusal is an error that says what and what to do, never a panic, and nothing that was
+//! computed is lost.
+
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+use sweep_tests::sweep_binary;
+use tempfile::TempDir;
+
+const GRID: &str = r#"
+[spin]
+profile = "triangular"
+peak_rpm = 350.0
+ramp_s = 50.0
+[time]
+end_s = 0.1
+window_s = [0.05, 0.1]
+[integrator]
+method = "rk4"
+step_s = 2.0e-4
+[[axis]]
+parameter = "unbalance_mass_kg"
+range = { from = 0.05, to = 1.0, count = 24 }
+"#;
+
+const RUN: &[&str] = &["run", "g.toml", "--threads", "2", "--out", "x.parquet"];
+const TRACE: &[&str] = &["trace", "g.toml", "--at", "unbalance_mass_kg=0.4", "--out", "t.parquet"];
+const BOUNDARY: &[&str] = &["boundary", "g2.toml", "--threads", "2", "--lattice", "1", "--out", "b.parquet"];
+const SHOW: &[&str] = &["show", "map.parquet"];
+const PLOT: &[&str] = &["plot", "map.parquet", "-o", "map.svg"];
+
+struct Home(TempDir);
+
+impl Home {
+    /// A folder with two grids and a finished map.
+    fn new() -> Self {
+        let home = Self(tempfile::tempdir().expect("a temporary folder"));
+        fs::write(home.path("g.toml"), GRID).expect("the grid is written");
+        let second =
+            "[[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = { from = 60.0, to = 300.0, count = 2 }\n";
+        let two_axes = format!("{}{second}", GRID.replace("count = 24", "count = 2"));
+        fs::write(home.path("g2.toml"), two_axes).expect("the grid is written");
+        fs::write(home.path("map.parquet"), undisturbed()).expect("the map is written");
+        home
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// The command behind another program's command line.
+    fn under(&self, wrapper: &[&str], words: &[&str]) -> Output {
+        let mut command = match wrapper {
+            [] => Command::new(sweep_binary()),
+            [program, options @ ..] => {
+                let mut command = Command::new(program);
+                command.args(options).arg(sweep_binary());
+                command
+            }
+        };
+        for name in ["SLURM_ARRAY_TASK_ID", "SLURM_CPUS_PER_TASK", "JOB_COMPLETION_INDEX"] {
+            command.env_remove(name);
+        }
+        command.args(words).current_dir(self.0.path()).output().expect("the command starts")
+    }
+}
+
+fn undisturbed() -> &'static [u8] {
+    static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+    BYTES.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        fs::write(folder.path().join("g.toml"), GRID).expect("the grid is written");
+        let mut command = Command::new(sweep_binary());
+        let run = command.args(RUN).current_dir(folder.path()).output().expect("the command starts");
+        assert!(run.status.success(), "{}", said(&run));
+        fs::read(folder.path().join("x.parquet")).expect("a finished run has an output")
+    })
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Whatever a command met: no panic, and words if it failed.
+fn assert_told(output: &Output, what: &str) {
+    let said = said(output);
+    assert!(!said.contains("panicked"), "{what}: {said}");
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{what}: {:?} {said}", output.status);
+    assert!(output.status.success() || said.contains("error: "), "{what}: {said}");
+}
+
+/// After that, the same run ends in the undisturbed run's bytes.
+fn assert_mends(home: &Home, what: &str) {
+    if let Ok(bytes) = fs::read(home.path("x.parquet")) {
+        assert!(bytes == undisturbed(), "{what}: a broken result stands at the output");
+    }
+    let again = home.under(&[], RUN);
+    assert!(again.status.success(), "{what}: {}", said(&again));
+    assert!(fs::read(home.path("x.parquet")).expect("a result") == undisturbed(), "{what}: other bytes");
+}
+
+/// Fails the first, second, ... of some system calls, until the command has fewer of them.
+fn at_every_call(calls: &str, error: &str, words: &[&str]) {
+    for when in 1.. {
+        let home = Home::new();
+        let (trace, inject) = (format!("trace={calls}"), format!("inject={calls}:error={error}:when={when}"));
+        let run =
+            home.under(&["strace", "-f", "-qq", "-o", "/dev/stderr", "-e", &trace, "-e", &inject], words);
+        let what = format!("{error} at {calls} {when} of {words:?}");
+        let is_hit = said(&run).contains("(INJECTED)");
+        assert_told(&run, &what);
+        if words == RUN {
+            assert_mends(&home, &what);
+        }
+        if !is_hit {
+            assert!(when > 1, "{words:?} calls none of {calls}");
+            return;
+        }
+        assert!(when < 400, "{what} has no end");
+    }
+}
+
+#[test]
+#[ignore = "needs strace; .ci/run runs it"]
+fn threads_that_cannot_be_made_are_told() {
+    for words in [RUN, TRACE, BOUNDARY] {
+        at_every_call("clone,clone3", "EAGAIN", words);
+    }
+}
+
+#[test]
+#[ignore = "needs strace; .ci/run runs it"]
+fn a_folder_that_cannot_be_closed_harms_nothing() {
+    for words in [RUN, TRACE, SHOW, PLOT] {
+        at_every_call("close", "EIO", words);
+    }
+}
+
+#[test]
+#[ignore = "needs strace; .ci/run runs it"]
+fn a_folder_that_cannot_be_listed_is_told() {
+    at_every_call("getdents64", "EIO", RUN);
+}
+
+#[test]
+#[ignore = "needs strace; .ci/run runs it"]
+fn random_numbers_that_cannot_be_had_are_told() {
+    for words in [RUN, TRACE, SHOW, PLOT] {
+        at_every_call("getrandom", "EIO", words);
+    }
+}
+
+#[test]
+fn little_address_space_is_told() {
+    let mut refused = 0;
+    for kilobytes in [24_000, 28_000, 32_000, 36_000, 40_000, 60_000, 120_000, 400_000] {
+        for words in [RUN, TRACE, BOUNDARY, SHOW, PLOT] {
+            let home = Home::new();
+            let limit = format!("ulimit -v {kilobytes}; exec \"$@\"");
+            let run = home.under(&["sh", "-c", &limit, "sh"], words);
+            refused += u32::from(!run.status.success());
+            let what = format!("{kilobytes} kB for {words:?}");
+            assert!(!said(&run).contains("panicked"), "{what}: {}", said(&run));
+            if words == RUN {
+                assert_mends(&home, &what);
+            }
+        }
+    }
+    assert!(refused > 0, "every limit was large enough");
+}
+
+#[test]
+fn more_cores_than_there_can_be_are_refused_at_once() {
+    let home = Home::new();
+    for words in [RUN, BOUNDARY, &["check", "g.toml"]] {
+        let words: Vec<&str> =
+            words.iter().copied().filter(|word| !["--threads", "2"].contains(word)).collect();
+        let slurm = ["env", "SLURM_CPUS_PER_TASK=99999999"];
+        let run = home.under(&slurm, &words);
+        assert_eq!(run.status.code(), Some(2), "{words:?}: {}", said(&run));
+        assert!(said(&run).contains("SLURM_CPUS_PER_TASK is `99999999`"), "{words:?}: {}", said(&run));
+    }
+    let given = home.under(&["env", "SLURM_CPUS_PER_TASK=99999999"], RUN);
+    assert!(given.status.success(), "--threads counts: {}", said(&given));
+}
+
+#[test]
+fn slurm_gives_the_threads_of_a_run_and_of_its_traces() {
+    let home = Home::new();
+    let words = ["run", "g.toml", "--keep-traces", "--out", "x.parquet"];
+    let run = home.under(&["env", "SLURM_CPUS_PER_TASK=3"], &words);
+    assert!(run.status.success(), "{}", said(&run));
+    assert!(said(&run).contains("on 3 threads"), "{}", said(&run));
+    // Refused for the traces as for the run, although the map is there.
+    let run = home.under(&["env", "SLURM_CPUS_PER_TASK=0"], &words);
+    assert_eq!(run.status.code(), Some(2), "{}", said(&run));
+}
+
+#[test]
+fn an_interrupted_shard_is_gone_on_with_as_that_shard() {
+    let home = Home::new();
+    let long = GRID.replace("end_s = 0.1", "end_s = 50.0").replace("count = 24", "count = 200");
+    fs::write(home.path("g.toml"), long).expect("the grid is written");
+    let script = "\"$@\" & sweep=$!\n\
+        while ! ls x.parquet.partial/chunk-* > /dev/null 2>&1; do sleep 0.05; done\n\
+        kill -TERM $sweep; wait $sweep";
+    let words = ["run", "g.toml", "--threads", "1", "--shard", "2/3", "--out", "x.parquet"];
+    let run = home.under(&["sh", "-c", script, "sh"], &words);
+    assert_eq!(run.status.code(), Some(143), "{}", said(&run));
+    assert!(said(&run).contains("go on  sweep run g.toml --out x.parquet --shard 2/3"), "{}", said(&run));
+}
