@@ -23,7 +23,7 @@ fn sweep_binary() -> PathBuf {
 /// it as a program.
 #[cfg(unix)]
 fn signal(name: &str, process: u32) {
-    let status =
-        Command::new("sh").args(["-c", &format!("kill -{name} {process}")]).status().expect("sh runs");
+    let script = format!("kill -{name} {process}");
+    let status = Command::new("sh").args(["-c", &script]).status().expect("sh runs");
     assert!(status.success(), "process {process} takes no {name}");
 }
