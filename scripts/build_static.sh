@@ -13,10 +13,7 @@ ordinary=$(realpath --canonicalize-missing "${SWEEP:-target/release/sweep}")
 static=$(realpath --canonicalize-missing "${CARGO_TARGET_DIR:-target}/$target/release/sweep")
 
 [ -d "$(rustc --print target-libdir --target "$target")" ] || rustup target add "$target"
-if ! command -v musl-gcc > /dev/null; then
-    apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends musl-tools > /dev/null \
-        || { echo "musl-gcc is missing (Debian: musl-tools)" >&2; exit 1; }
-fi
+command -v musl-gcc > /dev/null || scripts/packages.sh musl-tools
 cargo build --release --locked --target "$target" -p sweep
 [ -x "$ordinary" ] || cargo build --release --locked -p sweep
 

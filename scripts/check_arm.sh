@@ -14,9 +14,7 @@ cd "$root"
 [ -d "$(rustc --print target-libdir --target "$target")" ] || rustup target add "$target"
 if ! command -v aarch64-linux-gnu-gcc > /dev/null || ! command -v qemu-aarch64 > /dev/null \
     || [ ! -d /usr/aarch64-linux-gnu/include ]; then
-    packages=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user)
-    apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${packages[@]}" > /dev/null \
-        || { echo "no cross compiler or no emulator (Debian: ${packages[*]})" >&2; exit 1; }
+    scripts/packages.sh gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user
 fi
 emulator="qemu-aarch64 -L /usr/aarch64-linux-gnu"
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER=$emulator

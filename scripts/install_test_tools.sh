@@ -1,11 +1,33 @@
 #!/bin/sh
-# Installs what the fault tests drive: strace, unshare and mount (Debian: strace, util-linux, mount).
+# Installs all that .ci/run needs besides a Rust toolchain, in one go; what is there already stays.
+# Each script that needs a tool also installs it for itself.
+#
+# Needs root or sudo where something is missing; packages are Debian's.
 set -eu
-missing=
-for tool in strace unshare mount; do
-    command -v "$tool" >/dev/null || missing=yes
-done
-if [ -n "$missing" ]; then
-    apt-get update -qq
-    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends strace util-linux mount >/dev/null
-fi
+packages=
+needs() { # PROGRAM PACKAGE ...
+    program=$1
+    shift
+    command -v "$program" > /dev/null || packages="$packages $*"
+}
+PATH=$PATH:/usr/sbin:/sbin
+needs git git
+needs c++ g++ libc6-dev
+needs nm binutils
+# The ignored tests of `cargo test`: faults injected into system calls, disks that fill up.
+needs strace strace
+needs unshare util-linux
+needs mount mount
+# scripts/venv.sh
+needs python3 python3 python3-venv
+# tests/browser
+needs chromium chromium
+needs chromedriver chromium-driver
+# tests/slurm
+needs slurmctld slurm-wlm
+needs munged munge
+# scripts/check_arm.sh
+needs aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+needs qemu-aarch64 qemu-user
+# shellcheck disable=SC2086 # A list of words.
+"$(dirname "$0")/packages.sh" $packages

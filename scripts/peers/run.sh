@@ -9,18 +9,8 @@ repeats=${1:-3}
 work=target/peers
 mkdir -p "$work"
 
-missing=()
-for package in g++ libsundials-dev libboost-dev python3-venv; do
-  dpkg -s "$package" > /dev/null 2>&1 || missing+=("$package")
-done
-if ((${#missing[@]})); then
-  as_root=()
-  ((EUID == 0)) || as_root=(sudo)
-  "${as_root[@]}" apt-get update
-  "${as_root[@]}" apt-get install -y --no-install-recommends "${missing[@]}"
-fi
-[[ -x $work/venv/bin/python ]] || python3 -m venv "$work/venv"
-"$work/venv/bin/pip" install --quiet --requirement scripts/peers/requirements.txt
+scripts/packages.sh g++ libsundials-dev libboost-dev
+venv=$(scripts/venv.sh scripts/peers/requirements.txt)
 
 cargo build --release -p washer-capi --lib --example trajectory
 cargo build --release --bin sweep
@@ -31,4 +21,4 @@ c++ "${flags[@]}" -o "$work/odeint" scripts/peers/odeint.cpp -lwasher_capi
 
 # The last core that this shell may use; all that follows stays on it.
 core=$(taskset -pc $$ | sed 's/.*[,: -]//')
-taskset -c "$core" "$work/venv/bin/python" scripts/peers/compare.py "$repeats"
+taskset -c "$core" "$venv/bin/python" scripts/peers/compare.py "$repeats"

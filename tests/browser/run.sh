@@ -1,23 +1,19 @@
 #!/bin/sh
 # The pages of a map and of a trace in a real browser: tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
 #
-# Needs chromium and chromedriver on the PATH, and on Debian installs them if they are not there; and Python 3. What else it
-# needs goes into a virtual environment under target/. SWEEP names another binary than the release build, SHOTS a folder for screenshots.
+# Needs chromium and chromedriver on the PATH, and on Debian installs them if they are not there.
+# SWEEP names another binary than the release build, SHOTS a folder for screenshots.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)
 sweep=${SWEEP:-$root/target/release/sweep}
-venv=$root/target/browser-venv
 map=$1
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-if ! command -v chromium >/dev/null || ! command -v chromedriver >/dev/null; then
-    apt-get update -qq
-    apt-get install -qq --no-install-recommends chromium chromium-driver >/dev/null
-fi
-if [ ! -x "$venv/bin/python" ]; then python3 -m venv "$venv"; fi
-"$venv/bin/pip" install --quiet --disable-pip-version-check -r "$here/requirements.txt"
+command -v chromium > /dev/null && command -v chromedriver > /dev/null \
+    || "$root/scripts/packages.sh" chromium chromium-driver
+venv=$("$root/scripts/venv.sh" "$here/requirements.txt")
 
 if [ $# -gt 1 ]; then
     "$sweep" plot "$map" --traces "$2" -o "$work/page.html"

@@ -1,7 +1,7 @@
 //! Whatever happens to a run, running it again ends in the undisturbed run's bytes.
 //!
-//! Drives the real binary on a small grid. Needs `strace`, `unshare` and `mount` (packages strace, util-linux, mount);
-//! a missing one fails the test that needs it.
+//! Drives the real binary on a small grid. Tests that tamper with system calls need strace, those
+//! of a disk that fills up or is read-only need to mount one: they are ignored unless asked for.
 
 #![cfg(target_os = "linux")]
 
@@ -11,8 +11,9 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use sweep_tests::sweep_binary;
 use tempfile::TempDir;
+
+use crate::{signal, sweep_binary};
 
 /// Five chunks of eight points, of trajectories so short that the files are most of the work.
 const GRID: &str = r#"
@@ -70,7 +71,7 @@ impl Home {
     /// The arguments of a run: one thread, so that which call is the third does not depend on luck.
     fn arguments(&self) -> Vec<String> {
         let path = |path: PathBuf| path.to_str().expect("temporary folders are UTF-8").to_owned();
-        let mut arguments = vec![path(sweep_binary().to_owned()), "run".into(), path(self.path("grid.toml"))];
+        let mut arguments = vec![path(sweep_binary()), "run".into(), path(self.path("grid.toml"))];
         arguments.extend(["--threads".into(), "1".into(), "--out".into(), path(self.output())]);
         arguments
     }
@@ -130,19 +131,13 @@ fn spawn(command: &mut Command) -> Child {
 
 fn missing<T>(command: &Command, error: &std::io::Error) -> T {
     panic!(
-        "{:?} does not start ({error}); these tests need strace, util-linux and mount",
+        "{:?} does not start ({error}): scripts/install_test_tools.sh installs what tests need",
         command.get_program()
     )
 }
 
 fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn signal(name: &str, process: u32) {
-    let status =
-        Command::new("sh").args(["-c", &format!("kill -{name} {process}")]).status().expect("sh runs");
-    assert!(status.success(), "process {process} takes no {name}");
 }
 
 /// The process that holds the run, once it has computed something.
@@ -217,6 +212,7 @@ fn at_every_call(calls: &str, what: &str, check: impl Fn(&Output, u32)) {
 const RENAMES: &str = "rename,renameat,renameat2,linkat";
 
 #[test]
+#[ignore = "needs strace; .ci/run runs it"]
 fn killed_at_every_write() {
     at_every_call("write", "signal=SIGKILL", |run, when| {
         assert!(run.status.code() != Some(1), "write {when}: {}", said(run));
@@ -224,6 +220,7 @@ fn killed_at_every_write() {
 }
 
 #[test]
+#[ignore = "needs strace; .ci/run runs it"]
 fn killed_at_every_fsync() {
     at_every_call("fsync", "signal=SIGKILL", |run, when| {
         assert!(run.status.code() != Some(1), "fsync {when}: {}", said(run));
@@ -231,6 +228,7 @@ fn killed_at_every_fsync() {
 }
 
 #[test]
+#[ignore = "needs strace; .ci/run runs it"]
 fn killed_at_every_rename() {
     at_every_call(RENAMES, "signal=SIGKILL", |run, when| {
         assert!(run.status.code() != Some(1), "rename {when}: {}", said(run));
@@ -250,21 +248,25 @@ fn told(run: &Output, when: u32) {
 }
 
 #[test]
+#[ignore = "needs strace; .ci/run runs it"]
 fn io_error_at_every_fsync() {
     at_every_call("fsync", "error=EIO", told);
 }
 
 #[test]
+#[ignore = "needs strace; .ci/run runs it"]
 fn io_error_at_every_rename() {
     at_every_call(RENAMES, "error=EIO", told);
 }
 
 #[test]
+#[ignore = "needs strace; .ci/run runs it"]
 fn disk_full_at_every_write() {
     at_every_call("write", "error=ENOSPC", told);
 }
 
 #[test]
+#[ignore = "needs unshare and mount; .ci/run runs it"]
 fn a_disk_too_small_is_told_and_a_larger_one_is_gone_on_with() {
     let home = Home::new();
     let run = home.arguments().join("' '");
@@ -346,6 +348,7 @@ fn a_flipped_bit_and_a_truncation_are_told_and_mended() {
 }
 
 #[test]
+#[ignore = "needs strace; .ci/run runs it"]
 fn a_second_runner_is_sent_away_with_the_first_ones_process_and_a_killed_one_blocks_nobody() {
     let home = Home::new();
     let mut first = held_up(&home, 3);
@@ -364,7 +367,8 @@ fn a_second_runner_is_sent_away_with_the_first_ones_process_and_a_killed_one_blo
 }
 
 #[test]
-fn a_signal_keeps_what_is_done_and_a_second_one_leaves_at_once() {
+#[ignore = "needs strace; .ci/run runs it"]
+fn a_signal_keeps_what_is_done() {
     for (name, code) in [("TERM", 143), ("INT", 130)] {
         let home = Home::new();
         let run = held_up(&home, 1);
@@ -375,7 +379,11 @@ fn a_signal_keeps_what_is_done_and_a_second_one_leaves_at_once() {
         assert!(!home.output().exists());
         home.assert_mends(name);
     }
-    // Points that take far longer than anyone waits, so that the first signal finds the engine deep in its work.
+}
+
+#[test]
+fn a_second_signal_leaves_at_once() {
+    // Points that take far longer than anyone waits: the first signal finds the engine at work.
     let home = Home::new();
     let long = GRID.replace("end_s = 0.1", "end_s = 500.0").replace("2.0e-4", "1.0e-6");
     fs::write(home.path("grid.toml"), long).expect("the grid is written");
@@ -414,6 +422,7 @@ fn a_folder_that_cannot_be_written_is_told() {
 }
 
 #[test]
+#[ignore = "needs unshare and mount; .ci/run runs it"]
 fn a_read_only_folder_is_told_and_gone_on_with_when_it_is_not() {
     let home = Home::new();
     let disk = home.path("disk");

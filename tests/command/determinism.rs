@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::Command;
 
-use sweep_tests::sweep_binary;
+use crate::sweep_binary;
 
 /// Three chunks of eight points, of trajectories long enough to differ where a bit did.
 const GRID: &str = r#"

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use sweep_tests::sweep_binary;
+use crate::sweep_binary;
 use tempfile::TempDir;
 
 const GRID: &str = r#"

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use sweep_tests::sweep_binary;
+use crate::sweep_binary;
 use tempfile::TempDir;
 
 /// Forty points of trajectories so short that the files are most of the work.

@@ -10,7 +10,7 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 use sweep::identity::{NUMERICS_VERSION, VERSION};
-use sweep_tests::sweep_binary;
+use crate::sweep_binary;
 use tempfile::TempDir;
 
 /// The spin and the window of every golden: a run-up that is short, but passes the lowest

@@ -6,7 +6,7 @@ use std::fs;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use sweep_tests::sweep_binary;
+use crate::{signal, sweep_binary};
 
 /// A tenth of a second of every trajectory is plenty for what is tested here.
 const GRID: &str = r#"
@@ -100,8 +100,7 @@ fn an_interrupt_leaves_nothing_half_written() {
     let folder = folder_with("200");
     let child = boundary(&folder, &["--out", "x.parquet"]).stderr(Stdio::piped()).spawn().expect("it starts");
     std::thread::sleep(Duration::from_millis(500));
-    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
-    assert!(killed.success());
+    signal("INT", child.id());
     let done = child.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(130), "{said}");

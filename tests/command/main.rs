@@ -1,0 +1,32 @@
+//! The command as a user runs it: what it writes, says and leaves behind.
+//!
+//! These tests belong to the package `sweep`, whose manifest names this file, because Cargo tells
+//! only a package's own tests where its binary is. They need a Rust toolchain and a POSIX shell.
+//! A test that needs more is ignored and names what it needs; `.ci/run` installs that and runs it.
+
+#![allow(missing_docs, reason = "a test is documented by its name")]
+
+mod boundary;
+mod determinism;
+mod faults;
+mod files;
+mod goldens;
+mod limits;
+
+use std::path::PathBuf;
+use std::process::Command;
+
+/// The `sweep` binary of this build, or the one that `SWEEP_BINARY` names, such as an installed
+/// one.
+fn sweep_binary() -> PathBuf {
+    std::env::var_os("SWEEP_BINARY").map_or_else(|| env!("CARGO_BIN_EXE_sweep").into(), Into::into)
+}
+
+/// Sends a signal by its short name. `kill` is built into every shell, and only some systems have
+/// it as a program.
+#[cfg(unix)]
+fn signal(name: &str, process: u32) {
+    let script = format!("kill -{name} {process}");
+    let status = Command::new("sh").args(["-c", &script]).status().expect("sh runs");
+    assert!(status.success(), "process {process} takes no {name}");
+}
