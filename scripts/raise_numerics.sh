@@ -8,5 +8,5 @@ file=crates/sweep/src/identity.rs
 now=$(sed -n 's/^pub const NUMERICS_VERSION: u32 = \([0-9]*\);$/\1/p' "$file")
 sed "/^pub const NUMERICS_VERSION/s/$now;$/$((now + 1));/" "$file" > "$file.new"
 mv "$file.new" "$file"
-UPDATE_GOLDENS=1 cargo test --release -p sweep-tests --test goldens
+UPDATE_GOLDENS=1 cargo test --release -p sweep --test command goldens
 echo "numerics $now -> $((now + 1)); commit $file and tests/goldens.json"

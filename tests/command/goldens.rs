@@ -38,7 +38,7 @@ const MODES_TOLERANCE: f64 = 1e-9;
 
 /// What is on record.
 fn record() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("goldens.json")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/goldens.json")
 }
 
 /// Runs a command in `home` and returns what it prints.

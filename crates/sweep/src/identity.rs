@@ -7,7 +7,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// derived from their motions, the columns. It is raised with every change to such bytes.
 ///
 /// Builds of one `VERSION` and one `NUMERICS_VERSION` write the same bytes for the same input;
-/// chunks of others are never mixed with theirs. `tests/tests/goldens.rs` fails when bytes change
+/// chunks of others are never mixed with theirs. `tests/command/goldens.rs` fails when bytes change
 /// and this number does not; `scripts/raise_numerics.sh` raises it and writes the new hashes.
 pub const NUMERICS_VERSION: u32 = 1;
 
