@@ -86,7 +86,12 @@ impl FileKind<'_> {
         };
         let is_ours = match self {
             Self::Map | Self::Trace | Self::Modes | Self::Boundary => match ParquetFile::look(path) {
-                Ok(file) => self.has_keys(&|key| file.value(key).is_some()),
+                Ok(file) if self.has_keys(&|key| file.value(key).is_some()) => true,
+                Ok(_) => {
+                    // A damaged key makes one of ours look like another's.
+                    ParquetFile::open(path)?;
+                    false
+                }
                 Err(FileError::NotParquet { reason, .. }) => {
                     let name = self.name();
                     return Ok(Some(format!("the file there is no {name}, nor a Parquet file ({reason})")));

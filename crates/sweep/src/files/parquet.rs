@@ -41,10 +41,13 @@ impl ParquetFile {
         Ok(file)
     }
 
-    /// Opens a file to see whose it is, without reading it through.
+    /// Opens a file to see whose it is, without reading it through unless it makes no sense.
     pub(crate) fn look(path: &Path) -> Result<Self, FileError> {
-        let file = regular::open(path).map_err(FileError::io("open", path))?;
-        Self::parse(path, file, Seal::Absent)
+        let open = || regular::open(path).map_err(FileError::io("open", path));
+        let parsed = Self::parse(path, open()?, Seal::Absent);
+        let is_damaged = matches!(parsed, Err(FileError::NotParquet { .. }))
+            && seal::check(&mut open()?).map_err(FileError::io("read", path))? == Seal::Broken;
+        if is_damaged { Err(FileError::Damaged { path: path.to_path_buf() }) } else { parsed }
     }
 
     fn parse(path: &Path, file: File, seal: Seal) -> Result<Self, FileError> {

@@ -366,7 +366,7 @@ fn mistakes_are_told_apart_and_nothing_is_written() {
         .words("status", [Some("ok"), Some("ok")]);
     for (result, said) in [
         (draw(map(), &none, "a.pdf"), ".svg, .png or .html"),
-        (draw(map(), &none, "missing/a.svg"), "cannot write"),
+        (draw(map(), &none, "input.parquet/a.svg"), "a part of that path is a file"),
         (draw(map(), &channel("tub_yow"), "a.svg"), "it has tub_yaw, tub_pitch"),
         (draw(map(), &channel("tub_yow"), "a.html"), "it has tub_yaw, tub_pitch"),
         (draw(trace(), &channel("tub_pitch"), "a.svg"), "it has tub_yaw, drum_front_y"),
@@ -397,7 +397,7 @@ fn mistakes_are_told_apart_and_nothing_is_written() {
     let text = folder.path().join("text.parquet");
     std::fs::write(&text, "no Parquet").unwrap();
     for (input, said) in
-        [(text.as_path(), "not a readable Parquet file"), (Path::new("/no/such"), "cannot read /no/such")]
+        [(text.as_path(), "not a readable Parquet file"), (Path::new("/no/such"), "cannot open /no/such")]
     {
         let output = folder.path().join("a.svg");
         assert!(render(input, &none, &output).unwrap_err().to_string().contains(said));
