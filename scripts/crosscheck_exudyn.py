@@ -134,6 +134,11 @@ class Washer:
         self.drum = body(drum_mass, (drum_centre[0] - hinge_x, drum_centre[1]), drum_inertia, hinge, drum,
                          shaft_velocity + np.cross(shaft_rate, hinge - shaft_point), drum_rate)
         ground = mbs.CreateGround()
+        # Mass, and mass centre in the body's own axes.
+        self.masses = [
+            (self.tub, t["mass_kg"], [t["centre_x_m"], 0, 0]), (self.shaft, s["mass_kg"], [s["centre_x_m"], 0, 0]),
+            (self.drum, drum_mass, [drum_centre[0] - hinge_x, drum_centre[1], 0]),
+        ]
 
         def marker(number, place=(0, 0, 0), rotation=np.eye(3)):
             frame = exudyn.HT(rotation=rotation, translation=list(place))
@@ -224,15 +229,29 @@ class Washer:
 
     def run(self, end_s, step_s, every_s):
         """Coordinates at every multiple of `every_s`."""
-        sensors = self.sensors(exudyn.OutputVariableType.Position, exudyn.OutputVariableType.RotationMatrix)
+        return self.motion(end_s, step_s, every_s)[0]
+
+    def motion(self, end_s, step_s, every_s):
+        """Coordinates, and where the mass centre of all bodies is, at every multiple of `every_s`."""
+        position = exudyn.OutputVariableType.Position
+        sensors = self.sensors(position, exudyn.OutputVariableType.RotationMatrix)
+        centres = [
+            self.mbs.AddSensor(SensorBody(
+                bodyNumber=body, localPosition=place, outputVariableType=position, storeInternal=True))
+            for body, _, place in self.masses
+        ]
         self.integrate(end_s, step_s, every_s)
         places, rotations = ([self.mbs.GetSensorStoredData(sensor) for sensor in row] for row in sensors)
         times = places[0][:, 0]
         assert np.allclose(times, every_s * np.arange(len(times)))
-        return np.array([
+        q = np.array([
             coordinates([place[k, 1:] for place in places], [rotation[k, 1:] for rotation in rotations])
             for k in range(len(times))
         ])
+        masses = [mass for _, mass, _ in self.masses]
+        weighed = zip(masses, centres)
+        total = sum(mass * self.mbs.GetSensorStoredData(centre)[:, 1:] for mass, centre in weighed)
+        return q, total / sum(masses)
 
     def parting(self):
         """Accelerations at the start of shaft against tub (two of translation, two of turning) and of drum against shaft."""
@@ -335,21 +354,21 @@ def table(step_s, equilibrium, motions):
 
 
 def write_trace(path, machine, rest, step_s):
-    """The run-up of sweeps/fig6.toml in Exudyn: the tub's channels, as deviations from equilibrium."""
+    """The run-up of sweeps/fig6.toml in Exudyn: channels of tub and mass centre as deviations from equilibrium."""
     spin = tomllib.loads((ROOT / "sweeps/fig6.toml").read_text())
     peak_rpm, ramp_s, end_s = spin["spin"]["peak_rpm"], spin["spin"]["ramp_s"], spin["time"]["end_s"]
     every_s, front_m = 0.002, machine["tub"]["front_x_m"]
     washer = Washer(machine, rest, np.zeros(10), cycloidal(peak_rpm, ramp_s), 0.0)
-    q = np.vstack([rest, washer.run(end_s, step_s, every_s)])
-    front = {
+    # The first instant is equilibrium.
+    q, centre = washer.motion(end_s, step_s, every_s)
+    channels = {
         "tub_front_y": q[:, 0] + front_m * np.sin(q[:, 5]),
         "tub_front_z": q[:, 1] - front_m * np.sin(q[:, 4]) * np.cos(q[:, 5]),
-        "tub_yaw": q[:, 4], "tub_pitch": q[:, 5],
+        "total_centre_y": centre[:, 1], "total_centre_z": centre[:, 2], "tub_yaw": q[:, 4], "tub_pitch": q[:, 5],
     }
-    # The first row is equilibrium.
-    columns = {f"nonlinear_{name}": values[1:] - values[0] for name, values in front.items()}
+    columns = {f"nonlinear_{name}": values - values[0] for name, values in channels.items()}
     told = {"sweep.plan": json.dumps({"name": f"Exudyn {exudyn.__version__}", "machine": machine})}
-    table = pa.table({"time_s": every_s * np.arange(len(q) - 1), **columns})
+    table = pa.table({"time_s": every_s * np.arange(len(q)), **columns})
     pq.write_table(table.replace_schema_metadata(told), path, compression="zstd")
 
 

@@ -379,7 +379,7 @@ function createMap(host, data) {
     for (const line of coordinates(place)) readout.append(element("p", {}, line));
     const largest = word("ratio_max_channel", point);
     readout.append(element("p", { class: "verdict" }, capitalised(verdict(point))),
-      ...(word("sensitive", point) === "true" ? [element("p", {}, "The motion is chaotic here: the verdict holds, the ratio's digits depend on the integrator.")] : []),
+      ...(word("sensitive", point) === "true" ? [element("p", {}, "The motion is chaotic here: plain rk4 does not agree with itself at two steps.")] : []),
       element("p", { id: "ratio" }, `Largest ratio ${shownValue("ratio_max", point)}${largest ? ` (${largest.replaceAll("_", " ")})` : ""}`));
     if (!Number.isNaN(columns.fail_time_s?.values[point] ?? NaN)) {
       readout.append(element("p", {}, `Failed at ${shownValue("fail_time_s", point)} s`));
