@@ -8,9 +8,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::sweep_binary;
 use serde_json::{Value, json};
 use sweep::identity::{NUMERICS_VERSION, VERSION};
-use crate::sweep_binary;
 use tempfile::TempDir;
 
 /// The spin and the window of every golden: a run-up that is short, but passes the lowest
