@@ -53,7 +53,7 @@ fn try_out(plan: &Plan) {
         })
         .collect();
     let end_s = END_S.min(plan.end_s);
-    let timing = Timing { end_s, window_s: [0.0, end_s] };
+    let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
     let simd = Simd::ALL.into_iter().find(|simd| simd.name() == "scalar").unwrap_or_else(Simd::best);
     let prepared = prepare(simd, &scenarios, &timing);
     let ready: Vec<&Point> = prepared.iter().filter_map(|point| point.as_ref().ok()).collect();
