@@ -72,7 +72,7 @@ fn a_curve_for_every_combination_of_further_axes_in_a_figure() {
     // It carries the grid's plan, but is not that grid's map.
     let (code, [_, said]) = sweep(&["run", "grid.toml", "--out", file]);
     assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("no column `point`"), "{said}");
+    assert!(said.contains("is no result of `sweep run`"), "{said}");
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn what_cannot_be_traced_is_refused_before_any_work() {
         (["--tolerance", "1e9"], "--tolerance 1000000000 is out of range"),
         (["--quantity", "ratio_tub"], "expected one of ratio_max"),
         (["--lattice", "0"], "--lattice"),
-        (["--out", "notes.parquet"], "no boundary file"),
+        (["--out", "notes.parquet"], "is no result of `sweep boundary`"),
     ] {
         let refused = boundary(&folder, &arguments).output().expect("it starts");
         let said = String::from_utf8_lossy(&refused.stderr).into_owned();

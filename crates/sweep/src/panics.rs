@@ -5,6 +5,8 @@ use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Once;
 
+use parquet::errors::ParquetError;
+
 thread_local! {
     /// Whether a panic of this thread is caught and reported by [`caught`].
     static CAUGHT: Cell<bool> = const { Cell::new(false) };
@@ -26,6 +28,11 @@ pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     let result = panic::catch_unwind(AssertUnwindSafe(work));
     CAUGHT.set(outer);
     result.map_err(|panic| text(panic.as_ref()).to_owned())
+}
+
+/// As [`caught`], for writers of Parquet, whose compressor panics where memory is refused.
+pub(crate) fn written<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
+    caught(work).unwrap_or_else(|reason| Err(ParquetError::General(reason)))
 }
 
 /// What a panic said.

@@ -16,6 +16,7 @@ use serde_json::{Map, Value, json};
 
 use crate::files::{key, seal};
 use crate::identity;
+use crate::panics;
 
 /// Columns on their way to a file.
 #[derive(Default)]
@@ -95,10 +96,13 @@ impl Table {
             .build();
         let schema = Arc::new(Schema::new(self.fields));
         let batch = RecordBatch::try_new(schema.clone(), self.arrays)?;
-        let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;
-        writer.write(&batch)?;
-        writer.append_key_value_metadata(seal::blank());
-        let mut file = Cursor::new(writer.into_inner()?);
+        let bytes = panics::written(move || {
+            let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;
+            writer.write(&batch)?;
+            writer.append_key_value_metadata(seal::blank());
+            writer.into_inner()
+        })?;
+        let mut file = Cursor::new(bytes);
         seal::seal(&mut file)?;
         Ok(file.into_inner())
     }

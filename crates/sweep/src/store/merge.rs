@@ -12,6 +12,7 @@ use super::provenance::{self, Session};
 use super::read::{self, Tally};
 use super::schema::{self, BATCH_ROWS, Rows};
 use crate::files::{self, FileKind, ParquetFile, atomic, seal};
+use crate::panics;
 
 /// A finished result.
 #[derive(Debug)]
@@ -38,9 +39,9 @@ impl Run {
         let failed = |error| StoreError::parquet("write", &output)(error);
         let from_arrow = |error| failed(ParquetError::from(error));
         let mut rows = Rows::new(&job.layout);
-        let mut writer =
-            ArrowWriter::try_new(BufWriter::new(&file), rows.schema(), Some(schema::properties(job)))
-                .map_err(failed)?;
+        let properties = schema::properties(job);
+        let begin = || ArrowWriter::try_new(BufWriter::new(&file), rows.schema(), Some(properties));
+        let mut writer = panics::written(begin).map_err(failed)?;
         for chunk in 0..self.chunks() {
             if stop() {
                 return Ok(None);
@@ -52,17 +53,19 @@ impl Run {
             for outcome in outcomes {
                 rows.push((job.axis_values)(outcome.point), outcome);
                 if rows.len() == BATCH_ROWS {
-                    writer.write(&rows.take().map_err(from_arrow)?).map_err(failed)?;
+                    let batch = rows.take().map_err(from_arrow)?;
+                    panics::written(|| writer.write(&batch)).map_err(failed)?;
                 }
             }
         }
         if rows.len() > 0 {
-            writer.write(&rows.take().map_err(from_arrow)?).map_err(failed)?;
+            let batch = rows.take().map_err(from_arrow)?;
+            panics::written(|| writer.write(&batch)).map_err(failed)?;
         }
         // Closing flushes to the file. (Taking the file back out of the writer would tell a full
         // disk as text only.)
         writer.append_key_value_metadata(seal::blank());
-        writer.close().map_err(failed)?;
+        panics::written(|| writer.close()).map_err(failed)?;
         seal::seal(file.as_file_mut()).map_err(StoreError::io("write", &output))?;
         // Read back before it takes its place: what cannot be read must not replace anything.
         let tally = read::tally(&ParquetFile::open(file.path())?)?;
