@@ -135,24 +135,8 @@ fn threads_that_cannot_be_made_are_told() {
 
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
-fn a_folder_that_cannot_be_closed_harms_nothing() {
-    for words in [RUN, TRACE, SHOW, PLOT] {
-        at_every_call("close", "EIO", words);
-    }
-}
-
-#[test]
-#[ignore = "needs strace; .ci/run runs it"]
 fn a_folder_that_cannot_be_listed_is_told() {
     at_every_call("getdents64", "EIO", RUN);
-}
-
-#[test]
-#[ignore = "needs strace; .ci/run runs it"]
-fn random_numbers_that_cannot_be_had_are_told() {
-    for words in [RUN, TRACE, SHOW, PLOT] {
-        at_every_call("getrandom", "EIO", words);
-    }
 }
 
 #[test]

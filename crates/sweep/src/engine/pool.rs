@@ -19,7 +19,7 @@ use crate::outcome::Outcome;
 use crate::plan::Scenario;
 
 /// Points that are made ready together.
-const FED: usize = 2 * MAX_LANES;
+const FED: usize = MAX_LANES;
 
 /// Rows that are on their way at once, beside those in the hands of threads: less than a group of each kind.
 pub(crate) const MOST_WAITING: usize = 12 * FED;
@@ -175,8 +175,8 @@ impl Pool<'_> {
 
 impl State {
     fn choose(&mut self) -> Work {
-        let full = |kind: &Kind, waiting: &Vec<u64>| waiting.len() >= group(*kind);
-        let best = self.waiting.iter().filter(|(kind, waiting)| full(kind, waiting)).map(|(kind, _)| *kind);
+        let full = |waiting: &Vec<u64>| waiting.len() >= MAX_LANES;
+        let best = self.waiting.iter().filter(|(_, waiting)| full(waiting)).map(|(kind, _)| *kind);
         if let Some(kind) = best.max_by_key(|&(model, rung)| (rung, model)) {
             return self.take(kind);
         }
@@ -208,14 +208,8 @@ impl State {
     /// Takes a group of what waits, the first come first.
     fn take(&mut self, kind: Kind) -> Work {
         let waiting = self.waiting.entry(kind).or_default();
-        let positions: Vec<u64> = waiting.drain(..waiting.len().min(group(kind))).collect();
+        let positions: Vec<u64> = waiting.drain(..waiting.len().min(MAX_LANES)).collect();
         let point = |position: &u64| Some((*position, self.rows.get(position)?.point.clone().ok()?));
         Work::Runs(kind, positions.iter().filter_map(point).collect())
     }
-}
-
-/// Runs that are taken together: on the quick rungs two lane groups, of which the second fills the lanes as those of the
-/// first come free.
-const fn group((_, rung): Kind) -> usize {
-    if rung < 2 { 2 * MAX_LANES } else { MAX_LANES }
 }
