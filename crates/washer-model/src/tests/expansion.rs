@@ -181,7 +181,7 @@ fn a_linear_machine_at_rest_moves_as_its_drum_turns() {
         let mass = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg + unbalance_mass_kg;
         let [drum_kg, drum_x_m] = [machine.drum.mass_kg, machine.drum.centre_x_m];
         let [hinge_x_m, front_x_m] = [machine.drum.hinge_x_m, machine.drum.front_x_m];
-        let unbalance = machine.unbalance.clone();
+        let unbalance = machine.unbalance;
         // One turn a second.
         let spin = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![60.0, 60.0] };
         let point = ready(machine, spin, 1.0);
