@@ -206,7 +206,7 @@ fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> Cow<'_, str> {
 /// text cannot reach the terminal.
 ///
 /// # Errors
-/// As [`print`].
+/// As [`print()`].
 pub fn show(text: &str) -> Result<Exit, Error> {
     print(&escaped(text, is_unsafe))
 }

@@ -69,7 +69,7 @@ impl<'a> Watch<'a> {
 /// How to run.
 #[derive(Clone, Copy)]
 pub struct RunOptions<'a> {
-    /// Worker threads ([`crate::threads::count`]).
+    /// Worker threads (`threads::count`).
     pub threads: usize,
     /// Start over.
     pub fresh: bool,

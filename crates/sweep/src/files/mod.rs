@@ -12,8 +12,8 @@
 //! * A temporary file is locked while its process lives. Those of killed processes are removed by
 //!   whoever writes to the folder next.
 //!
-//! Reading: [`regular`] opens regular files only, so that a FIFO cannot hold a command up;
-//! [`ParquetFile`] checks the digest that our files carry (`seal`) and turns every failure of the
+//! Reading: `regular` opens regular files only, so that a FIFO cannot hold a command up;
+//! `ParquetFile` checks the digest that our files carry (`seal`) and turns every failure of the
 //! Parquet library, panics included, into an error with the file's name.
 
 pub(crate) mod atomic;
