@@ -30,9 +30,13 @@ pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     result.map_err(|panic| text(panic.as_ref()).to_owned())
 }
 
-/// As [`caught`], for writers of Parquet, whose compressor panics where memory is refused.
-pub(crate) fn written<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
-    caught(work).unwrap_or_else(|reason| Err(ParquetError::General(reason)))
+/// As [`caught`], for the Parquet library; `what` a panic of it means. Reading, it panics at some damage and at some files
+/// of other programs; writing, where memory is refused.
+pub(crate) fn in_parquet<T>(
+    what: &str,
+    work: impl FnOnce() -> Result<T, ParquetError>,
+) -> Result<T, ParquetError> {
+    caught(work).unwrap_or_else(|panic| Err(ParquetError::General(format!("{what}: {panic}"))))
 }
 
 /// What a panic said.

@@ -96,7 +96,7 @@ impl Table {
             .build();
         let schema = Arc::new(Schema::new(self.fields));
         let batch = RecordBatch::try_new(schema.clone(), self.arrays)?;
-        let bytes = panics::written(move || {
+        let bytes = panics::in_parquet("the library gave up writing", move || {
             let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;
             writer.write(&batch)?;
             writer.append_key_value_metadata(seal::blank());

@@ -136,10 +136,11 @@ impl Row {
         let errors: f64 = self.climbs.iter().filter_map(|climb| climb.error).sum();
         if margin.is_some_and(|margin| margin <= errors) {
             for (model, climb) in self.climbs.iter().enumerate() {
+                // By way of its first step: only RK4 against RK4 tells chaos from a coarse rung.
                 if let Some(top) = ladders[model].top()
                     && climb.rung < top
                 {
-                    runs.push((model, top));
+                    runs.push((model, (climb.rung + 1).max(top - 1)));
                 }
             }
         }

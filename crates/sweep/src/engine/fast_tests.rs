@@ -147,6 +147,21 @@ fn rows_by_other_criteria_are_rk4s() {
 }
 
 #[test]
+fn where_the_verdict_is_in_doubt_rk4_is_held_against_rk4() {
+    let plan = load(include_str!("../../../../sweeps/fig12.toml"));
+    let at = [vec![0.4, 140.0]];
+    let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
+    assert_eq!(row.method, Level::Fast);
+    let ratio = Verdict::new(row, plan.reliability.channels.len(), 2.0).greatest.unwrap().1;
+    let reliability = crate::plan::Reliability { ratio_limit: ratio, ..plan.reliability.clone() };
+    let plan = Plan { reliability, ..plan };
+    let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
+    assert_eq!((row.method, row.sensitive), (Level::Rk4, Some(false)));
+    // What RK4 has left, not what the capped rung had.
+    assert!(row.error.unwrap() < 1e-6, "{row:?}");
+}
+
+#[test]
 fn a_row_does_not_depend_on_its_company() {
     let plan = load(include_str!("../../../../sweeps/quick.toml"));
     let plan = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };

@@ -125,10 +125,9 @@ impl Iterator for Batches {
     }
 }
 
-/// Has the library work. It panics at some damage and at some files of other programs.
+/// Has the library read.
 fn guarded<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
-    panics::caught(work)
-        .unwrap_or_else(|panic| Err(ParquetError::General(format!("it makes no sense inside: {panic}"))))
+    panics::in_parquet("it makes no sense inside", work)
 }
 
 /// What the library reported, as a plain I/O failure where it was one.

@@ -41,7 +41,7 @@ impl Run {
         let mut rows = Rows::new(&job.layout);
         let properties = schema::properties(job);
         let begin = || ArrowWriter::try_new(BufWriter::new(&file), rows.schema(), Some(properties));
-        let mut writer = panics::written(begin).map_err(failed)?;
+        let mut writer = panics::in_parquet("the library gave up writing", begin).map_err(failed)?;
         for chunk in 0..self.chunks() {
             if stop() {
                 return Ok(None);
@@ -54,18 +54,19 @@ impl Run {
                 rows.push((job.axis_values)(outcome.point), outcome);
                 if rows.len() == BATCH_ROWS {
                     let batch = rows.take().map_err(from_arrow)?;
-                    panics::written(|| writer.write(&batch)).map_err(failed)?;
+                    panics::in_parquet("the library gave up writing", || writer.write(&batch))
+                        .map_err(failed)?;
                 }
             }
         }
         if rows.len() > 0 {
             let batch = rows.take().map_err(from_arrow)?;
-            panics::written(|| writer.write(&batch)).map_err(failed)?;
+            panics::in_parquet("the library gave up writing", || writer.write(&batch)).map_err(failed)?;
         }
         // Closing flushes to the file. (Taking the file back out of the writer would tell a full
         // disk as text only.)
         writer.append_key_value_metadata(seal::blank());
-        panics::written(|| writer.close()).map_err(failed)?;
+        panics::in_parquet("the library gave up writing", || writer.close()).map_err(failed)?;
         seal::seal(file.as_file_mut()).map_err(StoreError::io("write", &output))?;
         // Read back before it takes its place: what cannot be read must not replace anything.
         let tally = read::tally(&ParquetFile::open(file.path())?)?;
