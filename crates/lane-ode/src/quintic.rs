@@ -4,6 +4,16 @@ use crate::lane::Lane;
 use crate::num::N;
 use crate::peaks::Sample;
 
+impl<T: Lane> Sample<T> {
+    /// The output between two samples, at a `share` (0 to 1) of the step of `length_s` from one to the
+    /// other: that of the polynomial of degree 5 which meets both.
+    #[inline(always)]
+    #[must_use]
+    pub fn between(start: &Self, end: &Self, length_s: N<T>, share: f64) -> Self {
+        Quintic::new(length_s, start, end).sample(length_s.lit(share), length_s)
+    }
+}
+
 /// The polynomial of degree 5 that meets values, slopes and curvatures at both ends of a step; over s from 0 to 1.
 pub(crate) struct Quintic<T> {
     c: [N<T>; 6],

@@ -14,7 +14,7 @@ use std::process::ExitCode;
 use rayon::prelude::*;
 use sweep::config;
 use sweep::engine::ModelEngine;
-use sweep::outcome::{Outcome, Status};
+use sweep::outcome::{Outcome, Status, Trajectory};
 use sweep::plan::{Integrator, Plan};
 use sweep::verdict::Verdict;
 
@@ -165,6 +165,11 @@ impl Found {
     }
 }
 
+fn amplitudes_differ(a: &Trajectory, b: &Trajectory) -> f64 {
+    let pairs = a.amplitudes.iter().zip(&b.amplitudes);
+    pairs.map(|(a, b)| (a - b).abs() / b.abs()).fold(0.0, f64::max)
+}
+
 fn difference(a: &Outcome, b: &Outcome) -> f64 {
     let relative = |(a, b): (&f64, &f64)| if a == b { 0.0 } else { (a - b).abs() / b.abs() };
     let models = [(&a.nonlinear, &b.nonlinear), (&a.linear, &b.linear)];
@@ -216,8 +221,11 @@ fn attack(seed: u64, folder: &std::path::Path) -> Found {
         let error = difference(row, halved);
         let mut complain = |count: fn(&mut Found) -> &mut u64, what: &str| {
             *count(&mut found) += 1;
-            let error_left = row.error;
-            found.exceptions.push(format!("seed {seed}, row {i}: {what}; {error:.2e}, said {error_left:?}"));
+            let (method, said) = (row.method.name(), row.error.unwrap_or(f64::NAN));
+            let of_linear = amplitudes_differ(&row.linear, &halved.linear);
+            found.exceptions.push(format!(
+                "seed {seed}, row {i}, {method}: {what}; {error:.2e} ({of_linear:.2e} linear), said {said:.2e}"
+            ));
         };
         if statuses(row) != statuses(halved) {
             complain(|found| &mut found.wrong_status, "status");
@@ -244,7 +252,9 @@ fn main() -> ExitCode {
     let folder = std::env::temp_dir().join(format!("sweep-attack-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     let grids = rows.div_ceil(9);
-    let seeds = first * 1_000_000..first * 1_000_000 + grids;
+    // A seed of a grid by itself, or so many from the first.
+    let seeds =
+        if first < 1_000_000 { first * 1_000_000..first * 1_000_000 + grids } else { first..first + grids };
     let found = seeds.into_par_iter().map(|seed| attack(seed, &folder)).reduce(Found::default, Found::plus);
     // What is left in the temporary folder harms nobody.
     let _ = std::fs::remove_dir_all(&folder);

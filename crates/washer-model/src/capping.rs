@@ -21,13 +21,15 @@
 //!   Stiff bearings pass at once: they hold next to no strain energy of slow modes. Soft ones do not, and then the cap rises until it
 //!   caps nothing: plain RK4.
 //!
-//! The hinge turns with the shaft: a motion of frequency f has frequencies up to f + theta' in it, which modes with theta frozen do not show.
-//! A hinge that holds the share e of a mode's strain energy moves it by e f / 2 times ((f + theta') / w)^2. Two and a half times that is added to ds: violent
-//! motion, which does not keep to the drum's speed, answers to it as well.
+//! The hinge turns with the shaft: a motion of frequency f has f + theta' and f - theta' in it, which modes
+//! with theta frozen do not show. A hinge that holds the share e of a mode's strain energy moves it by e f / 2
+//! times the greater softening of the two (`coupling.rs`); that is added to ds.
 
-use crate::coupling::Caps;
-use crate::geared::{Formula, GEARS, Gear, Geared};
-use crate::modal::{Mode, Modes, NoModes, highest_with_caps, modes_with_caps};
+use core::iter;
+
+use crate::coupling::{BACKWARD_SHARE, Caps};
+use crate::geared::{Formula, GEARS, Gear, Geared, interpolation_phase};
+use crate::modal::{Mode, Modes, NoModes, highest_with_caps, modes_with_caps, motions_with_caps};
 use crate::nonlinear::COORDINATES;
 use crate::point::Point;
 use crate::spin::Spin;
@@ -50,8 +52,11 @@ const HINGE_CAP: [Option<f64>; 3] = [None, Some(1.5), Some(1.0)];
 /// Half-width of a resonance that has no damping, as a share of its frequency.
 const LEAST_HALF_WIDTH: f64 = 0.01;
 
-/// By how much the shift that a turning hinge adds counts more than another.
-const HINGE_WEIGHT: f64 = 2.5;
+/// Modes are capped only where the hinge's are faster than the drum by this.
+///
+/// Near (f + f_i) / 3, with f of the hinge and f_i of the suspension, its whirls can grow from next to nothing. What they
+/// grow from depends on how bearings ring, which rungs with caps share and do not show.
+const HINGE_TO_DRUM: f64 = 3.2;
 
 /// Bits of a step's fraction that count: 1e-6 of the step.
 const STEP_BITS: u32 = 20;
@@ -59,7 +64,10 @@ const STEP_BITS: u32 = 20;
 /// From one candidate step to the next.
 const SHORTER: f64 = 0.97;
 
-/// The part of a shift's effect that motions answer to that do not turn with the drum, which is exact.
+/// So many candidates are passed over until one holds.
+const STRIDE: usize = 8;
+
+/// The part of what a capped hinge shifts that motions answer to: its law is exact for what turns with the drum.
 const FREE_SHARE: f64 = 0.1;
 
 /// Greatest speeds of the drum in each gear, as shares of the greatest of all.
@@ -80,6 +88,8 @@ struct Case<'a> {
     fastest_followed_rad_per_s: f64,
     /// Of all modes, at rest and turning.
     fastest_rad_per_s: f64,
+    /// The hinge is stiff enough.
+    may_be_capped: bool,
     /// The drum at the greatest speed of each gear.
     turning: [State; GEARS],
     rest: State,
@@ -123,6 +133,7 @@ impl<'a> Case<'a> {
             point,
             // A soft hinge takes part in the motion.
             fastest_followed_rad_per_s: if hinge < 2.0 * followed { hinge } else { followed },
+            may_be_capped: hinge >= HINGE_TO_DRUM * top,
             fastest_rad_per_s: highest_with_caps(point, 0.0, None)?.max(highest_with_caps(point, top, None)?),
             turning: [first?, second?, third?],
             rest,
@@ -139,9 +150,9 @@ impl<'a> Case<'a> {
             if slow.iter().any(|mode| error_of_shift(mode, hinge(mode), top_rad_per_s) > accuracy) {
                 return Ok(false);
             }
-            let capped = modes_with_caps(self.point, 0.0, state.speed_rad_per_s, Some(&trial.caps))?;
-            if !trial.is_stable(capped.modes[COORDINATES - 1].magnitude_rad_per_s)
-                || self.error_of_caps(state, &capped, trial, top_rad_per_s) > accuracy
+            let capped = motions_with_caps(self.point, state.speed_rad_per_s, &trial.caps)?;
+            if !trial.is_stable(capped[COORDINATES - 1].magnitude_rad_per_s)
+                || self.error_of_caps(state, &trial.caps, top_rad_per_s)? > accuracy
             {
                 return Ok(false);
             }
@@ -155,16 +166,16 @@ impl<'a> Case<'a> {
     }
 
     /// What the shifts of slow modes do to amplitudes.
-    fn error_of_caps(&self, state: &State, capped: &Modes, trial: &Trial, top_rad_per_s: f64) -> f64 {
-        let mut error = 0.0_f64;
-        for (plain, capped) in state.modes.modes[..SLOW_MODES].iter().zip(&capped.modes) {
-            let (slower, detuned) =
-                (capped.re_per_s - plain.re_per_s, capped.im_rad_per_s - plain.im_rad_per_s);
-            let shift = (slower * slower + detuned * detuned).sqrt()
-                + self.hinge_shift(plain, state.speed_rad_per_s, &trial.caps);
-            error = error.max(error_of_shift(plain, shift, top_rad_per_s));
-        }
-        error
+    fn error_of_caps(&self, state: &State, caps: &Caps, top_rad_per_s: f64) -> Result<f64, NoModes> {
+        let of_bearings = Caps { hinge_rad_per_s: None, ..*caps };
+        let capped = motions_with_caps(self.point, state.speed_rad_per_s, &of_bearings)?;
+        let errors = state.modes.modes[..SLOW_MODES].iter().zip(&capped).map(|(plain, capped)| {
+            let (slower, detuned) = (capped.s.re - plain.re_per_s, capped.s.im - plain.im_rad_per_s);
+            let of_bearings = (slower * slower + detuned * detuned).sqrt();
+            let of_hinge = self.hinge_shift(plain, state.speed_rad_per_s, caps);
+            error_of_shift(plain, of_bearings + of_hinge, top_rad_per_s)
+        });
+        Ok(errors.fold(0.0, f64::max))
     }
 
     /// What a hinge with a cap adds to a suspension mode's shift while the drum turns (rad/s), as it counts.
@@ -175,8 +186,11 @@ impl<'a> Case<'a> {
         if !is_of_suspension {
             return 0.0;
         }
-        let in_hinge = (frequency + turning_rad_per_s) / cap_rad_per_s;
-        HINGE_WEIGHT * 0.5 * mode.hinge_share(self.point) * frequency * in_hinge * in_hinge
+        let softening = (frequency * frequency - BACKWARD_SHARE * turning_rad_per_s * turning_rad_per_s)
+            .abs()
+            + (1.0 - BACKWARD_SHARE) * frequency * turning_rad_per_s;
+        let in_hinge = softening / (cap_rad_per_s * cap_rad_per_s);
+        FREE_SHARE * 0.5 * mode.hinge_share(self.point) * frequency * in_hinge
     }
 
     /// What truncation does to amplitudes.
@@ -205,11 +219,7 @@ impl<'a> Cases<'a> {
     /// Machines without modes are left out.
     #[must_use]
     pub fn plain_step_s(&self) -> Option<f64> {
-        self.plain_step_of(Formula::Rk4)
-    }
-
-    fn plain_step_of(&self, formula: Formula) -> Option<f64> {
-        let steps = self.0.iter().flatten().map(|case| formula.limit() / case.fastest_rad_per_s);
+        let steps = self.0.iter().flatten().map(|case| Formula::Rk4.limit() / case.fastest_rad_per_s);
         steps.reduce(f64::min).map(rounded_down)
     }
 
@@ -217,45 +227,31 @@ impl<'a> Cases<'a> {
         self.0.iter().map(|case| case.as_ref().map_err(|none| *none)).collect()
     }
 
-    /// The cheapest formula, steps and caps at which amplitudes should be right to `accuracy` (relative) at each of the
-    /// points; `None` if plain RK4 at its longest stable step is cheaper.
+    /// The longest steps of a formula, and their caps, at which amplitudes should be right to `accuracy` (relative) at
+    /// each of the points; `None` if plain RK4 at its longest stable step is cheaper.
     ///
     /// # Errors
     /// [`NoModes`] of the first machine that has none.
-    pub fn choose(&self, accuracy: f64) -> Result<Option<Geared>, NoModes> {
+    pub fn choose(&self, formula: Formula, accuracy: f64) -> Result<Option<Geared>, NoModes> {
         let cases = self.all()?;
-        let plain = self.plain_step_s().map(|step_s| Formula::Rk4.evaluations_per_s(step_s));
-        let (mut best, mut least) = (None, plain.unwrap_or(0.0));
-        for formula in Formula::ALL {
-            if let Some(geared) = self.choose_for(&cases, formula, accuracy, least)?
-                && geared.evaluations_per_s() < least
-            {
-                (best, least) = (Some(geared), geared.evaluations_per_s());
-            }
+        let Some(plain_step_s) = self.plain_step_s() else { return Ok(None) };
+        if !cases.iter().all(|case| case.may_be_capped) {
+            return Ok(None);
         }
-        Ok(best)
-    }
-
-    fn choose_for(
-        &self,
-        cases: &[&Case<'a>],
-        formula: Formula,
-        accuracy: f64,
-        most_evaluations_per_s: f64,
-    ) -> Result<Option<Geared>, NoModes> {
+        let most_evaluations_per_s = Formula::Rk4.evaluations_per_s(plain_step_s);
         let followed = cases.iter().map(|case| case.fastest_followed_rad_per_s).fold(0.0, f64::max);
-        let longest_s = formula.step_phase(MEMORY_DAMPING_RATIO * accuracy) / followed;
-        let plain_step_s = self.plain_step_of(formula).unwrap_or(f64::INFINITY);
+        let longest_phase =
+            formula.step_phase(MEMORY_DAMPING_RATIO * accuracy).min(interpolation_phase(accuracy));
+        let longest_s = longest_phase / followed;
         let top = GEARS - 1;
-        // Steps so short that another formula is cheaper are not looked at.
-        let shortest_s = plain_step_s.max(formula.evaluations_per_s(1.0) / most_evaluations_per_s);
-        let Some(trial) = longest(cases, formula, top, [shortest_s, longest_s], accuracy)? else {
+        let shortest_s = formula.evaluations_per_s(1.0) / most_evaluations_per_s;
+        let Some(trial) = longest(&cases, formula, top, [shortest_s, longest_s], accuracy)? else {
             return Ok(None);
         };
         let mut geared = Geared::steady(formula, trial.step_s, trial.caps);
         for gear in 0..top {
             let steps_s = [WORTH_A_GEAR * trial.step_s, longest_s / GEAR_SHARES[gear]];
-            if let Some(Trial { step_s, caps, .. }) = longest(cases, formula, gear, steps_s, accuracy)? {
+            if let Some(Trial { step_s, caps, .. }) = longest(&cases, formula, gear, steps_s, accuracy)? {
                 let speeds = cases.iter().map(|case| case.turning[gear].speed_rad_per_s);
                 let up_to_rad_per_s = speeds.fold(f64::INFINITY, f64::min);
                 geared.gears[gear] = Gear { up_to_rad_per_s, step_s, caps };
@@ -274,14 +270,11 @@ impl<'a> Cases<'a> {
     /// [`NoModes`] of the first machine that has none.
     pub fn expected_error(&self, geared: &Geared) -> Result<f64, NoModes> {
         let Gear { step_s, caps, .. } = *geared.top();
-        let trial = Trial { formula: geared.formula, step_s, caps };
         let mut error = 0.0_f64;
         for case in self.all()? {
-            error = error.max(case.error_of_truncation(trial.formula, step_s));
+            error = error.max(case.error_of_truncation(geared.formula, step_s));
             let state = &case.turning[GEARS - 1];
-            let capped = modes_with_caps(case.point, 0.0, state.speed_rad_per_s, Some(&caps))?;
-            let of_caps = case.error_of_caps(state, &capped, &trial, state.speed_rad_per_s);
-            error = error.max(FREE_SHARE * of_caps);
+            error = error.max(case.error_of_caps(state, &caps, state.speed_rad_per_s)?);
         }
         Ok(error)
     }
@@ -295,24 +288,47 @@ fn longest(
     [above_s, up_to_s]: [f64; 2],
     accuracy: f64,
 ) -> Result<Option<Trial>, NoModes> {
-    let mut step_s = rounded_down(up_to_s);
-    while step_s > above_s {
-        for step_times_cap in STEP_TIMES_CAP {
-            let cap = step_times_cap * formula.limit() / step_s;
-            for multiple in HINGE_CAP {
-                let hinge_rad_per_s = multiple.map(|multiple| multiple * cap);
-                let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s };
-                let trial = Trial { formula, step_s, caps };
-                let mut holds = true;
-                for case in cases {
-                    holds = holds && case.holds(&trial, gear, accuracy)?;
-                }
-                if holds {
-                    return Ok(Some(trial));
+    let steps_s = iter::successors(Some(rounded_down(up_to_s)), |step_s| Some(SHORTER * step_s));
+    let steps_s: Vec<f64> = steps_s.take_while(|step_s| *step_s > above_s).collect();
+    // By strides, and back to the longest step of the last one by halving.
+    let mut fail = 0;
+    for at in (0..steps_s.len()).step_by(STRIDE).chain(steps_s.len().checked_sub(1)) {
+        if let Some(mut best) = holding(cases, formula, gear, steps_s[at], accuracy)? {
+            let mut holds = at;
+            while fail < holds {
+                let between = fail.midpoint(holds);
+                match holding(cases, formula, gear, steps_s[between], accuracy)? {
+                    Some(trial) => (best, holds) = (trial, between),
+                    None => fail = between + 1,
                 }
             }
+            return Ok(Some(best));
         }
-        step_s *= SHORTER;
+        fail = at + 1;
+    }
+    Ok(None)
+}
+
+/// The best caps with which a step holds in a gear, if any.
+fn holding(
+    cases: &[&Case<'_>],
+    formula: Formula,
+    gear: usize,
+    step_s: f64,
+    accuracy: f64,
+) -> Result<Option<Trial>, NoModes> {
+    for step_times_cap in STEP_TIMES_CAP {
+        let cap = step_times_cap * formula.limit() / step_s;
+        'caps: for multiple in HINGE_CAP {
+            let hinge_rad_per_s = multiple.map(|multiple| multiple * cap);
+            let trial = Trial { formula, step_s, caps: Caps { bearings_rad_per_s: cap, hinge_rad_per_s } };
+            for case in cases {
+                if !case.holds(&trial, gear, accuracy)? {
+                    continue 'caps;
+                }
+            }
+            return Ok(Some(trial));
+        }
     }
     Ok(None)
 }
@@ -342,7 +358,7 @@ mod tests {
         let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
         let ready: Vec<_> = points.iter().flatten().map(|point| (point, &spin)).collect();
         let cases = Cases::new(ready, timing.end_s);
-        (cases.choose(1e-3).unwrap().unwrap(), cases.plain_step_s())
+        (cases.choose(Formula::Dop853, 1e-3).unwrap().unwrap(), cases.plain_step_s())
     }
 
     #[test]

@@ -20,14 +20,19 @@
 //! (w^2 K^-1 + C) lambda = -(w^2 d + theta'^2 (d - d0) + e)
 //! ```
 //!
-//! The hinge's modes come next. Its angles p = (q9, q10) turn with the shaft, so that a whirl at the drum's speed is at rest in them, and the
-//! weight's sag p0 turns backwards, p0'' = -theta'^2 p0. The moment
+//! The hinge's modes come next. Its angles p = (q9, q10) turn with the shaft, so that a whirl at the
+//! drum's speed is at rest in them, and the weight's sag p0 turns backwards. With J a right angle
+//! forwards, the moment is
 //!
 //! ```text
-//! -k (p + (p'' + theta'^2 p0(theta)) / w^2)
+//! -k (p + (p'' + 3/2 theta' J p' - theta'^2 p0(theta) / 2) / w^2)
 //! ```
 //!
-//! leaves both exact. It adds k / w^2 to two entries of the rotor's inertia and a known torque.
+//! A whirl at the frequency f, seen from the cabinet and signed as the drum turns, finds the hinge softer
+//! by (f - theta') (f + theta' / 2) / w^2: the moment is exact for what turns with the drum, for the
+//! weight, and for the backward half of a motion at half the drum's speed, which is where parametric
+//! resonance doubles the period. It adds k / w^2 to two entries of the rotor's inertia, a torque per
+//! speed that does no work, and a known torque.
 
 use crate::coefficients::Bodies;
 use crate::floating::{Factors, Floating};
@@ -78,6 +83,9 @@ impl<T: Real> Deflection<T> {
         [self.offset[0], self.offset[1], self.tilt[0], self.tilt[1]]
     }
 }
+
+/// The hinge's scaled mass is exact for a backward whirl at this share of the drum's speed.
+pub(crate) const BACKWARD_SHARE: f64 = 0.5;
 
 /// The bearings as a model treats them.
 #[derive(Clone, Copy)]
@@ -155,6 +163,8 @@ pub(crate) struct HingeMass<T> {
     pub(crate) inertia: N<T>,
     /// Added to the torque.
     pub(crate) torque: [N<T>; 2],
+    /// Torque about q9 per speed of q10; about q10 per speed of q9 it is the opposite.
+    pub(crate) torque_per_speed: N<T>,
 }
 
 impl<T: Real> Coupling<T> {
@@ -188,13 +198,14 @@ impl<T: Real> Coupling<T> {
     ) -> Option<HingeMass<T>> {
         let Self::MassScaled(scaling) = self else { return None };
         let inertia = (scaling.per_hinge_squared * flexure_stiffness).v();
-        let centrifugal = -(inertia * (spin.speed * spin.speed).v()).v();
+        let of_sag = (BACKWARD_SHARE * (inertia * (spin.speed * spin.speed).v()).v()).v();
         Some(HingeMass {
             inertia,
             torque: [
-                (centrifugal * (spin.cos * sag_9 + spin.sin * sag_10)).v(),
-                (centrifugal * (spin.cos * sag_10 - spin.sin * sag_9)).v(),
+                (of_sag * (spin.cos * sag_9 + spin.sin * sag_10)).v(),
+                (of_sag * (spin.cos * sag_10 - spin.sin * sag_9)).v(),
             ],
+            torque_per_speed: ((1.0 + BACKWARD_SHARE) * (inertia * spin.speed).v()).v(),
         })
     }
 

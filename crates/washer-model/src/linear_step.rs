@@ -218,6 +218,8 @@ impl<T: Lane> RotorAt<T> {
                 inertia[r][r] += mass.inertia;
                 self.entries[entry::force(2 + r)][0] += mass.torque[place];
             }
+            self.entries[entry::damping(4, 3)][0] -= mass.torque_per_speed;
+            self.entries[entry::damping(5, 2)][0] += mass.torque_per_speed;
         }
         self.inverse = Symmetric4(inertia).inverse();
         if let Coupling::MassScaled(scaling) = coupling {

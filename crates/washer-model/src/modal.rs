@@ -2,7 +2,7 @@
 //!
 //! With theta, its speed and so M, C and K frozen, M q'' + C q' + K q = 0 has solutions q = phi exp(s t).
 
-use crate::coupling::Caps;
+use crate::coupling::{BACKWARD_SHARE, Caps};
 use crate::nonlinear::COORDINATES;
 use crate::point::Point;
 use core::f64::consts::TAU;
@@ -118,41 +118,67 @@ pub(crate) fn modes_with_caps(
 ) -> Result<Modes, NoModes> {
     let (system, mass) = first_order(point, theta_rad, speed_rad_per_s, caps)?;
     let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
-    let values = decomposition.S().column_vector();
-    let vectors = decomposition.U();
+    let (values, vectors) = (decomposition.S().column_vector(), decomposition.U());
+    let motions = natural_motions((0..STATES).map(|k| values[k] * system.unit_per_s))?;
+    let modes = motions.map(|Motion { s, magnitude_rad_per_s, state }| Mode {
+        re_per_s: s.re,
+        im_rad_per_s: s.im,
+        magnitude_rad_per_s,
+        shape: unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, state)])),
+    });
+    Ok(Modes { modes, mass })
+}
+
+/// The eigenvalues of these motions alone, which take a third of the time.
+pub(crate) fn motions_with_caps(
+    point: &Point,
+    speed_rad_per_s: f64,
+    caps: &Caps,
+) -> Result<[Motion; COORDINATES], NoModes> {
+    let (system, _) = first_order(point, 0.0, speed_rad_per_s, Some(caps))?;
+    let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
+    natural_motions(values.into_iter().map(|s| s * system.unit_per_s))
+}
+
+/// A natural motion by its eigenvalue.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Motion {
+    /// s (1/s); its imaginary part is not negative.
+    pub(crate) s: c64,
+    /// As in [`Mode`].
+    pub(crate) magnitude_rad_per_s: f64,
+    /// Which of the eigenvalues it is.
+    state: usize,
+}
+
+/// The natural motions of all eigenvalues, the slowest first.
+fn natural_motions(values: impl Iterator<Item = c64>) -> Result<[Motion; COORDINATES], NoModes> {
     let mut swinging = Vec::with_capacity(COORDINATES);
     let mut steady = Vec::new();
-    for k in 0..STATES {
-        let s = values[k] * system.unit_per_s;
+    for (state, s) in values.enumerate() {
         if !(s.re.is_finite() && s.im.is_finite()) {
             return Err(NoModes::Eigenvalues);
         }
-        let shape = || unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, k)]));
         if s.im > 0.0 {
-            swinging.push(mode(s, magnitude(s), shape()));
+            swinging.push(Motion { s, magnitude_rad_per_s: magnitude(s), state });
         } else if s.im == 0.0 {
-            steady.push((s.re, shape()));
+            steady.push((s.re, state));
         }
     }
     // Rates that belong together come apart symmetrically about their mean: the slowest with the fastest would not do.
     steady.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
     for pair in steady.chunks_exact(2) {
-        let (slow, fast) = (pair[0].0, pair[1].0);
+        let [(slow, state), (fast, _)] = [pair[0], pair[1]];
         let s = c64::new(0.5 * (slow + fast), 0.0);
-        swinging.push(mode(s, (slow * fast).abs().sqrt(), pair[0].1));
+        swinging.push(Motion { s, magnitude_rad_per_s: (slow * fast).abs().sqrt(), state });
     }
     swinging.sort_by(|a, b| a.magnitude_rad_per_s.total_cmp(&b.magnitude_rad_per_s));
-    let modes = swinging.try_into().map_err(|_| NoModes::Eigenvalues)?;
-    Ok(Modes { modes, mass })
+    swinging.try_into().map_err(|_| NoModes::Eigenvalues)
 }
 
 /// |s| from operations that round the same everywhere; `hypot` is each system's own.
 fn magnitude(s: c64) -> f64 {
     s.norm_sqr().sqrt()
-}
-
-fn mode(s: c64, magnitude: f64, shape: [[f64; 2]; COORDINATES]) -> Mode {
-    Mode { re_per_s: s.re, im_rad_per_s: s.im, magnitude_rad_per_s: magnitude, shape }
 }
 
 /// Of unit modal mass; its largest entry real and positive, so that phases read as lags behind it.
@@ -225,9 +251,14 @@ fn first_order(
             }
         }
         if let Some(cap) = caps.hinge_rad_per_s {
+            let inertia = bodies.flexure_stiffness.0 / (cap * cap);
             for q in HINGE {
-                matrices.mass[q][q] += bodies.flexure_stiffness.0 / (cap * cap);
+                matrices.mass[q][q] += inertia;
             }
+            let torque_per_speed = (1.0 + BACKWARD_SHARE) * speed_rad_per_s * inertia;
+            let [nine, ten] = HINGE;
+            matrices.damping[nine][ten] -= torque_per_speed;
+            matrices.damping[ten][nine] += torque_per_speed;
         }
     }
     let full = |m: &[[f64; COORDINATES]; COORDINATES]| Mat::from_fn(COORDINATES, COORDINATES, |i, j| m[i][j]);

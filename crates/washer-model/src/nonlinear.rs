@@ -74,6 +74,8 @@ pub(crate) fn accelerations<T: Real>(
             rotor.inertia[r][r] += mass.inertia;
             rotor.floating.torque[r] += mass.torque[place];
         }
+        rotor.floating.torque[2] += mass.torque_per_speed * u[9];
+        rotor.floating.torque[3] -= mass.torque_per_speed * u[8];
     }
     coupling.accelerations(
         machine.bodies,

@@ -311,7 +311,7 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     /// Has more recorded than the peaks.
     #[inline(always)]
     fn record(&mut self, zero: N<T>, wanted: Wanted, model: ModelKind) {
-        self.extras = Extras::new(zero, wanted, model, self.points[0], self.points.len());
+        self.extras = Extras::new(zero, wanted, (model, self.method), self.points[0], self.points.len());
         if wanted.course {
             self.courses = self.points.iter().map(|point| Vec::with_capacity(point.legs.len())).collect();
         }

@@ -12,7 +12,8 @@
 
 use std::fmt;
 
-use washer_model::{Cases, Formula, Gear, Geared, Method, ModelKind};
+use lane_ode::dop853::DOP853_STABILITY_LIMIT;
+use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind};
 
 /// Which rung a row's numbers come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -61,25 +62,27 @@ const LONGER_STEP: f64 = 1.25;
 /// Error of the reference as a share of its difference from that: 1 / (1.25^4 - 1).
 const REFERENCE_CONTRACTION: f64 = 0.7;
 
-/// By how much the finest capped rung's steps are shorter than the fine one's, and its caps higher.
-const FINEST: [f64; 2] = [2.5, 3.0];
-
 /// A finest rung is climbed if it costs less than this share of the reference.
 const WORTH_IT: f64 = 0.5;
 
-/// For what error the rungs are chosen, in parts of the accuracy. The first one only shows the error of the second.
+/// For what error the first two rungs are chosen, in parts of the accuracy. The first one only shows the error of the second.
 ///
 /// The linear model amplifies nothing, so its first rung may be coarser and its second needs less in reserve.
-const fn aims(model: ModelKind) -> [f64; 3] {
+const fn aims(model: ModelKind) -> [f64; 2] {
     match model {
-        ModelKind::Nonlinear => [10.0, 0.1, 0.01],
-        ModelKind::Linear => [100.0, 0.3, 0.01],
+        ModelKind::Nonlinear => [10.0, 0.1],
+        ModelKind::Linear => [100.0, 0.3],
     }
 }
 
-/// The same of plain RK4 and the finest capped rung, whose error is what the difference shows: RK4's is smaller by orders of
-/// magnitude.
-const FIRST_ORDER_OF_RK4: f64 = 0.2;
+/// The same of the nonlinear model's third rung.
+const FINE_AIM: f64 = 0.01;
+
+/// By how much the finest capped rung's steps are shorter than those of the rung before.
+const FINEST_STEP: f64 = 2.5;
+
+/// Its step times its bearings' cap, rad: nearly as high as the formula is stable.
+const FINEST_STEP_TIMES_CAP: f64 = 0.96 * DOP853_STABILITY_LIMIT;
 
 /// Up to which difference of two rungs errors are of first order.
 const fn first_order(model: ModelKind) -> f64 {
@@ -88,6 +91,10 @@ const fn first_order(model: ModelKind) -> f64 {
         ModelKind::Linear => 0.3,
     }
 }
+
+/// The same of plain RK4 and the finest capped rung. The difference is that rung's error: RK4's is
+/// smaller by orders of magnitude.
+const FIRST_ORDER_OF_RK4: f64 = 0.2;
 
 /// A contraction better than this is not believed.
 const BEST_CONTRACTION: f64 = 1e-3;
@@ -148,34 +155,13 @@ impl Ladder {
 
     /// The fast method's for these cases.
     pub(crate) fn new(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Self {
+        let mut rungs = capped(cases, model, accuracy);
         let reference_step_s = reference_step_s(cases);
-        let mut rungs: Vec<Rung> = Vec::new();
-        let mut error = f64::INFINITY;
-        let mut push = |level: Level, method: Method, next: f64| {
-            let contraction = (next / error).clamp(BEST_CONTRACTION, 1.0);
-            rungs.push(Rung { level, method, contraction });
-            error = next;
-        };
-        let levels = [Level::Fast, Level::Fast, Level::Fine];
-        let mut last: Option<(Geared, f64)> = None;
-        for (level, aim) in levels.into_iter().zip(aims(model)) {
-            // Corners without an equilibrium or without modes are rows that say so; the rest climbs by plain RK4.
-            let Ok(Some(geared)) = cases.choose(aim * accuracy) else { continue };
-            let Ok(expected) = cases.expected_error(&geared) else { continue };
-            if last.is_none_or(|(_, before)| expected < 0.5 * before) {
-                push(level, Method::Geared(geared), expected);
-                last = Some((geared, expected));
-            }
-        }
-        let finest = last.map(|(geared, expected)| (refined(&geared), expected));
-        if let Some((finest, expected)) = finest
-            && finest.evaluations_per_s() < WORTH_IT * Formula::Rk4.evaluations_per_s(reference_step_s)
+        let contraction = if rungs.is_empty() { 1.0 } else { BEST_CONTRACTION };
+        for (step_s, contraction) in [(LONGER_STEP * reference_step_s, contraction), (reference_step_s, 1.0)]
         {
-            let [_, caps] = FINEST;
-            push(Level::Finest, Method::Geared(finest), expected / (caps * caps));
+            rungs.push(Rung { level: Level::Rk4, method: Method::Rk4 { step_s }, contraction });
         }
-        push(Level::Rk4, Method::Rk4 { step_s: LONGER_STEP * reference_step_s }, 0.0);
-        push(Level::Rk4, Method::Rk4 { step_s: reference_step_s }, 0.0);
         if let Some(last) = rungs.last_mut() {
             last.contraction = REFERENCE_CONTRACTION;
         }
@@ -198,16 +184,52 @@ impl Ladder {
     }
 }
 
-/// With shorter steps and higher caps.
+/// The rungs with capped modes, if any are worth their time.
+///
+/// The coarse one's steps are held short by truncation, and the fast one's by its caps: how much less the second errs only
+/// the rule can say. From there on the formula is one, and what is left of an error is the greatest share that is left of any
+/// part of it. Corners without an equilibrium or without modes are rows that say so; the rest climbs by plain RK4.
+fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
+    let chosen = |formula, parts: f64| {
+        let geared = cases.choose(formula, parts * accuracy).ok().flatten()?;
+        Some((geared, cases.expected_error(&geared).ok()?))
+    };
+    let [coarse_aim, fast_aim] = aims(model);
+    let coarse = chosen(Formula::Rk4, coarse_aim);
+    let Some((coarse, coarse_error)) = coarse else { return Vec::new() };
+    let Some((fast, fast_error)) = chosen(Formula::Dop853, fast_aim) else { return Vec::new() };
+    let rung = |level, geared, contraction| Rung { level, method: Method::Geared(geared), contraction };
+    let mut rungs = vec![
+        rung(Level::Fast, coarse, 1.0),
+        rung(Level::Fast, fast, (fast_error / coarse_error).clamp(BEST_CONTRACTION, 1.0)),
+    ];
+    let mut last = fast;
+    if model == ModelKind::Nonlinear
+        && let Some((fine, _)) = chosen(Formula::Dop853, FINE_AIM)
+    {
+        // In one gear: what instability amplifies later is small while the drum is slow.
+        let fine = Geared::steady(fine.formula, fine.top().step_s, fine.top().caps);
+        rungs.push(rung(Level::Fine, fine, fine.share_of_error(&last).min(1.0)));
+        last = fine;
+    }
+    let finest = refined(&last);
+    let plain_evaluations_per_s = Formula::Rk4.evaluations_per_s(reference_step_s(cases));
+    if finest.evaluations_per_s() < WORTH_IT * plain_evaluations_per_s {
+        rungs.push(rung(Level::Finest, finest, finest.share_of_error(&last).min(1.0)));
+    }
+    rungs
+}
+
+/// With shorter steps, and caps as high as these bear.
 fn refined(geared: &Geared) -> Geared {
-    let [steps, factor] = FINEST;
-    let gears = geared.gears.map(|gear| {
-        let mut caps = gear.caps;
-        caps.bearings_rad_per_s *= factor;
-        caps.hinge_rad_per_s = caps.hinge_rad_per_s.map(|cap| factor * cap);
-        Gear { step_s: gear.step_s / steps, caps, ..gear }
-    });
-    Geared { gears, ..*geared }
+    let refined = |gear: Gear| {
+        let step_s = gear.step_s / FINEST_STEP;
+        let bearings_rad_per_s = FINEST_STEP_TIMES_CAP / step_s;
+        let higher = bearings_rad_per_s / gear.caps.bearings_rad_per_s;
+        let hinge_rad_per_s = gear.caps.hinge_rad_per_s.map(|cap| higher * cap);
+        Gear { step_s, caps: Caps { bearings_rad_per_s, hinge_rad_per_s }, ..gear }
+    };
+    Geared { gears: geared.gears.map(refined), ..*geared }
 }
 
 /// Step of the reference method.

@@ -10,10 +10,10 @@ use crate::nonlinear::COORDINATES;
 use crate::point::Point;
 use crate::run::ModelKind;
 use crate::suspension::forces;
-use lane_ode::{Dual, Lane, N, Sample};
+use lane_ode::{Dual, Lane, N, Peaks, Sample};
 
 /// One of the two models' force.
-pub(crate) enum CabinetForce<T> {
+enum CabinetForce<T> {
     /// Of the machine as it stands; as duals, for the force's derivative in time.
     Nonlinear(Coefficients<Dual<T>>),
     /// To first order in the deviations from equilibrium.
@@ -21,7 +21,7 @@ pub(crate) enum CabinetForce<T> {
 }
 
 /// The force's three components, cabinet axes.
-pub(crate) struct Expansion<T> {
+struct Expansion<T> {
     /// At equilibrium.
     rest: [N<T>; 3],
     /// Per deviation of each of [`TUB`].
@@ -33,7 +33,7 @@ pub(crate) struct Expansion<T> {
 impl<T: Lane> CabinetForce<T> {
     /// The same point in every lane.
     #[inline(always)]
-    pub(crate) fn splat(zero: N<T>, model: ModelKind, point: &Point) -> Self {
+    fn splat(zero: N<T>, model: ModelKind, point: &Point) -> Self {
         match model {
             ModelKind::Nonlinear => Self::Nonlinear(Coefficients::splat(zero.constant(), &point.machine)),
             ModelKind::Linear => {
@@ -48,24 +48,24 @@ impl<T: Lane> CabinetForce<T> {
     }
 
     /// Puts a point into one lane.
-    pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
+    fn set_point(&mut self, lane: usize, point: &Point) {
         match self {
             Self::Nonlinear(machine) => machine.set_lane(lane, &point.machine),
             Self::Linear(expansion) => expansion.set_point(lane, point),
         }
     }
 
-    /// The square of the force (N^2) at a state whose derivative is `dx`, with its own derivative; its curvature is not known.
+    /// The square of the force (N^2) at coordinates, speeds and accelerations of [`TUB`], with its derivative; its
+    /// curvature is not known.
     #[inline(always)]
-    pub(crate) fn squared(&self, x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> Sample<T> {
+    fn squared(&self, tub: &[Sample<T>; 4]) -> Sample<T> {
         match self {
             Self::Nonlinear(machine) => {
-                let mut q = [x[0].constant(); 4];
+                let mut q = [tub[0].value.constant(); 4];
                 let mut u = q;
-                for k in 0..4 {
-                    let (place, speed) = (TUB[k], COORDINATES + TUB[k]);
-                    q[k] = N(Dual { value: x[place].0, slope: dx[place].0 });
-                    u[k] = N(Dual { value: x[speed].0, slope: dx[speed].0 });
+                for (k, Sample { value, slope, curvature }) in tub.iter().enumerate() {
+                    q[k] = N(Dual { value: value.0, slope: slope.0 });
+                    u[k] = N(Dual { value: slope.0, slope: curvature.0 });
                 }
                 let tilt = Tilt::new(q[2], q[3]);
                 let rate = tilt.motion(u[2], u[3]).rate;
@@ -73,20 +73,20 @@ impl<T: Lane> CabinetForce<T> {
                 let (force, _) =
                     suspension_on_tub(&machine.view(), &tilt, &[q[0], q[1]], &[u[0], u[1]], &rate);
                 let squared = dot(&force, &force).0;
-                Sample { value: N(squared.value), slope: N(squared.slope), curvature: x[0].lit(0.0) }
+                Sample { value: N(squared.value), slope: N(squared.slope), curvature: tub[0].value.lit(0.0) }
             }
             Self::Linear(expansion) => {
-                let zero = x[0].lit(0.0);
+                let zero = tub[0].value.lit(0.0);
                 let (mut value, mut slope) = (zero, zero);
                 for i in 0..3 {
                     let mut force = expansion.rest[i];
                     let mut rate = zero;
                     for k in 0..4 {
                         let (by_place, by_speed) = (expansion.by_place[i][k], expansion.by_speed[i][k]);
-                        force += by_place * x[TUB[k]];
-                        force += by_speed * x[COORDINATES + TUB[k]];
-                        rate += by_place * dx[TUB[k]];
-                        rate += by_speed * dx[COORDINATES + TUB[k]];
+                        force += by_place * tub[k].value;
+                        force += by_speed * tub[k].slope;
+                        rate += by_place * tub[k].slope;
+                        rate += by_speed * tub[k].curvature;
                     }
                     value += force * force;
                     slope += (2.0 * force).v() * rate;
@@ -94,6 +94,73 @@ impl<T: Lane> CabinetForce<T> {
                 Sample { value, slope, curvature: zero }
             }
         }
+    }
+}
+
+/// The greatest force so far, over lanes.
+///
+/// Of the force itself no second derivative is known. So the motion between the ends of a long step is
+/// found first, and the force at a few places of it.
+pub(crate) struct GreatestForce<T> {
+    force: CabinetForce<T>,
+    squared: Peaks<T, 1>,
+    /// Coordinates, speeds and accelerations of [`TUB`] where the next step begins.
+    last: [Sample<T>; 4],
+    /// Parts that a step is cut into.
+    parts: u32,
+}
+
+impl<T: Lane> GreatestForce<T> {
+    /// Nothing seen yet, with the same point in every lane.
+    #[inline(always)]
+    pub(crate) fn new(zero: N<T>, model: ModelKind, point: &Point, parts: u32) -> Self {
+        let force = CabinetForce::splat(zero, model, point);
+        Self { force, squared: Peaks::new(zero), last: [Sample::still(zero, zero); 4], parts }
+    }
+
+    /// Begins a point's trajectory in one lane.
+    pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
+        self.squared.reset(lane);
+        self.force.set_point(lane, point);
+    }
+
+    /// The force of one lane, N.
+    pub(crate) fn lane_n(&self, lane: usize) -> f64 {
+        let [squared] = self.squared.lane(lane);
+        squared.sqrt()
+    }
+
+    /// A state whose derivative is `dx`, at the end of a step of `length_s`, or where a leg begins; `counts` says in
+    /// which lanes it counts.
+    #[inline(always)]
+    pub(crate) fn see(
+        &mut self,
+        length_s: Option<N<T>>,
+        x: &[N<T>; STATES],
+        dx: &[N<T>; STATES],
+        counts: T::Mask,
+    ) {
+        let mut now = self.last;
+        for (sample, q) in now.iter_mut().zip(TUB) {
+            *sample = Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] };
+        }
+        if let Some(length_s) = length_s {
+            let share = 1.0 / f64::from(self.parts);
+            for part in 1..self.parts {
+                let mut tub = now;
+                for k in 0..4 {
+                    tub[k] = Sample::between(&self.last[k], &now[k], length_s, share * f64::from(part));
+                }
+                let squared = self.force.squared(&tub);
+                self.squared.advance_by_slopes((share * length_s).v(), &[squared], counts);
+            }
+            let squared = self.force.squared(&now);
+            self.squared.advance_by_slopes((share * length_s).v(), &[squared], counts);
+        } else {
+            let squared = self.force.squared(&now);
+            self.squared.begin(&[squared], counts);
+        }
+        self.last = now;
     }
 }
 

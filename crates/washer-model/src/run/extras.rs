@@ -3,13 +3,16 @@
 //! All of it is found in the lanes, step by step, in a function of its own ([`Lane::aside`]): what nobody asks for leaves the loop over
 //! steps as it is.
 
-use super::cabinet_force::CabinetForce;
-use super::{Course, ModelKind};
+use super::cabinet_force::GreatestForce;
+use super::{Course, Method, ModelKind};
 use crate::model::STATES;
 use crate::outputs::{CHANNELS, RADIAL, squared};
 use crate::point::Point;
 use crate::spin::cuts_s;
-use lane_ode::{Aside, Lane, N, PartPeaks, Peaks, Sample, SquareIntegrals, TimeAbove};
+use lane_ode::{Aside, Lane, N, PartPeaks, Sample, SquareIntegrals, TimeAbove};
+
+/// Parts into which the cabinet's force cuts steps that are not held short by the bearings.
+const PARTS_OF_A_LONG_STEP: u32 = 4;
 
 /// What to record beyond a [`Record`](super::Record); nothing by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -55,8 +58,7 @@ pub(super) struct Extras<T> {
     wanted: Wanted,
     squares: SquareIntegrals<T, CHANNELS>,
     turns: PartPeaks<T, CHANNELS>,
-    force: Option<CabinetForce<T>>,
-    force_squared: Peaks<T, 1>,
+    force: Option<GreatestForce<T>>,
     clash: TimeAbove<T>,
     clearance_squared: N<T>,
     /// Of every point, as far as they have ended.
@@ -69,7 +71,7 @@ impl<T: Lane> Extras<T> {
     pub(super) fn new(
         zero: N<T>,
         wanted: Wanted,
-        model: ModelKind,
+        (model, method): (ModelKind, &Method),
         point: &Point,
         count: usize,
     ) -> Option<Self> {
@@ -77,13 +79,17 @@ impl<T: Lane> Extras<T> {
         if !wanted.anything() {
             return None;
         }
-        let force = if wanted.cabinet_force { Some(CabinetForce::splat(zero, model, point)) } else { None };
+        let parts = match method {
+            Method::Rk4 { .. } => 1,
+            Method::Geared(_) | Method::Dopri5(_) | Method::Rodas5p(_) => PARTS_OF_A_LONG_STEP,
+        };
+        let force =
+            if wanted.cabinet_force { Some(GreatestForce::new(zero, model, point, parts)) } else { None };
         Some(Self {
             wanted,
             squares: SquareIntegrals::new(zero),
             turns: PartPeaks::new(zero),
             force,
-            force_squared: Peaks::new(zero),
             clash: TimeAbove::new(zero),
             clearance_squared: zero,
             found: vec![Extra::default(); count],
@@ -93,7 +99,6 @@ impl<T: Lane> Extras<T> {
     /// Begins a point's trajectory in one lane.
     pub(super) fn set_point(&mut self, lane: usize, point: &Point) {
         self.squares.reset(lane);
-        self.force_squared.reset(lane);
         self.clash.reset(lane);
         let clearance_m = point.machine.bodies.clearance.0;
         self.clearance_squared.0.set(lane, clearance_m * clearance_m);
@@ -112,14 +117,13 @@ impl<T: Lane> Extras<T> {
             return;
         }
         let [from_s, to_s] = point.window_s();
-        let [force_squared] = self.force_squared.lane(lane);
         // Rounding can leave the integral of next to nothing a hair below zero.
         let mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let wanted = self.wanted;
         self.found[index] = Extra {
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),
             turns,
-            cabinet_force_n: wanted.cabinet_force.then(|| force_squared.sqrt()),
+            cabinet_force_n: self.force.as_ref().map(|force| force.lane_n(lane)),
             clash_time_s: wanted.clash_time.then(|| self.clash.lane(lane)),
             course: Course::new(),
         };
@@ -156,12 +160,13 @@ impl<T: Lane> Aside for Seen<'_, T> {
                 None => extras.turns.begin(channels, inside),
             }
         }
-        if let Some(force) = &extras.force {
-            let squared = [force.squared(x, dx)];
-            match step {
-                Some((_, length_s)) => extras.force_squared.advance_by_slopes(length_s, &squared, inside),
-                None => extras.force_squared.begin(&squared, inside),
-            }
+        if let Some(force) = &mut extras.force {
+            // No closure: it would be compiled without the instruction set.
+            let length_s = match step {
+                Some((_, length_s)) => Some(length_s),
+                None => None,
+            };
+            force.see(length_s, x, dx, inside);
         }
         if wanted.clash_time {
             let mut overlap = squared(radial);

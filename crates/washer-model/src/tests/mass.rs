@@ -103,8 +103,10 @@ fn mass_scaling_changes_the_forces_of_bearings_and_hinge_and_nothing_else() {
                 let [nine, ten] = sag.hinge;
                 let turned = [spin.cos * nine + spin.sin * ten, spin.cos * ten - spin.sin * nine];
                 let mass = N(machine.bodies.flexure_stiffness.0 / (cap * cap));
+                let forwards = [-u[9], u[8]];
                 for i in 0..2 {
-                    both.rotor.floating.torque[2 + i] -= mass * (a[8 + i] + N(speed_squared) * turned[i]);
+                    let whirl = N(1.5 * spin.speed.0) * forwards[i] - N(0.5 * speed_squared) * turned[i];
+                    both.rotor.floating.torque[2 + i] -= mass * (a[8 + i] + whirl);
                 }
             }
             worst = worst.max(left(&equations_of(&both, &a)));
