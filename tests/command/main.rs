@@ -12,6 +12,7 @@ mod faults;
 mod files;
 mod goldens;
 mod limits;
+mod pictures;
 
 use std::path::PathBuf;
 use std::process::Command;

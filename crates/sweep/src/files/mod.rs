@@ -28,4 +28,4 @@ pub use error::FileError;
 pub use kind::{FileKind, key};
 pub use output::Output;
 pub(crate) use output::{beside, judge, ready, write};
-pub(crate) use parquet::ParquetFile;
+pub(crate) use parquet::{Batches, ParquetFile};

@@ -30,6 +30,8 @@ pub(crate) const DISTINCT: [Colour; 6] = [
 pub(crate) const NONLINEAR: Colour = DISTINCT[0];
 /// The linear model, in every figure.
 pub(crate) const LINEAR: Colour = DISTINCT[1];
+/// Cells with points on both sides of a limit: Okabe and Ito's yellow, which no scale here has.
+pub(crate) const BOTH: Colour = Colour::hex(0xf0e442);
 /// Points that failed.
 pub(crate) const FAILED: Colour = Colour::hex(0xbfc5cc);
 

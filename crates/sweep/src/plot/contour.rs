@@ -118,6 +118,26 @@ fn join(links: &mut BTreeMap<Edge, Vec<Edge>>) -> Vec<Vec<Edge>> {
     lines
 }
 
+/// Points of level lines that a figure has room for.
+pub(crate) const MOST_POINTS: usize = 100_000;
+
+/// Leaves out the shortest lines of all cuts until at most `room` points are left.
+pub(crate) fn leave_out_shortest(lines: &mut [Vec<Vec<[f64; 2]>>], room: usize) {
+    let mut lengths: Vec<usize> = lines.iter().flatten().map(Vec::len).collect();
+    lengths.sort_unstable_by(|a, b| b.cmp(a));
+    let mut points = 0;
+    let kept = lengths.iter().take_while(|length| {
+        points += **length;
+        points <= room
+    });
+    let kept = kept.count();
+    if let Some(longest_left_out) = lengths.get(kept) {
+        for cut in lines {
+            cut.retain(|line| line.len() > *longest_left_out);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,5 +193,17 @@ mod tests {
     fn a_value_at_the_level_belongs_to_the_upper_side() {
         let lines = zero_lines(&numbers(3), &numbers(2), |i, _| i as f64 - 1.0);
         assert_eq!(lines, [[[1.0, 0.0], [1.0, 1.0]]]);
+    }
+
+    #[test]
+    fn the_shortest_lines_make_room() {
+        let line = |points: usize| vec![[0.0, 0.0]; points];
+        let mut cuts = [vec![line(2), line(7)], vec![line(4), line(2)]];
+        leave_out_shortest(&mut cuts, 12);
+        assert_eq!(cuts, [vec![line(7)], vec![line(4)]]);
+        leave_out_shortest(&mut cuts, 11);
+        assert_eq!(cuts.iter().flatten().count(), 2);
+        leave_out_shortest(&mut cuts, 3);
+        assert_eq!(cuts.iter().flatten().count(), 0);
     }
 }

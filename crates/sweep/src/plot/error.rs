@@ -42,6 +42,18 @@ pub enum PlotError {
         /// What is missing.
         reason: &'static str,
     },
+    /// More rows than a figure of this kind can show.
+    #[error("{}: a {kind} file of {rows} rows is more than a figure can show, which is {most} of them", path.display())]
+    TooMany {
+        /// Which file.
+        path: PathBuf,
+        /// What kind of file it is.
+        kind: &'static str,
+        /// Its rows.
+        rows: usize,
+        /// The most.
+        most: usize,
+    },
     /// The rows do not lie on a grid.
     #[error("{}: {reason}; a map has one row per point of a full grid", path.display())]
     NotAGrid {

@@ -3,7 +3,7 @@
 use super::axis::{Scale, Tick};
 use super::colour::FAILED;
 use super::raster::Typeface;
-use super::scene::{Anchor, Colour, FAINT, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
+use super::scene::{Anchor, Colour, FAINT, Hatch, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
 
 /// Type sizes, px: legible at half a figure's size.
 pub(crate) const TITLE_SIZE: f64 = 20.0;
@@ -147,6 +147,8 @@ pub(crate) enum Sign {
     Area(Colour),
     /// A hatched area: failed points.
     Failed,
+    /// A hatch without a ground of its own.
+    Hatched(Hatch),
     /// A dotted mark: undefined points.
     Undefined,
     /// A star.
@@ -179,6 +181,11 @@ pub(crate) fn legend(
                 scene.line(Outline::rectangle(x, y - 8.0, 28.0, 16.0), Stroke::solid(MUTED, 1.0));
             }
             Sign::Failed => failed(scene, Outline::rectangle(x, y - 8.0, 28.0, 16.0)),
+            Sign::Hatched(hatch) => {
+                let area = Outline::rectangle(x, y - 8.0, 28.0, 16.0);
+                scene.hatch(area.clone(), hatch);
+                scene.line(area, Stroke::solid(MUTED, 1.0));
+            }
             Sign::Undefined => undefined(scene, &[[x, y - 8.0, 28.0, 16.0]]),
             Sign::Star(colour) => scene.fill(Outline::star([x + 14.0, y], 9.0), *colour),
         }
@@ -206,7 +213,18 @@ fn lay_out(typeface: &Typeface, entries: &[(Sign, String)], width: f64) -> Vec<(
 /// Draws an area of failed points: grey and hatched.
 pub(crate) fn failed(scene: &mut Scene, area: Outline) {
     scene.fill_crisp(area.clone(), FAILED);
-    scene.hatch(area, &Stroke::solid(INK, 1.2), 9.0);
+    scene.hatch(area, &failed_hatch());
+}
+
+/// Lines over points that failed.
+pub(crate) fn failed_hatch() -> Hatch {
+    Hatch { strokes: vec![Stroke::solid(INK, 1.2)], spacing: 9.0, falling: false }
+}
+
+/// Lines over points whose motion is chaotic: light on dark, to show on every colour of a scale.
+pub(crate) fn sensitive_hatch() -> Hatch {
+    let strokes = vec![Stroke::solid(INK, 2.4), Stroke::solid(PAPER, 1.0)];
+    Hatch { strokes, spacing: 7.0, falling: true }
 }
 
 /// Draws cells `[x, y, width, height]` of undefined points: white with a dot in the middle.

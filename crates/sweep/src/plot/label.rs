@@ -39,6 +39,15 @@ pub(crate) fn channel(name: &str) -> String {
     name.replace('_', " ")
 }
 
+/// The unit of a channel whose file does not say it: angles are named after their axis, the rest are displacements.
+pub(crate) fn unit_of_channel(name: &str) -> &'static str {
+    match name.rsplit('_').next() {
+        Some("x" | "y" | "z") => "m",
+        Some("yaw" | "pitch" | "roll") => "rad",
+        _ => "",
+    }
+}
+
 /// With a capital first letter.
 pub(crate) fn capitalised(text: &str) -> String {
     let mut letters = text.chars();

@@ -8,10 +8,12 @@ mod axis;
 mod chart;
 mod colour;
 pub(crate) mod contour;
+mod cuts;
 mod decimate;
 mod error;
 mod figures;
 mod frame;
+mod gather;
 mod grid;
 mod html;
 mod label;
@@ -23,18 +25,26 @@ mod region;
 mod sample;
 mod scene;
 mod svg;
+mod swept;
+mod table;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_long;
+mod thin;
 
 use std::path::{Path, PathBuf};
 
 pub use error::PlotError;
-pub use read::{Column, Kind, Table, Values};
 
 use chart::Chart;
+use cuts::Cuts;
+use gather::Map;
 use grid::Grid;
 use raster::Typeface;
+use read::{Kind, Source};
 use scene::Scene;
+use table::Table;
 
 use crate::files::{self, Output};
 
@@ -142,50 +152,66 @@ impl Format {
 pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), PlotError> {
     let format = Format::of(output)?;
     let file = Output::begin(output, format.kind())?;
-    let table = Table::open(input)?;
-    check_options(&table, options, format)?;
-    let bytes = match figure(&table, options)? {
-        Figure::Map(grid) => match format {
-            Format::Html => html::map_page(&table, &grid, options)?.into_bytes(),
-            Format::Svg | Format::Png => {
-                let typeface = Typeface::load()?;
-                image(&figures::map::draw(&table, &grid, options, &typeface)?, format)?
-            }
-        },
-        Figure::Chart(chart) => match format {
-            Format::Html => html::chart_page(&table, &chart).into_bytes(),
-            Format::Svg | Format::Png => image(&chart::draw(&chart, &Typeface::load()?), format)?,
-        },
+    let source = Source::open(input)?;
+    check_options(&source, options, format)?;
+    let bytes = match source.kind {
+        Kind::Map => map(source, options, format)?,
+        Kind::Trace | Kind::Modes | Kind::Boundary => chart(&Table::read(source)?, options, format)?,
     };
     Ok(file.finish(&bytes)?)
 }
 
-enum Figure {
-    Map(Grid),
-    Chart(Chart),
+/// Most cells of a picture: two pixels or three to each.
+const PICTURE_CELLS: usize = 1 << 17;
+
+fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+    let axes = swept::axes(&source)?;
+    let limit = source.ratio_limit();
+    let divide = |name: &str| layer::divide(limit, name);
+    if format != Format::Html && axes.len() > 1 {
+        let shown = layer::chosen(&source, options)?;
+        let columns: Vec<&str> = shown.iter().map(|shown| shown.column.as_str()).chain(["status"]).collect();
+        let cuts = Cuts::of_picture(&source, &axes, options)?;
+        let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
+        let map = Map::read(source, grid, &columns, divide)?;
+        let typeface = Typeface::load()?;
+        return image(&figures::map::draw(&map, &cuts, shown.as_ref(), &typeface)?, format);
+    }
+    let columns: Vec<String> = html::carried(&source, &axes).into_iter().map(str::to_owned).collect();
+    let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let most = html::most_cells(columns.len());
+    let cuts = Cuts::of_page(&source, &axes, options, most)?;
+    let grid = Grid::new(&axes, &cuts.picks, most);
+    if axes.len() == 1 {
+        let map = Map::read(source, grid, &columns, divide)?;
+        return written(&map.table, &figures::curves::chart(&map, options)?, format);
+    }
+    // An amplitude without a channel is chosen on the page.
+    let choice = matches!(options.quantity, Quantity::Nonlinear | Quantity::Linear);
+    if !(choice && options.channels.is_empty()) {
+        layer::chosen(&source, options)?;
+    }
+    let map = Map::read(source, grid, &columns, divide)?;
+    Ok(html::map_page(&map, &cuts, options)?.into_bytes())
 }
 
-fn figure(table: &Table, options: &PlotOptions) -> Result<Figure, PlotError> {
-    Ok(match table.kind {
-        Kind::Map => {
-            let grid = Grid::of(table)?;
-            if grid.axes.len() == 1 {
-                Figure::Chart(figures::curves::chart(table, &grid, options)?)
-            } else {
-                Figure::Map(grid)
-            }
-        }
-        Kind::Trace => Figure::Chart(match options.view {
-            Some(View::Passages) => figures::passages::chart(table, options)?,
-            _ => figures::trace::chart(table, options)?,
-        }),
-        Kind::Modes => Figure::Chart(match options.view {
-            Some(View::Variation) => figures::turn::chart(table)?,
-            Some(View::Shapes) => figures::shapes::chart(table)?,
-            _ => figures::campbell::chart(table)?,
-        }),
-        Kind::Boundary => Figure::Chart(figures::boundary::chart(table)?),
-    })
+fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+    let chart = match (table.source.kind, options.view) {
+        (Kind::Trace, Some(View::Passages)) => figures::passages::chart(table, options)?,
+        (Kind::Trace, _) => figures::trace::chart(table, options)?,
+        (Kind::Modes, Some(View::Variation)) => figures::turn::chart(table)?,
+        (Kind::Modes, Some(View::Shapes)) => figures::shapes::chart(table)?,
+        (Kind::Modes, _) => figures::campbell::chart(table)?,
+        (Kind::Boundary | Kind::Map, _) => figures::boundary::chart(table)?,
+    };
+    written(table, &chart, format)
+}
+
+fn written(table: &Table, chart: &Chart, format: Format) -> Result<Vec<u8>, PlotError> {
+    match format {
+        Format::Html => Ok(html::chart_page(table, chart).into_bytes()),
+        Format::Svg | Format::Png => image(&chart::draw(chart, &Typeface::load()?), format),
+    }
 }
 
 fn image(scene: &Scene, format: Format) -> Result<Vec<u8>, PlotError> {
@@ -204,9 +230,9 @@ fn view_of(options: &PlotOptions) -> &'static str {
 }
 
 /// Refuses options that the file's kind or the output's format would leave without effect.
-fn check_options(table: &Table, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
-    let (map, trace) = (table.kind == Kind::Map, table.kind == Kind::Trace);
-    let view_fits = options.view.is_some_and(|view| view.of() == table.kind);
+fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
+    let (map, trace) = (source.kind == Kind::Map, source.kind == Kind::Trace);
+    let view_fits = options.view.is_some_and(|view| view.of() == source.kind);
     let over_time = trace && options.view != Some(View::Passages);
     let rules = [
         ("--quantity", options.quantity != Quantity::default(), map, "maps"),
@@ -220,8 +246,8 @@ fn check_options(table: &Table, options: &PlotOptions, format: Format) -> Result
     ];
     for (option, given, fits, where_it_does) in rules {
         if given && !fits {
-            let kind = table.kind.name();
-            let path = table.path.display();
+            let kind = source.kind.name();
+            let path = source.path.display();
             return Err(PlotError::Unfit(format!(
                 "`{option}` is for {where_it_does}; {path} is a {kind} file"
             )));

@@ -1,19 +1,23 @@
-//! One of this program's Parquet files: its columns as typed vectors, what they mean, and where they came from.
+//! One of this program's Parquet files, open: what it says of itself, and its rows, batch by batch.
+//!
+//! This is the one place that reads files. A map of ten million rows is read in several passes over
+//! the columns that a figure needs, and never stands in memory whole.
 
 use std::path::{Path, PathBuf};
 
-use arrow_array::{ArrayRef, RecordBatch};
+use arrow_array::ArrayRef;
 use arrow_schema::{ArrowError, DataType, Field};
+use parquet::arrow::ProjectionMask;
 use serde_json::Value;
 
 use super::error::PlotError;
 use super::label;
 use crate::cells;
-use crate::files::{FileError, ParquetFile};
+use crate::files::{self, FileError, ParquetFile};
 
 /// What a file holds, told by its columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// One row per grid point.
     Map,
     /// Time histories of both models at one point.
@@ -26,8 +30,7 @@ pub enum Kind {
 
 impl Kind {
     /// As in "a map file".
-    #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Map => "map",
             Self::Trace => "trace",
@@ -37,58 +40,61 @@ impl Kind {
     }
 }
 
-/// The values of a column.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Values {
-    /// Any numeric type; null is NaN.
-    Number(Vec<f64>),
-    /// Truth values.
-    Flag(Vec<Option<bool>>),
-    /// Text, plain or dictionary coded.
-    Text(Vec<Option<String>>),
+/// What the cells of a column are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cells {
+    /// Any numeric type.
+    Numbers,
+    /// Text, plain or dictionary coded, and truth values as `true` and `false`.
+    Words,
 }
 
-/// A column.
+/// A column, without its rows.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Column {
+pub(crate) struct ColumnFacts {
     /// As in the file.
-    pub name: String,
+    pub(crate) name: String,
     /// As the file's field metadata says, or else as the name's suffix does; empty for pure numbers.
-    pub unit: String,
+    pub(crate) unit: String,
     /// As the file's field metadata says; may be empty.
-    pub description: String,
-    /// One per row.
-    pub values: Values,
+    pub(crate) description: String,
+    /// What its cells are.
+    pub(crate) cells: Cells,
+    /// Its place among the file's fields.
+    field: usize,
 }
 
-/// A whole file.
-#[derive(Clone, Debug)]
-pub struct Table {
-    /// Where it was read.
-    pub path: PathBuf,
+/// A file whose columns are those of a figure.
+#[derive(Debug)]
+pub(crate) struct Source {
+    /// Where it is.
+    pub(crate) path: PathBuf,
     /// What it holds.
-    pub kind: Kind,
-    /// In file order.
-    pub columns: Vec<Column>,
+    pub(crate) kind: Kind,
+    /// In file order, without those of types that none of our files has.
+    pub(crate) columns: Vec<ColumnFacts>,
     /// The file-level key-value metadata, parsed where it is JSON; in file order.
-    pub provenance: Vec<(String, Value)>,
+    pub(crate) provenance: Vec<(String, Value)>,
     /// Number of rows.
-    pub rows: usize,
+    pub(crate) rows: usize,
+    file: ParquetFile,
 }
 
 /// Key under which Arrow keeps its own copy of the schema: no provenance.
 const ARROW_SCHEMA: &str = "ARROW:schema";
 
-impl Table {
-    /// Reads a file whole.
+/// Rows decoded at once.
+const BATCH_ROWS: usize = 1 << 12;
+
+impl Source {
+    /// Opens a file and reads what it says of itself.
     ///
     /// # Errors
-    /// [`PlotError::File`], or [`PlotError::UnknownKind`] when the columns are not those of
-    /// a file of ours.
-    pub fn open(path: &Path) -> Result<Self, PlotError> {
+    /// [`PlotError::File`], or [`PlotError::UnknownKind`] when the columns are not those of a file
+    /// of ours.
+    pub(crate) fn open(path: &Path) -> Result<Self, PlotError> {
         let file = ParquetFile::open(path)?;
-        let damaged =
-            |error: ArrowError| FileError::NotParquet { path: path.to_owned(), reason: error.to_string() };
+        let rows = usize::try_from(file.rows()).unwrap_or(usize::MAX);
         let provenance = file
             .pairs()
             .filter(|entry| entry.key != ARROW_SCHEMA)
@@ -97,38 +103,50 @@ impl Table {
                 (entry.key.clone(), serde_json::from_str(&text).unwrap_or(Value::String(text)))
             })
             .collect();
-        let schema = file.schema().clone();
-        let batches = file.batches(|builder| builder)?.collect::<Result<Vec<RecordBatch>, _>>()?;
-
-        let mut columns = Vec::with_capacity(schema.fields().len());
-        for (index, field) in schema.fields().iter().enumerate() {
-            let parts: Vec<&ArrayRef> = batches.iter().map(|batch| batch.column(index)).collect();
-            if let Some(values) = values(field.data_type(), &parts).map_err(damaged)? {
-                columns.push(column(field, values));
-            }
-        }
-        let rows = batches.iter().map(RecordBatch::num_rows).sum();
+        let fields = file.schema().fields().iter().enumerate();
+        let columns: Vec<ColumnFacts> = fields.filter_map(|(place, field)| column(field, place)).collect();
         let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
         let kind = recognise(&names)
             .ok_or_else(|| PlotError::UnknownKind { path: path.to_owned(), columns: names.join(", ") })?;
-        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows })
+        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, file })
+    }
+
+    /// The rows of the named columns, from the first. Names that the file lacks are left out.
+    ///
+    /// # Errors
+    /// [`PlotError::File`].
+    pub(crate) fn batches(&self, names: &[&str]) -> Result<Batches<'_>, PlotError> {
+        let columns: Vec<&ColumnFacts> = names.iter().filter_map(|name| self.column(name)).collect();
+        let mut fields: Vec<usize> = columns.iter().map(|column| column.field).collect();
+        fields.sort_unstable();
+        // Two columns of one name, in a file that is not ours, are the first of them twice.
+        fields.dedup();
+        let at = columns.iter().map(|column| fields.partition_point(|&field| field < column.field));
+        let at = at.collect();
+        let reader = self.file.batches(|builder| {
+            let mask = ProjectionMask::roots(builder.parquet_schema(), fields);
+            builder.with_projection(mask).with_batch_size(BATCH_ROWS)
+        })?;
+        Ok(Batches { path: &self.path, reader, columns, at })
     }
 
     /// The column of that name.
-    #[must_use]
-    pub fn column(&self, name: &str) -> Option<&Column> {
+    pub(crate) fn column(&self, name: &str) -> Option<&ColumnFacts> {
         self.columns.iter().find(|column| column.name == name)
     }
 
-    /// The numbers of a column that this kind of file must have.
-    ///
-    /// # Errors
-    /// [`PlotError::Column`].
-    pub fn numbers(&self, name: &str) -> Result<&[f64], PlotError> {
-        self.column(name).and_then(Column::numbers).ok_or_else(|| self.lacks(name, "numeric"))
+    /// Columns of numbers whose name starts with `prefix`, without it.
+    pub(crate) fn with_prefix(&self, prefix: &str) -> Vec<(&str, &ColumnFacts)> {
+        self.numeric().filter_map(|column| Some((column.name.strip_prefix(prefix)?, column))).collect()
     }
 
-    fn lacks(&self, column: &str, expected: &'static str) -> PlotError {
+    /// Columns of numbers.
+    pub(crate) fn numeric(&self) -> impl Iterator<Item = &ColumnFacts> {
+        self.columns.iter().filter(|column| column.cells == Cells::Numbers)
+    }
+
+    /// A column that this kind of file must have is missing.
+    pub(crate) fn lacks(&self, column: &str, expected: &'static str) -> PlotError {
         PlotError::Column {
             path: self.path.clone(),
             kind: self.kind.name(),
@@ -137,39 +155,20 @@ impl Table {
         }
     }
 
-    /// Columns of numbers whose name starts with `prefix`, without it.
-    #[must_use]
-    pub fn with_prefix(&self, prefix: &str) -> Vec<(&str, &Column)> {
-        self.columns
-            .iter()
-            .filter(|column| column.numbers().is_some())
-            .filter_map(|column| Some((column.name.strip_prefix(prefix)?, column)))
-            .collect()
-    }
-
     /// The first value stored under `key` in the provenance, outer levels before inner ones.
-    #[must_use]
-    pub fn find(&self, key: &str) -> Option<&Value> {
+    pub(crate) fn find(&self, key: &str) -> Option<&Value> {
         self.provenance
             .iter()
             .find_map(|(name, value)| if name == key { Some(value) } else { find(value, key) })
     }
 
     /// Name of the run, if the file says it.
-    #[must_use]
-    pub fn run_name(&self) -> Option<&str> {
+    pub(crate) fn run_name(&self) -> Option<&str> {
         self.find("name").and_then(Value::as_str)
     }
 
-    /// How each row's point ended; `unknown` where the file does not say.
-    pub fn statuses(&self) -> impl Iterator<Item = &str> {
-        let texts = self.column("status").and_then(Column::texts).unwrap_or_default();
-        texts.iter().map(|text| text.as_deref().unwrap_or("unknown"))
-    }
-
     /// What its ratios are ratios of, by the criterion that the run was told.
-    #[must_use]
-    pub fn compared(&self) -> &'static str {
+    pub(crate) fn compared(&self) -> &'static str {
         match self.find("criterion").and_then(Value::as_str) {
             Some("envelope") => "amplitudes by turn",
             Some("rms") => "root mean squares",
@@ -178,29 +177,74 @@ impl Table {
     }
 
     /// The ratio from which on a point is unreliable: as the run was told, or else 2 as in the paper.
-    #[must_use]
-    pub fn ratio_limit(&self) -> f64 {
+    pub(crate) fn ratio_limit(&self) -> f64 {
         self.find("ratio_limit").and_then(Value::as_f64).filter(|limit| *limit > 0.0).unwrap_or(2.0)
     }
 }
 
-impl Column {
-    /// The values, if they are numbers.
-    #[must_use]
-    pub fn numbers(&self) -> Option<&[f64]> {
-        match &self.values {
-            Values::Number(values) => Some(values),
-            Values::Flag(_) | Values::Text(_) => None,
-        }
+/// The cells are not what the schema says.
+fn damaged(path: &Path, error: &ArrowError) -> PlotError {
+    FileError::NotParquet { path: path.to_owned(), reason: error.to_string() }.into()
+}
+
+/// The rows of some columns of a file, in file order.
+pub(crate) struct Batches<'a> {
+    path: &'a Path,
+    reader: files::Batches,
+    columns: Vec<&'a ColumnFacts>,
+    /// Place of each column in what the reader gives.
+    at: Vec<usize>,
+}
+
+impl<'a> Iterator for Batches<'a> {
+    type Item = Result<Batch<'a>, PlotError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let batch = self.reader.next()?.map_err(PlotError::from);
+        Some(batch.map(|batch| {
+            let cells = self.at.iter().map(|&place| batch.column(place).clone());
+            let columns = self.columns.iter().copied().zip(cells).collect();
+            Batch { path: self.path, columns, rows: batch.num_rows() }
+        }))
+    }
+}
+
+/// Some rows of some columns.
+pub(crate) struct Batch<'a> {
+    path: &'a Path,
+    columns: Vec<(&'a ColumnFacts, ArrayRef)>,
+    /// Number of rows.
+    pub(crate) rows: usize,
+}
+
+impl Batch<'_> {
+    fn array(&self, name: &str) -> Option<&ArrayRef> {
+        self.columns.iter().find(|(column, _)| column.name == name).map(|(_, array)| array)
     }
 
-    /// The values, if they are text.
-    #[must_use]
-    pub fn texts(&self) -> Option<&[Option<String>]> {
-        match &self.values {
-            Values::Text(values) => Some(values),
-            Values::Flag(_) | Values::Number(_) => None,
-        }
+    /// The numbers of a column, null as NaN; none for a column that was not asked for.
+    ///
+    /// # Errors
+    /// [`PlotError::File`] if the cells are not what the schema says.
+    pub(crate) fn numbers(&self, name: &str) -> Result<Vec<f64>, PlotError> {
+        let Some(array) = self.array(name) else { return Ok(Vec::new()) };
+        let numbers = cells::numbers(array).map_err(|error| damaged(self.path, &error))?;
+        Ok(numbers.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
+    }
+
+    /// The words of a column; none for a column that was not asked for.
+    ///
+    /// # Errors
+    /// [`PlotError::File`] if the cells are not what the schema says.
+    pub(crate) fn words(&self, name: &str) -> Result<Vec<Option<&str>>, PlotError> {
+        let Some(array) = self.array(name) else { return Ok(Vec::new()) };
+        let words = if matches!(array.data_type(), DataType::Boolean) {
+            let word = |flag: bool| if flag { "true" } else { "false" };
+            cells::flags(array).map(|flags| flags.iter().map(|flag| flag.map(word)).collect())
+        } else {
+            cells::texts(array)
+        };
+        words.map_err(|error| damaged(self.path, &error))
     }
 }
 
@@ -235,42 +279,21 @@ pub(crate) fn bracket<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
     Some((with_word(&["low", "lower", "min"])?, with_word(&["high", "upper", "max"])?))
 }
 
-fn column(field: &Field, values: Values) -> Column {
+fn column(field: &Field, place: usize) -> Option<ColumnFacts> {
+    let cells = match field.data_type() {
+        DataType::Boolean => Cells::Words,
+        text if cells::is_text(text) => Cells::Words,
+        number if cells::is_number(number) => Cells::Numbers,
+        _ => return None,
+    };
     let told = |key: &str| field.metadata().get(key).filter(|text| !text.is_empty()).cloned();
     let unit = told("unit").unwrap_or_else(|| label::unit_of_name(field.name()).to_owned());
-    Column {
+    Some(ColumnFacts {
         name: field.name().clone(),
         // A pure number's unit is 1, which no label should say.
         unit: if unit == "1" { String::new() } else { unit },
         description: told("description").unwrap_or_default(),
-        values,
-    }
-}
-
-/// A column's values from its batches; `None` for types that none of our files has.
-fn values(data_type: &DataType, parts: &[&ArrayRef]) -> Result<Option<Values>, ArrowError> {
-    Ok(match data_type {
-        DataType::Boolean => {
-            let mut flags = Vec::new();
-            for part in parts {
-                flags.extend(cells::flags(part)?);
-            }
-            Some(Values::Flag(flags))
-        }
-        text if cells::is_text(text) => {
-            let mut texts = Vec::new();
-            for part in parts {
-                texts.extend(cells::texts(part)?.into_iter().map(|text| text.map(str::to_owned)));
-            }
-            Some(Values::Text(texts))
-        }
-        number if cells::is_number(number) => {
-            let mut numbers = Vec::new();
-            for part in parts {
-                numbers.extend(cells::numbers(part)?.into_iter().map(|value| value.unwrap_or(f64::NAN)));
-            }
-            Some(Values::Number(numbers))
-        }
-        _ => None,
+        cells,
+        field: place,
     })
 }

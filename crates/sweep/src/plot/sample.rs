@@ -14,7 +14,7 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 
 /// Columns with their units, and metadata, on the way to a file.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Sample {
     columns: Vec<(Field, ArrayRef)>,
     metadata: Vec<KeyValue>,
@@ -60,17 +60,27 @@ impl Sample {
     }
 
     pub(crate) fn write(self, folder: &Path, name: &str) -> PathBuf {
-        let path = folder.join(name);
-        let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = self.columns.into_iter().unzip();
-        let schema = Arc::new(Schema::new(fields));
-        let batch = RecordBatch::try_new(schema.clone(), arrays).unwrap();
-        let properties = WriterProperties::builder().set_key_value_metadata(Some(self.metadata)).build();
-        let file = std::fs::File::create(&path).unwrap();
-        let mut writer = ArrowWriter::try_new(file, schema, Some(properties)).unwrap();
-        writer.write(&batch).unwrap();
-        writer.close().unwrap();
-        path
+        write_all(folder, name, [self])
     }
+}
+
+/// Writes samples of the same columns to one file, one after the other; the metadata is that of the first.
+fn write_all(folder: &Path, name: &str, samples: impl IntoIterator<Item = Sample>) -> PathBuf {
+    let path = folder.join(name);
+    let mut writer: Option<ArrowWriter<std::fs::File>> = None;
+    for sample in samples {
+        let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = sample.columns.into_iter().unzip();
+        let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap();
+        let writer = writer.get_or_insert_with(|| {
+            let properties =
+                WriterProperties::builder().set_key_value_metadata(Some(sample.metadata)).build();
+            let file = std::fs::File::create(&path).unwrap();
+            ArrowWriter::try_new(file, batch.schema(), Some(properties)).unwrap()
+        });
+        writer.write(&batch).unwrap();
+    }
+    writer.unwrap().close().unwrap();
+    path
 }
 
 /// A map's axes by name and values, and what the two models give at a point.
@@ -79,23 +89,45 @@ pub(crate) struct MapSample<'a> {
     pub(crate) limit: f64,
     /// Amplitudes of `tub_yaw` in the nonlinear and the linear model, rad; `None` where the run diverged.
     pub(crate) yaw: &'a dyn Fn(&[f64]) -> Option<[f64; 2]>,
+    /// Where the motion is `sensitive`.
+    pub(crate) chaotic: &'a dyn Fn(&[f64]) -> bool,
 }
 
 impl MapSample<'_> {
     pub(crate) fn sample(&self) -> Sample {
-        let mut points: Vec<Vec<f64>> = vec![Vec::new()];
-        for (_, values) in &self.axes {
-            points = points
-                .iter()
-                .flat_map(|at| values.iter().map(|value| [&at[..], &[*value]].concat()))
-                .collect();
+        self.rows(0..self.points())
+    }
+
+    /// A file as long as the axes make it, some rows in memory at a time.
+    pub(crate) fn write_long(&self, folder: &Path, name: &str) -> PathBuf {
+        const ROWS: usize = 1 << 14;
+        let all = self.points();
+        write_all(folder, name, (0..all).step_by(ROWS).map(|row| self.rows(row..all.min(row + ROWS))))
+    }
+
+    fn points(&self) -> usize {
+        self.axes.iter().map(|(_, values)| values.len()).product()
+    }
+
+    fn point(&self, index: usize) -> Vec<f64> {
+        let mut rest = index;
+        let mut at: Vec<f64> = Vec::with_capacity(self.axes.len());
+        for (_, values) in self.axes.iter().rev() {
+            at.push(values[rest % values.len()]);
+            rest /= values.len();
         }
+        at.reverse();
+        at
+    }
+
+    fn rows(&self, rows: std::ops::Range<usize>) -> Sample {
+        let points: Vec<Vec<f64>> = rows.clone().map(|index| self.point(index)).collect();
         let yaws: Vec<Option<[f64; 2]>> = points.iter().map(|at| (self.yaw)(at)).collect();
         let model =
             |k: usize| yaws.iter().map(move |yaw| yaw.map_or(f64::NAN, |yaw| yaw[k])).collect::<Vec<f64>>();
         let ratio: Vec<f64> =
             model(0).iter().zip(model(1)).map(|(n, l)| if l > 0.0 { n / l } else { f64::NAN }).collect();
-        let mut sample = Sample::default().counts("point", 0..points.len() as u64);
+        let mut sample = Sample::default().counts("point", rows.start as u64..rows.end as u64);
         for (k, (name, _)) in self.axes.iter().enumerate() {
             sample = sample.numbers(name, "", points.iter().map(|at| at[k]));
         }
@@ -110,6 +142,7 @@ impl MapSample<'_> {
             .numbers("ratio_max", "1", ratio.iter().copied())
             .words("ratio_max_channel", ratio.iter().map(|ratio| ratio.is_finite().then_some("tub_yaw")))
             .flags("reliable", ratio.iter().map(|ratio| ratio.is_finite().then_some(*ratio < self.limit)))
+            .flags("sensitive", points.iter().map(|at| Some((self.chaotic)(at))))
             .numbers("min_gap_nonlinear_m", "m", model(0).into_iter().map(|yaw| 0.01 - 0.1 * yaw))
             .numbers("min_gap_linear_m", "m", model(1).into_iter().map(|yaw| 0.01 - 0.1 * yaw))
             .words("status", yaws.iter().map(|yaw| Some(if yaw.is_some() { "ok" } else { "diverged" })))
@@ -137,6 +170,7 @@ pub(crate) fn map() -> Sample {
             [mass, damping] => Some([0.009 * 3.0 * ((50.0 + 200.0 * mass - damping) / 60.0).exp(), 0.009]),
             _ => unreachable!("two axes"),
         },
+        chaotic: &|_| false,
     }
     .sample()
 }

@@ -121,6 +121,34 @@ impl Stroke {
     }
 }
 
+/// Slanted lines over an area.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Hatch {
+    /// Drawn one over the other.
+    pub(crate) strokes: Vec<Stroke>,
+    /// From one line to the next along x, px.
+    pub(crate) spacing: f64,
+    /// Lines fall to the right, in place of rising.
+    pub(crate) falling: bool,
+}
+
+impl Hatch {
+    /// The same, drawn smaller where areas of `width` by `height` px are so small that they could
+    /// lie between its lines.
+    pub(crate) fn within(mut self, [width, height]: [f64; 2]) -> Self {
+        // An area is crossed by a line at least where the spacing is no more than both its sides.
+        let spacing = ((width + height) / 1.5).clamp(FINEST_HATCH, self.spacing);
+        for stroke in &mut self.strokes {
+            stroke.width *= spacing / self.spacing;
+        }
+        self.spacing = spacing;
+        self
+    }
+}
+
+/// Least spacing at which lines are still told apart, px.
+const FINEST_HATCH: f64 = 2.0;
+
 /// Which part of a text stands at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Anchor {
@@ -283,8 +311,9 @@ impl Scene {
         self.items.push(Item::Unclip);
     }
 
-    /// Fills `outline` with slanted lines `spacing` px apart.
-    pub(crate) fn hatch(&mut self, outline: Outline, stroke: &Stroke, spacing: f64) {
+    /// Fills `outline` with slanted lines.
+    pub(crate) fn hatch(&mut self, outline: Outline, hatch: &Hatch) {
+        let spacing = hatch.spacing;
         let points = outline.0.iter().filter_map(|segment| match *segment {
             Segment::Move(point) | Segment::Line(point) => Some(point),
             Segment::Close => None,
@@ -301,13 +330,18 @@ impl Scene {
         }
         let height = high[1] - low[1];
         let mut lines = Outline::default();
-        // Lines lie on multiples of the spacing of x + y, so that the hatching runs on from shape to shape.
-        let mut along = ((low[0] + low[1]) / spacing).ceil() * spacing - low[1];
+        // Lines lie on multiples of the spacing of x + y, or of x - y, so that the hatching runs on
+        // from shape to shape.
+        let (from, to, sign) = if hatch.falling { (high[1], low[1], -1.0) } else { (low[1], high[1], 1.0) };
+        let mut along = ((low[0] + sign * from) / spacing).ceil() * spacing - sign * from;
         while along < high[0] + height {
-            lines.add_line(&[[along, low[1]], [along - height, high[1]]]);
+            lines.add_line(&[[along, from], [along - height, to]]);
             along += spacing;
         }
-        let stroke = stroke.clone();
-        self.clipped(outline, |scene| scene.line(lines, stroke));
+        self.clipped(outline, |scene| {
+            for stroke in &hatch.strokes {
+                scene.line(lines.clone(), stroke.clone());
+            }
+        });
     }
 }

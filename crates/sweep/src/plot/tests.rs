@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::sample::{MapSample, Sample, boundary, map, modes, trace};
 use super::*;
 
-fn draw(sample: Sample, options: &PlotOptions, output: &str) -> Result<Vec<u8>, PlotError> {
+pub(super) fn draw(sample: Sample, options: &PlotOptions, output: &str) -> Result<Vec<u8>, PlotError> {
     let folder = tempfile::tempdir().unwrap();
     let input = sample.write(folder.path(), "input.parquet");
     let output = folder.path().join(output);
@@ -15,13 +15,17 @@ fn draw(sample: Sample, options: &PlotOptions, output: &str) -> Result<Vec<u8>, 
     Ok(std::fs::read(output).unwrap())
 }
 
-fn svg(sample: Sample, options: &PlotOptions) -> String {
+pub(super) fn svg(sample: Sample, options: &PlotOptions) -> String {
     String::from_utf8(draw(sample, options, "figure.svg").unwrap()).unwrap()
 }
 
-/// What a page carries as its data.
 fn data(sample: Sample, options: &PlotOptions) -> Value {
-    let page = String::from_utf8(draw(sample, options, "figure.html").unwrap()).unwrap();
+    carried(&draw(sample, options, "figure.html").unwrap())
+}
+
+/// What a page carries as its data.
+pub(super) fn carried(page: &[u8]) -> Value {
+    let page = std::str::from_utf8(page).unwrap();
     let start = page.find(r#"id="data">"#).unwrap() + r#"id="data">"#.len();
     serde_json::from_str(&page[start..start + page[start..].find("</script>").unwrap()]).unwrap()
 }
@@ -33,7 +37,7 @@ fn curve(series: &Value) -> Vec<f64> {
     bytes.chunks(4).map(|four| f64::from(f32::from_le_bytes(four.try_into().unwrap()))).collect()
 }
 
-fn message(result: Result<Vec<u8>, PlotError>) -> String {
+pub(super) fn message(result: Result<Vec<u8>, PlotError>) -> String {
     result.unwrap_err().to_string()
 }
 
@@ -46,6 +50,7 @@ fn three_axes() -> Sample {
         ],
         limit: 2.0,
         yaw: &|at| Some([0.02 * at[0] * at[2] / at[1], 0.01]),
+        chaotic: &|_| false,
     }
     .sample()
 }
@@ -55,6 +60,7 @@ fn one_axis() -> Sample {
         axes: vec![("damping_n_s_per_m", vec![60.0, 100.0, 140.0, 180.0])],
         limit: 2.0,
         yaw: &|at| (at[0] > 70.0).then(|| [2.0 / at[0], 0.01]),
+        chaotic: &|_| false,
     }
     .sample()
 }
@@ -63,17 +69,18 @@ fn one_axis() -> Sample {
 fn columns_come_with_units_words_and_provenance() {
     let folder = tempfile::tempdir().unwrap();
     let table = Table::open(&map().write(folder.path(), "map.parquet")).unwrap();
-    assert_eq!((table.kind, table.rows), (Kind::Map, 90));
+    assert_eq!((table.source.kind, table.rows), (Kind::Map, 90));
     let column = |name: &str| table.column(name).unwrap();
     assert_eq!(column("damping_n_s_per_m").unit, "N s/m", "by the name where the file does not say");
     assert_eq!(column("nonlinear_tub_yaw").unit, "rad");
     assert_eq!(column("nonlinear_tub_yaw").description, "nonlinear_tub_yaw, said");
     assert_eq!(column("ratio_max").unit, "", "1 is no unit to show");
-    assert!(
-        matches!(&column("reliable").values, Values::Flag(flags) if flags.iter().filter(|f| f.is_none()).count() == 2)
-    );
-    assert_eq!(table.statuses().filter(|status| *status == "diverged").count(), 1);
-    assert_eq!((table.ratio_limit(), table.run_name()), (3.0, Some("sample")));
+    let words = |name: &str| column(name).words().unwrap();
+    let without = (0..table.rows).filter(|&row| words("reliable").get(row).is_none()).count();
+    assert_eq!((words("reliable").names.join(" "), without), ("false true".to_owned(), 2));
+    let diverged = (0..table.rows).filter(|&row| words("status").get(row) == Some("diverged")).count();
+    assert_eq!(diverged, 1);
+    assert_eq!((table.source.ratio_limit(), table.source.run_name()), (3.0, Some("sample")));
     let undefined = table.numbers("ratio_max").unwrap().iter().filter(|ratio| ratio.is_nan()).count();
     assert_eq!(undefined, 2);
 }

@@ -7,7 +7,8 @@ use crate::plot::chart::{Chart, ChartPanel, Series, Style};
 use crate::plot::colour::DISTINCT;
 use crate::plot::error::PlotError;
 use crate::plot::label;
-use crate::plot::read::{Column, Table, bracket};
+use crate::plot::read::bracket;
+use crate::plot::table::{Column, Table};
 
 /// One place of the file: where it is, and the bracket it lies in. The place is NaN where there is no such number.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +29,8 @@ struct Place {
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let columns: Vec<&Column> = table.columns.iter().filter(|column| column.numbers().is_some()).collect();
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-    let empty = || PlotError::Empty { path: table.path.clone(), reason: "a curve needs at least two points" };
+    let empty =
+        || PlotError::Empty { path: table.source.path.clone(), reason: "a curve needs at least two points" };
     let (low, high) = bracket(&names).ok_or_else(empty)?;
     let (x, y) = (columns[0], columns[1]);
     let [xs, ys, lows, highs] =
@@ -69,7 +71,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         }));
     }
     let side = far_side(&curves, quantity(table).starts_with("min_gap"));
-    let run = table.run_name().map_or(String::new(), |name| format!("{name} · "));
+    let run = table.source.run_name().map_or(String::new(), |name| format!("{name} · "));
     Ok(Chart {
         title: "Boundary of the linear model's reliability".to_owned(),
         subtitle: format!("{run}{} values of {}{side}", grid.len(), label::words(&x.name).to_lowercase()),
@@ -119,12 +121,12 @@ fn far_side(curves: &[(String, Vec<Place>)], gap: bool) -> String {
 
 /// The quantity that is at its limit: its column's name in a map.
 fn quantity(table: &Table) -> &str {
-    table.find("quantity").and_then(Value::as_str).unwrap_or("ratio_max")
+    table.source.find("quantity").and_then(Value::as_str).unwrap_or("ratio_max")
 }
 
 /// What is at its limit, as the file says, or else the ratio.
 fn limit(table: &Table) -> String {
-    let ratio = label::significant(table.ratio_limit(), 4);
+    let ratio = label::significant(table.source.ratio_limit(), 4);
     match quantity(table) {
         "ratio_max" => format!("ratio {ratio}"),
         gap if gap.starts_with("min_gap") => format!("{} 0", label::words(gap)),
@@ -134,7 +136,7 @@ fn limit(table: &Table) -> String {
 
 /// The values of the axes beyond the second, which the plan in the file names.
 fn further(table: &Table, row: usize) -> String {
-    let axes = table.find("axis").and_then(Value::as_array);
+    let axes = table.source.find("axis").and_then(Value::as_array);
     let names = axes.into_iter().flatten().skip(2).filter_map(|axis| axis.get("parameter")?.as_str());
     let said = names.filter_map(|name| {
         let column = table.column(name)?;

@@ -4,8 +4,9 @@ use crate::plot::axis::extremes;
 use crate::plot::chart::{Chart, ChartPanel, Series, Style};
 use crate::plot::colour::DISTINCT;
 use crate::plot::error::PlotError;
-use crate::plot::read::Table;
+use crate::plot::read::Kind;
 use crate::plot::scene::INK;
+use crate::plot::table::Table;
 
 /// One mode over speed.
 pub(super) struct Mode {
@@ -25,7 +26,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let top = modes.iter().flat_map(|mode| &mode.speed).fold(0.0_f64, |top, &speed| top.max(speed));
     if top <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
         return Err(PlotError::Empty {
-            path: table.path.clone(),
+            path: table.source.path.clone(),
             reason: "the modes are given at one speed only",
         });
     }
@@ -62,7 +63,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         style: Style::Dashed,
     };
     series.push(line);
-    let mut notes: Vec<String> = table.run_name().map(str::to_owned).into_iter().collect();
+    let mut notes: Vec<String> = table.source.run_name().map(str::to_owned).into_iter().collect();
     if series.iter().any(|series| matches!(series.style, Style::Band(..))) {
         notes.push("shaded: least to greatest over a turn of the drum".to_owned());
     }
@@ -97,11 +98,11 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
 /// # Errors
 /// [`PlotError::Unfit`] when the file is no modes file, [`PlotError::Column`] when it lacks a column.
 pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
-    if table.kind != crate::plot::read::Kind::Modes {
+    if table.source.kind != Kind::Modes {
         return Err(PlotError::Unfit(format!(
             "`--modes {}`: this is a {} file; `sweep modes --out FILE` writes a modes file",
-            table.path.display(),
-            table.kind.name()
+            table.source.path.display(),
+            table.source.kind.name()
         )));
     }
     let mut speeds: Vec<f64> = modes(table)?.iter().flat_map(crossings).collect();
@@ -123,7 +124,7 @@ pub(super) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
         columns.next().and_then(|column| column.numbers())
     };
     let band = over_turn("min").zip(over_turn("max"));
-    let names = table.column("name").or_else(|| table.column("shape")).and_then(|column| column.texts());
+    let names = table.column("name").or_else(|| table.column("shape")).and_then(|column| column.words());
 
     let mut numbers = number.to_vec();
     numbers.sort_by(f64::total_cmp);
@@ -134,7 +135,7 @@ pub(super) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
             let mut rows: Vec<usize> = (0..table.rows).filter(|&row| number[row] == wanted).collect();
             rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
             let pick = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
-            let said = names.and_then(|names| names[*rows.first()?].clone());
+            let said = names.and_then(|names| names.get(*rows.first()?));
             Mode {
                 name: said.map_or(format!("mode {wanted}"), |said| format!("{wanted} {said}")),
                 speed: pick(speed),

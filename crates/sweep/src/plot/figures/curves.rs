@@ -3,36 +3,39 @@
 use crate::plot::chart::{Chart, ChartPanel, Mark, Series, Style, spans_decades};
 use crate::plot::colour::{DISTINCT, LINEAR, NONLINEAR};
 use crate::plot::error::PlotError;
-use crate::plot::grid::Grid;
+use crate::plot::gather::Map;
 use crate::plot::label;
 use crate::plot::layer::channels;
-use crate::plot::read::{Column, Table};
 use crate::plot::scene::INK;
+use crate::plot::table::Column;
 use crate::plot::{PlotOptions, Quantity};
+
+/// Most failed points that are marked: as many lines as a figure has room for.
+const MOST_MARKS: usize = 400;
 
 /// The chart of a map file of one axis.
 ///
 /// # Errors
 /// [`PlotError::NotThere`] for an unknown channel, [`PlotError::Unfit`] for a quantity that is no curve.
-pub(crate) fn chart(table: &Table, grid: &Grid, options: &PlotOptions) -> Result<Chart, PlotError> {
+pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError> {
     if options.quantity == Quantity::Status {
         return Err(PlotError::Unfit(
             "status is drawn on maps of two or more axes; over one axis, failed points are marked".to_owned(),
         ));
     }
-    let axis = &grid.axes[0];
-    let order: Vec<usize> = grid.rows().iter().copied().flatten().collect();
-    let at_grid = |column: &Column, factor: f64| -> Vec<f64> {
+    let (axis, table) = (&map.grid.axes[0], &map.table);
+    let cells: Vec<usize> = (0..map.counts.len()).filter(|&cell| map.filled(cell)).collect();
+    let values = |column: &Column, factor: f64| -> Vec<f64> {
         let values = column.numbers().unwrap_or_default();
-        order.iter().map(|&row| values[row] * factor).collect()
+        cells.iter().map(|&cell| values[cell] * factor).collect()
     };
-    let names: Vec<&str> = channels(table, "nonlinear_").into_iter().map(|(name, _)| name).collect();
+    let names: Vec<&str> = channels(&table.source, "nonlinear_").into_iter().map(|(name, _)| name).collect();
     for asked in &options.channels {
         if !names.contains(&asked.as_str()) {
             return Err(PlotError::NotThere {
                 option: "--channel",
                 given: asked.clone(),
-                path: table.path.clone(),
+                path: table.source.path.clone(),
                 what: "channel",
                 known: names.join(", "),
             });
@@ -41,14 +44,16 @@ pub(crate) fn chart(table: &Table, grid: &Grid, options: &PlotOptions) -> Result
     let wanted =
         |name: &str| options.channels.is_empty() || options.channels.iter().any(|asked| asked == name);
 
-    let mut panels = vec![ratios(table, options.quantity == Quantity::Ratio, &at_grid, &wanted)];
+    let mut panels = vec![ratios(map, options.quantity == Quantity::Ratio, &values, &wanted)];
     let amplitudes = matches!(options.quantity, Quantity::Nonlinear | Quantity::Linear);
-    for (name, column) in channels(table, "nonlinear_") {
-        let (unit, factor) = label::shown(&column.unit);
-        let mut series = vec![line("nonlinear model", NONLINEAR, at_grid(column, factor))];
-        if let Some(column) = table.column(&format!("linear_{name}")) {
-            series.push(line("linear model", LINEAR, at_grid(column, factor)));
-        }
+    for (name, facts) in channels(&table.source, "nonlinear_") {
+        let (unit, factor) = label::shown(&facts.unit);
+        let models =
+            [("nonlinear", NONLINEAR), ("linear", LINEAR)].into_iter().filter_map(|(model, colour)| {
+                let column = table.column(&format!("{model}_{name}"))?;
+                Some(line(&format!("{model} model"), colour, values(column, factor)))
+            });
+        let series = models.collect();
         panels.push(ChartPanel {
             label: label::with_unit(&label::channel(name), unit),
             shown: amplitudes && wanted(name),
@@ -58,7 +63,7 @@ pub(crate) fn chart(table: &Table, grid: &Grid, options: &PlotOptions) -> Result
     }
     let gaps = [("nonlinear", NONLINEAR), ("linear", LINEAR)].into_iter().filter_map(|(model, colour)| {
         let column = table.column(&format!("min_gap_{model}_m"))?;
-        Some(line(&format!("{model} model"), colour, at_grid(column, 1e3)))
+        Some(line(&format!("{model} model"), colour, values(column, 1e3)))
     });
     let gaps = ChartPanel {
         label: "Least gap between drum and tub (mm)".to_owned(),
@@ -69,11 +74,17 @@ pub(crate) fn chart(table: &Table, grid: &Grid, options: &PlotOptions) -> Result
     panels.push(gaps);
     panels.retain(|panel| !panel.series.is_empty());
 
-    let status: Vec<&str> = table.statuses().collect();
-    let failures = order.iter().zip(&axis.values).filter_map(|(&row, &x)| {
-        let status = *status.get(row)?;
-        (status != "ok").then(|| Mark { x, label: status.replace('_', " ") })
-    });
+    let failed: Vec<usize> = cells.iter().copied().filter(|&cell| map.counts[cell].failed > 0).collect();
+    let each = failed.len().div_ceil(MOST_MARKS).max(1);
+    let mark = |&cell: &usize| Mark {
+        x: axis.values[cell],
+        label: map.status(cell).unwrap_or("some failed").replace('_', " "),
+    };
+    let mark_meaning = if each == 1 {
+        "failed: no result".to_owned()
+    } else {
+        format!("failed: no result; one of {each} places is marked")
+    };
     Ok(Chart {
         title: match options.quantity {
             Quantity::Ratio => "Where the linear model can be trusted",
@@ -81,43 +92,38 @@ pub(crate) fn chart(table: &Table, grid: &Grid, options: &PlotOptions) -> Result
             _ => "Least gap between drum and tub",
         }
         .to_owned(),
-        subtitle: super::map::counts(table),
+        subtitle: super::map::subtitle(map, &[]),
         x_label: axis.label(),
         x_log: axis.log,
-        marks: failures.collect(),
-        mark_meaning: "failed: no result".to_owned(),
-        grids: vec![order_values(grid)],
+        marks: failed.iter().step_by(each).map(mark).collect(),
+        mark_meaning,
+        grids: vec![cells.iter().map(|&cell| axis.values[cell]).collect()],
         panels,
     })
 }
 
-/// Axis values that have a row, in grid order.
-fn order_values(grid: &Grid) -> Vec<f64> {
-    let values = &grid.axes[0].values;
-    grid.rows().iter().zip(values).filter(|(row, _)| row.is_some()).map(|(_, value)| *value).collect()
-}
-
 fn ratios(
-    table: &Table,
+    map: &Map,
     shown: bool,
-    at_grid: &impl Fn(&Column, f64) -> Vec<f64>,
+    values: &impl Fn(&Column, f64) -> Vec<f64>,
     wanted: &impl Fn(&str) -> bool,
 ) -> ChartPanel {
-    let limit = table.ratio_limit();
-    let mut series: Vec<Series> = channels(table, "ratio_")
+    let limit = map.table.source.ratio_limit();
+    let mut series: Vec<Series> = channels(&map.table.source, "ratio_")
         .into_iter()
         .enumerate()
         .filter(|(_, (name, _))| wanted(name))
-        .map(|(k, (name, column))| {
-            line(&label::channel(name), DISTINCT[k % DISTINCT.len()], at_grid(column, 1.0))
+        .filter_map(|(k, (name, facts))| {
+            let column = map.table.column(&facts.name)?;
+            Some(line(&label::channel(name), DISTINCT[k % DISTINCT.len()], values(column, 1.0)))
         })
         .collect();
-    if let Some(column) = table.column("ratio_max") {
-        let largest = Series { style: Style::Dashed, ..line("largest", INK, at_grid(column, 1.0)) };
+    if let Some(column) = map.table.column("ratio_max") {
+        let largest = Series { style: Style::Dashed, ..line("largest", INK, values(column, 1.0)) };
         series.push(largest);
     }
     ChartPanel {
-        label: format!("Ratio of {}, nonlinear / linear", table.compared()),
+        label: format!("Ratio of {}, nonlinear / linear", map.table.source.compared()),
         shown,
         log: spans_decades(series.iter().flat_map(|series| series.y.iter().copied())),
         levels: vec![(limit, format!("unreliable from ratio {} on", label::significant(limit, 4)))],

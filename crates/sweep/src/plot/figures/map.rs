@@ -3,21 +3,20 @@
 use std::collections::BTreeMap;
 
 use crate::plot::axis::Scale;
-use crate::plot::colour::{ColourScale, DISTINCT, LEVELS};
-use crate::plot::contour::zero_lines;
+use crate::plot::colour::{BOTH, ColourScale, DISTINCT, LEVELS};
+use crate::plot::contour::{MOST_POINTS, leave_out_shortest, zero_lines};
+use crate::plot::cuts::Cuts;
 use crate::plot::error::PlotError;
 use crate::plot::frame::{
-    HEADING_HEIGHT, LABEL_SIZE, LEGEND_ROW, Panel, Sign, TICK_SIZE, failed, heading, legend, legend_rows,
-    undefined,
+    HEADING_HEIGHT, LABEL_SIZE, LEGEND_ROW, Panel, Sign, TICK_SIZE, failed, failed_hatch, heading, legend,
+    legend_rows, sensitive_hatch, undefined,
 };
-use crate::plot::grid::Grid;
-use crate::plot::label;
-use crate::plot::layer::{Layer, Level, layer};
+use crate::plot::gather::{Map, OK};
+use crate::plot::grid::GridAxis;
+use crate::plot::layer::{Layer, Level, Shown};
 use crate::plot::raster::Typeface;
-use crate::plot::read::Table;
 use crate::plot::region::roomiest;
-use crate::plot::scene::{Anchor, Colour, INK, Outline, PAPER, Scene, Stroke, Text};
-use crate::plot::{PlotOptions, Quantity};
+use crate::plot::scene::{Anchor, Colour, Hatch, INK, Outline, PAPER, Scene, Stroke, Text};
 
 const WIDTH: f64 = 880.0;
 /// Left of a panel: numbers and label of the y axis.
@@ -26,45 +25,39 @@ const LEFT: f64 = 86.0;
 const RIGHT: f64 = 128.0;
 /// Below a panel: numbers and label of the x axis.
 const BELOW: f64 = 64.0;
-/// Most values of a third axis that are drawn side by side.
-const MOST_PANELS: usize = 9;
-
-/// Draws a map file of two or more axes.
+/// Draws a map of two or more axes.
 ///
 /// Over two axes it is one panel. A third axis becomes one panel for each of its values (at most nine, evenly picked);
 /// an axis beyond the second that is pinned by `--at`, and every one from the fourth on, is cut at one value (its first
 /// unless pinned), which the subtitle names.
 ///
 /// # Errors
-/// As [`layer`] and [`Slices::of`].
+/// As [`Shown::layer`].
 pub(crate) fn draw(
-    table: &Table,
-    grid: &Grid,
-    options: &PlotOptions,
+    map: &Map,
+    cuts: &Cuts,
+    shown: Option<&Shown>,
     typeface: &Typeface,
 ) -> Result<Scene, PlotError> {
-    let slices = Slices::of(table, grid, options)?;
-    let cells = if options.quantity == Quantity::Status {
-        if !options.channels.is_empty() {
-            layer(table, options)?;
-        }
-        Cells::by_status(table)
-    } else {
-        Cells::by_value(table, layer(table, options)?)
+    let mut cells = match shown {
+        Some(shown) => Cells::by_value(map, shown.layer(map)?),
+        None => Cells::by_status(map),
     };
+    let grid = &map.grid;
 
-    let columns = match slices.panels.len() {
+    let columns = match cuts.cuts.len() {
         1 => 1,
         2..=4 => 2,
         _ => 3,
     };
-    let rows = slices.panels.len().div_ceil(columns);
-    let single = slices.panels.len() == 1;
+    let rows = cuts.cuts.len().div_ceil(columns);
+    let single = cuts.cuts.len() == 1;
     let bar = if cells.layer.is_some() { RIGHT } else { 24.0 };
     let (gap, head) = if single { (0.0, 0.0) } else { (22.0, 26.0) };
     let width = (WIDTH - LEFT - bar - gap * (columns - 1) as f64) / columns as f64;
     let height = if single { 440.0 } else { 0.78 * width };
-    let entries = cells.legend(&slices, grid);
+    cells.refine_hatches([width, height]);
+    let entries = cells.legend(cuts);
     let legend_height = LEGEND_ROW * legend_rows(typeface, &entries, WIDTH - LEFT - 20.0) as f64;
     let panels_height = rows as f64 * (height + head) + gap * (rows - 1) as f64;
     let total = HEADING_HEIGHT + panels_height + BELOW + legend_height + 14.0;
@@ -72,27 +65,28 @@ pub(crate) fn draw(
     let [x_axis, y_axis] = [&grid.axes[0], &grid.axes[1]];
     let described = format!("{}: {} over {}", cells.title, y_axis.label(), x_axis.label());
     let mut scene = Scene::new(WIDTH, total, described);
-    heading(&mut scene, typeface, &cells.title, &subtitle(table, &slices));
-    let scale = |borders: &[f64], log| Scale { log, from: borders[0], to: borders[borders.len() - 1] };
-    let borders = [x_axis.borders(), y_axis.borders()];
-    for (index, slice) in slices.panels.iter().enumerate() {
+    heading(&mut scene, typeface, &cells.title, &subtitle(map, &cuts.notes));
+    for (index, cut) in cuts.cuts.iter().enumerate() {
         let (column, row) = (index % columns, index / columns);
         let panel = Panel {
             x: LEFT + column as f64 * (width + gap),
             y: HEADING_HEIGHT + head + row as f64 * (height + head + gap),
             width,
             height,
-            xs: scale(&borders[0], x_axis.log),
-            ys: scale(&borders[1], y_axis.log),
+            xs: scale(x_axis),
+            ys: scale(y_axis),
         };
-        cells.draw(&mut scene, &panel, grid, &borders, &slice.rest);
-        if let Some(level) = cells.layer.as_ref().and_then(|layer| layer.level.as_ref()) {
-            cells.draw_line(&mut scene, &panel, grid, &slice.rest, level);
-            cells.name_regions(&mut scene, typeface, &panel, grid, &borders, &slice.rest, level);
+        cells.draw(&mut scene, &panel, &cut.rest);
+        if let Some(layer) = &cells.layer
+            && let Some(level) = &layer.level
+        {
+            let room = MOST_POINTS / cuts.cuts.len();
+            cells.draw_line(&mut scene, &panel, (layer, level), &cut.rest, room);
+            cells.name_regions(&mut scene, typeface, &panel, (layer, level), &cut.rest);
         }
-        let lowest = index + columns >= slices.panels.len();
+        let lowest = index + columns >= cuts.cuts.len();
         panel.frame(&mut scene, lowest, column == 0);
-        if let Some(name) = &slice.name {
+        if let Some(name) = &cut.name {
             let at = [panel.x + width / 2.0, panel.y - 8.0];
             scene.text(Text::new(name.clone(), at, TICK_SIZE).bold().anchor(Anchor::Middle));
         }
@@ -112,100 +106,21 @@ pub(crate) fn draw(
     Ok(scene)
 }
 
-/// Which cuts through the grid are shown.
-pub(crate) struct Slices {
-    panels: Vec<Slice>,
-    /// What is fixed or left out, in words.
-    notes: Vec<String>,
+/// From the first border of an axis to its last.
+fn scale(axis: &GridAxis) -> Scale {
+    Scale { log: axis.log, from: axis.borders[0], to: axis.borders[axis.borders.len() - 1] }
 }
 
-struct Slice {
-    /// Place on each axis after the second.
-    rest: Vec<usize>,
-    name: Option<String>,
-}
-
-impl Slices {
-    /// The cuts that the options ask for.
-    ///
-    /// # Errors
-    /// [`PlotError::NotThere`] when `--at` names no axis beyond the second, or a value that its axis does not have.
-    pub(crate) fn of(table: &Table, grid: &Grid, options: &PlotOptions) -> Result<Self, PlotError> {
-        let extra = grid.axes.get(2..).unwrap_or_default();
-        let mut pinned: Vec<Option<usize>> = vec![None; extra.len()];
-        for (name, value) in &options.at {
-            let missing = |what, known: String| PlotError::NotThere {
-                option: "--at",
-                given: format!("{name}={value}"),
-                path: table.path.clone(),
-                what,
-                known,
-            };
-            let place = extra.iter().position(|axis| axis.name == *name).ok_or_else(|| {
-                let known: Vec<&str> = extra.iter().map(|axis| axis.name.as_str()).collect();
-                let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-                missing("axis beyond the second", known)
-            })?;
-            let near = |known: f64| (known - value).abs() <= 1e-9 * value.abs().max(known.abs());
-            pinned[place] =
-                Some(extra[place].values.iter().position(|&known| near(known)).ok_or_else(|| {
-                    let known: Vec<String> =
-                        extra[place].values.iter().map(|&v| label::significant(v, 6)).collect();
-                    missing("value of that axis", known.join(", "))
-                })?);
-        }
-        let mut notes = Vec::new();
-        for (axis, pin) in extra.iter().zip(&pinned).enumerate().filter_map(|(k, (axis, pin))| {
-            // The third axis becomes panels unless it is pinned.
-            (k > 0 || pin.is_some()).then_some((axis, pin))
-        }) {
-            notes.push(axis.said(pin.unwrap_or(0)));
-        }
-        let rest = |third: usize| {
-            let mut rest: Vec<usize> = pinned.iter().map(|pin| pin.unwrap_or(0)).collect();
-            if let Some(first) = rest.first_mut() {
-                *first = third;
-            }
-            rest
-        };
-        let panels = match (extra.first(), pinned.first().copied().flatten()) {
-            (None, _) => vec![Slice { rest: Vec::new(), name: None }],
-            (Some(_), Some(pin)) => vec![Slice { rest: rest(pin), name: None }],
-            (Some(axis), None) => {
-                let count = axis.values.len();
-                let shown = count.min(MOST_PANELS);
-                if shown < count {
-                    notes.push(format!("{shown} of {count} values of {}", axis.words.to_lowercase()));
-                }
-                let pick =
-                    |k: usize| if shown == 1 { 0 } else { (k * (count - 1) + (shown - 1) / 2) / (shown - 1) };
-                (0..shown).map(pick).map(|k| Slice { rest: rest(k), name: Some(axis.said(k)) }).collect()
-            }
-        };
-        Ok(Self { panels, notes })
-    }
-
-    /// Place of the first cut on each axis after the second.
-    pub(crate) fn first(&self) -> &[usize] {
-        self.panels.first().map_or(&[], |slice| &slice.rest)
-    }
-}
-
-/// Name of the run, count of points and failures, and where the map is cut.
-fn subtitle(table: &Table, slices: &Slices) -> String {
-    let mut parts = vec![counts(table)];
-    parts.extend(slices.notes.iter().cloned());
-    parts.join(" · ")
-}
-
-/// Name of the run, and how many points it has and how many failed.
-pub(crate) fn counts(table: &Table) -> String {
-    let mut parts: Vec<String> = table.run_name().map(str::to_owned).into_iter().collect();
-    parts.push(format!("{} points", table.rows));
-    let failed = table.statuses().filter(|status| *status != "ok").count();
+/// Name of the run, how many points it has and how many failed, and what is fixed, left out or merged.
+pub(crate) fn subtitle(map: &Map, notes: &[String]) -> String {
+    let mut parts: Vec<String> = map.table.source.run_name().map(str::to_owned).into_iter().collect();
+    parts.push(format!("{} points", map.table.source.rows));
+    let failed = map.failed();
     if failed > 0 {
         parts.push(format!("{failed} failed"));
     }
+    parts.extend(notes.iter().cloned());
+    parts.extend(map.grid.note());
     parts.join(" · ")
 }
 
@@ -214,70 +129,82 @@ pub(crate) fn counts(table: &Table) -> String {
 enum Fill {
     Level(usize),
     Kind(usize),
+    /// Points on both sides of the level, or of several kinds.
+    Both,
     Failed,
     Undefined,
 }
 
-/// How each row is drawn.
-struct Cells {
+/// How each cell is drawn.
+struct Cells<'a> {
+    map: &'a Map,
     title: String,
-    fills: Vec<Fill>,
+    /// None where the file has no point.
+    fills: Vec<Option<Fill>>,
     layer: Option<Layer>,
-    /// The kinds of [`Fill::Kind`].
-    kinds: Vec<String>,
+    /// The kinds of [`Fill::Kind`], with the number of points of each.
+    kinds: Vec<(String, usize)>,
+    /// Over cells in which some points have no value, and over those with sensitive points.
+    hatches: [Hatch; 2],
 }
 
-impl Cells {
-    fn by_value(table: &Table, layer: Layer) -> Self {
-        let fills = layer
-            .values
-            .iter()
-            .zip(table.statuses())
-            .map(|(value, status)| match (value.is_finite(), status) {
-                (true, _) => Fill::Level(layer.scale.level(*value)),
-                (false, "ok") => Fill::Undefined,
-                (false, _) => Fill::Failed,
-            })
-            .collect();
-        Self { title: layer.title.clone(), fills, layer: Some(layer), kinds: Vec::new() }
+impl<'a> Cells<'a> {
+    fn by_value(map: &'a Map, layer: Layer) -> Self {
+        let fill = |cell: usize| match (layer.values[cell].is_finite(), map.counts[cell].failed) {
+            (true, _) if layer.both(cell) => Fill::Both,
+            (true, _) => Fill::Level(layer.scale.level(layer.values[cell])),
+            (false, 0) => Fill::Undefined,
+            (false, _) => Fill::Failed,
+        };
+        let fills = (0..map.counts.len()).map(|cell| map.filled(cell).then(|| fill(cell))).collect();
+        let (title, hatches) = (layer.title.clone(), [failed_hatch(), sensitive_hatch()]);
+        Self { map, title, fills, layer: Some(layer), kinds: Vec::new(), hatches }
     }
 
-    fn by_status(table: &Table) -> Self {
-        let mut kinds: Vec<String> = table.statuses().map(str::to_owned).collect();
-        kinds.sort_by_key(|kind| (kind != "ok", kind.clone()));
-        kinds.dedup();
-        let fills = table
-            .statuses()
-            .map(|status| Fill::Kind(kinds.iter().position(|kind| kind == status).unwrap_or_default()))
-            .collect();
-        Self { title: "How each point ended".to_owned(), fills, layer: None, kinds }
+    fn by_status(map: &'a Map) -> Self {
+        let mut kinds: Vec<(String, usize)> =
+            map.statuses.iter().map(|(kind, points)| (kind.clone(), *points)).collect();
+        kinds.sort_by_key(|(kind, _)| (kind != OK, kind.clone()));
+        let fill = |cell: usize| {
+            map.status(cell).map_or(Fill::Both, |status| {
+                Fill::Kind(kinds.iter().position(|(kind, _)| kind == status).unwrap_or_default())
+            })
+        };
+        let fills = (0..map.counts.len()).map(|cell| map.filled(cell).then(|| fill(cell))).collect();
+        let (title, hatches) = ("How each point ended".to_owned(), [failed_hatch(), sensitive_hatch()]);
+        Self { map, title, fills, layer: None, kinds, hatches }
+    }
+
+    /// Makes hatches fine enough to show on the smallest cell of a panel of that size, px.
+    fn refine_hatches(&mut self, size: [f64; 2]) {
+        let smallest = [0, 1].map(|k| {
+            let axis = &self.map.grid.axes[k];
+            let scale = scale(axis);
+            let part = |pair: &[f64]| scale.position(pair[1]) - scale.position(pair[0]);
+            axis.borders.windows(2).map(part).fold(1.0, f64::min) * size[k]
+        });
+        self.hatches = self.hatches.clone().map(|hatch| hatch.within(smallest));
     }
 
     fn kind_colour(&self, kind: usize) -> Colour {
-        if self.kinds[kind] == "ok" { Colour::hex(0xe8ebee) } else { DISTINCT[kind % DISTINCT.len()] }
+        if self.kinds[kind].0 == OK { Colour::hex(0xe8ebee) } else { DISTINCT[kind % DISTINCT.len()] }
     }
 
-    fn draw(&self, scene: &mut Scene, panel: &Panel, grid: &Grid, borders: &[Vec<f64>; 2], rest: &[usize]) {
+    fn draw(&self, scene: &mut Scene, panel: &Panel, rest: &[usize]) {
         // Cells of one colour are one shape, and runs of them along y one rectangle: small files, no seams.
         let mut shapes: BTreeMap<Fill, Outline> = BTreeMap::new();
         let mut lone: Vec<[f64; 4]> = Vec::new();
-        let ys: Vec<f64> = borders[1].iter().map(|&border| panel.at_y(border)).collect();
-        for (x, pair) in borders[0].windows(2).enumerate() {
+        let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
+        let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.at_y(border)).collect();
+        for (x, pair) in x_axis.borders.windows(2).enumerate() {
             let (left, right) = (panel.at_x(pair[0]), panel.at_x(pair[1]));
-            let mut y = 0;
-            while y + 1 < ys.len() {
-                let fill = |y: usize| grid.row(x, y, rest).map(|row| self.fills[row]);
-                let here = fill(y);
-                let start = y;
-                y += 1;
-                while here != Some(Fill::Undefined) && y + 1 < ys.len() && fill(y) == here {
-                    y += 1;
-                }
+            let fill = |y: usize| self.fills[self.map.grid.cell(x, y, rest)];
+            for (start, end, here) in runs(ys.len() - 1, fill, |fill| fill == Some(Fill::Undefined)) {
                 match here {
-                    Some(Fill::Undefined) => lone.push([left, ys[y], right - left, ys[start] - ys[y]]),
+                    Some(Fill::Undefined) => lone.push([left, ys[end], right - left, ys[start] - ys[end]]),
                     Some(fill) => {
                         let shape = shapes.entry(fill).or_default();
-                        shape.add_rectangle(left, ys[y], right - left, ys[start] - ys[y]);
+                        shape.add_rectangle(left, ys[end], right - left, ys[start] - ys[end]);
                     }
                     None => {}
                 }
@@ -287,30 +214,67 @@ impl Cells {
             match (fill, &self.layer) {
                 (Fill::Level(level), Some(layer)) => scene.fill_crisp(shape, layer.scale.colour(level)),
                 (Fill::Kind(kind), _) => scene.fill_crisp(shape, self.kind_colour(kind)),
+                (Fill::Both, _) => scene.fill_crisp(shape, BOTH),
                 _ => failed(scene, shape),
             }
         }
         if !lone.is_empty() {
             undefined(scene, &lone);
         }
+        scene.hatch(self.area(panel, rest, |cell| self.partly_lost(cell)), &self.hatches[0]);
+        scene.hatch(self.area(panel, rest, |cell| self.sensitive(cell)), &self.hatches[1]);
     }
 
-    fn value(&self, row: Option<usize>) -> f64 {
-        match (row, &self.layer) {
-            (Some(row), Some(layer)) => layer.values[row],
-            _ => f64::NAN,
+    /// The cells that `holds` is true of.
+    fn area(&self, panel: &Panel, rest: &[usize], holds: impl Fn(usize) -> bool) -> Outline {
+        let mut area = Outline::default();
+        let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
+        let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.at_y(border)).collect();
+        for (x, pair) in x_axis.borders.windows(2).enumerate() {
+            let (left, right) = (panel.at_x(pair[0]), panel.at_x(pair[1]));
+            let within = |y: usize| holds(self.map.grid.cell(x, y, rest));
+            for (start, end, _) in runs(ys.len() - 1, within, |_| false).filter(|(_, _, within)| *within) {
+                area.add_rectangle(left, ys[end], right - left, ys[start] - ys[end]);
+            }
         }
+        area
     }
 
-    fn draw_line(&self, scene: &mut Scene, panel: &Panel, grid: &Grid, rest: &[usize], level: &Level) {
-        let lines = zero_lines(&grid.axes[0].even(), &grid.axes[1].even(), |x, y| {
-            level.offset(self.value(grid.row(x, y, rest)))
+    /// Whether a cell has points that failed or have no value beside others that have one.
+    fn partly_lost(&self, cell: usize) -> bool {
+        matches!(self.fills[cell], Some(Fill::Level(_) | Fill::Both))
+            && self.layer.as_ref().is_some_and(|layer| self.some_failed(cell) || layer.undefined(cell))
+    }
+
+    fn some_failed(&self, cell: usize) -> bool {
+        self.map.counts[cell].failed > 0
+    }
+
+    /// Whether a cell's colour depends on a motion that is chaotic.
+    fn sensitive(&self, cell: usize) -> bool {
+        self.layer.as_ref().is_some_and(|layer| layer.nonlinear) && self.map.counts[cell].sensitive > 0
+    }
+
+    /// Draws the level's line with at most `room` points.
+    fn draw_line(
+        &self,
+        scene: &mut Scene,
+        panel: &Panel,
+        (layer, level): (&Layer, &Level),
+        rest: &[usize],
+        room: usize,
+    ) {
+        let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
+        let lines = zero_lines(&x_axis.even(), &y_axis.even(), |x, y| {
+            level.offset(self.map.cell(x, y, rest).map_or(f64::NAN, |cell| layer.typical(cell)))
         });
+        let mut lines = [lines];
+        leave_out_shortest(&mut lines, room);
         let place = |scale: Scale, even: f64| {
             if scale.log { scale.position(even.exp()) } else { scale.position(even) }
         };
         let mut outline = Outline::default();
-        for line in lines {
+        for line in lines.into_iter().flatten() {
             let points: Vec<[f64; 2]> = line
                 .into_iter()
                 .map(|[x, y]| {
@@ -326,25 +290,24 @@ impl Cells {
         scene.line(outline, Stroke::solid(INK, 2.6));
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one call; the panel's parts belong together nowhere else")]
     fn name_regions(
         &self,
         scene: &mut Scene,
         typeface: &Typeface,
         panel: &Panel,
-        grid: &Grid,
-        borders: &[Vec<f64>; 2],
+        (layer, level): (&Layer, &Level),
         rest: &[usize],
-        level: &Level,
     ) {
-        let place = |borders: &[f64], scale: Scale, part: f64| {
-            let found = borders.partition_point(|&border| scale.position(border) <= part);
-            found.clamp(1, borders.len() - 1) - 1
+        let place = |axis: &GridAxis, scale: Scale, part: f64| {
+            let found = axis.borders.partition_point(|&border| scale.position(border) <= part);
+            found.clamp(1, axis.borders.len() - 1) - 1
         };
+        let axes = &self.map.grid.axes;
         let offset = |[x, y]: [f64; 2]| {
-            let x = place(&borders[0], panel.xs, x / panel.width);
-            let y = place(&borders[1], panel.ys, 1.0 - y / panel.height);
-            level.offset(self.value(grid.row(x, y, rest)))
+            let x = place(&axes[0], panel.xs, x / panel.width);
+            let y = place(&axes[1], panel.ys, 1.0 - y / panel.height);
+            let cell = self.map.cell(x, y, rest).filter(|&cell| !layer.both(cell));
+            level.offset(cell.map_or(f64::NAN, |cell| layer.values[cell]))
         };
         for (name, wanted_above) in [(&level.above[0], true), (&level.below[0], false)] {
             // A cell without a value is on neither side.
@@ -360,34 +323,82 @@ impl Cells {
         }
     }
 
-    fn legend(&self, slices: &Slices, grid: &Grid) -> Vec<(Sign, String)> {
+    fn legend(&self, cuts: &Cuts) -> Vec<(Sign, String)> {
         let mut entries = Vec::new();
+        let shown = |wanted: &dyn Fn(usize) -> bool| {
+            let [xs, ys] = [0, 1].map(|k| self.map.grid.axes[k].values.len());
+            cuts.cuts.iter().any(|cut| {
+                let mut places = (0..xs).flat_map(|x| (0..ys).map(move |y| (x, y)));
+                places.any(|(x, y)| wanted(self.map.grid.cell(x, y, &cut.rest)))
+            })
+        };
+        let filled = |fill: Fill| shown(&|cell| self.fills[cell] == Some(fill));
         if let Some(Layer { level: Some(level), scale, .. }) = &self.layer {
             let quarter = |part: usize| scale.colour(part * LEVELS / 4);
             entries.push((Sign::Line(Stroke::solid(INK, 2.6)), level.line.clone()));
             entries.push((Sign::Area(quarter(3)), level.above[1].clone()));
             entries.push((Sign::Area(quarter(1)), level.below[1].clone()));
+            if filled(Fill::Both) {
+                entries.push((Sign::Area(BOTH), level.both.clone()));
+            }
         }
-        for (kind, name) in self.kinds.iter().enumerate() {
-            let count = self.fills.iter().filter(|fill| **fill == Fill::Kind(kind)).count();
-            entries
-                .push((Sign::Area(self.kind_colour(kind)), format!("{} ({count})", name.replace('_', " "))));
+        for (kind, (name, points)) in self.kinds.iter().enumerate() {
+            let text = format!("{} ({points})", name.replace('_', " "));
+            entries.push((Sign::Area(self.kind_colour(kind)), text));
         }
-        let shown = |fill: Fill| {
-            slices.panels.iter().any(|slice| {
-                let (xs, ys) = (grid.axes[0].values.len(), grid.axes[1].values.len());
-                let mut rows = (0..xs).flat_map(|x| (0..ys).map(move |y| (x, y)));
-                rows.any(|(x, y)| grid.row(x, y, &slice.rest).is_some_and(|row| self.fills[row] == fill))
-            })
-        };
-        if shown(Fill::Failed) {
+        if self.layer.is_none() && filled(Fill::Both) {
+            entries.push((Sign::Area(BOTH), "points of several kinds".to_owned()));
+        }
+        let only_failed = |cell: usize| self.map.counts[cell].failed == self.map.counts[cell].points;
+        if shown(&|cell| self.fills[cell] == Some(Fill::Failed) && !only_failed(cell)) {
+            entries.push((Sign::Failed, "no result: failed or undefined".to_owned()));
+        } else if filled(Fill::Failed) {
             entries.push((Sign::Failed, "failed: no result".to_owned()));
         }
-        if shown(Fill::Undefined) {
+        if shown(&|cell| self.partly_lost(cell)) {
+            let some_failed = shown(&|cell| self.partly_lost(cell) && self.some_failed(cell));
+            let undefined = |cell| self.layer.as_ref().is_some_and(|layer| layer.undefined(cell));
+            let some_undefined = shown(&|cell| self.partly_lost(cell) && undefined(cell));
+            let said = match (some_failed, some_undefined) {
+                (true, false) => "some points failed",
+                (true, true) => "some points failed or undefined",
+                (false, _) => "some points undefined",
+            };
+            entries.push((Sign::Hatched(self.hatches[0].clone()), said.to_owned()));
+        }
+        if shown(&|cell| self.sensitive(cell)) {
+            let said = if self.map.grid.merged() {
+                "some points sensitive: chaotic"
+            } else {
+                "sensitive: motion is chaotic"
+            };
+            entries.push((Sign::Hatched(self.hatches[1].clone()), said.to_owned()));
+        }
+        if filled(Fill::Undefined) {
             entries.push((Sign::Undefined, "undefined: no excitation".to_owned()));
         }
         entries
     }
+}
+
+/// Neighbouring places with the same content as `(first, one past the last, content)`, those alone that `lone` says.
+fn runs<T: Copy + PartialEq>(
+    count: usize,
+    content: impl Fn(usize) -> T,
+    lone: impl Fn(T) -> bool,
+) -> impl Iterator<Item = (usize, usize, T)> {
+    let mut next = 0;
+    std::iter::from_fn(move || {
+        if next >= count {
+            return None;
+        }
+        let (start, here) = (next, content(next));
+        next += 1;
+        while !lone(here) && next < count && content(next) == here {
+            next += 1;
+        }
+        Some((start, next, here))
+    })
 }
 
 fn colour_bar(scene: &mut Scene, layer: &Layer, [x, y, width, height]: [f64; 4]) {

@@ -7,7 +7,7 @@ use crate::plot::colour::DISTINCT;
 use crate::plot::error::PlotError;
 use crate::plot::figures::trace;
 use crate::plot::label;
-use crate::plot::read::Table;
+use crate::plot::table::Table;
 
 /// A stretch of a trace over which the drum only gains or only loses speed: first and last instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         .collect();
     if turns.is_empty() {
         return Err(PlotError::Empty {
-            path: table.path.clone(),
+            path: table.source.path.clone(),
             reason: "the drum makes no whole turn while its speed changes",
         });
     }

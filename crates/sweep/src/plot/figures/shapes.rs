@@ -6,7 +6,7 @@ use crate::plot::chart::{Chart, ChartPanel, Series, Style};
 use crate::plot::colour::DISTINCT;
 use crate::plot::error::PlotError;
 use crate::plot::label;
-use crate::plot::read::Table;
+use crate::plot::table::Table;
 
 /// Where a modes file keeps resonances and shapes.
 const MODES: &str = "sweep.modes";
@@ -35,9 +35,9 @@ type Line = [Vec<Phasor>; 2];
 /// # Errors
 /// [`PlotError::Empty`] where the file holds no machine or no resonances.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
-    let empty = |reason| PlotError::Empty { path: table.path.clone(), reason };
+    let empty = |reason| PlotError::Empty { path: table.source.path.clone(), reason };
     let places = places(table).ok_or_else(|| empty("the file does not say where the machine's parts are"))?;
-    let modes = table.find(MODES).and_then(Value::as_array).into_iter().flatten();
+    let modes = table.source.find(MODES).and_then(Value::as_array).into_iter().flatten();
     let mut panels = Vec::new();
     for mode in modes {
         let name = mode["name"].as_str().unwrap_or_default();
@@ -62,7 +62,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     if panels.is_empty() {
         return Err(empty("the file holds no resonance; `sweep modes --speed` over faster speeds may"));
     }
-    let run = table.run_name().map_or(String::new(), |name| format!("{name} · "));
+    let run = table.source.run_name().map_or(String::new(), |name| format!("{name} · "));
     Ok(Chart {
         title: "Mode shapes at the resonance speeds".to_owned(),
         subtitle: format!("{run}deflection of the axis as a share of the greatest, unbalance up"),
@@ -76,7 +76,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
 }
 
 fn places(table: &Table) -> Option<Places> {
-    let machine = table.find("machine")?;
+    let machine = table.source.find("machine")?;
     let number = |path: &str| machine.pointer(path).and_then(Value::as_f64);
     Some(Places {
         rear: number("/bearings/rear_x_m")?,

@@ -11,8 +11,9 @@ use crate::plot::colour::{LINEAR, NONLINEAR};
 use crate::plot::error::PlotError;
 use crate::plot::figures::campbell;
 use crate::plot::label;
-use crate::plot::read::{Kind, Table};
+use crate::plot::read::Kind;
 use crate::plot::scene::INK;
+use crate::plot::table::Table;
 
 /// Channels that a picture shows unless told otherwise: one a way the tub can move.
 const USUAL: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
@@ -26,7 +27,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let time = table.numbers("time_s")?.to_vec();
     if time.len() < 2 {
         return Err(PlotError::Empty {
-            path: table.path.clone(),
+            path: table.source.path.clone(),
             reason: "a trace needs at least two instants",
         });
     }
@@ -36,7 +37,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         return Err(PlotError::NotThere {
             option: "--channel",
             given: unknown.clone(),
-            path: table.path.clone(),
+            path: table.source.path.clone(),
             what: "channel",
             known: channels.join(", "),
         });
@@ -82,7 +83,9 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             )
         })
         .collect();
-    let apart = if other.is_some() { difference(&panels) } else { None };
+    // Rows of two files that were thinned do not lie at the same instants.
+    let whole = other.as_ref().is_some_and(|other| table.stretch.or(other.stretch).is_none());
+    let apart = if whole { difference(&panels) } else { None };
     let mut gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
     if other.is_some() && gaps.len() < 2 {
         gaps.clear();
@@ -151,7 +154,7 @@ impl Quantity<'_> {
 /// Channels first, then states and forces; the gap has its own panel.
 fn quantities(table: &Table) -> Vec<Quantity<'_>> {
     let channels = table.with_prefix("nonlinear_").into_iter().map(|(name, column)| {
-        let unit = if column.unit.is_empty() { unit_of_channel(name) } else { &column.unit };
+        let unit = if column.unit.is_empty() { label::unit_of_channel(name) } else { &column.unit };
         Quantity { name, unit, end: "", channel: true }
     });
     let further = table.columns.iter().filter(|column| column.numbers().is_some()).filter_map(|column| {
@@ -175,25 +178,17 @@ fn difference(panels: &[ChartPanel]) -> Option<f64> {
 /// The trace whose nonlinear model is drawn in place of the linear one.
 fn other_trace(path: &Path) -> Result<Table, PlotError> {
     let table = Table::open(path)?;
-    if table.kind == Kind::Trace {
+    if table.source.kind == Kind::Trace {
         return Ok(table);
     }
-    let kind = table.kind.name();
+    let kind = table.source.kind.name();
     Err(PlotError::Unfit(format!("`--against {}`: this is a {kind} file, expected a trace", path.display())))
 }
 
 /// What a run is called: its name, or else its file's.
 fn said(table: &Table) -> String {
-    let file = || table.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    table.run_name().map_or_else(file, str::to_owned)
-}
-
-/// The unit of a channel whose file does not say it.
-fn unit_of_channel(name: &str) -> &'static str {
-    washer_model::Channel::ALL
-        .into_iter()
-        .find(|channel| channel.name() == name)
-        .map_or("", |channel| channel.unit())
+    let file = || table.source.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    table.source.run_name().map_or_else(file, str::to_owned)
 }
 
 /// The least gap of each model that has one, in the unit shown.
@@ -209,9 +204,9 @@ fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
 /// Name of the run, its unbalance and damping, the rest of the point if the file says which, the least gaps (mm), and how
 /// far two runs are apart.
 pub(super) fn subtitle(table: &Table, least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> String {
-    let mut parts: Vec<String> = table.run_name().map(str::to_owned).into_iter().collect();
+    let mut parts: Vec<String> = table.source.run_name().map(str::to_owned).into_iter().collect();
     let mut said: Vec<(&str, f64)> = machine(table);
-    for (name, value) in table.find("at").and_then(Value::as_object).into_iter().flatten() {
+    for (name, value) in table.source.find("at").and_then(Value::as_object).into_iter().flatten() {
         if let Some(value) = value.as_f64().filter(|_| !said.iter().any(|(known, _)| known == name)) {
             said.push((name, value));
         }
@@ -227,12 +222,15 @@ pub(super) fn subtitle(table: &Table, least_gaps_mm: &[(String, f64)], apart: Op
     if let Some(apart) = apart {
         parts.push(format!("largest difference {apart:.1e} of the peak"));
     }
+    if let Some(rows) = table.stretch {
+        parts.push(format!("least and greatest of every {rows} instants"));
+    }
     parts.join(" · ")
 }
 
 /// The two numbers of the machine that reliability turns on, as far as the file has them and all dampers are alike.
 fn machine(table: &Table) -> Vec<(&'static str, f64)> {
-    let Some(machine) = table.find("machine") else { return Vec::new() };
+    let Some(machine) = table.source.find("machine") else { return Vec::new() };
     let unbalance = machine.pointer("/unbalance/mass_kg").and_then(Value::as_f64);
     let dampers = machine.get("dampers").and_then(Value::as_array).into_iter().flatten();
     let mut dampings: Vec<f64> =

@@ -4,7 +4,7 @@ use crate::plot::chart::{Chart, ChartPanel, Series, Style};
 use crate::plot::colour::DISTINCT;
 use crate::plot::error::PlotError;
 use crate::plot::figures::campbell::{crossings, modes};
-use crate::plot::read::Table;
+use crate::plot::table::Table;
 
 /// The chart of a modes file: of each mode that has a resonance, half the distance from its least
 /// to its greatest frequency over a turn, as a share of the mean.
@@ -40,11 +40,11 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     }
     if series.is_empty() {
         return Err(PlotError::Empty {
-            path: table.path.clone(),
+            path: table.source.path.clone(),
             reason: "no mode's frequency meets the spin speed",
         });
     }
-    let run = table.run_name().map_or(String::new(), |name| format!("{name} · "));
+    let run = table.source.run_name().map_or(String::new(), |name| format!("{name} · "));
     Ok(Chart {
         title: "Natural frequencies over a turn of the drum".to_owned(),
         subtitle: format!("{run}half the distance from least to greatest"),

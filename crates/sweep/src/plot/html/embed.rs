@@ -13,6 +13,12 @@ pub(crate) fn bytes(values: impl Iterator<Item = u8>) -> String {
     STANDARD.encode(values.collect::<Vec<u8>>())
 }
 
+/// Truth values as bits, the least of a byte first, base64.
+pub(crate) fn bits(values: &[bool]) -> String {
+    let byte = |values: &[bool]| values.iter().rev().fold(0, |byte: u8, value| byte << 1 | u8::from(*value));
+    STANDARD.encode(values.chunks(8).map(byte).collect::<Vec<u8>>())
+}
+
 /// Values as little-endian 16 bit integers, base64, and the size of their unit: a curve to 1/32767 of its peak.
 /// What is not finite becomes the least integer.
 pub(crate) fn quantised(values: &[f64]) -> (String, f64) {
@@ -36,6 +42,12 @@ mod tests {
     #[test]
     fn floats_are_little_endian() {
         assert_eq!(STANDARD.decode(floats([1.0, f64::NAN].into_iter())).unwrap()[..4], [0, 0, 0x80, 0x3f]);
+    }
+
+    #[test]
+    fn bits_start_with_the_least() {
+        let values: Vec<bool> = (0..10).map(|k| k == 1 || k == 9).collect();
+        assert_eq!(STANDARD.decode(bits(&values)).unwrap(), [0b10, 0b10]);
     }
 
     #[test]

@@ -1,4 +1,9 @@
 // The map over the first two axes: cells, the dividing line, values under the pointer, time histories on a click.
+// A cell is one point, or a block of points where the file has more than a page carries: then its values are the worst
+// of them, and `counts` says how many are what.
+
+// Codes of a cell without a word, and of one whose points differ.
+const [NO_WORD, SEVERAL_WORDS] = [255, 254];
 
 const MAP = { left: 76, right: 128, top: 10, bottom: 52, height: 560 };
 
@@ -11,7 +16,29 @@ function createMap(host, data) {
   for (const [name, column] of Object.entries(data.columns)) columns[name] = { ...column, values: floats(column.data) };
   const codes = {};
   for (const [name, coded] of Object.entries(data.codes)) codes[name] = { ...coded, values: decode(coded.data) };
-  const word = (name, point) => codes[name]?.words[codes[name].values[point]] ?? null;
+  const word = (name, cell) => codes[name]?.words[codes[name].values[cell]] ?? null;
+  const counts = data.counts && Object.fromEntries(Object.entries(data.counts).map(([name, text]) => [name, floats(text)]));
+  // Cells of several points with some on either side of a layer's level, and with some that did not
+  // fail and yet have no value.
+  for (const layer of data.layers) {
+    for (const name of ["both", "undefined"]) if (layer[name]) layer[name] = decode(layer[name]);
+  }
+  const bit = (bits, cell) => bits !== undefined && ((bits[cell >> 3] >> (cell & 7)) & 1) === 1;
+  // Whether the file has a point in a cell, whether any of its points failed, and whether others did not.
+  const filled = (cell) => (counts ? counts.points[cell] > 0 : codes.status.values[cell] !== NO_WORD);
+  const failed = (cell) => (counts ? counts.failed[cell] > 0 : word("status", cell) !== "ok");
+  const hasValue = (layer, cell) => {
+    const value = columns[layer.column].values[cell];
+    return Number.isFinite(value) && (layer.group !== "ratio" || value > 0);
+  };
+  // Without any value, because of points that failed.
+  const isLost = (layer, cell) => filled(cell) && failed(cell) && !hasValue(layer, cell);
+  // Points that failed or have no value beside others that have one.
+  const partlyLost = (layer, cell) => counts !== undefined && hasValue(layer, cell)
+    && (counts.failed[cell] > 0 || bit(layer.undefined, cell));
+  // Cells whose colour depends on a motion that is chaotic.
+  const sensitive = (layer, cell) => layer.nonlinear
+    && (counts ? counts.sensitive[cell] > 0 : word("sensitive", cell) === "true");
 
   const evenOf = (axis) => (axis.log ? Math.log : (value) => value);
   const [evenX, evenY] = [evenOf(xAxis), evenOf(yAxis)];
@@ -127,22 +154,23 @@ function createMap(host, data) {
     return layer.scale.reversed ? [...data.palettes.diverging].reverse() : data.palettes.diverging;
   }
 
-  // What fills a point's cell: a colour, "failed", "undefined", or null where the file has no row.
+  // What fills a cell: a colour, "failed", "undefined", or null where the file has no point.
   function filler(layer) {
     const status = codes.status;
     if (!layer) {
       const kinds = kindColours();
-      return (point) => kinds[status.values[point]] ?? null;
+      return (cell) => (status.values[cell] === SEVERAL_WORDS ? data.palettes.both : kinds[status.values[cell]] ?? null);
     }
     const colours = palette(layer);
     const { values, factor } = columns[layer.column];
-    return (point) => {
-      const value = values[point] * factor;
-      if (Number.isFinite(value) && (layer.group !== "ratio" || value > 0)) {
-        return colours[Math.min(Math.floor(position(layer.scale, value) * colours.length), colours.length - 1)];
+    return (cell) => {
+      if (hasValue(layer, cell)) {
+        if (bit(layer.both, cell)) return data.palettes.both;
+        const place = position(layer.scale, values[cell] * factor);
+        return colours[Math.min(Math.floor(place * colours.length), colours.length - 1)];
       }
-      if (status.values[point] === 255) return null;
-      return status.words[status.values[point]] === "ok" ? "undefined" : "failed";
+      if (!filled(cell)) return null;
+      return failed(cell) ? "failed" : "undefined";
     };
   }
 
@@ -151,18 +179,25 @@ function createMap(host, data) {
     return codes.status.words.map((kind) => (kind === "ok" ? themed("faint") : data.palettes.kinds[next++ % data.palettes.kinds.length]));
   }
 
-  function hatching(context) {
-    const tile = element("canvas", { width: 8, height: 8 });
+  // Slanted lines, on a ground of that colour or on what is there: each a colour and a width.
+  // A finer one is for areas that could lie between the lines.
+  function hatching(context, ground, { lines = [["#1b1f24", 1]], falling = false, side = 8 } = {}) {
+    const tile = element("canvas", { width: side, height: side });
     const brush = tile.getContext("2d");
-    brush.fillStyle = data.palettes.failed;
-    brush.fillRect(0, 0, 8, 8);
-    brush.strokeStyle = "#1b1f24";
-    brush.beginPath();
-    for (const shift of [-8, 0, 8]) {
-      brush.moveTo(shift, 8);
-      brush.lineTo(shift + 8, 0);
+    if (ground) {
+      brush.fillStyle = ground;
+      brush.fillRect(0, 0, side, side);
     }
-    brush.stroke();
+    brush.beginPath();
+    for (const shift of [-side, 0, side]) {
+      brush.moveTo(shift, falling ? 0 : side);
+      brush.lineTo(shift + side, falling ? side : 0);
+    }
+    for (const [colour, width] of lines) {
+      brush.strokeStyle = colour;
+      brush.lineWidth = (width * side) / 8;
+      brush.stroke();
+    }
     return context.createPattern(tile, "repeat");
   }
 
@@ -170,7 +205,7 @@ function createMap(host, data) {
     const box = area();
     const layer = currentLayer();
     const fill = filler(layer);
-    const failed = hatching(context);
+    const failedHatch = hatching(context, data.palettes.failed);
     context.save();
     context.beginPath();
     context.rect(box.left, box.top, box.width, box.height);
@@ -185,12 +220,28 @@ function createMap(host, data) {
         const start = j++;
         while (kind !== "undefined" && j < ny && fill(pointAt(i, j)) === kind) j++;
         if (kind === null) continue;
-        context.fillStyle = kind === "failed" ? failed : kind === "undefined" ? themed("paper") : kind;
+        context.fillStyle = kind === "failed" ? failedHatch : kind === "undefined" ? themed("paper") : kind;
         context.fillRect(xs[i], ys[j], xs[i + 1] - xs[i], ys[start] - ys[j]);
         if (kind === "undefined") {
           const side = Math.min(4, 0.4 * (xs[i + 1] - xs[i]), 0.4 * (ys[start] - ys[j]));
           context.fillStyle = themed("muted");
           context.fillRect((xs[i] + xs[i + 1] - side) / 2, (ys[start] + ys[j] - side) / 2, side, side);
+        }
+      }
+    }
+    if (layer) {
+      const least = (list) => Math.min(...list.slice(1).map((at, k) => Math.abs(at - list[k])));
+      const side = Math.min(Math.max(Math.round((least(xs) + least(ys)) / 1.5), 3), 8);
+      const chaos = { lines: [["#1b1f24", 2.4], ["#ffffff", 1]], falling: true, side };
+      const marks = [[partlyLost, hatching(context, null, { side })],
+        [sensitive, hatching(context, null, chaos)]];
+      for (const [marked, hatch] of marks) {
+        context.fillStyle = hatch;
+        for (let i = 0; i < nx; i++) {
+          for (let j = 0; j < ny; j++) {
+            if (!marked(layer, pointAt(i, j))) continue;
+            context.fillRect(xs[i], ys[j + 1], xs[i + 1] - xs[i], ys[j] - ys[j + 1]);
+          }
         }
       }
     }
@@ -322,15 +373,35 @@ function createMap(host, data) {
       add(`height:0;border-top:3px solid ${themed("ink")}`, layer.level.line);
       add(`background:${colours[Math.floor(colours.length * 0.75)]}`, layer.level.above);
       add(`background:${colours[Math.floor(colours.length * 0.25)]}`, layer.level.below);
+      const both = layer.both?.some((bits) => bits > 0);
+      if (both) add(`background:${data.palettes.both}`, layer.level.both);
     }
     if (!layer) {
       const colours = kindColours();
       codes.status.words.forEach((kind, k) => {
-        const count = codes.status.values.reduce((sum, code) => sum + (code === k), 0);
-        add(`background:${colours[k]}`, `${kind.replaceAll("_", " ")} (${count})`);
+        add(`background:${colours[k]}`, `${kind.replaceAll("_", " ")} (${data.statuses[kind]})`);
       });
-    } else if (codes.status.words.some((kind) => kind !== "ok")) {
-      add(`background:repeating-linear-gradient(135deg,#1b1f24 0 1px,${data.palettes.failed} 1px 6px)`, "failed: no result");
+      if (codes.status.values.includes(SEVERAL_WORDS)) add(`background:${data.palettes.both}`, "points of several kinds");
+    } else if (columns[layer.column].values.some((_, cell) => isLost(layer, cell))) {
+      const mixed = counts?.points.some((points, cell) => counts.failed[cell] > 0
+        && counts.failed[cell] < points && isLost(layer, cell));
+      const lines = `#1b1f24 0 1px,${data.palettes.failed} 1px 6px`;
+      add(`background:repeating-linear-gradient(135deg,${lines})`,
+        mixed ? "no result: failed or undefined" : "failed: no result");
+    }
+    if (layer && counts) {
+      const lost = [...counts.points.keys()].filter((cell) => partlyLost(layer, cell));
+      const kinds = [["failed", lost.some((cell) => counts.failed[cell] > 0)],
+        ["undefined", lost.some((cell) => bit(layer.undefined, cell))]];
+      if (lost.length > 0) {
+        add("background:repeating-linear-gradient(135deg,currentColor 0 1px,transparent 1px 6px)",
+          `some points ${kinds.filter(([, there]) => there).map(([kind]) => kind).join(" or ")}`);
+      }
+    }
+    if (layer && columns[layer.column].values.some((_, cell) => sensitive(layer, cell))) {
+      const lines = "#1b1f24 0 1px,#ffffff 1px 2px,#1b1f24 2px 3px,transparent 3px 7px";
+      add(`background:repeating-linear-gradient(45deg,${lines})`,
+        counts ? "some points sensitive: chaotic" : "sensitive: motion is chaotic");
     }
     if (layer?.group === "ratio" && anyUndefined(layer)) {
       add(`background:radial-gradient(circle,${themed("muted")} 2px,${themed("paper")} 2.5px);outline:1px solid ${themed("faint")}`, "undefined: no excitation");
@@ -338,24 +409,50 @@ function createMap(host, data) {
   }
 
   function anyUndefined(layer) {
-    const { values } = columns[layer.column];
-    const ok = codes.status.words.indexOf("ok");
-    return codes.status.values.some((code, point) => code === ok && !Number.isFinite(values[point]));
+    return columns[layer.column].values.some((value, cell) => filled(cell) && !failed(cell) && !Number.isFinite(value));
   }
 
   const labelled = (axis) => (axis.unit ? `${axis.words} (${axis.unit})` : axis.words);
 
-  function verdict(point) {
-    const reliable = word("reliable", point);
+  function verdict(cell) {
+    if (!filled(cell)) return "not in the file";
+    const points = counts?.points[cell] ?? 1;
+    if (points > 1) {
+      const [reliable, unreliable, lost] = [counts.reliable[cell], counts.unreliable[cell], counts.failed[cell]];
+      const kinds = [[reliable, "reliable"], [unreliable, "unreliable"], [lost, "failed"],
+        [points - reliable - unreliable - lost, "undefined"]].filter(([count]) => count > 0);
+      if (kinds.length > 1) return kinds.map(([count, kind]) => `${count} ${kind}`).join(", ");
+      return { reliable: "linear model reliable", unreliable: "linear model unreliable", failed: "failed",
+        undefined: "undefined: no excitation" }[kinds[0][1]] + ` at all ${points} points`;
+    }
+    const reliable = word("reliable", cell);
     if (reliable !== null) return reliable === "true" ? "linear model reliable" : "linear model unreliable";
-    const status = word("status", point);
-    if (status === null) return "not in the file";
+    const status = word("status", cell) ?? "unknown";
     return status === "ok" ? "undefined: no excitation" : `failed: ${status.replaceAll("_", " ")}`;
   }
 
   function coordinates([i, j]) {
     const places = [[xAxis, i], [yAxis, j], ...extra.map((axis, k) => [axis, rest[k]])];
-    return places.map(([axis, index]) => `${axis.words} ${significant(axis.values[index])} ${axis.unit}`.trim());
+    return places.map(([axis, index]) => {
+      const [from, to] = axis.spans?.[index] ?? [axis.values[index], axis.values[index]];
+      const value = from === to ? significant(from) : `${significant(from)} to ${significant(to)}`;
+      return `${axis.words} ${value} ${axis.unit}`.trim();
+    });
+  }
+
+  // Where plain rk4 does not agree with itself.
+  function chaos(cell) {
+    const [points, chaotic] = [counts?.points[cell] ?? 1, counts?.sensitive[cell] ?? 0];
+    if (points > 1 ? chaotic === 0 : word("sensitive", cell) !== "true") return [];
+    const where = points > 1 ? `at ${chaotic} of ${points} points` : "here";
+    const said = `The motion is chaotic ${where}: plain rk4 does not agree with itself at two steps.`;
+    return [element("p", {}, said)];
+  }
+
+  // What the readout is of: a point, or a cell and the point in it that has the largest ratio.
+  function heading(cell) {
+    const point = shownValue("point", cell, 9);
+    return (counts?.points[cell] ?? 1) > 1 ? `Cell of ${counts.points[cell]} points: worst values` : `Point ${point}`;
   }
 
   function shownValue(name, point, digits = 4) {
@@ -374,15 +471,17 @@ function createMap(host, data) {
     }
     const point = pointAt(...place);
     const layer = currentLayer();
+    const several = (counts?.points[point] ?? 1) > 1;
     figure.dataset.point = shownValue("point", point, 9);
-    readout.append(element("h2", {}, `Point ${shownValue("point", point, 9)}`));
+    readout.append(element("h2", {}, heading(point)));
     for (const line of coordinates(place)) readout.append(element("p", {}, line));
     const largest = word("ratio_max_channel", point);
     readout.append(element("p", { class: "verdict" }, capitalised(verdict(point))),
-      ...(word("sensitive", point) === "true" ? [element("p", {}, "The motion is chaotic here: plain rk4 does not agree with itself at two steps.")] : []),
-      element("p", { id: "ratio" }, `Largest ratio ${shownValue("ratio_max", point)}${largest ? ` (${largest.replaceAll("_", " ")})` : ""}`));
+      ...chaos(point),
+      element("p", { id: "ratio" }, `Largest ratio ${shownValue("ratio_max", point)}${largest ? ` (${largest.replaceAll("_", " ")})` : ""}`
+        + (several ? ` at point ${shownValue("point", point, 9)}` : "")));
     if (!Number.isNaN(columns.fail_time_s?.values[point] ?? NaN)) {
-      readout.append(element("p", {}, `Failed at ${shownValue("fail_time_s", point)} s`));
+      readout.append(element("p", {}, `${several ? "First failed" : "Failed"} at ${shownValue("fail_time_s", point)} s`));
     }
     const rows = element("tbody");
     for (const { channel: name, channelWords } of data.layers.filter((one) => one.group === "nonlinear")) {

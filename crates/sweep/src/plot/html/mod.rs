@@ -3,20 +3,25 @@
 mod embed;
 mod histories;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Map as Object, Value, json};
 
+use super::PlotOptions;
+use super::Quantity;
 use super::chart::{Chart, ChartPanel, Series, Style};
-use super::colour::{ColourScale, DISTINCT, FAILED, LEVELS};
-use super::contour::zero_lines;
+use super::colour::{BOTH, ColourScale, DISTINCT, FAILED, LEVELS};
+use super::contour::{MOST_POINTS, leave_out_shortest, zero_lines};
+use super::cuts::Cuts;
 use super::error::PlotError;
 use super::figures;
-use super::grid::{Grid, GridAxis};
+use super::gather::{Counts, Map};
+use super::grid::GridAxis;
 use super::label;
-use super::layer::{Layer, Level, channels, layer};
-use super::read::{Table, Values};
+use super::layer::{self, Layer, Level, Shown};
+use super::read::Source;
 use super::scene::{Colour, INK};
 use super::svg::escape;
-use super::{PlotOptions, Quantity};
+use super::swept::SweptAxis;
+use super::table::{Column, Table};
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("style.css");
@@ -25,66 +30,83 @@ const CHART: &str = include_str!("chart.js");
 const MAP: &str = include_str!("map.js");
 const START: &str = include_str!("start.js");
 
+/// Bytes of a page that the values of a map's cells may take.
+const CELL_BYTES: usize = 7_000_000;
+
+/// Columns of a map file that a page carries: all results but the counts of steps.
+pub(crate) fn carried<'a>(source: &'a Source, axes: &[SweptAxis]) -> Vec<&'a str> {
+    let names = source.columns.iter().map(|column| column.name.as_str());
+    names
+        .filter(|name| !name.starts_with("steps_") && !name.starts_with("rejected_"))
+        .filter(|name| axes.iter().all(|axis| axis.name != *name))
+        .collect()
+}
+
+/// How many cells of a map a page has room for.
+pub(crate) fn most_cells(columns: usize) -> usize {
+    // A number takes four bytes, which base64 makes 5.3; besides the columns there are the counts of each cell.
+    CELL_BYTES / (6 * (columns + 5))
+}
+
 /// The page of a map of two or more axes: every quantity and channel, and with `--traces` the time histories.
 ///
 /// # Errors
 /// [`PlotError::NotThere`] for options that the file does not have, and any that reading the traces brings.
-pub(crate) fn map_page(table: &Table, grid: &Grid, options: &PlotOptions) -> Result<String, PlotError> {
-    let mut layers = Vec::new();
-    let mut add = |group: &str, channel: Option<&str>, quantity: Quantity| -> Result<(), PlotError> {
-        let channels = channel.map(str::to_owned).into_iter().collect();
-        let layer = layer(table, &PlotOptions { quantity, channels, ..PlotOptions::default() })?;
-        layers.push(layer_json(grid, group, channel.unwrap_or_default(), &layer));
-        Ok(())
-    };
-    add("ratio", None, Quantity::Ratio)?;
-    for (name, _) in channels(table, "ratio_") {
-        add("ratio", Some(name), Quantity::Ratio)?;
-    }
-    for (prefix, group, quantity) in
-        [("nonlinear_", "nonlinear", Quantity::Nonlinear), ("linear_", "linear", Quantity::Linear)]
-    {
-        for (name, _) in channels(table, prefix) {
-            add(group, Some(name), quantity)?;
-        }
-    }
-    for (column, group, quantity) in [
-        ("min_gap_nonlinear_m", "gap-nonlinear", Quantity::GapNonlinear),
-        ("min_gap_linear_m", "gap-linear", Quantity::GapLinear),
-    ] {
-        if table.column(column).is_some() {
-            add(group, None, quantity)?;
-        }
-    }
-    let first = first_view(table, grid, options)?;
+pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<String, PlotError> {
+    let all = layer::all(&map.table.source);
+    let room = MOST_POINTS / all.len();
+    let layers = all.iter().map(|shown| Ok(layer_json(map, shown, &shown.layer(map)?, room)));
+    let layers = layers.collect::<Result<Vec<Value>, PlotError>>()?;
+    let source = &map.table.source;
     let palette =
         |scale: &ColourScale| -> Vec<String> { (0..LEVELS).map(|k| scale.colour(k).css()).collect() };
     let traces = match &options.traces {
-        Some(folder) => histories::read(folder, table, grid)?,
+        Some(folder) => histories::read(folder, map)?,
         None => Value::Null,
     };
     let title = "Where the linear model can be trusted";
-    let data = json!({
+    let mut data = json!({
         "kind": "map",
         "title": title,
-        "subtitle": figures::map::counts(table),
-        "limit": table.ratio_limit(),
-        "axes": grid.axes.iter().map(axis_json).collect::<Vec<_>>(),
-        "columns": columns_json(table, grid),
-        "codes": codes_json(table, grid),
+        "subtitle": figures::map::subtitle(map, &cuts.notes),
+        "limit": source.ratio_limit(),
+        "axes": map.grid.axes.iter().map(axis_json).collect::<Vec<_>>(),
+        "columns": columns_json(&map.table),
+        "codes": codes_json(&map.table),
         "layers": layers,
-        "first": first,
+        "first": first_view(options, cuts),
         "palettes": {
             "diverging": palette(&ColourScale::ratio(std::iter::empty(), 2.0)),
             "sequential": palette(&ColourScale::amplitude(std::iter::empty())),
             "kinds": DISTINCT.map(Colour::css),
             "failed": FAILED.css(),
+            "both": BOTH.css(),
         },
+        "statuses": map.statuses,
         "traces": traces,
-        "provenance": table.provenance,
+        "provenance": provenance(source),
     });
+    if map.grid.merged() {
+        data["counts"] = counts_json(map);
+    }
     Ok(page(title, &data, &[CORE, CHART, MAP, START]))
 }
+
+/// The file's own word about itself, without what would fill the page: a list of a million values, say.
+fn provenance(source: &Source) -> Value {
+    let entry = |(key, value): &(String, Value)| {
+        let text = value.to_string();
+        if text.len() <= MOST_PROVENANCE {
+            return json!([key, value]);
+        }
+        let head: String = text.chars().take(MOST_PROVENANCE / 8).collect();
+        json!([key, format!("{head} ... ({} characters in all; the file has them)", text.len())])
+    };
+    source.provenance.iter().map(entry).collect()
+}
+
+/// Longest entry of a file's metadata that a page carries whole, characters.
+const MOST_PROVENANCE: usize = 100_000;
 
 /// The page of a chart: every panel, those that a picture shows at first.
 pub(crate) fn chart_page(table: &Table, chart: &Chart) -> String {
@@ -93,7 +115,7 @@ pub(crate) fn chart_page(table: &Table, chart: &Chart) -> String {
         "title": chart.title,
         "subtitle": chart.subtitle,
         "chart": chart_json(chart),
-        "provenance": table.provenance,
+        "provenance": provenance(&table.source),
     });
     page(&chart.title, &data, &[CORE, CHART, START])
 }
@@ -108,98 +130,80 @@ fn page(title: &str, data: &Value, scripts: &[&str]) -> String {
 }
 
 /// The layer and the cut that the page opens with.
-fn first_view(table: &Table, grid: &Grid, options: &PlotOptions) -> Result<Value, PlotError> {
-    let group = match options.quantity {
+fn first_view(options: &PlotOptions, cuts: &Cuts) -> Value {
+    json!({
+        "group": group(options.quantity),
+        "channel": options.channels.first().map_or("", String::as_str),
+        "rest": cuts.cuts.first().map_or(&[][..], |cut| &cut.rest),
+    })
+}
+
+/// The name by which the page knows a quantity.
+fn group(quantity: Quantity) -> &'static str {
+    match quantity {
         Quantity::Ratio => "ratio",
         Quantity::Nonlinear => "nonlinear",
         Quantity::Linear => "linear",
         Quantity::GapNonlinear => "gap-nonlinear",
         Quantity::GapLinear => "gap-linear",
         Quantity::Status => "status",
-    };
-    let free_choice = options.channels.is_empty()
-        && matches!(options.quantity, Quantity::Status | Quantity::Nonlinear | Quantity::Linear);
-    if !free_choice {
-        layer(table, options)?;
     }
-    let cuts = figures::map::Slices::of(table, grid, options)?;
-    Ok(json!({
-        "group": group,
-        "channel": options.channels.first().map_or("", String::as_str),
-        "rest": cuts.first(),
-    }))
 }
 
 fn axis_json(axis: &GridAxis) -> Value {
-    json!({
+    let mut data = json!({
         "name": axis.name,
         "words": axis.words,
         "unit": axis.unit,
         "log": axis.log,
         "values": axis.values,
-        "borders": axis.borders(),
-    })
+        "borders": axis.borders,
+    });
+    if let Some(spans) = &axis.spans {
+        data["spans"] = json!(spans);
+    }
+    data
 }
 
 /// Every column of results as 32 bit floats in grid order, NaN where the file has no value.
-fn columns_json(table: &Table, grid: &Grid) -> Value {
-    let mut columns = Map::new();
-    let axes: Vec<&str> = grid.axes.iter().map(|axis| axis.name.as_str()).collect();
-    for column in &table.columns {
-        let Some(numbers) = column.numbers() else { continue };
-        let counter = column.name.starts_with("steps_") || column.name.starts_with("rejected_");
-        if counter || axes.contains(&column.name.as_str()) {
-            continue;
-        }
-        let values = grid.rows().iter().map(|row| row.map_or(f64::NAN, |row| numbers[row]));
+fn columns_json(table: &Table) -> Value {
+    let numbers = |column: &Column| {
         let (unit, factor) = label::shown(&column.unit);
-        columns.insert(
-            column.name.clone(),
-            json!({
-                "unit": unit,
-                "factor": factor,
-                "description": column.description,
-                "data": embed::floats(values),
-            }),
-        );
-    }
-    Value::Object(columns)
-}
-
-/// Columns of few distinct words, as their numbers in grid order; 255 where the file has none.
-fn codes_json(table: &Table, grid: &Grid) -> Value {
-    let mut coded = Map::new();
-    for column in &table.columns {
-        let word = |row: usize| match &column.values {
-            Values::Text(texts) => texts[row].clone(),
-            Values::Flag(flags) => flags[row].map(|flag| flag.to_string()),
-            Values::Number(_) => None,
-        };
-        if column.numbers().is_some() {
-            continue;
-        }
-        let mut words: Vec<String> = (0..table.rows).filter_map(word).collect();
-        words.sort();
-        words.dedup();
-        // Names that are not among the first 255 could only come from a file that is not ours.
-        words.truncate(255);
-        let code = |row: &Option<usize>| {
-            let word = row.and_then(word)?;
-            words.binary_search(&word).ok().and_then(|code| u8::try_from(code).ok())
-        };
-        let codes = grid.rows().iter().map(|row| code(row).unwrap_or(u8::MAX));
-        coded.insert(column.name.clone(), json!({ "data": embed::bytes(codes), "words": words }));
-    }
-    Value::Object(coded)
-}
-
-fn layer_json(grid: &Grid, group: &str, channel: &str, layer: &Layer) -> Value {
-    let column = match (group, channel) {
-        ("ratio", "") => "ratio_max".to_owned(),
-        ("gap-nonlinear", _) => "min_gap_nonlinear_m".to_owned(),
-        ("gap-linear", _) => "min_gap_linear_m".to_owned(),
-        (group, channel) => format!("{group}_{channel}"),
+        let data = json!({
+            "unit": unit,
+            "factor": factor,
+            "description": column.description,
+            "data": embed::floats(column.numbers()?.iter().copied()),
+        });
+        Some((column.name.clone(), data))
     };
+    Value::Object(table.columns.iter().filter_map(numbers).collect::<Object<_, _>>())
+}
+
+/// Columns of few distinct words, as their numbers in grid order; 255 where the file has none, 254 where a cell has
+/// several.
+fn codes_json(table: &Table) -> Value {
+    let words = |column: &Column| {
+        let words = column.words()?;
+        let data = json!({ "data": embed::bytes(words.codes.iter().copied()), "words": words.names });
+        Some((column.name.clone(), data))
+    };
+    Value::Object(table.columns.iter().filter_map(words).collect::<Object<_, _>>())
+}
+
+/// How many of each cell's points are what.
+fn counts_json(map: &Map) -> Value {
+    let of = |count: fn(&Counts) -> u32| embed::floats(map.counts.iter().map(|cell| f64::from(count(cell))));
+    json!({
+        "points": of(|cell| cell.points),
+        "reliable": of(|cell| cell.reliable),
+        "unreliable": of(|cell| cell.unreliable),
+        "failed": of(|cell| cell.failed),
+        "sensitive": of(|cell| cell.sensitive),
+    })
+}
+
+fn layer_json(map: &Map, shown: &Shown, layer: &Layer, room: usize) -> Value {
     let scale = match layer.scale {
         ColourScale::Diverging { log, low, centre, high, reversed } => {
             json!({ "log": log, "low": low, "centre": centre, "high": high, "reversed": reversed })
@@ -208,39 +212,54 @@ fn layer_json(grid: &Grid, group: &str, channel: &str, layer: &Layer) -> Value {
     };
     let ticks: Vec<Value> =
         layer.scale.ticks().iter().map(|tick| json!([embed::short(tick.value), tick.label])).collect();
-    json!({
-        "group": group,
+    let channel = shown.channel.as_deref().unwrap_or_default();
+    let mut data = json!({
+        "group": group(shown.quantity),
         "channel": channel,
         "channelWords": label::channel(channel),
         "title": layer.title,
         "label": layer.label,
-        "column": column,
+        "column": shown.column,
         "scale": scale,
         "ticks": ticks,
-        "level": layer.level.as_ref().map(|level| level_json(grid, layer, level)),
-    })
+        "nonlinear": layer.nonlinear,
+        "level": layer.level.as_ref().map(|level| level_json(map, layer, level, room)),
+    });
+    if let Some([both, undefined]) = layer.mixed() {
+        data["both"] = json!(embed::bits(both));
+        data["undefined"] = json!(embed::bits(undefined));
+    }
+    data
 }
 
-/// The level, and its lines in data coordinates for each cut through the axes after the second, in grid order.
-fn level_json(grid: &Grid, layer: &Layer, level: &Level) -> Value {
-    let [x_axis, y_axis] = [&grid.axes[0], &grid.axes[1]];
-    let cuts: usize = grid.axes[2..].iter().map(|axis| axis.values.len()).product();
+/// The level, and its lines in data coordinates for each cut through the axes after the second, in grid order. Where a
+/// ragged boundary has more than `room` points, its shortest lines are left out: the cells on either side show them.
+fn level_json(map: &Map, layer: &Layer, level: &Level, room: usize) -> Value {
+    let [x_axis, y_axis] = [&map.grid.axes[0], &map.grid.axes[1]];
+    let cuts: usize = map.grid.axes[2..].iter().map(|axis| axis.values.len()).product();
     let (xs, ys) = (x_axis.even(), y_axis.even());
-    let back = |axis: &GridAxis, even: f64| embed::short(if axis.log { even.exp() } else { even });
-    let lines: Vec<Value> = (0..cuts)
+    let mut lines: Vec<Vec<Vec<[f64; 2]>>> = (0..cuts)
         .map(|cut| {
-            let value = |x: usize, y: usize| {
-                let row = grid.rows()[(x * ys.len() + y) * cuts + cut];
-                level.offset(row.map_or(f64::NAN, |row| layer.values[row]))
-            };
-            let lines = zero_lines(&xs, &ys, value);
-            let flat = |line: Vec<[f64; 2]>| -> Vec<f64> {
-                line.into_iter().flat_map(|[x, y]| [back(x_axis, x), back(y_axis, y)]).collect()
-            };
-            json!(lines.into_iter().map(flat).collect::<Vec<_>>())
+            zero_lines(&xs, &ys, |x, y| {
+                let cell = (x * ys.len() + y) * cuts + cut;
+                level.offset(if map.filled(cell) { layer.typical(cell) } else { f64::NAN })
+            })
         })
         .collect();
-    json!({ "value": level.value, "line": level.line, "above": level.above[1], "below": level.below[1], "lines": lines })
+    leave_out_shortest(&mut lines, room);
+    let back = |axis: &GridAxis, even: f64| embed::short(if axis.log { even.exp() } else { even });
+    let flat = |line: &Vec<[f64; 2]>| -> Vec<f64> {
+        line.iter().flat_map(|[x, y]| [back(x_axis, *x), back(y_axis, *y)]).collect()
+    };
+    let lines: Vec<Vec<Vec<f64>>> = lines.iter().map(|cut| cut.iter().map(flat).collect()).collect();
+    json!({
+        "value": level.value,
+        "line": level.line,
+        "above": level.above[1],
+        "below": level.below[1],
+        "both": level.both,
+        "lines": lines,
+    })
 }
 
 fn chart_json(chart: &Chart) -> Value {

@@ -1,0 +1,438 @@
+//! A map file's rows gathered into the cells of its grid, batch by batch: memory goes by the cells,
+//! not the rows.
+//!
+//! A cell of one point has that point's values. A cell of several has the worst of them, column by
+//! column: the greatest amplitude and ratio, the least gap. How many of its points are reliable,
+//! unreliable or failed is counted, so that a cell which holds both says so.
+
+use std::collections::BTreeMap;
+
+use super::error::PlotError;
+use super::grid::{Grid, GridAxis};
+use super::read::{Batch, Cells, ColumnFacts, Source};
+use super::table::{Column, NONE, SEVERAL, Table, Values, Words};
+
+/// Least and greatest finite values of a column over all rows of the file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Extent {
+    low: f64,
+    high: f64,
+    least_positive: f64,
+}
+
+impl Extent {
+    const NONE: Self = {
+        let most = f64::INFINITY;
+        Self { low: most, high: -most, least_positive: most }
+    };
+
+    fn take(&mut self, value: f64) {
+        if value.is_finite() {
+            (self.low, self.high) = (self.low.min(value), self.high.max(value));
+            if value > 0.0 {
+                self.least_positive = self.least_positive.min(value);
+            }
+        }
+    }
+
+    /// Values with the same extremes as all, and as all that are positive.
+    pub(crate) fn values(self) -> impl Iterator<Item = f64> {
+        [self.low, self.least_positive, self.high].into_iter().filter(|value| value.is_finite())
+    }
+}
+
+/// How many of a cell's points are what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    /// All of them.
+    pub(crate) points: u32,
+    /// Whose ratio is below the limit.
+    pub(crate) reliable: u32,
+    /// Whose ratio is at the limit or above.
+    pub(crate) unreliable: u32,
+    /// Whose status is not `ok`.
+    pub(crate) failed: u32,
+    /// Whose motion is chaotic.
+    pub(crate) sensitive: u32,
+}
+
+/// A level that divides a column's values, and how distances from it are measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Divide {
+    /// In the column's own unit.
+    pub(crate) value: f64,
+    /// By the logarithm.
+    pub(crate) log: bool,
+}
+
+/// Where a cell's points lie about a level.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Sides {
+    /// Cells with points on both sides of the level.
+    pub(crate) both: Vec<bool>,
+    /// Cells with points that did not fail and yet have no value.
+    pub(crate) undefined: Vec<bool>,
+    /// The mean of each cell's values, by the logarithm where distances are.
+    pub(crate) mean: Vec<f64>,
+}
+
+/// A map file in cells.
+#[derive(Debug)]
+pub(crate) struct Map {
+    /// One row per cell in grid order.
+    pub(crate) table: Table,
+    /// Where the cells are.
+    pub(crate) grid: Grid,
+    /// Of each cell.
+    pub(crate) counts: Vec<Counts>,
+    /// Of each column of numbers.
+    pub(crate) extents: BTreeMap<String, Extent>,
+    /// Of each column with a level, where cells hold more than one point.
+    pub(crate) sides: BTreeMap<String, Sides>,
+    /// Rows of the whole file by their status.
+    pub(crate) statuses: BTreeMap<String, usize>,
+}
+
+/// Status of a row whose file does not say.
+const UNKNOWN: &str = "unknown";
+/// Status of a point with a result.
+pub(crate) const OK: &str = "ok";
+
+impl Map {
+    /// Reads the named columns of a map file into the cells of a grid. `divide` says which columns
+    /// have a level.
+    ///
+    /// # Errors
+    /// As [`Source::batches`]; [`PlotError::NotAGrid`] for two rows at one point.
+    pub(crate) fn read(
+        source: Source,
+        grid: Grid,
+        columns: &[&str],
+        divide: impl Fn(&str) -> Option<Divide>,
+    ) -> Result<Self, PlotError> {
+        let mut gather = Gather::new(&source, &grid, columns, divide);
+        let mut wanted = columns.to_vec();
+        wanted.extend(grid.axes.iter().map(|axis| axis.name.as_str()));
+        wanted.extend(["status", "reliable", "sensitive", "ratio_max"]);
+        wanted.sort_unstable();
+        wanted.dedup();
+        for batch in source.batches(&wanted)? {
+            gather.take(&batch?)?;
+        }
+        let Gather { columns, counts, statuses, by_status, .. } = gather;
+        let named = statuses.names.into_iter().zip(by_status.iter().copied());
+        let unknown = (UNKNOWN.to_owned(), by_status[usize::from(NONE)]);
+        let statuses = named.chain([unknown]).filter(|(_, rows)| *rows > 0).collect();
+        let (mut extents, mut sides) = (BTreeMap::new(), BTreeMap::new());
+        let mut kept = Vec::with_capacity(columns.len());
+        for column in columns {
+            let name = column.facts.name.clone();
+            if column.facts.cells == Cells::Numbers {
+                extents.insert(name.clone(), column.extent);
+            }
+            if let Some(dividing) = column.dividing {
+                sides.insert(name, dividing.sides());
+            }
+            let mut values = column.values;
+            if let Values::Words(words) = &mut values {
+                words.sort();
+            }
+            kept.push(Column::new(column.facts, values));
+        }
+        let table = Table { rows: grid.cells(), columns: kept, source, stretch: None };
+        Ok(Self { table, grid, counts, extents, sides, statuses })
+    }
+
+    /// The cell at `x` on the first axis, `y` on the second, and `rest` on those after, if the file
+    /// has a point in it.
+    pub(crate) fn cell(&self, x: usize, y: usize, rest: &[usize]) -> Option<usize> {
+        Some(self.grid.cell(x, y, rest)).filter(|&cell| self.filled(cell))
+    }
+
+    /// Whether the file has a point in the cell.
+    pub(crate) fn filled(&self, cell: usize) -> bool {
+        self.counts[cell].points > 0
+    }
+
+    /// The status of each cell: none where its points differ in it.
+    pub(crate) fn status(&self, cell: usize) -> Option<&str> {
+        let words = self.table.column("status").and_then(Column::words)?;
+        match words.codes.get(cell) {
+            Some(&SEVERAL) => None,
+            _ => Some(words.get(cell).unwrap_or(UNKNOWN)),
+        }
+    }
+
+    /// How many rows of the file failed.
+    pub(crate) fn failed(&self) -> usize {
+        self.statuses.iter().filter(|(status, _)| *status != OK).map(|(_, rows)| rows).sum()
+    }
+}
+
+/// What becomes of the values of a cell's points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Rule {
+    Greatest,
+    Least,
+    /// That of the point with the greatest ratio.
+    OfGreatestRatio,
+    /// The word that all have.
+    Common,
+}
+
+impl Rule {
+    fn of(column: &ColumnFacts) -> Self {
+        match (column.name.as_str(), column.cells) {
+            ("point" | "ratio_max_channel", _) => Self::OfGreatestRatio,
+            (_, Cells::Words) => Self::Common,
+            ("fail_time_s", _) => Self::Least,
+            (name, Cells::Numbers) if name.starts_with("min_") => Self::Least,
+            _ => Self::Greatest,
+        }
+    }
+}
+
+/// A column on its way into cells.
+struct Gathered<'a> {
+    facts: &'a ColumnFacts,
+    rule: Rule,
+    values: Values,
+    extent: Extent,
+    dividing: Option<Dividing>,
+}
+
+/// Cells on their way to [`Sides`].
+struct Dividing {
+    divide: Divide,
+    above: Vec<bool>,
+    below: Vec<bool>,
+    undefined: Vec<bool>,
+    /// Sum and count of the values, or of their logarithms.
+    sums: Vec<(f64, u32)>,
+}
+
+impl Dividing {
+    fn new(divide: Divide, cells: usize) -> Self {
+        let none = || vec![false; cells];
+        let (above, below, undefined) = (none(), none(), none());
+        Self { divide, above, below, undefined, sums: vec![(0.0, 0); cells] }
+    }
+
+    fn take(&mut self, cell: usize, value: f64, failed: bool) {
+        let even = if self.divide.log { value.ln() } else { value };
+        if even.is_finite() {
+            let side = if value >= self.divide.value { &mut self.above } else { &mut self.below };
+            side[cell] = true;
+            let (sum, count) = self.sums[cell];
+            self.sums[cell] = (sum + even, count + 1);
+        } else if !failed {
+            self.undefined[cell] = true;
+        }
+    }
+
+    fn sides(self) -> Sides {
+        let mean = |(sum, count): (f64, u32)| {
+            let mean = sum / f64::from(count);
+            if self.divide.log { mean.exp() } else { mean }
+        };
+        let sides = self.above.into_iter().zip(self.below);
+        Sides {
+            both: sides.map(|(above, below)| above && below).collect(),
+            undefined: self.undefined,
+            mean: self.sums.into_iter().map(mean).collect(),
+        }
+    }
+}
+
+/// Which rows of a batch are something.
+type Marked = Vec<bool>;
+
+/// All columns on their way into cells.
+struct Gather<'a> {
+    source: &'a Source,
+    grid: &'a Grid,
+    columns: Vec<Gathered<'a>>,
+    counts: Vec<Counts>,
+    /// First row of each cell.
+    first: Vec<usize>,
+    /// Greatest ratio of each cell so far.
+    greatest: Vec<f64>,
+    statuses: Words,
+    /// Rows by the code of their status.
+    by_status: [usize; 256],
+    row: usize,
+    /// Value and place last found on each axis.
+    last: Vec<(f64, Option<usize>)>,
+}
+
+impl<'a> Gather<'a> {
+    fn new(
+        source: &'a Source,
+        grid: &'a Grid,
+        columns: &[&str],
+        divide: impl Fn(&str) -> Option<Divide>,
+    ) -> Self {
+        let cells = grid.cells();
+        let wanted = source.columns.iter().filter(|column| columns.contains(&column.name.as_str()));
+        let columns = wanted.map(|facts| Gathered {
+            facts,
+            rule: Rule::of(facts),
+            values: match facts.cells {
+                Cells::Numbers => Values::Numbers(vec![f64::NAN; cells]),
+                Cells::Words => Values::Words(Words::none(cells)),
+            },
+            extent: Extent::NONE,
+            // A cell of one point lies on one side, and its value is its mean.
+            dividing: divide(&facts.name)
+                .filter(|_| grid.merged())
+                .map(|divide| Dividing::new(divide, cells)),
+        });
+        Self {
+            source,
+            grid,
+            columns: columns.collect(),
+            counts: vec![Counts::default(); cells],
+            first: vec![0; cells],
+            greatest: vec![f64::NAN; cells],
+            statuses: Words::default(),
+            by_status: [0; 256],
+            row: 0,
+            last: vec![(f64::NAN, None); grid.axes.len()],
+        }
+    }
+
+    fn take(&mut self, batch: &Batch<'_>) -> Result<(), PlotError> {
+        let cells = self.cells(batch)?;
+        let worst = self.worst(batch, &cells)?;
+        let failed = self.count(batch, &cells)?;
+        let rows = Rows { cells: &cells, worst: &worst, failed: &failed };
+        for column in &mut self.columns {
+            column.take(batch, &rows)?;
+        }
+        self.row += batch.rows;
+        Ok(())
+    }
+
+    /// The cell of each row; none where it is not shown.
+    fn cells(&mut self, batch: &Batch<'_>) -> Result<Vec<Option<usize>>, PlotError> {
+        let mut cells = vec![Some(0_usize); batch.rows];
+        for (axis, last) in self.grid.axes.iter().zip(&mut self.last) {
+            for (cell, value) in cells.iter_mut().zip(batch.numbers(&axis.name)?) {
+                if value != last.0 {
+                    *last = (value, GridAxis::place(axis, value));
+                }
+                *cell = cell.zip(last.1).map(|(cell, place)| cell * axis.values.len() + place);
+            }
+        }
+        Ok(cells)
+    }
+
+    /// Which rows have the greatest ratio of their cell so far.
+    fn worst(&mut self, batch: &Batch<'_>, cells: &[Option<usize>]) -> Result<Marked, PlotError> {
+        let ratios = batch.numbers("ratio_max")?;
+        let mut worst = vec![false; batch.rows];
+        for ((worst, cell), ratio) in worst.iter_mut().zip(cells).zip(ratios) {
+            let Some(cell) = *cell else { continue };
+            let known = &mut self.greatest[cell];
+            *worst = ratio > *known || (known.is_nan() && !ratio.is_nan());
+            if *worst {
+                *known = ratio;
+            }
+        }
+        Ok(worst)
+    }
+
+    /// Counts what the rows are; gives which of them failed.
+    fn count(&mut self, batch: &Batch<'_>, cells: &[Option<usize>]) -> Result<Marked, PlotError> {
+        let limit = self.source.ratio_limit();
+        let statuses = batch.words("status")?;
+        let reliable = batch.words("reliable")?;
+        let sensitive = batch.words("sensitive")?;
+        let ratios = batch.numbers("ratio_max")?;
+        let mut failed = Vec::with_capacity(batch.rows);
+        for (k, cell) in cells.iter().enumerate() {
+            let status = statuses.get(k).copied().flatten();
+            self.by_status[usize::from(self.statuses.code(status))] += 1;
+            failed.push(status != Some(OK));
+            let Some(cell) = *cell else { continue };
+            let counts = &mut self.counts[cell];
+            let is_full = |points| counts.points as usize >= points;
+            if counts.points == 0 {
+                self.first[cell] = self.row + k;
+            } else if self.grid.points(cell).is_some_and(is_full) {
+                return Err(self.twice(cell, self.row + k));
+            }
+            counts.points += 1;
+            counts.failed += u32::from(status != Some(OK));
+            counts.sensitive += u32::from(sensitive.get(k).copied().flatten() == Some("true"));
+            let ratio = ratios.get(k).copied().unwrap_or(f64::NAN);
+            let verdict = match reliable.get(k) {
+                Some(word) => word.map(|word| word == "true"),
+                None => (!ratio.is_nan()).then_some(ratio < limit),
+            };
+            counts.reliable += u32::from(verdict == Some(true));
+            counts.unreliable += u32::from(verdict == Some(false));
+        }
+        Ok(failed)
+    }
+
+    fn twice(&self, cell: usize, row: usize) -> PlotError {
+        let first = self.first[cell];
+        let reason = match self.grid.points(cell) {
+            Some(1) => format!("rows {first} and {row} are the same point"),
+            _ => format!("some rows between {first} and {row} are the same point"),
+        };
+        PlotError::NotAGrid { path: self.source.path.clone(), reason }
+    }
+}
+
+/// What is known of a batch's rows, one by one.
+struct Rows<'a> {
+    /// None where the row is not shown.
+    cells: &'a [Option<usize>],
+    /// Which have the greatest ratio of their cell so far.
+    worst: &'a [bool],
+    failed: &'a [bool],
+}
+
+impl Gathered<'_> {
+    fn take(&mut self, batch: &Batch<'_>, rows: &Rows<'_>) -> Result<(), PlotError> {
+        let &Rows { cells, worst, failed } = rows;
+        match &mut self.values {
+            Values::Numbers(kept) => {
+                let numbers = batch.numbers(&self.facts.name)?;
+                let rows = cells.iter().zip(numbers).zip(worst.iter().zip(failed));
+                for ((cell, value), (worst, failed)) in rows {
+                    self.extent.take(value);
+                    let Some(cell) = *cell else { continue };
+                    let known = kept[cell];
+                    let takes = match self.rule {
+                        Rule::Least => value < known,
+                        Rule::OfGreatestRatio => *worst,
+                        Rule::Greatest | Rule::Common => value > known,
+                    };
+                    if takes || known.is_nan() {
+                        kept[cell] = value;
+                    }
+                    if let Some(dividing) = &mut self.dividing {
+                        dividing.take(cell, value, *failed);
+                    }
+                }
+            }
+            Values::Words(words) => {
+                let texts = batch.words(&self.facts.name)?;
+                for ((cell, word), worst) in cells.iter().zip(texts).zip(worst) {
+                    let Some(cell) = *cell else { continue };
+                    let code = words.code(word);
+                    let known = &mut words.codes[cell];
+                    if *known == NONE || (self.rule == Rule::OfGreatestRatio && *worst) {
+                        *known = code;
+                    } else if self.rule == Rule::Common && code != NONE && code != *known {
+                        *known = SEVERAL;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}

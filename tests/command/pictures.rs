@@ -1,0 +1,186 @@
+//! `sweep plot` of maps with more rows than a picture has pixels: what it takes and what it makes.
+
+#![cfg(target_os = "linux")]
+
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::Arc;
+
+use arrow_array::types::Int32Type;
+use arrow_array::{ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array};
+use arrow_array::{RecordBatch, StringArray, UInt64Array};
+use parquet::arrow::ArrowWriter;
+
+use crate::sweep_binary;
+
+/// Bytes of memory that a figure may take, whatever the rows.
+const MOST_MEMORY: u64 = 200_000_000;
+/// Bytes that a picture or a page may have.
+const MOST_BYTES: u64 = 10_000_000;
+
+const ROWS_AT_ONCE: u64 = 1 << 16;
+
+/// A number of 0 to 1 that looks random.
+fn noise(index: u64) -> f64 {
+    let mixed = (index ^ 0x5bf0_3635).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    (mixed >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+fn names(list: &[&str], keys: impl Iterator<Item = Option<i32>>) -> ArrayRef {
+    let names = StringArray::from_iter_values(list);
+    Arc::new(DictionaryArray::<Int32Type>::new(keys.collect::<Int32Array>(), Arc::new(names)))
+}
+
+/// Rows of a map of `side` dampings to a mass, with the columns of a result. The ratio falls with
+/// damping and is ragged by `rough`; some points fail, some are undefined, some chaotic.
+fn rows(from: u64, to: u64, side: u64, rough: f64) -> RecordBatch {
+    let all: Vec<u64> = (from..to).collect();
+    let failed = |point: u64| noise(3 * point) < 0.05 * rough;
+    let ratio = |point: u64| {
+        let [mass, damping] = [point / side, point % side].map(|at| at as f64 / side as f64);
+        let smooth = (3.0 * (mass - damping) + rough * 6.0 * (noise(point) - 0.5)).exp();
+        (!failed(point) && noise(7 * point) > 0.01 * rough).then_some(2.0 * smooth)
+    };
+    let numbers = |of: &dyn Fn(u64) -> Option<f64>| -> ArrayRef {
+        Arc::new(all.iter().map(|&point| of(point)).collect::<Float64Array>())
+    };
+    let counts = |of: &dyn Fn(u64) -> u64| -> ArrayRef {
+        Arc::new(UInt64Array::from_iter_values(all.iter().map(|&point| of(point))))
+    };
+    let flags = |of: &dyn Fn(u64) -> Option<bool>| -> ArrayRef {
+        Arc::new(all.iter().map(|&point| of(point)).collect::<BooleanArray>())
+    };
+    let amplitude = |point: u64| (!failed(point)).then(|| 0.01 * (1.0 + noise(5 * point)));
+    let nonlinear = |point: u64| Some(amplitude(point)? * ratio(point).unwrap_or(0.0));
+    let gap = |point: u64| Some(0.01 - 0.1 * amplitude(point)?);
+    let ends = all.iter().map(|&point| Some(i32::from(failed(point))));
+    let channels = all.iter().map(|&point| ratio(point).map(|_| i32::from(noise(point) < 0.5)));
+    let methods = all.iter().map(|&point| Some((point % 4) as i32));
+    let columns: Vec<(&str, ArrayRef)> = vec![
+        ("point", counts(&|point| point)),
+        ("unbalance_mass_kg", numbers(&|point| Some(0.05 + 1e-4 * (point / side) as f64))),
+        ("damping_n_s_per_m", numbers(&|point| Some(60.0 + 0.1 * (point % side) as f64))),
+        ("nonlinear_tub_yaw", numbers(&nonlinear)),
+        ("nonlinear_tub_pitch", numbers(&nonlinear)),
+        ("linear_tub_yaw", numbers(&amplitude)),
+        ("linear_tub_pitch", numbers(&amplitude)),
+        ("ratio_tub_yaw", numbers(&ratio)),
+        ("ratio_tub_pitch", numbers(&|point| Some(0.8 * ratio(point)?))),
+        ("ratio_max", numbers(&ratio)),
+        ("ratio_max_channel", names(&["tub_yaw", "tub_pitch"], channels)),
+        ("reliable", flags(&|point| Some(ratio(point)? < 2.0))),
+        ("sensitive", flags(&|point| (!failed(point)).then_some(noise(11 * point) < 0.3 * rough))),
+        ("method", names(&["fast", "fine", "finest", "rk4"], methods)),
+        ("error", numbers(&|point| Some(1e-3 * noise(13 * point)))),
+        ("min_gap_nonlinear_m", numbers(&gap)),
+        ("min_gap_linear_m", numbers(&gap)),
+        ("status", names(&["ok", "diverged"], ends)),
+        ("fail_time_s", numbers(&|point| failed(point).then_some(41.5))),
+        ("steps_nonlinear", counts(&|_| 250_000)),
+        ("steps_linear", counts(&|_| 250_000)),
+        ("rejected_nonlinear", counts(&|_| 0)),
+        ("rejected_linear", counts(&|_| 0)),
+    ];
+    let columns = columns.into_iter().map(|(name, array)| (name, array, true));
+    RecordBatch::try_from_iter_with_nullable(columns).expect("columns of one length")
+}
+
+/// A map of `side` masses by `side` dampings.
+fn write_map(path: &Path, side: u64, rough: f64) {
+    let file = File::create(path).expect("the map can be made");
+    let mut writer: Option<ArrowWriter<File>> = None;
+    let mut file = Some(file);
+    for from in (0..side * side).step_by(ROWS_AT_ONCE as usize) {
+        let batch = rows(from, (from + ROWS_AT_ONCE).min(side * side), side, rough);
+        let writer = writer.get_or_insert_with(|| {
+            let file = file.take().expect("one writer");
+            ArrowWriter::try_new(file, batch.schema(), None).expect("a writer")
+        });
+        writer.write(&batch).expect("rows are written");
+    }
+    writer.expect("rows").close().expect("the map is written");
+}
+
+/// The command with no more address space than that.
+fn plot_within(bytes: u64, folder: &Path, words: &[&str]) -> Output {
+    let limit = format!("ulimit -v {}; exec \"$@\"", bytes / 1000);
+    let mut command = Command::new("sh");
+    command.args(["-c", &limit, "sh"]).arg(sweep_binary()).arg("plot");
+    command.args(words).current_dir(folder).output().expect("sh runs")
+}
+
+fn draws_within_bounds(side: u64, rough: f64) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    write_map(&folder.path().join("map.parquet"), side, rough);
+    for name in ["map.svg", "map.png", "map.html"] {
+        let run = plot_within(MOST_MEMORY, folder.path(), &["map.parquet", "-o", name]);
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{side} by {side}, {name}: {said}");
+        let bytes = fs::metadata(folder.path().join(name)).expect("a figure").len();
+        assert!(bytes < MOST_BYTES, "{side} by {side}, rough {rough}: {name} has {bytes} bytes");
+        if let Some(kept) = std::env::var_os("SHOTS") {
+            let kept = Path::new(&kept).join(format!("{side}_{rough}_{name}"));
+            fs::copy(folder.path().join(name), kept).expect("the figure is kept");
+        }
+    }
+}
+
+#[test]
+fn a_million_rows_take_bounded_memory_and_make_bounded_figures() {
+    draws_within_bounds(1000, 0.02);
+}
+
+#[test]
+fn rows_unlike_their_neighbours_take_no_more() {
+    draws_within_bounds(1000, 1.0);
+}
+
+#[test]
+#[ignore = "writes 1.5 GB and takes a minute; .ci/run runs it"]
+fn ten_million_rows_take_no_more() {
+    draws_within_bounds(3163, 0.02);
+}
+
+#[test]
+fn a_flipped_bit_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let grid = r#"
+[spin]
+profile = "triangular"
+peak_rpm = 350.0
+ramp_s = 50.0
+[time]
+end_s = 0.1
+window_s = [0.05, 0.1]
+[integrator]
+method = "rk4"
+step_s = 2.0e-4
+[[axis]]
+parameter = "unbalance_mass_kg"
+range = { from = 0.05, to = 1.0, count = 3 }
+[[axis]]
+parameter = "damping_n_s_per_m"
+range = { from = 60.0, to = 300.0, count = 3 }
+"#;
+    fs::write(folder.path().join("g.toml"), grid).expect("the grid is written");
+    let sweep = |words: &[&str]| {
+        let mut command = Command::new(sweep_binary());
+        command.args(words).current_dir(folder.path()).output().expect("it starts")
+    };
+    assert!(sweep(&["run", "g.toml", "--out", "map.parquet"]).status.success());
+    assert!(sweep(&["plot", "map.parquet", "-o", "whole.svg"]).status.success());
+    let whole = fs::read(folder.path().join("map.parquet")).expect("a map");
+    for bit in (0..8 * whole.len()).step_by(8 * whole.len() / 150 + 1) {
+        let mut bytes = whole.clone();
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        fs::write(folder.path().join("map.parquet"), bytes).expect("the map is written");
+        let run = sweep(&["plot", "map.parquet", "-o", "a.svg"]);
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(1), "bit {bit}: {said}");
+        assert!(said.contains("map.parquet is"), "bit {bit}: {said}");
+        assert!(!said.contains("panicked"), "bit {bit}: {said}");
+        assert!(!folder.path().join("a.svg").exists(), "bit {bit}");
+    }
+}
