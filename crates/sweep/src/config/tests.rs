@@ -45,7 +45,7 @@ fn load_as_told(path: &Path) -> Result<Plan, Diagnostics> {
 }
 
 /// A grid written to a folder of its own.
-fn load_text(text: impl AsRef<[u8]>, sets: &[&str]) -> Result<Plan, String> {
+pub(super) fn load_text(text: impl AsRef<[u8]>, sets: &[&str]) -> Result<Plan, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grid.toml");
     std::fs::write(&path, text).unwrap();
@@ -53,7 +53,8 @@ fn load_text(text: impl AsRef<[u8]>, sets: &[&str]) -> Result<Plan, String> {
     load(&path, &sets).map_err(|diagnostics| diagnostics.to_string())
 }
 
-const SMALLEST: &str = "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = 50\n";
+pub(super) const SMALLEST: &str =
+    "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = 50\n";
 
 #[test]
 fn broken_files_are_refused_with_these_messages() {
@@ -307,8 +308,8 @@ const PIECES: [&str; 24] = [
 fn loads_or_explains(text: &[u8]) {
     match load_text(text, &[]) {
         Ok(plan) => {
-            for values in plan.corners() {
-                let scenario = plan.scenario_at(&values);
+            for corner in 0..plan.corners() {
+                let scenario = plan.scenario_at(&plan.corner(corner));
                 assert_eq!(scenario.machine.violations(), []);
                 assert_eq!(scenario.spin.violations(), []);
             }

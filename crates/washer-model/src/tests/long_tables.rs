@@ -45,7 +45,8 @@ fn every_leg_has_the_stretch_that_holds_on_it() {
         }
         for t_s in [0.0, 0.3, 0.5, 2.3, 5.0] {
             let stretch = point.stretches.iter().rev().find(|stretch| stretch.start_s <= t_s);
-            let of_one = crate::spin::SpinLanes::splat(lane_ode::N(0.0), stretch.unwrap()).at(lane_ode::N(t_s));
+            let of_one =
+                crate::spin::SpinLanes::splat(lane_ode::N(0.0), stretch.unwrap()).at(lane_ode::N(t_s));
             let speed_rpm = of_one.speed.0 * 60.0 / core::f64::consts::TAU;
             assert_eq!(spin.speeds_rpm([t_s]).next(), Some(speed_rpm), "{t_s}");
         }
