@@ -88,7 +88,7 @@ fn a_machine_too_stiff_for_any_number_of_steps_is_refused_by_every_explicit_meth
 fn a_stiff_machine_that_is_accepted_is_estimated_from_a_beginning() {
     for method in ["rk4-mass-scaled", "dopri5"] {
         let plan = light(1e-6, 10.0, &format!("method = \"{method}\"")).unwrap();
-        let estimate = Estimate::of(&plan, &|_| Some("1".to_owned())).unwrap();
+        let estimate = Estimate::of(&plan, 1).unwrap();
         assert!(estimate.sampled_s < 1.0, "{estimate:?}");
     }
 }

@@ -7,7 +7,6 @@ mod csv;
 mod pages;
 mod parquet;
 
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
@@ -16,6 +15,7 @@ use super::report::{Diagnostic, Report};
 use super::section::{cut, short};
 use super::source::{Located, Location, SourceId, Sources};
 use crate::design::Design;
+use crate::files::regular;
 
 /// Longest list that is read, in bytes; and so of a Parquet file's pages unpacked.
 const LONGEST_BYTES: u64 = 256 << 20;
@@ -138,7 +138,7 @@ pub(super) fn read(file: &Located<&str>, grid: &Path, report: &mut Report) -> Op
 
 fn bytes(path: &Path) -> Result<Vec<u8>, Unreadable> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(LONGEST_BYTES + 1).read_to_end(&mut bytes)?;
+    regular::open(path)?.take(LONGEST_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LONGEST_BYTES { Err(Unreadable::TooLong) } else { Ok(bytes) }
 }
 

@@ -1,7 +1,5 @@
 //! Parquet files of numbers. The library trusts a file's own account of its sizes, so that is checked first.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
 use bytes::Bytes;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::Compression;
@@ -9,7 +7,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
 use super::{LONGEST_BYTES, MOST_COLUMNS, Unreadable, fits, pages};
-use crate::cells;
+use crate::{cells, panics};
 
 /// How a list may be compressed, for a message.
 pub(super) const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
@@ -19,9 +17,8 @@ const BATCH_ROWS: usize = 8192;
 
 /// Names and values of the columns.
 pub(super) fn columns(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
-    // The library panics at some files that are damaged.
-    catch_unwind(AssertUnwindSafe(|| read(bytes.into())))
-        .unwrap_or_else(|_| Err(Unreadable::Damaged("it makes no sense inside".to_owned())))
+    let panicked = |panic| Err(Unreadable::Damaged(format!("it makes no sense inside: {panic}")));
+    panics::caught(|| read(bytes.into())).unwrap_or_else(panicked)
 }
 
 fn read(bytes: Bytes) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
