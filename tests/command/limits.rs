@@ -8,6 +8,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 
 use crate::sweep_binary;
 use tempfile::TempDir;
@@ -140,6 +141,20 @@ fn a_folder_that_cannot_be_listed_is_told() {
 }
 
 #[test]
+#[ignore = "needs strace; .ci/run runs it"]
+fn a_folder_that_cannot_be_closed_is_told() {
+    at_every_call("close", "EIO", RUN);
+}
+
+#[test]
+#[ignore = "needs strace; .ci/run runs it"]
+fn random_numbers_that_are_refused_are_told() {
+    for words in [RUN, TRACE, BOUNDARY, SHOW, PLOT] {
+        at_every_call("getrandom", "EIO", words);
+    }
+}
+
+#[test]
 fn little_address_space_is_told() {
     let mut refused = 0;
     for kilobytes in [24_000, 28_000, 32_000, 36_000, 40_000, 60_000, 120_000, 400_000] {
@@ -183,6 +198,28 @@ fn slurm_gives_the_threads_of_a_run_and_of_its_traces() {
     // Refused for the traces as for the run, although the map is there.
     let run = home.under(&["env", "SLURM_CPUS_PER_TASK=0"], &words);
     assert_eq!(run.status.code(), Some(2), "{}", said(&run));
+}
+
+#[test]
+fn a_signal_is_answered_within_a_trajectory() {
+    // By explicit methods an hour of computing; the stiff one has a tolerance that it cannot meet any quicker.
+    for (set, method) in [
+        ("tub_mass_kg = 1e-6", "method = \"rk4\"\nstep_s = 1.0e-8"),
+        ("tub_mass_kg = 1e-6", "method = \"dopri5\""),
+        ("tub_mass_kg = 20", "method = \"rodas5p\"\nrtol = 1e-13\natol = 1e-30"),
+    ] {
+        let home = Home::new();
+        let grid = format!(
+            "spin = {{ profile = \"ramp\", peak_rpm = 350, ramp_s = 50 }}\ntime = {{ end_s = 90 }}\n\
+             [set]\n{set}\n[integrator]\n{method}\n"
+        );
+        fs::write(home.path("g.toml"), grid).expect("the grid is written");
+        let script = "\"$@\" & sweep=$!\nsleep 2\nkill -TERM $sweep; wait $sweep";
+        let began = Instant::now();
+        let run = home.under(&["sh", "-c", script, "sh"], RUN);
+        assert_eq!(run.status.code(), Some(143), "{method}: {}", said(&run));
+        assert!(began.elapsed() < Duration::from_secs(30), "{method}: {:?}", began.elapsed());
+    }
 }
 
 #[test]

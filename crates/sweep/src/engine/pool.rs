@@ -114,7 +114,11 @@ impl Pool<'_> {
                     state.at_work.push(above(rung));
                     drop(state);
                     let points: Vec<&Point> = taken.iter().map(|(_, point)| point.as_ref()).collect();
-                    let runs = self.engine.runs(model, rung, &points);
+                    let runs = self.engine.runs(model, rung, &points, self.watch);
+                    // They may have been cut short.
+                    if self.watch.stopped() {
+                        break;
+                    }
                     let mut state = self.lock();
                     let mut rows = Vec::with_capacity(taken.len());
                     for ((position, _), run) in taken.iter().zip(runs) {

@@ -13,6 +13,10 @@ fn table(rows: usize) -> Spin {
     Spin::Table { time_s, speed_rpm: (0..rows).map(speed).collect() }
 }
 
+const fn timing(end_s: f64, window_s: [f64; 2]) -> Timing {
+    Timing { end_s, window_s, checkpoints: 0 }
+}
+
 fn points(spins: &[Spin], timing: &Timing) -> Vec<Point> {
     let scenarios: Vec<_> = spins.iter().map(|spin| (Machine::paper(), spin.clone())).collect();
     prepare(Simd::Scalar, &scenarios, timing).into_iter().map(Result::unwrap).collect()
@@ -27,8 +31,7 @@ fn a_table_of_a_million_rows_is_made_ready() {
     assert!((greatest_rpm - 350.0).abs() < 1e-9, "{greatest_rpm}");
     let halfway_rpm = spin.speeds_rpm((0..rows).map(|k| (k as f64 + 0.5) / 64.0)).sum::<f64>() / rows as f64;
     assert!((halfway_rpm - 300.0).abs() < 0.1, "{halfway_rpm}");
-    let timing = Timing { end_s, window_s: [1.0, end_s] };
-    let point = &points(&[spin], &timing)[0];
+    let point = &points(&[spin], &timing(end_s, [1.0, end_s]))[0];
     assert_eq!((point.stretches.len(), point.legs.len()), (rows, rows));
 }
 
@@ -37,7 +40,7 @@ fn every_leg_has_the_stretch_that_holds_on_it() {
     let spin = table(200);
     // Edges on a row's time, between two, and past the last.
     for window_s in [[0.0, 1.0], [0.5, 2.3], [1.01, 4.0]] {
-        let point = &points(std::slice::from_ref(&spin), &Timing { end_s: 4.0, window_s })[0];
+        let point = &points(std::slice::from_ref(&spin), &timing(4.0, window_s))[0];
         for leg in point.legs.iter() {
             let holds = point.stretches.iter().rposition(|stretch| stretch.start_s <= leg.start_s);
             assert_eq!(Some(leg.stretch), holds, "{leg:?}");
@@ -56,7 +59,7 @@ fn every_leg_has_the_stretch_that_holds_on_it() {
 #[test]
 fn neighbours_of_one_spin_share_what_follows_from_it() {
     let (a, b) = (table(100), table(101));
-    let points = points(&[a.clone(), a.clone(), b, a], &Timing { end_s: 1.0, window_s: [0.0, 1.0] });
+    let points = points(&[a.clone(), a.clone(), b, a], &timing(1.0, [0.0, 1.0]));
     let shared = |i: usize, j: usize| {
         Arc::ptr_eq(&points[i].stretches, &points[j].stretches)
             && Arc::ptr_eq(&points[i].legs, &points[j].legs)
