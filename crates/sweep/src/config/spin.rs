@@ -101,7 +101,11 @@ pub(super) fn read(root: &mut Section<'_>, origins: &mut Origins, report: &mut R
     };
     section.finish(report);
     spin.unwrap_or_else(|| match profile {
-        Profile::Table => machine::no_spin(),
+        Profile::Table => {
+            // What is wrong with the table has been said; that the stand-in has no rows is not it.
+            origins.doubt("spin.time_s".to_owned());
+            machine::no_spin()
+        }
         Profile::Ramped(_) | Profile::Unknown => stand_in,
     })
 }
