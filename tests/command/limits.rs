@@ -114,6 +114,10 @@ fn at_every_call(calls: &str, error: &str, words: &[&str]) {
             home.under(&["strace", "-f", "-qq", "-o", "/dev/stderr", "-e", &trace, "-e", &inject], words);
         let what = format!("{error} at {calls} {when} of {words:?}");
         let is_hit = said(&run).contains("(INJECTED)");
+        if said(&run).contains("error while loading shared libraries") {
+            // The loader's own call; the command has not begun.
+            continue;
+        }
         assert_told(&run, &what);
         if words == RUN {
             assert_mends(&home, &what);
@@ -206,7 +210,7 @@ fn a_signal_is_answered_within_a_trajectory() {
     for (set, method) in [
         ("tub_mass_kg = 1e-6", "method = \"rk4\"\nstep_s = 1.0e-8"),
         ("tub_mass_kg = 1e-6", "method = \"dopri5\""),
-        ("tub_mass_kg = 20", "method = \"rodas5p\"\nrtol = 1e-13\natol = 1e-30"),
+        ("tub_mass_kg = 20", "method = \"rodas5p\"\nrtol = 1e-12\natol = 1e-18"),
     ] {
         let home = Home::new();
         let grid = format!(

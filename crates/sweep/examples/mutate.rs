@@ -1,11 +1,14 @@
-//! The fuzzer's targets without a fuzzer: inputs of its corpus, changed at random, for as long as asked.
+//! The fuzzer's targets without a fuzzer: inputs of its corpus, changed at random, for as long as
+//! asked.
 //!
 //! ```sh
-//! cargo run --release -p sweep --example mutate -- list 300 1 > /dev/null    # target, seconds, seed
+//! # target, seconds, seed
+//! cargo run --release -p sweep --example mutate -- list 300 1 > /dev/null
 //! ```
 //!
-//! Needs no instrumented build, so it finds less in a second than `scripts/fuzz.sh` and can be started at once. Targets
-//! are `list`, `result` and `folder`. What is found stands in `target/fuzz/findings`; exits with 1 if there is any.
+//! Needs no instrumented build, so it finds less in a second than `scripts/fuzz.sh` and can be
+//! started at once. Targets are `list`, `result` and `folder`. What is found stands in
+//! `target/fuzz/findings`; exits with 1 if there is any.
 
 #[path = "../../../fuzz/src/targets/folder.rs"]
 mod folder;
@@ -100,10 +103,17 @@ fn changed(rng: &mut Rng, seeds: &[Vec<u8>]) -> Vec<u8> {
 }
 
 fn seeds(corpus: &Path) -> Vec<Vec<u8>> {
-    let entries = fs::read_dir(corpus).unwrap_or_else(|error| panic!("{}: {error}", corpus.display()));
+    let entries = fs::read_dir(corpus).expect("there is a corpus");
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
     paths.sort();
     paths.iter().map(|path| fs::read(path).expect("an input is read")).collect()
+}
+
+/// Time that this thread has computed, so that other work of the machine slows no input down.
+fn computed() -> Duration {
+    let schedule = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds = schedule.split_whitespace().next().and_then(|text| text.parse().ok());
+    Duration::from_nanos(nanoseconds.unwrap_or_default())
 }
 
 /// The most memory that this process has had, in kB.
@@ -137,20 +147,22 @@ fn main() -> ExitCode {
     let mut inputs = unchanged.chain(std::iter::repeat_with(|| changed(&mut rng, &seeds)));
     while began.elapsed() < Duration::from_secs(seconds) {
         let Some(input) = inputs.next() else { break };
-        let start = Instant::now();
+        let start = computed();
         let is_sound = catch_unwind(|| run(&input)).is_ok();
-        let took = start.elapsed();
+        let took = computed() - start;
         tried += 1;
         slowest = slowest.max(took);
         if !is_sound || took > SLOW {
             found += 1;
             let path = findings.join(format!("{name}-{tried}"));
             fs::write(&path, &input).expect("a finding is kept");
-            eprintln!("{}: {} after {took:?}", path.display(), if is_sound { "slow" } else { "panic" });
+            let what = if is_sound { "slow" } else { "panic" };
+            eprintln!("{}: {what} after {took:?}", path.display());
         }
     }
     eprintln!(
-        "{name}: {tried} inputs from {} in {:.0} s, slowest {slowest:?}, at most {}, {found} findings",
+        "{name}: {tried} inputs from {} in {:.0} s, slowest {slowest:?}, \
+         at most {}, {found} findings",
         seeds.len(),
         began.elapsed().as_secs_f64(),
         peak_kb()

@@ -9,6 +9,7 @@ use crate::commands::{
 };
 use crate::exit::{Error, Exit};
 use crate::nearest::nearest;
+use crate::panics;
 
 /// Maps where a washing machine's linear suspension model can be trusted.
 #[derive(Debug, Parser)]
@@ -121,6 +122,7 @@ impl Command {
     /// # Errors
     /// Whatever kept the command from its end.
     pub fn run(&self) -> Result<Exit, Error> {
+        panics::draw_random_keys()?;
         match self {
             Self::Run(args) => run::run(args),
             Self::Check(args) => check::run(args),

@@ -1,13 +1,16 @@
 //! The name that someone meant.
 
 /// The valid name most like what was typed, if any is near.
-pub(crate) fn nearest<'a>(typed: &str, valid: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub(crate) fn nearest<'a, I>(typed: &str, valid: I) -> Option<&'a str>
+where
+    I: IntoIterator<Item = &'a str>,
+{
     // Comparing takes time with the square of the length, and no valid name is long.
     let typed: String = typed.chars().take(80).flat_map(char::to_lowercase).collect();
     let likeness = |name: &str| {
         // Leaving out the unit or a leading word is as common as a slip of the finger.
-        let part =
-            typed.len() >= 4 && (name.starts_with(&typed) || name.split('_').any(|word| word == typed));
+        let is_word = || name.split('_').any(|word| word == typed);
+        let part = typed.len() >= 4 && (name.starts_with(&typed) || is_word());
         // One slip in a short word leaves too little for the measures of likeness.
         let one_slip = typed.len() >= 3 && strsim::damerau_levenshtein(&typed, name) == 1;
         if part {

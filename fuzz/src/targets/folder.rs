@@ -108,9 +108,12 @@ fn home() -> &'static Home {
     HOME.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let grid = folder.path().join("g.toml");
-        let text = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\ntime = { end_s = 1e-3 }\n\
-            integrator = { method = \"rk4\", step_s = 1e-4 }\nreliability = { channels = [\"tub_yaw\"] }\n\
-            [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = { from = 0.1, to = 0.9, count = 10 }\n";
+        let text = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\n\
+            time = { end_s = 1e-3 }\n\
+            integrator = { method = \"rk4\", step_s = 1e-4 }\n\
+            reliability = { channels = [\"tub_yaw\"] }\n\
+            [[axis]]\nparameter = \"unbalance_mass_kg\"\n\
+            range = { from = 0.1, to = 0.9, count = 10 }\n";
         fs::write(&grid, text).expect("the grid is written");
         let plan = sweep::config::load(&grid, &[]).expect("the grid is right");
         let output = folder.path().join("x.parquet");
@@ -136,8 +139,8 @@ fn home() -> &'static Home {
         let files: Vec<(String, Vec<u8>)> = names
             .map(|entry| entry.expect("an entry").path())
             .map(|path: PathBuf| {
-                let name = path.file_name().and_then(|name| name.to_str()).expect("UTF-8").to_owned();
-                (name, fs::read(path).expect("a file is read"))
+                let name = path.file_name().and_then(|name| name.to_str()).expect("UTF-8");
+                (name.to_owned(), fs::read(&path).expect("a file is read"))
             })
             .collect();
         assert!(matches!(go(None), Ended::Finished(_)));

@@ -42,8 +42,10 @@ fn home() -> &'static Home {
     HOME.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = |name: &str| folder.path().join(name);
-        let grid = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\ntime = { end_s = 1 }\n\
-            integrator = { method = \"rodas5p\" }\ndesign = { method = \"list\", file = \"list\" }\n";
+        let grid = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\n\
+            time = { end_s = 1 }\n\
+            integrator = { method = \"rodas5p\" }\n\
+            design = { method = \"list\", file = \"list\" }\n";
         fs::write(path("g.toml"), grid).expect("the grid is written");
         Home { list: path("list"), grid: path("g.toml"), _folder: folder }
     })

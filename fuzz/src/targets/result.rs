@@ -17,7 +17,8 @@ use tempfile::TempDir;
 /// Tries one input; a panic is a finding.
 pub(crate) fn run(bytes: &[u8]) {
     let home = home();
-    let bytes = &sealed(bytes);
+    let bytes = sealed(bytes);
+    let bytes = bytes.as_slice();
     fs::write(&home.result, bytes).expect("the input is written");
     let job = Job::of(&home.plan);
     match status(&home.result, &job) {
@@ -71,7 +72,8 @@ fn home() -> &'static Home {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = |name: &str| folder.path().join(name);
         let text = |path: &Path| path.to_str().expect("temporary folders are UTF-8").to_owned();
-        let run = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\ntime = { end_s = 1 }\n";
+        let run = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\n\
+            time = { end_s = 1 }\n";
         fs::write(path("g.toml"), run).expect("the grid is written");
         Home {
             result: path("x.parquet"),

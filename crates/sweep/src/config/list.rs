@@ -1,7 +1,7 @@
 //! Lists of points: files whose columns are parameters and whose rows are points.
 //!
-//! A list is read into memory as a whole. What bounds it is how many bytes the file has, packed and unpacked, and
-//! how many numbers it holds; each bound is checked before the memory is taken.
+//! A list is read into memory as a whole. What bounds it is how many bytes the file has, packed and
+//! unpacked, and how many numbers it holds; each bound is checked before the memory is taken.
 
 mod csv;
 mod pages;
@@ -67,7 +67,8 @@ enum Unreadable {
     #[error("its column `{}` has no value in row {row}", short(column))]
     NoValue { column: String, row: usize },
     #[error(
-        "its column `{}` is compressed by {codec}, which this program does not read: write it with {}",
+        "its column `{}` is compressed by {codec}, which this program does not read: \
+         write it with {}",
         short(column),
         parquet::READABLE_CODECS
     )]
@@ -98,8 +99,8 @@ pub(super) fn read(file: &Located<&str>, grid: &Path, report: &mut Report) -> Op
         let hash = blake3::hash(&bytes).to_hex().to_string();
         if bytes.starts_with(b"PAR1") {
             let columns = parquet::columns(bytes)?;
-            let column =
-                |(name, values)| Column { name: Located { value: name, at: file.at.clone() }, values };
+            let located = |value| Located { value, at: file.at.clone() };
+            let column = |(name, values)| Column { name: located(name), values };
             let columns = columns.into_iter().map(column).collect();
             return Ok(Some((columns, Rows::Binary(file.at.clone()), hash)));
         }
@@ -119,8 +120,8 @@ pub(super) fn read(file: &Located<&str>, grid: &Path, report: &mut Report) -> Op
         Ok(read) => read?,
         Err(reason) => {
             let title = format!("cannot read the list of points {shown}: {reason}");
-            let expected =
-                "expected a CSV or Parquet file of numbers, one column a parameter, relative to this file";
+            let expected = "expected a CSV or Parquet file of numbers, one column a parameter, \
+                relative to this file";
             report.push(Diagnostic::new(title).at(&file.at, expected));
             return None;
         }

@@ -7,8 +7,8 @@ use super::report::{Diagnostic, Report};
 use super::section::{Section, listed};
 use super::{machine, parameters};
 
-/// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are made ready
-/// together.
+/// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are
+/// made ready together.
 pub(super) const MOST_ROWS: usize = 20_000;
 
 /// A profile that a peak and a ramp give.
@@ -72,7 +72,8 @@ pub(super) fn read(root: &mut Section<'_>, origins: &mut Origins, report: &mut R
     // Stands in for a wrong spin, so that axes over its numbers are still known.
     let stand_in = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
     let field = root.table("spin", "[spin]", report);
-    let Some(section) = root.require(field, "spin", "a section [spin]", report) else { return stand_in };
+    let section = root.require(field, "spin", "a section [spin]", report);
+    let Some(section) = section else { return stand_in };
     let mut section = section.value;
     let [cycloidal, triangular, ramp] = RAMPED.map(|profile| profile.name);
     let profiles = [cycloidal, triangular, ramp, TABLE];
@@ -85,13 +86,16 @@ pub(super) fn read(root: &mut Section<'_>, origins: &mut Origins, report: &mut R
             section.misplace(&["time_s", "speed_rpm"], &reason);
         }
         Profile::Table => {
-            section.misplace(&["peak_rpm", "ramp_s"], "a table gives `time_s` and `speed_rpm` instead");
+            let reason = "a table gives `time_s` and `speed_rpm` instead";
+            section.misplace(&["peak_rpm", "ramp_s"], reason);
         }
         Profile::Unknown => {}
     }
-    let mut reader = Reader { section: &mut section, profile, stand_in: &stand_in, origins, report };
+    let mut reader = Reader::new(&mut section, profile, &stand_in, origins, report);
     let spin = match profile {
-        Profile::Ramped(ramped) => reader.ramped().map(|[peak_rpm, ramp_s]| (ramped.make)(peak_rpm, ramp_s)),
+        Profile::Ramped(Ramped { make, .. }) => {
+            reader.ramped().map(|[peak_rpm, ramp_s]| make(peak_rpm, ramp_s))
+        }
         Profile::Table => reader.table(),
         Profile::Unknown => {
             reader.ramped();
@@ -118,7 +122,17 @@ struct Reader<'r, 'a> {
     report: &'r mut Report,
 }
 
-impl Reader<'_, '_> {
+impl<'r, 'a> Reader<'r, 'a> {
+    fn new(
+        section: &'r mut Section<'a>,
+        profile: Profile,
+        stand_in: &'r Spin,
+        origins: &'r mut Origins,
+        report: &'r mut Report,
+    ) -> Self {
+        Self { section, profile, stand_in, origins, report }
+    }
+
     fn must_be_there(&self) -> bool {
         !matches!(self.profile, Profile::Unknown)
     }
@@ -157,9 +171,9 @@ impl Reader<'_, '_> {
         };
         if found.value.len() > MOST_ROWS {
             let title = format!("`{key}` has {} numbers", decimal(found.value.len() as f64));
-            let expected =
-                format!("expected at most {MOST_ROWS}: leave out rows between which speed is linear");
-            self.report.push(Diagnostic::new(title).at(&found.at, expected));
+            let expected = format!("expected at most {MOST_ROWS}");
+            let refusal = Diagnostic::new(title).at(&found.at, expected);
+            self.report.push(refusal.help("leave out rows between which the speed is linear"));
             return None;
         }
         self.origins.put(format!("spin.{key}"), found.at);

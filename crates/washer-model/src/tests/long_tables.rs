@@ -1,4 +1,5 @@
-//! A spin measured at many times: what is made ready of it grows with its rows, not with their square.
+//! A spin measured at many times: what is made ready of it grows with its rows, not with their
+//! square.
 
 use std::sync::Arc;
 
@@ -29,7 +30,8 @@ fn a_table_of_a_million_rows_is_made_ready() {
     let (spin, end_s) = (table(rows), rows as f64 / 64.0);
     let greatest_rpm = spin.greatest_speed_rad_per_s(end_s) * 60.0 / core::f64::consts::TAU;
     assert!((greatest_rpm - 350.0).abs() < 1e-9, "{greatest_rpm}");
-    let halfway_rpm = spin.speeds_rpm((0..rows).map(|k| (k as f64 + 0.5) / 64.0)).sum::<f64>() / rows as f64;
+    let halfway_s = (0..rows).map(|k| (k as f64 + 0.5) / 64.0);
+    let halfway_rpm = spin.speeds_rpm(halfway_s).sum::<f64>() / rows as f64;
     assert!((halfway_rpm - 300.0).abs() < 0.1, "{halfway_rpm}");
     let point = &points(&[spin], &timing(end_s, [1.0, end_s]))[0];
     assert_eq!((point.stretches.len(), point.legs.len()), (rows, rows));
@@ -44,13 +46,13 @@ fn every_leg_has_the_stretch_that_holds_on_it() {
         for leg in point.legs.iter() {
             let holds = point.stretches.iter().rposition(|stretch| stretch.start_s <= leg.start_s);
             assert_eq!(Some(leg.stretch), holds, "{leg:?}");
-            assert!(point.stretches.get(leg.stretch + 1).is_none_or(|next| leg.end_s <= next.start_s));
+            let next = point.stretches.get(leg.stretch + 1);
+            assert!(next.is_none_or(|next| leg.end_s <= next.start_s));
         }
         for t_s in [0.0, 0.3, 0.5, 2.3, 5.0] {
             let stretch = point.stretches.iter().rev().find(|stretch| stretch.start_s <= t_s);
-            let of_one =
-                crate::spin::SpinLanes::splat(lane_ode::N(0.0), stretch.unwrap()).at(lane_ode::N(t_s));
-            let speed_rpm = of_one.speed.0 * 60.0 / core::f64::consts::TAU;
+            let speed_rad_per_s = stretch.unwrap().speed_rad_per_s(t_s);
+            let speed_rpm = speed_rad_per_s * 60.0 / core::f64::consts::TAU;
             assert_eq!(spin.speeds_rpm([t_s]).next(), Some(speed_rpm), "{t_s}");
         }
     }

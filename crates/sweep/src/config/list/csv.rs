@@ -1,4 +1,5 @@
-//! Comma-separated numbers under a line of names. Lines that are empty or begin with `#` do not count.
+//! Comma-separated numbers under a line of names. Lines that are empty or begin with `#` do not
+//! count.
 
 use std::ops::Range;
 
@@ -7,7 +8,8 @@ use super::super::section::short;
 use super::super::source::{Located, Location, SourceId};
 use super::{Column, MOST_COLUMNS, Unreadable, fits};
 
-/// The columns, and the byte at which each row's line begins; `None` after mistakes, which are reported.
+/// The columns, and the byte at which each row's line begins; `None` after mistakes, which are
+/// reported.
 pub(super) fn read(
     text: &str,
     source: SourceId,
@@ -40,9 +42,13 @@ pub(super) fn read(
             sound = false;
             report.push_with(|_| {
                 let at = Location::new(source, offset..offset + line.len());
-                let of = |count, what| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
-                let title = format!("a row of {} under {}", of(count, "number"), of(columns.len(), "name"));
-                let expected = format!("expected {}, separated by commas", of(columns.len(), "number"));
+                let of = |count, what| {
+                    let plural = if count == 1 { "" } else { "s" };
+                    format!("{count} {what}{plural}")
+                };
+                let (names, numbers) = (of(columns.len(), "name"), of(columns.len(), "number"));
+                let title = format!("a row of {} under {names}", of(count, "number"));
+                let expected = format!("expected {numbers}, separated by commas");
                 Diagnostic::new(title).at(&at, expected)
             });
             continue;

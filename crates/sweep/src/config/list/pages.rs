@@ -1,7 +1,8 @@
 //! What a column's pages take unpacked, from their own headers.
 //!
-//! A page of a few kilobytes may unpack into gigabytes, and the library makes room for whatever a header declares.
-//! So the headers are walked beforehand. They are structs in Thrift's compact protocol.
+//! A page of a few kilobytes may unpack into gigabytes, and the library makes room for whatever a
+//! header declares. So the headers are walked beforehand. They are structs in Thrift's compact
+//! protocol.
 
 use std::io::Read as _;
 
@@ -40,8 +41,8 @@ struct Header {
     is_plain: bool,
 }
 
-/// Bytes of all pages of a column chunk, unpacked. What its headers declare is true, or at most what the library
-/// would unpack.
+/// Bytes of all pages of a column chunk, unpacked. What its headers declare is true, or at most
+/// what the library would unpack.
 pub(super) fn unpacked_bytes(chunk: &[u8], codec: Compression) -> Result<u64, Unreadable> {
     let mut rest = chunk;
     let mut total = 0_u64;
@@ -68,7 +69,8 @@ pub(super) fn unpacked_bytes(chunk: &[u8], codec: Compression) -> Result<u64, Un
 
 /// Of the codecs, gzip alone is unpacked to its end whatever the header declares.
 fn check_gzip(page: &[u8], levels: u64, unpacked: u64) -> Result<(), Unreadable> {
-    let packed = usize::try_from(levels).ok().and_then(|levels| page.get(levels..)).ok_or_else(senseless)?;
+    let packed = usize::try_from(levels).ok().and_then(|levels| page.get(levels..));
+    let packed = packed.ok_or_else(senseless)?;
     let most = unpacked.saturating_sub(levels);
     let mut decoder = MultiGzDecoder::new(packed).take(most + 1);
     // Bytes that are no gzip are the library's to report.
@@ -100,8 +102,8 @@ impl Header {
     }
 }
 
-/// Whether a field of a page header may be of this kind. The library reads each as what it should be, whatever
-/// kind the file declares, so another one would part its reading from this one.
+/// Whether a field of a page header may be of this kind. The library reads each as what it should
+/// be, whatever kind the file declares, so another one would part its reading from this one.
 fn is_kind(path: &[i16], kind: u8) -> bool {
     match path {
         [1..=4] | [5, 1..=4] | [7, 1..=2] | [8, 1..=6] => kind == I32,
@@ -115,7 +117,8 @@ fn is_kind(path: &[i16], kind: u8) -> bool {
 struct Thrift<'a>(&'a [u8]);
 
 impl Thrift<'_> {
-    /// Reads a struct to its end, and hands over each number by the fields that lead to it; true is 1.
+    /// Reads a struct to its end, and hands over each number by the fields that lead to it; true is
+    /// 1.
     fn fields(&mut self, path: &mut Vec<i16>, found: &mut dyn FnMut(&[i16], i32)) -> Option<()> {
         let mut field = 0_i16;
         loop {
@@ -204,7 +207,8 @@ mod tests {
     /// A page of the first version with a header that declares these sizes.
     fn page(unpacked: i32, packed: &[u8]) -> Vec<u8> {
         let sizes = [number(0), number(unpacked), number(packed.len() as i32)];
-        let mut bytes: Vec<u8> = sizes.iter().flat_map(|size| [&[0x15], size.as_slice()].concat()).collect();
+        let size = |size: &Vec<u8>| [&[0x15], size.as_slice()].concat();
+        let mut bytes: Vec<u8> = sizes.iter().flat_map(size).collect();
         // Field 5, the data page's own: four numbers.
         bytes.extend([0x2c, 0x15, 2, 0x15, 0, 0x15, 6, 0x15, 6, 0, 0]);
         bytes.extend(packed);
@@ -213,14 +217,18 @@ mod tests {
 
     /// A dictionary's, with so many entries.
     fn dictionary(unpacked: i32, entries: i32) -> Vec<u8> {
-        let mut bytes = [&[0x15, 4, 0x15], number(unpacked).as_slice(), &[0x15, 0, 0x4c, 0x15]].concat();
+        let unpacked = number(unpacked);
+        let mut bytes = [&[0x15, 4, 0x15], unpacked.as_slice(), &[0x15, 0, 0x4c, 0x15]].concat();
         bytes.extend(number(entries));
         bytes.extend([0x15, 0, 0, 0]);
         bytes
     }
 
     fn told(chunk: &[u8], codec: Compression) -> String {
-        unpacked_bytes(chunk, codec).map_or_else(|error| error.to_string(), |bytes| bytes.to_string())
+        match unpacked_bytes(chunk, codec) {
+            Ok(bytes) => bytes.to_string(),
+            Err(error) => error.to_string(),
+        }
     }
 
     #[test]
@@ -256,8 +264,8 @@ mod tests {
         for length in 1..sound.len() {
             assert!(told(&sound[..length], Compression::SNAPPY).contains("no sense"), "{length}");
         }
-        // A size as a text, which a reader that trusts the schema would take for a number; and a field number
-        // in full.
+        // A size as a text, which a reader that trusts the schema would take for a number; and a
+        // field number in full.
         for (at, kind) in [(2, 0x18), (2, 0x05)] {
             let mut other = sound.clone();
             other[at] = kind;

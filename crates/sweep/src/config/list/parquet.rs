@@ -1,4 +1,5 @@
-//! Parquet files of numbers. The library trusts a file's own account of its sizes, so that is checked first.
+//! Parquet files of numbers. The library trusts a file's own account of its sizes, so that is
+//! checked first.
 
 use bytes::Bytes;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -39,9 +40,8 @@ fn read(bytes: Bytes) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
         let batch = batch.map_err(|error| damaged(error.into()))?;
         fits((rows + batch.num_rows()) as u64, columns.len())?;
         for ((name, values), array) in columns.iter_mut().zip(batch.columns()) {
-            for (k, value) in
-                cells::numbers(array).map_err(|error| damaged(error.into()))?.into_iter().enumerate()
-            {
+            let numbers = cells::numbers(array).map_err(|error| damaged(error.into()))?;
+            for (k, value) in numbers.into_iter().enumerate() {
                 let no_value = || Unreadable::NoValue { column: name.clone(), row: rows + k + 1 };
                 values.push(value.ok_or_else(no_value)?);
             }
@@ -67,10 +67,12 @@ fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Resu
                 return Err(Unreadable::Codec { column: name, codec });
             }
             let (start, length) = column.byte_range();
-            let chunk = start
-                .checked_add(length)
-                .and_then(|end| bytes.get(usize::try_from(start).ok()?..usize::try_from(end).ok()?));
-            let chunk = chunk.ok_or_else(|| Unreadable::Damaged("a column lies outside of it".to_owned()))?;
+            let within = |end: u64| {
+                let (start, end) = (usize::try_from(start).ok()?, usize::try_from(end).ok()?);
+                bytes.get(start..end)
+            };
+            let outside = || Unreadable::Damaged("a column lies outside of it".to_owned());
+            let chunk = start.checked_add(length).and_then(within).ok_or_else(outside)?;
             unpacked = unpacked.saturating_add(pages::unpacked_bytes(chunk, codec)?);
             if unpacked > LONGEST_BYTES {
                 return Err(Unreadable::TooLongUnpacked);
