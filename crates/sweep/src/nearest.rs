@@ -14,13 +14,11 @@ where
         // One slip in a short word leaves too little for the measures of likeness.
         let one_slip = typed.len() >= 3 && strsim::damerau_levenshtein(&typed, name) == 1;
         if part {
-            0.95
-        } else if one_slip {
-            0.9
-        } else {
-            strsim::jaro_winkler(&typed, name)
-                .min(strsim::normalized_damerau_levenshtein(&typed, name) + 0.45)
+            return 0.95;
         }
+        let measured = strsim::jaro_winkler(&typed, name)
+            .min(strsim::normalized_damerau_levenshtein(&typed, name) + 0.45);
+        if one_slip { measured.max(0.9) } else { measured }
     };
     valid
         .into_iter()

@@ -47,7 +47,7 @@ fn a_spin_of_as_many_rows_as_allowed_is_checked_and_one_more_is_refused() {
     let refused = load_text(with_a_table(spin::MOST_ROWS + 1, &axes), &[]).unwrap_err();
     assert!(refused.contains("`time_s` has 20001 numbers"), "{refused}");
     assert!(refused.contains("at most 20000"), "{refused}");
-    assert!(refused.contains("2 mistakes, nothing was done"), "{refused}");
+    assert!(!refused.contains("is empty"), "{refused}");
 }
 
 #[test]
