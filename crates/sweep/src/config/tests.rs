@@ -241,7 +241,7 @@ fn a_file_of_nothing_but_mistakes_is_refused_in_bounded_text_and_time() {
     assert!(unknown.len() < 10_000, "{}", unknown.len());
     let repeated = load_text("a = 1\n".repeat(100_000), &[]).unwrap_err();
     assert!(repeated.contains("100000 mistakes (100 shown)"), "{}", &repeated[repeated.len() - 200..]);
-    let (times, speeds) = ("1,".repeat(50_000), "2,".repeat(50_000));
+    let (times, speeds) = ("1,".repeat(20_000), "2,".repeat(20_000));
     let table = format!(
         "[spin]\nprofile = \"table\"\ntime_s = [{times}]\nspeed_rpm = [{speeds}]\n[time]\nend_s = 9\n"
     );
