@@ -153,7 +153,9 @@ fn a_folder_that_cannot_be_closed_is_told() {
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
 fn random_numbers_that_are_refused_are_told() {
-    for words in [RUN, TRACE, BOUNDARY, SHOW, PLOT] {
+    // Not the boundary: its columns of words are made with a map of the Arrow library that draws
+    // numbers of its own.
+    for words in [RUN, TRACE, SHOW, PLOT] {
         at_every_call("getrandom", "EIO", words);
     }
 }
