@@ -42,11 +42,9 @@ fn try_out(plan: &Plan) {
     assert_eq!(plan.axis_values(plan.points() - 1).len(), plan.axes.len());
     assert!(plan.window_s[0] < plan.window_s[1] && plan.window_s[1] <= plan.end_s);
     assert_eq!(Job::of(plan).hash(), Job::of(plan).hash());
-    let scenarios: Vec<_> = plan
-        .corners()
-        .take(4)
-        .map(|values| {
-            let scenario = plan.scenario_at(&values);
+    let scenarios: Vec<_> = (0..plan.corners().min(4))
+        .map(|corner| {
+            let scenario = plan.scenario_at(&plan.corner(corner));
             assert_eq!(scenario.machine.violations(), []);
             assert_eq!(scenario.spin.violations(), []);
             (scenario.machine, scenario.spin)

@@ -10,6 +10,7 @@ mod boundary;
 mod determinism;
 mod faults;
 mod files;
+mod flips;
 mod goldens;
 mod limits;
 mod pictures;

@@ -89,7 +89,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
             t.0.set(lane, leg.map_or(0.0, |l| l.start_s));
             control.start(lane, leg.map_or(0.0, |l| l.step_s));
         }
-        if !lanes[..T::LANES].iter().any(|lane| lane.is_active) {
+        if task.is_stopped() || !lanes[..T::LANES].iter().any(|lane| lane.is_active) {
             return;
         }
         // Never past the end of a leg, nor a sliver short of it.

@@ -7,6 +7,9 @@ use crate::system::{Count, Ended, Failure, Leg, Task};
 /// The most lanes any instruction set has here.
 pub const MAX_LANES: usize = 8;
 
+/// Steps between two looks at [`Task::is_stopped`], at most: some hundredths of a second.
+pub const STEPS_AT_ONCE: u64 = 1 << 14;
+
 /// Steps of one lane's leg: the smallest whole number of equal steps not above the leg's own.
 #[must_use]
 pub fn fixed_steps(leg: &Leg) -> u64 {
@@ -64,7 +67,8 @@ impl<T: Lane> Legs<T> {
     }
 
     /// Gives every lane whose leg has ended its next one. Returns how many steps all lanes can make before one of
-    /// them is at its end; `None` when none has anything left to do.
+    /// them is at its end, or the task wants to be asked whether it is stopped; `None` when it is, or when no lane
+    /// has anything left to do.
     #[inline(always)]
     pub(crate) fn take_up<const D: usize, P: Task<T, D>>(
         &mut self,
@@ -83,7 +87,11 @@ impl<T: Lane> Legs<T> {
             self.clock.total.0.set(lane, steps as f64);
             self.index.0.set(lane, 0.0);
         }
-        self.lanes[..T::LANES].iter().filter(|lane| lane.is_active).map(|lane| lane.left).min()
+        if task.is_stopped() {
+            return None;
+        }
+        let active = self.lanes[..T::LANES].iter().filter(|lane| lane.is_active);
+        active.map(|lane| lane.left.min(STEPS_AT_ONCE)).min()
     }
 
     /// Ends the legs of lanes that are out of range at `time`, `done` steps after the last taking up. Returns whether

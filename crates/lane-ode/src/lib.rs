@@ -125,7 +125,7 @@ mod x86;
 
 pub use control::Tolerance;
 pub use dual::Dual;
-pub use fixed::{MAX_LANES, fixed_steps};
+pub use fixed::{MAX_LANES, STEPS_AT_ONCE, fixed_steps};
 pub use lane::Lane;
 pub use num::{N, Product};
 pub use part_peaks::PartPeaks;

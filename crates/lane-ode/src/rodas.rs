@@ -177,6 +177,9 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
         let mut is_fresh = true;
         let mut is_known = false;
         how = loop {
+            if task.is_stopped() {
+                return;
+            }
             // Never past the end of the leg, nor a sliver short of it.
             let left = leg.end_s - t;
             let is_last = control.step.0 * 1.01 >= left;

@@ -36,6 +36,12 @@ pub trait Task<T: Lane, const D: usize>: System<T, D> {
 
     /// Every lane has made a step, or stood still (zero length).
     fn observe(&mut self, forcing: &Self::Forcing, step: &Step<'_, T, D>);
+
+    /// Whether to put the work down; what has not ended then never does. Asked every
+    /// [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps at least, because one leg may take hours.
+    fn is_stopped(&self) -> bool {
+        false
+    }
 }
 
 /// A stretch of a trajectory without kinks: its end is hit exactly.

@@ -1,5 +1,6 @@
 //! The command line: one subcommand a module.
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::commands::{
@@ -7,6 +8,8 @@ use crate::commands::{
     schema, show, slurm, status, trace,
 };
 use crate::exit::{Error, Exit};
+use crate::nearest::nearest;
+use crate::panics;
 
 /// Maps where a washing machine's linear suspension model can be trusted.
 #[derive(Debug, Parser)]
@@ -76,11 +79,39 @@ pub fn command() -> clap::Command {
     })
 }
 
+/// The command line without what help hides, for what lists every subcommand.
+#[must_use]
+pub fn shown_command() -> clap::Command {
+    let whole = command();
+    let shown = whole.get_subcommands().filter(|command| !command.is_hide_set()).cloned();
+    clap::Command::new("sweep")
+        .version(env!("CARGO_PKG_VERSION"))
+        .about(whole.get_about().cloned().unwrap_or_default())
+        .disable_help_subcommand(true)
+        .args(whole.get_arguments().cloned())
+        .subcommands(shown)
+}
+
+/// Adds the subcommand that was meant, where clap finds none near: it looks for likeness, of which a slip leaves
+/// little in a name of three letters.
+fn suggest(mut error: clap::Error) -> clap::Error {
+    let typed = match (error.kind(), error.get(ContextKind::InvalidSubcommand)) {
+        (ErrorKind::InvalidSubcommand, Some(ContextValue::String(typed))) => typed.clone(),
+        _ => return error,
+    };
+    let shown = shown_command();
+    let names = shown.get_subcommands().map(clap::Command::get_name);
+    if let (None, Some(name)) = (error.get(ContextKind::SuggestedSubcommand), nearest(&typed, names)) {
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![name.to_owned()]));
+    }
+    error
+}
+
 impl Cli {
     /// Reads this process's command line; on a mistake, or when asked for help, tells and ends the process.
     #[must_use]
     pub fn read() -> Self {
-        let matches = command().get_matches();
+        let matches = command().try_get_matches().unwrap_or_else(|error| suggest(error).exit());
         Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
     }
 }
@@ -91,6 +122,7 @@ impl Command {
     /// # Errors
     /// Whatever kept the command from its end.
     pub fn run(&self) -> Result<Exit, Error> {
+        panics::draw_random_keys()?;
         match self {
             Self::Run(args) => run::run(args),
             Self::Check(args) => check::run(args),
@@ -119,6 +151,15 @@ mod tests {
     #[test]
     fn the_command_line_is_well_formed() {
         command().debug_assert();
+    }
+
+    #[test]
+    fn a_slip_in_a_short_subcommand_is_answered_by_its_name() {
+        let refusal =
+            |typed: &str| suggest(command().try_get_matches_from(["sweep", typed]).unwrap_err()).to_string();
+        assert!(refusal("rnu").contains("'run'"), "{}", refusal("rnu"));
+        assert!(refusal("boundry").contains("'boundary'"), "{}", refusal("boundry"));
+        assert!(!refusal("xyzzy").contains("similar"), "{}", refusal("xyzzy"));
     }
 
     #[test]

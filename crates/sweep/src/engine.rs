@@ -6,7 +6,7 @@ mod pool;
 
 pub use climb::Demand;
 pub use ladder::Level;
-pub(crate) use ladder::{Ladder, reference_step_s};
+pub(crate) use ladder::{Ladder, REFERENCE_SHARE, reference_step_s};
 pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,7 +16,7 @@ use climb::{MODELS, Run};
 use lane_ode::{Failure, Simd, Tolerance};
 use pool::{Feed, Keep, Pool, Shared};
 use washer_model::{
-    Cases, Extra, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted, prepare, simulate_with,
+    Cases, Extra, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted, prepare, simulate_until,
 };
 
 use crate::interrupt::Interrupt;
@@ -183,16 +183,24 @@ impl<'a> ModelEngine<'a> {
         prepared
     }
 
-    /// One model at every point, by one rung.
-    fn runs(&self, model: usize, rung: usize, points: &[&Point]) -> Vec<Run> {
+    /// One model at every point, by one rung. Once `watch` says to stop, what this returns means nothing.
+    fn runs(&self, model: usize, rung: usize, points: &[&Point], watch: &Watch<'_>) -> Vec<Run> {
         let method = &self.ladders()[model].rungs[rung].method;
-        let together = |points: &[&Point]| self.trajectories(points, MODELS[model], method);
+        let together = |points: &[&Point]| self.trajectories(points, MODELS[model], method, watch);
         let panicked = || Run { trajectory: Trajectory::failed(Status::Panicked), course: Vec::new() };
         together_or_alone(points, together, panicked)
     }
 
-    fn trajectories(&self, points: &[&Point], model: ModelKind, method: &Method) -> Vec<Run> {
-        let (records, extras) = simulate_with(self.simd, model, method, points, self.wanted);
+    fn trajectories(
+        &self,
+        points: &[&Point],
+        model: ModelKind,
+        method: &Method,
+        watch: &Watch<'_>,
+    ) -> Vec<Run> {
+        let stop = || watch.stopped();
+        let found = simulate_until(self.simd, model, method, points, self.wanted, &stop);
+        let (records, extras) = found.unwrap_or_default();
         // None at all if nothing was wanted.
         let mut extras = extras.into_iter();
         records

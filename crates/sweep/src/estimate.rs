@@ -7,7 +7,7 @@ use lane_ode::MAX_LANES;
 use crate::engine::{Demand, EngineError, Ladder, MOST_WAITING, ModelEngine, ROWS_A_THREAD};
 use crate::interrupt::Interrupt;
 use crate::outcome::{Deviations, Outcome};
-use crate::plan::{Integrator, Plan};
+use crate::plan::{Integrator, Plan, shortest_step_s};
 use crate::run::{Engine, Watch};
 use crate::store::{Job, Shape, chunk_points};
 
@@ -16,6 +16,10 @@ const LONG_ENOUGH: Duration = Duration::from_millis(60);
 
 /// No further place of the grid is tried after this.
 const BUDGET: Duration = Duration::from_millis(350);
+
+/// The first beginning that is tried by a method that chooses its steps: at most [`FIRST_STEPS`] of them.
+const FIRST_END_S: f64 = 1e-3;
+const FIRST_STEPS: f64 = 1e4;
 
 /// Parts of the way through the grid at which points are tried.
 const PLACES: [f64; 3] = [0.5, 0.9, 0.1];
@@ -98,8 +102,11 @@ impl Sample {
         let first = (plan.points().saturating_sub(points) as f64 * place) as u64;
         let mut shorter: Option<(f64, f64)> = None;
         let mut end_s = first_end_s(plan);
+        let mut cut = plan.clone();
         loop {
-            let cost_s = cost_s(plan, ladders, first..first + points, end_s)?;
+            cut.end_s = end_s;
+            cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
+            let cost_s = cost_s(&cut, ladders, first..first + points)?;
             if end_s >= plan.end_s || cost_s >= LONG_ENOUGH.as_secs_f64() {
                 // What does not grow with the length (the equilibrium) must not be multiplied.
                 let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
@@ -113,28 +120,22 @@ impl Sample {
     }
 }
 
-/// A beginning of the run so short that any method is through it in milliseconds.
+/// A beginning of the run so short that any method is through it in milliseconds, however stiff the machine.
 fn first_end_s(plan: &Plan) -> f64 {
     let short_s = match plan.integrator {
         Integrator::Rk4 { step_s } => 100.0 * step_s,
-        Integrator::Dopri5 { .. } | Integrator::Rodas5p { .. } | Integrator::Rk4MassScaled { .. } => 1e-3,
+        Integrator::Dopri5 { .. } | Integrator::Rodas5p { .. } | Integrator::Rk4MassScaled { .. } => {
+            FIRST_END_S.min(FIRST_STEPS * shortest_step_s(plan.end_s))
+        }
     };
     short_s.min(plan.end_s)
 }
 
-/// Time that one core takes for the beginning of these points' runs.
-fn cost_s(
-    plan: &Plan,
-    ladders: &[Ladder; 2],
-    points: std::ops::Range<u64>,
-    end_s: f64,
-) -> Result<f64, EngineError> {
-    let share = end_s / plan.end_s;
-    let window_s = plan.window_s.map(|edge_s| (edge_s * share).min(end_s));
-    let cut = Plan { end_s, window_s, ..plan.clone() };
+/// Time that one core takes for these points' runs, which are cut short.
+fn cost_s(cut: &Plan, ladders: &[Ladder; 2], points: std::ops::Range<u64>) -> Result<f64, EngineError> {
     // A shorter run alone would be slower spin, and longer steps.
-    let engine = ModelEngine::with_ladders(&cut, ladders.clone())?;
-    let axis_values: Vec<Vec<f64>> = points.map(|point| plan.axis_values(point)).collect();
+    let engine = ModelEngine::with_ladders(cut, ladders.clone())?;
+    let axis_values: Vec<Vec<f64>> = points.map(|point| cut.axis_values(point)).collect();
     let interrupt = Interrupt::new();
     let began = Instant::now();
     let outcomes = engine.evaluate_for(&axis_values, Demand::Row, &Watch::new(&interrupt));

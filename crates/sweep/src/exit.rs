@@ -10,6 +10,7 @@ use crate::boundary::product::BoundaryError;
 use crate::config::Diagnostics;
 use crate::engine::EngineError;
 use crate::files::FileError;
+use crate::panics::NoRandomNumbers;
 use crate::plot::PlotError;
 use crate::store::StoreError;
 use crate::threads::ThreadsError;
@@ -118,6 +119,9 @@ pub enum Error {
     /// No threads.
     #[error(transparent)]
     Threads(#[from] ThreadsError),
+    /// No random numbers.
+    #[error(transparent)]
+    Random(#[from] NoRandomNumbers),
     /// A file that could not be read or written.
     #[error("cannot {action} {}: {source}", path.display())]
     File {
@@ -146,7 +150,8 @@ impl Error {
             Self::Store(error) => error.exit(),
             Self::Plot(error) if error.is_usage() => Exit::BadInput,
             Self::Plot(_) => Exit::Failed,
-            Self::Files(_) | Self::Threads(_) | Self::File { .. } | Self::Stdout(_) => Exit::Failed,
+            Self::Files(_) | Self::Threads(_) | Self::Random(_) => Exit::Failed,
+            Self::File { .. } | Self::Stdout(_) => Exit::Failed,
         }
     }
 

@@ -42,6 +42,7 @@ pub mod files;
 pub mod identity;
 pub mod interrupt;
 pub mod measures;
+mod nearest;
 pub mod outcome;
 mod panics;
 pub mod plan;

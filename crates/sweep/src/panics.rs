@@ -2,6 +2,7 @@
 
 use std::any::Any;
 use std::cell::Cell;
+use std::hash::RandomState;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Once;
 
@@ -37,6 +38,23 @@ pub(crate) fn in_parquet<T>(
     work: impl FnOnce() -> Result<T, ParquetError>,
 ) -> Result<T, ParquetError> {
     caught(work).unwrap_or_else(|panic| Err(ParquetError::General(format!("{what}: {panic}"))))
+}
+
+/// The system gives no random numbers.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "the system gives no random numbers, which maps of this program's libraries are keyed with\n  \
+     = help: allow this process the system call getrandom, or let it read /dev/urandom"
+)]
+pub struct NoRandomNumbers;
+
+/// Draws this thread's keys of hash maps. The standard library does so where the first map is made,
+/// and panics where the system refuses.
+///
+/// # Errors
+/// [`NoRandomNumbers`].
+pub(crate) fn draw_random_keys() -> Result<(), NoRandomNumbers> {
+    caught(RandomState::new).map(drop).map_err(|_| NoRandomNumbers)
 }
 
 /// What a panic said.

@@ -1,10 +1,20 @@
 //! What a run is about to do, with every value resolved and checked: the one thing that flows from the
 //! configuration into the engine, the store and the reports.
 
-use washer_model::{Channel, Machine, Parameter, Spin};
+use washer_model::{Channel, Machine, Parameter, Spin, Target};
 
 use crate::design::Design;
 use crate::measures::Measures;
+
+/// Most steps that a trajectory may need by a method whose steps are bounded by its stability; at this
+/// many, one point takes an hour or more.
+pub const MOST_STEPS: f64 = 1e10;
+
+/// The shortest step with which a trajectory to `end_s` takes at most [`MOST_STEPS`].
+#[must_use]
+pub fn shortest_step_s(end_s: f64) -> f64 {
+    end_s / MOST_STEPS
+}
 
 /// A validated run: every grid point of every axis, and how each is integrated.
 ///
@@ -180,7 +190,7 @@ impl Plan {
     const CORNER_AXES: usize = 8;
 
     /// Most corners at which machines are made ready before a run.
-    const MOST_PREPARED: usize = 256;
+    const MOST_PREPARED: u64 = 256;
 
     /// Number of points, of the design or of the grid; 1 without axes.
     #[must_use]
@@ -221,11 +231,16 @@ impl Plan {
     pub fn scenario_at(&self, axis_values: &[f64]) -> Scenario {
         let mut scenario =
             Scenario { machine: self.machine.clone(), spin: self.spin.clone(), window_s: self.window_s };
+        self.place(&mut scenario, axis_values);
+        scenario
+    }
+
+    /// Makes any scenario of this plan the one at these values of the axes: those are all that differs.
+    pub(crate) fn place(&self, scenario: &mut Scenario, axis_values: &[f64]) {
+        let Scenario { machine, spin, window_s } = scenario;
         for (axis, &value) in self.axes.iter().zip(axis_values) {
-            let Scenario { machine, spin, window_s } = &mut scenario;
             write(&axis.parameter, machine, spin, window_s, value);
         }
-        scenario
     }
 
     /// Points of a grid where every axis is at its least or greatest value, beyond the eighth axis at its least; none of a
@@ -245,30 +260,36 @@ impl Plan {
         (0..1_u32 << free).map(corner).collect()
     }
 
-    /// Values of the axes where a condition that is monotonic along each of them is hardest to meet: every axis at its
-    /// least or greatest value, or every point of a list. One without axes.
+    /// Number of corners: places where a condition that is monotonic along each axis is hardest to meet.
+    /// Every axis is at its least or greatest value there; the corners of a list are all of its points.
+    /// One without axes.
     #[must_use]
-    pub fn corners(&self) -> Box<dyn Iterator<Item = Vec<f64>> + '_> {
-        if matches!(self.design, Some(Design::List { .. })) {
-            return Box::new((0..self.points()).map(|point| self.axis_values(point)));
+    pub fn corners(&self) -> u64 {
+        match &self.design {
+            Some(Design::List { points, .. }) => *points,
+            _ => 1 << self.axes.len().min(Self::CORNER_AXES),
         }
-        let free = self.axes.len().min(Self::CORNER_AXES);
-        Box::new((0..1_u32 << free).map(move |sides| {
-            let ends = self.axes.iter().enumerate().map(|(k, axis)| {
-                let greatest = k < free && sides >> k & 1 == 1;
-                axis.values.value(axis.values.extremes()[usize::from(greatest)])
-            });
-            ends.collect()
-        }))
     }
 
-    /// Of the corners not more than 256, spread evenly: a list has no corners but its points, and looking at a machine's
-    /// modes is dear.
+    /// Values of the axes at corner `corner`, from 0.
+    #[must_use]
+    pub fn corner(&self, corner: u64) -> Vec<f64> {
+        if matches!(self.design, Some(Design::List { .. })) {
+            return self.axis_values(corner);
+        }
+        let end = |(k, axis): (usize, &Axis)| {
+            let greatest = k < Self::CORNER_AXES && corner >> k & 1 == 1;
+            axis.values.value(axis.values.extremes()[usize::from(greatest)])
+        };
+        self.axes.iter().enumerate().map(end).collect()
+    }
+
+    /// Of the corners not more than 256, spread evenly: a list has no corners but its points, and looking at a
+    /// machine's modes is expensive.
     #[must_use]
     pub fn some_corners(&self) -> Vec<Vec<f64>> {
-        let corners: Vec<_> = self.corners().collect();
-        let every = corners.len().div_ceil(Self::MOST_PREPARED);
-        corners.into_iter().step_by(every).collect()
+        let every = self.corners().div_ceil(Self::MOST_PREPARED);
+        (0..self.corners().div_ceil(every)).map(|k| self.corner(k * every)).collect()
     }
 }
 
@@ -289,9 +310,9 @@ pub(crate) fn write(
     window_s: &mut [f64; 2],
     value: f64,
 ) {
-    match parameter.window_edge() {
-        Some(edge) => window_s[edge] = value,
-        None => parameter.set(machine, spin, value),
+    match parameter.target() {
+        Target::Window(edge) => window_s[edge] = value,
+        _ => parameter.set(machine, spin, value),
     }
 }
 
@@ -385,7 +406,7 @@ mod tests {
             ("unbalance_mass_kg", AxisValues::List(vec![0.3, 0.1, 0.2])),
             ("damping_n_s_per_m", AxisValues::Linear { from: 80.0, to: 60.0, count: 3 }),
         ]);
-        let corners: Vec<_> = plan.corners().collect();
+        let corners: Vec<_> = (0..plan.corners()).map(|corner| plan.corner(corner)).collect();
         assert_eq!(corners, [[0.1, 60.0], [0.3, 60.0], [0.1, 80.0], [0.3, 80.0]].map(Vec::from));
     }
 
@@ -393,7 +414,7 @@ mod tests {
     fn a_plan_without_axes_is_one_point() {
         let plan = plan(&[]);
         assert_eq!(plan.points(), 1);
-        assert_eq!(plan.corners().collect::<Vec<_>>(), [Vec::<f64>::new()]);
+        assert_eq!((plan.corners(), plan.corner(0)), (1, Vec::new()));
         assert_eq!(plan.scenario(0).machine, plan.machine);
     }
 
@@ -409,7 +430,7 @@ mod tests {
         let below = |axis: usize, middle: f64| points.iter().filter(|point| point[axis] < middle).count();
         assert_eq!([below(0, 0.5), below(1, 1e7)], [512, 512]);
         assert!(points.iter().all(|p| (0.1..0.9).contains(&p[0]) && (1e6..1e8).contains(&p[1])));
-        assert_eq!(plan.corners().count(), 4);
+        assert_eq!(plan.corners(), 4);
         assert_eq!(plan.scenario(7).machine.unbalance.mass_kg, points[7][0]);
     }
 }

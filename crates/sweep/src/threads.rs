@@ -2,6 +2,8 @@
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use crate::panics::{self, NoRandomNumbers};
+
 /// Where a scheduler's word is looked up; the process environment outside tests.
 pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
 
@@ -31,6 +33,9 @@ pub enum ThreadsError {
         /// As it stands in the environment.
         given: String,
     },
+    /// No random numbers.
+    #[error(transparent)]
+    Random(#[from] NoRandomNumbers),
 }
 
 impl ThreadsError {
@@ -71,13 +76,16 @@ pub(crate) fn cores() -> usize {
 /// A pool of so many threads.
 ///
 /// # Errors
-/// [`ThreadsError::Start`].
+/// [`ThreadsError::Start`], [`ThreadsError::Random`].
 pub(crate) fn pool(threads: usize) -> Result<ThreadPool, ThreadsError> {
-    ThreadPoolBuilder::new()
+    let pool = ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|i| format!("sweep-{i}"))
         .build()
-        .map_err(|error| ThreadsError::start(threads)(&error))
+        .map_err(|error| ThreadsError::start(threads)(&error))?;
+    // Maps of the libraries are made in any of them.
+    pool.broadcast(|_| panics::draw_random_keys()).into_iter().collect::<Result<(), _>>()?;
+    Ok(pool)
 }
 
 #[cfg(test)]

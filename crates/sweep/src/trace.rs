@@ -75,7 +75,7 @@ pub fn trace(
     let time = |k: usize| k as f64 * every_s;
     let mut table = Table::default();
     table.numbers("time_s", "s", "time since the start", (0..instants).map(|k| Some(time(k))));
-    let speeds = (0..instants).map(|k| Some(spin.speed_rpm(time(k))));
+    let speeds = spin.speeds_rpm((0..instants).map(time)).map(Some);
     table.numbers("speed_rpm", "rpm", "spin of the shaft", speeds);
     let models = [Columns::new("nonlinear", &nonlinear, instants), Columns::new("linear", &linear, instants)];
     models.iter().for_each(|model| model.channels(&mut table));

@@ -6,8 +6,9 @@ use crate::nonlinear::COORDINATES;
 use crate::outputs::CHANNELS;
 use crate::point::Point;
 use crate::run::ModelKind;
-use crate::spin::SpinStretch;
+use crate::spin::{SpinStretch, stretch_at};
 use lane_ode::{Dual, N, Partials, ScalarKernel, Simd, System};
+use std::sync::Arc;
 
 /// Numbers of a state: the ten coordinates q1 to q10 (m, rad), then their speeds.
 pub const STATE_LEN: usize = STATES;
@@ -17,7 +18,7 @@ pub const STATE_LEN: usize = STATES;
 pub struct Equations {
     model: Either,
     at_rest: [f64; STATES],
-    stretches: Vec<SpinStretch>,
+    stretches: Arc<[SpinStretch]>,
     /// The stretch of the spin that holds since the last call.
     stretch: usize,
 }
@@ -45,7 +46,7 @@ impl Equations {
                 (Either::Linear(WithTangent::new(point)), <Linear<f64> as Model<f64>>::at_rest(point))
             }
         };
-        Self { model, at_rest, stretches: point.stretches.clone(), stretch: 0 }
+        Self { model, at_rest, stretches: Arc::clone(&point.stretches), stretch: 0 }
     }
 
     /// The state at rest in static equilibrium, from which trajectories start.
@@ -104,7 +105,7 @@ impl Equations {
         if holds(self.stretch + 1) && (self.stretch == 0 || !holds(self.stretch)) {
             return;
         }
-        self.stretch = self.stretches.iter().rposition(|stretch| stretch.start_s <= t_s).unwrap_or(0);
+        self.stretch = stretch_at(&self.stretches, t_s);
         let stretch = &self.stretches[self.stretch];
         match &mut self.model {
             Either::Nonlinear(of) => of.set_spin(stretch),

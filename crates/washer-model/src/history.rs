@@ -13,6 +13,7 @@ use crate::outputs::{CHANNELS, squared};
 use crate::point::Point;
 use crate::run::stiff::{OnLeg, WithTangent};
 use crate::run::{Family, Method, ModelKind, OfLinear, OfNonlinear, coupling, first_step};
+use crate::spin::stretch_at;
 use crate::suspension::{Forces, forces};
 use core::marker::PhantomData;
 use lane_ode::{
@@ -119,9 +120,7 @@ impl History<'_> {
 /// Channels and gap of a state.
 fn observed<M: Model<f64>>(point: &Point, time_s: f64, state: &[f64; STATES]) -> ([f64; CHANNELS], f64) {
     let mut model = M::splat(N(0.0), point, Coupling::Springs);
-    if let Some(stretch) = point.stretches.iter().rev().find(|stretch| stretch.start_s <= time_s) {
-        model.set_spin(0, stretch);
-    }
+    model.set_spin(0, &point.stretches[stretch_at(&point.stretches, time_s)]);
     let (radial, channels) = model.observe(&model.forcing(N(time_s)), &state.map(N), &[N(0.0); STATES], true);
     let gap_m = point.machine.bodies.clearance.0 - squared(&radial).value.0.sqrt();
     (channels.map_or([f64::NAN; CHANNELS], |channels| channels.map(|sample| sample.value.0)), gap_m)

@@ -99,9 +99,11 @@ pub use linear::Matrices;
 pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};
 pub use modal::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
 pub use nonlinear::COORDINATES;
-pub use parameters::{Parameter, Range, Source, UnknownParameter, decimal, unit_suffix};
+pub use parameters::{Parameter, Range, Source, Target, UnknownParameter, decimal, unit_suffix};
 pub use point::{NoEquilibrium, Point, Timing, prepare};
-pub use run::{Course, Extra, Method, ModelKind, Record, Wanted, simulate, simulate_with};
+pub use run::{
+    Course, Extra, Method, ModelKind, Record, Stop, Wanted, simulate, simulate_until, simulate_with,
+};
 pub use shape::{Motion, Movement, Plane};
 pub use spin::{Spin, SpinStretch};
 pub use suspension::Forces;

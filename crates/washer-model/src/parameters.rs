@@ -8,8 +8,8 @@ use crate::{Damper, Machine, Spin, Spring};
 
 /// A number of the machine, the spin or the window that a user can name, set and sweep.
 ///
-/// Most write one number. Three write several at once: `bearing_stiffness_n_per_m` (both bearings),
-/// `spring_stiffness_n_per_m` (all springs) and `damping_n_s_per_m` (all dampers); see [`Parameter::parts`].
+/// Most write one number. Some write several at once, such as `spring_stiffness_n_per_m` that of all springs; see
+/// [`Parameter::parts`].
 #[derive(Clone)]
 pub struct Parameter {
     name: Cow<'static, str>,
@@ -33,6 +33,24 @@ pub enum Source {
     Grid,
     /// Has no default of its own: the grid file's `[time]` gives it.
     Time,
+}
+
+/// What a parameter writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// One number of the machine.
+    Machine,
+    /// A number of both bearings, by its name after `bearing_front_` and `bearing_rear_`.
+    Bearings(&'static str),
+    /// A number of every spring, by its name after `spring_1_`.
+    Springs(&'static str),
+    /// A number of every damper, by its name after `damper_1_`.
+    Dampers(&'static str),
+    /// A number of the spin: of its profile, or of a point of its table.
+    Spin,
+    /// An edge of the window (0: the beginning, 1: the end), which neither machine nor spin holds:
+    /// [`Parameter::get`] finds nothing and [`Parameter::set`] writes nothing.
+    Window(usize),
 }
 
 /// Values a parameter may take. Beyond [`Range::LARGEST`] in magnitude nothing is accepted anywhere, so that
@@ -84,8 +102,17 @@ struct Row {
     description: &'static str,
     source: Source,
     range: Range,
+    target: Target,
     get: fn(&Machine, &Spin, usize) -> Option<f64>,
     set: fn(&mut Machine, &mut Spin, usize, f64),
+}
+
+impl Target {
+    /// Whether these are several numbers at once.
+    #[must_use]
+    pub const fn is_several(self) -> bool {
+        matches!(self, Self::Bearings(_) | Self::Springs(_) | Self::Dampers(_))
+    }
 }
 
 impl Range {
@@ -189,7 +216,7 @@ impl Parameter {
     #[must_use]
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
         let tabled = matches!(spin, Spin::Table { .. });
-        let single = TABLE.iter().filter(|row| !(tabled && row.source == Source::Grid)).map(Self::single);
+        let single = TABLE.iter().filter(|row| !(tabled && row.target == Target::Spin)).map(Self::single);
         let springs =
             (0..machine.springs.len()).flat_map(|k| SPRING.iter().map(move |row| Self::spring(row, k)));
         let dampers =
@@ -205,7 +232,7 @@ impl Parameter {
     /// When the table has no such row, or this machine or spin no such number.
     pub fn find(name: &str, machine: &Machine, spin: &Spin) -> Result<Self, UnknownParameter> {
         if let Some(row) = TABLE.iter().find(|row| row.name == name) {
-            return if row.source == Source::Grid && matches!(spin, Spin::Table { .. }) {
+            return if row.target == Target::Spin && matches!(spin, Spin::Table { .. }) {
                 Err(UnknownParameter::TableSpin)
             } else {
                 Ok(Self::single(row))
@@ -269,11 +296,10 @@ impl Parameter {
         self.row.range
     }
 
-    /// Which edge of the window it is (0: the beginning, 1: the end), if it is one: neither machine nor spin holds it, so
-    /// [`Parameter::get`] finds nothing and [`Parameter::set`] writes nothing.
+    /// What it writes.
     #[must_use]
-    pub fn window_edge(&self) -> Option<usize> {
-        (self.row.source == Source::Time).then_some(usize::from(self.name == "window_to_s"))
+    pub fn target(&self) -> Target {
+        self.row.target
     }
 
     /// Its value; `None` if it stands for several numbers that differ, or the machine has no such number.
@@ -288,26 +314,19 @@ impl Parameter {
         (self.row.set)(machine, spin, self.index, value);
     }
 
-    /// Whether it writes several numbers at once.
-    #[must_use]
-    pub fn writes_several(&self) -> bool {
-        matches!(self.name(), "bearing_stiffness_n_per_m" | "spring_stiffness_n_per_m" | "damping_n_s_per_m")
-    }
-
-    /// Names of the single numbers this parameter writes: its own name, but for the three that write several.
+    /// Names of the single numbers this parameter writes: its own name, unless it writes several at once.
     #[must_use]
     pub fn parts(&self, machine: &Machine) -> Vec<Cow<'static, str>> {
-        match self.name() {
-            "bearing_stiffness_n_per_m" => {
-                vec!["bearing_front_stiffness_n_per_m".into(), "bearing_rear_stiffness_n_per_m".into()]
+        let each = |count: usize, element: &str, number: &str| {
+            (1..=count).map(|k| format!("{element}_{k}_{number}").into()).collect()
+        };
+        match self.row.target {
+            Target::Bearings(number) => {
+                ["front", "rear"].map(|end| format!("bearing_{end}_{number}").into()).into()
             }
-            "spring_stiffness_n_per_m" => {
-                (1..=machine.springs.len()).map(|k| format!("spring_{k}_stiffness_n_per_m").into()).collect()
-            }
-            "damping_n_s_per_m" => {
-                (1..=machine.dampers.len()).map(|k| format!("damper_{k}_damping_n_s_per_m").into()).collect()
-            }
-            _ => vec![self.name.clone()],
+            Target::Springs(number) => each(machine.springs.len(), "spring", number),
+            Target::Dampers(number) => each(machine.dampers.len(), "damper", number),
+            Target::Machine | Target::Spin | Target::Window(_) => vec![self.name.clone()],
         }
     }
 
@@ -375,21 +394,21 @@ fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// A row of the table. The last part says what it reads and writes.
 macro_rules! row {
     ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, machine $($field:tt)+) => {
-        row!(@ $name, $unit, $range, $source, $description,
+        row!(@ $name, $unit, $range, $source, $description, Target::Machine,
             |m, _, _| Some(m.$($field)+), |m, _, _, v| m.$($field)+ = v)
     };
     ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, spring $($field:tt)+) => {
-        row!(@ $name, $unit, $range, $source, $description,
+        row!(@ $name, $unit, $range, $source, $description, Target::Machine,
             |m, _, k| m.springs.get(k).map(|s| s.$($field)+),
             |m, _, k, v| if let Some(s) = m.springs.get_mut(k) { s.$($field)+ = v })
     };
     ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, damper $($field:tt)+) => {
-        row!(@ $name, $unit, $range, $source, $description,
+        row!(@ $name, $unit, $range, $source, $description, Target::Machine,
             |m, _, k| m.dampers.get(k).map(|d| d.$($field)+),
             |m, _, k, v| if let Some(d) = m.dampers.get_mut(k) { d.$($field)+ = v })
     };
     ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, spin $field:ident) => {
-        row!(@ $name, $unit, $range, $source, $description,
+        row!(@ $name, $unit, $range, $source, $description, Target::Spin,
             |_, spin, _| match spin {
                 Spin::Cycloidal { $field, .. } | Spin::Triangular { $field, .. } | Spin::Ramp { $field, .. } => Some(*$field),
                 Spin::Table { .. } => None,
@@ -399,17 +418,21 @@ macro_rules! row {
                 Spin::Table { .. } => {}
             })
     };
-    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, by $get:expr, $set:expr) => {
-        row!(@ $name, $unit, $range, $source, $description, $get, $set)
+    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, window $edge:literal) => {
+        row!(@ $name, $unit, $range, $source, $description, Target::Window($edge), |_, _, _| None, |_, _, _, _| ())
+    };
+    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, $target:expr, by $get:expr, $set:expr) => {
+        row!(@ $name, $unit, $range, $source, $description, $target, $get, $set)
     };
     ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, table $field:ident) => {
-        row!(@ $name, $unit, $range, $source, $description,
+        row!(@ $name, $unit, $range, $source, $description, Target::Spin,
             |_, spin, k| if let Spin::Table { $field, .. } = spin { $field.get(k).copied() } else { None },
             |_, spin, k, v| if let Spin::Table { $field, .. } = spin && let Some(entry) = $field.get_mut(k) { *entry = v })
     };
-    (@ $name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, $get:expr, $set:expr) => {
+    (@ $name:literal, $unit:literal, $range:expr, $source:expr, $description:literal, $target:expr, $get:expr, $set:expr) => {
         Row {
-            name: $name, unit: $unit, range: $range, source: $source, description: $description, get: $get, set: $set,
+            name: $name, unit: $unit, range: $range, source: $source, description: $description, target: $target,
+            get: $get, set: $set,
         }
     };
 }
@@ -451,22 +474,22 @@ static TABLE: &[Row] = &[
     row!("unbalance_radius_m", "m", NonNegative, Paper("its text"), "distance of the unbalance from the axis (r_u)", machine unbalance.radius_m),
     row!("flexure_stiffness_n_m_per_rad", "N m/rad", Positive, SECTION_3_1, "bending stiffness between shaft and drum (K_D)", machine flexure.stiffness_n_m_per_rad),
     row!("bearing_stiffness_n_per_m", "N/m", Positive, SECTION_3_1, "radial stiffness of both bearings (K_fb, K_rb)",
-        by |m, _, _| common(&[m.bearings.front_stiffness_n_per_m, m.bearings.rear_stiffness_n_per_m], |k| *k),
+        Target::Bearings("stiffness_n_per_m"), by |m, _, _| common(&[m.bearings.front_stiffness_n_per_m, m.bearings.rear_stiffness_n_per_m], |k| *k),
         |m, _, _, v| [m.bearings.front_stiffness_n_per_m, m.bearings.rear_stiffness_n_per_m] = [v; 2]),
     row!("bearing_front_x_m", "m", Positive, Assumed("a usual length"), "front bearing centre (L_fb)", machine bearings.front_x_m),
     row!("bearing_rear_x_m", "m", Negative, Assumed("O is midway between the bearings"), "rear bearing centre (-L_rb)", machine bearings.rear_x_m),
     row!("bearing_front_stiffness_n_per_m", "N/m", Positive, SECTION_3_1, "radial stiffness of the front bearing (K_fb)", machine bearings.front_stiffness_n_per_m),
     row!("bearing_rear_stiffness_n_per_m", "N/m", Positive, SECTION_3_1, "radial stiffness of the rear bearing (K_rb)", machine bearings.rear_stiffness_n_per_m),
     row!("spring_stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1, "stiffness of all springs (K_k)",
-        by |m, _, _| common(&m.springs, |s| s.stiffness_n_per_m),
+        Target::Springs("stiffness_n_per_m"), by |m, _, _| common(&m.springs, |s| s.stiffness_n_per_m),
         |m, _, _, v| m.springs.iter_mut().for_each(|s| s.stiffness_n_per_m = v)),
     row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1, "damping of all dampers (C)",
-        by |m, _, _| common(&m.dampers, |d| d.damping_n_s_per_m),
+        Target::Dampers("damping_n_s_per_m"), by |m, _, _| common(&m.dampers, |d| d.damping_n_s_per_m),
         |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = v)),
     row!("spin_peak_rpm", "rpm", Range::Within(-1e5, 1e5), Grid, "greatest spin speed; negative turns backwards", spin peak_rpm),
     row!("spin_ramp_s", "s", Positive, Grid, "duration of the run-up, and of a triangle's run-down (Figs. 10 to 12: 50 s, assumed)", spin ramp_s),
-    row!("window_from_s", "s", NonNegative, Time, "when amplitudes begin to be taken", by |_, _, _| None, |_, _, _, _| ()),
-    row!("window_to_s", "s", NonNegative, Time, "when amplitudes cease to be taken", by |_, _, _| None, |_, _, _, _| ()),
+    row!("window_from_s", "s", NonNegative, Time, "when amplitudes begin to be taken", window 0),
+    row!("window_to_s", "s", NonNegative, Time, "when amplitudes cease to be taken", window 1),
 ];
 
 /// Rows of each spring, after `spring_1_`.
@@ -474,7 +497,7 @@ static TABLE: &[Row] = &[
 static SPRING: &[Row] = &[
     row!("stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1, "stiffness of this spring", spring stiffness_n_per_m),
     row!("free_length_m", "m", NonNegative, Assumed("the distance between the ends as given"), "length of this spring without force",
-        by |m, _, k| m.springs.get(k).map(|s| s.free_length_m.unwrap_or_else(|| s.given_length_m())),
+        Target::Machine, by |m, _, k| m.springs.get(k).map(|s| s.free_length_m.unwrap_or_else(|| s.given_length_m())),
         |m, _, k, v| if let Some(s) = m.springs.get_mut(k) { s.free_length_m = Some(v) }),
     row!("cabinet_x_m", "m", Any, TABLE_4, "cabinet end of this spring, towards the door", spring cabinet_m[0]),
     row!("cabinet_y_m", "m", Any, TABLE_4, "cabinet end of this spring, upwards", spring cabinet_m[1]),

@@ -7,9 +7,10 @@ use crate::linear_outputs::{LinearOutputs, linearise_outputs};
 use crate::machine::Machine;
 use crate::nonlinear::COORDINATES;
 use crate::outputs::{Axes, CHANNELS, Motion};
-use crate::ringing::Ringing;
-use crate::spin::{Spin, SpinState, SpinStretch};
+use crate::ringing::{Ringing, jumps_rad_per_s2};
+use crate::spin::{Spin, SpinState, SpinStretch, stretch_at};
 use lane_ode::{Kernel, Lane, N, Simd};
+use std::sync::Arc;
 
 /// When a trajectory ends, and when its amplitudes are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,8 +37,8 @@ pub struct Point {
     pub(crate) rest: [f64; CHANNELS],
     pub(crate) linear: LinearPoint,
     pub(crate) linear_outputs: LinearOutputs<f64>,
-    pub(crate) stretches: Vec<SpinStretch>,
-    pub(crate) legs: Vec<PlannedLeg>,
+    pub(crate) stretches: Arc<[SpinStretch]>,
+    pub(crate) legs: Arc<[PlannedLeg]>,
     pub(crate) ringing: Ringing,
 }
 
@@ -104,12 +105,12 @@ impl Point {
 /// Per point: [`NoEquilibrium`].
 #[must_use]
 pub fn prepare(simd: Simd, points: &[(Machine, Spin)], timing: &Timing) -> Vec<Result<Point, NoEquilibrium>> {
-    simd.dispatch(Prepare { points, timing })
+    simd.dispatch(Prepare { points, courses: courses(points, timing) })
 }
 
 struct Prepare<'a> {
     points: &'a [(Machine, Spin)],
-    timing: &'a Timing,
+    courses: Vec<Course>,
 }
 
 impl Kernel for Prepare<'_> {
@@ -119,6 +120,7 @@ impl Kernel for Prepare<'_> {
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let zero = N(zero);
         let mut ready = Vec::with_capacity(self.points.len());
+        let mut courses = self.courses.into_iter();
         for group in self.points.chunks(T::LANES) {
             let machines: Vec<_> = group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
             let mut lanes = Coefficients::splat(zero, &machines[0]);
@@ -132,28 +134,51 @@ impl Kernel for Prepare<'_> {
             let at_rest = Motion { q, u: still, a: still };
             let unbalance_up = SpinState::new((zero, zero.lit(1.0)), zero, zero);
             let rest = Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
-            let parts = machines.into_iter().zip(linear).zip(linear_outputs).zip(group);
+            let parts = machines.into_iter().zip(linear).zip(linear_outputs).zip(group).zip(courses.by_ref());
             ready.extend(parts.enumerate().map(
-                |(lane, (((coefficients, linear), linear_outputs), (machine, spin)))| {
+                |(lane, ((((coefficients, linear), linear_outputs), (machine, _)), course))| {
                     if found >> lane & 1 == 0 {
                         return Err(NoEquilibrium);
                     }
-                    let stretches = spin.stretches();
                     Ok(Point {
-                        ringing: Ringing::new(machine, &stretches, self.timing.window_s[1]),
+                        ringing: Ringing::new(machine, course.jumps_rad_per_s2),
                         machine: coefficients,
                         equilibrium: q.map(|q| q.0.get(lane)),
                         rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),
                         linear,
                         linear_outputs,
-                        legs: legs(&stretches, self.timing),
-                        stretches,
+                        stretches: course.stretches,
+                        legs: course.legs,
                     })
                 },
             ));
         }
         ready
     }
+}
+
+/// What a trajectory goes through.
+#[derive(Clone)]
+struct Course {
+    stretches: Arc<[SpinStretch]>,
+    legs: Arc<[PlannedLeg]>,
+    /// All jumps of the drum's acceleration until the window ends, added.
+    jumps_rad_per_s2: f64,
+}
+
+/// One a point. Neighbours of the same spin share it, because a table may have thousands of rows.
+fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<Course> {
+    let mut courses: Vec<Course> = Vec::with_capacity(points.len());
+    for (k, (_, spin)) in points.iter().enumerate() {
+        let shared = if k > 0 && points[k - 1].1 == *spin { courses.last().cloned() } else { None };
+        courses.push(shared.unwrap_or_else(|| {
+            let stretches = spin.stretches();
+            let jumps_rad_per_s2 = jumps_rad_per_s2(&stretches, timing.window_s[1]);
+            let legs = legs(&stretches, timing).into();
+            Course { legs, jumps_rad_per_s2, stretches: stretches.into() }
+        }));
+    }
+    courses
 }
 
 /// The run cut at every kink.
@@ -170,7 +195,7 @@ fn legs(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedLeg> {
         .windows(2)
         .map(|pair| {
             let (start_s, end_s) = (pair[0], pair[1]);
-            let stretch = stretches.iter().rposition(|s| s.start_s <= start_s).unwrap_or(0);
+            let stretch = stretch_at(stretches, start_s);
             // Within a stretch the speed rises or falls all the way.
             for time_s in [start_s, end_s] {
                 fastest_rad_per_s = fastest_rad_per_s.max(stretches[stretch].speed_rad_per_s(time_s).abs());

@@ -27,19 +27,24 @@ pub(crate) struct Ringing {
     span_m: f64,
 }
 
-impl Ringing {
-    /// Left by all jumps until `end_s`.
-    pub(crate) fn new(machine: &Machine, stretches: &[SpinStretch], end_s: f64) -> Self {
-        let mut acceleration = 0.0;
-        let mut jumps = 0.0;
-        for (i, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s <= end_s) {
-            jumps += (stretch.acceleration_rad_per_s2(stretch.start_s) - acceleration).abs();
-            if let Some(next) = stretches.get(i + 1) {
-                acceleration = stretch.acceleration_rad_per_s2(next.start_s);
-            }
+/// All jumps of the drum's acceleration until `end_s`, added.
+pub(crate) fn jumps_rad_per_s2(stretches: &[SpinStretch], end_s: f64) -> f64 {
+    let mut acceleration = 0.0;
+    let mut jumps = 0.0;
+    for (i, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s <= end_s) {
+        jumps += (stretch.acceleration_rad_per_s2(stretch.start_s) - acceleration).abs();
+        if let Some(next) = stretches.get(i + 1) {
+            acceleration = stretch.acceleration_rad_per_s2(next.start_s);
         }
+    }
+    jumps
+}
+
+impl Ringing {
+    /// Left by all jumps of the drum's acceleration, added (rad/s2).
+    pub(crate) fn new(machine: &Machine, jumps_rad_per_s2: f64) -> Self {
         let unbalance = &machine.unbalance;
-        let load_n = unbalance.mass_kg * unbalance.radius_m.abs() * jumps;
+        let load_n = unbalance.mass_kg * unbalance.radius_m.abs() * jumps_rad_per_s2;
         let bearings = &machine.bearings;
         let span_m = (bearings.front_x_m - bearings.rear_x_m).abs();
         let softer = bearings.front_stiffness_n_per_m.min(bearings.rear_stiffness_n_per_m);

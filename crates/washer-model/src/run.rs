@@ -70,6 +70,9 @@ pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
     }
 }
 
+/// Says whether to put the work down.
+pub type Stop<'a> = &'a dyn Fn() -> bool;
+
 /// Coordinates (m, rad) at the ends of a trajectory's legs, as far as it came.
 pub type Course = Vec<[f64; COORDINATES]>;
 
@@ -104,21 +107,40 @@ pub fn simulate_with(
     points: &[&Point],
     wanted: Wanted,
 ) -> (Vec<Record>, Vec<Extra>) {
+    simulate_until(simd, model, method, points, wanted, &|| false).unwrap_or_default()
+}
+
+/// As [`simulate_with`], unless `stop` says before all trajectories have ended that they need not; then `None`. It is
+/// asked every [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps at least.
+#[must_use]
+pub fn simulate_until(
+    simd: Simd,
+    model: ModelKind,
+    method: &Method,
+    points: &[&Point],
+    wanted: Wanted,
+    stop: Stop<'_>,
+) -> Option<(Vec<Record>, Vec<Extra>)> {
     if points.is_empty() {
-        return (Vec::new(), Vec::new());
+        return Some((Vec::new(), Vec::new()));
     }
     let stepper = match method {
         Method::Rk4 { .. } | Method::Geared(Geared { formula: Formula::Rk4, .. }) => Stepper::Rk4,
         Method::Geared(Geared { formula: Formula::Dop853, .. }) => Stepper::Dop853,
         Method::Dopri5(tolerance) => Stepper::Dopri5(*tolerance),
-        Method::Rodas5p(tolerance) => return stiff::simulate(model, tolerance, points, wanted),
+        Method::Rodas5p(tolerance) => return stiff::simulate(model, tolerance, points, wanted, stop),
     };
     match model {
-        ModelKind::Nonlinear => {
-            simd.dispatch(Simulate::<OfNonlinear> { points, method, stepper, wanted, family: PhantomData })
-        }
+        ModelKind::Nonlinear => simd.dispatch(Simulate::<OfNonlinear> {
+            points,
+            method,
+            stepper,
+            wanted,
+            stop,
+            family: PhantomData,
+        }),
         ModelKind::Linear => {
-            simd.dispatch(Simulate::<OfLinear> { points, method, stepper, wanted, family: PhantomData })
+            simd.dispatch(Simulate::<OfLinear> { points, method, stepper, wanted, stop, family: PhantomData })
         }
     }
 }
@@ -152,15 +174,16 @@ struct Simulate<'a, F> {
     method: &'a Method,
     stepper: Stepper,
     wanted: Wanted,
+    stop: Stop<'a>,
     family: PhantomData<F>,
 }
 
 impl<F: Family> Kernel for Simulate<'_, F> {
-    type Output = (Vec<Record>, Vec<Extra>);
+    type Output = Option<(Vec<Record>, Vec<Extra>)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut run = Run::<T, F::Over<T>>::new(N(zero), self.points, self.method);
+        let mut run = Run::<T, F::Over<T>>::new(N(zero), self.points, self.method, self.stop);
         run.record(N(zero), self.wanted, F::KIND);
         match self.stepper {
             Stepper::Rk4 => rk4::integrate(zero, &mut run),
@@ -186,7 +209,9 @@ struct LaneState {
 struct Run<'a, T, M> {
     model: M,
     points: &'a [&'a Point],
+    stop: Stop<'a>,
     taken: usize,
+    finished: usize,
     lanes: [LaneState; MAX_LANES],
     method: &'a Method,
     channels: Peaks<T, CHANNELS>,
@@ -244,6 +269,7 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
             state.leg += 1;
             return Some(self.enter(lane));
         }
+        self.finished += 1;
         let Count { accepted: steps, rejected } = state.count;
         let record = &mut self.records[state.point];
         *record = Record { failure, steps, rejected, ..EMPTY };
@@ -281,6 +307,10 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
         }
         self.radial.advance(step.length_s, &[squared(&radial)], everywhere(self.windows));
     }
+
+    fn is_stopped(&self) -> bool {
+        (self.stop)()
+    }
 }
 
 /// True in every lane.
@@ -292,11 +322,13 @@ fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
 impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     /// Every point still to be taken up; there is at least one.
     #[inline(always)]
-    fn new(zero: N<T>, points: &'a [&'a Point], method: &'a Method) -> Self {
+    fn new(zero: N<T>, points: &'a [&'a Point], method: &'a Method, stop: Stop<'a>) -> Self {
         Self {
             model: M::splat(zero, points[0], coupling(method, zero)),
             points,
+            stop,
             taken: 0,
+            finished: 0,
             lanes: [LaneState::default(); MAX_LANES],
             method,
             channels: Peaks::new(zero),
@@ -317,8 +349,11 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
         }
     }
 
-    /// Everything that was recorded.
-    fn recorded(self) -> (Vec<Record>, Vec<Extra>) {
+    /// Everything that was recorded; `None` if it is not of every point.
+    fn recorded(self) -> Option<(Vec<Record>, Vec<Extra>)> {
+        if self.finished < self.points.len() {
+            return None;
+        }
         let mut found = self.extras.map_or_else(Vec::new, |extras| extras.found);
         if !self.courses.is_empty() {
             found.resize(self.courses.len(), Extra::default());
@@ -326,7 +361,7 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
         for (extra, course) in found.iter_mut().zip(self.courses) {
             extra.course = course;
         }
-        (self.records, found)
+        Some((self.records, found))
     }
 
     /// Shows an instant to the recorders that were asked for.

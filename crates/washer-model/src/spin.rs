@@ -142,18 +142,24 @@ impl Spin {
     /// The fastest speed from 0 to `end_s`, rad/s.
     #[must_use]
     pub fn greatest_speed_rad_per_s(&self, end_s: f64) -> f64 {
-        let stretches = self.stretches();
-        let starts = stretches.iter().map(|s| s.start_s).chain([end_s]).filter(|&t| t <= end_s);
-        starts.map(|t| self.speed_rpm(t).abs()).fold(0.0, f64::max) * TAU / 60.0
+        let starts: Vec<f64> = self.stretches().iter().map(|stretch| stretch.start_s).collect();
+        let times_s = starts.into_iter().chain([end_s]).filter(|&t_s| t_s <= end_s);
+        self.speeds_rpm(times_s).map(f64::abs).fold(0.0, f64::max) * TAU / 60.0
     }
 
-    /// Speed at time `t_s` (rpm).
-    #[must_use]
-    pub fn speed_rpm(&self, t_s: f64) -> f64 {
+    /// Speeds at times (rpm).
+    pub fn speeds_rpm(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = f64> {
         let stretches = self.stretches();
-        let current = stretches.iter().rev().find(|s| s.start_s <= t_s).or(stretches.first());
-        current.map_or(0.0, |stretch| stretch.speed_rad_per_s(t_s) * 60.0 / TAU)
+        times_s.into_iter().map(move |t_s| {
+            let current = stretches.get(stretch_at(&stretches, t_s));
+            current.map_or(0.0, |stretch| stretch.speed_rad_per_s(t_s) * 60.0 / TAU)
+        })
     }
+}
+
+/// Which of these stretches, in order of time, holds at a time; before all of them, the first.
+pub(crate) fn stretch_at(stretches: &[SpinStretch], t_s: f64) -> usize {
+    stretches.partition_point(|stretch| stretch.start_s <= t_s).saturating_sub(1)
 }
 
 /// Turns, whole ones dropped, of a ramp between two speeds (1/s).

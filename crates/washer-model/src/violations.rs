@@ -179,6 +179,16 @@ impl Machine {
         let mut found = out_of_range(self, &no_spin);
         let in_range =
             |names: &[String]| !found.iter().any(|v| v.concerns().iter().any(|name| names.contains(name)));
+        let mut joint = self.joint_violations();
+        // A number refused by itself says all there is to say about what depends on it.
+        joint.retain(|violation| in_range(&violation.concerns()));
+        found.append(&mut joint);
+        found
+    }
+
+    /// What is impossible of numbers together that are each in their range.
+    #[must_use]
+    pub fn joint_violations(&self) -> Vec<Violation> {
         let mut joint = Vec::new();
         for (body, moments_kg_m2) in [
             ("tub", self.tub.inertia_kg_m2),
@@ -203,13 +213,10 @@ impl Machine {
         if distance_m < SHORTEST_M {
             joint.push(Violation::BearingsTogether { distance_m });
         }
-        // A number refused by itself says all there is to say about what depends on it.
-        joint.retain(|violation| in_range(&violation.concerns()));
         if self.springs.is_empty() {
             joint.push(Violation::NoSprings);
         }
-        found.append(&mut joint);
-        found
+        joint
     }
 }
 
@@ -217,7 +224,7 @@ impl Machine {
 fn out_of_range(machine: &Machine, spin: &Spin) -> Vec<Violation> {
     let judge = |parameter: Parameter| {
         let value = parameter.get(machine, spin)?;
-        let single = !parameter.writes_several();
+        let single = !parameter.target().is_several();
         (single && !parameter.range().contains(value)).then_some(Violation::OutOfRange { parameter, value })
     };
     Parameter::all(machine, spin).into_iter().filter_map(judge).collect()
@@ -227,10 +234,18 @@ impl Spin {
     /// Everything that makes this spin impossible; empty for a sound one.
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
-        let Self::Table { time_s, speed_rpm } = self else {
-            let machine = Machine::paper();
-            return out_of_range(&machine, self);
-        };
+        match self {
+            Self::Table { .. } => self.joint_violations(),
+            Self::Cycloidal { .. } | Self::Triangular { .. } | Self::Ramp { .. } => {
+                out_of_range(&Machine::paper(), self)
+            }
+        }
+    }
+
+    /// What is impossible of a table; numbers of a profile have nothing to do with each other.
+    #[must_use]
+    pub fn joint_violations(&self) -> Vec<Violation> {
+        let Self::Table { time_s, speed_rpm } = self else { return Vec::new() };
         let mut found = Vec::new();
         if time_s.len() != speed_rpm.len() || time_s.is_empty() {
             found.push(Violation::TableLength { times: time_s.len(), speeds: speed_rpm.len() });

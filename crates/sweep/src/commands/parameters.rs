@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
-use washer_model::{Machine, Parameter, Range, Source, Spin};
+use washer_model::{Machine, Parameter, Range, Spin, Target};
 
 use crate::config;
 use crate::exit::{Error, Exit, show};
@@ -48,10 +48,10 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
 fn rows(machine: &Machine, spin: &Spin, window_s: Option<[f64; 2]>) -> Vec<Row> {
     let built_in = Machine::paper();
     let row = |parameter: Parameter| {
-        let of_grid = matches!(parameter.source(), Source::Grid | Source::Time);
-        let value = match parameter.window_edge() {
-            Some(edge) => window_s.map(|window_s| window_s[edge]),
-            None => parameter.get(machine, spin).filter(|_| window_s.is_some() || !of_grid),
+        let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
+        let value = match parameter.target() {
+            Target::Window(edge) => window_s.map(|window_s| window_s[edge]),
+            _ => parameter.get(machine, spin).filter(|_| window_s.is_some() || !of_grid),
         };
         let as_built_in = parameter.get(&built_in, spin) == value;
         let source = if of_grid || as_built_in { parameter.source().to_string() } else { "given".to_owned() };

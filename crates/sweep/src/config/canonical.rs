@@ -56,18 +56,15 @@ fn design(design: &Design) -> Value {
 }
 
 fn spin(spin: &Spin) -> Value {
+    let profile = super::spin::name(spin);
     match spin {
-        Spin::Cycloidal { peak_rpm, ramp_s } => {
-            json!({ "profile": "cycloidal", "peak_rpm": peak_rpm, "ramp_s": ramp_s })
-        }
-        Spin::Triangular { peak_rpm, ramp_s } => {
-            json!({ "profile": "triangular", "peak_rpm": peak_rpm, "ramp_s": ramp_s })
-        }
-        Spin::Ramp { peak_rpm, ramp_s } => {
-            json!({ "profile": "ramp", "peak_rpm": peak_rpm, "ramp_s": ramp_s })
+        Spin::Cycloidal { peak_rpm, ramp_s }
+        | Spin::Triangular { peak_rpm, ramp_s }
+        | Spin::Ramp { peak_rpm, ramp_s } => {
+            json!({ "profile": profile, "peak_rpm": peak_rpm, "ramp_s": ramp_s })
         }
         Spin::Table { time_s, speed_rpm } => {
-            json!({ "profile": "table", "time_s": time_s, "speed_rpm": speed_rpm })
+            json!({ "profile": profile, "time_s": time_s, "speed_rpm": speed_rpm })
         }
     }
 }

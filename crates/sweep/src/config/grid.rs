@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use washer_model::{Channel, Machine, Range, Spin, decimal};
+use washer_model::{Channel, Machine, Range, decimal};
 
 use super::origins::Origins;
 use super::parameters::Written;
 use super::report::{Diagnostic, Report};
-use super::section::{Field, Section, cut, listed, unknown_word};
+use super::section::{Field, Section, cut, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
-use super::{design, machine, parameters};
+use super::{design, machine, parameters, spin};
 use crate::measures::{Criterion, Measures, Metric};
 use crate::plan::{Integrator, Plan, Reliability};
 
@@ -51,8 +51,6 @@ pub(super) const ATOL: Range = Range::Within(1e-18, 1e-1);
 
 /// The methods, in the order of [`Integrator`].
 pub(super) const METHODS: [&str; 4] = ["rk4", "dopri5", "rodas5p", "rk4-mass-scaled"];
-/// The profiles, in the order of [`Spin`].
-pub(super) const PROFILES: [&str; 4] = ["cycloidal", "triangular", "ramp", "table"];
 /// Names of machines that need no file.
 pub(super) const MACHINES: [&str; 1] = [DEFAULT_MACHINE];
 
@@ -94,7 +92,7 @@ pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option
     let name = name(&mut root, path, report);
     let mut origins = Origins::default();
     let machine = machine(&mut root, path, &mut origins, report);
-    let spin = spin(&mut root, &mut origins, report);
+    let spin = spin::read(&mut root, &mut origins, report);
     let [end_s, from_s, to_s] = time(&mut root, &mut origins, report);
     let integrator = integrator(&mut root, &mut origins, report);
     let metrics = names(&mut root, "metrics", "metric", &Metric::ALL, Metric::name, report);
@@ -181,54 +179,6 @@ fn machine(root: &mut Section<'_>, grid: &Path, origins: &mut Origins, report: &
     machine::read(&text, root, origins, report)
 }
 
-fn spin(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> Spin {
-    // Stands in for a wrong spin, so that axes over its numbers are still known.
-    let stand_in = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
-    let field = root.table("spin", "[spin]", report);
-    let Some(section) = root.require(field, "spin", "a section [spin]", report) else { return stand_in };
-    let mut section = section.value;
-    let expected = listed(&PROFILES);
-    let field = section.choice("profile", &PROFILES, report);
-    let Some(profile) = section.require(field, "profile", &expected, report) else {
-        return stand_in;
-    };
-    let spin = if PROFILES[profile.value] == "table" {
-        section.misplace(&["peak_rpm", "ramp_s"], "a table gives `time_s` and `speed_rpm` instead");
-        let mut column = |key: &'static str, range: Range| {
-            let field = section.numbers(key, range, report);
-            let found = section.require(field, key, "an array of numbers", report)?;
-            origins.put(format!("spin.{key}"), found.at);
-            let mut values = Vec::with_capacity(found.value.len());
-            for (k, entry) in found.value.into_iter().enumerate() {
-                origins.put(format!("spin.{key}[{k}]"), entry.at);
-                values.push(entry.value);
-            }
-            Some(values)
-        };
-        let (time_s, speed_rpm) = (column("time_s", Range::NonNegative), column("speed_rpm", Range::Any));
-        time_s.zip(speed_rpm).map(|(time_s, speed_rpm)| Spin::Table { time_s, speed_rpm })
-    } else {
-        let reason = format!("only the profile \"table\" has it, not \"{}\"", PROFILES[profile.value]);
-        section.misplace(&["time_s", "speed_rpm"], &reason);
-        let mut number = |key: &'static str, parameter: &str, expected: &str| {
-            let range = parameters::range(parameter, &stand_in);
-            let field = section.number(key, range, report);
-            let found = section.require(field, key, expected, report)?;
-            origins.put(parameter.to_owned(), found.at);
-            Some(found.value)
-        };
-        let peak_rpm = number("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm");
-        let ramp_s = number("ramp_s", "spin_ramp_s", "the duration of the run-up in s");
-        peak_rpm.zip(ramp_s).map(|(peak_rpm, ramp_s)| match PROFILES[profile.value] {
-            "cycloidal" => Spin::Cycloidal { peak_rpm, ramp_s },
-            "triangular" => Spin::Triangular { peak_rpm, ramp_s },
-            _ => Spin::Ramp { peak_rpm, ramp_s },
-        })
-    };
-    section.finish(report);
-    spin.unwrap_or_else(|| if PROFILES[profile.value] == "table" { machine::no_spin() } else { stand_in })
-}
-
 /// End and both edges of the window, in s.
 fn time(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> [f64; 3] {
     const STAND_IN: [f64; 3] = [50.0, 0.0, 50.0];
@@ -298,8 +248,16 @@ fn integrator(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report
     let method = match section.choice("method", &METHODS, report) {
         Field::Given(method) => METHODS[method.value],
         Field::Absent => DEFAULT_METHOD,
-        // Which keys belong to a method that is none cannot be said.
-        Field::Bad => return stand_in,
+        Field::Bad => {
+            // Which keys belong to a method that is none cannot be said, but what is wrong with any can.
+            for (key, range) in
+                [("step_s", Range::Positive), ("rtol", RTOL), ("atol", ATOL), ("accuracy", ACCURACY)]
+            {
+                let _ = section.number(key, range, report);
+            }
+            section.finish(report);
+            return stand_in;
+        }
     };
     let mut misplace = |keys: &[&'static str], owners: &[&str]| {
         if !owners.contains(&method) {

@@ -12,16 +12,20 @@
 //! With `[design]` the axes are ranges without a count, over which `latin_hypercube` or `sobol` spreads `points` points;
 //! or there is no axis, and `list` takes points from a CSV or Parquet file whose columns are parameters.
 //!
-//! Bounds: files to 4 MiB (lists of points to 256 MiB), a Sobol design to 2^32 points over 32 axes, 1e12 grid points, 1e6 s, 1e10 fixed steps, numbers to 1e12 in magnitude, 1000 springs and 1000
-//! dampers.
+//! Bounds: files to 4 MiB; lists of points to 256 MiB, packed or not, and 2e7 numbers; a Sobol design to 2^32 points
+//! over 32 axes; 1e12 grid points; 1e6 s; 1e10 steps that stability asks for; spin tables of 20,000 rows; numbers to
+//! 1e12 in magnitude; 1000 springs and 1000 dampers.
 //!
 //! Precedence, later over earlier: machine file, `[set]`, `--set`, axes. Within each of them no number may be written
 //! twice, not even under two names (`damping_n_s_per_m` writes every `damper_1_damping_n_s_per_m`), because nothing
 //! would say which comes last.
 
+#[cfg(test)]
+mod bounds_tests;
 mod canonical;
 mod design;
 mod grid;
+mod list;
 mod machine;
 mod origins;
 mod parameters;
@@ -30,6 +34,7 @@ mod report;
 pub mod schema;
 mod section;
 mod source;
+mod spin;
 mod syntax;
 #[cfg(test)]
 mod tests;

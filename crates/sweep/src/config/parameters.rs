@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 
 use washer_model::{Machine, Parameter, Range, Spin, UnknownParameter, decimal};
 
-use super::design::List;
 use super::grid::Draft;
+use super::list::List;
 use super::report::{Diagnostic, Report};
-use super::section::{Field, Section, check_number, quoted, short};
+use super::section::{Field, Section, check_number, quoted, refused_number, short};
 use super::source::{Located, Location};
 use crate::design::{Design, MOST_AXES};
 use crate::plan::{Axis, AxisValues, Plan};
@@ -248,7 +248,7 @@ pub(super) fn box_of_axes(
         section.misplace(&["values"], "a design spreads its points over `range = { from = ..., to = ... }`");
         let field = section.table("range", "range = { from, to }", report);
         let spaced = section.require(field, "range", "`range = { from = ..., to = ... }`", report);
-        let values = spaced.and_then(|spaced| extent(spaced.value, range, report));
+        let values = spaced.and_then(|spaced| extent(spaced.value, range, design.value.points(), report));
         section.finish(report);
         let (Some(name), Some(parameter)) = (name, parameter) else { continue };
         if claim(&name, &parameter, &mut swept, draft, report)
@@ -262,37 +262,39 @@ pub(super) fn box_of_axes(
 }
 
 /// The axes of a list: its columns.
-pub(super) fn listed_axes(root: &mut Section<'_>, list: List, draft: &mut Draft, report: &mut Report) {
+pub(super) fn listed_axes(root: &mut Section<'_>, mut list: List, draft: &mut Draft, report: &mut Report) {
     for section in root.tables("axis", report) {
         let diagnostic = Diagnostic::new("an [[axis]] beside a list of points");
         report.push(diagnostic.at(section.at(), "the columns of the list are the axes; remove this"));
     }
     let mut swept = Swept::new();
-    for column in list.columns {
+    for (k, column) in std::mem::take(&mut list.columns).into_iter().enumerate() {
         let name = Located { value: column.name.value.as_str(), at: column.name.at.clone() };
         let Some(parameter) = find(&name, draft, report) else { continue };
         let range = parameter.range();
-        let mut values = Vec::with_capacity(column.values.len());
-        for (k, value) in column.values.iter().enumerate() {
-            let what = format!("value {} of {}", k + 1, quoted(name.value));
-            let at = column.places.get(k).unwrap_or(&column.name.at);
-            if range.contains(*value) {
-                values.push(*value);
-            } else {
-                // Formatting a place a million times over would take minutes; wrong values are few, or beyond counting.
-                let _ = check_number(&what, *value, at.clone(), range, report);
-            }
+        let mut sound = true;
+        for (row, &value) in column.values.iter().enumerate().filter(|(_, value)| !range.contains(**value)) {
+            sound = false;
+            report.push_with(|sources| {
+                let what = format!("value {} of {}", row + 1, quoted(name.value));
+                refused_number(&what, value, &list.place(sources, k, row), range)
+            });
         }
-        if claim(&name, &parameter, &mut swept, draft, report) && values.len() == column.values.len() {
-            draft.origins.put(format!("axis[{}]", draft.plan.axes.len()), column.name.at.clone());
-            draft.plan.axes.push(Axis { parameter, values: AxisValues::List(values) });
+        if claim(&name, &parameter, &mut swept, draft, report) && sound {
+            draft.origins.put(format!("axis[{}]", draft.plan.axes.len()), name.at.clone());
+            draft.plan.axes.push(Axis { parameter, values: AxisValues::List(column.values) });
         }
     }
     draft.plan.design = Some(list.design);
 }
 
 /// A range without a count.
-fn extent(mut section: Section<'_>, range: Range, report: &mut Report) -> Option<Located<AxisValues>> {
+fn extent(
+    mut section: Section<'_>,
+    range: Range,
+    points: u64,
+    report: &mut Report,
+) -> Option<Located<AxisValues>> {
     let at = section.at().clone();
     section.misplace(&["count"], "the number of points stands in [design], as `points`");
     let [from, to] = ["from", "to"].map(|key| {
@@ -309,6 +311,13 @@ fn extent(mut section: Section<'_>, range: Range, report: &mut Report) -> Option
         let end = if from.value > 0.0 { &to } else { &from };
         let title = format!("{} has no logarithm", decimal(end.value));
         Some((title, &end.at, "expected a number greater than 0, or spacing = \"linear\""))
+    } else if most_distinct(from.value, to.value).is_some_and(|most| most < points) {
+        let title = format!(
+            "a range from {} to {} has no {points} different values",
+            decimal(from.value),
+            decimal(to.value)
+        );
+        Some((title, &to.at, "expected ends farther apart, or fewer `points` in [design]"))
     } else {
         None
     };
@@ -324,6 +333,17 @@ fn extent(mut section: Section<'_>, range: Range, report: &mut Report) -> Option
         AxisValues::Linear { from, to, count }
     };
     Some(Located { value, at })
+}
+
+/// Neighbours on a range are apart by at least this share of the greater end, or else rounding would put some on
+/// one number.
+const CLOSEST: f64 = 8.0 * f64::EPSILON;
+
+/// How many values a range has room for, if that is fewer than any range may have.
+fn most_distinct(from: f64, to: f64) -> Option<u64> {
+    let steps = ((to - from).abs() / (CLOSEST * from.abs().max(to.abs()))).floor();
+    // Both ends are exact, however close.
+    (steps < MOST_POINTS as f64).then_some((steps as u64 + 1).max(2))
 }
 
 /// Reads every `[[axis]]` of a grid.
@@ -425,6 +445,16 @@ fn spacing(mut section: Section<'_>, range: Range, report: &mut Report) -> Optio
         let title =
             format!("a range from {0} to {0} has one value, not {1}", decimal(from.value), count.value);
         return refuse(title, &to.at, "expected another number, or count = 1");
+    }
+    if let Some(most) = most_distinct(from.value, to.value).filter(|&most| most < count.value) {
+        let title = format!(
+            "a range from {} to {} has no {} different values",
+            decimal(from.value),
+            decimal(to.value),
+            count.value
+        );
+        let expected = format!("expected at most {most}, or ends farther apart");
+        return refuse(title, &count.at, &expected);
     }
     if from.value != to.value && count.value == 1 {
         return refuse(

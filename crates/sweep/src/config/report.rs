@@ -5,6 +5,7 @@ use std::fmt;
 
 use super::render;
 use super::source::{Location, SourceId, Sources};
+use crate::nearest::nearest;
 
 /// More mistakes than this are counted but not kept: a wrong file should not fill a terminal or the memory.
 const KEPT: usize = 100;
@@ -42,32 +43,6 @@ impl Diagnostic {
             None => self,
         }
     }
-}
-
-/// The valid name most like what was typed.
-fn nearest<'a>(typed: &str, valid: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // Comparing takes time with the square of the length, and no valid name is long.
-    let typed: String = typed.chars().take(80).flat_map(char::to_lowercase).collect();
-    let likeness = |name: &str| {
-        // Leaving out the unit or a leading word is as common as a slip of the finger.
-        let part =
-            typed.len() >= 4 && (name.starts_with(&typed) || name.split('_').any(|word| word == typed));
-        if part {
-            0.95
-        } else {
-            strsim::jaro_winkler(&typed, name)
-                .min(strsim::normalized_damerau_levenshtein(&typed, name) + 0.45)
-        }
-    };
-    valid
-        .into_iter()
-        .map(|name| (name, likeness(name)))
-        .filter(|&(_, likeness)| likeness > 0.8)
-        .fold(None, |best: Option<(&str, f64)>, next| match best {
-            Some(best) if best.1 >= next.1 => Some(best),
-            _ => Some(next),
-        })
-        .map(|(name, _)| name)
 }
 
 /// Texts read and mistakes found so far.
@@ -142,7 +117,8 @@ impl Report {
         }
     }
 
-    fn is_full(&self) -> bool {
+    /// Whether further mistakes would only be counted.
+    pub(super) fn is_full(&self) -> bool {
         self.found.len() >= KEPT
     }
 
@@ -208,26 +184,6 @@ impl std::error::Error for Diagnostics {}
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_nearest_name_is_what_a_reader_would_say() {
-        let valid = [
-            "unbalance_mass_kg",
-            "tub_mass_kg",
-            "damping_n_s_per_m",
-            "spring_stiffness_n_per_m",
-            "spin_ramp_s",
-        ];
-        let near = |typed| nearest(typed, valid);
-        assert_eq!(near("unbalance_mas_kg"), Some("unbalance_mass_kg"));
-        assert_eq!(near("Unbalance_Mass_kg"), Some("unbalance_mass_kg"));
-        assert_eq!(near("tub_mass"), Some("tub_mass_kg"));
-        assert_eq!(near("damping"), Some("damping_n_s_per_m"));
-        assert_eq!(near("spring_stifness_n_per_m"), Some("spring_stiffness_n_per_m"));
-        assert_eq!(near("colour"), None);
-        assert_eq!(near(""), None);
-        assert_eq!(near(&"damping".repeat(1000)), None);
-    }
 
     #[test]
     fn mistakes_beyond_what_is_kept_are_counted() {

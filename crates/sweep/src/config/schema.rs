@@ -11,6 +11,7 @@ use super::grid::{
 };
 use super::machine::{BLOCKS, Block, DAMPERS, FREE_LENGTH, SPRINGS, no_spin};
 use super::parameters::MOST_POINTS;
+use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
 use crate::measures::{Criterion, Metric};
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
@@ -185,8 +186,8 @@ fn set() -> Value {
 }
 
 fn spin() -> Value {
-    let ramped = |profile: &str, description: &str| {
-        let profile = json!({ "const": profile, "description": description });
+    let ramped = |profile: &Ramped| {
+        let profile = json!({ "const": profile.name, "description": profile.description });
         let keys = [
             ("profile", profile),
             ("peak_rpm", parameter("spin_peak_rpm")),
@@ -194,26 +195,22 @@ fn spin() -> Value {
         ];
         table(keys, &["profile", "peak_rpm", "ramp_s"])
     };
-    let column = |range: Range, description: &str| json!({ "type": "array", "items": number(range), "minItems": 1, "description": description });
+    let column = |range: Range, description: &str| {
+        let (items, most) = (number(range), MOST_ROWS);
+        json!({ "type": "array", "items": items, "minItems": 1, "maxItems": most, "description": description })
+    };
     let tabled = table(
         [
             (
                 "profile",
-                json!({ "const": "table", "description": "linear between given points, constant after the last" }),
+                json!({ "const": TABLE, "description": "linear between given points, constant after the last" }),
             ),
             ("time_s", column(Range::NonNegative, "increasing times from 0, s")),
             ("speed_rpm", column(Range::Within(-1e5, 1e5), "speeds at these times, rpm")),
         ],
         &["profile", "time_s", "speed_rpm"],
     );
-    json!({
-        "oneOf": [
-            ramped("cycloidal", "smooth run-up, then constant"),
-            ramped("triangular", "linear up, and as long down"),
-            ramped("ramp", "linear up, then constant"),
-            tabled,
-        ],
-    })
+    json!({ "oneOf": RAMPED.iter().map(ramped).chain([tabled]).collect::<Value>() })
 }
 
 fn time() -> Value {

@@ -387,6 +387,12 @@ pub(super) fn check_number(
     if range.contains(value) {
         return Some(Located { value, at });
     }
+    report.push(refused_number(what, value, &at, range));
+    None
+}
+
+/// What is wrong with a number that is not finite or not in range.
+pub(super) fn refused_number(what: &str, value: f64, at: &Location, range: Range) -> Diagnostic {
     let title = if value.is_nan() {
         format!("{what} is not a number")
     } else if value.is_infinite() {
@@ -394,8 +400,7 @@ pub(super) fn check_number(
     } else {
         format!("{what} = {} is out of range", decimal(value))
     };
-    report.push(Diagnostic::new(title).at(&at, format!("expected {}", range.instead_of(value))));
-    None
+    Diagnostic::new(title).at(at, format!("expected {}", range.instead_of(value)))
 }
 
 fn wrong_kind(what: &str, at: &Location, expected: &str, found: &DeValue<'_>) -> Diagnostic {

@@ -78,6 +78,11 @@ impl Sources {
         SourceId(self.0.len() - 1)
     }
 
+    /// Puts in the text of a source that was kept under its name alone.
+    pub(super) fn fill(&mut self, id: SourceId, text: String) {
+        self.0[id.0].text = text;
+    }
+
     pub(super) fn name(&self, id: SourceId) -> &str {
         &self.0[id.0].name
     }
@@ -96,7 +101,8 @@ impl Sources {
         let end = floor_char_boundary(text, at.span.end).min(line_start + line.len());
         let start = (start - line_start).min(line.len());
         let end = (end.max(line_start) - line_start).max(start);
-        let number = text[..line_start].matches('\n').count() + 1;
+        // By bytes: a long list's lines are counted for each of its mistakes.
+        let number = text.as_bytes()[..line_start].iter().filter(|&&byte| byte == b'\n').count() + 1;
         Line { text: line, number, span: start..end }
     }
 }

@@ -4,30 +4,126 @@ use std::collections::BTreeSet;
 
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
-use washer_model::{Parameter, Timing, Violation, decimal, highest_frequency_rad_per_s, prepare};
+use washer_model::{
+    Parameter, Spin, Target, Timing, Violation, decimal, highest_frequency_rad_per_s, prepare,
+};
 
 use super::grid::Draft;
 use super::report::{Diagnostic, Report};
 use super::source::{Location, Sources};
+use crate::engine::REFERENCE_SHARE;
 use crate::measures::{Criterion, MOST_TURNS};
-use crate::plan::{Integrator, Scenario};
+use crate::plan::{Integrator, MOST_STEPS, Plan, Scenario, shortest_step_s};
 
-/// Most fixed steps of a trajectory that are accepted; an hour or more of computing for one point.
-pub(super) const MOST_STEPS: f64 = 1e10;
+/// Springs, dampers and rows of a spin's table that are looked at before a run, over all points of a list:
+/// some seconds' worth.
+const MOST_JUDGED: u64 = 1_000_000_000;
 
-/// A machine or spin that cannot be, at any corner of the grid. Ranges, inertia and bearings are linear conditions, so
-/// a machine that meets them at the corners meets them between; a spring that shrinks to nothing only in between is
+/// Counting a row's turns takes as long as judging so many rows.
+const TURNS_PER_ROW: u64 = 50;
+
+/// A machine or spin that cannot be, at any corner of the grid. Inertia and bearings are linear conditions, so a
+/// machine that meets them at the corners meets them between; a spring that shrinks to nothing only in between is
 /// left to the run, as a failed row.
 pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
-    let mut reported = BTreeSet::new();
-    for values in draft.plan.corners() {
-        window(draft, &draft.plan.scenario_at(&values), &mut reported, report);
-        turns(draft, &draft.plan.scenario_at(&values), &mut reported, report);
-        for (violation, of_spin) in violations(&draft.plan.scenario_at(&values)) {
+    let plan = &draft.plan;
+    let mut scenario = plan.scenario_at(&plan.corner(0));
+    let swept = Swept::of(plan);
+    if swept.is_too_much(draft, &scenario, report) {
+        return;
+    }
+    let mut judge = Judge { draft, reported: BTreeSet::new(), spin_is_sound: true };
+    judge.corner(&scenario, Swept::EVERYTHING, report);
+    for corner in 1..plan.corners() {
+        if report.is_full() {
+            // A corner's mistakes are mostly another's, and none would be shown.
+            break;
+        }
+        plan.place(&mut scenario, &plan.corner(corner));
+        judge.corner(&scenario, swept, report);
+    }
+}
+
+/// What of a scenario differs from corner to corner.
+#[derive(Clone, Copy)]
+struct Swept {
+    machine: bool,
+    spin: bool,
+    window: bool,
+}
+
+impl Swept {
+    const EVERYTHING: Self = Self { machine: true, spin: true, window: true };
+
+    fn of(plan: &Plan) -> Self {
+        let any = |of: fn(Target) -> bool| plan.axes.iter().any(|axis| of(axis.parameter.target()));
+        Self {
+            machine: any(|target| !matches!(target, Target::Spin | Target::Window(_))),
+            spin: any(|target| target == Target::Spin),
+            window: any(|target| matches!(target, Target::Window(_))),
+        }
+    }
+
+    /// Refuses a list so long, of a machine or a spin so large, that judging its points would take minutes.
+    fn is_too_much(self, draft: &Draft, scenario: &Scenario, report: &mut Report) -> bool {
+        let Scenario { machine, spin, .. } = scenario;
+        let elements = (machine.springs.len() + machine.dampers.len()) as u64;
+        let rows = match spin {
+            Spin::Table { time_s, .. } => time_s.len() as u64,
+            Spin::Cycloidal { .. } | Spin::Triangular { .. } | Spin::Ramp { .. } => 1,
+        };
+        let counts_turns = draft.plan.measures.criterion == Criterion::Envelope && (self.spin || self.window);
+        let a_point = u64::from(self.machine) * elements
+            + u64::from(self.spin) * rows
+            + u64::from(counts_turns) * rows * TURNS_PER_ROW;
+        let (points, most) = (draft.plan.corners(), MOST_JUDGED / a_point.max(1));
+        if points <= most {
+            return false;
+        }
+        let title = format!(
+            "too many points to check: {points}, each with {elements} springs and dampers and a spin of {rows} \
+             rows"
+        );
+        let at = draft.origins.get("axis[0]");
+        report.push(at.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
+            diagnostic.at(at, format!("expected at most {most} points of this machine and spin"))
+        }));
+        true
+    }
+}
+
+/// Judges corner after corner, and reports each mistake once.
+struct Judge<'a> {
+    draft: &'a Draft,
+    reported: BTreeSet<Vec<String>>,
+    spin_is_sound: bool,
+}
+
+impl Judge<'_> {
+    /// Judges what is new at a corner. Single numbers were judged where they were read; left is how they go together.
+    fn corner(&mut self, scenario: &Scenario, new: Swept, report: &mut Report) {
+        if new.machine {
+            self.violations(scenario.machine.joint_violations(), false, report);
+        }
+        if new.spin {
+            let violations = scenario.spin.joint_violations();
+            self.spin_is_sound = violations.is_empty();
+            self.violations(violations, true, report);
+        }
+        if new.window {
+            window(self.draft, scenario, &mut self.reported, report);
+        }
+        if (new.spin || new.window) && self.spin_is_sound {
+            turns(self.draft, scenario, &mut self.reported, report);
+        }
+    }
+
+    fn violations(&mut self, found: Vec<Violation>, of_spin: bool, report: &mut Report) {
+        for violation in found {
             let concerns = keys(&violation, of_spin);
-            let judged = !concerns.iter().any(|key| draft.origins.is_doubtful(key));
-            if judged && reported.insert(concerns.clone()) {
-                report.push_with(|sources| describe(&violation, &places(draft, &concerns, sources)));
+            let judged = !concerns.iter().any(|key| self.draft.origins.is_doubtful(key));
+            if judged && self.reported.insert(concerns.clone()) {
+                report.push_with(|sources| describe(&violation, &places(self.draft, &concerns, sources)));
             }
         }
     }
@@ -63,7 +159,7 @@ fn window(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String
 /// More turns of the drum in the window than are compared one by one.
 fn turns(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String>>, report: &mut Report) {
     let Some(criterion) = draft.origins.get("reliability.criterion") else { return };
-    if draft.plan.measures.criterion != Criterion::Envelope || !scenario.spin.violations().is_empty() {
+    if draft.plan.measures.criterion != Criterion::Envelope {
         return;
     }
     let turns = scenario.spin.turns_within(scenario.window_s);
@@ -76,12 +172,6 @@ fn turns(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String>
         Criterion::Envelope.name()
     );
     report.push(Diagnostic::new(title).at(criterion, expected));
-}
-
-/// What is wrong with one scenario, and whether it is the spin.
-fn violations(scenario: &Scenario) -> Vec<(Violation, bool)> {
-    let machine = scenario.machine.violations().into_iter().map(|violation| (violation, false));
-    machine.chain(scenario.spin.violations().into_iter().map(|violation| (violation, true))).collect()
 }
 
 /// The keys under which the numbers' places are kept.
@@ -136,36 +226,61 @@ pub(super) fn steps(draft: &Draft, report: &mut Report) {
     } else {
         return;
     };
-    let expected = format!("expected a step from {:e} s to {} s", end_s / MOST_STEPS, decimal(end_s));
+    let expected = format!("expected a step from {:e} s to {} s", shortest_step_s(end_s), decimal(end_s));
     let refusal = refuse_step(draft, title, &expected);
     report
         .push(draft.origins.get("time.end_s").into_iter().fold(refusal, |all, end| all.at(end, "and this")));
 }
 
-/// A fixed step with which some machine's fastest motion would grow without bounds, undamped bearings against their mass as
-/// a rule. Only a sound plan can be judged. The limit is sought at the grid's corners, on the machine at rest and turning at
-/// its greatest speed; a machine without equilibrium has none, and its rows will say so.
+/// A machine whose fastest motion is too fast for an explicit method: for any number of steps that is accepted, or
+/// for the plan's own step. Only a sound plan can be judged.
 pub(super) fn stability(draft: &Draft, report: &mut Report) {
-    let Integrator::Rk4 { step_s } = draft.plan.integrator else { return };
+    // As a share of the longest stable step: that which the method takes at its slowest.
+    let (step_s, share) = match draft.plan.integrator {
+        Integrator::Rk4 { step_s } => (Some(step_s), 1.0),
+        Integrator::Dopri5 { .. } => (None, 1.0),
+        // No rung costs more than the reference.
+        Integrator::Rk4MassScaled { .. } => (None, REFERENCE_SHARE),
+        // Stable at any step.
+        Integrator::Rodas5p { .. } => return,
+    };
     if !report.is_clean() {
         return;
     }
-    let Some(limit_s) = longest_stable_step_s(draft, step_s) else { return };
-    let title = format!(
-        "a step of {} s is past the stability limit of rk4 on this machine, {limit_s:.2e} s",
-        decimal(step_s)
-    );
-    let expected = format!("expected a step of at most {limit_s:.2e} s");
+    let frequency = highest_frequency_of_corners_rad_per_s(draft);
+    let limit_s = RK4_STABILITY_LIMIT / frequency;
+    let end_s = draft.plan.end_s;
     let axes = draft.plan.axes.iter().any(|axis| axis.values.len() > 1);
     let at = if axes { ", at the grid's hardest corner" } else { "" };
-    let frequency = RK4_STABILITY_LIMIT / limit_s;
-    report.push(refuse_step(draft, title, &expected).help(format!(
-        "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural frequency{at}"
-    )));
+    if share * limit_s < shortest_step_s(end_s) {
+        let title = format!(
+            "the machine is too stiff: an explicit method needs {:.1e} steps to {} s",
+            end_s / (share * limit_s),
+            decimal(end_s)
+        );
+        let place = ["integrator", "time.end_s"].into_iter().find_map(|key| draft.origins.get(key));
+        let refusal = place.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
+            diagnostic.at(at, format!("expected at most {MOST_STEPS:e} steps"))
+        });
+        report.push(refusal.help(format!(
+            "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mass, a moment of inertia or a \
+             stiffness that is not meant so, or use method = \"rodas5p\""
+        )));
+    } else if let Some(step_s) = step_s.filter(|&step_s| step_s > limit_s) {
+        let title = format!(
+            "a step of {} s is past the stability limit of rk4 on this machine, {limit_s:.2e} s",
+            decimal(step_s)
+        );
+        let expected = format!("expected a step of at most {limit_s:.2e} s");
+        report.push(refuse_step(draft, title, &expected).help(format!(
+            "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural frequency{at}"
+        )));
+    }
 }
 
-/// The longest stable step over the grid's corners, if `step_s` is longer.
-fn longest_stable_step_s(draft: &Draft, step_s: f64) -> Option<f64> {
+/// The highest natural frequency of any corner's machine, at rest and turning at its greatest speed. As a rule it is
+/// that of undamped bearings against their mass. A machine without equilibrium has none, and its rows will say so.
+fn highest_frequency_of_corners_rad_per_s(draft: &Draft) -> f64 {
     let plan = &draft.plan;
     let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
     let mut highest = 0.0_f64;
@@ -177,8 +292,7 @@ fn longest_stable_step_s(draft: &Draft, step_s: f64) -> Option<f64> {
             highest = highest.max(highest_frequency_rad_per_s(&point, speed).unwrap_or(0.0));
         }
     }
-    let limit_s = RK4_STABILITY_LIMIT / highest;
-    (step_s > limit_s).then_some(limit_s)
+    highest
 }
 
 /// A refusal of the step, pointing at it, or at the section that leaves it out.

@@ -54,7 +54,7 @@ impl Level {
 const REFERENCE_STEP_S: f64 = 2e-4;
 
 /// Share of the longest stable step that the reference method may use.
-const REFERENCE_SHARE: f64 = 0.75;
+pub(crate) const REFERENCE_SHARE: f64 = 0.75;
 
 /// Step of plain RK4 where it is run first, as a multiple of the reference's.
 const LONGER_STEP: f64 = 1.25;

@@ -6,7 +6,7 @@
 //!
 //! What a lane computes does not depend on its company, so neither does a row.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -54,11 +54,11 @@ const BELOW_ALL: usize = 0;
 #[derive(Default)]
 struct State {
     /// Rows on their way, by what the caller knows them by.
-    rows: HashMap<u64, Row>,
+    rows: BTreeMap<u64, Row>,
     /// Points that the feed has given.
     fed: u64,
     /// Rows that wait for a run, by its kind.
-    waiting: HashMap<Kind, Vec<u64>>,
+    waiting: BTreeMap<Kind, Vec<u64>>,
     /// What threads are at work on ([`above`]), one entry each.
     at_work: Vec<usize>,
     /// The feed has run dry.
@@ -114,7 +114,11 @@ impl Pool<'_> {
                     state.at_work.push(above(rung));
                     drop(state);
                     let points: Vec<&Point> = taken.iter().map(|(_, point)| point.as_ref()).collect();
-                    let runs = self.engine.runs(model, rung, &points);
+                    let runs = self.engine.runs(model, rung, &points, self.watch);
+                    // They may have been cut short.
+                    if self.watch.stopped() {
+                        break;
+                    }
                     let mut state = self.lock();
                     let mut rows = Vec::with_capacity(taken.len());
                     for ((position, _), run) in taken.iter().zip(runs) {

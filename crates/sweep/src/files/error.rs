@@ -50,15 +50,6 @@ pub enum FileError {
 const DAMAGED: &str = "the digest that it carries is not that of its bytes";
 
 impl FileError {
-    /// What is wrong, for a message that has named the file already.
-    pub(crate) fn reason(&self) -> String {
-        match self {
-            Self::Io { source, .. } => source.to_string(),
-            Self::Refused { reason, .. } | Self::NotParquet { reason, .. } => reason.clone(),
-            Self::Damaged { .. } => format!("it is damaged: {DAMAGED}"),
-        }
-    }
-
     pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_path_buf();
         move |source| Self::Io { action, path, source }

@@ -153,7 +153,7 @@ impl StoreError {
             | Self::NoRun { .. }
             | Self::Engine { .. }
             | Self::Parquet { .. }
-            | Self::Threads(ThreadsError::Start { .. }) => Exit::Failed,
+            | Self::Threads(ThreadsError::Start { .. } | ThreadsError::Random(_)) => Exit::Failed,
         }
     }
 }

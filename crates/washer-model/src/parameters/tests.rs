@@ -11,7 +11,7 @@ fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
     for parameter in Parameter::all(&Machine::paper(), &spin()) {
         let (mut machine, mut spin) = (Machine::paper(), spin());
         assert_eq!(Parameter::find(parameter.name(), &machine, &spin).as_ref(), Ok(&parameter));
-        if parameter.window_edge().is_some() {
+        if matches!(parameter.target(), Target::Window(_)) {
             assert_eq!(parameter.get(&machine, &spin), None);
             continue;
         }
@@ -122,8 +122,8 @@ fn numbers_beyond_the_machine_are_told_from_misspellings() {
         Err(UnknownParameter::TablePoint { count: 2 })
     );
     let edges = ["window_from_s", "window_to_s", "tub_mass_kg"];
-    let edges = edges.map(|name| Parameter::find(name, &machine, &table).unwrap().window_edge());
-    assert_eq!(edges, [Some(0), Some(1), None]);
+    let edges = edges.map(|name| Parameter::find(name, &machine, &table).unwrap().target());
+    assert_eq!(edges, [Target::Window(0), Target::Window(1), Target::Machine]);
 }
 
 #[test]

@@ -22,7 +22,7 @@ impl Point {
         };
         let mut greatest = [[0.0_f64; FOLLOWED]; 2];
         let mut difference = greatest;
-        for ((a, b), leg) in a.iter().zip(b).zip(&self.legs) {
+        for ((a, b), leg) in a.iter().zip(b).zip(&*self.legs) {
             for i in 0..FOLLOWED {
                 let (deviation, apart) = ((b[i] - rest[i]).abs(), (a[i] - b[i]).abs());
                 for place in 0..=usize::from(leg.in_window) {

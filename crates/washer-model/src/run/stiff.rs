@@ -1,6 +1,6 @@
 //! Trajectories by the stiff method: one at a time, its derivatives by lanes of dual numbers.
 
-use super::{Extra, Family, Method, ModelKind, OfLinear, OfNonlinear, Record, Run, Wanted};
+use super::{Extra, Family, Method, ModelKind, OfLinear, OfNonlinear, Record, Run, Stop, Wanted};
 use crate::coupling::Coupling;
 use crate::model::{Model, STATES};
 use crate::nonlinear::COORDINATES;
@@ -14,13 +14,16 @@ pub(super) fn simulate(
     tolerance: &Tolerance,
     points: &[&Point],
     wanted: Wanted,
-) -> (Vec<Record>, Vec<Extra>) {
+    stop: Stop<'_>,
+) -> Option<(Vec<Record>, Vec<Extra>)> {
     match model {
         ModelKind::Nonlinear => {
-            Simd::dispatch_narrow(Simulate::<OfNonlinear> { points, tolerance, wanted, family: PhantomData })
+            let family = PhantomData;
+            Simd::dispatch_narrow(Simulate::<OfNonlinear> { points, tolerance, wanted, stop, family })
         }
         ModelKind::Linear => {
-            Simd::dispatch_narrow(Simulate::<OfLinear> { points, tolerance, wanted, family: PhantomData })
+            let family = PhantomData;
+            Simd::dispatch_narrow(Simulate::<OfLinear> { points, tolerance, wanted, stop, family })
         }
     }
 }
@@ -29,16 +32,17 @@ struct Simulate<'a, F> {
     points: &'a [&'a Point],
     tolerance: &'a Tolerance,
     wanted: Wanted,
+    stop: Stop<'a>,
     family: PhantomData<F>,
 }
 
 impl<F: Family> Kernel for Simulate<'_, F> {
-    type Output = (Vec<Record>, Vec<Extra>);
+    type Output = Option<(Vec<Record>, Vec<Extra>)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let method = Method::Rodas5p(*self.tolerance);
-        let mut run = Run::<f64, F::Over<f64>>::new(N(0.0), self.points, &method);
+        let mut run = Run::<f64, F::Over<f64>>::new(N(0.0), self.points, &method, self.stop);
         run.record(N(0.0), self.wanted, F::KIND);
         let mut run = WithTangent::<T, _, F::Over<Dual<T>>>::new(zero, run, self.points[0]);
         rodas::integrate(&mut run, self.tolerance);
@@ -121,6 +125,10 @@ impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> Task<f64, STATES> for WithTangent<T, 
     #[inline(always)]
     fn observe(&mut self, forcing: &R::Forcing, step: &Step<'_, f64, STATES>) {
         self.task.observe(forcing, step);
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.task.is_stopped()
     }
 }
 

@@ -3,9 +3,10 @@
 use super::instruments::{paper, random_machine, random_spin};
 use crate::{
     Caps, Extra, Formula, Gear, Geared, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted,
-    prepare, simulate_with,
+    prepare, simulate_until, simulate_with,
 };
-use lane_ode::{Simd, Tolerance};
+use core::cell::Cell;
+use lane_ode::{STEPS_AT_ONCE, Simd, Tolerance};
 
 type Scenario = (Machine, Spin);
 
@@ -152,4 +153,54 @@ fn same_bits_in_any_company_quick_map() {
 #[test]
 fn same_bits_in_any_company_random_machines() {
     same_in_any_company(&random_machines());
+}
+
+/// A leg of more steps than are made at once, and in other lanes legs that end on the way.
+#[test]
+fn a_leg_is_cut_where_no_bit_shows_it() {
+    let timing = Timing { end_s: 1.0, window_s: [0.9, 1.0], checkpoints: 0 };
+    let spins = [2.0, 0.37, 0.11].map(|ramp_s| Spin::Triangular { peak_rpm: 350.0, ramp_s });
+    let scenarios: Vec<_> = spins.into_iter().map(|spin| (paper(0.4, 90.0), spin)).collect();
+    let simd = Simd::best();
+    let points: Vec<_> = prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
+    let all: Vec<_> = points.iter().collect();
+    let dop853 = Method::Geared(Geared::steady(Formula::Dop853, 2e-5, CAPS));
+    for method in [Method::Rk4 { step_s: 2e-5 }, dop853] {
+        for model in MODELS {
+            let together = simulate_with(simd, model, &method, &all, EVERYTHING);
+            assert!(together.0[0].steps > 3 * STEPS_AT_ONCE, "{} steps", together.0[0].steps);
+            for (k, point) in all.iter().enumerate() {
+                let alone = simulate_with(simd, model, &method, &[point], EVERYTHING);
+                let expected = bits((&together.0[k], &together.1[k]));
+                assert_eq!(bits((&alone.0[0], &alone.1[0])), expected, "{model:?} by {method:?}, {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_stop_is_answered_within_a_leg_by_every_method() {
+    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
+    let scenario = (paper(0.4, 90.0), Spin::Ramp { peak_rpm: 350.0, ramp_s: 1.0 });
+    let point = prepare(Simd::best(), &[scenario], &timing).remove(0).unwrap();
+    let tolerance = Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000 };
+    let dop853 = Method::Geared(Geared::steady(Formula::Dop853, 2e-5, CAPS));
+    let stiff = Method::Rodas5p(tolerance);
+    for method in [Method::Rk4 { step_s: 2e-5 }, dop853, Method::Dopri5(tolerance), stiff] {
+        for model in MODELS {
+            let asked = Cell::new(0);
+            let until = |most: u32| {
+                asked.set(0);
+                let stop = || {
+                    asked.set(asked.get() + 1);
+                    asked.get() > most
+                };
+                simulate_until(Simd::best(), model, &method, &[&point], Wanted::default(), &stop)
+            };
+            assert!(until(u32::MAX).is_some_and(|(records, _)| records[0].failure.is_none()));
+            assert!(asked.get() > 3, "{model:?} by {method:?} asks {} times", asked.get());
+            assert_eq!(until(2), None, "{model:?} by {method:?}");
+            assert_eq!(asked.get(), 3, "{model:?} by {method:?}");
+        }
+    }
 }

@@ -6,7 +6,7 @@ use crate::floating::Floating;
 use crate::nonlinear::{COORDINATES, Half, Halves, halves};
 use crate::point::Point;
 use crate::spin::SpinState;
-use crate::{Machine, Parameter, Source, Spin, Timing, prepare};
+use crate::{Machine, Parameter, Spin, Target, Timing, prepare};
 use lane_ode::{N, Real, Simd};
 
 /// Fig. 12's spin.
@@ -27,9 +27,8 @@ pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
     loop {
         let (mut machine, mut spin) = (Machine::paper(), triangular());
         for parameter in Parameter::all(&machine, &spin) {
-            let value = parameter.get(&machine, &spin);
-            if let (Some(value), false) =
-                (value, parameter.writes_several() || parameter.source() == Source::Grid)
+            if parameter.target() == Target::Machine
+                && let Some(value) = parameter.get(&machine, &spin)
             {
                 parameter.set(&mut machine, &mut spin, value * (0.8 + 0.4 * rng.f64()));
             }

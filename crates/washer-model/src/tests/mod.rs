@@ -8,5 +8,6 @@ mod expansion;
 mod extras;
 mod findings;
 mod instruments;
+mod long_tables;
 mod mass;
 mod observation;

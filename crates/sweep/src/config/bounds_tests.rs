@@ -1,0 +1,185 @@
+//! What is too much: each bound at its edge, and that what is within it is checked at once.
+
+use std::fmt::Write as _;
+
+use proptest::prelude::*;
+
+use super::tests::{SMALLEST, load_text};
+use super::*;
+use crate::estimate::Estimate;
+
+/// A grid whose spin is a table of so many rows.
+fn with_a_table(rows: usize, more: &str) -> String {
+    let column = |of: fn(usize) -> f64| {
+        (0..rows).fold(String::new(), |mut text, k| {
+            let _ = write!(text, "{},", of(k));
+            text
+        })
+    };
+    let (times, speeds) = (column(|k| k as f64 / 64.0), column(|k| (k % 100) as f64));
+    format!(
+        "[spin]\nprofile = \"table\"\ntime_s = [{times}]\nspeed_rpm = [{speeds}]\n\
+         [time]\nend_s = 320\n{more}"
+    )
+}
+
+/// A grid beside a list of points.
+fn load_list(grid: &str, list: &str) -> Result<Plan, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grid.toml");
+    std::fs::write(folder.path().join("points.csv"), list).unwrap();
+    let design = "[design]\nmethod = \"list\"\nfile = \"points.csv\"\n";
+    std::fs::write(&path, format!("{grid}{design}")).unwrap();
+    load(&path, &[]).map_err(|diagnostics| diagnostics.to_string())
+}
+
+#[test]
+fn a_spin_of_as_many_rows_as_allowed_is_checked_and_one_more_is_refused() {
+    // Seven axes more: 128 corners, at each of which the machine and the whole table are looked at.
+    let masses = ["tub_mass_kg", "shaft_mass_kg", "drum_mass_kg", "unbalance_mass_kg"];
+    let range = "range = { from = 1, to = 2, count = 2 }\n";
+    let axis = |name: &str| format!("[[axis]]\nparameter = \"{name}\"\n{range}");
+    let mut axes: String = masses.map(axis).concat();
+    axes.push_str(&axis("damping_n_s_per_m"));
+    axes.push_str(&axis("spin_table_2_speed_rpm"));
+    let plan = load_text(with_a_table(spin::MOST_ROWS, &axes), &[]).unwrap();
+    assert_eq!(plan.corners(), 64);
+    let refused = load_text(with_a_table(spin::MOST_ROWS + 1, &axes), &[]).unwrap_err();
+    assert!(refused.contains("`time_s` has 20001 numbers"), "{refused}");
+    assert!(refused.contains("at most 20000"), "{refused}");
+    assert!(!refused.contains("is empty"), "{refused}");
+}
+
+#[test]
+fn a_list_of_millions_of_points_is_checked() {
+    // A wrong one among them is found, in the last row.
+    let mut list = "spring_1_cabinet_x_m,shaft_mass_kg\n".to_owned();
+    list.push_str(&"0.1,1e0\n".repeat(3_000_000));
+    let plan = load_list(SMALLEST, &list).unwrap();
+    assert_eq!((plan.points(), plan.some_corners().len()), (3_000_000, 256));
+    list.push_str("0.1,0\n");
+    let refused = load_list(SMALLEST, &list).unwrap_err();
+    assert!(refused.contains("points.csv:3000002:5"), "{refused}");
+    assert!(refused.contains("value 3000001"), "{refused}");
+}
+
+#[test]
+fn points_that_would_take_minutes_to_check_are_refused() {
+    let mut list = "spin_table_2_speed_rpm\n".to_owned();
+    list.push_str(&"5\n".repeat(50_001));
+    let refused = load_list(&with_a_table(20_000, ""), &list).unwrap_err();
+    assert!(refused.contains("50001") && refused.contains("at most 50000 points"), "{refused}");
+    // The same points do not touch the table: nothing is to be judged again.
+    let list = list.replace("spin_table_2_speed_rpm", "tub_mass_kg");
+    assert_eq!(load_list(&with_a_table(20_000, ""), &list).unwrap().points(), 50_001);
+}
+
+/// The grid with a tub so light that its dampers make it stiff.
+fn light(tub_mass_kg: f64, end_s: f64, integrator: &str) -> Result<Plan, String> {
+    let grid = SMALLEST.replace("end_s = 50", &format!("end_s = {end_s}"));
+    let set = format!("[set]\ntub_mass_kg = {tub_mass_kg:e}\n");
+    load_text(format!("{grid}{set}[integrator]\n{integrator}\n"), &[])
+}
+
+#[test]
+fn a_machine_too_stiff_for_any_number_of_steps_is_refused_by_every_explicit_method() {
+    for method in ["rk4-mass-scaled", "dopri5", "rk4"] {
+        let refused = light(1e-9, 50.0, &format!("method = \"{method}\"")).unwrap_err();
+        assert!(refused.contains("the machine is too stiff"), "{refused}");
+        assert!(refused.contains("rodas5p"), "{refused}");
+    }
+    assert!(light(1e-9, 50.0, "method = \"rodas5p\"").is_ok());
+    assert!(light(1e-6, 1.0, "method = \"rk4-mass-scaled\"").is_ok());
+}
+
+#[test]
+fn a_stiff_machine_that_is_accepted_is_estimated_from_a_beginning() {
+    for method in ["rk4-mass-scaled", "dopri5"] {
+        let plan = light(1e-6, 10.0, &format!("method = \"{method}\"")).unwrap();
+        let estimate = Estimate::of(&plan, 1).unwrap();
+        assert!(estimate.sampled_s < 1.0, "{estimate:?}");
+    }
+}
+
+#[test]
+fn a_wrong_choice_hides_no_mistake_beside_it() {
+    let refused = |text: &str, parts: &[&str]| {
+        let refused = load_text(text, &[]).unwrap_err();
+        for part in parts {
+            assert!(refused.contains(part), "no {part} in\n{refused}");
+        }
+    };
+    refused(
+        "[spin]\nprofile = \"sinus\"\npeak_rpm = \"fast\"\nramp_s = -1\nspeed = 3\n\
+         [time]\nend_s = 50\n",
+        &["unknown profile", "`peak_rpm` has the wrong type", "`ramp_s` = -1", "key `speed`"],
+    );
+    refused(
+        &format!(
+            "{SMALLEST}[integrator]\nmethod = \"euler\"\nstep_s = 0\n\
+             rtol = \"small\"\norder = 1\n"
+        ),
+        &["unknown method", "`step_s` = 0", "`rtol` has the wrong type", "unknown key `order`"],
+    );
+    refused(
+        &format!("{SMALLEST}[design]\nmethod = \"halton\"\npoints = 0\nseed = -1\nskip = 3\n"),
+        &["unknown method", "`points` = 0", "`seed` = -1", "unknown key `skip`"],
+    );
+}
+
+#[test]
+fn a_range_without_room_for_its_values_is_refused() {
+    let load = |from: f64, to: f64, count: u64, spacing: &str| {
+        let ends = format!("from = {from:?}, to = {to:?}");
+        let range = format!("{{ {ends}, count = {count}, spacing = \"{spacing}\" }}");
+        let axis = format!("[[axis]]\nparameter = \"tub_mass_kg\"\nrange = {range}\n");
+        load_text(format!("{SMALLEST}{axis}"), &[])
+    };
+    let close = 1.0 + 2.0 * f64::EPSILON;
+    for spacing in ["linear", "log"] {
+        let refused = load(1.0, close, 5, spacing).unwrap_err();
+        assert!(refused.contains("has no 5 different values"), "{refused}");
+        assert!(refused.contains("at most 2"), "{refused}");
+        assert_eq!(load(1.0, close, 2, spacing).unwrap().points(), 2);
+        assert_eq!(load(1.0, 2.0, 1_000_000_000_000, spacing).unwrap().points(), 1_000_000_000_000);
+    }
+    let design = "[design]\nmethod = \"sobol\"\npoints = 1024\n\
+        [[axis]]\nparameter = \"tub_mass_kg\"\n";
+    let range = format!("range = {{ from = 1.0, to = {close:?} }}\n");
+    let refused = load_text(format!("{SMALLEST}{design}{range}"), &[]).unwrap_err();
+    assert!(refused.contains("has no 1024 different values"), "{refused}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 200,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn values_of_a_range_that_is_accepted_are_all_different(
+        from in 1e-6_f64..1e6,
+        ulps in 1_u64..400,
+        count in 2_u64..60,
+        down in any::<bool>(),
+        log in any::<bool>(),
+    ) {
+        let to = f64::from_bits(from.to_bits() + ulps);
+        let (from, to) = if down { (to, from) } else { (from, to) };
+        let spacing = if log { "log" } else { "linear" };
+        let ends = format!("from = {from:?}, to = {to:?}");
+        let range = format!("{{ {ends}, count = {count}, spacing = \"{spacing}\" }}");
+        let grid = format!("{SMALLEST}[[axis]]\nparameter = \"tub_mass_kg\"\nrange = {range}\n");
+        match load_text(grid, &[]) {
+            Ok(plan) => {
+                let values: Vec<f64> = (0..count).map(|i| plan.axes[0].values.value(i)).collect();
+                let ordered = |pair: &[f64]| (pair[0] > pair[1]) == down && pair[0] != pair[1];
+                prop_assert!(values.windows(2).all(ordered), "{values:?}");
+            }
+            Err(refused) => {
+                prop_assert!(refused.contains("different values") && count > 2, "{refused}");
+            }
+        }
+    }
+}

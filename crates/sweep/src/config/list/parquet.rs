@@ -1,0 +1,101 @@
+//! Parquet files of numbers. The library trusts a file's own account of its sizes, so that is
+//! checked first.
+
+use bytes::Bytes;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::basic::Compression;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::ParquetMetaData;
+
+use super::{LONGEST_BYTES, MOST_COLUMNS, Unreadable, fits, pages};
+use crate::{cells, panics};
+
+/// How a list may be compressed, for a message.
+pub(super) const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
+
+/// Rows that are decoded at a time.
+const BATCH_ROWS: usize = 8192;
+
+/// Names and values of the columns.
+pub(super) fn columns(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
+    let panicked = |panic| Err(Unreadable::Damaged(format!("it makes no sense inside: {panic}")));
+    panics::caught(|| read(bytes.into())).unwrap_or_else(panicked)
+}
+
+fn read(bytes: Bytes) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(bytes.clone()).map_err(damaged)?;
+    let fields = builder.schema().fields().clone();
+    if fields.len() > MOST_COLUMNS {
+        return Err(Unreadable::TooManyColumns(fields.len()));
+    }
+    if let Some(field) = fields.iter().find(|field| !cells::is_number(field.data_type())) {
+        let found = field.data_type().to_string();
+        return Err(Unreadable::NotNumbers { column: field.name().clone(), found });
+    }
+    check_sizes(builder.metadata(), &bytes, fields.len())?;
+    let mut columns: Vec<(String, Vec<f64>)> =
+        fields.iter().map(|field| (field.name().clone(), Vec::new())).collect();
+    let mut rows = 0;
+    for batch in builder.with_batch_size(BATCH_ROWS).build().map_err(damaged)? {
+        let batch = batch.map_err(|error| damaged(error.into()))?;
+        fits((rows + batch.num_rows()) as u64, columns.len())?;
+        for ((name, values), array) in columns.iter_mut().zip(batch.columns()) {
+            let numbers = cells::numbers(array).map_err(|error| damaged(error.into()))?;
+            for (k, value) in numbers.into_iter().enumerate() {
+                let no_value = || Unreadable::NoValue { column: name.clone(), row: rows + k + 1 };
+                values.push(value.ok_or_else(no_value)?);
+            }
+        }
+        rows += batch.num_rows();
+    }
+    Ok(columns)
+}
+
+/// Refuses what could not be held, or not be unpacked, before any of it is.
+fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Result<(), Unreadable> {
+    let (mut rows, mut unpacked) = (0_u64, 0_u64);
+    for group in metadata.row_groups() {
+        rows = rows.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX));
+        fits(rows, columns)?;
+        for column in group.columns() {
+            let codec = column.compression();
+            if !is_readable(codec) {
+                let name = column.column_path().string();
+                // Its level, in brackets, is nothing to a reader.
+                let codec = codec.to_string();
+                let codec = codec.split('(').next().unwrap_or_default().to_lowercase();
+                return Err(Unreadable::Codec { column: name, codec });
+            }
+            let (start, length) = column.byte_range();
+            let within = |end: u64| {
+                let (start, end) = (usize::try_from(start).ok()?, usize::try_from(end).ok()?);
+                bytes.get(start..end)
+            };
+            let outside = || Unreadable::Damaged("a column lies outside of it".to_owned());
+            let chunk = start.checked_add(length).and_then(within).ok_or_else(outside)?;
+            unpacked = unpacked.saturating_add(pages::unpacked_bytes(chunk, codec)?);
+            if unpacked > LONGEST_BYTES {
+                return Err(Unreadable::TooLongUnpacked);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What the features of `parquet` in the workspace's Cargo.toml are for.
+const fn is_readable(codec: Compression) -> bool {
+    match codec {
+        Compression::UNCOMPRESSED
+        | Compression::SNAPPY
+        | Compression::ZSTD(_)
+        | Compression::GZIP(_)
+        | Compression::LZ4_RAW => true,
+        Compression::BROTLI(_) | Compression::LZ4 | Compression::LZO => false,
+    }
+}
+
+fn damaged(error: ParquetError) -> Unreadable {
+    let text = error.to_string();
+    let reason = text.strip_prefix("Parquet error: ").unwrap_or(&text);
+    Unreadable::Damaged(reason.trim().to_owned())
+}

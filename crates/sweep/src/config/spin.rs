@@ -1,0 +1,199 @@
+//! `[spin]`: the profiles by name, and how each is read and described.
+
+use washer_model::{Range, Spin, decimal};
+
+use super::origins::Origins;
+use super::report::{Diagnostic, Report};
+use super::section::{Section, listed};
+use super::{machine, parameters};
+
+/// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are
+/// made ready together.
+pub(super) const MOST_ROWS: usize = 20_000;
+
+/// A profile that a peak and a ramp give.
+pub(super) struct Ramped {
+    pub(super) name: &'static str,
+    pub(super) description: &'static str,
+    make: fn(f64, f64) -> Spin,
+}
+
+/// The profiles that a peak and a ramp give.
+pub(super) const RAMPED: [Ramped; 3] = [
+    Ramped {
+        name: "cycloidal",
+        description: "smooth run-up, then constant",
+        make: |peak_rpm, ramp_s| Spin::Cycloidal { peak_rpm, ramp_s },
+    },
+    Ramped {
+        name: "triangular",
+        description: "linear up, and as long down",
+        make: |peak_rpm, ramp_s| Spin::Triangular { peak_rpm, ramp_s },
+    },
+    Ramped {
+        name: "ramp",
+        description: "linear up, then constant",
+        make: |peak_rpm, ramp_s| Spin::Ramp { peak_rpm, ramp_s },
+    },
+];
+
+/// The profile that is given as a table.
+pub(super) const TABLE: &str = "table";
+
+/// A spin's profile.
+pub(super) const fn name(spin: &Spin) -> &'static str {
+    match spin {
+        Spin::Cycloidal { .. } => RAMPED[0].name,
+        Spin::Triangular { .. } => RAMPED[1].name,
+        Spin::Ramp { .. } => RAMPED[2].name,
+        Spin::Table { .. } => TABLE,
+    }
+}
+
+/// What `profile` says.
+#[derive(Clone, Copy)]
+enum Profile {
+    Ramped(&'static Ramped),
+    Table,
+    /// None that there is: its numbers are still checked.
+    Unknown,
+}
+
+impl Profile {
+    fn of(choice: Option<usize>) -> Self {
+        match choice {
+            None => Self::Unknown,
+            Some(choice) => RAMPED.get(choice).map_or(Self::Table, Self::Ramped),
+        }
+    }
+}
+
+pub(super) fn read(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> Spin {
+    // Stands in for a wrong spin, so that axes over its numbers are still known.
+    let stand_in = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+    let field = root.table("spin", "[spin]", report);
+    let section = root.require(field, "spin", "a section [spin]", report);
+    let Some(section) = section else { return stand_in };
+    let mut section = section.value;
+    let [cycloidal, triangular, ramp] = RAMPED.map(|profile| profile.name);
+    let profiles = [cycloidal, triangular, ramp, TABLE];
+    let field = section.choice("profile", &profiles, report);
+    let profile = section.require(field, "profile", &listed(&profiles), report);
+    let profile = Profile::of(profile.map(|profile| profile.value));
+    match profile {
+        Profile::Ramped(Ramped { name, .. }) => {
+            let reason = format!("only the profile \"{TABLE}\" has it, not \"{name}\"");
+            section.misplace(&["time_s", "speed_rpm"], &reason);
+        }
+        Profile::Table => {
+            let reason = "a table gives `time_s` and `speed_rpm` instead";
+            section.misplace(&["peak_rpm", "ramp_s"], reason);
+        }
+        Profile::Unknown => {}
+    }
+    let mut reader = Reader::new(&mut section, profile, &stand_in, origins, report);
+    let spin = match profile {
+        Profile::Ramped(Ramped { make, .. }) => {
+            reader.ramped().map(|[peak_rpm, ramp_s]| make(peak_rpm, ramp_s))
+        }
+        Profile::Table => reader.table(),
+        Profile::Unknown => {
+            reader.ramped();
+            reader.table();
+            None
+        }
+    };
+    section.finish(report);
+    spin.unwrap_or_else(|| match profile {
+        Profile::Table => {
+            // What is wrong with the table has been said; that the stand-in has no rows is not it.
+            origins.doubt("spin.time_s".to_owned());
+            machine::no_spin()
+        }
+        Profile::Ramped(_) | Profile::Unknown => stand_in,
+    })
+}
+
+struct Reader<'r, 'a> {
+    section: &'r mut Section<'a>,
+    profile: Profile,
+    stand_in: &'r Spin,
+    origins: &'r mut Origins,
+    report: &'r mut Report,
+}
+
+impl<'r, 'a> Reader<'r, 'a> {
+    fn new(
+        section: &'r mut Section<'a>,
+        profile: Profile,
+        stand_in: &'r Spin,
+        origins: &'r mut Origins,
+        report: &'r mut Report,
+    ) -> Self {
+        Self { section, profile, stand_in, origins, report }
+    }
+
+    fn must_be_there(&self) -> bool {
+        !matches!(self.profile, Profile::Unknown)
+    }
+
+    /// Peak and ramp.
+    fn ramped(&mut self) -> Option<[f64; 2]> {
+        let peak_rpm = self.number("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm");
+        let ramp_s = self.number("ramp_s", "spin_ramp_s", "the duration of the run-up in s");
+        Some([peak_rpm?, ramp_s?])
+    }
+
+    fn number(&mut self, key: &'static str, parameter: &str, expected: &str) -> Option<f64> {
+        let range = parameters::range(parameter, self.stand_in);
+        let field = self.section.number(key, range, self.report);
+        let found = if self.must_be_there() {
+            self.section.require(field, key, expected, self.report)?
+        } else {
+            field.given()?
+        };
+        self.origins.put(parameter.to_owned(), found.at);
+        Some(found.value)
+    }
+
+    fn table(&mut self) -> Option<Spin> {
+        let time_s = self.column("time_s", Range::NonNegative);
+        let speed_rpm = self.column("speed_rpm", Range::Any);
+        Some(Spin::Table { time_s: time_s?, speed_rpm: speed_rpm? })
+    }
+
+    fn column(&mut self, key: &'static str, range: Range) -> Option<Vec<f64>> {
+        let field = self.section.numbers(key, range, self.report);
+        let found = if self.must_be_there() {
+            self.section.require(field, key, "an array of numbers", self.report)?
+        } else {
+            field.given()?
+        };
+        if found.value.len() > MOST_ROWS {
+            let title = format!("`{key}` has {} numbers", decimal(found.value.len() as f64));
+            let expected = format!("expected at most {MOST_ROWS}");
+            let refusal = Diagnostic::new(title).at(&found.at, expected);
+            self.report.push(refusal.help("leave out rows between which the speed is linear"));
+            return None;
+        }
+        self.origins.put(format!("spin.{key}"), found.at);
+        let mut values = Vec::with_capacity(found.value.len());
+        for (k, entry) in found.value.into_iter().enumerate() {
+            self.origins.put(format!("spin.{key}[{k}]"), entry.at);
+            values.push(entry.value);
+        }
+        Some(values)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_profile_has_one_name() {
+        for Ramped { name, make, .. } in &RAMPED {
+            assert_eq!(super::name(&make(350.0, 50.0)), *name);
+        }
+    }
+}

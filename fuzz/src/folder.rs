@@ -1,0 +1,8 @@
+//! `targets/folder.rs` under libFuzzer.
+
+#![no_main]
+
+#[path = "targets/folder.rs"]
+mod target;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| target::run(bytes));

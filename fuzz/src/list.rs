@@ -1,0 +1,8 @@
+//! `targets/list.rs` under libFuzzer.
+
+#![no_main]
+
+#[path = "targets/list.rs"]
+mod target;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| target::run(bytes));

@@ -1,0 +1,151 @@
+//! Any bytes in place of one file of an unfinished run: the run is refused, or goes on and ends in
+//! a result whose bytes are those of the undisturbed one, unless the file is a chunk that passes
+//! for one.
+//!
+//! The first byte of an input says which file it is for. A chunk gets the right header and the
+//! right hash, so that the fuzzer has records to change.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use sweep::engine::ModelEngine;
+use sweep::interrupt::Interrupt;
+use sweep::plan::Plan;
+use sweep::progress::Mode;
+use sweep::run::{self, Ended, RunOptions};
+use sweep::store::{Job, Opened, Options, Run, Shard, ShardRequest, status};
+use tempfile::TempDir;
+
+/// Bytes of a chunk before its records, and of the hash behind them.
+const HEADER: usize = 72;
+const HASH: usize = 32;
+
+const NAMES: [&str; 7] = [
+    "plan.json",
+    "shards.json",
+    "lock",
+    "session-x-1-1.json",
+    "shard-1.lock",
+    CHUNK,
+    // Beside the folder.
+    "../x.run.json",
+];
+const CHUNK: &str = "chunk-00000000.bin";
+
+/// Tries one input; a panic is a finding.
+pub(crate) fn run(bytes: &[u8]) {
+    let Some((which, content)) = bytes.split_first() else { return };
+    let home = home();
+    let name = NAMES[usize::from(*which) % NAMES.len()];
+    let content = if name == CHUNK { as_chunk(content, &home.chunk) } else { content.to_vec() };
+    let partial = home.folder.path().join("x.parquet.partial");
+    reset(home, &partial);
+    fs::write(partial.join(name), &content).expect("the input is written");
+
+    let job = Job::of(&home.plan);
+    let output = home.folder.path().join("x.parquet");
+    // Looking changes nothing, whatever it finds.
+    let _ = status(&output, &job);
+    assert_eq!(fs::read(partial.join(name)).expect("the input is there"), content);
+    let mut opened = match Run::open(&output, &job, options()) {
+        Ok(Opened::Run(opened)) => opened,
+        Ok(Opened::Finished(..)) => panic!("there is no result"),
+        Err(error) => {
+            assert!(error.to_string().contains("x."), "{error}");
+            return;
+        }
+    };
+    match opened.join(&job, &|| false) {
+        Ok(tally) => {
+            let tally = tally.expect("nobody stops it");
+            assert_eq!(tally.points, home.plan.points());
+            let result = fs::read(&output).expect("there is a result");
+            assert!(name == CHUNK || result == home.result, "{name} has changed the result");
+            let _ = opened.complete(&job, tally, None);
+        }
+        Err(error) => assert!(name == CHUNK, "{name}: {error}"),
+    }
+}
+
+fn options() -> Options<'static> {
+    Options { fresh: false, shard: None, environment: &|_| None }
+}
+
+/// The records of an input between a right header and a right hash.
+fn as_chunk(records: &[u8], chunk: &[u8]) -> Vec<u8> {
+    let length = chunk.len() - HEADER - HASH;
+    let mut bytes = chunk[..HEADER].to_vec();
+    bytes.extend(records.iter().copied().chain(std::iter::repeat(0)).take(length));
+    let hash = blake3::hash(&bytes);
+    bytes.extend_from_slice(hash.as_bytes());
+    bytes
+}
+
+struct Home {
+    folder: TempDir,
+    plan: Plan,
+    /// Files of the whole run's folder, before it is joined.
+    files: Vec<(String, Vec<u8>)>,
+    chunk: Vec<u8>,
+    result: Vec<u8>,
+}
+
+/// Puts everything back as an undisturbed run leaves it before its join.
+fn reset(home: &Home, partial: &Path) {
+    for file in ["x.parquet", "x.run.json"] {
+        let _ = fs::remove_file(home.folder.path().join(file));
+    }
+    let _ = fs::remove_dir_all(partial);
+    fs::create_dir(partial).expect("the folder is made");
+    for (name, bytes) in &home.files {
+        fs::write(partial.join(name), bytes).expect("a file is written");
+    }
+}
+
+fn home() -> &'static Home {
+    static HOME: OnceLock<Home> = OnceLock::new();
+    HOME.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let grid = folder.path().join("g.toml");
+        let text = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\n\
+            time = { end_s = 1e-3 }\n\
+            integrator = { method = \"rk4\", step_s = 1e-4 }\n\
+            reliability = { channels = [\"tub_yaw\"] }\n\
+            [[axis]]\nparameter = \"unbalance_mass_kg\"\n\
+            range = { from = 0.1, to = 0.9, count = 10 }\n";
+        fs::write(&grid, text).expect("the grid is written");
+        let plan = sweep::config::load(&grid, &[]).expect("the grid is right");
+        let output = folder.path().join("x.parquet");
+        let go = |shard| {
+            let options = RunOptions {
+                threads: 1,
+                fresh: false,
+                shard,
+                progress: Mode::None,
+                environment: &|_| None,
+                tell: &|_| {},
+            };
+            let engine = ModelEngine::new(&plan).expect("there is an engine");
+            run::run(&engine, &Job::of(&plan), &output, options, &Interrupt::new())
+                .expect("the run ends")
+                .ended
+        };
+        // A shard of one leaves its folder.
+        let shard = Some(ShardRequest::Given(Shard { index: 1, of: 1 }));
+        assert!(matches!(go(shard), Ended::Shard(_)));
+        let partial = folder.path().join("x.parquet.partial");
+        let names = fs::read_dir(&partial).expect("the folder is there");
+        let files: Vec<(String, Vec<u8>)> = names
+            .map(|entry| entry.expect("an entry").path())
+            .map(|path: PathBuf| {
+                let name = path.file_name().and_then(|name| name.to_str()).expect("UTF-8");
+                (name.to_owned(), fs::read(&path).expect("a file is read"))
+            })
+            .collect();
+        assert!(matches!(go(None), Ended::Finished(_)));
+        let result = fs::read(&output).expect("there is a result");
+        let (_, chunk) = files.iter().find(|(name, _)| name == CHUNK).expect("there is a chunk");
+        Home { chunk: chunk.clone(), plan, files, result, folder }
+    })
+}
