@@ -3,8 +3,8 @@
 #![cfg(unix)]
 
 use std::fs;
-use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 use crate::{signal, sweep_binary};
 
@@ -94,20 +94,90 @@ fn what_cannot_be_traced_is_refused_before_any_work() {
     assert!(!folder.path().join("results").exists());
 }
 
+/// Bytes of the points that a search on `x.parquet` has kept.
+fn kept(folder: &tempfile::TempDir) -> u64 {
+    fs::metadata(folder.path().join("x.parquet.partial/trials.bin")).map_or(0, |found| found.len())
+}
+
+/// Starts a search and waits until it has kept more points than were there.
+fn at_work(folder: &tempfile::TempDir, search: &mut Command) -> Child {
+    let (there, began) = (kept(folder), Instant::now());
+    let child = search.stderr(Stdio::piped()).spawn().expect("it starts");
+    while kept(folder) <= there {
+        assert!(began.elapsed() < Duration::from_secs(60), "no points are kept");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child
+}
+
+fn names(folder: &tempfile::TempDir) -> Vec<String> {
+    let names = fs::read_dir(folder.path()).expect("the folder is there");
+    let mut names: Vec<_> =
+        names.map(|name| name.expect("a name").file_name().into_string().expect("UTF-8")).collect();
+    names.sort();
+    names
+}
+
 #[test]
-fn an_interrupt_leaves_nothing_half_written() {
-    // Long enough that the signal comes in the middle, on any machine.
-    let folder = folder_with("200");
-    let child = boundary(&folder, &["--out", "x.parquet"]).stderr(Stdio::piped()).spawn().expect("it starts");
-    std::thread::sleep(Duration::from_millis(500));
-    signal("INT", child.id());
-    let done = child.wait_with_output().expect("it ends");
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert_eq!(done.status.code(), Some(130), "{said}");
-    assert!(said.contains("nothing was written"), "{said}");
-    let left: Vec<_> = fs::read_dir(folder.path())
-        .expect("the folder is there")
-        .map(|entry| entry.expect("an entry").file_name())
-        .collect();
-    assert_eq!(left, ["grid.toml"]);
+fn an_interrupted_search_goes_on_and_ends_in_the_same_bytes() {
+    // Long enough that the signals come in the middle, on any machine.
+    let folder = folder_with("10");
+    let arguments = ["--threads", "1", "--lattice", "11", "--progress", "none", "--out"];
+    let search = |out: &str| boundary(&folder, &[&arguments, &[out][..]].concat());
+    let undisturbed = search("whole.parquet").output().expect("it starts");
+    let said = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(undisturbed.status.code(), Some(0), "{}", said(&undisturbed));
+    for (name, code) in [("INT", 130), ("TERM", 143)] {
+        let child = at_work(&folder, &mut search("x.parquet"));
+        signal(name, child.id());
+        let done = child.wait_with_output().expect("it ends");
+        assert_eq!(done.status.code(), Some(code), "{}", said(&done));
+        assert!(said(&done).contains("points kept"), "{}", said(&done));
+        assert_eq!(names(&folder), ["grid.toml", "whole.parquet", "x.parquet.partial"]);
+    }
+    // Killed where nothing can be said any more.
+    let mut child = at_work(&folder, &mut search("x.parquet"));
+    child.kill().expect("it is killed");
+    child.wait().expect("it ends");
+    let other = boundary(&folder, &["--lattice", "2", "--out", "x.parquet"]).output().expect("it starts");
+    assert_eq!(other.status.code(), Some(2), "{}", said(&other));
+    assert!(said(&other).contains("/boundary/lattice: was 11, is 2"), "{}", said(&other));
+    let done = search("x.parquet").output().expect("it starts");
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    assert!(said(&done).contains("going on: "), "{}", said(&done));
+    let bytes = |name: &str| fs::read(folder.path().join(name)).expect("there is a file");
+    assert!(bytes("x.parquet") == bytes("whole.parquet"), "other bytes");
+    assert_eq!(names(&folder), ["grid.toml", "whole.parquet", "x.parquet"]);
+}
+
+#[test]
+fn a_boundary_of_another_plan_is_not_written_over_unasked() {
+    let folder = folder_with("0.1");
+    let trace = |more: &[&str]| {
+        let arguments = [&["--lattice", "1", "--out", "x.parquet"][..], more].concat();
+        let done = boundary(&folder, &arguments).output().expect("it starts");
+        (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
+    };
+    let bytes = || fs::read(folder.path().join("x.parquet")).expect("there is a file");
+    let (code, said) = trace(&[]);
+    assert_eq!(code, Some(0), "{said}");
+    let first = bytes();
+    let (code, said) = trace(&[]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("is there already"), "{said}");
+    for (more, expected) in [
+        (["--tolerance", "3"], "/boundary/tolerance: was 0.5, is 3"),
+        (["--quantity", "min_gap_linear_m"], "/boundary/quantity: was"),
+        (["--set", "tub_mass_kg=31"], "/machine/tub/mass_kg: was"),
+    ] {
+        let (code, said) = trace(&more);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains("already holds the result of another plan"), "{said}");
+        assert!(said.contains(expected) && said.contains("--fresh"), "{said}");
+        assert!(bytes() == first, "{more:?}");
+    }
+    let (code, said) = trace(&["--quantity", "min_gap_linear_m", "--fresh"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(bytes() != first);
+    assert_eq!(names(&folder), ["grid.toml", "x.parquet"]);
 }

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use lane_ode::Simd;
-use washer_model::{Cases, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
+use washer_model::{Cases, Formula, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
 
 /// As many as the widest lanes hold.
 const TRAJECTORIES: usize = 8;
@@ -108,7 +108,7 @@ fn methods(rounds: usize) {
     let corners = [0, 32, last - 32, last].map(|corner| (&points[corner], &spin));
     let cases = Cases::new(corners, end_s);
     let fast = |accuracy| {
-        let geared = cases.choose(accuracy).expect("the paper's machine has modes");
+        let geared = cases.choose(Formula::Dop853, accuracy).expect("the paper's machine has modes");
         Method::Geared(geared.expect("its bearings are stiff"))
     };
     let methods = [

@@ -129,15 +129,18 @@ impl<'a> ModelEngine<'a> {
     #[must_use]
     pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
         let interrupt = Interrupt::new();
-        self.evaluate_for(axis_values, Demand::Row, &Watch::new(&interrupt)).unwrap_or_default()
+        let watch = Watch::new(&interrupt);
+        self.evaluate_for(axis_values, Demand::Row, &|_| {}, &watch).unwrap_or_default()
     }
 
-    /// As [`Self::evaluate_at`], with outcomes good for what is asked; `None` if it was told to stop.
+    /// As [`Self::evaluate_at`], with outcomes good for what is asked, each shown to `seen` as it
+    /// comes, on any thread; `None` if it was told to stop.
     #[must_use]
     pub fn evaluate_for(
         &self,
         axis_values: &[Vec<f64>],
         demand: Demand,
+        seen: &(dyn Fn(&Outcome) + Sync),
         watch: &Watch<'_>,
     ) -> Option<Vec<Outcome>> {
         let next = Mutex::new(0..axis_values.len());
@@ -149,6 +152,7 @@ impl<'a> ModelEngine<'a> {
         let found = Mutex::new(Vec::with_capacity(axis_values.len()));
         let keep = |outcome: Outcome| {
             watch.done(1);
+            seen(&outcome);
             found.lock().unwrap_or_else(PoisonError::into_inner).push(outcome);
         };
         self.through_lanes(demand, &feed, &keep, watch);

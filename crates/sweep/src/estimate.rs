@@ -4,11 +4,10 @@ use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
 
-use crate::engine::{Demand, EngineError, Ladder, MOST_WAITING, ModelEngine, ROWS_A_THREAD};
-use crate::interrupt::Interrupt;
+use crate::engine::{EngineError, Ladder, MOST_WAITING, ModelEngine, ROWS_A_THREAD};
 use crate::outcome::{Deviations, Outcome};
 use crate::plan::{Integrator, Plan, shortest_step_s};
-use crate::run::{Engine, Watch};
+use crate::run::Engine;
 use crate::store::{Job, Shape, chunk_points};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long.
@@ -136,9 +135,8 @@ fn cost_s(cut: &Plan, ladders: &[Ladder; 2], points: std::ops::Range<u64>) -> Re
     // A shorter run alone would be slower spin, and longer steps.
     let engine = ModelEngine::with_ladders(cut, ladders.clone())?;
     let axis_values: Vec<Vec<f64>> = points.map(|point| cut.axis_values(point)).collect();
-    let interrupt = Interrupt::new();
     let began = Instant::now();
-    let outcomes = engine.evaluate_for(&axis_values, Demand::Row, &Watch::new(&interrupt));
+    let outcomes = engine.evaluate_at(&axis_values);
     let cost_s = began.elapsed().as_secs_f64();
     drop(outcomes);
     Ok(cost_s)

@@ -48,6 +48,16 @@ enum Shown {
 
 impl Progress {
     pub(crate) fn new(mode: Mode, total: u64, start: u64) -> Self {
+        Self::shown(mode, BAR, total, start, start)
+    }
+
+    /// Of a search, whose points nobody can count beforehand: rows of this total are done. `start`
+    /// points were there at the start.
+    pub(crate) fn of_search(mode: Mode, rows: u64, start: u64) -> Self {
+        Self::shown(mode, ROWS, rows, 0, start)
+    }
+
+    fn shown(mode: Mode, template: &str, total: u64, position: u64, start: u64) -> Self {
         let lines = |seconds| {
             let every = Duration::from_secs(seconds);
             Shown::Lines { every, next: Instant::now() + every }
@@ -55,7 +65,7 @@ impl Progress {
         let shown = match mode {
             Mode::None => Shown::Nothing,
             Mode::Plain => lines(5),
-            Mode::Auto if std::io::stderr().is_terminal() => Shown::Bar(bar(total, start)),
+            Mode::Auto if std::io::stderr().is_terminal() => Shown::Bar(bar(template, total, position)),
             Mode::Auto => lines(60),
         };
         Self { shown, total, start, began: Instant::now() }
@@ -63,19 +73,44 @@ impl Progress {
 
     /// Shows that `done` points of the total are there.
     pub(crate) fn show(&mut self, done: u64) {
-        let text = match &self.shown {
-            Shown::Lines { next, .. } if Instant::now() >= *next => self.line(done),
-            _ => String::new(),
-        };
-        match &mut self.shown {
+        match &self.shown {
             Shown::Bar(bar) => bar.set_position(done),
-            Shown::Lines { every, next } if !text.is_empty() => {
-                *next = Instant::now() + *every;
-                // A log that cannot be written to must not end the run.
-                let _ = writeln!(std::io::stderr(), "{text}");
+            Shown::Lines { next, .. } if Instant::now() >= *next => self.say(&self.line(done)),
+            _ => {}
+        }
+    }
+
+    /// Shows that so many rows of a search are done, with so many points.
+    pub(crate) fn show_search(&mut self, rows: u64, points: u64) {
+        match &self.shown {
+            Shown::Bar(bar) => {
+                bar.set_position(rows);
+                bar.set_message(self.points(points));
+            }
+            Shown::Lines { next, .. } if Instant::now() >= *next => {
+                self.say(&format!("{rows} of {} rows, {}", self.total, self.points(points)));
             }
             _ => {}
         }
+    }
+
+    /// The points of a search and their rate.
+    fn points(&self, points: u64) -> String {
+        format!("{points} points, {}", per_second(self.rate(points)))
+    }
+
+    /// Writes a line, and none for a while.
+    fn say(&mut self, text: &str) {
+        if let Shown::Lines { every, next } = &mut self.shown {
+            *next = Instant::now() + *every;
+            // A log that cannot be written to must not end the run.
+            let _ = writeln!(std::io::stderr(), "{text}");
+        }
+    }
+
+    /// Points a second of this process.
+    fn rate(&self, done: u64) -> f64 {
+        done.saturating_sub(self.start) as f64 / self.began.elapsed().as_secs_f64().max(1e-9)
     }
 
     /// Says that the chunks are being joined.
@@ -94,8 +129,7 @@ impl Progress {
     }
 
     fn line(&self, done: u64) -> String {
-        let seconds = self.began.elapsed().as_secs_f64();
-        let rate = done.saturating_sub(self.start) as f64 / seconds.max(1e-9);
+        let rate = self.rate(done);
         let percent = 100.0 * done as f64 / self.total.max(1) as f64;
         let left = if rate > 0.0 {
             format!("{} left", duration(self.total.saturating_sub(done) as f64 / rate))
@@ -109,13 +143,16 @@ impl Progress {
 /// The bar with its numbers.
 const BAR: &str = "{wide_bar} {human_pos}/{human_len} points  {per_sec}  {eta} left";
 
+/// The bar of a search.
+const ROWS: &str = "{wide_bar} {human_pos}/{human_len} rows  {msg}";
+
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
-fn bar(total: u64, start: u64) -> ProgressBar {
+fn bar(template: &str, total: u64, start: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(8));
-    bar.set_style(style(BAR));
+    bar.set_style(style(template));
     bar.set_position(start);
     bar.reset_eta();
     bar
@@ -166,6 +203,15 @@ mod tests {
             "{line}"
         );
         assert!(progress.line(900).contains("unknown"));
+    }
+
+    #[test]
+    fn a_search_counts_its_rows_and_the_rate_of_its_new_points() {
+        let mut progress = Progress::of_search(Mode::Plain, 39, 100);
+        progress.began = Instant::now() - Duration::from_secs(10);
+        let points = progress.points(200);
+        assert!(points.starts_with("200 points, ") && points.ends_with(" points/s"), "{points}");
+        assert!((9.0..=10.0).contains(&progress.rate(200)), "{points}");
     }
 
     #[test]

@@ -59,6 +59,11 @@ impl<'a> Watch<'a> {
         self.done.fetch_add(points, Ordering::Relaxed);
     }
 
+    /// Has the work put down.
+    pub(crate) fn abort(&self) {
+        self.abort.store(true, Ordering::Relaxed);
+    }
+
     /// Whether to put the work down.
     #[must_use]
     pub fn stopped(&self) -> bool {
@@ -229,7 +234,7 @@ fn compute(
                     if let Err(error) = run.write_chunk(chunk, &outcomes) {
                         // A chunk that makes no sense costs itself; a disk that fails would cost them all.
                         if !matches!(error, StoreError::Engine { .. }) {
-                            watch.abort.store(true, Ordering::Relaxed);
+                            watch.abort();
                         }
                         result = std::mem::replace(&mut result, Ok(())).and(Err(error));
                     }

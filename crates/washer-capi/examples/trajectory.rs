@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use lane_ode::{Simd, Tolerance};
 use washer_model::{
-    Cases, Channel, Gear, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate,
+    Cases, Channel, Formula, Gear, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate,
 };
 
 const END_S: f64 = 50.0;
@@ -49,7 +49,7 @@ fn method(words: &[&str], point: &Point, spin: &Spin) -> Result<(Method, &'stati
     match words {
         ["rk4", step] => Ok((Method::Rk4 { step_s: number(step)? }, "RK4")),
         ["rk4-mass-scaled", accuracy] => {
-            let geared = Cases::new([(point, spin)], END_S).choose(number(accuracy)?);
+            let geared = Cases::new([(point, spin)], END_S).choose(Formula::Dop853, number(accuracy)?);
             let geared = geared.map_err(|error| Failed::Because(error.to_string()))?;
             let geared = geared.ok_or_else(|| Failed::Because("plain RK4 is cheaper".to_owned()))?;
             Ok((Method::Geared(geared), "mass-scaled RK"))

@@ -1,7 +1,7 @@
 //! The boundary file: one row per place where the side changes, or per row of the first axis that has none.
 
 use parquet::errors::ParquetError;
-use serde_json::json;
+use serde_json::{Value, json};
 use washer_model::unit_suffix;
 
 use super::product::{Task, further_values};
@@ -28,20 +28,37 @@ fn within(name: &str, unit: &str, word: &str) -> String {
     format!("{stem}_{word}{}", &name[stem.len()..])
 }
 
-/// The file's bytes.
+/// What the store must know of a search: its plan, with what is asked of it beside the grid.
+#[must_use]
+pub fn job<'a>(plan: &'a Plan, quantity: Quantity, task: &Task) -> Job<'a> {
+    let mut job = Job::of(plan);
+    job.plan["boundary"] = asked(quantity, task);
+    job
+}
+
+fn asked(quantity: Quantity, task: &Task) -> Value {
+    json!({
+        "quantity": quantity.name(),
+        "tolerance": task.search.tolerance,
+        "lattice": task.search.lattice,
+    })
+}
+
+/// The bytes of the file of a [`job`].
 ///
 /// # Errors
 /// What the Parquet library refuses: a defect of this program.
-pub fn bytes(plan: &Plan, quantity: Quantity, task: &Task, traced: &Traced) -> Result<Vec<u8>, ParquetError> {
-    let job = Job::of(plan);
-    let about = json!({
-        "quantity": quantity.name(),
-        "limit": quantity.limit(plan),
-        "tolerance": task.search.tolerance,
-        "lattice": task.search.lattice,
-        "points": traced.trials,
-        "rounds": traced.rounds,
-    });
+pub fn bytes(
+    job: &Job<'_>,
+    plan: &Plan,
+    quantity: Quantity,
+    task: &Task,
+    traced: &Traced,
+) -> Result<Vec<u8>, ParquetError> {
+    let mut about = asked(quantity, task);
+    about["limit"] = quantity.limit(plan).into();
+    about["points"] = traced.trials.into();
+    about["rounds"] = traced.rounds.into();
     let mut table = Table::default();
     add_columns(&mut table, plan, quantity, traced);
     table.metadata(key::PLAN, &job.plan);

@@ -1,36 +1,56 @@
-//! The boundary itself: for each value of the first axis, where along the second a quantity passes its limit, without
-//! filling the grid between.
+//! The boundary itself: for each value of the first axis, where along the second a quantity passes
+//! its limit, without filling the grid between.
 //!
-//! The quantity enters as a signed distance from its limit, negative on the reliable side ([`Evaluate`]); nothing here
-//! knows a machine. Rounds of trial points go to the evaluator as one batch each, so that its lanes are full:
+//! The quantity enters as a signed distance from its limit, negative on the reliable side
+//! ([`Evaluate`]); nothing here knows a machine. Trials go to the evaluator in batches, and what a
+//! batch costs is counted in lane groups ([`lane_groups`]): nine trials cost as much as sixteen.
 //!
-//! 1. A coarse lattice: every value of the second axis's lattice at evenly spread rows. It finds what lies in range, and
-//!    guards against islands wider than its cells.
-//! 2. In those rows, bracketed root finding (`row`): secants within brackets, then two trials a tolerance apart.
-//! 3. The rows between, from the middle of each gap outwards, start from where their neighbours' roots point (`warm`):
-//!    where the curve is smooth, two trials a row are enough.
+//! 1. A lattice: every value of the second axis's lattice at evenly spread rows. It finds what lies
+//!    in range, and guards against islands wider than its cells.
+//! 2. In those rows, nets around where the side should change (`net`), until they catch a bracket
+//!    within tolerance (`row`). Distances that hint at more are followed (`look`).
+//! 3. The rows between, from the middle of each gap outwards, start from where their neighbours'
+//!    roots point (`warm`): where the curve is smooth, two trials a row are enough.
+//! 4. Where neighbouring rows disagree, both are looked at until the pocket that one has is found in
+//!    the other, or closes between them (`pockets`).
 //!
-//! Which trials are made depends on values alone, never on threads or lanes, so the result is a pure function of the
-//! input.
+//! All rows that are at work share a batch, rows begin in whole lane groups, and the trials that
+//! fill up the last group make the widest nets closer (`batch`).
+//!
+//! Which trials are made depends on values alone, never on threads or lanes, so the result is a pure
+//! function of the input.
 
+mod batch;
 pub mod file;
+mod look;
 #[cfg(test)]
 mod model_tests;
+mod net;
+mod pockets;
 pub mod product;
 pub mod quantity;
+#[cfg(test)]
+mod random_tests;
 mod row;
 #[cfg(test)]
 mod tests;
 mod trace;
 mod warm;
 
-pub use trace::{Stopped, trace};
+pub use batch::{LANES, lane_groups};
+pub use trace::trace;
 
 /// Evaluates trial points.
 pub trait Evaluate {
-    /// One signed distance from the limit a trial, in the same order: negative on the reliable side, `None` where the
-    /// quantity is not defined. `None` in place of all of them if it was told to stop.
-    fn evaluate(&self, trials: &[Trial]) -> Option<Vec<Option<f64>>>;
+    /// Why it stopped before all was done.
+    type Stop;
+
+    /// One signed distance from the limit a trial, in the same order: negative on the reliable
+    /// side, `None` where the quantity is not defined.
+    ///
+    /// # Errors
+    /// When it was told to stop, or could not go on.
+    fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Self::Stop>;
 }
 
 /// A point to evaluate.
@@ -129,12 +149,25 @@ pub struct TracedRow {
 }
 
 /// The traced curves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Traced {
     /// Per curve, its rows in the first axis's order.
     pub curves: Vec<Vec<TracedRow>>,
     /// Trial points in all.
     pub trials: usize,
+    /// Lane groups that they filled, the last of every batch perhaps in part.
+    pub lane_groups: usize,
     /// Batches they went in.
     pub rounds: usize,
+}
+
+/// Where a trace stands before a batch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Standing {
+    /// Rows that are done, unless a neighbour will announce something.
+    pub rows: usize,
+    /// Trials that are done.
+    pub trials: usize,
+    /// Trials of the batch.
+    pub batch: usize,
 }

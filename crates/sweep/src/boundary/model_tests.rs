@@ -1,9 +1,9 @@
 //! The search over the real models, against the grid it stands for.
 
-use super::file::bytes;
-use super::product::{BoundaryError, Models, Task};
+use super::file::{bytes, job};
+use super::product::{BoundaryError, Models, Stopped, Task};
 use super::quantity::Quantity;
-use super::{Kind, Stopped, Traced, trace};
+use super::{Edge, Kind, Traced, trace};
 use crate::config;
 use crate::engine::ModelEngine;
 use crate::interrupt::Interrupt;
@@ -11,6 +11,7 @@ use crate::measures::Criterion;
 use crate::outcome::Outcome;
 use crate::plan::Plan;
 use crate::plot::contour::zero_lines;
+use crate::store::{OpenedTrials, Trials};
 use crate::verdict::Verdict;
 
 const HEAD: &str = r#"
@@ -47,7 +48,7 @@ fn plan(text: &str) -> Plan {
 fn traced(plan: &Plan, task: &Task, threads: usize, interrupt: &Interrupt) -> Result<Traced, Stopped> {
     let engine = ModelEngine::new(plan).unwrap();
     let models = Models::new(plan, engine, Quantity::RatioMax, threads, interrupt, &|_| {}).unwrap();
-    trace(&models, &task.firsts, task.curves, &task.search)
+    trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {})
 }
 
 /// Axis values of every point of the grid.
@@ -61,7 +62,8 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
     let task = Task::new(&plan, Some(0.5), 3).unwrap();
     let interrupt = Interrupt::new();
     let traced = [1, 3].map(|threads| traced(&plan, &task, threads, &interrupt).unwrap());
-    let [one, three] = [0, 1].map(|k| bytes(&plan, Quantity::RatioMax, &task, &traced[k]).unwrap());
+    let job = job(&plan, Quantity::RatioMax, &task);
+    let [one, three] = [0, 1].map(|k| bytes(&job, &plan, Quantity::RatioMax, &task, &traced[k]).unwrap());
     assert!(one == three, "other bytes on three threads");
 
     let engine = ModelEngine::new(&plan).unwrap();
@@ -149,7 +151,76 @@ fn a_stop_is_heeded_before_the_next_group() {
     assert_eq!(task.search.tolerance, 0.5, "1/480 of 240 N s/m");
     let interrupt = Interrupt::new();
     interrupt.raise(2);
-    assert_eq!(traced(&plan, &task, 2, &interrupt), Err(Stopped));
+    assert!(matches!(traced(&plan, &task, 2, &interrupt), Err(Stopped::Interrupted)));
+}
+
+#[test]
+fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
+    let plan = plan(&format!("{HEAD}{GRID}"));
+    let task = Task::new(&plan, Some(2.0), 2).unwrap();
+    let whole = traced(&plan, &task, 1, &Interrupt::new()).unwrap();
+    let home = tempfile::tempdir().unwrap();
+    let output = home.path().join("x.parquet");
+    let job = job(&plan, Quantity::RatioMax, &task);
+    let mut stops = 0;
+    let (found, trials) = loop {
+        let Ok(OpenedTrials::Open(trials)) = Trials::open(&output, &job, false) else { panic!() };
+        let interrupt = Interrupt::new();
+        let there = trials.count();
+        // The first to be told so much stops it, wherever it is in its batch.
+        let tell = |done: u64| {
+            if done >= there as u64 + 5 {
+                interrupt.raise(2);
+            }
+        };
+        let engine = ModelEngine::new(&plan).unwrap();
+        let models = Models::new(&plan, engine, Quantity::RatioMax, 2, &interrupt, &tell).unwrap();
+        let models = models.keeping(*trials);
+        let found = trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {});
+        let trials = models.into_kept().unwrap();
+        match found {
+            Ok(found) => break (found, trials),
+            Err(Stopped::Interrupted) => assert!(trials.count() > there),
+            Err(Stopped::Failed(error)) => panic!("{error}"),
+        }
+        stops += 1;
+    };
+    assert!(stops > 1);
+    assert_eq!((found, trials.count()), (whole.clone(), whole.trials));
+}
+
+#[test]
+fn a_pocket_is_followed_along_a_damper_that_is_moved() {
+    // Where one damper is hung up decides for which dampings there is a reliable stretch at all.
+    let head = HEAD.split("[integrator]").next().unwrap();
+    let axes = "[[axis]]\nparameter = \"damper_1_cabinet_z_m\"\n\
+                range = { from = 0.1, to = 0.3, count = 17 }\n\
+                [[axis]]\nparameter = \"damping_n_s_per_m\"\n\
+                range = { from = 60.0, to = 300.0, count = 33 }\n";
+    let plan = plan(&format!("{head}{axes}"));
+    let task = Task::new(&plan, None, 6).unwrap();
+    let rows = traced(&plan, &task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+    // At 0.1 m nothing is reliable, from 0.125 m on all is from a crossing upwards; the row between
+    // has a part of that, which no point of the lattice meets.
+    let kinds: Vec<Kind> = rows.iter().map(|row| row.edges[0].kind).collect();
+    assert_eq!(kinds[..3], [Kind::NoneUnreliable, Kind::Crossing, Kind::Crossing], "{rows:?}");
+    let engine = ModelEngine::new(&plan).unwrap();
+    for row in &rows[..3] {
+        let dampings: Vec<f64> = (0..=24).map(|k| 60.0 + 10.0 * f64::from(k)).collect();
+        let points: Vec<Vec<f64>> = dampings.iter().map(|damping| vec![row.first, *damping]).collect();
+        for (damping, outcome) in dampings.iter().zip(engine.evaluate_at(&points)) {
+            let is_reliable = Quantity::RatioMax.distance(&outcome, &plan).unwrap() < 0.0;
+            let below = row.edges.iter().rev().find(|edge| edge.bracket.is_some_and(|b| b[1] <= *damping));
+            let found = match (below, row.edges[0].distances[0]) {
+                (Some(edge), _) => edge.distances[1].unwrap() < 0.0,
+                (None, Some(distance)) => distance < 0.0,
+                (None, None) => row.edges[0].kind == Kind::NoneReliable,
+            };
+            let is_bracketed = |edge: &Edge| edge.bracket.is_some_and(|b| b[0] < *damping && *damping < b[1]);
+            let said = (row.first, damping, &row.edges);
+            assert!(found == is_reliable || row.edges.iter().any(is_bracketed), "{said:?}");
+        }
+    }
 }
 
 #[test]

@@ -1,13 +1,16 @@
 //! The product's evaluator: both models at the trial points, on all cores, and the settings a plan gives a search.
 
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::quantity::Quantity;
 use super::{Evaluate, Search, Trial};
 use crate::engine::{Demand, ModelEngine};
 use crate::interrupt::Interrupt;
+use crate::outcome::Outcome;
 use crate::plan::{Axis, AxisValues, Plan};
 use crate::run::Watch;
+use crate::store::{Key, StoreError, Trials};
 use crate::threads::{self, ThreadsError};
 
 /// Rows of all curves together that are accepted: what is known of them stays in memory.
@@ -137,6 +140,8 @@ pub struct Models<'a> {
     quantity: Quantity,
     pool: rayon::ThreadPool,
     interrupt: &'a Interrupt,
+    /// What is known from before, and where answers are kept as they come.
+    kept: Option<Mutex<Trials>>,
     done: AtomicU64,
     tell: &'a (dyn Fn(u64) + Sync),
 }
@@ -155,23 +160,92 @@ impl<'a> Models<'a> {
         tell: &'a (dyn Fn(u64) + Sync),
     ) -> Result<Self, ThreadsError> {
         let pool = threads::pool(threads)?;
-        Ok(Self { plan, engine, quantity, pool, interrupt, done: AtomicU64::new(0), tell })
+        let done = AtomicU64::new(0);
+        Ok(Self { plan, engine, quantity, pool, interrupt, kept: None, done, tell })
+    }
+
+    /// The same with a memory: it makes no trial again that is known from before.
+    #[must_use]
+    pub fn keeping(self, trials: Trials) -> Self {
+        Self { kept: Some(Mutex::new(trials)), ..self }
+    }
+
+    /// The memory, at the end.
+    #[must_use]
+    pub fn into_kept(self) -> Option<Trials> {
+        self.kept.map(|kept| kept.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// What the engine is asked for: it makes sure of a ratio's side, and knows nothing of a gap's.
+    const fn demand(&self) -> Demand {
+        match self.quantity {
+            Quantity::RatioMax | Quantity::Ratio(_) => Demand::Side,
+            Quantity::GapNonlinear | Quantity::GapLinear => Demand::Row,
+        }
+    }
+
+    fn kept(&self) -> Option<MutexGuard<'_, Trials>> {
+        self.kept.as_ref().map(|kept| kept.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Counts trials that are done.
+    fn count(&self, trials: u64) {
+        (self.tell)(self.done.fetch_add(trials, Ordering::Relaxed) + trials);
     }
 }
 
+/// Why the evaluator stopped. What it was asked is kept as far as it was answered.
+#[derive(Debug)]
+pub enum Stopped {
+    /// It was told to.
+    Interrupted,
+    /// An answer could not be kept.
+    Failed(StoreError),
+}
+
 impl Evaluate for Models<'_> {
-    fn evaluate(&self, trials: &[Trial]) -> Option<Vec<Option<f64>>> {
-        let axis_values: Vec<Vec<f64>> = trials
-            .iter()
-            .map(|trial| {
-                let further = further_values(self.plan, trial.curve);
-                [trial.first, trial.second].into_iter().chain(further).collect()
-            })
-            .collect();
+    type Stop = Stopped;
+
+    fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Stopped> {
+        let known = |trial: &Trial| self.kept()?.recall(&key(trial));
+        let mut distances: Vec<Option<Option<f64>>> = trials.iter().map(known).collect();
+        let new: Vec<usize> = (0..trials.len()).filter(|k| distances[*k].is_none()).collect();
+        self.count((trials.len() - new.len()) as u64);
+        let values = |k: &usize| {
+            let trial = trials[*k];
+            let further = further_values(self.plan, trial.curve);
+            [trial.first, trial.second].into_iter().chain(further).collect()
+        };
+        let axis_values: Vec<Vec<f64>> = new.iter().map(values).collect();
         let watch = Watch::new(self.interrupt);
-        let outcomes = self.pool.install(|| self.engine.evaluate_for(&axis_values, Demand::Side, &watch))?;
-        let done = self.done.fetch_add(trials.len() as u64, Ordering::Relaxed);
-        (self.tell)(done + trials.len() as u64);
-        Some(outcomes.iter().map(|outcome| self.quantity.distance(outcome, self.plan)).collect())
+        let failure = Mutex::new(None);
+        let seen = |outcome: &Outcome| {
+            let distance = self.quantity.distance(outcome, self.plan);
+            let position = usize::try_from(outcome.point).ok().and_then(|point| new.get(point));
+            if let (Some(mut kept), Some(position)) = (self.kept(), position)
+                && let Err(error) = kept.keep(key(&trials[*position]), distance)
+            {
+                failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                watch.abort();
+            }
+            self.count(1);
+        };
+        let demand = self.demand();
+        let engine = &self.engine;
+        let outcomes = self.pool.install(|| engine.evaluate_for(&axis_values, demand, &seen, &watch));
+        let settled = self.kept().map_or(Ok(()), |kept| kept.settle());
+        let failure = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
+        if let Some(error) = failure.or(settled.err()) {
+            return Err(Stopped::Failed(error));
+        }
+        for (position, outcome) in new.iter().zip(outcomes.ok_or(Stopped::Interrupted)?) {
+            distances[*position] = Some(self.quantity.distance(&outcome, self.plan));
+        }
+        Ok(distances.into_iter().flatten().collect())
     }
+}
+
+/// What a trial is kept by.
+const fn key(trial: &Trial) -> Key {
+    [trial.curve as u64, trial.first.to_bits(), trial.second.to_bits()]
 }

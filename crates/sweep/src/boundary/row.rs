@@ -1,25 +1,23 @@
-//! Root finding along one row: which values of the second axis to try next, from those tried so far.
+//! One row: what was tried along it, what that says of its sides, and what it wants tried next.
 //!
-//! Positions are coordinates of the second axis: its values, or their logarithms. Distances are signed distances from
-//! the limit, of order one (a logarithm of a ratio).
+//! Positions are coordinates of the second axis: its values, or their logarithms. Distances are
+//! signed distances from the limit, of order one (a logarithm of a ratio).
 
-use super::{Edge, Kind};
+use super::net::{self, Net};
+use super::{Edge, Kind, look};
 
-/// Beyond this many rounds a row's brackets are halved instead of interpolated: whatever the function does, it ends.
+/// After so many rounds brackets are cut evenly, and after so many looks none is taken any more:
+/// whatever the function does, it ends.
 const PATIENCE: usize = 12;
-/// A change of the distance over a bracket within tolerance that calls for a closer look: a factor of 1.5 in a ratio.
+/// A net is so many times wider after one that caught nothing.
+const WIDER: f64 = 4.0;
+/// A change of the distance over a bracket within tolerance that calls for a closer look: a factor
+/// of 1.5 in a ratio.
 const LEAP: f64 = 0.405;
 /// How much closer that look goes.
 const CLOSER: f64 = 1.0 / 16.0;
-/// Distances below this are near the limit: neighbouring samples there should not differ by more than [`STRIDE`].
-const NEAR: f64 = 0.5;
-/// A factor of 2 in a ratio.
-const STRIDE: f64 = 0.693;
-/// An extremum expected this close to the limit, or beyond it, is looked at.
-const TOUCH: f64 = 0.05;
-/// Trials on both sides of an expected root stand this far from it, in tolerances: a little less than half, so that the
-/// bracket they make is within tolerance.
-const HALF: f64 = 0.45;
+/// Brackets of so many tolerances tell other rows where to begin.
+const PLACED: f64 = 4.0;
 
 /// Which side of the limit a sample is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,9 +43,9 @@ impl Sample {
         }
     }
 
-    /// Distance if it can be calculated with.
-    fn finite(&self) -> Option<f64> {
-        self.distance.filter(|distance| distance.is_finite())
+    /// Where it is and how far from the limit, if that can be calculated with.
+    pub(super) fn finite(&self) -> Option<(f64, f64)> {
+        Some((self.at, self.distance.filter(|distance| distance.is_finite())?))
     }
 }
 
@@ -59,27 +57,137 @@ pub(super) struct Span {
     pub(super) tolerance: f64,
 }
 
+impl Span {
+    pub(super) fn contains(&self, at: f64) -> bool {
+        self.least <= at && at <= self.greatest
+    }
+}
+
+/// A stretch of the range on one side, as far as is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Run {
+    pub(super) from: f64,
+    pub(super) to: f64,
+    pub(super) side: Side,
+}
+
+impl Run {
+    pub(super) fn middle(&self) -> f64 {
+        0.5 * (self.from + self.to)
+    }
+
+    pub(super) fn width(&self) -> f64 {
+        self.to - self.from
+    }
+}
+
+/// Where the side should change by what other rows say, and how far they may be mistaken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Hint {
+    pub(super) root: f64,
+    pub(super) spread: f64,
+}
+
+/// What a row is asked because of other rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Question {
+    /// To be tried.
+    pub(super) places: Vec<f64>,
+    /// Where to cast nets at once, in order.
+    pub(super) roots: Vec<Hint>,
+    /// Where to cast one if there is a bracket around it.
+    pub(super) perhaps: Vec<Hint>,
+}
+
+impl Question {
+    /// One for these places alone.
+    pub(super) fn places(places: Vec<f64>) -> Self {
+        Self { places, ..Self::default() }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.places.is_empty() && self.roots.is_empty()
+    }
+}
+
+/// Something that a row wants tried.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Want {
+    /// One place.
+    At(f64),
+    /// The places of a net.
+    Net(Net),
+}
+
+impl Want {
+    /// Places that it needs at least.
+    pub(super) fn needed(&self) -> usize {
+        match self {
+            Self::At(_) => 1,
+            Self::Net(net) => net.least,
+        }
+    }
+
+    /// Its places, so many.
+    pub(super) fn places(&self, count: usize, span: &Span) -> Vec<f64> {
+        match self {
+            Self::At(at) => vec![*at],
+            Self::Net(net) => net.places(count, span),
+        }
+    }
+}
+
 /// A row in the making.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
     /// In order of position, no two at the same.
     samples: Vec<Sample>,
-    /// To be tried first.
-    seeds: Vec<f64>,
-    /// The sides expected at both ends of the range, if the row was begun near a root its neighbours point to.
-    expected: Option<[Side; 2]>,
+    /// Not yet passed on.
+    asked: Question,
+    /// Where the side changes by what other rows say, for brackets that turn up there.
+    perhaps: Vec<Hint>,
+    /// The sides at the ends of the range, where they are taken from other rows until they are seen.
+    assumed: [Option<Side>; 2],
+    /// Where nets were cast of late, and how much wider the next ones are because these failed.
+    cast: Vec<[f64; 2]>,
+    strain: f64,
     rounds: usize,
+    looks: usize,
+}
+
+/// The end of a bracket: where, on which side, and the sample unless it is assumed.
+#[derive(Clone, Copy)]
+struct End {
+    at: f64,
+    side: Side,
+    sample: Option<Sample>,
 }
 
 impl Row {
-    /// A row that begins with these positions.
-    pub(super) fn new(seeds: Vec<f64>, expected: Option<[Side; 2]>) -> Self {
-        Self { samples: Vec::new(), seeds, expected, rounds: 0 }
+    /// A row that begins with this question.
+    pub(super) fn new(asked: Question, assumed: [Option<Side>; 2]) -> Self {
+        Self {
+            samples: Vec::new(),
+            asked,
+            perhaps: Vec::new(),
+            assumed,
+            cast: Vec::new(),
+            strain: 1.0,
+            rounds: 0,
+            looks: 0,
+        }
     }
 
-    /// How many values were tried.
-    pub(super) fn trials(&self) -> usize {
-        self.samples.len()
+    /// Has this looked into.
+    pub(super) fn ask(&mut self, question: Question) {
+        self.asked.places.extend(question.places);
+        self.asked.roots.extend(question.roots);
+        self.asked.perhaps.extend(question.perhaps);
+    }
+
+    /// Whether there is a question that it has not passed on.
+    pub(super) fn is_asked(&self) -> bool {
+        !self.asked.is_empty()
     }
 
     /// Keeps what came of a trial.
@@ -90,177 +198,172 @@ impl Row {
         }
     }
 
-    /// What to try next, in order and each once; nothing when the row is done.
-    pub(super) fn propose(&mut self, span: &Span) -> Vec<f64> {
-        let mut trials = std::mem::take(&mut self.seeds);
-        if trials.is_empty() {
+    /// Whether something was tried here.
+    pub(super) fn knows(&self, at: f64) -> bool {
+        self.samples.binary_search_by(|sample| sample.at.total_cmp(&at)).is_ok()
+    }
+
+    /// Remembers where a net was cast.
+    pub(super) fn note(&mut self, net: [f64; 2]) {
+        self.cast.push(net);
+    }
+
+    /// How many values were tried.
+    pub(super) fn trials(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// What to try next; nothing when the row is done.
+    pub(super) fn wants(&mut self, span: &Span) -> Vec<Want> {
+        let mut wants = self.pass_on(span);
+        if wants.is_empty() {
             self.rounds += 1;
-            for pair in self.samples.windows(2) {
-                if pair[0].side() != pair[1].side() {
-                    self.close(pair[0], pair[1], span, &mut trials);
-                }
-            }
-            if trials.is_empty() {
-                self.reach_out(span, &mut trials);
-            }
-            if trials.is_empty() {
-                self.look_around(span, &mut trials);
-            }
+            wants = self.close(span);
         }
-        for trial in &mut trials {
-            *trial = trial.clamp(span.least, span.greatest);
+        if wants.is_empty() && self.looks < PATIENCE {
+            self.looks += 1;
+            wants = look::around(&self.samples, span);
         }
-        trials.sort_by(f64::total_cmp);
-        trials.dedup();
-        trials.retain(|trial| self.samples.iter().all(|sample| sample.at != *trial));
-        trials
+        wants
     }
 
-    /// Trials that narrow a bracket.
-    fn close(&self, a: Sample, b: Sample, span: &Span, trials: &mut Vec<f64>) {
-        let (width, tolerance) = (b.at - a.at, span.tolerance);
-        let middle = 0.5 * (a.at + b.at);
-        let halvable = a.at < middle && middle < b.at;
-        let (Some(from), Some(to)) = (a.finite(), b.finite()) else {
-            if width > tolerance && halvable {
-                trials.push(middle);
+    /// What it was asked.
+    fn pass_on(&mut self, span: &Span) -> Vec<Want> {
+        let Question { places, roots, perhaps } = std::mem::take(&mut self.asked);
+        self.perhaps.extend(perhaps);
+        let places = places.into_iter().map(|at| at.clamp(span.least, span.greatest));
+        let mut wants: Vec<Want> = places.filter(|at| !self.knows(*at)).map(Want::At).collect();
+        for (k, hint) in roots.iter().enumerate() {
+            // Halfway to the next root is the other one's.
+            let half = |other: &Hint| 0.5 * (other.root + hint.root);
+            let before = k.checked_sub(1).and_then(|k| roots.get(k));
+            let from = before.map_or(span.least, half);
+            let to = roots.get(k + 1).map_or(span.greatest, half);
+            let Hint { root, spread } = *hint;
+            if from < root && root < to {
+                wants.push(Want::Net(Net { from, to, root, spread, least: 2 }));
             }
-            return;
+        }
+        wants
+    }
+
+    /// Samples, and what is assumed of the range's ends beyond them, in order.
+    fn ends(&self, span: &Span) -> Vec<End> {
+        let tried = |sample: &Sample| End { at: sample.at, side: sample.side(), sample: Some(*sample) };
+        let assumed = |at, side| End { at, side, sample: None };
+        let mut ends: Vec<End> = self.samples.iter().map(tried).collect();
+        let [low, high] = self.assumed;
+        if let Some(side) = low
+            && !self.knows(span.least)
+        {
+            ends.insert(0, assumed(span.least, side));
+        }
+        if let Some(side) = high
+            && !self.knows(span.greatest)
+        {
+            ends.push(assumed(span.greatest, side));
+        }
+        ends
+    }
+
+    /// Brackets: neighbouring ends on different sides.
+    fn brackets(&self, span: &Span) -> Vec<[End; 2]> {
+        let ends = self.ends(span);
+        let pairs = ends.windows(2).map(|pair| [pair[0], pair[1]]);
+        pairs.filter(|[a, b]| a.side != b.side).collect()
+    }
+
+    /// Nets that narrow brackets.
+    fn close(&mut self, span: &Span) -> Vec<Want> {
+        let cast = std::mem::take(&mut self.cast);
+        let mut open = self.brackets(span);
+        open.retain(|[a, b]| is_open(a, b, span));
+        let is_caught = |[a, b]: &[End; 2]| cast.iter().any(|net| net[0] <= a.at && b.at <= net[1]);
+        if cast.is_empty() || open.iter().any(is_caught) {
+            self.strain = 1.0;
+        } else if !open.is_empty() {
+            self.strain *= WIDER;
+        }
+        let mut wants: Vec<Want> = open.iter().map(|[a, b]| self.narrow(a, b, span)).collect();
+        let first = self.samples.first().map(Sample::side);
+        if wants.is_empty() && self.samples.iter().all(|sample| Some(sample.side()) == first) {
+            // That there is no change of side at all is not taken from other rows.
+            let ends = [span.least, span.greatest].into_iter();
+            wants.extend(ends.filter(|end| !self.knows(*end)).map(Want::At));
+        }
+        wants
+    }
+
+    /// What narrows one bracket.
+    fn narrow(&mut self, a: &End, b: &End, span: &Span) -> Want {
+        let (from, to) = (a.at, b.at);
+        let width = to - from;
+        let impatient = self.rounds > PATIENCE;
+        if a.sample.is_none() || b.sample.is_none() {
+            // What was assumed of the range's end has to be seen if the bracket comes close to it.
+            if impatient || width <= 2.0 * span.tolerance {
+                return Want::At(if a.sample.is_none() { from } else { to });
+            }
+        }
+        if impatient || width <= span.tolerance {
+            return Want::Net(Net::even(from, to));
+        }
+        let told = self.perhaps.iter().position(|hint| from < hint.root && hint.root < to);
+        let estimate = match told.map(|k| self.perhaps.swap_remove(k)) {
+            Some(hint) => Some((hint.root, hint.spread)),
+            None => net::estimate(&self.around(from, to), from, to),
         };
-        if width <= tolerance {
-            if (from - to).abs() > LEAP && width > CLOSER * tolerance && halvable {
-                trials.push(middle);
-            }
-            return;
-        }
-        if self.rounds > PATIENCE {
-            trials.push(middle);
-            return;
-        }
-        let (root, nearest) = self.root(a, b, from, to);
-        if root - a.at <= 0.75 * tolerance {
-            trials.push((root + 0.25 * tolerance).min(middle.max(a.at + 0.5 * tolerance)));
-        } else if b.at - root <= 0.75 * tolerance {
-            trials.push((root - 0.25 * tolerance).max(middle.min(b.at - 0.5 * tolerance)));
-        } else if nearest <= 8.0 * tolerance {
-            trials.extend([root - HALF * tolerance, root + HALF * tolerance]);
-        } else {
-            trials.push(root);
-        }
-    }
-
-    /// Where the limit is expected between two samples on either side of it, and how far that is from the nearest
-    /// sample it was found from: the secant through the two samples closest to the limit, or through the ends.
-    fn root(&self, a: Sample, b: Sample, from: f64, to: f64) -> (f64, f64) {
-        let place = self.samples.partition_point(|sample| sample.at < a.at);
-        let first = place.saturating_sub(1);
-        let around = &self.samples[first..(place + 3).min(self.samples.len())];
-        let mut close: Vec<(f64, f64)> =
-            around.iter().filter_map(|sample| Some((sample.at, sample.finite()?))).collect();
-        close.sort_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        let secant = match close[..] {
-            [(x0, y0), (x1, y1), ..] if y0 != y1 => x0 - y0 * (x1 - x0) / (y1 - y0),
-            _ => f64::NAN,
+        // Without an estimate, the root is near the tried end: that is where others expected it.
+        let stride = (span.tolerance * self.strain).min(0.5 * width);
+        let (root, spread) = match (estimate, a.sample, b.sample) {
+            (Some((root, spread)), ..) => (root, (spread * self.strain).min(0.5 * width)),
+            (None, None, Some(_)) => (to - stride, 0.5 * stride),
+            (None, Some(_), None) => (from + stride, 0.5 * stride),
+            (None, ..) => return Want::Net(Net::even(from, to)),
         };
-        let inside = a.at < secant && secant < b.at;
-        // Far from the limit a ratio saturates: what is beyond one only says which side it is on.
-        let (from, to) = (from.clamp(-1.0, 1.0), to.clamp(-1.0, 1.0));
-        let root = if inside { secant } else { a.at + (b.at - a.at) * (from / (from - to)) };
-        (root, (root - a.at).min(b.at - root))
+        Want::Net(Net { from, to, root, spread, least: 1 })
     }
 
-    /// Trials beyond the samples, where a side that is expected at an end has not been met, and at both ends of the
-    /// range where no change of side was found at all.
-    fn reach_out(&self, span: &Span, trials: &mut Vec<f64>) {
-        let (Some(first), Some(last)) = (self.samples.first(), self.samples.last()) else { return };
-        if let Some([low, high]) = self.expected {
-            if first.side() != low && first.at > span.least {
-                trials.push(self.beyond(-1.0, span));
-            }
-            if last.side() != high && last.at < span.greatest {
-                trials.push(self.beyond(1.0, span));
-            }
-            if !trials.is_empty() {
-                return;
-            }
-        }
-        if self.samples.iter().all(|sample| sample.side() == first.side()) {
-            trials.extend([span.least, span.greatest]);
-        }
+    /// Up to two samples with finite distances on each side of a bracket, in order.
+    fn around(&self, from: f64, to: f64) -> Vec<(f64, f64)> {
+        let left = self.samples.partition_point(|sample| sample.at <= from);
+        let right = self.samples.partition_point(|sample| sample.at < to);
+        let left = &self.samples[left.saturating_sub(2)..left];
+        left.iter().chain(self.samples[right..].iter().take(2)).filter_map(Sample::finite).collect()
     }
 
-    /// The next trial outwards in this direction: a little beyond where the last two samples point, or in growing
-    /// strides.
-    fn beyond(&self, direction: f64, span: &Span) -> f64 {
-        let tolerance = span.tolerance;
-        let (last, before) = if direction > 0.0 {
-            (self.samples.last(), self.samples.iter().rev().nth(1))
-        } else {
-            (self.samples.first(), self.samples.get(1))
+    /// Whether its roots are known well enough to tell where those of other rows are.
+    pub(super) fn is_placed(&self, span: &Span) -> bool {
+        let is_narrow = |[a, b]: &[End; 2]| {
+            a.sample.is_some() && b.sample.is_some() && b.at - a.at <= PLACED * span.tolerance
         };
-        let Some(last) = last else { return span.least };
-        let stride = tolerance * f64::powi(4.0, i32::try_from(self.rounds.min(20)).unwrap_or(20));
-        let step = match (last.finite(), before.and_then(|before| Some((before.at, before.finite()?)))) {
-            (Some(distance), Some((at, other))) => {
-                let step = direction * -distance * (last.at - at) / (distance - other);
-                if step > 0.0 && step <= 2.0 * stride { step + 0.25 * tolerance } else { stride }
-            }
-            _ => stride,
-        };
-        last.at + direction * step
+        !self.samples.is_empty() && !self.is_asked() && self.brackets(span).iter().all(is_narrow)
     }
 
-    /// Trials against what hides between samples of one side: where the distance changes fast near the limit, where
-    /// three samples make an extremum that may touch it, and beyond samples that point to the limit.
-    fn look_around(&self, span: &Span, trials: &mut Vec<f64>) {
-        let samples: Vec<Option<(f64, f64)>> =
-            self.samples.iter().map(|sample| Some((sample.at, sample.finite()?))).collect();
-        for pair in samples.windows(2) {
-            let &[Some((a, from)), Some((b, to))] = pair else { continue };
-            let near = from.abs().min(to.abs()) < NEAR && (from < 0.0) == (to < 0.0);
-            if near && (from - to).abs() > STRIDE && b - a > 4.0 * span.tolerance {
-                trials.push(0.5 * (a + b));
+    /// Stretches of one side, in order; each reaches to where the side changes, or to the range's
+    /// end.
+    pub(super) fn runs(&self, span: &Span) -> Vec<Run> {
+        let mut runs: Vec<Run> = Vec::new();
+        let mut from = span.least;
+        for pair in self.samples.windows(2) {
+            let (a, b) = (pair[0], pair[1]);
+            if a.side() != b.side() {
+                let to = crossing(&a, &b).unwrap_or(0.5 * (a.at + b.at));
+                runs.push(Run { from, to, side: a.side() });
+                from = to;
             }
         }
-        for three in samples.windows(3) {
-            let &[Some(a), Some(b), Some(c)] = three else { continue };
-            let Some(extremum) = touching(a, b, c) else { continue };
-            let clear = |at: f64| [a, b, c].iter().all(|sample| (sample.0 - at).abs() > 0.5 * span.tolerance);
-            // An extremum on top of a sample may be a kink in the wider gap beside it.
-            let (from, to) = if b.0 - a.0 > c.0 - b.0 { (a.0, b.0) } else { (b.0, c.0) };
-            let middle = 0.5 * (from + to);
-            if let Some(trial) = [extremum, middle].into_iter().find(|at| clear(*at)) {
-                trials.push(trial);
-            }
+        if let Some(last) = self.samples.last() {
+            runs.push(Run { from, to: span.greatest, side: last.side() });
         }
-        let backwards = samples.iter().rev().copied();
-        for ends in [samples.iter().copied().take(2).collect::<Vec<_>>(), backwards.take(2).collect()] {
-            let &[Some((last, at_last)), Some((before, at_before))] = ends.as_slice() else { continue };
-            let (near, far) = (at_last.abs(), at_before.abs());
-            if (at_last < 0.0) == (at_before < 0.0) && near < far && near < NEAR && 2.0 * near - far < TOUCH {
-                trials.push(last + (last - before));
-            }
-        }
+        runs
     }
 
-    /// Changes of side, as positions in order.
-    pub(super) fn roots(&self) -> Vec<f64> {
-        self.samples
-            .windows(2)
-            .filter(|pair| pair[0].side() != pair[1].side())
-            .map(|pair| self.place(&pair[0], &pair[1]).unwrap_or(0.5 * (pair[0].at + pair[1].at)))
-            .collect()
-    }
-
-    /// Where the limit is met within a final bracket: by the straight line between its ends.
-    fn place(&self, a: &Sample, b: &Sample) -> Option<f64> {
-        let (from, to) = (a.finite()?, b.finite()?);
-        Some((a.at + (b.at - a.at) * (from / (from - to))).clamp(a.at, b.at))
-    }
-
-    /// The sides at the outermost samples.
-    pub(super) fn ends(&self) -> Option<[Side; 2]> {
-        Some([self.samples.first()?.side(), self.samples.last()?.side()])
+    /// The gaps that trials leave within a stretch.
+    pub(super) fn gaps(&self, from: f64, to: f64) -> Vec<[f64; 2]> {
+        let inside = self.samples.iter().map(|sample| sample.at).filter(|at| from < *at && *at < to);
+        let marks: Vec<f64> = [from].into_iter().chain(inside).chain([to]).collect();
+        marks.windows(2).map(|pair| [pair[0], pair[1]]).collect()
     }
 
     /// What the row says in the end; `value` turns positions into values.
@@ -280,7 +383,7 @@ impl Row {
             };
             edges.push(Edge {
                 kind,
-                at: if kind == Kind::Crossing { self.place(&a, &b).map(value) } else { None },
+                at: if kind == Kind::Crossing { crossing(&a, &b).map(value) } else { None },
                 bracket: Some([value(a.at), value(b.at)]),
                 distances: [a.distance, b.distance],
             });
@@ -297,21 +400,19 @@ impl Row {
     }
 }
 
-/// The extremum of the parabola through three samples of one side, if the middle one is the closest to the limit and the
-/// parabola comes as close as [`TOUCH`].
-fn touching(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<f64> {
-    let sign = b.1.signum();
-    let [fa, fb, fc] = [sign * a.1, sign * b.1, sign * c.1];
-    if fa < 0.0 || fc < 0.0 || fb > fa || fb > fc || fb >= NEAR {
-        return None;
-    }
-    let (left, right) = ((fb - fa) / (b.0 - a.0), (fc - fb) / (c.0 - b.0));
-    let curvature = (right - left) / (c.0 - a.0);
-    if curvature <= 0.0 {
-        return None;
-    }
-    let slope = (left * (c.0 - b.0) + right * (b.0 - a.0)) / (c.0 - a.0);
-    let step = -0.5 * slope / curvature;
-    let least = fb + 0.5 * slope * step;
-    (least < TOUCH).then_some((b.0 + step).clamp(a.0, c.0))
+/// Whether a bracket has to be narrowed: it is too wide, or the quantity may leap over its limit in
+/// it.
+fn is_open(a: &End, b: &End, span: &Span) -> bool {
+    let (width, middle) = (b.at - a.at, 0.5 * (a.at + b.at));
+    let Some((low, high)) = a.sample.zip(b.sample) else { return true };
+    let leap = low.finite().zip(high.finite()).map(|(low, high)| (low.1 - high.1).abs());
+    let may_leap = leap.is_some_and(|leap| leap > LEAP) && width > CLOSER * span.tolerance;
+    // Rounding ends it too.
+    (width > span.tolerance || may_leap) && a.at < middle && middle < b.at
+}
+
+/// Where the limit is met within a bracket: by the straight line between its ends.
+fn crossing(a: &Sample, b: &Sample) -> Option<f64> {
+    let ((from, at_from), (to, at_to)) = (a.finite()?, b.finite()?);
+    Some((from + (to - from) * (at_from / (at_from - at_to))).clamp(from, to))
 }

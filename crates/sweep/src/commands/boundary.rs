@@ -1,23 +1,24 @@
 //! `sweep boundary GRID.toml`: the curve itself.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
-use std::sync::Mutex;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use super::run::line;
 use super::{Grid, quoted};
-use crate::boundary::file::bytes;
-use crate::boundary::product::{Models, Task};
+use crate::boundary::file::{bytes, job};
+use crate::boundary::product::{Models, Stopped, Task};
 use crate::boundary::quantity::Quantity;
-use crate::boundary::{Kind, Traced, trace};
+use crate::boundary::{Kind, Standing, Traced, trace};
 use crate::engine::ModelEngine;
 use crate::exit::{Error, Exit, tell};
 use crate::files::{FileKind, Output};
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
-use crate::progress::duration;
-use crate::store::StoreError;
+use crate::progress::{Mode, Progress, duration};
+use crate::store::{OpenedTrials, StoreError, Trials};
 use crate::threads;
 
 /// Arguments of `sweep boundary`.
@@ -44,6 +45,13 @@ pub struct Args {
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
     #[arg(long, value_name = "N", value_parser = threads::parse)]
     pub threads: Option<usize>,
+    /// Start over, even if the boundary is there or another plan was begun
+    #[arg(long)]
+    pub fresh: bool,
+    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
+    /// 5 s) or none
+    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
+    pub progress: Mode,
 }
 
 /// What `--help` adds.
@@ -53,7 +61,8 @@ it is known to lie in. Where there is no such place, or the quantity leaps over 
 no number. The least and greatest value of the second axis are the range, however it is written. Axes beyond the second \
 give one curve for every combination of their values.
 
-The file is a pure function of its input, whatever the number of threads. An interrupted run leaves nothing behind.";
+The file is a pure function of its input, whatever the number of threads and interruptions. What an interrupted \
+search has found out stays in FILE.partial, and the same command goes on from there.";
 
 /// Traces the boundary of a grid.
 ///
@@ -73,33 +82,72 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         source,
     })?;
     let engine = ModelEngine::new(&plan)?;
-    let began = Instant::now();
-    let told = Mutex::new(began);
-    let progress = |points: u64| {
-        // A line a minute is what a batch job's log can bear; a thread that finds another telling goes on.
-        if let Ok(mut told) = told.try_lock()
-            && told.elapsed().as_secs() >= 60
-        {
-            *told = Instant::now();
-            tell(&format!("{points} points so far"));
+    let job = job(&plan, args.quantity, &task);
+    let mut trials = match Trials::open(&output, &job, args.fresh)? {
+        OpenedTrials::Open(trials) => *trials,
+        OpenedTrials::Finished => {
+            tell(&already(&plan, &output));
+            return Ok(Exit::Done);
         }
     };
-    let models = Models::new(&plan, engine, args.quantity, threads, &interrupt, &progress)?;
-    let Ok(traced) = trace(&models, &task.firsts, task.curves, &task.search) else {
-        tell(&format!("{}: interrupted; nothing was written", plan.name));
-        return Ok(match interrupt.signal() {
-            Some(15) => Exit::Terminated,
-            _ => Exit::Interrupted,
-        });
+    trials.take_notes().iter().for_each(|note| tell(note));
+    let there = trials.count() as u64;
+    if there > 0 {
+        tell(&format!("going on: {there} points are there"));
+    }
+    let began = Instant::now();
+    let rows = (task.firsts.len() * task.curves) as u64;
+    let rows_done = AtomicU64::new(0);
+    let progress = Mutex::new(Progress::of_search(args.progress, rows, there));
+    let shown = |points: u64| {
+        // A thread that finds another showing it goes on.
+        if let Ok(mut progress) = progress.try_lock() {
+            progress.show_search(rows_done.load(Ordering::Relaxed), points);
+        }
     };
-    let bytes = bytes(&plan, args.quantity, &task, &traced);
+    let models = Models::new(&plan, engine, args.quantity, threads, &interrupt, &shown)?.keeping(trials);
+    let mut standing = |standing: &Standing| rows_done.store(standing.rows as u64, Ordering::Relaxed);
+    let traced = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
+    progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+    let trials = models.into_kept();
+    let traced = match traced {
+        Ok(traced) => traced,
+        Err(Stopped::Failed(error)) => return Err(error.into()),
+        Err(Stopped::Interrupted) => {
+            let kept = trials.map_or(0, |trials| trials.count());
+            let wall = duration(began.elapsed().as_secs_f64());
+            let mut text = format!("{}: interrupted with {kept} points kept, after {wall}\n", plan.name);
+            line(&mut text, "go on", "the same command");
+            tell(text.trim_end());
+            return Ok(match interrupt.signal() {
+                Some(15) => Exit::Terminated,
+                _ => Exit::Interrupted,
+            });
+        }
+    };
+    let bytes = bytes(&job, &plan, args.quantity, &task, &traced);
     file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;
+    if let Some(note) = trials.and_then(Trials::complete) {
+        tell(&note);
+    }
     let mut text = summary(&plan, args.quantity, &task, &traced, began.elapsed().as_secs_f64());
-    let shown = output.display().to_string();
-    line(&mut text, "file", &shown);
-    line(&mut text, "next", &format!("sweep plot {}", quoted(&shown)));
+    next(&mut text, &output);
     tell(text.trim_end());
     Ok(Exit::Done)
+}
+
+/// What there is to say if the boundary is there.
+fn already(plan: &Plan, output: &Path) -> String {
+    let mut text = format!("{}: the boundary is there already (--fresh traces it again)\n", plan.name);
+    next(&mut text, output);
+    text.trim_end().to_owned()
+}
+
+/// The file, and what to do with it.
+fn next(text: &mut String, output: &Path) {
+    let shown = output.display().to_string();
+    line(text, "file", &shown);
+    line(text, "next", &format!("sweep plot {}", quoted(&shown)));
 }
 
 fn summary(plan: &Plan, quantity: Quantity, task: &Task, traced: &Traced, wall_s: f64) -> String {

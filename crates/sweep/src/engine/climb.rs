@@ -23,6 +23,9 @@ pub enum Demand {
 /// Ratios further from the limit than this many times their error are on their side of it.
 const SURE: f64 = 2.0;
 
+/// A model whose error times this is less than the margin is not what leaves the side in doubt.
+const SHARE: f64 = 4.0;
+
 /// An amplitude is within this many times the difference of two runs that have left their common course.
 const ROUGHLY: f64 = 2.0;
 
@@ -134,13 +137,17 @@ impl Row {
         let Some(outcome) = outcome.filter(|_| runs.is_empty()) else { return Next::Runs(runs) };
         // The verdict is plain RK4's: where the error left could turn it, RK4 has the word.
         let errors: f64 = self.climbs.iter().filter_map(|climb| climb.error).sum();
-        if margin.is_some_and(|margin| margin <= errors) {
+        if let Some(margin) = margin.filter(|margin| *margin <= errors) {
             for (model, climb) in self.climbs.iter().enumerate() {
-                // By way of its first step: only RK4 against RK4 tells chaos from a coarse rung.
-                if let Some(top) = ladders[model].top()
-                    && climb.rung < top
-                {
-                    runs.push((model, (climb.rung + 1).max(top - 1)));
+                let Some(top) = ladders[model].top().filter(|top| climb.rung < *top) else { continue };
+                match demand {
+                    // By way of its first step: only RK4 against RK4 tells chaos from a coarse rung.
+                    Demand::Row => runs.push((model, (climb.rung + 1).max(top - 1))),
+                    // Of the side alone, the next rung may make sure: where it cannot, the one after.
+                    Demand::Side if climb.error.is_some_and(|error| SHARE * error > margin) => {
+                        runs.push((model, climb.rung + 1));
+                    }
+                    Demand::Side => {}
                 }
             }
         }

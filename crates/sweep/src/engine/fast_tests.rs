@@ -183,7 +183,7 @@ fn a_side_is_that_of_the_row() {
     let engine = ModelEngine::new(&plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
     let interrupt = Interrupt::new();
-    let sides = engine.evaluate_for(&values, Demand::Side, &Watch::new(&interrupt)).unwrap();
+    let sides = engine.evaluate_for(&values, Demand::Side, &|_| {}, &Watch::new(&interrupt)).unwrap();
     let rows = engine.evaluate_at(&values);
     let steps = |outcomes: &[Outcome]| outcomes.iter().map(|outcome| outcome.nonlinear.steps).sum::<u64>();
     assert!(steps(&sides) < steps(&rows));

@@ -25,7 +25,7 @@ pub(crate) struct Lock {
     _shard: Option<File>,
     path: PathBuf,
     /// Set when the file system has no locks and the run goes on without.
-    pub(crate) missing: bool,
+    missing: bool,
 }
 
 impl Lock {
@@ -65,6 +65,18 @@ impl Lock {
             }
         }
         Err(StoreError::Busy { output: folder.output.clone(), holders: holders(folder) })
+    }
+
+    /// What a user should hear of a file system without locks.
+    pub(crate) fn note(&self, folder: &Folder) -> Option<String> {
+        let folder = folder.path.display();
+        let note = || {
+            format!(
+                "{folder} is on a file system without locks: make sure that nothing else runs on \
+                 this output"
+            )
+        };
+        self.missing.then(note)
     }
 
     /// Deletes the lock's file while it is still held, so that no one can take it over, then lets go.

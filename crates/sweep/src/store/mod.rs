@@ -7,6 +7,7 @@
 //! | `plan.json` | the frozen plan, written first (`plan_file`) |
 //! | `shards.json` | into how many shards the run was dealt, if it was (`shard`) |
 //! | `chunk-<index>.bin` | outcomes of neighbouring points, each file whole or absent (`chunk`) |
+//! | `trials.bin` | the trials of a search, in place of chunks (`trials`) |
 //! | `*.damaged` | what was not as it had been written; computed again |
 //! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
 //! | `lock`, `shard-<i>.lock` | who is at work (`lock`) |
@@ -29,6 +30,7 @@ mod status;
 pub(crate) mod synthetic;
 #[cfg(test)]
 mod tests;
+mod trials;
 
 use std::path::{Path, PathBuf};
 
@@ -42,6 +44,7 @@ pub use plan_file::Difference;
 pub use schema::{AxisColumn, Layout};
 pub use shard::{Shard, ShardRequest};
 pub use status::{FolderStatus, State, status};
+pub use trials::{Key, OpenedTrials, Trials};
 
 use crate::files::{self, FileKind};
 use crate::identity;
@@ -133,12 +136,21 @@ impl Folder {
     /// Those of the run with this output. Neither it nor its sidecar is anything but absent or
     /// ours.
     pub(crate) fn of(output: &Path) -> Result<Self, StoreError> {
-        files::judge(output, FileKind::Map)?;
-        let mut name = output.file_name().unwrap_or_default().to_owned();
-        name.push(".partial");
-        let folder = Self { output: output.to_path_buf(), path: output.with_file_name(name) };
+        let folder = Self::beside(output, FileKind::Map)?;
         files::judge(&folder.sidecar(), folder.account())?;
         Ok(folder)
+    }
+
+    /// Those of the search with this output.
+    fn of_search(output: &Path) -> Result<Self, StoreError> {
+        Self::beside(output, FileKind::Boundary)
+    }
+
+    fn beside(output: &Path, kind: FileKind<'_>) -> Result<Self, StoreError> {
+        files::judge(output, kind)?;
+        let mut name = output.file_name().unwrap_or_default().to_owned();
+        name.push(".partial");
+        Ok(Self { output: output.to_path_buf(), path: output.with_file_name(name) })
     }
 
     fn plan(&self) -> PathBuf {

@@ -13,7 +13,7 @@ use super::lock::{self, Lock};
 use super::plan_file::{Found, PlanFile, set_aside};
 use super::read::{self, ResultFile, Tally};
 use super::shard::{self, Dealing, Shard, ShardRequest};
-use super::{Folder, Job, chunk_of_name, chunk_points, provenance};
+use super::{Folder, Job, chunk_of_name, chunk_points, provenance, trials};
 use crate::files::{FileError, atomic, regular};
 use crate::outcome::Outcome;
 use crate::threads::Environment;
@@ -76,13 +76,7 @@ impl Run {
             )));
         }
         let lock = Lock::acquire(&folder, dealt.map(|(shard, _)| shard.index))?;
-        let mut notes = Vec::new();
-        if lock.missing {
-            notes.push(format!(
-                "{} is on a file system without locks: make sure that nothing else runs on this output",
-                folder.path.display()
-            ));
-        }
+        let mut notes: Vec<String> = lock.note(&folder).into_iter().collect();
         if options.fresh {
             clear(&folder)?;
         }
@@ -338,7 +332,12 @@ pub(super) fn finished(folder: &Folder, job: &Job<'_>) -> Result<Option<(ResultF
     Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
 }
 
-fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Result<(), StoreError> {
+/// Refuses a folder that another plan was begun in.
+pub(super) fn refuse_other_plan(
+    folder: &Folder,
+    found: &PlanFile,
+    ours: &PlanFile,
+) -> Result<(), StoreError> {
     if found == ours {
         return Ok(());
     }
@@ -346,7 +345,7 @@ fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Resu
 }
 
 /// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers' files stay.
-fn clear(folder: &Folder) -> Result<(), StoreError> {
+pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
     atomic::remove(&folder.plan())?;
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         if name.to_str().is_some_and(is_ours) {
@@ -359,7 +358,7 @@ fn clear(folder: &Folder) -> Result<(), StoreError> {
 /// Whether a run writes files of this name into its folder, the lock aside.
 fn is_ours(name: &str) -> bool {
     let whole = name.strip_suffix(".damaged").unwrap_or(name);
-    ["plan.json", "shards.json"].contains(&whole)
+    ["plan.json", "shards.json", trials::NAME].contains(&whole)
         || chunk_of_name(whole).is_some()
         || lock::shard_of_name(name).is_some()
         || provenance::is_session(name)
