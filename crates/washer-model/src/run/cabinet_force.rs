@@ -130,12 +130,12 @@ impl<T: Lane> GreatestForce<T> {
         squared.sqrt()
     }
 
-    /// A state whose derivative is `dx`, at the end of a step of `length_s`, or where a leg begins; `counts` says in
-    /// which lanes it counts.
+    /// A state whose derivative is `dx`: at the end of a step, of which end and length (s) are given, or
+    /// where a leg begins. `counts` says in which lanes it counts.
     #[inline(always)]
     pub(crate) fn see(
         &mut self,
-        length_s: Option<N<T>>,
+        step: Option<(N<T>, N<T>)>,
         x: &[N<T>; STATES],
         dx: &[N<T>; STATES],
         counts: T::Mask,
@@ -144,7 +144,7 @@ impl<T: Lane> GreatestForce<T> {
         for (sample, q) in now.iter_mut().zip(TUB) {
             *sample = Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] };
         }
-        if let Some(length_s) = length_s {
+        if let Some((_, length_s)) = step {
             let share = 1.0 / f64::from(self.parts);
             for part in 1..self.parts {
                 let mut tub = now;

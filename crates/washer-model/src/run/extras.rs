@@ -161,12 +161,7 @@ impl<T: Lane> Aside for Seen<'_, T> {
             }
         }
         if let Some(force) = &mut extras.force {
-            // No closure: it would be compiled without the instruction set.
-            let length_s = match step {
-                Some((_, length_s)) => Some(length_s),
-                None => None,
-            };
-            force.see(length_s, x, dx, inside);
+            force.see(step, x, dx, inside);
         }
         if wanted.clash_time {
             let mut overlap = squared(radial);
