@@ -65,25 +65,14 @@ const REFERENCE_CONTRACTION: f64 = 0.7;
 /// A finest rung is climbed if it costs less than this share of the reference.
 const WORTH_IT: f64 = 0.5;
 
-/// For what error the first two rungs are chosen, in parts of the accuracy. The first one only shows the error of the second.
+/// For what error the capped rungs are chosen, in parts of the accuracy. The first one only shows the error of the second.
 ///
-/// The linear model amplifies nothing, so its first rung may be coarser and its second needs less in reserve.
-const fn aims(model: ModelKind) -> [f64; 2] {
+/// The linear model amplifies nothing: its first rung may be coarser, its second needs less in reserve, and a third is
+/// hardly ever asked for.
+const fn aims(model: ModelKind) -> (Formula, &'static [f64]) {
     match model {
-        ModelKind::Nonlinear => [10.0, 0.1],
-        ModelKind::Linear => [100.0, 0.3],
-    }
-}
-
-/// The same of the nonlinear model's third rung.
-const FINE_AIM: f64 = 0.01;
-
-/// How far the rule may be off in what share of the first rung's error the second leaves. Motions that amplify the one
-/// kind of error more than the other show it: 1.9 was seen.
-const fn doubt(model: ModelKind) -> f64 {
-    match model {
-        ModelKind::Nonlinear => 2.5,
-        ModelKind::Linear => 1.0,
+        ModelKind::Nonlinear => (Formula::Dop853, &[10.0, 0.15, 0.01]),
+        ModelKind::Linear => (Formula::Rk4, &[100.0, 0.3]),
     }
 }
 
@@ -117,6 +106,8 @@ pub(crate) struct Rung {
     pub(crate) method: Method,
     /// Its error as a share of the rung's before; 1 for the first.
     contraction: f64,
+    /// Up to which difference from that rung this is so.
+    believed_to: f64,
 }
 
 impl fmt::Display for Rung {
@@ -150,7 +141,6 @@ impl fmt::Display for Rung {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Ladder {
     pub(crate) rungs: Vec<Rung>,
-    first_order: f64,
     /// Whether there is more than one, and the last two are plain RK4.
     is_checked: bool,
 }
@@ -158,8 +148,8 @@ pub(crate) struct Ladder {
 impl Ladder {
     /// One method, which nothing is compared with.
     pub(crate) fn direct(level: Level, method: Method) -> Self {
-        let rungs = vec![Rung { level, method, contraction: 1.0 }];
-        Self { rungs, first_order: 0.0, is_checked: false }
+        let rungs = vec![Rung { level, method, contraction: 1.0, believed_to: 0.0 }];
+        Self { rungs, is_checked: false }
     }
 
     /// The fast method's for these cases.
@@ -167,14 +157,17 @@ impl Ladder {
         let mut rungs = capped(cases, model, accuracy);
         let reference_step_s = reference_step_s(cases);
         let contraction = if rungs.is_empty() { 1.0 } else { BEST_CONTRACTION };
-        for (step_s, contraction) in [(LONGER_STEP * reference_step_s, contraction), (reference_step_s, 1.0)]
-        {
-            rungs.push(Rung { level: Level::Rk4, method: Method::Rk4 { step_s }, contraction });
-        }
-        if let Some(last) = rungs.last_mut() {
-            last.contraction = REFERENCE_CONTRACTION;
-        }
-        Self { rungs, first_order: first_order(model), is_checked: true }
+        let plain = [
+            (LONGER_STEP * reference_step_s, contraction, FIRST_ORDER_OF_RK4),
+            (reference_step_s, REFERENCE_CONTRACTION, f64::INFINITY),
+        ];
+        rungs.extend(plain.map(|(step_s, contraction, believed_to)| Rung {
+            level: Level::Rk4,
+            method: Method::Rk4 { step_s },
+            contraction,
+            believed_to,
+        }));
+        Self { rungs, is_checked: true }
     }
 
     /// The last rung, if there are others below it.
@@ -184,49 +177,57 @@ impl Ladder {
 
     /// The error left at a rung whose run differs so much from that of the rung before.
     pub(crate) fn error_left(&self, rung: usize, difference: f64) -> f64 {
-        let first_order = match self.top() {
-            Some(top) if rung == top => f64::INFINITY,
-            Some(top) if rung + 1 == top => FIRST_ORDER_OF_RK4,
-            _ => self.first_order,
-        };
-        if difference <= first_order { self.rungs[rung].contraction * difference } else { difference }
+        let Rung { contraction, believed_to, .. } = self.rungs[rung];
+        if difference <= believed_to { contraction * difference } else { difference }
     }
 }
 
 /// The rungs with capped modes, if any are worth their time.
 ///
-/// The coarse one's steps are held short by truncation, and the fast one's by its caps: how much less the second errs only
-/// the rule can say. From there on the formula is one, and what is left of an error is the greatest share that is left of any
-/// part of it. Corners without an equilibrium or without modes are rows that say so; the rest climbs by plain RK4.
+/// How much less a rung errs than the one before: the greatest share that is left of any part of an error, with something in
+/// reserve. For the linear model, whose first rung is of another formula and held short by truncation alone, it is what
+/// the rule expects. Corners without an equilibrium or without modes are rows that say so; the rest climbs by plain RK4.
 fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
-    let chosen = |formula, parts: f64| {
-        let geared = cases.choose(formula, parts * accuracy).ok().flatten()?;
-        Some((geared, cases.expected_error(&geared).ok()?))
+    let (first_formula, aims) = aims(model);
+    let mut rungs: Vec<Rung> = Vec::new();
+    let mut last: Option<(Geared, f64)> = None;
+    let mut push = |level: Level, geared: Geared, expected: f64| {
+        let contraction = match last {
+            None => 1.0,
+            Some((before, error)) if before.formula != geared.formula => expected / error,
+            Some((before, _)) => reserve(rungs.len()) * geared.share_of_error(&before),
+        };
+        let contraction = contraction.clamp(BEST_CONTRACTION, 1.0);
+        let method = Method::Geared(geared);
+        rungs.push(Rung { level, method, contraction, believed_to: first_order(model) });
+        last = Some((geared, expected));
     };
-    let [coarse_aim, fast_aim] = aims(model);
-    let coarse = chosen(Formula::Rk4, coarse_aim);
-    let Some((coarse, coarse_error)) = coarse else { return Vec::new() };
-    let Some((fast, fast_error)) = chosen(Formula::Dop853, fast_aim) else { return Vec::new() };
-    let rung = |level, geared, contraction| Rung { level, method: Method::Geared(geared), contraction };
-    let mut rungs = vec![
-        rung(Level::Fast, coarse, 1.0),
-        rung(Level::Fast, fast, (doubt(model) * fast_error / coarse_error).clamp(BEST_CONTRACTION, 1.0)),
-    ];
-    let mut last = fast;
-    if model == ModelKind::Nonlinear
-        && let Some((fine, _)) = chosen(Formula::Dop853, FINE_AIM)
-    {
-        // In one gear: what instability amplifies later is small while the drum is slow.
-        let fine = Geared::steady(fine.formula, fine.top().step_s, fine.top().caps);
-        rungs.push(rung(Level::Fine, fine, fine.share_of_error(&last).min(1.0)));
-        last = fine;
+    let mut finest = None;
+    for (place, (level, aim)) in [Level::Fast, Level::Fast, Level::Fine].into_iter().zip(aims).enumerate() {
+        let formula = if place == 0 { first_formula } else { Formula::Dop853 };
+        let Ok(Some(mut geared)) = cases.choose(formula, aim * accuracy) else { break };
+        let Ok(expected) = cases.expected_error(&geared) else { break };
+        if place > 0 && model == ModelKind::Nonlinear {
+            // One gear: what instability amplifies later is small while the drum is slow.
+            geared = Geared::steady(formula, geared.top().step_s, geared.top().caps);
+        }
+        push(level, geared, expected);
+        finest = Some((refined(&geared), expected));
     }
-    let finest = refined(&last);
     let plain_evaluations_per_s = Formula::Rk4.evaluations_per_s(reference_step_s(cases));
-    if finest.evaluations_per_s() < WORTH_IT * plain_evaluations_per_s {
-        rungs.push(rung(Level::Finest, finest, finest.share_of_error(&last).min(1.0)));
+    if let Some((finest, expected)) = finest
+        && finest.formula == Formula::Dop853
+        && finest.evaluations_per_s() < WORTH_IT * plain_evaluations_per_s
+    {
+        push(Level::Finest, finest, expected);
     }
     rungs
+}
+
+/// By how much the share of an error that is left may be greater than reckoned. Where caps are as low as the first rung's, a
+/// mode's shift is less than proportional to it.
+const fn reserve(rung: usize) -> f64 {
+    if rung == 1 { 2.0 } else { 1.5 }
 }
 
 /// With shorter steps, and caps as high as these bear.
