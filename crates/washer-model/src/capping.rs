@@ -12,18 +12,18 @@
 //!   are pushed up by it: h w is the first of 0.95, 0.84, ... times the
 //!   formula's limit that leaves the step stable, with the hinge as it is or, if that does not do,
 //!   capped too.
-//! * Fidelity. What turns with the drum is exact under the caps (`coupling.rs`); other motion is not, and so the modes of suspension and hinge
-//!   move, by ds. A response at the drum's speed would answer to ds over
-//!   the distance from resonance, or the resonance's half-width |Re s| if that is more; that it is exact leaves free and nonlinear motion to
-//!   answer, which is less. A mode faster than the drum by a factor r
-//!   takes part in the motion by 1/r^2 only, and of that its speed matters by 1/r^2 again, because static compliance stays exact.
-//!   The shift so weighted stays below the accuracy.
-//!   Stiff bearings pass at once: they hold next to no strain energy of slow modes. Soft ones do not, and then the cap rises until it
-//!   caps nothing: plain RK4.
+//! * Fidelity. What turns with the drum is exact under the caps (`coupling.rs`); other motion is not, and so the modes of
+//!   the suspension move, by ds. A motion answers to ds over the distance from resonance, or over the resonance's
+//!   half-width |Re s| if that is more. A mode faster than the drum by a factor r takes part in the motion by 1/r^2
+//!   only, and of that its speed matters by 1/r^2 again, because static compliance stays exact. The shift so weighted
+//!   stays below the accuracy. Stiff bearings pass at once: they hold next to no strain energy of slow modes. Soft ones
+//!   do not, and then the cap rises until it caps nothing: plain RK4.
 //!
-//! The hinge turns with the shaft: a motion of frequency f has f + theta' and f - theta' in it, which modes
-//! with theta frozen do not show. A hinge that holds the share e of a mode's strain energy moves it by e f / 2
-//! times the greater softening of the two (`coupling.rs`); that is added to ds.
+//! The hinge turns with the shaft: a motion of frequency f has f + theta' and f - theta' in it, which modes with theta
+//! frozen do not show. A hinge that holds the share e of a mode's strain energy moves it by e f / 2 times the greater
+//! softening of the two (`coupling.rs`). A tenth of that is added to ds: on the paper's machine motions answer to less.
+//!
+//! Between steps a motion is a polynomial of degree 5, which bounds the step too.
 
 use core::iter;
 

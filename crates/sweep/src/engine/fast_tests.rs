@@ -158,7 +158,7 @@ fn where_the_verdict_is_in_doubt_rk4_is_held_against_rk4() {
     let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
     assert_eq!((row.method, row.sensitive), (Level::Rk4, Some(false)));
     // What RK4 has left, not what the capped rung had.
-    assert!(row.error.unwrap() < 1e-6, "{row:?}");
+    assert!(row.error.unwrap() < 1e-5, "{row:?}");
 }
 
 #[test]
