@@ -2,7 +2,8 @@
 
     python docs/recipes/with_duckdb.py results/quick.parquet [MASS_KG]
 
-Answers: which least damping keeps this unbalance reliable? And where does the drum come nearest to the tub?
+Answers: which least damping keeps this unbalance reliable? And where does the drum come nearest to
+the tub?
 """
 
 import sys
@@ -20,14 +21,16 @@ LEAST_DAMPING = """
     WITH at_mass AS (
         SELECT * FROM read_parquet($path)
         WHERE unbalance_mass_kg = (
-            SELECT min(unbalance_mass_kg) FROM read_parquet($path) WHERE unbalance_mass_kg >= $mass_kg
+            SELECT min(unbalance_mass_kg) FROM read_parquet($path)
+            WHERE unbalance_mass_kg >= $mass_kg
         )
     )
     SELECT
         min(unbalance_mass_kg),
         min(damping_n_s_per_m) FILTER (
             damping_n_s_per_m > coalesce(
-                (SELECT max(damping_n_s_per_m) FROM at_mass WHERE reliable IS NOT TRUE), '-infinity'::DOUBLE
+                (SELECT max(damping_n_s_per_m) FROM at_mass WHERE reliable IS NOT TRUE),
+                '-infinity'::DOUBLE
             )
         )
     FROM at_mass
@@ -45,7 +48,8 @@ def units(path):
 
 
 def least_damping(path, mass_kg):
-    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which on it is reliable.
+    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which
+    on it is reliable.
 
     The damping is None if even the strongest of the map does not do.
     """
@@ -57,7 +61,10 @@ def main():
     path, mass_kg = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else 0.6
     print(f"the five least gaps ({units(path)['min_gap_nonlinear_m']}), nonlinear model")
     for mass, damping, gap, reliable in duckdb.execute(NEAREST, {"path": path}).fetchall():
-        print(f"  {gap:.5f} at {mass:g} kg, {damping:g} N s/m{'' if reliable else ', where the linear model is wrong'}")
+        print(
+            f"  {gap:.5f} at {mass:g} kg, {damping:g} N "
+            f"s/m{'' if reliable else ', where the linear model is wrong'}"
+        )
     mass, damping = least_damping(path, mass_kg)
     answer = "at no damping of this map" if damping is None else f"from {damping:g} N s/m"
     print(f"{mass_kg:g} kg stays reliable {answer} (grid: {mass:g} kg)")

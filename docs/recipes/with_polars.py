@@ -18,18 +18,24 @@ def units(path):
 
 
 def requirement(path):
-    """One row per mass of the grid: the damping from which on it is reliable; null if no damping of the map does."""
+    """One row per mass of the grid: the damping from which on it is reliable; null if no damping of
+    the map does."""
     rows = pl.scan_parquet(path)
     # A row without a verdict (null) is not a reliable one.
     worst = pl.col("damping_n_s_per_m").filter(~pl.col("reliable").fill_null(False)).max()
     above = pl.col("damping_n_s_per_m").filter(
         pl.col("damping_n_s_per_m") > worst.fill_null(float("-inf"))
     )
-    return rows.group_by("unbalance_mass_kg").agg(above.min().alias("damping_n_s_per_m")).sort("unbalance_mass_kg")
+    return (
+        rows.group_by("unbalance_mass_kg")
+        .agg(above.min().alias("damping_n_s_per_m"))
+        .sort("unbalance_mass_kg")
+    )
 
 
 def least_damping(path, mass_kg):
-    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which on it is reliable.
+    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which
+    on it is reliable.
 
     The damping is None if even the strongest of the map does not do.
     """
@@ -40,7 +46,10 @@ def main():
     """Read the command line, tell."""
     path, mass_kg = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else 0.6
     unit = units(path)
-    print(f"damping ({unit['damping_n_s_per_m']}) from which on a mass ({unit['unbalance_mass_kg']}) is reliable")
+    print(
+        f"damping ({unit['damping_n_s_per_m']}) from which on a mass ({unit['unbalance_mass_kg']}) "
+        f"is reliable"
+    )
     print(requirement(path).collect())
     deciding = pl.col("ratio_max_channel")
     print(pl.scan_parquet(path).group_by(deciding).len().sort("len", descending=True).collect())

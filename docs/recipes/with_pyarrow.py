@@ -1,4 +1,5 @@
-"""The map with pyarrow, which sees everything: types, nulls, and each column's unit in the field metadata.
+"""The map with pyarrow, which sees everything: types, nulls, and each column's unit in the field
+metadata.
 
     python docs/recipes/with_pyarrow.py results/quick.parquet [MASS_KG]
 
@@ -18,7 +19,8 @@ def units(path):
 
 
 def least_damping(path, mass_kg):
-    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which on it is reliable.
+    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which
+    on it is reliable.
 
     The damping is None if even the strongest of the map does not do.
     """

@@ -1,8 +1,10 @@
-"""The map as an xarray dataset: one dimension per axis of the grid, units and descriptions as attributes.
+"""The map as an xarray dataset: one dimension per axis of the grid, units and descriptions as
+attributes.
 
     python docs/recipes/with_xarray.py results/quick.parquet [MASS_KG [PICTURE.png]]
 
-Answers: which least damping keeps this unbalance reliable? Works for any number of axes; with two it draws the map.
+Answers: which least damping keeps this unbalance reliable? Works for any number of axes; with two
+it draws the map.
 """
 
 import json
@@ -25,8 +27,15 @@ def load(path):
     data = xr.Dataset.from_dataframe(rows)
     for name, facts in json.loads(metadata[b"sweep.columns"]).items():
         # What plots and netCDF readers look for.
-        data[name].attrs = {"units": facts["unit"], "long_name": name, "description": facts["description"]}
-    data.attrs = {"plan": metadata[b"sweep.plan"].decode(), "sweep": metadata[b"sweep.version"].decode()}
+        data[name].attrs = {
+            "units": facts["unit"],
+            "long_name": name,
+            "description": facts["description"],
+        }
+    data.attrs = {
+        "plan": metadata[b"sweep.plan"].decode(),
+        "sweep": metadata[b"sweep.version"].decode(),
+    }
     return data
 
 
@@ -36,12 +45,14 @@ def units(path):
 
 
 def least_damping(path, mass_kg):
-    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which on it is reliable.
+    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which
+    on it is reliable.
 
     The damping is None if even the strongest of the map does not do.
     """
     column = load(path)["reliable"].sel(unbalance_mass_kg=mass_kg, method="bfill")
-    # From the strongest damping down, as long as every one is reliable; a row without a verdict is not.
+    # From the strongest damping down, as long as every one is reliable; a row without a verdict is
+    # not.
     downward = column.sortby("damping_n_s_per_m", ascending=False) == True  # noqa: E712
     kept = downward.damping_n_s_per_m.where(downward.cumprod("damping_n_s_per_m") == 1, drop=True)
     return float(column.unbalance_mass_kg), float(kept.min()) if kept.size else None
@@ -54,7 +65,9 @@ def main():
     print(data["ratio_max"])
     if len(sys.argv) > 3 and data["ratio_max"].ndim == 2:
         limit = json.loads(data.attrs["plan"])["reliability"]["ratio_limit"]
-        data["ratio_max"].plot.contourf(x="unbalance_mass_kg", levels=[0, 1, limit, 5, 10, 50], figsize=(8, 6))
+        data["ratio_max"].plot.contourf(
+            x="unbalance_mass_kg", levels=[0, 1, limit, 5, 10, 50], figsize=(8, 6)
+        )
         plt.savefig(sys.argv[3], dpi=120)
     mass, damping = least_damping(path, mass_kg)
     answer = "at no damping of this map" if damping is None else f"from {damping:g} N s/m"

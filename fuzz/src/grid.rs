@@ -1,4 +1,5 @@
-//! Any grid file, machine file and constants: either a plan whose corners can be prepared and integrated, or an explanation.
+//! Any grid file, machine file and constants: either a plan whose corners can be prepared and
+//! integrated, or an explanation.
 
 #![no_main]
 
@@ -10,8 +11,7 @@ use std::sync::OnceLock;
 use input::Input;
 use lane_ode::Simd;
 use libfuzzer_sys::{Corpus, fuzz_target};
-use sweep::plan::Plan;
-use sweep::store::Job;
+use sweep::{Job, Plan};
 use tempfile::TempDir;
 use washer_model::{Method, ModelKind, Point, Timing, prepare, simulate};
 
@@ -25,7 +25,7 @@ const STEP_S: f64 = 1e-4;
 fuzz_target!(|bytes: &[u8]| -> Corpus {
     let input = Input::new(bytes);
     let Ok(grid) = input.write(folder()) else { return Corpus::Reject };
-    match sweep::config::load(&grid, &input.sets) {
+    match sweep::load(&grid, &input.sets) {
         Ok(plan) => try_out(&plan),
         Err(mistakes) => {
             let text = mistakes.to_string();
@@ -52,7 +52,8 @@ fn try_out(plan: &Plan) {
         .collect();
     let end_s = END_S.min(plan.end_s);
     let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
-    let simd = Simd::ALL.into_iter().find(|simd| simd.name() == "scalar").unwrap_or_else(Simd::best);
+    let mut all = Simd::ALL.into_iter();
+    let simd = all.find(|simd| simd.name() == "scalar").unwrap_or_else(Simd::best);
     let prepared = prepare(simd, &scenarios, &timing);
     let ready: Vec<&Point> = prepared.iter().filter_map(|point| point.as_ref().ok()).collect();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {

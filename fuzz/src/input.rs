@@ -1,4 +1,5 @@
-//! What the fuzzer's bytes stand for: a grid file, a machine file beside it and constants of the command line.
+//! What the fuzzer's bytes stand for: a grid file, a machine file beside it and constants of the
+//! command line.
 
 use std::path::Path;
 
@@ -18,7 +19,8 @@ impl<'a> Input<'a> {
     pub(crate) fn new(bytes: &'a [u8]) -> Self {
         let (files, sets) = cut(bytes, SETS);
         let (grid, machine) = cut(files, MACHINE);
-        let sets = String::from_utf8_lossy(sets.unwrap_or_default()).lines().map(str::to_owned).collect();
+        let sets =
+            String::from_utf8_lossy(sets.unwrap_or_default()).lines().map(str::to_owned).collect();
         Self { grid, machine, sets }
     }
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Runs every program of the comparison in turns and writes the table and the work-precision diagram: called by run.sh."""
+"""Runs every program of the comparison in turns and writes the table and the work-precision
+diagram: called by run.sh."""
 
 import json
 import os
@@ -37,8 +38,18 @@ def commands():
     sets, best = instruction_sets()
     sweep = [[SWEEP, name, "rk4", "2.5e-4"] for name in sets]
     sweep += [[SWEEP, best, "rk4", step] for step in ["1e-4", "5e-5", "2.5e-5"]]
-    adaptive = [("1e-3", "1e-6"), ("1e-4", "1e-7"), ("1e-5", "1e-8"), ("1e-6", "1e-9"), ("1e-7", "1e-10")]
-    sweep += [[SWEEP, name, "rk4-mass-scaled", accuracy] for accuracy in ["1e-3", "1e-4", "1e-6"] for name in sets]
+    adaptive = [
+        ("1e-3", "1e-6"),
+        ("1e-4", "1e-7"),
+        ("1e-5", "1e-8"),
+        ("1e-6", "1e-9"),
+        ("1e-7", "1e-10"),
+    ]
+    sweep += [
+        [SWEEP, name, "rk4-mass-scaled", accuracy]
+        for accuracy in ["1e-3", "1e-4", "1e-6"]
+        for name in sets
+    ]
     sweep += [[SWEEP, best, "dopri5", *pair] for pair in adaptive[1:4:2]]
     loose = [("3e-2", "3e-5"), ("1e-2", "1e-5"), ("3e-3", "3e-6")]
     sweep += [[SWEEP, "scalar", "rodas5p", *pair] for pair in [*loose, *adaptive[:4]]]
@@ -66,18 +77,29 @@ def measure(repeats):
             found = json.loads(done.stdout)
             entries.setdefault(command, []).append(found)
             raw.append({"round": turn + 1, **found})
-            print(f"round {turn + 1}: {found['program']}, {found['method']}, {found['settings']}: "
-                  f"{found['seconds'] * 1e3:.1f} ms", file=sys.stderr)
-    medians = {command: {**runs[0], "seconds": statistics.median(run["seconds"] for run in runs), "runs": len(runs)}
-               for command, runs in entries.items()}
+            print(
+                f"round {turn + 1}: {found['program']}, {found['method']}, {found['settings']}: "
+                f"{found['seconds'] * 1e3:.1f} ms",
+                file=sys.stderr,
+            )
+    medians = {
+        command: {
+            **runs[0],
+            "seconds": statistics.median(run["seconds"] for run in runs),
+            "runs": len(runs),
+        }
+        for command, runs in entries.items()
+    }
     return raw, medians
 
 
 def whole_map(medians, repeats):
-    """Fig. 12 by `sweep run`, checks and recomputed points included, beside CVODE's time for one point as often as the map has points."""
+    """Fig. 12 by `sweep run`, checks and recomputed points included, beside CVODE's time for one
+    point as often as the map has points."""
     grid = (ROOT / "sweeps/fig12.toml").read_text()
     lines = [
-        "| accuracy | observed | `sweep run`, s | CVODE | its error | nonlinear, ms | linear, ms | the map, s | times longer |",
+        "| accuracy | observed | `sweep run`, s | CVODE | its error | nonlinear, ms | linear, ms | "
+        "the map, s | times longer |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for accuracy in ["1e-3", "1e-6"]:
@@ -86,48 +108,92 @@ def whole_map(medians, repeats):
         seconds = []
         for _ in range(repeats):
             begin = time.perf_counter()
-            subprocess.run([ROOT / "target/release/sweep", "run", path, "--out", out, "--fresh", "--threads", "1",
-                            "--progress", "none"], check=True, capture_output=True)
+            subprocess.run(
+                [
+                    ROOT / "target/release/sweep",
+                    "run",
+                    path,
+                    "--out",
+                    out,
+                    "--fresh",
+                    "--threads",
+                    "1",
+                    "--progress",
+                    "none",
+                ],
+                check=True,
+                capture_output=True,
+            )
             seconds.append(time.perf_counter() - begin)
         run = json.loads(out.with_suffix(".run.json").read_text())
         ours = statistics.median(seconds)
-        peers = [(entry["seconds"], command, entry) for command, entry in medians.items()
-                 if "CVODE" in entry["program"] and entry["error"] <= float(accuracy)]
+        peers = [
+            (entry["seconds"], command, entry)
+            for command, entry in medians.items()
+            if "CVODE" in entry["program"] and entry["error"] <= float(accuracy)
+        ]
         _, command, nonlinear = min(peers, key=lambda peer: peer[0])
-        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=True,
-                              env={**os.environ, "LINEAR": "1"})
+        done = subprocess.run(
+            list(map(str, command)),
+            capture_output=True,
+            text=True,
+            check=True,
+            env={**os.environ, "LINEAR": "1"},
+        )
         linear = json.loads(done.stdout)["seconds"]
         theirs = run["points"] * (nonlinear["seconds"] + linear)
-        lines.append(f"| {accuracy} | {run['observed_accuracy']:.1e} | {ours:.2f} | {nonlinear['method']}, {nonlinear['settings']} "
-                     f"| {nonlinear['error']:.0e} | {nonlinear['seconds'] * 1e3:.1f} | {linear * 1e3:.1f} | {theirs:.0f} "
-                     f"| {theirs / ours:.0f} |")
+        lines.append(
+            f"| {accuracy} | {run['observed_accuracy']:.1e} | {ours:.2f} | {nonlinear['method']}, "
+            f"{nonlinear['settings']} "
+            f"| {nonlinear['error']:.0e} | {nonlinear['seconds'] * 1e3:.1f} | {linear * 1e3:.1f} | "
+            f"{theirs:.0f} "
+            f"| {theirs / ours:.0f} |"
+        )
     return lines
 
 
 def version(command, line=0):
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT).stdout.splitlines()[line].strip()
+    return (
+        subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+        .stdout.splitlines()[line]
+        .strip()
+    )
 
 
 def machine():
-    models = [line.split(":", 1)[1].strip() for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines()
-              if line.startswith("model name")]
-    family = version(["sh", "-c", "lscpu | grep -E '^(CPU family|Model):' | tr -s ' ' | paste -sd, -"])
-    return f"{models[0] if models else platform.machine()} ({family}), {platform.system()} {platform.release()}"
+    models = [
+        line.split(":", 1)[1].strip()
+        for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines()
+        if line.startswith("model name")
+    ]
+    family = version(
+        ["sh", "-c", "lscpu | grep -E '^(CPU family|Model):' | tr -s ' ' | paste -sd, -"]
+    )
+    model = models[0] if models else platform.machine()
+    return f"{model} ({family}), {platform.system()} {platform.release()}"
 
 
 def table(medians, fastest):
-    lines = ["| program | method | settings | error | ms a trajectory | against row 1 |", "|---|---|---|---|---|---|"]
+    lines = [
+        "| program | method | settings | error | ms a trajectory | against row 1 |",
+        "|---|---|---|---|---|---|",
+    ]
     for entry in medians:
         error = "the reference" if entry["settings"] == REFERENCE else f"{entry['error']:.0e}"
         times = entry["seconds"] / fastest
-        lines.append(f"| {entry['program']} | {entry['method']} | {entry['settings']} | {error} "
-                     f"| {entry['seconds'] * 1e3:.1f} | {times:.3g} |")
+        lines.append(
+            f"| {entry['program']} | {entry['method']} | {entry['settings']} | {error} "
+            f"| {entry['seconds'] * 1e3:.1f} | {times:.3g} |"
+        )
     return lines
 
 
 def best_at(medians, accuracy):
     """The quickest setting of each method that is at least so accurate."""
-    lines = ["| program | method | settings | error | ms a trajectory | against the best of CVODE |", "|---|---|---|---|---|---|"]
+    lines = [
+        "| program | method | settings | error | ms a trajectory | against the best of CVODE |",
+        "|---|---|---|---|---|---|",
+    ]
     chosen = {}
     for entry in medians:
         if entry["error"] <= accuracy and entry["settings"] != REFERENCE:
@@ -136,9 +202,16 @@ def best_at(medians, accuracy):
                 chosen[key] = entry
     cvode = min((e["seconds"] for e in chosen.values() if "CVODE" in e["program"]), default=None)
     for entry in sorted(chosen.values(), key=lambda entry: entry["seconds"]):
-        ratio = f"{entry['seconds'] / cvode:.3g}" if cvode else "no CVODE setting of the list is so accurate"
-        lines.append(f"| {entry['program']} | {entry['method']} | {entry['settings']} | {entry['error']:.0e} "
-                     f"| {entry['seconds'] * 1e3:.1f} | {ratio} |")
+        ratio = (
+            f"{entry['seconds'] / cvode:.3g}"
+            if cvode
+            else "no CVODE setting of the list is so accurate"
+        )
+        lines.append(
+            f"| {entry['program']} | {entry['method']} | {entry['settings']} | "
+            f"{entry['error']:.0e} "
+            f"| {entry['seconds'] * 1e3:.1f} | {ratio} |"
+        )
     return lines
 
 
@@ -151,12 +224,20 @@ def diagram(medians, path):
     curves = {}
     for entry in medians:
         if entry["settings"] != REFERENCE and entry["error"] > 0:
-            curves.setdefault((entry["program"], entry["method"]), []).append((entry["error"], entry["seconds"] * 1e3))
+            curves.setdefault((entry["program"], entry["method"]), []).append(
+                (entry["error"], entry["seconds"] * 1e3)
+            )
     for k, ((program, method), points) in enumerate(curves.items()):
         points.sort()
         ours = program.startswith("sweep")
-        axes.loglog(*zip(*points), marker="osD^v<>PX"[k % 9], linewidth=2.2 if ours else 1.2,
-                    linestyle="-" if ours else "--", color=matplotlib.colormaps["tab20"](k % 20), label=f"{program}, {method}")
+        axes.loglog(
+            *zip(*points),
+            marker="osD^v<>PX"[k % 9],
+            linewidth=2.2 if ours else 1.2,
+            linestyle="-" if ours else "--",
+            color=matplotlib.colormaps["tab20"](k % 20),
+            label=f"{program}, {method}",
+        )
     axes.invert_xaxis()
     axes.set_xlabel("relative error of the greatest yaw in 30 to 50 s")
     axes.set_ylabel("ms a trajectory, one core")
@@ -179,13 +260,18 @@ def main():
     text = [
         "# One trajectory by other programs' integrators",
         "",
-        "One nonlinear trajectory of the paper's machine: 0.4 kg, 140 N s/m, 0 to 350 rpm in 50 s. Every program calls this project's right-hand",
-        "side, the others by way of the C ABI (`crates/washer-capi`), implicit ones with its exact Jacobian. Error: relative, on the greatest yaw in",
+        "One nonlinear trajectory of the paper's machine: 0.4 kg, 140 N s/m, 0 to 350 rpm in 50 s. "
+        "Every program calls this project's right-hand",
+        "side, the others by way of the C ABI (`crates/washer-capi`), implicit ones with its exact "
+        "Jacobian. Error: relative, on the greatest yaw in",
         f"30 to 50 s, against converged RK4 ({REFERENCE}).",
         "",
-        f"Machine: {machine()}; one core (`taskset`). {version(['rustc', '--version'])}; {version(['c++', '--version'])}, `-O3 -march=native`; "
-        f"Python {platform.python_version()}. Load when it began: {load:.1f} on {os.cpu_count()} cores. Commit {version(['git', 'describe', '--always', '--dirty'])}.",
-        f"Command: `scripts/peers/run.sh {repeats}`; medians of {repeats} round(s) in which all take turns, of one where a run takes more than "
+        f"Machine: {machine()}; one core (`taskset`). {version(['rustc', '--version'])}; "
+        f"{version(['c++', '--version'])}, `-O3 -march=native`; "
+        f"Python {platform.python_version()}. Load when it began: {load:.1f} on {os.cpu_count()} "
+        f"cores. Commit {version(['git', 'describe', '--always', '--dirty'])}.",
+        f"Command: `scripts/peers/run.sh {repeats}`; medians of {repeats} round(s) in which all "
+        f"take turns, of one where a run takes more than "
         f"{SLOW_S:.0f} s. Raw runs: `peers.jsonl`.",
         "Times in lanes are a trajectory's share of a full lane group.",
         "",
@@ -194,13 +280,20 @@ def main():
         *table(medians, medians[0]["seconds"]),
     ]
     for accuracy in [1e-3, 1e-6]:
-        text += ["", f"## The quickest setting of each at an error of at most {accuracy:.0e}", "", *best_at(medians, accuracy)]
+        text += [
+            "",
+            f"## The quickest setting of each at an error of at most {accuracy:.0e}",
+            "",
+            *best_at(medians, accuracy),
+        ]
     text += [
         "",
         "## A whole map",
         "",
-        "Fig. 12, 1287 points by both models, on the same core: `sweep run sweeps/fig12.toml` at either accuracy, its sample, second runs and recomputed",
-        "points included, start to end; and CVODE's quickest setting that is so accurate, as if all points cost what the one above does (the",
+        "Fig. 12, 1287 points by both models, on the same core: `sweep run sweeps/fig12.toml` at "
+        "either accuracy, its sample, second runs and recomputed",
+        "points included, start to end; and CVODE's quickest setting that is so accurate, as if "
+        "all points cost what the one above does (the",
         "chaotic ones cost more).",
         "",
         *whole_map(by_command, repeats),

@@ -14,12 +14,14 @@ static int right_hand_side(realtype t, N_Vector x, N_Vector dx, void *machine) {
     return 0;
 }
 
-static int jacobian(realtype t, N_Vector x, N_Vector fx, SUNMatrix j, void *machine, N_Vector a, N_Vector b, N_Vector c) {
+static int jacobian(realtype t, N_Vector x, N_Vector fx, SUNMatrix j, void *machine, N_Vector a,
+                    N_Vector b, N_Vector c) {
     (void)fx, (void)a, (void)b, (void)c;
     double rows[DIMENSION * DIMENSION];
     washer_jacobian(t, N_VGetArrayPointer(x), rows, machine);
     for (int row = 0; row < DIMENSION; ++row)
-        for (int column = 0; column < DIMENSION; ++column) SM_ELEMENT_D(j, row, column) = rows[row * DIMENSION + column];
+        for (int column = 0; column < DIMENSION; ++column)
+            SM_ELEMENT_D(j, row, column) = rows[row * DIMENSION + column];
     return 0;
 }
 

@@ -47,7 +47,8 @@ int main(int argc, char **argv) {
 
     std::string version = BOOST_LIB_VERSION;
     std::replace(version.begin(), version.end(), '_', '.');
-    report(("Boost odeint " + version).c_str(), "dopri5", rtol, atol, most, seconds, evaluations, steps);
+    report(("Boost odeint " + version).c_str(), "dopri5", rtol, atol, most, seconds, evaluations,
+           steps);
     washer_free(machine);
     return 0;
 }

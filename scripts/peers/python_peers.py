@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""scipy and numbalsoda on the trajectory of trajectory.h: python_peers.py radau|lsoda|rk45|numbalsoda RTOL ATOL"""
+"""scipy and numbalsoda on the trajectory of trajectory.h:
+python_peers.py radau|lsoda|rk45|numbalsoda RTOL ATOL"""
 
 import ctypes
 import importlib.metadata
@@ -60,7 +61,8 @@ def by_scipy(method, library, machine, x, rtol, atol):
     times = WINDOW_FROM_S + np.arange(SAMPLES + 1) * (END_S - WINDOW_FROM_S) / SAMPLES
     samples = np.empty((2, SAMPLES + 1))
     begin = time.perf_counter()
-    solver = solver_class(right_hand_side, 0.0, x, END_S, first_step=FIRST_STEP_S, rtol=rtol, atol=atol, **options)
+    options |= {"first_step": FIRST_STEP_S, "rtol": rtol, "atol": atol}
+    solver = solver_class(right_hand_side, 0.0, x, END_S, **options)
     done, steps = 0, 0
     while solver.status == "running":
         message = solver.step()
@@ -87,7 +89,9 @@ def by_numbalsoda(library, machine, x, rtol, atol):
     # The first call compiles.
     lsoda(function, x, np.array([0.0, 1e-4]), data=data, rtol=rtol, atol=atol)
     begin = time.perf_counter()
-    states, success = lsoda(function, x, times, data=data, rtol=rtol, atol=atol, mxstep=1_000_000_000)
+    states, success = lsoda(
+        function, x, times, data=data, rtol=rtol, atol=atol, mxstep=1_000_000_000
+    )
     if not success:
         raise RuntimeError("numbalsoda failed")
     most = greatest(states[1:, YAW], states[1:, YAW_RATE], x[YAW])

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The C ABI against the reference right-hand sides of crates/washer-model/tests/reference/rhs.json; standard library only.
+"""The C ABI against the reference right-hand sides of crates/washer-model/tests/reference/rhs.json;
+standard library only.
 
     python3 scripts/peers/smoke.py [LIBRARY]
 """
@@ -16,12 +17,14 @@ ALLOWED = 1e-9
 
 def main():
     library = washer.load(*sys.argv[1:])
-    cases = json.loads((washer.ROOT / "crates/washer-model/tests/reference/rhs.json").read_text())["cases"]
+    reference = washer.ROOT / "crates/washer-model/tests/reference/rhs.json"
+    cases = json.loads(reference.read_text())["cases"]
     worst = 0.0
     for case in cases:
         theta, speed, acceleration = case["theta"], case["theta_dot"], case["theta_ddot"]
-        # A spin of constant acceleration that begins at speed w and passes theta, modulo whole turns, later with the speed asked for:
-        # 2 acceleration theta = speed^2 - w^2. Where that leaves no w, it comes from the other side.
+        # A spin of constant acceleration that begins at speed w and passes theta, modulo whole
+        # turns, later with the speed asked for: 2 acceleration theta = speed^2 - w^2. Where that
+        # leaves no w, it comes from the other side.
         angle = theta % math.tau
         if speed * speed >= 2 * acceleration * angle:
             start = math.sqrt(speed * speed - 2 * acceleration * angle)
@@ -38,8 +41,10 @@ def main():
         slopes = machine.rhs(time, case["q"] + case["u"])
         assert slopes[:10] == case["u"], "q' is not u"
         largest = max(map(abs, case["acceleration"]))
-        worst = max([worst] + [abs(a - b) / largest for a, b in zip(slopes[10:], case["acceleration"])])
-    print(f"{len(cases)} right-hand sides through the C ABI, within {worst:.1e} of the largest acceleration")
+        pairs = zip(slopes[10:], case["acceleration"])
+        worst = max([worst] + [abs(a - b) / largest for a, b in pairs])
+    print(f"{len(cases)} right-hand sides through the C ABI, within {worst:.1e} of the largest "
+          "acceleration")
     return 0 if worst < ALLOWED else 1
 
 

@@ -32,10 +32,12 @@ static inline washer *paper_trajectory(void) {
     return made;
 }
 
-static inline double sample_time(int i) { return WINDOW_FROM_S + i * (END_S - WINDOW_FROM_S) / SAMPLES; }
+static inline double sample_time(int i) {
+    return WINDOW_FROM_S + i * (END_S - WINDOW_FROM_S) / SAMPLES;
+}
 
-/* Greatest deviation of the yaw from `rest`, between samples by the cubic through values and rates: at 1 ms and less than 6 Hz its
- * error is below 1e-8 of the amplitude. */
+/* Greatest deviation of the yaw from `rest`, between samples by the cubic through values and
+ * rates: at 1 ms and less than 6 Hz its error is below 1e-8 of the amplitude. */
 static inline double greatest(const double *yaw, const double *rate, double rest) {
     const double h = (END_S - WINDOW_FROM_S) / SAMPLES;
     double most = 0.0;
@@ -51,7 +53,8 @@ static inline double greatest(const double *yaw, const double *rate, double rest
             const double curvature = 2.0 * a + 6.0 * b * s;
             if (curvature != 0.0) s -= (start + s * (2.0 * a + 3.0 * b * s)) / curvature;
         }
-        if (s > 0.0 && s < 1.0) most = fmax(most, fabs(yaw[i] + s * (start + s * (a + s * b)) - rest));
+        if (s > 0.0 && s < 1.0)
+            most = fmax(most, fabs(yaw[i] + s * (start + s * (a + s * b)) - rest));
     }
     return most;
 }
@@ -63,10 +66,10 @@ static inline double seconds_now(void) {
 }
 
 /* One line of JSON per run. */
-static inline void report(const char *program, const char *method, double rtol, double atol, double yaw, double seconds,
-                          long evaluations, long steps) {
-    printf("{\"program\": \"%s\", \"method\": \"%s\", \"settings\": \"rtol %.0e, atol %.0e\", \"yaw_rad\": %.17g, "
-           "\"seconds\": %.6f, \"evaluations\": %ld, \"steps\": %ld}\n",
+static inline void report(const char *program, const char *method, double rtol, double atol,
+                          double yaw, double seconds, long evaluations, long steps) {
+    printf("{\"program\": \"%s\", \"method\": \"%s\", \"settings\": \"rtol %.0e, atol %.0e\", "
+           "\"yaw_rad\": %.17g, \"seconds\": %.6f, \"evaluations\": %ld, \"steps\": %ld}\n",
            program, method, rtol, atol, yaw, seconds, evaluations, steps);
     fflush(stdout);
 }

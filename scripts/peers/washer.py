@@ -14,7 +14,8 @@ class Setup(ctypes.Structure):
         ("model", ctypes.c_char_p), ("profile", ctypes.c_char_p),
         ("peak_rpm", ctypes.c_double), ("ramp_s", ctypes.c_double),
         ("time_s", DOUBLES), ("speed_rpm", DOUBLES), ("spin_points", ctypes.c_size_t),
-        ("names", ctypes.POINTER(ctypes.c_char_p)), ("values", DOUBLES), ("constants", ctypes.c_size_t),
+        ("names", ctypes.POINTER(ctypes.c_char_p)), ("values", DOUBLES),
+        ("constants", ctypes.c_size_t),
     ]
 
 
@@ -41,13 +42,15 @@ def doubles(values):
 class Washer:
     """One machine and its spin; `constants` are named as in `sweep parameters`."""
 
-    def __init__(self, library, constants, model="nonlinear", profile="triangular", peak_rpm=350.0, ramp_s=50.0, table=None):
+    def __init__(self, library, constants, model="nonlinear", profile="triangular",
+                 peak_rpm=350.0, ramp_s=50.0, table=None):
         self.library = library
         time_s, speed_rpm = table or ([], [])
         names = (ctypes.c_char_p * len(constants))(*[name.encode() for name in constants])
         setup = Setup(
             model.encode(), ("table" if table else profile).encode(), peak_rpm, ramp_s,
-            doubles(time_s), doubles(speed_rpm), len(time_s), names, doubles(list(constants.values())), len(constants),
+            doubles(time_s), doubles(speed_rpm), len(time_s),
+            names, doubles(list(constants.values())), len(constants),
         )
         self.handle = ctypes.c_void_p()
         status = library.washer_new(ctypes.byref(setup), ctypes.byref(self.handle))

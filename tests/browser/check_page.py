@@ -2,12 +2,14 @@
 
     python check_page.py MAP.parquet PAGE.html [--screenshots FOLDER]
 
-The pointer is moved with the browser's own input events; where a point lies on the screen is worked out here, from the file's
-axis values and the rectangle that the page says it draws in. Values are read from the file with pyarrow. Prints what was
-checked; exits with 1 at the first thing that is wrong.
+The pointer is moved with the browser's own input events; where a point lies on the screen is worked
+out here, from the file's axis values and the rectangle that the page says it draws in. Values are
+read from the file with pyarrow. Prints what was checked; exits with 1 at the first thing that is
+wrong.
 """
 
 import argparse
+import itertools
 import json
 import math
 import pathlib
@@ -34,6 +36,21 @@ FLAGS = [
 ]
 
 
+# The modifier of an input event.
+CTRL = 2
+
+# Quantities that no channel has: their columns, and the page's unit as a part of the file's.
+WHOLE = {
+    "gap-nonlinear": ("min_gap_nonlinear_m", 1000),
+    "gap-linear": ("min_gap_linear_m", 1000),
+    "cabinet-force-nonlinear": ("cabinet_force_nonlinear_n", 1),
+    "cabinet-force-linear": ("cabinet_force_linear_n", 1),
+    "clash-time-nonlinear": ("clash_time_nonlinear_s", 1),
+    "clash-time-linear": ("clash_time_linear_s", 1),
+    "static-sag": ("static_sag_m", 1000),
+}
+
+
 class Wrong(Exception):
     """The page does not do what it should."""
 
@@ -51,20 +68,24 @@ class Map:
         table = pq.read_table(path)
         self.rows = table.to_pylist()
         names = table.column_names
-        results = next(k for k, name in enumerate(names) if name.startswith(("nonlinear_", "linear_")))
-        self.axes = [name for name in names[:results] if name != "point"]
-        self.channels = [name.removeprefix("ratio_") for name in names if name.startswith("ratio_") and name not in
-                         ("ratio_max", "ratio_max_channel")]
+        of_model = [name.startswith(("nonlinear_", "linear_")) for name in names]
+        self.axes = [name for name in names[:of_model.index(True)] if name != "point"]
+        ratios = [name for name in names if name.startswith("ratio_")]
+        self.channels = [name.removeprefix("ratio_") for name in ratios
+                         if name not in ("ratio_max", "ratio_max_channel")]
+        self.whole = [group for group, (column, _) in WHOLE.items() if column in names]
         self.values = [sorted({row[axis] for row in self.rows}) for axis in self.axes]
         # The page opens with every axis after the second at its first value.
+        cuts = list(zip(self.axes[2:], self.values[2:]))
         self.shown = [row for row in self.rows
-                      if all(row[axis] == values[0] for axis, values in zip(self.axes[2:], self.values[2:]))]
+                      if all(row[axis] == values[0] for axis, values in cuts)]
 
     def some(self):
-        """Rows spread over the map, with one that failed and one without a ratio if there are any."""
+        """Rows spread over the map, with one that failed and one without a ratio if any did."""
         chosen = self.shown[:: max(1, len(self.shown) // 12)]
         chosen += [row for row in self.shown if row["status"] != "ok"][:1]
-        return chosen + [row for row in self.shown if row["status"] == "ok" and row["ratio_max"] is None][:1]
+        ok = [row for row in self.shown if row["status"] == "ok"]
+        return chosen + [row for row in ok if row["ratio_max"] is None][:1]
 
 
 class Page:
@@ -77,7 +98,8 @@ class Page:
         for flag in [*FLAGS, f"--user-data-dir={self.profile.name}"]:
             options.add_argument(flag)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-        self.driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
+        service = Service(shutil.which("chromedriver"))
+        self.driver = webdriver.Chrome(options=options, service=service)
         self.screenshots = screenshots
         self.driver.get(pathlib.Path(path).resolve().as_uri())
         self.wait(self.drawn, "the figure was never drawn")
@@ -100,7 +122,8 @@ class Page:
 
     def frame(self):
         """Let the page draw what is due."""
-        script = "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done));"
+        script = """const done = arguments[0];
+            requestAnimationFrame(() => requestAnimationFrame(done));"""
         self.driver.execute_async_script(script)
 
     def figure(self):
@@ -110,6 +133,11 @@ class Page:
     def text(self, name):
         """What an element says."""
         return self.driver.find_element(By.ID, name).text
+
+    def data(self):
+        """What the page carries."""
+        script = "return document.getElementById('data').textContent"
+        return json.loads(self.driver.execute_script(script))
 
     def quiet(self, when):
         """Nothing was written to the console."""
@@ -133,6 +161,15 @@ class Page:
         """An input event at a place in the window."""
         event = {"type": kind, "x": x, "y": y, **more}
         self.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+
+    def window(self, width, scheme):
+        """A window of this width, px, for a reader of light or dark pages."""
+        metrics = {"width": width, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        self.frame()
+        self.frame()
 
     def press(self, key, code=None):
         """A key, down and up."""
@@ -172,23 +209,38 @@ def hovering_shows_the_file(page, data, log, when):
     for row in data.some():
         page.mouse("mouseMoved", *page.place(row[data.axes[0]], row[data.axes[1]], log))
         expected = f"Point {row['point']}"
-        page.wait(lambda: page.text("readout").startswith(expected), f"{when}: hovering never showed {expected}")
+        page.wait(lambda: page.text("readout").startswith(expected),
+                  f"{when}: hovering never showed {expected}")
         said = page.text("readout")
         largest = page.text("ratio").removeprefix("Largest ratio ").split(" ")[0]
-        check(same(number_in(largest), row["ratio_max"]), f"{when}: {expected}: {largest} for {row['ratio_max']}")
+        check(same(number_in(largest), row["ratio_max"]),
+              f"{when}: {expected}: {largest} for {row['ratio_max']}")
         for channel in data.channels:
             for kind in ("nonlinear", "linear", "ratio"):
                 selector = f'#readout tr[data-channel="{channel}"] td[data-kind="{kind}"]'
                 text = page.driver.find_element(By.CSS_SELECTOR, selector).text
                 true = row[f"{kind}_{channel}"]
                 true = true * 1000 if true is not None and kind != "ratio" else true
-                check(same(number_in(text), true), f"{when}: {expected}, {kind} {channel}: {text} for {true}")
+                check(same(number_in(text), true),
+                      f"{when}: {expected}, {kind} {channel}: {text} for {true}")
+        for group in data.whole:
+            column, factor = WHOLE[group]
+            name, _, kind = group.rpartition("-")
+            if kind not in ("nonlinear", "linear"):
+                name, kind = group, "nonlinear"
+            name = name.replace("-", "_")
+            selector = f'#readout tr[data-channel="{name}"] td[data-kind="{kind}"]'
+            text = page.driver.find_element(By.CSS_SELECTOR, selector).text
+            true = None if row[column] is None else factor * row[column]
+            check(same(number_in(text), true), f"{when}: {expected}, {group}: {text} for {true}")
         if row["status"] != "ok":
-            check(f"Failed: {row['status'].replace('_', ' ')}" in said, f"{when}: {expected} hides its status: {said}")
+            check(f"Failed: {row['status'].replace('_', ' ')}" in said,
+                  f"{when}: {expected} hides its status: {said}")
         elif row["reliable"] is not None:
             verdict = "Linear model reliable" if row["reliable"] else "Linear model unreliable"
             check(verdict in said, f"{when}: {expected}: not '{verdict}': {said}")
-    return f"{when}: {len(data.some())} points, {3 * len(data.channels) + 2} values each"
+    values = 3 * len(data.channels) + len(data.whole)
+    return f"{when}: {len(data.some())} points, {values} values each"
 
 
 def switches_redraw(page, data, log):
@@ -197,24 +249,32 @@ def switches_redraw(page, data, log):
     channel = Select(page.driver.find_element(By.ID, "channel"))
     row = next(row for row in data.some() if row["ratio_max"] is not None)
     pictures = {}
-    for group in [option.get_attribute("value") for option in quantity.options]:
+    groups = [option.get_attribute("value") for option in quantity.options]
+    missing = set(data.whole) - set(groups)
+    check(not missing, f"the page does not offer {missing}")
+    for group in groups:
         quantity.select_by_value(group)
         for name in [option.get_attribute("value") for option in channel.options]:
             if len(channel.options) > 1:
                 channel.select_by_value(name)
-            pictures[group, name] = page.pixels()
             page.mouse("mouseMoved", 5, 5)
             page.mouse("mouseMoved", *page.place(row[data.axes[0]], row[data.axes[1]], log))
             page.wait(lambda: page.text("tip"), f"{group} {name}: no tip at the pointer")
-            column = {"status": None, "gap-nonlinear": "min_gap_nonlinear_m", "gap-linear": "min_gap_linear_m"}.get(
-                group, f"{group}_{name or 'max'}")
-            if column:
-                true = row[column] * (1 if group == "ratio" else 1000)
-                shown = next(line for line in page.text("tip").split("\n") if ": " in line).rsplit(": ", 1)[1]
-                check(same(number_in(shown), true), f"{group} {name}: the tip says {shown} for {true}")
+            channel_column = (f"{group}_{name or 'max'}", 1 if group == "ratio" else 1000)
+            column, factor = WHOLE.get(group, channel_column)
+            values = [row.get("status" if group == "status" else column) for row in data.shown]
+            pictures[group, name] = (page.pixels(), values)
+            if group != "status":
+                true = row[column] * factor
+                lines = page.text("tip").split("\n")
+                shown = next(line for line in lines if ": " in line).rsplit(": ", 1)[1]
+                check(same(number_in(shown), true),
+                      f"{group} {name}: the tip says {shown} for {true}")
         page.shot(f"quantity-{group}")
     for (first, picture), (second, other) in zip(pictures.items(), list(pictures.items())[1:]):
-        check(picture != other, f"switching from {first} to {second} did not redraw")
+        # Two metrics that are zero everywhere look alike.
+        alike = picture[1] == other[1]
+        check(alike or picture[0] != other[0], f"switching from {first} to {second} did not redraw")
     quantity.select_by_value("ratio")
     return f"{len(pictures)} pictures, each redrawn, each with its value at the pointer"
 
@@ -224,16 +284,22 @@ def zoom_moves_and_returns(page, data, log):
     view = lambda: page.figure().get_attribute("data-view")  # noqa: E731
     whole = view()
     middle = [values[len(values) // 2] for values in data.values[:2]]
+    page.driver.execute_script("scrollTo(0, 0)")
     at = page.place(*middle, log)
-    page.mouse("mouseWheel", *at, deltaX=0, deltaY=-600)
-    page.wait(lambda: view() != whole, "the wheel did not zoom")
+    page.mouse("mouseWheel", *at, deltaX=0, deltaY=-200)
+    page.frame()
+    check(view() == whole, "the wheel alone zooms: the page cannot be scrolled over the map")
+    page.mouse("mouseWheel", *at, deltaX=0, deltaY=-600, modifiers=CTRL)
+    page.wait(lambda: view() != whole, "Ctrl and the wheel did not zoom")
     near = page.place(*middle, log)
     # The browser rounds the pointer's place to a pixel, which the zoom enlarges.
-    check(math.dist(at, near) < 3.0, f"zooming moved the point under the pointer by {math.dist(at, near):.1f} px")
+    apart = math.dist(at, near)
+    check(apart < 3.0, f"zooming moved the point under the pointer by {apart:.1f} px")
     page.shot("zoomed")
     row = next(r for r in data.shown if [r[data.axes[0]], r[data.axes[1]]] == middle)
     page.mouse("mouseMoved", at[0] + 1, at[1])
-    page.wait(lambda: page.text("readout").startswith(f"Point {row['point']}"), "zoomed: hovering is off")
+    page.wait(lambda: page.text("readout").startswith(f"Point {row['point']}"),
+              "zoomed: hovering is off")
     zoomed = view()
     page.mouse("mousePressed", *at, button="left", clickCount=1)
     page.mouse("mouseMoved", at[0] + 60, at[1] + 40, button="left", buttons=1)
@@ -245,7 +311,9 @@ def zoom_moves_and_returns(page, data, log):
         page.mouse("mousePressed", *at, button="left", clickCount=count)
         page.mouse("mouseReleased", *at, button="left", clickCount=count)
     page.wait(lambda: view() == whole, "double-click did not reset the view")
-    return "wheel about the pointer, drag, double-click"
+    touch = "return document.getElementById('map').style.touchAction"
+    check(page.driver.execute_script(touch) == "", "a finger cannot scroll the page over the map")
+    return "Ctrl and wheel about the pointer, drag, double-click"
 
 
 def keys_do_all_of_it(page, data):
@@ -263,7 +331,8 @@ def keys_do_all_of_it(page, data):
         seen.append(point())
     steps = [int(b) - int(a) for a, b in zip(seen, seen[1:])]
     cuts = math.prod(len(values) for values in data.values[2:])
-    check(steps == [cuts, len(data.values[1]) * cuts], f"arrows moved by {steps} points in grid order")
+    check(steps == [cuts, len(data.values[1]) * cuts],
+          f"arrows moved by {steps} points in grid order")
     said = page.driver.execute_script("return document.getElementById('said').textContent")
     check(said.count(";") >= 2, f"a screen reader hears only {said!r}")
     whole = page.figure().get_attribute("data-view")
@@ -277,7 +346,7 @@ def keys_do_all_of_it(page, data):
 
 def clicking_shows_histories(page, data, log):
     """A point with time histories shows them; another shows none."""
-    carried = page.driver.execute_script("return JSON.parse(document.getElementById('data').textContent).traces")
+    carried = page.data()["traces"]
     if carried is None:
         return "no traces beside this map"
     row = next(row for row in data.shown if str(row["point"]) in carried)
@@ -286,52 +355,70 @@ def clicking_shows_histories(page, data, log):
     page.mouse("mouseMoved", *at)
     page.mouse("mousePressed", *at, button="left", clickCount=1)
     page.mouse("mouseReleased", *at, button="left", clickCount=1)
-    page.wait(lambda: page.driver.find_elements(By.CSS_SELECTOR, "#histories canvas"), "no time histories appeared")
+    page.wait(lambda: page.driver.find_elements(By.CSS_SELECTOR, "#histories canvas"),
+              "no time histories appeared")
     canvas = page.driver.find_element(By.CSS_SELECTOR, "#histories canvas")
     page.driver.execute_script("arguments[0].scrollIntoView({ block: 'center' })", canvas)
     page.frame()
-    bounds = page.driver.execute_script("return arguments[0].getBoundingClientRect().toJSON()", canvas)
+    rectangle = "return arguments[0].getBoundingClientRect().toJSON()"
+    bounds = page.driver.execute_script(rectangle, canvas)
     page.mouse("mouseMoved", bounds["left"] + bounds["width"] / 2, bounds["top"] + 60)
-    legend = lambda: page.driver.find_element(By.CSS_SELECTOR, "#histories .legend").text  # noqa: E731
-    page.wait(lambda: "nonlinear model: " in legend() and "linear model: " in legend(), "histories show no values")
+    selector = "#histories .tip td[data-name]"
+    values = lambda: page.driver.find_elements(By.CSS_SELECTOR, selector)  # noqa: E731
+    page.wait(lambda: len(values()) >= 2, "histories show no values")
+    said = {value.get_attribute("data-name"): value.text for value in values()}
     page.shot("histories")
-    return f"point {row['point']} of {len(carried)} with histories: {' / '.join(legend().splitlines()[:3])}"
+    models = [name for name in said if name.endswith((", nonlinear model", ", linear model"))]
+    check(len(models) >= 2 and all(said.values()), f"histories say {said}")
+    return f"point {row['point']} of {len(carried)} with histories: {said}"
 
 
-def dark_theme_redraws(page):
-    """The page follows the reader's colour scheme, the picture with it."""
+def widths_and_schemes(page):
+    """At 400 px the map takes the window's width; map and page follow the colour scheme."""
     page.driver.execute_script("scrollTo(0, 0)")
     background = "return getComputedStyle(document.body).backgroundColor"
     seen = {}
-    for scheme in ("light", "dark"):
-        features = [{"name": "prefers-color-scheme", "value": scheme}]
-        page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-        seen[scheme] = (page.driver.execute_script(background), page.pixels())
-        page.shot(scheme)
-    for k, what in enumerate(("page", "map")):
-        check(seen["light"][k] != seen["dark"][k], f"the {what} is the same in light and dark")
-    return "light and dark"
+    for width, scheme in itertools.product((400, 1400), ("light", "dark")):
+        page.window(width, scheme)
+        page.wait(page.drawn, "the map is not drawn")
+        seen[width, scheme] = (page.driver.execute_script(background), page.pixels())
+        _, _, across, _ = map(float, page.figure().get_attribute("data-area").split())
+        wide = page.driver.execute_script("return document.documentElement.scrollWidth")
+        check(wide <= width, f"at {width} px the page is {wide} px wide")
+        check(width > 400 or across > 280, f"at {width} px the map is {across} px wide")
+        page.shot(f"{width}-{scheme}")
+        for k, what in enumerate(("page", "map")):
+            other = seen.get((width, "light"))
+            check(scheme == "light" or other[k] != seen[width, scheme][k],
+                  f"the {what} is the same in light and dark at {width} px")
+    return "400 and 1400 px, light and dark"
 
 
 def redraw_time(page):
     """Median milliseconds of drawing all cells once more."""
-    script = """const done = arguments[0]; const times = []; const button = document.getElementById('reset');
+    script = """const done = arguments[0]; const times = [];
+        const button = document.getElementById('reset');
         const once = () => { const start = performance.now(); button.click();
           requestAnimationFrame(() => setTimeout(() => { times.push(performance.now() - start);
             times.length < 11 ? once() : done(times.sort((a, b) => a - b)[5]); })); }; once();"""
-    return f"{page.driver.execute_async_script(script):.0f} ms from a change of view to the next frame (median of 11)"
+    median = page.driver.execute_async_script(script)
+    return f"{median:.0f} ms from a change of view to the next frame (median of 11)"
 
 
 def stands_alone(page):
     """Nothing was fetched but the page."""
-    fetched = page.driver.execute_script("return performance.getEntriesByType('resource').map((entry) => entry.name)")
-    check([name for name in fetched if not name.startswith("data:")] == [], f"the page fetched {fetched}")
+    entries = "performance.getEntriesByType('resource')"
+    fetched = page.driver.execute_script(f"return {entries}.map((entry) => entry.name)")
+    outside = [name for name in fetched if not name.startswith("data:")]
+    check(not outside, f"the page fetched {outside}")
     return "nothing fetched"
 
 
 def main():
     """Run every check on one page."""
-    parser = argparse.ArgumentParser(description="Check a map's page in headless Chromium against its Parquet file.")
+    parser = argparse.ArgumentParser(
+        description="Check a map's page in headless Chromium against its Parquet file."
+    )
     parser.add_argument("map")
     parser.add_argument("page")
     parser.add_argument("--screenshots", help="folder for pictures of what was seen")
@@ -340,7 +427,7 @@ def main():
     started = time.monotonic()
     page = Page(arguments.page, arguments.screenshots)
     try:
-        carried = json.loads(page.driver.execute_script("return document.getElementById('data').textContent"))
+        carried = page.data()
         log = [axis["log"] for axis in carried["axes"]]
         for name, run in [
             ("alone", lambda: stands_alone(page)),
@@ -349,7 +436,7 @@ def main():
             ("zoom", lambda: zoom_moves_and_returns(page, data, log)),
             ("keys", lambda: keys_do_all_of_it(page, data)),
             ("histories", lambda: clicking_shows_histories(page, data, log)),
-            ("theme", lambda: dark_theme_redraws(page)),
+            ("widths", lambda: widths_and_schemes(page)),
             ("speed", lambda: redraw_time(page)),
         ]:
             result = run()

@@ -1,5 +1,6 @@
 #!/bin/sh
-# The pages of a map and of a trace in a real browser: tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
+# The pages of a map and of a trace in a real browser:
+# tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
 #
 # Needs chromium and chromedriver on the PATH, and on Debian installs them if they are not there.
 # SWEEP names another binary than the release build, SHOTS a folder for screenshots.
@@ -12,8 +13,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 command -v chromium > /dev/null && command -v chromedriver > /dev/null \
-    || "$root/scripts/packages.sh" chromium chromium-driver
-venv=$("$root/scripts/venv.sh" "$here/requirements.txt")
+    || "$root/scripts/tools/packages.sh" chromium chromium-driver
+venv=$("$root/scripts/tools/venv.sh" "$here/requirements.txt")
 
 if [ $# -gt 1 ]; then
     "$sweep" plot "$map" --traces "$2" -o "$work/page.html"
@@ -26,4 +27,5 @@ fi
 "$sweep" modes --speed 0:400:50 --out "$work/modes.parquet" 2> /dev/null
 "$sweep" trace "$root/sweeps/fig11.toml" --every 0.02 --out "$work/trace.parquet"
 "$sweep" plot "$work/trace.parquet" --modes "$work/modes.parquet" -o "$work/trace.html"
-"$venv/bin/python" "$here/check_chart.py" "$work/trace.parquet" "$work/trace.html" ${SHOTS:+--screenshots "$SHOTS"}
+"$venv/bin/python" "$here/check_chart.py" "$work/trace.parquet" "$work/trace.html" \
+    ${SHOTS:+--screenshots "$SHOTS"}

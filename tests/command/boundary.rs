@@ -6,7 +6,8 @@ use std::fs;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::{signal, sweep_binary};
+use crate::home::sweep_binary;
+use crate::signal;
 
 /// A tenth of a second of every trajectory is plenty for what is tested here.
 const GRID: &str = r#"
@@ -32,7 +33,8 @@ values = [300.0, 350.0, 400.0]
 
 fn folder_with(end_s: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    fs::write(folder.path().join("grid.toml"), GRID.replace("END", end_s)).expect("the grid is written");
+    fs::write(folder.path().join("grid.toml"), GRID.replace("END", end_s))
+        .expect("the grid is written");
     folder
 }
 
@@ -45,7 +47,8 @@ fn boundary(folder: &tempfile::TempDir, arguments: &[&str]) -> Command {
 #[test]
 fn a_curve_for_every_combination_of_further_axes_in_a_figure() {
     let folder = folder_with("0.1");
-    let done = boundary(&folder, &["--quantity", "min_gap_nonlinear_m"]).output().expect("it starts");
+    let done =
+        boundary(&folder, &["--quantity", "min_gap_nonlinear_m"]).output().expect("it starts");
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(0), "{said}");
     // No gap closes in a tenth of a second: six rows say so.
@@ -139,7 +142,8 @@ fn an_interrupted_search_goes_on_and_ends_in_the_same_bytes() {
     let mut child = at_work(&folder, &mut search("x.parquet"));
     child.kill().expect("it is killed");
     child.wait().expect("it ends");
-    let other = boundary(&folder, &["--lattice", "2", "--out", "x.parquet"]).output().expect("it starts");
+    let other =
+        boundary(&folder, &["--lattice", "2", "--out", "x.parquet"]).output().expect("it starts");
     assert_eq!(other.status.code(), Some(2), "{}", said(&other));
     assert!(said(&other).contains("/boundary/lattice: was 11, is 2"), "{}", said(&other));
     let done = search("x.parquet").output().expect("it starts");

@@ -1,9 +1,10 @@
-//! A result file is a pure function of its input: the same bytes for any number of threads, on any instruction set.
+//! A result file is a pure function of its input: the same bytes for any number of threads, on any
+//! instruction set.
 
 use std::fs;
 use std::process::Command;
 
-use crate::sweep_binary;
+use crate::home::sweep_binary;
 
 /// Three chunks of eight points, of trajectories long enough to differ where a bit did.
 const GRID: &str = r#"
@@ -34,7 +35,8 @@ channels = ["tub_front_y", "tub_front_z", "drum_front_y", "drum_front_z", "tub_y
 [integrator]
 "#;
 
-/// Runs the grid and returns the result's bytes; `None` where this processor lacks the instruction set.
+/// Runs the grid and returns the result's bytes; `None` where this processor lacks the instruction
+/// set.
 fn bytes(integrator: &str, threads: u32, simd: &str) -> Option<Vec<u8>> {
     let home = tempfile::tempdir().expect("a temporary folder");
     let [grid, result] = ["grid.toml", "result.parquet"].map(|name| home.path().join(name));

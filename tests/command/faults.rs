@@ -6,60 +6,21 @@
 #![cfg(target_os = "linux")]
 
 use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use tempfile::TempDir;
+use crate::home::{Home, grid, said, sweep_binary};
+use crate::signal;
 
-use crate::{signal, sweep_binary};
-
-/// Five chunks of eight points, of trajectories so short that the files are most of the work.
-const GRID: &str = r#"
-name = "faults"
-machine = "paper"
-
-[spin]
-profile = "triangular"
-peak_rpm = 350.0
-ramp_s = 50.0
-
-[time]
-end_s = 0.1
-window_s = [0.05, 0.1]
-
-[integrator]
-method = "rk4"
-step_s = 2.0e-4
-
-[[axis]]
-parameter = "unbalance_mass_kg"
-range = { from = 0.05, to = 1.0, count = 5 }
-
-[[axis]]
-parameter = "damping_n_s_per_m"
-range = { from = 60.0, to = 300.0, count = 8 }
-
-[reliability]
-ratio_limit = 2.0
-channels = ["tub_front_y", "tub_yaw"]
-"#;
-
-/// A folder with the grid in it, and where its result goes.
-struct Home(TempDir);
+/// Five chunks of eight points.
+fn fresh_home() -> Home {
+    Home::new(&grid(5, 8))
+}
 
 impl Home {
-    fn new() -> Self {
-        let home = Self(tempfile::tempdir().expect("a temporary folder"));
-        fs::write(home.path("grid.toml"), GRID).expect("the grid is written");
-        home
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
     fn output(&self) -> PathBuf {
         self.path("x.parquet")
     }
@@ -68,12 +29,16 @@ impl Home {
         self.path("x.parquet.partial")
     }
 
-    /// The arguments of a run: one thread, so that which call is the third does not depend on luck.
-    fn arguments(&self) -> Vec<String> {
-        let path = |path: PathBuf| path.to_str().expect("temporary folders are UTF-8").to_owned();
-        let mut arguments = vec![path(sweep_binary()), "run".into(), path(self.path("grid.toml"))];
-        arguments.extend(["--threads".into(), "1".into(), "--out".into(), path(self.output())]);
-        arguments
+    /// The words of a run: one thread, so that which call is the third does not depend on luck.
+    /// Paths are absolute, as messages are to show them.
+    fn words(&self) -> Vec<String> {
+        let [grid, output] = [self.path("g.toml"), self.output()].map(text);
+        ["run", &grid, "--threads", "1", "--out", &output].map(str::to_owned).to_vec()
+    }
+
+    /// A run as a shell takes it, between two single quotes.
+    fn line(&self) -> String {
+        [vec![text(sweep_binary())], self.words()].concat().join("' '")
     }
 
     fn run(&self) -> Command {
@@ -82,9 +47,8 @@ impl Home {
 
     /// A run behind another program's command line.
     fn run_under(&self, wrapper: &[&str]) -> Command {
-        let mut words = wrapper.iter().map(|word| (*word).to_owned()).chain(self.arguments());
-        let mut command = Command::new(words.next().expect("there is a program"));
-        command.args(words).env_remove("SLURM_ARRAY_TASK_ID").env_remove("JOB_COMPLETION_INDEX");
+        let mut command = self.under(wrapper);
+        command.args(self.words());
         command
     }
 
@@ -110,11 +74,15 @@ impl Home {
     }
 }
 
+fn text(path: PathBuf) -> String {
+    path.into_os_string().into_string().expect("temporary folders are UTF-8")
+}
+
 /// The bytes of a run that nothing happens to.
 fn undisturbed() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
     BYTES.get_or_init(|| {
-        let home = Home::new();
+        let home = fresh_home();
         let done = output(&mut home.run());
         assert!(done.status.success(), "{}", said(&done));
         fs::read(home.output()).expect("a finished run has an output")
@@ -131,13 +99,10 @@ fn spawn(command: &mut Command) -> Child {
 
 fn missing<T>(command: &Command, error: &std::io::Error) -> T {
     panic!(
-        "{:?} does not start ({error}): scripts/install_test_tools.sh installs what tests need",
+        "{:?} does not start ({error}): scripts/tools/install_test_tools.sh installs what \
+         tests need",
         command.get_program()
     )
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// The process that holds the run, once it has computed something.
@@ -146,7 +111,9 @@ fn holder_with_chunk(home: &Home) -> u32 {
     loop {
         let lock = fs::read_to_string(home.partial().join("lock")).unwrap_or_default();
         let chunks = home.partial().join("chunk-00000000.bin").exists();
-        if let (true, Some(process)) = (chunks, lock.split(' ').next().and_then(|word| word.parse().ok())) {
+        if let (true, Some(process)) =
+            (chunks, lock.split(' ').next().and_then(|word| word.parse().ok()))
+        {
             return process;
         }
         assert!(started.elapsed() < Duration::from_secs(60), "no run starts: lock `{lock}`");
@@ -156,7 +123,8 @@ fn holder_with_chunk(home: &Home) -> u32 {
 
 /// Holds a run up, for some seconds, between its first chunk and its last.
 fn held_up(home: &Home, seconds: u32) -> Child {
-    // Syncs: the plan and its folder, then each chunk and its folder; the sixth is the second chunk's folder.
+    // Syncs: the plan and its folder, then each chunk and its folder; the sixth is the second
+    // chunk's folder.
     let delay = format!("inject=fsync:delay_enter={seconds}s:when=6");
     spawn(&mut home.tampered(&["trace=fsync", &delay]))
 }
@@ -164,14 +132,14 @@ fn held_up(home: &Home, seconds: u32) -> Child {
 #[test]
 fn killed_at_thirty_random_instants() {
     undisturbed();
-    let home = Home::new();
+    let home = fresh_home();
     let started = Instant::now();
     assert!(output(&mut home.run()).status.success());
     let whole = started.elapsed();
     let mut random = 0x2545_f491_4f6c_dd1d_u64;
     let mut killed = 0;
     for round in 0.. {
-        let home = Home::new();
+        let home = fresh_home();
         // Each kill meets what the ones before left.
         for _ in 0..6 {
             random ^= random << 13;
@@ -195,7 +163,7 @@ fn killed_at_thirty_random_instants() {
 /// Tampers with the first, second, ... call of some system calls, until a run has fewer of them.
 fn at_every_call(calls: &str, what: &str, check: impl Fn(&Output, u32)) {
     for when in 1.. {
-        let home = Home::new();
+        let home = fresh_home();
         let tamper = format!("inject={calls}:{what}:when={when}");
         let run = output(&mut home.tampered(&[&format!("trace={calls}"), &tamper]));
         let untouched = run.status.success();
@@ -235,7 +203,8 @@ fn killed_at_every_rename() {
     });
 }
 
-/// A failed call is a message with the path (the result's, its folder's or its sidecar's) and what to do, and exit code 1.
+/// A failed call is a message with the path (the result's, its folder's or its sidecar's) and what
+/// to do, and exit code 1.
 fn told(run: &Output, when: u32) {
     let said = said(run);
     let folder = std::env::temp_dir();
@@ -268,8 +237,8 @@ fn disk_full_at_every_write() {
 #[test]
 #[ignore = "needs unshare and mount; .ci/run runs it"]
 fn a_disk_too_small_is_told_and_a_larger_one_is_gone_on_with() {
-    let home = Home::new();
-    let run = home.arguments().join("' '");
+    let home = fresh_home();
+    let run = home.line();
     let out = home.output();
     // The file system lives in a name space of its own and goes with it; only the result leaves.
     let script = format!(
@@ -301,7 +270,10 @@ fn a_disk_too_small_is_told_and_a_larger_one_is_gone_on_with() {
         } else {
             assert!(first.contains("first 0"), "{pages} pages: {first} {said}");
         }
-        assert!(fs::read(&result).expect("a result") == undisturbed(), "{pages} pages: other bytes");
+        assert!(
+            fs::read(&result).expect("a result") == undisturbed(),
+            "{pages} pages: other bytes"
+        );
     }
     assert!(full >= 4, "only {full} disks were too small");
 }
@@ -311,13 +283,17 @@ fn a_file_size_limit_is_told_and_gone_on_from() {
     let mut limited = 0;
     // Blocks of 512 bytes: too small for the plan, for a chunk, for the result.
     for blocks in [1, 2, 4, 8, 16, 24, 32] {
-        let home = Home::new();
+        let home = fresh_home();
         let limit = format!("ulimit -f {blocks}; exec \"$@\"");
         let run = output(&mut home.run_under(&["sh", "-c", &limit, "sh"]));
         if !run.status.success() {
             limited += 1;
             told(&run, blocks);
-            assert!(said(&run).contains("a file-size limit was hit"), "{blocks} blocks: {}", said(&run));
+            assert!(
+                said(&run).contains("a file-size limit was hit"),
+                "{blocks} blocks: {}",
+                said(&run)
+            );
         }
         home.assert_mends(&format!("{blocks} blocks"));
     }
@@ -327,7 +303,7 @@ fn a_file_size_limit_is_told_and_gone_on_from() {
 #[test]
 fn a_flipped_bit_and_a_truncation_are_told_and_mended() {
     let break_chunk = |change: &dyn Fn(&mut Vec<u8>)| {
-        let home = Home::new();
+        let home = fresh_home();
         let shard = output(home.run().args(["--shard", "1/2"]));
         assert!(shard.status.success(), "{}", said(&shard));
         let chunk = home.partial().join("chunk-00000002.bin");
@@ -350,7 +326,7 @@ fn a_flipped_bit_and_a_truncation_are_told_and_mended() {
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
 fn a_second_runner_is_sent_away_with_the_first_ones_process_and_a_killed_one_blocks_nobody() {
-    let home = Home::new();
+    let home = fresh_home();
     let mut first = held_up(&home, 3);
     let process = holder_with_chunk(&home);
     let second = output(&mut home.run());
@@ -359,7 +335,7 @@ fn a_second_runner_is_sent_away_with_the_first_ones_process_and_a_killed_one_blo
     assert!(first.wait().expect("a child can be waited for").success());
     home.assert_mends("two runners");
 
-    let home = Home::new();
+    let home = fresh_home();
     let mut first = held_up(&home, 30);
     signal("KILL", holder_with_chunk(&home));
     first.wait().expect("a child can be waited for");
@@ -370,7 +346,7 @@ fn a_second_runner_is_sent_away_with_the_first_ones_process_and_a_killed_one_blo
 #[ignore = "needs strace; .ci/run runs it"]
 fn a_signal_keeps_what_is_done() {
     for (name, code) in [("TERM", 143), ("INT", 130)] {
-        let home = Home::new();
+        let home = fresh_home();
         let run = held_up(&home, 1);
         signal(name, holder_with_chunk(&home));
         let run = run.wait_with_output().expect("a child can be waited for");
@@ -383,26 +359,14 @@ fn a_signal_keeps_what_is_done() {
 
 #[test]
 fn a_second_signal_leaves_at_once() {
-    // Steps are chosen for the machines of 256 corners before the first point, for some seconds, in
-    // which a signal is not looked at.
-    let axes = [
-        ("unbalance_mass_kg", 0.1, 1.0),
-        ("damping_n_s_per_m", 60.0, 300.0),
-        ("tub_mass_kg", 20.0, 25.0),
-        ("shaft_mass_kg", 4.0, 5.0),
-        ("drum_mass_kg", 3.0, 4.0),
-        ("spring_stiffness_n_per_m", 7e3, 9e3),
-        ("bearing_stiffness_n_per_m", 1e8, 3e8),
-        ("unbalance_x_m", 0.2, 0.3),
-    ];
-    let home = Home::new();
-    let axis = |(name, from, to): (&str, f64, f64)| {
-        format!("[[axis]]\nparameter = \"{name}\"\nrange = {{ from = {from}, to = {to}, count = 2 }}\n")
-    };
-    let spin = "spin = { profile = \"triangular\", peak_rpm = 350.0, ramp_s = 50.0 }";
-    let corners = format!("{spin}\ntime = {{ end_s = 50.0 }}\n{}", axes.map(axis).concat());
-    fs::write(home.path("grid.toml"), corners).expect("the grid is written");
-    let mut run = spawn(&mut home.run());
+    // Nobody reads what the run says, and no more fits into the pipe: with its answer to the first
+    // signal it waits there.
+    const PIPE_BYTES: usize = 1 << 16;
+    let (_reader, mut full) = std::io::pipe().expect("a pipe can be made");
+    full.write_all(&[b' '; PIPE_BYTES]).expect("a pipe takes as much");
+    let home = fresh_home();
+    home.choose_for_seconds();
+    let mut run = home.run().stderr(full).spawn().expect("the command starts");
     let begun = Instant::now();
     while !home.partial().join("plan.json").exists() {
         assert!(begun.elapsed() < Duration::from_secs(60), "no run starts");
@@ -413,7 +377,7 @@ fn a_second_signal_leaves_at_once() {
     std::thread::sleep(Duration::from_millis(500));
     assert!(
         run.try_wait().expect("a child can be asked").is_none(),
-        "the first signal lets the steps be chosen"
+        "the first signal lets it say what is kept"
     );
     let second = Instant::now();
     signal("TERM", run.id());
@@ -424,25 +388,23 @@ fn a_second_signal_leaves_at_once() {
 
 #[test]
 fn a_folder_that_cannot_be_written_is_told() {
-    let home = Home::new();
-    let blocked = home.path("grid.toml/sub/x.parquet");
-    let arguments = home.arguments();
-    let mut command = Command::new(&arguments[0]);
-    command.args(&arguments[1..arguments.len() - 1]).arg(&blocked);
-    let run = output(&mut command);
+    let home = fresh_home();
+    let blocked = home.path("g.toml/sub/x.parquet");
+    let words = home.words();
+    let run = output(home.under(&[]).args(&words[..words.len() - 1]).arg(&blocked));
     assert_eq!(run.status.code(), Some(1), "{}", said(&run));
     assert!(said(&run).contains("write elsewhere with --out"), "{}", said(&run));
-    assert!(Path::new(&home.path("grid.toml")).is_file());
+    assert!(Path::new(&home.path("g.toml")).is_file());
 }
 
 #[test]
 #[ignore = "needs unshare and mount; .ci/run runs it"]
 fn a_read_only_folder_is_told_and_gone_on_with_when_it_is_not() {
-    let home = Home::new();
+    let home = fresh_home();
     let disk = home.path("disk");
     fs::create_dir(&disk).expect("a mount point");
     let out = home.output();
-    let run = home.arguments().join("' '").replace(out.to_str().expect("UTF-8"), "'\"$1\"'/x.parquet");
+    let run = home.line().replace(out.to_str().expect("UTF-8"), "'\"$1\"'/x.parquet");
     // For root too, which permissions do not stop.
     let script = format!(
         "set -eu\n\
@@ -461,16 +423,22 @@ fn a_read_only_folder_is_told_and_gone_on_with_when_it_is_not() {
     let run = output(&mut command);
     assert!(run.status.success(), "{}", said(&run));
     assert!(String::from_utf8_lossy(&run.stdout).contains("read-only 1"), "{}", said(&run));
-    assert!(said(&run).contains("make it writable for this user, or write elsewhere"), "{}", said(&run));
+    assert!(
+        said(&run).contains("make it writable for this user, or write elsewhere"),
+        "{}",
+        said(&run)
+    );
     assert!(fs::read(home.path("result")).expect("a result") == undisturbed());
 }
 
 #[test]
 fn failed_points_are_rows_and_fail_the_run_only_when_asked() {
-    let home = Home::new();
+    let home = fresh_home();
     // Springs from too soft to carry the machine to its own.
-    let axis = "[[axis]]\nparameter = \"spring_stiffness_n_per_m\"\nvalues = [1, 7000]\n[reliability]";
-    fs::write(home.path("grid.toml"), GRID.replace("[reliability]", axis)).expect("the grid is written");
+    let axis =
+        "[[axis]]\nparameter = \"spring_stiffness_n_per_m\"\nvalues = [1, 7000]\n[reliability]";
+    fs::write(home.path("g.toml"), grid(5, 8).replace("[reliability]", axis))
+        .expect("the grid is written");
     let run = output(&mut home.run());
     assert_eq!(run.status.code(), Some(0), "{}", said(&run));
     assert!(said(&run).contains("failed  40 no_equilibrium"), "{}", said(&run));
@@ -479,6 +447,6 @@ fn failed_points_are_rows_and_fail_the_run_only_when_asked() {
         let run = output(home.run().arg("--fail-on-error").args(fresh));
         assert_eq!(run.status.code(), Some(3), "{fresh:?}: {}", said(&run));
     }
-    let whole = output(Home::new().run().arg("--fail-on-error"));
+    let whole = output(fresh_home().run().arg("--fail-on-error"));
     assert_eq!(whole.status.code(), Some(0), "{}", said(&whole));
 }

@@ -4,35 +4,11 @@
 
 use std::fs;
 use std::io::{Read as _, Seek as _, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use crate::sweep_binary;
-use tempfile::TempDir;
-
-/// Forty points of trajectories so short that the files are most of the work.
-const GRID: &str = r#"
-name = "files"
-[spin]
-profile = "triangular"
-peak_rpm = 350.0
-ramp_s = 50.0
-[time]
-end_s = 0.1
-window_s = [0.05, 0.1]
-[integrator]
-method = "rk4"
-step_s = 2.0e-4
-[[axis]]
-parameter = "unbalance_mass_kg"
-range = { from = 0.05, to = 1.0, count = 5 }
-[[axis]]
-parameter = "damping_n_s_per_m"
-range = { from = 60.0, to = 300.0, count = 8 }
-[reliability]
-channels = ["tub_front_y", "tub_yaw"]
-"#;
+use crate::home::{Home, grid, said};
 
 /// Every command that writes a file of its user's choice, up to the path.
 const WRITERS: [&[&str]; 7] = [
@@ -45,52 +21,18 @@ const WRITERS: [&[&str]; 7] = [
     &["plot", "map.parquet", "-o"],
 ];
 
-struct Home(TempDir);
-
-impl Home {
-    /// A folder with the grid, its finished map `map.parquet`, and nothing else.
-    fn new() -> Self {
-        static MAP: OnceLock<Vec<u8>> = OnceLock::new();
-        let home = Self(tempfile::tempdir().expect("a temporary folder"));
-        fs::write(home.path("g.toml"), GRID).expect("the grid is written");
-        let map = MAP.get_or_init(|| {
-            let done = home.sweep(&["run", "g.toml", "--out", "map.parquet"]);
-            assert!(done.status.success(), "{}", said(&done));
-            fs::remove_file(home.path("map.run.json")).expect("there is a sidecar");
-            fs::read(home.path("map.parquet")).expect("there is a map")
-        });
-        fs::write(home.path("map.parquet"), map).expect("the map is written");
-        home
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn command(&self) -> Command {
-        let mut command = Command::new(sweep_binary());
-        command.current_dir(self.0.path());
-        for name in ["SLURM_ARRAY_TASK_ID", "SLURM_CPUS_PER_TASK", "JOB_COMPLETION_INDEX"] {
-            command.env_remove(name);
-        }
-        command
-    }
-
-    fn sweep(&self, words: &[&str]) -> Output {
-        self.command().args(words).output().expect("the command starts")
-    }
-
-    fn names(&self) -> Vec<String> {
-        let names = fs::read_dir(self.0.path()).expect("the folder is there");
-        let mut names: Vec<String> =
-            names.map(|name| name.expect("a name").file_name().into_string().expect("UTF-8")).collect();
-        names.sort();
-        names
-    }
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+/// A folder with the grid, its finished map `map.parquet`, and nothing else.
+fn fresh_home() -> Home {
+    static MAP: OnceLock<Vec<u8>> = OnceLock::new();
+    let home = Home::new(&grid(5, 8));
+    let map = MAP.get_or_init(|| {
+        let done = home.sweep(&["run", "g.toml", "--out", "map.parquet"]);
+        assert!(done.status.success(), "{}", said(&done));
+        fs::remove_file(home.path("map.run.json")).expect("there is a sidecar");
+        fs::read(home.path("map.parquet")).expect("there is a map")
+    });
+    fs::write(home.path("map.parquet"), map).expect("the map is written");
+    home
 }
 
 /// Runs a program that is on every Linux.
@@ -103,14 +45,17 @@ fn run(program: &str, words: &[&Path]) {
 fn assert_refused(output: &Output, writer: &[&str], name: &str) -> String {
     let said = said(output);
     assert_eq!(output.status.code(), Some(2), "{writer:?} {name}: {said}");
-    assert!(said.contains("cannot be an output") && said.contains("= help: "), "{writer:?} {name}: {said}");
+    assert!(
+        said.contains("cannot be an output") && said.contains("= help: "),
+        "{writer:?} {name}: {said}"
+    );
     said
 }
 
 #[test]
 fn no_command_writes_over_what_is_not_its_own() {
     for writer in WRITERS {
-        let home = Home::new();
+        let home = fresh_home();
         let ending = if writer[0] == "plot" { ".svg" } else { ".parquet" };
         let named = |name: &str| format!("{name}{ending}");
         let [fifo, folder, link, dangling, hard, mine] =
@@ -135,7 +80,7 @@ fn no_command_writes_over_what_is_not_its_own() {
             }
         }
         assert_eq!(home.names(), before, "{writer:?}");
-        assert_eq!(fs::read_to_string(home.path("g.toml")).expect("the grid"), GRID);
+        assert_eq!(fs::read_to_string(home.path("g.toml")).expect("the grid"), grid(5, 8));
         assert_eq!(fs::read_to_string(home.path("thesis.tex")).expect("the thesis"), "mine");
         assert_eq!(fs::read_to_string(home.path(&mine)).expect("the file"), "mine");
     }
@@ -143,13 +88,14 @@ fn no_command_writes_over_what_is_not_its_own() {
 
 #[test]
 fn a_figure_does_not_overwrite_its_data_by_any_path() {
-    let home = Home::new();
+    let home = fresh_home();
     fs::rename(home.path("map.parquet"), home.path("map.svg")).expect("the map is renamed");
     let data = fs::read(home.path("map.svg")).expect("the map");
     std::os::unix::fs::symlink("map.svg", home.path("link.svg")).expect("a link is made");
     fs::hard_link(home.path("map.svg"), home.path("hard.svg")).expect("a link is made");
     let absolute = home.path("map.svg");
-    let outputs = ["map.svg", "./map.svg", absolute.to_str().expect("UTF-8"), "link.svg", "hard.svg"];
+    let outputs =
+        ["map.svg", "./map.svg", absolute.to_str().expect("UTF-8"), "link.svg", "hard.svg"];
     for output in outputs {
         assert_refused(&home.sweep(&["plot", "map.svg", "-o", output]), &["plot"], output);
         assert!(fs::read(home.path("map.svg")).expect("the map") == data, "{output}");
@@ -160,9 +106,12 @@ fn a_figure_does_not_overwrite_its_data_by_any_path() {
 #[test]
 fn every_command_writes_over_its_own_and_clears_up_after_killed_processes() {
     for writer in WRITERS.iter().filter(|writer| writer[0] != "merge") {
-        let home = Home::new();
-        let outputs: &[&str] =
-            if writer[0] == "plot" { &["out.svg", "out.png", "out.html"] } else { &["out.parquet"] };
+        let home = fresh_home();
+        let outputs: &[&str] = if writer[0] == "plot" {
+            &["out.svg", "out.png", "out.html"]
+        } else {
+            &["out.parquet"]
+        };
         for output in outputs {
             fs::create_dir_all(home.path("new")).expect("a folder is made");
             let path = format!("new/{output}");
@@ -177,7 +126,11 @@ fn every_command_writes_over_its_own_and_clears_up_after_killed_processes() {
                     fs::remove_file(&left).expect("the leftover goes");
                 }
                 let done = home.sweep(&[*writer, &[&path]].concat());
-                assert!(done.status.success(), "{writer:?} {output} round {round}: {}", said(&done));
+                assert!(
+                    done.status.success(),
+                    "{writer:?} {output} round {round}: {}",
+                    said(&done)
+                );
                 assert!(!left.exists(), "{writer:?} {output}");
                 let written = fs::read(home.path(&path)).expect("there is an output");
                 assert!(round == 0 || written == bytes, "{writer:?} {output}: other bytes");
@@ -192,12 +145,13 @@ fn every_command_writes_over_its_own_and_clears_up_after_killed_processes() {
 
 #[test]
 fn a_file_size_limit_leaves_the_old_file() {
-    for (writer, output) in [(WRITERS[3], "x.parquet"), (WRITERS[4], "x.parquet"), (WRITERS[6], "x.svg")] {
-        let home = Home::new();
+    for (writer, output) in
+        [(WRITERS[3], "x.parquet"), (WRITERS[4], "x.parquet"), (WRITERS[6], "x.svg")]
+    {
+        let home = fresh_home();
         let limited = |output: &str| {
-            let mut command = Command::new("sh");
-            command.current_dir(home.0.path()).args(["-c", "ulimit -f 1; exec \"$@\"", "sh"]);
-            command.arg(sweep_binary()).args(writer).arg(output).output().expect("sh starts")
+            let limit = ["sh", "-c", "ulimit -f 1; exec \"$@\"", "sh"];
+            home.under(&limit).args(writer).arg(output).output().expect("sh starts")
         };
         let run = limited(output);
         assert_eq!(run.status.code(), Some(1), "{writer:?}: {}", said(&run));
@@ -214,18 +168,25 @@ fn a_file_size_limit_leaves_the_old_file() {
 
 #[test]
 fn traces_beside_a_result_are_named_as_it_is() {
-    let home = Home::new();
-    for (output, traces) in [("v1.0", "v1.0.traces"), ("v1.5", "v1.5.traces"), ("x.parquet", "x.traces")] {
+    let home = fresh_home();
+    for (output, traces) in
+        [("v1.0", "v1.0.traces"), ("v1.5", "v1.5.traces"), ("x.parquet", "x.traces")]
+    {
         let run = home.sweep(&["run", "g.toml", "--keep-traces", "--out", output]);
         assert!(run.status.success(), "{}", said(&run));
-        assert_eq!(fs::read_dir(home.path(traces)).expect("there are traces").count(), 40, "{output}");
+        assert_eq!(
+            fs::read_dir(home.path(traces)).expect("there are traces").count(),
+            40,
+            "{output}"
+        );
     }
 }
 
 /// A bit of this file is flipped, read by `look`, and flipped back.
 fn with_flipped_bit<T>(path: &Path, at: u64, bit: u8, look: impl FnOnce() -> T) -> T {
     let flip = || {
-        let mut file = fs::OpenOptions::new().read(true).write(true).open(path).expect("the file opens");
+        let mut file =
+            fs::OpenOptions::new().read(true).write(true).open(path).expect("the file opens");
         let mut byte = [0];
         file.seek(std::io::SeekFrom::Start(at)).expect("a place in the file");
         file.read_exact(&mut byte).expect("a byte is read");
@@ -240,7 +201,7 @@ fn with_flipped_bit<T>(path: &Path, at: u64, bit: u8, look: impl FnOnce() -> T) 
 
 #[test]
 fn every_command_that_reads_a_file_sees_a_flipped_bit() {
-    let home = Home::new();
+    let home = fresh_home();
     let map = home.path("map.parquet");
     let whole = fs::read(&map).expect("the map");
     for writer in [WRITERS[3], WRITERS[4], WRITERS[5]] {
@@ -270,7 +231,10 @@ fn every_command_that_reads_a_file_sees_a_flipped_bit() {
             let (at, bit) = (random % length, (random >> 40) as u8 % 8);
             let seen = with_flipped_bit(&path, at, bit, || home.sweep(reader));
             let text = said(&seen);
-            assert!(matches!(seen.status.code(), Some(1 | 2)), "{reader:?}, bit {bit} of {at}: {text}");
+            assert!(
+                matches!(seen.status.code(), Some(1 | 2)),
+                "{reader:?}, bit {bit} of {at}: {text}"
+            );
             assert!(text.contains("parquet") && !text.contains("panicked"), "{reader:?}: {text}");
         }
     }
@@ -282,22 +246,25 @@ fn every_command_that_reads_a_file_sees_a_flipped_bit() {
 
 #[test]
 fn junk_at_an_output_is_not_a_run_that_has_not_started() {
-    let home = Home::new();
+    let home = fresh_home();
     fs::write(home.path("junk.parquet"), "junk").expect("a file is written");
     let status = home.sweep(&["status", "g.toml", "--out", "junk.parquet"]);
     assert_refused(&status, &["status"], "junk.parquet");
     let status = home.sweep(&["status", "g.toml", "--out", "nothing.parquet"]);
     assert!(status.status.success() && said(&status).contains("not started"), "{}", said(&status));
-    let status = home.sweep(&["status", "g.toml", "--set", "tub_mass_kg=20", "--out", "map.parquet"]);
+    let status =
+        home.sweep(&["status", "g.toml", "--set", "tub_mass_kg=20", "--out", "map.parquet"]);
     assert_eq!(status.status.code(), Some(2), "{}", said(&status));
     assert!(said(&status).contains("tub"), "{}", said(&status));
 }
 
 #[test]
 fn files_that_are_not_regular_are_not_read() {
-    let home = Home::new();
+    let home = fresh_home();
     run("mkfifo", &[&home.path("fifo.parquet")]);
-    for words in [&["show", "fifo.parquet"] as &[&str], &["plot", "fifo.parquet"], &["show", "/dev/zero"]] {
+    for words in
+        [&["show", "fifo.parquet"] as &[&str], &["plot", "fifo.parquet"], &["show", "/dev/zero"]]
+    {
         let run = home.sweep(words);
         assert_eq!(run.status.code(), Some(1), "{}", said(&run));
         assert!(said(&run).contains("not a regular file"), "{words:?}: {}", said(&run));
@@ -306,11 +273,11 @@ fn files_that_are_not_regular_are_not_read() {
 
 #[test]
 fn nothing_a_file_says_reaches_the_terminal_as_an_escape() {
-    let home = Home::new();
+    let home = fresh_home();
     let hostile = "evil\u{1b}]0;title\u{7}\u{9b}2J\u{202e}";
-    let grid = GRID.replace("\"files\"", &format!("{hostile:?}")).replace("tub_yaw", hostile);
-    fs::write(home.path("evil.toml"), grid).expect("a grid is written");
-    let raw = GRID.replace("name = ", &format!("# {hostile}\n{hostile} = "));
+    let evil = grid(5, 8).replace("\"short\"", &format!("{hostile:?}")).replace("tub_yaw", hostile);
+    fs::write(home.path("evil.toml"), evil).expect("a grid is written");
+    let raw = grid(5, 8).replace("name = ", &format!("# {hostile}\n{hostile} = "));
     fs::write(home.path("raw.toml"), raw).expect("a grid is written");
     let partial = home.path("x.parquet.partial");
     fs::create_dir(&partial).expect("a folder is made");
@@ -319,7 +286,8 @@ fn nothing_a_file_says_reaches_the_terminal_as_an_escape() {
               "chunk_points": 8, "plan": {{}} }}"#,
         version = serde_json::to_string(hostile).expect("a string")
     );
-    fs::write(partial.join("plan.json"), plan.replace("\"format\": 2", "\"format\": 7")).expect("a plan");
+    fs::write(partial.join("plan.json"), plan.replace("\"format\": 2", "\"format\": 7"))
+        .expect("a plan");
     for words in [
         &["check", "evil.toml"] as &[&str],
         &["check", "raw.toml"],

@@ -2,26 +2,12 @@
 //! says and writes the very same as without the flip.
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::Output;
 
-use tempfile::TempDir;
-
-use crate::sweep_binary;
+use crate::home::{Home, grid, said};
 
 const FLIPS: u64 = 300;
-
-const GRID: &str = r#"
-spin = { profile = "triangular", peak_rpm = 350.0, ramp_s = 50.0 }
-time = { end_s = 0.05 }
-integrator = { method = "rk4", step_s = 2.0e-4 }
-[[axis]]
-parameter = "unbalance_mass_kg"
-range = { from = 0.05, to = 1.0, count = 12 }
-[[axis]]
-parameter = "damping_n_s_per_m"
-range = { from = 60.0, to = 300.0, count = 12 }
-"#;
 
 const COMMANDS: [&[&str]; 5] = [
     &["run", "g.toml", "--threads", "1", "--out", "x.parquet"],
@@ -39,40 +25,25 @@ struct Left {
     picture: Option<Vec<u8>>,
 }
 
-struct Home(TempDir);
+/// A folder with a grid and its finished result, `x.parquet`.
+pub(super) fn finished() -> Home {
+    let home = Home::new(&grid(12, 12));
+    let run = home.sweep(COMMANDS[0]);
+    assert!(run.status.success(), "{}", said(&run));
+    home
+}
 
 impl Home {
-    fn new() -> Self {
-        let home = Self(tempfile::tempdir().expect("a temporary folder"));
-        fs::write(home.path("g.toml"), GRID).expect("the grid is written");
-        let run = home.call(COMMANDS[0]);
-        assert!(run.status.success(), "{}", said(&run));
-        home
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn call(&self, words: &[&str]) -> Output {
-        let mut command = Command::new(sweep_binary());
-        command.args(words).current_dir(self.0.path()).output().expect("the command starts")
-    }
-
     /// Has a command meet these bytes.
     fn meet(&self, bytes: &[u8], words: &[&str]) -> Left {
         fs::write(self.path("x.parquet"), bytes).expect("the result is written");
         // Absent unless drawn before.
         let _ = fs::remove_file(self.path("x.svg"));
-        let output = self.call(words);
+        let output = self.sweep(words);
         let read = |path: &Path| fs::read(path).ok();
         let result = read(&self.path("x.parquet")).expect("nobody removes a result");
         Left { output, result, picture: read(&self.path("x.svg")) }
     }
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// Numbers from a seed: splitmix64.
@@ -85,7 +56,7 @@ fn random(seed: u64) -> u64 {
 
 #[test]
 fn a_flipped_bit_of_a_result_is_refused_or_changes_nothing() {
-    let home = Home::new();
+    let home = finished();
     let whole = fs::read(home.path("x.parquet")).expect("there is a result");
     let mut undisturbed = Vec::new();
     for words in COMMANDS {

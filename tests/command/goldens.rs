@@ -1,16 +1,16 @@
 //! The bytes that this build writes, by every method and command that writes results: hashes that
 //! change when any byte does, together with the version of the numerics or not at all.
 //!
-//! `scripts/raise_numerics.sh` raises that version and writes the new hashes.
+//! `scripts/release/raise_numerics.sh` raises that version and writes the new hashes.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::sweep_binary;
+use crate::home::sweep_binary;
 use serde_json::{Value, json};
-use sweep::identity::{NUMERICS_VERSION, VERSION};
+use sweep::{NUMERICS_VERSION, VERSION};
 use tempfile::TempDir;
 
 /// The spin and the window of every golden: a run-up that is short, but passes the lowest
@@ -63,16 +63,21 @@ fn hash(grid: &str, command: &[&str]) -> String {
     fs::write(home.path().join("list.csv"), list).expect("the list is written");
     let (verb, options) = command.split_first().expect("a command has a name");
     sweep(&home, &[&[*verb, "grid.toml", "--out", "out.parquet"], options].concat());
-    let bytes = fs::read(home.path().join("out.parquet")).expect("the command has written its file");
+    let bytes =
+        fs::read(home.path().join("out.parquet")).expect("the command has written its file");
     blake3::hash(&bytes).to_hex().to_string()
 }
 
 fn hashes() -> BTreeMap<&'static str, String> {
     let run: &[&str] = &["run", "--progress", "none"];
-    let map = |integrator: &str| hash(&format!("{SPIN}integrator = {{ {integrator} }}\n{AXES}"), run);
+    let map =
+        |integrator: &str| hash(&format!("{SPIN}integrator = {{ {integrator} }}\n{AXES}"), run);
     let design = |design: &str| hash(&format!("{SPIN}{RK4}design = {{ {design} }}\n{BOX}"), run);
     let judged = |criterion: &str| {
-        hash(&format!("{METRICS}{SPIN}{RK4}reliability = {{ criterion = \"{criterion}\" }}\n{AXES}"), run)
+        hash(
+            &format!("{METRICS}{SPIN}{RK4}reliability = {{ criterion = \"{criterion}\" }}\n{AXES}"),
+            run,
+        )
     };
     let point = ["--at", "unbalance_mass_kg=0.4", "--at", "damping_n_s_per_m=100"];
     let trace: &[&str] = &["trace", "--every", "0.02", "--states", "--forces"];
@@ -88,7 +93,10 @@ fn hashes() -> BTreeMap<&'static str, String> {
         ("map of sobol's sequence", design("method = \"sobol\", points = 8, seed = 3")),
         (
             "map of a list",
-            hash(&format!("{SPIN}{RK4}design = {{ method = \"list\", file = \"list.csv\" }}\n"), run),
+            hash(
+                &format!("{SPIN}{RK4}design = {{ method = \"list\", file = \"list.csv\" }}\n"),
+                run,
+            ),
         ),
         ("boundary", hash(&format!("{SPIN}{RK4}{AXES}"), boundary)),
         ("trace", hash(&format!("{SPIN}{RK4}{AXES}"), &[trace, &point].concat())),
@@ -104,26 +112,37 @@ fn modes() -> Vec<f64> {
     modes
         .iter()
         .flat_map(|mode| mode["at_speed"].as_array().expect("a list of speeds"))
-        .flat_map(|at| ["frequency_rpm", "damping_ratio"].map(|key| at[key].as_f64().expect("a number")))
+        .flat_map(|at| {
+            ["frequency_rpm", "damping_ratio"].map(|key| at[key].as_f64().expect("a number"))
+        })
         .collect()
 }
 
 #[test]
 fn bytes_change_with_the_version_of_the_numerics_or_not_at_all() {
     let (hashes, modes) = (hashes(), modes());
-    let now = json!({ "version": VERSION, "numerics": NUMERICS_VERSION, "hashes": hashes, "modes": modes });
+    let now = json!({
+        "version": VERSION,
+        "numerics": NUMERICS_VERSION,
+        "hashes": hashes,
+        "modes": modes,
+    });
     let update = std::env::var_os("UPDATE_GOLDENS").is_some();
     let text = fs::read_to_string(record()).unwrap_or_default();
     let was: Value = serde_json::from_str(&text).unwrap_or_default();
     let same_build = was["version"] == now["version"] && was["numerics"] == now["numerics"];
 
-    let mut changed: Vec<&str> =
-        hashes.iter().filter(|(name, hash)| was["hashes"][**name] != **hash).map(|(name, _)| *name).collect();
+    let mut changed: Vec<&str> = hashes
+        .iter()
+        .filter(|(name, hash)| was["hashes"][**name] != **hash)
+        .map(|(name, _)| *name)
+        .collect();
     let recorded = was["modes"].as_array().cloned().unwrap_or_default();
     let near = |was: &Value, is: &f64| {
         was.as_f64().is_some_and(|was| (was - is).abs() <= MODES_TOLERANCE * was.abs().max(1e-3))
     };
-    if recorded.len() != modes.len() || !recorded.iter().zip(&modes).all(|(was, is)| near(was, is)) {
+    if recorded.len() != modes.len() || !recorded.iter().zip(&modes).all(|(was, is)| near(was, is))
+    {
         changed.push("modes");
     }
     if changed.is_empty() && same_build {
@@ -132,13 +151,15 @@ fn bytes_change_with_the_version_of_the_numerics_or_not_at_all() {
     assert!(
         !same_build,
         "these bytes have changed, and NUMERICS_VERSION is still {NUMERICS_VERSION}: {}.\n\
-         If they were meant to, raise it and write the new hashes by scripts/raise_numerics.sh",
+         If they were meant to, raise it and write the new hashes by\n\
+         scripts/release/raise_numerics.sh",
         changed.join(", ")
     );
     assert!(
         update,
-        "tests/goldens.json is of sweep {}, numerics {}; this is sweep {VERSION}, numerics {NUMERICS_VERSION}.\n\
-         Write its hashes by UPDATE_GOLDENS=1 cargo test --release -p sweep-tests --test goldens",
+        "tests/goldens.json is of sweep {}, numerics {}; this is sweep {VERSION}, numerics \
+         {NUMERICS_VERSION}.\n\
+         Write its hashes by UPDATE_GOLDENS=1 cargo test --release -p sweep --test command goldens",
         was["version"], was["numerics"]
     );
     fs::write(record(), format!("{now:#}\n")).expect("tests/goldens.json is written");

@@ -5,86 +5,40 @@
 #![cfg(target_os = "linux")]
 
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::Output;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use crate::sweep_binary;
-use tempfile::TempDir;
-
-const GRID: &str = r#"
-[spin]
-profile = "triangular"
-peak_rpm = 350.0
-ramp_s = 50.0
-[time]
-end_s = 0.1
-window_s = [0.05, 0.1]
-[integrator]
-method = "rk4"
-step_s = 2.0e-4
-[[axis]]
-parameter = "unbalance_mass_kg"
-range = { from = 0.05, to = 1.0, count = 24 }
-"#;
+use crate::home::{Home, grid, said};
 
 const RUN: &[&str] = &["run", "g.toml", "--threads", "2", "--out", "x.parquet"];
 const TRACE: &[&str] = &["trace", "g.toml", "--at", "unbalance_mass_kg=0.4", "--out", "t.parquet"];
-const BOUNDARY: &[&str] = &["boundary", "g2.toml", "--threads", "2", "--lattice", "1", "--out", "b.parquet"];
+const BOUNDARY: &[&str] =
+    &["boundary", "g2.toml", "--threads", "2", "--lattice", "1", "--out", "b.parquet"];
 const SHOW: &[&str] = &["show", "map.parquet"];
 const PLOT: &[&str] = &["plot", "map.parquet", "-o", "map.svg"];
 
-struct Home(TempDir);
+/// A folder with two grids and a finished map.
+fn fresh_home() -> Home {
+    let home = Home::new(&grid(24, 0));
+    fs::write(home.path("g2.toml"), grid(2, 2)).expect("the grid is written");
+    fs::write(home.path("map.parquet"), undisturbed()).expect("the map is written");
+    home
+}
 
-impl Home {
-    /// A folder with two grids and a finished map.
-    fn new() -> Self {
-        let home = Self(tempfile::tempdir().expect("a temporary folder"));
-        fs::write(home.path("g.toml"), GRID).expect("the grid is written");
-        let second =
-            "[[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = { from = 60.0, to = 300.0, count = 2 }\n";
-        let two_axes = format!("{}{second}", GRID.replace("count = 24", "count = 2"));
-        fs::write(home.path("g2.toml"), two_axes).expect("the grid is written");
-        fs::write(home.path("map.parquet"), undisturbed()).expect("the map is written");
-        home
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// The command behind another program's command line.
-    fn under(&self, wrapper: &[&str], words: &[&str]) -> Output {
-        let mut command = match wrapper {
-            [] => Command::new(sweep_binary()),
-            [program, options @ ..] => {
-                let mut command = Command::new(program);
-                command.args(options).arg(sweep_binary());
-                command
-            }
-        };
-        for name in ["SLURM_ARRAY_TASK_ID", "SLURM_CPUS_PER_TASK", "JOB_COMPLETION_INDEX"] {
-            command.env_remove(name);
-        }
-        command.args(words).current_dir(self.0.path()).output().expect("the command starts")
-    }
+/// What the command does behind another program's command line.
+fn under(home: &Home, wrapper: &[&str], words: &[&str]) -> Output {
+    home.under(wrapper).args(words).output().expect("the command starts")
 }
 
 fn undisturbed() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
     BYTES.get_or_init(|| {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        fs::write(folder.path().join("g.toml"), GRID).expect("the grid is written");
-        let mut command = Command::new(sweep_binary());
-        let run = command.args(RUN).current_dir(folder.path()).output().expect("the command starts");
+        let home = Home::new(&grid(24, 0));
+        let run = home.sweep(RUN);
         assert!(run.status.success(), "{}", said(&run));
-        fs::read(folder.path().join("x.parquet")).expect("a finished run has an output")
+        fs::read(home.path("x.parquet")).expect("a finished run has an output")
     })
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// Whatever a command met: no panic, and words if it failed.
@@ -100,18 +54,25 @@ fn assert_mends(home: &Home, what: &str) {
     if let Ok(bytes) = fs::read(home.path("x.parquet")) {
         assert!(bytes == undisturbed(), "{what}: a broken result stands at the output");
     }
-    let again = home.under(&[], RUN);
+    let again = home.sweep(RUN);
     assert!(again.status.success(), "{what}: {}", said(&again));
-    assert!(fs::read(home.path("x.parquet")).expect("a result") == undisturbed(), "{what}: other bytes");
+    assert!(
+        fs::read(home.path("x.parquet")).expect("a result") == undisturbed(),
+        "{what}: other bytes"
+    );
 }
 
 /// Fails the first, second, ... of some system calls, until the command has fewer of them.
 fn at_every_call(calls: &str, error: &str, words: &[&str]) {
     for when in 1.. {
-        let home = Home::new();
-        let (trace, inject) = (format!("trace={calls}"), format!("inject={calls}:error={error}:when={when}"));
-        let run =
-            home.under(&["strace", "-f", "-qq", "-o", "/dev/stderr", "-e", &trace, "-e", &inject], words);
+        let home = fresh_home();
+        let (trace, inject) =
+            (format!("trace={calls}"), format!("inject={calls}:error={error}:when={when}"));
+        let run = under(
+            &home,
+            &["strace", "-f", "-qq", "-o", "/dev/stderr", "-e", &trace, "-e", &inject],
+            words,
+        );
         let what = format!("{error} at {calls} {when} of {words:?}");
         let is_hit = said(&run).contains("(INJECTED)");
         if said(&run).contains("error while loading shared libraries") {
@@ -153,9 +114,7 @@ fn a_folder_that_cannot_be_closed_is_told() {
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
 fn random_numbers_that_are_refused_are_told() {
-    // Not the boundary: its columns of words are made with a map of the Arrow library that draws
-    // numbers of its own.
-    for words in [RUN, TRACE, SHOW, PLOT] {
+    for words in [RUN, TRACE, BOUNDARY, SHOW, PLOT] {
         at_every_call("getrandom", "EIO", words);
     }
 }
@@ -165,9 +124,9 @@ fn little_address_space_is_told() {
     let mut refused = 0;
     for kilobytes in [24_000, 28_000, 32_000, 36_000, 40_000, 60_000, 120_000, 400_000] {
         for words in [RUN, TRACE, BOUNDARY, SHOW, PLOT] {
-            let home = Home::new();
+            let home = fresh_home();
             let limit = format!("ulimit -v {kilobytes}; exec \"$@\"");
-            let run = home.under(&["sh", "-c", &limit, "sh"], words);
+            let run = under(&home, &["sh", "-c", &limit, "sh"], words);
             refused += u32::from(!run.status.success());
             let what = format!("{kilobytes} kB for {words:?}");
             assert!(!said(&run).contains("panicked"), "{what}: {}", said(&run));
@@ -181,63 +140,91 @@ fn little_address_space_is_told() {
 
 #[test]
 fn more_cores_than_there_can_be_are_refused_at_once() {
-    let home = Home::new();
+    let home = fresh_home();
     for words in [RUN, BOUNDARY, &["check", "g.toml"]] {
         let words: Vec<&str> =
             words.iter().copied().filter(|word| !["--threads", "2"].contains(word)).collect();
         let slurm = ["env", "SLURM_CPUS_PER_TASK=99999999"];
-        let run = home.under(&slurm, &words);
+        let run = under(&home, &slurm, &words);
         assert_eq!(run.status.code(), Some(2), "{words:?}: {}", said(&run));
-        assert!(said(&run).contains("SLURM_CPUS_PER_TASK is `99999999`"), "{words:?}: {}", said(&run));
+        assert!(
+            said(&run).contains("SLURM_CPUS_PER_TASK is `99999999`"),
+            "{words:?}: {}",
+            said(&run)
+        );
     }
-    let given = home.under(&["env", "SLURM_CPUS_PER_TASK=99999999"], RUN);
+    let given = under(&home, &["env", "SLURM_CPUS_PER_TASK=99999999"], RUN);
     assert!(given.status.success(), "--threads counts: {}", said(&given));
 }
 
 #[test]
 fn slurm_gives_the_threads_of_a_run_and_of_its_traces() {
-    let home = Home::new();
+    let home = fresh_home();
     let words = ["run", "g.toml", "--keep-traces", "--out", "x.parquet"];
-    let run = home.under(&["env", "SLURM_CPUS_PER_TASK=3"], &words);
+    let run = under(&home, &["env", "SLURM_CPUS_PER_TASK=3"], &words);
     assert!(run.status.success(), "{}", said(&run));
     assert!(said(&run).contains("on 3 threads"), "{}", said(&run));
     // Refused for the traces as for the run, although the map is there.
-    let run = home.under(&["env", "SLURM_CPUS_PER_TASK=0"], &words);
+    let run = under(&home, &["env", "SLURM_CPUS_PER_TASK=0"], &words);
     assert_eq!(run.status.code(), Some(2), "{}", said(&run));
 }
 
 #[test]
 fn a_signal_is_answered_within_a_trajectory() {
-    // By explicit methods an hour of computing; the stiff one has a tolerance that it cannot meet any quicker.
+    // By explicit methods an hour of computing; the stiff one has a tolerance that it cannot meet
+    // any quicker.
     for (set, method) in [
         ("tub_mass_kg = 1e-6", "method = \"rk4\"\nstep_s = 1.0e-8"),
         ("tub_mass_kg = 1e-6", "method = \"dopri5\""),
         ("tub_mass_kg = 20", "method = \"rodas5p\"\nrtol = 1e-12\natol = 1e-18"),
     ] {
-        let home = Home::new();
+        let home = fresh_home();
         let grid = format!(
-            "spin = {{ profile = \"ramp\", peak_rpm = 350, ramp_s = 50 }}\ntime = {{ end_s = 90 }}\n\
+            "spin = {{ profile = \"ramp\", peak_rpm = 350, ramp_s = 50 }}\ntime = {{ end_s = 90 \
+             }}\n\
              [set]\n{set}\n[integrator]\n{method}\n"
         );
         fs::write(home.path("g.toml"), grid).expect("the grid is written");
         let script = "\"$@\" & sweep=$!\nsleep 2\nkill -TERM $sweep; wait $sweep";
         let began = Instant::now();
-        let run = home.under(&["sh", "-c", script, "sh"], RUN);
+        let run = under(&home, &["sh", "-c", script, "sh"], RUN);
         assert_eq!(run.status.code(), Some(143), "{method}: {}", said(&run));
         assert!(began.elapsed() < Duration::from_secs(30), "{method}: {:?}", began.elapsed());
     }
 }
 
 #[test]
+fn a_signal_is_answered_while_steps_are_chosen() {
+    let home = fresh_home();
+    home.choose_for_seconds();
+    // The folder is made before steps are chosen.
+    let script = "\"$@\" & sweep=$!\n\
+        while ! test -e x.parquet.partial/plan.json; do sleep 0.02; done\n\
+        sleep 0.1; date +%s%N; kill -TERM $sweep; wait $sweep; code=$?; date +%s%N; exit $code";
+    let run = under(&home, &["sh", "-c", script, "sh"], RUN);
+    assert_eq!(run.status.code(), Some(143), "{}", said(&run));
+    assert!(said(&run).contains("interrupted with 0 of 256 points kept"), "{}", said(&run));
+    let times = String::from_utf8_lossy(&run.stdout).into_owned();
+    let times: Vec<u64> = times.lines().map(|line| line.parse().expect("a time")).collect();
+    let took = Duration::from_nanos(times[1] - times[0]);
+    // Half a second of a core; tests run beside others.
+    assert!(took < Duration::from_secs(2), "{took:?}");
+}
+
+#[test]
 fn an_interrupted_shard_is_gone_on_with_as_that_shard() {
-    let home = Home::new();
-    let long = GRID.replace("end_s = 0.1", "end_s = 50.0").replace("count = 24", "count = 200");
+    let home = fresh_home();
+    let long = grid(200, 0).replace("end_s = 0.1", "end_s = 50.0");
     fs::write(home.path("g.toml"), long).expect("the grid is written");
     let script = "\"$@\" & sweep=$!\n\
         while ! ls x.parquet.partial/chunk-* > /dev/null 2>&1; do sleep 0.05; done\n\
         kill -TERM $sweep; wait $sweep";
     let words = ["run", "g.toml", "--threads", "1", "--shard", "2/3", "--out", "x.parquet"];
-    let run = home.under(&["sh", "-c", script, "sh"], &words);
+    let run = under(&home, &["sh", "-c", script, "sh"], &words);
     assert_eq!(run.status.code(), Some(143), "{}", said(&run));
-    assert!(said(&run).contains("go on  sweep run g.toml --out x.parquet --shard 2/3"), "{}", said(&run));
+    assert!(
+        said(&run).contains("go on  sweep run g.toml --out x.parquet --shard 2/3"),
+        "{}",
+        said(&run)
+    );
 }

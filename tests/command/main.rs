@@ -12,17 +12,11 @@ mod faults;
 mod files;
 mod flips;
 mod goldens;
+mod home;
 mod limits;
 mod pictures;
 
-use std::path::PathBuf;
 use std::process::Command;
-
-/// The `sweep` binary of this build, or the one that `SWEEP_BINARY` names, such as an installed
-/// one.
-fn sweep_binary() -> PathBuf {
-    std::env::var_os("SWEEP_BINARY").map_or_else(|| env!("CARGO_BIN_EXE_sweep").into(), Into::into)
-}
 
 /// Sends a signal by its short name. `kill` is built into every shell, and only some systems have
 /// it as a program.

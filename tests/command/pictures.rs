@@ -12,7 +12,8 @@ use arrow_array::{ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Ar
 use arrow_array::{RecordBatch, StringArray, UInt64Array};
 use parquet::arrow::ArrowWriter;
 
-use crate::sweep_binary;
+use crate::flips::finished;
+use crate::home::sweep_binary;
 
 /// Bytes of memory that a figure may take, whatever the rows.
 const MOST_MEMORY: u64 = 200_000_000;
@@ -145,42 +146,19 @@ fn ten_million_rows_take_no_more() {
 
 #[test]
 fn a_flipped_bit_is_refused() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let grid = r#"
-[spin]
-profile = "triangular"
-peak_rpm = 350.0
-ramp_s = 50.0
-[time]
-end_s = 0.1
-window_s = [0.05, 0.1]
-[integrator]
-method = "rk4"
-step_s = 2.0e-4
-[[axis]]
-parameter = "unbalance_mass_kg"
-range = { from = 0.05, to = 1.0, count = 3 }
-[[axis]]
-parameter = "damping_n_s_per_m"
-range = { from = 60.0, to = 300.0, count = 3 }
-"#;
-    fs::write(folder.path().join("g.toml"), grid).expect("the grid is written");
-    let sweep = |words: &[&str]| {
-        let mut command = Command::new(sweep_binary());
-        command.args(words).current_dir(folder.path()).output().expect("it starts")
-    };
-    assert!(sweep(&["run", "g.toml", "--out", "map.parquet"]).status.success());
-    assert!(sweep(&["plot", "map.parquet", "-o", "whole.svg"]).status.success());
-    let whole = fs::read(folder.path().join("map.parquet")).expect("a map");
+    let home = finished();
+    fs::rename(home.path("x.parquet"), home.path("map.parquet")).expect("there is a result");
+    assert!(home.sweep(&["plot", "map.parquet", "-o", "whole.svg"]).status.success());
+    let whole = fs::read(home.path("map.parquet")).expect("a map");
     for bit in (0..8 * whole.len()).step_by(8 * whole.len() / 150 + 1) {
         let mut bytes = whole.clone();
         bytes[bit / 8] ^= 1 << (bit % 8);
-        fs::write(folder.path().join("map.parquet"), bytes).expect("the map is written");
-        let run = sweep(&["plot", "map.parquet", "-o", "a.svg"]);
+        fs::write(home.path("map.parquet"), bytes).expect("the map is written");
+        let run = home.sweep(&["plot", "map.parquet", "-o", "a.svg"]);
         let said = String::from_utf8_lossy(&run.stderr);
         assert_eq!(run.status.code(), Some(1), "bit {bit}: {said}");
         assert!(said.contains("map.parquet is"), "bit {bit}: {said}");
         assert!(!said.contains("panicked"), "bit {bit}: {said}");
-        assert!(!folder.path().join("a.svg").exists(), "bit {bit}");
+        assert!(!home.path("a.svg").exists(), "bit {bit}");
     }
 }

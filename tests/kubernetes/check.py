@@ -1,8 +1,10 @@
-"""What the schemas cannot see: a manifest with a mistake is refused, and the commands are ones that the program takes.
+"""What the schemas cannot see: a manifest with a mistake is refused, and the commands are ones that
+the program takes.
 
 usage: check.py SWEEP_BINARY FOLDER
 
-The shards are run here with the index that Kubernetes would give each, in its containers' environment, and then merged.
+The shards are run here with the index that Kubernetes would give each, in its containers'
+environment, and then merged.
 """
 
 import os
@@ -31,7 +33,9 @@ range = { from = 0.05, to = 1.0, count = 100 }
 
 
 def main(binary: str, folder: Path):
-    sweep, merge = (yaml.safe_load((folder / name).read_text()) for name in ("sweep.yaml", "merge.yaml"))
+    sweep, merge = (
+        yaml.safe_load((folder / name).read_text()) for name in ("sweep.yaml", "merge.yaml")
+    )
 
     misspelt = yaml.safe_load((folder / "sweep.yaml").read_text())
     misspelt["spec"]["completionmode"] = misspelt["spec"].pop("completionMode")
@@ -55,8 +59,16 @@ def run(binary: str, job: dict, home: str, environment: dict[str, str] = {}, exp
     (container,) = job["spec"]["template"]["spec"]["containers"]
     command, *arguments = container["command"]
     assert command == "sweep"
-    done = subprocess.run([binary, *arguments], cwd=home, env={**os.environ, **environment}, capture_output=True, text=True)
-    assert done.returncode == expect, f"{arguments} {environment} ended with {done.returncode}: {done.stderr}"
+    done = subprocess.run(
+        [binary, *arguments],
+        cwd=home,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+    )
+    assert (
+        done.returncode == expect
+    ), f"{arguments} {environment} ended with {done.returncode}: {done.stderr}"
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)
 sweep=${SWEEP:-$root/target/release/sweep}
-venv=$("$root/scripts/venv.sh" "$here/requirements.txt")
+venv=$("$root/scripts/tools/venv.sh" "$here/requirements.txt")
 
 # 1.29 is the first whose API has backoffLimitPerIndex switched on.
 for version in 1.29 1.37; do

@@ -1,8 +1,10 @@
-"""A sweep on a real Slurm cluster: an array over two nodes, a task killed, a node killed, the controller killed.
+"""A sweep on a real Slurm cluster: an array over two nodes, a task killed, a node killed, the
+controller killed.
 
 usage: check.py SWEEP_BINARY
 
-Each time the merged file must be the single machine's, byte for byte. Needs root, slurm-wlm and munge; run.sh sees to that.
+Each time the merged file must be the single machine's, byte for byte. Needs root, slurm-wlm and
+munge; run.sh sees to that.
 """
 
 import json
@@ -63,8 +65,12 @@ class Sweep:
 
     def sweep(self, *arguments: str, code: int = 0) -> subprocess.CompletedProcess:
         command = [self.binary, *arguments]
-        done = subprocess.run(command, cwd=self.folder, env=self.slurm.environment, capture_output=True, text=True)
-        assert done.returncode == code, f"{arguments} ended with {done.returncode}, not {code}: {done.stderr}"
+        done = subprocess.run(
+            command, cwd=self.folder, env=self.slurm.environment, capture_output=True, text=True
+        )
+        assert (
+            done.returncode == code
+        ), f"{arguments} ended with {done.returncode}, not {code}: {done.stderr}"
         return done
 
     def status(self) -> dict:
@@ -72,7 +78,9 @@ class Sweep:
 
     def script(self) -> Path:
         script = self.folder / "submit.sh"
-        text = self.sweep("slurm", "array.toml", "--shards", str(SHARDS), "--time", "10", "--mem", "200M").stdout
+        text = self.sweep(
+            "slurm", "array.toml", "--shards", str(SHARDS), "--time", "10", "--mem", "200M"
+        ).stdout
         script.write_text(text)
         return script
 
@@ -84,8 +92,10 @@ class Sweep:
         return words[1], words[3]
 
     def stopped_in_mid_shard(self) -> tuple[str, int]:
-        """A task that has one of its two chunks, its process held still: the task's number and the process."""
+        """A task that has one of its two chunks, its process held still: the task's number and the
+        process."""
         found = []
+
         def look():
             for shard in range(1, SHARDS + 1):
                 pid = self.process(str(shard)) if self.chunks(shard) == 1 else None
@@ -96,6 +106,7 @@ class Sweep:
                         return True
                     os.kill(pid, signal.SIGCONT)
             return False
+
         self.slurm.wait_for("task with one chunk", look, 60, lambda: self.slurm.tasks(self.array))
         return found[0]
 
@@ -106,12 +117,17 @@ class Sweep:
     def process(self, task: str) -> int | None:
         """The sweep of a task, if it is at work."""
         for pid, words in cluster.processes():
-            if words[0] == str(self.binary) and cluster.environment(pid).get("SLURM_ARRAY_TASK_ID") == task:
+            if (
+                words[0] == str(self.binary)
+                and cluster.environment(pid).get("SLURM_ARRAY_TASK_ID") == task
+            ):
                 return pid
         return None
 
     def logs(self) -> str:
-        return "\n".join(f"--- {path.name}\n{path.read_text()}" for path in sorted(self.folder.rglob("*.log")))
+        return "\n".join(
+            f"--- {path.name}\n{path.read_text()}" for path in sorted(self.folder.rglob("*.log"))
+        )
 
     def assert_same(self, expected: bytes):
         assert self.result.exists(), f"no result\n{self.logs()}"
@@ -122,22 +138,36 @@ class Sweep:
 def array_over_two_nodes(sweep: Sweep, expected: bytes):
     sweep.array, merge = sweep.submit()
     nodes = set()
+
     def watch():
         tasks = sweep.slurm.tasks(sweep.array)
         nodes.update(facts["node"] for facts in tasks.values() if facts["node"])
         return sweep.slurm.tasks(merge).get("N/A", {}).get("state") in ("COMPLETED", "FAILED")
+
     sweep.slurm.wait_for("merge", watch, 90, lambda: sweep.slurm.tasks(sweep.array))
     assert nodes == {"n1", "n2"}, nodes
     sessions = json.loads((sweep.folder / "results/array.run.json").read_text())["sessions"]
-    assert sorted(session["shard"] for session in sessions) == [f"{i}/{SHARDS}" for i in range(1, SHARDS + 1)]
-    assert {session["threads"] for session in sessions} == {1}, "threads are the cores that Slurm gave"
+    assert sorted(session["shard"] for session in sessions) == [
+        f"{i}/{SHARDS}" for i in range(1, SHARDS + 1)
+    ]
+    assert {session["threads"] for session in sessions} == {
+        1
+    }, "threads are the cores that Slurm gave"
     sweep.assert_same(expected)
 
 
 def plain_array_numbered_from_zero(sweep: Sweep, expected: bytes):
-    """The defaults alone: place and number from the environment, and a part of the array submitted again."""
+    """The defaults alone: place and number from the environment, and a part of the array submitted
+    again."""
     wrap = f"--wrap={sweep.binary} run array.toml"
-    job = sweep.slurm.ask("sbatch", "--parsable", f"--array=0-{SHARDS - 1}", "--open-mode=append", wrap, cwd=sweep.folder).strip()
+    job = sweep.slurm.ask(
+        "sbatch",
+        "--parsable",
+        f"--array=0-{SHARDS - 1}",
+        "--open-mode=append",
+        wrap,
+        cwd=sweep.folder,
+    ).strip()
     sweep.slurm.wait_for("beginning", lambda: (sweep.partial / "shards.json").exists(), 30)
     sweep.slurm.ask("scancel", "--state=PENDING", job)
     sweep.slurm.wait_for_job(job, 60)
@@ -145,7 +175,9 @@ def plain_array_numbered_from_zero(sweep: Sweep, expected: bytes):
     assert status["shards"] == SHARDS and status["missing_shards"], status
     refused = sweep.sweep("merge", "array.toml", code=1).stderr
     assert "is incomplete" in refused and "of shards" in refused, refused
-    again = sweep.slurm.ask("sbatch", "--parsable", f"--array={status['missing_shards']}", wrap, cwd=sweep.folder).strip()
+    again = sweep.slurm.ask(
+        "sbatch", "--parsable", f"--array={status['missing_shards']}", wrap, cwd=sweep.folder
+    ).strip()
     assert set(sweep.slurm.wait_for_job(again, 90).values()) == {"COMPLETED"}, sweep.logs()
     assert sweep.status()["state"] == "complete"
     sweep.sweep("merge", "array.toml")
@@ -178,16 +210,23 @@ def node_killed(sweep: Sweep, expected: bytes):
     assert process in victims, "the node's power cut spared its task"
     down = lambda: slurm.ask("sinfo", "-h", "-n", node, "-o", "%T").strip().rstrip("*") == "down"
     slurm.wait_for(f"word that {node} is down", down, 60)
-    slurm.wait_for("task queued again", lambda: slurm.tasks(sweep.array)[task]["state"] == "PENDING", 30)
-    # Slurm lets a task wait two minutes after its node failed; an administrator's word makes it now.
+    slurm.wait_for(
+        "task queued again", lambda: slurm.tasks(sweep.array)[task]["state"] == "PENDING", 30
+    )
+    # Slurm lets a task wait two minutes after its node failed; an administrator's word makes it
+    # now.
     slurm.ask("scontrol", "update", f"JobId={sweep.array}_{task}", "StartTime=now")
     assert set(slurm.wait_for_job(sweep.array, 120).values()) == {"COMPLETED"}, sweep.logs()
     assert slurm.wait_for_job(merge, 60) == {"N/A": "COMPLETED"}, sweep.logs()
     log = (sweep.folder / f"results/array.slurm-{sweep.array}_{task}.log").read_text()
-    assert "going on: 8 of 16 points are there" in log, f"the task did not go on from its chunk:\n{log}"
+    assert (
+        "going on: 8 of 16 points are there" in log
+    ), f"the task did not go on from its chunk:\n{log}"
     sweep.assert_same(expected)
     slurm.start_node(node)
-    slurm.wait_for("node's return", lambda: slurm.node_states() == ["idle", "idle"], 60, slurm.node_states)
+    slurm.wait_for(
+        "node's return", lambda: slurm.node_states() == ["idle", "idle"], 60, slurm.node_states
+    )
 
 
 def controller_killed(sweep: Sweep, expected: bytes):
@@ -201,16 +240,24 @@ def controller_killed(sweep: Sweep, expected: bytes):
     os.kill(process, signal.SIGCONT)
     time.sleep(2)
     slurm.start_controller()
-    # A controller that lost sight of tasks queues them again, to wait as above; one that lost a start may start it twice and
-    # then drain the node. An administrator's word in either case.
+
+    # A controller that lost sight of tasks queues them again, to wait as above; one that lost a
+    # start may start it twice and then drain the node. An administrator's word in either case.
     def over():
         for task, facts in slurm.tasks(sweep.array).items():
             if facts["state"] == "PENDING":
-                slurm.ask("scontrol", "update", f"JobId={sweep.array}_{task}", "StartTime=now", check=False)
+                slurm.ask(
+                    "scontrol",
+                    "update",
+                    f"JobId={sweep.array}_{task}",
+                    "StartTime=now",
+                    check=False,
+                )
         for node in ("n1", "n2"):
             if slurm.ask("sinfo", "-h", "-n", node, "-o", "%T").startswith("drain"):
                 slurm.ask("scontrol", "update", f"NodeName={node}", "State=RESUME")
         return slurm.is_over(sweep.array) and slurm.is_over(merge)
+
     slurm.wait_for("end of array and merge", over, 120, lambda: slurm.tasks(sweep.array))
     if not sweep.result.exists():
         # What the controller forgot is what status finds.
@@ -219,7 +266,13 @@ def controller_killed(sweep: Sweep, expected: bytes):
     sweep.assert_same(expected)
 
 
-SCENARIOS = [array_over_two_nodes, plain_array_numbered_from_zero, task_killed, node_killed, controller_killed]
+SCENARIOS = [
+    array_over_two_nodes,
+    plain_array_numbered_from_zero,
+    task_killed,
+    node_killed,
+    controller_killed,
+]
 
 
 def main(binary: Path, names: list[str]):
@@ -237,7 +290,10 @@ def main(binary: Path, names: list[str]):
                     continue
                 began = time.monotonic()
                 scenario(Sweep(slurm, binary, home / scenario.__name__), expected)
-                print(f"{scenario.__name__}: {time.monotonic() - began:.0f} s, the same bytes", flush=True)
+                print(
+                    f"{scenario.__name__}: {time.monotonic() - began:.0f} s, the same bytes",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""A Slurm cluster of two virtual nodes on this host, without systemd: daemons as child processes, killed one by one."""
+"""A Slurm cluster of two virtual nodes on this host, without systemd: daemons as child processes,
+killed one by one."""
 
 import os
 import pwd
@@ -15,7 +16,9 @@ class Cluster:
         self.folder = folder
         self.munge = folder / "munge"
         self.processes: dict[str, subprocess.Popen] = {}
-        self.environment = {k: v for k, v in os.environ.items() if not k.startswith(("SLURM_", "SBATCH_"))}
+        self.environment = {
+            k: v for k, v in os.environ.items() if not k.startswith(("SLURM_", "SBATCH_"))
+        }
         self.environment["SLURM_CONF"] = str(folder / "slurm.conf")
 
     def __enter__(self):
@@ -54,15 +57,33 @@ class Cluster:
         key.chmod(0o400)
         for path in (self.munge, key):
             shutil.chown(path, user.pw_uid, user.pw_gid)
-        paths = {"key-file": key, "socket": self.munge / "munge.socket", "pid-file": self.munge / "munged.pid",
-                 "log-file": self.munge / "munged.log", "seed-file": self.munge / "munged.seed"}
+        paths = {
+            "key-file": key,
+            "socket": self.munge / "munge.socket",
+            "pid-file": self.munge / "munged.pid",
+            "log-file": self.munge / "munged.log",
+            "seed-file": self.munge / "munged.seed",
+        }
         options = [f"--{name}={path}" for name, path in paths.items()]
-        self.start("munged", ["setpriv", "--reuid=munge", "--regid=munge", "--clear-groups", "/usr/sbin/munged", "--foreground", *options])
+        self.start(
+            "munged",
+            [
+                "setpriv",
+                "--reuid=munge",
+                "--regid=munge",
+                "--clear-groups",
+                "/usr/sbin/munged",
+                "--foreground",
+                *options,
+            ],
+        )
         self.wait_for("munge's socket", paths["socket"].exists, 10)
 
     def start_controller(self):
         self.start("slurmctld", ["/usr/sbin/slurmctld", "-D"])
-        self.wait_for("the controller", lambda: "is UP" in self.ask("scontrol", "ping", check=False), 20)
+        self.wait_for(
+            "the controller", lambda: "is UP" in self.ask("scontrol", "ping", check=False), 20
+        )
 
     def start_node(self, node: str):
         self.start(node, ["/usr/sbin/slurmd", "-D", "-N", node])
@@ -70,7 +91,9 @@ class Cluster:
     def start(self, name: str, command: list[str]):
         log = open(self.folder / f"{name}.out", "ab")
         # A session of its own: what a node starts can be told from what another one started.
-        self.processes[name] = subprocess.Popen(command, env=self.environment, stdout=log, stderr=log, start_new_session=True)
+        self.processes[name] = subprocess.Popen(
+            command, env=self.environment, stdout=log, stderr=log, start_new_session=True
+        )
 
     def kill(self, name: str):
         """Ends a daemon as a crash would."""
@@ -79,8 +102,13 @@ class Cluster:
         process.wait()
 
     def kill_node(self, node: str):
-        """Ends a node as a power cut would: its daemon, the steps it had started, and whatever those had started."""
-        steps = [pid for pid, words in processes() if words[0].startswith("slurmstepd") and f"SLURMD_NODENAME={node}" in of_any_child(pid)]
+        """Ends a node as a power cut would: its daemon, the steps it had started, and whatever
+        those had started."""
+        steps = [
+            pid
+            for pid, words in processes()
+            if words[0].startswith("slurmstepd") and f"SLURMD_NODENAME={node}" in of_any_child(pid)
+        ]
         self.kill(node)
         victims = [pid for step in steps for pid in [step, *descendants(step)]]
         for pid in victims:
@@ -98,10 +126,13 @@ class Cluster:
                 process.wait()
 
     def ask(self, *command: str, check: bool = True, **options) -> str:
-        # On a busy host the controller now and then drops a connection; asking again is harmless, submitting again is not.
+        # On a busy host the controller now and then drops a connection; asking again is harmless,
+        # submitting again is not.
         attempts = 5 if command[0] in ("squeue", "sinfo", "scontrol") and check else 1
         for attempt in range(attempts):
-            done = subprocess.run(command, env=self.environment, capture_output=True, text=True, **options)
+            done = subprocess.run(
+                command, env=self.environment, capture_output=True, text=True, **options
+            )
             if done.returncode == 0 or not check:
                 return done.stdout
             time.sleep(0.2 * (attempt + 1))
@@ -111,26 +142,33 @@ class Cluster:
         return self.ask("sinfo", "-h", "-N", "-o", "%T").split()
 
     def tasks(self, job: str) -> dict[str, dict[str, str]]:
-        """State and node of each task of an array (of a job without tasks: N/A) that the controller still knows."""
+        """State and node of each task of an array (of a job without tasks: N/A) that the controller
+        still knows."""
         lines = self.ask("squeue", "-h", "-r", "-t", "all", "-o", "%F|%K|%T|%N").splitlines()
         rows = (line.split("|") for line in lines)
         return {task: {"state": state, "node": node} for of, task, state, node in rows if of == job}
 
     def is_over(self, job: str) -> bool:
-        """Whether no task of a job will do anything any more; so it is with one that the controller has lost."""
+        """Whether no task of a job will do anything any more; so it is with one that the controller
+        has lost."""
         ended = {"COMPLETED", "FAILED", "CANCELLED", "TIMEOUT", "NODE_FAIL"}
         return all(task["state"] in ended for task in self.tasks(job).values())
 
     def wait_for_job(self, job: str, seconds: float) -> dict[str, str]:
         """The end state of each task."""
-        self.wait_for(f"end of job {job}", lambda: self.is_over(job), seconds, lambda: self.tasks(job))
+        self.wait_for(
+            f"end of job {job}", lambda: self.is_over(job), seconds, lambda: self.tasks(job)
+        )
         return {task: facts["state"] for task, facts in self.tasks(job).items()}
 
     def wait_until_saved(self, since: float):
-        """Waits until the controller has written its record of the jobs anew, which it does some seconds after a change."""
+        """Waits until the controller has written its record of the jobs anew, which it does some
+        seconds after a change."""
         state = self.folder / "state/job_state"
         # Half a second for the snapshot that was under way.
-        self.wait_for("record of the jobs", lambda: state.exists() and state.stat().st_mtime > since + 0.5, 60)
+        self.wait_for(
+            "record of the jobs", lambda: state.exists() and state.stat().st_mtime > since + 0.5, 60
+        )
 
     def wait_for(self, what, condition, seconds, show=lambda: ""):
         until = time.monotonic() + seconds
@@ -141,7 +179,10 @@ class Cluster:
 
     def logs(self) -> str:
         tail = lambda path: "\n".join(path.read_text(errors="replace").splitlines()[-15:])
-        return "\n".join(f"--- {path.name}\n{tail(path)}" for path in [*sorted(self.folder.glob("*.log")), *sorted(self.folder.glob("*.out"))])
+        return "\n".join(
+            f"--- {path.name}\n{tail(path)}"
+            for path in [*sorted(self.folder.glob("*.log")), *sorted(self.folder.glob("*.out"))]
+        )
 
 
 def free_ports(count: int) -> list[int]:

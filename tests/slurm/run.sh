@@ -9,6 +9,6 @@ here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)
 
 [ -x /usr/sbin/slurmctld ] && [ -x /usr/sbin/slurmd ] && [ -x /usr/sbin/munged ] \
-    || "$root/scripts/packages.sh" slurm-wlm munge
-command -v python3 > /dev/null || "$root/scripts/packages.sh" python3
+    || "$root/scripts/tools/packages.sh" slurm-wlm munge
+command -v python3 > /dev/null || "$root/scripts/tools/packages.sh" python3
 exec python3 "$here/check.py" "${SWEEP:-$root/target/release/sweep}" "$@"

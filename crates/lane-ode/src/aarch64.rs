@@ -1,11 +1,11 @@
 //! NEON lanes: intrinsics behind a newtype.
 //!
-//! Every processor that this target is compiled for has NEON. The entry function is there all the same, and makes the first
-//! value, as on other architectures: a value of this type exists only where the instructions do, which is why the `unsafe`
-//! below is sound.
+//! Every processor of this target has NEON. As on other architectures, only the entry function
+//! makes a first value: a value of this type exists only where the instructions do, which makes the
+//! `unsafe` below sound.
 //!
-//! One register a value: with two, the right-hand sides outgrow the 32 registers, and a lane's step takes a sixth more instructions
-//! (results/benchmarks/arm.md).
+//! A value has one register. With two, the right-hand sides outgrow the 32 registers, and a lane's
+//! step takes a sixth more instructions (results/benchmarks/arm.md).
 #![allow(unsafe_code)]
 
 use crate::vector::vector;
@@ -34,14 +34,15 @@ vector!(
 
 /// `-x`, in an instruction of its own.
 ///
-/// LLVM 22 turns the negative of a fused a b + c into one `fnmadd`, which is -a b - c: 0 in place of -0 where the terms cancel. NEON's
-/// vectors have no such instruction.
+/// LLVM 22 turns the negative of a fused a b + c into one `fnmadd`, which is -a b - c: 0 in place
+/// of -0 where the terms cancel. NEON's vectors have no such instruction.
 #[inline(always)]
 pub(crate) fn negated(x: f64) -> f64 {
     let negative;
     // SAFETY: one instruction from register to register.
     unsafe {
-        asm!("fneg {:d}, {:d}", lateout(vreg) negative, in(vreg) x, options(pure, nomem, nostack, preserves_flags));
+        asm!("fneg {:d}, {:d}", lateout(vreg) negative, in(vreg) x,
+            options(pure, nomem, nostack, preserves_flags));
     }
     negative
 }

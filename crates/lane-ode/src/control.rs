@@ -3,7 +3,7 @@
 use crate::lane::Lane;
 use crate::num::N;
 
-/// What an adaptive method is allowed.
+/// Limits of an adaptive method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     /// Relative error per component and step.
@@ -15,7 +15,8 @@ pub struct Tolerance {
 }
 
 impl Tolerance {
-    /// The largest component of the error over its tolerance; NaN if any is not finite. Below 1 the step is good.
+    /// The largest component of the error over its tolerance; NaN if any is not finite. Below 1 the
+    /// step is good.
     #[inline(always)]
     pub(crate) fn norm<T: Lane, const D: usize>(
         &self,
@@ -47,13 +48,14 @@ pub(crate) enum Verdict {
 /// Proportional-integral step control (Hairer and Wanner II, section IV.2): h grows by
 /// 0.9 err^-alpha err_before^beta, within 0.2 to 5.
 ///
-/// The exponents are sums of powers of one half, so that square roots are enough: the same bits everywhere.
+/// The exponents are sums of powers of one half, so that square roots are enough: the same bits
+/// everywhere.
 pub(crate) struct StepControl<T> {
     /// The step to try next.
     pub(crate) step: N<T>,
     /// err^beta of the last accepted step.
     memory: N<T>,
-    /// Lanes whose last attempt was rejected: their step must not grow at once.
+    /// Lanes whose last attempt was rejected: their next step must not grow.
     was_rejected: u32,
 }
 
@@ -84,7 +86,8 @@ impl<T: Lane> StepControl<T> {
         Self { step: zero, memory: zero.lit(1.0), was_rejected: 0 }
     }
 
-    /// A leg begins, with nothing of what the lane did before: a result must not depend on who was there.
+    /// Begins a leg. Nothing is kept of the lane's earlier trajectories, so that results do not
+    /// depend on them.
     #[inline(always)]
     pub(crate) fn start(&mut self, lane: usize, first_step_s: f64) {
         self.step.0.set(lane, first_step_s);
@@ -95,7 +98,7 @@ impl<T: Lane> StepControl<T> {
     /// The next steps after error `error` over step `h`.
     #[inline(always)]
     pub(crate) fn proposals(&self, error: N<T>, h: N<T>) -> Proposals<T> {
-        // NaN counts as far too large.
+        // NaN is far too large.
         let error = error.where_less(error.lit(1e30), error, error.lit(1e30));
         let error = error.lit(LEAST_ERROR).where_less(error, error, error.lit(LEAST_ERROR));
         let root_2 = error.sqrt();

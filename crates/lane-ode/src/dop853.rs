@@ -1,15 +1,17 @@
 //! The eighth-order Runge-Kutta method of Dormand and Prince with a fixed step.
 //!
-//! Coefficients: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.5 and the program
-//! `dop853.f` that goes with it. Its error estimate is left out: whoever uses it here compares whole trajectories.
+//! Coefficients: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.5
+//! and the program `dop853.f` that goes with it. Its error estimate is left out: callers compare
+//! whole trajectories.
 //!
-//! On the imaginary axis it is stable up to |h w| = 5.96: half a radian a stage, where classical Runge-Kutta has 0.71.
-//! It pays where the error asked for, and not stability, would shorten that one's steps.
+//! On the imaginary axis it is stable up to |h w| = 5.96: half a radian per stage, against 0.71 of
+//! classical Runge-Kutta. It is cheaper where accuracy, not stability, limits the steps of the
+//! latter.
 
 use crate::fixed::Legs;
 use crate::lane::Lane;
 use crate::num::N;
-use crate::system::{Step, Task};
+use crate::system::{Step, System as _, Task};
 use core::hint::black_box;
 
 /// On the imaginary axis the method is stable up to |h w| = 5.96.
@@ -129,10 +131,10 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let h = clock.h;
         let mut time = clock.at(index);
         // Hidden from the compiler, which would copy it from place to place.
-        let mut forcing = task.forcing(time);
+        let mut forcing = task.system().forcing(time);
         let forcing = black_box(&mut forcing);
-        // States of this step's start and of the last one's, which change places, and the stage's; the last step's first
-        // slope, which observers want, after this step's.
+        // States of this step's start and of the last one's, which change places, and the stage's;
+        // the last step's first slope, which observers want, after this step's.
         let mut states = [x; 3];
         let mut slopes = [x; DOP853_STAGES + 1];
         const STAGE: usize = 2;
@@ -141,12 +143,13 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let mut is_fresh = true;
         let mut done = 0;
         loop {
-            // The one after the last is an evaluation only: observers want the slope at both ends of a step.
+            // The one after the last is an evaluation only: observers want the slope at both ends
+            // of a step.
             let is_last = done == run;
             let next_time = clock.at(index + 1.0);
             for stage in 0..DOP853_STAGES {
                 if stage == 0 {
-                    slopes[0] = task.derivative(forcing, &states[now]);
+                    slopes[0] = task.system().derivative(forcing, &states[now]);
                     if is_fresh {
                         task.begin(forcing, &states[now], &slopes[0]);
                         is_fresh = false;
@@ -171,9 +174,12 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                     continue;
                 }
                 let stage_time = clock.at(index + TIMES[stage]);
-                task.renew(if stage == DOP853_STAGES - 1 { next_time } else { stage_time }, forcing);
+                task.system().renew(
+                    if stage == DOP853_STAGES - 1 { next_time } else { stage_time },
+                    forcing,
+                );
                 along(h, STAGES[stage - 1], &slopes, &mut states, now, STAGE);
-                slopes[stage] = task.derivative(forcing, &states[STAGE]);
+                slopes[stage] = task.system().derivative(forcing, &states[STAGE]);
             }
             if is_last {
                 break;
@@ -183,7 +189,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             index = index + 1.0;
             time = next_time;
             done += 1;
-            let in_range = task.in_range(&states[now]);
+            let in_range = task.system().in_range(&states[now]);
             if !T::all(in_range) && legs.fail(in_range, time, done) {
                 run = done;
             }

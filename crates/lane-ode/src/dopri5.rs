@@ -1,16 +1,13 @@
 //! Dormand and Prince's method of order 5(4), adaptive, every lane with its own time and step.
 //!
-//! Coefficients: J. R. Dormand, P. J. Prince, J. Comp. Appl. Math. 6 (1980) 19, Table 2; dense output and step control: Hairer,
-//! Norsett, Wanner, Solving Ordinary Differential Equations I, sections II.4 to II.6.
+//! Coefficients: J. R. Dormand, P. J. Prince, J. Comp. Appl. Math. 6 (1980) 19, Table 2; dense
+//! output and step control: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I,
+//! sections II.4 to II.6.
 
 use crate::control::{StepControl, Tolerance, Verdict};
-use crate::fixed::MAX_LANES;
-use crate::lane::Lane;
+use crate::lane::{Lane, MAX_LANES};
 use crate::num::N;
-use crate::system::{Count, Ended, Failure, Step, Task};
-
-/// On the imaginary axis the method is stable up to about |h w| = 1.
-pub const DOPRI5_STABILITY_LIMIT: f64 = 1.0;
+use crate::system::{Count, Ended, Failure, Step, System as _, Task};
 
 const STAGES: usize = 7;
 
@@ -29,8 +26,15 @@ const A: [[f64; 6]; STAGES] = [
 ];
 
 /// Weights of order 5 less those of order 4.
-const ERROR: [f64; STAGES] =
-    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
+const ERROR: [f64; STAGES] = [
+    71.0 / 57600.0,
+    0.0,
+    -71.0 / 16695.0,
+    71.0 / 1920.0,
+    -17253.0 / 339_200.0,
+    22.0 / 525.0,
+    -1.0 / 40.0,
+];
 
 /// The dense output's fourth-order term (Hairer's `dopri5.f`, d1 to d7).
 const DENSE: [f64; STAGES] = [
@@ -45,7 +49,11 @@ const DENSE: [f64; STAGES] = [
 
 /// h times a weighted sum of the stages' slopes.
 #[inline(always)]
-fn combined<T: Lane, const D: usize>(h: N<T>, k: &[[N<T>; D]; STAGES], weights: &[f64; STAGES]) -> [N<T>; D] {
+fn combined<T: Lane, const D: usize>(
+    h: N<T>,
+    k: &[[N<T>; D]; STAGES],
+    weights: &[f64; STAGES],
+) -> [N<T>; D] {
     let mut sums = [h.lit(0.0); D];
     for i in 0..D {
         for stage in 0..STAGES {
@@ -56,7 +64,7 @@ fn combined<T: Lane, const D: usize>(h: N<T>, k: &[[N<T>; D]; STAGES], weights: 
     sums
 }
 
-/// What a lane keeps of its own.
+/// The state of one lane.
 #[derive(Clone, Copy, Default)]
 struct Progress {
     is_active: bool,
@@ -66,7 +74,11 @@ struct Progress {
 
 /// Runs every trajectory that the task has; no lane waits for another's error.
 #[inline(always)]
-pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, tolerance: &Tolerance) {
+pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
+    zero: T,
+    task: &mut P,
+    tolerance: &Tolerance,
+) {
     let zero = N(zero);
     let mut x = [zero; D];
     let mut t = zero;
@@ -106,7 +118,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
         // The last stage of a step is the first of the next, unless something new has begun.
         let mut y = x;
         for stage in usize::from(!is_fresh)..STAGES {
-            let forcing = task.forcing(h * NODE[stage] + t);
+            let forcing = task.system().forcing(h * NODE[stage] + t);
             for i in 0..D {
                 let mut sum = zero;
                 for j in 0..stage {
@@ -114,7 +126,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
                 }
                 y[i] = x[i] + h * sum;
             }
-            k[stage] = task.derivative(&forcing, &y);
+            k[stage] = task.system().derivative(&forcing, &y);
             if stage == 0 {
                 task.begin(&forcing, &x, &k[0]);
             }
@@ -123,7 +135,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
 
         let error = tolerance.norm(&x, &y, &combined(h, &k, &ERROR));
         let accepted = T::bits(error.0.less(zero.lit(1.0).0));
-        let in_range = T::bits(task.in_range(&y));
+        let in_range = T::bits(task.system().in_range(&y));
 
         // Lane by lane: bookkeeping in scalars is small beside seven evaluations.
         let mut length = zero;
@@ -132,7 +144,9 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
         let mut slope_after = k[0];
         let dense = combined(h, &k, &DENSE);
         let next = control.proposals(error, h);
-        for (lane, progress) in lanes[..T::LANES].iter_mut().enumerate().filter(|(_, lane)| lane.is_active) {
+        for (lane, progress) in
+            lanes[..T::LANES].iter_mut().enumerate().filter(|(_, lane)| lane.is_active)
+        {
             let step = h.0.get(lane);
             let time = t.0.get(lane);
             let is_last = time + step >= progress.end_s || step == progress.end_s - time;
@@ -155,9 +169,13 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
             } else {
                 progress.count.rejected += 1;
                 control.settle(lane, Verdict::Rejected, &next);
-                if control.step.0.get(lane) <= 16.0 * f64::EPSILON * time.abs().max(progress.end_s) {
-                    let reason =
-                        if in_range >> lane & 1 == 0 { Failure::Diverged } else { Failure::StepTooSmall };
+                if control.step.0.get(lane) <= 16.0 * f64::EPSILON * time.abs().max(progress.end_s)
+                {
+                    let reason = if in_range >> lane & 1 == 0 {
+                        Failure::Diverged
+                    } else {
+                        Failure::StepTooSmall
+                    };
                     ended[lane] = fail(reason, time, progress.count);
                 }
             }
@@ -167,7 +185,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P, 
             }
         }
         k[0] = slope_after;
-        let forcing = task.forcing(t);
+        let forcing = task.system().forcing(t);
         task.observe(
             &forcing,
             &Step {

@@ -1,9 +1,8 @@
 //! Forward automatic differentiation: the same source, with one derivative carried along.
 
-use crate::lane::Lane;
+use crate::lane::{Aside, Lane};
 use crate::num::N;
 use crate::real::Real;
-use crate::simd::Aside;
 
 /// A value and its derivative along one direction. Nest it for second derivatives.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +47,10 @@ impl<T: Real> Real for Dual<T> {
     }
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
-        Self { value: self.value.mul(b.value), slope: self.slope.mul_add(b.value, self.value.mul(b.slope)) }
+        Self {
+            value: self.value.mul(b.value),
+            slope: self.slope.mul_add(b.value, self.value.mul(b.slope)),
+        }
     }
     #[inline(always)]
     fn div(self, b: Self) -> Self {
@@ -111,7 +113,8 @@ impl<T: Real> Real for Dual<T> {
     }
 }
 
-/// Lanes of dual numbers: whole systems run on them, so that each lane can carry a derivative along a direction of its own.
+/// Lanes of dual numbers: whole systems run on them, so that each lane can carry a derivative along
+/// a direction of its own.
 impl<T: Lane> Lane for Dual<T> {
     const LANES: usize = T::LANES;
     #[inline(always)]

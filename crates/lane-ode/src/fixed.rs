@@ -1,29 +1,25 @@
-//! What methods with a fixed step share: where every lane's leg stands in time, and how it ends.
+//! The common part of methods with a fixed step: each lane's place in its leg, and how legs end.
 
-use crate::lane::Lane;
+use crate::lane::{Lane, MAX_LANES};
 use crate::num::N;
 use crate::system::{Count, Ended, Failure, Leg, Task};
 
-/// The most lanes any instruction set has here.
-pub const MAX_LANES: usize = 8;
-
-/// Steps between two looks at [`Task::is_stopped`], at most: some hundredths of a second.
+/// Most steps between two calls of [`Task::is_stopped`]: some hundredths of a second.
 pub const STEPS_AT_ONCE: u64 = 1 << 14;
 
 /// Steps of one lane's leg: the smallest whole number of equal steps not above the leg's own.
-#[must_use]
-pub fn fixed_steps(leg: &Leg) -> u64 {
-    // The quotient may come out a hair above a whole number that was meant.
+pub(crate) fn fixed_steps(leg: &Leg) -> u64 {
+    // Rounding may leave the quotient just above the intended whole number.
     let steps = ((leg.end_s - leg.start_s) / leg.step_s * (1.0 - 1e-12)).ceil().max(1.0);
     steps as u64
 }
 
-/// Where each lane's leg is in time; its end is exact, whatever the rounding error of the step.
+/// The time of each lane's leg. Its end is exact, whatever the rounding error of the step.
 #[derive(Clone, Copy)]
 pub(crate) struct Clock<T> {
     start: N<T>,
     end: N<T>,
-    /// Step of each lane; zero where a lane stands still.
+    /// Step of each lane; zero where a lane is idle.
     pub(crate) h: N<T>,
     /// Steps in the leg.
     total: N<T>,
@@ -66,9 +62,9 @@ impl<T: Lane> Legs<T> {
         }
     }
 
-    /// Gives every lane whose leg has ended its next one. Returns how many steps all lanes can make before one of
-    /// them is at its end, or the task wants to be asked whether it is stopped; `None` when it is, or when no lane
-    /// has anything left to do.
+    /// Gives every lane whose leg has ended its next one. Returns how many steps all lanes can make
+    /// before one of them is at its end, or the task wants to be asked whether it is stopped;
+    /// `None` when it is, or when no lane has anything left to do.
     #[inline(always)]
     pub(crate) fn take_up<const D: usize, P: Task<T, D>>(
         &mut self,
@@ -94,12 +90,13 @@ impl<T: Lane> Legs<T> {
         active.map(|lane| lane.left.min(STEPS_AT_ONCE)).min()
     }
 
-    /// Ends the legs of lanes that are out of range at `time`, `done` steps after the last taking up. Returns whether
-    /// there are any.
+    /// Ends the legs of lanes that are out of range at `time`, `done` steps after the last taking
+    /// up. Returns whether there are any.
     #[inline(always)]
     pub(crate) fn fail(&mut self, in_range: T::Mask, time: N<T>, done: u64) -> bool {
         let out = !T::bits(in_range);
-        for lane in (0..T::LANES).filter(|lane| self.lanes[*lane].is_active && out >> lane & 1 == 1) {
+        for lane in (0..T::LANES).filter(|lane| self.lanes[*lane].is_active && out >> lane & 1 == 1)
+        {
             let made = self.lanes[lane].total - self.lanes[lane].left + done;
             self.ended[lane] = Some(Ended::Failed {
                 reason: Failure::Diverged,
@@ -118,7 +115,8 @@ impl<T: Lane> Legs<T> {
             if progress.is_active {
                 progress.left -= done;
                 if progress.left == 0 && self.ended[lane].is_none() {
-                    self.ended[lane] = Some(Ended::Arrived(Count { accepted: progress.total, rejected: 0 }));
+                    self.ended[lane] =
+                        Some(Ended::Arrived(Count { accepted: progress.total, rejected: 0 }));
                 }
             }
         }

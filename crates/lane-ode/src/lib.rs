@@ -1,20 +1,25 @@
-//! Integrators over SIMD lanes: each lane a trajectory with its own time, no heap after set-up, the same bits on
-//! every instruction set.
+//! Integrators over SIMD lanes: each lane a trajectory with its own time, no heap after set-up, the
+//! same bits on every instruction set.
 //!
-//! One trajectory of a small system cannot fill a processor's vector units; eight trajectories side by side can. So a value
-//! here ([`Lane`]) carries 1, 2, 4 or 8 numbers, one per trajectory, and the lanes share nothing but the program: each has its
-//! own parameters, time, step and end, and takes up the next trajectory when it is done.
+//! One trajectory of a small system cannot fill a processor's vector units; eight trajectories side
+//! by side can. So a value here ([`Lane`]) carries 1, 2, 4 or 8 numbers, one per trajectory, and
+//! the lanes share nothing but the program: each has its own parameters, time, step and end, and
+//! takes up the next trajectory when it is done.
 //!
-//! What is yours to write, in this order:
+//! A user writes, in this order:
 //!
-//! 1. [`System`]: x' = f(t, x), over values with operators ([`N`]). Products wait for the sum that they are part of and fuse
-//!    with it, the same way everywhere; [`Product::v`] rounds one that stands alone.
-//! 2. [`Task`]: which trajectories there are, each cut into [`Leg`]s at its kinks, and what is to be recorded of every
-//!    [`Step`]. [`Peaks`] finds largest magnitudes between steps as well as at them.
-//! 3. [`Kernel`]: the work as a whole, which [`Simd::dispatch`] compiles for every instruction set and starts on one.
+//! 1. [`System`]: x' = f(t, x), over values with operators ([`N`]). Products wait for the sum that
+//!    they are part of and fuse with it, the same way everywhere; [`Product::v`] rounds one that
+//!    is on its own.
+//! 2. [`Task`]: the trajectories of a system, each cut into [`Leg`]s at its kinks, and the records
+//!    of every [`Step`]. [`Peaks`] finds largest magnitudes between steps as well as at
+//!    them.
+//! 3. [`Kernel`]: the work as a whole. [`Simd::dispatch`] is compiled for every instruction set and
+//!    runs it on one.
 //!
-//! The methods are [`rk4`] (classical, fixed step), [`dopri5`] (Dormand-Prince 5(4), adaptive, with dense output) and `rodas5p`
-//! (linearly implicit, for stiff systems).
+//! The methods are [`rk4`] (classical, fixed step), [`dop853`] (order 8, fixed step), [`dopri5`]
+//! (Dormand-Prince 5(4), adaptive, with dense output) and [`rodas`] (Rodas5P, linearly implicit,
+//! for stiff systems).
 //!
 //! # Example
 //!
@@ -23,9 +28,11 @@
 //! ```
 //! use lane_ode::{Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, rk4};
 //!
+//! /// k of the trajectory in each lane (1/s^2).
+//! struct Spring<T>(N<T>);
+//!
 //! struct Springs<'a, T> {
-//!     /// k of the trajectory in each lane (1/s^2).
-//!     stiffness: N<T>,
+//!     spring: Spring<T>,
 //!     /// k of every trajectory.
 //!     all: &'a [f64],
 //!     /// How many have been given to lanes.
@@ -36,7 +43,7 @@
 //!     ends: Vec<f64>,
 //! }
 //!
-//! impl<T: Lane> System<T, 2> for Springs<'_, T> {
+//! impl<T: Lane> System<T, 2> for Spring<T> {
 //!     type Forcing = ();
 //!
 //!     #[inline(always)]
@@ -44,7 +51,7 @@
 //!
 //!     #[inline(always)]
 //!     fn derivative(&self, (): &(), x: &[N<T>; 2]) -> [N<T>; 2] {
-//!         [x[1], -(self.stiffness * x[0]).v()]
+//!         [x[1], -(self.0 * x[0]).v()]
 //!     }
 //!
 //!     #[inline(always)]
@@ -54,12 +61,18 @@
 //! }
 //!
 //! impl<T: Lane> Task<T, 2> for Springs<'_, T> {
+//!     type System = Spring<T>;
+//!
+//!     fn system(&self) -> &Spring<T> {
+//!         &self.spring
+//!     }
+//!
 //!     fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; 2]) -> Option<Leg> {
 //!         if let Ended::Arrived(_) = ended {
 //!             self.ends[self.held[lane]] = x[0].0.get(lane);
 //!         }
 //!         let stiffness = *self.all.get(self.taken)?;
-//!         self.stiffness.0.set(lane, stiffness);
+//!         self.spring.0.0.set(lane, stiffness);
 //!         self.held[lane] = self.taken;
 //!         self.taken += 1;
 //!         x[0].0.set(lane, 1.0);
@@ -80,8 +93,8 @@
 //!     #[inline(always)]
 //!     fn run<T: Lane>(self, zero: T) -> Vec<f64> {
 //!         let ends = vec![f64::NAN; self.0.len()];
-//!         let (stiffness, held) = (N(zero), [0; MAX_LANES]);
-//!         let mut springs = Springs { stiffness, all: self.0, taken: 0, held, ends };
+//!         let (spring, held) = (Spring(N(zero)), [0; MAX_LANES]);
+//!         let mut springs = Springs { spring, all: self.0, taken: 0, held, ends };
 //!         rk4::integrate(zero, &mut springs);
 //!         springs.ends
 //!     }
@@ -113,6 +126,7 @@ mod quintic;
 mod real;
 pub mod rk4;
 pub mod rodas;
+mod scalar;
 mod simd;
 mod squares;
 mod system;
@@ -125,16 +139,17 @@ mod x86;
 
 pub use control::Tolerance;
 pub use dual::Dual;
-pub use fixed::{MAX_LANES, STEPS_AT_ONCE, fixed_steps};
-pub use lane::Lane;
+pub use fixed::STEPS_AT_ONCE;
+pub use lane::{Aside, Lane, MAX_LANES};
 pub use num::{N, Product};
 pub use part_peaks::PartPeaks;
 pub use partials::Partials;
-pub use peaks::{Peaks, Sample};
+pub use peaks::Peaks;
+pub use quintic::Sample;
 pub use real::Real;
-pub use simd::{Aside, Kernel, ScalarKernel, Simd};
+pub use simd::{Kernel, ScalarKernel, Simd};
 pub use squares::SquareIntegrals;
-pub use system::{Count, Ended, Failure, Leg, Step, System, Task};
+pub use system::{Count, Ended, Failure, Forcing, Leg, Step, System, Task};
 pub use time_above::TimeAbove;
 
 #[cfg(test)]

@@ -4,15 +4,17 @@ use crate::num::N;
 
 /// Row-pivoted triangular factors of a square matrix.
 pub(crate) struct Lu<const C: usize> {
-    /// L below the diagonal (its unit diagonal not stored), U above it, the reciprocals of U's diagonal on it.
+    /// L below the diagonal (its unit diagonal not stored), U above it, the reciprocals of U's
+    /// diagonal on it.
     packed: [[N<f64>; C]; C],
     /// Row `i` of the factors comes from row `order[i]` of the matrix.
     order: [usize; C],
 }
 
 impl<const C: usize> Lu<C> {
-    /// Factors `a`, always with the largest remaining entry of a column as pivot (Golub and Van Loan, Matrix Computations,
-    /// Algorithm 3.4.1). `None` if a column has nothing left but zeros, or something not finite.
+    /// Factors `a`, always with the largest remaining entry of a column as pivot (Golub and Van
+    /// Loan, Matrix Computations, Algorithm 3.4.1). `None` if a column has nothing left but zeros,
+    /// or something not finite.
     #[inline(always)]
     pub(crate) fn new(mut a: [[N<f64>; C]; C]) -> Option<Self> {
         let mut order = [0; C];
@@ -76,7 +78,12 @@ mod tests {
     #[test]
     fn solutions_solve() {
         // Zero pivots on the way: only exchanges of rows get through.
-        let a = [[0.0, 2.0, -1.0, 3.0], [0.0, 0.0, 4.0, 1e-3], [5.0, -1.0, 0.5, 2.0], [1.0, 1e6, 0.0, 7.0]];
+        let a = [
+            [0.0, 2.0, -1.0, 3.0],
+            [0.0, 0.0, 4.0, 1e-3],
+            [5.0, -1.0, 0.5, 2.0],
+            [1.0, 1e6, 0.0, 7.0],
+        ];
         let x = [1.5, -2.0, 0.25, 3.0];
         let b = core::array::from_fn(|i| N((0..4).map(|j| a[i][j] * x[j]).sum::<f64>()));
         let solved = Lu::new(a.map(|row| row.map(N))).unwrap().solve(&b);

@@ -1,8 +1,10 @@
-//! Operators whose types fuse: a product waits for the sum it is part of.
+//! Operators that fuse by their types: a product is rounded together with the sum that it is part
+//! of.
 //!
-//! `a * b` is a pending [`Product`]; adding to it or subtracting from it makes one fused operation. So
-//! `m * v + k * (x - y)` compiles to one multiplication and one fused multiply-add, in the order its types say, on
-//! every instruction set. The rules, for a sum of two products, are `a*b + c*d = fma(a, b, c*d)`.
+//! `a * b` is a pending [`Product`]; adding to it or subtracting from it makes one fused operation.
+//! So `m * v + k * (x - y)` compiles to one multiplication and one fused multiply-add, in the order
+//! its types say, on every instruction set. The rules, for a sum of two products, are
+//! `a*b + c*d = fma(a, b, c*d)`.
 
 use crate::real::Real;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -12,7 +14,7 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 #[repr(transparent)]
 pub struct N<T>(pub T);
 
-/// A product that has not been rounded yet.
+/// A product that is not rounded yet.
 #[derive(Clone, Copy, Debug)]
 pub struct Product<T>(T, T);
 

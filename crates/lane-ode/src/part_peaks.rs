@@ -1,15 +1,17 @@
 //! Peaks of every part of a trajectory that is cut at known instants.
 
-use crate::fixed::MAX_LANES;
-use crate::lane::Lane;
+use crate::lane::{Lane, MAX_LANES};
 use crate::num::N;
-use crate::peaks::{Peaks, Sample};
+use crate::peaks::Peaks;
+use crate::quintic::Sample;
 use crate::quintic::{Quintic, within_step};
 
-/// Largest magnitude of `M` outputs in every part of each lane's trajectory, parts being divided by instants of the lane's own.
+/// Largest magnitude of `M` outputs in every part of each lane's trajectory, parts being divided by
+/// instants of the lane's own.
 ///
-/// Steps need not end at the instants: a step that spans one is taken in two, at the polynomial of degree 5 through values,
-/// slopes and curvatures at its ends. Heap is asked for when a lane takes up a trajectory, not by steps.
+/// Steps need not end at the instants. A step that spans one is divided there by the polynomial of
+/// degree 5 through values, slopes and curvatures at its ends. A lane allocates when it takes up a
+/// trajectory, not in steps.
 #[derive(Clone, Debug)]
 pub struct PartPeaks<T, const M: usize> {
     peaks: Peaks<T, M>,
@@ -45,7 +47,8 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
         self.part_end_s.0.set(lane, first);
     }
 
-    /// Peaks of one lane's parts, the last one as far as it has come; the lane's trajectory ends here.
+    /// Peaks of one lane's parts, the last one as far as it has come; the lane's trajectory ends
+    /// here.
     pub fn finish(&mut self, lane: usize) -> Vec<[f64; M]> {
         self.part_end_s.0.set(lane, f64::INFINITY);
         let mut parts = core::mem::take(&mut self.parts[lane]);
@@ -61,7 +64,13 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
 
     /// The samples at `end_s`, the end of a step of `length_s` that began at the last ones.
     #[inline(always)]
-    pub fn advance(&mut self, end_s: N<T>, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
+    pub fn advance(
+        &mut self,
+        end_s: N<T>,
+        length_s: N<T>,
+        samples: &[Sample<T>; M],
+        counts: T::Mask,
+    ) {
         let mut rest_s = length_s;
         loop {
             let cut = self.part_end_s.0.less(end_s.0);
@@ -69,11 +78,12 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
             let mut there = *samples;
             let mut part_s = rest_s;
             if lanes_cut != 0 {
-                // Lanes that are not cut go to the step's end; from there on nothing is left of it.
+                // Lanes without a cut go to the step's end at once.
                 let to_cut = self.part_end_s - (end_s - rest_s);
                 let share = N(T::select(cut, within_step(to_cut / rest_s).0, rest_s.lit(1.0).0));
                 for i in 0..M {
-                    let inside = Quintic::new(rest_s, &self.peaks.last[i], &samples[i]).sample(share, rest_s);
+                    let inside = Quintic::new(rest_s, &self.peaks.last[i], &samples[i])
+                        .sample(share, rest_s);
                     there[i] = Sample {
                         value: N(T::select(cut, inside.value.0, there[i].value.0)),
                         slope: N(T::select(cut, inside.slope.0, there[i].slope.0)),

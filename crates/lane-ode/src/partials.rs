@@ -1,4 +1,5 @@
-//! Partial derivatives of a second-order system, exact to rounding: the same source over dual numbers.
+//! Partial derivatives of a second-order system, exact to rounding: the same source over dual
+//! numbers.
 
 use crate::dual::Dual;
 use crate::lane::Lane;
@@ -7,7 +8,8 @@ use crate::system::System;
 
 /// How the accelerations of a system of `C` coordinates change with its state and with time.
 ///
-/// The state is C coordinates q, then their speeds u, so that q' = u and only u' = a(t, q, u) has derivatives worth storing.
+/// The state is C coordinates q, then their speeds u, so that q' = u and only u' = a(t, q, u) has
+/// derivatives worth storing.
 #[derive(Clone, Debug)]
 pub struct Partials<const C: usize> {
     /// Row i, column j: by coordinate j.
@@ -25,8 +27,8 @@ impl<const C: usize> Partials<C> {
         Self { by_coordinate: [[N(0.0); C]; C], by_speed: [[N(0.0); C]; C], by_time: [N(0.0); C] }
     }
 
-    /// The derivatives at time `t_s` and state `x`. `system` has the same parameters in every lane; each lane takes a direction of
-    /// its own, and the results do not depend on how many there are.
+    /// The derivatives at time `t_s` and state `x`. `system` has the same parameters in every lane;
+    /// each lane takes a direction of its own, and the results do not depend on how many there are.
     #[inline(always)]
     pub fn find<T: Lane, const D: usize, S: System<Dual<T>, D>>(
         &mut self,

@@ -2,32 +2,13 @@
 
 use crate::lane::Lane;
 use crate::num::N;
-use crate::quintic::Quintic;
-
-/// An output with its first two derivatives in time.
-#[derive(Clone, Copy, Debug)]
-pub struct Sample<T> {
-    /// The output.
-    pub value: N<T>,
-    /// Its first derivative, per second.
-    pub slope: N<T>,
-    /// Its second derivative, per second squared.
-    pub curvature: N<T>,
-}
-
-impl<T: Copy> Sample<T> {
-    /// An output that stands still.
-    #[inline(always)]
-    #[must_use]
-    pub const fn still(value: N<T>, zero: N<T>) -> Self {
-        Self { value, slope: zero, curvature: zero }
-    }
-}
+use crate::quintic::{Quintic, Sample};
 
 /// Largest magnitude so far of `M` outputs.
 ///
-/// Between two steps an output stays within the control polygon of the cubic through its values and slopes. Only where that reaches
-/// above the peak so far is a step looked into, with second derivatives: then the sampling error is of sixth order in the step.
+/// Between two steps an output stays within the control polygon of the cubic through its values and
+/// slopes. Only where that reaches above the peak so far is a step looked into, with second
+/// derivatives: then the sampling error is of sixth order in the step.
 #[derive(Clone, Copy, Debug)]
 pub struct Peaks<T, const M: usize> {
     peak: [N<T>; M],
@@ -75,8 +56,10 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
             let (last, now) = (self.last[i], &samples[i]);
             self.raise(i, now.value.abs(), counts);
             // How far the control polygon reaches above the peak.
-            let polygon =
-                (last.value + third * last.slope).abs().0.larger((now.value - third * now.slope).abs().0);
+            let polygon = (last.value + third * last.slope)
+                .abs()
+                .0
+                .larger((now.value - third * now.slope).abs().0);
             rises[i] = N(polygon) - self.peak[i];
             highest = N(rises[i].0.larger(highest.0));
         }
@@ -93,8 +76,8 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         self.last = *samples;
     }
 
-    /// As [`Peaks::advance`], for outputs whose curvatures are not known: then a step is the cubic through values and slopes, and
-    /// the sampling error is of fourth order.
+    /// As [`Peaks::advance`], for outputs whose curvatures are not known: then a step is the cubic
+    /// through values and slopes, and the sampling error is of fourth order.
     #[inline(always)]
     pub fn advance_by_slopes(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let mut samples = *samples;

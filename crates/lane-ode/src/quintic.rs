@@ -1,12 +1,31 @@
-//! Between the ends of a step: the polynomial through values, slopes and curvatures.
+//! An output between the ends of a step: the polynomial through values, slopes and curvatures.
 
 use crate::lane::Lane;
 use crate::num::N;
-use crate::peaks::Sample;
+
+/// An output with its first two derivatives in time.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample<T> {
+    /// The output.
+    pub value: N<T>,
+    /// Its first derivative, per second.
+    pub slope: N<T>,
+    /// Its second derivative, per second squared.
+    pub curvature: N<T>,
+}
+
+impl<T: Copy> Sample<T> {
+    /// A constant output.
+    #[inline(always)]
+    #[must_use]
+    pub const fn still(value: N<T>, zero: N<T>) -> Self {
+        Self { value, slope: zero, curvature: zero }
+    }
+}
 
 impl<T: Lane> Sample<T> {
-    /// The output between two samples, at a `share` (0 to 1) of the step of `length_s` from one to the
-    /// other: that of the polynomial of degree 5 which meets both.
+    /// The output between two samples, at a `share` (0 to 1) of the step of `length_s` from one to
+    /// the other: that of the polynomial of degree 5 which meets both.
     #[inline(always)]
     #[must_use]
     pub fn between(start: &Self, end: &Self, length_s: N<T>, share: f64) -> Self {
@@ -14,7 +33,8 @@ impl<T: Lane> Sample<T> {
     }
 }
 
-/// The polynomial of degree 5 that meets values, slopes and curvatures at both ends of a step; over s from 0 to 1.
+/// The polynomial of degree 5 that meets values, slopes and curvatures at both ends of a step; over
+/// s from 0 to 1.
 pub(crate) struct Quintic<T> {
     c: [N<T>; 6],
 }
@@ -22,8 +42,10 @@ pub(crate) struct Quintic<T> {
 impl<T: Lane> Quintic<T> {
     #[inline(always)]
     pub(crate) fn new(h: N<T>, start: &Sample<T>, end: &Sample<T>) -> Self {
-        let (Sample { value: y0, slope: d0, curvature: e0 }, Sample { value: y1, slope: d1, curvature: e1 }) =
-            (*start, *end);
+        let (
+            Sample { value: y0, slope: d0, curvature: e0 },
+            Sample { value: y1, slope: d1, curvature: e1 },
+        ) = (*start, *end);
         let hh = (h * h).v();
         let (v0, v1) = ((h * d0).v(), (h * d1).v());
         let (a0, a1) = ((0.5 * (hh * e0).v()).v(), (0.5 * (hh * e1).v()).v());
@@ -31,7 +53,16 @@ impl<T: Lane> Quintic<T> {
         let r = y1 - y0 - v0 - a0;
         let s = v1 - v0 - 2.0 * a0;
         let t = a1 - a0;
-        Self { c: [y0, v0, a0, 10.0 * r - 4.0 * s + t, 7.0 * s - 15.0 * r - 2.0 * t, 6.0 * r - 3.0 * s + t] }
+        Self {
+            c: [
+                y0,
+                v0,
+                a0,
+                10.0 * r - 4.0 * s + t,
+                7.0 * s - 15.0 * r - 2.0 * t,
+                6.0 * r - 3.0 * s + t,
+            ],
+        }
     }
 
     /// The value where the slope vanishes; at worst an end's.
@@ -40,7 +71,8 @@ impl<T: Lane> Quintic<T> {
         self.value(self.extremum_at())
     }
 
-    /// Where the slope vanishes, by Newton's method from where a straight slope would; at worst an end.
+    /// Where the slope vanishes, by Newton's method from where a straight slope would; at worst an
+    /// end.
     #[inline(always)]
     pub(crate) fn extremum_at(&self) -> N<T> {
         let c = &self.c;
@@ -62,7 +94,11 @@ impl<T: Lane> Quintic<T> {
     /// Value and time derivatives at s, of a step of length `h`.
     #[inline(always)]
     pub(crate) fn sample(&self, s: N<T>, h: N<T>) -> Sample<T> {
-        Sample { value: self.value(s), slope: self.slope(s) / h, curvature: self.curvature(s) / h / h }
+        Sample {
+            value: self.value(s),
+            slope: self.slope(s) / h,
+            curvature: self.curvature(s) / h / h,
+        }
     }
 
     /// The first derivative by s.

@@ -1,10 +1,12 @@
-//! What the equations need of a number, and nothing more.
+//! The operations that equations need of a number.
 
-/// A real number, or several side by side, or one with derivatives: physics written over this trait runs on all.
+/// A real number, or several side by side, or one with derivatives: physics written over this trait
+/// runs on all.
 ///
-/// Every operation is correctly rounded (IEEE 754), or built from such in a fixed order, so that one source gives
-/// the same bits on every type of lane. There is no constructor from nothing: [`Real::lit`] makes a constant out of a
-/// value that exists already, because a vector type's first value proves that the processor has its instructions.
+/// Every operation is correctly rounded (IEEE 754), or built from such in a fixed order, so that
+/// one source gives the same bits on every type of lane. [`Real::lit`] makes a constant out of a
+/// value that exists already, because a vector type's first value proves that the processor has its
+/// instructions.
 pub trait Real: Copy {
     /// One truth value per lane.
     type Mask: Copy;

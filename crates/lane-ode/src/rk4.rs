@@ -1,12 +1,12 @@
 //! The classical fourth-order Runge-Kutta method with a fixed step.
 //!
-//! W. Kutta, Zeitschrift fuer Mathematik und Physik 46 (1901) 435; Hairer, Norsett, Wanner, Solving Ordinary
-//! Differential Equations I, Table II.1.2.
+//! W. Kutta, Zeitschrift fuer Mathematik und Physik 46 (1901) 435; Hairer, Norsett, Wanner, Solving
+//! Ordinary Differential Equations I, Table II.1.2.
 
 use crate::fixed::Legs;
 use crate::lane::Lane;
 use crate::num::N;
-use crate::system::{Step, Task};
+use crate::system::{Step, System as _, Task};
 use core::hint::black_box;
 
 /// On the imaginary axis the method is stable up to |h w| = 2 sqrt(2).
@@ -27,35 +27,40 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let h = clock.h;
         let (one_third, one_sixth) = (zero.lit(1.0 / 3.0), h / zero.lit(6.0));
         let mut time = clock.at(index);
-        // At the step's start, then its middle, then its end, which is the next one's start. Hidden from the compiler, which would
-        // hold it in variables, and copy all of them from place to place in every step.
-        let mut forcing = task.forcing(time);
+        // At the step's start, then its middle, then its end, which is the next one's start. Hidden
+        // from the compiler, which would hold it in variables, and copy all of them from place to
+        // place in every step.
+        let mut forcing = task.system().forcing(time);
         let forcing = black_box(&mut forcing);
-        // States and slopes of this step's start and of the last one's, which change places too; then two more for the states of
-        // stages. All states in one array, so that a stage's is one address away. Few places, for the first cache is small.
+        // States and slopes of this step's start and of the last one's, which change places too;
+        // then two more for the states of stages. All states in one array, so that a stage's is one
+        // address away. Few places, for the first cache is small.
         let (mut states, mut slopes) = ([x; 4], [x; 2]);
         let (mut now, mut last) = (0, 1);
         let mut is_fresh = true;
         let mut done = 0;
         loop {
-            // The one after the last is an evaluation only: observers want the slope at both ends of a step.
+            // The one after the last is an evaluation only: observers want the slope at both ends
+            // of a step.
             let is_last = done == run;
             let next_time = clock.at(index + 1.0);
-            // Nobody asks for the last step's start any more once this one's has been observed.
+            // The last step's start is not read any more once this step's has been observed.
             let (second, third, fourth) = (2, last, 3);
             // One copy of the right-hand side: four would not fit the instruction cache.
             let from = [now, second, third, fourth];
             for stage in 0..4 {
                 if stage % 2 == 1 {
-                    task.renew(if stage == 1 { clock.at(index + 0.5) } else { next_time }, forcing);
+                    task.system()
+                        .renew(if stage == 1 { clock.at(index + 0.5) } else { next_time }, forcing);
                 }
-                let slope = task.derivative(forcing, &states[from[stage]]);
+                let slope = task.system().derivative(forcing, &states[from[stage]]);
                 if stage == 3 {
-                    // x + h (k1 + 2 k2 + 2 k3 + k4) / 6, where the later stages' states tell what h k1 to h k3 are: no sum of
-                    // slopes is kept, for stores are what this loop has least room for.
+                    // x + h (k1 + 2 k2 + 2 k3 + k4) / 6, with h k1 to h k3 from the later stages'
+                    // states. No sum of slopes is kept: stores are the bottleneck of this loop.
                     for i in 0..D {
                         let x = states[now][i];
-                        let moved = states[second][i] + states[fourth][i] + 2.0 * states[third][i] - 4.0 * x;
+                        let moved = states[second][i] + states[fourth][i] + 2.0 * states[third][i]
+                            - 4.0 * x;
                         states[last][i] = x + one_third * moved + one_sixth * slope[i];
                     }
                     break;
@@ -96,7 +101,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             index = index + 1.0;
             time = next_time;
             done += 1;
-            let in_range = task.in_range(&states[now]);
+            let in_range = task.system().in_range(&states[now]);
             if !T::all(in_range) && legs.fail(in_range, time, done) {
                 run = done;
             }

@@ -1,18 +1,20 @@
 //! Rodas5P: a linearly implicit method of order 5(4) for stiff systems, adaptive.
 //!
-//! Eight stages, one Jacobian and one factorisation a step; L-stable and stiffly accurate, so that fast undamped vibrations are
-//! stepped over instead of followed. The independent reference beside the explicit methods, and the method for machines on
-//! which those would crawl. It follows one trajectory at a time: lanes carry the Jacobian's columns (`Partials`).
+//! Eight stages, one Jacobian and one factorisation a step; L-stable and stiffly accurate, so that
+//! it steps over fast undamped vibrations. It is the independent reference for the explicit
+//! methods, and the method for machines too stiff for them. It integrates one trajectory at a time:
+//! lanes carry the Jacobian's columns (`Partials`).
 //!
-//! Coefficients: G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within the Julia
-//! Differential Equations package, BIT Numerical Mathematics 63 (2023) 27, in the transformed variables of Hairer and Wanner, Solving
-//! Ordinary Differential Equations II, section IV.7, Eq. 7.25. The tests hold them against the order conditions.
+//! Coefficients: G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical
+//! benchmarks within the Julia Differential Equations package, BIT Numerical Mathematics 63 (2023)
+//! 27, in the transformed variables of Hairer and Wanner, Solving Ordinary Differential Equations
+//! II, section IV.7, Eq. 7.25. The tests hold them against the order conditions.
 
 use crate::control::{StepControl, Tolerance, Verdict};
 use crate::linear_solve::Lu;
 use crate::num::N;
 use crate::partials::Partials;
-use crate::system::{Count, Ended, Failure, Step, Task};
+use crate::system::{Count, Ended, Failure, Step, System as _, Task};
 
 const STAGES: usize = 8;
 
@@ -20,12 +22,28 @@ const STAGES: usize = 8;
 const GAMMA: f64 = 0.21193756319429014;
 
 /// Nodes: sums of the rows of alpha.
-const NODE: [f64; STAGES] =
-    [0.0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1.0, 1.0, 1.0];
+const NODE: [f64; STAGES] = [
+    0.0,
+    0.6358126895828704,
+    0.4095798393397535,
+    0.9769306725060716,
+    0.4288403609558664,
+    1.0,
+    1.0,
+    1.0,
+];
 
 /// What a stage takes of h f_t: sums of the rows of the matrix Gamma.
-const TIME: [f64; STAGES] =
-    [GAMMA, -0.42387512638858027, -0.3384627126235924, 1.8046452872882734, 2.325825639765069, 0.0, 0.0, 0.0];
+const TIME: [f64; STAGES] = [
+    GAMMA,
+    -0.42387512638858027,
+    -0.3384627126235924,
+    1.8046452872882734,
+    2.325825639765069,
+    0.0,
+    0.0,
+    0.0,
+];
 
 /// Where a stage is evaluated: a_ij.
 const A: [[f64; 7]; STAGES] = [
@@ -33,15 +51,29 @@ const A: [[f64; 7]; STAGES] = [
     [3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [2.849394379747939, 0.45842242204463923, 0.0, 0.0, 0.0, 0.0, 0.0],
     [-6.954028509809101, 2.489845061869568, -10.358996098473584, 0.0, 0.0, 0.0, 0.0],
-    [2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641, 0.0, 0.0, 0.0],
+    [
+        2.8029986275628964,
+        0.5072464736228206,
+        -0.3988312541770524,
+        -0.04721187230404641,
+        0.0,
+        0.0,
+        0.0,
+    ],
     [LAST[0], LAST[1], LAST[2], LAST[3], LAST[4], 0.0, 0.0],
     [LAST[0], LAST[1], LAST[2], LAST[3], LAST[4], 1.0, 0.0],
     [LAST[0], LAST[1], LAST[2], LAST[3], LAST[4], 1.0, 1.0],
 ];
 
-/// The last three stages and the solution itself differ by whole stages: the last is the error's estimate.
-const LAST: [f64; 5] =
-    [-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946];
+/// The last three stages and the solution itself differ by whole stages: the last is the error's
+/// estimate.
+const LAST: [f64; 5] = [
+    -7.502846399306121,
+    2.561846144803919,
+    -11.627539656261098,
+    -0.18268767659942256,
+    0.030198172008377946,
+];
 
 /// What a stage takes of the earlier ones, over h: C_ij.
 const C: [[f64; 7]; STAGES] = [
@@ -79,7 +111,8 @@ const C: [[f64; 7]; STAGES] = [
     ],
 ];
 
-/// The dense output over s from 0 to 1: x0 + s (x1 - x0 + (1 - s) (d1 + s (d2 + s d3))), d_r these rows' sums of stages.
+/// The dense output over s from 0 to 1: x0 + s (x1 - x0 + (1 - s) (d1 + s (d2 + s d3))), d_r these
+/// rows' sums of stages.
 const DENSE: [[f64; STAGES]; 3] = [
     [
         25.948786856663858,
@@ -115,7 +148,8 @@ const DENSE: [[f64; STAGES]; 3] = [
 
 /// A task whose state is K coordinates, then their speeds, and which knows its partial derivatives.
 pub trait Stiff<const D: usize, const K: usize>: Task<f64, D> {
-    /// Finds the derivatives of the accelerations at time `t_s` and state `x`, within the current leg.
+    /// Finds the derivatives of the accelerations at time `t_s` and state `x`, within the current
+    /// leg.
     fn partials(&self, t_s: f64, x: &[N<f64>; D], partials: &mut Partials<K>);
 }
 
@@ -133,7 +167,8 @@ impl<const K: usize> Eliminated<K> {
         let mut matrix = [[N(0.0); K]; K];
         for i in 0..K {
             for j in 0..K {
-                matrix[i][j] = -(gamma_h * partials.by_coordinate[i][j]).v() - partials.by_speed[i][j];
+                matrix[i][j] =
+                    -(gamma_h * partials.by_coordinate[i][j]).v() - partials.by_speed[i][j];
             }
             matrix[i][i] += gamma_h.recip();
         }
@@ -163,7 +198,10 @@ impl<const K: usize> Eliminated<K> {
 
 /// Runs every trajectory that the task has, one after another.
 #[inline(always)]
-pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, tolerance: &Tolerance) {
+pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(
+    task: &mut P,
+    tolerance: &Tolerance,
+) {
     const { assert!(D == 2 * K, "a state is the coordinates and their speeds") };
     let mut x = [N(0.0); D];
     let mut control = StepControl::new(N(0.0));
@@ -193,16 +231,18 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
 
             let mut stages = [[N(0.0); D]; STAGES];
             let mut y = x;
-            let at_start = task.forcing(N(t));
+            let at_start = task.system().forcing(N(t));
             let mut forcing = at_start;
-            // A matrix without factors makes no step: the error stays NaN and the next try is shorter.
+            // A matrix without factors makes no step: the error stays NaN and the next try is
+            // shorter.
             let mut error = N(f64::NAN);
             if let Some(eliminated) = &eliminated {
                 let per_h = h.recip();
                 for stage in 0..STAGES {
                     if stage > 0 && NODE[stage] != NODE[stage - 1] {
-                        let time = if NODE[stage] == 1.0 { N(reached) } else { h * NODE[stage] + N(t) };
-                        task.renew(time, &mut forcing);
+                        let time =
+                            if NODE[stage] == 1.0 { N(reached) } else { h * NODE[stage] + N(t) };
+                        task.system().renew(time, &mut forcing);
                     }
                     y = x;
                     let mut earlier = [N(0.0); D];
@@ -213,7 +253,7 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
                             earlier[i] += weight * stages[j][i];
                         }
                     }
-                    let slope = task.derivative(&forcing, &y);
+                    let slope = task.system().derivative(&forcing, &y);
                     let time_weight = (h * TIME[stage]).v();
                     let mut b = slope;
                     for i in 0..D {
@@ -232,7 +272,7 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
 
             let next = control.proposals(error, h);
             let fail = |reason, time_s, count| Ended::Failed { reason, time_s, count };
-            let is_in_range = task.in_range(&y);
+            let is_in_range = task.system().in_range(&y);
             if error.0 < 1.0 {
                 count.accepted += 1;
                 control.settle(0, Verdict::Accepted, &next);
@@ -266,7 +306,8 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
                 count.rejected += 1;
                 control.settle(0, Verdict::Rejected, &next);
                 if control.step.0 <= 16.0 * f64::EPSILON * t.abs().max(leg.end_s) {
-                    let reason = if is_in_range { Failure::StepTooSmall } else { Failure::Diverged };
+                    let reason =
+                        if is_in_range { Failure::StepTooSmall } else { Failure::Diverged };
                     break fail(reason, t, count);
                 }
             }
@@ -277,8 +318,9 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(task: &mut P, t
     }
 }
 
-/// The dense output of one step, in the terms of [`Step`]. Slopes at the ends are its own: the right-hand side itself would
-/// multiply what is left of the fast vibrations by their squared frequency.
+/// The dense output of one step, in the terms of [`Step`]. Slopes at the ends are its own: the
+/// right-hand side itself would multiply what is left of the fast vibrations by their squared
+/// frequency.
 struct Dense<const D: usize> {
     slope_before: [N<f64>; D],
     slope_after: [N<f64>; D],
@@ -287,7 +329,12 @@ struct Dense<const D: usize> {
 
 impl<const D: usize> Dense<D> {
     #[inline(always)]
-    fn new(h: N<f64>, before: &[N<f64>; D], after: &[N<f64>; D], stages: &[[N<f64>; D]; STAGES]) -> Self {
+    fn new(
+        h: N<f64>,
+        before: &[N<f64>; D],
+        after: &[N<f64>; D],
+        stages: &[[N<f64>; D]; STAGES],
+    ) -> Self {
         let mut dense = Self { slope_before: *before, slope_after: *before, fourth: *before };
         let per_h = h.recip();
         for i in 0..D {

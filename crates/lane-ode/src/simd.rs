@@ -1,12 +1,12 @@
 //! Which instruction set runs, decided when the program runs.
 
-use crate::lane::Lane;
+use crate::lane::{Aside, Lane, out_of_line};
 
 /// An instruction set the integrators can run on. Results are the same bits on all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Simd {
-    /// One lane, with the processor's fused multiply-add where it has one. Without one, the fused operations run in
-    /// software: the same bits, about ten times slower.
+    /// One lane, with the processor's fused multiply-add where it has one. Without one, the fused
+    /// operations run in software: the same bits, about ten times slower.
     Scalar,
     /// Four lanes of AVX2 with FMA.
     Avx2,
@@ -18,12 +18,13 @@ pub enum Simd {
 
 /// Work that is written once and compiled for every instruction set.
 ///
-/// Mark `run`, and all that it calls in a loop, `#[inline(always)]`: only code that ends up inside the entry function
-/// of an instruction set is compiled with its instructions.
+/// Mark `run`, and all that it calls in a loop, `#[inline(always)]`: only code that ends up inside
+/// the entry function of an instruction set is compiled with its instructions.
 pub trait Kernel {
     /// What the work gives.
     type Output;
-    /// Does the work over lanes of type `T`; `zero` is the first value, from which all constants are made.
+    /// Does the work over lanes of type `T`; `zero` is the first value, from which all constants
+    /// are made.
     fn run<T: Lane>(self, zero: T) -> Self::Output;
 }
 
@@ -33,19 +34,6 @@ pub trait ScalarKernel {
     type Output;
     /// Does the work over `f64`. Mark it `#[inline(always)]` as [`Kernel::run`].
     fn run(self) -> Self::Output;
-}
-
-/// Work over lanes of one type that is compiled once, as a function of its own, not wherever it is called from: for what is long
-/// and runs seldom beside what surrounds it. [`Lane::aside`] runs it.
-pub trait Aside {
-    /// Does the work. Mark it `#[inline(always)]` as [`Kernel::run`].
-    fn run(self);
-}
-
-/// Work without any instruction set of its own.
-#[inline(never)]
-pub(crate) fn out_of_line<W: Aside>(work: W) {
-    work.run();
 }
 
 impl Simd {
@@ -78,7 +66,7 @@ impl Simd {
         }
     }
 
-    /// Name as in `SWEEP_SIMD`.
+    /// Its name in lower case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -100,8 +88,8 @@ impl Simd {
         }
     }
 
-    /// Runs the kernel on this instruction set, or on one lane without any if this processor lacks it: the result is the
-    /// same.
+    /// Runs the kernel on this instruction set, or on one lane without any if this processor lacks
+    /// it: the result is the same.
     #[inline(never)]
     pub fn dispatch<K: Kernel>(self, kernel: K) -> K::Output {
         match self {
@@ -117,7 +105,8 @@ impl Simd {
         }
     }
 
-    /// Runs the work on one lane, with the processor's fused multiply-add where it has one: the same bits as in any lane.
+    /// Runs the work on one lane, with the processor's fused multiply-add where it has one: the
+    /// same bits as in any lane.
     #[inline(never)]
     pub fn one_lane<K: ScalarKernel>(kernel: K) -> K::Output {
         #[cfg(target_arch = "x86_64")]
@@ -127,7 +116,8 @@ impl Simd {
         kernel.run()
     }
 
-    /// Runs work over `f64` as a function of its own, with the processor's fused multiply-add where it has one.
+    /// Runs work over `f64` as a function of its own, with the processor's fused multiply-add where
+    /// it has one.
     #[inline(always)]
     pub(crate) fn aside<W: Aside>(work: W) {
         #[cfg(target_arch = "x86_64")]
@@ -137,8 +127,9 @@ impl Simd {
         out_of_line(work);
     }
 
-    /// Runs a kernel that follows one trajectory and uses lanes for something else, on a few lanes. The result is the same on
-    /// any number of them; few are enough, and the kernel is compiled for one instruction set instead of all.
+    /// Runs a kernel that follows one trajectory and uses lanes for something else, on a few lanes.
+    /// The result is the same on any number of them; few are enough, and the kernel is compiled for
+    /// one instruction set instead of all.
     #[inline(never)]
     pub fn dispatch_narrow<K: Kernel>(kernel: K) -> K::Output {
         #[cfg(target_arch = "x86_64")]
@@ -163,7 +154,10 @@ macro_rules! entry {
             fn inner<K: Kernel>(kernel: K) -> K::Output {
                 kernel.run($first)
             }
-            assert!($simd.is_available(), "dispatched to an instruction set that this processor lacks");
+            assert!(
+                $simd.is_available(),
+                "dispatched to an instruction set that this processor lacks"
+            );
             // SAFETY: asserted above.
             unsafe { inner(kernel) }
         }
@@ -177,7 +171,9 @@ mod x86 {
     use crate::x86::{F64x4, F64x8};
 
     // SAFETY (of the two `first`): inside the entry function of their instruction set.
-    entry!(avx512, "avx2,fma,avx512f,avx512dq,avx512vl", super::Simd::Avx512, unsafe { F64x8::first(0.0) });
+    entry!(avx512, "avx2,fma,avx512f,avx512dq,avx512vl", super::Simd::Avx512, unsafe {
+        F64x8::first(0.0)
+    });
     entry!(avx2, "avx2,fma", super::Simd::Avx2, unsafe { F64x4::first(0.0) });
     entry!(scalar, "avx2,fma", super::Simd::Avx2, 0.0_f64);
 

@@ -2,12 +2,12 @@
 
 use crate::lane::Lane;
 use crate::num::N;
-use crate::peaks::Sample;
+use crate::quintic::Sample;
 
 /// Integrals over time of the squares of `M` outputs.
 ///
-/// Over each step the rule through values and first and second derivatives at both ends: exact for polynomials of degree 5, so the
-/// error is of sixth order in the step.
+/// Over each step the rule through values and first and second derivatives at both ends: exact for
+/// polynomials of degree 5, so the error is of sixth order in the step.
 #[derive(Clone, Copy, Debug)]
 pub struct SquareIntegrals<T, const M: usize> {
     integral: [N<T>; M],
@@ -42,7 +42,8 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
         }
     }
 
-    /// The samples at the end of a step of `length_s` that began at the last ones; `counts` says in which lanes it counts.
+    /// The samples at the end of a step of `length_s` that began at the last ones; `counts` says in
+    /// which lanes it counts.
     #[inline(always)]
     pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let zero = length_s.lit(0.0);

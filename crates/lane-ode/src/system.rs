@@ -1,17 +1,18 @@
-//! What the integrators ask of a model, and what they tell about a trajectory.
+//! What integrators need of a system, and what they report of a trajectory.
 
 use crate::lane::Lane;
 use crate::num::N;
 
 /// A first-order system x' = f(t, x) with `D` states, in lanes.
 pub trait System<T: Lane, const D: usize> {
-    /// What f needs that depends on time alone; found once where several stages share a time.
+    /// The part of f that depends on time alone; computed once where several stages share a time.
     type Forcing: Copy;
 
     /// The forcing at time `t_s`, which may differ between lanes.
     fn forcing(&self, t_s: N<T>) -> Self::Forcing;
 
-    /// Overwrites a forcing of this system by that at another time; for large ones cheaper than a new one.
+    /// Overwrites a forcing of this system with that at another time; cheaper than a new one where
+    /// forcings are large.
     #[inline(always)]
     fn renew(&self, t_s: N<T>, forcing: &mut Self::Forcing) {
         *forcing = self.forcing(t_s);
@@ -20,48 +21,59 @@ pub trait System<T: Lane, const D: usize> {
     /// f at state `x`.
     fn derivative(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D];
 
-    /// Where a state still means something; a lane that leaves this range has diverged. NaN must count as out.
+    /// The lanes whose states are in the model's range. A lane that leaves it has diverged. NaN is
+    /// outside.
     fn in_range(&self, x: &[N<T>; D]) -> T::Mask;
 }
 
 /// Trajectories fed into lanes one after another: a lane that ends takes up the next at once.
-pub trait Task<T: Lane, const D: usize>: System<T, D> {
-    /// Says how lane `lane` got to the end of its leg, and asks what it does next: another leg of the same
-    /// trajectory, the first of a new one (write its parameters and its state), or nothing.
+pub trait Task<T: Lane, const D: usize> {
+    /// The system whose trajectories they are.
+    type System: System<T, D>;
+
+    /// The system with the parameters that the lanes hold.
+    fn system(&self) -> &Self::System;
+
+    /// Reports how lane `lane` came to the end of its leg, and asks for the next: another leg of
+    /// the same trajectory, the first leg of a new one (write its parameters and its state), or
+    /// none.
     fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; D]) -> Option<Leg>;
 
-    /// A leg has begun in some lane: the trajectory may have a kink here, or be a new one. Lanes whose legs went on
-    /// are given the sample that they had.
-    fn begin(&mut self, forcing: &Self::Forcing, x: &[N<T>; D], dx: &[N<T>; D]);
+    /// A leg has begun in some lane: the trajectory may have a kink here, or be a new one. Lanes
+    /// whose legs went on are given the sample that they had.
+    fn begin(&mut self, forcing: &Forcing<Self, T, D>, x: &[N<T>; D], dx: &[N<T>; D]);
 
-    /// Every lane has made a step, or stood still (zero length).
-    fn observe(&mut self, forcing: &Self::Forcing, step: &Step<'_, T, D>);
+    /// Every lane has made a step, of zero length if it is idle.
+    fn observe(&mut self, forcing: &Forcing<Self, T, D>, step: &Step<'_, T, D>);
 
-    /// Whether to put the work down; what has not ended then never does. Asked every
+    /// Whether to stop; trajectories that have not ended by then never do. Asked every
     /// [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps at least, because one leg may take hours.
     fn is_stopped(&self) -> bool {
         false
     }
 }
 
-/// A stretch of a trajectory without kinks: its end is hit exactly.
+/// The forcing of a task's system.
+pub type Forcing<P, T, const D: usize> = <<P as Task<T, D>>::System as System<T, D>>::Forcing;
+
+/// A stretch of a trajectory without kinks. Its last step ends exactly at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
     /// Where it starts.
     pub start_s: f64,
     /// Where it ends.
     pub end_s: f64,
-    /// Fixed-step methods: the longest step; a whole number of equal steps fills the leg. Adaptive methods: the first
-    /// step to try.
+    /// Fixed-step methods: the longest step; a whole number of equal steps fills the leg. Adaptive
+    /// methods: the first step to try.
     pub step_s: f64,
 }
 
-/// How a lane came to the end of a leg.
+/// How a lane's leg ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ended {
-    /// It had none yet.
+    /// There was none yet.
     Idle,
-    /// At the leg's end.
+    /// At its end.
     Arrived(Count),
     /// Before it.
     Failed {
@@ -102,11 +114,11 @@ impl Count {
     }
 }
 
-/// A step just made, with what an observer needs to look inside it.
+/// A step just made, with all that an observer needs to interpolate in it.
 pub struct Step<'a, T, const D: usize> {
     /// Its end in time.
     pub end_s: N<T>,
-    /// Its length; zero in a lane that stood still.
+    /// Its length; zero in an idle lane.
     pub length_s: N<T>,
     /// State at its start.
     pub before: &'a [N<T>; D],
@@ -121,7 +133,8 @@ pub struct Step<'a, T, const D: usize> {
 }
 
 impl<T: Lane, const D: usize> Step<'_, T, D> {
-    /// The state a fraction `s` (0 to 1) into the step: the method's dense output, or the cubic through both ends.
+    /// The state a fraction `s` (0 to 1) into the step: the method's dense output, or the cubic
+    /// through both ends.
     ///
     /// Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.6 (`contd5`).
     #[inline(always)]

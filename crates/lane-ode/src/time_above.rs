@@ -2,16 +2,16 @@
 
 use crate::lane::Lane;
 use crate::num::N;
-use crate::peaks::Sample;
 use crate::quintic::Quintic;
+use crate::quintic::Sample;
 
 /// Halvings that find where an output passes zero: to a millionth of a millionth of the step.
 const HALVINGS: usize = 40;
 
 /// Time that one output has spent above zero.
 ///
-/// A step is looked into where the control polygon of the cubic through its values and slopes passes zero: on each side of its
-/// extremum the output passes zero at most once.
+/// A step is examined where the control polygon of the cubic through its values and slopes crosses
+/// zero. On each side of its extremum the output crosses zero at most once.
 #[derive(Clone, Copy, Debug)]
 pub struct TimeAbove<T> {
     time_s: N<T>,
@@ -43,7 +43,8 @@ impl<T: Lane> TimeAbove<T> {
         self.last = *sample;
     }
 
-    /// The sample at the end of a step of `length_s` that began at the last one; `counts` says in which lanes it counts.
+    /// The sample at the end of a step of `length_s` that began at the last one; `counts` says in
+    /// which lanes it counts.
     #[inline(always)]
     pub fn advance(&mut self, length_s: N<T>, sample: &Sample<T>, counts: T::Mask) {
         let zero = length_s.lit(0.0);
@@ -80,7 +81,7 @@ fn above_between<T: Lane>(quintic: &Quintic<T>, from: N<T>, to: N<T>) -> N<T> {
     let zero = from.lit(0.0);
     let (at_from, at_to) = (quintic.value(from), quintic.value(to));
     let (mut low, mut high) = (from, to);
-    // Towards the place where the sign is no longer that at `from`; without one, towards `to`.
+    // Towards the place where the sign changes from that at `from`; without one, towards `to`.
     for _ in 0..HALVINGS {
         let middle = (0.5 * (low + high)).v();
         let value = quintic.value(middle);

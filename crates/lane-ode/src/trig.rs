@@ -1,8 +1,10 @@
-//! Sine and cosine over lanes, from fused operations alone, so that every instruction set gives the same bits.
+//! Sine and cosine over lanes, from fused operations alone, so that every instruction set gives the
+//! same bits.
 //!
-//! Within a quarter turn the polynomials are those of fdlibm's `k_sin.c` and `k_cos.c` (Sun Microsystems, 1993), without
-//! their correction of a rounding error of the cosine. Errors measured against arbitrary precision (`tests/trig.rs`): up to
-//! 1.2 ulp within pi/4, 1.5 ulp up to 1e6 rad, 1.6 ulp of angles in turns.
+//! Within a quarter turn the polynomials are those of fdlibm's `k_sin.c` and `k_cos.c` (Sun
+//! Microsystems, 1993), without their correction of a rounding error of the cosine. Errors measured
+//! against arbitrary precision (`tests/trig.rs`): up to 1.2 ulp within pi/4, 1.5 ulp up to 1e6 rad,
+//! 1.6 ulp of angles in turns.
 
 use crate::lane::Lane;
 use crate::num::N;
@@ -54,7 +56,8 @@ fn polynomial<T: Real>(c: &[f64; 6], z: N<T>) -> N<T> {
 /// Turns a pair within quadrant 0 on by `quadrant` (an integer) quarter turns.
 #[inline(always)]
 fn turned_on<T: Lane>(quadrant: N<T>, sin: N<T>, cos: N<T>) -> (N<T>, N<T>) {
-    // In quarters: 0, 0.25, 0.5 or 0.75 of four quadrants. A multiple of 1/4 less 3/8 rounds to its floor.
+    // In quarters: 0, 0.25, 0.5 or 0.75 of four quadrants. A multiple of 1/4 less 3/8 rounds to its
+    // floor.
     let quarter = (quadrant * 0.25).v();
     let part = quarter - N((quarter - 0.375).0.round());
     (by_quadrant(part, [sin, cos, -sin, -cos]), by_quadrant(part, [cos, -sin, -cos, sin]))
@@ -78,8 +81,9 @@ pub(crate) fn sin_cos<T: Lane>(x: T) -> (T, T) {
     wide(x)
 }
 
-/// The rare path: lane by lane, out of line, so that the common one stays short. Its results for an angle within a
-/// quarter turn are those of the common path, bit for bit: a lane does not feel its neighbours.
+/// The rare path: lane by lane, out of line, so that the common one stays short. For an angle
+/// within a quarter turn it gives the bits of the common path, so that a lane does not depend on
+/// its neighbours.
 #[cold]
 #[inline(never)]
 fn wide<T: Lane>(x: T) -> (T, T) {

@@ -1,12 +1,14 @@
-//! Lane types out of vector registers: what is the same for every instruction set.
+//! Lane types made of vector registers: the part common to all instruction sets.
 //!
-//! The module that invokes the macro says what each operation is in its instructions, and why its values exist only where the
-//! instructions do: on that rests the `unsafe` below, which is that module's.
+//! The module that invokes the macro gives each operation in its instructions, and guarantees that
+//! its values exist only where the processor has them. The `unsafe` below relies on that guarantee.
 
-/// Makes `$name`, `$lanes` numbers in one register of type `$raw`, a [`Lane`](crate::Lane) compiled with `$features`.
+/// Makes `$name`, `$lanes` numbers in one register of type `$raw`, a [`Lane`](crate::Lane) compiled
+/// with `$features`.
 macro_rules! vector {
     ($name:ident, $raw:ty, $lanes:literal, $mask:ty, $features:literal, $doc:literal,
-     set1 $set1:ident, add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident, sqrt $sqrt:ident,
+     set1 $set1:ident, add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident,
+     sqrt $sqrt:ident,
      mul_add |$p1:ident, $p2:ident, $p3:ident| $mul_add:expr,
      mul_sub |$q1:ident, $q2:ident, $q3:ident| $mul_sub:expr,
      neg_mul_add |$o1:ident, $o2:ident, $o3:ident| $neg_mul_add:expr,
@@ -34,7 +36,8 @@ macro_rules! vector {
             type Mask = $mask;
             #[inline(always)]
             fn lit(self, value: f64) -> Self {
-                // SAFETY: `self` exists, so its instruction set does (module docs of the invocation); likewise below.
+                // SAFETY: `self` exists, so its instruction set does (module docs of the
+                // invocation); likewise below.
                 Self(unsafe { $set1(value) })
             }
             #[inline(always)]

@@ -1,5 +1,5 @@
-//! Kernels by instruction set: `cargo bench --bench kernels`. Times are per evaluation, step or trajectory of the whole lane
-//! group; divide by the lanes (1, 4, 8) for one trajectory's share.
+//! Kernels by instruction set: `cargo bench --bench kernels`. Times are per evaluation, step or
+//! trajectory of the whole lane group; divide by the lanes (1, 4, 8) for one trajectory's share.
 
 use divan::{Bencher, counter::ItemsCount};
 use lane_ode::{Simd, Tolerance};

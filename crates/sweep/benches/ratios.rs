@@ -1,12 +1,16 @@
-//! The ratios that are published, all from one run: `cargo bench --bench ratios [-- ROUNDS]` writes Markdown. What is compared takes
-//! turns, round by round, so that a slow moment of the machine falls on all; figures are medians over the rounds.
+//! The ratios that are published, all from one run: `cargo bench --bench ratios [-- ROUNDS]` writes
+//! Markdown. What is compared takes turns, round by round, so that a slow moment of the machine
+//! falls on all; figures are medians over the rounds.
 #![allow(clippy::print_stdout)]
 
+use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
 use lane_ode::Simd;
-use washer_model::{Cases, Formula, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
+use washer_model::{
+    Cases, Formula, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate,
+};
 
 /// As many as the widest lanes hold.
 const TRAJECTORIES: usize = 8;
@@ -15,10 +19,12 @@ const ROUNDS: usize = 5;
 
 fn main() {
     // Cargo passes `--bench` along.
-    let rounds = std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(ROUNDS);
+    let rounds =
+        std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(ROUNDS);
     trajectories(rounds);
-    methods(rounds);
-    threads(rounds);
+    let once_s = methods(rounds);
+    threads(rounds, once_s);
+    boundaries(rounds);
 }
 
 fn median(values: &[f64]) -> f64 {
@@ -51,8 +57,10 @@ fn trajectories(rounds: usize) {
     let points: Vec<_> = points.iter().collect();
     let available: Vec<_> = Simd::ALL.into_iter().filter(|simd| simd.is_available()).collect();
     let models = [("nonlinear", ModelKind::Nonlinear), ("linear", ModelKind::Linear)];
-    let subjects: Vec<_> =
-        available.iter().flat_map(|&simd| models.map(|(name, model)| (simd, name, model))).collect();
+    let subjects: Vec<_> = available
+        .iter()
+        .flat_map(|&simd| models.map(|(name, model)| (simd, name, model)))
+        .collect();
     let mut times = vec![Vec::new(); subjects.len()];
     for _ in 0..rounds {
         for (&(simd, _, model), times) in subjects.iter().zip(&mut times) {
@@ -63,10 +71,14 @@ fn trajectories(rounds: usize) {
         }
     }
     println!("One core, {TRAJECTORIES} trajectories of 50 s by RK4 at {STEP_S:e} s, with peaks:\n");
-    let names: Vec<_> = subjects.iter().map(|(simd, name, _)| format!("{name}, {}", simd.name())).collect();
+    let names: Vec<_> =
+        subjects.iter().map(|(simd, name, _)| format!("{name}, {}", simd.name())).collect();
     let medians = table("ms a trajectory", &names, &times);
     let of = |simd: Simd, name: &str| {
-        subjects.iter().position(|subject| subject.0 == simd && subject.1 == name).map(|at| medians[at])
+        subjects
+            .iter()
+            .position(|subject| subject.0 == simd && subject.1 == name)
+            .map(|at| medians[at])
     };
     println!("| ratio | |\n|---|---|");
     for (name, _) in models {
@@ -85,8 +97,9 @@ fn trajectories(rounds: usize) {
     println!();
 }
 
-/// One core, the whole grid of Fig. 12: plain steps and the fast method.
-fn methods(rounds: usize) {
+/// One core, the whole grid of Fig. 12: plain steps and the fast method. What both models'
+/// trajectories take by the latter at 1e-3, once each (s).
+fn methods(rounds: usize) -> f64 {
     let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
     let (end_s, window_s) = (50.0, [30.0, 50.0]);
     let mut scenarios = Vec::new();
@@ -100,15 +113,17 @@ fn methods(rounds: usize) {
             scenarios.push((machine, spin.clone()));
         }
     }
-    let points: Vec<Point> = prepare(Simd::best(), &scenarios, &Timing { end_s, window_s, checkpoints: 0 })
-        .into_iter()
-        .map(|point| point.expect("the paper's machine has an equilibrium"))
-        .collect();
+    let points: Vec<Point> =
+        prepare(Simd::best(), &scenarios, &Timing { end_s, window_s, checkpoints: 0 })
+            .into_iter()
+            .map(|point| point.expect("the paper's machine has an equilibrium"))
+            .collect();
     let last = points.len() - 1;
     let corners = [0, 32, last - 32, last].map(|corner| (&points[corner], &spin));
     let cases = Cases::new(corners, end_s);
     let fast = |accuracy| {
-        let geared = cases.choose(Formula::Dop853, accuracy).expect("the paper's machine has modes");
+        let geared =
+            cases.choose(Formula::Dop853, accuracy).expect("the paper's machine has modes");
         Method::Geared(geared.expect("its bearings are stiff"))
     };
     let methods = [
@@ -119,7 +134,9 @@ fn methods(rounds: usize) {
     let models = [("nonlinear", ModelKind::Nonlinear), ("linear", ModelKind::Linear)];
     let subjects: Vec<_> = methods
         .iter()
-        .flat_map(|(name, method)| models.map(|(model, kind)| (format!("{model}, {name}"), kind, *method)))
+        .flat_map(|(name, method)| {
+            models.map(|(model, kind)| (format!("{model}, {name}"), kind, *method))
+        })
         .collect();
     let points: Vec<_> = points.iter().collect();
     let mut times = vec![Vec::new(); subjects.len()];
@@ -132,7 +149,8 @@ fn methods(rounds: usize) {
         }
     }
     println!(
-        "One core, {}, the {} points of Fig. 12, each trajectory once; what a run adds (runs that are compared, rows that climb) is below:\n",
+        "One core, {}, the {} points of Fig. 12, each trajectory once; what a run adds (runs that \
+         are compared, rows that climb) is below:\n",
         Simd::best().name(),
         points.len()
     );
@@ -153,32 +171,87 @@ fn methods(rounds: usize) {
         );
     }
     println!();
+    medians[2] + medians[3]
 }
 
-/// Fig. 12 by the program itself.
-fn threads(rounds: usize) {
-    let grid = concat!(env!("CARGO_MANIFEST_DIR"), "/../../sweeps/fig12.toml");
-    let output = std::env::temp_dir().join(format!("sweep-ratios-{}.parquet", std::process::id()));
+const FIG12: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../sweeps/fig12.toml");
+
+/// How long the program takes with these arguments, in a folder for its output (s).
+fn program_s(folder: &Path, arguments: &[&str]) -> f64 {
+    let begin = Instant::now();
+    let run = Command::new(env!("CARGO_BIN_EXE_sweep"))
+        .args(arguments)
+        .args(["--fresh", "--progress", "none", "--out"])
+        .arg(folder.join("out.parquet"))
+        .output();
+    let took_s = begin.elapsed().as_secs_f64();
+    let run = run.expect("the sweep program starts");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    took_s
+}
+
+/// A folder for the program's output.
+fn temporary() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary folder can be made")
+}
+
+/// The grid of Fig. 12 and its boundary, by each criterion.
+fn boundaries(rounds: usize) {
+    let folder = temporary();
+    let text = std::fs::read_to_string(FIG12).expect("the grid file of Fig. 12");
+    let criteria = ["peak", "rms", "envelope"].map(|criterion| {
+        let path = folder.path().join(format!("{criterion}.toml"));
+        let reliability = format!("[reliability]\ncriterion = \"{criterion}\"");
+        std::fs::write(&path, text.replace("[reliability]", &reliability)).expect("a grid file");
+        (criterion, path)
+    });
+    let commands = ["run", "boundary"];
+    let mut times = vec![Vec::new(); criteria.len() * commands.len()];
+    for _ in 0..rounds {
+        for (i, (_, path)) in criteria.iter().enumerate() {
+            let path = path.to_str().expect("a path in Unicode");
+            for (k, command) in commands.iter().enumerate() {
+                let took_s = program_s(folder.path(), &[command, path, "--threads", "1"]);
+                times[commands.len() * i + k].push(took_s);
+            }
+        }
+    }
+    println!(
+        "`sweep run` and `sweep boundary` of `sweeps/fig12.toml`, by criterion, on one thread:\n"
+    );
+    let names: Vec<_> = criteria
+        .iter()
+        .flat_map(|(criterion, _)| commands.map(|command| format!("{criterion}: sweep {command}")))
+        .collect();
+    let medians = table("s", &names, &times);
+    println!("| ratio | |\n|---|---|");
+    for (i, (criterion, _)) in criteria.iter().enumerate() {
+        let share = medians[commands.len() * i + 1] / medians[commands.len() * i];
+        println!("| {criterion}: boundary against grid | {share:.3} |");
+    }
+    println!();
+}
+
+/// Fig. 12 by the program itself; `once_s` is what the trajectories of its lowest rung that a row
+/// may hold take.
+fn threads(rounds: usize, once_s: f64) {
+    let folder = temporary();
     let counts = ["1", "2"];
     let mut times = vec![Vec::new(); counts.len()];
     for _ in 0..rounds {
         for (count, times) in counts.iter().zip(&mut times) {
-            let begin = Instant::now();
-            let status = Command::new(env!("CARGO_BIN_EXE_sweep"))
-                .args(["run", grid, "--fresh", "--progress", "none", "--threads", count, "--out"])
-                .arg(&output)
-                .output();
-            times.push(begin.elapsed().as_secs_f64());
-            let status = status.expect("the sweep program starts");
-            assert!(status.status.success(), "{}", String::from_utf8_lossy(&status.stderr));
+            times.push(program_s(folder.path(), &["run", FIG12, "--threads", count]));
         }
     }
-    for made in [output.clone(), output.with_extension("run.json")] {
-        // What is left in the temporary folder harms nobody.
-        let _ = std::fs::remove_file(made);
-    }
-    println!("`sweep run sweeps/fig12.toml` (1287 points, both models), start of the program included:\n");
+    println!(
+        "`sweep run sweeps/fig12.toml` (1287 points, both models), start of the program included:\n"
+    );
     let names: Vec<_> = counts.iter().map(|count| format!("--threads {count}")).collect();
     let medians = table("s a map", &names, &times);
-    println!("| ratio | |\n|---|---|\n| two threads against one | {:.2} |\n", medians[0] / medians[1]);
+    println!(
+        "| ratio | |\n|---|---|\n| two threads against one | {:.2} |\n| the run against its \
+         trajectories once: what checks and climbing cost | {:.2} |\n",
+        medians[0] / medians[1],
+        medians[0] / once_s
+    );
 }

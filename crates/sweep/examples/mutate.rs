@@ -6,8 +6,8 @@
 //! cargo run --release -p sweep --example mutate -- list 300 1 > /dev/null
 //! ```
 //!
-//! Needs no instrumented build, so it finds less in a second than `scripts/fuzz.sh` and can be
-//! started at once. Targets are `list`, `result` and `folder`. What is found stands in
+//! Needs no instrumented build, so it finds less in a second than `scripts/checks/fuzz.sh` and can
+//! be started at once. Targets are `list`, `result` and `folder`. What is found stands in
 //! `target/fuzz/findings`; exits with 1 if there is any.
 
 #[path = "../../../fuzz/src/targets/folder.rs"]

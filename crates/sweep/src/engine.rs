@@ -3,30 +3,29 @@
 mod climb;
 mod ladder;
 mod pool;
+mod watch;
 
-pub use climb::Demand;
-pub use ladder::Level;
-pub(crate) use ladder::{Ladder, REFERENCE_SHARE, reference_step_s};
+pub(crate) use climb::Demand;
+pub(crate) use ladder::{Ladder, reference_step_s};
 pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
+pub(crate) use watch::{Engine, Watch};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use climb::{MODELS, Run};
-use lane_ode::{Failure, Simd, Tolerance};
+use climb::{MODELS, RungRun};
+use lane_ode::{Failure, Simd};
 use pool::{Feed, Keep, Pool, Shared};
 use washer_model::{
-    Cases, Extra, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted, prepare, simulate_until,
+    Cases, Extra, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted, prepare,
+    simulate_until,
 };
 
 use crate::interrupt::Interrupt;
 use crate::measures::{Criterion, Metric};
+use crate::method::Steps;
 use crate::outcome::{Outcome, Status, Trajectory};
-use crate::plan::{Integrator, Plan, Scenario};
-use crate::run::{Engine, Watch};
-
-/// Steps that one leg of an adaptive trajectory may take.
-const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
+use crate::plan::{Plan, Scenario};
 
 /// Parts of a run at whose ends two runs of a trajectory are compared.
 const CHECKPOINTS: u32 = 128;
@@ -47,13 +46,15 @@ pub struct ModelEngine<'a> {
     wanted: Wanted,
     /// Of both models; found when first asked for.
     ladders: OnceLock<[Ladder; 2]>,
+    /// Held by the thread that finds them.
+    finding: Mutex<()>,
 }
 
 /// The instruction set that `SWEEP_SIMD` asks for, else the best.
 ///
 /// # Errors
 /// A name that is not one of this machine's.
-pub fn simd_from_environment() -> Result<Simd, EngineError> {
+pub(crate) fn simd_from_environment() -> Result<Simd, EngineError> {
     let Ok(name) = std::env::var("SWEEP_SIMD") else { return Ok(Simd::best()) };
     let available = || Simd::ALL.into_iter().filter(|simd| simd.is_available());
     available().find(|simd| simd.name() == name).ok_or_else(|| {
@@ -62,27 +63,18 @@ pub fn simd_from_environment() -> Result<Simd, EngineError> {
     })
 }
 
-/// Dormand-Prince with a grid file's tolerances.
-pub(crate) fn dopri5(rtol: f64, atol: f64) -> Method {
-    Method::Dopri5(Tolerance { relative: rtol, absolute: atol, max_steps: MAX_ADAPTIVE_STEPS })
-}
-
-/// The stiff method with a grid file's tolerances.
-pub(crate) fn rodas5p(rtol: f64, atol: f64) -> Method {
-    Method::Rodas5p(Tolerance { relative: rtol, absolute: atol, max_steps: MAX_ADAPTIVE_STEPS })
-}
-
 impl<'a> ModelEngine<'a> {
     /// An engine for a plan, on the best instruction set or the one asked for.
     ///
     /// # Errors
     /// A method or an instruction set that is not there.
     pub fn new(plan: &'a Plan) -> Result<Self, EngineError> {
-        let is_checked = matches!(plan.integrator, Integrator::Rk4MassScaled { .. });
+        let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
         let wanted = Wanted { course: is_checked, ..plan.measures.wanted() };
-        Ok(Self { plan, simd: simd_from_environment()?, timing, wanted, ladders: OnceLock::new() })
+        let (simd, ladders) = (simd_from_environment()?, OnceLock::new());
+        Ok(Self { plan, simd, timing, wanted, ladders, finding: Mutex::new(()) })
     }
 
     /// As [`Self::new`], with the rungs of another engine.
@@ -95,37 +87,53 @@ impl<'a> ModelEngine<'a> {
 
     /// The rungs of both models.
     pub(crate) fn ladders(&self) -> &[Ladder; 2] {
-        self.ladders.get_or_init(|| {
-            let direct = |level, method| [Ladder::direct(level, method), Ladder::direct(level, method)];
-            match self.plan.integrator {
-                Integrator::Rk4 { step_s } => direct(Level::Rk4, Method::Rk4 { step_s }),
-                Integrator::Dopri5 { rtol, atol } => direct(Level::Dopri5, dopri5(rtol, atol)),
-                Integrator::Rodas5p { rtol, atol } => direct(Level::Rodas5p, rodas5p(rtol, atol)),
-                Integrator::Rk4MassScaled { accuracy } => self.checked(accuracy),
-            }
-        })
+        self.ladders.get_or_init(|| self.find_ladders(&|| false))
+    }
+
+    /// As [`Self::ladders`]; `None` if `watch` says to stop before they are found.
+    fn ladders_under(&self, watch: &Watch<'_>) -> Option<&[Ladder; 2]> {
+        if let Some(found) = self.ladders.get() {
+            return Some(found);
+        }
+        let _one_thread = self.finding.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(found) = self.ladders.get() {
+            return Some(found);
+        }
+        let found = self.find_ladders(&|| watch.stopped());
+        // They may have been cut short.
+        if watch.stopped() { None } else { Some(self.ladders.get_or_init(|| found)) }
+    }
+
+    fn find_ladders(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
+        match self.plan.integrator.direct() {
+            Some((level, method)) => MODELS.map(|_| Ladder::direct(level, method)),
+            None => self.checked(self.accuracy(), is_stopped),
+        }
     }
 
     /// The fast method's ladders, by the corners of the grid.
-    fn checked(&self, accuracy: f64) -> [Ladder; 2] {
-        let scenarios: Vec<_> = self.plan.some_corners().iter().map(|at| self.plan.scenario_at(at)).collect();
+    fn checked(&self, accuracy: f64, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
+        let scenarios: Vec<_> =
+            self.plan.some_corners().iter().map(|at| self.plan.scenario_at(at)).collect();
         let prepared = self.prepare(&scenarios);
         let ready = prepared.iter().zip(&scenarios);
-        let ready = ready.filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.spin)));
-        let cases = Cases::new(ready, self.plan.end_s);
+        let ready =
+            ready.filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.spin)));
+        let cases = Cases::until(ready, self.plan.end_s, is_stopped);
         MODELS.map(|model| Ladder::new(&cases, model, accuracy))
     }
 
     /// What amplitudes must be good for; of one method alone nothing is asked.
     fn accuracy(&self) -> f64 {
-        match self.plan.integrator {
-            Integrator::Rk4MassScaled { accuracy } => accuracy,
-            Integrator::Rk4 { .. } | Integrator::Dopri5 { .. } | Integrator::Rodas5p { .. } => f64::INFINITY,
+        match self.plan.integrator.steps() {
+            Steps::Checked(accuracy) => accuracy,
+            Steps::Fixed(_) | Steps::Explicit | Steps::Implicit => f64::INFINITY,
         }
     }
 
-    /// One row per point given by the values of its axes, on the grid or between its points; `point` of an outcome is the
-    /// position among them. On all threads of the rayon pool it is called in, if in one.
+    /// One row per point given by the values of its axes, on the grid or between its points;
+    /// `point` of an outcome is the position among them. On all threads of the rayon pool it is
+    /// called in, if in one.
     #[must_use]
     pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
         let interrupt = Interrupt::new();
@@ -134,7 +142,7 @@ impl<'a> ModelEngine<'a> {
     }
 
     /// As [`Self::evaluate_at`], with outcomes good for what is asked, each shown to `seen` as it
-    /// comes, on any thread; `None` if it was told to stop.
+    /// comes, on any thread; `None` if `watch` stopped it.
     #[must_use]
     pub fn evaluate_for(
         &self,
@@ -147,7 +155,10 @@ impl<'a> ModelEngine<'a> {
         let feed = |most: usize| {
             let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
             let positions: Vec<usize> = next.by_ref().take(most).collect();
-            positions.into_iter().map(|i| (i as u64, self.plan.scenario_at(&axis_values[i]))).collect()
+            positions
+                .into_iter()
+                .map(|i| (i as u64, self.plan.scenario_at(&axis_values[i])))
+                .collect()
         };
         let found = Mutex::new(Vec::with_capacity(axis_values.len()));
         let keep = |outcome: Outcome| {
@@ -175,8 +186,10 @@ impl<'a> ModelEngine<'a> {
     fn prepare(&self, scenarios: &[Scenario]) -> Vec<Result<Point, Status>> {
         let mut prepared = Vec::with_capacity(scenarios.len());
         for alike in scenarios.chunk_by(|a, b| a.window_s == b.window_s) {
-            let machines: Vec<_> =
-                alike.iter().map(|scenario| (scenario.machine.clone(), scenario.spin.clone())).collect();
+            let machines: Vec<_> = alike
+                .iter()
+                .map(|scenario| (scenario.machine.clone(), scenario.spin.clone()))
+                .collect();
             let timing = Timing { window_s: alike[0].window_s, ..self.timing };
             let together = |machines: &[(Machine, Spin)]| {
                 let points = prepare(self.simd, machines, &timing);
@@ -187,11 +200,21 @@ impl<'a> ModelEngine<'a> {
         prepared
     }
 
-    /// One model at every point, by one rung. Once `watch` says to stop, what this returns means nothing.
-    fn runs(&self, model: usize, rung: usize, points: &[&Point], watch: &Watch<'_>) -> Vec<Run> {
-        let method = &self.ladders()[model].rungs[rung].method;
+    /// One model at every point, by one method. Once `watch` says to stop, what this returns means
+    /// nothing.
+    fn runs(
+        &self,
+        model: usize,
+        method: &Method,
+        points: &[&Point],
+        watch: &Watch<'_>,
+    ) -> Vec<RungRun> {
         let together = |points: &[&Point]| self.trajectories(points, MODELS[model], method, watch);
-        let panicked = || Run { trajectory: Trajectory::failed(Status::Panicked), course: Vec::new() };
+        let panicked = || RungRun {
+            trajectory: Trajectory::failed(Status::Panicked),
+            course: Vec::new(),
+            clash_doubt_s: None,
+        };
         together_or_alone(points, together, panicked)
     }
 
@@ -201,7 +224,7 @@ impl<'a> ModelEngine<'a> {
         model: ModelKind,
         method: &Method,
         watch: &Watch<'_>,
-    ) -> Vec<Run> {
+    ) -> Vec<RungRun> {
         let stop = || watch.stopped();
         let found = simulate_until(self.simd, model, method, points, self.wanted, &stop);
         let (records, extras) = found.unwrap_or_default();
@@ -212,7 +235,8 @@ impl<'a> ModelEngine<'a> {
             .map(|record| {
                 let mut extra = extras.next().unwrap_or_default();
                 let course = std::mem::take(&mut extra.course);
-                Run { trajectory: self.trajectory(record, extra), course }
+                let clash_doubt_s = extra.clash_doubt_s;
+                RungRun { trajectory: self.trajectory(record, extra), course, clash_doubt_s }
             })
             .collect()
     }
@@ -225,7 +249,12 @@ impl<'a> ModelEngine<'a> {
                 Failure::StepTooSmall => Status::StepTooSmall,
                 Failure::StepLimit => Status::StepLimit,
             };
-            return Trajectory { fail_time_s: Some(time_s), steps, rejected, ..Trajectory::failed(status) };
+            return Trajectory {
+                fail_time_s: Some(time_s),
+                steps,
+                rejected,
+                ..Trajectory::failed(status)
+            };
         }
         let channels = &self.plan.reliability.channels;
         let amplitudes = match self.plan.measures.criterion {
@@ -250,18 +279,28 @@ impl<'a> ModelEngine<'a> {
     }
 }
 
-/// One result per item of a group. A panic over one item must not cost the others theirs: then each is done alone, which
-/// gives the same bits, and the one is a defect.
-fn together_or_alone<I, R>(items: &[I], together: impl Fn(&[I]) -> Vec<R>, defect: impl Fn() -> R) -> Vec<R> {
+/// One result per item of a group. A panic over one item must not cost the others theirs: then each
+/// is done alone, which gives the same bits, and the one is a defect.
+fn together_or_alone<I, R>(
+    items: &[I],
+    together: impl Fn(&[I]) -> Vec<R>,
+    defect: impl Fn() -> R,
+) -> Vec<R> {
     let caught = |items: &[I]| catch_unwind(AssertUnwindSafe(|| together(items))).ok();
     caught(items).unwrap_or_else(|| {
-        let alone = |item: &I| caught(std::slice::from_ref(item)).and_then(|mut results| results.pop());
+        let alone =
+            |item: &I| caught(std::slice::from_ref(item)).and_then(|mut results| results.pop());
         items.iter().map(|item| alone(item).unwrap_or_else(&defect)).collect()
     })
 }
 
 impl Engine for ModelEngine<'_> {
-    fn evaluate(&self, feed: &(dyn Fn() -> Option<u64> + Sync), keep: &Keep<'_>, watch: &Watch<'_>) {
+    fn evaluate(
+        &self,
+        feed: &(dyn Fn() -> Option<u64> + Sync),
+        keep: &Keep<'_>,
+        watch: &Watch<'_>,
+    ) {
         let feed = |most: usize| {
             let points = std::iter::from_fn(feed).take(most);
             points.map(|point| (point, self.plan.scenario(point))).collect()

@@ -1,13 +1,14 @@
-//! What a run will take: time, from a few points integrated on the spot; memory and disk, from what is held at once.
+//! The cost of a run: time, from a few points integrated on the spot; memory and disk, from what is
+//! held at once.
 
 use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
 
-use crate::engine::{EngineError, Ladder, MOST_WAITING, ModelEngine, ROWS_A_THREAD};
+use crate::engine::{Engine, EngineError, Ladder, MOST_WAITING, ModelEngine, ROWS_A_THREAD};
+use crate::method::Steps;
 use crate::outcome::{Deviations, Outcome};
-use crate::plan::{Integrator, Plan, shortest_step_s};
-use crate::run::Engine;
+use crate::plan::{Plan, shortest_step_s};
 use crate::store::{Job, Shape, chunk_points};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long.
@@ -16,7 +17,8 @@ const LONG_ENOUGH: Duration = Duration::from_millis(60);
 /// No further place of the grid is tried after this.
 const BUDGET: Duration = Duration::from_millis(350);
 
-/// The first beginning that is tried by a method that chooses its steps: at most [`FIRST_STEPS`] of them.
+/// The first beginning that is tried by a method that chooses its steps: at most [`FIRST_STEPS`] of
+/// them.
 const FIRST_END_S: f64 = 1e-3;
 const FIRST_STEPS: f64 = 1e4;
 
@@ -26,12 +28,13 @@ const PLACES: [f64; 3] = [0.5, 0.9, 0.1];
 /// The program, its libraries and its buffers, before any point (measured: docs/scaling.md).
 const BASE_BYTES: f64 = 14e6;
 
-/// What a cell of a row group takes while it is encoded, besides its own 8 bytes (measured: docs/scaling.md).
+/// What a cell of a row group takes while it is encoded, besides its own 8 bytes (measured:
+/// docs/scaling.md).
 const CELL_BYTES: f64 = 5.0;
 
 /// What a run will take. Every number is an estimate.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     /// Instruction set.
     pub simd: String,
     /// Worker threads.
@@ -58,18 +61,18 @@ impl Estimate {
     ///
     /// # Errors
     /// What keeps a run from having an engine.
-    pub fn of(plan: &Plan, threads: usize) -> Result<Self, EngineError> {
+    pub(crate) fn of(plan: &Plan, threads: usize) -> Result<Self, EngineError> {
         let engine = ModelEngine::new(plan)?;
         let ladders = engine.ladders();
         let began = Instant::now();
         let mut samples = Vec::new();
         for place in PLACES {
             if samples.is_empty() || began.elapsed() < BUDGET {
-                samples.push(Sample::take(plan, ladders, place)?);
+                samples.push(Measured::take(plan, ladders, place)?);
             }
         }
-        let core_s_per_point =
-            samples.iter().map(|sample| sample.core_s_per_point).sum::<f64>() / samples.len() as f64;
+        let core_s_per_point = samples.iter().map(|sample| sample.core_s_per_point).sum::<f64>()
+            / samples.len() as f64;
         let chunk = chunk_points(plan.points());
         // A chunk is one thread's work, so the last round of chunks may leave threads without any.
         let rounds = plan.points().div_ceil(chunk).div_ceil(threads as u64);
@@ -82,20 +85,21 @@ impl Estimate {
             sampled_points: samples.iter().map(|sample| sample.points).sum(),
             sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
             memory_bytes: memory_bytes(plan, threads),
-            disk_bytes: plan.points() as f64 * Shape::of(&Job::of(plan).layout).bytes_a_point() as f64,
+            disk_bytes: plan.points() as f64
+                * Shape::of(&Job::of(plan).layout).bytes_a_point() as f64,
             ladder: ladders[0].clone(),
         })
     }
 }
 
-/// What one place of the grid told.
-struct Sample {
+/// The cost measured at one place of the grid.
+struct Measured {
     core_s_per_point: f64,
     points: u64,
     integrated_s: f64,
 }
 
-impl Sample {
+impl Measured {
     fn take(plan: &Plan, ladders: &[Ladder; 2], place: f64) -> Result<Self, EngineError> {
         let points = plan.points().min(MAX_LANES as u64);
         let first = (plan.points().saturating_sub(points) as f64 * place) as u64;
@@ -111,7 +115,11 @@ impl Sample {
                 let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
                 let rate = ((cost_s - base_s) / (end_s - base_end_s)).max(0.0);
                 let whole_s = cost_s + rate * (plan.end_s - end_s);
-                return Ok(Self { core_s_per_point: whole_s / points as f64, points, integrated_s: end_s });
+                return Ok(Self {
+                    core_s_per_point: whole_s / points as f64,
+                    points,
+                    integrated_s: end_s,
+                });
             }
             shorter = Some((end_s, cost_s));
             end_s = (4.0 * end_s).min(plan.end_s);
@@ -119,11 +127,12 @@ impl Sample {
     }
 }
 
-/// A beginning of the run so short that any method is through it in milliseconds, however stiff the machine.
+/// A beginning of the run so short that any method is through it in milliseconds, however stiff the
+/// machine.
 fn first_end_s(plan: &Plan) -> f64 {
-    let short_s = match plan.integrator {
-        Integrator::Rk4 { step_s } => 100.0 * step_s,
-        Integrator::Dopri5 { .. } | Integrator::Rodas5p { .. } | Integrator::Rk4MassScaled { .. } => {
+    let short_s = match plan.integrator.steps() {
+        Steps::Fixed(step_s) => 100.0 * step_s,
+        Steps::Explicit | Steps::Implicit | Steps::Checked(_) => {
             FIRST_END_S.min(FIRST_STEPS * shortest_step_s(plan.end_s))
         }
     };
@@ -131,7 +140,11 @@ fn first_end_s(plan: &Plan) -> f64 {
 }
 
 /// Time that one core takes for these points' runs, which are cut short.
-fn cost_s(cut: &Plan, ladders: &[Ladder; 2], points: std::ops::Range<u64>) -> Result<f64, EngineError> {
+fn cost_s(
+    cut: &Plan,
+    ladders: &[Ladder; 2],
+    points: std::ops::Range<u64>,
+) -> Result<f64, EngineError> {
     // A shorter run alone would be slower spin, and longer steps.
     let engine = ModelEngine::with_ladders(cut, ladders.clone())?;
     let axis_values: Vec<Vec<f64>> = points.map(|point| cut.axis_values(point)).collect();
@@ -153,7 +166,8 @@ fn memory_bytes(plan: &Plan, threads: usize) -> f64 {
     BASE_BYTES + in_hand.max(joining) + turn_bytes(plan, threads)
 }
 
-/// Peaks by turn of the drum, both models', of the points that go through each thread's lanes together.
+/// Peaks by turn of the drum, both models', of the points that go through each thread's lanes
+/// together.
 fn turn_bytes(plan: &Plan, threads: usize) -> f64 {
     if !plan.measures.wanted().turns {
         return 0.0;
@@ -183,7 +197,10 @@ mod tests {
     #[test]
     fn sizes_read_as_people_say_them() {
         let said = [0.0, 999.0, 1234.0, 56.7e6, 999.96e6, 2e9, 3e15].map(size);
-        assert_eq!(said, ["0 bytes", "999 bytes", "1.2 kB", "56.7 MB", "1.0 GB", "2.0 GB", "3000 TB"]);
+        assert_eq!(
+            said,
+            ["0 bytes", "999 bytes", "1.2 kB", "56.7 MB", "1.0 GB", "2.0 GB", "3000 TB"]
+        );
     }
 
     /// A grid of `count` points over `end_s`.
@@ -191,9 +208,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("grid.toml");
         let grid = format!(
-            "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = {end_s}\n\
+            "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = \
+             {end_s}\n\
              [integrator]\nmethod = \"rk4\"\nstep_s = 2e-4\n\
-             [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.0, count = {count} }}\n"
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.0, count \
+             = {count} }}\n"
         );
         std::fs::write(&path, grid).unwrap();
         crate::config::load(&path, &[]).unwrap()

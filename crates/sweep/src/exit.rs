@@ -9,11 +9,11 @@ use std::process::ExitCode;
 use crate::boundary::product::BoundaryError;
 use crate::config::Diagnostics;
 use crate::engine::EngineError;
-use crate::files::FileError;
-use crate::panics::NoRandomNumbers;
-use crate::plot::PlotError;
+use crate::random_keys::NoRandomNumbers;
 use crate::store::StoreError;
 use crate::threads::ThreadsError;
+use sweep_files::FileError;
+use sweep_plot::PlotError;
 use washer_model::{NoEquilibrium, NoModes};
 
 /// Exit codes, a contract with scripts.
@@ -97,10 +97,10 @@ pub enum Error {
     /// A figure.
     #[error(transparent)]
     Plot(#[from] PlotError),
-    /// A machine that cannot stand.
+    /// A machine without a static equilibrium.
     #[error(transparent)]
     Equilibrium(#[from] NoEquilibrium),
-    /// A machine whose motions cannot be told.
+    /// A machine whose modes cannot be computed.
     #[error(transparent)]
     Modes(#[from] NoModes),
     /// An option whose value makes no sense here.
@@ -143,14 +143,17 @@ impl Error {
     pub fn exit(&self) -> Exit {
         match self {
             Self::Input(_) => Exit::BadInput,
-            Self::Engine(_) | Self::Equilibrium(_) | Self::Modes(_) | Self::Option { .. } => Exit::BadInput,
+            Self::Engine(_) | Self::Equilibrium(_) | Self::Modes(_) | Self::Option { .. } => {
+                Exit::BadInput
+            }
             Self::Boundary(_) => Exit::BadInput,
             Self::Files(error) if error.is_refusal() => Exit::BadInput,
-            Self::Threads(ThreadsError::Scheduler { .. }) => Exit::BadInput,
-            Self::Store(error) => error.exit(),
+            Self::Threads(error) if error.is_refusal() => Exit::BadInput,
+            Self::Store(StoreError::Busy { .. }) => Exit::Busy,
+            Self::Store(error) if error.is_refusal() => Exit::BadInput,
             Self::Plot(error) if error.is_usage() => Exit::BadInput,
             Self::Plot(_) => Exit::Failed,
-            Self::Files(_) | Self::Threads(_) | Self::Random(_) => Exit::Failed,
+            Self::Store(_) | Self::Files(_) | Self::Threads(_) | Self::Random(_) => Exit::Failed,
             Self::File { .. } | Self::Stdout(_) => Exit::Failed,
         }
     }
@@ -212,7 +215,7 @@ fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> Cow<'_, str> {
 ///
 /// # Errors
 /// As [`print()`].
-pub fn show(text: &str) -> Result<Exit, Error> {
+pub(crate) fn show(text: &str) -> Result<Exit, Error> {
     print(&escaped(text, is_unsafe))
 }
 
@@ -221,7 +224,7 @@ pub fn show(text: &str) -> Result<Exit, Error> {
 ///
 /// # Errors
 /// When standard output cannot be written for any other reason.
-pub fn print(text: &str) -> Result<Exit, Error> {
+pub(crate) fn print(text: &str) -> Result<Exit, Error> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Error::Stdout(error)),
@@ -230,7 +233,7 @@ pub fn print(text: &str) -> Result<Exit, Error> {
 }
 
 /// Writes a message for people to standard error; as in [`show`], text only.
-pub fn tell(text: &str) {
+pub(crate) fn tell(text: &str) {
     // As in `Error::report`: nobody is left to tell.
     let _ = writeln!(anstream::stderr(), "{}", escaped(text, is_unsafe));
 }
@@ -255,6 +258,20 @@ mod tests {
         let back: serde_json::Value = serde_json::from_str(&escaped(&json, is_unsafe)).unwrap();
         assert_eq!(back["host"], "a\u{9b}\x07b");
         assert!(matches!(escaped("plain", is_unsafe), Cow::Borrowed("plain")));
+    }
+
+    #[test]
+    fn a_store_that_is_busy_refuses_or_fails_has_a_code_each() {
+        let (output, folder) = (PathBuf::from("x.parquet"), PathBuf::from("x.parquet.partial"));
+        let differs = StoreError::PlanDiffers { folder: folder.clone(), differences: Vec::new() };
+        for (error, exit) in [
+            (StoreError::Busy { output: output.clone(), holders: Vec::new() }, Exit::Busy),
+            (differs, Exit::BadInput),
+            (ThreadsError::Scheduler { given: "0".to_owned() }.into(), Exit::BadInput),
+            (StoreError::NoRun { output, folder }, Exit::Failed),
+        ] {
+            assert_eq!(Error::Store(error).exit(), exit);
+        }
     }
 
     #[test]

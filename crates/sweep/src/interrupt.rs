@@ -1,4 +1,5 @@
-//! SIGINT and SIGTERM: the first asks the run to stop where nothing is lost, the second leaves at once.
+//! SIGINT and SIGTERM: the first asks the run to stop where nothing is lost, the second leaves at
+//! once.
 
 use std::io;
 use std::sync::Arc;
@@ -39,7 +40,8 @@ impl Interrupt {
     pub fn install() -> io::Result<Self> {
         let interrupt = Self::new();
         for signal in [SIGINT, SIGTERM] {
-            // Order matters: the shutdown looks at the flag before this signal's own registration sets it.
+            // Order matters: the shutdown looks at the flag before this signal's own registration
+            // sets it.
             flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.stop))?;
             flag::register_usize(
                 signal,

@@ -2,9 +2,7 @@
 
 use std::process::ExitCode;
 
-use sweep::cli::Cli;
-use sweep::exit::{Error, Exit};
-use sweep::interrupt::survive_file_size_limits;
+use sweep::{Cli, Error, Exit, survive_file_size_limits};
 
 fn main() -> ExitCode {
     let exit = run().unwrap_or_else(|error| {

@@ -1,14 +1,17 @@
-//! What a run measures of its motions: which amplitude the two models are compared by, and metrics beside it.
+//! What a run measures of its motions: which amplitude the two models are compared by, and metrics
+//! beside it.
 
 use washer_model::{Channel, Wanted};
 
 use crate::outcome::{Deviations, Outcome};
 
-/// Deviations below this count as this (m, rad) where turns are compared: neither 0 over 0 nor what no machine feels decides.
-pub const TURN_FLOOR: f64 = 1e-5;
+/// Deviations below this count as this (m, rad) where turns are compared: neither 0 over 0 nor what
+/// no machine feels decides.
+pub(crate) const TURN_FLOOR: f64 = 1e-5;
 
-/// Most turns of the drum in a window that are compared one by one: 20 minutes at 1000 rpm. They stay in memory for a group of points.
-pub const MOST_TURNS: f64 = 20_000.0;
+/// Most turns of the drum in a window that are compared one by one: 20 minutes at 1000 rpm. They
+/// stay in memory for a group of points.
+pub(crate) const MOST_TURNS: f64 = 20_000.0;
 
 /// What counts as the amplitude of a motion, and so as a ratio of two.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -50,14 +53,18 @@ impl Criterion {
     pub const fn ratio(self) -> &'static str {
         match self {
             Self::Peak => {
-                "nonlinear over linear amplitude; null where the linear one is zero or a model failed"
+                "nonlinear over linear amplitude; null where the linear one is zero or a model \
+                 failed"
             }
             Self::Envelope => {
-                "greatest ratio over the drum's turns in the window, nonlinear over linear largest deviation in the same turn, \
-                 both counted as 1e-5 at least; null where the linear motion is zero in all of them or a model failed"
+                "greatest ratio over the drum's turns in the window, nonlinear over linear \
+                 largest deviation in the same turn, \
+                 both counted as 1e-5 at least; null where the linear motion is zero in all of \
+                 them or a model failed"
             }
             Self::Rms => {
-                "nonlinear over linear root mean square; null where the linear one is zero or a model failed"
+                "nonlinear over linear root mean square; null where the linear one is zero or a \
+                 model failed"
             }
         }
     }
@@ -119,11 +126,13 @@ impl Metric {
     pub const fn description(self) -> &'static str {
         match self {
             Self::CabinetForce => {
-                "greatest magnitude in the window of the sum of all spring and damper forces on the cabinet (at rest the weight)"
+                "greatest magnitude in the window of the sum of all spring and damper forces on \
+                 the cabinet (at rest the weight)"
             }
             Self::ClashTime => "time in the window with a gap between drum and tub below zero",
             Self::StaticSag => {
-                "how far the tub's mass centre sinks from where the machine file draws it to the static equilibrium; null if \
+                "how far the tub's mass centre sinks from where the machine file draws it to the \
+                 static equilibrium; null if \
                  there is none"
             }
         }
@@ -206,7 +215,8 @@ mod tests {
 
     #[test]
     fn motions_below_the_floor_decide_nothing() {
-        // A thousand times as large, and still nothing that counts; then from the floor upwards without a leap.
+        // A thousand times as large, and still nothing that counts; then from the floor upwards
+        // without a leap.
         let compared = outcome(&[[1e-6, 4e-5], [1e-3, 1e-3]], &[[1e-9, 1e-9], [1e-3, 1e-3]]);
         let [Some(first), Some(second)] = compared.turn_ratios[..] else { panic!("{compared:?}") };
         assert_eq!(first, 1.0);
@@ -223,6 +233,10 @@ mod tests {
     fn what_is_not_asked_for_is_not_recorded() {
         assert_eq!(Measures::default().wanted(), Wanted::default());
         let sag = Measures { metrics: vec![Metric::StaticSag], ..Measures::default() };
-        assert_eq!(sag.wanted(), Wanted::default(), "the equilibrium is known without a trajectory");
+        assert_eq!(
+            sag.wanted(),
+            Wanted::default(),
+            "the equilibrium is known without a trajectory"
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use washer_model::Channel;
 
-use crate::engine::Level;
+use crate::method::Level;
 
 /// Why a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -23,8 +23,14 @@ pub enum Status {
 
 impl Status {
     /// Every status; the position is its code in chunk files, so new ones go to the end.
-    pub const ALL: [Self; 6] =
-        [Self::Ok, Self::Diverged, Self::StepTooSmall, Self::StepLimit, Self::NoEquilibrium, Self::Panicked];
+    pub const ALL: [Self; 6] = [
+        Self::Ok,
+        Self::Diverged,
+        Self::StepTooSmall,
+        Self::StepLimit,
+        Self::NoEquilibrium,
+        Self::Panicked,
+    ];
 }
 
 /// One model's trajectory at one grid point.
@@ -34,7 +40,8 @@ pub struct Trajectory {
     pub status: Status,
     /// When it failed, if it did during the integration.
     pub fail_time_s: Option<f64>,
-    /// Largest deviation from equilibrium within the window, per channel of the plan; empty if the model failed.
+    /// Largest deviation from equilibrium within the window, per channel of the plan; empty if the
+    /// model failed.
     pub amplitudes: Vec<f64>,
     /// Least gap between drum and tub over the whole run; `None` if the model failed.
     pub min_gap_m: Option<f64>,
@@ -44,12 +51,13 @@ pub struct Trajectory {
     pub rejected: u64,
     /// The model's metrics that the plan asks for, in column order; empty if the model failed.
     pub metrics: Vec<f64>,
-    /// Largest deviations by turn of the drum, in the order of `Channel::ALL`: while the two models are being compared by them.
+    /// Largest deviations by turn of the drum, in the order of `Channel::ALL`: while the two models
+    /// are being compared by them.
     pub turns: Vec<Deviations>,
 }
 
 /// Of every channel, in the order of `Channel::ALL` (m, rad).
-pub type Deviations = [f64; Channel::ALL.len()];
+pub(crate) type Deviations = [f64; Channel::ALL.len()];
 
 impl Trajectory {
     /// Nothing but a status.
@@ -79,12 +87,14 @@ pub struct Outcome {
     pub linear: Trajectory,
     /// Which rung of which method the nonlinear model's numbers come from.
     pub method: Level,
-    /// The relative error left in the row's numbers, at most, as seen by comparing rungs; `None` where nothing was compared.
+    /// The relative error left in the row's numbers, at most, as seen by comparing rungs; `None`
+    /// where nothing was compared.
     pub error: Option<f64>,
-    /// Whether plain RK4 does not agree with itself at two steps: the motion is chaotic. `None` where nothing was compared.
+    /// Whether plain RK4 does not agree with itself at two steps: the motion is chaotic. `None`
+    /// where nothing was compared.
     pub sensitive: Option<bool>,
-    /// Ratios per channel of the plan where they are found turn by turn; `None` where undefined. Empty where the amplitudes' quotients
-    /// are the ratios, or a model failed.
+    /// Ratios per channel of the plan where they are found turn by turn; `None` where undefined.
+    /// Empty where the amplitudes' quotients are the ratios, or a model failed.
     pub turn_ratios: Vec<Option<f64>>,
     /// How far the machine sinks to its equilibrium, if the plan asks for it and there is one.
     pub static_sag_m: Option<f64>,

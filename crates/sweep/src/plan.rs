@@ -1,25 +1,26 @@
-//! What a run is about to do, with every value resolved and checked: the one thing that flows from the
-//! configuration into the engine, the store and the reports.
+//! What a run is about to do, with every value resolved and checked: the one thing that flows from
+//! the configuration into the engine, the store and the reports.
 
 use washer_model::{Channel, Machine, Parameter, Spin, Target};
 
 use crate::design::Design;
 use crate::measures::Measures;
+use crate::method::Integrator;
 
-/// Most steps that a trajectory may need by a method whose steps are bounded by its stability; at this
-/// many, one point takes an hour or more.
-pub const MOST_STEPS: f64 = 1e10;
+/// Most steps that a trajectory may need by a method whose steps are bounded by its stability; at
+/// this many, one point takes an hour or more.
+pub(crate) const MOST_STEPS: f64 = 1e10;
 
 /// The shortest step with which a trajectory to `end_s` takes at most [`MOST_STEPS`].
 #[must_use]
-pub fn shortest_step_s(end_s: f64) -> f64 {
+pub(crate) fn shortest_step_s(end_s: f64) -> f64 {
     end_s / MOST_STEPS
 }
 
 /// A validated run: every grid point of every axis, and how each is integrated.
 ///
-/// A plan can only be made by the configuration, which refuses bad input, so the rest of the program takes its
-/// numbers as they are.
+/// A plan can only be made by the configuration, which refuses bad input, so the rest of the
+/// program takes its numbers as they are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Name of the run; the output defaults to `results/<name>.parquet`.
@@ -42,35 +43,6 @@ pub struct Plan {
     pub reliability: Reliability,
     /// What is measured of the motions.
     pub measures: Measures,
-}
-
-/// How a trajectory is integrated.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Integrator {
-    /// Classical Runge-Kutta with a fixed step.
-    Rk4 {
-        /// Step; the last one before a window edge or the end is shortened by the plan to hit it exactly.
-        step_s: f64,
-    },
-    /// Dormand-Prince 5(4), adaptive.
-    Dopri5 {
-        /// Relative tolerance per component.
-        rtol: f64,
-        /// Absolute tolerance per component (m, rad, m/s, rad/s).
-        atol: f64,
-    },
-    /// Rodas5P, linearly implicit, adaptive: for machines too stiff for the others.
-    Rodas5p {
-        /// Relative tolerance per component.
-        rtol: f64,
-        /// Absolute tolerance per component (m, rad, m/s, rad/s).
-        atol: f64,
-    },
-    /// Classical Runge-Kutta over the mass-scaled bearings.
-    Rk4MassScaled {
-        /// Relative error asked of every amplitude.
-        accuracy: f64,
-    },
 }
 
 /// One swept parameter.
@@ -123,8 +95,9 @@ impl AxisValues {
         self.len() == 0
     }
 
-    /// Value `i`, from 0; beyond the last, the last. Both ends are exact and every value is the same on all
-    /// machines: a linear one has the bits of NumPy's `linspace`, a logarithmic one takes no platform's `pow`.
+    /// Value `i`, from 0; beyond the last, the last. Both ends are exact and every value is the
+    /// same on all machines: a linear one has the bits of NumPy's `linspace`, a logarithmic one
+    /// takes no platform's `pow`.
     ///
     /// # Panics
     /// If there are no values.
@@ -147,18 +120,20 @@ impl AxisValues {
             Self::Linear { from, to, count } => {
                 at(from, to, count, &|i, last| i * ((to - from) / last) + from)
             }
-            Self::Log { from, to, count } => {
-                at(from, to, count, &|i, last| from * libm::exp10(i * (libm::log10(to / from) / last)))
-            }
+            Self::Log { from, to, count } => at(from, to, count, &|i, last| {
+                from * libm::exp10(i * (libm::log10(to / from) / last))
+            }),
         }
     }
 
-    /// The value a part `place` (0 to 1) of the way from the first to the last, evenly or by the logarithm; a list has
-    /// no values between its own, and gives the nearest.
+    /// The value a part `place` (0 to 1) of the way from the first to the last, evenly or by the
+    /// logarithm; a list has no values between its own, and gives the nearest.
     #[must_use]
     pub fn between(&self, place: f64) -> f64 {
         match *self {
-            Self::List(ref values) => values[((place * values.len() as f64) as usize).min(values.len() - 1)],
+            Self::List(ref values) => {
+                values[((place * values.len() as f64) as usize).min(values.len() - 1)]
+            }
             Self::Linear { from, to, .. } => from + place * (to - from),
             Self::Log { from, to, .. } => from * libm::exp10(place * libm::log10(to / from)),
         }
@@ -229,13 +204,17 @@ impl Plan {
     /// Machine and spin at the given value of each axis, on the grid or between its points.
     #[must_use]
     pub fn scenario_at(&self, axis_values: &[f64]) -> Scenario {
-        let mut scenario =
-            Scenario { machine: self.machine.clone(), spin: self.spin.clone(), window_s: self.window_s };
+        let mut scenario = Scenario {
+            machine: self.machine.clone(),
+            spin: self.spin.clone(),
+            window_s: self.window_s,
+        };
         self.place(&mut scenario, axis_values);
         scenario
     }
 
-    /// Makes any scenario of this plan the one at these values of the axes: those are all that differs.
+    /// Makes any scenario of this plan the one at these values of the axes: those are all that
+    /// differs.
     pub(crate) fn place(&self, scenario: &mut Scenario, axis_values: &[f64]) {
         let Scenario { machine, spin, window_s } = scenario;
         for (axis, &value) in self.axes.iter().zip(axis_values) {
@@ -243,8 +222,8 @@ impl Plan {
         }
     }
 
-    /// Points of a grid where every axis is at its least or greatest value, beyond the eighth axis at its least; none of a
-    /// design, whose points need not be there.
+    /// Points of a grid where every axis is at its least or greatest value, beyond the eighth axis
+    /// at its least; none of a design, whose points need not be there.
     #[must_use]
     pub fn corner_points(&self) -> Vec<u64> {
         if self.design.is_some() {
@@ -260,9 +239,9 @@ impl Plan {
         (0..1_u32 << free).map(corner).collect()
     }
 
-    /// Number of corners: places where a condition that is monotonic along each axis is hardest to meet.
-    /// Every axis is at its least or greatest value there; the corners of a list are all of its points.
-    /// One without axes.
+    /// Number of corners: places where a condition that is monotonic along each axis is hardest to
+    /// meet. Every axis is at its least or greatest value there; the corners of a list are all of
+    /// its points. One without axes.
     #[must_use]
     pub fn corners(&self) -> u64 {
         match &self.design {
@@ -284,8 +263,8 @@ impl Plan {
         self.axes.iter().enumerate().map(end).collect()
     }
 
-    /// Of the corners not more than 256, spread evenly: a list has no corners but its points, and looking at a
-    /// machine's modes is expensive.
+    /// Of the corners not more than 256, spread evenly: a list has no corners but its points, and
+    /// looking at a machine's modes is expensive.
     #[must_use]
     pub fn some_corners(&self) -> Vec<Vec<f64>> {
         let every = self.corners().div_ceil(Self::MOST_PREPARED);
@@ -354,14 +333,25 @@ mod tests {
 
     #[test]
     fn linear_values_are_numpys_linspace() {
-        // linspace is i * step + start with the last value replaced by the end; these are its doubles in Python.
+        // linspace is i * step + start with the last value replaced by the end; these are its
+        // doubles in Python.
         let masses = AxisValues::Linear { from: 0.05, to: 1.0, count: 39 };
-        let numpy = [(0, 0.05), (1, 0.075), (2, 0.1), (20, 0.549_999_999_999_999_9), (37, 0.975), (38, 1.0)];
+        let numpy = [
+            (0, 0.05),
+            (1, 0.075),
+            (2, 0.1),
+            (20, 0.549_999_999_999_999_9),
+            (37, 0.975),
+            (38, 1.0),
+        ];
         for (i, value) in numpy {
             assert_eq!(masses.value(i), value, "{i}");
         }
         let dampings = AxisValues::Linear { from: 60.0, to: 300.0, count: 33 };
-        assert_eq!([dampings.value(1), dampings.value(31), dampings.value(32)], [67.5, 292.5, 300.0]);
+        assert_eq!(
+            [dampings.value(1), dampings.value(31), dampings.value(32)],
+            [67.5, 292.5, 300.0]
+        );
     }
 
     #[test]
@@ -392,7 +382,8 @@ mod tests {
         assert_eq!(plan.points(), 6);
         let order: Vec<_> = (0..6).map(|p| plan.axis_values(p)).collect();
         let expected =
-            [[0.1, 60.0], [0.1, 70.0], [0.1, 80.0], [0.2, 60.0], [0.2, 70.0], [0.2, 80.0]].map(Vec::from);
+            [[0.1, 60.0], [0.1, 70.0], [0.1, 80.0], [0.2, 60.0], [0.2, 70.0], [0.2, 80.0]]
+                .map(Vec::from);
         assert_eq!(order, expected);
         let scenario = plan.scenario(4);
         assert_eq!(scenario.machine.unbalance.mass_kg, 0.2);
@@ -427,7 +418,8 @@ mod tests {
         plan.design = Some(Design::Sobol { points: 1024, seed: 1 });
         assert_eq!(plan.points(), 1024);
         let points: Vec<Vec<f64>> = (0..1024).map(|point| plan.axis_values(point)).collect();
-        let below = |axis: usize, middle: f64| points.iter().filter(|point| point[axis] < middle).count();
+        let below =
+            |axis: usize, middle: f64| points.iter().filter(|point| point[axis] < middle).count();
         assert_eq!([below(0, 0.5), below(1, 1e7)], [512, 512]);
         assert!(points.iter().all(|p| (0.1..0.9).contains(&p[0]) && (1e6..1e8).contains(&p[1])));
         assert_eq!(plan.corners(), 4);

@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// What `--progress` said.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Mode {
+pub enum ProgressMode {
     /// A bar on a terminal; elsewhere a line a minute, which is what a batch job's log can bear.
     #[default]
     Auto,
@@ -18,7 +18,7 @@ pub enum Mode {
     None,
 }
 
-impl FromStr for Mode {
+impl FromStr for ProgressMode {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -47,26 +47,28 @@ enum Shown {
 }
 
 impl Progress {
-    pub(crate) fn new(mode: Mode, total: u64, start: u64) -> Self {
+    pub(crate) fn new(mode: ProgressMode, total: u64, start: u64) -> Self {
         Self::shown(mode, BAR, total, start, start)
     }
 
     /// Of a search, whose points nobody can count beforehand: rows of this total are done. `start`
     /// points were there at the start.
-    pub(crate) fn of_search(mode: Mode, rows: u64, start: u64) -> Self {
+    pub(crate) fn of_search(mode: ProgressMode, rows: u64, start: u64) -> Self {
         Self::shown(mode, ROWS, rows, 0, start)
     }
 
-    fn shown(mode: Mode, template: &str, total: u64, position: u64, start: u64) -> Self {
+    fn shown(mode: ProgressMode, template: &str, total: u64, position: u64, start: u64) -> Self {
         let lines = |seconds| {
             let every = Duration::from_secs(seconds);
             Shown::Lines { every, next: Instant::now() + every }
         };
         let shown = match mode {
-            Mode::None => Shown::Nothing,
-            Mode::Plain => lines(5),
-            Mode::Auto if std::io::stderr().is_terminal() => Shown::Bar(bar(template, total, position)),
-            Mode::Auto => lines(60),
+            ProgressMode::None => Shown::Nothing,
+            ProgressMode::Plain => lines(5),
+            ProgressMode::Auto if std::io::stderr().is_terminal() => {
+                Shown::Bar(bar(template, total, position))
+            }
+            ProgressMode::Auto => lines(60),
         };
         Self { shown, total, start, began: Instant::now() }
     }
@@ -194,12 +196,14 @@ mod tests {
 
     #[test]
     fn a_resumed_run_counts_what_is_there_but_not_towards_the_rate() {
-        let mut progress = Progress::new(Mode::Plain, 1000, 900);
+        let mut progress = Progress::new(ProgressMode::Plain, 1000, 900);
         progress.began = Instant::now() - Duration::from_secs(10);
         let line = progress.line(950);
         assert!(line.starts_with("950 of 1000 points (95.0 %), 5.0"), "{line}");
         assert!(
-            line.ends_with("10 s left") || line.ends_with("9.99 s left") || line.ends_with("10.00 s left"),
+            line.ends_with("10 s left")
+                || line.ends_with("9.99 s left")
+                || line.ends_with("10.00 s left"),
             "{line}"
         );
         assert!(progress.line(900).contains("unknown"));
@@ -207,7 +211,7 @@ mod tests {
 
     #[test]
     fn a_search_counts_its_rows_and_the_rate_of_its_new_points() {
-        let mut progress = Progress::of_search(Mode::Plain, 39, 100);
+        let mut progress = Progress::of_search(ProgressMode::Plain, 39, 100);
         progress.began = Instant::now() - Duration::from_secs(10);
         let points = progress.points(200);
         assert!(points.starts_with("200 points, ") && points.ends_with(" points/s"), "{points}");
@@ -216,7 +220,9 @@ mod tests {
 
     #[test]
     fn modes_read_as_written() {
-        assert_eq!("plain".parse(), Ok(Mode::Plain));
-        assert!("loud".parse::<Mode>().unwrap_err().contains("expected auto, plain or none"));
+        assert_eq!("plain".parse(), Ok(ProgressMode::Plain));
+        assert!(
+            "loud".parse::<ProgressMode>().unwrap_err().contains("expected auto, plain or none")
+        );
     }
 }

@@ -1,75 +1,26 @@
-//! The runner: takes missing chunks in order, has the engine compute them on all cores, keeps each as it comes, and
-//! joins the whole.
+//! The runner: takes missing chunks in order, has the engine compute them on all cores, keeps each
+//! as it comes, and joins the whole.
 //!
-//! Memory: a chunk (at most 4096 points, about 2 MB) in hand for each thread and as many again on their way to the
-//! disk, then about 40 MB for the join; nothing grows with the number of points but one set entry a chunk.
+//! Memory: a chunk (at most 4096 points, about 2 MB) in hand for each thread and as many again on
+//! their way to the disk, then about 40 MB for the join; nothing grows with the number of points
+//! but one set entry a chunk.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::engine::{Engine, Watch};
 use crate::interrupt::Interrupt;
 use crate::outcome::Outcome;
-use crate::panics;
-use crate::progress::{Mode, Progress};
+use crate::progress::{Progress, ProgressMode};
 use crate::store::provenance::{self, Session};
 use crate::store::read::{ResultFile, Tally};
-use crate::store::{Job, Opened, Options, Run, Shard, ShardRequest, StoreError};
+use crate::store::{Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, StoreError};
 use crate::threads::{self, Environment, ThreadsError};
-
-/// What computes points.
-pub trait Engine: Sync {
-    /// Evaluates points until `next` gives none, and hands each outcome to `keep`, in any order; fewer if it put the work
-    /// down because [`Watch::stopped`] said so. Works on all threads of the rayon pool that it is called in, and calls
-    /// both from any of them.
-    ///
-    /// A point that fails, even by a panic, is an outcome; a panic that leaves this function costs all that is in hand.
-    fn evaluate(
-        &self,
-        next: &(dyn Fn() -> Option<u64> + Sync),
-        keep: &(dyn Fn(Outcome) + Sync),
-        watch: &Watch<'_>,
-    );
-
-    /// The instruction set in use.
-    fn simd(&self) -> &str;
-}
-
-/// The engine's view of the run it serves.
-pub struct Watch<'a> {
-    interrupt: &'a Interrupt,
-    /// Set when a chunk could not be kept: what is in hand would be lost too.
-    abort: AtomicBool,
-    done: AtomicU64,
-}
-
-impl<'a> Watch<'a> {
-    /// A watch over nothing but the stop flag.
-    #[must_use]
-    pub const fn new(interrupt: &'a Interrupt) -> Self {
-        Self { interrupt, abort: AtomicBool::new(false), done: AtomicU64::new(0) }
-    }
-
-    /// Counts points done, for the bar.
-    pub fn done(&self, points: u64) {
-        self.done.fetch_add(points, Ordering::Relaxed);
-    }
-
-    /// Has the work put down.
-    pub(crate) fn abort(&self) {
-        self.abort.store(true, Ordering::Relaxed);
-    }
-
-    /// Whether to put the work down.
-    #[must_use]
-    pub fn stopped(&self) -> bool {
-        self.interrupt.stopped() || self.abort.load(Ordering::Relaxed)
-    }
-}
+use sweep_files::panics;
 
 /// How to run.
 #[derive(Clone, Copy)]
@@ -81,10 +32,10 @@ pub struct RunOptions<'a> {
     /// Which part.
     pub shard: Option<ShardRequest>,
     /// How progress is shown.
-    pub progress: Mode,
-    /// Where a scheduler's word is looked up.
+    pub progress: ProgressMode,
+    /// Looks up the scheduler's variables.
     pub environment: Environment<'a>,
-    /// Takes what a user should hear before the work starts.
+    /// Shows a user what matters before the work starts.
     pub tell: &'a dyn Fn(&str),
 }
 
@@ -108,14 +59,14 @@ pub enum Ended {
     },
 }
 
-/// What there is to say about a run.
+/// The outcome of a run, for a user.
 #[derive(Debug)]
-pub struct Report {
+pub struct RunReport {
     /// How it ended.
     pub ended: Ended,
     /// This process's work; absent if there was none to do.
     pub session: Option<Session>,
-    /// Things a user should hear of.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
@@ -129,12 +80,12 @@ pub fn run(
     output: &Path,
     options: RunOptions<'_>,
     interrupt: &Interrupt,
-) -> Result<Report, StoreError> {
+) -> Result<RunReport, StoreError> {
     let RunOptions { threads, fresh, shard, environment, .. } = options;
-    let mut run = match Run::open(output, job, Options { fresh, shard, environment })? {
+    let mut run = match OpenRun::open(output, job, OpenOptions { fresh, shard, environment })? {
         Opened::Finished(file, tally) => {
             let ended = Ended::Already(file, tally);
-            return Ok(Report { ended, session: None, notes: Vec::new() });
+            return Ok(RunReport { ended, session: None, notes: Vec::new() });
         }
         Opened::Run(run) => *run,
     };
@@ -148,7 +99,8 @@ pub fn run(
     if there > 0 {
         (options.tell)(&format!("going on: {there} of {points} points are there"));
     }
-    let clock = Clock { began: Instant::now(), started_unix_s: provenance::now_unix_s(), threads, there };
+    let clock =
+        Clock { began: Instant::now(), started_unix_s: provenance::now_unix_s(), threads, there };
     let mut progress = Progress::new(options.progress, points, there);
     let result = compute_and_join(engine, job, &mut run, threads, &mut progress, interrupt);
     progress.finish();
@@ -157,7 +109,7 @@ pub fn run(
         Ok(Some(tally)) => {
             let joined = run.complete(job, tally, Some(session.clone()))?;
             let ended = Ended::Finished(Box::new(joined.tally));
-            Ok(Report { ended, session: Some(session), notes: joined.notes })
+            Ok(RunReport { ended, session: Some(session), notes: joined.notes })
         }
         Ok(None) => {
             let mut notes = run.take_notes();
@@ -166,9 +118,11 @@ pub fn run(
             let (points, kept) = run.own_points();
             let ended = match (interrupt.signal(), run.shard()) {
                 (None, Some(shard)) => Ended::Shard(shard),
-                (signal, _) => Ended::Interrupted { signal: signal.unwrap_or_default(), kept, points },
+                (signal, _) => {
+                    Ended::Interrupted { signal: signal.unwrap_or_default(), kept, points }
+                }
             };
-            Ok(Report { ended, session: Some(session), notes })
+            Ok(RunReport { ended, session: Some(session), notes })
         }
         Err(error) => {
             // The error counts; whether its session can be recorded on the same disk does not.
@@ -182,7 +136,7 @@ pub fn run(
 fn compute_and_join(
     engine: &dyn Engine,
     job: &Job<'_>,
-    run: &mut Run,
+    run: &mut OpenRun,
     threads: usize,
     progress: &mut Progress,
     interrupt: &Interrupt,
@@ -195,17 +149,19 @@ fn compute_and_join(
         }
         progress.joining();
         match run.join(job, &|| interrupt.stopped()) {
-            // A chunk that was whole a moment ago is not any more: compute it again, but not for ever.
+            // A chunk that was whole a moment ago is not any more: compute it again, but not for
+            // ever.
             Err(StoreError::Incomplete { .. }) if attempts_left > 0 => attempts_left -= 1,
             result => return result,
         }
     }
 }
 
-/// Computes and keeps every missing chunk of this process's part, or as many as a signal or an error lets.
+/// Computes and keeps every missing chunk of this process's part, or as many as a signal or an
+/// error lets.
 fn compute(
     engine: &dyn Engine,
-    run: &Run,
+    run: &OpenRun,
     threads: usize,
     progress: &mut Progress,
     interrupt: &Interrupt,
@@ -232,7 +188,8 @@ fn compute(
             match receiver.recv_timeout(Duration::from_millis(100)) {
                 Ok((chunk, outcomes)) => {
                     if let Err(error) = run.write_chunk(chunk, &outcomes) {
-                        // A chunk that makes no sense costs itself; a disk that fails would cost them all.
+                        // A chunk that makes no sense costs itself; a disk that fails would cost
+                        // them all.
                         if !matches!(error, StoreError::Engine { .. }) {
                             watch.abort();
                         }
@@ -242,7 +199,7 @@ fn compute(
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
-            progress.show(start + watch.done.load(Ordering::Relaxed));
+            progress.show(start + watch.points_done());
         }
         if let Some(Ok(Err(error))) = work.map(std::thread::ScopedJoinHandle::join) {
             result = std::mem::replace(&mut result, Ok(())).and(Err(error));
@@ -253,7 +210,7 @@ fn compute(
 
 /// Chunks in hand: points go out one by one, outcomes come back in any order, whole chunks go on.
 struct Hand<'a> {
-    run: &'a Run,
+    run: &'a OpenRun,
     /// Points of missing chunks that have not gone out.
     left: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
     /// Outcomes of chunks that are not whole.
@@ -262,7 +219,7 @@ struct Hand<'a> {
 }
 
 impl<'a> Hand<'a> {
-    fn new(run: &'a Run, whole: SyncSender<(u64, Vec<Outcome>)>) -> Self {
+    fn new(run: &'a OpenRun, whole: SyncSender<(u64, Vec<Outcome>)>) -> Self {
         let missing = (0..run.chunks()).filter(|&chunk| run.is_missing(chunk));
         let left = missing.flat_map(|chunk| run.chunk_range(chunk));
         Self { run, left: Mutex::new(Box::new(left)), parts: Mutex::default(), whole }
@@ -283,9 +240,11 @@ impl<'a> Hand<'a> {
         let untouched = lock(&self.left).next();
         match (unfinished, untouched) {
             (None, None) => Ok(()),
-            (Some(points), _) => {
-                Err(StoreError::Engine { first: points.start, last: points.end.saturating_sub(1), reason })
-            }
+            (Some(points), _) => Err(StoreError::Engine {
+                first: points.start,
+                last: points.end.saturating_sub(1),
+                reason,
+            }),
             (None, Some(point)) => Err(StoreError::Engine { first: point, last: point, reason }),
         }
     }
@@ -312,7 +271,7 @@ fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What a session is made of besides the engine's word.
+/// What a session is made of, besides what the engine knows.
 struct Clock {
     began: Instant,
     started_unix_s: u64,
@@ -322,7 +281,7 @@ struct Clock {
 }
 
 impl Clock {
-    fn session(&self, engine: &dyn Engine, job: &Job<'_>, run: &Run) -> Session {
+    fn session(&self, engine: &dyn Engine, job: &Job<'_>, run: &OpenRun) -> Session {
         let points = run.own_points().1.saturating_sub(self.there);
         let wall_s = self.began.elapsed().as_secs_f64();
         Session {

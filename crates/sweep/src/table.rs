@@ -1,4 +1,5 @@
-//! A small result file: columns with units and descriptions, metadata as in the map's file (`store::schema`), in one piece.
+//! A small result file: columns with units and descriptions, metadata as in the map's file
+//! (`store::schema`), in one piece.
 
 use std::collections::HashMap;
 use std::io::Cursor;
@@ -14,9 +15,21 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde_json::{Map, Value, json};
 
-use crate::files::{key, seal};
 use crate::identity;
-use crate::panics;
+use sweep_files::panics;
+use sweep_files::{key, seal};
+
+/// A column's metadata in the Arrow schema.
+pub(crate) fn field_metadata(unit: &str, description: &str) -> HashMap<String, String> {
+    [("unit", unit), ("description", description)]
+        .map(|(key, text)| (key.to_owned(), text.to_owned()))
+        .into()
+}
+
+/// A column's entry in the column dictionary, the JSON under `key::COLUMNS`.
+pub(crate) fn dictionary_entry(type_name: &str, unit: &str, description: &str) -> Value {
+    json!({ "type": type_name, "unit": unit, "description": description })
+}
 
 /// Columns on their way to a file.
 #[derive(Default)]
@@ -28,7 +41,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Adds numbers; what is not known is null.
+    /// Adds numbers; unknown ones are null.
     pub(crate) fn numbers(
         &mut self,
         name: &str,
@@ -41,11 +54,16 @@ impl Table {
     }
 
     /// Adds counts.
-    pub(crate) fn counts(&mut self, name: &str, description: &str, values: impl IntoIterator<Item = u64>) {
+    pub(crate) fn counts(
+        &mut self,
+        name: &str,
+        description: &str,
+        values: impl IntoIterator<Item = u64>,
+    ) {
         self.add(name, "1", description, "uint64", Arc::new(UInt64Array::from_iter_values(values)));
     }
 
-    /// Adds words of which there are few.
+    /// Adds words from a short list.
     pub(crate) fn words<'a>(
         &mut self,
         name: &str,
@@ -57,15 +75,13 @@ impl Table {
     }
 
     fn add(&mut self, name: &str, unit: &str, description: &str, type_name: &str, array: ArrayRef) {
-        let facts = HashMap::from([
-            ("unit".to_owned(), unit.to_owned()),
-            ("description".to_owned(), description.to_owned()),
-        ]);
         let nullable = matches!(array.data_type(), DataType::Float64);
-        self.fields.push(Field::new(name, array.data_type().clone(), nullable).with_metadata(facts));
+        self.fields.push(
+            Field::new(name, array.data_type().clone(), nullable)
+                .with_metadata(field_metadata(unit, description)),
+        );
         self.arrays.push(array);
-        self.dictionary
-            .insert(name.to_owned(), json!({ "type": type_name, "unit": unit, "description": description }));
+        self.dictionary.insert(name.to_owned(), dictionary_entry(type_name, unit, description));
     }
 
     /// Adds an entry to the file's key-value metadata.
@@ -73,7 +89,7 @@ impl Table {
         self.text(key, value.to_string());
     }
 
-    /// Adds an entry that is no JSON.
+    /// Adds an entry that is not JSON.
     pub(crate) fn text(&mut self, key: &str, value: String) {
         self.metadata.push(KeyValue::new(key.to_owned(), value));
     }
@@ -86,8 +102,10 @@ impl Table {
         let version = identity::VERSION;
         self.text(key::VERSION, version.to_owned());
         self.text(key::NUMERICS, identity::NUMERICS_VERSION.to_string());
-        self.metadata
-            .push(KeyValue::new(key::COLUMNS.to_owned(), Value::Object(self.dictionary).to_string()));
+        self.metadata.push(KeyValue::new(
+            key::COLUMNS.to_owned(),
+            Value::Object(self.dictionary).to_string(),
+        ));
         let properties = WriterProperties::builder()
             .set_created_by(format!("sweep version {version}"))
             .set_compression(Compression::ZSTD(ZstdLevel::default()))

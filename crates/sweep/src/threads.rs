@@ -2,15 +2,15 @@
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::panics::{self, NoRandomNumbers};
+use crate::random_keys::{NoRandomNumbers, draw_random_keys};
 
-/// Where a scheduler's word is looked up; the process environment outside tests.
-pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
+/// Looks up a variable of a scheduler; the process environment outside tests.
+pub(crate) type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 /// As many threads as a process can sensibly ask for.
 const MOST: usize = 4096;
 
-/// Slurm's word for the cores of a task.
+/// Slurm's variable with the cores of a task.
 const SLURM_CORES: &str = "SLURM_CPUS_PER_TASK";
 
 /// Why there are no threads to work with.
@@ -30,7 +30,7 @@ pub enum ThreadsError {
          --threads"
     )]
     Scheduler {
-        /// As it stands in the environment.
+        /// The variable's value.
         given: String,
     },
     /// No random numbers.
@@ -41,6 +41,11 @@ pub enum ThreadsError {
 impl ThreadsError {
     pub(crate) fn start(threads: usize) -> impl Fn(&dyn std::fmt::Display) -> Self {
         move |reason| Self::Start { threads, reason: reason.to_string() }
+    }
+
+    /// Whether the scheduler's variable is wrong.
+    pub(crate) fn is_refusal(&self) -> bool {
+        matches!(self, Self::Scheduler { .. })
     }
 }
 
@@ -60,7 +65,10 @@ pub(crate) fn parse(text: &str) -> Result<usize, String> {
 ///
 /// # Errors
 /// [`ThreadsError::Scheduler`].
-pub(crate) fn count(asked: Option<usize>, environment: Environment<'_>) -> Result<usize, ThreadsError> {
+pub(crate) fn count(
+    asked: Option<usize>,
+    environment: Environment<'_>,
+) -> Result<usize, ThreadsError> {
     match (asked, environment(SLURM_CORES)) {
         (Some(threads), _) => Ok(threads),
         (None, Some(given)) => parse(&given).map_err(|_| ThreadsError::Scheduler { given }),
@@ -84,7 +92,7 @@ pub(crate) fn pool(threads: usize) -> Result<ThreadPool, ThreadsError> {
         .build()
         .map_err(|error| ThreadsError::start(threads)(&error))?;
     // Maps of the libraries are made in any of them.
-    pool.broadcast(|_| panics::draw_random_keys()).into_iter().collect::<Result<(), _>>()?;
+    pool.broadcast(|_| draw_random_keys()).into_iter().collect::<Result<(), _>>()?;
     Ok(pool)
 }
 
@@ -94,7 +102,8 @@ mod tests {
 
     #[test]
     fn threads_are_those_asked_for_or_what_slurm_gave_or_the_cores() {
-        let slurm = |cores: &'static str| move |name: &str| (name == SLURM_CORES).then(|| cores.to_owned());
+        let slurm =
+            |cores: &'static str| move |name: &str| (name == SLURM_CORES).then(|| cores.to_owned());
         assert_eq!(count(None, &slurm("3")).unwrap(), 3);
         assert_eq!(count(Some(2), &slurm("3")).unwrap(), 2);
         assert_eq!(count(None, &|_| None).unwrap(), cores());

@@ -1,34 +1,38 @@
 //! Time histories of both models at one point, as a table.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use lane_ode::{Failure, Simd};
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use washer_model::{
-    COORDINATES, Cases, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium, Point, Spin,
-    Start, Timing, history, prepare,
+    COORDINATES, Cases, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium, Point,
+    Spin, Start, Timing, history, prepare,
 };
 
-use crate::engine;
-use crate::files::{self, FileKind, key};
-use crate::plan::{Integrator, Plan, Scenario};
+use crate::config::NamedValues;
+use crate::engine::reference_step_s;
+use crate::method::Integrator;
+use crate::plan::{Plan, Scenario};
 use crate::store::StoreError;
 use crate::table::Table;
 use crate::threads;
+use sweep_files::{self as files, FileKind, key};
 
-/// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as many.
-pub const MOST_INSTANTS: f64 = 2e6;
+/// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as
+/// many.
+pub(crate) const MOST_INSTANTS: f64 = 2e6;
 
 /// Most points whose traces a run keeps: at some 300 kB each.
-pub const MOST_KEPT: u64 = 10_000;
+pub(crate) const MOST_KEPT: u64 = 10_000;
 
 /// Instants of a kept trace: what a page shows of it.
 const KEPT_INSTANTS: f64 = 2000.0;
 
 /// What a trace holds beside channels, gap and speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Extras {
+pub(crate) struct Extras {
     /// Coordinates and their speeds.
     pub states: bool,
     /// Forces of springs and dampers, and their sum.
@@ -36,7 +40,7 @@ pub struct Extras {
 }
 
 /// The histories of one point.
-pub struct Trace {
+pub(crate) struct Trace {
     table: Table,
     /// Instants.
     pub instants: usize,
@@ -51,10 +55,10 @@ pub struct Trace {
 ///
 /// # Errors
 /// [`NoEquilibrium`].
-pub fn trace(
+pub(crate) fn trace(
     plan: &Plan,
     scenario: Scenario,
-    at: Map<String, Value>,
+    at: NamedValues,
     every_s: f64,
     start: &Start,
     extras: Extras,
@@ -77,7 +81,10 @@ pub fn trace(
     table.numbers("time_s", "s", "time since the start", (0..instants).map(|k| Some(time(k))));
     let speeds = spin.speeds_rpm((0..instants).map(time)).map(Some);
     table.numbers("speed_rpm", "rpm", "spin of the shaft", speeds);
-    let models = [Columns::new("nonlinear", &nonlinear, instants), Columns::new("linear", &linear, instants)];
+    let models = [
+        Columns::new("nonlinear", &nonlinear, instants),
+        Columns::new("linear", &linear, instants),
+    ];
     models.iter().for_each(|model| model.channels(&mut table));
     models.iter().for_each(|model| model.gap(&mut table));
     if extras.states {
@@ -91,10 +98,13 @@ pub fn trace(
     table.metadata(
         key::TRACE,
         &json!({
-            "at": at,
+            "at": at.into_iter().collect::<BTreeMap<_, _>>(),
             "every_s": every_s,
             "equilibrium": named('q', point.equilibrium()),
-            "start": { "deviations": named('q', &start.deviations), "speeds": named('u', &start.speeds) },
+            "start": {
+                "deviations": named('q', &start.deviations),
+                "speeds": named('u', &start.speeds),
+            },
             "integrator": method_json,
             "nonlinear_failure": failures[0],
             "linear_failure": failures[1],
@@ -103,12 +113,12 @@ pub fn trace(
     Ok(Trace { table, instants, failures: failures.into_iter().flatten().collect() })
 }
 
-/// Traces of every point of a plan, one file each (`point-<index>.parquet`) in `folder`, until `stop` says so. A point without
-/// equilibrium has none.
+/// Traces of every point of a plan, one file each (`point-<index>.parquet`) in `folder`, until
+/// `stop` says so. A point without equilibrium has none.
 ///
 /// # Errors
 /// As `store`; and no more threads.
-pub fn keep(
+pub(crate) fn keep(
     plan: &Plan,
     folder: &Path,
     threads: usize,
@@ -121,9 +131,16 @@ pub fn keep(
                 return Ok(());
             }
             let values = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
-            let at = values.zip(plan.axis_values(point).into_iter().map(Value::from)).collect();
+            let at = values.zip(plan.axis_values(point)).collect();
             let every_s = plan.end_s / KEPT_INSTANTS;
-            match trace(plan, plan.scenario(point), at, every_s, &Start::default(), Extras::default()) {
+            match trace(
+                plan,
+                plan.scenario(point),
+                at,
+                every_s,
+                &Start::default(),
+                Extras::default(),
+            ) {
                 Ok(trace) => {
                     let path = folder.join(format!("point-{point}.parquet"));
                     Ok(files::write(&path, FileKind::Trace, &trace.into_bytes(&path)?)?)
@@ -139,29 +156,28 @@ impl Trace {
     ///
     /// # Errors
     /// What the Parquet library refuses: a defect of this program.
-    pub fn into_bytes(self, path: &Path) -> Result<Vec<u8>, StoreError> {
+    pub(crate) fn into_bytes(self, path: &Path) -> Result<Vec<u8>, StoreError> {
         self.table.into_bytes().map_err(StoreError::parquet("write", path))
     }
 }
 
 /// Ten numbers as q1 to q10 or u1 to u10.
 fn named(letter: char, values: &[f64; COORDINATES]) -> Value {
-    values.iter().enumerate().map(|(i, value)| (format!("{letter}{}", i + 1), json!(value))).collect()
+    values
+        .iter()
+        .enumerate()
+        .map(|(i, value)| (format!("{letter}{}", i + 1), json!(value)))
+        .collect()
 }
 
-/// The plan's method. A map may scale the bearings' mass to be quick; a single trajectory keeps them as they are, in stable steps.
+/// The plan's method. A map may scale the bearings' mass to be quick; a single trajectory keeps
+/// them as they are, in stable steps.
 fn method(plan: &Plan, point: &Point, spin: &Spin) -> (Method, Value) {
-    let rk4 = |step_s: f64| (Method::Rk4 { step_s }, json!({ "method": "rk4", "step_s": step_s }));
-    match plan.integrator {
-        Integrator::Rk4 { step_s } => rk4(step_s),
-        Integrator::Dopri5 { rtol, atol } => {
-            (engine::dopri5(rtol, atol), json!({ "method": "dopri5", "rtol": rtol, "atol": atol }))
-        }
-        Integrator::Rodas5p { rtol, atol } => {
-            (engine::rodas5p(rtol, atol), json!({ "method": "rodas5p", "rtol": rtol, "atol": atol }))
-        }
-        Integrator::Rk4MassScaled { .. } => {
-            rk4(engine::reference_step_s(&Cases::new([(point, spin)], plan.end_s)))
+    match plan.integrator.direct() {
+        Some((_, method)) => (method, plan.integrator.to_json()),
+        None => {
+            let step_s = reference_step_s(&Cases::new([(point, spin)], plan.end_s));
+            (Method::Rk4 { step_s }, Integrator::Rk4 { step_s }.to_json())
         }
     }
 }
@@ -193,7 +209,9 @@ impl<'a> Columns<'a> {
         for channel in Channel::ALL {
             let name = format!("{}_{}", self.model, channel.name());
             let description = format!("{} from equilibrium", channel.description());
-            self.column(table, (&name, channel.unit(), &description), |at| at.channels[channel.index()]);
+            self.column(table, (&name, channel.unit(), &description), |at| {
+                at.channels[channel.index()]
+            });
         }
     }
 
@@ -214,10 +232,12 @@ impl<'a> Columns<'a> {
     }
 
     fn forces(&self, table: &mut Table) {
-        let forces: Vec<Option<Forces>> = (0..self.instants.len()).map(|k| self.history.forces(k)).collect();
+        let forces: Vec<Option<Forces>> =
+            (0..self.instants.len()).map(|k| self.history.forces(k)).collect();
         let mut add = |what: &str, description: &str, of: &dyn Fn(&Forces) -> f64| {
             let name = format!("{what}_{}_n", self.model);
-            let description = format!("{description}, {} model; null from where it failed", self.model);
+            let description =
+                format!("{description}, {} model; null from where it failed", self.model);
             table.numbers(&name, "N", &description, forces.iter().map(|at| at.as_ref().map(of)));
         };
         let Some(first) = forces.first().and_then(Option::as_ref) else { return };
@@ -227,10 +247,13 @@ impl<'a> Columns<'a> {
         }
         for k in 0..first.dampers_n.len() {
             let what = format!("damper_{}_tension", k + 1);
-            add(&what, "tension of the damper, positive while it is drawn out", &|at| at.dampers_n[k]);
+            add(&what, "tension of the damper, positive while it is drawn out", &|at| {
+                at.dampers_n[k]
+            });
         }
         for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-            let description = format!("force of all springs and dampers on the cabinet along c{}", k + 1);
+            let description =
+                format!("force of all springs and dampers on the cabinet along c{}", k + 1);
             add(&format!("cabinet_force_{axis}"), &description, &|at| at.cabinet_n[k]);
         }
     }
@@ -242,6 +265,9 @@ impl<'a> Columns<'a> {
             Failure::StepTooSmall => "needs steps too small for double precision",
             Failure::StepLimit => "used up its allowance of steps",
         };
-        Some(format!("the {} model {what} at {time_s:.4} s: its columns are null from there on", self.model))
+        Some(format!(
+            "the {} model {what} at {time_s:.4} s: its columns are null from there on",
+            self.model
+        ))
     }
 }

@@ -1,12 +1,13 @@
-//! From two trajectories to a verdict: the ratios, the greatest of them, reliable or not, and the row's status.
+//! From two trajectories to a verdict: the ratios, the greatest of them, reliable or not, and the
+//! row's status.
 
 use crate::outcome::{Outcome, Status};
 
 /// Every value of the result file's `status` column, in the order of its dictionary.
 ///
-/// A row whose nonlinear model failed carries that model's reason, whatever became of the linear one; a row whose
-/// linear model alone failed carries that reason behind `linear_`.
-pub const ROW_STATUSES: [&str; 11] = [
+/// A row whose nonlinear model failed carries that model's reason, whatever became of the linear
+/// one; a row whose linear model alone failed carries that reason behind `linear_`.
+pub(crate) const ROW_STATUSES: [&str; 11] = [
     "ok",
     "diverged",
     "step_too_small",
@@ -22,7 +23,7 @@ pub const ROW_STATUSES: [&str; 11] = [
 
 /// The row's entry in [`ROW_STATUSES`], and the failing model's time of failure.
 #[must_use]
-pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
+pub(crate) fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
     let code = |status: Status| status as usize;
     if outcome.nonlinear.status != Status::Ok {
         (code(outcome.nonlinear.status), outcome.nonlinear.fail_time_s)
@@ -36,10 +37,11 @@ pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
 /// How the two models compare at one grid point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// Nonlinear over linear amplitude per channel of the plan, or the greatest such ratio over the drum's turns; `None` where
-    /// the linear amplitude is zero or a model failed.
+    /// Nonlinear over linear amplitude per channel of the plan, or the greatest such ratio over the
+    /// drum's turns; `None` where the linear amplitude is zero or a model failed.
     pub ratios: Vec<Option<f64>>,
-    /// The greatest defined ratio and its channel's position in the plan; the first channel wins a tie.
+    /// The greatest defined ratio and its channel's position in the plan; the first channel wins a
+    /// tie.
     pub greatest: Option<(usize, f64)>,
     /// Whether the greatest ratio is below the limit; `None` where no ratio is defined.
     pub reliable: Option<bool>,
@@ -99,8 +101,10 @@ mod tests {
 
     #[test]
     fn ratios_by_turns_stand_in_the_place_of_the_amplitudes() {
-        let mut row =
-            outcome(trajectory(Status::Ok, &[2.0, 3.0], None), trajectory(Status::Ok, &[2.0, 1.0], None));
+        let mut row = outcome(
+            trajectory(Status::Ok, &[2.0, 3.0], None),
+            trajectory(Status::Ok, &[2.0, 1.0], None),
+        );
         row.turn_ratios = vec![Some(4.0), None];
         let verdict = Verdict::new(&row, 2, 3.5);
         assert_eq!((verdict.ratios, verdict.greatest), (vec![Some(4.0), None], Some((0, 4.0))));
@@ -109,12 +113,16 @@ mod tests {
 
     #[test]
     fn zero_linear_amplitude_leaves_that_ratio_undefined() {
-        let row =
-            outcome(trajectory(Status::Ok, &[1.0, 1.0], None), trajectory(Status::Ok, &[0.0, 1.0], None));
+        let row = outcome(
+            trajectory(Status::Ok, &[1.0, 1.0], None),
+            trajectory(Status::Ok, &[0.0, 1.0], None),
+        );
         assert_eq!(Verdict::new(&row, 2, 2.0).ratios, [None, Some(1.0)]);
         assert_eq!(Verdict::new(&row, 2, 2.0).reliable, Some(true));
-        let still =
-            outcome(trajectory(Status::Ok, &[0.0, 0.0], None), trajectory(Status::Ok, &[0.0, 0.0], None));
+        let still = outcome(
+            trajectory(Status::Ok, &[0.0, 0.0], None),
+            trajectory(Status::Ok, &[0.0, 0.0], None),
+        );
         assert_eq!(
             Verdict::new(&still, 2, 2.0),
             Verdict { ratios: vec![None, None], greatest: None, reliable: None }
@@ -123,20 +131,26 @@ mod tests {
 
     #[test]
     fn a_failed_model_leaves_everything_undefined_and_names_itself() {
-        let row =
-            outcome(trajectory(Status::Diverged, &[], Some(3.5)), trajectory(Status::Ok, &[1.0, 1.0], None));
+        let row = outcome(
+            trajectory(Status::Diverged, &[], Some(3.5)),
+            trajectory(Status::Ok, &[1.0, 1.0], None),
+        );
         assert_eq!(Verdict::new(&row, 2, 2.0).reliable, None);
         assert_eq!(row_status(&row), (1, Some(3.5)));
-        let row =
-            outcome(trajectory(Status::Ok, &[1.0], None), trajectory(Status::StepLimit, &[], Some(2.0)));
+        let row = outcome(
+            trajectory(Status::Ok, &[1.0], None),
+            trajectory(Status::StepLimit, &[], Some(2.0)),
+        );
         let (status, time) = row_status(&row);
         assert_eq!((ROW_STATUSES[status], time), ("linear_step_limit", Some(2.0)));
     }
 
     #[test]
     fn both_failed_reports_the_nonlinear_reason_and_time() {
-        let row =
-            outcome(trajectory(Status::Panicked, &[], None), trajectory(Status::Diverged, &[], Some(1.0)));
+        let row = outcome(
+            trajectory(Status::Panicked, &[], None),
+            trajectory(Status::Diverged, &[], Some(1.0)),
+        );
         let (status, time) = row_status(&row);
         assert_eq!((ROW_STATUSES[status], time), ("panicked", None));
     }

@@ -1,6 +1,6 @@
-//! This project's own methods on the trajectory of `scripts/peers/trajectory.h`, in the same words: `trajectory SIMD METHOD SETTINGS`, with
-//! rk4 STEP, rk4-mass-scaled ACCURACY, dopri5 RTOL ATOL or rodas5p RTOL ATOL. Lanes are filled with copies, and the time is that of
-//! one of them.
+//! This project's own methods on the trajectory of `scripts/peers/trajectory.h`, in the same words:
+//! `trajectory SIMD METHOD SETTINGS`, with rk4 STEP, rk4-mass-scaled ACCURACY, dopri5 RTOL ATOL or
+//! rodas5p RTOL ATOL. Lanes are filled with copies, and the time is that of one of them.
 #![allow(clippy::print_stdout)]
 
 use std::process::ExitCode;
@@ -8,7 +8,8 @@ use std::time::Instant;
 
 use lane_ode::{Simd, Tolerance};
 use washer_model::{
-    Cases, Channel, Formula, Gear, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate,
+    Cases, Channel, Formula, Gear, Machine, Method, ModelKind, Point, Spin, Timing, prepare,
+    simulate,
 };
 
 const END_S: f64 = 50.0;
@@ -44,14 +45,20 @@ fn number(word: &str) -> Result<f64, Failed> {
 /// The method that the words name, and how the table calls it.
 fn method(words: &[&str], point: &Point, spin: &Spin) -> Result<(Method, &'static str), Failed> {
     let tolerance = |relative: &str, absolute: &str| {
-        Ok(Tolerance { relative: number(relative)?, absolute: number(absolute)?, max_steps: u64::MAX })
+        Ok(Tolerance {
+            relative: number(relative)?,
+            absolute: number(absolute)?,
+            max_steps: u64::MAX,
+        })
     };
     match words {
         ["rk4", step] => Ok((Method::Rk4 { step_s: number(step)? }, "RK4")),
         ["rk4-mass-scaled", accuracy] => {
-            let geared = Cases::new([(point, spin)], END_S).choose(Formula::Dop853, number(accuracy)?);
+            let geared =
+                Cases::new([(point, spin)], END_S).choose(Formula::Dop853, number(accuracy)?);
             let geared = geared.map_err(|error| Failed::Because(error.to_string()))?;
-            let geared = geared.ok_or_else(|| Failed::Because("plain RK4 is cheaper".to_owned()))?;
+            let geared =
+                geared.ok_or_else(|| Failed::Because("plain RK4 is cheaper".to_owned()))?;
             Ok((Method::Geared(geared), "mass-scaled RK"))
         }
         ["dopri5", rtol, atol] => Ok((Method::Dopri5(tolerance(rtol, atol)?), "dopri5")),
@@ -94,14 +101,18 @@ fn run() -> Result<String, Failed> {
             let cap = caps.bearings_rad_per_s;
             format!("accuracy {}: step {step_s:.2e} s, cap {cap:.0} rad/s{hinge}", words[1])
         }
-        Method::Dopri5(t) | Method::Rodas5p(t) => format!("rtol {:.0e}, atol {:.0e}", t.relative, t.absolute),
+        Method::Dopri5(t) | Method::Rodas5p(t) => {
+            format!("rtol {:.0e}, atol {:.0e}", t.relative, t.absolute)
+        }
     };
     let lanes = match copies {
         1 => "one trajectory".to_owned(),
         _ => format!("{copies} lanes, {}", simd.name()),
     };
     Ok(format!(
-        r#"{{"program": "sweep {}", "method": "{name}, {lanes}", "settings": "{settings}", "yaw_rad": {:e}, "seconds": {seconds}, "evaluations": 0, "steps": {}}}"#,
+        "{{\"program\": \"sweep {}\", \"method\": \"{name}, {lanes}\", \
+         \"settings\": \"{settings}\", \"yaw_rad\": {:e}, \"seconds\": {seconds}, \
+         \"evaluations\": 0, \"steps\": {}}}",
         env!("CARGO_PKG_VERSION"),
         record.amplitudes[Channel::TubYaw.index()],
         record.steps,

@@ -1,6 +1,7 @@
 /* The equations of motion of a washing machine, x' = f(t, x), for any integrator.
  *
- * A state holds the ten coordinates q1 to q10 (m, rad), then their speeds (m/s, rad/s). One `washer` serves one thread at a time.
+ * A state holds the ten coordinates q1 to q10 (m, rad), then their speeds (m/s, rad/s). One thread
+ * at a time may use a `washer`.
  */
 #ifndef WASHER_H
 #define WASHER_H
@@ -21,7 +22,8 @@ typedef struct washer_setup {
     const double *time_s;    /* of "table": increasing, the first 0 */
     const double *speed_rpm; /* of "table": speeds at these times, linear in between */
     size_t spin_points;
-    const char *const *names; /* parameters that differ from the paper's machine, as in `sweep parameters` */
+    /* parameters that differ from the paper's machine, as in `sweep parameters` */
+    const char *const *names;
     const double *values;
     size_t constants;
 } washer_setup;
@@ -42,7 +44,7 @@ void washer_free(washer *machine);
 size_t washer_dimension(void);
 /* At rest in static equilibrium: where trajectories start. */
 void washer_initial_state(const washer *machine, double *x);
-/* dx = f(t, x). The arguments are in this order so that it serves as a right-hand side elsewhere. */
+/* dx = f(t, x). The order of arguments is that of right-hand sides in other programs. */
 void washer_rhs(double t_s, const double *x, double *dx, washer *machine);
 /* df/dx, row by row: jacobian[row * dimension + column]. */
 void washer_jacobian(double t_s, const double *x, double *jacobian, washer *machine);

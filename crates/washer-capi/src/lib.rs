@@ -1,15 +1,18 @@
-//! The washing machine's equations behind a C ABI: right-hand side, Jacobian and outputs at given parameters, for integrators in other
-//! languages. `include/washer.h` is the contract.
+//! The washing machine's equations behind a C ABI: right-hand side, Jacobian and outputs at given
+//! parameters, for integrators in other languages. `include/washer.h` is the contract.
 //!
-//! Pointers come from the other side of the border, where the compiler cannot look: that is why there is `unsafe` here. What each
-//! function asks of its pointers stands with it; a panic ends the process instead of unwinding into foreign frames.
+//! The compiler cannot check pointers that come from another language, hence the `unsafe`. Each
+//! function documents what its pointers must satisfy. A panic ends the process instead of unwinding
+//! into foreign frames.
 #![allow(unsafe_code)]
 
 use core::ffi::{CStr, c_char};
 use core::ptr;
 use core::slice;
 use lane_ode::Simd;
-use washer_model::{Channel, Equations, Machine, ModelKind, Parameter, STATE_LEN, Spin, Timing, prepare};
+use washer_model::{
+    Channel, Equations, Machine, ModelKind, Parameter, STATE_LEN, Spin, Timing, prepare,
+};
 
 /// The equations of one machine and its spin.
 pub struct Washer(Equations);
@@ -39,17 +42,17 @@ pub struct Setup {
     pub constants: usize,
 }
 
-/// How a call went.
+/// The outcome of a call.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// Made.
+    /// The machine was made.
     Ok = 0,
     /// A pointer that must not be null is, or a text is not UTF-8.
     Null = 1,
     /// No such model, profile or parameter.
     UnknownName = 2,
-    /// A machine or spin that cannot be.
+    /// The machine or the spin is impossible.
     OutOfRange = 3,
     /// The springs cannot carry the machine.
     NoEquilibrium = 4,
@@ -113,7 +116,7 @@ unsafe fn make(setup: &Setup) -> Result<Washer, Status> {
     if !machine.violations().is_empty() || !spin.violations().is_empty() {
         return Err(Status::OutOfRange);
     }
-    // Only the equations are wanted: any time serves.
+    // Only the equations are used, so any time will do.
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     let point = prepare(Simd::best(), &[(machine, spin)], &timing).pop();
     match point {
@@ -125,7 +128,8 @@ unsafe fn make(setup: &Setup) -> Result<Washer, Status> {
 /// Makes a machine.
 ///
 /// # Safety
-/// `setup` is null or points at a setup whose texts and arrays are null or valid; `made` is null or can be written.
+/// `setup` is null or points at a setup whose texts and arrays are null or valid; `made` is null or
+/// can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn washer_new(setup: *const Setup, made: *mut *mut Washer) -> Status {
     if setup.is_null() || made.is_null() {
@@ -142,7 +146,7 @@ pub unsafe extern "C" fn washer_new(setup: *const Setup, made: *mut *mut Washer)
     }
 }
 
-/// Frees a machine; null is none.
+/// Frees a machine; null is allowed.
 ///
 /// # Safety
 /// `machine` comes from `washer_new` and is not used again.
@@ -187,7 +191,12 @@ pub unsafe extern "C" fn washer_rhs(t_s: f64, x: *const f64, dx: *mut f64, machi
 /// # Safety
 /// As [`washer_rhs`]; `jacobian` has room for the square of the dimension.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn washer_jacobian(t_s: f64, x: *const f64, jacobian: *mut f64, machine: *mut Washer) {
+pub unsafe extern "C" fn washer_jacobian(
+    t_s: f64,
+    x: *const f64,
+    jacobian: *mut f64,
+    machine: *mut Washer,
+) {
     // SAFETY: the caller's promise.
     let (machine, x) = unsafe { (&mut *machine, *x.cast::<[f64; STATE_LEN]>()) };
     // SAFETY: the caller's promise.
@@ -200,22 +209,10 @@ pub extern "C" fn washer_channels() -> usize {
     Channel::ALL.len()
 }
 
-/// Names with the zero byte that C wants, in the order of `Channel::ALL`.
-const CHANNEL_NAMES: [&CStr; Channel::ALL.len()] = [
-    c"tub_front_y",
-    c"tub_front_z",
-    c"drum_front_y",
-    c"drum_front_z",
-    c"total_centre_y",
-    c"total_centre_z",
-    c"tub_yaw",
-    c"tub_pitch",
-];
-
 /// A channel's name; null beyond the last.
 #[unsafe(no_mangle)]
 pub extern "C" fn washer_channel_name(channel: usize) -> *const c_char {
-    CHANNEL_NAMES.get(channel).map_or(ptr::null(), |name| name.as_ptr())
+    Channel::ALL.get(channel).map_or(ptr::null(), |channel| channel.c_name().as_ptr())
 }
 
 /// Channels and their rates.
@@ -318,7 +315,8 @@ mod tests {
                         moved[j] += sign * step;
                         washer_rhs(20.0, moved.as_ptr(), column[side].as_mut_ptr(), made);
                     }
-                    let largest = (0..STATE_LEN).fold(1.0_f64, |m, i| m.max(f64::abs(jacobian[i][j])));
+                    let largest =
+                        (0..STATE_LEN).fold(1.0_f64, |m, i| m.max(f64::abs(jacobian[i][j])));
                     for i in 0..STATE_LEN {
                         let slope = (column[0][i] - column[1][i]) / (2.0 * step);
                         let error = (jacobian[i][j] - slope).abs() / largest;

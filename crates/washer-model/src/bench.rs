@@ -1,8 +1,9 @@
-//! A narrow door for benchmarks: parts of a step that the public interface has no word for.
+//! For benchmarks: parts of a step that the public interface does not expose.
 
-use crate::coupling::{Caps, Coupling};
-use crate::model::{Model, STATES};
+use crate::coordinates::STATES;
+use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::point::Point;
+use crate::run::model::Model;
 use crate::run::{Family, ModelKind, OfLinear, OfNonlinear};
 use core::hint::black_box;
 use core::marker::PhantomData;
@@ -17,8 +18,8 @@ pub enum Part {
     Derivative,
 }
 
-/// Evaluates a part of one model's right-hand side `evaluations` times in a row, each after the one before, with the same point in
-/// every lane; with modes capped if caps are given.
+/// Evaluates a part of one model's right-hand side `evaluations` times in a row, each after the one
+/// before, with the same point in every lane; with modes capped if caps are given.
 pub fn evaluate(
     simd: Simd,
     model: ModelKind,
@@ -29,7 +30,9 @@ pub fn evaluate(
 ) {
     let subject = Subject { point, part, caps, evaluations };
     match model {
-        ModelKind::Nonlinear => simd.dispatch(Evaluate::<OfNonlinear> { subject, family: PhantomData }),
+        ModelKind::Nonlinear => {
+            simd.dispatch(Evaluate::<OfNonlinear> { subject, family: PhantomData })
+        }
         ModelKind::Linear => simd.dispatch(Evaluate::<OfLinear> { subject, family: PhantomData }),
     }
 }
@@ -72,7 +75,7 @@ impl<F: Family> Kernel for Evaluate<'_, F> {
             Part::Derivative => {
                 let forcing = model.forcing(t);
                 for _ in 0..evaluations {
-                    // Opaque, so that nothing is found once for all.
+                    // Opaque, so that the compiler computes nothing in advance.
                     let slope = model.derivative(black_box(&forcing), &x);
                     for i in 0..STATES {
                         x[i] += slope[i] * 1e-9;

@@ -1,73 +1,190 @@
-//! Moving whole structures in and out of single lanes.
+//! Structures of lane values: filled from plain numbers, and read, lane by lane.
 
-use lane_ode::{Lane, N};
+use lane_ode::{Dual, Lane, N, Real};
 
-/// A structure of lane values whose lanes each hold an `S`.
-pub(crate) trait SetLane<S> {
+/// A structure of lane values. `One` is the same structure of plain numbers, as one lane holds it.
+pub(crate) trait InLanes {
+    /// The number that the lanes share.
+    type Number: Copy;
+    /// The structure of plain numbers.
+    type One;
+    /// The same numbers in every lane; `zero` is any value.
+    fn splat(zero: Self::Number, one: &Self::One) -> Self;
     /// Overwrites lane `lane`.
-    fn set_lane(&mut self, lane: usize, from: &S);
-}
-
-impl<T: Lane> SetLane<N<f64>> for N<T> {
-    #[inline(always)]
-    fn set_lane(&mut self, lane: usize, from: &N<f64>) {
-        self.0.set(lane, from.0);
-    }
-}
-
-impl<A: SetLane<B>, B, const K: usize> SetLane<[B; K]> for [A; K] {
-    #[inline(always)]
-    fn set_lane(&mut self, lane: usize, from: &[B; K]) {
-        self.iter_mut().zip(from).for_each(|(to, from)| to.set_lane(lane, from));
-    }
-}
-
-/// The reverse: one lane's value.
-pub(crate) trait GetLane<S> {
+    fn set_lane(&mut self, lane: usize, one: &Self::One);
     /// Reads lane `lane`.
-    fn get_lane(&self, lane: usize) -> S;
+    fn get_lane(&self, lane: usize) -> Self::One;
 }
 
-impl<T: Lane> GetLane<N<f64>> for N<T> {
+/// A structure that can be made of dual numbers whose derivatives are zero.
+pub(crate) trait Constant {
+    /// The structure of dual numbers.
+    type Dual;
+    /// As constants of a dual number.
+    fn constant(&self) -> Self::Dual;
+}
+
+impl<T: Lane> InLanes for N<T> {
+    type Number = Self;
+    type One = N<f64>;
+    #[inline(always)]
+    fn splat(zero: Self, one: &N<f64>) -> Self {
+        zero.lit(one.0)
+    }
+    #[inline(always)]
+    fn set_lane(&mut self, lane: usize, one: &N<f64>) {
+        self.0.set(lane, one.0);
+    }
     #[inline(always)]
     fn get_lane(&self, lane: usize) -> N<f64> {
         N(self.0.get(lane))
     }
 }
 
-impl<A: GetLane<B>, B, const K: usize> GetLane<[B; K]> for [A; K] {
+impl<T: Real> Constant for N<T> {
+    type Dual = N<Dual<T>>;
     #[inline(always)]
-    fn get_lane(&self, lane: usize) -> [B; K] {
+    fn constant(&self) -> N<Dual<T>> {
+        N::constant(*self)
+    }
+}
+
+impl<A: InLanes + Copy, const K: usize> InLanes for [A; K] {
+    type Number = A::Number;
+    type One = [A::One; K];
+    #[inline(always)]
+    fn splat(zero: A::Number, one: &[A::One; K]) -> Self {
+        let mut array = [A::splat(zero, &one[0]); K];
+        for i in 1..K {
+            array[i] = A::splat(zero, &one[i]);
+        }
+        array
+    }
+    #[inline(always)]
+    fn set_lane(&mut self, lane: usize, one: &[A::One; K]) {
+        self.iter_mut().zip(one).for_each(|(to, from)| to.set_lane(lane, from));
+    }
+    #[inline(always)]
+    fn get_lane(&self, lane: usize) -> [A::One; K] {
         core::array::from_fn(|i| self[i].get_lane(lane))
     }
 }
 
-/// A constant structure in every lane.
-pub(crate) trait Splat<S> {
-    /// `from` in every lane.
-    fn splat(zero: Self::Number, from: &S) -> Self
-    where
-        Self: Sized;
-    /// The lanes' number.
-    type Number: Copy;
-}
-
-impl<T: Lane> Splat<N<f64>> for N<T> {
-    type Number = N<T>;
+impl<A: Constant<Dual: Copy>, const K: usize> Constant for [A; K] {
+    type Dual = [A::Dual; K];
     #[inline(always)]
-    fn splat(zero: N<T>, from: &N<f64>) -> Self {
-        zero.lit(from.0)
-    }
-}
-
-impl<A: Splat<B> + Copy, B, const K: usize> Splat<[B; K]> for [A; K] {
-    type Number = A::Number;
-    #[inline(always)]
-    fn splat(zero: A::Number, from: &[B; K]) -> Self {
-        let mut all = [A::splat(zero, &from[0]); K];
+    fn constant(&self) -> [A::Dual; K] {
+        let mut array = [self[0].constant(); K];
         for i in 1..K {
-            all[i] = A::splat(zero, &from[i]);
+            array[i] = self[i].constant();
         }
-        all
+        array
     }
 }
+
+// Loops, not closures, where a vector type's first value is at hand: only what is inlined into an
+// instruction set's entry function is compiled for it.
+impl<A: InLanes> InLanes for Vec<A> {
+    type Number = A::Number;
+    type One = Vec<A::One>;
+    #[inline(always)]
+    fn splat(zero: A::Number, one: &Vec<A::One>) -> Self {
+        let mut list = Self::with_capacity(one.len());
+        for item in one {
+            list.push(A::splat(zero, item));
+        }
+        list
+    }
+    /// Both lists have the same length.
+    #[inline(always)]
+    fn set_lane(&mut self, lane: usize, one: &Vec<A::One>) {
+        self.iter_mut().zip(one).for_each(|(to, from)| to.set_lane(lane, from));
+    }
+    #[inline(always)]
+    fn get_lane(&self, lane: usize) -> Vec<A::One> {
+        self.iter().map(|item| item.get_lane(lane)).collect()
+    }
+}
+
+impl<A: Constant> Constant for Vec<A> {
+    type Dual = Vec<A::Dual>;
+    #[inline(always)]
+    fn constant(&self) -> Vec<A::Dual> {
+        let mut list = Vec::with_capacity(self.len());
+        for item in self {
+            list.push(item.constant());
+        }
+        list
+    }
+}
+
+/// Declares a structure over a number `T` and implements [`InLanes`] and [`Constant`] for it.
+///
+/// Fields are `N<T>` where no types are given. `Name of One { ... }` is filled from the fields of
+/// `One`, which are `f64`.
+macro_rules! lane_struct {
+    ($(#[$meta:meta])* $name:ident of $one:ident { $($field:ident),* $(,)? }) => {
+        $(#[$meta])*
+        pub(crate) struct $name<T> {
+            $($field: lane_ode::N<T>,)*
+        }
+
+        impl<T: lane_ode::Lane> $crate::lanes::InLanes for $name<T> {
+            type Number = lane_ode::N<T>;
+            type One = $one;
+            #[inline(always)]
+            fn splat(zero: lane_ode::N<T>, one: &$one) -> Self {
+                Self { $($field: zero.lit(one.$field),)* }
+            }
+            #[inline(always)]
+            fn set_lane(&mut self, lane: usize, one: &$one) {
+                $(self.$field.0.set(lane, one.$field);)*
+            }
+            #[inline(always)]
+            fn get_lane(&self, lane: usize) -> $one {
+                $one { $($field: self.$field.0.get(lane),)* }
+            }
+        }
+    };
+    ($(#[$meta:meta])* $name:ident {
+        $($(#[$field_meta:meta])* $field:ident),* $(,)?
+    }) => {
+        $crate::lanes::lane_struct! {
+            $(#[$meta])* $name { $($(#[$field_meta])* $field: lane_ode::N<T>),* }
+        }
+    };
+    ($(#[$meta:meta])* $name:ident {
+        $($(#[$field_meta:meta])* $field:ident: $type:ty),* $(,)?
+    }) => {
+        $(#[$meta])*
+        pub(crate) struct $name<T> {
+            $($(#[$field_meta])* pub(crate) $field: $type,)*
+        }
+
+        impl<T: lane_ode::Lane> $crate::lanes::InLanes for $name<T> {
+            type Number = lane_ode::N<T>;
+            type One = $name<f64>;
+            #[inline(always)]
+            fn splat(zero: lane_ode::N<T>, one: &$name<f64>) -> Self {
+                Self { $($field: $crate::lanes::InLanes::splat(zero, &one.$field),)* }
+            }
+            #[inline(always)]
+            fn set_lane(&mut self, lane: usize, one: &$name<f64>) {
+                $($crate::lanes::InLanes::set_lane(&mut self.$field, lane, &one.$field);)*
+            }
+            #[inline(always)]
+            fn get_lane(&self, lane: usize) -> $name<f64> {
+                $name { $($field: $crate::lanes::InLanes::get_lane(&self.$field, lane),)* }
+            }
+        }
+
+        impl<T: lane_ode::Real> $crate::lanes::Constant for $name<T> {
+            type Dual = $name<lane_ode::Dual<T>>;
+            #[inline(always)]
+            fn constant(&self) -> $name<lane_ode::Dual<T>> {
+                $name { $($field: $crate::lanes::Constant::constant(&self.$field),)* }
+            }
+        }
+    };
+}
+pub(crate) use lane_struct;

@@ -1,15 +1,19 @@
-//! Physics of a front-loading washing machine: parameters, equations of motion, equilibrium, modes, spin.
+//! Physics of a front-loading washing machine: parameters, equations of motion, equilibrium, modes,
+//! spin.
 //!
-//! A [`Machine`] is plain numbers in SI units; [`Machine::paper`] is the one of Park, Jeong and Yoo (2021). Every number also
-//! has a flat name ([`Parameter`]) by which it is read, set and swept, and [`Machine`]s are checked whole: every [`Violation`]
-//! at once. With a [`Spin`] it becomes a [`Point`]: [`prepare`] finds the static equilibrium and the linear model there. From a
-//! point go
+//! A [`Machine`] is plain numbers in SI units; [`Machine::paper`] is the one of Park, Jeong and Yoo
+//! (2021). Every number also has a flat name ([`Parameter`]) by which it is read, set and swept. A
+//! check reports every [`Violation`] of a machine at once. With a [`Spin`] a machine becomes a
+//! [`Point`]: [`prepare`] finds the static equilibrium and the linear model there. A point leads to
 //!
-//! * [`simulate`]: time histories of the nonlinear or the linear model through the lanes of an integrator, and their [`Record`];
+//! * [`simulate`]: time histories of the nonlinear or the linear model through the lanes of an
+//!   integrator, and their [`Record`];
 //! * [`Point::matrices`]: M, C, K and F of the linear model at an instant;
-//! * [`modes`] and [`campbell`]: natural motions at an instant, and followed over spin speed to the resonances.
+//! * [`modes`] and [`campbell`]: natural motions at an instant, and followed over spin speed to the
+//!   resonances.
 //!
-//! The equations, numbered as the comments here cite them, stand in `docs/equations.md` of the repository ("the model page").
+//! `docs/equations.md` of the repository ("the model page") holds the equations by the numbers that
+//! comments cite.
 //!
 //! # Example
 //!
@@ -35,14 +39,16 @@
 //!     let sag_m = -point.equilibrium()[0];
 //!     // The linear model at rest: a symmetric, positive stiffness.
 //!     let stiffness = point.matrices(0.0, 0.0, 0.0).stiffness;
-//!     assert!(stiffness[0][0] > 0.0 && (stiffness[4][0] - stiffness[0][4]).abs() < 1e-6 * stiffness[0][0]);
+//!     let asymmetry = stiffness[4][0] - stiffness[0][4];
+//!     assert!(stiffness[0][0] > 0.0 && asymmetry.abs() < 1e-6 * stiffness[0][0]);
 //!     // Its natural motions at 100 rpm, the slowest first, decay.
 //!     let slowest = modes(&point, 0.0, 100.0 * std::f64::consts::TAU / 60.0)?.modes[0];
 //!     assert!(slowest.damping_ratio() > 0.0 && slowest.damping_ratio() < 1.0);
 //!     // And where the spin speed meets one of them.
 //!     let speeds_rpm: Vec<f64> = (2..=20).map(|k| 20.0 * f64::from(k)).collect();
-//!     let resonances = campbell(&point, &speeds_rpm)?.into_iter().flat_map(|mode| mode.resonances);
-//!     let first_rpm = resonances.map(|resonance| resonance.speed_rpm).fold(f64::INFINITY, f64::min);
+//!     let modes = campbell(&point, &speeds_rpm)?.into_iter();
+//!     let resonances_rpm = modes.flat_map(|mode| mode.resonances).map(|at| at.speed_rpm);
+//!     let first_rpm = resonances_rpm.fold(f64::INFINITY, f64::min);
 //!     firsts.push((sag_m, first_rpm));
 //! }
 //! let [(sag_m, first_rpm), (stiff_sag_m, stiff_first_rpm)] = firsts[..] else { unreachable!() };
@@ -54,66 +60,39 @@
 
 #[doc(hidden)]
 pub mod bench;
-mod campbell;
-mod capping;
 mod channel;
-mod coefficients;
-mod coupling;
-mod equations;
-mod equilibrium;
-mod floating;
-mod forces;
-mod frame;
-mod geared;
-mod harmonics;
-mod history;
+mod coordinates;
+mod fast;
 mod lanes;
 mod linear;
-mod linear_outputs;
-mod linear_step;
 mod machine;
-mod modal;
-mod model;
+mod modes;
 mod nonlinear;
-mod outputs;
-mod parameters;
 mod point;
-mod ringing;
-mod rotor_terms;
 mod run;
-mod shape;
-mod sparse;
-mod spin;
-mod suspension;
-mod symmetric;
-mod violations;
 
-pub use campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
-pub use capping::Cases;
 pub use channel::Channel;
-pub use coupling::Caps;
-pub use equations::{Equations, STATE_LEN};
-pub use geared::{Formula, Gear, Geared};
-pub use history::{History, Instant, Start, history};
+pub use coordinates::COORDINATES;
+pub use fast::Cases;
+pub use fast::geared::{Formula, Gear, Geared};
 pub use linear::Matrices;
+pub use machine::parameters::{
+    Parameter, Range, Source, Target, UnknownParameter, decimal, unit_suffix,
+};
+pub use machine::spin::Spin;
+pub use machine::violations::Violation;
 pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};
-pub use modal::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
-pub use nonlinear::COORDINATES;
-pub use parameters::{Parameter, Range, Source, Target, UnknownParameter, decimal, unit_suffix};
+pub use modes::campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
+pub use modes::shape::{Motion, Movement, Plane};
+pub use modes::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
+pub use nonlinear::coupling::Caps;
 pub use point::{NoEquilibrium, Point, Timing, prepare};
+pub use run::equations::{Equations, STATE_LEN};
+pub use run::history::{History, Instant, Start, history};
+pub use run::suspension::Forces;
 pub use run::{
     Course, Extra, Method, ModelKind, Record, Stop, Wanted, simulate, simulate_until, simulate_with,
 };
-pub use shape::{Motion, Movement, Plane};
-pub use spin::{Spin, SpinStretch};
-pub use suspension::Forces;
-pub use violations::Violation;
 
-#[cfg(test)]
-mod campbell_tests;
-#[cfg(test)]
-mod history_tests;
-#[cfg(test)]
-mod reference_tests;
 #[cfg(test)]
 mod tests;

@@ -1,56 +1,50 @@
-//! The linear model: exact first order about the static equilibrium (section 5 of the model page, Eq. 41).
+//! The linear model: exact first order about the static equilibrium (section 5 of the model page,
+//! Eq. 41).
 //!
-//! Every coefficient comes from the nonlinear source by automatic differentiation, once per grid point. What depends on theta
-//! is a trigonometric polynomial of harmonics 0 to 2, times 1, theta', theta'^2 or theta''; five angles determine it. Like the
-//! nonlinear model it is solved by halves, each about its mass centre; only the bearings couple them.
+//! Every coefficient comes from the nonlinear source by automatic differentiation, once per grid
+//! point. Five angles determine its trigonometric polynomial in theta. Like the nonlinear model it
+//! is solved by halves, each about its mass centre; only the bearings couple them.
 
-use crate::coefficients::{Bodies, Coefficients};
-use crate::coupling::Deflection;
-use crate::forces::AxisLoad;
-use crate::frame::Tilt;
-use crate::harmonics::{self, FUNCTIONS, HARMONICS, SAMPLES};
-use crate::lanes::GetLane;
-use crate::nonlinear::{COORDINATES, Half, rotor, tub};
-use crate::rotor_terms::{self as entry, ENTRIES, INERTIA_ENTRIES, InertiaTerms, ROWS, RotorTerms, Terms};
-use crate::spin::SpinState;
+pub(crate) mod harmonics;
+pub(crate) mod outputs;
+pub(crate) mod rotor_terms;
+pub(crate) mod sparse;
+pub(crate) mod step;
+pub(crate) mod symmetric;
+
+use crate::coordinates::{
+    COORDINATES, ROTOR_TURNS, SHAFT_Y, SHAFT_Z, TUB, TUB_TURNS, TUB_Y, TUB_Z, seeded,
+};
+use crate::lanes::{Constant as _, InLanes as _, lane_struct};
+use crate::linear::harmonics::{FUNCTIONS, HARMONICS, SAMPLES};
+use crate::linear::rotor_terms::{
+    self as entry, ENTRIES, INERTIA_ENTRIES, InertiaTerms, ROWS, RotorTerms, Terms,
+};
+use crate::machine::spin::SpinState;
+use crate::nonlinear::coefficients::{Bodies, Coefficients};
+use crate::nonlinear::coupling::Deflection;
+use crate::nonlinear::forces::AxisLoad;
+use crate::nonlinear::frame::Tilt;
+use crate::nonlinear::{Half, rotor, tub};
 use lane_ode::{Dual, Lane, N, Real};
-
-/// Coordinates of the tub: q1, q2, q5, q6.
-pub(crate) const TUB: [usize; 4] = [0, 1, 4, 5];
-/// Those that turn it.
-const TUB_TURNS: [usize; 2] = [4, 5];
-/// Coordinates that turn the rotor: q7 to q10. Its forces do not depend on q3 and q4 but through the bearings.
-pub(crate) const TURNS: [usize; 4] = [6, 7, 8, 9];
 
 /// Entries of all arrays of the rotor, its inertia after all others.
 const ALL_ENTRIES: usize = ENTRIES + INERTIA_ENTRIES;
 
-/// What does not depend on the spin. Rows are forces (y, z) and torques about a half's mass centre, columns those of `TUB`.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Constants<T> {
-    pub(crate) tub_per_mass: N<T>,
-    /// Partial velocities of the tub's mass centre.
-    pub(crate) tub_arm: [[N<T>; 2]; 2],
-    pub(crate) tub_axis: [[N<T>; 2]; 2],
-    pub(crate) tub_inertia: [[N<T>; 2]; 2],
-    pub(crate) tub_stiffness: [[N<T>; 4]; 4],
-    pub(crate) tub_damping: [[N<T>; 4]; 4],
-    pub(crate) rotor_per_mass: N<T>,
-    pub(crate) rotor_axis: [[N<T>; 2]; 2],
-}
-
-impl<T: Lane> Constants<T> {
-    fn lane(&self, lane: usize) -> Constants<f64> {
-        Constants {
-            tub_per_mass: self.tub_per_mass.get_lane(lane),
-            tub_arm: self.tub_arm.get_lane(lane),
-            tub_axis: self.tub_axis.get_lane(lane),
-            tub_inertia: self.tub_inertia.get_lane(lane),
-            tub_stiffness: self.tub_stiffness.get_lane(lane),
-            tub_damping: self.tub_damping.get_lane(lane),
-            rotor_per_mass: self.rotor_per_mass.get_lane(lane),
-            rotor_axis: self.rotor_axis.get_lane(lane),
-        }
+lane_struct! {
+    /// The parts that do not depend on the spin. Rows are forces (y, z) and torques about a half's
+    /// mass centre, columns those of `TUB`.
+    #[derive(Clone, Copy, Debug)]
+    Constants {
+        tub_per_mass: N<T>,
+        /// Partial velocities of the tub's mass centre.
+        tub_arm: [[N<T>; 2]; 2],
+        tub_axis: [[N<T>; 2]; 2],
+        tub_inertia: [[N<T>; 2]; 2],
+        tub_stiffness: [[N<T>; 4]; 4],
+        tub_damping: [[N<T>; 4]; 4],
+        rotor_per_mass: N<T>,
+        rotor_axis: [[N<T>; 2]; 2],
     }
 }
 
@@ -63,21 +57,24 @@ pub(crate) struct LinearPoint {
 
 /// Linearises one machine per lane about the equilibrium `q`.
 #[inline(always)]
-pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINATES]) -> Vec<LinearPoint> {
+pub(crate) fn linearise<T: Lane>(
+    machine: &Coefficients<T>,
+    q: &[N<T>; COORDINATES],
+) -> Vec<LinearPoint> {
     let zero = q[0].lit(0.0);
     let still = [zero; COORDINATES];
     let bodies = &machine.bodies;
-    let on_shaft = Deflection::new(q, &Tilt::new(q[4], q[5]), &Tilt::new(q[6], q[7])).load(bodies);
+    let on_shaft = Deflection::new(q, &Tilt::of_tub(q), &Tilt::of_shaft(q)).load(bodies);
     let on_tub = on_shaft.reaction();
     let lifted = machine.constant();
 
-    // The tub does not know the spin.
-    let at_rest = tub(&machine.view(), q, &still);
+    // The tub does not depend on the spin.
+    let at_rest = tub(machine, q, &still);
     let mut tub_stiffness = [[zero; 4]; 4];
     let mut tub_damping = [[zero; 4]; 4];
     for (column, &j) in TUB.iter().enumerate() {
         for (matrix, dq, du) in [(&mut tub_stiffness, 1.0, 0.0), (&mut tub_damping, 0.0, 1.0)] {
-            let Half { mut floating, .. } = tub(&lifted.view(), &seeded(q, j, dq), &seeded(&still, j, du));
+            let Half { mut floating, .. } = tub(&lifted, &seeded(q, j, dq), &seeded(&still, j, du));
             floating.apply(&on_tub.constant());
             let rows: [_; 4] = about_centre(floating.generalised_forces(), &at_rest.floating.arm);
             for (row, slope) in rows.iter().enumerate() {
@@ -88,21 +85,28 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
 
     let mut samples = [[[zero; HARMONICS]; ALL_ENTRIES]; 3];
     for (k, &(cos, sin)) in SAMPLES.iter().enumerate() {
-        for (kind, (speed, acceleration)) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
-            let spin =
-                SpinState::new((zero.lit(sin), zero.lit(cos)), zero.lit(speed), zero.lit(acceleration));
+        for (kind, (speed, acceleration)) in
+            [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate()
+        {
+            let spin = SpinState::new(
+                (zero.lit(sin), zero.lit(cos)),
+                zero.lit(speed),
+                zero.lit(acceleration),
+            );
             let Half { mut floating, inertia, .. } = rotor(bodies, &spin, q, &still);
             floating.apply(&on_shaft);
             let (force, torque) = floating.generalised_forces();
             let arm = floating.arm;
             let lifted_spin = spin.constant();
-            // Stiffness at every kind of spin, damping only at unit speed: without spin the rotor has none.
+            // Stiffness at every kind of spin, damping only at unit speed: without spin the rotor
+            // has none.
             let directions = if kind == 1 { 8 } else { 4 };
             for direction in 0..directions {
                 let column = direction % 4;
                 let entry = if direction < 4 { entry::stiffness } else { entry::damping };
                 let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
-                let (q, u) = (seeded(q, TURNS[column], dq), seeded(&still, TURNS[column], du));
+                let (q, u) =
+                    (seeded(q, ROTOR_TURNS[column], dq), seeded(&still, ROTOR_TURNS[column], du));
                 let Half { mut floating, .. } = rotor(&lifted.bodies, &lifted_spin, &q, &u);
                 floating.apply(&on_shaft.constant());
                 let rows: [_; ROWS] = about_centre(floating.generalised_forces(), &arm);
@@ -133,30 +137,18 @@ pub(crate) fn linearise<T: Lane>(machine: &Coefficients<T>, q: &[N<T>; COORDINAT
         tub_stiffness,
         tub_damping,
         rotor_per_mass: bodies.rotor_per_mass,
-        rotor_axis: Tilt::new(q[6], q[7]).axis_partials(),
+        rotor_axis: Tilt::of_shaft(q).axis_partials(),
     };
     (0..T::LANES)
-        .map(|lane| LinearPoint { constants: constants.lane(lane), terms: terms_of_lane(&samples, lane) })
+        .map(|lane| LinearPoint {
+            constants: constants.get_lane(lane),
+            terms: terms_of_lane(&samples, lane),
+        })
         .collect()
 }
 
-/// `values` with a unit derivative (times `slope`) along coordinate `j`.
-#[inline(always)]
-pub(crate) fn seeded<T: Lane>(
-    values: &[N<T>; COORDINATES],
-    j: usize,
-    slope: f64,
-) -> [N<Dual<T>>; COORDINATES] {
-    let mut seeded = [values[0].constant(); COORDINATES];
-    for i in 0..COORDINATES {
-        seeded[i] = values[i].constant();
-    }
-    seeded[j].0.slope = values[j].lit(slope).0;
-    seeded
-}
-
-/// Slopes of generalised forces, from the bearing midpoint's rows to the mass centre's: the inverse of what
-/// `Floating::generalised_forces` does, at the equilibrium's arms.
+/// Slopes of generalised forces, from the bearing midpoint's rows to the mass centre's: the inverse
+/// of what `Floating::generalised_forces` does, at the equilibrium's arms.
 #[inline(always)]
 fn about_centre<T: Real, const R: usize, const ROWS: usize>(
     (midpoint, rotation): ([N<Dual<T>>; 2], [N<Dual<T>>; R]),
@@ -172,7 +164,10 @@ fn about_centre<T: Real, const R: usize, const ROWS: usize>(
 }
 
 /// Terms of one lane, from samples at no spin, unit speed and unit acceleration.
-fn terms_of_lane<T: Lane>(samples: &[[[N<T>; HARMONICS]; ALL_ENTRIES]; 3], lane: usize) -> Terms<f64> {
+fn terms_of_lane<T: Lane>(
+    samples: &[[[N<T>; HARMONICS]; ALL_ENTRIES]; 3],
+    lane: usize,
+) -> Terms<f64> {
     let coefficients = |entry: usize| {
         let mut functions = [0.0; FUNCTIONS];
         let of = |kind: usize| harmonics::coefficients(samples[kind][entry].map(|v| v.0.get(lane)));
@@ -209,7 +204,10 @@ pub struct Matrices {
 
 impl LinearPoint {
     /// The bearings' share of the stiffness matrix, without that of their static load.
-    pub(crate) fn bearing_stiffness(&self, bodies: &Bodies<f64>) -> [[f64; COORDINATES]; COORDINATES] {
+    pub(crate) fn bearing_stiffness(
+        &self,
+        bodies: &Bodies<f64>,
+    ) -> [[f64; COORDINATES]; COORDINATES] {
         let Constants { tub_axis, rotor_axis, .. } = &self.constants;
         let by_unit = |i: usize| {
             let mut unit = [N(0.0); COORDINATES];
@@ -240,7 +238,9 @@ impl LinearPoint {
             mass: [[0.0; COORDINATES]; COORDINATES],
             damping: [[0.0; COORDINATES]; COORDINATES],
             stiffness: self.bearing_stiffness(bodies),
-            force: about_midpoint([2, 3], &TURNS, &rotor_arm, |row| e[entry::force(row)][0]),
+            force: about_midpoint([SHAFT_Y, SHAFT_Z], &ROTOR_TURNS, &rotor_arm, |row| {
+                e[entry::force(row)][0]
+            }),
         };
         let mut add = |j: usize, stiffness: [f64; COORDINATES], damping: [f64; COORDINATES]| {
             for i in 0..COORDINATES {
@@ -251,26 +251,45 @@ impl LinearPoint {
         for column in 0..4 {
             add(
                 TUB[column],
-                about_midpoint([0, 1], &TUB_TURNS, &c.tub_arm, |row| c.tub_stiffness[row][column]),
-                about_midpoint([0, 1], &TUB_TURNS, &c.tub_arm, |row| c.tub_damping[row][column]),
+                about_midpoint([TUB_Y, TUB_Z], &TUB_TURNS, &c.tub_arm, |row| {
+                    c.tub_stiffness[row][column]
+                }),
+                about_midpoint([TUB_Y, TUB_Z], &TUB_TURNS, &c.tub_arm, |row| {
+                    c.tub_damping[row][column]
+                }),
             );
             add(
-                TURNS[column],
-                about_midpoint([2, 3], &TURNS, &rotor_arm, |row| e[entry::stiffness(row, column)][0]),
-                about_midpoint([2, 3], &TURNS, &rotor_arm, |row| e[entry::damping(row, column)][0]),
+                ROTOR_TURNS[column],
+                about_midpoint([SHAFT_Y, SHAFT_Z], &ROTOR_TURNS, &rotor_arm, |row| {
+                    e[entry::stiffness(row, column)][0]
+                }),
+                about_midpoint([SHAFT_Y, SHAFT_Z], &ROTOR_TURNS, &rotor_arm, |row| {
+                    e[entry::damping(row, column)][0]
+                }),
             );
         }
-        fill_mass(&mut matrices.mass, [0, 1], &TUB_TURNS, c.tub_per_mass, &c.tub_arm, |r, s| {
-            c.tub_inertia[r][s].0
-        });
-        fill_mass(&mut matrices.mass, [2, 3], &TURNS, c.rotor_per_mass, &rotor_arm, |r, s| {
-            inertia[entry::inertia(r, s)][0].0
-        });
+        fill_mass(
+            &mut matrices.mass,
+            [TUB_Y, TUB_Z],
+            &TUB_TURNS,
+            c.tub_per_mass,
+            &c.tub_arm,
+            |r, s| c.tub_inertia[r][s].0,
+        );
+        fill_mass(
+            &mut matrices.mass,
+            [SHAFT_Y, SHAFT_Z],
+            &ROTOR_TURNS,
+            c.rotor_per_mass,
+            &rotor_arm,
+            |r, s| inertia[entry::inertia(r, s)][0].0,
+        );
         matrices
     }
 }
 
-/// Forces that the coordinates see, from a half's force (y, z) and torques about its mass centre: the inverse of `about_centre`.
+/// Forces that the coordinates see, from a half's force (y, z) and torques about its mass centre:
+/// the inverse of `about_centre`.
 fn about_midpoint<const R: usize>(
     midpoint: [usize; 2],
     turns: &[usize; R],

@@ -1,7 +1,12 @@
 //! The machine in SI units, as a machine file describes it.
 
-/// A front-loading washing machine on its suspension. Lengths are in metres from O, the midpoint between the
-/// bearing centres before loading; x runs along the drum axis towards the door, y up, z horizontal.
+pub(crate) mod parameters;
+pub(crate) mod spin;
+pub(crate) mod violations;
+
+/// A front-loading washing machine on its suspension. Lengths are in metres from O, the midpoint
+/// between the bearing centres before loading; x runs along the drum axis towards the door, y up, z
+/// horizontal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machine {
     /// Acceleration of gravity along -y.
@@ -121,14 +126,16 @@ pub struct Damper {
 }
 
 impl Machine {
-    /// The machine of Park, Jeong and Yoo (Machines 2021, 9(11), 289): Tables 2 to 4 and section 3.1, the bare drum
-    /// and unbalance split of the equations page, and this project's assumptions where the paper is silent (bearing
-    /// positions, hinge, fronts, clearance, free lengths of the springs).
+    /// The machine of Park, Jeong and Yoo (Machines 2021, 9(11), 289): Tables 2 to 4 and section
+    /// 3.1, the bare drum and unbalance split of the equations page, and this project's assumptions
+    /// where the paper is silent (bearing positions, hinge, fronts, clearance, free lengths of the
+    /// springs).
     #[must_use]
     pub fn paper() -> Self {
         let [unbalance_mass_kg, drum_mass_kg, drum_x_m] = [0.4, 3.64, 0.200];
         let unbalance = Unbalance { mass_kg: unbalance_mass_kg, x_m: 0.300, radius_m: 0.200 };
-        // Tables 2 and 3 print the drum with its 0.4 kg unbalance; take the point mass out (model page, section 2).
+        // Tables 2 and 3 print the drum with its 0.4 kg unbalance; take the point mass out (model
+        // page, section 2).
         let reduced_mass_kg = unbalance_mass_kg * drum_mass_kg / (unbalance_mass_kg + drum_mass_kg);
         let (dx, r) = (unbalance.x_m - drum_x_m, unbalance.radius_m);
         let with_unbalance = [0.196, 0.162, 0.177];
@@ -154,7 +161,11 @@ impl Machine {
                 inertia_kg_m2: [1.03, 1.61, 1.53],
                 front_x_m: 0.450,
             },
-            shaft: Shaft { mass_kg: 4.34, centre_x_m: -0.01811, inertia_kg_m2: [0.0553, 0.0384, 0.0384] },
+            shaft: Shaft {
+                mass_kg: 4.34,
+                centre_x_m: -0.01811,
+                inertia_kg_m2: [0.0553, 0.0384, 0.0384],
+            },
             drum: Drum {
                 mass_kg: drum_mass_kg,
                 centre_x_m: drum_x_m,

@@ -1,20 +1,32 @@
 //! The nonlinear equations of motion (section 4 of the model page; Eqs. 19 to 37 of the paper).
 //!
-//! Kane's equations, arranged as recursive Newton-Euler in the frames where vectors are sparse. Frame A is the shaft's before
-//! the spin (yaw q7, pitch q8), frame S spins with the shaft, frame E is S turned by q9, frame D by q10 more.
+//! Kane's equations, arranged as recursive Newton-Euler in the frames where vectors are sparse.
+//! Frame A is the shaft's before the spin (yaw q7, pitch q8), frame S spins with the shaft, frame E
+//! is S turned by q9, frame D by q10 more.
 
-use crate::coefficients::{Bodies, Coefficients, DamperOf, SpringOf};
-use crate::coupling::{Coupling, Deflection, Sag};
-use crate::floating::{Factors, Floating};
-use crate::forces::{Flexure, suspension_load};
-use crate::frame::{Tilt, Vec3, combination, difference, scaled, sum};
-use crate::spin::SpinState;
+pub(crate) mod coefficients;
+pub(crate) mod coupling;
+pub(crate) mod elements;
+pub(crate) mod equilibrium;
+pub(crate) mod floating;
+pub(crate) mod forces;
+pub(crate) mod frame;
+pub(crate) mod outputs;
+
+use crate::coordinates::{
+    COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_YAW, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z,
+};
+use crate::machine::spin::SpinState;
+use crate::nonlinear::coefficients::{Bodies, Coefficients};
+use crate::nonlinear::coupling::{Coupling, Deflection, Sag};
+use crate::nonlinear::elements::TubMotion;
+use crate::nonlinear::floating::{Factors, Floating};
+use crate::nonlinear::forces::Flexure;
+use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
 use lane_ode::{N, Real};
 
-/// Number of generalised coordinates.
-pub const COORDINATES: usize = 10;
-
-/// One half of the machine: its equations without the bearings, its inertia (lower triangle), and its axis.
+/// One half of the machine: its equations without the bearings, its inertia (lower triangle), and
+/// its axis.
 pub(crate) struct Half<T, const R: usize> {
     pub(crate) floating: Floating<T, R>,
     pub(crate) inertia: [[N<T>; R]; R],
@@ -27,40 +39,27 @@ pub(crate) struct Halves<T> {
     pub(crate) rotor: Half<T, 4>,
 }
 
-/// Assembles the equations of motion at coordinates `q` (m, rad) and speeds `u`, with the bearing forces in both halves.
+/// Assembles the equations of motion at coordinates `q` (m, rad) and speeds `u`, with the bearing
+/// forces in both halves.
 #[inline(always)]
 pub(crate) fn halves<T: Real>(
-    machine: &MachineView<'_, T>,
+    machine: &Coefficients<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> Halves<T> {
     let mut tub = tub(machine, q, u);
-    let mut rotor = rotor(machine.bodies, spin, q, u);
-    let on_shaft = Deflection::new(q, &tub.tilt, &rotor.tilt).load(machine.bodies);
+    let mut rotor = rotor(&machine.bodies, spin, q, u);
+    let on_shaft = Deflection::new(q, &tub.tilt, &rotor.tilt).load(&machine.bodies);
     tub.floating.apply(&on_shaft.reaction());
     rotor.floating.apply(&on_shaft);
     Halves { tub, rotor }
 }
 
-/// The coefficients that the equations read.
-pub(crate) struct MachineView<'a, T> {
-    pub(crate) bodies: &'a Bodies<T>,
-    pub(crate) springs: &'a [SpringOf<T>],
-    pub(crate) dampers: &'a [DamperOf<T>],
-}
-
-impl<T> Coefficients<T> {
-    #[inline(always)]
-    pub(crate) fn view(&self) -> MachineView<'_, T> {
-        MachineView { bodies: &self.bodies, springs: &self.springs, dampers: &self.dampers }
-    }
-}
-
 /// Accelerations du/dt of all ten coordinates; `sag` at the same machine's equilibrium.
 #[inline(always)]
 pub(crate) fn accelerations<T: Real>(
-    machine: &MachineView<'_, T>,
+    machine: &Coefficients<T>,
     coupling: &Coupling<T>,
     sag: &Sag<T>,
     spin: &SpinState<T>,
@@ -68,17 +67,17 @@ pub(crate) fn accelerations<T: Real>(
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
     let tub = tub(machine, q, u);
-    let mut rotor = rotor(machine.bodies, spin, q, u);
+    let mut rotor = rotor(&machine.bodies, spin, q, u);
     if let Some(mass) = coupling.hinge_mass(machine.bodies.flexure_stiffness, spin, sag.hinge) {
         for (place, r) in [2, 3].into_iter().enumerate() {
             rotor.inertia[r][r] += mass.inertia;
             rotor.floating.torque[r] += mass.torque[place];
         }
-        rotor.floating.torque[2] += mass.torque_per_speed * u[9];
-        rotor.floating.torque[3] -= mass.torque_per_speed * u[8];
+        rotor.floating.torque[2] += mass.torque_per_speed * u[HINGE_PITCH];
+        rotor.floating.torque[3] -= mass.torque_per_speed * u[HINGE_YAW];
     }
     coupling.accelerations(
-        machine.bodies,
+        &machine.bodies,
         spin.speed,
         &Deflection::new(q, &tub.tilt, &rotor.tilt),
         &sag.bearings,
@@ -90,15 +89,25 @@ pub(crate) fn accelerations<T: Real>(
 /// Body T about its mass centre.
 #[inline(always)]
 pub(crate) fn tub<T: Real>(
-    machine: &MachineView<'_, T>,
+    machine: &Coefficients<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> Half<T, 2> {
-    let b = machine.bodies;
-    let tilt = Tilt::new(q[4], q[5]);
-    let motion = tilt.motion(u[4], u[5]);
+    let b = &machine.bodies;
+    let tilt = Tilt::of_tub(q);
+    let motion = tilt.motion(u[TUB_YAW], u[TUB_PITCH]);
     let [x, y, z] = motion.rate;
-    let suspension = suspension_load(machine, &tilt, &[q[0], q[1]], &[u[0], u[1]], &motion.rate);
+    let (force, moment) = machine.elements.on_tub(&TubMotion {
+        tilt: &tilt,
+        midpoint: [q[TUB_Y], q[TUB_Z]],
+        midpoint_velocity: [u[TUB_Y], u[TUB_Z]],
+        rate: &motion.rate,
+    });
+    // y and z, cabinet axes.
+    let force = [
+        tilt.axis_c[1] * force[0] + tilt.second_c[1] * force[1],
+        tilt.axis_c[2] * force[0] + tilt.second_c[2] * force[1] + tilt.cos_yaw * force[2],
+    ];
     let centre = b.tub_centre;
 
     // Inertia moments I alpha + omega x I omega at constant speeds, in tub axes.
@@ -107,7 +116,7 @@ pub(crate) fn tub<T: Real>(
         b.tub_i22 * motion.acceleration_y + (b.tub_i11 - b.tub_i33) * (x * z),
         ((b.tub_i22 - b.tub_i11) * (x * y)).v(),
     ];
-    let moment = difference(suspension.moment, &inertia_moment);
+    let moment = difference(moment, &inertia_moment);
 
     // The mass centre L_T t1 (Eq. 8): partial velocities in cabinet axes, and acceleration.
     let arm_yaw_x = (centre * tilt.axis_c[2]).v();
@@ -116,11 +125,12 @@ pub(crate) fn tub<T: Real>(
     let axis_drift = tilt.to_cabinet(&motion.axis_acceleration);
     let drift = scaled(centre, axis_drift);
 
-    let force = suspension.force;
     let axial = (b.tub_mass * drift[0]).v();
-    let torque_yaw =
-        tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1] - force[1] * arm_yaw_z - axial * arm_yaw_x;
-    let torque_pitch = moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial * arm_pitch[0];
+    let torque_yaw = tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]
+        - force[1] * arm_yaw_z
+        - axial * arm_yaw_x;
+    let torque_pitch =
+        moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial * arm_pitch[0];
 
     let axial_yaw = (b.tub_mass * arm_yaw_x).v();
     let (s, c) = (tilt.sin_pitch, tilt.cos_pitch);
@@ -137,7 +147,10 @@ pub(crate) fn tub<T: Real>(
         },
         inertia: [
             [axial_yaw * arm_yaw_x + (b.tub_i11 * (s * s) + b.tub_i22 * (c * c)), zero],
-            [(axial_yaw * arm_pitch[0]).v(), b.tub_i33 + b.tub_mass * (arm_pitch[0] * arm_pitch[0])],
+            [
+                (axial_yaw * arm_pitch[0]).v(),
+                b.tub_i33 + b.tub_mass * (arm_pitch[0] * arm_pitch[0]),
+            ],
         ],
         tilt,
     }
@@ -145,8 +158,9 @@ pub(crate) fn tub<T: Real>(
 
 /// Bodies S and D about their common mass centre.
 ///
-/// The vector between their centres, l s1 + rho, moves as if the reduced mass were at its end. Its part in rho is in the
-/// drum's inertia about the hinge (`Bodies::drum_i11` ...); the rest appears below with `mu_l` and `mu_l2`.
+/// The vector between their centres, l s1 + rho, moves as if the reduced mass were at its end. Its
+/// part in rho is in the drum's inertia about the hinge (`Bodies::drum_i11` ...); the rest appears
+/// below with `mu_l` and `mu_l2`.
 #[inline(always)]
 pub(crate) fn rotor<T: Real>(
     b: &Bodies<T>,
@@ -154,11 +168,11 @@ pub(crate) fn rotor<T: Real>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> Half<T, 4> {
-    let tilt = Tilt::new(q[6], q[7]);
-    let motion = tilt.motion(u[6], u[7]);
-    let (u9, u10) = (u[8], u[9]);
-    let (s9, c9) = q[8].sin_cos();
-    let (s10, c10) = q[9].sin_cos();
+    let tilt = Tilt::of_shaft(q);
+    let motion = tilt.motion(u[SHAFT_YAW], u[SHAFT_PITCH]);
+    let (u9, u10) = (u[HINGE_YAW], u[HINGE_PITCH]);
+    let (s9, c9) = q[HINGE_YAW].sin_cos();
+    let (s10, c10) = q[HINGE_PITCH].sin_cos();
 
     // Angular velocities and their rates at constant speeds: S in S, then D in E.
     let omega_s = {
@@ -209,7 +223,8 @@ pub(crate) fn rotor<T: Real>(
         moment[2] + (b.mu_l * rho_acceleration_a[1] + b.mu_l2 * axis_acceleration[1]),
     ];
 
-    // The common centre w = along_shaft s1 + drum_share rho: place, partial velocities, acceleration; in cabinet axes.
+    // The common centre w = along_shaft s1 + drum_share rho: place, partial velocities,
+    // acceleration; in cabinet axes.
     let rho_s = [(c9 * rho[0]).v(), rho[1], -(s9 * rho[0]).v()];
     let rho_a = out_of_spin(spin, &rho_s);
     let w = tilt.to_cabinet(&[
@@ -217,8 +232,12 @@ pub(crate) fn rotor<T: Real>(
         (b.drum_share * rho_a[1]).v(),
         (b.drum_share * rho_a[2]).v(),
     ]);
-    let drift =
-        tilt.to_cabinet(&combination(b.along_shaft, axis_acceleration, b.drum_share, &rho_acceleration_a));
+    let drift = tilt.to_cabinet(&combination(
+        b.along_shaft,
+        axis_acceleration,
+        b.drum_share,
+        &rho_acceleration_a,
+    ));
     let arm_9 = {
         let share = -(b.drum_share * rho[0]).v();
         let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];
@@ -303,7 +322,8 @@ impl<T: Real> DrumInertia<T> {
     }
 }
 
-/// Inertia of the rotor about its mass centre over (q7, q8, q9, q10), without the axial motion's share; lower triangle.
+/// Inertia of the rotor about its mass centre over (q7, q8, q9, q10), without the axial motion's
+/// share; lower triangle.
 #[inline(always)]
 fn rotor_inertia<T: Real>(
     b: &Bodies<T>,
@@ -327,7 +347,8 @@ fn rotor_inertia<T: Real>(
     let j11 = l11 + b.shaft_i11;
     let j22 = k.k22 + b.shaft_i22 + across;
     let j33 = l33 + b.shaft_i33 + across;
-    let [_, j12, j13] = out_of_spin(spin, &[j11, l12 - mu_rho[1], (c9 * s9) * difference - mu_rho[2]]);
+    let [_, j12, j13] =
+        out_of_spin(spin, &[j11, l12 - mu_rho[1], (c9 * s9) * difference - mu_rho[2]]);
     let half_sum = (0.5 * (j22 + j33)).v();
     let half_difference = (0.5 * (j22 - j33)).v();
     let turned = half_difference * spin.cos_2 - l23 * spin.sin_2;

@@ -1,14 +1,18 @@
-//! A grid point made ready: everything that is found once before its trajectories start.
+//! A grid point made ready: everything that is computed once, before its trajectories start.
 
-use crate::coefficients::Coefficients;
-use crate::equilibrium;
+pub(crate) mod ringing;
+
+use crate::channel::CHANNELS;
+use crate::coordinates::{COORDINATES, TUB_PITCH, TUB_Y};
+use crate::lanes::InLanes as _;
+use crate::linear::outputs::{LinearOutputs, linearise_outputs};
 use crate::linear::{LinearPoint, Matrices, linearise};
-use crate::linear_outputs::{LinearOutputs, linearise_outputs};
 use crate::machine::Machine;
-use crate::nonlinear::COORDINATES;
-use crate::outputs::{Axes, CHANNELS, Motion};
-use crate::ringing::{Ringing, jumps_rad_per_s2};
-use crate::spin::{Spin, SpinState, SpinStretch, stretch_at};
+use crate::machine::spin::{Spin, SpinState, SpinStretch, stretch_at};
+use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::equilibrium;
+use crate::nonlinear::outputs::{Axes, Motion};
+use crate::point::ringing::{Ringing, jumps_rad_per_s2};
 use lane_ode::{Kernel, Lane, N, Simd};
 use std::sync::Arc;
 
@@ -19,7 +23,8 @@ pub struct Timing {
     pub end_s: f64,
     /// Amplitudes are taken over this closed interval within the run.
     pub window_s: [f64; 2],
-    /// Into how many even parts the run is cut, so that states at their ends can be compared; 0 for none.
+    /// Into how many even parts the run is cut, so that states at their ends can be compared; 0 for
+    /// none.
     pub checkpoints: u32,
 }
 
@@ -62,17 +67,18 @@ impl Point {
         &self.equilibrium
     }
 
-    /// How far the tub's mass centre has sunk (m) from where the machine file draws it, its springs without load unless they have free
-    /// lengths of their own, to the static equilibrium.
+    /// How far the tub's mass centre sinks (m) from its place in the machine file to the static
+    /// equilibrium. In the machine file springs carry no load, unless they have free lengths.
     #[must_use]
     pub fn static_sag_m(&self) -> f64 {
-        let (sin_pitch, _) = N(self.equilibrium[5]).sin_cos();
-        -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[0])).0
+        let (sin_pitch, _) = N(self.equilibrium[TUB_PITCH]).sin_cos();
+        -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[TUB_Y])).0
     }
 
-    /// By how much each channel (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) may swing with the modes of
-    /// bearings and hinge that jumps of the drum's acceleration leave swinging until the window ends. Steps longer than
-    /// their periods leave that out.
+    /// A bound on the swing of each channel (m, rad; in the order of
+    /// [`Channel::ALL`](crate::Channel::ALL)) by the modes of bearings and hinge, after all jumps
+    /// of the drum's acceleration up to the window's end. Steps longer than their periods leave it
+    /// out.
     #[must_use]
     pub fn ringing(&self) -> [f64; CHANNELS] {
         self.ringing.channels()
@@ -91,10 +97,17 @@ impl Point {
         [from, inside().next_back().map_or(from, |leg| leg.end_s)]
     }
 
-    /// M, C, K and F of the linear model (Eq. 41) at spin angle `theta_rad`, speed and acceleration.
+    /// M, C, K and F of the linear model (Eq. 41) at spin angle `theta_rad`, speed and
+    /// acceleration.
     #[must_use]
-    pub fn matrices(&self, theta_rad: f64, speed_rad_per_s: f64, acceleration_rad_per_s2: f64) -> Matrices {
-        let spin = SpinState::new(N(theta_rad).sin_cos(), N(speed_rad_per_s), N(acceleration_rad_per_s2));
+    pub fn matrices(
+        &self,
+        theta_rad: f64,
+        speed_rad_per_s: f64,
+        acceleration_rad_per_s2: f64,
+    ) -> Matrices {
+        let spin =
+            SpinState::new(N(theta_rad).sin_cos(), N(speed_rad_per_s), N(acceleration_rad_per_s2));
         self.linear.matrices(&self.machine.bodies, &spin)
     }
 }
@@ -104,7 +117,11 @@ impl Point {
 /// # Errors
 /// Per point: [`NoEquilibrium`].
 #[must_use]
-pub fn prepare(simd: Simd, points: &[(Machine, Spin)], timing: &Timing) -> Vec<Result<Point, NoEquilibrium>> {
+pub fn prepare(
+    simd: Simd,
+    points: &[(Machine, Spin)],
+    timing: &Timing,
+) -> Vec<Result<Point, NoEquilibrium>> {
     simd.dispatch(Prepare { points, courses: courses(points, timing) })
 }
 
@@ -122,7 +139,8 @@ impl Kernel for Prepare<'_> {
         let mut ready = Vec::with_capacity(self.points.len());
         let mut courses = self.courses.into_iter();
         for group in self.points.chunks(T::LANES) {
-            let machines: Vec<_> = group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
+            let machines: Vec<_> =
+                group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
             let mut lanes = Coefficients::splat(zero, &machines[0]);
             for (lane, machine) in machines.iter().enumerate() {
                 lanes.set_lane(lane, machine);
@@ -134,7 +152,12 @@ impl Kernel for Prepare<'_> {
             let at_rest = Motion { q, u: still, a: still };
             let unbalance_up = SpinState::new((zero, zero.lit(1.0)), zero, zero);
             let rest = Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
-            let parts = machines.into_iter().zip(linear).zip(linear_outputs).zip(group).zip(courses.by_ref());
+            let parts = machines
+                .into_iter()
+                .zip(linear)
+                .zip(linear_outputs)
+                .zip(group)
+                .zip(courses.by_ref());
             ready.extend(parts.enumerate().map(
                 |(lane, ((((coefficients, linear), linear_outputs), (machine, _)), course))| {
                     if found >> lane & 1 == 0 {
@@ -157,7 +180,7 @@ impl Kernel for Prepare<'_> {
     }
 }
 
-/// What a trajectory goes through.
+/// The course of a trajectory's spin.
 #[derive(Clone)]
 struct Course {
     stretches: Arc<[SpinStretch]>,
@@ -166,7 +189,8 @@ struct Course {
     jumps_rad_per_s2: f64,
 }
 
-/// One a point. Neighbours of the same spin share it, because a table may have thousands of rows.
+/// One per point. Neighbours with the same spin share it, because a table may have thousands of
+/// rows.
 fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<Course> {
     let mut courses: Vec<Course> = Vec::with_capacity(points.len());
     for (k, (_, spin)) in points.iter().enumerate() {
@@ -198,7 +222,8 @@ fn legs(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedLeg> {
             let stretch = stretch_at(stretches, start_s);
             // Within a stretch the speed rises or falls all the way.
             for time_s in [start_s, end_s] {
-                fastest_rad_per_s = fastest_rad_per_s.max(stretches[stretch].speed_rad_per_s(time_s).abs());
+                fastest_rad_per_s =
+                    fastest_rad_per_s.max(stretches[stretch].speed_rad_per_s(time_s).abs());
             }
             let in_window = from <= start_s && end_s <= to;
             PlannedLeg { start_s, end_s, stretch, in_window, fastest_rad_per_s }

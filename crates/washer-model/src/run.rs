@@ -1,22 +1,28 @@
-//! Trajectories: points through the lanes of an integrator, and what is recorded of them.
+//! Trajectories: points run through the lanes of an integrator, and their records.
 
 mod cabinet_force;
 mod course;
+pub(crate) mod equations;
 mod extras;
+pub(crate) mod history;
+pub(crate) mod model;
 pub(crate) mod stiff;
+pub(crate) mod suspension;
+mod tangent;
 
 pub use extras::{Extra, Wanted};
 
-use crate::coupling::{Caps, Coupling};
-use crate::geared::{Formula, Geared};
-use crate::model::{Linear, Model, Nonlinear, STATES};
-use crate::nonlinear::COORDINATES;
-use crate::outputs::{CHANNELS, RADIAL, squared};
+use crate::channel::CHANNELS;
+use crate::coordinates::{COORDINATES, STATES};
+use crate::fast::geared::{Formula, Geared};
+use crate::nonlinear::coupling::{Caps, Coupling};
+use crate::nonlinear::outputs::{RADIAL, squared};
 use crate::point::{PlannedLeg, Point};
+use crate::run::model::{Linear, Model, Nonlinear};
 use core::marker::PhantomData;
 use extras::{Extras, Seen};
 use lane_ode::{
-    Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, System, Task,
+    Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, Task,
     Tolerance, dop853, dopri5, rk4,
 };
 
@@ -28,12 +34,13 @@ pub enum Method {
         /// Longest step.
         step_s: f64,
     },
-    /// An explicit formula on the machine whose bearings and hinge have scaled mass, so that none of their modes is
-    /// faster than a cap (see `coupling.rs`).
+    /// An explicit formula on the machine whose bearings and hinge have scaled mass, so that none
+    /// of their modes is faster than a cap (section 4.3 of the model page).
     Geared(Geared),
     /// Dormand-Prince 5(4).
     Dopri5(Tolerance),
-    /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others. One trajectory at a time.
+    /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others.
+    /// One trajectory at a time.
     Rodas5p(Tolerance),
 }
 
@@ -70,18 +77,19 @@ pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
     }
 }
 
-/// Says whether to put the work down.
+/// Says whether to stop.
 pub type Stop<'a> = &'a dyn Fn() -> bool;
 
-/// Coordinates (m, rad) at the ends of a trajectory's legs, as far as it came.
+/// Coordinates (m, rad) at the ends of a trajectory's legs, up to its own end.
 pub type Course = Vec<[f64; COORDINATES]>;
 
-/// How one trajectory went.
+/// The record of one trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
     /// Why and when (s) it failed, if it did.
     pub failure: Option<(Failure, f64)>,
-    /// Largest deviation from equilibrium within the window, in the order of `Channel::ALL` (m, rad).
+    /// Largest deviation from equilibrium within the window, in the order of `Channel::ALL` (m,
+    /// rad).
     pub amplitudes: [f64; CHANNELS],
     /// Least gap between drum and tub over the whole run (m).
     pub min_gap_m: f64,
@@ -91,14 +99,14 @@ pub struct Record {
     pub rejected: u64,
 }
 
-/// Integrates one model at every point and records peaks. The result does not depend on the instruction set, nor on which
-/// points come together.
+/// Integrates one model at every point and records peaks. The result does not depend on the
+/// instruction set, nor on which points come together.
 #[must_use]
 pub fn simulate(simd: Simd, model: ModelKind, method: &Method, points: &[&Point]) -> Vec<Record> {
     simulate_with(simd, model, method, points, Wanted::default()).0
 }
 
-/// As [`simulate`], and records what else is wanted: one [`Extra`] a point, or none at all if nothing is.
+/// As [`simulate`], and records one [`Extra`] per point if anything else is wanted.
 #[must_use]
 pub fn simulate_with(
     simd: Simd,
@@ -110,8 +118,8 @@ pub fn simulate_with(
     simulate_until(simd, model, method, points, wanted, &|| false).unwrap_or_default()
 }
 
-/// As [`simulate_with`], unless `stop` says before all trajectories have ended that they need not; then `None`. It is
-/// asked every [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps at least.
+/// As [`simulate_with`]; `None` if `stop` says so before all trajectories have ended. It is asked
+/// every [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps at least.
 #[must_use]
 pub fn simulate_until(
     simd: Simd,
@@ -128,20 +136,14 @@ pub fn simulate_until(
         Method::Rk4 { .. } | Method::Geared(Geared { formula: Formula::Rk4, .. }) => Stepper::Rk4,
         Method::Geared(Geared { formula: Formula::Dop853, .. }) => Stepper::Dop853,
         Method::Dopri5(tolerance) => Stepper::Dopri5(*tolerance),
-        Method::Rodas5p(tolerance) => return stiff::simulate(model, tolerance, points, wanted, stop),
-    };
-    match model {
-        ModelKind::Nonlinear => simd.dispatch(Simulate::<OfNonlinear> {
-            points,
-            method,
-            stepper,
-            wanted,
-            stop,
-            family: PhantomData,
-        }),
-        ModelKind::Linear => {
-            simd.dispatch(Simulate::<OfLinear> { points, method, stepper, wanted, stop, family: PhantomData })
+        Method::Rodas5p(tolerance) => {
+            return stiff::simulate(model, tolerance, points, wanted, stop);
         }
+    };
+    let order = Order { points, method, stepper, wanted, stop };
+    match model {
+        ModelKind::Nonlinear => simd.dispatch(Simulate::<OfNonlinear>(order, PhantomData)),
+        ModelKind::Linear => simd.dispatch(Simulate::<OfLinear>(order, PhantomData)),
     }
 }
 
@@ -169,23 +171,26 @@ impl Family for OfLinear {
     const KIND: ModelKind = ModelKind::Linear;
 }
 
-struct Simulate<'a, F> {
+/// What to simulate, by either model.
+struct Order<'a> {
     points: &'a [&'a Point],
     method: &'a Method,
     stepper: Stepper,
     wanted: Wanted,
     stop: Stop<'a>,
-    family: PhantomData<F>,
 }
+
+struct Simulate<'a, F>(Order<'a>, PhantomData<F>);
 
 impl<F: Family> Kernel for Simulate<'_, F> {
     type Output = Option<(Vec<Record>, Vec<Extra>)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut run = Run::<T, F::Over<T>>::new(N(zero), self.points, self.method, self.stop);
-        run.record(N(zero), self.wanted, F::KIND);
-        match self.stepper {
+        let Order { points, method, stepper, wanted, stop } = self.0;
+        let mut run = Run::<T, F::Over<T>>::new(N(zero), points, method, stop);
+        run.record(N(zero), wanted, F::KIND);
+        match stepper {
             Stepper::Rk4 => rk4::integrate(zero, &mut run),
             Stepper::Dop853 => dop853::integrate(zero, &mut run),
             Stepper::Dopri5(tolerance) => dopri5::integrate(zero, &mut run, &tolerance),
@@ -194,8 +199,13 @@ impl<F: Family> Kernel for Simulate<'_, F> {
     }
 }
 
-const EMPTY: Record =
-    Record { failure: None, amplitudes: [f64::NAN; CHANNELS], min_gap_m: f64::NAN, steps: 0, rejected: 0 };
+const EMPTY: Record = Record {
+    failure: None,
+    amplitudes: [f64::NAN; CHANNELS],
+    min_gap_m: f64::NAN,
+    steps: 0,
+    rejected: 0,
+};
 
 /// Which trajectory a lane holds, and where in it.
 #[derive(Clone, Copy, Default)]
@@ -224,31 +234,14 @@ struct Run<'a, T, M> {
     courses: Vec<Course>,
 }
 
-impl<T: Lane, M: Model<T>> System<T, STATES> for Run<'_, T, M> {
-    type Forcing = M::Forcing;
-
-    #[inline(always)]
-    fn forcing(&self, t_s: N<T>) -> M::Forcing {
-        self.model.forcing(t_s)
-    }
-
-    #[inline(always)]
-    fn renew(&self, t_s: N<T>, forcing: &mut M::Forcing) {
-        self.model.renew(t_s, forcing);
-    }
-
-    #[inline(always)]
-    fn derivative(&self, forcing: &M::Forcing, x: &[N<T>; STATES]) -> [N<T>; STATES] {
-        self.model.derivative(forcing, x)
-    }
-
-    #[inline(always)]
-    fn in_range(&self, x: &[N<T>; STATES]) -> T::Mask {
-        self.model.in_range(x)
-    }
-}
-
 impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
+    type System = M;
+
+    #[inline(always)]
+    fn system(&self) -> &M {
+        &self.model
+    }
+
     #[inline(never)]
     fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; STATES]) -> Option<Leg> {
         let state = &mut self.lanes[lane];
@@ -340,16 +333,18 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
         }
     }
 
-    /// Has more recorded than the peaks.
+    /// Asks for more records than the peaks.
     #[inline(always)]
     fn record(&mut self, zero: N<T>, wanted: Wanted, model: ModelKind) {
-        self.extras = Extras::new(zero, wanted, (model, self.method), self.points[0], self.points.len());
+        self.extras =
+            Extras::new(zero, wanted, (model, self.method), self.points[0], self.points.len());
         if wanted.course {
-            self.courses = self.points.iter().map(|point| Vec::with_capacity(point.legs.len())).collect();
+            self.courses =
+                self.points.iter().map(|point| Vec::with_capacity(point.legs.len())).collect();
         }
     }
 
-    /// Everything that was recorded; `None` if it is not of every point.
+    /// All records; `None` if some point has none.
     fn recorded(self) -> Option<(Vec<Record>, Vec<Extra>)> {
         if self.finished < self.points.len() {
             return None;
@@ -364,7 +359,7 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
         Some((self.records, found))
     }
 
-    /// Shows an instant to the recorders that were asked for.
+    /// Passes an instant to the recorders in use.
     #[inline(always)]
     fn show(
         &mut self,
@@ -387,7 +382,7 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     /// Takes up the next point, if there is one.
     fn next_point(&mut self, lane: usize, x: &mut [N<T>; STATES]) -> Option<Leg> {
         self.windows.0.set(lane, 0.0);
-        // An idle lane stands still at its last point's start, where the model means something.
+        // An idle lane rests at the start of its last point, where the model is defined.
         let is_last = self.taken == self.points.len();
         let index = if is_last { self.lanes[lane].point } else { self.taken };
         let point = self.points[index];

@@ -9,12 +9,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use sweep::engine::ModelEngine;
-use sweep::interrupt::Interrupt;
-use sweep::plan::Plan;
-use sweep::progress::Mode;
-use sweep::run::{self, Ended, RunOptions};
-use sweep::store::{Job, Opened, Options, Run, Shard, ShardRequest, status};
+use sweep::{
+    Ended, Interrupt, Job, ModelEngine, OpenOptions, OpenRun, Opened, Plan, ProgressMode,
+    RunOptions, Shard, ShardRequest, status,
+};
 use tempfile::TempDir;
 
 /// Bytes of a chunk before its records, and of the hash behind them.
@@ -48,7 +46,7 @@ pub(crate) fn run(bytes: &[u8]) {
     // Looking changes nothing, whatever it finds.
     let _ = status(&output, &job);
     assert_eq!(fs::read(partial.join(name)).expect("the input is there"), content);
-    let mut opened = match Run::open(&output, &job, options()) {
+    let mut opened = match OpenRun::open(&output, &job, options()) {
         Ok(Opened::Run(opened)) => opened,
         Ok(Opened::Finished(..)) => panic!("there is no result"),
         Err(error) => {
@@ -68,8 +66,8 @@ pub(crate) fn run(bytes: &[u8]) {
     }
 }
 
-fn options() -> Options<'static> {
-    Options { fresh: false, shard: None, environment: &|_| None }
+fn options() -> OpenOptions<'static> {
+    OpenOptions { fresh: false, shard: None, environment: &|_| None }
 }
 
 /// The records of an input between a right header and a right hash.
@@ -115,19 +113,19 @@ fn home() -> &'static Home {
             [[axis]]\nparameter = \"unbalance_mass_kg\"\n\
             range = { from = 0.1, to = 0.9, count = 10 }\n";
         fs::write(&grid, text).expect("the grid is written");
-        let plan = sweep::config::load(&grid, &[]).expect("the grid is right");
+        let plan = sweep::load(&grid, &[]).expect("the grid is right");
         let output = folder.path().join("x.parquet");
         let go = |shard| {
             let options = RunOptions {
                 threads: 1,
                 fresh: false,
                 shard,
-                progress: Mode::None,
+                progress: ProgressMode::None,
                 environment: &|_| None,
                 tell: &|_| {},
             };
             let engine = ModelEngine::new(&plan).expect("there is an engine");
-            run::run(&engine, &Job::of(&plan), &output, options, &Interrupt::new())
+            sweep::run(&engine, &Job::of(&plan), &output, options, &Interrupt::new())
                 .expect("the run ends")
                 .ended
         };

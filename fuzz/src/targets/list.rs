@@ -14,7 +14,7 @@ const LONGEST_EXPLANATION: usize = 200_000;
 pub(crate) fn run(bytes: &[u8]) {
     let home = home();
     fs::write(&home.list, bytes).expect("the input is written");
-    match sweep::config::load(&home.grid, &[]) {
+    match sweep::load(&home.grid, &[]) {
         Ok(plan) => {
             assert!(plan.points() >= 1);
             for corner in [0, plan.corners() - 1] {

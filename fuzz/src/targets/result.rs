@@ -9,9 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use clap::Parser as _;
-use sweep::cli::Cli;
-use sweep::plan::Plan;
-use sweep::store::{Job, Run, State, status};
+use sweep::{Cli, Job, OpenRun, Plan, State, status};
 use tempfile::TempDir;
 
 /// Tries one input; a panic is a finding.
@@ -27,7 +25,7 @@ pub(crate) fn run(bytes: &[u8]) {
         Err(error) => assert!(error.to_string().contains("x.parquet"), "{error}"),
     }
     if !bytes.is_empty() {
-        assert!(Run::open_for_merge(&home.result, &job).is_err());
+        assert!(OpenRun::open_for_merge(&home.result, &job).is_err());
     }
     assert_eq!(fs::read(&home.result).expect("the input is there"), bytes);
     call(&["sweep", "show", &home.result_text]);
@@ -79,7 +77,7 @@ fn home() -> &'static Home {
             result: path("x.parquet"),
             result_text: text(&path("x.parquet")),
             picture_text: text(&path("x.svg")),
-            plan: sweep::config::load(&path("g.toml"), &[]).expect("the grid is right"),
+            plan: sweep::load(&path("g.toml"), &[]).expect("the grid is right"),
             _folder: folder,
         }
     })

@@ -5,7 +5,8 @@ use crate::tests::array::Array;
 
 type Matrix = [[f64; STAGES]; STAGES];
 
-/// The method in the terms of its order conditions (Hairer and Wanner II, section IV.7): k_i in place of the transformed stages.
+/// The method in the terms of its order conditions (Hairer and Wanner II, section IV.7): k_i in
+/// place of the transformed stages.
 struct Conditions {
     alpha: Matrix,
     /// alpha + Gamma
@@ -17,8 +18,9 @@ struct Conditions {
 
 /// Every coefficient, flat: gamma, then the rows of a, C and the dense output.
 fn coefficients() -> Vec<f64> {
-    let lower =
-        |rows: &[[f64; 7]; STAGES]| -> Vec<f64> { (0..STAGES).flat_map(|i| rows[i][..i].to_vec()).collect() };
+    let lower = |rows: &[[f64; 7]; STAGES]| -> Vec<f64> {
+        (0..STAGES).flat_map(|i| rows[i][..i].to_vec()).collect()
+    };
     [vec![GAMMA], lower(&A), lower(&C), DENSE.concat()].concat()
 }
 
@@ -121,7 +123,8 @@ fn trees(order: usize) -> Vec<Tree> {
     all
 }
 
-/// How badly the order conditions are missed: of the solution (5), its companion and the dense output (4), and the nodes.
+/// How badly the order conditions are missed: of the solution (5), its companion and the dense
+/// output (4), and the nodes.
 fn worst_miss(flat: &[f64]) -> f64 {
     let (c, dense) = conditions(flat);
     let mut worst = 0.0_f64;
@@ -144,7 +147,8 @@ fn worst_miss(flat: &[f64]) -> f64 {
     }
     let sum = |row: &[f64; STAGES]| row.iter().sum::<f64>();
     for i in 0..STAGES {
-        worst = worst.max((sum(&c.alpha[i]) - NODE[i]).abs()).max((sum(&c.gamma[i]) - TIME[i]).abs());
+        worst =
+            worst.max((sum(&c.alpha[i]) - NODE[i]).abs()).max((sum(&c.gamma[i]) - TIME[i]).abs());
     }
     worst
 }
@@ -155,7 +159,8 @@ fn coefficients_meet_the_order_conditions() {
     let flat = coefficients();
     let miss = worst_miss(&flat);
     assert!(miss < 1e-12, "{miss:e}");
-    // A mistyped digit would show. Only what the dense output takes of the last stage, the error's estimate, does not touch its order.
+    // A mistyped digit would show. Only what the dense output takes of the last stage, the error's
+    // estimate, does not touch its order.
     let of_last_stage = |i: usize| flat.len() - i <= 3 * STAGES && (flat.len() - i) % STAGES == 1;
     for i in (0..flat.len()).filter(|&i| !of_last_stage(i)) {
         let mut wrong = flat.clone();
@@ -165,10 +170,10 @@ fn coefficients_meet_the_order_conditions() {
     }
 }
 
-/// Two masses, a spring of stiffness `stiffness` between them and a pendulum's restoring force, driven: the distance between the
-/// masses stays (nearly) what it was, however stiff the spring.
+/// Two masses, a spring of stiffness `stiffness` between them and a pendulum's restoring force,
+/// driven: the distance between the masses stays (nearly) what it was, however stiff the spring.
 struct Coupled {
-    stiffness: f64,
+    masses: Masses,
     legs: Vec<Leg>,
     next: usize,
     start: [f64; 4],
@@ -178,7 +183,10 @@ struct Coupled {
     seen: Vec<(f64, [f64; 4])>,
 }
 
-/// What both tests and dual numbers run on.
+/// Their equations, by the stiffness of the spring.
+struct Masses(f64);
+
+/// The same for plain and dual numbers.
 fn coupled<T: Lane>(stiffness: f64, push: N<T>, x: &[N<T>; 4]) -> [N<T>; 4] {
     let [a, b, va, vb] = *x;
     let force = (b - a) * stiffness;
@@ -186,7 +194,7 @@ fn coupled<T: Lane>(stiffness: f64, push: N<T>, x: &[N<T>; 4]) -> [N<T>; 4] {
     [va, vb, force - 9.0 * sin - 0.1 * va + push, 4.0 * push - 2.0 * force.v()]
 }
 
-impl<T: Lane> System<T, 4> for &Coupled {
+impl<T: Lane> System<T, 4> for Masses {
     type Forcing = N<T>;
     /// Sets in so smoothly that a stiff spring does not ring.
     fn forcing(&self, t_s: N<T>) -> N<T> {
@@ -194,27 +202,18 @@ impl<T: Lane> System<T, 4> for &Coupled {
         (sin * (sin * sin)).v()
     }
     fn derivative(&self, push: &N<T>, x: &[N<T>; 4]) -> [N<T>; 4] {
-        coupled(self.stiffness, *push, x)
+        coupled(self.0, *push, x)
     }
     fn in_range(&self, x: &[N<T>; 4]) -> T::Mask {
         x[0].0.abs().less(x[0].lit(1.5).0)
     }
 }
 
-impl System<f64, 4> for Coupled {
-    type Forcing = N<f64>;
-    fn forcing(&self, t_s: N<f64>) -> N<f64> {
-        (&self).forcing(t_s)
-    }
-    fn derivative(&self, push: &N<f64>, x: &[N<f64>; 4]) -> [N<f64>; 4] {
-        (&self).derivative(push, x)
-    }
-    fn in_range(&self, x: &[N<f64>; 4]) -> bool {
-        (&self).in_range(x)
-    }
-}
-
 impl Task<f64, 4> for Coupled {
+    type System = Masses;
+    fn system(&self) -> &Masses {
+        &self.masses
+    }
     fn next_leg(&mut self, _: usize, ended: Ended, x: &mut [N<f64>; 4]) -> Option<Leg> {
         if ended == Ended::Idle {
             *x = self.start.map(N);
@@ -237,15 +236,16 @@ impl Task<f64, 4> for Coupled {
 
 impl Stiff<4, 2> for Coupled {
     fn partials(&self, t_s: f64, x: &[N<f64>; 4], partials: &mut Partials<2>) {
-        partials.find(Array([0.0; 4]), &self, t_s, x);
+        partials.find(Array([0.0; 4]), &self.masses, t_s, x);
     }
 }
 
 fn run(stiffness: f64, ends_s: &[f64], relative: f64) -> Coupled {
     let starts = [0.0].into_iter().chain(ends_s.iter().copied());
-    let legs = starts.zip(ends_s).map(|(start_s, &end_s)| Leg { start_s, end_s, step_s: 1e-4 }).collect();
+    let legs =
+        starts.zip(ends_s).map(|(start_s, &end_s)| Leg { start_s, end_s, step_s: 1e-4 }).collect();
     let mut task = Coupled {
-        stiffness,
+        masses: Masses(stiffness),
         legs,
         next: 0,
         start: [0.0; 4],
@@ -263,11 +263,12 @@ fn partials_are_exact_and_do_not_depend_on_the_lanes() {
     let task = run(50.0, &[], 1e-3);
     let x = [0.4, 0.5, -1.0, 2.0].map(N);
     let mut one = Partials::<2>::zero();
-    one.find(0.0, &&task, 2.0, &x);
+    one.find(0.0, &task.masses, 2.0, &x);
     let mut four = Partials::<2>::zero();
-    four.find(Array([0.0; 4]), &&task, 2.0, &x);
+    four.find(Array([0.0; 4]), &task.masses, 2.0, &x);
     assert_eq!(format!("{one:?}"), format!("{four:?}"));
-    let close = |ours: N<f64>, exact: f64| assert!((ours.0 - exact).abs() < 1e-13, "{} {exact}", ours.0);
+    let close =
+        |ours: N<f64>, exact: f64| assert!((ours.0 - exact).abs() < 1e-13, "{} {exact}", ours.0);
     let [[aa, ab], [ba, bb]] = one.by_coordinate;
     close(aa, -50.0 - 9.0 * 0.4_f64.cos());
     close(ab, 50.0);
@@ -287,12 +288,16 @@ fn it_converges_with_its_tolerance_between_steps_as_at_them() {
     let mut last = f64::INFINITY;
     for relative in [1e-4, 1e-6, 1e-8] {
         let coarse = run(50.0, &ends, relative);
-        let error = |a: &[f64; 4], b: &[f64; 4]| (0..4).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max);
+        let error =
+            |a: &[f64; 4], b: &[f64; 4]| (0..4).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max);
         let at_end = error(&coarse.ends[1], &fine.ends[1]);
         // Where a middle of a coarse step is, by one more run that ends there.
         let (time, middle) = coarse.seen[coarse.seen.len() * 2 / 3];
         let inside = error(&middle, &run(50.0, &[1.0, time], 1e-12).ends[1]);
-        assert!(at_end < 20.0 * relative && inside < 20.0 * relative, "{relative}: {at_end:e} {inside:e}");
+        assert!(
+            at_end < 20.0 * relative && inside < 20.0 * relative,
+            "{relative}: {at_end:e} {inside:e}"
+        );
         assert!(at_end < 0.1 * last, "{at_end:e} after {last:e}");
         last = at_end;
     }
@@ -328,9 +333,14 @@ fn failures_say_why_and_when() {
     assert!(time_s > 0.0 && time_s < 10.0 && count.accepted + count.rejected == 20);
 
     let ended = until_failure(50.0, [1.4, 1.4, 3.0, 3.0], 1000);
-    let [Ended::Failed { reason: Failure::Diverged, time_s, .. }] = ended[..] else { panic!("{ended:?}") };
+    let [Ended::Failed { reason: Failure::Diverged, time_s, .. }] = ended[..] else {
+        panic!("{ended:?}")
+    };
     assert!(time_s > 0.01 && time_s < 0.1, "{time_s}");
 
     let ended = until_failure(f64::INFINITY, [0.0; 4], 1000);
-    assert!(matches!(ended[..], [Ended::Failed { reason: Failure::StepTooSmall, .. }]), "{ended:?}");
+    assert!(
+        matches!(ended[..], [Ended::Failed { reason: Failure::StepTooSmall, .. }]),
+        "{ended:?}"
+    );
 }

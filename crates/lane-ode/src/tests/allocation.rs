@@ -11,13 +11,18 @@ fn the_counter_counts() {
 
 #[test]
 fn a_whole_integration_asks_nothing_of_the_heap() {
-    let trajectories: Vec<_> =
-        (0..21).map(|i| Trajectory::swing(1.0 + 0.1 * f64::from(i), 3.0, 1 + i % 3, 1e-3)).collect();
+    let trajectories: Vec<_> = (0..21)
+        .map(|i| Trajectory::swing(1.0 + 0.1 * f64::from(i), 3.0, 1 + i % 3, 1e-3))
+        .collect();
     let tolerance = Tolerance { relative: 1e-8, absolute: 1e-8, max_steps: 100_000 };
     for simd in instruction_sets() {
         for method in [Method::Rk4, Method::Dop853, Method::Dopri5(tolerance)] {
             let (outcomes, asked) = solve::<Swing, 3, 1>(simd, method, &trajectories);
-            assert!(outcomes.iter().all(|o| matches!(o.ended, Ended::Arrived(_)) && o.count.accepted > 20));
+            assert!(
+                outcomes
+                    .iter()
+                    .all(|o| matches!(o.ended, Ended::Arrived(_)) && o.count.accepted > 20)
+            );
             assert_eq!(asked, 0, "{method:?} on {simd:?}");
         }
     }

@@ -52,7 +52,8 @@ const CASES: &[Case] = &[
     case!("sin(x x) / sqrt(x + 2)", |x| (x * x).v().sin_cos().0 / (x + 2.0).sqrt(), |x| {
         let ((s, c), r) = ((x * x).sin_cos(), (x + 2.0).sqrt());
         let first = 2.0 * x * c / r - 0.5 * s / (r * r * r);
-        let second = (2.0 * c - 4.0 * x * x * s) / r - 2.0 * x * c / (r * r * r) + 0.75 * s / r.powi(5);
+        let second =
+            (2.0 * c - 4.0 * x * x * s) / r - 2.0 * x * c / (r * r * r) + 0.75 * s / r.powi(5);
         [first, second]
     }),
 ];
@@ -69,10 +70,21 @@ fn first_and_second_derivatives_are_those_by_hand() {
         for x in ARGUMENTS {
             let [first, second] = (case.by_hand)(x);
             let y = (case.first)(N(Dual { value: x, slope: 1.0 })).0;
-            assert_eq!(y.value.to_bits(), (case.plain)(N(x)).0.to_bits(), "{}: value at {x}", case.name);
-            assert!(is_close(y.slope, first, 1e-14), "{}: {} against {first} at {x}", case.name, y.slope);
+            assert_eq!(
+                y.value.to_bits(),
+                (case.plain)(N(x)).0.to_bits(),
+                "{}: value at {x}",
+                case.name
+            );
+            assert!(
+                is_close(y.slope, first, 1e-14),
+                "{}: {} against {first} at {x}",
+                case.name,
+                y.slope
+            );
             let once = Dual { value: x, slope: 1.0 };
-            let y = (case.second)(N(Dual { value: once, slope: Dual { value: 1.0, slope: 0.0 } })).0;
+            let y =
+                (case.second)(N(Dual { value: once, slope: Dual { value: 1.0, slope: 0.0 } })).0;
             assert!(is_close(y.slope.value, first, 1e-14), "{}: first of two at {x}", case.name);
             assert!(
                 is_close(y.slope.slope, second, 1e-13),
@@ -91,7 +103,12 @@ fn derivatives_are_what_differences_tend_to() {
         for x in ARGUMENTS {
             let difference = ((case.plain)(N(x + H)).0 - (case.plain)(N(x - H)).0) / (2.0 * H);
             let y = (case.first)(N(Dual { value: x, slope: 1.0 })).0;
-            assert!(is_close(y.slope, difference, 1e-8), "{}: {} against {difference}", case.name, y.slope);
+            assert!(
+                is_close(y.slope, difference, 1e-8),
+                "{}: {} against {difference}",
+                case.name,
+                y.slope
+            );
         }
     }
 }

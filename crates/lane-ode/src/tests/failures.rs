@@ -3,7 +3,8 @@
 use super::{Equation, Method, Outcome, Trajectory, instruction_sets, solve};
 use crate::{Ended, Failure, Lane, Leg, N, Tolerance};
 
-/// x' = a x^2 + b / (c - t) + sqrt(d - t), y' = w z, z' = -w y: explodes, runs into a pole, has no value, or is fast.
+/// x' = a x^2 + b / (c - t) + sqrt(d - t), y' = w z, z' = -w y: explodes, runs into a pole, has no
+/// value, or is fast.
 struct Mishaps;
 
 impl Equation<3, 5> for Mishaps {
@@ -43,10 +44,11 @@ fn is_fast() -> Trajectory<3, 5> {
     trajectory([0.01, 0.0, 100.0, 100.0, 1e4])
 }
 
-const DOPRI5: Method = Method::Dopri5(Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 2000 });
+const DOPRI5: Method =
+    Method::Dopri5(Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 2000 });
 
-/// Solves mishaps among sound trajectories, in every order of arrival, and the sound ones alone; asserts that these are the
-/// same bits, and returns what became of the mishaps.
+/// Solves mishaps among sound trajectories, in every order of arrival, and the sound ones alone;
+/// asserts that these are the same bits, and returns what became of the mishaps.
 fn among_others(method: Method, mishaps: &[Trajectory<3, 5>]) -> Vec<Outcome<3>> {
     let mut ends: Option<Vec<Outcome<3>>> = None;
     for simd in instruction_sets() {
@@ -80,7 +82,9 @@ fn among_others(method: Method, mishaps: &[Trajectory<3, 5>]) -> Vec<Outcome<3>>
 }
 
 fn failure(outcome: &Outcome<3>) -> (Failure, f64) {
-    let Ended::Failed { reason, time_s, .. } = outcome.ended else { panic!("it did not fail: {outcome:?}") };
+    let Ended::Failed { reason, time_s, .. } = outcome.ended else {
+        panic!("it did not fail: {outcome:?}")
+    };
     (reason, time_s)
 }
 
@@ -132,5 +136,8 @@ fn a_spent_allowance_of_steps_ends_alone() {
 fn all_mishaps_together_leave_the_others_as_they_are() {
     let mishaps = [explodes(), has_no_value_after(0.3), runs_into_a_pole_at(0.9), is_fast()];
     let reasons: Vec<_> = among_others(DOPRI5, &mishaps).iter().map(|o| failure(o).0).collect();
-    assert_eq!(reasons, [Failure::Diverged, Failure::Diverged, Failure::StepTooSmall, Failure::StepLimit]);
+    assert_eq!(
+        reasons,
+        [Failure::Diverged, Failure::Diverged, Failure::StepTooSmall, Failure::StepLimit]
+    );
 }

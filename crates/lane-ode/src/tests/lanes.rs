@@ -1,4 +1,5 @@
-//! Each operation of each lane type gives the bits of plain `f64`, whatever stands in the other lanes.
+//! Each operation of each lane type gives the bits of plain `f64`, whatever is in the other
+//! lanes.
 
 use super::array::Array;
 use super::instruction_sets;
@@ -11,7 +12,8 @@ type Operands = [f64; 3];
 /// What is computed of them: numbers, sine and cosine twice, two choices.
 const RESULTS: usize = 21;
 
-/// What IEEE 754 and the standard library say; of a negated sum, without the compiler's eye on both at once (`aarch64::negated`).
+/// What IEEE 754 and the standard library say; of a negated sum, without the compiler's eye on both
+/// at once (`aarch64::negated`).
 fn expected([a, b, c]: Operands) -> [f64; RESULTS] {
     let (sin, cos) = trig::sin_cos(a);
     let (sin_turns, cos_turns) = trig::sin_cos_turns(N(a));
@@ -133,7 +135,8 @@ fn operands() -> Vec<Operands> {
         let mut number = || (rng.f64() * 2.0 - 1.0) * 2.0_f64.powi(rng.i32(-40..40));
         all.push([number(), number(), number()]);
     }
-    // Products of numbers of a size, and their sums: where a fused operation and two rounded ones differ.
+    // Products of numbers of a size, and their sums: where a fused operation and two rounded ones
+    // differ.
     for _ in 0..20_000 {
         let [a, b] = [rng.f64() + 0.5, rng.f64() + 0.5];
         all.push([a, b, -a * b]);
@@ -193,7 +196,13 @@ fn every_instruction_set_has_the_lanes_it_says() {
         assert_eq!(simd.dispatch(CountLanes), simd.lanes(), "{}", simd.name());
     }
     let baseline = if cfg!(target_arch = "aarch64") { Simd::Neon } else { Simd::Scalar };
-    assert!(instruction_sets().contains(&baseline), "every processor of this architecture has {baseline:?}");
+    assert!(
+        instruction_sets().contains(&baseline),
+        "every processor of this architecture has {baseline:?}"
+    );
     let absent = Simd::ALL.into_iter().filter(|simd| !simd.is_available());
-    assert!(absent.into_iter().all(|simd| simd.dispatch(CountLanes) == 1), "what is absent runs on one lane");
+    assert!(
+        absent.into_iter().all(|simd| simd.dispatch(CountLanes) == 1),
+        "what is absent runs on one lane"
+    );
 }

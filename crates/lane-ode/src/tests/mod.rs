@@ -11,7 +11,8 @@ mod recorders;
 mod trig;
 
 use crate::{
-    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, Tolerance, dop853, dopri5, rk4,
+    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, Tolerance, dop853,
+    dopri5, rk4,
 };
 use core::marker::PhantomData;
 
@@ -102,12 +103,11 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for Solve<'_, E, 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut batch = Batch::<'_, T, E, D, P> {
-            p: [N(zero); P],
+            member: Member { p: [N(zero); P], equation: PhantomData },
             trajectories: self.trajectories,
             taken: 0,
             at: [(0, 0); MAX_LANES],
             outcomes: vec![Outcome::NONE; self.trajectories.len()],
-            equation: PhantomData,
         };
         let heap = allocation_counter::measure(|| match self.method {
             Method::Rk4 => rk4::integrate(zero, &mut batch),
@@ -120,16 +120,21 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for Solve<'_, E, 
 
 /// Trajectories through lanes, one after another.
 struct Batch<'a, T, E, const D: usize, const P: usize> {
-    p: [N<T>; P],
+    member: Member<T, E, P>,
     trajectories: &'a [Trajectory<D, P>],
     taken: usize,
     /// Trajectory and leg of each lane.
     at: [(usize, usize); MAX_LANES],
     outcomes: Vec<Outcome<D>>,
+}
+
+/// The member of the family in each lane.
+struct Member<T, E, const P: usize> {
+    p: [N<T>; P],
     equation: PhantomData<E>,
 }
 
-impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D> for Batch<'_, T, E, D, P> {
+impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D> for Member<T, E, P> {
     type Forcing = N<T>;
 
     #[inline(always)]
@@ -153,11 +158,21 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D> fo
     }
 }
 
-impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D> for Batch<'_, T, E, D, P> {
+impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
+    for Batch<'_, T, E, D, P>
+{
+    type System = Member<T, E, P>;
+
+    #[inline(always)]
+    fn system(&self) -> &Member<T, E, P> {
+        &self.member
+    }
+
     fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; D]) -> Option<Leg> {
         if ended != Ended::Idle {
             let (trajectory, leg) = &mut self.at[lane];
-            let (legs, outcome) = (&self.trajectories[*trajectory].legs, &mut self.outcomes[*trajectory]);
+            let (legs, outcome) =
+                (&self.trajectories[*trajectory].legs, &mut self.outcomes[*trajectory]);
             outcome.ended = ended;
             match ended {
                 Ended::Arrived(count) | Ended::Failed { count, .. } => outcome.count.add(count),
@@ -172,7 +187,7 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D> for 
         let trajectory = self.trajectories.get(self.taken)?;
         self.at[lane] = (self.taken, 0);
         self.taken += 1;
-        for (p, value) in self.p.iter_mut().zip(trajectory.parameters) {
+        for (p, value) in self.member.p.iter_mut().zip(trajectory.parameters) {
             p.0.set(lane, value);
         }
         for (x, start) in x.iter_mut().zip(trajectory.start) {
@@ -194,7 +209,8 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D> for 
                 let exact = E::exact(&self.trajectories[trajectory].parameters, t_s);
                 for i in 0..D {
                     // `max` drops a NaN: an unknown solution leaves no error.
-                    outcome.error_inside = outcome.error_inside.max((inside[i].0.get(lane) - exact[i]).abs());
+                    outcome.error_inside =
+                        outcome.error_inside.max((inside[i].0.get(lane) - exact[i]).abs());
                 }
             }
         }
@@ -221,7 +237,8 @@ impl Trajectory<3, 1> {
     /// From 0 to `end_s` in `legs` equal legs.
     fn swing(w: f64, end_s: f64, legs: u32, step_s: f64) -> Self {
         let edge = |i: u32| end_s * f64::from(i) / f64::from(legs);
-        let legs = (0..legs).map(|i| Leg { start_s: edge(i), end_s: edge(i + 1), step_s }).collect();
+        let legs =
+            (0..legs).map(|i| Leg { start_s: edge(i), end_s: edge(i + 1), step_s }).collect();
         Self { parameters: [w], start: [1.0, 1.0, 0.0], legs }
     }
 }

@@ -30,11 +30,13 @@ fn errors(method: Method, steps: &[u32]) -> Vec<[f64; 2]> {
 
 /// Slope of log error over log step, by least squares.
 fn slope(steps: &[u32], errors: impl Iterator<Item = f64>) -> f64 {
-    let points: Vec<_> = steps.iter().zip(errors).map(|(&n, e)| (-f64::from(n).ln(), e.ln())).collect();
+    let points: Vec<_> =
+        steps.iter().zip(errors).map(|(&n, e)| (-f64::from(n).ln(), e.ln())).collect();
     let count = points.len() as f64;
     let (mx, my) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / count, y + p.1 / count));
-    let (xy, xx) =
-        points.iter().fold((0.0, 0.0), |(xy, xx), p| (xy + (p.0 - mx) * (p.1 - my), xx + (p.0 - mx).powi(2)));
+    let (xy, xx) = points
+        .iter()
+        .fold((0.0, 0.0), |(xy, xx), p| (xy + (p.0 - mx) * (p.1 - my), xx + (p.0 - mx).powi(2)));
     xy / xx
 }
 
@@ -75,7 +77,8 @@ fn dop853_is_stable_on_the_imaginary_axis_to_its_limit() {
 
 #[test]
 fn dopri5_has_order_5_and_so_has_its_dense_output() {
-    // Dense output of order 4 has a local error of h^5, which is not summed up: it keeps pace with the method.
+    // Dense output of order 4 has a local error of h^5, which is not summed up: it keeps pace with
+    // the method.
     let [order, between] = slopes("dopri5", Method::Dopri5(ANYTHING), &[64, 91, 128, 181, 256]);
     assert!((order - 5.0).abs() < 0.1, "order {order}");
     assert!((between - 5.0).abs() < 0.1, "between steps {between}");
@@ -88,8 +91,11 @@ fn dopri5_keeps_the_tolerance_it_is_given_with_steps_by_the_fifth_root() {
     let mut steps = Vec::new();
     for tolerance in [1e-5, 1e-7, 1e-9, 1e-11] {
         let allowed = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 100_000 };
-        let (outcomes, _) =
-            solve::<Swing, 3, 1>(Simd::best(), Method::Dopri5(allowed), core::slice::from_ref(&trajectory));
+        let (outcomes, _) = solve::<Swing, 3, 1>(
+            Simd::best(),
+            Method::Dopri5(allowed),
+            core::slice::from_ref(&trajectory),
+        );
         let Outcome { ended, x, count, error_inside, .. } = outcomes[0];
         assert!(matches!(ended, Ended::Arrived(_)));
         let error = (0..3).map(|i| (x[i] - exact[i]).abs()).fold(error_inside, f64::max);
@@ -97,7 +103,8 @@ fn dopri5_keeps_the_tolerance_it_is_given_with_steps_by_the_fifth_root() {
         assert!(error < 30.0 * tolerance, "{tolerance:e} gave {error:e}");
         steps.push(count.accepted as f64);
     }
-    // Local error is h^5 against the tolerance: a hundredth of it takes 100^(1/5) = 2.51 times as many steps.
+    // Local error is h^5 against the tolerance: a hundredth of it takes 100^(1/5) = 2.51 times as
+    // many steps.
     for pair in steps.windows(2) {
         assert!((2.1..2.9).contains(&(pair[1] / pair[0])), "{steps:?}");
     }
@@ -127,7 +134,11 @@ fn every_leg_ends_where_it_should() {
             let (outcomes, _) = solve::<Swing, 3, 1>(simd, method, &trajectories);
             for (end_s, outcome) in ends.into_iter().zip(outcomes) {
                 assert!(matches!(outcome.ended, Ended::Arrived(_)));
-                assert_eq!(outcome.observed_to_s.to_bits(), end_s.to_bits(), "{method:?} on {simd:?}");
+                assert_eq!(
+                    outcome.observed_to_s.to_bits(),
+                    end_s.to_bits(),
+                    "{method:?} on {simd:?}"
+                );
             }
         }
     }
@@ -135,10 +146,12 @@ fn every_leg_ends_where_it_should() {
 
 #[test]
 fn a_fixed_step_fills_its_leg_with_the_fewest_equal_steps() {
-    let steps = |end_s: f64, step_s: f64| crate::fixed_steps(&Leg { start_s: 0.0, end_s, step_s });
+    let steps =
+        |end_s: f64, step_s: f64| crate::fixed::fixed_steps(&Leg { start_s: 0.0, end_s, step_s });
     assert_eq!(steps(50.0, 2e-4), 250_000);
     assert_eq!(steps(1.0, 0.3), 4);
-    // 0.7 / 0.1 is a hair below 7, 0.3 / 0.1 a hair below 3, 4.35 / 0.01 a hair below 435: none is an eighth of a step off.
+    // 0.7 / 0.1 is a hair below 7, 0.3 / 0.1 a hair below 3, 4.35 / 0.01 a hair below 435: none is
+    // an eighth of a step off.
     assert_eq!([steps(0.7, 0.1), steps(0.3, 0.1), steps(4.35, 0.01)], [7, 3, 435]);
     // 1.1 / 0.1 is a hair above 11.
     assert_eq!(steps(1.1, 0.1), 11);

@@ -63,7 +63,8 @@ impl Waves {
 
 type Advance = fn(&mut Peaks<f64, 1>, N<f64>, &[Sample<f64>; 1], bool);
 
-/// The largest error, as a share of the amplitude, over many waves of unit frequency and a slower or faster companion.
+/// The largest error, as a share of the amplitude, over many waves of unit frequency and a slower
+/// or faster companion.
 fn largest_error(steps_per_period: u32) -> f64 {
     largest_error_by(Peaks::advance, steps_per_period)
 }
@@ -108,7 +109,9 @@ fn the_sampling_error_is_of_sixth_order() {
 fn without_curvatures_the_sampling_error_is_of_fourth_order() {
     let [coarse, fine] = [24, 48].map(|steps| largest_error_by(Peaks::advance_by_slopes, steps));
     let order = (coarse / fine).log2();
-    eprintln!("without curvatures, 48 steps a period: {fine:.2e} of the amplitude, order {order:.2}");
+    eprintln!(
+        "without curvatures, 48 steps a period: {fine:.2e} of the amplitude, order {order:.2}"
+    );
     assert!(order > 3.5 && fine < 1e-5, "{order} {fine:e}");
 }
 

@@ -117,7 +117,8 @@ fn integrals_of_squares_are_of_sixth_order() {
     assert!(order > 5.5 && fine < 1e-6, "{order} {fine:e}");
 }
 
-/// Time above zero of a sine wave less `height`, from 0 to `end` in `steps` steps, and the exact one for whole periods.
+/// Time above zero of a sine wave less `height`, from 0 to `end` in `steps` steps, and the exact
+/// one for whole periods.
 fn above(height: f64, phase: f64, periods: u32, steps: u32) -> [f64; 2] {
     let waves = Waves { amplitude: [1.0, 0.0], frequency: [TAU, 1.0], phase: [phase, 0.0] };
     let sample = |t: f64| {
@@ -130,7 +131,8 @@ fn above(height: f64, phase: f64, periods: u32, steps: u32) -> [f64; 2] {
     for i in 1..=steps {
         time.advance(N(h), &sample(h * f64::from(i)), true);
     }
-    let exact = f64::from(periods) * (core::f64::consts::PI - 2.0 * height.clamp(-1.0, 1.0).asin()) / TAU;
+    let exact =
+        f64::from(periods) * (core::f64::consts::PI - 2.0 * height.clamp(-1.0, 1.0).asin()) / TAU;
     [time.lane(0), exact]
 }
 

@@ -4,7 +4,8 @@ use crate::{N, trig};
 use astro_float_num::{BigFloat, Consts, RoundingMode};
 use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-/// Bits of the reference: the closest that an argument here comes to a multiple of pi/2 costs some 60 to 80 of them.
+/// Bits of the reference: the closest that an argument here comes to a multiple of pi/2 costs some
+/// 60 to 80 of them.
 const BITS: usize = 320;
 const NEAREST: RoundingMode = RoundingMode::ToEven;
 
@@ -17,7 +18,8 @@ impl Reference {
         Self { constants: Consts::new().unwrap() }
     }
 
-    /// Errors of `computed` sine and cosine of `angle`, in units in the last place of the true values.
+    /// Errors of `computed` sine and cosine of `angle`, in units in the last place of the true
+    /// values.
     fn errors(&mut self, angle: &BigFloat, (sin, cos): (f64, f64)) -> f64 {
         let true_sin = angle.sin(BITS, NEAREST, &mut self.constants);
         let true_cos = angle.cos(BITS, NEAREST, &mut self.constants);
@@ -31,14 +33,16 @@ impl Reference {
 
     /// Of an angle in turns.
     fn turns(&mut self, turns: f64) -> f64 {
-        let two_pi = self.constants.pi(BITS, NEAREST).mul(&BigFloat::from_f64(2.0, BITS), BITS, NEAREST);
+        let two_pi =
+            self.constants.pi(BITS, NEAREST).mul(&BigFloat::from_f64(2.0, BITS), BITS, NEAREST);
         let angle = BigFloat::from_f64(turns, BITS).mul(&two_pi, BITS, NEAREST);
         let (sin, cos) = trig::sin_cos_turns(N(turns));
         self.errors(&angle, (sin.0, cos.0))
     }
 }
 
-/// Distance between `computed` and `exact` in units of the last place that a double of `exact`'s size has.
+/// Distance between `computed` and `exact` in units of the last place that a double of `exact`'s
+/// size has.
 fn ulps(computed: f64, exact: &BigFloat) -> f64 {
     let difference = BigFloat::from_f64(computed, BITS).sub(exact, BITS, NEAREST);
     if difference.is_zero() {
@@ -52,7 +56,11 @@ fn ulps(computed: f64, exact: &BigFloat) -> f64 {
 }
 
 /// The largest error over many angles.
-fn largest(name: &str, angles: impl Iterator<Item = f64>, mut error: impl FnMut(f64) -> f64) -> f64 {
+fn largest(
+    name: &str,
+    angles: impl Iterator<Item = f64>,
+    mut error: impl FnMut(f64) -> f64,
+) -> f64 {
     let (mut most, mut at) = (0.0_f64, 0.0);
     for angle in angles {
         let error = error(angle);
@@ -75,7 +83,8 @@ fn random(seed: u64, count: usize, number: impl Fn(f64) -> f64) -> impl Iterator
 fn sines_of_coordinates_are_within_1_5_ulp() {
     let mut reference = Reference::new();
     // Within a quarter turn on one path, up to where a trajectory has diverged on the other.
-    let narrow = random(1, 3000, |u| u * FRAC_PI_4).chain(random(2, 1000, |u| 10.0_f64.powf(-12.0 * u)));
+    let narrow =
+        random(1, 3000, |u| u * FRAC_PI_4).chain(random(2, 1000, |u| 10.0_f64.powf(-12.0 * u)));
     assert!(largest("below pi/4", narrow, |x| reference.radians(x)) < 1.2);
     let wide = random(3, 3000, |u| FRAC_PI_4 + u * FRAC_PI_4);
     assert!(largest("pi/4 to pi/2", wide, |x| reference.radians(x)) < 1.5);
@@ -87,7 +96,9 @@ fn sines_of_any_angle_are_within_1_5_ulp() {
     let large = random(4, 3000, |u| 10.0_f64.powf(6.0 * u));
     assert!(largest("up to 1e6", large, |x| reference.radians(x)) < 1.5);
     // Where almost all digits cancel.
-    let close = (1..500_u32).map(|k| f64::from(k * k) * FRAC_PI_2).chain((1..500).map(|k| f64::from(k) * PI));
+    let close = (1..500_u32)
+        .map(|k| f64::from(k * k) * FRAC_PI_2)
+        .chain((1..500).map(|k| f64::from(k) * PI));
     assert!(largest("near multiples of pi/2", close, |x| reference.radians(x)) < 1.5);
 }
 

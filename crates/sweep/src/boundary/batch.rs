@@ -5,11 +5,11 @@ use super::row::{Span, Want};
 
 /// Trials that cost as much as one. Fixed, so that which trials are made depends neither on the
 /// instruction set nor on the number of threads.
-pub const LANES: usize = lane_ode::MAX_LANES;
+pub(crate) const LANES: usize = lane_ode::MAX_LANES;
 
 /// What a batch costs.
 #[must_use]
-pub const fn lane_groups(trials: usize) -> usize {
+pub(crate) const fn lane_groups(trials: usize) -> usize {
     trials.div_ceil(LANES)
 }
 

@@ -1,16 +1,17 @@
-//! The boundary file: one row per place where the side changes, or per row of the first axis that has none.
+//! The boundary file: one row per place where the side changes, or per row of the first axis that
+//! has none.
 
 use parquet::errors::ParquetError;
 use serde_json::{Value, json};
 use washer_model::unit_suffix;
 
-use super::product::{Task, further_values};
-use super::quantity::Quantity;
+use super::product::{BoundaryTask, further_values};
+use super::quantity::TracedQuantity;
 use super::{Edge, Traced, TracedRow};
-use crate::files::key;
 use crate::plan::Plan;
 use crate::store::Job;
 use crate::table::Table;
+use sweep_files::key;
 
 /// One line of the file.
 struct Line<'a> {
@@ -21,7 +22,8 @@ struct Line<'a> {
     edge: &'a Edge,
 }
 
-/// A name with something before its unit's suffix: `damping_n_s_per_m` and `low` give `damping_low_n_s_per_m`.
+/// A name with something before its unit's suffix: `damping_n_s_per_m` and `low` give
+/// `damping_low_n_s_per_m`.
 fn within(name: &str, unit: &str, word: &str) -> String {
     let suffix = unit_suffix(unit).unwrap_or_default();
     let stem = name.strip_suffix(suffix).unwrap_or(name);
@@ -30,13 +32,13 @@ fn within(name: &str, unit: &str, word: &str) -> String {
 
 /// What the store must know of a search: its plan, with what is asked of it beside the grid.
 #[must_use]
-pub fn job<'a>(plan: &'a Plan, quantity: Quantity, task: &Task) -> Job<'a> {
+pub(crate) fn job<'a>(plan: &'a Plan, quantity: TracedQuantity, task: &BoundaryTask) -> Job<'a> {
     let mut job = Job::of(plan);
     job.plan["boundary"] = asked(quantity, task);
     job
 }
 
-fn asked(quantity: Quantity, task: &Task) -> Value {
+fn asked(quantity: TracedQuantity, task: &BoundaryTask) -> Value {
     json!({
         "quantity": quantity.name(),
         "tolerance": task.search.tolerance,
@@ -48,11 +50,11 @@ fn asked(quantity: Quantity, task: &Task) -> Value {
 ///
 /// # Errors
 /// What the Parquet library refuses: a defect of this program.
-pub fn bytes(
+pub(crate) fn bytes(
     job: &Job<'_>,
     plan: &Plan,
-    quantity: Quantity,
-    task: &Task,
+    quantity: TracedQuantity,
+    task: &BoundaryTask,
     traced: &Traced,
 ) -> Result<Vec<u8>, ParquetError> {
     let mut about = asked(quantity, task);
@@ -67,7 +69,7 @@ pub fn bytes(
     table.into_bytes()
 }
 
-fn add_columns(table: &mut Table, plan: &Plan, quantity: Quantity, traced: &Traced) {
+fn add_columns(table: &mut Table, plan: &Plan, quantity: TracedQuantity, traced: &Traced) {
     let lines: Vec<Line<'_>> = traced
         .curves
         .iter()
@@ -83,27 +85,33 @@ fn add_columns(table: &mut Table, plan: &Plan, quantity: Quantity, traced: &Trac
     add_axes(table, plan, quantity, &lines);
     table.words(
         "kind",
-        "crossing, jump (the quantity leaps over its limit), undefined (it is not defined on one side), or why there is none in \
+        "crossing, jump (the quantity leaps over its limit), undefined (it is not defined on one \
+         side), or why there is none in \
          range: reliable, unreliable or undefined wherever it was evaluated",
         lines.iter().map(|line| line.edge.kind.name()),
     );
     table.counts(
         "crossing",
-        "number of this change of side at this value of the first axis, from 1 upwards along the second; 0 where none is \
+        "number of this change of side at this value of the first axis, from 1 upwards along the \
+         second; 0 where none is \
          in range",
         lines.iter().map(|line| line.number as u64),
     );
     table.counts(
         "crossings",
         "how many changes of side there are",
-        lines.iter().map(|line| line.row.edges.iter().filter(|edge| edge.bracket.is_some()).count() as u64),
+        lines
+            .iter()
+            .map(|line| line.row.edges.iter().filter(|edge| edge.bracket.is_some()).count() as u64),
     );
     for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
         table.numbers(
             &format!("quantity_{word}"),
             quantity.unit(),
             &format!("{} at the bracket's {side} end; null where not defined", quantity.name()),
-            lines.iter().map(|line| line.edge.distances[end].map(|distance| quantity.value(distance, plan))),
+            lines.iter().map(|line| {
+                line.edge.distances[end].map(|distance| quantity.value(distance, plan))
+            }),
         );
     }
     table.counts(
@@ -114,7 +122,7 @@ fn add_columns(table: &mut Table, plan: &Plan, quantity: Quantity, traced: &Trac
 }
 
 /// Where the boundary is: both axes, the bracket, and the axes beyond the second.
-fn add_axes(table: &mut Table, plan: &Plan, quantity: Quantity, lines: &[Line<'_>]) {
+fn add_axes(table: &mut Table, plan: &Plan, quantity: TracedQuantity, lines: &[Line<'_>]) {
     let [first, second, further @ ..] = plan.axes.as_slice() else { return };
     let (name, unit) = (second.parameter.name(), second.parameter.unit());
     table.numbers(
@@ -134,7 +142,9 @@ fn add_axes(table: &mut Table, plan: &Plan, quantity: Quantity, lines: &[Line<'_
         table.numbers(
             &within(name, unit, word),
             unit,
-            &format!("{side} end of the bracket in which the side changes; null where none is in range"),
+            &format!(
+                "{side} end of the bracket in which the side changes; null where none is in range"
+            ),
             lines.iter().map(|line| line.edge.bracket.map(|bracket| bracket[end])),
         );
     }

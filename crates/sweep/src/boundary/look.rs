@@ -2,7 +2,7 @@
 //! them met.
 
 use super::net::Net;
-use super::row::{Sample, Span, Want};
+use super::row::{Span, Tried, Want};
 
 /// Distances below this are near the limit: neighbouring samples there should not differ by more
 /// than [`STRIDE`].
@@ -17,8 +17,8 @@ type Point = (f64, f64);
 
 /// Where to look between and beyond these samples: where the distance changes fast near the limit,
 /// where three samples make an extremum that may touch it, and beyond samples that point to it.
-pub(super) fn around(samples: &[Sample], span: &Span) -> Vec<Want> {
-    let points: Vec<Option<Point>> = samples.iter().map(Sample::finite).collect();
+pub(super) fn around(samples: &[Tried], span: &Span) -> Vec<Want> {
+    let points: Vec<Option<Point>> = samples.iter().map(Tried::finite).collect();
     let pairs = points.windows(2).filter_map(|pair| Some((pair[0]?, pair[1]?)));
     let threes = points.windows(3).filter_map(|three| Some((three[0]?, three[1]?, three[2]?)));
     let steep = pairs.filter(|(a, b)| is_steep(*a, *b, span));
@@ -83,7 +83,7 @@ mod tests {
     const SPAN: Span = Span { least: 0.0, greatest: 100.0, tolerance: 1.0 };
 
     fn wants(samples: &[Point]) -> Vec<Want> {
-        let sample = |&(at, distance): &Point| Sample { at, distance: Some(distance) };
+        let sample = |&(at, distance): &Point| Tried { at, distance: Some(distance) };
         around(&samples.iter().map(sample).collect::<Vec<_>>(), &SPAN)
     }
 

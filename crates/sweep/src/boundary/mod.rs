@@ -3,7 +3,8 @@
 //!
 //! The quantity enters as a signed distance from its limit, negative on the reliable side
 //! ([`Evaluate`]); nothing here knows a machine. Trials go to the evaluator in batches, and what a
-//! batch costs is counted in lane groups ([`lane_groups`]): nine trials cost as much as sixteen.
+//! batch costs is counted in lane groups ([`batch::lane_groups`]): nine trials cost as much as
+//! sixteen.
 //!
 //! 1. A lattice: every value of the second axis's lattice at evenly spread rows. It finds what lies
 //!    in range, and guards against islands wider than its cells.
@@ -11,24 +12,24 @@
 //!    within tolerance (`row`). Distances that hint at more are followed (`look`).
 //! 3. The rows between, from the middle of each gap outwards, start from where their neighbours'
 //!    roots point (`warm`): where the curve is smooth, two trials a row are enough.
-//! 4. Where neighbouring rows disagree, both are looked at until the pocket that one has is found in
-//!    the other, or closes between them (`pockets`).
+//! 4. Where neighbouring rows disagree, both are looked at until the pocket that one has is found
+//!    in the other, or closes between them (`pockets`).
 //!
 //! All rows that are at work share a batch, rows begin in whole lane groups, and the trials that
 //! fill up the last group make the widest nets closer (`batch`).
 //!
-//! Which trials are made depends on values alone, never on threads or lanes, so the result is a pure
-//! function of the input.
+//! Which trials are made depends on values alone, never on threads or lanes, so the result is a
+//! pure function of the input.
 
 mod batch;
-pub mod file;
+pub(crate) mod file;
 mod look;
 #[cfg(test)]
 mod model_tests;
 mod net;
 mod pockets;
-pub mod product;
-pub mod quantity;
+pub(crate) mod product;
+pub(crate) mod quantity;
 #[cfg(test)]
 mod random_tests;
 mod row;
@@ -37,11 +38,10 @@ mod tests;
 mod trace;
 mod warm;
 
-pub use batch::{LANES, lane_groups};
-pub use trace::trace;
+pub(crate) use trace::trace;
 
 /// Evaluates trial points.
-pub trait Evaluate {
+pub(crate) trait Evaluate {
     /// Why it stopped before all was done.
     type Stop;
 
@@ -49,13 +49,13 @@ pub trait Evaluate {
     /// side, `None` where the quantity is not defined.
     ///
     /// # Errors
-    /// When it was told to stop, or could not go on.
+    /// When it was stopped, or could not go on.
     fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Self::Stop>;
 }
 
 /// A point to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trial {
+pub(crate) struct Trial {
     /// Which curve: a combination of the axes beyond the second.
     pub curve: usize,
     /// Value of the first axis.
@@ -66,7 +66,7 @@ pub struct Trial {
 
 /// The stretch of the second axis that is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Search {
+pub(crate) struct Search {
     /// Least value.
     pub least: f64,
     /// Greatest value.
@@ -75,8 +75,8 @@ pub struct Search {
     pub first_log: bool,
     /// The second axis is searched in its logarithm.
     pub second_log: bool,
-    /// Brackets end no wider than this: in the second axis's unit, or as a fraction of its value if that axis is
-    /// logarithmic.
+    /// Brackets end no wider than this: in the second axis's unit, or as a fraction of its value if
+    /// that axis is logarithmic.
     pub tolerance: f64,
     /// Cells of the lattice along each axis, at least 1.
     pub lattice: usize,
@@ -84,12 +84,13 @@ pub struct Search {
 
 /// What a row of the boundary file says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub(crate) enum EdgeKind {
     /// The quantity passes its limit continuously within the bracket.
     Crossing,
     /// The quantity leaps over its limit within the bracket, however closely one looks.
     Jump,
-    /// On one side of the bracket the quantity is not defined (a model failed, or there is nothing to compare).
+    /// On one side of the bracket the quantity is not defined (a model failed, or there is nothing
+    /// to compare).
     Undefined,
     /// On the reliable side wherever it was evaluated.
     NoneReliable,
@@ -99,9 +100,9 @@ pub enum Kind {
     NoneUndefined,
 }
 
-impl Kind {
+impl EdgeKind {
     /// Every kind, in the order of the file's dictionary.
-    pub const ALL: [Self; 6] = [
+    pub(crate) const ALL: [Self; 6] = [
         Self::Crossing,
         Self::Jump,
         Self::Undefined,
@@ -112,7 +113,7 @@ impl Kind {
 
     /// As in the file.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Crossing => "crossing",
             Self::Jump => "jump",
@@ -126,9 +127,9 @@ impl Kind {
 
 /// One place where the side changes, or the news that there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
+pub(crate) struct Edge {
     /// What it is.
-    pub kind: Kind,
+    pub kind: EdgeKind,
     /// Where the quantity is at its limit; only a crossing has such a place.
     pub at: Option<f64>,
     /// The values of the second axis between which the side changes, the lower first.
@@ -139,7 +140,7 @@ pub struct Edge {
 
 /// All that is known about one value of the first axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TracedRow {
+pub(crate) struct TracedRow {
     /// Value of the first axis.
     pub first: f64,
     /// From the least to the greatest value of the second axis; never empty.
@@ -150,7 +151,7 @@ pub struct TracedRow {
 
 /// The traced curves.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Traced {
+pub(crate) struct Traced {
     /// Per curve, its rows in the first axis's order.
     pub curves: Vec<Vec<TracedRow>>,
     /// Trial points in all.
@@ -161,9 +162,9 @@ pub struct Traced {
     pub rounds: usize,
 }
 
-/// Where a trace stands before a batch.
+/// Progress of a trace before a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Standing {
+pub(crate) struct Standing {
     /// Rows that are done, unless a neighbour will announce something.
     pub rows: usize,
     /// Trials that are done.

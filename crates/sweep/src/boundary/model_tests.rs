@@ -1,18 +1,18 @@
 //! The search over the real models, against the grid it stands for.
 
 use super::file::{bytes, job};
-use super::product::{BoundaryError, Models, Stopped, Task};
-use super::quantity::Quantity;
-use super::{Edge, Kind, Traced, trace};
+use super::product::{BoundaryError, BoundaryTask, Models, Stopped};
+use super::quantity::TracedQuantity;
+use super::{Edge, EdgeKind, Traced, trace};
 use crate::config;
 use crate::engine::ModelEngine;
 use crate::interrupt::Interrupt;
 use crate::measures::Criterion;
 use crate::outcome::Outcome;
 use crate::plan::Plan;
-use crate::plot::contour::zero_lines;
 use crate::store::{OpenedTrials, Trials};
 use crate::verdict::Verdict;
+use sweep_plot::contour::zero_lines;
 
 const HEAD: &str = r#"
 name = "short"
@@ -45,9 +45,15 @@ fn plan(text: &str) -> Plan {
     config::load(&path, &[]).unwrap_or_else(|mistakes| panic!("{mistakes}"))
 }
 
-fn traced(plan: &Plan, task: &Task, threads: usize, interrupt: &Interrupt) -> Result<Traced, Stopped> {
+fn traced(
+    plan: &Plan,
+    task: &BoundaryTask,
+    threads: usize,
+    interrupt: &Interrupt,
+) -> Result<Traced, Stopped> {
     let engine = ModelEngine::new(plan).unwrap();
-    let models = Models::new(plan, engine, Quantity::RatioMax, threads, interrupt, &|_| {}).unwrap();
+    let models =
+        Models::new(plan, engine, TracedQuantity::RatioMax, threads, interrupt, &|_| {}).unwrap();
     trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {})
 }
 
@@ -59,11 +65,12 @@ fn all_points(plan: &Plan) -> Vec<Vec<f64>> {
 #[test]
 fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, Some(0.5), 3).unwrap();
+    let task = BoundaryTask::new(&plan, Some(0.5), 3).unwrap();
     let interrupt = Interrupt::new();
     let traced = [1, 3].map(|threads| traced(&plan, &task, threads, &interrupt).unwrap());
-    let job = job(&plan, Quantity::RatioMax, &task);
-    let [one, three] = [0, 1].map(|k| bytes(&job, &plan, Quantity::RatioMax, &task, &traced[k]).unwrap());
+    let job = job(&plan, TracedQuantity::RatioMax, &task);
+    let [one, three] =
+        [0, 1].map(|k| bytes(&job, &plan, TracedQuantity::RatioMax, &task, &traced[k]).unwrap());
     assert!(one == three, "other bytes on three threads");
 
     let engine = ModelEngine::new(&plan).unwrap();
@@ -81,15 +88,18 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
             })
             .collect();
         let Some([low, high]) = edge.bracket else {
-            assert_eq!((row.first, edge.kind), (0.1, Kind::NoneReliable));
+            assert_eq!((row.first, edge.kind), (0.1, EdgeKind::NoneReliable));
             assert!(logs.iter().all(|(_, log)| *log < 0.0));
             continue;
         };
-        assert_eq!((row.edges.len(), edge.kind), (1, Kind::Crossing));
+        assert_eq!((row.edges.len(), edge.kind), (1, EdgeKind::Crossing));
         assert!(high - low <= 0.5);
         for (damping, log) in &logs {
             let reliable = *log < 0.0;
-            assert!(if reliable { *damping > low } else { *damping < high }, "{damping} {log} {edge:?}");
+            assert!(
+                if reliable { *damping > low } else { *damping < high },
+                "{damping} {log} {edge:?}"
+            );
         }
         let contour = logs.windows(2).find_map(|pair| {
             let [(a, from), (b, to)] = [pair[0], pair[1]];
@@ -103,8 +113,11 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
 fn grid_logs(plan: &Plan) -> Vec<Vec<f64>> {
     let engine = ModelEngine::new(plan).unwrap();
     let outcomes = engine.evaluate_at(&all_points(plan));
-    let log = |outcome: &Outcome| Quantity::RatioMax.distance(outcome, plan).unwrap();
-    outcomes.chunks(plan.axes[1].values.len() as usize).map(|row| row.iter().map(log).collect()).collect()
+    let log = |outcome: &Outcome| TracedQuantity::RatioMax.distance(outcome, plan).unwrap();
+    outcomes
+        .chunks(plan.axes[1].values.len() as usize)
+        .map(|row| row.iter().map(log).collect())
+        .collect()
 }
 
 #[test]
@@ -114,17 +127,21 @@ fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
     let masses = [0.39, 0.40, 0.41];
     let axes = |masses: &[f64], from: f64, to: f64, count: u32| {
         format!(
-            "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = {masses:?}\n[[axis]]\nparameter = \"damping_n_s_per_m\"\n\
+            "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = {masses:?}\n\
+             [[axis]]\nparameter = \"damping_n_s_per_m\"\n\
              range = {{ from = {from:?}, to = {to:?}, count = {count} }}\n"
         )
     };
     for criterion in Criterion::ALL {
         let told = format!("{head}[reliability]\ncriterion = \"{}\"\n", criterion.name());
         let wide = plan(&format!("{told}{}", axes(&[0.39, 0.395, 0.41], 60.0, 300.0, 33)));
-        let task = Task::new(&wide, Some(0.5), 4).unwrap();
+        let task = BoundaryTask::new(&wide, Some(0.5), 4).unwrap();
         let rows = traced(&wide, &task, 2, &Interrupt::new()).unwrap().curves.remove(0);
         let edges: Vec<_> = rows.iter().map(|row| row.edges.last().copied().unwrap()).collect();
-        assert!(edges.iter().all(|edge| edge.kind == Kind::Crossing), "{criterion:?}: {edges:?}");
+        assert!(
+            edges.iter().all(|edge| edge.kind == EdgeKind::Crossing),
+            "{criterion:?}: {edges:?}"
+        );
         // Dampings 0.5 N s/m apart around the last crossing.
         let middle = edges[0].at.unwrap().round();
         let (from, count) = (middle - 4.0, 29);
@@ -139,7 +156,11 @@ fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
                 inside.then(|| y0 + (y1 - y0) * (row.first - x0) / (x1 - x0))
             });
             let (contour, at) = (nearest.unwrap(), edge.at.unwrap());
-            assert!((contour - at).abs() < 0.25, "{criterion:?} at {} kg: {contour} and {at}", row.first);
+            assert!(
+                (contour - at).abs() < 0.25,
+                "{criterion:?} at {} kg: {contour} and {at}",
+                row.first
+            );
         }
     }
 }
@@ -147,7 +168,7 @@ fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
 #[test]
 fn a_stop_is_heeded_before_the_next_group() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, None, 6).unwrap();
+    let task = BoundaryTask::new(&plan, None, 6).unwrap();
     assert_eq!(task.search.tolerance, 0.5, "1/480 of 240 N s/m");
     let interrupt = Interrupt::new();
     interrupt.raise(2);
@@ -157,11 +178,11 @@ fn a_stop_is_heeded_before_the_next_group() {
 #[test]
 fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, Some(2.0), 2).unwrap();
+    let task = BoundaryTask::new(&plan, Some(2.0), 2).unwrap();
     let whole = traced(&plan, &task, 1, &Interrupt::new()).unwrap();
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.parquet");
-    let job = job(&plan, Quantity::RatioMax, &task);
+    let job = job(&plan, TracedQuantity::RatioMax, &task);
     let mut stops = 0;
     let (found, trials) = loop {
         let Ok(OpenedTrials::Open(trials)) = Trials::open(&output, &job, false) else { panic!() };
@@ -174,7 +195,8 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
             }
         };
         let engine = ModelEngine::new(&plan).unwrap();
-        let models = Models::new(&plan, engine, Quantity::RatioMax, 2, &interrupt, &tell).unwrap();
+        let models =
+            Models::new(&plan, engine, TracedQuantity::RatioMax, 2, &interrupt, &tell).unwrap();
         let models = models.keeping(*trials);
         let found = trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {});
         let trials = models.into_kept().unwrap();
@@ -198,25 +220,32 @@ fn a_pocket_is_followed_along_a_damper_that_is_moved() {
                 [[axis]]\nparameter = \"damping_n_s_per_m\"\n\
                 range = { from = 60.0, to = 300.0, count = 33 }\n";
     let plan = plan(&format!("{head}{axes}"));
-    let task = Task::new(&plan, None, 6).unwrap();
+    let task = BoundaryTask::new(&plan, None, 6).unwrap();
     let rows = traced(&plan, &task, 2, &Interrupt::new()).unwrap().curves.remove(0);
     // At 0.1 m nothing is reliable, from 0.125 m on all is from a crossing upwards; the row between
     // has a part of that, which no point of the lattice meets.
-    let kinds: Vec<Kind> = rows.iter().map(|row| row.edges[0].kind).collect();
-    assert_eq!(kinds[..3], [Kind::NoneUnreliable, Kind::Crossing, Kind::Crossing], "{rows:?}");
+    let kinds: Vec<EdgeKind> = rows.iter().map(|row| row.edges[0].kind).collect();
+    assert_eq!(
+        kinds[..3],
+        [EdgeKind::NoneUnreliable, EdgeKind::Crossing, EdgeKind::Crossing],
+        "{rows:?}"
+    );
     let engine = ModelEngine::new(&plan).unwrap();
     for row in &rows[..3] {
         let dampings: Vec<f64> = (0..=24).map(|k| 60.0 + 10.0 * f64::from(k)).collect();
-        let points: Vec<Vec<f64>> = dampings.iter().map(|damping| vec![row.first, *damping]).collect();
+        let points: Vec<Vec<f64>> =
+            dampings.iter().map(|damping| vec![row.first, *damping]).collect();
         for (damping, outcome) in dampings.iter().zip(engine.evaluate_at(&points)) {
-            let is_reliable = Quantity::RatioMax.distance(&outcome, &plan).unwrap() < 0.0;
-            let below = row.edges.iter().rev().find(|edge| edge.bracket.is_some_and(|b| b[1] <= *damping));
+            let is_reliable = TracedQuantity::RatioMax.distance(&outcome, &plan).unwrap() < 0.0;
+            let below =
+                row.edges.iter().rev().find(|edge| edge.bracket.is_some_and(|b| b[1] <= *damping));
             let found = match (below, row.edges[0].distances[0]) {
                 (Some(edge), _) => edge.distances[1].unwrap() < 0.0,
                 (None, Some(distance)) => distance < 0.0,
-                (None, None) => row.edges[0].kind == Kind::NoneReliable,
+                (None, None) => row.edges[0].kind == EdgeKind::NoneReliable,
             };
-            let is_bracketed = |edge: &Edge| edge.bracket.is_some_and(|b| b[0] < *damping && *damping < b[1]);
+            let is_bracketed =
+                |edge: &Edge| edge.bracket.is_some_and(|b| b[0] < *damping && *damping < b[1]);
             let said = (row.first, damping, &row.edges);
             assert!(found == is_reliable || row.edges.iter().any(is_bracketed), "{said:?}");
         }
@@ -227,7 +256,7 @@ fn a_pocket_is_followed_along_a_damper_that_is_moved() {
 fn plans_without_a_boundary_say_why() {
     let mass = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.2]\n";
     let refused = |text: &str, tolerance: Option<f64>| {
-        Task::new(&plan(&format!("{HEAD}{text}")), tolerance, 6).unwrap_err()
+        BoundaryTask::new(&plan(&format!("{HEAD}{text}")), tolerance, 6).unwrap_err()
     };
     assert_eq!(refused(mass, None), BoundaryError::Axes(1));
     let one = format!("{mass}[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100.0]\n");
@@ -236,7 +265,8 @@ fn plans_without_a_boundary_say_why() {
         let error = refused(GRID, Some(tolerance)).to_string();
         assert!(error.contains("--tolerance") && error.contains("240"), "{error}");
     }
-    let design = "[design]\nmethod = \"sobol\"\npoints = 8\n[[axis]]\nparameter = \"unbalance_mass_kg\"\n\
+    let design = "[design]\nmethod = \"sobol\"\npoints = 8\n\
+                  [[axis]]\nparameter = \"unbalance_mass_kg\"\n\
                   range = { from = 0.1, to = 0.2 }\n";
     assert_eq!(refused(design, None), BoundaryError::Design);
 }
@@ -244,10 +274,13 @@ fn plans_without_a_boundary_say_why() {
 #[test]
 fn every_quantity_is_found_by_its_name_and_back_from_its_distance() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    for quantity in Quantity::all() {
+    for quantity in TracedQuantity::all() {
         assert_eq!(quantity.name().parse(), Ok(quantity));
         assert_eq!(quantity.value(0.0, &plan), quantity.limit(&plan));
     }
-    assert!("ratio_tub".parse::<Quantity>().unwrap_err().contains("ratio_tub_yaw"));
-    assert_eq!(Quantity::Ratio(washer_model::Channel::TubYaw).plan(&plan).reliability.channels.len(), 1);
+    assert!("ratio_tub".parse::<TracedQuantity>().unwrap_err().contains("ratio_tub_yaw"));
+    assert_eq!(
+        TracedQuantity::Ratio(washer_model::Channel::TubYaw).plan(&plan).reliability.channels.len(),
+        1
+    );
 }

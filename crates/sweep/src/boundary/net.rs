@@ -3,16 +3,16 @@
 
 use super::row::Span;
 
-/// Neighbouring places of the closest net stand this far from each other, in tolerances: a little
+/// Neighbouring places of the closest net are this far from each other, in tolerances: a little
 /// less than one, so that the bracket they make is within tolerance whatever is rounded.
 const MESH: f64 = 0.9;
-/// A place beside an end of the bracket stands this far from it, in tolerances.
+/// A place beside an end of the bracket is this far from it, in tolerances.
 const MARGIN: f64 = 0.945;
 /// A root this close to an end of the bracket, in tolerances, is caught by one place beyond it.
 const CLOSE: f64 = 0.6;
 /// A spread of more than this part of the bracket tells nothing about where in it the root is.
 const VAGUE: f64 = 0.2;
-/// A single place stands this far from the expected root, in tolerances: what lies at its limit is
+/// A single place is this far from the expected root, in tolerances: what lies at its limit is
 /// the dearest to make sure of.
 const ASIDE: f64 = 0.45;
 /// A net whose mesh reaches so many times as far as the root is expected to stray needs no more.

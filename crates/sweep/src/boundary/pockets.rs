@@ -1,7 +1,7 @@
 //! Pockets that a neighbour announces: where a row has to be looked at because the row beside it is
 //! on another side there.
 
-use super::row::{Question, Row, Run, Span};
+use super::row::{Question, RowSearch, SideRange, Span};
 use super::warm::{Neighbour, hint, nearest, shared};
 
 /// A neighbour's pocket is looked for until no gap between trials is wider than this part of it.
@@ -31,7 +31,7 @@ pub(super) struct Beside<'a> {
 impl Beside<'_> {
     /// What the row is asked: `gap` is the widest that is left between trials where the two are on
     /// different sides.
-    pub(super) fn question(&self, row: &Row, gap: f64, span: &Span) -> Question {
+    pub(super) fn question(&self, row: &RowSearch, gap: f64, span: &Span) -> Question {
         let mut question = Question::default();
         for run in missing(self.neighbour.runs, self.own.runs, span) {
             self.look_for(run, row, gap, span, &mut question);
@@ -51,7 +51,14 @@ impl Beside<'_> {
 
     /// Asks for a run of the neighbour's: where it should be by its own way through the rows
     /// beyond, or else where it is there, and where the change of side beside it has taken it.
-    fn look_for(&self, run: &Run, row: &Row, gap: f64, span: &Span, question: &mut Question) {
+    fn look_for(
+        &self,
+        run: &SideRange,
+        row: &RowSearch,
+        gap: f64,
+        span: &Span,
+        question: &mut Question,
+    ) {
         let trend = self.trend(run, span);
         let expected = trend.unwrap_or_else(|| {
             let pairs = shared(self.neighbour, self.own, self.before.as_ref());
@@ -60,7 +67,7 @@ impl Beside<'_> {
                 (was, self.own.runs[*m].from - was)
             });
             let moved = nearest(run, moves);
-            Run { from: run.from + moved, to: run.to + moved, side: run.side }
+            SideRange { from: run.from + moved, to: run.to + moved, side: run.side }
         });
         let ends = [(run.from, expected.from), (run.to, expected.to)];
         let ends = ends.map(|(was, is)| hint(is, CORRECTION * (is - was), span));
@@ -83,7 +90,7 @@ impl Beside<'_> {
     }
 
     /// Where a run of the neighbour's should be here, by where it is in the row beyond.
-    fn trend(&self, run: &Run, span: &Span) -> Option<Run> {
+    fn trend(&self, run: &SideRange, span: &Span) -> Option<SideRange> {
         let beyond = self.beyond?;
         let then = partner(run, self.neighbour.runs, beyond.runs, span)?;
         let part = (self.own.at - self.neighbour.at) / (self.neighbour.at - beyond.at);
@@ -92,7 +99,7 @@ impl Beside<'_> {
         };
         let from = on(then.from, run.from, span.least);
         let to = on(then.to, run.to, span.greatest);
-        (from < to).then_some(Run { from, to, side: run.side })
+        (from < to).then_some(SideRange { from, to, side: run.side })
     }
 
     /// Stretches where the two rows are on different sides, unless a change of side that both have
@@ -114,7 +121,7 @@ impl Beside<'_> {
             own.runs.iter().chain(other.runs).flat_map(|run| [run.from, run.to]).collect();
         marks.sort_by(f64::total_cmp);
         marks.dedup();
-        let side = |runs: &[Run], at: f64| {
+        let side = |runs: &[SideRange], at: f64| {
             runs.iter().find(|run| run.from <= at && at <= run.to).map(|run| run.side)
         };
         let is_disputed = |[from, to]: &[f64; 2]| {
@@ -128,21 +135,26 @@ impl Beside<'_> {
 
 /// The runs of one row that go on in none of another's.
 pub(super) fn missing<'a>(
-    runs: &'a [Run],
-    other: &'a [Run],
+    runs: &'a [SideRange],
+    other: &'a [SideRange],
     span: &'a Span,
-) -> impl Iterator<Item = &'a Run> {
+) -> impl Iterator<Item = &'a SideRange> {
     runs.iter().filter(move |run| partner(run, runs, other, span).is_none())
 }
 
 /// The run of another row in which a run goes on: one that it lies beside for the most part, or
 /// else the nearest, if that is not far and it is the nearest to that one too.
-fn partner(run: &Run, runs: &[Run], other: &[Run], span: &Span) -> Option<Run> {
+fn partner(
+    run: &SideRange,
+    runs: &[SideRange],
+    other: &[SideRange],
+    span: &Span,
+) -> Option<SideRange> {
     if let Some(beside) = other.iter().find(|other| lies_beside(run, other)) {
         return Some(*beside);
     }
-    let nearest = |to: &Run, among: &[Run]| {
-        let away = |run: &Run| (run.middle() - to.middle()).abs();
+    let nearest = |to: &SideRange, among: &[SideRange]| {
+        let away = |run: &SideRange| (run.middle() - to.middle()).abs();
         let alike = among.iter().filter(|run| run.side == to.side && is_inner(run, span));
         alike.min_by(|a, b| away(a).total_cmp(&away(b))).copied()
     };
@@ -153,18 +165,18 @@ fn partner(run: &Run, runs: &[Run], other: &[Run], span: &Span) -> Option<Run> {
 }
 
 /// Whether half of the narrower of two runs lies beside the other.
-fn lies_beside(a: &Run, b: &Run) -> bool {
+fn lies_beside(a: &SideRange, b: &SideRange) -> bool {
     let common = a.to.min(b.to) - a.from.max(b.from);
     a.side == b.side && common > 0.5 * a.width().min(b.width())
 }
 
 /// Whether a run touches neither end of the range.
-fn is_inner(run: &Run, span: &Span) -> bool {
+fn is_inner(run: &SideRange, span: &Span) -> bool {
     run.from > span.least && run.to < span.greatest
 }
 
 /// Places that leave no gap between a row's trials within a stretch wider than this.
-fn cuts(from: f64, to: f64, widest: f64, row: &Row) -> Vec<f64> {
+fn cuts(from: f64, to: f64, widest: f64, row: &RowSearch) -> Vec<f64> {
     let cut = |[from, to]: [f64; 2]| {
         // Rounding is no reason for one more.
         let pieces = ((to - from) / widest - 1e-6).ceil().max(1.0) as usize;

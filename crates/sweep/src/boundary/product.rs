@@ -1,15 +1,15 @@
-//! The product's evaluator: both models at the trial points, on all cores, and the settings a plan gives a search.
+//! The product's evaluator: both models at the trial points, on all cores, and the settings a plan
+//! gives a search.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::quantity::Quantity;
+use super::quantity::TracedQuantity;
 use super::{Evaluate, Search, Trial};
-use crate::engine::{Demand, ModelEngine};
+use crate::engine::{Demand, ModelEngine, Watch};
 use crate::interrupt::Interrupt;
 use crate::outcome::Outcome;
 use crate::plan::{Axis, AxisValues, Plan};
-use crate::run::Watch;
 use crate::store::{Key, StoreError, Trials};
 use crate::threads::{self, ThreadsError};
 
@@ -27,24 +27,28 @@ const DEFAULT_PARTS: f64 = 480.0;
 pub enum BoundaryError {
     /// Fewer than two axes.
     #[error(
-        "a boundary runs over two axes, and this grid has {0}: give [[axis]] twice, first the one along which the \
+        "a boundary runs over two axes, and this grid has {0}: give [[axis]] twice, first the one \
+         along which the \
          curve is wanted, then the one that is searched"
     )]
     Axes(usize),
     /// The points come from a design.
     #[error(
-        "a boundary runs over the axes of a grid, and this file has a [design]: remove it, and give [[axis]] twice"
+        "a boundary runs over the axes of a grid, and this file has a [design]: remove it, and \
+         give [[axis]] twice"
     )]
     Design,
     /// The second axis has no extent.
     #[error(
-        "the second axis, `{0}`, has one value: give it the range to search, as range = {{ from, to, count }} or as \
+        "the second axis, `{0}`, has one value: give it the range to search, as range = {{ from, \
+         to, count }} or as \
          `values` whose least and greatest are its ends"
     )]
     NoRange(String),
     /// Too many rows.
     #[error(
-        "{rows} rows (values of the first axis, times the combinations of the axes beyond the second) are more than \
+        "{rows} rows (values of the first axis, times the combinations of the axes beyond the \
+         second) are more than \
          {MOST_ROWS}: trace parts of them"
     )]
     Rows {
@@ -52,7 +56,10 @@ pub enum BoundaryError {
         rows: u64,
     },
     /// A tolerance that cannot be met or means nothing.
-    #[error("--tolerance {given} is out of range: expected from {least:e} to {greatest} for the second axis")]
+    #[error(
+        "--tolerance {given} is out of range: expected from {least:e} to {greatest} for the \
+         second axis"
+    )]
     Tolerance {
         /// As given.
         given: f64,
@@ -65,7 +72,7 @@ pub enum BoundaryError {
 
 /// What is traced over which values.
 #[derive(Clone, Debug)]
-pub struct Task {
+pub(crate) struct BoundaryTask {
     /// Values of the first axis, in grid order.
     pub firsts: Vec<f64>,
     /// Number of curves: combinations of the axes beyond the second.
@@ -74,13 +81,17 @@ pub struct Task {
     pub search: Search,
 }
 
-impl Task {
-    /// The task of a plan. `tolerance` is in the second axis's unit, or a fraction of its value if that axis is
-    /// logarithmic; the default is 1/480 of the range.
+impl BoundaryTask {
+    /// The task of a plan. `tolerance` is in the second axis's unit, or a fraction of its value if
+    /// that axis is logarithmic; the default is 1/480 of the range.
     ///
     /// # Errors
     /// Any [`BoundaryError`].
-    pub fn new(plan: &Plan, tolerance: Option<f64>, lattice: usize) -> Result<Self, BoundaryError> {
+    pub(crate) fn new(
+        plan: &Plan,
+        tolerance: Option<f64>,
+        lattice: usize,
+    ) -> Result<Self, BoundaryError> {
         if plan.design.is_some() {
             return Err(BoundaryError::Design);
         }
@@ -122,7 +133,7 @@ fn all(axis: &Axis) -> Vec<f64> {
 
 /// Values of the axes beyond the second, of a curve; the last varies fastest.
 #[must_use]
-pub fn further_values(plan: &Plan, curve: usize) -> Vec<f64> {
+pub(crate) fn further_values(plan: &Plan, curve: usize) -> Vec<f64> {
     let further = plan.axes.get(2..).unwrap_or_default();
     let mut values = vec![0.0; further.len()];
     let mut rest = curve as u64;
@@ -134,10 +145,10 @@ pub fn further_values(plan: &Plan, curve: usize) -> Vec<f64> {
 }
 
 /// Both models at trial points.
-pub struct Models<'a> {
+pub(crate) struct Models<'a> {
     plan: &'a Plan,
     engine: ModelEngine<'a>,
-    quantity: Quantity,
+    quantity: TracedQuantity,
     pool: rayon::ThreadPool,
     interrupt: &'a Interrupt,
     /// What is known from before, and where answers are kept as they come.
@@ -147,14 +158,15 @@ pub struct Models<'a> {
 }
 
 impl<'a> Models<'a> {
-    /// An evaluator of `quantity` over [`Quantity::plan`]; `tell` hears how many trials are done.
+    /// An evaluator of `quantity` over [`TracedQuantity::plan`]; `tell` hears how many trials are
+    /// done.
     ///
     /// # Errors
     /// [`ThreadsError::Start`].
-    pub fn new(
+    pub(crate) fn new(
         plan: &'a Plan,
         engine: ModelEngine<'a>,
-        quantity: Quantity,
+        quantity: TracedQuantity,
         threads: usize,
         interrupt: &'a Interrupt,
         tell: &'a (dyn Fn(u64) + Sync),
@@ -166,21 +178,21 @@ impl<'a> Models<'a> {
 
     /// The same with a memory: it makes no trial again that is known from before.
     #[must_use]
-    pub fn keeping(self, trials: Trials) -> Self {
+    pub(crate) fn keeping(self, trials: Trials) -> Self {
         Self { kept: Some(Mutex::new(trials)), ..self }
     }
 
     /// The memory, at the end.
     #[must_use]
-    pub fn into_kept(self) -> Option<Trials> {
+    pub(crate) fn into_kept(self) -> Option<Trials> {
         self.kept.map(|kept| kept.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// What the engine is asked for: it makes sure of a ratio's side, and knows nothing of a gap's.
     const fn demand(&self) -> Demand {
         match self.quantity {
-            Quantity::RatioMax | Quantity::Ratio(_) => Demand::Side,
-            Quantity::GapNonlinear | Quantity::GapLinear => Demand::Row,
+            TracedQuantity::RatioMax | TracedQuantity::Ratio(_) => Demand::Side,
+            TracedQuantity::GapNonlinear | TracedQuantity::GapLinear => Demand::Row,
         }
     }
 
@@ -196,8 +208,8 @@ impl<'a> Models<'a> {
 
 /// Why the evaluator stopped. What it was asked is kept as far as it was answered.
 #[derive(Debug)]
-pub enum Stopped {
-    /// It was told to.
+pub(crate) enum Stopped {
+    /// The interrupt stopped it.
     Interrupted,
     /// An answer could not be kept.
     Failed(StoreError),
@@ -232,7 +244,8 @@ impl Evaluate for Models<'_> {
         };
         let demand = self.demand();
         let engine = &self.engine;
-        let outcomes = self.pool.install(|| engine.evaluate_for(&axis_values, demand, &seen, &watch));
+        let outcomes =
+            self.pool.install(|| engine.evaluate_for(&axis_values, demand, &seen, &watch));
         let settled = self.kept().map_or(Ok(()), |kept| kept.settle());
         let failure = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(error) = failure.or(settled.err()) {

@@ -11,7 +11,7 @@ const GAP_SCALE_M: f64 = 0.010;
 
 /// A quantity with a limit, named as its column in a result file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
+pub enum TracedQuantity {
     /// The greatest ratio over the channels.
     RatioMax,
     /// One channel's ratio.
@@ -22,12 +22,16 @@ pub enum Quantity {
     GapLinear,
 }
 
-impl Quantity {
+impl TracedQuantity {
     /// Every quantity.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let ratios = Channel::ALL.into_iter().map(Self::Ratio);
-        [Self::RatioMax].into_iter().chain(ratios).chain([Self::GapNonlinear, Self::GapLinear]).collect()
+        [Self::RatioMax]
+            .into_iter()
+            .chain(ratios)
+            .chain([Self::GapNonlinear, Self::GapLinear])
+            .collect()
     }
 
     /// The column's name.
@@ -59,7 +63,8 @@ impl Quantity {
         }
     }
 
-    /// The plan that computes it: a channel of its own is compared even if the grid file leaves it out.
+    /// The plan that computes it: a channel of its own is compared even if the grid file leaves it
+    /// out.
     #[must_use]
     pub fn plan(self, plan: &Plan) -> Plan {
         let mut plan = plan.clone();
@@ -69,8 +74,9 @@ impl Quantity {
         plan
     }
 
-    /// Signed distance of an outcome of [`Quantity::plan`] from the limit: negative where the ratio is below it or a
-    /// gap is left. The logarithm of a ratio over its limit, or a gap in centimetres.
+    /// Signed distance of an outcome of [`TracedQuantity::plan`] from the limit: negative where the
+    /// ratio is below it or a gap is left. The logarithm of a ratio over its limit, or a gap in
+    /// centimetres.
     #[must_use]
     pub fn distance(self, outcome: &Outcome, plan: &Plan) -> Option<f64> {
         match self {
@@ -97,7 +103,7 @@ impl Quantity {
     }
 }
 
-impl std::str::FromStr for Quantity {
+impl std::str::FromStr for TracedQuantity {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {

@@ -127,7 +127,7 @@ fn found(row: &TracedRow) -> Vec<Stretch> {
     let is_reliable = |distance: Option<f64>| distance.is_some_and(|distance| distance < 0.0);
     let first = match row.edges[0].bracket {
         Some(_) => is_reliable(row.edges[0].distances[0]),
-        None => row.edges[0].kind == Kind::NoneReliable,
+        None => row.edges[0].kind == EdgeKind::NoneReliable,
     };
     let changes = row.edges.iter().filter_map(|edge| {
         let [low, high] = edge.bracket?;

@@ -4,7 +4,7 @@
 //! signed distances from the limit, of order one (a logarithm of a ratio).
 
 use super::net::{self, Net};
-use super::{Edge, Kind, look};
+use super::{Edge, EdgeKind, look};
 
 /// After so many rounds brackets are cut evenly, and after so many looks none is taken any more:
 /// whatever the function does, it ends.
@@ -29,12 +29,12 @@ pub(super) enum Side {
 
 /// A value tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Sample {
+pub(super) struct Tried {
     pub(super) at: f64,
     pub(super) distance: Option<f64>,
 }
 
-impl Sample {
+impl Tried {
     pub(super) fn side(&self) -> Side {
         match self.distance {
             Some(distance) if distance < 0.0 => Side::Reliable,
@@ -65,13 +65,13 @@ impl Span {
 
 /// A stretch of the range on one side, as far as is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Run {
+pub(super) struct SideRange {
     pub(super) from: f64,
     pub(super) to: f64,
     pub(super) side: Side,
 }
 
-impl Run {
+impl SideRange {
     pub(super) fn middle(&self) -> f64 {
         0.5 * (self.from + self.to)
     }
@@ -139,14 +139,15 @@ impl Want {
 
 /// A row in the making.
 #[derive(Clone, Debug)]
-pub(super) struct Row {
+pub(super) struct RowSearch {
     /// In order of position, no two at the same.
-    samples: Vec<Sample>,
+    samples: Vec<Tried>,
     /// Not yet passed on.
     asked: Question,
     /// Where the side changes by what other rows say, for brackets that turn up there.
     perhaps: Vec<Hint>,
-    /// The sides at the ends of the range, where they are taken from other rows until they are seen.
+    /// The sides at the ends of the range, where they are taken from other rows until they are
+    /// seen.
     assumed: [Option<Side>; 2],
     /// Where nets were cast of late, and how much wider the next ones are because these failed.
     cast: Vec<[f64; 2]>,
@@ -160,10 +161,10 @@ pub(super) struct Row {
 struct End {
     at: f64,
     side: Side,
-    sample: Option<Sample>,
+    sample: Option<Tried>,
 }
 
-impl Row {
+impl RowSearch {
     /// A row that begins with this question.
     pub(super) fn new(asked: Question, assumed: [Option<Side>; 2]) -> Self {
         Self {
@@ -191,7 +192,7 @@ impl Row {
     }
 
     /// Keeps what came of a trial.
-    pub(super) fn insert(&mut self, sample: Sample) {
+    pub(super) fn insert(&mut self, sample: Tried) {
         let place = self.samples.partition_point(|other| other.at < sample.at);
         if self.samples.get(place).is_none_or(|other| other.at != sample.at) {
             self.samples.insert(place, sample);
@@ -249,7 +250,8 @@ impl Row {
 
     /// Samples, and what is assumed of the range's ends beyond them, in order.
     fn ends(&self, span: &Span) -> Vec<End> {
-        let tried = |sample: &Sample| End { at: sample.at, side: sample.side(), sample: Some(*sample) };
+        let tried =
+            |sample: &Tried| End { at: sample.at, side: sample.side(), sample: Some(*sample) };
         let assumed = |at, side| End { at, side, sample: None };
         let mut ends: Vec<End> = self.samples.iter().map(tried).collect();
         let [low, high] = self.assumed;
@@ -285,7 +287,7 @@ impl Row {
             self.strain *= WIDER;
         }
         let mut wants: Vec<Want> = open.iter().map(|[a, b]| self.narrow(a, b, span)).collect();
-        let first = self.samples.first().map(Sample::side);
+        let first = self.samples.first().map(Tried::side);
         if wants.is_empty() && self.samples.iter().all(|sample| Some(sample.side()) == first) {
             // That there is no change of side at all is not taken from other rows.
             let ends = [span.least, span.greatest].into_iter();
@@ -329,7 +331,7 @@ impl Row {
         let left = self.samples.partition_point(|sample| sample.at <= from);
         let right = self.samples.partition_point(|sample| sample.at < to);
         let left = &self.samples[left.saturating_sub(2)..left];
-        left.iter().chain(self.samples[right..].iter().take(2)).filter_map(Sample::finite).collect()
+        left.iter().chain(self.samples[right..].iter().take(2)).filter_map(Tried::finite).collect()
     }
 
     /// Whether its roots are known well enough to tell where those of other rows are.
@@ -342,26 +344,27 @@ impl Row {
 
     /// Stretches of one side, in order; each reaches to where the side changes, or to the range's
     /// end.
-    pub(super) fn runs(&self, span: &Span) -> Vec<Run> {
-        let mut runs: Vec<Run> = Vec::new();
+    pub(super) fn runs(&self, span: &Span) -> Vec<SideRange> {
+        let mut runs: Vec<SideRange> = Vec::new();
         let mut from = span.least;
         for pair in self.samples.windows(2) {
             let (a, b) = (pair[0], pair[1]);
             if a.side() != b.side() {
                 let to = crossing(&a, &b).unwrap_or(0.5 * (a.at + b.at));
-                runs.push(Run { from, to, side: a.side() });
+                runs.push(SideRange { from, to, side: a.side() });
                 from = to;
             }
         }
         if let Some(last) = self.samples.last() {
-            runs.push(Run { from, to: span.greatest, side: last.side() });
+            runs.push(SideRange { from, to: span.greatest, side: last.side() });
         }
         runs
     }
 
     /// The gaps that trials leave within a stretch.
     pub(super) fn gaps(&self, from: f64, to: f64) -> Vec<[f64; 2]> {
-        let inside = self.samples.iter().map(|sample| sample.at).filter(|at| from < *at && *at < to);
+        let inside =
+            self.samples.iter().map(|sample| sample.at).filter(|at| from < *at && *at < to);
         let marks: Vec<f64> = [from].into_iter().chain(inside).chain([to]).collect();
         marks.windows(2).map(|pair| [pair[0], pair[1]]).collect()
     }
@@ -377,22 +380,26 @@ impl Row {
             let kind = match (a.distance, b.distance) {
                 (Some(from), Some(to)) => {
                     let leaps = (from - to).abs() > LEAP && b.at - a.at <= span.tolerance;
-                    if leaps || !(from - to).is_finite() { Kind::Jump } else { Kind::Crossing }
+                    if leaps || !(from - to).is_finite() {
+                        EdgeKind::Jump
+                    } else {
+                        EdgeKind::Crossing
+                    }
                 }
-                _ => Kind::Undefined,
+                _ => EdgeKind::Undefined,
             };
             edges.push(Edge {
                 kind,
-                at: if kind == Kind::Crossing { crossing(&a, &b).map(value) } else { None },
+                at: if kind == EdgeKind::Crossing { crossing(&a, &b).map(value) } else { None },
                 bracket: Some([value(a.at), value(b.at)]),
                 distances: [a.distance, b.distance],
             });
         }
         if edges.is_empty() {
-            let kind = match self.samples.first().map(Sample::side) {
-                Some(Side::Reliable) => Kind::NoneReliable,
-                Some(Side::Unreliable) => Kind::NoneUnreliable,
-                Some(Side::Undefined) | None => Kind::NoneUndefined,
+            let kind = match self.samples.first().map(Tried::side) {
+                Some(Side::Reliable) => EdgeKind::NoneReliable,
+                Some(Side::Unreliable) => EdgeKind::NoneUnreliable,
+                Some(Side::Undefined) | None => EdgeKind::NoneUndefined,
             };
             edges.push(Edge { kind, at: None, bracket: None, distances: [None; 2] });
         }
@@ -412,7 +419,7 @@ fn is_open(a: &End, b: &End, span: &Span) -> bool {
 }
 
 /// Where the limit is met within a bracket: by the straight line between its ends.
-fn crossing(a: &Sample, b: &Sample) -> Option<f64> {
+fn crossing(a: &Tried, b: &Tried) -> Option<f64> {
     let ((from, at_from), (to, at_to)) = (a.finite()?, b.finite()?);
     Some((from + (to - from) * (at_from / (at_from - at_to))).clamp(from, to))
 }

@@ -28,14 +28,24 @@ impl<F: Fn(f64, f64) -> Option<f64>> Evaluate for Function<F> {
     }
 }
 
-pub(super) const SEARCH: Search =
-    Search { least: 60.0, greatest: 300.0, first_log: false, second_log: false, tolerance: 0.5, lattice: 6 };
+pub(super) const SEARCH: Search = Search {
+    least: 60.0,
+    greatest: 300.0,
+    first_log: false,
+    second_log: false,
+    tolerance: 0.5,
+    lattice: 6,
+};
 
 fn masses(count: u32) -> Vec<f64> {
     (0..count).map(|k| 0.05 + 0.95 * f64::from(k) / f64::from(count - 1)).collect()
 }
 
-pub(super) fn traced(of: impl Fn(f64, f64) -> Option<f64>, firsts: &[f64], search: &Search) -> Traced {
+pub(super) fn traced(
+    of: impl Fn(f64, f64) -> Option<f64>,
+    firsts: &[f64],
+    search: &Search,
+) -> Traced {
     let function = Function::new(of);
     let told = Cell::new(0);
     let mut tell = |standing: &Standing| {
@@ -45,9 +55,13 @@ pub(super) fn traced(of: impl Fn(f64, f64) -> Option<f64>, firsts: &[f64], searc
     };
     let Ok(traced) = trace(&function, firsts, 1, search, &mut tell);
     let (asked, batches) = (function.asked.borrow(), function.batches.borrow());
-    assert_eq!((traced.trials, traced.rounds, told.get()), (asked.len(), batches.len(), asked.len()));
+    assert_eq!(
+        (traced.trials, traced.rounds, told.get()),
+        (asked.len(), batches.len(), asked.len())
+    );
     assert_eq!(traced.lane_groups, batches.iter().map(|trials| trials.div_ceil(8)).sum::<usize>());
-    let mut keys: Vec<[u64; 2]> = asked.iter().map(|t| [t.first.to_bits(), t.second.to_bits()]).collect();
+    let mut keys: Vec<[u64; 2]> =
+        asked.iter().map(|t| [t.first.to_bits(), t.second.to_bits()]).collect();
     keys.sort_unstable();
     keys.dedup();
     assert_eq!(keys.len(), asked.len(), "nothing is evaluated twice");
@@ -58,7 +72,8 @@ pub(super) fn traced(of: impl Fn(f64, f64) -> Option<f64>, firsts: &[f64], searc
 /// Shaped like the paper's Fig. 12: saturated far on both sides of a line that bends a little.
 fn like_fig12(mass: f64, damping: f64) -> Option<f64> {
     let x = (line(mass) - damping) / 40.0;
-    let distance = if x > 0.0 { 2.5 * (1.0 - (-1.4 * x).exp()) } else { 0.65 * ((1.6 * x).exp() - 1.0) };
+    let distance =
+        if x > 0.0 { 2.5 * (1.0 - (-1.4 * x).exp()) } else { 0.65 * ((1.6 * x).exp() - 1.0) };
     Some(distance)
 }
 
@@ -91,9 +106,9 @@ fn a_smooth_boundary_costs_a_seventh_of_the_grids_lane_groups() {
         assert_eq!((row.first, row.edges.len()), (mass, 1));
         let edge = row.edges[0];
         if line(mass) <= 60.0 {
-            assert_eq!(edge.kind, Kind::NoneReliable, "{mass}");
+            assert_eq!(edge.kind, EdgeKind::NoneReliable, "{mass}");
         } else {
-            assert_eq!(edge.kind, Kind::Crossing, "{mass}");
+            assert_eq!(edge.kind, EdgeKind::Crossing, "{mass}");
             // The function has a kink there, so the straight line within the bracket is not exact.
             assert!((edge.at.unwrap() - line(mass)).abs() < 0.2, "{mass}: {edge:?}");
         }
@@ -123,13 +138,13 @@ fn a_jump_is_told_from_a_crossing_however_steep() {
     let leap = |_: f64, damping: f64| Some(if damping < 137.3 { 1.0 } else { -0.6 });
     for row in &traced(leap, &masses(12), &SEARCH).curves[0] {
         let edge = row.edges[0];
-        assert_eq!((edge.kind, edge.at), (Kind::Jump, None));
+        assert_eq!((edge.kind, edge.at), (EdgeKind::Jump, None));
         let [low, high] = edge.bracket.unwrap();
         assert!(low < 137.3 && 137.3 <= high && high - low <= 0.5 / 16.0);
     }
     let steep = |_: f64, damping: f64| Some(((137.3 - damping) * 5.0).clamp(-0.6, 1.0));
     for row in &traced(steep, &masses(12), &SEARCH).curves[0] {
-        assert_eq!(row.edges[0].kind, Kind::Crossing);
+        assert_eq!(row.edges[0].kind, EdgeKind::Crossing);
         assert!((row.edges[0].at.unwrap() - 137.3).abs() < 0.03, "{row:?}");
     }
 }
@@ -168,7 +183,8 @@ fn an_island_as_wide_as_two_cells_is_found_in_every_row_it_spans() {
             if x.abs() < 0.97 {
                 assert_eq!(row.edges.len(), 2, "{row:?}");
             } else if x.abs() > 1.0 {
-                let none = if sign > 0.0 { Kind::NoneUnreliable } else { Kind::NoneReliable };
+                let none =
+                    if sign > 0.0 { EdgeKind::NoneUnreliable } else { EdgeKind::NoneReliable };
                 assert_eq!(row.edges[0].kind, none, "{row:?}");
             }
         }
@@ -190,15 +206,16 @@ fn folded(mass: f64, damping: f64) -> Option<f64> {
 fn a_narrow_dip_beside_the_crossing_is_found_and_followed() {
     let traced = traced(folded, &masses(39), &SEARCH);
     check_edges(&traced, folded, 0.5);
-    let edges: Vec<usize> = traced.curves[0].iter().rev().take(5).map(|row| row.edges.len()).collect();
+    let edges: Vec<usize> =
+        traced.curves[0].iter().rev().take(5).map(|row| row.edges.len()).collect();
     assert_eq!(edges, [3, 3, 3, 1, 1]);
 }
 
 #[test]
 fn a_pocket_that_ends_between_two_rows_is_found_in_the_last_that_has_it() {
-    // As damper 1's height on the cabinet against damping: reliable from a line that bends up towards
-    // the lowest heights, to one that leaves the range at 0.125 m, is at 180 N s/m at 0.1125 m, and
-    // has met the other at 0.1 m.
+    // As damper 1's height on the cabinet against damping: reliable from a line that bends up
+    // towards the lowest heights, to one that leaves the range at 0.125 m, is at 180 N s/m at
+    // 0.1125 m, and has met the other at 0.1 m.
     let heights: Vec<f64> = (0..17).map(|k| 0.1 + 0.0125 * f64::from(k)).collect();
     let bottom = |height: f64| 97.0 + 0.3 / (height - 0.09);
     let pocket = |height: f64, damping: f64| {
@@ -208,13 +225,16 @@ fn a_pocket_that_ends_between_two_rows_is_found_in_the_last_that_has_it() {
     let traced = traced(pocket, &heights, &SEARCH);
     check_edges(&traced, pocket, 0.5);
     let rows = &traced.curves[0];
-    assert_eq!(rows[0].edges[0].kind, Kind::NoneUnreliable);
+    assert_eq!(rows[0].edges[0].kind, EdgeKind::NoneUnreliable);
     for (row, height) in rows.iter().zip(&heights).skip(1) {
         let mut expected = vec![bottom(*height)];
         expected.extend((*height < 0.12).then_some(180.0));
         let found: Vec<f64> = row.edges.iter().filter_map(|edge| edge.at).collect();
         let is_near = |(a, b): (&f64, &f64)| (a - b).abs() < 0.1;
-        assert!(found.len() == expected.len() && found.iter().zip(&expected).all(is_near), "{row:?}");
+        assert!(
+            found.len() == expected.len() && found.iter().zip(&expected).all(is_near),
+            "{row:?}"
+        );
     }
 }
 
@@ -236,23 +256,25 @@ fn a_pocket_found_late_is_followed_through_every_row() {
 
 #[test]
 fn where_the_quantity_is_not_defined_is_said() {
-    let broken = |mass: f64, damping: f64| if damping < 100.0 { None } else { like_fig12(mass, damping) };
-    let of =
-        |of: &dyn Fn(f64, f64) -> Option<f64>, firsts: &[f64]| traced(of, firsts, &SEARCH).curves.remove(0);
+    let broken =
+        |mass: f64, damping: f64| if damping < 100.0 { None } else { like_fig12(mass, damping) };
+    let of = |of: &dyn Fn(f64, f64) -> Option<f64>, firsts: &[f64]| {
+        traced(of, firsts, &SEARCH).curves.remove(0)
+    };
     let rows = of(&broken, &[0.2, 0.6]);
-    let kinds: Vec<Vec<Kind>> =
+    let kinds: Vec<Vec<EdgeKind>> =
         rows.iter().map(|row| row.edges.iter().map(|edge| edge.kind).collect()).collect();
-    assert_eq!(kinds, [vec![Kind::Undefined], vec![Kind::Undefined, Kind::Crossing]]);
+    assert_eq!(kinds, [vec![EdgeKind::Undefined], vec![EdgeKind::Undefined, EdgeKind::Crossing]]);
     assert_eq!(rows[0].edges[0].at, None);
     let nothing = of(&|_, _| None, &masses(5));
-    assert!(nothing.iter().all(|row| row.edges[0].kind == Kind::NoneUndefined));
+    assert!(nothing.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
     let nan = of(&|_, _| Some(f64::NAN), &masses(5));
-    assert!(nan.iter().all(|row| row.edges[0].kind == Kind::NoneUndefined));
+    assert!(nan.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
 }
 
 #[test]
 fn nothing_in_range_is_no_number() {
-    for (distance, kind) in [(-1.0, Kind::NoneReliable), (1.0, Kind::NoneUnreliable)] {
+    for (distance, kind) in [(-1.0, EdgeKind::NoneReliable), (1.0, EdgeKind::NoneUnreliable)] {
         let traced = traced(|_, _| Some(distance), &masses(39), &SEARCH);
         for row in &traced.curves[0] {
             let edge = Edge { kind, at: None, bracket: None, distances: [None; 2] };
@@ -288,7 +310,8 @@ fn logarithmic_axes_are_searched_by_their_logarithms() {
     let of = |first: f64, second: f64| Some((line(first) / second).ln().clamp(-1.0, 1.0));
     let firsts: Vec<f64> = (0..20).map(|k| 10.0_f64.powf(f64::from(k) / 10.0)).collect();
     let (least, greatest) = (1e4, 1e9);
-    let search = Search { least, greatest, first_log: true, second_log: true, tolerance: 0.01, ..SEARCH };
+    let search =
+        Search { least, greatest, first_log: true, second_log: true, tolerance: 0.01, ..SEARCH };
     for row in &traced(of, &firsts, &search).curves[0] {
         let edge = row.edges[0];
         let [low, high] = edge.bracket.unwrap();
@@ -303,7 +326,10 @@ fn curves_share_batches() {
     impl Evaluate for Shifted {
         type Stop = Infallible;
         fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Infallible> {
-            Ok(trials.iter().map(|t| like_fig12(t.first, t.second - 9.0 * t.curve as f64)).collect())
+            Ok(trials
+                .iter()
+                .map(|t| like_fig12(t.first, t.second - 9.0 * t.curve as f64))
+                .collect())
         }
     }
     let firsts = masses(39);

@@ -3,26 +3,26 @@
 
 use super::batch::{LANES, deal, lane_groups};
 use super::pockets::Beside;
-use super::row::{Question, Row, Run, Sample, Span, Want};
+use super::row::{Question, RowSearch, SideRange, Span, Tried, Want};
 use super::warm::{self, HEARD, Neighbour};
 use super::{Evaluate, Search, Standing, Traced, TracedRow, Trial};
 
 /// Rows that are worked on at once, in whole curves: bounds memory, and is plenty to fill lanes.
 const ROWS_AT_ONCE: usize = 1 << 14;
-/// Most places that a row tries because of what its neighbours announce: whatever the function does,
-/// it ends.
+/// Most places that a row tries because of what its neighbours announce: whatever the function
+/// does, it ends.
 const MOST_ASKED: usize = 64;
 /// How far a pocket is announced, in rows: from one place to many in a few rounds.
 const ANNOUNCED: [isize; 6] = [-1, 1, -2, 2, -4, 4];
 /// Where rows disagree, no gap between trials is wider than this part of a cell of the lattice.
 const GAP: f64 = 0.25;
 
-/// Traces `curves` curves over these values of the first axis, and tells where it stands before
+/// Traces `curves` curves over these values of the first axis, and reports its progress before
 /// every batch.
 ///
 /// # Errors
 /// Whatever stopped the evaluator.
-pub fn trace<E: Evaluate>(
+pub(crate) fn trace<E: Evaluate>(
     evaluator: &E,
     firsts: &[f64],
     curves: usize,
@@ -52,7 +52,7 @@ pub fn trace<E: Evaluate>(
     Ok(traced)
 }
 
-/// Where a row stands: its curve within the block, its rank along the first axis.
+/// A row's place: its curve within the block, its rank along the first axis.
 type Place = (usize, usize);
 /// A trial, whose it is, and its position.
 type Asked = (Trial, Place, f64);
@@ -77,20 +77,21 @@ struct Rank {
     index: usize,
     /// When it begins.
     level: usize,
-    /// Ranks of earlier levels that it begins from, to its left and to its right, the nearest first.
+    /// Ranks of earlier levels that it begins from, to its left and to its right, the nearest
+    /// first.
     heard: [Vec<usize>; 2],
 }
 
 /// A row of a curve.
 #[derive(Clone, Default)]
 struct Slot {
-    row: Option<Row>,
+    row: Option<RowSearch>,
     /// It wanted nothing when it was last asked, and nothing has come since.
     is_settled: bool,
     /// Whether its roots are known well enough for others to begin from.
     is_placed: bool,
     /// What is known of it, while it is placed.
-    runs: Vec<Run>,
+    runs: Vec<SideRange>,
     /// Places it tried because of its neighbours.
     asked: usize,
 }
@@ -111,7 +112,8 @@ impl<'a> Block<'a> {
             .map(|k| if k + 1 == columns { greatest } else { least + width * k as f64 })
             .collect();
         let slot = |rank: &Rank| {
-            let row = (rank.level == 0).then(|| Row::new(Question::places(lattice.clone()), [None; 2]));
+            let row = (rank.level == 0)
+                .then(|| RowSearch::new(Question::places(lattice.clone()), [None; 2]));
             Slot { row, ..Slot::default() }
         };
         let slots: Vec<Slot> = order.iter().map(slot).collect();
@@ -171,10 +173,10 @@ impl<'a> Block<'a> {
         wants
     }
 
-    /// Begins rows whose neighbours are placed: as many as make whole lane groups together with what
-    /// the others want, in the order of their levels; the rest waits for the next batch.
+    /// Begins rows whose neighbours are placed: as many as make whole lane groups together with
+    /// what the others want, in the order of their levels; the rest waits for the next batch.
     fn begin(&mut self, wants: &mut Vec<(Place, Want)>) {
-        let mut ready: Vec<(Place, Row, Vec<Want>)> = Vec::new();
+        let mut ready: Vec<(Place, RowSearch, Vec<Want>)> = Vec::new();
         for (curve, slots) in self.curves.iter().enumerate() {
             for (rank, _) in slots.iter().enumerate().filter(|(_, slot)| slot.row.is_none()) {
                 let Rank { at, heard, .. } = &self.order[rank];
@@ -239,7 +241,7 @@ impl<'a> Block<'a> {
         let slot = &mut self.curves[curve][rank];
         slot.is_settled = false;
         if let Some(row) = &mut slot.row {
-            row.insert(Sample { at, distance: distance.filter(|distance| !distance.is_nan()) });
+            row.insert(Tried { at, distance: distance.filter(|distance| !distance.is_nan()) });
         }
     }
 

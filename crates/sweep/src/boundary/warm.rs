@@ -1,7 +1,7 @@
 //! Warm starts: where the side should change in a row, by the rows around it that are done.
 
 use super::pockets::missing;
-use super::row::{Hint, Question, Row, Run, Side, Span};
+use super::row::{Hint, Question, RowSearch, Side, SideRange, Span};
 
 /// Most rows on each side that a prediction is made from.
 pub(super) const HEARD: usize = 2;
@@ -14,7 +14,7 @@ const CORRECTION: f64 = 0.25;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Neighbour<'a> {
     pub(super) at: f64,
-    pub(super) runs: &'a [Run],
+    pub(super) runs: &'a [SideRange],
 }
 
 impl Neighbour<'_> {
@@ -41,18 +41,23 @@ impl Neighbour<'_> {
     }
 }
 
-/// A new row at `at` among rows that are done: those to its left and those to its right, the nearest
-/// first.
-pub(super) fn start(at: f64, left: &[Neighbour<'_>], right: &[Neighbour<'_>], span: &Span) -> Row {
+/// A new row at `at` among rows that are done: those to its left and those to its right, the
+/// nearest first.
+pub(super) fn start(
+    at: f64,
+    left: &[Neighbour<'_>],
+    right: &[Neighbour<'_>],
+    span: &Span,
+) -> RowSearch {
     let both_ends = || Question::places(vec![span.least, span.greatest]);
     let (Some(a), Some(b)) = (left.first(), right.first()) else {
-        return Row::new(both_ends(), [None; 2]);
+        return RowSearch::new(both_ends(), [None; 2]);
     };
     if !a.is_like(b) {
         return between_unlike(at, left, right, span);
     }
     if a.runs.len() < 2 {
-        return Row::new(both_ends(), [None; 2]);
+        return RowSearch::new(both_ends(), [None; 2]);
     }
     let like: Vec<Neighbour<'_>> = [left, right]
         .into_iter()
@@ -64,7 +69,7 @@ pub(super) fn start(at: f64, left: &[Neighbour<'_>], right: &[Neighbour<'_>], sp
     // What lies between two roots is seen, not taken from the neighbours.
     let places = roots.windows(2).map(|two| 0.5 * (two[0].root + two[1].root)).collect();
     let assumed = [a.runs.first(), a.runs.last()].map(|run| run.map(|run| run.side));
-    Row::new(Question { places, roots, perhaps: Vec::new() }, assumed)
+    RowSearch::new(Question { places, roots, perhaps: Vec::new() }, assumed)
 }
 
 /// Where the k-th change of side of rows that are alike should be.
@@ -77,17 +82,24 @@ fn predicted(at: f64, k: usize, like: &[Neighbour<'_>], span: &Span) -> Hint {
 }
 
 /// A row between two whose sides change differently.
-fn between_unlike(at: f64, left: &[Neighbour<'_>], right: &[Neighbour<'_>], span: &Span) -> Row {
-    let (few, many) = if left[0].runs.len() < right[0].runs.len() { (left, right) } else { (right, left) };
+fn between_unlike(
+    at: f64,
+    left: &[Neighbour<'_>],
+    right: &[Neighbour<'_>],
+    span: &Span,
+) -> RowSearch {
+    let (few, many) =
+        if left[0].runs.len() < right[0].runs.len() { (left, right) } else { (right, left) };
     let (poor, rich) = (few[0], many[0]);
     // An end on whose side both agree is taken from them, the other is tried.
-    let agreed = |run: fn(&[Run]) -> Option<&Run>| {
+    let agreed = |run: fn(&[SideRange]) -> Option<&SideRange>| {
         let [a, b] = [poor, rich].map(|row| run(row.runs).map(|run| run.side));
         if a == b { a } else { None }
     };
-    let assumed = [agreed(<[Run]>::first), agreed(<[Run]>::last)];
+    let assumed = [agreed(<[SideRange]>::first), agreed(<[SideRange]>::last)];
     let ends = [span.least, span.greatest].into_iter().zip(assumed);
-    let mut places: Vec<f64> = ends.filter(|(_, side)| side.is_none()).map(|(end, _)| end).collect();
+    let mut places: Vec<f64> =
+        ends.filter(|(_, side)| side.is_none()).map(|(end, _)| end).collect();
     let part = (at - rich.at) / (poor.at - rich.at);
     let shared = shared(rich, poor, few.get(1));
     let moved = |[k, m]: [usize; 2]| poor.runs[m].from - rich.runs[k].from;
@@ -100,8 +112,11 @@ fn between_unlike(at: f64, left: &[Neighbour<'_>], right: &[Neighbour<'_>], span
         .collect();
     if rich.runs.len() == 2 && shared.is_empty() {
         // It leaves the range between the two, towards where it comes from.
-        let from: Vec<(f64, f64)> =
-            many.iter().filter(|row| row.is_like(&rich)).map(|row| (row.at, row.runs[1].from)).collect();
+        let from: Vec<(f64, f64)> = many
+            .iter()
+            .filter(|row| row.is_like(&rich))
+            .map(|row| (row.at, row.runs[1].from))
+            .collect();
         let root = polynomial(&from, at);
         if span.contains(root) {
             roots.push(hint(root, CORRECTION * (root - rich.runs[1].from), span));
@@ -117,7 +132,7 @@ fn between_unlike(at: f64, left: &[Neighbour<'_>], right: &[Neighbour<'_>], span
         places.push(run.middle() + (1.0 - part) * near);
     }
     places.retain(|place| span.contains(*place));
-    Row::new(Question { places, roots, perhaps: Vec::new() }, assumed)
+    RowSearch::new(Question { places, roots, perhaps: Vec::new() }, assumed)
 }
 
 /// A root with how far it may be off: by as much as this, and never by nothing.
@@ -126,7 +141,7 @@ pub(super) fn hint(root: f64, off: f64, span: &Span) -> Hint {
 }
 
 /// How far the change of side next to a run has moved, of these with their moves.
-pub(super) fn nearest(run: &Run, moves: impl Iterator<Item = (f64, f64)>) -> f64 {
+pub(super) fn nearest(run: &SideRange, moves: impl Iterator<Item = (f64, f64)>) -> f64 {
     let away = |at: f64| (at - run.middle()).abs();
     let nearest = moves.min_by(|a, b| away(a.0).total_cmp(&away(b.0)));
     nearest.map_or(0.0, |(_, moved)| moved)
@@ -134,13 +149,17 @@ pub(super) fn nearest(run: &Run, moves: impl Iterator<Item = (f64, f64)>) -> f64
 
 /// Changes of side that two rows have in common, as pairs of their numbers (of the run that begins
 /// there): every change of the row with fewer goes with the nearest of its kind in the other, in
-/// order. `before` is the row before `b`, seen from `a`: it tells how far those of `b` have moved on
-/// their way.
-pub(super) fn shared(a: Neighbour<'_>, b: Neighbour<'_>, before: Option<&Neighbour<'_>>) -> Vec<[usize; 2]> {
+/// order. `before` is the row before `b`, seen from `a`: it tells how far those of `b` have moved
+/// on their way.
+pub(super) fn shared(
+    a: Neighbour<'_>,
+    b: Neighbour<'_>,
+    before: Option<&Neighbour<'_>>,
+) -> Vec<[usize; 2]> {
     let drift = b.drift(before, a.at);
     let expected = |m: usize| b.runs[m].from + drift.get(m - 1).copied().unwrap_or(0.0);
     let is_alike = |k: usize, m: usize| {
-        let sides = |runs: &[Run], k: usize| [runs[k - 1].side, runs[k].side];
+        let sides = |runs: &[SideRange], k: usize| [runs[k - 1].side, runs[k].side];
         sides(a.runs, k) == sides(b.runs, m)
     };
     let distance = |k: usize, m: usize| (a.runs[k].from - expected(m)).abs();
@@ -152,12 +171,12 @@ pub(super) fn shared(a: Neighbour<'_>, b: Neighbour<'_>, before: Option<&Neighbo
         let pair = |other: usize| if has_more { [other, one] } else { [one, other] };
         // Those after it need theirs too.
         let end = many.runs.len() - (few.runs.len() - 1 - one);
-        let found = (next..end.max(next)).filter(|other| is_alike(pair(*other)[0], pair(*other)[1])).min_by(
-            |x, y| {
+        let found = (next..end.max(next))
+            .filter(|other| is_alike(pair(*other)[0], pair(*other)[1]))
+            .min_by(|x, y| {
                 let [x, y] = [pair(*x), pair(*y)];
                 distance(x[0], x[1]).total_cmp(&distance(y[0], y[1]))
-            },
-        );
+            });
         if let Some(other) = found {
             pairs.push(pair(other));
             next = other + 1;
@@ -183,11 +202,12 @@ mod tests {
     const SPAN: Span = Span { least: 0.0, greatest: 100.0, tolerance: 1.0 };
 
     /// Runs that change sides here, the first unreliable.
-    pub(in super::super) fn runs(roots: &[f64]) -> Vec<Run> {
-        let marks: Vec<f64> = [0.0].into_iter().chain(roots.iter().copied()).chain([100.0]).collect();
+    pub(in super::super) fn runs(roots: &[f64]) -> Vec<SideRange> {
+        let marks: Vec<f64> =
+            [0.0].into_iter().chain(roots.iter().copied()).chain([100.0]).collect();
         let side = |k: usize| if k.is_multiple_of(2) { Side::Unreliable } else { Side::Reliable };
         let pairs = marks.windows(2).enumerate();
-        pairs.map(|(k, pair)| Run { from: pair[0], to: pair[1], side: side(k) }).collect()
+        pairs.map(|(k, pair)| SideRange { from: pair[0], to: pair[1], side: side(k) }).collect()
     }
 
     #[test]
@@ -207,8 +227,8 @@ mod tests {
         assert_eq!(shared(rich, poor, Some(&before)), [[3, 1]]);
         assert_eq!(shared(poor, rich, None), [[1, 1]]);
         let other = [
-            Run { from: 0.0, to: 40.0, side: Side::Reliable },
-            Run { from: 40.0, to: 100.0, side: Side::Unreliable },
+            SideRange { from: 0.0, to: 40.0, side: Side::Reliable },
+            SideRange { from: 40.0, to: 100.0, side: Side::Unreliable },
         ];
         let other = Neighbour { at: 3.0, runs: &other };
         assert_eq!(shared(poor, other, None), [[0; 2]; 0], "the other way round is no match");
@@ -217,7 +237,8 @@ mod tests {
     #[test]
     fn between_rows_alike_two_trials_a_root_and_one_a_pocket() {
         let [a, b] = [runs(&[20.0, 30.0, 60.0]), runs(&[22.0, 34.0, 62.0])];
-        let [a, b] = [(0.0, &a), (1.0, &b)].map(|(at, runs)| Neighbour { at, runs: runs.as_slice() });
+        let [a, b] =
+            [(0.0, &a), (1.0, &b)].map(|(at, runs)| Neighbour { at, runs: runs.as_slice() });
         let wants = start(0.5, &[a], &[b], &SPAN).wants(&SPAN);
         assert_eq!(wants.iter().map(|want| want.needed()).sum::<usize>(), 3 * 2 + 2, "{wants:?}");
     }

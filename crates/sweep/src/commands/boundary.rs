@@ -6,20 +6,30 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
+use super::examples::Examples;
+use super::grid::{GridArgs, quoted};
 use super::run::line;
-use super::{Grid, quoted};
 use crate::boundary::file::{bytes, job};
-use crate::boundary::product::{Models, Stopped, Task};
-use crate::boundary::quantity::Quantity;
-use crate::boundary::{Kind, Standing, Traced, trace};
+use crate::boundary::product::{BoundaryTask, Models, Stopped};
+use crate::boundary::quantity::TracedQuantity;
+use crate::boundary::{EdgeKind, Standing, Traced, trace};
 use crate::engine::ModelEngine;
 use crate::exit::{Error, Exit, tell};
-use crate::files::{FileKind, Output};
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
-use crate::progress::{Mode, Progress, duration};
+use crate::progress::{Progress, ProgressMode, duration};
 use crate::store::{OpenedTrials, StoreError, Trials};
 use crate::threads;
+use sweep_files::{FileKind, Output};
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    [
+        "sweep boundary my.toml --out line.parquet",
+        "the line on which the ratio is at its limit, without the map",
+    ],
+    ["sweep plot line.parquet", "drawn with the brackets it is known to lie in"],
+];
 
 /// Arguments of `sweep boundary`.
 #[derive(Debug, clap::Args)]
@@ -27,20 +37,31 @@ use crate::threads;
 pub struct Args {
     /// The grid: its first axis gives the rows, its second the range that is searched
     #[command(flatten)]
-    pub grid: Grid,
+    pub grid: GridArgs,
     /// Boundary file [default: results/NAME-boundary.parquet]
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// What is at its limit: ratio_max, ratio_CHANNEL, min_gap_nonlinear_m or min_gap_linear_m (at no gap)
-    #[arg(long, value_name = "NAME", default_value = "ratio_max", value_parser = str::parse::<Quantity>)]
-    pub quantity: Quantity,
-    /// Width of the final brackets, in the second axis's unit; if that axis is logarithmic, as a fraction of its value
-    /// [default: 1/480 of the range]
+    /// What is at its limit: ratio_max, ratio_CHANNEL, min_gap_nonlinear_m or min_gap_linear_m (at
+    /// no gap)
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "ratio_max",
+        value_parser = str::parse::<TracedQuantity>
+    )]
+    pub quantity: TracedQuantity,
+    /// Width of the final brackets, in the second axis's unit; if that axis is logarithmic, as a
+    /// fraction of its value [default: 1/480 of the range]
     #[arg(long, value_name = "WIDTH")]
     pub tolerance: Option<f64>,
-    /// Cells along each axis of the lattice that guards against islands: the finer, the smaller the island it cannot
-    /// miss, and the more points it takes
-    #[arg(long, value_name = "CELLS", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    /// Cells along each axis of the lattice that guards against islands: the finer, the smaller the
+    /// island it cannot miss, and the more points it takes
+    #[arg(
+        long,
+        value_name = "CELLS",
+        default_value_t = 6,
+        value_parser = clap::value_parser!(u16).range(1..=1000)
+    )]
     pub lattice: u16,
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
     #[arg(long, value_name = "N", value_parser = threads::parse)]
@@ -51,27 +72,32 @@ pub struct Args {
     /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
     /// 5 s) or none
     #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
-    pub progress: Mode,
+    pub progress: ProgressMode,
 }
 
 /// What `--help` adds.
 const LONG: &str = "\
-For each value of the first axis, the places along the second where the quantity passes its limit, each with the bracket \
-it is known to lie in. Where there is no such place, or the quantity leaps over its limit, the file says so and gives \
-no number. The least and greatest value of the second axis are the range, however it is written. Axes beyond the second \
+For each value of the first axis, the places along the second where the quantity passes its \
+limit, each with the bracket \
+it is known to lie in. Where there is no such place, or the quantity leaps over its limit, the \
+file says so and gives \
+no number. The least and greatest value of the second axis are the range, however it is written. \
+Axes beyond the second \
 give one curve for every combination of their values.
 
-The file is a pure function of its input, whatever the number of threads and interruptions. What an interrupted \
+The file is a pure function of its input, whatever the number of threads and interruptions. What \
+    an interrupted \
 search has found out stays in FILE.partial, and the same command goes on from there.";
 
 /// Traces the boundary of a grid.
 ///
 /// # Errors
-/// Mistakes in the grid file, a plan without a range to search, and whatever keeps the file from being written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+/// Mistakes in the grid file, a plan without a range to search, and whatever keeps the file from
+/// being written.
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.grid.load()?;
     let plan = args.quantity.plan(&plan);
-    let task = Task::new(&plan, args.tolerance, usize::from(args.lattice))?;
+    let task = BoundaryTask::new(&plan, args.tolerance, usize::from(args.lattice))?;
     let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
     let output = args.out.clone().unwrap_or_else(default);
     let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
@@ -105,8 +131,10 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
             progress.show_search(rows_done.load(Ordering::Relaxed), points);
         }
     };
-    let models = Models::new(&plan, engine, args.quantity, threads, &interrupt, &shown)?.keeping(trials);
-    let mut standing = |standing: &Standing| rows_done.store(standing.rows as u64, Ordering::Relaxed);
+    let models =
+        Models::new(&plan, engine, args.quantity, threads, &interrupt, &shown)?.keeping(trials);
+    let mut standing =
+        |standing: &Standing| rows_done.store(standing.rows as u64, Ordering::Relaxed);
     let traced = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
     progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
     let trials = models.into_kept();
@@ -116,7 +144,8 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         Err(Stopped::Interrupted) => {
             let kept = trials.map_or(0, |trials| trials.count());
             let wall = duration(began.elapsed().as_secs_f64());
-            let mut text = format!("{}: interrupted with {kept} points kept, after {wall}\n", plan.name);
+            let mut text =
+                format!("{}: interrupted with {kept} points kept, after {wall}\n", plan.name);
             line(&mut text, "go on", "the same command");
             tell(text.trim_end());
             return Ok(match interrupt.signal() {
@@ -138,7 +167,8 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
 
 /// What there is to say if the boundary is there.
 fn already(plan: &Plan, output: &Path) -> String {
-    let mut text = format!("{}: the boundary is there already (--fresh traces it again)\n", plan.name);
+    let mut text =
+        format!("{}: the boundary is there already (--fresh traces it again)\n", plan.name);
     next(&mut text, output);
     text.trim_end().to_owned()
 }
@@ -150,7 +180,13 @@ fn next(text: &mut String, output: &Path) {
     line(text, "next", &format!("sweep plot {}", quoted(&shown)));
 }
 
-fn summary(plan: &Plan, quantity: Quantity, task: &Task, traced: &Traced, wall_s: f64) -> String {
+fn summary(
+    plan: &Plan,
+    quantity: TracedQuantity,
+    task: &BoundaryTask,
+    traced: &Traced,
+    wall_s: f64,
+) -> String {
     let mut text = String::new();
     let grid: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
     // Writing to a String cannot fail.
@@ -165,16 +201,22 @@ fn summary(plan: &Plan, quantity: Quantity, task: &Task, traced: &Traced, wall_s
         duration(wall_s)
     );
     let rows = || traced.curves.iter().flatten();
-    let counts: Vec<String> = Kind::ALL
+    let counts: Vec<String> = EdgeKind::ALL
         .into_iter()
-        .map(|kind| (kind, rows().flat_map(|row| &row.edges).filter(|edge| edge.kind == kind).count()))
+        .map(|kind| {
+            (kind, rows().flat_map(|row| &row.edges).filter(|edge| edge.kind == kind).count())
+        })
         .filter(|(_, count)| *count > 0)
         .map(|(kind, count)| format!("{count} {}", kind.name()))
         .collect();
     line(&mut text, "found", &counts.join(", "));
     let several = rows().filter(|row| row.edges.len() > 1).count();
     if several > 0 {
-        line(&mut text, "folds", &format!("{several} values of the first axis have several crossings"));
+        line(
+            &mut text,
+            "folds",
+            &format!("{several} values of the first axis have several crossings"),
+        );
     }
     let widest = rows()
         .flat_map(|row| &row.edges)

@@ -2,21 +2,29 @@
 
 use std::fmt::Write as _;
 
-use super::Grid;
+use super::examples::Examples;
+use super::grid::GridArgs;
 use crate::design::Design;
 use crate::engine::Ladder;
 use crate::estimate::{Estimate, size};
 use crate::exit::{Error, Exit, show, tell};
 use crate::measures::Criterion;
-use crate::plan::{Axis, AxisValues, Integrator, Plan};
+use crate::method::Steps;
+use crate::plan::{Axis, AxisValues, Plan};
 use crate::progress::duration;
 use crate::threads;
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    ["sweep check my.toml", "the plan, or every mistake with its place"],
+    ["sweep check my.toml --json", "the plan with every default in place"],
+];
 
 /// Arguments of `sweep check`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    grid: Grid,
+    grid: GridArgs,
     /// Print the plan as JSON, with every default and constant in place
     #[arg(long)]
     json: bool,
@@ -26,7 +34,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Mistakes in the grid file, no engine for it, or standard output that cannot be written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.grid.load()?;
     if args.json {
         return show(&format!("{:#}\n", plan.to_json()));
@@ -55,7 +63,10 @@ fn summary(plan: &Plan, estimate: &Estimate) -> String {
         None => points.to_string(),
     };
     line("points", laid_out);
-    line("time", format!("0 to {} s, window {} to {} s", plan.end_s, plan.window_s[0], plan.window_s[1]));
+    line(
+        "time",
+        format!("0 to {} s, window {} to {} s", plan.end_s, plan.window_s[0], plan.window_s[1]),
+    );
     line("method", method(plan, &estimate.ladder));
     let metrics: Vec<_> = plan.measures.metrics.iter().map(|metric| metric.name()).collect();
     if !metrics.is_empty() {
@@ -68,7 +79,10 @@ fn summary(plan: &Plan, estimate: &Estimate) -> String {
         Criterion::Envelope => ", turn by turn of the drum",
         Criterion::Rms => ", of root mean squares",
     };
-    line("verdict", format!("reliable where every ratio is below {}{by}", plan.reliability.ratio_limit));
+    line(
+        "verdict",
+        format!("reliable where every ratio is below {}{by}", plan.reliability.ratio_limit),
+    );
     line("output", format!("results/{}.parquet", plan.name));
     line(
         "runs on",
@@ -83,7 +97,10 @@ fn summary(plan: &Plan, estimate: &Estimate) -> String {
     let (memory, disk) = (size(estimate.memory_bytes), size(estimate.disk_bytes));
     line(
         "",
-        format!("{memory} of memory; on disk {disk} while it runs, and at most as much again for the result"),
+        format!(
+            "{memory} of memory; on disk {disk} while it runs, and at most as much again for the \
+             result"
+        ),
     );
     text
 }
@@ -91,9 +108,13 @@ fn summary(plan: &Plan, estimate: &Estimate) -> String {
 /// The time, and what it was reckoned from.
 fn took(plan: &Plan, estimate: &Estimate) -> String {
     let (points, whole) = (estimate.sampled_points, estimate.sampled_s >= plan.end_s);
-    let part = if whole { String::new() } else { format!(", the first {} s each", estimate.sampled_s) };
+    let part =
+        if whole { String::new() } else { format!(", the first {} s each", estimate.sampled_s) };
     let about = duration(estimate.wall_s);
-    format!("about {about}: an estimate, from {points} point{} integrated just now{part}", plural(points))
+    format!(
+        "about {about}: an estimate, from {points} point{} integrated just now{part}",
+        plural(points)
+    )
 }
 
 fn plural(count: u64) -> &'static str {
@@ -103,7 +124,9 @@ fn plural(count: u64) -> &'static str {
 fn describe(axis: &Axis, design: Option<&Design>) -> String {
     let (name, count) = (axis.parameter.name(), axis.values.len());
     match &axis.values {
-        AxisValues::Linear { from, to, .. } if design.is_some() => format!("{name}: from {from} to {to}"),
+        AxisValues::Linear { from, to, .. } if design.is_some() => {
+            format!("{name}: from {from} to {to}")
+        }
         AxisValues::Log { from, to, .. } if design.is_some() => {
             format!("{name}: from {from} to {to}, logarithmic")
         }
@@ -112,7 +135,9 @@ fn describe(axis: &Axis, design: Option<&Design>) -> String {
             let more = if values.len() > shown.len() { ", ..." } else { "" };
             format!("{name}: {count} values, {}{more}", shown.join(", "))
         }
-        AxisValues::Linear { from, to, .. } => format!("{name}: {count} values from {from} to {to}"),
+        AxisValues::Linear { from, to, .. } => {
+            format!("{name}: {count} values from {from} to {to}")
+        }
         AxisValues::Log { from, to, .. } => {
             format!("{name}: {count} values from {from} to {to}, logarithmic")
         }
@@ -120,23 +145,21 @@ fn describe(axis: &Axis, design: Option<&Design>) -> String {
 }
 
 fn method(plan: &Plan, ladder: &Ladder) -> String {
-    match plan.integrator {
-        Integrator::Rk4 { step_s } => {
+    let steps = match plan.integrator.steps() {
+        Steps::Fixed(step_s) => {
             // Both window edges and the end are hit exactly, so each stretch rounds up.
             let edges = [0.0, plan.window_s[0], plan.window_s[1], plan.end_s];
-            let steps: f64 = edges.windows(2).map(|edge| ((edge[1] - edge[0]) / step_s).ceil()).sum();
-            format!("rk4, step {step_s} s: about {steps} steps per trajectory, two trajectories per point")
+            let steps: f64 =
+                edges.windows(2).map(|edge| ((edge[1] - edge[0]) / step_s).ceil()).sum();
+            format!(": about {steps} steps per trajectory, two trajectories per point")
         }
-        Integrator::Dopri5 { rtol, atol } => {
-            format!("dopri5, rtol {rtol:e}, atol {atol:e}: steps as it needs")
+        Steps::Explicit => ": steps as it needs".to_owned(),
+        Steps::Implicit => ": steps as it needs, one trajectory at a time".to_owned(),
+        Steps::Checked(_) => {
+            let rungs: Vec<String> =
+                ladder.rungs.iter().skip(1).map(|rung| rung.to_string()).collect();
+            format!(", until two rungs agree: {}", rungs.join("\n            then "))
         }
-        Integrator::Rodas5p { rtol, atol } => {
-            format!("rodas5p, rtol {rtol:e}, atol {atol:e}: steps as it needs, one trajectory at a time")
-        }
-        Integrator::Rk4MassScaled { accuracy } => {
-            let rungs: Vec<String> = ladder.rungs.iter().skip(1).map(|rung| rung.to_string()).collect();
-            let rungs = rungs.join("\n            then ");
-            format!("rk4-mass-scaled, accuracy {accuracy:e}, until two rungs agree: {rungs}")
-        }
-    }
+    };
+    format!("{}{steps}", plan.integrator)
 }

@@ -2,8 +2,12 @@
 
 use clap_complete::Shell;
 
-use crate::cli;
+use super::examples::Examples;
 use crate::exit::{Error, Exit, print};
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples =
+    &[["sweep completions bash", "to be sourced, or put where the shell looks"]];
 
 /// Arguments of `sweep completions`.
 #[derive(Debug, clap::Args)]
@@ -12,17 +16,17 @@ pub struct Args {
     shell: Shell,
 }
 
-/// Prints the completion script.
+/// Prints the completion script of a command line.
 ///
 /// # Errors
 /// When standard output cannot be written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
-    print(&script(args.shell))
+pub(crate) fn run(args: &Args, program: clap::Command) -> Result<Exit, Error> {
+    print(&script(args.shell, program))
 }
 
-fn script(shell: Shell) -> String {
+fn script(shell: Shell, mut program: clap::Command) -> String {
     let mut script = Vec::new();
-    clap_complete::generate(shell, &mut cli::shown_command(), "sweep", &mut script);
+    clap_complete::generate(shell, &mut program, "sweep", &mut script);
     String::from_utf8_lossy(&script).into_owned()
 }
 
@@ -31,11 +35,12 @@ mod tests {
     use clap::ValueEnum as _;
 
     use super::*;
+    use crate::commands::shown_command;
 
     #[test]
     fn every_shell_completes_what_help_shows_and_nothing_else() {
         for shell in Shell::value_variants() {
-            let script = script(*shell);
+            let script = script(*shell, shown_command());
             for name in ["boundary", "completions", "--keep-traces", "--version"] {
                 assert!(script.contains(name.trim_start_matches('-')), "{shell}: no {name}");
             }

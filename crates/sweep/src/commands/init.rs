@@ -5,12 +5,19 @@ use std::path::{Path, PathBuf};
 
 use washer_model::Machine;
 
+use super::examples::Examples;
 use crate::config;
 use crate::exit::{Error, Exit, print, tell};
-use crate::files::atomic;
+use sweep_files::atomic;
 
 /// The commented grid file.
 const GRID: &str = include_str!("starter.toml");
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    ["sweep init my.toml", "a commented grid file"],
+    ["sweep init --machine washer.toml", "the built-in machine, to be changed into one's own"],
+];
 
 /// Arguments of `sweep init`.
 #[derive(Debug, clap::Args)]
@@ -26,7 +33,7 @@ pub struct Args {
 ///
 /// # Errors
 /// When the file exists or cannot be written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let text = if args.machine { config::machine_file(&Machine::paper()) } else { GRID.to_owned() };
     let default = if args.machine { "machine.toml" } else { "grid.toml" };
     let path = args.file.as_deref().unwrap_or(Path::new(default));
@@ -47,4 +54,21 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         format!("wrote {shown}; next: sweep check {shown}")
     });
     Ok(Exit::Done)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::METHODS;
+
+    #[test]
+    fn the_starter_shows_every_method_and_setting() {
+        for entry in &METHODS {
+            assert!(GRID.contains(&format!("\"{}\"", entry.name)), "no {}", entry.name);
+            for setting in entry.settings {
+                let line = format!("{} = {:e}", setting.key, setting.default);
+                assert!(GRID.contains(&line), "no {line}");
+            }
+        }
+    }
 }

@@ -6,10 +6,13 @@ use std::path::PathBuf;
 use clap_mangen::Man;
 use clap_mangen::roff::{Roff, bold, roman};
 
-use super::examples;
-use crate::cli;
+use super::examples::Examples;
 use crate::exit::{Error, Exit};
-use crate::files::{self, FileKind};
+use sweep_files::{self as files, FileKind};
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples =
+    &[["sweep man ~/.local/share/man/man1", "then `man sweep`, `man sweep-run`"]];
 
 /// Arguments of `sweep man`.
 #[derive(Debug, clap::Args)]
@@ -18,29 +21,35 @@ pub struct Args {
     folder: PathBuf,
 }
 
-/// Writes a page for the program and one for each command.
+/// Writes a page for the program and one for each command, with their examples.
 ///
 /// # Errors
 /// A folder that cannot be written to.
-pub fn run(args: &Args) -> Result<Exit, Error> {
-    let failed = |source| Error::File { action: "write manual pages to", path: args.folder.clone(), source };
+pub(crate) fn run(
+    args: &Args,
+    mut program: clap::Command,
+    examples: &dyn Fn(&str) -> Examples,
+) -> Result<Exit, Error> {
+    let failed =
+        |source| Error::File { action: "write manual pages to", path: args.folder.clone(), source };
     files::ready(&args.folder)?;
-    let write = |name: &str, page: &[u8]| files::write(&args.folder.join(name), FileKind::ManPage, page);
-    let mut program = cli::command();
+    let write =
+        |name: &str, page: &[u8]| files::write(&args.folder.join(name), FileKind::ManPage, page);
     // Tells each command its full name.
     program.build();
     for command in program.get_subcommands().filter(|command| !command.is_hide_set()) {
         let name = command.get_name();
-        write(&format!("sweep-{name}.1"), &page(command, name).map_err(failed)?)?;
+        write(&format!("sweep-{name}.1"), &page(command, name, examples(name)).map_err(failed)?)?;
     }
-    write("sweep.1", &page(&program, "").map_err(failed)?)?;
+    write("sweep.1", &page(&program, "", examples("")).map_err(failed)?)?;
     Ok(Exit::Done)
 }
 
-/// One page, as manual pages are ordered; examples, which help begins with, stand where `man` readers look for them.
-fn page(command: &clap::Command, name: &str) -> io::Result<Vec<u8>> {
+/// One page in the order of manual pages: the examples, with which help begins, are at the end.
+fn page(command: &clap::Command, name: &str, examples: Examples) -> io::Result<Vec<u8>> {
     let title = if name.is_empty() { "sweep".to_owned() } else { format!("sweep-{name}") };
-    let man = Man::new(command.clone()).title(title).source(concat!("sweep ", env!("CARGO_PKG_VERSION")));
+    let man =
+        Man::new(command.clone()).title(title).source(concat!("sweep ", env!("CARGO_PKG_VERSION")));
     let mut text = Vec::new();
     man.render_title(&mut text)?;
     man.render_name_section(&mut text)?;
@@ -56,7 +65,7 @@ fn page(command: &clap::Command, name: &str) -> io::Result<Vec<u8>> {
         rest.control("TP", []).text([bold((exit as u8).to_string())]).text([roman(exit.meaning())]);
     }
     rest.control("SH", ["EXAMPLES"]);
-    for [line, does] in examples::lines(name) {
+    for [line, does] in examples {
         rest.control("TP", []).text([bold(*line)]).text([roman(*does)]);
     }
     rest.to_writer(&mut text)?;
@@ -66,16 +75,22 @@ fn page(command: &clap::Command, name: &str) -> io::Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::commands::{command, examples_of};
 
     #[test]
     fn pages_have_their_name_examples_and_exit_codes() {
-        let mut program = cli::command();
+        let mut program = command();
         program.build();
         let run = program.find_subcommand("run").unwrap();
-        let text = String::from_utf8(page(run, "run").unwrap()).unwrap();
-        for part in
-            [".TH sweep-run 1", "sweep run", ".SH EXAMPLES", "\\-\\-shard 3/16", ".SH \"EXIT STATUS\"", "75"]
-        {
+        let text = String::from_utf8(page(run, "run", examples_of("run")).unwrap()).unwrap();
+        for part in [
+            ".TH sweep-run 1",
+            "sweep run",
+            ".SH EXAMPLES",
+            "\\-\\-shard 3/16",
+            ".SH \"EXIT STATUS\"",
+            "75",
+        ] {
             assert!(text.contains(part), "no {part} in\n{text}");
         }
     }

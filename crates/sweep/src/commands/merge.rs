@@ -1,23 +1,29 @@
 //! `sweep merge GRID.toml`: finished shards into the one file.
 
-use super::Target;
+use super::examples::Examples;
+use super::grid::ResultArgs;
 use super::run::{line, rows};
 use crate::exit::{Error, Exit, tell};
 use crate::interrupt::Interrupt;
-use crate::store::{Job, Opened, Run};
+use crate::store::{Job, OpenRun, Opened};
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples =
+    &[["sweep merge my.toml", "when `sweep status my.toml` finds no shard missing"]];
 
 /// Arguments of `sweep merge`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    target: Target,
+    target: ResultArgs,
 }
 
 /// Joins what the shards have left.
 ///
 /// # Errors
-/// [`crate::store::StoreError::Incomplete`] with what is missing, and whatever else keeps it from its end.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+/// [`crate::store::StoreError::Incomplete`] with what is missing, and whatever else keeps it from
+/// its end.
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.target.grid.load()?;
     let (job, output) = (Job::of(&plan), args.target.output(&plan));
     let interrupt = Interrupt::install().map_err(|source| Error::File {
@@ -25,7 +31,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         path: "this process".into(),
         source,
     })?;
-    let mut run = match Run::open_for_merge(&output, &job)? {
+    let mut run = match OpenRun::open_for_merge(&output, &job)? {
         Opened::Run(run) => run,
         Opened::Finished(file, tally) => {
             let mut text = format!("{}: all {} points are there already\n", plan.name, file.points);
@@ -39,7 +45,11 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     }
     let Some(tally) = run.join(&job, &|| interrupt.stopped())? else {
         tell("interrupted; the chunks are kept");
-        return Ok(if interrupt.signal() == Some(15) { Exit::Terminated } else { Exit::Interrupted });
+        return Ok(if interrupt.signal() == Some(15) {
+            Exit::Terminated
+        } else {
+            Exit::Interrupted
+        });
     };
     let joined = run.complete(&job, tally, None)?;
     for note in &joined.notes {

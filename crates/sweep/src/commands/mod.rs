@@ -1,88 +1,202 @@
-//! One module a subcommand, each with its arguments and `run`.
+//! The command line: one module a subcommand, each with its arguments and `run`.
 
-use std::path::PathBuf;
+mod boundary;
+mod check;
+mod completions;
+mod examples;
+mod grid;
+mod init;
+mod man;
+mod merge;
+mod modes;
+mod parameters;
+mod plot;
+mod reference;
+mod run;
+mod schema;
+mod show;
+mod slurm;
+mod status;
+mod trace;
 
-use crate::config::{self, Diagnostics};
-use crate::plan::Plan;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-pub mod boundary;
-pub mod check;
-pub mod completions;
-pub mod examples;
-pub mod init;
-pub mod man;
-pub mod merge;
-pub mod modes;
-pub mod parameters;
-pub mod plot;
-pub mod reference;
-pub mod run;
-pub mod schema;
-pub mod show;
-pub mod slurm;
-pub mod status;
-pub mod trace;
+use examples::Examples;
 
-/// A grid file and changes to its constants, as most commands take them.
-#[derive(Debug, clap::Args)]
-pub struct Grid {
-    /// Grid file
-    #[arg(value_name = "GRID.toml")]
-    pub grid: PathBuf,
-    /// Set a constant, over those of the grid file; may be repeated
-    #[arg(long = "set", value_name = "NAME=VALUE")]
-    pub sets: Vec<String>,
+use crate::exit::{Error, Exit};
+use crate::nearest::nearest;
+use crate::random_keys::draw_random_keys;
+
+/// Shown by `--help`.
+const EXAMPLES: Examples = &[
+    ["sweep init my.toml", "a commented grid file to start from"],
+    ["sweep check my.toml", "every mistake in it, or what it would do"],
+    ["sweep run my.toml", "do it; again after an interruption, it goes on"],
+    ["sweep show results/first.parquet", "what came of it"],
+    ["sweep plot results/first.parquet", "the map as a picture"],
+    ["sweep parameters", "every number that can be set or swept"],
+];
+
+/// Maps where a washing machine's linear suspension model can be trusted.
+#[derive(Debug, Parser)]
+#[command(
+    name = "sweep",
+    version,
+    after_help = Exit::table(),
+    subcommand_required = true,
+    arg_required_else_help = true,
+    disable_help_subcommand = true,
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
 }
 
-impl Grid {
-    /// The plan.
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Integrate every grid point with both models, into one Parquet file; resumes what was
+    /// interrupted
+    Run(run::Args),
+    /// Check a grid file and show what it would do, without doing it
+    Check(check::Args),
+    /// Join the finished shards of a run into its one result file
+    Merge(merge::Args),
+    /// Show how far a run is: done, missing, failed, running
+    Status(status::Args),
+    /// Print the script that submits a run to a Slurm cluster: an array of shards, then their merge
+    Slurm(slurm::Args),
+    /// Show what a result file holds: counts, verdicts, extremes, provenance
+    Show(show::Args),
+    /// Write time histories of both models at one point
+    Trace(trace::Args),
+    /// Find the natural frequencies over spin speed, the resonance speeds and the mode shapes
+    Modes(modes::Args),
+    /// Trace the curve where the ratio is at its limit, without filling the grid
+    Boundary(boundary::Args),
+    /// Draw the figure that fits a file: map, boundary, time histories or Campbell diagram
+    Plot(plot::Args),
+    /// List every parameter that can be set or swept
+    Parameters(parameters::Args),
+    /// Write a commented grid file, or a machine file, to start from
+    Init(init::Args),
+    /// Print the JSON Schema of grid or machine files, for editors
+    Schema(schema::Args),
+    /// Print shell completions
+    Completions(completions::Args),
+    /// Write manual pages
+    Man(man::Args),
+    /// Print a page of the guide that is made from this program's tables
+    #[command(hide = true)]
+    Reference(reference::Args),
+}
+
+/// The examples of a subcommand; of the program, by the empty name.
+fn examples_of(name: &str) -> Examples {
+    match name {
+        "" => EXAMPLES,
+        "run" => run::EXAMPLES,
+        "check" => check::EXAMPLES,
+        "merge" => merge::EXAMPLES,
+        "status" => status::EXAMPLES,
+        "slurm" => slurm::EXAMPLES,
+        "show" => show::EXAMPLES,
+        "trace" => trace::EXAMPLES,
+        "modes" => modes::EXAMPLES,
+        "boundary" => boundary::EXAMPLES,
+        "plot" => plot::EXAMPLES,
+        "parameters" => parameters::EXAMPLES,
+        "init" => init::EXAMPLES,
+        "schema" => schema::EXAMPLES,
+        "completions" => completions::EXAMPLES,
+        "man" => man::EXAMPLES,
+        _ => &[],
+    }
+}
+
+/// The command line with everything that its help shows.
+#[must_use]
+pub(crate) fn command() -> clap::Command {
+    let with = |command: clap::Command, lines: Examples| match examples::shown(lines) {
+        Some(examples) => command.before_help(examples),
+        None => command,
+    };
+    let program = with(Cli::command(), EXAMPLES);
+    let names: Vec<String> =
+        program.get_subcommands().map(|command| command.get_name().to_owned()).collect();
+    names.into_iter().fold(program, |program, name| {
+        program.mut_subcommand(&name, |command| with(command, examples_of(&name)))
+    })
+}
+
+/// The command line without what help hides, for what lists every subcommand.
+#[must_use]
+pub(crate) fn shown_command() -> clap::Command {
+    let whole = command();
+    let shown = whole.get_subcommands().filter(|command| !command.is_hide_set()).cloned();
+    clap::Command::new("sweep")
+        .version(env!("CARGO_PKG_VERSION"))
+        .about(whole.get_about().cloned().unwrap_or_default())
+        .disable_help_subcommand(true)
+        .args(whole.get_arguments().cloned())
+        .subcommands(shown)
+}
+
+/// Adds the subcommand that was meant, where clap finds none near: it looks for likeness, of which
+/// a slip leaves little in a name of three letters.
+fn suggest(mut error: clap::Error) -> clap::Error {
+    let typed = match (error.kind(), error.get(ContextKind::InvalidSubcommand)) {
+        (ErrorKind::InvalidSubcommand, Some(ContextValue::String(typed))) => typed.clone(),
+        _ => return error,
+    };
+    let shown = shown_command();
+    let names = shown.get_subcommands().map(clap::Command::get_name);
+    if let (None, Some(name)) =
+        (error.get(ContextKind::SuggestedSubcommand), nearest(&typed, names))
+    {
+        error
+            .insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![name.to_owned()]));
+    }
+    error
+}
+
+impl Cli {
+    /// Reads this process's command line; on a mistake, or when asked for help, tells and ends the
+    /// process.
+    #[must_use]
+    pub fn read() -> Self {
+        let matches = command().try_get_matches().unwrap_or_else(|error| suggest(error).exit());
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    }
+}
+
+impl Command {
+    /// Does it.
     ///
     /// # Errors
-    /// Every mistake in the grid file, its machine file and the constants.
-    pub fn load(&self) -> Result<Plan, Diagnostics> {
-        config::load(&self.grid, &self.sets)
-    }
-}
-
-/// A grid and where its result goes, as the commands about runs take them.
-#[derive(Debug, clap::Args)]
-pub struct Target {
-    /// The grid.
-    #[command(flatten)]
-    pub grid: Grid,
-    /// Result file [default: results/NAME.parquet]
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-}
-
-impl Target {
-    /// The result file.
-    #[must_use]
-    pub fn output(&self, plan: &Plan) -> PathBuf {
-        self.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{}.parquet", plan.name)))
-    }
-
-    /// A command line about the same run, for a user to copy.
-    #[must_use]
-    pub fn command(&self, verb: &str) -> String {
-        let mut line = format!("sweep {verb} {}", quoted(&self.grid.grid.display().to_string()));
-        for set in &self.grid.sets {
-            line.push_str(&format!(" --set {}", quoted(set)));
+    /// Whatever kept the command from its end.
+    pub fn run(&self) -> Result<Exit, Error> {
+        draw_random_keys()?;
+        match self {
+            Self::Run(args) => run::run(args),
+            Self::Check(args) => check::run(args),
+            Self::Merge(args) => merge::run(args),
+            Self::Status(args) => status::run(args),
+            Self::Slurm(args) => slurm::run(args),
+            Self::Show(args) => show::run(args),
+            Self::Trace(args) => trace::run(args),
+            Self::Modes(args) => modes::run(args),
+            Self::Boundary(args) => boundary::run(args),
+            Self::Plot(args) => plot::run(args),
+            Self::Parameters(args) => parameters::run(args),
+            Self::Init(args) => init::run(args),
+            Self::Schema(args) => schema::run(args),
+            Self::Completions(args) => completions::run(args, shown_command()),
+            Self::Man(args) => man::run(args, command(), &examples_of),
+            Self::Reference(args) => reference::run(args, command()),
         }
-        if let Some(out) = &self.out {
-            line.push_str(&format!(" --out {}", quoted(&out.display().to_string())));
-        }
-        line
-    }
-}
-
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "/._-=:,+".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
     }
 }
 
@@ -91,12 +205,61 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_command_to_copy_survives_the_shell() {
-        let grid = Grid { grid: "my grids/it's.toml".into(), sets: vec!["tub_mass_kg=20".into()] };
-        let target = Target { grid, out: Some("x.parquet".into()) };
-        assert_eq!(
-            target.command("merge"),
-            r"sweep merge 'my grids/it'\''s.toml' --set tub_mass_kg=20 --out x.parquet"
-        );
+    fn the_command_line_is_well_formed() {
+        command().debug_assert();
+    }
+
+    #[test]
+    fn a_slip_in_a_short_subcommand_is_answered_by_its_name() {
+        let refusal = |typed: &str| {
+            suggest(command().try_get_matches_from(["sweep", typed]).unwrap_err()).to_string()
+        };
+        assert!(refusal("rnu").contains("'run'"), "{}", refusal("rnu"));
+        assert!(refusal("boundry").contains("'boundary'"), "{}", refusal("boundry"));
+        assert!(!refusal("xyzzy").contains("similar"), "{}", refusal("xyzzy"));
+    }
+
+    #[test]
+    fn every_visible_command_has_examples_and_every_example_parses() {
+        let whole = command();
+        let shown = whole.get_subcommands().filter(|command| !command.is_hide_set());
+        for name in shown.map(clap::Command::get_name).chain([""]) {
+            // A command's own first; what follows may go on with its output.
+            let (lines, own) = (examples_of(name), format!("sweep {name}"));
+            assert!(lines.first().is_some_and(|[line, _]| line.starts_with(&own)), "{name}");
+            for [line, _] in lines {
+                let line = line.split(" 2>").next().unwrap_or_default();
+                let parsed = command().try_get_matches_from(line.split_whitespace());
+                assert!(parsed.is_ok(), "{line}: {parsed:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_example_is_wider_than_a_terminal_or_changed_by_folding() {
+        for name in command().get_subcommands().map(clap::Command::get_name).chain([""]) {
+            let lines = examples_of(name);
+            let shown = examples::shown(lines).unwrap_or_default();
+            assert!(shown.lines().all(|line| line.len() <= examples::WIDEST), "{shown}");
+            // As a shell reads it, which takes a folded line for one.
+            let words = shown.replace("\\\n", "").split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(lines.iter().all(|[line, _]| words.contains(line)), "{shown}");
+        }
+    }
+
+    #[test]
+    fn help_of_a_command_begins_with_its_examples() {
+        let mut command = command();
+        let run = command.find_subcommand_mut("run").unwrap();
+        let help = run.render_help().to_string();
+        let place = |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));
+        assert!(place("--shard 3/16") < place("Usage:"));
+    }
+
+    #[test]
+    fn help_shows_the_examples_before_the_usage_and_the_exit_codes_after() {
+        let help = command().render_help().to_string();
+        let place = |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));
+        assert!(place("Examples:") < place("Usage:") && place("Usage:") < place("Exit codes:"));
     }
 }

@@ -11,14 +11,24 @@ use washer_model::{
     COORDINATES, Machine, ModeAtSpeed, ModeOverSpeed, Spin, Timing, campbell, decimal, prepare,
 };
 
+use super::examples::Examples;
 use crate::config;
 use crate::exit::{Error, Exit, show, tell};
-use crate::files::{FileKind, Output, key};
 use crate::store::StoreError;
 use crate::table::Table;
+use sweep_files::{FileKind, Output, key};
 
 /// Most speeds that are accepted: an hour of computing.
 const MOST_SPEEDS: f64 = 100_000.0;
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    ["sweep modes", "resonance speeds of the built-in machine"],
+    [
+        "sweep modes my.toml --speed 0:400:10 --out modes.parquet",
+        "a Campbell diagram's data, for `sweep plot`",
+    ],
+];
 
 /// Arguments of `sweep modes`.
 #[derive(Debug, clap::Args)]
@@ -55,14 +65,17 @@ impl FromStr for Speeds {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers: Option<Vec<f64>> = text.split(':').map(|part| part.trim().parse().ok()).collect();
+        let numbers: Option<Vec<f64>> =
+            text.split(':').map(|part| part.trim().parse().ok()).collect();
         let Some([from, to, step]) = numbers.as_deref() else {
             return Err("expected FROM:TO:STEP in rpm, as in 0:1200:10".to_owned());
         };
         let (from, to, step) = (*from, *to, *step);
         let count = (to - from) / step;
         if !(from >= 0.0 && to > from && step > 0.0 && to.is_finite()) {
-            return Err("expected speeds of 0 rpm or more, TO above FROM, and a STEP above 0".to_owned());
+            return Err(
+                "expected speeds of 0 rpm or more, TO above FROM, and a STEP above 0".to_owned()
+            );
         }
         if count > MOST_SPEEDS {
             return Err(format!("these are {count:.0} speeds, expected at most {MOST_SPEEDS}"));
@@ -76,35 +89,49 @@ impl Speeds {
     fn values(self) -> Vec<f64> {
         // The quotient may come out a hair beside the whole number that was meant.
         let steps = ((self.to - self.from) / self.step * (1.0 - 1e-12)).ceil().max(1.0) as usize;
-        (0..=steps).map(|k| if k == steps { self.to } else { self.from + k as f64 * self.step }).collect()
+        (0..=steps)
+            .map(|k| if k == steps { self.to } else { self.from + k as f64 * self.step })
+            .collect()
     }
 }
 
 /// Analyses, and prints or writes.
 ///
 /// # Errors
-/// Mistakes in the grid file or the options, a machine without equilibrium or modes, and what cannot be written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+/// Mistakes in the grid file or the options, a machine without equilibrium or modes, and what
+/// cannot be written.
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let (name, machine, spin) = match &args.grid {
-        None => ("paper".to_owned(), Machine::paper(), Spin::Ramp { peak_rpm: args.speed.to, ramp_s: 1.0 }),
+        None => (
+            "paper".to_owned(),
+            Machine::paper(),
+            Spin::Ramp { peak_rpm: args.speed.to, ramp_s: 1.0 },
+        ),
         Some(grid) => {
             let plan = if args.at.is_empty() {
                 config::load(grid, &args.sets)?
             } else {
-                config::load_point(grid, &args.sets, &args.at)?
+                config::load_point(grid, &args.sets, &args.at)?.0
             };
             (plan.name, plan.machine, plan.spin)
         }
     };
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-    let output = args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
+    let output =
+        args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
     let point = prepare(Simd::Scalar, &[(machine.clone(), spin)], &timing).remove(0)?;
     let speeds = args.speed.values();
     let modes = campbell(&point, &speeds)?;
     if let (Some(path), Some(output)) = (&args.out, output) {
-        let bytes = bytes(&name, &machine, &speeds, &modes).map_err(StoreError::parquet("write", path))?;
+        let bytes =
+            bytes(&name, &machine, &speeds, &modes).map_err(StoreError::parquet("write", path))?;
         output.finish(&bytes)?;
-        tell(&format!("wrote {}: {} modes at {} speeds", path.display(), modes.len(), speeds.len()));
+        tell(&format!(
+            "wrote {}: {} modes at {} speeds",
+            path.display(),
+            modes.len(),
+            speeds.len()
+        ));
     }
     if args.json {
         return show(&format!("{:#}\n", to_json(&name, &speeds, &modes)));
@@ -148,14 +175,15 @@ fn table(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
         let (percent, speed) = (100.0 * swing, decimal(speed));
         let _ = writeln!(
             text,
-            "Over a turn, resonant modes vary by up to +-{percent:.3} % of their mean frequency (mode {mode}, {speed} rpm)."
+            "Over a turn, resonant modes vary by up to +-{percent:.3} % of their mean frequency \
+             (mode {mode}, {speed} rpm)."
         );
     }
     text
 }
 
-/// Where the frequency of a mode that has a resonance varies most over a turn: half the distance from least to greatest as a
-/// share of the mean, the mode's number, the speed (rpm).
+/// Where the frequency of a mode that has a resonance varies most over a turn: half the distance
+/// from least to greatest as a share of the mean, the mode's number, the speed (rpm).
 fn widest_swing(speeds: &[f64], modes: &[ModeOverSpeed]) -> Option<(f64, usize, f64)> {
     let resonant = modes.iter().enumerate().filter(|(_, mode)| !mode.resonances.is_empty());
     resonant
@@ -180,7 +208,8 @@ fn to_json(name: &str, speeds: &[f64], modes: &[ModeOverSpeed]) -> Value {
 
 /// A mode's name, what it moves, its resonances.
 fn facts(k: usize, mode: &ModeOverSpeed) -> Value {
-    let resonance = |resonance: &washer_model::Resonance| at_speed(resonance.speed_rpm, &resonance.mode);
+    let resonance =
+        |resonance: &washer_model::Resonance| at_speed(resonance.speed_rpm, &resonance.mode);
     let motion = &mode.motion;
     json!({
         "mode": k + 1,
@@ -229,20 +258,34 @@ fn bytes(
         rows().map(|(_, mode)| names[mode].as_str()),
     );
     let columns: [(&str, &str, &str, fn(&ModeAtSpeed) -> f64); 7] = [
-        ("frequency_rpm", "rpm", "damped natural frequency in cycles per minute, mean over a turn", |at| {
-            at.frequency_rpm
-        }),
+        (
+            "frequency_rpm",
+            "rpm",
+            "damped natural frequency in cycles per minute, mean over a turn",
+            |at| at.frequency_rpm,
+        ),
         ("frequency_hz", "Hz", "the same in cycles per second", |at| at.frequency_rpm / 60.0),
-        ("damping_ratio", "1", "share of critical damping, mean over a turn", |at| at.damping_ratio),
+        ("damping_ratio", "1", "share of critical damping, mean over a turn", |at| {
+            at.damping_ratio
+        }),
         ("eigenvalue_re", "1/s", "real part of the eigenvalue, mean over a turn", |at| at.re_per_s),
         ("eigenvalue_im", "rad/s", "imaginary part of the eigenvalue, mean over a turn", |at| {
             at.im_rad_per_s
         }),
-        ("frequency_min_rpm", "rpm", "least damped natural frequency over a turn", |at| at.least_rpm),
-        ("frequency_max_rpm", "rpm", "greatest damped natural frequency over a turn", |at| at.greatest_rpm),
+        ("frequency_min_rpm", "rpm", "least damped natural frequency over a turn", |at| {
+            at.least_rpm
+        }),
+        ("frequency_max_rpm", "rpm", "greatest damped natural frequency over a turn", |at| {
+            at.greatest_rpm
+        }),
     ];
     for (column, unit, description, of) in columns {
-        table.numbers(column, unit, description, rows().map(|(k, mode)| Some(of(&modes[mode].at_speed[k]))));
+        table.numbers(
+            column,
+            unit,
+            description,
+            rows().map(|(k, mode)| Some(of(&modes[mode].at_speed[k]))),
+        );
     }
     let plan = json!({ "name": name, "machine": config::machine_json(machine) });
     table.metadata(key::PLAN, &plan);

@@ -6,8 +6,15 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 use washer_model::{Machine, Parameter, Range, Spin, Target};
 
+use super::examples::Examples;
 use crate::config;
 use crate::exit::{Error, Exit, show};
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    ["sweep parameters", "names, values, units, meaning and where each value is from"],
+    ["sweep parameters my.toml", "the same with the values of this grid's machine"],
+];
 
 /// Arguments of `sweep parameters`.
 #[derive(Debug, clap::Args)]
@@ -21,7 +28,7 @@ pub struct Args {
 }
 
 /// A line of the listing.
-struct Row {
+struct Listed {
     parameter: Parameter,
     /// `None` without a grid for numbers only a grid gives, and where several numbers differ.
     value: Option<f64>,
@@ -32,7 +39,7 @@ struct Row {
 ///
 /// # Errors
 /// Mistakes in the grid file, or standard output that cannot be written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let rows = match &args.grid {
         Some(grid) => {
             let plan = config::load(grid, &[])?;
@@ -44,8 +51,9 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     show(&if args.json { as_json(&rows) } else { as_text(&rows) })
 }
 
-/// Every parameter with its value; those of spin and window have one only if a grid gives its window.
-fn rows(machine: &Machine, spin: &Spin, window_s: Option<[f64; 2]>) -> Vec<Row> {
+/// Every parameter with its value; those of spin and window have one only if a grid gives its
+/// window.
+fn rows(machine: &Machine, spin: &Spin, window_s: Option<[f64; 2]>) -> Vec<Listed> {
     let built_in = Machine::paper();
     let row = |parameter: Parameter| {
         let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
@@ -54,14 +62,18 @@ fn rows(machine: &Machine, spin: &Spin, window_s: Option<[f64; 2]>) -> Vec<Row> 
             _ => parameter.get(machine, spin).filter(|_| window_s.is_some() || !of_grid),
         };
         let as_built_in = parameter.get(&built_in, spin) == value;
-        let source = if of_grid || as_built_in { parameter.source().to_string() } else { "given".to_owned() };
-        Row { parameter, value, source }
+        let source = if of_grid || as_built_in {
+            parameter.source().to_string()
+        } else {
+            "given".to_owned()
+        };
+        Listed { parameter, value, source }
     };
     Parameter::all(machine, spin).into_iter().map(row).collect()
 }
 
-fn as_json(rows: &[Row]) -> String {
-    let row = |row: &Row| {
+fn as_json(rows: &[Listed]) -> String {
+    let row = |row: &Listed| {
         json!({
             "name": row.parameter.name(),
             "value": row.value,
@@ -86,9 +98,9 @@ fn range(range: Range) -> Value {
     json!({ "least": least, "greatest": greatest, "zero_excluded": excluded })
 }
 
-fn as_text(rows: &[Row]) -> String {
-    let value = |row: &Row| row.value.map_or_else(|| "-".to_owned(), |value| value.to_string());
-    let width = |length: &dyn Fn(&Row) -> usize| rows.iter().map(length).max().unwrap_or(0);
+fn as_text(rows: &[Listed]) -> String {
+    let value = |row: &Listed| row.value.map_or_else(|| "-".to_owned(), |value| value.to_string());
+    let width = |length: &dyn Fn(&Listed) -> usize| rows.iter().map(length).max().unwrap_or(0);
     let name_width = width(&|row| row.parameter.name().len());
     let value_width = width(&|row| value(row).len());
     let unit_width = width(&|row| row.parameter.unit().len());
@@ -120,7 +132,10 @@ mod tests {
         assert_eq!(text.lines().count(), rows.len());
         assert!(text.contains("tub_mass_kg") && text.contains("23.87 kg"), "{text}");
         let json: Value = serde_json::from_str(&as_json(&rows)).unwrap();
-        assert_eq!(json.as_array().map(Vec::len), Some(Parameter::all(&Machine::paper(), &spin).len()));
+        assert_eq!(
+            json.as_array().map(Vec::len),
+            Some(Parameter::all(&Machine::paper(), &spin).len())
+        );
         assert_eq!(json[0]["name"], "gravity_m_per_s2");
     }
 

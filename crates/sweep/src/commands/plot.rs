@@ -2,9 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
+use super::examples::Examples;
 use crate::exit::{Error, Exit, tell};
-use crate::files::beside;
-use crate::plot::{PlotOptions, Quantity, View, render};
+use sweep_files::beside;
+use sweep_plot::{PlotOptions, Quantity, View, render};
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    ["sweep plot results/first.parquet", "results/first.svg: ratios, and the line of the limit"],
+    ["sweep plot results/first.parquet -o map.html", "a page to point and click in"],
+    [
+        "sweep plot results/first.parquet --quantity nonlinear --channel tub_yaw",
+        "one channel's amplitude",
+    ],
+];
 
 /// Arguments of `sweep plot`.
 #[derive(Debug, clap::Args)]
@@ -25,7 +36,8 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t)]
     pub quantity: Quantity,
 
-    /// Channel to show, as in the column names (tub_yaw, drum_front_y, ...); again for more of them in a trace
+    /// Channel to show, as in the column names (tub_yaw, drum_front_y, ...); again for more of them
+    /// in a trace
     #[arg(long = "channel", value_name = "NAME")]
     pub channels: Vec<String>,
 
@@ -34,7 +46,13 @@ pub struct Args {
     pub at: Vec<(String, f64)>,
 
     /// Trace: mark where these speeds are passed, in rpm, separated by commas
-    #[arg(long, value_name = "RPM,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = speed)]
+    #[arg(
+        long,
+        value_name = "RPM,...",
+        value_delimiter = ',',
+        allow_negative_numbers = true,
+        value_parser = speed
+    )]
     pub resonances: Vec<f64>,
 
     /// Trace: mark where the resonance speeds of this modes file are passed
@@ -54,7 +72,7 @@ pub struct Args {
 ///
 /// # Errors
 /// As [`render`].
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.file));
     let options = PlotOptions {
         view: args.view,
@@ -77,7 +95,8 @@ fn default_output(file: &Path) -> PathBuf {
 }
 
 fn assignment(text: &str) -> Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, as in spin_peak_rpm=350")?;
+    let (name, value) =
+        text.split_once('=').ok_or("expected NAME=VALUE, as in spin_peak_rpm=350")?;
     Ok((name.trim().to_owned(), finite(value)?))
 }
 
@@ -113,7 +132,8 @@ mod tests {
     #[test]
     fn options_are_read_as_documented() {
         let args = parse(
-            "m.parquet --quantity gap-linear --at spin_peak_rpm=350 --resonances 99.9,147.6 --channel a --channel b",
+            "m.parquet --quantity gap-linear --at spin_peak_rpm=350 --resonances 99.9,147.6 \
+             --channel a --channel b",
         );
         let args = args.unwrap();
         assert_eq!(args.quantity, Quantity::GapLinear);

@@ -1,12 +1,14 @@
-//! `sweep reference PAGE`: pages of the guide that are made from the program's own tables, as Markdown.
+//! `sweep reference PAGE`: pages of the guide that are made from the program's own tables, as
+//! Markdown.
 
 use std::fmt::Write as _;
+use std::iter;
 
 use washer_model::{Channel, Machine, Parameter, Range, Spin};
 
-use crate::cli;
 use crate::exit::{Error, Exit, print};
 use crate::measures::{Criterion, Measures, Metric};
+use crate::method::{Entry, METHODS};
 use crate::store::schema::{AxisColumn, Layout};
 use crate::verdict::ROW_STATUSES;
 
@@ -22,6 +24,8 @@ pub struct Args {
 enum Page {
     /// Every parameter that can be set or swept.
     Parameters,
+    /// Every method of integration with its settings.
+    Methods,
     /// Every column of a result file.
     Columns,
     /// Every command with its options.
@@ -32,18 +36,20 @@ enum Page {
 ///
 /// # Errors
 /// Standard output that cannot be written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &Args, program: clap::Command) -> Result<Exit, Error> {
     print(&match args.page {
         Page::Parameters => parameters(),
+        Page::Methods => methods(),
         Page::Columns => columns(),
-        Page::Commands => commands(),
+        Page::Commands => commands(program),
     })
 }
 
-/// What stands at the head of a page, so that nobody edits it by hand.
+/// The head of a page, which says that it is generated.
 fn head(title: &str, page: &str) -> String {
     format!(
-        "# {title}\n\n<!-- Made by `sweep reference {page}`; scripts/check_docs.py holds it against the program. -->\n\n"
+        "# {title}\n\n<!-- Made by `sweep reference {page}`; scripts/checks/check_docs.py holds it \
+         against the program. -->\n\n"
     )
 }
 
@@ -57,11 +63,16 @@ fn row(text: &mut String, cells: &[&str]) {
 fn parameters() -> String {
     let mut text = head("Parameters", "parameters");
     text.push_str(
-        "Every number of the machine and of the spin has one name, the same in `[set]`, in `--set NAME=VALUE` and as the\n\
-         `parameter` of an `[[axis]]`. Values are those of the built-in machine. *Paper* means printed there, *derived*\n\
-         follows from what is printed, *assumed* is this project's own choice where the paper is silent.\n\
-         Springs and dampers are numbered in the order of the machine file; the table shows the first of each. The end of the run\n\
-         (`end_s`) and the integrator's settings are no parameters: `[time]` and `[integrator]` set them once, because rows whose\n\
+        "Every number of the machine and of the spin has one name, the same in `[set]`, in `--set \
+         NAME=VALUE` and as the\n\
+         `parameter` of an `[[axis]]`. Values are those of the built-in machine. *Paper* means \
+         printed there, *derived*\n\
+         follows from what is printed, *assumed* is this project's own choice where the paper is \
+         silent.\n\
+         Springs and dampers are numbered in the order of the machine file; the table shows the \
+         first of each. The end of the run\n\
+         (`end_s`) and the integrator's settings are no parameters: `[time]` and `[integrator]` \
+         set them once, because rows whose\n\
          runs differ in length or method would not compare. The window's edges are.\n\n",
     );
     row(&mut text, &["name", "built in", "unit", "meaning", "values", "source"]);
@@ -75,7 +86,8 @@ fn parameters() -> String {
         }
         let of_spin = name.starts_with("spin_");
         let value = parameter.get(&machine, &spin).filter(|_| !of_spin);
-        let value = value.map_or_else(|| "as the grid file says".to_owned(), |value| value.to_string());
+        let value =
+            value.map_or_else(|| "as the grid file says".to_owned(), |value| value.to_string());
         row(
             &mut text,
             &[
@@ -109,16 +121,44 @@ fn allowed(range: Range) -> String {
     }
 }
 
+fn methods() -> String {
+    let mut text = head("Methods of integration", "methods");
+    text.push_str(
+        "The `method` of `[integrator]`, with its keys. [Method and \
+         accuracy](../method.md)\nsays which one to take.\n\n",
+    );
+    row(&mut text, &["`method`", "what it does", "key", "meaning", "default", "values"]);
+    row(&mut text, &["---"; 6]);
+    for entry in &METHODS {
+        let is_default = entry.name == Entry::default_method().name;
+        let name = format!("`{}`{}", entry.name, if is_default { ", the default" } else { "" });
+        // Only the first key's row has the name and the description.
+        let heads = [[name.as_str(), entry.description]].into_iter().chain(iter::repeat([""; 2]));
+        for ([name, does], setting) in heads.zip(entry.settings) {
+            let (key, default) = (format!("`{}`", setting.key), format!("{:e}", setting.default));
+            let values = allowed(setting.range);
+            row(&mut text, &[name, does, &key, setting.description, &default, &values]);
+        }
+    }
+    text
+}
+
 fn columns() -> String {
     let mut text = head("Columns of a result file", "columns");
     text.push_str(
-        "One row per grid point, in grid order. Behind `point` stands one column per axis, named as its\n\
-         parameter (here the two axes of `sweeps/fig12.toml`); the channels are those of `[reliability]`,\n\
-         here all that exist. Each column's unit and description also stand in the file: in the Arrow field\n\
-         metadata (`unit`, `description`), and as JSON under the key `sweep.columns` of the file's key-value\n\
-         metadata. There stand too `sweep.plan` (the grid as run with the full machine), `sweep.plan_hash`,\n\
+        "One row per grid point, in grid order. Behind `point` stands one column per axis, named \
+         as its\n\
+         parameter (here the two axes of `sweeps/fig12.toml`); the channels are those of \
+         `[reliability]`,\n\
+         here all that exist. Each column's unit and description also stand in the file: in the \
+         Arrow field\n\
+         metadata (`unit`, `description`), and as JSON under the key `sweep.columns` of the \
+         file's key-value\n\
+         metadata. There stand too `sweep.plan` (the grid as run with the full machine), \
+         `sweep.plan_hash`,\n\
          `sweep.version` and `sweep.numerics` (together they say which build made it), and last\n\
-         `sweep.digest`, by which every command that reads the file knows that no bit of it has changed.\n\n",
+         `sweep.digest`, by which every command that reads the file knows that no bit of it has \
+         changed.\n\n",
     );
     let (machine, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
     let axes = Parameter::all(&machine, &spin)
@@ -150,13 +190,18 @@ fn columns() -> String {
     row(&mut text, &["criterion", "`nonlinear_` and `linear_`", "`ratio_`"]);
     row(&mut text, &["---"; 3]);
     for criterion in Criterion::ALL {
-        row(&mut text, &[&format!("`{}`", criterion.name()), criterion.amplitude(), criterion.ratio()]);
+        row(
+            &mut text,
+            &[&format!("`{}`", criterion.name()), criterion.amplitude(), criterion.ratio()],
+        );
     }
-    let metrics: Vec<String> = Metric::ALL.iter().map(|metric| format!("`{}`", metric.name())).collect();
+    let metrics: Vec<String> =
+        Metric::ALL.iter().map(|metric| format!("`{}`", metric.name())).collect();
     // Writing to a String cannot fail.
     let _ = writeln!(
         text,
-        "\nThe columns of a metric ({}) are there only where the grid file's `metrics` names it, in its order.",
+        "\nThe columns of a metric ({}) are there only where the grid file's `metrics` names it, \
+         in its order.",
         metrics.join(", ")
     );
     let statuses: Vec<String> = ROW_STATUSES.iter().map(|status| format!("`{status}`")).collect();
@@ -165,11 +210,10 @@ fn columns() -> String {
     text
 }
 
-fn commands() -> String {
+fn commands(program: clap::Command) -> String {
     let mut text = head("Commands", "commands");
-    let mut program = cli::command();
     // The width of a terminal must not show in a file.
-    program = program.term_width(100);
+    let mut program = program.term_width(100);
     program.build();
     let mut part = |title: &str, help: String| {
         let help: Vec<&str> = help.lines().map(str::trim_end).collect();
@@ -188,11 +232,16 @@ fn commands() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::commands::command;
 
     #[test]
     fn further_springs_and_dampers_are_left_out_and_nothing_else() {
-        assert!(is_a_further_one("spring_2_tub_x_m") && is_a_further_one("damper_12_damping_n_s_per_m"));
-        assert!(!is_a_further_one("spring_1_tub_x_m") && !is_a_further_one("spring_stiffness_n_per_m"));
+        assert!(
+            is_a_further_one("spring_2_tub_x_m") && is_a_further_one("damper_12_damping_n_s_per_m")
+        );
+        assert!(
+            !is_a_further_one("spring_1_tub_x_m") && !is_a_further_one("spring_stiffness_n_per_m")
+        );
     }
 
     #[test]
@@ -201,8 +250,11 @@ mod tests {
         for name in ["tub_mass_kg", "spring_1_free_length_m", "spin_peak_rpm"] {
             assert!(page.contains(&format!("| `{name}` |")), "{name}");
         }
+        for entry in &METHODS {
+            assert!(methods().contains(&format!("| `{}`", entry.name)), "{}", entry.name);
+        }
         assert!(columns().contains("| `ratio_max_channel` | text |"));
-        let page = commands();
+        let page = commands(command());
         assert!(page.contains("## sweep run\n") && page.contains("--fail-on-error"));
         assert!(!page.contains("sweep reference PAGE"), "hidden commands stay hidden");
     }

@@ -3,42 +3,53 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::{Target, quoted};
-use crate::engine::ModelEngine;
+use super::examples::Examples;
+use super::grid::{ResultArgs, quoted};
+use crate::engine::{Engine, ModelEngine};
 use crate::exit::{Error, Exit, tell};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
-use crate::progress::{self, Mode, duration, per_second};
-use crate::run::{self as runner, Ended, Engine, Report, RunOptions};
+use crate::progress::{ProgressMode, duration, per_second};
+use crate::run::{self as runner, Ended, RunOptions, RunReport};
 use crate::store::provenance::Session;
 use crate::store::read::Tally;
 use crate::store::{Job, ShardRequest};
 use crate::threads::{self, Environment};
 use crate::trace::{self, MOST_KEPT};
+use sweep_files as files;
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    ["sweep run my.toml", "to results/NAME.parquet, on every core"],
+    ["sweep run my.toml --set tub_mass_kg=20 --out light.parquet", "the same with another tub"],
+    ["sweep run my.toml --progress plain 2> run.log", "a line every 5 s, for a log"],
+    ["sweep run my.toml --shard 3/16", "one sixteenth; `sweep merge` joins them"],
+];
 
 /// Arguments of `sweep run`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The run.
     #[command(flatten)]
-    pub target: Target,
+    pub target: ResultArgs,
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
     #[arg(long, value_name = "N", value_parser = threads::parse)]
     pub threads: Option<usize>,
-    /// Compute one of N equal shards only, to be joined by `sweep merge`; `auto/N` takes the place from
-    /// SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX. In a Slurm array the default is that array's task and count
-    /// (--shard 1/1 is the whole)
+    /// Compute one of N equal shards only, to be joined by `sweep merge`; `auto/N` takes the place
+    /// from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX. In a Slurm array the default is that
+    /// array's task and count (--shard 1/1 is the whole)
     #[arg(long, value_name = "I/N")]
     pub shard: Option<ShardRequest>,
     /// Start over, even if the result is there or another plan was begun
     #[arg(long)]
     pub fresh: bool,
-    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every 5 s) or none
+    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
+    /// 5 s) or none
     #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
-    pub progress: Mode,
-    /// Keep the time histories of every point too, decimated, in NAME.traces beside NAME.parquet: `sweep plot NAME.parquet
-    /// --traces NAME.traces -o MAP.html` shows them on a click. They take a run of their own, one trajectory at a time
+    pub progress: ProgressMode,
+    /// Keep the time histories of every point too, decimated, in NAME.traces beside NAME.parquet:
+    /// `sweep plot NAME.parquet --traces NAME.traces -o MAP.html` shows them on a click. They take
+    /// a run of their own, one trajectory at a time
     #[arg(long)]
     pub keep_traces: bool,
     /// Exit with 3 if any row of the finished result failed
@@ -50,7 +61,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Mistakes in the grid file, and whatever kept the run from its end.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.target.grid.load()?;
     let engine = ModelEngine::new(&plan)?;
     execute(args, &plan, &engine)
@@ -60,7 +71,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
 ///
 /// # Errors
 /// Whatever of [`crate::store::StoreError`] kept it from its end; finished chunks are kept.
-pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Error> {
+pub(crate) fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Error> {
     if args.keep_traces && plan.points() > MOST_KEPT {
         return Err(Error::Option {
             option: "--keep-traces",
@@ -110,7 +121,7 @@ pub fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Er
 }
 
 /// What came of the run, in at most twelve lines.
-fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &Report) -> String {
+fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &RunReport) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = match (&report.ended, &report.session) {
@@ -131,7 +142,14 @@ fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &Repo
                 .unwrap_or_default()
         ),
         (Ended::Shard(shard), Some(session)) => {
-            writeln!(text, "{}, shard {} of {}: {}", plan.name, shard.index, shard.of, work(session))
+            writeln!(
+                text,
+                "{}, shard {} of {}: {}",
+                plan.name,
+                shard.index,
+                shard.of,
+                work(session)
+            )
         }
         (_, Some(session)) => writeln!(text, "{}: {}", plan.name, work(session)),
         (_, None) => Ok(()),
@@ -147,9 +165,15 @@ fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &Repo
             line(&mut text, "next", &format!("sweep plot {out}"));
         }
         Ended::Shard(_) => {
-            line(&mut text, "next", &format!("{}, when all shards are done", args.target.command("merge")));
+            line(
+                &mut text,
+                "next",
+                &format!("{}, when all shards are done", args.target.command("merge")),
+            );
         }
-        Ended::Interrupted { .. } => line(&mut text, "go on", &go_on(args, report.session.as_ref())),
+        Ended::Interrupted { .. } => {
+            line(&mut text, "go on", &go_on(args, report.session.as_ref()))
+        }
     }
     text
 }
@@ -180,11 +204,16 @@ fn work(session: &Session) -> String {
     )
 }
 
-/// A result's rows: verdicts, failures, what stands out. At most six lines.
+/// A result's rows: verdicts, failures, extremes. At most six lines.
 pub(super) fn rows(tally: &Tally, job: &Job<'_>) -> String {
     let at = |point: u64| {
         let values = (job.axis_values)(point);
-        let place = job.layout.axes.iter().zip(values).map(|(axis, value)| format!("{} {value}", axis.name));
+        let place = job
+            .layout
+            .axes
+            .iter()
+            .zip(values)
+            .map(|(axis, value)| format!("{} {value}", axis.name));
         place.collect::<Vec<_>>().join(", ")
     };
     counts(tally, job.layout.ratio_limit, &at)
@@ -204,18 +233,23 @@ pub(super) fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String
     line(&mut text, "reliable", &verdicts);
     if tally.by_status.failed() > 0 {
         let by_status = tally.by_status.iter().filter(|(status, _)| *status != "ok");
-        let list: Vec<String> = by_status.map(|(status, count)| format!("{count} {status}")).collect();
+        let list: Vec<String> =
+            by_status.map(|(status, count)| format!("{count} {status}")).collect();
         line(&mut text, "failed", &list.join(", "));
     }
     if tally.sensitive > 0 {
-        let told = format!("{}: chaotic, rk4 does not agree with itself at two steps", tally.sensitive);
+        let told =
+            format!("{}: chaotic, rk4 does not agree with itself at two steps", tally.sensitive);
         line(&mut text, "sensitive", &told);
     }
     if let Some(greatest) = &tally.greatest_error {
         let methods: Vec<String> =
             tally.by_method.iter().map(|(method, count)| format!("{count} {method}")).collect();
-        let told =
-            format!("at most {:.1e} left in a row; rows by method: {}", greatest.value, methods.join(", "));
+        let told = format!(
+            "at most {:.1e} left in a row; rows by method: {}",
+            greatest.value,
+            methods.join(", ")
+        );
         line(&mut text, "error", &told);
     }
     let place = |point: u64| match at(point) {
@@ -223,7 +257,11 @@ pub(super) fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String
         place => format!(" at {place}"),
     };
     if let Some(greatest) = &tally.greatest_ratio {
-        line(&mut text, "greatest", &format!("ratio {:.3}{}", greatest.value, place(greatest.point)));
+        line(
+            &mut text,
+            "greatest",
+            &format!("ratio {:.3}{}", greatest.value, place(greatest.point)),
+        );
     }
     if let Some(least) = &tally.least_gap_nonlinear_m {
         line(&mut text, "least gap", &format!("{:.5} m{}", least.value, place(least.point)));
@@ -237,10 +275,10 @@ pub(super) fn line(text: &mut String, name: &str, value: &str) {
     let _ = writeln!(text, "{name:>10}  {value}");
 }
 
-impl clap::builder::ValueParserFactory for Mode {
+impl clap::builder::ValueParserFactory for ProgressMode {
     type Parser = clap::builder::ValueParser;
 
     fn value_parser() -> Self::Parser {
-        clap::builder::ValueParser::new(|text: &str| text.parse::<progress::Mode>())
+        clap::builder::ValueParser::new(|text: &str| text.parse::<ProgressMode>())
     }
 }

@@ -1,7 +1,12 @@
 //! `sweep schema`: JSON Schema of the files a user writes.
 
+use super::examples::Examples;
 use crate::config::schema;
 use crate::exit::{Error, Exit, print};
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples =
+    &[["sweep schema", "for editors that complete and check TOML"]];
 
 /// Arguments of `sweep schema`.
 #[derive(Debug, clap::Args)]
@@ -15,7 +20,7 @@ pub struct Args {
 ///
 /// # Errors
 /// When standard output cannot be written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let schema = if args.machine { schema::machine() } else { schema::grid() };
     print(&format!("{schema:#}\n"))
 }

@@ -5,11 +5,16 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
+use super::examples::Examples;
 use super::run::{counts, line};
 use crate::exit::{Error, Exit, show};
-use crate::files::ParquetFile;
 use crate::identity;
 use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, overview, row, tally};
+use sweep_files::ParquetFile;
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples =
+    &[["sweep show results/first.parquet", "verdicts, extremes, columns with units and ranges"]];
 
 /// Arguments of `sweep show`.
 #[derive(Debug, clap::Args)]
@@ -19,11 +24,12 @@ pub struct Args {
     file: PathBuf,
 }
 
-/// Shows a file's content in short: for a result its verdicts and extremes, for any file its columns and their ranges.
+/// Shows a file's content in short: for a result its verdicts and extremes, for any file its
+/// columns and their ranges.
 ///
 /// # Errors
 /// A file that cannot be read, or is not Parquet.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let opened = ParquetFile::open(&args.file)?;
     let file = overview(&opened)?;
     let mut text = String::new();
@@ -32,15 +38,23 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         Some(result) => {
             provenance(&mut text, result);
             if !opened.is_sealed() {
-                line(&mut text, "checked", "no: it carries no digest, as files of older builds do not");
+                line(
+                    &mut text,
+                    "checked",
+                    "no: it carries no digest, as files of older builds do not",
+                );
             }
             let tally = tally(&opened)?;
             let limit = result.plan["reliability"]["ratio_limit"].as_f64().unwrap_or(f64::NAN);
             let axes: Vec<&str> =
                 axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
-            let places = places(&opened, &axes, &[&tally.greatest_ratio, &tally.least_gap_nonlinear_m])?;
+            let places =
+                places(&opened, &axes, &[&tally.greatest_ratio, &tally.least_gap_nonlinear_m])?;
             let at = |point| {
-                places.iter().find(|(known, _)| *known == point).map_or(String::new(), |(_, at)| at.clone())
+                places
+                    .iter()
+                    .find(|(known, _)| *known == point)
+                    .map_or(String::new(), |(_, at)| at.clone())
             };
             text.push_str(&counts(&tally, limit, &at));
         }
@@ -63,7 +77,11 @@ fn provenance(text: &mut String, result: &ResultFile) {
     }
     for axis in axes(plan) {
         let values = axis.get("range").or(axis.get("values")).map(brief).unwrap_or_default();
-        line(text, "axis", &format!("{}: {values}", axis["parameter"].as_str().unwrap_or_default()));
+        line(
+            text,
+            "axis",
+            &format!("{}: {values}", axis["parameter"].as_str().unwrap_or_default()),
+        );
     }
 }
 
@@ -76,7 +94,11 @@ fn brief(value: &Value) -> String {
         }
         Value::Array(values) => match values.get(..12) {
             Some(first) if values.len() > 12 => {
-                format!("{}, ... ({} values)", list(first.iter().map(brief).collect()), values.len())
+                format!(
+                    "{}, ... ({} values)",
+                    list(first.iter().map(brief).collect()),
+                    values.len()
+                )
             }
             _ => list(values.iter().map(brief).collect()),
         },
@@ -137,7 +159,11 @@ fn range(column: &ColumnRange) -> String {
 fn short(value: f64) -> String {
     if value == 0.0 || (1e-4..1e9).contains(&value.abs()) {
         let text = format!("{value:.6}");
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+        if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
+        }
     } else {
         format!("{value:.5e}")
     }

@@ -3,19 +3,25 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::{Target, quoted};
+use super::examples::Examples;
+use super::grid::{ResultArgs, quoted};
 use crate::exit::{Error, Exit, print, tell};
 use crate::plan::Plan;
 use crate::store::{ShardRequest, chunk_points};
 
-/// Tasks that a Slurm array may have unless its administrator allowed more (`MaxArraySize` 1001 counts from 0).
+/// Tasks that a Slurm array may have unless its administrator allowed more (`MaxArraySize` 1001
+/// counts from 0).
 const USUAL_MOST_TASKS: u64 = 1000;
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples =
+    &[["sweep slurm my.toml --shards 16 --time 30", "the script that submits them"]];
 
 /// Arguments of `sweep slurm`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    target: Target,
+    target: ResultArgs,
     /// Parts to compute side by side, each a task of the array
     #[arg(long, value_name = "N", value_parser = shards)]
     shards: u64,
@@ -29,7 +35,12 @@ pub struct Args {
     #[arg(long, value_name = "NAME", value_parser = word)]
     account: Option<String>,
     /// Cores a task, and so its threads
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..=4096)
+    )]
     cpus_per_task: u32,
     /// Memory a task, as sbatch takes it: 500M, 2G
     #[arg(long, value_name = "SIZE", value_parser = word)]
@@ -57,11 +68,16 @@ fn word(text: &str) -> Result<String, String> {
 /// Prints the script.
 ///
 /// # Errors
-/// Mistakes in the grid file, a working folder or program without a path, standard output that cannot be written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+/// Mistakes in the grid file, a working folder or program without a path, standard output that
+/// cannot be written.
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.target.grid.load()?;
     let path_of = |what: &str, found: std::io::Result<PathBuf>| {
-        found.map_err(|source| Error::File { action: "find the path of", path: what.into(), source })
+        found.map_err(|source| Error::File {
+            action: "find the path of",
+            path: what.into(),
+            source,
+        })
     };
     let folder = path_of("the working folder", std::env::current_dir())?;
     let program = path_of("this program", std::env::current_exe())?;
@@ -74,7 +90,8 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     }
     if args.shards > USUAL_MOST_TASKS {
         tell(
-            "note: many clusters allow arrays of 1000 tasks (scontrol show config | grep MaxArraySize); more --cpus-per-task \
+            "note: many clusters allow arrays of 1000 tasks (scontrol show config | grep \
+             MaxArraySize); more --cpus-per-task \
              need fewer shards",
         );
     }
@@ -96,13 +113,17 @@ fn script(args: &Args, plan: &Plan, folder: &Path, program: &Path) -> String {
     };
     let command = |verb: &str| {
         let line = args.target.command(verb);
-        // `command` begins with the program's bare name; on a node only its path is sure to be found.
+        // `command` begins with the program's bare name; on a node only its path is sure to be
+        // found.
         line.replacen("sweep", &quoted(&program.display().to_string()), 1)
     };
     let mut common = String::new();
-    for (option, value) in
-        [("time", &args.time), ("partition", &args.partition), ("account", &args.account), ("mem", &args.mem)]
-    {
+    for (option, value) in [
+        ("time", &args.time),
+        ("partition", &args.partition),
+        ("account", &args.account),
+        ("mem", &args.mem),
+    ] {
         if let Some(value) = value {
             // Writing to a String cannot fail.
             let _ = write!(common, " --{option}={}", quoted(value));
@@ -112,29 +133,32 @@ fn script(args: &Args, plan: &Plan, folder: &Path, program: &Path) -> String {
         let _ = write!(common, " {}", quoted(option));
     }
     let (shards, cpus) = (args.shards, args.cpus_per_task);
-    let (folder, results) = (quoted(&folder.display().to_string()), quoted(&results.display().to_string()));
+    let (folder, results) =
+        (quoted(&folder.display().to_string()), quoted(&results.display().to_string()));
     let (array_log, merge_log) = (log("%A_%a"), log("merge-%j"));
     let (run, merge) = (command("run"), command("merge"));
     format!(
         r#"#!/bin/sh
-# Submits the sweep {name}: {shards} shards as one array, and their merge once all have ended. To be run where sbatch is:
-# arguments go to the array's sbatch, so `sh THIS_SCRIPT --array=3,7` submits the shards again that `sweep status` misses,
-# and the merge after them. A task that loses its node is queued again by Slurm and goes on from its finished chunks.
+# Submits the sweep {name}: {shards} shards as one array, and their merge once all have ended.
+# Run it where sbatch is. Arguments go to the array's sbatch: `sh THIS_SCRIPT --array=3,7` submits
+# the shards again that `sweep status` misses, and the merge after them. Slurm queues a task again
+# that loses its node; the task goes on from its finished chunks.
 set -eu
 cd {folder}
 mkdir -p {results}
 
-array=$(sbatch --parsable --job-name={name} --array=1-{shards} --requeue --open-mode=append --nodes=1 --ntasks=1 \
-    --cpus-per-task={cpus} --output={array_log}{common} "$@" <<'END'
+array=$(sbatch --parsable --job-name={name} --array=1-{shards} --requeue --open-mode=append \
+    --nodes=1 --ntasks=1 --cpus-per-task={cpus} --output={array_log}{common} "$@" <<'END'
 #!/bin/sh
 exec {run} --shard "$SLURM_ARRAY_TASK_ID/{shards}"
 END
 )
 array=${{array%%;*}}
 
-# Whatever became of the tasks: a merge that finds a chunk missing says of which shard, and leaves everything in place.
-merge=$(sbatch --parsable --job-name={name}-merge --dependency="afterany:$array" --requeue --open-mode=append --nodes=1 --ntasks=1 \
-    --output={merge_log}{common} <<'END'
+# Whatever became of the tasks: a merge that finds a chunk missing names its shard, and leaves
+# everything in place.
+merge=$(sbatch --parsable --job-name={name}-merge --dependency="afterany:$array" --requeue \
+    --open-mode=append --nodes=1 --ntasks=1 --output={merge_log}{common} <<'END'
 #!/bin/sh
 exec {merge}
 END
@@ -182,8 +206,11 @@ mod tests {
             calls.display()
         );
         std::fs::write(bin.join("sbatch"), fake).unwrap();
-        std::fs::set_permissions(bin.join("sbatch"), std::os::unix::fs::PermissionsExt::from_mode(0o755))
-            .unwrap();
+        std::fs::set_permissions(
+            bin.join("sbatch"),
+            std::os::unix::fs::PermissionsExt::from_mode(0o755),
+        )
+        .unwrap();
         let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap());
         let mut shell = Command::new("sh")
             .args([&["-s", "--"], arguments].concat())
@@ -203,7 +230,8 @@ mod tests {
     fn the_shell_takes_the_script_as_it_was_meant_whatever_the_names() {
         let home = tempfile::tempdir().unwrap();
         let grid = home.path().join("it's a grid.toml");
-        let text = "name = \"half.of-it\"\n[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = 50\n";
+        let text = "name = \"half.of-it\"\n[spin]\nprofile = \"triangular\"\npeak_rpm = \
+                    350\nramp_s = 50\n[time]\nend_s = 50\n";
         std::fs::write(&grid, text).unwrap();
         let grid = grid.to_str().unwrap();
         let args = parse(&[
@@ -247,7 +275,8 @@ mod tests {
         place("--dependency=afterany:17");
         let grid = grid.replace('\'', r"'\''");
         place(&format!(
-            "exec '/opt/my sweep' run '{grid}' --set tub_mass_kg=20 --shard \"$SLURM_ARRAY_TASK_ID/8\""
+            "exec '/opt/my sweep' run '{grid}' --set tub_mass_kg=20 \
+             --shard \"$SLURM_ARRAY_TASK_ID/8\""
         ));
         place(&format!("exec '/opt/my sweep' merge '{grid}' --set tub_mass_kg=20"));
         assert!(home.path().join("results").is_dir(), "Slurm makes no folder for its logs");

@@ -1,27 +1,34 @@
-//! `sweep status GRID.toml`: where a run stands.
+//! `sweep status GRID.toml`: progress of a run.
 
 use serde_json::json;
 
-use super::Target;
+use super::examples::Examples;
+use super::grid::ResultArgs;
 use super::run::line;
 use crate::exit::{Error, Exit, show, tell};
 use crate::store::{FolderStatus, Job, State, status};
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    ["sweep status my.toml", "how far it is"],
+    ["sweep status my.toml --json", "the same for a program, missing shards as a list"],
+];
 
 /// Arguments of `sweep status`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    target: Target,
+    target: ResultArgs,
     /// Print it as JSON
     #[arg(long)]
     json: bool,
 }
 
-/// Tells where a run stands, disturbing nobody.
+/// Shows the progress of a run, without disturbing it.
 ///
 /// # Errors
 /// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
-pub fn run(args: &Args) -> Result<Exit, Error> {
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.target.grid.load()?;
     let output = args.target.output(&plan);
     let found = status(&output, &Job::of(&plan))?;
@@ -54,8 +61,10 @@ fn summary(args: &Args, found: &FolderStatus) -> String {
         0 => String::new(),
         count => format!(" ({count} of them damaged)"),
     };
-    let chunks =
-        format!("{} of {} done, {} missing{damaged}", found.chunks_done, found.chunks, found.chunks_missing);
+    let chunks = format!(
+        "{} of {} done, {} missing{damaged}",
+        found.chunks_done, found.chunks, found.chunks_missing
+    );
     line(&mut text, "chunks", &chunks);
     for holder in &found.running {
         let shard = holder.shard.map(|shard| format!(", shard {shard}")).unwrap_or_default();

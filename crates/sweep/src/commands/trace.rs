@@ -2,23 +2,33 @@
 
 use std::path::PathBuf;
 
-use serde_json::{Map, Value};
-
 use washer_model::{COORDINATES, Start};
 
+use super::examples::Examples;
 use crate::config;
 use crate::exit::{Error, Exit, tell};
-use crate::files::{FileKind, Output};
 use crate::plan::Plan;
 use crate::threads;
 use crate::trace::{Extras, MOST_INSTANTS, trace};
+use sweep_files::{FileKind, Output};
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    [
+        "sweep trace my.toml --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=100 --out \
+                 rocking.parquet",
+        "both models at one point",
+    ],
+    ["sweep plot rocking.parquet", "drawn over time and spin speed"],
+];
 
 /// Arguments of `sweep trace`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    grid: super::Grid,
-    /// The point: a value for each axis, on the grid or between its points, and for any other parameter; may be repeated
+    grid: super::grid::GridArgs,
+    /// The point: a value for each axis, on the grid or between its points, and for any other
+    /// parameter; may be repeated
     #[arg(long, value_name = "NAME=VALUE")]
     at: Vec<String>,
     /// Time between two instants of the file, in s; the integration's steps are its own
@@ -30,8 +40,8 @@ pub struct Args {
     /// Add the tension of each spring and damper, and their sum on the cabinet
     #[arg(long)]
     forces: bool,
-    /// Begin away from equilibrium, both models alike: a coordinate q1 to q10 (m, rad) or a speed u1 to u10 (per s);
-    /// may be repeated
+    /// Begin away from equilibrium, both models alike: a coordinate q1 to q10 (m, rad) or a speed
+    /// u1 to u10 (per s); may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = start)]
     start: Vec<StartValue>,
     /// Trace file to write
@@ -52,16 +62,21 @@ struct StartValue {
 const FARTHEST_START: f64 = 1.5;
 
 fn start(text: &str) -> Result<StartValue, String> {
-    let expected = "expected a coordinate q1 to q10 or a speed u1 to u10 with its value, as in q5=0.1";
+    let expected =
+        "expected a coordinate q1 to q10 or a speed u1 to u10 with its value, as in q5=0.1";
     let (name, value) = text.split_once('=').ok_or(expected)?;
     let (is_speed, number) = match (name.trim().strip_prefix('q'), name.trim().strip_prefix('u')) {
         (Some(number), _) => (false, number),
         (_, Some(number)) => (true, number),
         _ => return Err(expected.to_owned()),
     };
-    let index =
-        number.parse::<usize>().ok().filter(|number| (1..=COORDINATES).contains(number)).ok_or(expected)?;
-    let value = value.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or(expected)?;
+    let index = number
+        .parse::<usize>()
+        .ok()
+        .filter(|number| (1..=COORDINATES).contains(number))
+        .ok_or(expected)?;
+    let value =
+        value.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or(expected)?;
     if !is_speed && value.abs() > FARTHEST_START {
         return Err(format!("expected at most {FARTHEST_START} m or rad from equilibrium"));
     }
@@ -71,9 +86,10 @@ fn start(text: &str) -> Result<StartValue, String> {
 /// Integrates and writes.
 ///
 /// # Errors
-/// Mistakes in the grid file or the options, a machine without equilibrium, and a file that cannot be written.
-pub fn run(args: &Args) -> Result<Exit, Error> {
-    let plan = config::load_point(&args.grid.grid, &args.grid.sets, &args.at)?;
+/// Mistakes in the grid file or the options, a machine without equilibrium, and a file that cannot
+/// be written.
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+    let (plan, at) = config::load_point(&args.grid.grid, &args.grid.sets, &args.at)?;
     let every_s = every(args.every, &plan)?;
     let extras = Extras { states: args.states, forces: args.forces };
     let mut start = Start::default();
@@ -81,7 +97,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         if *is_speed { start.speeds[*index] = *value } else { start.deviations[*index] = *value }
     }
     let output = Output::begin(&args.out, FileKind::Trace)?;
-    let work = || trace(&plan, plan.scenario(0), point(&args.at), every_s, &start, extras);
+    let work = || trace(&plan, plan.scenario(0), at, every_s, &start, extras);
     // A thread for each model, where there may be two; they write the same bytes as one.
     let trace = match threads::pool(2) {
         Ok(pool) => pool.install(work)?,
@@ -105,15 +121,6 @@ fn every(every_s: f64, plan: &Plan) -> Result<f64, Error> {
         given: every_s.to_string(),
         expected: format!("from {least:e} to {} s", plan.end_s),
     })
-}
-
-/// The point by name, as the configuration has accepted it.
-fn point(at: &[String]) -> Map<String, Value> {
-    let pair = |argument: &String| {
-        let (name, value) = argument.split_once('=')?;
-        Some((name.trim().to_owned(), Value::from(value.trim().parse::<f64>().ok()?)))
-    };
-    at.iter().filter_map(pair).collect()
 }
 
 #[cfg(test)]

@@ -1,37 +1,41 @@
-//! A plan as JSON: what a result file carries as its input, and what tells one run's plan from another's.
+//! A plan as JSON: what a result file carries as its input, and what tells one run's plan from
+//! another's.
 
 use serde_json::{Value, json};
-use washer_model::{Channel, Spin};
+use washer_model::Spin;
 
 use super::machine;
 use crate::design::Design;
 use crate::measures::{Criterion, Measures};
-use crate::plan::{Axis, AxisValues, Integrator, Plan};
+use crate::plan::{Axis, AxisValues, Plan};
 
 impl Plan {
-    /// The whole plan with every default and constant in place, in the grid file's own terms: `name`, `machine` (in
-    /// full), `spin`, `time`, `integrator`, `axis`, `reliability`.
+    /// The whole plan with every default and constant in place, in the grid file's own terms:
+    /// `name`, `machine` (in full), `spin`, `time`, `integrator`, `axis`, `reliability`.
     ///
-    /// Canonical: keys are sorted, and numbers are written as the shortest decimal that reads back to the same bits,
-    /// so two plans are the same if and only if their texts are.
+    /// Canonical: keys are sorted, and numbers are written as the shortest decimal that reads back
+    /// to the same bits, so two plans are the same if and only if their texts are.
     #[must_use]
     pub fn to_json(&self) -> Value {
+        let axes = self.axes.iter().map(|axis| self::axis(axis, self.design.as_ref()));
+        let channels = self.reliability.channels.iter().map(|channel| channel.name());
         let mut plan = json!({
             "name": self.name,
             "machine": machine::to_json(&self.machine),
             "spin": spin(&self.spin),
             "time": { "end_s": self.end_s, "window_s": self.window_s },
-            "integrator": integrator(&self.integrator),
-            "axis": self.axes.iter().map(|axis| self::axis(axis, self.design.as_ref())).collect::<Value>(),
+            "integrator": self.integrator.to_json(),
+            "axis": axes.collect::<Value>(),
             "reliability": {
                 "ratio_limit": self.reliability.ratio_limit,
-                "channels": self.reliability.channels.iter().map(|channel| Channel::name(*channel)).collect::<Value>(),
+                "channels": channels.collect::<Value>(),
             },
         });
         if let Some(design) = &self.design {
             plan["design"] = self::design(design);
         }
-        // What is left out stands for the default, so that plans which do not ask for more read as ever.
+        // What is left out stands for the default, so that plans which do not ask for more read as
+        // ever.
         let Measures { criterion, metrics } = &self.measures;
         if *criterion != Criterion::default() {
             plan["reliability"]["criterion"] = criterion.name().into();
@@ -65,17 +69,6 @@ fn spin(spin: &Spin) -> Value {
         }
         Spin::Table { time_s, speed_rpm } => {
             json!({ "profile": profile, "time_s": time_s, "speed_rpm": speed_rpm })
-        }
-    }
-}
-
-fn integrator(integrator: &Integrator) -> Value {
-    match integrator {
-        Integrator::Rk4 { step_s } => json!({ "method": "rk4", "step_s": step_s }),
-        Integrator::Dopri5 { rtol, atol } => json!({ "method": "dopri5", "rtol": rtol, "atol": atol }),
-        Integrator::Rodas5p { rtol, atol } => json!({ "method": "rodas5p", "rtol": rtol, "atol": atol }),
-        Integrator::Rk4MassScaled { accuracy } => {
-            json!({ "method": "rk4-mass-scaled", "accuracy": accuracy })
         }
     }
 }

@@ -19,7 +19,7 @@ pub(super) const MOST_SEED: u64 = (1 << 53) - 1;
 pub(super) const MOST_SOBOL: u64 = 1 << 32;
 
 /// What `[design]` says.
-pub(super) enum Written {
+pub(super) enum WrittenDesign {
     /// Nothing: a grid.
     None,
     /// Something wrong, already reported.
@@ -31,28 +31,31 @@ pub(super) enum Written {
 }
 
 /// Reads the section, and the file it names.
-pub(super) fn read(root: &mut Section<'_>, grid: &Path, report: &mut Report) -> Written {
+pub(super) fn read(root: &mut Section<'_>, grid: &Path, report: &mut Report) -> WrittenDesign {
     let mut section = match root.table("design", "[design]", report) {
-        Field::Absent => return Written::None,
-        Field::Bad => return Written::Bad,
+        Field::Absent => return WrittenDesign::None,
+        Field::Bad => return WrittenDesign::Bad,
         Field::Given(section) => section.value,
     };
     let at = section.at().clone();
     let field = section.choice("method", &METHODS, report);
     let expected = "`latin_hypercube`, `sobol` or `list`";
     let Some(method) = section.require(field, "method", expected, report) else {
-        // Which keys belong to a method that is none cannot be said, but what is wrong with any can.
+        // Which keys belong to a method that is none cannot be said, but what is wrong with any
+        // can.
         let _ = section.count("points", MOST_POINTS, report);
         let _ = section.whole("seed", 0..=MOST_SEED, report);
         let _ = section.text("file", report);
         section.finish(report);
-        return Written::Bad;
+        return WrittenDesign::Bad;
     };
     let written = if METHODS[method.value] == "list" {
         section.misplace(&["points", "seed"], "a list has the points that it lists");
         let field = section.text("file", report);
-        let file = section.require(field, "file", "a CSV or Parquet file, relative to this file", report);
-        file.and_then(|file| list::read(&file, grid, report)).map_or(Written::Bad, Written::List)
+        let file =
+            section.require(field, "file", "a CSV or Parquet file, relative to this file", report);
+        file.and_then(|file| list::read(&file, grid, report))
+            .map_or(WrittenDesign::Bad, WrittenDesign::List)
     } else {
         section.misplace(&["file"], "only the method \"list\" has it");
         let sobol = METHODS[method.value] == "sobol";
@@ -60,10 +63,14 @@ pub(super) fn read(root: &mut Section<'_>, grid: &Path, report: &mut Report) -> 
         let points = section.require(field, "points", "the number of points", report);
         let seed = section.whole("seed", 0..=MOST_SEED, report).or(DEFAULT_SEED);
         // Stand-ins for what was refused, so that the axes are read all the same.
-        let (points, seed) = (points.map_or(1, |points| points.value), seed.unwrap_or(DEFAULT_SEED));
-        let design =
-            if sobol { Design::Sobol { points, seed } } else { Design::LatinHypercube { points, seed } };
-        Written::Box(Located { value: design, at })
+        let (points, seed) =
+            (points.map_or(1, |points| points.value), seed.unwrap_or(DEFAULT_SEED));
+        let design = if sobol {
+            Design::Sobol { points, seed }
+        } else {
+            Design::LatinHypercube { points, seed }
+        };
+        WrittenDesign::Box(Located { value: design, at })
     };
     section.finish(report);
     written

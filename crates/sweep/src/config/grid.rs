@@ -1,31 +1,23 @@
 //! The grid file, section by section. What is left out has the defaults of the constants below.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use washer_model::{Channel, Machine, Range, decimal};
 
 use super::origins::Origins;
-use super::parameters::Written;
+use super::parameters::WrittenConstant;
 use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, cut, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
 use super::{design, machine, parameters, spin};
 use crate::measures::{Criterion, Measures, Metric};
-use crate::plan::{Integrator, Plan, Reliability};
+use crate::method::{Entry, Integrator, METHODS, settings};
+use crate::plan::{Plan, Reliability};
 
 /// `machine` when the grid names none.
 pub(super) const DEFAULT_MACHINE: &str = "paper";
-/// `method` when the grid names none.
-pub(super) const DEFAULT_METHOD: &str = "rk4-mass-scaled";
-/// `accuracy` of `rk4-mass-scaled`.
-pub(super) const DEFAULT_ACCURACY: f64 = 1e-3;
-/// `step_s` of `rk4`.
-pub(super) const DEFAULT_STEP_S: f64 = 2e-4;
-/// `rtol` of `dopri5` and `rodas5p`.
-pub(super) const DEFAULT_RTOL: f64 = 1e-6;
-/// `atol` of `dopri5` and `rodas5p`.
-pub(super) const DEFAULT_ATOL: f64 = 1e-9;
 /// `ratio_limit` of `[reliability]`.
 pub(super) const DEFAULT_RATIO_LIMIT: f64 = 2.0;
 /// `channels` of `[reliability]`.
@@ -42,15 +34,7 @@ pub(super) const DEFAULT_CHANNELS: [Channel; 6] = [
 pub(super) const LONGEST_S: f64 = 1e6;
 /// Most characters of a path in a message; no system takes much longer ones.
 const LONGEST_PATH: usize = 1000;
-/// Values of `accuracy`.
-pub(super) const ACCURACY: Range = Range::Within(1e-9, 1e-1);
-/// Values of `rtol`.
-pub(super) const RTOL: Range = Range::Within(1e-14, 1e-1);
-/// Values of `atol`.
-pub(super) const ATOL: Range = Range::Within(1e-18, 1e-1);
 
-/// The methods, in the order of [`Integrator`].
-pub(super) const METHODS: [&str; 4] = ["rk4", "dopri5", "rodas5p", "rk4-mass-scaled"];
 /// Names of machines that need no file.
 pub(super) const MACHINES: [&str; 1] = [DEFAULT_MACHINE];
 
@@ -58,17 +42,18 @@ pub(super) const MACHINES: [&str; 1] = [DEFAULT_MACHINE];
 pub(super) struct Draft {
     pub(super) plan: Plan,
     pub(super) origins: Origins,
-    pub(super) constants: Vec<Written>,
+    pub(super) constants: Vec<WrittenConstant>,
 }
 
-/// Reads the grid file and its machine file and puts the constants in place. `None` if the grid file has no text.
+/// Reads the grid file and its machine file and puts the constants in place. `None` if the grid
+/// file has no text.
 pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option<Draft> {
     let shown = path.display();
     let text = match read(path) {
         Ok(text) => text,
         Err(error) => {
             let missing =
-                matches!(&error, ReadError::Io(error) if error.kind() == std::io::ErrorKind::NotFound);
+                matches!(&error, ReadError::Io(error) if error.kind() == ErrorKind::NotFound);
             let diagnostic = Diagnostic::new(format!("cannot read the grid file {shown}: {error}"));
             report.push(if missing {
                 diagnostic.help("`sweep init FILE` writes a grid file to start from")
@@ -112,10 +97,14 @@ pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option
     let mut draft = Draft { plan, origins, constants: Vec::new() };
     parameters::constants(&mut root, sets, &mut draft, report);
     match design::read(&mut root, path, report) {
-        design::Written::None => parameters::axes(&mut root, &mut draft, report),
-        design::Written::Box(design) => parameters::box_of_axes(&mut root, design, &mut draft, report),
-        design::Written::List(list) => parameters::listed_axes(&mut root, list, &mut draft, report),
-        design::Written::Bad => {
+        design::WrittenDesign::None => parameters::axes(&mut root, &mut draft, report),
+        design::WrittenDesign::Box(design) => {
+            parameters::box_of_axes(&mut root, design, &mut draft, report)
+        }
+        design::WrittenDesign::List(list) => {
+            parameters::listed_axes(&mut root, list, &mut draft, report)
+        }
+        design::WrittenDesign::Bad => {
             // Which axes are right depends on what cannot be known.
             let _ = root.tables("axis", report);
         }
@@ -130,11 +119,13 @@ pub(super) fn is_blank(text: &str) -> bool {
 }
 
 fn name(root: &mut Section<'_>, path: &Path, report: &mut Report) -> String {
-    const EXPECTED: &str =
-        "letters, digits, `-`, `_` and `.`, beginning with a letter or digit, at most 100 characters";
+    const EXPECTED: &str = "letters, digits, `-`, `_` and `.`, beginning with a letter or digit, \
+                            at most 100 characters";
     let plain = |name: &str| {
         let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
-        first && name.len() <= 100 && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
+        first
+            && name.len() <= 100
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
     };
     match root.text("name", report) {
         Field::Given(found) if plain(found.value) => return found.value.to_owned(),
@@ -149,13 +140,19 @@ fn name(root: &mut Section<'_>, path: &Path, report: &mut Report) -> String {
                 return stem.to_owned();
             }
             let title = "`name` is missing, and the file's own name cannot stand in for it";
-            report.push_missing(Diagnostic::new(title).at(root.at(), format!("expected {EXPECTED}")));
+            report
+                .push_missing(Diagnostic::new(title).at(root.at(), format!("expected {EXPECTED}")));
         }
     }
     String::new()
 }
 
-fn machine(root: &mut Section<'_>, grid: &Path, origins: &mut Origins, report: &mut Report) -> Machine {
+fn machine(
+    root: &mut Section<'_>,
+    grid: &Path,
+    origins: &mut Origins,
+    report: &mut Report,
+) -> Machine {
     let Some(named) = root.text("machine", report).given() else { return Machine::paper() };
     if named.value == DEFAULT_MACHINE {
         return Machine::paper();
@@ -168,8 +165,11 @@ fn machine(root: &mut Section<'_>, grid: &Path, origins: &mut Origins, report: &
                 "cannot read the machine file {}: {error}",
                 cut(&path.display().to_string(), LONGEST_PATH)
             );
-            let expected = format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
-            report.push(Diagnostic::new(title).at(&named.at, expected).nearest(named.value, MACHINES));
+            let expected =
+                format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
+            report.push(
+                Diagnostic::new(title).at(&named.at, expected).nearest(named.value, MACHINES),
+            );
             return Machine::paper();
         }
     };
@@ -183,7 +183,9 @@ fn machine(root: &mut Section<'_>, grid: &Path, origins: &mut Origins, report: &
 fn time(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> [f64; 3] {
     const STAND_IN: [f64; 3] = [50.0, 0.0, 50.0];
     let field = root.table("time", "[time]", report);
-    let Some(section) = root.require(field, "time", "a section [time]", report) else { return STAND_IN };
+    let Some(section) = root.require(field, "time", "a section [time]", report) else {
+        return STAND_IN;
+    };
     let mut section = section.value;
     let field = section.number("end_s", Range::Any, report);
     let end = section.require(field, "end_s", "the end of the integration in s", report);
@@ -234,59 +236,50 @@ fn window(
     if let Some(end) = end.filter(|end| to.value > end.value) {
         let title = format!("the window ends at {} s, after the integration", decimal(to.value));
         let expected = format!("expected at most {}", decimal(end.value));
-        report.push(Diagnostic::new(title).at(&to.at, expected).at(&end.at, "the integration ends here"));
+        report.push(
+            Diagnostic::new(title).at(&to.at, expected).at(&end.at, "the integration ends here"),
+        );
         return None;
     }
     Some([from.value, to.value])
 }
 
 fn integrator(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> Integrator {
-    let stand_in = Integrator::Rk4MassScaled { accuracy: DEFAULT_ACCURACY };
-    let Some(section) = root.table("integrator", "[integrator]", report).given() else { return stand_in };
+    let stand_in = || Entry::default_method().with_defaults();
+    let Some(section) = root.table("integrator", "[integrator]", report).given() else {
+        return stand_in();
+    };
     let mut section = section.value;
     origins.put("integrator".to_owned(), section.at().clone());
-    let method = match section.choice("method", &METHODS, report) {
-        Field::Given(method) => METHODS[method.value],
-        Field::Absent => DEFAULT_METHOD,
+    let names: Vec<_> = METHODS.iter().map(|entry| entry.name).collect();
+    let method = match section.choice("method", &names, report) {
+        Field::Given(place) => &METHODS[place.value],
+        Field::Absent => Entry::default_method(),
         Field::Bad => {
-            // Which keys belong to a method that is none cannot be said, but what is wrong with any can.
-            for (key, range) in
-                [("step_s", Range::Positive), ("rtol", RTOL), ("atol", ATOL), ("accuracy", ACCURACY)]
-            {
-                let _ = section.number(key, range, report);
+            // Nobody knows which keys belong to an unknown method, but each has its range.
+            for (setting, _) in settings() {
+                let _ = section.number(setting.key, setting.range, report);
             }
             section.finish(report);
-            return stand_in;
+            return stand_in();
         }
     };
-    let mut misplace = |keys: &[&'static str], owners: &[&str]| {
-        if !owners.contains(&method) {
-            let (noun, verb) = if owners.len() == 1 { ("method", "has") } else { ("methods", "have") };
-            let owners = owners.join("\" and \"");
-            section.misplace(keys, &format!("only the {noun} \"{owners}\" {verb} it, not \"{method}\""));
+    for (setting, owners) in settings() {
+        if !owners.contains(&method.name) {
+            let (noun, verb) =
+                if owners.len() == 1 { ("method", "has") } else { ("methods", "have") };
+            let (owners, method) = (owners.join("\" and \""), method.name);
+            let reason = format!("only the {noun} \"{owners}\" {verb} it, not \"{method}\"");
+            section.misplace(&[setting.key], &reason);
         }
-    };
-    misplace(&["step_s"], &["rk4"]);
-    misplace(&["rtol", "atol"], &["dopri5", "rodas5p"]);
-    misplace(&["accuracy"], &["rk4-mass-scaled"]);
-    let mut number = |key: &'static str, range: Range, default: f64| {
-        if let Some(at) = section.key_at(key) {
-            origins.put(format!("integrator.{key}"), at);
+    }
+    let integrator = (method.with)(&mut |setting| {
+        if let Some(at) = section.key_at(setting.key) {
+            origins.put(format!("integrator.{}", setting.key), at);
         }
-        section.number(key, range, report).or(default).unwrap_or(default)
-    };
-    let integrator = match method {
-        "rk4" => Integrator::Rk4 { step_s: number("step_s", Range::Positive, DEFAULT_STEP_S) },
-        "dopri5" => Integrator::Dopri5 {
-            rtol: number("rtol", RTOL, DEFAULT_RTOL),
-            atol: number("atol", ATOL, DEFAULT_ATOL),
-        },
-        "rodas5p" => Integrator::Rodas5p {
-            rtol: number("rtol", RTOL, DEFAULT_RTOL),
-            atol: number("atol", ATOL, DEFAULT_ATOL),
-        },
-        _ => Integrator::Rk4MassScaled { accuracy: number("accuracy", ACCURACY, DEFAULT_ACCURACY) },
-    };
+        let number = section.number(setting.key, setting.range, report);
+        number.or(setting.default).unwrap_or(setting.default)
+    });
     section.finish(report);
     integrator
 }
@@ -296,17 +289,20 @@ fn reliability(
     origins: &mut Origins,
     report: &mut Report,
 ) -> (Reliability, Criterion) {
-    let stand_in = Reliability { ratio_limit: DEFAULT_RATIO_LIMIT, channels: DEFAULT_CHANNELS.to_vec() };
+    let stand_in =
+        Reliability { ratio_limit: DEFAULT_RATIO_LIMIT, channels: DEFAULT_CHANNELS.to_vec() };
     let Some(section) = root.table("reliability", "[reliability]", report).given() else {
         return (stand_in, Criterion::default());
     };
     let mut section = section.value;
-    section.misplace(&["metrics"], "it stands at the top of the file, before the first [section]");
-    let criterion = section.choice("criterion", &Criterion::ALL.map(Criterion::name), report).given();
+    section.misplace(&["metrics"], "it belongs at the top of the file, before the first [section]");
+    let criterion =
+        section.choice("criterion", &Criterion::ALL.map(Criterion::name), report).given();
     if let Some(criterion) = &criterion {
         origins.put("reliability.criterion".to_owned(), criterion.at.clone());
     }
-    let ratio_limit = section.number("ratio_limit", Range::Positive, report).or(DEFAULT_RATIO_LIMIT);
+    let ratio_limit =
+        section.number("ratio_limit", Range::Positive, report).or(DEFAULT_RATIO_LIMIT);
     let channels = names(&mut section, "channels", "channel", &Channel::ALL, Channel::name, report);
     section.finish(report);
     let reliability = Reliability {

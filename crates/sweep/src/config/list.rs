@@ -15,7 +15,7 @@ use super::report::{Diagnostic, Report};
 use super::section::{cut, short};
 use super::source::{Located, Location, SourceId, Sources};
 use crate::design::Design;
-use crate::files::regular;
+use sweep_files::regular;
 
 /// Longest list that is read, in bytes; and so of a Parquet file's pages unpacked.
 const LONGEST_BYTES: u64 = 256 << 20;
@@ -29,17 +29,17 @@ const LONGEST_PATH: usize = 1000;
 /// A list of points.
 pub(super) struct List {
     pub(super) design: Design,
-    pub(super) columns: Vec<Column>,
+    pub(super) columns: Vec<ListColumn>,
     rows: Rows,
 }
 
 /// One parameter's values.
-pub(super) struct Column {
+pub(super) struct ListColumn {
     pub(super) name: Located<String>,
     pub(super) values: Vec<f64>,
 }
 
-/// Where rows stand.
+/// The places of rows.
 enum Rows {
     /// In lines of a text that begin at these bytes.
     Lines { source: SourceId, starts: Vec<u32> },
@@ -78,7 +78,7 @@ enum Unreadable {
 }
 
 impl List {
-    /// Where a value stands, both counted from 0.
+    /// The place of a value, both counted from 0.
     pub(super) fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
         match &self.rows {
             Rows::Binary(at) => at.clone(),
@@ -100,7 +100,7 @@ pub(super) fn read(file: &Located<&str>, grid: &Path, report: &mut Report) -> Op
         if bytes.starts_with(b"PAR1") {
             let columns = parquet::columns(bytes)?;
             let located = |value| Located { value, at: file.at.clone() };
-            let column = |(name, values)| Column { name: located(name), values };
+            let column = |(name, values)| ListColumn { name: located(name), values };
             let columns = columns.into_iter().map(column).collect();
             return Ok(Some((columns, Rows::Binary(file.at.clone()), hash)));
         }
@@ -126,7 +126,7 @@ pub(super) fn read(file: &Located<&str>, grid: &Path, report: &mut Report) -> Op
             return None;
         }
     };
-    let points = columns.first().map_or(0, |column: &Column| column.values.len());
+    let points = columns.first().map_or(0, |column: &ListColumn| column.values.len());
     if points == 0 {
         let title = format!("the list of points {shown} is empty");
         let expected = "expected a line of parameter names, and under it a row of numbers a point";

@@ -1,5 +1,5 @@
-//! Machine files: every section and key is a group of parameters, so one small table of their names reads a file,
-//! writes one, and describes it.
+//! Machine files: every section and key is a group of parameters, so one small table of their names
+//! reads a file, writes one, and describes it.
 
 use std::path::Path;
 
@@ -12,8 +12,8 @@ use super::report::{Diagnostic, Report};
 use super::section::Section;
 use super::source::Location;
 
-/// A section of the machine file. Parameters are named `<prefix>_<number>` and, for vectors, with the component
-/// before the unit: `inertia_kg_m2` holds `inertia_11_kg_m2` and two more.
+/// A section of the machine file. Parameters are named `<prefix>_<number>` and, for vectors, with
+/// the component before the unit: `inertia_kg_m2` holds `inertia_11_kg_m2` and two more.
 pub(super) struct Block {
     /// Key of the section; empty for the numbers at the top of the file.
     pub(super) section: &'static str,
@@ -30,18 +30,38 @@ const ENDS: &[(&str, [&str; 3])] = &[
     ("tub_m", ["tub_x_m", "tub_y_m", "tub_z_m"]),
 ];
 
-/// The sections that stand once.
+/// The sections that a machine file has once.
 #[rustfmt::skip]
 pub(super) const BLOCKS: [Block; 7] = [
-    Block { section: "", prefix: "", numbers: &["gravity_m_per_s2", "radial_clearance_m"], vectors: &[] },
-    Block { section: "tub", prefix: "tub_", numbers: &["mass_kg", "centre_x_m", "front_x_m"], vectors: &[INERTIA] },
-    Block { section: "shaft", prefix: "shaft_", numbers: &["mass_kg", "centre_x_m"], vectors: &[INERTIA] },
-    Block { section: "drum", prefix: "drum_", numbers: &["mass_kg", "centre_x_m", "hinge_x_m", "front_x_m"], vectors: &[INERTIA] },
-    Block { section: "unbalance", prefix: "unbalance_", numbers: &["mass_kg", "x_m", "radius_m"], vectors: &[] },
-    Block { section: "flexure", prefix: "flexure_", numbers: &["stiffness_n_m_per_rad"], vectors: &[] },
     Block {
-        section: "bearings", prefix: "bearing_",
-        numbers: &["front_x_m", "rear_x_m", "front_stiffness_n_per_m", "rear_stiffness_n_per_m"], vectors: &[],
+        section: "", prefix: "", vectors: &[],
+        numbers: &["gravity_m_per_s2", "radial_clearance_m"],
+    },
+    Block {
+        section: "tub", prefix: "tub_", vectors: &[INERTIA],
+        numbers: &["mass_kg", "centre_x_m", "front_x_m"],
+    },
+    Block {
+        section: "shaft", prefix: "shaft_", vectors: &[INERTIA],
+        numbers: &["mass_kg", "centre_x_m"],
+    },
+    Block {
+        section: "drum", prefix: "drum_", vectors: &[INERTIA],
+        numbers: &["mass_kg", "centre_x_m", "hinge_x_m", "front_x_m"],
+    },
+    Block {
+        section: "unbalance", prefix: "unbalance_", vectors: &[],
+        numbers: &["mass_kg", "x_m", "radius_m"],
+    },
+    Block {
+        section: "flexure", prefix: "flexure_", vectors: &[],
+        numbers: &["stiffness_n_m_per_rad"],
+    },
+    Block {
+        section: "bearings", prefix: "bearing_", vectors: &[],
+        numbers: &[
+            "front_x_m", "rear_x_m", "front_stiffness_n_per_m", "rear_stiffness_n_per_m",
+        ],
     },
 ];
 /// One `[[springs]]`; its prefix is completed by the number.
@@ -50,7 +70,8 @@ pub(super) const SPRINGS: Block =
 /// One `[[dampers]]`; its prefix is completed by the number.
 pub(super) const DAMPERS: Block =
     Block { section: "dampers", prefix: "damper_", numbers: &["damping_n_s_per_m"], vectors: ENDS };
-/// Most springs, and most dampers, of a machine: enough for any, and what depends on all of them stays quick.
+/// Most springs, and most dampers, of a machine: enough for any, and what depends on all of them
+/// stays quick.
 const MOST_ELEMENTS: usize = 1000;
 /// The one key that may be left out of a spring.
 pub(super) const FREE_LENGTH: &str = "free_length_m";
@@ -60,15 +81,22 @@ pub(super) fn no_spin() -> Spin {
     Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() }
 }
 
-/// Reads a machine file's text. Wrong and missing numbers keep the paper's, and their names are marked doubtful.
-pub(super) fn read(text: &str, root: Section<'_>, origins: &mut Origins, report: &mut Report) -> Machine {
+/// Reads a machine file's text. Wrong and missing numbers keep the paper's, and their names are
+/// marked doubtful.
+pub(super) fn read(
+    text: &str,
+    root: Section<'_>,
+    origins: &mut Origins,
+    report: &mut Report,
+) -> Machine {
     let mut machine = Machine::paper();
     let mut root = root;
     if is_blank(text) {
-        report.push(Diagnostic::new("the machine file is empty").at(root.at(), "expected a machine"));
+        report
+            .push(Diagnostic::new("the machine file is empty").at(root.at(), "expected a machine"));
         return machine;
     }
-    let mut reader = Reader { machine: &mut machine, origins, report };
+    let mut reader = MachineReader { machine: &mut machine, origins, report };
     for block in &BLOCKS {
         if block.section.is_empty() {
             reader.block(block, "", &mut root);
@@ -112,13 +140,13 @@ pub(super) fn read(text: &str, root: Section<'_>, origins: &mut Origins, report:
     machine
 }
 
-struct Reader<'r> {
+struct MachineReader<'r> {
     machine: &'r mut Machine,
     origins: &'r mut Origins,
     report: &'r mut Report,
 }
 
-impl Reader<'_> {
+impl MachineReader<'_> {
     /// The tables of springs or dampers, no more of them than are accepted.
     fn elements<'a>(&mut self, block: &Block, root: &mut Section<'a>) -> Vec<Section<'a>> {
         let mut sections = root.tables(block.section, self.report);
@@ -140,7 +168,13 @@ impl Reader<'_> {
         }
     }
 
-    fn number(&mut self, prefix: &str, key: &'static str, required: bool, section: &mut Section<'_>) {
+    fn number(
+        &mut self,
+        prefix: &str,
+        key: &'static str,
+        required: bool,
+        section: &mut Section<'_>,
+    ) {
         let name = format!("{prefix}{key}");
         let Some(parameter) = self.find(&name) else { return };
         let field = section.number(key, parameter.range(), self.report);
@@ -156,7 +190,13 @@ impl Reader<'_> {
         }
     }
 
-    fn vector(&mut self, prefix: &str, key: &'static str, components: &[&str; 3], section: &mut Section<'_>) {
+    fn vector(
+        &mut self,
+        prefix: &str,
+        key: &'static str,
+        components: &[&str; 3],
+        section: &mut Section<'_>,
+    ) {
         let names = components.map(|component| format!("{prefix}{component}"));
         let parameters: Vec<_> = names.iter().filter_map(|name| self.find(name)).collect();
         let Some(first) = parameters.first() else { return };
@@ -199,7 +239,8 @@ pub(super) fn beside(grid: &Path, machine: &str) -> std::path::PathBuf {
     grid.parent().unwrap_or(Path::new("")).join(machine)
 }
 
-/// The machine as a machine file's tables hold it; every number as its shortest decimal that reads back the same.
+/// The machine as a machine file's tables hold it; every number as its shortest decimal that reads
+/// back the same.
 pub(crate) fn to_json(machine: &Machine) -> Value {
     let mut root = Map::new();
     for block in &BLOCKS {
@@ -211,7 +252,8 @@ pub(crate) fn to_json(machine: &Machine) -> Value {
         }
     }
     let spring = |(k, spring): (usize, &Spring)| {
-        let mut numbers = block_to_json(&SPRINGS, &format!("{}{}_", SPRINGS.prefix, k + 1), machine);
+        let mut numbers =
+            block_to_json(&SPRINGS, &format!("{}{}_", SPRINGS.prefix, k + 1), machine);
         if let Some(free_length_m) = spring.free_length_m {
             numbers.insert(FREE_LENGTH.to_owned(), free_length_m.into());
         }
@@ -219,7 +261,8 @@ pub(crate) fn to_json(machine: &Machine) -> Value {
     };
     let springs = machine.springs.iter().enumerate().map(spring).collect();
     root.insert(SPRINGS.section.to_owned(), springs);
-    let damper = |k: usize| block_to_json(&DAMPERS, &format!("{}{}_", DAMPERS.prefix, k + 1), machine);
+    let damper =
+        |k: usize| block_to_json(&DAMPERS, &format!("{}{}_", DAMPERS.prefix, k + 1), machine);
     let dampers = (0..machine.dampers.len()).map(|k| Value::Object(damper(k))).collect();
     root.insert(DAMPERS.section.to_owned(), dampers);
     Value::Object(root)
@@ -228,21 +271,27 @@ pub(crate) fn to_json(machine: &Machine) -> Value {
 fn block_to_json(block: &Block, prefix: &str, machine: &Machine) -> Map<String, Value> {
     let number = |name: &str| {
         let parameter = Parameter::find(&format!("{prefix}{name}"), machine, &no_spin()).ok();
-        parameter.and_then(|parameter| parameter.get(machine, &no_spin())).map_or(Value::Null, Value::from)
+        parameter
+            .and_then(|parameter| parameter.get(machine, &no_spin()))
+            .map_or(Value::Null, Value::from)
     };
     let numbers = block.numbers.iter().map(|&key| (key.to_owned(), number(key)));
     let vector = |components: &[&str; 3]| components.iter().map(|name| number(name)).collect();
-    let vectors = block.vectors.iter().map(|(key, components)| ((*key).to_owned(), vector(components)));
+    let vectors =
+        block.vectors.iter().map(|(key, components)| ((*key).to_owned(), vector(components)));
     numbers.chain(vectors).collect()
 }
 
 /// The machine as the text of a machine file, each number with its meaning and source.
 pub(crate) fn to_toml(machine: &Machine) -> String {
-    let mut text = "# A machine in full, in SI units. Lengths in m from O, midway between the bearings before loading: x along the\n\
-         # drum axis towards the door, y up, z sideways. Inertia about each body's own mass centre, in body axes.\n"
+    let mut text = "# A machine in full, in SI units. Lengths in m from O, midway between the \
+                    bearings before loading: x along the\n\
+         # drum axis towards the door, y up, z sideways. Inertia about each body's own mass \
+         centre, in body axes.\n"
         .to_owned();
     for block in &BLOCKS {
-        let header = if block.section.is_empty() { String::new() } else { format!("[{}]", block.section) };
+        let header =
+            if block.section.is_empty() { String::new() } else { format!("[{}]", block.section) };
         text.push_str(&block_to_toml(block, block.prefix, &header, machine));
     }
     for (k, spring) in machine.springs.iter().enumerate() {
@@ -270,13 +319,19 @@ fn block_to_toml(block: &Block, prefix: &str, header: &str, machine: &Machine) -
     for key in block.numbers {
         if let Some(parameter) = find(key) {
             let written = format!("{key} = {:?}", value(&parameter));
-            text.push_str(&format!("{written:<40} # {} [{}]\n", parameter.description(), parameter.source()));
+            text.push_str(&format!(
+                "{written:<40} # {} [{}]\n",
+                parameter.description(),
+                parameter.source()
+            ));
         }
     }
     for (key, components) in block.vectors {
         let parameters: Vec<_> = components.iter().filter_map(|name| find(name)).collect();
-        let values: Vec<_> = parameters.iter().map(|parameter| format!("{:?}", value(parameter))).collect();
-        let source = parameters.first().map_or_else(String::new, |parameter| parameter.source().to_string());
+        let values: Vec<_> =
+            parameters.iter().map(|parameter| format!("{:?}", value(parameter))).collect();
+        let source =
+            parameters.first().map_or_else(String::new, |parameter| parameter.source().to_string());
         let written = format!("{key} = [{}]", values.join(", "));
         text.push_str(&format!("{written:<40} # [{source}]\n"));
     }

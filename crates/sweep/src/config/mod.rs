@@ -1,24 +1,26 @@
 //! From what a user typed to a [`Plan`], or to every mistake in it.
 //!
-//! A grid file, the machine file it names and the constants of the command line are walked once, each value with the
-//! place where it stands. Wrong values are reported and replaced by stand-ins, so that the walk goes on and one pass
-//! finds every mistake; a plan comes out only if there is none.
+//! A grid file, the machine file it names and the constants of the command line are walked once,
+//! each value with its place. Wrong values are reported and replaced by stand-ins,
+//! so that the walk goes on and one pass finds every mistake; a plan comes out only if there is
+//! none.
 //!
-//! Left out: `name` is the file's own name, `machine` is `"paper"`, `window_s` the whole run, `[integrator]`
-//! `rk4-mass-scaled` with `accuracy = 1e-3` (`rk4`: `step_s = 2e-4`; `dopri5` and `rodas5p`: `rtol = 1e-6`, `atol = 1e-9`),
-//! `[reliability]` the ratio 2 over the six channels of tub and drum fronts and tub angles; without axes the grid is a
-//! single point. `[spin]` and `end_s` must be given, and a machine file is always whole.
+//! Left out: `name` is the file's own name, `machine` is `"paper"`, `window_s` the whole run,
+//! `[integrator]` the defaults of [`crate::method`]'s table, `[reliability]` the ratio 2 over the
+//! six channels of tub and drum fronts and tub angles; without axes the grid is a single point.
+//! `[spin]` and `end_s` must be given, and a machine file is always whole.
 //!
-//! With `[design]` the axes are ranges without a count, over which `latin_hypercube` or `sobol` spreads `points` points;
-//! or there is no axis, and `list` takes points from a CSV or Parquet file whose columns are parameters.
+//! With `[design]` the axes are ranges without a count, over which `latin_hypercube` or `sobol`
+//! spreads `points` points; or there is no axis, and `list` takes points from a CSV or Parquet file
+//! whose columns are parameters.
 //!
-//! Bounds: files to 4 MiB; lists of points to 256 MiB, packed or not, and 2e7 numbers; a Sobol design to 2^32 points
-//! over 32 axes; 1e12 grid points; 1e6 s; 1e10 steps that stability asks for; spin tables of 20,000 rows; numbers to
-//! 1e12 in magnitude; 1000 springs and 1000 dampers.
+//! Bounds: files to 4 MiB; lists of points to 256 MiB, packed or not, and 2e7 numbers; a Sobol
+//! design to 2^32 points over 32 axes; 1e12 grid points; 1e6 s; 1e10 steps that stability asks for;
+//! spin tables of 20,000 rows; numbers to 1e12 in magnitude; 1000 springs and 1000 dampers.
 //!
-//! Precedence, later over earlier: machine file, `[set]`, `--set`, axes. Within each of them no number may be written
-//! twice, not even under two names (`damping_n_s_per_m` writes every `damper_1_damping_n_s_per_m`), because nothing
-//! would say which comes last.
+//! Precedence, later over earlier: machine file, `[set]`, `--set`, axes. Within each of them no
+//! number may be written twice, not even under two names (`damping_n_s_per_m` writes every
+//! `damper_1_damping_n_s_per_m`), because nothing would say which comes last.
 
 #[cfg(test)]
 mod bounds_tests;
@@ -31,7 +33,7 @@ mod origins;
 mod parameters;
 mod render;
 mod report;
-pub mod schema;
+pub(crate) mod schema;
 mod section;
 mod source;
 mod spin;
@@ -42,7 +44,7 @@ mod validate;
 
 use std::path::Path;
 
-pub use report::Diagnostics;
+pub(crate) use report::Diagnostics;
 
 use grid::Draft;
 use report::Report;
@@ -50,45 +52,56 @@ use washer_model::Machine;
 
 use crate::plan::Plan;
 
-/// Reads a grid file with its machine file, puts the constants `NAME=VALUE` in place, and checks the whole.
+/// Reads a grid file with its machine file, puts the constants `NAME=VALUE` in place, and checks
+/// the whole.
 ///
 /// # Errors
 /// Every mistake found, in one pass.
 pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
-    resolve(path, sets, |_, _| ())
+    resolve(path, sets, |_, _| ()).map(|(plan, ())| plan)
 }
 
-/// As [`load`], for one point: `at` gives each axis of several values one (on the grid or between its points), and any
-/// other parameter too. The plan has no axes; its machine and spin are the point's.
+/// Parameters by name, with a value each.
+pub(crate) type NamedValues = Vec<(String, f64)>;
+
+/// As [`load`], for one point: `at` gives each axis of several values one (on the grid or between
+/// its points), and any other parameter too. The plan has no axes; its machine and spin are the
+/// point's. Beside it, what `at` says, by name.
 ///
 /// # Errors
 /// Every mistake found, in one pass.
-pub fn load_point(path: &Path, sets: &[String], at: &[String]) -> Result<Plan, Diagnostics> {
+pub(crate) fn load_point(
+    path: &Path,
+    sets: &[String],
+    at: &[String],
+) -> Result<(Plan, NamedValues), Diagnostics> {
     resolve(path, sets, |draft, report| parameters::point(at, draft, report))
 }
 
-fn resolve(
+fn resolve<T>(
     path: &Path,
     sets: &[String],
-    finish: impl FnOnce(&mut Draft, &mut Report),
-) -> Result<Plan, Diagnostics> {
+    finish: impl FnOnce(&mut Draft, &mut Report) -> T,
+) -> Result<(Plan, T), Diagnostics> {
     let mut report = Report::default();
-    let Some(mut draft) = grid::draft(path, sets, &mut report) else { return Err(report.into_diagnostics()) };
-    finish(&mut draft, &mut report);
+    let Some(mut draft) = grid::draft(path, sets, &mut report) else {
+        return Err(report.into_diagnostics());
+    };
+    let finished = finish(&mut draft, &mut report);
     validate::steps(&draft, &mut report);
     validate::scenarios(&draft, &mut report);
     validate::stability(&draft, &mut report);
-    report.finish(draft.plan)
+    report.finish((draft.plan, finished))
 }
 
 /// A machine in full, as a result file carries it.
 #[must_use]
-pub fn machine_json(machine: &Machine) -> serde_json::Value {
+pub(crate) fn machine_json(machine: &Machine) -> serde_json::Value {
     machine::to_json(machine)
 }
 
 /// A machine as the text of a machine file: loading it gives the same machine, bit for bit.
 #[must_use]
-pub fn machine_file(machine: &Machine) -> String {
+pub(crate) fn machine_file(machine: &Machine) -> String {
     machine::to_toml(machine)
 }

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::source::Location;
 
-/// Places by key: a parameter's name, `time.end_s` and the like for the rest of the grid file, `spin.time_s[3]` for
-/// an entry of an array, `axis[0]` for an axis.
+/// Places by key: a parameter's name, `time.end_s` and the like for the rest of the grid file,
+/// `spin.time_s[3]` for an entry of an array, `axis[0]` for an axis.
 #[derive(Debug, Default)]
 pub(super) struct Origins {
     places: BTreeMap<String, Location>,
@@ -17,7 +17,8 @@ impl Origins {
         self.places.insert(key, at);
     }
 
-    /// Marks a number that was refused or missing: a stand-in holds its place, and what depends on it is not judged.
+    /// Marks a number that was refused or missing: a stand-in holds its place, and what depends on
+    /// it is not judged.
     pub(super) fn doubt(&mut self, key: String) {
         self.doubtful.insert(key);
     }

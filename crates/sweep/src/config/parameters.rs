@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use washer_model::{Machine, Parameter, Range, Spin, UnknownParameter, decimal};
 
+use super::NamedValues;
 use super::grid::Draft;
 use super::list::List;
 use super::report::{Diagnostic, Report};
@@ -16,7 +17,8 @@ use crate::plan::{Axis, AxisValues, Plan};
 /// Most grid points that are accepted. A hundred thousand points a second would take four months.
 pub(super) const MOST_POINTS: u64 = 1_000_000_000_000;
 
-/// Names offered as the nearest one; a machine of thousands of springs has more than a reader wants compared.
+/// Names offered as the nearest one; a machine of thousands of springs has more than a reader wants
+/// compared.
 const COMPARED: usize = 400;
 
 /// A name with its value, and the numbers it writes.
@@ -27,23 +29,30 @@ struct Constant<'a> {
 }
 
 /// A constant that was put in place.
-pub(super) struct Written {
+pub(super) struct WrittenConstant {
     name: Located<String>,
     parts: Vec<Cow<'static, str>>,
 }
 
 /// The range of a parameter of the spin.
 pub(super) fn range(parameter: &str, spin: &Spin) -> Range {
-    Parameter::find(parameter, &Machine::paper(), spin).map_or(Range::Any, |parameter| parameter.range())
+    Parameter::find(parameter, &Machine::paper(), spin)
+        .map_or(Range::Any, |parameter| parameter.range())
 }
 
 /// Reads `[set]`, then `--set`, which overrides it, and writes both into the plan.
-pub(super) fn constants(root: &mut Section<'_>, sets: &[String], draft: &mut Draft, report: &mut Report) {
+pub(super) fn constants(
+    root: &mut Section<'_>,
+    sets: &[String],
+    draft: &mut Draft,
+    report: &mut Report,
+) {
     let mut constants = Vec::new();
     if let Some(section) = root.table("set", "[set]", report).given() {
         let section = section.value;
         for name in section.names() {
-            let number = |range: Range, report: &mut Report| section.number_named(name.value, range, report);
+            let number =
+                |range: Range, report: &mut Report| section.number_named(name.value, range, report);
             constants.extend(constant(name.clone(), number, draft, report));
         }
         apply(&constants, draft, report);
@@ -51,11 +60,13 @@ pub(super) fn constants(root: &mut Section<'_>, sets: &[String], draft: &mut Dra
     apply(&arguments("--set", sets, draft, report), draft, report);
 }
 
-/// Puts one point in place of the axes: `--at` gives every axis of several values, and may give more.
-pub(super) fn point(at: &[String], draft: &mut Draft, report: &mut Report) {
+/// Puts one point in place of the axes: `--at` gives every axis of several values, and may give
+/// more.
+pub(super) fn point(at: &[String], draft: &mut Draft, report: &mut Report) -> NamedValues {
     let constants = arguments("--at", at, draft, report);
-    let named =
-        |name: &str| at.iter().any(|argument| argument.split('=').next().is_some_and(|n| n.trim() == name));
+    let named = |name: &str| {
+        at.iter().any(|argument| argument.split('=').next().is_some_and(|n| n.trim() == name))
+    };
     for (k, axis) in std::mem::take(&mut draft.plan.axes).into_iter().enumerate() {
         if named(axis.parameter.name()) {
             continue;
@@ -65,12 +76,18 @@ pub(super) fn point(at: &[String], draft: &mut Draft, report: &mut Report) {
         } else if let Some(place) = draft.origins.get(&format!("axis[{k}]")) {
             let name = axis.parameter.name();
             let title = format!("a point of the grid needs a value of `{name}`");
-            report
-                .push(Diagnostic::new(title).at(place, format!("expected --at {name}=VALUE for this axis")));
+            report.push(
+                Diagnostic::new(title)
+                    .at(place, format!("expected --at {name}=VALUE for this axis")),
+            );
         }
     }
     draft.plan.design = None;
     apply(&constants, draft, report);
+    constants
+        .iter()
+        .map(|constant| (constant.name.value.to_owned(), constant.value.value))
+        .collect()
 }
 
 /// Reads NAME=VALUE arguments.
@@ -127,7 +144,12 @@ fn find(name: &Located<&str>, draft: &Draft, report: &mut Report) -> Option<Para
     None
 }
 
-fn unknown(name: &Located<&str>, error: &UnknownParameter, machine: &Machine, spin: &Spin) -> Diagnostic {
+fn unknown(
+    name: &Located<&str>,
+    error: &UnknownParameter,
+    machine: &Machine,
+    spin: &Spin,
+) -> Diagnostic {
     let title = format!("unknown parameter {}", quoted(name.value));
     let diagnostic = Diagnostic::new(title).at(&name.at, error.to_string());
     let section = match name.value {
@@ -139,12 +161,13 @@ fn unknown(name: &Located<&str>, error: &UnknownParameter, machine: &Machine, sp
     };
     match (error, section) {
         (UnknownParameter::Name, Some(section)) => diagnostic.help(format!(
-            "`{}` stands in {section} of the grid file and is the same at every point",
+            "`{}` is set in {section} of the grid file and is the same at every point",
             name.value
         )),
         (UnknownParameter::Name, None) => {
             let all = Parameter::all(machine, spin);
-            let near = diagnostic.nearest(name.value, all.iter().take(COMPARED).map(Parameter::name));
+            let near =
+                diagnostic.nearest(name.value, all.iter().take(COMPARED).map(Parameter::name));
             near.help("`sweep parameters` lists every name")
         }
         (
@@ -156,7 +179,8 @@ fn unknown(name: &Located<&str>, error: &UnknownParameter, machine: &Machine, sp
     }
 }
 
-/// Writes constants of equal rank; no number may be written twice, as nothing says which comes last.
+/// Writes constants of equal rank; no number may be written twice, as nothing says which comes
+/// last.
 fn apply(constants: &[Constant<'_>], draft: &mut Draft, report: &mut Report) {
     let mut written: BTreeMap<Cow<'static, str>, &Constant<'_>> = BTreeMap::new();
     for constant in constants {
@@ -169,8 +193,9 @@ fn apply(constants: &[Constant<'_>], draft: &mut Draft, report: &mut Report) {
                     draft.origins.put(part.clone().into_owned(), constant.value.at.clone());
                     written.insert(part.clone(), constant);
                 }
-                let name = Located { value: constant.name.value.to_owned(), at: constant.name.at.clone() };
-                draft.constants.push(Written { name, parts });
+                let name =
+                    Located { value: constant.name.value.to_owned(), at: constant.name.at.clone() };
+                draft.constants.push(WrittenConstant { name, parts });
             }
         }
     }
@@ -186,7 +211,9 @@ fn twice(second: &Located<&str>, first: &Located<&str>) -> Diagnostic {
     } else {
         format!("`{}` and `{}` write the same number", first.value, second.value)
     };
-    Diagnostic::new(title).at(&second.at, "expected each number once").at(&first.at, "first written here")
+    Diagnostic::new(title)
+        .at(&second.at, "expected each number once")
+        .at(&first.at, "first written here")
 }
 
 /// What axes write so far, by the single numbers.
@@ -208,9 +235,12 @@ fn claim(
     }
     for constant in &draft.constants {
         if constant.parts.iter().all(|part| parts.contains(part)) {
-            let title = format!("`{}` is swept by an axis: this constant has no effect", constant.name.value);
-            let diagnostic =
-                Diagnostic::new(title).at(&constant.name.at, "expected a parameter that no axis sweeps");
+            let title = format!(
+                "`{}` is swept by an axis: this constant has no effect",
+                constant.name.value
+            );
+            let diagnostic = Diagnostic::new(title)
+                .at(&constant.name.at, "expected a parameter that no axis sweeps");
             report.push(diagnostic.at(&name.at, "swept here"));
         }
     }
@@ -233,7 +263,8 @@ pub(super) fn box_of_axes(
         Design::LatinHypercube { .. } | Design::List { .. } => usize::MAX,
     };
     if sections.is_empty() || sections.len() > most {
-        let title = format!("a design by \"{}\" over {} axes", design.value.method(), sections.len());
+        let title =
+            format!("a design by \"{}\" over {} axes", design.value.method(), sections.len());
         let expected = match most {
             usize::MAX => "expected at least one [[axis]] with a range".to_owned(),
             most => format!("expected from 1 to {most} [[axis]], each with a range"),
@@ -245,10 +276,14 @@ pub(super) fn box_of_axes(
         let name = section.require(field, "parameter", "the name of a parameter", report);
         let parameter = name.as_ref().and_then(|name| find(name, draft, report));
         let range = parameter.as_ref().map_or(Range::Any, Parameter::range);
-        section.misplace(&["values"], "a design spreads its points over `range = { from = ..., to = ... }`");
+        section.misplace(
+            &["values"],
+            "a design spreads its points over `range = { from = ..., to = ... }`",
+        );
         let field = section.table("range", "range = { from, to }", report);
         let spaced = section.require(field, "range", "`range = { from = ..., to = ... }`", report);
-        let values = spaced.and_then(|spaced| extent(spaced.value, range, design.value.points(), report));
+        let values =
+            spaced.and_then(|spaced| extent(spaced.value, range, design.value.points(), report));
         section.finish(report);
         let (Some(name), Some(parameter)) = (name, parameter) else { continue };
         if claim(&name, &parameter, &mut swept, draft, report)
@@ -262,10 +297,16 @@ pub(super) fn box_of_axes(
 }
 
 /// The axes of a list: its columns.
-pub(super) fn listed_axes(root: &mut Section<'_>, mut list: List, draft: &mut Draft, report: &mut Report) {
+pub(super) fn listed_axes(
+    root: &mut Section<'_>,
+    mut list: List,
+    draft: &mut Draft,
+    report: &mut Report,
+) {
     for section in root.tables("axis", report) {
         let diagnostic = Diagnostic::new("an [[axis]] beside a list of points");
-        report.push(diagnostic.at(section.at(), "the columns of the list are the axes; remove this"));
+        report
+            .push(diagnostic.at(section.at(), "the columns of the list are the axes; remove this"));
     }
     let mut swept = Swept::new();
     for (k, column) in std::mem::take(&mut list.columns).into_iter().enumerate() {
@@ -273,7 +314,9 @@ pub(super) fn listed_axes(root: &mut Section<'_>, mut list: List, draft: &mut Dr
         let Some(parameter) = find(&name, draft, report) else { continue };
         let range = parameter.range();
         let mut sound = true;
-        for (row, &value) in column.values.iter().enumerate().filter(|(_, value)| !range.contains(**value)) {
+        for (row, &value) in
+            column.values.iter().enumerate().filter(|(_, value)| !range.contains(**value))
+        {
             sound = false;
             report.push_with(|sources| {
                 let what = format!("value {} of {}", row + 1, quoted(name.value));
@@ -296,7 +339,7 @@ fn extent(
     report: &mut Report,
 ) -> Option<Located<AxisValues>> {
     let at = section.at().clone();
-    section.misplace(&["count"], "the number of points stands in [design], as `points`");
+    section.misplace(&["count"], "the number of points belongs in [design], as `points`");
     let [from, to] = ["from", "to"].map(|key| {
         let field = section.number(key, range, report);
         section.require(field, key, "a number", report)
@@ -335,8 +378,8 @@ fn extent(
     Some(Located { value, at })
 }
 
-/// Neighbours on a range are apart by at least this share of the greater end, or else rounding would put some on
-/// one number.
+/// Neighbours on a range are apart by at least this share of the greater end, or else rounding
+/// would put some on one number.
 const CLOSEST: f64 = 8.0 * f64::EPSILON;
 
 /// How many values a range has room for, if that is fewer than any range may have.
@@ -359,12 +402,14 @@ pub(super) fn axes(root: &mut Section<'_>, draft: &mut Draft, report: &mut Repor
         section.finish(report);
 
         let count = values.as_ref().map_or(1, |values| values.value.len());
-        let product =
-            points.and_then(|points| points.checked_mul(count)).filter(|&points| points <= MOST_POINTS);
+        let product = points
+            .and_then(|points| points.checked_mul(count))
+            .filter(|&points| points <= MOST_POINTS);
         if let (Some(points), None, Some(values)) = (points, product, &values) {
             let title = format!("too many grid points: {points} before this axis, times {count}");
             report.push(
-                Diagnostic::new(title).at(&values.at, format!("expected at most {MOST_POINTS} in all")),
+                Diagnostic::new(title)
+                    .at(&values.at, format!("expected at most {MOST_POINTS} in all")),
             );
         }
         points = product;
@@ -381,7 +426,11 @@ pub(super) fn axes(root: &mut Section<'_>, draft: &mut Draft, report: &mut Repor
 }
 
 /// The values of an axis: listed, or a range.
-fn values(section: &mut Section<'_>, range: Range, report: &mut Report) -> Option<Located<AxisValues>> {
+fn values(
+    section: &mut Section<'_>,
+    range: Range,
+    report: &mut Report,
+) -> Option<Located<AxisValues>> {
     let listed = section.right_numbers("values", range, report);
     let spaced = section.table("range", "range = { from, to, count }", report);
     match (listed, spaced) {
@@ -397,24 +446,31 @@ fn values(section: &mut Section<'_>, range: Range, report: &mut Report) -> Optio
         (Field::Absent, Field::Given(spaced)) => spacing(spaced.value, range, report),
         (Field::Given(listed), Field::Given(spaced)) => {
             let diagnostic = Diagnostic::new("an axis has both `values` and `range`");
-            report.push(diagnostic.at(&spaced.at, "expected only one of them").at(&listed.at, "given here"));
+            report.push(
+                diagnostic.at(&spaced.at, "expected only one of them").at(&listed.at, "given here"),
+            );
             None
         }
         (Field::Bad, _) | (_, Field::Bad) => None,
     }
 }
 
-fn list(listed: Located<(Vec<Located<f64>>, bool)>, report: &mut Report) -> Option<Located<AxisValues>> {
+fn list(
+    listed: Located<(Vec<Located<f64>>, bool)>,
+    report: &mut Report,
+) -> Option<Located<AxisValues>> {
     let (values, mut sound) = listed.value;
     if values.is_empty() && sound {
-        report.push(Diagnostic::new("`values` is empty").at(&listed.at, "expected at least one number"));
+        report.push(
+            Diagnostic::new("`values` is empty").at(&listed.at, "expected at least one number"),
+        );
         return None;
     }
     let mut order: Vec<&Located<f64>> = values.iter().collect();
     order.sort_by(|a, b| a.value.total_cmp(&b.value).then(a.at.span.start.cmp(&b.at.span.start)));
     for pair in order.windows(2) {
         if pair[0].value == pair[1].value {
-            let title = format!("the value {} stands twice on this axis", decimal(pair[1].value));
+            let title = format!("the value {} is twice on this axis", decimal(pair[1].value));
             let diagnostic = Diagnostic::new(title).at(&pair[1].at, "expected each value once");
             report.push(diagnostic.at(&pair[0].at, "first given here"));
             sound = false;
@@ -424,7 +480,11 @@ fn list(listed: Located<(Vec<Located<f64>>, bool)>, report: &mut Report) -> Opti
     sound.then_some(Located { value: values, at: listed.at })
 }
 
-fn spacing(mut section: Section<'_>, range: Range, report: &mut Report) -> Option<Located<AxisValues>> {
+fn spacing(
+    mut section: Section<'_>,
+    range: Range,
+    report: &mut Report,
+) -> Option<Located<AxisValues>> {
     let at = section.at().clone();
     let end = |key: &'static str, section: &mut Section<'_>, report: &mut Report| {
         let field = section.number(key, range, report);
@@ -442,8 +502,11 @@ fn spacing(mut section: Section<'_>, range: Range, report: &mut Report) -> Optio
         None
     };
     if from.value == to.value && count.value > 1 {
-        let title =
-            format!("a range from {0} to {0} has one value, not {1}", decimal(from.value), count.value);
+        let title = format!(
+            "a range from {0} to {0} has one value, not {1}",
+            decimal(from.value),
+            count.value
+        );
         return refuse(title, &to.at, "expected another number, or count = 1");
     }
     if let Some(most) = most_distinct(from.value, to.value).filter(|&most| most < count.value) {

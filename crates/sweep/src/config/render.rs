@@ -35,7 +35,12 @@ pub(super) fn diagnostic(diagnostic: &Diagnostic, sources: &Sources, colour: boo
 }
 
 /// The line of place `k`, with every place of that line marked.
-fn picture<'a>(group: Group<'a>, diagnostic: &'a Diagnostic, sources: &'a Sources, k: usize) -> Group<'a> {
+fn picture<'a>(
+    group: Group<'a>,
+    diagnostic: &'a Diagnostic,
+    sources: &'a Sources,
+    k: usize,
+) -> Group<'a> {
     let at = &diagnostic.places[k].0;
     let line = sources.line(at);
     let window = window(&line);
@@ -49,7 +54,8 @@ fn picture<'a>(group: Group<'a>, diagnostic: &'a Diagnostic, sources: &'a Source
             && marked.span.start <= window.end;
         if inside {
             let kind = if j == 0 { AnnotationKind::Primary } else { AnnotationKind::Context };
-            let span = marked.span.start - window.start..marked.span.end.min(window.end) - window.start;
+            let span =
+                marked.span.start - window.start..marked.span.end.min(window.end) - window.start;
             snippet = snippet.annotation(kind.span(span).label(label.as_str()));
         }
     }

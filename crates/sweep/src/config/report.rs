@@ -7,7 +7,8 @@ use super::render;
 use super::source::{Location, SourceId, Sources};
 use crate::nearest::nearest;
 
-/// More mistakes than this are counted but not kept: a wrong file should not fill a terminal or the memory.
+/// More mistakes than this are counted but not kept: a wrong file should not fill a terminal or the
+/// memory.
 const KEPT: usize = 100;
 
 /// One mistake.
@@ -58,13 +59,13 @@ pub(super) struct Report {
 }
 
 impl Report {
-    /// Keeps a mistake, unless it stands on a line whose syntax is already refused.
+    /// Keeps a mistake, unless it is on a line whose syntax is already refused.
     pub(super) fn push(&mut self, diagnostic: Diagnostic) {
         self.push_with(|_| diagnostic);
     }
 
-    /// As [`Report::push`], but a mistake beyond those kept is only counted: finding its line, or the nearest name,
-    /// a million times over would take minutes.
+    /// As [`Report::push`], but a mistake beyond those kept is only counted: finding its line, or
+    /// the nearest name, a million times over would take minutes.
     pub(super) fn push_with(&mut self, diagnose: impl FnOnce(&Sources) -> Diagnostic) {
         if self.is_full() {
             self.beyond += 1;
@@ -72,7 +73,8 @@ impl Report {
         }
         let diagnostic = diagnose(&self.sources);
         let broken = diagnostic.places.first().is_some_and(|(at, _)| {
-            let swallowed = self.swallowed.get(&at.source).is_some_and(|&from| at.span.start >= from);
+            let swallowed =
+                self.swallowed.get(&at.source).is_some_and(|&from| at.span.start >= from);
             let broken = self.broken.get(&at.source);
             swallowed || broken.is_some_and(|lines| lines.contains(&self.sources.line(at).number))
         });
@@ -140,8 +142,8 @@ impl Report {
 
 /// Everything wrong with a grid file, its machine file and the command line's constants.
 ///
-/// `Display` shows each mistake with file, line and column, the text pointed at, what was expected and the nearest
-/// valid name, without colour; [`Diagnostics::styled`] the same with colour.
+/// `Display` shows each mistake with file, line and column, the text pointed at, what was expected
+/// and the nearest valid name, without colour; [`Diagnostics::styled`] the same with colour.
 #[derive(Debug)]
 pub struct Diagnostics {
     sources: Sources,

@@ -1,28 +1,28 @@
-//! JSON Schema (draft 2020-12) of grid and machine files, made from the tables that read them. It covers what a schema
-//! can say about one file; what needs the machine or two values together is left to [`super::load`].
+//! JSON Schema (draft 2020-12) of grid and machine files, made from the tables that read them. It
+//! covers what a schema can say about one file; what needs the machine or two values together is
+//! left to [`super::load`].
 
 use serde_json::{Map, Value, json};
 use washer_model::{Channel, Machine, Parameter, Range, Spin};
 
 use super::design::{DEFAULT_SEED, MOST_SEED, MOST_SOBOL};
-use super::grid::{
-    ACCURACY, ATOL, DEFAULT_ACCURACY, DEFAULT_ATOL, DEFAULT_CHANNELS, DEFAULT_MACHINE, DEFAULT_METHOD,
-    DEFAULT_RATIO_LIMIT, DEFAULT_RTOL, DEFAULT_STEP_S, LONGEST_S, METHODS, RTOL,
-};
+use super::grid::{DEFAULT_CHANNELS, DEFAULT_MACHINE, DEFAULT_RATIO_LIMIT, LONGEST_S};
 use super::machine::{BLOCKS, Block, DAMPERS, FREE_LENGTH, SPRINGS, no_spin};
 use super::parameters::MOST_POINTS;
 use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
 use crate::measures::{Criterion, Metric};
+use crate::method::{Entry, METHODS};
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
 /// The schema of grid files.
 #[must_use]
-pub fn grid() -> Value {
+pub(crate) fn grid() -> Value {
     let name = json!({
         "type": "string",
         "pattern": "^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
-        "description": "name of the run and of its result file; the grid file's own name if left out",
+        "description": "name of the run and of its result file; the grid file's own name if left \
+                        out",
     });
     let machine = json!({
         "type": "string",
@@ -32,7 +32,8 @@ pub fn grid() -> Value {
     let axes = json!({
         "type": "array",
         "items": axis(),
-        "description": "swept parameters; the first varies slowest. With [design] each has a range without a count",
+        "description": "swept parameters; the first varies slowest. With [design] each has a \
+                        range without a count",
     });
     let sections = [
         ("name", name),
@@ -49,24 +50,37 @@ pub fn grid() -> Value {
     let mut schema = table(sections, &["spin", "time"]);
     // Whether a range has a count depends on whether there is a design.
     schema["if"] = json!({ "required": ["design"] });
-    schema["then"] = json!({ "properties": { "axis": { "items": { "not": { "properties": { "range": { "required": ["count"] } } } } } } });
-    schema["else"] = json!({ "properties": { "axis": { "items": { "properties": { "range": { "required": ["count"] } } } } } });
+    let counted = json!({ "properties": { "range": { "required": ["count"] } } });
+    let every_axis = |items: Value| json!({ "properties": { "axis": { "items": items } } });
+    schema["then"] = every_axis(json!({ "not": counted }));
+    schema["else"] = every_axis(counted);
     document("Grid file of sweep", schema)
 }
 
 fn design() -> Value {
     let one = |method: &'static str, description: &str, most: u64| {
         let method = json!({ "const": method, "description": description });
-        let points = json!({ "type": "integer", "minimum": 1, "maximum": most, "description": "how many" });
-        let seed = json!({ "type": "integer", "minimum": 0, "maximum": MOST_SEED, "default": DEFAULT_SEED, "description": "another seed, another draw" });
+        let points =
+            json!({ "type": "integer", "minimum": 1, "maximum": most, "description": "how many" });
+        let seed = json!({
+            "type": "integer",
+            "minimum": 0,
+            "maximum": MOST_SEED,
+            "default": DEFAULT_SEED,
+            "description": "another seed, another draw",
+        });
         table([("method", method), ("points", points), ("seed", seed)], &["method", "points"])
     };
     let list = json!({ "const": "list", "description": "points as listed" });
-    let file = json!({ "type": "string", "description": "CSV or Parquet, relative to this file: one column a parameter, one row a point" });
+    let file = json!({ "type": "string", "description": "CSV or Parquet, relative to this file: \
+                                                         one column a parameter, one row a \
+                                                         point" });
     json!({
         "oneOf": [
-            one("latin_hypercube", "every axis cut into as many strata as there are points, one point in each", MOST_POINTS),
-            one("sobol", "a scrambled Sobol sequence; a power of two points is the most even", MOST_SOBOL),
+            one("latin_hypercube", "every axis cut into as many strata as there are points, one \
+                                    point in each", MOST_POINTS),
+            one("sobol", "a scrambled Sobol sequence; a power of two points is the most \
+                          even", MOST_SOBOL),
             table([("method", list), ("file", file)], &["method", "file"]),
         ],
     })
@@ -74,7 +88,7 @@ fn design() -> Value {
 
 /// The schema of machine files.
 #[must_use]
-pub fn machine() -> Value {
+pub(crate) fn machine() -> Value {
     let mut properties: Vec<(&str, Value)> = Vec::new();
     let mut required = Vec::new();
     for block in &BLOCKS {
@@ -104,7 +118,12 @@ fn document(title: &str, mut schema: Value) -> Value {
 fn table<'k>(properties: impl IntoIterator<Item = (&'k str, Value)>, required: &[&str]) -> Value {
     let properties: Map<String, Value> =
         properties.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
-    json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
+    json!({
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": false,
+    })
 }
 
 fn number(range: Range) -> Value {
@@ -114,7 +133,9 @@ fn number(range: Range) -> Value {
         Range::Positive => json!({ "type": "number", "exclusiveMinimum": 0, "maximum": largest }),
         Range::NonNegative => json!({ "type": "number", "minimum": 0, "maximum": largest }),
         Range::Negative => json!({ "type": "number", "minimum": -largest, "exclusiveMaximum": 0 }),
-        Range::Within(least, greatest) => json!({ "type": "number", "minimum": least, "maximum": greatest }),
+        Range::Within(least, greatest) => {
+            json!({ "type": "number", "minimum": least, "maximum": greatest })
+        }
     }
 }
 
@@ -180,7 +201,10 @@ fn set() -> Value {
         }
     }
     json!({
-        "type": "object", "properties": properties, "patternProperties": patterns, "additionalProperties": false,
+        "type": "object",
+        "properties": properties,
+        "patternProperties": patterns,
+        "additionalProperties": false,
         "description": "constants, by the names of `sweep parameters`",
     })
 }
@@ -197,13 +221,20 @@ fn spin() -> Value {
     };
     let column = |range: Range, description: &str| {
         let (items, most) = (number(range), MOST_ROWS);
-        json!({ "type": "array", "items": items, "minItems": 1, "maxItems": most, "description": description })
+        json!({
+            "type": "array",
+            "items": items,
+            "minItems": 1,
+            "maxItems": most,
+            "description": description,
+        })
     };
     let tabled = table(
         [
             (
                 "profile",
-                json!({ "const": TABLE, "description": "linear between given points, constant after the last" }),
+                json!({ "const": TABLE, "description": "linear between given points, constant \
+                                                        after the last" }),
             ),
             ("time_s", column(Range::NonNegative, "increasing times from 0, s")),
             ("speed_rpm", column(Range::Within(-1e5, 1e5), "speeds at these times, rpm")),
@@ -225,26 +256,23 @@ fn time() -> Value {
         "items": number(Range::NonNegative),
         "minItems": 2,
         "maxItems": 2,
-        "description": "amplitudes are taken from the first to the second time, s; the whole run if left out",
+        "description": "amplitudes are taken from the first to the second time, s; the whole run \
+                        if left out",
     });
     table([("end_s", end_s), ("window_s", window_s)], &["end_s"])
 }
 
 fn integrator() -> Value {
-    let step_s = described(number(Range::Positive), DEFAULT_STEP_S, "fixed step, s");
-    let rtol = described(number(RTOL), DEFAULT_RTOL, "relative tolerance per component");
-    let atol = described(number(ATOL), DEFAULT_ATOL, "absolute tolerance per component");
-    let accuracy = described(number(ACCURACY), DEFAULT_ACCURACY, "relative error of the amplitudes");
-    let one = |name: &str| {
-        let method = ("method", json!({ "const": name }));
-        let required: &[&str] = if name == DEFAULT_METHOD { &[] } else { &["method"] };
-        match name {
-            "rk4" => table([method, ("step_s", step_s.clone())], required),
-            "dopri5" | "rodas5p" => table([method, ("rtol", rtol.clone()), ("atol", atol.clone())], required),
-            _ => table([method, ("accuracy", accuracy.clone())], required),
-        }
+    let one = |entry: &Entry| {
+        let method = json!({ "const": entry.name, "description": entry.description });
+        let settings = entry.settings.iter().map(|setting| {
+            (setting.key, described(number(setting.range), setting.default, setting.description))
+        });
+        let is_default = entry.name == Entry::default_method().name;
+        let required: &[&str] = if is_default { &[] } else { &["method"] };
+        table([("method", method)].into_iter().chain(settings), required)
     };
-    json!({ "oneOf": METHODS.map(one) })
+    json!({ "oneOf": METHODS.iter().map(one).collect::<Value>() })
 }
 
 fn metrics() -> Value {
@@ -261,7 +289,8 @@ fn reliability() -> Value {
     let criterion = json!({
         "enum": Criterion::ALL.map(Criterion::name),
         "default": Criterion::default().name(),
-        "description": "what the models are compared by: largest deviations, the same turn by turn of the drum, or root mean squares",
+        "description": "what the models are compared by: largest deviations, the same turn by \
+                        turn of the drum, or root mean squares",
     });
     let limit = "a point is reliable where every ratio is below this";
     let channels = json!({
@@ -284,13 +313,19 @@ fn axis() -> Value {
             ("to", number(Range::Any)),
             (
                 "count",
-                json!({ "type": "integer", "minimum": 1, "maximum": MOST_POINTS, "description": "how many, both ends included" }),
+                json!({
+                    "type": "integer",
+                    "minimum": 1,
+                    "maximum": MOST_POINTS,
+                    "description": "how many, both ends included",
+                }),
             ),
             ("spacing", json!({ "enum": ["linear", "log"], "default": "linear" })),
         ],
         &["from", "to"],
     );
-    let values = json!({ "type": "array", "items": number(Range::Any), "minItems": 1, "uniqueItems": true });
+    let values =
+        json!({ "type": "array", "items": number(Range::Any), "minItems": 1, "uniqueItems": true });
     json!({
         "oneOf": [
             table([("parameter", parameter.clone()), ("values", values)], &["parameter", "values"]),

@@ -1,5 +1,6 @@
-//! Walks one TOML table key by key. Every value is taken by name and kind; a wrong one is reported and the walk goes
-//! on, so that one pass finds every mistake. Keys nobody asked for are reported at the end.
+//! Walks one TOML table key by key. Every value is taken by name and kind; a wrong one is reported
+//! and the walk goes on, so that one pass finds every mistake. Keys nobody asked for are reported
+//! at the end.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -77,7 +78,7 @@ impl<'a> Section<'a> {
         self.table.get(key)
     }
 
-    /// Where a key stands, if it is written.
+    /// The place of a key, if it is written.
     pub(super) fn key_at(&self, key: &str) -> Option<Location> {
         self.table.get_key_value(key).map(|(key, _)| self.place(key.span()))
     }
@@ -107,13 +108,23 @@ impl<'a> Section<'a> {
     }
 
     /// A finite number in a range.
-    pub(super) fn number(&mut self, key: &'static str, range: Range, report: &mut Report) -> Field<f64> {
+    pub(super) fn number(
+        &mut self,
+        key: &'static str,
+        range: Range,
+        report: &mut Report,
+    ) -> Field<f64> {
         let Some(value) = self.get(key) else { return Field::Absent };
         number(&quoted(key), self.at.source, value, range, report).map_or(Field::Bad, Field::Given)
     }
 
     /// A whole number from 1 to `most`.
-    pub(super) fn count(&mut self, key: &'static str, most: u64, report: &mut Report) -> Field<u64> {
+    pub(super) fn count(
+        &mut self,
+        key: &'static str,
+        most: u64,
+        report: &mut Report,
+    ) -> Field<u64> {
         self.whole(key, 1..=most, report)
     }
 
@@ -126,16 +137,21 @@ impl<'a> Section<'a> {
     ) -> Field<u64> {
         let Some(value) = self.get(key) else { return Field::Absent };
         let at = self.place(value.span());
-        let expected = format!("expected a whole number from {} to {}", bounds.start(), bounds.end());
+        let expected =
+            format!("expected a whole number from {} to {}", bounds.start(), bounds.end());
         match value.get_ref() {
-            DeValue::Integer(integer) => match u64::from_str_radix(integer.as_str(), integer.radix()) {
-                Ok(count) if bounds.contains(&count) => Field::Given(Located { value: count, at }),
-                _ => {
-                    let title = format!("`{key}` = {integer} is out of range");
-                    report.push(Diagnostic::new(title).at(&at, expected));
-                    Field::Bad
+            DeValue::Integer(integer) => {
+                match u64::from_str_radix(integer.as_str(), integer.radix()) {
+                    Ok(count) if bounds.contains(&count) => {
+                        Field::Given(Located { value: count, at })
+                    }
+                    _ => {
+                        let title = format!("`{key}` = {integer} is out of range");
+                        report.push(Diagnostic::new(title).at(&at, expected));
+                        Field::Bad
+                    }
                 }
-            },
+            }
             other => {
                 report.push(wrong_kind(&quoted(key), &at, "a whole number", other));
                 Field::Bad
@@ -198,16 +214,28 @@ impl<'a> Section<'a> {
     }
 
     /// An array of strings, wrong ones left out and reported.
-    pub(super) fn texts(&mut self, key: &'static str, report: &mut Report) -> Field<Vec<Located<&'a str>>> {
+    pub(super) fn texts(
+        &mut self,
+        key: &'static str,
+        report: &mut Report,
+    ) -> Field<Vec<Located<&'a str>>> {
         let source = self.at.source;
         self.items(key, "an array of strings", report).then(|items| {
-            let texts =
-                items.value.iter().filter_map(|item| text(&entry(key), source, item, report)).collect();
+            let texts = items
+                .value
+                .iter()
+                .filter_map(|item| text(&entry(key), source, item, report))
+                .collect();
             Some(Located { value: texts, at: items.at })
         })
     }
 
-    fn items(&mut self, key: &'static str, kind: &str, report: &mut Report) -> Field<&'a [Value<'a>]> {
+    fn items(
+        &mut self,
+        key: &'static str,
+        kind: &str,
+        report: &mut Report,
+    ) -> Field<&'a [Value<'a>]> {
         let Some(value) = self.get(key) else { return Field::Absent };
         let at = self.place(value.span());
         match value.get_ref() {
@@ -263,7 +291,7 @@ impl<'a> Section<'a> {
         sections
     }
 
-    /// Every key as it stands, for tables whose keys are names of parameters.
+    /// Every key as written, for tables whose keys are names of parameters.
     pub(super) fn names(&self) -> Vec<Located<&'a str>> {
         let mut names = Vec::new();
         for key in self.table.keys() {
@@ -273,7 +301,12 @@ impl<'a> Section<'a> {
     }
 
     /// The number under a name from [`Section::names`].
-    pub(super) fn number_named(&self, name: &str, range: Range, report: &mut Report) -> Option<Located<f64>> {
+    pub(super) fn number_named(
+        &self,
+        name: &str,
+        range: Range,
+        report: &mut Report,
+    ) -> Option<Located<f64>> {
         number(&quoted(name), self.at.source, self.table.get(name)?, range, report)
     }
 
@@ -287,18 +320,22 @@ impl<'a> Section<'a> {
             report.push_with(|_| {
                 let at = self.place(key.span());
                 match self.misplaced.get(name) {
-                    Some(reason) => Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
-                        .at(&at, reason.as_str()),
-                    None => Diagnostic::new(format!("unknown key `{}` in {}", short(name), self.title))
-                        .at(&at, format!("expected {}", listed(&self.known)))
-                        .nearest(name, self.known.iter().copied()),
+                    Some(reason) => {
+                        Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
+                            .at(&at, reason.as_str())
+                    }
+                    None => {
+                        Diagnostic::new(format!("unknown key `{}` in {}", short(name), self.title))
+                            .at(&at, format!("expected {}", listed(&self.known)))
+                            .nearest(name, self.known.iter().copied())
+                    }
                 }
             });
         }
     }
 }
 
-/// A word that is none of the choices.
+/// Refuses a word that is not among the choices.
 pub(super) fn unknown_word(what: &str, found: &Located<&str>, choices: &[&str]) -> Diagnostic {
     Diagnostic::new(format!("unknown {what} \"{}\"", short(found.value)))
         .at(&found.at, format!("expected {}", listed(choices)))

@@ -5,7 +5,8 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
-/// Longest file that is read. A list of two hundred thousand numbers fits; a result file given by mistake does not.
+/// Longest file that is read. A list of two hundred thousand numbers fits; a result file given by
+/// mistake does not.
 pub(super) const LONGEST_BYTES: u64 = 4 << 20;
 
 /// A text among [`Sources`].
@@ -49,9 +50,15 @@ impl fmt::Display for ReadError {
         match self {
             Self::Io(error) => write!(f, "{error}"),
             Self::TooLong => write!(f, "it is longer than {} MiB", LONGEST_BYTES >> 20),
-            Self::NotUtf8 { utf16: true, .. } => f.write_str("it is UTF-16, not UTF-8: save it as UTF-8"),
+            Self::NotUtf8 { utf16: true, .. } => {
+                f.write_str("it is UTF-16, not UTF-8: save it as UTF-8")
+            }
             Self::NotUtf8 { first_bad_byte, .. } => {
-                write!(f, "it is not UTF-8 text: the first bad byte is number {}", first_bad_byte + 1)
+                write!(
+                    f,
+                    "it is not UTF-8 text: the first bad byte is number {}",
+                    first_bad_byte + 1
+                )
             }
         }
     }
@@ -102,7 +109,8 @@ impl Sources {
         let start = (start - line_start).min(line.len());
         let end = (end.max(line_start) - line_start).max(start);
         // By bytes: a long list's lines are counted for each of its mistakes.
-        let number = text.as_bytes()[..line_start].iter().filter(|&&byte| byte == b'\n').count() + 1;
+        let number =
+            text.as_bytes()[..line_start].iter().filter(|&&byte| byte == b'\n').count() + 1;
         Line { text: line, number, span: start..end }
     }
 }
@@ -162,7 +170,10 @@ mod tests {
             read(&path)
         };
         assert_eq!(file(b"name = 1").unwrap(), "name = 1");
-        assert!(matches!(file(b"ab\xffc"), Err(ReadError::NotUtf8 { first_bad_byte: 2, utf16: false })));
+        assert!(matches!(
+            file(b"ab\xffc"),
+            Err(ReadError::NotUtf8 { first_bad_byte: 2, utf16: false })
+        ));
         assert!(matches!(file(b"\xff\xfen\0"), Err(ReadError::NotUtf8 { utf16: true, .. })));
         assert!(matches!(file(&vec![b' '; LONGEST_BYTES as usize + 1]), Err(ReadError::TooLong)));
         assert!(file(&vec![b' '; LONGEST_BYTES as usize]).is_ok());

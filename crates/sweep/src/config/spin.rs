@@ -91,7 +91,7 @@ pub(super) fn read(root: &mut Section<'_>, origins: &mut Origins, report: &mut R
         }
         Profile::Unknown => {}
     }
-    let mut reader = Reader::new(&mut section, profile, &stand_in, origins, report);
+    let mut reader = SpinReader::new(&mut section, profile, &stand_in, origins, report);
     let spin = match profile {
         Profile::Ramped(Ramped { make, .. }) => {
             reader.ramped().map(|[peak_rpm, ramp_s]| make(peak_rpm, ramp_s))
@@ -106,7 +106,7 @@ pub(super) fn read(root: &mut Section<'_>, origins: &mut Origins, report: &mut R
     section.finish(report);
     spin.unwrap_or_else(|| match profile {
         Profile::Table => {
-            // What is wrong with the table has been said; that the stand-in has no rows is not it.
+            // The table's mistakes are reported; that the stand-in has no rows is not one of them.
             origins.doubt("spin.time_s".to_owned());
             machine::no_spin()
         }
@@ -114,7 +114,7 @@ pub(super) fn read(root: &mut Section<'_>, origins: &mut Origins, report: &mut R
     })
 }
 
-struct Reader<'r, 'a> {
+struct SpinReader<'r, 'a> {
     section: &'r mut Section<'a>,
     profile: Profile,
     stand_in: &'r Spin,
@@ -122,7 +122,7 @@ struct Reader<'r, 'a> {
     report: &'r mut Report,
 }
 
-impl<'r, 'a> Reader<'r, 'a> {
+impl<'r, 'a> SpinReader<'r, 'a> {
     fn new(
         section: &'r mut Section<'a>,
         profile: Profile,

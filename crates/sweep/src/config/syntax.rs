@@ -7,13 +7,20 @@ use super::report::{Diagnostic, Report};
 use super::section::quoted;
 use super::source::{Location, SourceId};
 
-/// The table a text holds; what is not TOML is reported, what can be made out of the rest is returned.
-pub(super) fn parse<'a>(text: &'a str, source: SourceId, report: &mut Report) -> Spanned<DeTable<'a>> {
+/// The table a text holds; what is not TOML is reported, what can be made out of the rest is
+/// returned.
+pub(super) fn parse<'a>(
+    text: &'a str,
+    source: SourceId,
+    report: &mut Report,
+) -> Spanned<DeTable<'a>> {
     let (table, mut errors) = DeTable::parse_recoverable(text);
     errors.sort_by_key(start);
-    // An array that is never closed swallows what follows; all that says of it is the first complaint.
+    // An array that is never closed swallows what follows; all that says of it is the first
+    // complaint.
     let unclosed = errors.iter().any(|error| error.message().starts_with("unclosed array"));
-    let swallowed = errors.iter().position(|error| error.message().contains("array")).filter(|_| unclosed);
+    let swallowed =
+        errors.iter().position(|error| error.message().contains("array")).filter(|_| unclosed);
     if let Some(first) = swallowed {
         let at = Location::new(source, errors[first].span().unwrap_or(0..0));
         report.push_syntax(

@@ -1,7 +1,9 @@
-//! Every kind of mistake with its whole message, the defaults, precedence, and inputs no user would type.
+//! Every kind of mistake with its whole message, the defaults, precedence, and inputs no user would
+//! type.
 //!
-//! Each file of `testdata/broken` is a grid with mistakes; its snapshot stands beside it. A first line
-//! `# args: --set NAME=VALUE ...` adds the command line's part; `--at` makes it the load of a point.
+//! Each file of `testdata/broken` is a grid with mistakes; its snapshot stands beside it. A first
+//! line `# args: --set NAME=VALUE ...` adds the command line's part; `--at` makes it the load of a
+//! point.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +13,8 @@ use washer_model::{Machine, Spin};
 use super::*;
 use crate::design::Design;
 use crate::measures::{Measures, Metric};
-use crate::plan::{AxisValues, Integrator};
+use crate::method::Integrator;
+use crate::plan::AxisValues;
 
 /// What the fuzzer's inputs stand for.
 #[path = "../../../../fuzz/src/input.rs"]
@@ -27,7 +30,8 @@ fn sweeps() -> Vec<PathBuf> {
 
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<_> = entries.filter(|path| path.extension().is_some_and(|x| x == "toml")).collect();
+    let mut files: Vec<_> =
+        entries.filter(|path| path.extension().is_some_and(|x| x == "toml")).collect();
     files.sort();
     files
 }
@@ -36,12 +40,21 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 fn load_as_told(path: &Path) -> Result<Plan, Diagnostics> {
     let text = std::fs::read_to_string(path).unwrap();
     let first = text.lines().next().unwrap_or_default();
-    let arguments: Vec<_> = first.strip_prefix("# args: ").unwrap_or_default().split_whitespace().collect();
+    let arguments: Vec<_> =
+        first.strip_prefix("# args: ").unwrap_or_default().split_whitespace().collect();
     let of = |option: &str| -> Vec<String> {
-        arguments.chunks(2).filter(|pair| pair[0] == option).map(|pair| pair[1].to_owned()).collect()
+        arguments
+            .chunks(2)
+            .filter(|pair| pair[0] == option)
+            .map(|pair| pair[1].to_owned())
+            .collect()
     };
     let (sets, at) = (of("--set"), of("--at"));
-    if at.is_empty() { load(path, &sets) } else { load_point(path, &sets, &at) }
+    if at.is_empty() {
+        load(path, &sets)
+    } else {
+        load_point(path, &sets, &at).map(|(plan, _)| plan)
+    }
 }
 
 /// A grid written to a folder of its own.
@@ -105,10 +118,14 @@ fn what_is_left_out_has_its_default() {
         channels,
         ["tub_front_y", "tub_front_z", "drum_front_y", "drum_front_z", "tub_yaw", "tub_pitch"]
     );
-    let method = |text: &str| load_text(format!("{SMALLEST}[integrator]\n{text}"), &[]).unwrap().integrator;
+    let method =
+        |text: &str| load_text(format!("{SMALLEST}[integrator]\n{text}"), &[]).unwrap().integrator;
     assert_eq!(method("method = \"rk4\""), Integrator::Rk4 { step_s: 2e-4 });
     assert_eq!(method("method = \"dopri5\""), Integrator::Dopri5 { rtol: 1e-6, atol: 1e-9 });
-    assert_eq!(method("method = \"rodas5p\"\nrtol = 1e-8"), Integrator::Rodas5p { rtol: 1e-8, atol: 1e-9 });
+    assert_eq!(
+        method("method = \"rodas5p\"\nrtol = 1e-8"),
+        Integrator::Rodas5p { rtol: 1e-8, atol: 1e-9 }
+    );
     assert_eq!(method("accuracy = 1e-5"), Integrator::Rk4MassScaled { accuracy: 1e-5 });
 }
 
@@ -128,7 +145,8 @@ fn what_is_measured_is_part_of_the_plan_only_where_it_is_not_the_default() {
     let told = load_text(format!("{SMALLEST}[reliability]\ncriterion = \"peak\"\n"), &[]).unwrap();
     assert_eq!(told.to_json(), plain.to_json());
     let more = format!(
-        "metrics = [\"static_sag\", \"cabinet_force\"]\n{SMALLEST}[reliability]\ncriterion = \"rms\"\n"
+        "metrics = [\"static_sag\", \"cabinet_force\"]\n{SMALLEST}[reliability]\ncriterion \
+         = \"rms\"\n"
     );
     let more = load_text(more, &[]).unwrap();
     assert_eq!(more.measures.metrics, [Metric::StaticSag, Metric::CabinetForce]);
@@ -139,9 +157,11 @@ fn what_is_measured_is_part_of_the_plan_only_where_it_is_not_the_default() {
 
 #[test]
 fn later_layers_override_earlier_ones() {
-    let grid =
-        format!("{SMALLEST}[set]\ndamping_n_s_per_m = 100\nunbalance_mass_kg = 0.2\nspin_peak_rpm = 600\n");
-    let plan = load_text(&grid, &["unbalance_mass_kg=0.3", "damper_2_damping_n_s_per_m=90"]).unwrap();
+    let grid = format!(
+        "{SMALLEST}[set]\ndamping_n_s_per_m = 100\nunbalance_mass_kg = 0.2\nspin_peak_rpm = 600\n"
+    );
+    let plan =
+        load_text(&grid, &["unbalance_mass_kg=0.3", "damper_2_damping_n_s_per_m=90"]).unwrap();
     assert_eq!(plan.machine.unbalance.mass_kg, 0.3);
     let dampings = plan.machine.dampers.iter().map(|damper| damper.damping_n_s_per_m);
     assert_eq!(dampings.collect::<Vec<_>>(), [100.0, 90.0]);
@@ -149,14 +169,18 @@ fn later_layers_override_earlier_ones() {
     // An axis of one damper beside a constant for all of them.
     let axis = "[[axis]]\nparameter = \"damper_1_damping_n_s_per_m\"\nvalues = [50, 60]\n";
     let plan = load_text(format!("{grid}{axis}"), &[]).unwrap();
-    let dampings = plan.scenario(1).machine.dampers.iter().map(|d| d.damping_n_s_per_m).collect::<Vec<_>>();
+    let dampings =
+        plan.scenario(1).machine.dampers.iter().map(|d| d.damping_n_s_per_m).collect::<Vec<_>>();
     assert_eq!(dampings, [60.0, 100.0]);
 }
 
 #[test]
 fn a_point_may_lie_between_the_grids() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sweeps/fig12.toml");
-    let at = |at: &[&str]| load_point(&path, &[], &at.iter().map(|&at| at.to_owned()).collect::<Vec<_>>());
+    let at = |at: &[&str]| {
+        load_point(&path, &[], &at.iter().map(|&at| at.to_owned()).collect::<Vec<_>>())
+            .map(|(plan, _)| plan)
+    };
     let plan = at(&["damping_n_s_per_m=99.5", "unbalance_mass_kg=0.4", "tub_mass_kg=25"]).unwrap();
     assert_eq!((plan.points(), plan.machine.tub.mass_kg), (1, 25.0));
     assert!(plan.machine.dampers.iter().all(|damper| damper.damping_n_s_per_m == 99.5));
@@ -203,7 +227,10 @@ fn the_canonical_plan_tells_plans_apart_and_keeps_every_bit() {
     assert_eq!(json(SMALLEST, &[]), json(reordered, &[]));
     assert_eq!(json(SMALLEST, &[]), json(SMALLEST, &["tub_mass_kg=23.87"]));
     let odd = 0.1 + 0.2;
-    assert_ne!(json(SMALLEST, &["tub_mass_kg=0.3"]), json(SMALLEST, &[&format!("tub_mass_kg={odd}")]));
+    assert_ne!(
+        json(SMALLEST, &["tub_mass_kg=0.3"]),
+        json(SMALLEST, &[&format!("tub_mass_kg={odd}")])
+    );
     assert!(json(SMALLEST, &[&format!("tub_mass_kg={odd}")]).contains("0.30000000000000004"));
 }
 
@@ -240,10 +267,15 @@ fn a_file_of_nothing_but_mistakes_is_refused_in_bounded_text_and_time() {
     let unknown = load_text("]".repeat(1 << 20), &[]).unwrap_err();
     assert!(unknown.len() < 10_000, "{}", unknown.len());
     let repeated = load_text("a = 1\n".repeat(100_000), &[]).unwrap_err();
-    assert!(repeated.contains("100000 mistakes (100 shown)"), "{}", &repeated[repeated.len() - 200..]);
+    assert!(
+        repeated.contains("100000 mistakes (100 shown)"),
+        "{}",
+        &repeated[repeated.len() - 200..]
+    );
     let (times, speeds) = ("1,".repeat(20_000), "2,".repeat(20_000));
     let table = format!(
-        "[spin]\nprofile = \"table\"\ntime_s = [{times}]\nspeed_rpm = [{speeds}]\n[time]\nend_s = 9\n"
+        "[spin]\nprofile = \"table\"\ntime_s = [{times}]\nspeed_rpm = [{speeds}]\n[time]\nend_s = \
+         9\n"
     );
     assert!(load_text(table, &[]).unwrap_err().contains("20000 mistakes (100 shown)"));
     let list = format!("values = [{}]", "nan,".repeat(200_000));
@@ -255,17 +287,22 @@ fn a_file_of_nothing_but_mistakes_is_refused_in_bounded_text_and_time() {
 #[test]
 fn a_grid_of_as_many_points_as_allowed_takes_no_memory() {
     let axis = |name: &str, count: u64| {
-        format!("[[axis]]\nparameter = \"{name}\"\nrange = {{ from = 1.0, to = 2.0, count = {count} }}\n")
+        format!(
+            "[[axis]]\nparameter = \"{name}\"\nrange = {{ from = 1.0, to = 2.0, count = {count} \
+             }}\n"
+        )
     };
-    let grid = format!("{SMALLEST}{}{}", axis("tub_mass_kg", 1_000_000), axis("shaft_mass_kg", 1_000_000));
+    let grid =
+        format!("{SMALLEST}{}{}", axis("tub_mass_kg", 1_000_000), axis("shaft_mass_kg", 1_000_000));
     let plan = load_text(grid, &[]).unwrap();
     assert_eq!(plan.points(), 1_000_000_000_000);
     assert_eq!(plan.axis_values(plan.points() - 1), [2.0, 2.0]);
     let most = "18446744073709551615";
-    let grid = format!("{SMALLEST}{}{}", axis("tub_mass_kg", 1_000_000), axis("shaft_mass_kg", 1_000_001));
-    assert!(load_text(grid, &[]).unwrap_err().contains("too many grid points"));
     let grid =
-        format!("{SMALLEST}{}", axis("tub_mass_kg", 1)).replace("count = 1 ", &format!("count = {most} "));
+        format!("{SMALLEST}{}{}", axis("tub_mass_kg", 1_000_000), axis("shaft_mass_kg", 1_000_001));
+    assert!(load_text(grid, &[]).unwrap_err().contains("too many grid points"));
+    let grid = format!("{SMALLEST}{}", axis("tub_mass_kg", 1))
+        .replace("count = 1 ", &format!("count = {most} "));
     assert!(load_text(grid, &[]).unwrap_err().contains("out of range"));
 }
 
@@ -339,7 +376,11 @@ fn the_fuzzers_corpus_loads_or_is_explained() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 256,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn any_bytes_load_or_are_explained(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
@@ -354,7 +395,10 @@ proptest! {
     #[test]
     fn any_mutation_of_a_valid_grid_loads_or_is_explained(
         start in 0_usize..5,
-        edits in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..20, 0_usize..PIECES.len(), any::<bool>()), 1..5),
+        edits in prop::collection::vec(
+            (any::<prop::sample::Index>(), 0_usize..20, 0_usize..PIECES.len(), any::<bool>()),
+            1..5,
+        ),
     ) {
         let mut text = match start {
             0 => include_str!("../commands/starter.toml").to_owned(),
@@ -371,7 +415,11 @@ proptest! {
     }
 
     #[test]
-    fn any_constant_loads_or_is_explained(name in "[a-z_0-9=.]{0,40}", value in "\\PC{0,20}", known in any::<bool>()) {
+    fn any_constant_loads_or_is_explained(
+        name in "[a-z_0-9=.]{0,40}",
+        value in "\\PC{0,20}",
+        known in any::<bool>(),
+    ) {
         let name = if known { "damping_n_s_per_m" } else { name.as_str() };
         let set = format!("{name}={value}");
         if let Err(mistakes) = load_text(SMALLEST, &[&set]) {
@@ -380,13 +428,17 @@ proptest! {
     }
 
     #[test]
-    fn any_number_of_a_machine_file_loads_or_is_explained(line in 0_usize..60, value in any::<f64>()) {
+    fn any_number_of_a_machine_file_loads_or_is_explained(
+        line in 0_usize..60,
+        value in any::<f64>(),
+    ) {
         let machine = machine_file(&Machine::paper());
         let mut lines: Vec<String> = machine.lines().map(str::to_owned).collect();
         let line = line % lines.len();
         if let Some((key, rest)) = lines[line].clone().split_once(" = ") {
             let many = rest.starts_with('[');
-            lines[line] = if many { format!("{key} = [{value:?}, 1.0, 1.0]") } else { format!("{key} = {value:?}") };
+            lines[line] = if many { format!("{key} = [{value:?}, 1.0, \
+                                             1.0]") } else { format!("{key} = {value:?}") };
         }
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("machine.toml"), lines.join("\n")).unwrap();
@@ -402,8 +454,10 @@ proptest! {
 #[test]
 fn a_design_is_ranges_and_a_number_of_points() {
     let axes = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = { from = 0.1, to = 1.0 }\n\
-                [[axis]]\nparameter = \"bearing_stiffness_n_per_m\"\nrange = { from = 1e6, to = 1e9, spacing = \"log\" }\n";
-    let plan = |design: &str| load_text(format!("{SMALLEST}[design]\n{design}\n{axes}"), &[]).unwrap();
+                [[axis]]\nparameter = \"bearing_stiffness_n_per_m\"\nrange = { from = 1e6, to = \
+                1e9, spacing = \"log\" }\n";
+    let plan =
+        |design: &str| load_text(format!("{SMALLEST}[design]\n{design}\n{axes}"), &[]).unwrap();
     let sobol = plan("method = \"sobol\"\npoints = 64\nseed = 3");
     assert_eq!(sobol.design, Some(Design::Sobol { points: 64, seed: 3 }));
     let latin = plan("method = \"latin_hypercube\"\npoints = 64");
@@ -417,19 +471,29 @@ fn a_design_is_ranges_and_a_number_of_points() {
 fn a_list_is_a_file_of_points_whose_content_counts() {
     let folder = tempfile::tempdir().unwrap();
     let grid = folder.path().join("grid.toml");
-    std::fs::write(&grid, format!("{SMALLEST}[design]\nmethod = \"list\"\nfile = \"points.csv\"\n")).unwrap();
+    std::fs::write(
+        &grid,
+        format!("{SMALLEST}[design]\nmethod = \"list\"\nfile = \"points.csv\"\n"),
+    )
+    .unwrap();
     let load_list = |csv: &str| {
         std::fs::write(folder.path().join("points.csv"), csv).unwrap();
         load(&grid, &[]).unwrap()
     };
-    let text = "\u{feff}# by hand\n\"unbalance_mass_kg\", spin_ramp_s\r\n0.25, 5e1\r\n\r\n0.5, 40\r\n";
+    let text =
+        "\u{feff}# by hand\n\"unbalance_mass_kg\", spin_ramp_s\r\n0.25, 5e1\r\n\r\n0.5, 40\r\n";
     let plan = load_list(text);
     assert_eq!(plan.points(), 2);
-    assert_eq!([plan.axis_values(0), plan.axis_values(1)], [[0.25, 50.0], [0.5, 40.0]].map(Vec::from));
+    assert_eq!(
+        [plan.axis_values(0), plan.axis_values(1)],
+        [[0.25, 50.0], [0.5, 40.0]].map(Vec::from)
+    );
     assert_eq!(plan.scenario(1).spin, Spin::Triangular { peak_rpm: 350.0, ramp_s: 40.0 });
     let other = load_list(&text.replace("40", "41"));
     assert_ne!(plan.to_json()["design"]["hash"], other.to_json()["design"]["hash"]);
     assert_eq!(plan.to_json()["axis"], other.to_json()["axis"]);
-    let point = load_point(&grid, &[], &["unbalance_mass_kg=0.1".into(), "spin_ramp_s=9".into()]).unwrap();
+    let point = load_point(&grid, &[], &["unbalance_mass_kg=0.1".into(), "spin_ramp_s=9".into()])
+        .unwrap()
+        .0;
     assert_eq!((point.points(), point.design), (1, None));
 }

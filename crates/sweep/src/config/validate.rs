@@ -11,20 +11,20 @@ use washer_model::{
 use super::grid::Draft;
 use super::report::{Diagnostic, Report};
 use super::source::{Location, Sources};
-use crate::engine::REFERENCE_SHARE;
 use crate::measures::{Criterion, MOST_TURNS};
-use crate::plan::{Integrator, MOST_STEPS, Plan, Scenario, shortest_step_s};
+use crate::method::{REFERENCE_SHARE, Steps};
+use crate::plan::{MOST_STEPS, Plan, Scenario, shortest_step_s};
 
-/// Springs, dampers and rows of a spin's table that are looked at before a run, over all points of a list:
-/// some seconds' worth.
+/// Springs, dampers and rows of a spin's table that are looked at before a run, over all points of
+/// a list: some seconds' worth.
 const MOST_JUDGED: u64 = 1_000_000_000;
 
 /// Counting a row's turns takes as long as judging so many rows.
 const TURNS_PER_ROW: u64 = 50;
 
-/// A machine or spin that cannot be, at any corner of the grid. Inertia and bearings are linear conditions, so a
-/// machine that meets them at the corners meets them between; a spring that shrinks to nothing only in between is
-/// left to the run, as a failed row.
+/// A machine or spin that cannot be, at any corner of the grid. Inertia and bearings are linear
+/// conditions, so a machine that meets them at the corners meets them between; a spring that
+/// shrinks to nothing only in between is left to the run, as a failed row.
 pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
     let plan = &draft.plan;
     let mut scenario = plan.scenario_at(&plan.corner(0));
@@ -64,7 +64,8 @@ impl Swept {
         }
     }
 
-    /// Refuses a list so long, of a machine or a spin so large, that judging its points would take minutes.
+    /// Refuses a list so long, of a machine or a spin so large, that judging its points would take
+    /// minutes.
     fn is_too_much(self, draft: &Draft, scenario: &Scenario, report: &mut Report) -> bool {
         let Scenario { machine, spin, .. } = scenario;
         let elements = (machine.springs.len() + machine.dampers.len()) as u64;
@@ -72,7 +73,8 @@ impl Swept {
             Spin::Table { time_s, .. } => time_s.len() as u64,
             Spin::Cycloidal { .. } | Spin::Triangular { .. } | Spin::Ramp { .. } => 1,
         };
-        let counts_turns = draft.plan.measures.criterion == Criterion::Envelope && (self.spin || self.window);
+        let counts_turns =
+            draft.plan.measures.criterion == Criterion::Envelope && (self.spin || self.window);
         let a_point = u64::from(self.machine) * elements
             + u64::from(self.spin) * rows
             + u64::from(counts_turns) * rows * TURNS_PER_ROW;
@@ -81,7 +83,8 @@ impl Swept {
             return false;
         }
         let title = format!(
-            "too many points to check: {points}, each with {elements} springs and dampers and a spin of {rows} \
+            "too many points to check: {points}, each with {elements} springs and dampers and a \
+             spin of {rows} \
              rows"
         );
         let at = draft.origins.get("axis[0]");
@@ -100,7 +103,8 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    /// Judges what is new at a corner. Single numbers were judged where they were read; left is how they go together.
+    /// Judges what is new at a corner. Single numbers were judged where they were read; left is how
+    /// they go together.
     fn corner(&mut self, scenario: &Scenario, new: Swept, report: &mut Report) {
         if new.machine {
             self.violations(scenario.machine.joint_violations(), false, report);
@@ -123,14 +127,21 @@ impl Judge<'_> {
             let concerns = keys(&violation, of_spin);
             let judged = !concerns.iter().any(|key| self.draft.origins.is_doubtful(key));
             if judged && self.reported.insert(concerns.clone()) {
-                report.push_with(|sources| describe(&violation, &places(self.draft, &concerns, sources)));
+                report.push_with(|sources| {
+                    describe(&violation, &places(self.draft, &concerns, sources))
+                });
             }
         }
     }
 }
 
 /// A window that constants or axes have turned round, or moved past the end.
-fn window(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String>>, report: &mut Report) {
+fn window(
+    draft: &Draft,
+    scenario: &Scenario,
+    reported: &mut BTreeSet<Vec<String>>,
+    report: &mut Report,
+) {
     let [from_s, to_s] = scenario.window_s;
     let end_s = draft.plan.end_s;
     if from_s < to_s && to_s <= end_s {
@@ -149,7 +160,8 @@ fn window(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String
     report.push_with(|sources| {
         let mut diagnostic = Diagnostic::new(title);
         for (k, place) in places(draft, &concerns, sources).iter().enumerate() {
-            let label = if k == 0 { "expected window_from_s < window_to_s <= end_s" } else { "and this" };
+            let label =
+                if k == 0 { "expected window_from_s < window_to_s <= end_s" } else { "and this" };
             diagnostic = diagnostic.at(place, label);
         }
         diagnostic
@@ -157,7 +169,12 @@ fn window(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String
 }
 
 /// More turns of the drum in the window than are compared one by one.
-fn turns(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String>>, report: &mut Report) {
+fn turns(
+    draft: &Draft,
+    scenario: &Scenario,
+    reported: &mut BTreeSet<Vec<String>>,
+    report: &mut Report,
+) {
     let Some(criterion) = draft.origins.get("reliability.criterion") else { return };
     if draft.plan.measures.criterion != Criterion::Envelope {
         return;
@@ -166,7 +183,8 @@ fn turns(draft: &Draft, scenario: &Scenario, reported: &mut BTreeSet<Vec<String>
     if turns <= MOST_TURNS || !reported.insert(vec!["reliability.criterion".to_owned()]) {
         return;
     }
-    let title = format!("the drum makes {turns:.0} turns in the window, too many to compare one by one");
+    let title =
+        format!("the drum makes {turns:.0} turns in the window, too many to compare one by one");
     let expected = format!(
         "expected at most {MOST_TURNS} turns for \"{}\": shorten the window",
         Criterion::Envelope.name()
@@ -181,10 +199,14 @@ fn keys(violation: &Violation, of_spin: bool) -> Vec<String> {
     violation.concerns().into_iter().map(key).collect()
 }
 
-/// Where the concerned numbers were written: the axes that sweep them first, then files and arguments.
+/// Where the concerned numbers were written: the axes that sweep them first, then files and
+/// arguments.
 fn places(draft: &Draft, concerns: &[String], sources: &Sources) -> Vec<Location> {
     let sweeps = |parameter: &Parameter| {
-        parameter.parts(&draft.plan.machine).iter().any(|part| concerns.iter().any(|key| key == part))
+        parameter
+            .parts(&draft.plan.machine)
+            .iter()
+            .any(|part| concerns.iter().any(|key| key == part))
     };
     let axes = draft.plan.axes.iter().enumerate().filter(|(_, axis)| sweeps(&axis.parameter));
     let axes = axes.filter_map(|(k, _)| draft.origins.get(&format!("axis[{k}]")));
@@ -197,7 +219,8 @@ fn places(draft: &Draft, concerns: &[String], sources: &Sources) -> Vec<Location
             .find(|other| other.source == place.source && sources.line(other).number == line);
         match same {
             Some(other) => {
-                other.span = other.span.start.min(place.span.start)..other.span.end.max(place.span.end);
+                other.span =
+                    other.span.start.min(place.span.start)..other.span.end.max(place.span.end);
             }
             None => places.push(place.clone()),
         }
@@ -208,7 +231,11 @@ fn places(draft: &Draft, concerns: &[String], sources: &Sources) -> Vec<Location
 fn describe(violation: &Violation, places: &[Location]) -> Diagnostic {
     let mut diagnostic = Diagnostic::new(violation.to_string());
     for (k, place) in places.iter().enumerate() {
-        let label = if k == 0 { format!("expected {}", violation.expected()) } else { "and this".to_owned() };
+        let label = if k == 0 {
+            format!("expected {}", violation.expected())
+        } else {
+            "and this".to_owned()
+        };
         diagnostic = diagnostic.at(place, label);
     }
     diagnostic
@@ -216,33 +243,43 @@ fn describe(violation: &Violation, places: &[Location]) -> Diagnostic {
 
 /// A fixed step that is longer than the run, or so short that a trajectory would never end.
 pub(super) fn steps(draft: &Draft, report: &mut Report) {
-    let Integrator::Rk4 { step_s } = draft.plan.integrator else { return };
+    let Steps::Fixed(step_s) = draft.plan.integrator.steps() else { return };
     let end_s = draft.plan.end_s;
     let steps = end_s / step_s;
     let title = if step_s > end_s {
-        format!("a step of {} s is longer than the whole run, {} s", decimal(step_s), decimal(end_s))
+        format!(
+            "a step of {} s is longer than the whole run, {} s",
+            decimal(step_s),
+            decimal(end_s)
+        )
     } else if steps > MOST_STEPS {
         format!("a step of {} s makes {steps:.1e} steps to {} s", decimal(step_s), decimal(end_s))
     } else {
         return;
     };
-    let expected = format!("expected a step from {:e} s to {} s", shortest_step_s(end_s), decimal(end_s));
+    let expected =
+        format!("expected a step from {:e} s to {} s", shortest_step_s(end_s), decimal(end_s));
     let refusal = refuse_step(draft, title, &expected);
-    report
-        .push(draft.origins.get("time.end_s").into_iter().fold(refusal, |all, end| all.at(end, "and this")));
+    report.push(
+        draft
+            .origins
+            .get("time.end_s")
+            .into_iter()
+            .fold(refusal, |all, end| all.at(end, "and this")),
+    );
 }
 
-/// A machine whose fastest motion is too fast for an explicit method: for any number of steps that is accepted, or
-/// for the plan's own step. Only a sound plan can be judged.
+/// A machine whose fastest motion is too fast for an explicit method: for any number of steps that
+/// is accepted, or for the plan's own step. Only a sound plan can be judged.
 pub(super) fn stability(draft: &Draft, report: &mut Report) {
     // As a share of the longest stable step: that which the method takes at its slowest.
-    let (step_s, share) = match draft.plan.integrator {
-        Integrator::Rk4 { step_s } => (Some(step_s), 1.0),
-        Integrator::Dopri5 { .. } => (None, 1.0),
+    let (step_s, share) = match draft.plan.integrator.steps() {
+        Steps::Fixed(step_s) => (Some(step_s), 1.0),
+        Steps::Explicit => (None, 1.0),
         // No rung costs more than the reference.
-        Integrator::Rk4MassScaled { .. } => (None, REFERENCE_SHARE),
+        Steps::Checked(_) => (None, REFERENCE_SHARE),
         // Stable at any step.
-        Integrator::Rodas5p { .. } => return,
+        Steps::Implicit => return,
     };
     if !report.is_clean() {
         return;
@@ -263,7 +300,8 @@ pub(super) fn stability(draft: &Draft, report: &mut Report) {
             diagnostic.at(at, format!("expected at most {MOST_STEPS:e} steps"))
         });
         report.push(refusal.help(format!(
-            "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mass, a moment of inertia or a \
+            "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mass, a \
+             moment of inertia or a \
              stiffness that is not meant so, or use method = \"rodas5p\""
         )));
     } else if let Some(step_s) = step_s.filter(|&step_s| step_s > limit_s) {
@@ -273,13 +311,15 @@ pub(super) fn stability(draft: &Draft, report: &mut Report) {
         );
         let expected = format!("expected a step of at most {limit_s:.2e} s");
         report.push(refuse_step(draft, title, &expected).help(format!(
-            "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural frequency{at}"
+            "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural \
+             frequency{at}"
         )));
     }
 }
 
-/// The highest natural frequency of any corner's machine, at rest and turning at its greatest speed. As a rule it is
-/// that of undamped bearings against their mass. A machine without equilibrium has none, and its rows will say so.
+/// The highest natural frequency of any corner's machine, at rest and turning at its greatest
+/// speed. As a rule it is that of undamped bearings against their mass. A machine without
+/// equilibrium has none, and its rows will say so.
 fn highest_frequency_of_corners_rad_per_s(draft: &Draft) -> f64 {
     let plan = &draft.plan;
     let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
@@ -288,7 +328,8 @@ fn highest_frequency_of_corners_rad_per_s(draft: &Draft) -> f64 {
         let Scenario { machine, spin, .. } = plan.scenario_at(&values);
         let speed = spin.greatest_speed_rad_per_s(plan.end_s);
         for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
-            // Matrices without eigenvalues leave it to the run to tell whether the machine can move.
+            // Matrices without eigenvalues leave it to the run to tell whether the machine can
+            // move.
             highest = highest.max(highest_frequency_rad_per_s(&point, speed).unwrap_or(0.0));
         }
     }

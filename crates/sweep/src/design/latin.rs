@@ -1,4 +1,5 @@
-//! Latin hypercubes whose strata are dealt by a keyed permutation, so that no table of them is ever made.
+//! Latin hypercubes whose strata are dealt by a keyed permutation, so that no table of them is ever
+//! made.
 
 use super::{axis_key, mixed};
 
@@ -12,8 +13,9 @@ pub(super) fn place(point: u64, points: u64, axis: usize, seed: u64) -> f64 {
     place.min(1.0 - f64::EPSILON / 2.0)
 }
 
-/// A permutation of `0..length`: a Feistel network over the next even number of bits, walked along until it lands inside
-/// (J. Black, P. Rogaway, Ciphers with arbitrary finite domains, CT-RSA 2002, method 2). At most four steps on average.
+/// A permutation of `0..length`: a Feistel network over the next even number of bits, walked along
+/// until it lands inside (J. Black, P. Rogaway, Ciphers with arbitrary finite domains, CT-RSA 2002,
+/// method 2). At most four steps on average.
 fn permuted(index: u64, length: u64, key: u64) -> u64 {
     const ROUNDS: u64 = 6;
     let bits = u64::BITS - length.saturating_sub(1).leading_zeros();
@@ -51,8 +53,9 @@ mod tests {
     fn every_stratum_of_every_axis_holds_one_point() {
         for points in [1, 2, 37, 512] {
             for axis in 0..5 {
-                let mut strata: Vec<u64> =
-                    (0..points).map(|i| (place(i, points, axis, 3) * points as f64) as u64).collect();
+                let mut strata: Vec<u64> = (0..points)
+                    .map(|i| (place(i, points, axis, 3) * points as f64) as u64)
+                    .collect();
                 strata.sort_unstable();
                 assert_eq!(strata, (0..points).collect::<Vec<_>>());
             }
@@ -61,7 +64,8 @@ mod tests {
 
     #[test]
     fn axes_and_seeds_are_dealt_apart() {
-        let column = |axis, seed| (0..1000).map(|i| place(i, 1000, axis, seed)).collect::<Vec<f64>>();
+        let column =
+            |axis, seed| (0..1000).map(|i| place(i, 1000, axis, seed)).collect::<Vec<f64>>();
         let correlation = |a: &[f64], b: &[f64]| {
             let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - 0.5) * (b - 0.5)).sum();
             sum / 1000.0 * 12.0

@@ -1,19 +1,23 @@
-//! Designs: points that fill a box of parameters more evenly than chance, or as listed, in place of a grid.
+//! Designs: points that fill a box of parameters more evenly than chance, or as listed, in place of
+//! a grid.
 //!
-//! A point's place is a pure function of design and index: any shard, any resumed run, any machine finds the same.
+//! A point's place is a pure function of design and index: any shard, any resumed run, any machine
+//! finds the same.
 
 mod latin;
 mod sobol;
 
-pub use sobol::MOST_AXES;
+pub(crate) use sobol::MOST_AXES;
 
 /// How the points of a plan are laid out, if not as a grid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Design {
-    /// Every axis cut into as many strata as there are points, one point in each, at random within it.
+    /// Every axis cut into as many strata as there are points, one point in each, at random within
+    /// it.
     ///
-    /// M. D. McKay, R. J. Beckman, W. J. Conover, A comparison of three methods for selecting values of input variables
-    /// in the analysis of output from a computer code, Technometrics 21 (1979), 239-245.
+    /// M. D. McKay, R. J. Beckman, W. J. Conover, A comparison of three methods for selecting
+    /// values of input variables in the analysis of output from a computer code, Technometrics 21
+    /// (1979), 239-245.
     LatinHypercube {
         /// How many points.
         points: u64,
@@ -43,9 +47,9 @@ impl Design {
     #[must_use]
     pub const fn points(&self) -> u64 {
         match self {
-            Self::LatinHypercube { points, .. } | Self::Sobol { points, .. } | Self::List { points, .. } => {
-                *points
-            }
+            Self::LatinHypercube { points, .. }
+            | Self::Sobol { points, .. }
+            | Self::List { points, .. } => *points,
         }
     }
 
@@ -59,8 +63,8 @@ impl Design {
         }
     }
 
-    /// Where point `point` lies along axis `axis`, strictly between 0 and 1; `None` for a list, whose axes hold the
-    /// values themselves.
+    /// Where point `point` lies along axis `axis`, strictly between 0 and 1; `None` for a list,
+    /// whose axes hold the values themselves.
     #[must_use]
     pub fn place(&self, point: u64, axis: usize) -> Option<f64> {
         match *self {
@@ -71,8 +75,8 @@ impl Design {
     }
 }
 
-/// A well-mixed 64-bit function of its argument: the finaliser of SplitMix64 (G. L. Steele, D. Lea, C. H. Flood, Fast
-/// splittable pseudorandom number generators, OOPSLA 2014).
+/// A well-mixed 64-bit function of its argument: the finaliser of SplitMix64 (G. L. Steele, D. Lea,
+/// C. H. Flood, Fast splittable pseudorandom number generators, OOPSLA 2014).
 const fn mixed(x: u64) -> u64 {
     let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -3,14 +3,15 @@
 use super::axis_key;
 
 /// Axes that there are direction numbers for.
-pub const MOST_AXES: usize = 32;
+pub(crate) const MOST_AXES: usize = 32;
 
 /// Bits of a coordinate, and of an index: the sequence has 2^32 points.
 const BITS: usize = 32;
 
-/// Degree s, coefficients a and first direction numbers m of the primitive polynomial of each dimension from the second
-/// on: the beginning of `new-joe-kuo-6.21201`, S. Joe, F. Y. Kuo, Constructing Sobol sequences with better
-/// two-dimensional projections, SIAM J. Sci. Comput. 30 (2008), 2635-2654.
+/// Degree s, coefficients a and first direction numbers m of the primitive polynomial of each
+/// dimension from the second on: the beginning of `new-joe-kuo-6.21201`, S. Joe, F. Y. Kuo,
+/// Constructing Sobol sequences with better two-dimensional projections, SIAM J. Sci. Comput. 30
+/// (2008), 2635-2654.
 #[rustfmt::skip]
 const JOE_KUO: [(u32, &[u32]); MOST_AXES - 1] = [
     (0, &[1]),
@@ -82,17 +83,18 @@ const fn directions() -> [[u32; BITS]; MOST_AXES] {
     v
 }
 
-/// Coordinate `axis` of point `point`, as a fraction of 2^32. Beyond the 2^32 points there are, and the axes, it repeats.
+/// Coordinate `axis` of point `point`, as a fraction of 2^32. Beyond the 2^32 points there are, and
+/// the axes, it repeats.
 fn coordinate(point: u64, axis: usize) -> u32 {
     let directions = &DIRECTIONS[axis % MOST_AXES];
     (0..BITS).filter(|bit| point >> bit & 1 == 1).fold(0, |x, bit| x ^ directions[bit])
 }
 
-/// Owen's scrambling: each bit is flipped or not by a hash of the bits before it, which is what a hash that carries only
-/// upwards does to reversed bits.
+/// Owen's scrambling: each bit is flipped or not by a hash of the bits before it, which is what a
+/// hash that carries only upwards does to reversed bits.
 ///
-/// B. Burley, Practical hash-based Owen scrambling, J. Computer Graphics Techniques 9 (2020), 1-20; after S. Laine and
-/// T. Karras (2011), with the constants that N. Vegdahl found to mix better.
+/// B. Burley, Practical hash-based Owen scrambling, J. Computer Graphics Techniques 9 (2020), 1-20;
+/// after S. Laine and T. Karras (2011), with the constants that N. Vegdahl found to mix better.
 const fn scrambled(x: u32, seed: u32) -> u32 {
     let mut x = x.reverse_bits();
     x ^= x.wrapping_mul(0x3D20_ADEA);
@@ -116,8 +118,8 @@ mod tests {
 
     #[test]
     fn the_sequence_begins_as_published() {
-        // The first eight points in three dimensions, as Joe and Kuo's own program prints them (its Gray code order
-        // permutes within the eight).
+        // The first eight points in three dimensions, as Joe and Kuo's own program prints them (its
+        // Gray code order permutes within the eight).
         let points: Vec<[f64; 3]> = (0..8)
             .map(|i| [0, 1, 2].map(|axis| f64::from(coordinate(i, axis)) * 2.0_f64.powi(-32)))
             .collect();
@@ -155,7 +157,10 @@ mod tests {
         for columns in 0..=8_u32 {
             let (across, up) = (f64::from(1_u32 << columns), f64::from(1_u32 << (8 - columns)));
             let mut cells: Vec<u32> = (0..256)
-                .map(|i| ((place(i, 0, 9) * across) as u32) << (8 - columns) | (place(i, 1, 9) * up) as u32)
+                .map(|i| {
+                    ((place(i, 0, 9) * across) as u32) << (8 - columns)
+                        | (place(i, 1, 9) * up) as u32
+                })
                 .collect();
             cells.sort_unstable();
             assert_eq!(cells, (0..256).collect::<Vec<_>>(), "{columns}");

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use washer_model::{Course, ModelKind, Point};
 
-use super::ladder::{Ladder, Level};
-use super::pool::Kind;
+use super::ladder::Ladder;
+use super::pool::ModelRung;
 use crate::measures::{Metric, TURN_FLOOR};
+use crate::method::Level;
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::plan::Plan;
 use crate::verdict::Verdict;
@@ -26,17 +27,20 @@ const SURE: f64 = 2.0;
 /// A model whose error times this is less than the margin is not what leaves the side in doubt.
 const SHARE: f64 = 4.0;
 
-/// An amplitude is within this many times the difference of two runs that have left their common course.
+/// An amplitude is within this many times the difference of two runs that have left their common
+/// course.
 const ROUGHLY: f64 = 2.0;
 
-/// Fail times that differ by less than this share of the run are one.
-const SAME_TIME: f64 = 0.01;
+/// Fail times that differ by less than this share of the run are one. Where a trajectory fails for
+/// a step that is too long, the times at two steps differ by more: by 6e-4 was seen.
+const SAME_TIME: f64 = 1e-4;
 
-/// Differences of metrics are shares of the greater of their value and this part of what they are measured against.
+/// Differences of metrics are shares of the greater of their value and this part of what they are
+/// measured against.
 const METRIC_FLOOR: f64 = 1e-3;
 
-/// Differences of a turn's peak count so many times. Where it lies beside the turn's cut, it errs with the phase of the motion,
-/// and shrinks less from rung to rung than the motion's error does.
+/// Differences of a turn's peak count so many times. Where it lies beside the turn's cut, it errs
+/// with the phase of the motion, and shrinks less from rung to rung than the motion's error does.
 const TURN_WEIGHT: f64 = 3.0;
 
 /// Both models in the order in which this module holds them.
@@ -44,9 +48,11 @@ pub(super) const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Line
 
 /// A trajectory as a rung gave it.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Run {
+pub(super) struct RungRun {
     pub(super) trajectory: Trajectory,
     pub(super) course: Course,
+    /// By how much the time of clash may be off for what capped rungs leave out (s).
+    pub(super) clash_doubt_s: Option<f64>,
 }
 
 /// One model's trajectory on its ladder.
@@ -55,7 +61,7 @@ struct Climb {
     /// The rung of `run`.
     rung: usize,
     /// The last run.
-    run: Option<Run>,
+    run: Option<RungRun>,
     /// The error left in it; absent where nothing says so.
     error: Option<f64>,
     /// How far the numbers of the row were from those of the run before.
@@ -63,13 +69,21 @@ struct Climb {
 }
 
 impl Climb {
-    fn take(&mut self, rung: usize, now: Run, ladder: &Ladder, point: &Point, model: ModelKind, plan: &Plan) {
+    fn take(
+        &mut self,
+        rung: usize,
+        now: RungRun,
+        ladder: &Ladder,
+        point: &Point,
+        model: ModelKind,
+        plan: &Plan,
+    ) {
         let Some(before) = self.run.take() else {
             (self.rung, self.run) = (rung, Some(now));
             return;
         };
         let found = difference(&before, &now, point, model, plan);
-        let unseen = unseen(&now.trajectory, ladder.rungs[rung].level, point, plan);
+        let unseen = unseen(&now, ladder.rungs[rung].level, point, plan);
         self.error = found.map(|found| ladder.error_left(rung, found.greatest()).max(unseen));
         self.spread = found.map(|found| found.of_numbers);
         (self.rung, self.run) = (rung, Some(now));
@@ -86,7 +100,7 @@ impl Climb {
 }
 
 /// A point's row in the making.
-pub(super) struct Row {
+pub(super) struct Climber {
     /// What the caller knows it by.
     pub(super) id: u64,
     /// Or why there is none.
@@ -101,18 +115,25 @@ pub(super) struct Row {
 /// What a row needs next.
 pub(super) enum Next {
     /// These runs.
-    Runs(Vec<Kind>),
+    Runs(Vec<ModelRung>),
     /// Nothing.
     Done(Box<Outcome>),
 }
 
-impl Row {
+impl Climber {
     pub(super) fn new(id: u64, point: Result<Arc<Point>, Status>) -> Self {
         Self { id, point, climbs: Default::default(), pending: 0, came_as: 0 }
     }
 
     /// A run of a model that was asked for.
-    pub(super) fn take(&mut self, model: usize, rung: usize, run: Run, ladder: &Ladder, plan: &Plan) {
+    pub(super) fn take(
+        &mut self,
+        model: usize,
+        rung: usize,
+        run: RungRun,
+        ladder: &Ladder,
+        plan: &Plan,
+    ) {
         self.pending -= 1;
         if let Ok(point) = &self.point {
             self.climbs[model].take(rung, run, ladder, point, MODELS[model], plan);
@@ -120,17 +141,27 @@ impl Row {
     }
 
     /// What is to be done once nothing is pending.
-    pub(super) fn next(&mut self, ladders: &[Ladder; 2], demand: Demand, accuracy: f64, plan: &Plan) -> Next {
+    pub(super) fn next(
+        &mut self,
+        ladders: &[Ladder; 2],
+        demand: Demand,
+        accuracy: f64,
+        plan: &Plan,
+    ) -> Next {
         if let Err(status) = self.point {
             let none = || Trajectory::failed(status);
-            let outcome =
-                Outcome { method: ladders[0].rungs[0].level, ..Outcome::new(self.id, none(), none()) };
+            let outcome = Outcome {
+                method: ladders[0].rungs[0].level,
+                ..Outcome::new(self.id, none(), none())
+            };
             return Next::Done(Box::new(outcome));
         }
         let outcome = self.outcome(ladders, accuracy, plan);
         let margin = outcome.as_ref().and_then(|outcome| margin(outcome, plan));
         let is_sure = |climb: &Climb| match (demand, margin) {
-            (Demand::Side, Some(margin)) => climb.roughly().is_some_and(|error| SURE * error <= margin),
+            (Demand::Side, Some(margin)) => {
+                climb.roughly().is_some_and(|error| SURE * error <= margin)
+            }
             _ => false,
         };
         let higher = |(model, climb): (usize, &Climb)| {
@@ -143,11 +174,15 @@ impl Row {
         let errors: f64 = self.climbs.iter().filter_map(|climb| climb.error).sum();
         if let Some(margin) = margin.filter(|margin| *margin <= errors) {
             for (model, climb) in self.climbs.iter().enumerate() {
-                let Some(top) = ladders[model].top().filter(|top| climb.rung < *top) else { continue };
+                let Some(top) = ladders[model].top().filter(|top| climb.rung < *top) else {
+                    continue;
+                };
                 match demand {
-                    // By way of its first step: only RK4 against RK4 tells chaos from a coarse rung.
+                    // By way of its first step: only RK4 against RK4 tells chaos from a coarse
+                    // rung.
                     Demand::Row => runs.push((model, (climb.rung + 1).max(top - 1))),
-                    // Of the side alone, the next rung may make sure: where it cannot, the one after.
+                    // Of the side alone, the next rung may make sure: where it cannot, the one
+                    // after.
                     Demand::Side if climb.error.is_some_and(|error| SHARE * error > margin) => {
                         runs.push((model, climb.rung + 1));
                     }
@@ -172,7 +207,8 @@ impl Row {
             let is_chaotic = |climb: &Climb, top: usize| {
                 climb.rung == top && climb.error.is_none_or(|error| error > accuracy)
             };
-            outcome.sensitive = Some(is_chaotic(nonlinear, nonlinear_top) || is_chaotic(linear, linear_top));
+            outcome.sensitive =
+                Some(is_chaotic(nonlinear, nonlinear_top) || is_chaotic(linear, linear_top));
             let errors = nonlinear.error.zip(linear.error);
             outcome.error = errors.map(|(nonlinear, linear)| nonlinear.max(linear));
         }
@@ -221,7 +257,13 @@ impl Difference {
 }
 
 /// How far two runs are apart; `None` if one of them failed, or both at different times.
-fn difference(a: &Run, b: &Run, point: &Point, model: ModelKind, plan: &Plan) -> Option<Difference> {
+fn difference(
+    a: &RungRun,
+    b: &RungRun,
+    point: &Point,
+    model: ModelKind,
+    plan: &Plan,
+) -> Option<Difference> {
     let (of_a, of_b) = (&a.trajectory, &b.trajectory);
     if of_a.status != of_b.status {
         return None;
@@ -234,20 +276,35 @@ fn difference(a: &Run, b: &Run, point: &Point, model: ModelKind, plan: &Plan) ->
     Some(Difference { of_course, of_numbers: of_numbers(of_a, of_b, point, plan) })
 }
 
-/// The error that rungs of this level have in common, so that no comparison shows it: bearings and hinge that are left swinging.
-fn unseen(numbers: &Trajectory, level: Level, point: &Point, plan: &Plan) -> f64 {
-    let swings = match level {
-        Level::Fast | Level::Fine | Level::Finest => point.ringing(),
-        Level::Rk4 | Level::Dopri5 | Level::Rodas5p => return 0.0,
-    };
+/// The error that rungs of this level have in common, so that no comparison shows it: bearings and
+/// hinge that are left swinging.
+fn unseen(run: &RungRun, level: Level, point: &Point, plan: &Plan) -> f64 {
+    if !level.is_capped() {
+        return 0.0;
+    }
+    let numbers = &run.trajectory;
+    let swings = point.ringing();
     let share = |swing: f64, of: f64| if swing == 0.0 { 0.0 } else { swing / of };
     let channels = &plan.reliability.channels;
     let of_amplitudes = channels.iter().zip(&numbers.amplitudes);
     let of_amplitudes = of_amplitudes.map(|(channel, of)| share(swings[channel.index()], *of));
     let of_turns = numbers.turns.iter().flat_map(|turn| {
-        channels.iter().map(|channel| share(swings[channel.index()], turn[channel.index()].max(TURN_FLOOR)))
+        channels
+            .iter()
+            .map(|channel| share(swings[channel.index()], turn[channel.index()].max(TURN_FLOOR)))
     });
-    of_amplitudes.chain(of_turns).fold(0.0, f64::max)
+    let metrics = plan.measures.of_model().zip(&numbers.metrics);
+    let clash_s = metrics.filter(|(metric, _)| *metric == Metric::ClashTime).map(|(_, time)| *time);
+    let of_clash = clash_s
+        .zip(run.clash_doubt_s)
+        .map(|(time_s, doubt_s)| doubt_s / time_s.max(clash_floor_s(plan)));
+    of_amplitudes.chain(of_turns).chain(of_clash).fold(0.0, f64::max)
+}
+
+/// A clash that just happens is a time that just is not zero: shorter ones are compared with this.
+fn clash_floor_s(plan: &Plan) -> f64 {
+    let [from_s, to_s] = plan.window_s;
+    METRIC_FLOOR * (to_s - from_s)
 }
 
 /// The greatest relative difference of what a row takes from two trajectories.
@@ -266,11 +323,9 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, plan: &Plan) -> f64
     if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
         compare(a, b, point.clearance_m());
     }
-    let [from_s, to_s] = plan.window_s;
     for ((a, b), metric) in a.metrics.iter().zip(&b.metrics).zip(plan.measures.of_model()) {
         let least = match metric {
-            // A clash that just happens is a time that just is not zero.
-            Metric::ClashTime => METRIC_FLOOR * (to_s - from_s),
+            Metric::ClashTime => clash_floor_s(plan),
             Metric::CabinetForce | Metric::StaticSag => 0.0,
         };
         compare(*a, *b, least);

@@ -1,9 +1,11 @@
-//! The fast method's promises, held against plain RK4: on the paper's map, with the channels and windows that once hid errors, and
-//! on other machines. `examples/attack.rs` looks for exceptions at random.
+//! The fast method's promises, held against plain RK4: on the paper's map, with the channels and
+//! windows that once hid errors, and on other machines. `examples/attack.rs` looks for exceptions
+//! at random.
 
 use rayon::prelude::*;
 
 use super::*;
+use crate::method::{Integrator, Level};
 use crate::verdict::Verdict;
 
 fn load(text: &str) -> Plan {
@@ -30,11 +32,15 @@ fn error(a: &Outcome, b: &Outcome) -> f64 {
     let models = [(&a.nonlinear, &b.nonlinear), (&a.linear, &b.linear)];
     let amplitudes = models.into_iter().flat_map(|(a, b)| a.amplitudes.iter().zip(&b.amplitudes));
     let turns = a.turn_ratios.iter().flatten().zip(b.turn_ratios.iter().flatten());
-    amplitudes.map(|(a, b)| relative(*a, *b)).chain(turns.map(|(a, b)| relative(*a, *b))).fold(0.0, f64::max)
+    amplitudes
+        .map(|(a, b)| relative(*a, *b))
+        .chain(turns.map(|(a, b)| relative(*a, *b)))
+        .fold(0.0, f64::max)
 }
 
-/// Runs a plan by the fast method and by plain RK4 at 2e-4 s. Verdicts are the same, and amplitudes of every row that is not
-/// flagged within the accuracy; few rows are flagged, and only such where RK4 at another step differs.
+/// Runs a plan by the fast method and by plain RK4 at 2e-4 s. Verdicts are the same, and amplitudes
+/// of every row that is not flagged within the accuracy; few rows are flagged, and only such where
+/// RK4 at another step differs.
 fn hold_against_rk4(plan: &Plan, accuracy: f64) -> Vec<Outcome> {
     let fast = Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
     let at = |step_s: f64| rows(&Plan { integrator: Integrator::Rk4 { step_s }, ..plan.clone() });
@@ -46,7 +52,11 @@ fn hold_against_rk4(plan: &Plan, accuracy: f64) -> Vec<Outcome> {
         }
         assert_eq!(reliable(plan, row), reliable(plan, expected), "{}: {row:?}", plan.name);
         let error = error(row, expected);
-        assert!(error <= accuracy, "{}: error {error:e} of {row:?} against {expected:?}", plan.name);
+        assert!(
+            error <= accuracy,
+            "{}: error {error:e} of {row:?} against {expected:?}",
+            plan.name
+        );
     }
     rows
 }
@@ -65,10 +75,12 @@ fn every_row_of_fig12_is_that_of_rk4_or_flagged() {
 
 #[test]
 fn one_channel_alone_hides_nothing() {
-    // With all channels the yaw's ratio shows what these rows do; with the tub's front alone an early peak hides it.
+    // With all channels the yaw's ratio shows what these rows do; with the tub's front alone an
+    // early peak hides it.
     let points = [(0.7, 60.0, 2.0012), (1.0, 67.5, 2.2821), (0.9, 60.0, 1.976)];
     let plan = load(
-        "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = 50\nwindow_s = [30, 50]\n\
+        "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = \
+         50\nwindow_s = [30, 50]\n\
          [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.7, 1.0]\n\
          [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [60, 67.5]\n\
          [reliability]\nchannels = [\"tub_front_y\"]\n",
@@ -78,7 +90,10 @@ fn one_channel_alone_hides_nothing() {
         let row = &engine.evaluate_at(&[vec![mass_kg, damping]])[0];
         let found = Verdict::new(row, 1, 2.0).greatest.unwrap().1;
         // By an independent program.
-        assert!((found / ratio - 1.0).abs() < 1e-3, "{mass_kg} kg, {damping} N s/m: {found} for {ratio}");
+        assert!(
+            (found / ratio - 1.0).abs() < 1e-3,
+            "{mass_kg} kg, {damping} N s/m: {found} for {ratio}"
+        );
     }
 }
 
@@ -94,11 +109,17 @@ fn rows_are_rk4s_on_other_machines() {
         "damper_1_damping_n_s_per_m = 60\nspring_2_stiffness_n_per_m = 6000\ndrum_mass_kg = 5",
     ];
     for (k, set) in machines.into_iter().enumerate() {
-        let axis = if set.contains("damper_1") { "damper_2_damping_n_s_per_m" } else { "damping_n_s_per_m" };
+        let axis = if set.contains("damper_1") {
+            "damper_2_damping_n_s_per_m"
+        } else {
+            "damping_n_s_per_m"
+        };
         let plan = load(&format!(
-            "name = \"machine-{k}\"\n[set]\n{set}\n[spin]\nprofile = \"ramp\"\npeak_rpm = 350\nramp_s = 12\n\
+            "name = \"machine-{k}\"\n[set]\n{set}\n[spin]\nprofile = \"ramp\"\npeak_rpm = \
+             350\nramp_s = 12\n\
              [time]\nend_s = 14\nwindow_s = [4, 14]\n\
-             [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.2, count = 6 }}\n\
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.2, count \
+             = 6 }}\n\
              [[axis]]\nparameter = \"{axis}\"\nrange = {{ from = 40, to = 240, count = 5 }}\n"
         ));
         for accuracy in [1e-3, 1e-5] {
@@ -111,11 +132,15 @@ fn rows_are_rk4s_on_other_machines() {
 fn rows_by_other_criteria_are_rk4s() {
     for criterion in ["envelope", "rms"] {
         let plan = load(&format!(
-            "name = \"{criterion}\"\nmetrics = [\"cabinet_force\", \"static_sag\", \"clash_time\"]\n\
+            "name = \"{criterion}\"\nmetrics = \
+             [\"cabinet_force\", \"static_sag\", \"clash_time\"]\n\
              [set]\nradial_clearance_m = 5e-4\n\
-             [spin]\nprofile = \"ramp\"\npeak_rpm = 350\nramp_s = 12\n[time]\nend_s = 14\nwindow_s = [4, 14]\n\
-             [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.2, count = 6 }}\n\
-             [[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = {{ from = 40, to = 240, count = 5 }}\n\
+             [spin]\nprofile = \"ramp\"\npeak_rpm = 350\nramp_s = 12\n[time]\nend_s = \
+             14\nwindow_s = [4, 14]\n\
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.2, count \
+             = 6 }}\n\
+             [[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = {{ from = 40, to = 240, count = \
+             5 }}\n\
              [reliability]\ncriterion = \"{criterion}\"\n"
         ));
         let rows = hold_against_rk4(&plan, 1e-3);
@@ -128,16 +153,23 @@ fn rows_by_other_criteria_are_rk4s() {
                 row.nonlinear.turns.is_empty() && row.linear.turns.is_empty(),
                 "nothing is held for long"
             );
-            assert!(row.static_sag_m.is_some_and(|sag_m| (0.012..0.016).contains(&sag_m)), "{row:?}");
+            assert!(
+                row.static_sag_m.is_some_and(|sag_m| (0.012..0.016).contains(&sag_m)),
+                "{row:?}"
+            );
             let [force_n, clash_s] = row.nonlinear.metrics[..] else { panic!("{row:?}") };
             assert!(force_n > 300.0 && (0.0..=10.0).contains(&clash_s), "{row:?}");
             assert!(clash_s == 0.0 || row.nonlinear.min_gap_m.unwrap() < 0.0, "{row:?}");
             if criterion == "rms" {
                 let smaller = row.linear.amplitudes.iter().zip(&peak.linear.amplitudes);
-                assert!(smaller.into_iter().all(|(rms, peak)| 0.1 * peak < *rms && rms < peak), "{row:?}");
+                assert!(
+                    smaller.into_iter().all(|(rms, peak)| 0.1 * peak < *rms && rms < peak),
+                    "{row:?}"
+                );
                 continue;
             }
-            // In the turn in which the nonlinear motion is greatest the linear one is at most as great as it ever is.
+            // In the turn in which the nonlinear motion is greatest the linear one is at most as
+            // great as it ever is.
             let of_peaks = Verdict::new(peak, 6, 2.0).ratios;
             for (by_turn, of_peaks) in row.turn_ratios.iter().zip(of_peaks) {
                 assert!(by_turn.unwrap() > 0.99 * of_peaks.unwrap(), "{row:?}");
@@ -183,9 +215,11 @@ fn a_side_is_that_of_the_row() {
     let engine = ModelEngine::new(&plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
     let interrupt = Interrupt::new();
-    let sides = engine.evaluate_for(&values, Demand::Side, &|_| {}, &Watch::new(&interrupt)).unwrap();
+    let sides =
+        engine.evaluate_for(&values, Demand::Side, &|_| {}, &Watch::new(&interrupt)).unwrap();
     let rows = engine.evaluate_at(&values);
-    let steps = |outcomes: &[Outcome]| outcomes.iter().map(|outcome| outcome.nonlinear.steps).sum::<u64>();
+    let steps =
+        |outcomes: &[Outcome]| outcomes.iter().map(|outcome| outcome.nonlinear.steps).sum::<u64>();
     assert!(steps(&sides) < steps(&rows));
     for (side, row) in sides.iter().zip(&rows) {
         assert_eq!(reliable(&plan, side), reliable(&plan, row), "{side:?}");

@@ -1,11 +1,14 @@
-//! The fast method as a ladder: the same trajectory by finer and finer rungs, until two of them agree.
+//! The fast method as a ladder: the same trajectory by finer and finer rungs, until two of them
+//! agree.
 //!
-//! The lower rungs cap the modes of bearings and hinge (`washer_model::Cases`), each for a smaller error than the one
-//! before; the last two are plain RK4 at two steps, the shorter one the reference. What a rung leaves of error shows in how far its
-//! trajectory is from the rung's before: the first-order difference of the two, over the whole course of the motion and in every
-//! number of the row. The rule knows by how much the rung's error is smaller than that of the one before, so the difference times
-//! that share is the error left, as long as errors are small enough to be of first order. Motions that pass through bands of
-//! instability amplify errors a thousandfold and climb; motions that are chaotic climb to the top, where RK4 does not agree with
+//! The lower rungs cap the modes of bearings and hinge (`washer_model::Cases`), each for a smaller
+//! error than the one before; the last two are plain RK4 at two steps, the shorter one the
+//! reference. What a rung leaves of error shows in how far its trajectory is from the rung's
+//! before: the first-order difference of the two, over the whole course of the motion and in every
+//! number of the row. The rule knows by how much the rung's error is smaller than that of the one
+//! before, so the difference times that share is the error left, as long as errors are small enough
+//! to be of first order. Motions that pass through bands of instability amplify errors a
+//! thousandfold and climb; motions that are chaotic climb to the top, where RK4 does not agree with
 //! itself.
 //!
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
@@ -15,64 +18,32 @@ use std::fmt;
 use lane_ode::dop853::DOP853_STABILITY_LIMIT;
 use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind};
 
-/// Which rung a row's numbers come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Level {
-    /// The lowest rung that a row may hold: bearings and hinge with capped modes.
-    Fast,
-    /// The same with less error.
-    Fine,
-    /// The same with shorter steps and higher caps.
-    Finest,
-    /// Plain RK4.
-    Rk4,
-    /// Dormand-Prince 5(4).
-    Dopri5,
-    /// Rodas5P.
-    Rodas5p,
-}
+use crate::method::{Level, REFERENCE_SHARE};
 
-impl Level {
-    /// Every level; the position is its code in chunk files, so new ones go to the end.
-    pub const ALL: [Self; 6] = [Self::Fast, Self::Fine, Self::Finest, Self::Rk4, Self::Dopri5, Self::Rodas5p];
-
-    /// As in the file.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Fast => "fast",
-            Self::Fine => "fine",
-            Self::Finest => "finest",
-            Self::Rk4 => "rk4",
-            Self::Dopri5 => "dopri5",
-            Self::Rodas5p => "rodas5p",
-        }
-    }
-}
-
-/// Step of the reference method, where the machine allows it (s): amplitudes are converged to about 1e-9.
+/// Step of the reference method, where the machine allows it (s): amplitudes are converged to about
+/// 1e-9.
 const REFERENCE_STEP_S: f64 = 2e-4;
-
-/// Share of the longest stable step that the reference method may use.
-pub(crate) const REFERENCE_SHARE: f64 = 0.75;
 
 /// Step of plain RK4 where it is run first, as a multiple of the reference's.
 const LONGER_STEP: f64 = 1.25;
 
-/// Error of the reference as a share of its difference from that: 1 / (1.25^4 - 1).
-const REFERENCE_CONTRACTION: f64 = 0.7;
+/// Error of the reference as a share of its difference from that: 1 / (1.25^4 - 1) = 0.7 where it
+/// is of fourth order. Nearly chaotic motions keep to no order; 3.3 was seen.
+const REFERENCE_CONTRACTION: f64 = 4.0;
 
 /// A finest rung is climbed if it costs less than this share of the reference.
 const WORTH_IT: f64 = 0.5;
 
-/// For what error the capped rungs are chosen, in parts of the accuracy. The first one only shows the error of the second.
+/// For what error the capped rungs are chosen, in parts of the accuracy. The first one only shows
+/// the error of the second.
 ///
-/// The linear model amplifies nothing: its first rung may be coarser, its second needs less in reserve, and a third is
-/// hardly ever asked for.
+/// The linear model amplifies nothing: its first rung may be coarser, and a third is hardly ever
+/// asked for. Its second holds the row, and what a capped hinge does to motions that do not turn
+/// with the drum is more than the rule expects where a run-up is short: ten times was seen.
 const fn aims(model: ModelKind) -> (Formula, &'static [f64]) {
     match model {
         ModelKind::Nonlinear => (Formula::Dop853, &[10.0, 0.15, 0.01]),
-        ModelKind::Linear => (Formula::Rk4, &[100.0, 0.3]),
+        ModelKind::Linear => (Formula::Rk4, &[100.0, 0.12]),
     }
 }
 
@@ -94,9 +65,13 @@ const fn first_order(model: ModelKind) -> f64 {
 /// smaller by orders of magnitude.
 const FIRST_ORDER_OF_RK4: f64 = 0.2;
 
-/// Error of plain RK4 at its longer step as a share of its difference from the finest capped rung. Mostly it is far less;
-/// 0.013 was seen where the motion is amplified.
+/// Error of plain RK4 at its longer step as a share of its difference from the finest capped rung.
+/// Mostly it is far less; 0.013 was seen where the motion is amplified.
 const CONTRACTION_TO_RK4: f64 = 0.02;
+
+/// A contraction that the rule expects, and that does not follow from steps and caps, is not
+/// believed below this.
+const LEAST_EXPECTED_SHARE: f64 = 5e-3;
 
 /// A contraction better than this is not believed.
 const BEST_CONTRACTION: f64 = 1e-3;
@@ -136,7 +111,8 @@ impl fmt::Display for Rung {
                 }
             }
             Method::Rk4 { step_s } => write!(f, "{name} (step {:.3} ms)", 1e3 * step_s),
-            Method::Dopri5(_) | Method::Rodas5p(_) => write!(f, "{name}"),
+            // Methods outside the fast one's ladder are named, without their settings.
+            _ => write!(f, "{name}"),
         }
     }
 }
@@ -188,48 +164,58 @@ impl Ladder {
 
 /// The rungs with capped modes, if any are worth their time.
 ///
-/// How much less a rung errs than the one before: the greatest share that is left of any part of an error, with something in
-/// reserve. For the linear model, whose first rung is of another formula and held short by truncation alone, it is what
-/// the rule expects. Corners without an equilibrium or without modes are rows that say so; the rest climbs by plain RK4.
+/// How much less a rung errs than the one before: the greatest share that is left of any part of an
+/// error, with something in reserve. For the linear model, whose first rung is of another formula
+/// and held short by truncation alone, it is what the rule expects. Corners without an equilibrium
+/// or without modes are rows that say so; the rest climbs by plain RK4.
 fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
     let (first_formula, aims) = aims(model);
-    let mut rungs: Vec<Rung> = Vec::new();
-    let mut last: Option<(Geared, f64)> = None;
-    let mut push = |level: Level, geared: Geared, expected: f64| {
-        let contraction = match last {
-            None => 1.0,
-            Some((before, error)) if before.formula != geared.formula => expected / error,
-            Some((before, _)) => reserve(rungs.len()) * geared.share_of_error(&before),
+    let mut chosen: Vec<(Level, Geared)> = Vec::new();
+    for (level, aim) in [Level::Fast, Level::Fast, Level::Fine].into_iter().zip(aims) {
+        let is_first = chosen.is_empty();
+        let formula = if is_first { first_formula } else { Formula::Dop853 };
+        // One gear after the first: what instability amplifies later is small while the drum is
+        // slow, and a window may end early.
+        let found = match is_first {
+            true => cases.choose(formula, aim * accuracy),
+            false => cases.choose_steady(formula, aim * accuracy),
         };
-        let contraction = contraction.clamp(BEST_CONTRACTION, 1.0);
-        let method = Method::Geared(geared);
-        rungs.push(Rung { level, method, contraction, believed_to: first_order(model) });
-        last = Some((geared, expected));
-    };
-    let mut finest = None;
-    for (place, (level, aim)) in [Level::Fast, Level::Fast, Level::Fine].into_iter().zip(aims).enumerate() {
-        let formula = if place == 0 { first_formula } else { Formula::Dop853 };
-        let Ok(Some(mut geared)) = cases.choose(formula, aim * accuracy) else { break };
-        let Ok(expected) = cases.expected_error(&geared) else { break };
-        if place > 0 {
-            // One gear: what instability amplifies later is small while the drum is slow, and a window may end early.
-            geared = Geared::steady(formula, geared.top().step_s, geared.top().caps);
-        }
-        push(level, geared, expected);
-        finest = Some((refined(&geared), expected));
+        let Ok(Some(geared)) = found else { break };
+        chosen.push((level, geared));
     }
     let plain_evaluations_per_s = Formula::Rk4.evaluations_per_s(reference_step_s(cases));
-    if let Some((finest, expected)) = finest
-        && finest.formula == Formula::Dop853
-        && finest.evaluations_per_s() < WORTH_IT * plain_evaluations_per_s
-    {
-        push(Level::Finest, finest, expected);
-    }
-    rungs
+    let finest = chosen
+        .last()
+        .filter(|(_, last)| last.formula == Formula::Dop853)
+        .map(|(_, last)| refined(last));
+    let finest = finest.filter(|it| it.evaluations_per_s() < WORTH_IT * plain_evaluations_per_s);
+    chosen.extend(finest.map(|finest| (Level::Finest, finest)));
+    let rung = |(place, (level, geared)): (usize, &(Level, Geared))| {
+        let before = place.checked_sub(1).map(|before| &chosen[before].1);
+        let contraction = before.map_or(1.0, |before| match before.formula == geared.formula {
+            true => reserve(place) * geared.share_of_error(before),
+            false => expected_share(cases, before, geared).max(LEAST_EXPECTED_SHARE),
+        });
+        let contraction = contraction.clamp(BEST_CONTRACTION, 1.0);
+        Rung {
+            level: *level,
+            method: Method::Geared(*geared),
+            contraction,
+            believed_to: first_order(model),
+        }
+    };
+    chosen.iter().enumerate().map(rung).collect()
 }
 
-/// By how much the share of an error that is left may be greater than reckoned. Where caps are as low as the first rung's, a
-/// mode's shift is less than proportional to it.
+/// Share that the rule expects to be left of a coarser choice's error.
+fn expected_share(cases: &Cases<'_>, coarser: &Geared, finer: &Geared) -> f64 {
+    let [coarser, finer] =
+        [coarser, finer].map(|geared| cases.expected_error(geared).unwrap_or(f64::INFINITY));
+    if finer.is_finite() { finer / coarser } else { 1.0 }
+}
+
+/// By how much the share of an error that is left may be greater than reckoned. Where caps are as
+/// low as the first rung's, a mode's shift is less than proportional to it.
 const fn reserve(rung: usize) -> f64 {
     if rung == 1 { 2.0 } else { 1.5 }
 }
@@ -248,6 +234,7 @@ fn refined(geared: &Geared) -> Geared {
 
 /// Step of the reference method.
 pub(crate) fn reference_step_s(cases: &Cases<'_>) -> f64 {
-    let stable_s = cases.plain_step_s().map_or(f64::INFINITY, |longest_s| REFERENCE_SHARE * longest_s);
+    let stable_s =
+        cases.plain_step_s().map_or(f64::INFINITY, |longest_s| REFERENCE_SHARE * longest_s);
     REFERENCE_STEP_S.min(stable_s)
 }

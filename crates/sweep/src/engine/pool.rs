@@ -1,8 +1,10 @@
-//! The pool: rows from a feed, runs that wait for lanes, threads that take whole lane groups of them.
+//! The pool: rows from a feed, runs that wait for lanes, threads that take whole lane groups of
+//! them.
 //!
-//! A lane group costs the same with one trajectory as with eight. So runs of one rung and model wait for each other, whichever rows
-//! they belong to, and a thread takes a group as soon as there is a whole one, the highest rung first: rows that are nearly done
-//! leave. Only when nothing more can come are groups taken that are not full.
+//! A lane group costs the same with one trajectory as with eight. So runs of one rung and model
+//! wait for each other, whichever rows they belong to, and a thread takes a group as soon as there
+//! is a whole one, the highest rung first: rows that are nearly done leave. Only when nothing more
+//! can come are groups taken that are not full.
 //!
 //! What a lane computes does not depend on its company, so neither does a row.
 
@@ -13,7 +15,7 @@ use std::time::Duration;
 use lane_ode::MAX_LANES;
 use washer_model::Point;
 
-use super::climb::{Demand, Next, Row};
+use super::climb::{Climber, Demand, Next};
 use super::{ModelEngine, Watch};
 use crate::outcome::Outcome;
 use crate::plan::Scenario;
@@ -21,14 +23,15 @@ use crate::plan::Scenario;
 /// Points that are made ready together.
 const FED: usize = MAX_LANES;
 
-/// Rows that are on their way at once, beside those in the hands of threads: less than a group of each kind.
+/// Rows that are on their way at once, beside those in the hands of threads: less than a group of
+/// each kind.
 pub(crate) const MOST_WAITING: usize = 12 * FED;
 
 /// Rows on their way in a thread's hands.
 pub(crate) const ROWS_A_THREAD: usize = FED;
 
-/// A row that has seen so many others come after it waits no longer: the group is taken as it is, so that chunks become whole and
-/// an interrupt loses little.
+/// A row that has seen so many others come after it waits no longer: the group is taken as it is,
+/// so that chunks become whole and an interrupt loses little.
 const PATIENCE: u64 = 1024;
 
 /// Where points come from: at most so many, none at the end. Each with what the caller knows it by.
@@ -41,7 +44,7 @@ pub(super) type Keep<'a> = dyn Fn(Outcome) + Sync + 'a;
 const LOOK_UP: Duration = Duration::from_millis(50);
 
 /// Runs of one rung of one model: positions in `MODELS` and on its ladder.
-pub(super) type Kind = (usize, usize);
+pub(super) type ModelRung = (usize, usize);
 
 /// Where a rung is among what threads work at; below all of them is the feed.
 const fn above(rung: usize) -> usize {
@@ -52,13 +55,13 @@ const BELOW_ALL: usize = 0;
 
 /// Rows and the runs that they wait for.
 #[derive(Default)]
-struct State {
+struct PoolState {
     /// Rows on their way, by what the caller knows them by.
-    rows: BTreeMap<u64, Row>,
+    rows: BTreeMap<u64, Climber>,
     /// Points that the feed has given.
     fed: u64,
     /// Rows that wait for a run, by its kind.
-    waiting: BTreeMap<Kind, Vec<u64>>,
+    waiting: BTreeMap<ModelRung, Vec<u64>>,
     /// What threads are at work on ([`above`]), one entry each.
     at_work: Vec<usize>,
     /// The feed has run dry.
@@ -68,7 +71,7 @@ struct State {
 /// What a thread does next.
 enum Work {
     Feed,
-    Runs(Kind, Vec<(u64, Arc<Point>)>),
+    Runs(ModelRung, Vec<(u64, Arc<Point>)>),
     Wait,
     End,
 }
@@ -86,12 +89,12 @@ pub(super) struct Pool<'a> {
 /// What the threads of a pool share.
 #[derive(Default)]
 pub(super) struct Shared {
-    state: Mutex<State>,
+    state: Mutex<PoolState>,
     changed: Condvar,
 }
 
 impl Pool<'_> {
-    /// What one thread does until nothing is left, or it is told to stop.
+    /// The work of one thread, until nothing is left or the watch stops it.
     pub(super) fn work(&self) {
         while !self.watch.stopped() {
             let mut state = self.lock();
@@ -113,8 +116,12 @@ impl Pool<'_> {
                 Work::Runs((model, rung), taken) => {
                     state.at_work.push(above(rung));
                     drop(state);
-                    let points: Vec<&Point> = taken.iter().map(|(_, point)| point.as_ref()).collect();
-                    let runs = self.engine.runs(model, rung, &points, self.watch);
+                    let points: Vec<&Point> =
+                        taken.iter().map(|(_, point)| point.as_ref()).collect();
+                    let Some(ladders) = self.engine.ladders_under(self.watch) else { break };
+                    let ladder = &ladders[model];
+                    let method = &ladder.rungs[rung].method;
+                    let runs = self.engine.runs(model, method, &points, self.watch);
                     // They may have been cut short.
                     if self.watch.stopped() {
                         break;
@@ -123,7 +130,7 @@ impl Pool<'_> {
                     let mut rows = Vec::with_capacity(taken.len());
                     for ((position, _), run) in taken.iter().zip(runs) {
                         let Some(mut row) = state.rows.remove(position) else { continue };
-                        row.take(model, rung, run, &self.engine.ladders()[model], self.engine.plan);
+                        row.take(model, rung, run, ladder, self.engine.plan);
                         rows.push(row);
                     }
                     self.advance(state, rows, above(rung));
@@ -133,25 +140,30 @@ impl Pool<'_> {
         self.shared.changed.notify_all();
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, PoolState> {
         self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// New rows from the feed; none at its end.
-    fn fed(&self) -> Vec<Row> {
+    fn fed(&self) -> Vec<Climber> {
         let (ids, scenarios): (Vec<u64>, Vec<Scenario>) = (self.feed)(FED).into_iter().unzip();
         let points = self.engine.prepare(&scenarios);
-        ids.into_iter().zip(points).map(|(id, point)| Row::new(id, point.map(Arc::new))).collect()
+        ids.into_iter()
+            .zip(points)
+            .map(|(id, point)| Climber::new(id, point.map(Arc::new)))
+            .collect()
     }
 
     /// Asks for what rows need next, and hands over those that need nothing.
-    fn advance(&self, mut state: MutexGuard<'_, State>, rows: Vec<Row>, finished: usize) {
+    fn advance(&self, mut state: MutexGuard<'_, PoolState>, rows: Vec<Climber>, finished: usize) {
         let mut done = Vec::new();
         for mut row in rows {
             let next = if row.pending > 0 {
                 Next::Runs(Vec::new())
             } else {
-                row.next(self.engine.ladders(), self.demand, self.engine.accuracy(), self.engine.plan)
+                // Nothing is kept of what is put down.
+                let Some(ladders) = self.engine.ladders_under(self.watch) else { break };
+                row.next(ladders, self.demand, self.engine.accuracy(), self.engine.plan)
             };
             match next {
                 Next::Runs(kinds) => {
@@ -177,7 +189,7 @@ impl Pool<'_> {
     }
 }
 
-impl State {
+impl PoolState {
     fn choose(&mut self) -> Work {
         let full = |waiting: &Vec<u64>| waiting.len() >= MAX_LANES;
         let best = self.waiting.iter().filter(|(_, waiting)| full(waiting)).map(|(kind, _)| *kind);
@@ -190,7 +202,8 @@ impl State {
         if !self.is_dry {
             return Work::Feed;
         }
-        let lowest = self.waiting.iter().filter(|(_, waiting)| !waiting.is_empty()).map(|(kind, _)| *kind);
+        let lowest =
+            self.waiting.iter().filter(|(_, waiting)| !waiting.is_empty()).map(|(kind, _)| *kind);
         let lowest = lowest.min_by_key(|&(model, rung)| (rung, model));
         match lowest {
             // What is at work below may fill the group.
@@ -202,18 +215,20 @@ impl State {
     }
 
     /// The kind of runs that a row has waited for too long, if any.
-    fn overdue(&self) -> Option<Kind> {
+    fn overdue(&self) -> Option<ModelRung> {
         let latest = self.fed.checked_sub(PATIENCE)?;
         let is_overdue = |id: &u64| self.rows.get(id).is_some_and(|row| row.came_as < latest);
-        let overdue = self.waiting.iter().filter(|(_, waiting)| waiting.first().is_some_and(is_overdue));
+        let overdue =
+            self.waiting.iter().filter(|(_, waiting)| waiting.first().is_some_and(is_overdue));
         overdue.map(|(kind, _)| *kind).max_by_key(|&(model, rung)| (rung, model))
     }
 
     /// Takes a group of what waits, the first come first.
-    fn take(&mut self, kind: Kind) -> Work {
+    fn take(&mut self, kind: ModelRung) -> Work {
         let waiting = self.waiting.entry(kind).or_default();
         let positions: Vec<u64> = waiting.drain(..waiting.len().min(MAX_LANES)).collect();
-        let point = |position: &u64| Some((*position, self.rows.get(position)?.point.clone().ok()?));
+        let point =
+            |position: &u64| Some((*position, self.rows.get(position)?.point.clone().ok()?));
         Work::Runs(kind, positions.iter().filter_map(point).collect())
     }
 }

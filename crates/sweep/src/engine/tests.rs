@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// Springs too soft to carry the machine, unbalances that throw it out of the model's range, and points that go well.
+/// Springs too soft to carry the machine, unbalances that throw it out of the model's range, and
+/// points that go well.
 const GRID: &str = r#"
 [spin]
 profile = "ramp"
@@ -49,8 +50,23 @@ fn a_failed_point_is_a_row_and_leaves_the_others_bits_alone() {
         let model = &outcome.nonlinear;
         assert_eq!(model.amplitudes.is_empty(), model.status != Status::Ok);
         assert_eq!(model.fail_time_s.is_some(), model.status == Status::Diverged);
-        assert_eq!(evaluate(&engine, outcome.point..outcome.point + 1), std::slice::from_ref(outcome));
+        assert_eq!(
+            evaluate(&engine, outcome.point..outcome.point + 1),
+            std::slice::from_ref(outcome)
+        );
     }
+}
+
+#[test]
+fn rungs_whose_choice_was_cut_short_are_chosen_anew() {
+    let fast = GRID.replace("\"rk4\"", "\"rk4-mass-scaled\"");
+    let plan = plan(&fast.replace("[1, 500, 7000]", "[6000, 7000]"));
+    let engine = ModelEngine::new(&plan).unwrap();
+    let (stopped, calm) = (Interrupt::new(), Interrupt::new());
+    stopped.raise(15);
+    assert!(engine.ladders_under(&Watch::new(&stopped)).is_none());
+    let found = engine.ladders_under(&Watch::new(&calm)).unwrap();
+    assert_eq!(found, ModelEngine::new(&plan).unwrap().ladders());
 }
 
 #[test]

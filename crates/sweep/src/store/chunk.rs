@@ -12,16 +12,17 @@
 //! | points x (20 + 2 x (32 + 8 C + 8 M) + 8 B) | records |
 //! | 32 | blake3 of everything before |
 //!
-//! A record is the point (u64), flags, the two models' status codes and that of the method's level (u8 each), the error (f64,
-//! NaN where there is none), then for the nonlinear and the linear
-//! model: fail time, least gap (f64), steps, rejected (u64), C amplitudes and M metrics (f64). What a flag says is absent is zero.
-//! Behind both models stand B numbers (f64) of both together: ratios by turns, then the static sag; NaN where there is none. M and B
-//! follow from the plan, and are zero unless it asks for more than peaks.
+//! A record is the point (u64), flags, the two models' status codes and that of the method's level
+//! (u8 each), the error (f64, NaN where there is none), then for the nonlinear and the linear
+//! model: fail time, least gap (f64), steps, rejected (u64), C amplitudes and M metrics (f64). What
+//! a flag says is absent is zero. Behind both models stand B numbers (f64) of both together: ratios
+//! by turns, then the static sag; NaN where there is none. M and B follow from the plan, and are
+//! zero unless it asks for more than peaks.
 
 use super::error::StoreError;
 use super::schema::Layout;
-use crate::engine::Level;
 use crate::measures::{Criterion, Metric};
+use crate::method::Level;
 use crate::outcome::{Outcome, Status, Trajectory};
 
 const MAGIC: [u8; 8] = *b"SWEEPCHK";
@@ -88,7 +89,9 @@ pub(crate) struct Place {
 impl Place {
     /// Bytes of the whole file.
     pub(crate) fn bytes(&self) -> u64 {
-        self.count.saturating_mul(self.shape.bytes_a_point() as u64).saturating_add((HEADER + HASH) as u64)
+        self.count
+            .saturating_mul(self.shape.bytes_a_point() as u64)
+            .saturating_add((HEADER + HASH) as u64)
     }
 }
 
@@ -114,7 +117,10 @@ fn reject(place: &Place, reason: String) -> StoreError {
 /// The chunk's file.
 pub(crate) fn encode(place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, StoreError> {
     if outcomes.len() as u64 != place.count {
-        return Err(reject(place, format!("{} outcomes for {} points", outcomes.len(), place.count)));
+        return Err(reject(
+            place,
+            format!("{} outcomes for {} points", outcomes.len(), place.count),
+        ));
     }
     let shape = &place.shape;
     let mut bytes = Vec::with_capacity(HEADER + outcomes.len() * shape.bytes_a_point() + HASH);
@@ -136,7 +142,9 @@ pub(crate) fn encode(place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, Sto
                 if got != expected {
                     return Err(reject(
                         place,
-                        format!("point {point}, {name} model: {got} {what} where {expected} belong"),
+                        format!(
+                            "point {point}, {name} model: {got} {what} where {expected} belong"
+                        ),
                     ));
                 }
             }
@@ -148,7 +156,8 @@ pub(crate) fn encode(place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, Sto
     Ok(bytes)
 }
 
-/// The outcomes in a chunk's file, if every byte is as it was written and it is the chunk looked for.
+/// The outcomes in a chunk's file, if every byte is as it was written and it is the chunk looked
+/// for.
 pub(crate) fn decode(place: &Place, bytes: &[u8]) -> Result<Vec<Outcome>, Damage> {
     let (body, hash) = bytes.split_last_chunk::<HASH>().ok_or(Damage::Length)?;
     if blake3::hash(body) != *hash {
@@ -213,7 +222,9 @@ fn record(outcome: &Outcome, shape: &Shape, bytes: &mut Vec<u8>) {
         for number in [model.steps, model.rejected] {
             bytes.extend_from_slice(&number.to_le_bytes());
         }
-        for (numbers, many) in [(&model.amplitudes, shape.channels), (&model.metrics, shape.metrics)] {
+        for (numbers, many) in
+            [(&model.amplitudes, shape.channels), (&model.metrics, shape.metrics)]
+        {
             for i in 0..many as usize {
                 bytes.extend_from_slice(&numbers.get(i).copied().unwrap_or(0.0).to_le_bytes());
             }
@@ -385,20 +396,37 @@ mod tests {
             prop::option::of(any::<f64>()),
             any::<(u64, u64)>(),
         )
-            .prop_map(|(status, fail_time_s, amplitudes, metrics, min_gap_m, (steps, rejected))| {
-                let is_ok = status == Status::Ok;
-                let kept = |numbers: Vec<f64>| if is_ok { numbers } else { Vec::new() };
-                let (amplitudes, metrics) = (kept(amplitudes), kept(metrics));
-                let turns = Vec::new();
-                Trajectory { status, fail_time_s, amplitudes, min_gap_m, steps, rejected, metrics, turns }
-            })
+            .prop_map(
+                |(status, fail_time_s, amplitudes, metrics, min_gap_m, (steps, rejected))| {
+                    let is_ok = status == Status::Ok;
+                    let kept = |numbers: Vec<f64>| if is_ok { numbers } else { Vec::new() };
+                    let (amplitudes, metrics) = (kept(amplitudes), kept(metrics));
+                    let turns = Vec::new();
+                    Trajectory {
+                        status,
+                        fail_time_s,
+                        amplitudes,
+                        min_gap_m,
+                        steps,
+                        rejected,
+                        metrics,
+                        turns,
+                    }
+                },
+            )
     }
 
     proptest! {
         #[test]
         fn whatever_goes_in_comes_out(
             rows in prop::collection::vec(
-                (model(3, 2), model(3, 2), any::<Option<bool>>(), any::<[Option<f64>; 3]>(), any::<Option<f64>>()),
+                (
+                    model(3, 2),
+                    model(3, 2),
+                    any::<Option<bool>>(),
+                    any::<[Option<f64>; 3]>(),
+                    any::<Option<f64>>(),
+                ),
                 0..20,
             ),
             by_turns: bool,
@@ -412,9 +440,10 @@ mod tests {
                 .map(|((nonlinear, linear, sensitive, turn_ratios, static_sag_m), point)| {
                     let mut outcome = Outcome::new(point, nonlinear, linear);
                     outcome.sensitive = sensitive;
-                    let both_ok = [&outcome.nonlinear, &outcome.linear].iter().all(|m| m.status == Status::Ok);
-                    if by_turns && both_ok {
-                        outcome.turn_ratios = turn_ratios.map(|r| r.filter(|r| !r.is_nan())).to_vec();
+                    let models = [&outcome.nonlinear, &outcome.linear];
+                    if by_turns && models.iter().all(|model| model.status == Status::Ok) {
+                        let number = |ratio: Option<f64>| ratio.filter(|ratio| !ratio.is_nan());
+                        outcome.turn_ratios = turn_ratios.map(number).to_vec();
                     }
                     outcome.static_sag_m = static_sag_m.filter(|sag_m| with_sag && !sag_m.is_nan());
                     outcome

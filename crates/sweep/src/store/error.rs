@@ -4,10 +4,9 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::plan_file::Difference;
-use crate::exit::Exit;
-use crate::files::FileError;
+use super::plan_file::PlanDifference;
 use crate::threads::ThreadsError;
+use sweep_files::FileError;
 
 /// A failure of the store.
 #[derive(Debug, thiserror::Error)]
@@ -16,7 +15,8 @@ pub enum StoreError {
     #[error(transparent)]
     File(#[from] FileError),
     /// Another process runs on this output.
-    #[error("{} is in use by {}\n  = help: wait for it to end, or give another --out", output.display(), Holders(holders))]
+    #[error("{} is in use by {}\n  = help: wait for it to end, or give another \
+             --out", output.display(), Holders(holders))]
     Busy {
         /// The output both want.
         output: PathBuf,
@@ -25,7 +25,8 @@ pub enum StoreError {
     },
     /// The run folder belongs to another plan, or was begun by a build that computes other numbers.
     #[error(
-        "{} was begun with another plan or by another build:\n{}  = help: end it with that plan and \
+        "{} was begun with another plan or by another build:\n{}  = help: end it with that plan \
+         and \
          build, give another --out, or start over with --fresh (which deletes that folder's \
          finished chunks)",
         folder.display(),
@@ -35,7 +36,7 @@ pub enum StoreError {
         /// The run folder.
         folder: PathBuf,
         /// Where the plans part.
-        differences: Vec<Difference>,
+        differences: Vec<PlanDifference>,
     },
     /// The finished output belongs to another plan, or is of a build that computes other numbers.
     #[error(
@@ -48,7 +49,7 @@ pub enum StoreError {
         /// The finished file.
         output: PathBuf,
         /// Where the plans part.
-        differences: Vec<Difference>,
+        differences: Vec<PlanDifference>,
     },
     /// A shard that does not fit.
     #[error("{0}")]
@@ -67,7 +68,8 @@ pub enum StoreError {
         missing_shards: Option<String>,
     },
     /// There is no run to speak of.
-    #[error("there is no run at {}: neither {} nor that file exists\n  = help: start it with `sweep run`",
+    #[error("there is no run at {}: neither {} nor that file exists\n  = help: start it with \
+             `sweep run`",
         output.display(), folder.display())]
     NoRun {
         /// The output asked about.
@@ -139,21 +141,18 @@ impl StoreError {
         }
     }
 
-    /// How the program ends on it.
+    /// Whether nothing was begun, because the request does not fit what is there.
     #[must_use]
-    pub fn exit(&self) -> Exit {
+    pub fn is_refusal(&self) -> bool {
         match self {
-            Self::Busy { .. } => Exit::Busy,
-            // Nothing was begun: the request does not fit what is there.
-            Self::PlanDiffers { .. } | Self::OutputDiffers { .. } | Self::Shard(_) => Exit::BadInput,
-            Self::Threads(ThreadsError::Scheduler { .. }) => Exit::BadInput,
-            Self::File(error) if error.is_refusal() => Exit::BadInput,
-            Self::File(_)
+            Self::PlanDiffers { .. } | Self::OutputDiffers { .. } | Self::Shard(_) => true,
+            Self::Threads(error) => error.is_refusal(),
+            Self::File(error) => error.is_refusal(),
+            Self::Busy { .. }
             | Self::Incomplete { .. }
             | Self::NoRun { .. }
             | Self::Engine { .. }
-            | Self::Parquet { .. }
-            | Self::Threads(ThreadsError::Start { .. } | ThreadsError::Random(_)) => Exit::Failed,
+            | Self::Parquet { .. } => false,
         }
     }
 }
@@ -194,7 +193,7 @@ impl fmt::Display for Holders<'_> {
     }
 }
 
-struct Differences<'a>(&'a [Difference]);
+struct Differences<'a>(&'a [PlanDifference]);
 
 impl fmt::Display for Differences<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

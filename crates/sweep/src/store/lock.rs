@@ -1,9 +1,10 @@
 //! Who may work on an output: one whole run, or any number of shards of one run.
 //!
-//! Locks are the system's (`flock`), so a killed process frees its own; the files only say who holds them. A whole
-//! run and a merge hold `lock` alone; shards share it, and each also holds `shard-<i>.lock`, which says which are
-//! running. The same shard started twice is harmless and not refused: a scheduler that lost sight of a node does
-//! exactly that, and must not wait for the lost node's lock to expire.
+//! Locks are the system's (`flock`), so a killed process frees its own; the files only say who
+//! holds them. A whole run and a merge hold `lock` alone; shards share it, and each also holds
+//! `shard-<i>.lock`, which says which are running. The same shard started twice is harmless and not
+//! refused: a scheduler that lost sight of a node does exactly that, and must not wait for the lost
+//! node's lock to expire.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read, Seek, Write};
@@ -12,9 +13,10 @@ use std::time::Duration;
 
 use super::Folder;
 use super::error::{Holder, StoreError};
-use crate::files::{FileError, atomic, regular};
+use sweep_files::{FileError, atomic, regular};
 
-/// How long a lock is asked for before it counts as held: `sweep status` holds it for an instant when it looks.
+/// How long a lock is asked for before it counts as held: `sweep status` holds it for an instant
+/// when it looks.
 const ATTEMPTS: u32 = 5;
 const PAUSE: Duration = Duration::from_millis(40);
 
@@ -36,11 +38,14 @@ impl Lock {
             if attempt > 0 {
                 std::thread::sleep(PAUSE);
             }
-            fs::create_dir_all(&folder.path).map_err(StoreError::io("make the folder", &folder.path))?;
+            fs::create_dir_all(&folder.path)
+                .map_err(StoreError::io("make the folder", &folder.path))?;
             let mut file = match regular::open_or_create(&path) {
                 Ok(file) => file,
                 // A run that just finished removed the folder between the two lines above.
-                Err(error) if error.kind() == io::ErrorKind::NotFound && attempt + 1 < ATTEMPTS => continue,
+                Err(error) if error.kind() == io::ErrorKind::NotFound && attempt + 1 < ATTEMPTS => {
+                    continue;
+                }
                 Err(error) => return Err(StoreError::io("open the lock", &path)(error)),
             };
             refuse_strangers(&mut file, &path)?;
@@ -61,7 +66,9 @@ impl Lock {
                 Err(TryLockError::Error(error)) if no_locks_here(&error) => {
                     return Ok(Self { _run: None, _shard: None, path, missing: true });
                 }
-                Err(TryLockError::Error(error)) => return Err(StoreError::io("lock", &path)(error)),
+                Err(TryLockError::Error(error)) => {
+                    return Err(StoreError::io("lock", &path)(error));
+                }
             }
         }
         Err(StoreError::Busy { output: folder.output.clone(), holders: holders(folder) })
@@ -79,7 +86,8 @@ impl Lock {
         self.missing.then(note)
     }
 
-    /// Deletes the lock's file while it is still held, so that no one can take it over, then lets go.
+    /// Deletes the lock's file while it is still held, so that no one can take it over, then lets
+    /// go.
     pub(crate) fn retire(self) -> Result<(), StoreError> {
         Ok(atomic::remove(&self.path)?)
     }
@@ -87,8 +95,10 @@ impl Lock {
 
 /// Everyone who holds the folder now, as far as it can be read without disturbing them.
 pub(crate) fn holders(folder: &Folder) -> Vec<Holder> {
-    let mut found: Vec<Holder> =
-        shard_locks(folder).into_iter().filter_map(|(shard, path)| held_by(&path, Some(shard))).collect();
+    let mut found: Vec<Holder> = shard_locks(folder)
+        .into_iter()
+        .filter_map(|(shard, path)| held_by(&path, Some(shard)))
+        .collect();
     // Shards share the folder's lock, and whoever last held it alone has left his name in it.
     if found.is_empty() {
         found.extend(held_by(&folder.lock(), None));
@@ -116,7 +126,8 @@ fn refuse_strangers(file: &mut File, path: &Path) -> Result<(), StoreError> {
 
 fn take_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
     let path = folder.shard_lock(shard);
-    let mut file = regular::open_or_create(&path).map_err(StoreError::io("open the lock", &path))?;
+    let mut file =
+        regular::open_or_create(&path).map_err(StoreError::io("open the lock", &path))?;
     refuse_strangers(&mut file, &path)?;
     if file.try_lock().is_err() {
         return Ok(None);
@@ -151,7 +162,7 @@ fn shard_locks(folder: &Folder) -> Vec<(u64, PathBuf)> {
     found
 }
 
-/// The shard a lock's name stands for, if it stands for one.
+/// The shard that a lock is named after, if any.
 pub(super) fn shard_of_name(name: &str) -> Option<u64> {
     name.strip_prefix("shard-")?.strip_suffix(".lock")?.parse().ok()
 }
@@ -171,7 +182,6 @@ fn held_by(path: &Path, shard: Option<u64>) -> Option<Holder> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exit::Exit;
 
     fn folder(home: &tempfile::TempDir) -> Folder {
         Folder::of(&home.path().join("x.parquet")).unwrap()
@@ -179,11 +189,7 @@ mod tests {
 
     fn busy(result: Result<Lock, StoreError>) -> Vec<Holder> {
         match result {
-            Err(error @ StoreError::Busy { .. }) => {
-                assert_eq!(error.exit(), Exit::Busy);
-                let StoreError::Busy { holders, .. } = error else { unreachable!() };
-                holders
-            }
+            Err(StoreError::Busy { holders, .. }) => holders,
             other => panic!("expected a busy output, got {other:?}"),
         }
     }
@@ -231,7 +237,7 @@ mod tests {
             fs::hard_link(&mine, &name).unwrap();
             let error = Lock::acquire(&folder, shard).unwrap_err();
             assert!(error.to_string().contains("is no lock of `sweep run`"), "{error}");
-            assert_eq!(error.exit(), Exit::BadInput);
+            assert!(error.is_refusal());
             fs::remove_file(&name).unwrap();
         }
         assert_eq!(fs::read_to_string(&mine).unwrap(), "my thesis");

@@ -7,12 +7,12 @@ use parquet::errors::ParquetError;
 
 use super::Job;
 use super::error::StoreError;
-use super::open::{Run, remove};
+use super::open::{OpenRun, remove};
 use super::provenance::{self, Session};
 use super::read::{self, Tally};
-use super::schema::{self, BATCH_ROWS, Rows};
-use crate::files::{self, FileKind, ParquetFile, atomic, seal};
-use crate::panics;
+use super::schema::{self, BATCH_ROWS, ResultRows};
+use sweep_files::panics;
+use sweep_files::{self as files, FileKind, ParquetFile, atomic, seal};
 
 /// A finished result.
 #[derive(Debug)]
@@ -23,25 +23,30 @@ pub struct Joined {
     pub notes: Vec<String>,
 }
 
-impl Run {
-    /// Joins the chunks into the output and syncs it into place; `None` when `stop` said so. The folder stays until
-    /// [`Run::complete`].
+impl OpenRun {
+    /// Joins the chunks into the output and syncs it into place; `None` when `stop` said so. The
+    /// folder stays until [`OpenRun::complete`].
     ///
-    /// Memory: one row group while it is encoded and one chunk, about 40 MB whatever the number of points, and 150
-    /// bytes a column for each row group behind (10 MB for a billion points).
+    /// Memory: one row group while it is encoded and one chunk, about 40 MB whatever the number of
+    /// points, and 150 bytes a column for each row group behind (10 MB for a billion points).
     ///
     /// # Errors
-    /// [`StoreError::Incomplete`] when a chunk is missing or was found damaged (it is then set aside, and
-    /// [`Run::is_missing`]); [`StoreError::File`].
-    pub fn join(&mut self, job: &Job<'_>, stop: &dyn Fn() -> bool) -> Result<Option<Tally>, StoreError> {
+    /// [`StoreError::Incomplete`] when a chunk is missing or was found damaged (it is then set
+    /// aside, and [`OpenRun::is_missing`]); [`StoreError::File`].
+    pub fn join(
+        &mut self,
+        job: &Job<'_>,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Tally>, StoreError> {
         let output = self.output().to_path_buf();
         let mut file = atomic::begin(self.folder())?;
         let failed = |error| StoreError::parquet("write", &output)(error);
         let from_arrow = |error| failed(ParquetError::from(error));
-        let mut rows = Rows::new(&job.layout);
+        let mut rows = ResultRows::new(&job.layout);
         let properties = schema::properties(job);
         let begin = || ArrowWriter::try_new(BufWriter::new(&file), rows.schema(), Some(properties));
-        let mut writer = panics::in_parquet("the library gave up writing", begin).map_err(failed)?;
+        let mut writer =
+            panics::in_parquet("the library gave up writing", begin).map_err(failed)?;
         for chunk in 0..self.chunks() {
             if stop() {
                 return Ok(None);
@@ -61,7 +66,8 @@ impl Run {
         }
         if rows.len() > 0 {
             let batch = rows.take().map_err(from_arrow)?;
-            panics::in_parquet("the library gave up writing", || writer.write(&batch)).map_err(failed)?;
+            panics::in_parquet("the library gave up writing", || writer.write(&batch))
+                .map_err(failed)?;
         }
         // Closing flushes to the file. (Taking the file back out of the writer would tell a full
         // disk as text only.)

@@ -12,8 +12,9 @@
 //! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
 //! | `lock`, `shard-<i>.lock` | who is at work (`lock`) |
 //!
-//! When every chunk is there they are joined into the one Parquet file (`merge`), and the folder goes. The store
-//! knows points, axis names and outcomes; it does not know the engine that makes them.
+//! When every chunk is there they are joined into the one Parquet file (`merge`), and the folder
+//! goes. The store knows points, axis names and outcomes; it does not know the engine that makes
+//! them.
 
 mod chunk;
 mod error;
@@ -21,9 +22,9 @@ mod lock;
 mod merge;
 mod open;
 mod plan_file;
-pub mod provenance;
-pub mod read;
-pub mod schema;
+pub(crate) mod provenance;
+pub(crate) mod read;
+pub(crate) mod schema;
 mod shard;
 mod status;
 #[cfg(test)]
@@ -37,21 +38,20 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 pub(crate) use chunk::Shape;
-pub use error::{Holder, StoreError};
-pub use merge::Joined;
-pub use open::{Opened, Options, Run};
-pub use plan_file::Difference;
-pub use schema::{AxisColumn, Layout};
+pub use error::StoreError;
+pub use open::{OpenOptions, OpenRun, Opened};
+pub(crate) use schema::{AxisColumn, Layout};
 pub use shard::{Shard, ShardRequest};
-pub use status::{FolderStatus, State, status};
-pub use trials::{Key, OpenedTrials, Trials};
+pub(crate) use status::FolderStatus;
+pub use status::{State, status};
+pub(crate) use trials::{Key, OpenedTrials, Trials};
 
-use crate::files::{self, FileKind};
 use crate::identity;
 use crate::plan::{Axis, Plan};
+use sweep_files::{self as files, FileKind};
 
 /// The values of the axes at a point of the grid, first axis first.
-pub type AxisValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
+pub(crate) type AxisValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
 
 /// What the store must know of a plan.
 pub struct Job<'a> {
@@ -104,10 +104,11 @@ impl<'a> Job<'a> {
 
 /// Points a chunk holds (the last may hold fewer), from the number of points alone.
 ///
-/// A power of two, so that chunks fill whole SIMD lane groups: 8 for the smallest grids, so that every core gets some;
-/// then 32 to 4096, for about a thousand chunks; then 4096 each, for chunks of a megabyte.
+/// A power of two, so that chunks fill whole SIMD lane groups: 8 for the smallest grids, so that
+/// every core gets some; then 32 to 4096, for about a thousand chunks; then 4096 each, for chunks
+/// of a megabyte.
 #[must_use]
-pub const fn chunk_points(points: u64) -> u64 {
+pub(crate) const fn chunk_points(points: u64) -> u64 {
     const SMALL_GRID: u64 = 128;
     const CHUNKS: u64 = 1024;
     if points <= SMALL_GRID {
@@ -188,7 +189,7 @@ fn chunk_name(chunk: u64) -> String {
     format!("chunk-{chunk:08}.bin")
 }
 
-/// The chunk a file name stands for, if it stands for one.
+/// The chunk that a file is named after, if any.
 fn chunk_of_name(name: &str) -> Option<u64> {
     let chunk = name.strip_prefix("chunk-")?.strip_suffix(".bin")?.parse().ok()?;
     (chunk_name(chunk) == name).then_some(chunk)

@@ -14,18 +14,18 @@ use super::plan_file::{Found, PlanFile, set_aside};
 use super::read::{self, ResultFile, Tally};
 use super::shard::{self, Dealing, Shard, ShardRequest};
 use super::{Folder, Job, chunk_of_name, chunk_points, provenance, trials};
-use crate::files::{FileError, atomic, regular};
 use crate::outcome::Outcome;
 use crate::threads::Environment;
+use sweep_files::{FileError, atomic, regular};
 
 /// How a run is opened.
 #[derive(Clone, Copy)]
-pub struct Options<'a> {
+pub struct OpenOptions<'a> {
     /// Start over: finished chunks go now, a finished file stays until the new one takes its place.
     pub fresh: bool,
-    /// Which part to compute; a scheduler's word counts if it is `None`.
+    /// Which part to compute; if `None`, the scheduler's variables say.
     pub shard: Option<ShardRequest>,
-    /// Where a scheduler's word is looked up.
+    /// Looks up the scheduler's variables.
     pub environment: Environment<'a>,
 }
 
@@ -35,32 +35,38 @@ pub enum Opened {
     /// The output is there, whole, and of this very plan.
     Finished(Box<ResultFile>, Box<Tally>),
     /// There is something to do; the run holds its lock.
-    Run(Box<Run>),
+    Run(Box<OpenRun>),
 }
 
 /// A run folder this process has a right to.
 #[derive(Debug)]
-pub struct Run {
+pub struct OpenRun {
     pub(super) folder: Folder,
     pub(super) lock: Lock,
     place: Place,
     points: u64,
     chunk_points: u64,
     dealt: Option<(Shard, Dealing)>,
-    /// This process's chunks that are there; behind a lock because workers look while the writer adds.
+    /// This process's chunks that are there; behind a lock because workers look while the writer
+    /// adds.
     present: Mutex<BTreeSet<u64>>,
     notes: Vec<String>,
 }
 
-impl Run {
-    /// Takes the output for this job, freezes its plan or finds it frozen, and looks through its chunks.
+impl OpenRun {
+    /// Takes the output for this job, freezes its plan or finds it frozen, and looks through its
+    /// chunks.
     ///
     /// # Errors
     /// [`StoreError::Busy`] when another run holds the output, [`StoreError::PlanDiffers`],
     /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::Shard`]
     /// for a part that does not fit, [`StoreError::File`] for anything else at the output that is
     /// not ours, and for the file system.
-    pub fn open(output: &Path, job: &Job<'_>, options: Options<'_>) -> Result<Opened, StoreError> {
+    pub fn open(
+        output: &Path,
+        job: &Job<'_>,
+        options: OpenOptions<'_>,
+    ) -> Result<Opened, StoreError> {
         let folder = Folder::of(output)?;
         if !options.fresh
             && !folder.path.exists()
@@ -68,10 +74,12 @@ impl Run {
         {
             return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
         }
-        let mut dealt = shard::resolve(options.shard, options.environment, Dealing::read(&folder)?)?;
+        let mut dealt =
+            shard::resolve(options.shard, options.environment, Dealing::read(&folder)?)?;
         if options.fresh && dealt.is_some() {
             return Err(StoreError::Shard(format!(
-                "--fresh would delete what the other shards have done\n  = help: delete {} first, then start the shards",
+                "--fresh would delete what the other shards have done\n  = help: delete {} first, \
+                 then start the shards",
                 folder.path.display()
             )));
         }
@@ -81,34 +89,18 @@ impl Run {
             clear(&folder)?;
         }
         atomic::clear_leftovers(&folder.path);
-        let ours = PlanFile::of(job);
-        match PlanFile::read(&folder)? {
-            Found::Plan(found) => refuse_other_plan(&folder, &found, &ours)?,
-            Found::Damaged => {
-                let aside = set_aside(&folder.plan())?;
-                notes.push(format!("the frozen plan was damaged; kept as {}", aside.display()));
-                ours.freeze(&folder)?;
-            }
-            Found::Nothing => {
-                if !options.fresh
-                    && let Some((file, tally)) = finished(&folder, job)?
-                {
-                    // What a run leaves that dies between publishing its file and removing its folder.
-                    remove(&folder, lock);
-                    return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
-                }
-                ours.freeze(&folder)?;
-                // Another shard may have been first, with another plan.
-                if let Found::Plan(found) = PlanFile::read(&folder)? {
-                    refuse_other_plan(&folder, &found, &ours)?;
-                }
-            }
+        let finished = || if options.fresh { Ok(None) } else { finished(&folder, job) };
+        if let Some((file, tally)) = agree_on_plan(&folder, job, &mut notes, finished)? {
+            // What a run leaves that dies between publishing its file and removing its folder.
+            remove(&folder, lock);
+            return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
         }
         if let Some((_, dealing)) = dealt {
             let frozen = dealing.freeze(&folder)?;
             dealt = shard::resolve(options.shard, options.environment, Some(frozen))?;
         }
-        let place = Place { plan: job.hash(), shape: Shape::of(&job.layout), chunk: 0, first: 0, count: 0 };
+        let place =
+            Place { plan: job.hash(), shape: Shape::of(&job.layout), chunk: 0, first: 0, count: 0 };
         let mut run = Self {
             folder,
             lock,
@@ -126,13 +118,13 @@ impl Run {
     /// Opens what shards have left, in order to join it; never begins a run.
     ///
     /// # Errors
-    /// [`StoreError::NoRun`] when nothing is there; else as [`Run::open`].
+    /// [`StoreError::NoRun`] when nothing is there; else as [`OpenRun::open`].
     pub fn open_for_merge(output: &Path, job: &Job<'_>) -> Result<Opened, StoreError> {
         let folder = Folder::of(output)?;
         if !folder.path.exists() && !output.exists() {
             return Err(StoreError::NoRun { output: output.to_path_buf(), folder: folder.path });
         }
-        Self::open(output, job, Options { fresh: false, shard: None, environment: &|_| None })
+        Self::open(output, job, OpenOptions { fresh: false, shard: None, environment: &|_| None })
     }
 
     /// Looks through the chunks again, setting aside what is not whole.
@@ -153,7 +145,8 @@ impl Run {
         Ok(())
     }
 
-    /// A chunk's outcomes; `None`, with the file set aside and noted, if it is damaged, or if it is not there.
+    /// A chunk's outcomes; `None`, with the file set aside and noted, if it is damaged, or if it is
+    /// not there.
     pub(super) fn read_chunk(&mut self, chunk: u64) -> Result<Option<Vec<Outcome>>, StoreError> {
         match read_chunk(&self.folder, &self.place(chunk))? {
             ChunkFile::Whole(outcomes) => Ok(Some(outcomes)),
@@ -272,12 +265,13 @@ impl Run {
             folder: self.folder.path.clone(),
             missing: chunks - present.len() as u64,
             chunks,
-            missing_shards: dealing.map(|dealing| shard::list(dealing.incomplete(chunks, &present))),
+            missing_shards: dealing
+                .map(|dealing| shard::list(dealing.incomplete(chunks, &present))),
         })
     }
 }
 
-/// What stands where a chunk should be.
+/// What is in a chunk's place.
 pub(super) enum ChunkFile {
     Whole(Vec<Outcome>),
     Absent,
@@ -289,7 +283,8 @@ pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, St
     let path = folder.chunk(place.chunk);
     let mut bytes = Vec::new();
     // A byte too many is enough to know that it is too long.
-    let read = regular::open(&path).and_then(|file| file.take(place.bytes() + 1).read_to_end(&mut bytes));
+    let read =
+        regular::open(&path).and_then(|file| file.take(place.bytes() + 1).read_to_end(&mut bytes));
     match read {
         Ok(_) => {}
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(ChunkFile::Absent),
@@ -311,7 +306,10 @@ pub(super) fn chunks_named(folder: &Folder) -> Result<BTreeSet<u64>, StoreError>
 }
 
 /// The finished file, whole, if it is of this plan and build.
-pub(super) fn finished(folder: &Folder, job: &Job<'_>) -> Result<Option<(ResultFile, Tally)>, StoreError> {
+pub(super) fn finished(
+    folder: &Folder,
+    job: &Job<'_>,
+) -> Result<Option<(ResultFile, Tally)>, StoreError> {
     let Some(file) = read::finished(&folder.output)? else { return Ok(None) };
     let result = ResultFile::of(&file)?;
     if result.plan_hash == job.hash().to_hex().as_str() {
@@ -332,19 +330,49 @@ pub(super) fn finished(folder: &Folder, job: &Job<'_>) -> Result<Option<(ResultF
     Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
 }
 
-/// Refuses a folder that another plan was begun in.
-pub(super) fn refuse_other_plan(
+/// Finds this plan frozen in the folder, or freezes it. Where there was none, `finished` has the
+/// first word: what it finds is returned, and nothing is frozen.
+pub(super) fn agree_on_plan<T>(
     folder: &Folder,
-    found: &PlanFile,
-    ours: &PlanFile,
-) -> Result<(), StoreError> {
+    job: &Job<'_>,
+    notes: &mut Vec<String>,
+    finished: impl FnOnce() -> Result<Option<T>, StoreError>,
+) -> Result<Option<T>, StoreError> {
+    let ours = PlanFile::of(job);
+    match PlanFile::read(folder)? {
+        Found::Plan(found) => refuse_other_plan(folder, &found, &ours)?,
+        Found::Damaged => {
+            let aside = set_aside(&folder.plan())?;
+            notes.push(format!("the frozen plan was damaged; kept as {}", aside.display()));
+            ours.freeze(folder)?;
+        }
+        Found::Nothing => {
+            if let Some(finished) = finished()? {
+                return Ok(Some(finished));
+            }
+            ours.freeze(folder)?;
+            // Another process, a shard, may have been first, with another plan.
+            if let Found::Plan(found) = PlanFile::read(folder)? {
+                refuse_other_plan(folder, &found, &ours)?;
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Refuses a folder that another plan was begun in.
+fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Result<(), StoreError> {
     if found == ours {
         return Ok(());
     }
-    Err(StoreError::PlanDiffers { folder: folder.path.clone(), differences: found.differences(ours) })
+    Err(StoreError::PlanDiffers {
+        folder: folder.path.clone(),
+        differences: found.differences(ours),
+    })
 }
 
-/// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers' files stay.
+/// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers'
+/// files stay.
 pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
     atomic::remove(&folder.plan())?;
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
@@ -365,15 +393,17 @@ fn is_ours(name: &str) -> bool {
         || atomic::is_temporary(name)
 }
 
-/// Removes a folder that has served; the result does not depend on it, so a failure is only worth a note.
+/// Removes a folder that has served; the result does not depend on it, so a failure is only worth a
+/// note.
 pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
-    let removed =
-        clear(folder).and_then(|()| lock.retire()).and_then(|()| match fs::remove_dir(&folder.path) {
+    let removed = clear(folder).and_then(|()| lock.retire()).and_then(|()| {
+        match fs::remove_dir(&folder.path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
                 Err(StoreError::io("remove the folder", &folder.path)(error))
             }
             _ => Ok(()),
-        });
+        }
+    });
     match removed {
         Ok(()) => None,
         Err(error) => Some(format!(

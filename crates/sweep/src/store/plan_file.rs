@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::error::StoreError;
 use super::{Folder, Job};
-use crate::files::{atomic, regular};
+use sweep_files::{atomic, regular};
 
 /// Format of `plan.json`; a folder of another format is another plan.
 const FORMAT: u32 = 2;
@@ -36,13 +36,13 @@ pub(crate) struct PlanFile {
     pub(crate) plan: Value,
 }
 
-/// What stands in a run folder where the plan should be.
+/// What is in the plan's place in a run folder.
 pub(crate) enum Found {
     /// No plan was frozen here.
     Nothing,
     /// A plan, whole.
     Plan(Box<PlanFile>),
-    /// Something that is no whole plan.
+    /// A file that is not a whole plan.
     Damaged,
 }
 
@@ -94,7 +94,7 @@ impl PlanFile {
     }
 
     /// Where the plans part; empty if they are the same.
-    pub(crate) fn differences(&self, is: &Self) -> Vec<Difference> {
+    pub(crate) fn differences(&self, is: &Self) -> Vec<PlanDifference> {
         if self == is {
             return Vec::new();
         }
@@ -132,7 +132,7 @@ fn comparable(file: &PlanFile) -> Value {
 
 /// One place where two plans part.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Difference {
+pub struct PlanDifference {
     /// JSON pointer into the plan.
     pub pointer: String,
     /// Value in the older plan; `None` if it had none there.
@@ -141,7 +141,7 @@ pub struct Difference {
     pub is: Option<String>,
 }
 
-impl fmt::Display for Difference {
+impl fmt::Display for PlanDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let side = |value: &Option<String>| value.clone().unwrap_or_else(|| "absent".into());
         write!(f, "{}: was {}, is {}", self.pointer, side(&self.was), side(&self.is))
@@ -149,13 +149,18 @@ impl fmt::Display for Difference {
 }
 
 /// Every leaf at which two JSON values part.
-pub(crate) fn differences(was: &Value, is: &Value) -> Vec<Difference> {
+pub(crate) fn differences(was: &Value, is: &Value) -> Vec<PlanDifference> {
     let mut found = Vec::new();
     descend(Some(was), Some(is), &mut String::new(), &mut found);
     found
 }
 
-fn descend(was: Option<&Value>, is: Option<&Value>, pointer: &mut String, found: &mut Vec<Difference>) {
+fn descend(
+    was: Option<&Value>,
+    is: Option<&Value>,
+    pointer: &mut String,
+    found: &mut Vec<PlanDifference>,
+) {
     if was == is {
         return;
     }
@@ -180,7 +185,11 @@ fn descend(was: Option<&Value>, is: Option<&Value>, pointer: &mut String, found:
                 step(&i.to_string(), was.get(i), is.get(i));
             }
         }
-        _ => found.push(Difference { pointer: pointer.clone(), was: was.map(brief), is: is.map(brief) }),
+        _ => found.push(PlanDifference {
+            pointer: pointer.clone(),
+            was: was.map(brief),
+            is: is.map(brief),
+        }),
     }
 }
 
@@ -238,7 +247,8 @@ mod tests {
     #[test]
     fn floats_survive_the_file_so_the_hash_does() {
         let plan = json!({ "x": 0.1 + 0.2, "y": 1e-300 / 3.0, "z": 2.0e-4, "n": 5e-324 });
-        let back: Value = serde_json::from_slice(&serde_json::to_vec_pretty(&plan).unwrap()).unwrap();
+        let back: Value =
+            serde_json::from_slice(&serde_json::to_vec_pretty(&plan).unwrap()).unwrap();
         assert_eq!(plan_hash("1", 1, &plan), plan_hash("1", 1, &back));
         assert_ne!(plan_hash("1", 1, &plan), plan_hash("2", 1, &plan));
         assert_ne!(plan_hash("1", 1, &plan), plan_hash("1", 2, &plan));

@@ -1,4 +1,5 @@
-//! What varies between runs of one plan, kept out of the result and beside it: when, where, how fast.
+//! What varies between runs of one plan, kept out of the result and beside it: when, where, how
+//! fast.
 
 use std::fs;
 use std::io;
@@ -7,10 +8,10 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 
 use super::error::StoreError;
-use super::open::Run;
+use super::open::OpenRun;
 use super::read::Tally;
 use super::{Folder, Job};
-use crate::files::{atomic, regular};
+use sweep_files::{atomic, regular};
 
 /// How one process worked on a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,7 +26,7 @@ pub struct Session {
     pub pid: u32,
     /// Processors the process may use.
     pub cpus: usize,
-    /// Processor model, where the system tells.
+    /// Processor model, where the system reports it.
     pub cpu_model: Option<String>,
     /// Instruction set the engine used.
     pub simd: String,
@@ -61,13 +62,15 @@ struct Sidecar<'a> {
     sessions: &'a [Session],
 }
 
-impl Run {
-    /// Leaves a word about this process's work in the folder, for the sidecar of whoever finishes the run.
+impl OpenRun {
+    /// Records this process's work in the folder, for the sidecar of the process that finishes the
+    /// run.
     ///
     /// # Errors
     /// [`StoreError::File`].
     pub fn record(&self, session: &Session) -> Result<(), StoreError> {
-        let name = format!("session-{}-{}-{}.json", session.host, session.pid, session.started_unix_s);
+        let name =
+            format!("session-{}-{}-{}.json", session.host, session.pid, session.started_unix_s);
         let path = self.folder().join(name.replace(['/', '\0'], "_"));
         let text = serde_json::to_vec_pretty(session)
             .map_err(io::Error::from)
@@ -76,7 +79,7 @@ impl Run {
     }
 }
 
-/// The sidecar: this session and those that were recorded before. Sessions that were killed left no word.
+/// The sidecar: this session and those that were recorded before. Killed sessions left no record.
 pub(super) fn sidecar(
     folder: &Folder,
     job: &Job<'_>,
@@ -85,7 +88,9 @@ pub(super) fn sidecar(
 ) -> Result<Vec<u8>, StoreError> {
     let mut sessions = recorded(folder)?;
     sessions.extend(session);
-    sessions.sort_by(|a, b| (a.started_unix_s, &a.host, a.pid).cmp(&(b.started_unix_s, &b.host, b.pid)));
+    sessions.sort_by(|a, b| {
+        (a.started_unix_s, &a.host, a.pid).cmp(&(b.started_unix_s, &b.host, b.pid))
+    });
     let wall_s: f64 = sessions.iter().map(|session| session.wall_s).sum();
     let computed: u64 = sessions.iter().map(|session| session.points).sum();
     let last = sessions.last();
@@ -113,7 +118,7 @@ pub(super) fn sidecar(
     Ok(text)
 }
 
-/// Sessions on record; one that cannot be read tells nothing.
+/// Sessions on record; one that cannot be read is left out.
 fn recorded(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     let mut sessions = Vec::new();
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
@@ -125,14 +130,14 @@ fn recorded(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     Ok(sessions)
 }
 
-/// Whether [`Run::record`] writes files of this name.
+/// Whether [`OpenRun::record`] writes files of this name.
 pub(super) fn is_session(name: &str) -> bool {
     name.starts_with("session-") && name.ends_with(".json")
 }
 
 /// This machine's name.
 #[must_use]
-pub fn host() -> String {
+pub(crate) fn host() -> String {
     #[cfg(unix)]
     let name = rustix::system::uname().nodename().to_string_lossy().into_owned();
     #[cfg(not(unix))]
@@ -140,9 +145,9 @@ pub fn host() -> String {
     if name.is_empty() { "unknown".into() } else { name }
 }
 
-/// The processor's model, where Linux tells.
+/// The processor's model, where Linux reports it.
 #[must_use]
-pub fn cpu_model() -> Option<String> {
+pub(crate) fn cpu_model() -> Option<String> {
     let text = fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;
     Some(line.split_once(':')?.1.trim().to_owned())
@@ -150,6 +155,6 @@ pub fn cpu_model() -> Option<String> {
 
 /// Seconds since 1970.
 #[must_use]
-pub fn now_unix_s() -> u64 {
+pub(crate) fn now_unix_s() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }

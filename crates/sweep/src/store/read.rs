@@ -1,4 +1,5 @@
-//! Reading Parquet files back: whose plan a result is of, what it holds, what any file's columns range over.
+//! Reading Parquet files back: whose plan a result is of, what it holds, what any file's columns
+//! range over.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,11 +17,11 @@ use serde::ser::{SerializeMap, Serializer};
 use serde_json::Value;
 
 use super::error::StoreError;
-use crate::cells;
-use crate::files::{FileKind, ParquetFile, key};
 use crate::verdict::ROW_STATUSES;
+use sweep_files::cells;
+use sweep_files::{FileKind, ParquetFile, key};
 
-/// A finished result's own word about itself.
+/// What a finished result says of itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResultFile {
     /// Grid as run, full machine, method.
@@ -39,7 +40,7 @@ impl ResultFile {
     /// What the metadata says.
     ///
     /// # Errors
-    /// [`StoreError::Parquet`] for a file that is no result of a run.
+    /// [`StoreError::Parquet`] for a file that is not the result of a run.
     pub(crate) fn of(file: &ParquetFile) -> Result<Self, StoreError> {
         own_word(file).ok_or_else(|| {
             let reason = "its metadata is not that of a result of `sweep run`";
@@ -72,7 +73,7 @@ pub(crate) fn finished(path: &Path) -> Result<Option<ParquetFile>, StoreError> {
     }
 }
 
-/// A value that stands out, and where.
+/// An extreme value, and its place.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Extreme {
     /// The value.
@@ -144,8 +145,16 @@ impl Serialize for StatusCounts {
 /// # Errors
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
 pub(crate) fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 8] =
-        ["point", "status", "reliable", "sensitive", "method", "error", "ratio_max", "min_gap_nonlinear_m"];
+    const COLUMNS: [&str; 8] = [
+        "point",
+        "status",
+        "reliable",
+        "sensitive",
+        "method",
+        "error",
+        "ratio_max",
+        "min_gap_nonlinear_m",
+    ];
     let failed = StoreError::parquet("read", file.path());
     let mut tally = Tally::default();
     let batches = file.batches(|builder| {
@@ -165,9 +174,9 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
             .ok_or_else(|| ParquetError::General(format!("there is no column `{name}`")))
     };
     let points = column("point")?;
-    let points = points
-        .as_primitive_opt::<UInt64Type>()
-        .ok_or_else(|| ParquetError::General(format!("column `point` is of type {}", points.data_type())))?;
+    let points = points.as_primitive_opt::<UInt64Type>().ok_or_else(|| {
+        ParquetError::General(format!("column `point` is of type {}", points.data_type()))
+    })?;
     for name in cells::texts(column("status")?)?.into_iter().flatten() {
         if let Some(status) = ROW_STATUSES.iter().position(|status| *status == name) {
             tally.by_status.add(status);
@@ -303,7 +312,10 @@ pub(crate) fn row(file: &ParquetFile, row: u64, columns: &[&str]) -> Result<Vec<
     let absent = || ParquetError::General(format!("there is no row {row} with all of {columns:?}"));
     let mut batches = file.batches(|builder| {
         let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().copied());
-        builder.with_projection(mask).with_offset(usize::try_from(row).unwrap_or(usize::MAX)).with_limit(1)
+        builder
+            .with_projection(mask)
+            .with_offset(usize::try_from(row).unwrap_or(usize::MAX))
+            .with_limit(1)
     })?;
     let batch = batches.next().ok_or_else(absent).map_err(&failed)??;
     let value = |name: &&str| {

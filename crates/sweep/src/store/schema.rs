@@ -1,11 +1,12 @@
-//! The result file's columns: a function of the plan, with units and descriptions that travel in the file.
+//! The result file's columns: a function of the plan, with units and descriptions that travel in
+//! the file.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use arrow_array::types::Int32Type;
 use arrow_array::{
-    ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray, UInt64Array,
+    ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray,
+    UInt64Array,
 };
 use arrow_schema::ArrowError;
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
@@ -13,21 +14,23 @@ use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 use parquet::schema::types::ColumnPath;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 use washer_model::Channel;
 
 use super::Job;
-use crate::engine::Level;
-use crate::files::key;
 use crate::measures::Measures;
+use crate::method::Level;
 use crate::outcome::{Outcome, Trajectory};
+use crate::table::{dictionary_entry, field_metadata};
 use crate::verdict::{ROW_STATUSES, Verdict, row_status};
+use sweep_files::key;
 
-/// Rows in a row group: fixed, so that chunking leaves no trace in the file. A group of 25 columns takes about 30 MB
-/// in memory while it is written.
+/// Rows in a row group: fixed, so that chunking leaves no trace in the file. A group of 25 columns
+/// takes about 30 MB in memory while it is written.
 pub(crate) const ROW_GROUP_ROWS: usize = 1 << 17;
 
-/// Rows handed to the Parquet writer at once: fixed for the same reason, and a whole number of them makes a group.
+/// Rows handed to the Parquet writer at once: fixed for the same reason, and a whole number of them
+/// makes a group.
 pub(crate) const BATCH_ROWS: usize = 1 << 12;
 
 /// A swept parameter as a column.
@@ -55,7 +58,7 @@ pub struct Layout {
 }
 
 /// What a row's cells are taken from.
-pub(crate) struct Row {
+pub(crate) struct ResultRow {
     pub(crate) axis_values: Vec<f64>,
     pub(crate) outcome: Outcome,
     pub(crate) verdict: Verdict,
@@ -64,7 +67,7 @@ pub(crate) struct Row {
     fail_time_s: Option<f64>,
 }
 
-type Get<T> = Box<dyn Fn(&Row) -> T>;
+type Get<T> = Box<dyn Fn(&ResultRow) -> T>;
 
 /// How a column takes its cell from a row, which settles its type too.
 enum Cell {
@@ -80,15 +83,20 @@ enum Cell {
 }
 
 /// A column of the file.
-struct Column {
+struct ResultColumn {
     name: String,
     unit: String,
     description: String,
     cell: Cell,
 }
 
-impl Column {
-    fn new(name: impl Into<String>, unit: &str, description: impl Into<String>, cell: Cell) -> Self {
+impl ResultColumn {
+    fn new(
+        name: impl Into<String>,
+        unit: &str,
+        description: impl Into<String>,
+        cell: Cell,
+    ) -> Self {
         Self { name: name.into(), unit: unit.into(), description: description.into(), cell }
     }
 
@@ -101,21 +109,20 @@ impl Column {
             Cell::Flag(_) => (DataType::Boolean, true),
             Cell::Name(..) => (names(), true),
         };
-        let metadata = HashMap::from([
-            ("unit".into(), self.unit.clone()),
-            ("description".into(), self.description.clone()),
-        ]);
+        let metadata = field_metadata(&self.unit, &self.description);
         Field::new(&self.name, data_type, nullable).with_metadata(metadata)
     }
 
-    fn array(&self, rows: &[Row]) -> Result<ArrayRef, ArrowError> {
+    fn array(&self, rows: &[ResultRow]) -> Result<ArrayRef, ArrowError> {
         Ok(match &self.cell {
             Cell::Count(get) => Arc::new(UInt64Array::from_iter_values(rows.iter().map(get))),
             Cell::Axis(get) => Arc::new(Float64Array::from_iter_values(rows.iter().map(get))),
-            Cell::Measured(get) | Cell::Time(get) => Arc::new(rows.iter().map(get).collect::<Float64Array>()),
+            Cell::Measured(get) | Cell::Time(get) => {
+                Arc::new(rows.iter().map(get).collect::<Float64Array>())
+            }
             Cell::Flag(get) => Arc::new(rows.iter().map(get).collect::<BooleanArray>()),
             Cell::Name(names, get) => {
-                let position = |row: &Row| get(row).and_then(|name| i32::try_from(name).ok());
+                let position = |row: &ResultRow| get(row).and_then(|name| i32::try_from(name).ok());
                 let keys: Int32Array = rows.iter().map(position).collect();
                 let names = StringArray::from_iter_values(names);
                 Arc::new(DictionaryArray::<Int32Type>::try_new(keys, Arc::new(names))?)
@@ -140,12 +147,14 @@ const MODELS: [(&str, fn(&Outcome) -> &Trajectory); 2] =
 
 impl Layout {
     /// Every column, in order: the one place that says what the file holds.
-    fn columns(&self) -> Vec<Column> {
+    fn columns(&self) -> Vec<ResultColumn> {
         let point = Cell::Count(Box::new(|row| row.outcome.point));
-        let mut columns = vec![Column::new("point", "1", "index in grid order", point)];
+        let mut columns = vec![ResultColumn::new("point", "1", "index in grid order", point)];
         for (i, axis) in self.axes.iter().enumerate() {
-            let cell = Cell::Axis(Box::new(move |row| row.axis_values.get(i).copied().unwrap_or(f64::NAN)));
-            columns.push(Column::new(&axis.name, &axis.unit, &axis.description, cell));
+            let cell = Cell::Axis(Box::new(move |row| {
+                row.axis_values.get(i).copied().unwrap_or(f64::NAN)
+            }));
+            columns.push(ResultColumn::new(&axis.name, &axis.unit, &axis.description, cell));
         }
         columns.extend(self.amplitude_columns());
         columns.extend(self.verdict_columns());
@@ -155,66 +164,81 @@ impl Layout {
         columns
     }
 
-    fn amplitude_columns(&self) -> Vec<Column> {
+    fn amplitude_columns(&self) -> Vec<ResultColumn> {
         let mut columns = Vec::new();
         for (model, of) in MODELS {
             for (i, channel) in self.channels.iter().enumerate() {
-                let (what, amplitude) = (channel.description(), self.measures.criterion.amplitude());
+                let (what, amplitude) =
+                    (channel.description(), self.measures.criterion.amplitude());
                 let text = format!("{what}: {amplitude}, {model} model; null if it failed");
-                let cell = Cell::Measured(Box::new(move |row| of(&row.outcome).amplitudes.get(i).copied()));
-                columns.push(Column::new(format!("{model}_{}", channel.name()), channel.unit(), text, cell));
+                let cell = Cell::Measured(Box::new(move |row| {
+                    of(&row.outcome).amplitudes.get(i).copied()
+                }));
+                columns.push(ResultColumn::new(
+                    format!("{model}_{}", channel.name()),
+                    channel.unit(),
+                    text,
+                    cell,
+                ));
             }
         }
         for (i, channel) in self.channels.iter().enumerate() {
             let text = format!("{}: {}", channel.description(), self.measures.criterion.ratio());
-            let cell = Cell::Measured(Box::new(move |row| row.verdict.ratios.get(i).copied().flatten()));
-            columns.push(Column::new(format!("ratio_{}", channel.name()), "1", text, cell));
+            let cell =
+                Cell::Measured(Box::new(move |row| row.verdict.ratios.get(i).copied().flatten()));
+            columns.push(ResultColumn::new(format!("ratio_{}", channel.name()), "1", text, cell));
         }
         columns
     }
 
-    fn verdict_columns(&self) -> [Column; 6] {
+    fn verdict_columns(&self) -> [ResultColumn; 6] {
         let channels = self.channels.iter().map(|channel| channel.name()).collect();
         [
-            Column::new(
+            ResultColumn::new(
                 "ratio_max",
                 "1",
                 "greatest of the defined ratios; null if none is",
                 Cell::Measured(Box::new(|row| row.verdict.greatest.map(|(_, ratio)| ratio))),
             ),
-            Column::new(
+            ResultColumn::new(
                 "ratio_max_channel",
                 "",
                 "channel of ratio_max; the first of the plan's channels wins a tie",
-                Cell::Name(channels, Box::new(|row| row.verdict.greatest.map(|(channel, _)| channel))),
+                Cell::Name(
+                    channels,
+                    Box::new(|row| row.verdict.greatest.map(|(channel, _)| channel)),
+                ),
             ),
-            Column::new(
+            ResultColumn::new(
                 "reliable",
                 "",
                 format!("ratio_max below {}; null where ratio_max is", self.ratio_limit),
                 Cell::Flag(Box::new(|row| row.verdict.reliable)),
             ),
-            Column::new(
+            ResultColumn::new(
                 "sensitive",
                 "",
-                "true where plain rk4 does not agree with itself at two steps: the motion is chaotic, and the row's \
+                "true where plain rk4 does not agree with itself at two steps: the motion is \
+                 chaotic, and the row's \
                  digits are those of one trajectory; null where nothing was compared",
                 Cell::Flag(Box::new(|row| row.outcome.sensitive)),
             ),
-            Column::new(
+            ResultColumn::new(
                 "method",
                 "",
-                "what the row's numbers come from: fast, fine and finest are rungs of the fast method, the others \
+                "what the row's numbers come from: fast, fine and finest are rungs of the fast \
+                 method, the others \
                  methods of that name",
                 Cell::Name(
                     Level::ALL.map(Level::name).to_vec(),
                     Box::new(|row| Some(row.outcome.method as usize)),
                 ),
             ),
-            Column::new(
+            ResultColumn::new(
                 "error",
                 "1",
-                "greatest relative error left in the row's numbers, from comparing two rungs of its method; null where \
+                "greatest relative error left in the row's numbers, from comparing two rungs of \
+                 its method; null where \
                  nothing was compared",
                 Cell::Measured(Box::new(|row| row.outcome.error)),
             ),
@@ -222,20 +246,26 @@ impl Layout {
     }
 
     /// Columns of the metrics that are asked for, and no others.
-    fn metric_columns(&self) -> Vec<Column> {
+    fn metric_columns(&self) -> Vec<ResultColumn> {
         let mut columns = Vec::new();
         let mut position = 0;
         for metric in &self.measures.metrics {
             if !metric.is_of_model() {
                 let cell = Cell::Measured(Box::new(|row| row.outcome.static_sag_m));
-                columns.push(Column::new(metric.column(""), metric.unit(), metric.description(), cell));
+                columns.push(ResultColumn::new(
+                    metric.column(""),
+                    metric.unit(),
+                    metric.description(),
+                    cell,
+                ));
                 continue;
             }
             for (model, of) in MODELS {
                 let text = format!("{}, {model} model; null if it failed", metric.description());
-                let cell =
-                    Cell::Measured(Box::new(move |row| of(&row.outcome).metrics.get(position).copied()));
-                columns.push(Column::new(metric.column(model), metric.unit(), text, cell));
+                let cell = Cell::Measured(Box::new(move |row| {
+                    of(&row.outcome).metrics.get(position).copied()
+                }));
+                columns.push(ResultColumn::new(metric.column(model), metric.unit(), text, cell));
             }
             position += 1;
         }
@@ -245,65 +275,65 @@ impl Layout {
     /// The Arrow schema.
     #[must_use]
     pub fn schema(&self) -> SchemaRef {
-        Arc::new(Schema::new(self.columns().iter().map(Column::field).collect::<Vec<_>>()))
+        Arc::new(Schema::new(self.columns().iter().map(ResultColumn::field).collect::<Vec<_>>()))
     }
 
     /// The column dictionary: name to type, unit and description.
     fn dictionary(&self) -> Value {
-        let entry = |column: &Column| {
-            let facts = json!({
-                "type": column.type_name(),
-                "unit": column.unit,
-                "description": column.description,
-            });
-            (column.name.clone(), facts)
+        let entry = |column: &ResultColumn| {
+            let entry = dictionary_entry(column.type_name(), &column.unit, &column.description);
+            (column.name.clone(), entry)
         };
         Value::Object(self.columns().iter().map(entry).collect::<Map<_, _>>())
     }
 }
 
 /// Columns of the least gaps, the same for every plan.
-fn gap_columns() -> Vec<Column> {
+fn gap_columns() -> Vec<ResultColumn> {
     let mut columns = Vec::new();
     for (model, of) in MODELS {
         let text = format!(
-            "least gap between drum and tub over the whole run, {model} model; negative where they clash; null if \
+            "least gap between drum and tub over the whole run, {model} model; negative where \
+             they clash; null if \
              it failed"
         );
         let cell = Cell::Measured(Box::new(move |row| of(&row.outcome).min_gap_m));
-        columns.push(Column::new(format!("min_gap_{model}_m"), "m", text, cell));
+        columns.push(ResultColumn::new(format!("min_gap_{model}_m"), "m", text, cell));
     }
     columns
 }
 
 /// Columns about the two integrations, the same for every plan.
-fn run_columns() -> Vec<Column> {
+fn run_columns() -> Vec<ResultColumn> {
     let mut columns = Vec::new();
-    columns.push(Column::new(
+    columns.push(ResultColumn::new(
         "status",
         "",
         "ok, or why the nonlinear model failed, or behind linear_ why the linear model alone did",
         Cell::Name(ROW_STATUSES.to_vec(), Box::new(|row| Some(row.status))),
     ));
-    columns.push(Column::new(
+    columns.push(ResultColumn::new(
         "fail_time_s",
         "s",
         "when the model named by status failed; null if none did or it never started",
         Cell::Time(Box::new(|row| row.fail_time_s)),
     ));
-    let counts: [(&str, &str, fn(&Trajectory) -> u64); 2] =
-        [("steps", "accepted", |model| model.steps), ("rejected", "rejected", |model| model.rejected)];
+    let counts: [(&str, &str, fn(&Trajectory) -> u64); 2] = [
+        ("steps", "accepted", |model| model.steps),
+        ("rejected", "rejected", |model| model.rejected),
+    ];
     for (name, kind, count) in counts {
         for (model, of) in MODELS {
             let text = format!("{kind} integration steps, {model} model");
             let cell = Cell::Count(Box::new(move |row| count(of(&row.outcome))));
-            columns.push(Column::new(format!("{name}_{model}"), "1", text, cell));
+            columns.push(ResultColumn::new(format!("{name}_{model}"), "1", text, cell));
         }
     }
     columns
 }
 
-/// Writer settings and metadata of a result file. Nothing in them depends on when, where or how the run went.
+/// Writer settings and metadata of a result file. Nothing in them depends on when, where or how the
+/// run went.
 pub(crate) fn properties(job: &Job<'_>) -> WriterProperties {
     let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
     let metadata = vec![
@@ -323,7 +353,7 @@ pub(crate) fn properties(job: &Job<'_>) -> WriterProperties {
     job.layout.columns().iter().fold(builder, encoding).build()
 }
 
-fn encoding(builder: WriterPropertiesBuilder, column: &Column) -> WriterPropertiesBuilder {
+fn encoding(builder: WriterPropertiesBuilder, column: &ResultColumn) -> WriterPropertiesBuilder {
     let path = ColumnPath::from(column.name.as_str());
     match column.cell {
         // A dictionary of them would be written and thrown away.
@@ -333,14 +363,14 @@ fn encoding(builder: WriterPropertiesBuilder, column: &Column) -> WriterProperti
 }
 
 /// Rows on their way into a batch.
-pub(crate) struct Rows<'a> {
+pub(crate) struct ResultRows<'a> {
     layout: &'a Layout,
     schema: SchemaRef,
-    columns: Vec<Column>,
-    rows: Vec<Row>,
+    columns: Vec<ResultColumn>,
+    rows: Vec<ResultRow>,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> ResultRows<'a> {
     pub(crate) fn new(layout: &'a Layout) -> Self {
         let (schema, columns) = (layout.schema(), layout.columns());
         Self { layout, schema, columns, rows: Vec::with_capacity(BATCH_ROWS) }
@@ -354,19 +384,21 @@ impl<'a> Rows<'a> {
         self.rows.len()
     }
 
-    /// Adds a row: the axis values at the point, and what came of it. Returns the row with its verdict.
-    pub(crate) fn push(&mut self, axis_values: Vec<f64>, outcome: Outcome) -> &Row {
+    /// Adds a row: the axis values at the point, and what came of it. Returns the row with its
+    /// verdict.
+    pub(crate) fn push(&mut self, axis_values: Vec<f64>, outcome: Outcome) -> &ResultRow {
         let verdict = Verdict::new(&outcome, self.layout.channels.len(), self.layout.ratio_limit);
         let (status, fail_time_s) = row_status(&outcome);
         let row = self.rows.len();
-        self.rows.push(Row { axis_values, outcome, verdict, status, fail_time_s });
+        self.rows.push(ResultRow { axis_values, outcome, verdict, status, fail_time_s });
         &self.rows[row]
     }
 
     /// The rows so far as a batch; leaves none.
     pub(crate) fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         let rows = std::mem::take(&mut self.rows);
-        let arrays = self.columns.iter().map(|column| column.array(&rows)).collect::<Result<Vec<_>, _>>()?;
+        let arrays =
+            self.columns.iter().map(|column| column.array(&rows)).collect::<Result<Vec<_>, _>>()?;
         self.rows = rows;
         self.rows.clear();
         RecordBatch::try_new(self.schema(), arrays)
@@ -419,7 +451,7 @@ mod tests {
         let plain = layout.schema().fields().len();
         let metrics = vec![Metric::StaticSag, Metric::ClashTime, Metric::CabinetForce];
         layout.measures = Measures { criterion: Criterion::Rms, metrics };
-        let mut rows = Rows::new(&layout);
+        let mut rows = ResultRows::new(&layout);
         let mut outcome = synthetic::outcome(0, 2);
         outcome.static_sag_m = Some(0.013);
         outcome.nonlinear.metrics = vec![1.5, 400.0];
@@ -459,7 +491,7 @@ mod tests {
     #[test]
     fn name_dictionaries_do_not_depend_on_which_names_appear() {
         let layout = synthetic::layout();
-        let mut rows = Rows::new(&layout);
+        let mut rows = ResultRows::new(&layout);
         rows.push(vec![0.1, 60.0], synthetic::outcome(0, 2));
         let batch = rows.take().unwrap();
         let names = |column: &str| {

@@ -1,8 +1,9 @@
 //! Which part of a run this process computes, and how a scheduler's array numbers it.
 //!
-//! Chunk `c` belongs to shard `c mod N`, so every shard gets its share of every region of the grid. `N`, and the
-//! array number of the first shard, are frozen in `shards.json` by the first shard to start: when two lost tasks are
-//! submitted again (`--array=3,7`), the scheduler's own count says 2 and its smallest number 3, and neither matters.
+//! Chunk `c` belongs to shard `c mod N`, so every shard gets its share of every region of the grid.
+//! `N`, and the array number of the first shard, are frozen in `shards.json` by the first shard to
+//! start: when two lost tasks are submitted again (`--array=3,7`), the scheduler's own count says 2
+//! and its smallest number 3, and neither matters.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
@@ -13,8 +14,8 @@ use serde_json::json;
 use super::Folder;
 use super::error::StoreError;
 use super::plan_file::pretty;
-use crate::files::{atomic, regular};
 use crate::threads::Environment;
+use sweep_files::{atomic, regular};
 
 /// More parts than any scheduler's array has tasks; a bound for loops over them.
 const MAX_SHARDS: u64 = 1_000_000;
@@ -58,7 +59,8 @@ impl FromStr for ShardRequest {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || format!("expected I/N with I from 1 to N, or auto/N, such as 3/8; got `{text}`");
+        let expected =
+            || format!("expected I/N with I from 1 to N, or auto/N, such as 3/8; got `{text}`");
         let (index, of) = text.split_once('/').ok_or_else(expected)?;
         let of: u64 = of.parse().map_err(|_| expected())?;
         if !(1..=MAX_SHARDS).contains(&of) {
@@ -85,8 +87,8 @@ pub(crate) struct Dealing {
 }
 
 impl Dealing {
-    /// What a run folder was dealt into, if any shard has started. An unreadable file counts as none: the dealing
-    /// only says who computes a chunk, never what is in it.
+    /// What a run folder was dealt into, if any shard has started. An unreadable file counts as
+    /// none: the dealing only says who computes a chunk, never what is in it.
     pub(crate) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
         let path = folder.shards();
         match regular::read(&path) {
@@ -128,11 +130,13 @@ impl Dealing {
     }
 }
 
-/// The part this process is to compute and the dealing it assumes: from the request, else from a Slurm array or a
-/// Kubernetes Indexed Job, read against what is already frozen. `None` means the whole run.
+/// The part this process is to compute and the dealing it assumes: from the request, else from a
+/// Slurm array or a Kubernetes Indexed Job, read against what is already frozen. `None` means the
+/// whole run.
 ///
 /// # Errors
-/// [`StoreError::Shard`] when the request, the scheduler and the frozen dealing do not fit together.
+/// [`StoreError::Shard`] when the request, the scheduler and the frozen dealing do not fit
+/// together.
 pub(crate) fn resolve(
     request: Option<ShardRequest>,
     environment: Environment<'_>,
@@ -143,7 +147,8 @@ pub(crate) fn resolve(
         let dealing = frozen.unwrap_or(Dealing { shards: shard.of, first_array_id: 1 });
         if dealing.shards != shard.of {
             return refuse(format!(
-                "this run was dealt into {} shards by the first to start, not {}\n  = help: use --shard I/{}, or run it \
+                "this run was dealt into {} shards by the first to start, not {}\n  = help: use \
+                 --shard I/{}, or run it \
                  whole without --shard",
                 dealing.shards, shard.of, dealing.shards
             ));
@@ -158,7 +163,8 @@ pub(crate) fn resolve(
         return match asked {
             None => Ok(None),
             Some(of) => refuse(format!(
-                "--shard auto/{of} takes its place from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX, and neither is \
+                "--shard auto/{of} takes its place from SLURM_ARRAY_TASK_ID or \
+                 JOB_COMPLETION_INDEX, and neither is \
                  set\n  = help: give it as --shard I/{of}"
             )),
         };
@@ -166,7 +172,8 @@ pub(crate) fn resolve(
     let dealing = match (frozen, asked.or(scheduler.count)) {
         (Some(dealing), _) if asked.is_some_and(|of| of != dealing.shards) => {
             return refuse(format!(
-                "this run was dealt into {} shards by the first to start, not {}\n  = help: use --shard auto/{}",
+                "this run was dealt into {} shards by the first to start, not {}\n  = help: use \
+                 --shard auto/{}",
                 dealing.shards,
                 asked.unwrap_or_default(),
                 dealing.shards
@@ -176,7 +183,8 @@ pub(crate) fn resolve(
         (None, Some(shards)) => Dealing { shards, first_array_id: scheduler.first },
         (None, None) => {
             return refuse(format!(
-                "{} is set, but not how many shards there are\n  = help: give --shard auto/N, or --shard 1/1 to run it whole",
+                "{} is set, but not how many shards there are\n  = help: give --shard auto/N, or \
+                 --shard 1/1 to run it whole",
                 scheduler.name
             ));
         }
@@ -186,7 +194,8 @@ pub(crate) fn resolve(
             Ok(Some((Shard { index: place + 1, of: dealing.shards }, dealing)))
         }
         _ => refuse(format!(
-            "{} is {}, but this run's {} shards are numbered {} to {}\n  = help: submit those numbers, or give --shard I/N",
+            "{} is {}, but this run's {} shards are numbered {} to {}\n  = help: submit those \
+             numbers, or give --shard I/N",
             scheduler.name,
             scheduler.id,
             dealing.shards,
@@ -210,12 +219,15 @@ impl Scheduler {
             None => Ok(None),
             Some(text) => match text.parse::<u64>() {
                 Ok(number) => Ok(Some(number)),
-                Err(_) => Err(StoreError::Shard(format!("{name} is `{text}`, which is not a number"))),
+                Err(_) => {
+                    Err(StoreError::Shard(format!("{name} is `{text}`, which is not a number")))
+                }
             },
         };
         if let Some(id) = number("SLURM_ARRAY_TASK_ID")? {
             let first = number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(id);
-            let count = number("SLURM_ARRAY_TASK_COUNT")?.filter(|count| (1..=MAX_SHARDS).contains(count));
+            let count =
+                number("SLURM_ARRAY_TASK_COUNT")?.filter(|count| (1..=MAX_SHARDS).contains(count));
             return Ok(Some(Self { name: "SLURM_ARRAY_TASK_ID", id, first, count }));
         }
         let place = number("JOB_COMPLETION_INDEX")?;
@@ -241,15 +253,16 @@ pub(crate) fn list(numbers: impl IntoIterator<Item = u64>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exit::Exit;
 
-    fn environment(pairs: &'static [(&'static str, &'static str)]) -> impl Fn(&str) -> Option<String> {
+    fn environment(
+        pairs: &'static [(&'static str, &'static str)],
+    ) -> impl Fn(&str) -> Option<String> {
         move |name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
     }
 
     fn refusal(result: Result<Option<(Shard, Dealing)>, StoreError>) -> String {
         let error = result.unwrap_err();
-        assert_eq!(error.exit(), Exit::BadInput);
+        assert!(error.is_refusal());
         error.to_string()
     }
 
@@ -257,7 +270,9 @@ mod tests {
     fn requests_read_as_written() {
         assert_eq!("3/8".parse(), Ok(ShardRequest::Given(Shard { index: 3, of: 8 })));
         assert_eq!("auto/8".parse(), Ok(ShardRequest::Auto { of: 8 }));
-        for bad in ["0/8", "9/8", "1/0", "auto/0", "3", "a/8", "3/", "-1/8", "3/8/2", "", "1/1000001"] {
+        for bad in
+            ["0/8", "9/8", "1/0", "auto/0", "3", "a/8", "3/", "-1/8", "3/8/2", "", "1/1000001"]
+        {
             assert!(bad.parse::<ShardRequest>().unwrap_err().starts_with("expected"), "{bad}");
         }
     }
@@ -336,7 +351,10 @@ mod tests {
         let given = Some(ShardRequest::Given(Shard { index: 1, of: 8 }));
         assert!(refusal(resolve(given, &environment(&[]), frozen)).contains("into 4 shards"));
         let pod = environment(&[("JOB_COMPLETION_INDEX", "1")]);
-        assert!(refusal(resolve(Some(ShardRequest::Auto { of: 8 }), &pod, frozen)).contains("into 4 shards"));
+        assert!(
+            refusal(resolve(Some(ShardRequest::Auto { of: 8 }), &pod, frozen))
+                .contains("into 4 shards")
+        );
     }
 
     #[test]

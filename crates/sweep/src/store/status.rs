@@ -1,4 +1,4 @@
-//! Where a run stands, without disturbing it.
+//! Progress of a run, without disturbing it.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ pub enum State {
     Finished,
 }
 
-/// Where a run stands.
+/// Progress of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FolderStatus {
     /// The finished file, or where it will be.
@@ -55,8 +55,8 @@ pub struct FolderStatus {
     pub running: Vec<Holder>,
     /// Into how many shards the run was dealt, if it was.
     pub shards: Option<u64>,
-    /// Shards with something missing that nobody is working on, as the scheduler numbers them: `2,5-7`, for
-    /// `sbatch --array=`; empty if none is.
+    /// Shards with something missing that nobody is working on, as the scheduler numbers them:
+    /// `2,5-7`, for `sbatch --array=`; empty if none is.
     pub missing_shards: String,
 }
 
@@ -64,7 +64,7 @@ pub struct FolderStatus {
 /// the folder, another result or another file at the output, a damaged result.
 ///
 /// # Errors
-/// As [`super::Run::open`], but never [`StoreError::Busy`].
+/// As [`super::OpenRun::open`], but never [`StoreError::Busy`].
 pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> {
     let folder = Folder::of(output)?;
     let points_a_chunk = chunk_points(job.points);
@@ -119,15 +119,22 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     status.state = if status.chunks_missing == 0 { State::Complete } else { State::Unfinished };
     status.running = lock::holders(&folder);
     if let Some(dealing) = Dealing::read(&folder)? {
-        let running = |shard: &u64| status.running.iter().any(|holder| holder.shard == Some(*shard));
-        let missing = dealing.incomplete(chunks, &present).into_iter().filter(|shard| !running(shard));
-        status.missing_shards = shard::list(missing.map(|shard| shard - 1 + dealing.first_array_id));
+        let running =
+            |shard: &u64| status.running.iter().any(|holder| holder.shard == Some(*shard));
+        let missing =
+            dealing.incomplete(chunks, &present).into_iter().filter(|shard| !running(shard));
+        status.missing_shards =
+            shard::list(missing.map(|shard| shard - 1 + dealing.first_array_id));
         status.shards = Some(dealing.shards);
     }
     Ok(status)
 }
 
-fn finished(folder: &Folder, job: &Job<'_>, mut status: FolderStatus) -> Result<FolderStatus, StoreError> {
+fn finished(
+    folder: &Folder,
+    job: &Job<'_>,
+    mut status: FolderStatus,
+) -> Result<FolderStatus, StoreError> {
     if let Some((_, tally)) = open::finished(folder, job)? {
         status.state = State::Finished;
         status.points_done = tally.points;

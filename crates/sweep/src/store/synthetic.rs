@@ -4,8 +4,8 @@ use serde_json::json;
 use washer_model::Channel;
 
 use super::{AxisColumn, Job, Layout};
-use crate::engine::Level;
 use crate::measures::Measures;
+use crate::method::Level;
 use crate::outcome::{Outcome, Status, Trajectory};
 
 /// Two axes, two channels.
@@ -30,11 +30,14 @@ pub(crate) fn job(points: u64) -> Job<'static> {
         numerics: 1,
         points,
         layout: layout(),
-        axis_values: Box::new(|point| vec![0.05 * (point / 9 + 1) as f64, 60.0 + 10.0 * (point % 9) as f64]),
+        axis_values: Box::new(|point| {
+            vec![0.05 * (point / 9 + 1) as f64, 60.0 + 10.0 * (point % 9) as f64]
+        }),
     }
 }
 
-/// Every kind of row comes by within 60 points: reliable, not, undefined, failed in each model and in each way.
+/// Every kind of row comes by within 60 points: reliable, not, undefined, failed in each model and
+/// in each way.
 pub(crate) fn outcome(point: u64, channels: usize) -> Outcome {
     let x = point as f64;
     let model = |scale: f64, status: Status| Trajectory {

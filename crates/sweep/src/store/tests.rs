@@ -11,11 +11,11 @@ use proptest::prelude::*;
 use serde_json::json;
 use tempfile::TempDir;
 
+use super::merge::Joined;
 use super::*;
-use crate::cells;
-use crate::exit::Exit;
-use crate::files::FileError;
 use crate::verdict::{ROW_STATUSES, Verdict, row_status};
+use sweep_files::FileError;
+use sweep_files::cells;
 
 const POINTS: u64 = 81;
 
@@ -35,28 +35,31 @@ impl Home {
     }
 }
 
-fn options() -> Options<'static> {
-    Options { fresh: false, shard: None, environment: &|_| None }
+fn options() -> OpenOptions<'static> {
+    OpenOptions { fresh: false, shard: None, environment: &|_| None }
 }
 
-fn open(output: &Path, job: &Job<'_>) -> Run {
-    match Run::open(output, job, options()).unwrap() {
+fn open(output: &Path, job: &Job<'_>) -> OpenRun {
+    match OpenRun::open(output, job, options()).unwrap() {
         Opened::Run(run) => *run,
         Opened::Finished(file, _) => panic!("finished: {file:?}"),
     }
 }
 
-fn write(run: &Run, chunk: u64) {
-    let outcomes: Vec<_> = run.chunk_range(chunk).map(|point| synthetic::outcome(point, 2)).collect();
+fn write(run: &OpenRun, chunk: u64) {
+    let outcomes: Vec<_> =
+        run.chunk_range(chunk).map(|point| synthetic::outcome(point, 2)).collect();
     run.write_chunk(chunk, &outcomes).unwrap();
 }
 
-fn write_missing(run: &Run) -> u64 {
-    (0..run.chunks()).filter(|&chunk| run.is_missing(chunk)).inspect(|&chunk| write(run, chunk)).count()
-        as u64
+fn write_missing(run: &OpenRun) -> u64 {
+    (0..run.chunks())
+        .filter(|&chunk| run.is_missing(chunk))
+        .inspect(|&chunk| write(run, chunk))
+        .count() as u64
 }
 
-fn finish(mut run: Run, job: &Job<'_>) -> Joined {
+fn finish(mut run: OpenRun, job: &Job<'_>) -> Joined {
     let tally = run.join(job, &|| false).unwrap().unwrap();
     run.complete(job, tally, None).unwrap()
 }
@@ -113,8 +116,9 @@ fn every_cell_is_what_the_outcome_says() {
         let column = batch.column_by_name(name).unwrap().as_boolean();
         column.is_valid(row).then(|| column.value(row))
     };
-    let count =
-        |name: &str, row: usize| batch.column_by_name(name).unwrap().as_primitive::<UInt64Type>().value(row);
+    let count = |name: &str, row: usize| {
+        batch.column_by_name(name).unwrap().as_primitive::<UInt64Type>().value(row)
+    };
     let mut statuses = std::collections::BTreeSet::new();
     for row in 0..POINTS as usize {
         let outcome = synthetic::outcome(row as u64, 2);
@@ -129,7 +133,8 @@ fn every_cell_is_what_the_outcome_says() {
         assert_eq!(number("linear_tub_front_y", row), outcome.linear.amplitudes.first().copied());
         assert_eq!(number("ratio_tub_front_y", row), verdict.ratios[0]);
         assert_eq!(number("ratio_max", row), verdict.greatest.map(|(_, ratio)| ratio));
-        let channel = verdict.greatest.map(|(channel, _)| job.layout.channels[channel].name().to_owned());
+        let channel =
+            verdict.greatest.map(|(channel, _)| job.layout.channels[channel].name().to_owned());
         assert_eq!(text("ratio_max_channel", row), channel);
         assert_eq!(flag("reliable", row), verdict.reliable);
         assert_eq!(flag("sensitive", row), outcome.sensitive);
@@ -150,7 +155,8 @@ fn the_file_says_what_it_is_and_nothing_of_where_or_when() {
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
-    let reader = ParquetRecordBatchReaderBuilder::try_new(fs::File::open(home.output()).unwrap()).unwrap();
+    let reader =
+        ParquetRecordBatchReaderBuilder::try_new(fs::File::open(home.output()).unwrap()).unwrap();
     let file = reader.metadata().file_metadata();
     assert_eq!(file.created_by(), Some("sweep version 0.0.0-test"));
     let pairs = file.key_value_metadata().unwrap();
@@ -277,20 +283,25 @@ fn another_plan_is_refused_with_the_difference_until_fresh() {
         plan: json!({ "name": "synthetic", "points": POINTS, "step_s": 1.0e-4 }),
         ..synthetic::job(POINTS)
     };
-    let error = Run::open(&home.output(), &other, options()).unwrap_err();
-    assert_eq!(error.exit(), Exit::BadInput);
+    let error = OpenRun::open(&home.output(), &other, options()).unwrap_err();
+    assert!(error.is_refusal());
     let text = error.to_string();
     assert!(text.contains("/step_s: was 0.0002, is 0.0001") && text.contains("--fresh"), "{text}");
 
     let newer = Job { version: "9.9.9", ..synthetic::job(POINTS) };
-    let text = Run::open(&home.output(), &newer, options()).unwrap_err().to_string();
+    let text = OpenRun::open(&home.output(), &newer, options()).unwrap_err().to_string();
     assert!(text.contains(r#"/sweep_version: was "0.0.0-test", is "9.9.9""#), "{text}");
 
-    let fresh = Options { fresh: true, ..options() };
-    let Opened::Run(run) = Run::open(&home.output(), &other, fresh).unwrap() else { panic!("must run") };
+    let fresh = OpenOptions { fresh: true, ..options() };
+    let Opened::Run(run) = OpenRun::open(&home.output(), &other, fresh).unwrap() else {
+        panic!("must run")
+    };
     assert!(run.is_missing(0));
     drop(run);
-    assert!(Run::open(&home.output(), &job, options()).is_err(), "the folder is the other plan's now");
+    assert!(
+        OpenRun::open(&home.output(), &job, options()).is_err(),
+        "the folder is the other plan's now"
+    );
 }
 
 #[test]
@@ -299,7 +310,8 @@ fn a_finished_output_is_left_alone() {
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
-    let Opened::Finished(file, tally) = Run::open(&home.output(), &job, options()).unwrap() else {
+    let Opened::Finished(file, tally) = OpenRun::open(&home.output(), &job, options()).unwrap()
+    else {
         panic!("is done")
     };
     assert_eq!((file.points, &file.plan), (POINTS, &job.plan));
@@ -307,14 +319,14 @@ fn a_finished_output_is_left_alone() {
     assert!(!home.partial().exists());
 
     let other = Job { plan: json!({ "name": "other" }), ..synthetic::job(POINTS) };
-    let error = Run::open(&home.output(), &other, options()).unwrap_err();
-    assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.exit() == Exit::BadInput, "{error}");
+    let error = OpenRun::open(&home.output(), &other, options()).unwrap_err();
+    assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.is_refusal(), "{error}");
     assert!(error.to_string().contains(r#"/name: was "synthetic", is "other""#), "{error}");
 
     // Started over, the old result stays until the new one takes its place, interrupted or not.
     let before = fs::read(home.output()).unwrap();
-    let fresh = Options { fresh: true, ..options() };
-    drop(Run::open(&home.output(), &other, fresh).unwrap());
+    let fresh = OpenOptions { fresh: true, ..options() };
+    drop(OpenRun::open(&home.output(), &other, fresh).unwrap());
     assert_eq!(fs::read(home.output()).unwrap(), before);
     let run = open(&home.output(), &other);
     write_missing(&run);
@@ -328,15 +340,17 @@ fn another_build_of_the_version_is_another_run() {
     let other = Job { numerics: 2, ..synthetic::job(POINTS) };
     let refusal = |what: Result<Opened, StoreError>| {
         let error = what.unwrap_err();
-        assert_eq!(error.exit(), Exit::BadInput);
+        assert!(error.is_refusal());
         assert!(error.to_string().contains("/numerics: was 1, is 2"), "{error}");
     };
     let run = open(&home.output(), &job);
     write(&run, 0);
     drop(run);
-    refusal(Run::open(&home.output(), &other, options()));
-    refusal(Run::open_for_merge(&home.output(), &other));
-    assert!(status(&home.output(), &other).unwrap_err().to_string().contains("/numerics: was 1, is 2"));
+    refusal(OpenRun::open(&home.output(), &other, options()));
+    refusal(OpenRun::open_for_merge(&home.output(), &other));
+    assert!(
+        status(&home.output(), &other).unwrap_err().to_string().contains("/numerics: was 1, is 2")
+    );
 
     // A chunk of that build under this one's plan.
     let foreign = write_bytes(&other, 3);
@@ -348,9 +362,9 @@ fn another_build_of_the_version_is_another_run() {
 
     write_missing(&run);
     finish(run, &job);
-    refusal(Run::open(&home.output(), &other, options()));
-    let fresh = Options { fresh: true, ..options() };
-    assert!(matches!(Run::open(&home.output(), &other, fresh).unwrap(), Opened::Run(_)));
+    refusal(OpenRun::open(&home.output(), &other, options()));
+    let fresh = OpenOptions { fresh: true, ..options() };
+    assert!(matches!(OpenRun::open(&home.output(), &other, fresh).unwrap(), Opened::Run(_)));
 }
 
 #[test]
@@ -362,10 +376,13 @@ fn a_folder_of_an_older_format_is_refused_as_such() {
         "plan": job.plan,
     });
     fs::write(home.partial().join("plan.json"), old.to_string()).unwrap();
-    let error = Run::open(&home.output(), &job, options()).unwrap_err();
-    assert_eq!(error.exit(), Exit::BadInput);
+    let error = OpenRun::open(&home.output(), &job, options()).unwrap_err();
+    assert!(error.is_refusal());
     let text = error.to_string();
-    assert!(text.contains("/store_format: was 1, is 2") && text.contains("/numerics: was 0"), "{text}");
+    assert!(
+        text.contains("/store_format: was 1, is 2") && text.contains("/numerics: was 0"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -382,11 +399,14 @@ fn no_flipped_bit_of_a_result_is_taken_for_it() {
         let mut bytes = whole.clone();
         bytes[at] ^= 1 << (at % 8);
         fs::write(home.output(), &bytes).unwrap();
-        let error = Run::open(&home.output(), &job, options()).unwrap_err();
+        let error = OpenRun::open(&home.output(), &job, options()).unwrap_err();
         let text = error.to_string();
         damaged += usize::from(matches!(error, StoreError::File(FileError::Damaged { .. })));
         assert!(text.contains("x.parquet") && text.contains("= help: "), "byte {at}: {text}");
-        assert!(status(&home.output(), &job).is_err() && Run::open_for_merge(&home.output(), &job).is_err());
+        assert!(
+            status(&home.output(), &job).is_err()
+                && OpenRun::open_for_merge(&home.output(), &job).is_err()
+        );
         assert!(fs::read(home.output()).unwrap() == bytes && !home.partial().exists(), "byte {at}");
     }
     // The others have lost what makes them a result of ours: the end of the file, a key of the
@@ -404,14 +424,15 @@ fn a_result_whose_digest_is_cut_out_is_no_result_of_this_build() {
     let at = bytes.windows(12).rposition(|window| window == b"sweep.digest").unwrap();
     bytes[at + 6] = b'D';
     fs::write(home.output(), &bytes).unwrap();
-    let error = Run::open(&home.output(), &job, options()).unwrap_err();
+    let error = OpenRun::open(&home.output(), &job, options()).unwrap_err();
     assert!(matches!(error, StoreError::File(FileError::Damaged { .. })), "{error}");
 }
 
 #[test]
 fn results_that_differ_after_a_dot_have_a_sidecar_each() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
-    for (name, sidecar) in [("v1.0", "v1.0.run.json"), ("v1.5", "v1.5.run.json"), ("x.parquet", "x.run.json")]
+    for (name, sidecar) in
+        [("v1.0", "v1.0.run.json"), ("v1.5", "v1.5.run.json"), ("x.parquet", "x.run.json")]
     {
         let output = home.0.path().join(name);
         let run = open(&output, &job);
@@ -422,8 +443,8 @@ fn results_that_differ_after_a_dot_have_a_sidecar_each() {
     }
     // A result whose sidecar would be another's, and a stranger's file of its name.
     let refused = |output: &Path| {
-        let error = Run::open(output, &job, options()).unwrap_err();
-        assert_eq!(error.exit(), Exit::BadInput);
+        let error = OpenRun::open(output, &job, options()).unwrap_err();
+        assert!(error.is_refusal());
         assert!(error.to_string().contains("is no account of the run with this --out"), "{error}");
     };
     refused(&home.0.path().join("x"));
@@ -445,8 +466,8 @@ fn starting_over_deletes_what_a_run_wrote_and_nothing_else() {
     for name in theirs.into_iter().chain([damaged.as_str(), "shard-3.lock"]) {
         fs::write(home.partial().join(name), "").unwrap();
     }
-    let fresh = Options { fresh: true, ..options() };
-    drop(Run::open(&home.output(), &job, fresh).unwrap());
+    let fresh = OpenOptions { fresh: true, ..options() };
+    drop(OpenRun::open(&home.output(), &job, fresh).unwrap());
     let mut left: Vec<String> = fs::read_dir(home.partial())
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
@@ -454,7 +475,14 @@ fn starting_over_deletes_what_a_run_wrote_and_nothing_else() {
     left.sort();
     assert_eq!(
         left,
-        ["chunk-notes.txt", "lock", "plan.json", "plan.json.old", "session-notes.md", "shard-plan.txt"]
+        [
+            "chunk-notes.txt",
+            "lock",
+            "plan.json",
+            "plan.json.old",
+            "session-notes.md",
+            "shard-plan.txt"
+        ]
     );
 }
 
@@ -463,18 +491,20 @@ fn a_strangers_file_is_not_overwritten() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     fs::write(home.output(), "my thesis").unwrap();
     for fresh in [false, true] {
-        let error = Run::open(&home.output(), &job, Options { fresh, ..options() }).unwrap_err();
-        assert_eq!(error.exit(), Exit::BadInput);
+        let error =
+            OpenRun::open(&home.output(), &job, OpenOptions { fresh, ..options() }).unwrap_err();
+        assert!(error.is_refusal());
         assert!(error.to_string().contains("is no result of `sweep run`"), "{error}");
     }
-    for error in
-        [Run::open_for_merge(&home.output(), &job).unwrap_err(), status(&home.output(), &job).unwrap_err()]
-    {
+    for error in [
+        OpenRun::open_for_merge(&home.output(), &job).unwrap_err(),
+        status(&home.output(), &job).unwrap_err(),
+    ] {
         assert!(error.to_string().contains("is no result of `sweep run`"), "{error}");
     }
     assert_eq!(fs::read(home.output()).unwrap(), b"my thesis");
     assert!(!home.partial().exists());
-    let error = Run::open(home.0.path(), &job, options()).unwrap_err();
+    let error = OpenRun::open(home.0.path(), &job, options()).unwrap_err();
     assert!(error.to_string().contains("it is a folder"), "{error}");
 }
 
@@ -494,7 +524,10 @@ fn death_between_publishing_and_removing_the_folder_loses_nothing() {
     // The same, half-way through the removal: the plan goes first.
     fs::create_dir(home.partial()).unwrap();
     fs::write(home.partial().join(chunk_name(3)), "left").unwrap();
-    assert!(matches!(Run::open(&home.output(), &job, options()).unwrap(), Opened::Finished(..)));
+    assert!(matches!(
+        OpenRun::open(&home.output(), &job, options()).unwrap(),
+        Opened::Finished(..)
+    ));
     assert!(!home.partial().exists());
 }
 
@@ -515,7 +548,9 @@ fn a_damaged_plan_is_set_aside_and_its_chunks_are_used() {
     write(&open(&home.output(), &job), 0);
     let plan = home.partial().join("plan.json");
     let text = fs::read_to_string(&plan).unwrap();
-    for broken in [text.replace("synthetic", "synthetik"), text[..text.len() / 2].to_owned(), String::new()] {
+    for broken in
+        [text.replace("synthetic", "synthetik"), text[..text.len() / 2].to_owned(), String::new()]
+    {
         fs::write(&plan, broken).unwrap();
         let mut run = open(&home.output(), &job);
         assert!(run.take_notes()[0].contains("the frozen plan was damaged"));
@@ -545,12 +580,15 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     let shard = |index| {
         let shard = Some(ShardRequest::Given(Shard { index, of: 4 }));
-        match Run::open(&home.output(), &job, Options { shard, ..options() }).unwrap() {
+        match OpenRun::open(&home.output(), &job, OpenOptions { shard, ..options() }).unwrap() {
             Opened::Run(run) => *run,
             Opened::Finished(..) => panic!("is not done"),
         }
     };
-    assert!(matches!(Run::open_for_merge(&home.output(), &job).unwrap_err(), StoreError::NoRun { .. }));
+    assert!(matches!(
+        OpenRun::open_for_merge(&home.output(), &job).unwrap_err(),
+        StoreError::NoRun { .. }
+    ));
     // Two at once, and one of them twice.
     let (first, third, again) = (shard(1), shard(3), shard(3));
     assert_eq!(first.own_points(), (3 * 8, 0));
@@ -558,17 +596,17 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
     for run in [&first, &third, &again] {
         write_missing(run);
     }
-    let busy = Run::open_for_merge(&home.output(), &job).unwrap_err();
-    assert_eq!(busy.exit(), Exit::Busy, "{busy}");
+    let busy = OpenRun::open_for_merge(&home.output(), &job).unwrap_err();
+    assert!(matches!(busy, StoreError::Busy { .. }), "{busy}");
     let running = status(&home.output(), &job).unwrap().running;
     assert_eq!(running.iter().map(|holder| holder.shard).collect::<Vec<_>>(), [Some(1), Some(3)]);
     drop((first, third, again));
 
-    let Opened::Run(mut merge) = Run::open_for_merge(&home.output(), &job).unwrap() else {
+    let Opened::Run(mut merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
         panic!("is not done")
     };
     let error = merge.join(&job, &|| false).unwrap_err();
-    assert_eq!(error.exit(), Exit::Failed);
+    assert!(!error.is_refusal());
     assert!(error.to_string().contains("5 of 11 chunks are missing, of shards 2,4"), "{error}");
     drop(merge);
     let found = status(&home.output(), &job).unwrap();
@@ -578,17 +616,31 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
     );
     assert_eq!((found.chunks_done, found.chunks_missing), (6, 5));
 
-    let other = Options { shard: Some(ShardRequest::Given(Shard { index: 1, of: 5 })), ..options() };
-    assert!(Run::open(&home.output(), &job, other).unwrap_err().to_string().contains("into 4 shards"));
-    let fresh =
-        Options { fresh: true, shard: Some(ShardRequest::Given(Shard { index: 2, of: 4 })), ..options() };
-    assert!(Run::open(&home.output(), &job, fresh).unwrap_err().to_string().contains("--fresh would delete"));
+    let other =
+        OpenOptions { shard: Some(ShardRequest::Given(Shard { index: 1, of: 5 })), ..options() };
+    assert!(
+        OpenRun::open(&home.output(), &job, other)
+            .unwrap_err()
+            .to_string()
+            .contains("into 4 shards")
+    );
+    let fresh = OpenOptions {
+        fresh: true,
+        shard: Some(ShardRequest::Given(Shard { index: 2, of: 4 })),
+        ..options()
+    };
+    assert!(
+        OpenRun::open(&home.output(), &job, fresh)
+            .unwrap_err()
+            .to_string()
+            .contains("--fresh would delete")
+    );
 
     for index in [2, 4] {
         write_missing(&shard(index));
     }
     assert_eq!(status(&home.output(), &job).unwrap().state, State::Complete);
-    let Opened::Run(merge) = Run::open_for_merge(&home.output(), &job).unwrap() else {
+    let Opened::Run(merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
         panic!("is not done")
     };
     finish(*merge, &job);
@@ -608,7 +660,10 @@ fn status_counts_without_touching_anything() {
     write(&run, 1);
     fs::write(home.partial().join(chunk_name(1)), "not a chunk").unwrap();
     let found = status(&home.output(), &job).unwrap();
-    assert_eq!((found.chunks_done, found.chunks_damaged.as_slice(), found.points_done), (1, &[1][..], 8));
+    assert_eq!(
+        (found.chunks_done, found.chunks_damaged.as_slice(), found.points_done),
+        (1, &[1][..], 8)
+    );
     assert_eq!(found.points_failed, 2, "points 4 and 7 of the formula fail");
     assert_eq!(found.running[0].pid, std::process::id());
     assert!(home.partial().join(chunk_name(1)).exists());
@@ -645,8 +700,12 @@ fn the_sidecar_adds_up_the_sessions() {
     assert_eq!(sidecar["points_per_s"], 81.0 / 4.0);
     assert_eq!(sidecar["sessions"].as_array().unwrap().len(), 2);
     assert_eq!(sidecar["rows"]["points"], POINTS);
-    let by_status: u64 =
-        sidecar["rows"]["by_status"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();
+    let by_status: u64 = sidecar["rows"]["by_status"]
+        .as_object()
+        .unwrap()
+        .values()
+        .map(|count| count.as_u64().unwrap())
+        .sum();
     assert_eq!(by_status, POINTS);
 }
 
@@ -660,7 +719,8 @@ fn the_tally_agrees_with_the_outcomes() {
         .map(|point| synthetic::outcome(point, 2))
         .map(|outcome| (Verdict::new(&outcome, 2, 2.0), outcome))
         .collect();
-    let with = |reliable| rows.iter().filter(|(verdict, _)| verdict.reliable == reliable).count() as u64;
+    let with =
+        |reliable| rows.iter().filter(|(verdict, _)| verdict.reliable == reliable).count() as u64;
     assert_eq!(
         (tally.reliable, tally.unreliable, tally.undefined),
         (with(Some(true)), with(Some(false)), with(None))

@@ -3,7 +3,7 @@
 //!
 //! A search on `x.parquet` works in the folder `x.parquet.partial`, under the same lock and with
 //! the same frozen plan as a run. Chunks do not fit it: which points it needs is not known
-//! beforehand. Its trials stand in `trials.bin` instead, in the order in which they came, 40 bytes
+//! beforehand. Its trials are in `trials.bin` instead, in the order in which they came, 40 bytes
 //! each:
 //!
 //! | bytes | what |
@@ -16,18 +16,18 @@
 //! made again. What was written outlives the process at once, and a power cut once
 //! [`Trials::settle`] has returned.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::error::StoreError;
 use super::lock::Lock;
-use super::open::{self, refuse_other_plan};
-use super::plan_file::{Found, PlanFile, set_aside};
+use super::open;
+use super::plan_file::{PlanFile, set_aside};
 use super::read;
 use super::{Folder, Job};
-use crate::files::{FileError, FileKind, ParquetFile, atomic, key, regular};
+use sweep_files::{FileError, FileKind, ParquetFile, atomic, key, regular};
 
 /// The file of a search's folder that holds its trials.
 pub(super) const NAME: &str = "trials.bin";
@@ -37,11 +37,11 @@ const CONTENT_BYTES: usize = 32;
 const RECORD_BYTES: usize = 40;
 
 /// What a trial is known by.
-pub type Key = [u64; 3];
+pub(crate) type Key = [u64; 3];
 
 /// What opening a search's output came to.
 #[derive(Debug)]
-pub enum OpenedTrials {
+pub(crate) enum OpenedTrials {
     /// The output is there, whole, and of this very plan.
     Finished,
     /// There is something to do; the search holds its lock.
@@ -50,13 +50,13 @@ pub enum OpenedTrials {
 
 /// The trials of a search that this process has a right to.
 #[derive(Debug)]
-pub struct Trials {
+pub(crate) struct Trials {
     folder: Folder,
     lock: Lock,
     file: File,
     path: PathBuf,
     plan: [u8; blake3::OUT_LEN],
-    known: HashMap<Key, Option<f64>>,
+    known: BTreeMap<Key, Option<f64>>,
     notes: Vec<String>,
 }
 
@@ -68,7 +68,11 @@ impl Trials {
     /// [`StoreError::Busy`] when another process holds the output, [`StoreError::PlanDiffers`],
     /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::File`] for
     /// anything else at the output that is not ours, and for the file system.
-    pub fn open(output: &Path, job: &Job<'_>, fresh: bool) -> Result<OpenedTrials, StoreError> {
+    pub(crate) fn open(
+        output: &Path,
+        job: &Job<'_>,
+        fresh: bool,
+    ) -> Result<OpenedTrials, StoreError> {
         let folder = Folder::of_search(output)?;
         if !fresh && !folder.path.exists() && is_finished(&folder, job)? {
             return Ok(OpenedTrials::Finished);
@@ -79,30 +83,18 @@ impl Trials {
             open::clear(&folder)?;
         }
         atomic::clear_leftovers(&folder.path);
-        let ours = PlanFile::of(job);
-        match PlanFile::read(&folder)? {
-            Found::Plan(found) => refuse_other_plan(&folder, &found, &ours)?,
-            Found::Damaged => {
-                let aside = set_aside(&folder.plan())?;
-                notes.push(format!("the frozen plan was damaged; kept as {}", aside.display()));
-                ours.freeze(&folder)?;
-            }
-            Found::Nothing => {
-                if !fresh && is_finished(&folder, job)? {
-                    // What a search leaves that dies between publishing its file and removing its
-                    // folder.
-                    open::remove(&folder, lock);
-                    return Ok(OpenedTrials::Finished);
-                }
-                ours.freeze(&folder)?;
-            }
+        let finished = || Ok((!fresh && is_finished(&folder, job)?).then_some(()));
+        if open::agree_on_plan(&folder, job, &mut notes, finished)?.is_some() {
+            // What a search leaves that dies between publishing its file and removing its folder.
+            open::remove(&folder, lock);
+            return Ok(OpenedTrials::Finished);
         }
         let path = folder.path.join(NAME);
         let plan = *job.hash().as_bytes();
         let (mut file, bytes) = contents(&path)?;
         let found = bytes.len() / RECORD_BYTES;
         let records = bytes.chunks_exact(RECORD_BYTES);
-        let known: HashMap<_, _> = records.filter_map(|record| decode(&plan, record)).collect();
+        let known: BTreeMap<_, _> = records.filter_map(|record| decode(&plan, record)).collect();
         if known.is_empty() && found > 0 {
             let aside = set_aside(&path)?;
             notes.push(format!(
@@ -129,13 +121,13 @@ impl Trials {
 
     /// How many trials are there.
     #[must_use]
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.known.len()
     }
 
     /// The answer to a trial that was made before.
     #[must_use]
-    pub fn recall(&self, key: &Key) -> Option<Option<f64>> {
+    pub(crate) fn recall(&self, key: &Key) -> Option<Option<f64>> {
         self.known.get(key).copied()
     }
 
@@ -143,7 +135,7 @@ impl Trials {
     ///
     /// # Errors
     /// [`StoreError::File`].
-    pub fn keep(&mut self, key: Key, answer: Option<f64>) -> Result<(), StoreError> {
+    pub(crate) fn keep(&mut self, key: Key, answer: Option<f64>) -> Result<(), StoreError> {
         let record = encode(&self.plan, key, answer);
         self.file.write_all(&record).map_err(StoreError::io("write", &self.path))?;
         self.known.insert(key, answer);
@@ -154,18 +146,18 @@ impl Trials {
     ///
     /// # Errors
     /// [`StoreError::File`].
-    pub fn settle(&self) -> Result<(), StoreError> {
+    pub(crate) fn settle(&self) -> Result<(), StoreError> {
         self.file.sync_data().map_err(StoreError::io("sync", &self.path))
     }
 
     /// Things a user should hear of once.
-    pub fn take_notes(&mut self) -> Vec<String> {
+    pub(crate) fn take_notes(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notes)
     }
 
     /// Removes the folder of a search whose file is in place; a failure is only worth a note.
     #[must_use]
-    pub fn complete(self) -> Option<String> {
+    pub(crate) fn complete(self) -> Option<String> {
         open::remove(&self.folder, self.lock)
     }
 }

@@ -1,21 +1,18 @@
 //! The force that reaches the cabinet through springs and dampers, over lanes.
 
-use crate::coefficients::Coefficients;
-use crate::forces::suspension_on_tub;
-use crate::frame::{Tilt, dot};
-use crate::lanes::SetLane;
-use crate::linear::TUB;
-use crate::model::STATES;
-use crate::nonlinear::COORDINATES;
+use crate::coordinates::{COORDINATES, STATES, TUB};
+use crate::lanes::InLanes as _;
+use crate::nonlinear::elements::{Elements, TubMotion};
+use crate::nonlinear::frame::{Tilt, dot};
 use crate::point::Point;
 use crate::run::ModelKind;
-use crate::suspension::forces;
+use crate::run::suspension::forces;
 use lane_ode::{Dual, Lane, N, Peaks, Sample};
 
 /// One of the two models' force.
 enum CabinetForce<T> {
-    /// Of the machine as it stands; as duals, for the force's derivative in time.
-    Nonlinear(Coefficients<Dual<T>>),
+    /// Of the machine's elements, over duals for the force's derivative in time.
+    Nonlinear(Elements<Dual<T>>),
     /// To first order in the deviations from equilibrium.
     Linear(Expansion<T>),
 }
@@ -35,10 +32,15 @@ impl<T: Lane> CabinetForce<T> {
     #[inline(always)]
     fn splat(zero: N<T>, model: ModelKind, point: &Point) -> Self {
         match model {
-            ModelKind::Nonlinear => Self::Nonlinear(Coefficients::splat(zero.constant(), &point.machine)),
+            ModelKind::Nonlinear => {
+                Self::Nonlinear(Elements::splat(zero.constant(), &point.machine.elements))
+            }
             ModelKind::Linear => {
-                let mut expansion =
-                    Expansion { rest: [zero; 3], by_place: [[zero; 4]; 3], by_speed: [[zero; 4]; 3] };
+                let mut expansion = Expansion {
+                    rest: [zero; 3],
+                    by_place: [[zero; 4]; 3],
+                    by_speed: [[zero; 4]; 3],
+                };
                 for lane in 0..T::LANES {
                     expansion.set_point(lane, point);
                 }
@@ -50,17 +52,18 @@ impl<T: Lane> CabinetForce<T> {
     /// Puts a point into one lane.
     fn set_point(&mut self, lane: usize, point: &Point) {
         match self {
-            Self::Nonlinear(machine) => machine.set_lane(lane, &point.machine),
+            Self::Nonlinear(elements) => elements.set_lane(lane, &point.machine.elements),
             Self::Linear(expansion) => expansion.set_point(lane, point),
         }
     }
 
-    /// The square of the force (N^2) at coordinates, speeds and accelerations of [`TUB`], with its derivative; its
-    /// curvature is not known.
+    /// The square of the force (N^2) at coordinates, speeds and accelerations of [`TUB`], with its
+    /// derivative; without its curvature.
     #[inline(always)]
     fn squared(&self, tub: &[Sample<T>; 4]) -> Sample<T> {
         match self {
-            Self::Nonlinear(machine) => {
+            Self::Nonlinear(elements) => {
+                // In the order of `TUB`.
                 let mut q = [tub[0].value.constant(); 4];
                 let mut u = q;
                 for (k, Sample { value, slope, curvature }) in tub.iter().enumerate() {
@@ -70,10 +73,18 @@ impl<T: Lane> CabinetForce<T> {
                 let tilt = Tilt::new(q[2], q[3]);
                 let rate = tilt.motion(u[2], u[3]).rate;
                 // On the tub and in its axes: as large as on the cabinet.
-                let (force, _) =
-                    suspension_on_tub(&machine.view(), &tilt, &[q[0], q[1]], &[u[0], u[1]], &rate);
+                let (force, _) = elements.on_tub(&TubMotion {
+                    tilt: &tilt,
+                    midpoint: [q[0], q[1]],
+                    midpoint_velocity: [u[0], u[1]],
+                    rate: &rate,
+                });
                 let squared = dot(&force, &force).0;
-                Sample { value: N(squared.value), slope: N(squared.slope), curvature: tub[0].value.lit(0.0) }
+                Sample {
+                    value: N(squared.value),
+                    slope: N(squared.slope),
+                    curvature: tub[0].value.lit(0.0),
+                }
             }
             Self::Linear(expansion) => {
                 let zero = tub[0].value.lit(0.0);
@@ -82,7 +93,8 @@ impl<T: Lane> CabinetForce<T> {
                     let mut force = expansion.rest[i];
                     let mut rate = zero;
                     for k in 0..4 {
-                        let (by_place, by_speed) = (expansion.by_place[i][k], expansion.by_speed[i][k]);
+                        let (by_place, by_speed) =
+                            (expansion.by_place[i][k], expansion.by_speed[i][k]);
                         force += by_place * tub[k].value;
                         force += by_speed * tub[k].slope;
                         rate += by_place * tub[k].slope;
@@ -99,8 +111,8 @@ impl<T: Lane> CabinetForce<T> {
 
 /// The greatest force so far, over lanes.
 ///
-/// Of the force itself no second derivative is known. So the motion between the ends of a long step is
-/// found first, and the force at a few places of it.
+/// The force has no second derivative here. So the motion between the ends of a long step is
+/// interpolated first, and the force evaluated at a few places of it.
 pub(crate) struct GreatestForce<T> {
     force: CabinetForce<T>,
     squared: Peaks<T, 1>,
@@ -130,8 +142,8 @@ impl<T: Lane> GreatestForce<T> {
         squared.sqrt()
     }
 
-    /// A state whose derivative is `dx`: at the end of a step, of which end and length (s) are given, or
-    /// where a leg begins. `counts` says in which lanes it counts.
+    /// A state whose derivative is `dx`: at the end of a step, of which end and length (s) are
+    /// given, or where a leg begins. `counts` says in which lanes it counts.
     #[inline(always)]
     pub(crate) fn see(
         &mut self,
@@ -149,7 +161,8 @@ impl<T: Lane> GreatestForce<T> {
             for part in 1..self.parts {
                 let mut tub = now;
                 for k in 0..4 {
-                    tub[k] = Sample::between(&self.last[k], &now[k], length_s, share * f64::from(part));
+                    tub[k] =
+                        Sample::between(&self.last[k], &now[k], length_s, share * f64::from(part));
                 }
                 let squared = self.force.squared(&tub);
                 self.squared.advance_by_slopes((share * length_s).v(), &[squared], counts);

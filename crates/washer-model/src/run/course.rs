@@ -1,19 +1,21 @@
-//! Where two runs of one trajectory part.
+//! The difference of two runs of one trajectory.
 
 use super::{Course, ModelKind};
-use crate::nonlinear::COORDINATES;
+use crate::coordinates::COORDINATES;
 use crate::point::Point;
 
-/// Coordinates that follow the motion of interest. The hinge's two are left out: they also ring, hardly damped, in a way
-/// that no output feels.
+/// Coordinates that follow the motion of interest. The hinge's two are left out: they also ring,
+/// hardly damped, without effect on any output.
 const FOLLOWED: usize = COORDINATES - 2;
 
 impl Point {
-    /// The greatest difference between two runs of a model at this point, over all instants that both recorded and all
-    /// coordinates but the hinge's, as a share of that coordinate's greatest deviation from equilibrium: within the window of
-    /// its greatest there, outside of its greatest anywhere.
+    /// The greatest difference between two runs of a model at this point, over all instants that
+    /// both recorded and all coordinates but the hinge's, as a share of that coordinate's greatest
+    /// deviation from equilibrium: within the window of its greatest there, outside of its greatest
+    /// anywhere.
     ///
-    /// Zero if there is nothing to compare. An early peak does not hide what comes later, as it does between amplitudes.
+    /// Zero if there is nothing to compare. Unlike a difference of amplitudes, it shows deviations
+    /// after an early peak.
     #[must_use]
     pub fn course_difference(&self, model: ModelKind, a: &Course, b: &Course) -> f64 {
         let rest = match model {
@@ -32,6 +34,8 @@ impl Point {
             }
         }
         let shares = difference.as_flattened().iter().zip(greatest.as_flattened());
-        shares.map(|(apart, greatest)| if *apart == 0.0 { 0.0 } else { apart / greatest }).fold(0.0, f64::max)
+        shares
+            .map(|(apart, greatest)| if *apart == 0.0 { 0.0 } else { apart / greatest })
+            .fold(0.0, f64::max)
     }
 }

@@ -1,20 +1,21 @@
-//! What is recorded of a trajectory only when asked for: other measures of motion than its peak, and further metrics.
+//! Records made only on request: measures of motion other than peaks, and further metrics.
 //!
-//! All of it is found in the lanes, step by step, in a function of its own ([`Lane::aside`]): what nobody asks for leaves the loop over
-//! steps as it is.
+//! They are computed in the lanes, step by step, in a function of their own ([`Lane::aside`]), so
+//! that the loop over steps does not change where they are not in use.
 
 use super::cabinet_force::GreatestForce;
 use super::{Course, Method, ModelKind};
-use crate::model::STATES;
-use crate::outputs::{CHANNELS, RADIAL, squared};
+use crate::channel::CHANNELS;
+use crate::coordinates::STATES;
+use crate::machine::spin::cuts_s;
+use crate::nonlinear::outputs::{RADIAL, squared};
 use crate::point::Point;
-use crate::spin::cuts_s;
 use lane_ode::{Aside, Lane, N, PartPeaks, Sample, SquareIntegrals, TimeAbove};
 
 /// Parts into which the cabinet's force cuts steps that are not held short by the bearings.
 const PARTS_OF_A_LONG_STEP: u32 = 4;
 
-/// What to record beyond a [`Record`](super::Record); nothing by default.
+/// Records to make beyond a [`Record`](super::Record); none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Wanted {
     /// Root mean squares of the channels.
@@ -29,25 +30,33 @@ pub struct Wanted {
     pub course: bool,
 }
 
-/// What was asked for by [`Wanted`], of one trajectory, within the window.
+/// The records that [`Wanted`] asks for, of one trajectory, within the window.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Extra {
-    /// Root mean square of each channel's deviation from equilibrium, in the order of `Channel::ALL` (m, rad).
+    /// Root mean square of each channel's deviation from equilibrium, in the order of
+    /// `Channel::ALL` (m, rad).
     pub root_mean_squares: Option<[f64; CHANNELS]>,
-    /// Per turn of the drum, each channel's largest deviation from equilibrium (m, rad). Turns are counted from the start of the run by
-    /// the angle that the drum travels; parts of turns at the window's ends belong to the whole turn beside them, and a window
-    /// without whole turns counts as one. Empty unless asked for.
+    /// Per turn of the drum, each channel's largest deviation from equilibrium (m, rad). Turns are
+    /// counted from the start of the run by the angle that the drum travels; parts of turns at the
+    /// window's ends belong to the whole turn beside them, and a window without whole turns counts
+    /// as one. Empty unless asked for.
     pub turns: Vec<[f64; CHANNELS]>,
-    /// The greatest magnitude of the sum of all forces of springs and dampers on the cabinet (N); at rest it is the weight.
+    /// The greatest magnitude of the sum of all forces of springs and dampers on the cabinet (N);
+    /// at rest it is the weight.
     pub cabinet_force_n: Option<f64>,
     /// Time with a gap below zero (s).
     pub clash_time_s: Option<f64>,
-    /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed. Empty unless asked for.
+    /// By how much more or less that would be, with the gap off by as much as ringing can make it
+    /// (s). Where drum and tub only just touch, it is much of the time itself. Absent where modes
+    /// are not capped, because such runs follow the ringing.
+    pub clash_doubt_s: Option<f64>,
+    /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed.
+    /// Empty unless asked for.
     pub course: Course,
 }
 
 impl Wanted {
-    /// Whether anything is to be looked at between the ends of legs.
+    /// Whether any record needs more than the ends of legs.
     fn anything(self) -> bool {
         Self { course: false, ..self } != Self::default()
     }
@@ -59,14 +68,18 @@ pub(super) struct Extras<T> {
     squares: SquareIntegrals<T, CHANNELS>,
     turns: PartPeaks<T, CHANNELS>,
     force: Option<GreatestForce<T>>,
-    clash: TimeAbove<T>,
-    clearance_squared: N<T>,
+    /// With the clearance as it is; where modes are capped, also with less and more, by what ringing
+    /// may add to the gap.
+    clash: [TimeAbove<T>; 3],
+    clearances_squared: [N<T>; 3],
+    /// How many of these are in use.
+    clearances: usize,
     /// Of every point, as far as they have ended.
     pub(super) found: Vec<Extra>,
 }
 
 impl<T: Lane> Extras<T> {
-    /// For `count` points, of which one is given to start with; none if nothing is wanted.
+    /// For `count` points, of which `point` is any; `None` if nothing is wanted.
     #[inline(always)]
     pub(super) fn new(
         zero: N<T>,
@@ -79,19 +92,24 @@ impl<T: Lane> Extras<T> {
         if !wanted.anything() {
             return None;
         }
-        let parts = match method {
-            Method::Rk4 { .. } => 1,
-            Method::Geared(_) | Method::Dopri5(_) | Method::Rodas5p(_) => PARTS_OF_A_LONG_STEP,
+        let (parts, clearances) = match method {
+            Method::Rk4 { .. } => (1, 1),
+            Method::Geared(_) => (PARTS_OF_A_LONG_STEP, 3),
+            Method::Dopri5(_) | Method::Rodas5p(_) => (PARTS_OF_A_LONG_STEP, 1),
         };
-        let force =
-            if wanted.cabinet_force { Some(GreatestForce::new(zero, model, point, parts)) } else { None };
+        let force = if wanted.cabinet_force {
+            Some(GreatestForce::new(zero, model, point, parts))
+        } else {
+            None
+        };
         Some(Self {
             wanted,
             squares: SquareIntegrals::new(zero),
             turns: PartPeaks::new(zero),
             force,
-            clash: TimeAbove::new(zero),
-            clearance_squared: zero,
+            clash: [TimeAbove::new(zero); 3],
+            clearances_squared: [zero; 3],
+            clearances,
             found: vec![Extra::default(); count],
         })
     }
@@ -99,9 +117,13 @@ impl<T: Lane> Extras<T> {
     /// Begins a point's trajectory in one lane.
     pub(super) fn set_point(&mut self, lane: usize, point: &Point) {
         self.squares.reset(lane);
-        self.clash.reset(lane);
         let clearance_m = point.machine.bodies.clearance.0;
-        self.clearance_squared.0.set(lane, clearance_m * clearance_m);
+        let swing_m = point.ringing.gap_m();
+        let clearances_m = [clearance_m, (clearance_m - swing_m).max(0.0), clearance_m + swing_m];
+        for (k, clearance_m) in clearances_m.into_iter().enumerate() {
+            self.clash[k].reset(lane);
+            self.clearances_squared[k].0.set(lane, clearance_m * clearance_m);
+        }
         if self.wanted.turns {
             self.turns.reset(lane, &cuts_s(&point.stretches, point.window_s()));
         }
@@ -110,27 +132,30 @@ impl<T: Lane> Extras<T> {
         }
     }
 
-    /// Ends a lane's trajectory, that of point `index`; nothing is kept of one that failed.
+    /// Ends a lane's trajectory, that of point `index`. A failed one leaves no record.
     pub(super) fn finish(&mut self, lane: usize, index: usize, point: &Point, failed: bool) {
         let turns = if self.wanted.turns { self.turns.finish(lane) } else { Vec::new() };
         if failed {
             return;
         }
         let [from_s, to_s] = point.window_s();
-        // Rounding can leave the integral of next to nothing a hair below zero.
+        // Rounding can leave a tiny integral just below zero.
         let mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let wanted = self.wanted;
+        let [clash_s, longer_s, shorter_s] = self.clash.map(|clash| clash.lane(lane));
         self.found[index] = Extra {
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),
             turns,
             cabinet_force_n: self.force.as_ref().map(|force| force.lane_n(lane)),
-            clash_time_s: wanted.clash_time.then(|| self.clash.lane(lane)),
+            clash_time_s: wanted.clash_time.then_some(clash_s),
+            clash_doubt_s: (wanted.clash_time && self.clearances > 1)
+                .then_some((longer_s - clash_s).max(clash_s - shorter_s)),
             course: Course::new(),
         };
     }
 }
 
-/// What the recorders are shown of an instant.
+/// An instant as the recorders see it.
 pub(super) struct Seen<'a, T: Lane> {
     pub(super) extras: &'a mut Extras<T>,
     /// End and length of the step that leads here (s); none where a leg begins.
@@ -164,11 +189,14 @@ impl<T: Lane> Aside for Seen<'_, T> {
             force.see(step, x, dx, inside);
         }
         if wanted.clash_time {
-            let mut overlap = squared(radial);
-            overlap.value -= extras.clearance_squared;
-            match step {
-                Some((_, length_s)) => extras.clash.advance(length_s, &overlap, inside),
-                None => extras.clash.begin(&overlap),
+            let distance_squared = squared(radial);
+            for k in 0..extras.clearances {
+                let mut overlap = distance_squared;
+                overlap.value -= extras.clearances_squared[k];
+                match step {
+                    Some((_, length_s)) => extras.clash[k].advance(length_s, &overlap, inside),
+                    None => extras.clash[k].begin(&overlap),
+                }
             }
         }
     }

@@ -1,12 +1,14 @@
 //! Trajectories by the stiff method: one at a time, its derivatives by lanes of dual numbers.
 
 use super::{Extra, Family, Method, ModelKind, OfLinear, OfNonlinear, Record, Run, Stop, Wanted};
-use crate::coupling::Coupling;
-use crate::model::{Model, STATES};
-use crate::nonlinear::COORDINATES;
+use crate::coordinates::{COORDINATES, STATES};
 use crate::point::Point;
+use crate::run::model::Model;
+use crate::run::tangent::Tangent;
 use core::marker::PhantomData;
-use lane_ode::{Dual, Ended, Kernel, Lane, Leg, N, Partials, Simd, Step, System, Task, Tolerance, rodas};
+use lane_ode::{
+    Dual, Ended, Forcing, Kernel, Lane, Leg, N, Partials, Simd, Step, Task, Tolerance, rodas,
+};
 
 /// Integrates one model at every point and records peaks.
 pub(super) fn simulate(
@@ -19,7 +21,13 @@ pub(super) fn simulate(
     match model {
         ModelKind::Nonlinear => {
             let family = PhantomData;
-            Simd::dispatch_narrow(Simulate::<OfNonlinear> { points, tolerance, wanted, stop, family })
+            Simd::dispatch_narrow(Simulate::<OfNonlinear> {
+                points,
+                tolerance,
+                wanted,
+                stop,
+                family,
+            })
         }
         ModelKind::Linear => {
             let family = PhantomData;
@@ -44,7 +52,7 @@ impl<F: Family> Kernel for Simulate<'_, F> {
         let method = Method::Rodas5p(*self.tolerance);
         let mut run = Run::<f64, F::Over<f64>>::new(N(0.0), self.points, &method, self.stop);
         run.record(N(0.0), self.wanted, F::KIND);
-        let mut run = WithTangent::<T, _, F::Over<Dual<T>>>::new(zero, run, self.points[0]);
+        let mut run = StiffTask::<T, _, F::Over<Dual<T>>>::new(zero, run, self.points[0]);
         rodas::integrate(&mut run, self.tolerance);
         run.task.recorded()
     }
@@ -63,67 +71,51 @@ impl<M: Model<f64>> OnLeg for Run<'_, f64, M> {
     }
 }
 
-/// A task, with its model once more over dual numbers.
-pub(crate) struct WithTangent<T, R, J> {
-    zero: T,
+/// A task, with its model's derivatives.
+pub(crate) struct StiffTask<T, R, J> {
     pub(crate) task: R,
-    /// Holds the current trajectory in every lane.
-    tangent: J,
+    tangent: Tangent<T, J>,
 }
 
-impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> WithTangent<T, R, J> {
+impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> StiffTask<T, R, J> {
     /// `point` is the first that the task takes up, or any.
     #[inline(always)]
     pub(crate) fn new(zero: T, task: R, point: &Point) -> Self {
-        Self { zero, task, tangent: J::splat(N(zero).constant(), point, Coupling::Springs) }
+        Self { task, tangent: Tangent::new(zero, point) }
     }
 }
 
-impl<T, R: OnLeg, J> System<f64, STATES> for WithTangent<T, R, J> {
-    type Forcing = R::Forcing;
+impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> Task<f64, STATES> for StiffTask<T, R, J> {
+    type System = R::System;
 
     #[inline(always)]
-    fn forcing(&self, t_s: N<f64>) -> R::Forcing {
-        self.task.forcing(t_s)
+    fn system(&self) -> &R::System {
+        self.task.system()
     }
 
-    #[inline(always)]
-    fn renew(&self, t_s: N<f64>, forcing: &mut R::Forcing) {
-        self.task.renew(t_s, forcing);
-    }
-
-    #[inline(always)]
-    fn derivative(&self, forcing: &R::Forcing, x: &[N<f64>; STATES]) -> [N<f64>; STATES] {
-        self.task.derivative(forcing, x)
-    }
-
-    #[inline(always)]
-    fn in_range(&self, x: &[N<f64>; STATES]) -> bool {
-        self.task.in_range(x)
-    }
-}
-
-impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> Task<f64, STATES> for WithTangent<T, R, J> {
     #[inline(never)]
     fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<f64>; STATES]) -> Option<Leg> {
         let leg = self.task.next_leg(lane, ended, x)?;
         let (point, index) = self.task.place();
-        for column in 0..T::LANES {
-            if index == 0 {
-                self.tangent.set_point(column, point);
-            }
-            self.tangent.set_spin(column, &point.stretches[point.legs[index].stretch]);
+        if index == 0 {
+            self.tangent.set_point(point);
         }
+        self.tangent.set_spin(&point.stretches[point.legs[index].stretch]);
         Some(leg)
     }
 
     #[inline(always)]
-    fn begin(&mut self, forcing: &R::Forcing, x: &[N<f64>; STATES], dx: &[N<f64>; STATES]) {
+    fn begin(
+        &mut self,
+        forcing: &Forcing<R, f64, STATES>,
+        x: &[N<f64>; STATES],
+        dx: &[N<f64>; STATES],
+    ) {
         self.task.begin(forcing, x, dx);
     }
 
     #[inline(always)]
-    fn observe(&mut self, forcing: &R::Forcing, step: &Step<'_, f64, STATES>) {
+    fn observe(&mut self, forcing: &Forcing<R, f64, STATES>, step: &Step<'_, f64, STATES>) {
         self.task.observe(forcing, step);
     }
 
@@ -132,10 +124,12 @@ impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> Task<f64, STATES> for WithTangent<T, 
     }
 }
 
-impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> rodas::Stiff<STATES, COORDINATES> for WithTangent<T, R, J> {
+impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> rodas::Stiff<STATES, COORDINATES>
+    for StiffTask<T, R, J>
+{
     #[inline(always)]
     fn partials(&self, t_s: f64, x: &[N<f64>; STATES], partials: &mut Partials<COORDINATES>) {
-        partials.find(self.zero, &self.tangent, t_s, x);
+        self.tangent.partials(t_s, x, partials);
     }
 }
 
@@ -152,8 +146,10 @@ mod tests {
         let mut machine = Machine::paper();
         machine.bearings.front_stiffness_n_per_m = bearing_stiffness_n_per_m;
         machine.bearings.rear_stiffness_n_per_m = bearing_stiffness_n_per_m;
-        let spin =
-            Spin::Table { time_s: vec![0.0, 0.5, 1.5, 2.5], speed_rpm: vec![0.0, 100.0, 400.0, 300.0] };
+        let spin = Spin::Table {
+            time_s: vec![0.0, 0.5, 1.5, 2.5],
+            speed_rpm: vec![0.0, 100.0, 400.0, 300.0],
+        };
         prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
     }
 
@@ -165,22 +161,26 @@ mod tests {
     fn apart(a: &Record, b: &Record) -> f64 {
         assert_eq!((a.failure, b.failure), (None, None));
         let gap = (a.min_gap_m - b.min_gap_m).abs() / b.min_gap_m;
-        Channel::ALL
-            .iter()
-            .map(|c| c.index())
-            .fold(gap, |worst, i| worst.max((a.amplitudes[i] - b.amplitudes[i]).abs() / b.amplitudes[i]))
+        Channel::ALL.iter().map(|c| c.index()).fold(gap, |worst, i| {
+            worst.max((a.amplitudes[i] - b.amplitudes[i]).abs() / b.amplitudes[i])
+        })
     }
 
     #[test]
     fn agrees_with_converged_rk4() {
         let point = point(2e8);
         for model in MODELS {
-            let run = |method: &Method| crate::simulate(Simd::best(), model, method, &[&point]).remove(0);
+            let run =
+                |method: &Method| crate::simulate(Simd::best(), model, method, &[&point]).remove(0);
             let reference = run(&Method::Rk4 { step_s: 5e-5 });
             for (relative, allowed) in [(1e-5, 1e-4), (1e-7, 1e-6)] {
                 let ours = run(&rodas(relative));
                 let error = apart(&ours, &reference);
-                assert!(error < allowed, "{model:?} at {relative}: {error:e} after {} steps", ours.steps);
+                assert!(
+                    error < allowed,
+                    "{model:?} at {relative}: {error:e} after {} steps",
+                    ours.steps
+                );
             }
         }
     }
@@ -189,8 +189,9 @@ mod tests {
     fn serves_bearings_on_which_explicit_methods_crawl() {
         let [stiff, rigid] = [2e9, 1e11].map(point);
         for model in MODELS {
-            let run =
-                |method: &Method, point| crate::simulate(Simd::best(), model, method, &[point]).remove(0);
+            let run = |method: &Method, point| {
+                crate::simulate(Simd::best(), model, method, &[point]).remove(0)
+            };
             assert!(run(&Method::Rk4 { step_s: 5e-5 }, &rigid).failure.is_some());
             let ours = run(&rodas(1e-4), &rigid);
             // Bearings give way by a tenth of a micrometre, so rigid ones change little.
@@ -205,7 +206,8 @@ mod tests {
         let points = [2e8, 1e7, 1e8].map(point);
         let all = [&points[0], &points[1], &points[2]];
         let tolerance = Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 };
-        // One lane takes the points one after another; another instruction set may have them side by side.
+        // One lane takes the points one after another; another instruction set may have them side
+        // by side.
         for method in [rodas(1e-5), Method::Dopri5(tolerance), Method::Rk4 { step_s: 2e-4 }] {
             for model in MODELS {
                 let together = crate::simulate(Simd::Scalar, model, &method, &all);

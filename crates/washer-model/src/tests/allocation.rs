@@ -7,16 +7,23 @@ use lane_ode::{Simd, Tolerance};
 #[test]
 fn a_longer_trajectory_asks_no_more_of_the_heap_than_a_short_one() {
     let tolerance = Tolerance { relative: 1e-4, absolute: 1e-7, max_steps: 1_000_000 };
-    let everything =
-        Wanted { root_mean_squares: true, turns: true, cabinet_force: true, clash_time: true, course: true };
+    let everything = Wanted {
+        root_mean_squares: true,
+        turns: true,
+        cabinet_force: true,
+        clash_time: true,
+        course: true,
+    };
     let asked = |simd, model, method: &Method, wanted, end_s| {
         // More points than lanes: lanes that take up another are counted too.
-        let points: Vec<_> =
-            (0..11).map(|i| ready(paper(0.1 + 0.05 * f64::from(i), 140.0), triangular(), end_s)).collect();
+        let points: Vec<_> = (0..11)
+            .map(|i| ready(paper(0.1 + 0.05 * f64::from(i), 140.0), triangular(), end_s))
+            .collect();
         let points: Vec<_> = points.iter().collect();
         let mut steps = 0;
         let heap = allocation_counter::measure(|| {
-            steps = simulate_with(simd, model, method, &points, wanted).0.iter().map(|r| r.steps).sum();
+            steps =
+                simulate_with(simd, model, method, &points, wanted).0.iter().map(|r| r.steps).sum();
         });
         (heap.count_total, steps)
     };
@@ -27,8 +34,12 @@ fn a_longer_trajectory_asks_no_more_of_the_heap_than_a_short_one() {
                     let (short, few) = asked(simd, model, &method, wanted, 0.02);
                     let (long, many) = asked(simd, model, &method, wanted, 0.2);
                     assert!(many > 5 * few, "{few} and {many} steps");
-                    // Set-up of a point may ask once more or less, by who had its lane before; steps must not ask at all.
-                    assert!(long <= short + 11, "{model:?} by {method:?} on {simd:?}: {short}, {long}");
+                    // Set-up of a point may ask once more or less, by who had its lane before;
+                    // steps must not ask at all.
+                    assert!(
+                        long <= short + 11,
+                        "{model:?} by {method:?} on {simd:?}: {short}, {long}"
+                    );
                 }
             }
         }

@@ -1,9 +1,9 @@
 //! The same bits: on every instruction set, at any position in a batch, in any company.
 
-use super::instruments::{paper, random_machine, random_spin};
+use super::instruments::{EVERYTHING, paper, random_machine, random_spin};
 use crate::{
-    Caps, Extra, Formula, Gear, Geared, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted,
-    prepare, simulate_until, simulate_with,
+    Caps, Extra, Formula, Gear, Geared, Machine, Method, ModelKind, Point, Record, Spin, Timing,
+    Wanted, prepare, simulate_until, simulate_with,
 };
 use core::cell::Cell;
 use lane_ode::{STEPS_AT_ONCE, Simd, Tolerance};
@@ -27,8 +27,8 @@ const METHODS: [Method; 4] = [
     Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
 
-/// Corners, edges and middle of the quick map and a few between, its spin in a second: eleven points, so that lanes of
-/// four and eight are left part empty.
+/// Corners, edges and middle of the quick map and a few between, its spin in a second: eleven
+/// points, so that lanes of four and eight are left part empty.
 fn quick_map() -> Vec<Scenario> {
     let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 0.6 };
     let corners = [0.05, 0.525, 1.0].into_iter().flat_map(|m| [60.0, 180.0, 300.0].map(|c| (m, c)));
@@ -45,19 +45,23 @@ fn points(simd: Simd, scenarios: &[Scenario]) -> Vec<Point> {
     prepare(simd, scenarios, &TIMING).into_iter().map(Result::unwrap).collect()
 }
 
-const EVERYTHING: Wanted =
-    Wanted { root_mean_squares: true, turns: true, cabinet_force: true, clash_time: true, course: true };
-
 /// Every number that was recorded as its bits.
 fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
     let Record { failure, amplitudes, min_gap_m, steps, rejected } = record;
     let mut bits: Vec<_> = amplitudes.iter().map(|a| a.to_bits()).collect();
     bits.extend([min_gap_m.to_bits(), *steps, *rejected]);
     bits.extend(failure.iter().flat_map(|(reason, time_s)| [*reason as u64, time_s.to_bits()]));
-    let Extra { root_mean_squares, turns, cabinet_force_n, clash_time_s, course } = extra;
+    let Extra { root_mean_squares, turns, cabinet_force_n, clash_time_s, clash_doubt_s, course } =
+        extra;
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
     bits.extend(course.iter().flatten().map(|q| q.to_bits()));
-    bits.extend(cabinet_force_n.iter().chain(clash_time_s).map(|metric| metric.to_bits()));
+    bits.extend(
+        cabinet_force_n
+            .iter()
+            .chain(clash_time_s)
+            .chain(clash_doubt_s)
+            .map(|metric| metric.to_bits()),
+    );
     bits
 }
 
@@ -86,7 +90,8 @@ fn same_on_every_instruction_set(scenarios: &[Scenario]) {
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         assert!(batch(simd, scenarios) == scalar, "{} gives other bits than scalar", simd.name());
     }
-    // What this processor lacks runs on one lane without any instruction set: on x86-64, with fused operations in software.
+    // What this processor lacks runs on one lane without any instruction set: on x86-64, with fused
+    // operations in software.
     let absent = Simd::ALL.into_iter().find(|simd| !simd.is_available()).unwrap();
     assert!(
         batch(absent, &scenarios[..2]) == picked(&scalar, &[0, 1]),
@@ -162,7 +167,8 @@ fn a_leg_is_cut_where_no_bit_shows_it() {
     let spins = [2.0, 0.37, 0.11].map(|ramp_s| Spin::Triangular { peak_rpm: 350.0, ramp_s });
     let scenarios: Vec<_> = spins.into_iter().map(|spin| (paper(0.4, 90.0), spin)).collect();
     let simd = Simd::best();
-    let points: Vec<_> = prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
+    let points: Vec<_> =
+        prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let all: Vec<_> = points.iter().collect();
     let dop853 = Method::Geared(Geared::steady(Formula::Dop853, 2e-5, CAPS));
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853] {
@@ -172,7 +178,11 @@ fn a_leg_is_cut_where_no_bit_shows_it() {
             for (k, point) in all.iter().enumerate() {
                 let alone = simulate_with(simd, model, &method, &[point], EVERYTHING);
                 let expected = bits((&together.0[k], &together.1[k]));
-                assert_eq!(bits((&alone.0[0], &alone.1[0])), expected, "{model:?} by {method:?}, {k}");
+                assert_eq!(
+                    bits((&alone.0[0], &alone.1[0])),
+                    expected,
+                    "{model:?} by {method:?}, {k}"
+                );
             }
         }
     }

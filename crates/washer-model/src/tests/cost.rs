@@ -1,12 +1,14 @@
 //! Operations of one right-hand side, counted by a number that counts.
 
 use super::instruments::{paper, ready, triangular};
-use crate::coupling::{Caps, Coupling};
-use crate::model::{Linear, Model, Nonlinear, STATES};
+use crate::coordinates::STATES;
+use crate::nonlinear::coupling::{Caps, Coupling};
+use crate::run::model::{Linear, Model, Nonlinear};
 use core::cell::Cell;
 use lane_ode::{Lane, N, Real};
 
-/// Arithmetic operations. A fused one counts as one multiplication and one addition; signs are free.
+/// Arithmetic operations. A fused one counts as one multiplication and one addition; signs are
+/// free.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Operations {
     multiplications: u32,
@@ -21,7 +23,12 @@ struct Operations {
 
 thread_local! {
     static COUNT: Cell<Operations> = const { Cell::new(Operations {
-        multiplications: 0, additions: 0, fused: 0, divisions: 0, square_roots: 0, sine_cosine_pairs: 0,
+        multiplications: 0,
+        additions: 0,
+        fused: 0,
+        divisions: 0,
+        square_roots: 0,
+        sine_cosine_pairs: 0,
     }) };
 }
 
@@ -127,7 +134,8 @@ impl Lane for Counting {
     }
 }
 
-/// Counts of the forcing, which stages at one time share, and of the derivative; the derivative's values are plain numbers'.
+/// Counts of the forcing, which stages at one time share, and of the derivative; the derivative's
+/// values are plain numbers'.
 fn of_model<M: Model<Counting>, P: Model<f64>>(caps: Option<Caps>) -> [Operations; 2] {
     let point = ready(paper(0.4, 140.0), triangular(), 50.0);
     let model = M::splat(N(Counting(0.0)), &point, Coupling::new(N(Counting(0.0)), caps.as_ref()));
@@ -176,9 +184,12 @@ const fn operations(
     Operations { multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs }
 }
 
-/// The cost as it stands: forcing, right-hand side. Cheaper is better: whoever changes it writes the new numbers here.
-const NONLINEAR: [Operations; 2] = [operations([31, 34, 18, 0, 0, 0]), operations([557, 410, 319, 12, 4, 6])];
-const LINEAR: [Operations; 2] = [operations([348, 257, 241, 2, 0, 0]), operations([143, 135, 131, 0, 0, 0])];
+/// The present cost of forcing and right-hand side. Cheaper is better; a change writes its numbers
+/// here.
+const NONLINEAR: [Operations; 2] =
+    [operations([31, 34, 18, 0, 0, 0]), operations([557, 410, 319, 12, 4, 6])];
+const LINEAR: [Operations; 2] =
+    [operations([348, 257, 241, 2, 0, 0]), operations([143, 135, 131, 0, 0, 0])];
 const NONLINEAR_MASS_SCALED: Operations = operations([753, 580, 474, 16, 4, 6]);
 const LINEAR_MASS_SCALED: Operations = operations([175, 161, 157, 0, 0, 0]);
 const OBSERVED_NONLINEAR: Operations = operations([410, 278, 209, 0, 0, 6]);
@@ -218,7 +229,8 @@ fn observing_costs_what_it_did() {
 fn a_linear_step_costs_less_than_a_nonlinear_one() {
     for caps in [None, CAPPED] {
         // A step of RK4: four right-hand sides, the forcing at two new times.
-        let step = |[forcing, derivative]: [Operations; 2]| 4 * flops(derivative) + 2 * flops(forcing);
+        let step =
+            |[forcing, derivative]: [Operations; 2]| 4 * flops(derivative) + 2 * flops(forcing);
         let [nonlinear, linear] = [of_nonlinear(caps), of_linear(caps)].map(step);
         eprintln!("RK4 step, {caps:?}: {nonlinear} operations nonlinear, {linear} linear");
         assert!(linear < nonlinear);

@@ -1,10 +1,10 @@
 //! Energy of the machine without dampers and spin, written down apart from the equations of motion.
 
 use super::instruments::{mass_matrix, ready};
-use crate::coefficients::Coefficients;
+use crate::coordinates::COORDINATES;
 use crate::machine::Machine;
-use crate::nonlinear::COORDINATES;
-use crate::spin::{Spin, SpinState};
+use crate::machine::spin::{Spin, SpinState};
+use crate::nonlinear::coefficients::Coefficients;
 use crate::{Method, ModelKind, Start, history};
 use lane_ode::N;
 
@@ -48,9 +48,11 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
         energy += 0.5 * s.stiffness_n_per_m * stretch * stretch;
     }
     let b = &m.bearings;
-    for (x_m, stiffness) in [(b.front_x_m, b.front_stiffness_n_per_m), (b.rear_x_m, b.rear_stiffness_n_per_m)]
+    for (x_m, stiffness) in
+        [(b.front_x_m, b.front_stiffness_n_per_m), (b.rear_x_m, b.rear_stiffness_n_per_m)]
     {
-        let (on_tub, on_shaft) = (place(p_t, &tub, [x_m, 0.0, 0.0]), place(p_s, &shaft, [x_m, 0.0, 0.0]));
+        let (on_tub, on_shaft) =
+            (place(p_t, &tub, [x_m, 0.0, 0.0]), place(p_s, &shaft, [x_m, 0.0, 0.0]));
         let apart = (on_shaft[1] - on_tub[1]).powi(2) + (on_shaft[2] - on_tub[2]).powi(2);
         energy += 0.5 * stiffness * apart;
     }
@@ -66,8 +68,9 @@ fn kinetic_j(machine: &Coefficients<f64>, q: &[f64; COORDINATES], u: &[f64; COOR
     0.5 * (0..COORDINATES).map(of_row).sum::<f64>()
 }
 
-/// The paper's machine without dampers, thrown from its equilibrium: tub and rotor move alike, so that the bearing modes,
-/// which a step of 2e-4 s damps on purpose, are left asleep. Energies (J) over 10 s, the first the one given to it.
+/// The paper's machine without dampers, thrown from its equilibrium: tub and rotor move alike, so
+/// that the bearing modes, which a step of 2e-4 s damps on purpose, are left asleep. Energies (J)
+/// over 10 s, the first the one given to it.
 fn energies_j(step_s: f64) -> Vec<f64> {
     let mut machine = Machine::paper();
     machine.dampers.clear();

@@ -1,13 +1,14 @@
-//! The linear model is the first-order expansion of the nonlinear one: against automatic differentiation of the equations
-//! of motion, for random machines at random spins.
+//! The linear model is the first-order expansion of the nonlinear one: against automatic
+//! differentiation of the equations of motion, for random machines at random spins.
 
 use super::instruments::{equations, paper, random_machine, ready};
-use crate::coupling::Coupling;
-use crate::model::{Linear, Model, Nonlinear, STATES};
-use crate::nonlinear::COORDINATES;
-use crate::outputs::{Axes, Motion, RADIAL};
+use crate::coordinates::{COORDINATES, STATES};
+use crate::lanes::Constant as _;
+use crate::machine::spin::SpinState;
+use crate::nonlinear::coupling::Coupling;
+use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
 use crate::point::Point;
-use crate::spin::SpinState;
+use crate::run::model::{Linear, Model, Nonlinear};
 use crate::{Channel, Equations, ModelKind, Spin};
 use lane_ode::{Dual, N, System};
 
@@ -35,12 +36,14 @@ impl Instant {
         Self { point, t_s, model, spin }
     }
 
-    /// M a - f at equilibrium, and its derivative along deviations `q`, speeds `u` and accelerations `a`.
+    /// M a - f at equilibrium, and its derivative along deviations `q`, speeds `u` and
+    /// accelerations `a`.
     fn residual(&self, q: &Vector, u: &Vector, a: &Vector) -> [Vector; 2] {
         let along = |value: f64, slope: f64| N(Dual { value, slope });
         let at: [_; COORDINATES] = core::array::from_fn(|i| along(self.point.equilibrium[i], q[i]));
         let [u, a] = [u, a].map(|v| v.map(|v| along(0.0, v)));
-        let [inertia, force] = equations(&self.point.machine.constant(), &self.spin.constant(), &at, &u, &a);
+        let [inertia, force] =
+            equations(&self.point.machine.constant(), &self.spin.constant(), &at, &u, &a);
         let residual: [_; COORDINATES] = core::array::from_fn(|i| inertia[i] - force[i]);
         [residual.map(|r| r.0.value), residual.map(|r| r.0.slope)]
     }
@@ -96,7 +99,8 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
     });
     let [m, c, k, f] = worst;
     eprintln!(
-        "against automatic differentiation: M {m:.1e}, C {c:.1e}, K {k:.1e}, F {f:.1e} of the largest entry"
+        "against automatic differentiation: M {m:.1e}, C {c:.1e}, K {k:.1e}, F {f:.1e} of the \
+         largest entry"
     );
     assert!(m < 1e-14 && c < 1e-14 && k < 1e-14 && f < 1e-10);
 }
@@ -137,7 +141,8 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
             core::array::from_fn(|i| N([first, second][i / COORDINATES][i % COORDINATES]))
         };
         let forcing = instant.model.forcing(N(instant.t_s));
-        let (radial, channels) = instant.model.observe(&forcing, &state(&q, &u), &state(&u, &a), true);
+        let (radial, channels) =
+            instant.model.observe(&forcing, &state(&q, &u), &state(&u, &a), true);
         let along = |value: f64, slope: f64| N(Dual { value, slope });
         let at = core::array::from_fn(|i| along(instant.point.equilibrium[i], q[i]));
         let [u, a] = [u, a].map(|v| v.map(|v| along(0.0, v)));
@@ -149,7 +154,8 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         // The radial distance is whole, channels are deviations from equilibrium.
         let rest = instant.point.rest.into_iter().chain([0.0; RADIAL]);
         let ours = channels.unwrap().into_iter().chain(radial);
-        let theirs = axes.channels(&bodies, &motion).into_iter().chain(axes.radial(&bodies, &motion));
+        let theirs =
+            axes.channels(&bodies, &motion).into_iter().chain(axes.radial(&bodies, &motion));
         for ((ours, theirs), rest) in ours.zip(theirs).zip(rest) {
             let of_order_zero = theirs.value.0.value - rest;
             let pairs = [
@@ -164,7 +170,8 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         }
     });
     eprintln!(
-        "linear outputs at deviations of 20 mm and 20 mrad: within {:.1e} m or rad, with a part of order zero up to {turning:.1e}; \
+        "linear outputs at deviations of 20 mm and 20 mrad: within {:.1e} m or rad, with a part \
+         of order zero up to {turning:.1e}; \
          rates and second derivatives within {:.1e} and {:.1e} of what the spin makes of 1 m",
         worst[0], worst[1], worst[2]
     );
@@ -174,11 +181,12 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
 
 #[test]
 fn a_linear_machine_at_rest_moves_as_its_drum_turns() {
-    // (kg, mm at the mass centre, micrometres at the drum's front): what the independent linear histories of
-    // these two machines changed by when they took this part in.
+    // (kg, mm at the mass centre, micrometres at the drum's front): what the independent linear
+    // histories of these two machines changed by when they took this part in.
     for (unbalance_mass_kg, centre_mm, front_um) in [(0.4, 4.960, 47.96), (0.7, 8.600, 56.86)] {
         let machine = paper(unbalance_mass_kg, 140.0);
-        let mass = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg + unbalance_mass_kg;
+        let mass =
+            machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg + unbalance_mass_kg;
         let [drum_kg, drum_x_m] = [machine.drum.mass_kg, machine.drum.centre_x_m];
         let [hinge_x_m, front_x_m] = [machine.drum.hinge_x_m, machine.drum.front_x_m];
         let unbalance = machine.unbalance;
@@ -186,10 +194,12 @@ fn a_linear_machine_at_rest_moves_as_its_drum_turns() {
         let spin = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![60.0, 60.0] };
         let point = ready(machine, spin, 1.0);
         let mut equations = Equations::new(&point, ModelKind::Linear);
-        let mut at = |t_s: f64, channel: Channel| equations.channels(t_s, &[0.0; STATES]).0[channel.index()];
+        let mut at =
+            |t_s: f64, channel: Channel| equations.channels(t_s, &[0.0; STATES]).0[channel.index()];
         // Shaft and drum lean by q8 and q10 as weight has it; what the second one tilts turns too.
         let (lean, bend) = (point.equilibrium[7].cos(), point.equilibrium[9]);
-        let along = drum_kg * (drum_x_m - hinge_x_m) + unbalance_mass_kg * (unbalance.x_m - hinge_x_m);
+        let along =
+            drum_kg * (drum_x_m - hinge_x_m) + unbalance_mass_kg * (unbalance.x_m - hinge_x_m);
         let across = unbalance_mass_kg * unbalance.radius_m;
         let centre_m = (across * bend.cos() + along * bend.sin()) / mass;
         let front_m = (front_x_m - hinge_x_m) * bend.sin();
@@ -203,11 +213,20 @@ fn a_linear_machine_at_rest_moves_as_its_drum_turns() {
                 (0.5, -2.0 * radius_m * lean, 0.0),
                 (0.75, -radius_m * lean, -radius_m),
             ] {
-                assert!((at(t_s, y) - expected_y).abs() < 1e-15, "{y:?} at {t_s} s: {}", at(t_s, y));
-                assert!((at(t_s, z) - expected_z).abs() < 1e-15, "{z:?} at {t_s} s: {}", at(t_s, z));
+                assert!(
+                    (at(t_s, y) - expected_y).abs() < 1e-15,
+                    "{y:?} at {t_s} s: {}",
+                    at(t_s, y)
+                );
+                assert!(
+                    (at(t_s, z) - expected_z).abs() < 1e-15,
+                    "{z:?} at {t_s} s: {}",
+                    at(t_s, z)
+                );
             }
         }
-        for channel in [Channel::TubFrontY, Channel::TubFrontZ, Channel::TubYaw, Channel::TubPitch] {
+        for channel in [Channel::TubFrontY, Channel::TubFrontZ, Channel::TubYaw, Channel::TubPitch]
+        {
             assert_eq!(at(0.5, channel), 0.0);
         }
         // At a half turn; bent by its weight, the drum's front goes up.
@@ -215,14 +234,18 @@ fn a_linear_machine_at_rest_moves_as_its_drum_turns() {
             [(Channel::TotalCentreY, -1e-3 * centre_mm), (Channel::DrumFrontY, 1e-6 * front_um)]
         {
             let moved_m = at(0.5, channel);
-            assert!((moved_m / expected_m - 1.0).abs() < 1e-3, "{channel:?}: {moved_m} for {expected_m}");
+            assert!(
+                (moved_m / expected_m - 1.0).abs() < 1e-3,
+                "{channel:?}: {moved_m} for {expected_m}"
+            );
         }
     }
 }
 
 #[test]
 fn the_models_differ_by_second_order_in_the_deviation() {
-    // Half the deviation, a quarter of what the expansion leaves out, over the whole right-hand side of M a = f.
+    // Half the deviation, a quarter of what the expansion leaves out, over the whole right-hand
+    // side of M a = f.
     let mut slopes = Vec::new();
     at_random_instants(24, |instant, rng| {
         let (q, u, a) = (random(rng, 1.0), random(rng, 10.0), random(rng, 100.0));
@@ -237,7 +260,8 @@ fn the_models_differ_by_second_order_in_the_deviation() {
         };
         slopes.push((left_out(2e-3) / left_out(1e-3)).log2());
     });
-    let (least, greatest) = slopes.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), &s| (l.min(s), g.max(s)));
+    let (least, greatest) =
+        slopes.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), &s| (l.min(s), g.max(s)));
     eprintln!("order of what the expansion leaves out: {least:.3} to {greatest:.3}");
     assert!((1.9..2.1).contains(&least) && (1.9..2.1).contains(&greatest));
 }

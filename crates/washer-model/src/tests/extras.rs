@@ -1,22 +1,23 @@
-//! What is recorded only when asked for, against the same numbers from densely sampled time histories.
+//! What is recorded only when asked for, against the same numbers from densely sampled time
+//! histories.
 
-use super::instruments::paper;
-use crate::spin::cuts_s;
+use super::instruments::{EVERYTHING, paper};
+use crate::machine::spin::cuts_s;
 use crate::{
-    Caps, Channel, Formula, Geared, Machine, Method, ModelKind, Point, Spin, Start, Timing, Wanted, history,
-    prepare, simulate, simulate_with,
+    Caps, Channel, Formula, Geared, Machine, Method, ModelKind, Point, Spin, Start, Timing, Wanted,
+    history, prepare, simulate, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
-const EVERYTHING: Wanted =
-    Wanted { root_mean_squares: true, turns: true, cabinet_force: true, clash_time: true, course: true };
 const TIMING: Timing = Timing { end_s: 4.0, window_s: [1.3, 3.9], checkpoints: 0 };
 const EVERY_S: f64 = 2.5e-4;
 
-/// Through the resonances in four seconds, with so little room between drum and tub that they clash at times.
+/// Through the resonances in four seconds, with so little room between drum and tub that they clash
+/// at times.
 fn point() -> Point {
     let machine = Machine { radial_clearance_m: 0.4e-3, ..paper(0.8, 120.0) };
-    let spin = Spin::Table { time_s: vec![0.0, 1.0, 3.0, 4.0], speed_rpm: vec![0.0, 100.0, 420.0, 300.0] };
+    let spin =
+        Spin::Table { time_s: vec![0.0, 1.0, 3.0, 4.0], speed_rpm: vec![0.0, 100.0, 420.0, 300.0] };
     prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
@@ -47,7 +48,8 @@ fn sampled(point: &Point, model: ModelKind, method: &Method) -> Sampled {
             found.root_mean_squares[i] += weight * y * y;
             found.turns[turn][i] = found.turns[turn][i].max(y.abs());
         }
-        let force_n = history.forces(k).unwrap().cabinet_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        let force_n =
+            history.forces(k).unwrap().cabinet_n.iter().map(|f| f * f).sum::<f64>().sqrt();
         found.cabinet_force_n = found.cabinet_force_n.max(force_n);
         found.clash_time_s += if instant.gap_m < 0.0 { weight } else { 0.0 };
     }
@@ -67,7 +69,11 @@ fn they_are_what_a_densely_sampled_history_shows() {
     let method = Method::Rk4 { step_s: 2e-4 };
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let (records, extras) = simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING);
-        assert_eq!(records, simulate(Simd::best(), model, &method, &[&point]), "the rest is as ever");
+        assert_eq!(
+            records,
+            simulate(Simd::best(), model, &method, &[&point]),
+            "the rest is as ever"
+        );
         let (extra, expected) = (&extras[0], sampled(&point, model, &method));
         let rms = extra.root_mean_squares.unwrap();
         assert!(extra.turns.len() > 10);
@@ -77,11 +83,16 @@ fn they_are_what_a_densely_sampled_history_shows() {
             close(name, rms[i], expected.root_mean_squares[i], 1e-5);
             let mut exact = 0;
             for (found, expected) in extra.turns.iter().zip(&expected.turns) {
-                // A sample beside a crest is as good as the crest; one beside the end of a turn, on a flank, is not.
+                // A sample beside a crest is as good as the crest; one beside the end of a turn, on
+                // a flank, is not.
                 close(name, found[i], expected[i], 2e-2);
                 exact += usize::from((found[i] - expected[i]).abs() < 1e-4 * found[i]);
             }
-            assert!(2 * exact > extra.turns.len(), "{name}: {exact} of {} turns", extra.turns.len());
+            assert!(
+                2 * exact > extra.turns.len(),
+                "{name}: {exact} of {} turns",
+                extra.turns.len()
+            );
             let greatest = extra.turns.iter().fold(0.0_f64, |greatest, turn| greatest.max(turn[i]));
             close(name, greatest, records[0].amplitudes[i], 1e-9);
         }
@@ -99,16 +110,27 @@ fn methods_whose_steps_lie_elsewhere_find_the_same() {
     let point = point();
     let tolerance = Tolerance { relative: 1e-7, absolute: 1e-10, max_steps: 1_000_000 };
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let run = |method| simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING).1.remove(0);
+        let run =
+            |method| simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING).1.remove(0);
         let reference = run(Method::Rk4 { step_s: 2e-4 });
         for other in [run(Method::Dopri5(tolerance)), run(Method::Rodas5p(tolerance))] {
             let rms = [&other, &reference].map(|extra| extra.root_mean_squares.unwrap());
-            rms[0].iter().zip(rms[1]).for_each(|(found, expected)| close("rms", *found, expected, 1e-4));
+            rms[0]
+                .iter()
+                .zip(rms[1])
+                .for_each(|(found, expected)| close("rms", *found, expected, 1e-4));
             assert_eq!(other.turns.len(), reference.turns.len());
-            for (found, expected) in other.turns.iter().flatten().zip(reference.turns.iter().flatten()) {
+            for (found, expected) in
+                other.turns.iter().flatten().zip(reference.turns.iter().flatten())
+            {
                 close("turn", *found, *expected, 1e-3);
             }
-            close("force", other.cabinet_force_n.unwrap(), reference.cabinet_force_n.unwrap(), 1e-4);
+            close(
+                "force",
+                other.cabinet_force_n.unwrap(),
+                reference.cabinet_force_n.unwrap(),
+                1e-4,
+            );
             close("clash", other.clash_time_s.unwrap(), reference.clash_time_s.unwrap(), 1e-3);
         }
     }
@@ -119,7 +141,8 @@ fn only_what_is_asked_for_is_there() {
     let point = point();
     let caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: None };
     let method = Method::Geared(Geared::steady(Formula::Rk4, 1e-3, caps));
-    let run = |wanted| simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], wanted);
+    let run =
+        |wanted| simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], wanted);
     assert!(run(Wanted::default()).1.is_empty());
     let (_, extras) = run(Wanted { clash_time: true, ..Wanted::default() });
     assert_eq!(extras.len(), 2);
@@ -134,15 +157,21 @@ fn at_rest_the_cabinet_carries_the_weight() {
     let mut machine = Machine::paper();
     // Springs that carry the machine straight down: nothing along the drum's axis.
     machine.unbalance.mass_kg = 0.0;
-    let weight_n =
-        machine.gravity_m_per_s2 * (machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg);
+    let weight_n = machine.gravity_m_per_s2
+        * (machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg);
     let timing = Timing { end_s: 0.02, window_s: [0.0, 0.02], checkpoints: 0 };
     let still = Spin::Ramp { peak_rpm: 0.0, ramp_s: 1.0 };
     let point = prepare(Simd::best(), &[(machine, still)], &timing).remove(0).unwrap();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let (_, extras) =
-            simulate_with(Simd::best(), model, &Method::Rk4 { step_s: 2e-4 }, &[&point], EVERYTHING);
-        // Springs hold the tub back along c1, where the drum's bearings do: a force that the weight does not have.
+        let (_, extras) = simulate_with(
+            Simd::best(),
+            model,
+            &Method::Rk4 { step_s: 2e-4 },
+            &[&point],
+            EVERYTHING,
+        );
+        // Springs hold the tub back along c1, where the drum's bearings do: a force that the weight
+        // does not have.
         close("force", extras[0].cabinet_force_n.unwrap(), weight_n, 1e-4);
         assert_eq!(extras[0].clash_time_s, Some(0.0));
         assert_eq!(extras[0].turns.len(), 1);

@@ -9,7 +9,8 @@ fn both(points: &[(f64, f64)]) -> Vec<[Record; 2]> {
     let scenarios: Vec<_> = points.iter().map(|&(m, c)| (paper(m, c), triangular())).collect();
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
     let simd = Simd::best();
-    let ready: Vec<_> = prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
+    let ready: Vec<_> =
+        prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let ready: Vec<_> = ready.iter().collect();
     let method = Method::Rk4 { step_s: 2e-4 };
     let of = |model| simulate(simd, model, &method, &ready);
@@ -37,7 +38,8 @@ fn at_a_damping_of_140_the_linear_model_is_reliable_and_at_100_it_misses_violent
     let [reliable, missed] = [&records[0], &records[1]].map(ratio);
     let yaw = records[1].map(|r| r.amplitudes[Channel::TubYaw.index()]);
     eprintln!(
-        "C = 140: ratio {reliable:.3}; C = 100: ratio {missed:.2}, yaw {:.1} mrad nonlinear, {:.2} mrad linear",
+        "C = 140: ratio {reliable:.3}; C = 100: ratio {missed:.2}, yaw {:.1} mrad nonlinear, \
+         {:.2} mrad linear",
         1e3 * yaw[0],
         1e3 * yaw[1]
     );
@@ -48,10 +50,12 @@ fn at_a_damping_of_140_the_linear_model_is_reliable_and_at_100_it_misses_violent
 
 #[test]
 fn the_boundary_rises_with_the_unbalance_mass() {
-    // Below its bracket the linear model fails, above it holds; each bracket lies above the one before. (At 1 kg there is a
-    // reliable pocket inside the bracket, at 250 N s/m: the edge is not everywhere a single curve.)
+    // Below its bracket the linear model fails, above it holds; each bracket lies above the one
+    // before. (At 1 kg there is a reliable pocket inside the bracket, at 250 N s/m: the edge is not
+    // everywhere a single curve.)
     let brackets = [(0.15, [55.0, 75.0]), (0.4, [110.0, 135.0]), (1.0, [240.0, 290.0])];
-    let points: Vec<_> = brackets.iter().flat_map(|&(m, [low, high])| [(m, low), (m, high)]).collect();
+    let points: Vec<_> =
+        brackets.iter().flat_map(|&(m, [low, high])| [(m, low), (m, high)]).collect();
     let ratios: Vec<_> = both(&points).iter().map(ratio).collect();
     for ((m, [low, high]), pair) in brackets.into_iter().zip(ratios.chunks(2)) {
         eprintln!("m_u = {m} kg: ratio {:.2} at {low} N s/m, {:.2} at {high}", pair[0], pair[1]);

@@ -1,13 +1,23 @@
 //! Machines drawn from a seed, and the equations as a residual.
 
-use crate::coefficients::Coefficients;
-use crate::equilibrium;
-use crate::floating::Floating;
-use crate::nonlinear::{COORDINATES, Half, Halves, halves};
+use crate::coordinates::COORDINATES;
+use crate::machine::spin::SpinState;
+use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::equilibrium;
+use crate::nonlinear::floating::Floating;
+use crate::nonlinear::{Half, Halves, halves};
 use crate::point::Point;
-use crate::spin::SpinState;
-use crate::{Machine, Parameter, Spin, Target, Timing, prepare};
+use crate::{Machine, Parameter, Spin, Target, Timing, Wanted, prepare};
 use lane_ode::{N, Real, Simd};
+
+/// Every record that there is.
+pub(super) const EVERYTHING: Wanted = Wanted {
+    root_mean_squares: true,
+    turns: true,
+    cabinet_force: true,
+    clash_time: true,
+    course: true,
+};
 
 /// Fig. 12's spin.
 pub(super) fn triangular() -> Spin {
@@ -22,7 +32,8 @@ pub(super) fn paper(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
     machine
 }
 
-/// A machine with every number within a fifth of the paper's, drawn again until it is sound and rests somewhere.
+/// A machine with every number within a fifth of the paper's, drawn again until it is sound and
+/// rests somewhere.
 pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
     loop {
         let (mut machine, mut spin) = (Machine::paper(), triangular());
@@ -49,7 +60,10 @@ pub(super) fn random_spin(rng: &mut fastrand::Rng, kind: usize, end_s: f64) -> S
         0 => Spin::Cycloidal { peak_rpm, ramp_s },
         1 => Spin::Triangular { peak_rpm, ramp_s },
         2 => Spin::Ramp { peak_rpm: -peak_rpm, ramp_s },
-        _ => Spin::Table { time_s: vec![0.0, 0.4 * ramp_s, ramp_s], speed_rpm: vec![100.0, peak_rpm, 50.0] },
+        _ => Spin::Table {
+            time_s: vec![0.0, 0.4 * ramp_s, ramp_s],
+            speed_rpm: vec![100.0, peak_rpm, 50.0],
+        },
     }
 }
 
@@ -84,9 +98,13 @@ fn inertia_forces<T: Real, const R: usize>(
 }
 
 /// M a and f of the equations M a = f of both halves, as they are loaded.
-pub(super) fn equations_of<T: Real>(both: &Halves<T>, a: &[N<T>; COORDINATES]) -> [[N<T>; COORDINATES]; 2] {
+pub(super) fn equations_of<T: Real>(
+    both: &Halves<T>,
+    a: &[N<T>; COORDINATES],
+) -> [[N<T>; COORDINATES]; 2] {
     let ([i1, i2], [i5, i6]) = inertia_forces(&both.tub, [a[0], a[1]], [a[4], a[5]]);
-    let ([i3, i4], [i7, i8, i9, i10]) = inertia_forces(&both.rotor, [a[2], a[3]], [a[6], a[7], a[8], a[9]]);
+    let ([i3, i4], [i7, i8, i9, i10]) =
+        inertia_forces(&both.rotor, [a[2], a[3]], [a[6], a[7], a[8], a[9]]);
     let ([f1, f2], [f5, f6]) = both.tub.floating.generalised_forces();
     let ([f3, f4], [f7, f8, f9, f10]) = both.rotor.floating.generalised_forces();
     [[i1, i2, i3, i4, i5, i6, i7, i8, i9, i10], [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]]
@@ -100,7 +118,7 @@ pub(super) fn equations<T: Real>(
     u: &[N<T>; COORDINATES],
     a: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; 2] {
-    equations_of(&halves(&machine.view(), spin, q, u), a)
+    equations_of(&halves(machine, spin, q, u), a)
 }
 
 /// The mass matrix of the nonlinear model, column by column from unit accelerations.

@@ -1,5 +1,4 @@
-//! A spin measured at many times: what is made ready of it grows with its rows, not with their
-//! square.
+//! Long spin tables: preparation grows with the rows, not with their square.
 
 use std::sync::Arc;
 

@@ -1,19 +1,21 @@
 //! The mass matrix: against independent numbers, and against the accelerations it belongs to.
 
 use super::instruments::{equations, equations_of, mass_matrix, random_machine};
-use crate::coefficients::Coefficients;
-use crate::coupling::{Caps, Coupling, Deflection, Sag};
-use crate::frame::Tilt;
-use crate::nonlinear::{COORDINATES, accelerations, halves};
-use crate::reference_tests::{machine, numbers, reference, spin};
-use crate::spin::SpinState;
+use crate::coordinates::COORDINATES;
+use crate::machine::spin::SpinState;
+use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coupling::{Caps, Coupling, Deflection, Sag};
+use crate::nonlinear::frame::Tilt;
+use crate::nonlinear::{accelerations, halves};
+use crate::tests::reference::{machine, numbers, reference, spin};
 use lane_ode::{Dual, N};
 
 #[test]
 fn val_mass_matrix_matches_an_independent_one() {
     let mut worst = 0.0_f64;
     for case in reference("rhs.json")["cases"].as_array().unwrap() {
-        let ours = mass_matrix(&Coefficients::new(&machine(case)), &spin(case), &numbers(&case["q"]));
+        let ours =
+            mass_matrix(&Coefficients::new(&machine(case)), &spin(case), &numbers(&case["q"]));
         let theirs: [[f64; COORDINATES]; COORDINATES] =
             std::array::from_fn(|i| numbers(&case["mass_matrix"].as_array().unwrap()[i]));
         let largest = theirs.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
@@ -29,7 +31,10 @@ fn val_mass_matrix_matches_an_independent_one() {
 }
 
 /// Machines in motion: tub and shaft within the bearings' play.
-fn in_motion(seed: u64, mut check: impl FnMut(&Coefficients<f64>, &SpinState<f64>, &Vector, &Vector)) {
+fn in_motion(
+    seed: u64,
+    mut check: impl FnMut(&Coefficients<f64>, &SpinState<f64>, &Vector, &Vector),
+) {
     let mut rng = fastrand::Rng::with_seed(seed);
     for _ in 0..200 {
         let coefficients = Coefficients::new(&random_machine(&mut rng));
@@ -56,7 +61,7 @@ fn left([inertia, force]: &[Vector; 2]) -> f64 {
 fn accelerations_solve_the_equations_of_motion_of_any_machine() {
     let mut worst = 0.0_f64;
     in_motion(11, |machine, spin, q, u| {
-        let a = accelerations(&machine.view(), &Coupling::Springs, &sag(), spin, q, u);
+        let a = accelerations(machine, &Coupling::Springs, &sag(), spin, q, u);
         worst = worst.max(left(&equations(machine, spin, q, u, &a)));
     });
     eprintln!("M a - f: at most {worst:.1e} of the largest force");
@@ -76,7 +81,7 @@ fn mass_scaling_changes_the_forces_of_bearings_and_hinge_and_nothing_else() {
         let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s };
         in_motion(12, |machine, spin, q, u| {
             let sag = sag();
-            let a = accelerations(&machine.view(), &Coupling::new(N(0.0), Some(&caps)), &sag, spin, q, u);
+            let a = accelerations(machine, &Coupling::new(N(0.0), Some(&caps)), &sag, spin, q, u);
             // d'' of the true deflection, by two derivatives carried along the motion.
             let course: [_; COORDINATES] = core::array::from_fn(|i| {
                 let [q, u, a] = [q[i].0, u[i].0, a[i].0];
@@ -95,7 +100,7 @@ fn mass_scaling_changes_the_forces_of_bearings_and_hinge_and_nothing_else() {
             let Deflection { offset, tilt } = sag.bearings;
             let extra = Deflection { offset: added(d.offset, offset), tilt: added(d.tilt, tilt) };
             let extra = extra.load(&machine.bodies);
-            let mut both = halves(&machine.view(), spin, q, u);
+            let mut both = halves(machine, spin, q, u);
             both.tub.floating.apply(&extra.reaction());
             both.rotor.floating.apply(&extra);
             if let Some(cap) = hinge_rad_per_s {
@@ -105,7 +110,8 @@ fn mass_scaling_changes_the_forces_of_bearings_and_hinge_and_nothing_else() {
                 let mass = N(machine.bodies.flexure_stiffness.0 / (cap * cap));
                 let forwards = [-u[9], u[8]];
                 for i in 0..2 {
-                    let whirl = N(1.5 * spin.speed.0) * forwards[i] - N(0.5 * speed_squared) * turned[i];
+                    let whirl =
+                        N(1.5 * spin.speed.0) * forwards[i] - N(0.5 * speed_squared) * turned[i];
                     both.rotor.floating.torque[2 + i] -= mass * (a[8 + i] + whirl);
                 }
             }

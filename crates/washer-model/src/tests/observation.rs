@@ -1,15 +1,18 @@
-//! What an observer sees of a motion: values, and derivatives in time that are really those of the values.
+//! What an observer sees of a motion: values, and derivatives in time that are really those of the
+//! values.
 
 use super::instruments::{random_machine, random_spin, ready};
-use crate::coupling::Coupling;
-use crate::model::{Linear, Model, Nonlinear, STATES};
-use crate::nonlinear::COORDINATES;
-use crate::outputs::{CHANNELS, RADIAL};
+use crate::channel::CHANNELS;
+use crate::coordinates::{COORDINATES, STATES};
+use crate::nonlinear::coupling::Coupling;
+use crate::nonlinear::outputs::RADIAL;
+use crate::run::model::{Linear, Model, Nonlinear};
 use lane_ode::{N, Sample};
 
 const OUTPUTS: usize = CHANNELS + RADIAL;
 
-/// Largest errors of slope and curvature against differences over `2 H_S`, over their largest magnitudes.
+/// Largest errors of slope and curvature against differences over `2 H_S`, over their largest
+/// magnitudes.
 fn errors<M: Model<f64>>(seed: u64) -> [f64; 2] {
     const H_S: f64 = 1e-5;
     let mut rng = fastrand::Rng::with_seed(seed);
@@ -26,9 +29,12 @@ fn errors<M: Model<f64>>(seed: u64) -> [f64; 2] {
         // A motion of constant acceleration.
         let seen = |t: f64| -> [Sample<f64>; OUTPUTS] {
             let of = |i: usize| (q[i] + t * (u[i] + 0.5 * t * a[i]), u[i] + t * a[i]);
-            let joined = |first: &dyn Fn(usize) -> f64, second: &dyn Fn(usize) -> f64| -> [N<f64>; STATES] {
-                core::array::from_fn(|i| N(if i < COORDINATES { first(i) } else { second(i - COORDINATES) }))
-            };
+            let joined =
+                |first: &dyn Fn(usize) -> f64, second: &dyn Fn(usize) -> f64| -> [N<f64>; STATES] {
+                    core::array::from_fn(|i| {
+                        N(if i < COORDINATES { first(i) } else { second(i - COORDINATES) })
+                    })
+                };
             let x = joined(&|i| of(i).0, &|i| of(i).1);
             let dx = joined(&|i| of(i).1, &|i| a[i]);
             let (radial, channels) = model.observe(&model.forcing(N(middle_s + t)), &x, &dx, true);

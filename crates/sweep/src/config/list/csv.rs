@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::super::report::{Diagnostic, Report};
 use super::super::section::short;
 use super::super::source::{Located, Location, SourceId};
-use super::{Column, MOST_COLUMNS, Unreadable, fits};
+use super::{ListColumn, MOST_COLUMNS, Unreadable, fits};
 
 /// The columns, and the byte at which each row's line begins; `None` after mistakes, which are
 /// reported.
@@ -14,8 +14,8 @@ pub(super) fn read(
     text: &str,
     source: SourceId,
     report: &mut Report,
-) -> Result<Option<(Vec<Column>, Vec<u32>)>, Unreadable> {
-    let mut columns: Vec<Column> = Vec::new();
+) -> Result<Option<(Vec<ListColumn>, Vec<u32>)>, Unreadable> {
+    let mut columns: Vec<ListColumn> = Vec::new();
     let mut starts: Vec<u32> = Vec::new();
     let mut sound = true;
     let mut next = 0;
@@ -31,7 +31,7 @@ pub(super) fn read(
             if count > MOST_COLUMNS {
                 return Err(Unreadable::TooManyColumns(count));
             }
-            let column = |(name, at): (&str, _)| Column {
+            let column = |(name, at): (&str, _)| ListColumn {
                 name: Located { value: name.to_owned(), at: Location::new(source, at) },
                 values: Vec::new(),
             };
@@ -72,7 +72,7 @@ pub(super) fn read(
     Ok(sound.then_some((columns, starts)))
 }
 
-/// Where a cell stands in the line that begins at a byte of a text.
+/// The place of a cell in the line that begins at a byte of a text.
 pub(super) fn cell_span(text: &str, start: usize, column: usize) -> Range<usize> {
     let line = text.get(start..).unwrap_or_default();
     let line = line.split_inclusive('\n').next().unwrap_or_default();
@@ -87,7 +87,7 @@ fn body(line: &str, start: usize) -> (&str, usize) {
     (plain, start + body.len() - plain.len())
 }
 
-/// The cells of a line without white space and quotation marks, and where they stand.
+/// The cells of a line without white space and quotation marks, and their places.
 fn cells(line: &str, offset: usize) -> impl Iterator<Item = (&str, Range<usize>)> {
     let mut next = offset;
     line.split(',').map(move |cell| {

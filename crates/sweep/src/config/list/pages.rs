@@ -73,7 +73,7 @@ fn check_gzip(page: &[u8], levels: u64, unpacked: u64) -> Result<(), Unreadable>
     let packed = packed.ok_or_else(senseless)?;
     let most = unpacked.saturating_sub(levels);
     let mut decoder = MultiGzDecoder::new(packed).take(most + 1);
-    // Bytes that are no gzip are the library's to report.
+    // The library reports bytes that are not gzip.
     match std::io::copy(&mut decoder, &mut std::io::sink()) {
         Ok(found) if found > most => Err(senseless()),
         _ => Ok(()),

@@ -8,7 +8,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
 use super::{LONGEST_BYTES, MOST_COLUMNS, Unreadable, fits, pages};
-use crate::{cells, panics};
+use sweep_files::{cells, panics};
 
 /// How a list may be compressed, for a message.
 pub(super) const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";

@@ -116,7 +116,7 @@ fn damage_is_an_error_or_another_list_and_nothing_else() {
     }
 }
 
-fn csv_of(text: &str) -> Result<Option<(Vec<Column>, Vec<u32>)>, Unreadable> {
+fn csv_of(text: &str) -> Result<Option<(Vec<ListColumn>, Vec<u32>)>, Unreadable> {
     let mut report = Report::default();
     let source = report.sources.add("list.csv", String::new());
     csv::read(text, source, &mut report)

@@ -1,0 +1,101 @@
+//! `f64` as one lane.
+
+use crate::lane::{Aside, Lane};
+use crate::real::Real;
+use crate::simd::Simd;
+use crate::trig;
+
+impl Real for f64 {
+    type Mask = bool;
+    #[inline(always)]
+    fn lit(self, value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        self + b
+    }
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        self - b
+    }
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        self * b
+    }
+    #[inline(always)]
+    fn div(self, b: Self) -> Self {
+        self / b
+    }
+    #[inline(always)]
+    fn neg(self) -> Self {
+        #[cfg(target_arch = "aarch64")]
+        {
+            crate::aarch64::negated(self)
+        }
+        #[cfg(not(target_arch = "aarch64"))]
+        -self
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        f64::mul_add(self, b, c)
+    }
+    #[inline(always)]
+    fn mul_sub(self, b: Self, c: Self) -> Self {
+        f64::mul_add(self, b, -c)
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, b: Self, c: Self) -> Self {
+        f64::mul_add(-self, b, c)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        trig::sin_cos(self)
+    }
+    #[inline(always)]
+    fn less(self, b: Self) -> bool {
+        self < b
+    }
+    #[inline(always)]
+    fn select(mask: bool, a: Self, b: Self) -> Self {
+        if mask { a } else { b }
+    }
+    #[inline(always)]
+    fn all(mask: bool) -> bool {
+        mask
+    }
+}
+
+impl Lane for f64 {
+    const LANES: usize = 1;
+    #[inline(always)]
+    fn get(self, i: usize) -> f64 {
+        assert!(i == 0, "a scalar has one lane");
+        self
+    }
+    #[inline(always)]
+    fn set(&mut self, i: usize, value: f64) {
+        assert!(i == 0, "a scalar has one lane");
+        *self = value;
+    }
+    #[inline(always)]
+    fn round(self) -> Self {
+        self.round_ties_even()
+    }
+    #[inline(always)]
+    fn bits(mask: bool) -> u32 {
+        u32::from(mask)
+    }
+    #[inline(always)]
+    fn aside<W: Aside>(self, work: W) {
+        Simd::aside(work);
+    }
+}

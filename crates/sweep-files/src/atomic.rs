@@ -1,0 +1,216 @@
+//! Files that are whole or absent, after a power cut too: write under a temporary name, sync,
+//! rename, sync the folder.
+
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Write};
+use std::path::Path;
+
+use tempfile::NamedTempFile;
+
+use crate::{FileError, regular};
+
+/// Prefix and suffix of files in the making.
+const PREFIX: &str = ".sweep-";
+const SUFFIX: &str = ".tmp";
+
+/// How often a temporary file is made anew when somebody removes it before it is locked.
+const ATTEMPTS: u32 = 5;
+
+/// Whether a name is that of a file in the making.
+pub fn is_temporary(name: &str) -> bool {
+    name.starts_with(PREFIX) && name.ends_with(SUFFIX)
+}
+
+/// A file in the making inside `folder`; it disappears unless [`publish`]ed. It is locked, so that
+/// [`clear_leftovers`] knows it from those that killed processes left.
+///
+/// # Errors
+/// [`FileError::Io`].
+pub fn begin(folder: &Path) -> Result<NamedTempFile, FileError> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PREFIX).suffix(SUFFIX);
+    // Results are for sharing: the umask decides who reads them, not the private default of
+    // temporary files.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut attempt = 1;
+    loop {
+        let file =
+            builder.tempfile_in(folder).map_err(FileError::io("create a file in", folder))?;
+        let lost = match file.as_file().try_lock() {
+            Ok(()) => !is_named(file.as_file(), file.path()),
+            Err(TryLockError::WouldBlock) => true,
+            // Where there are no locks, nobody takes the file for a leftover.
+            Err(TryLockError::Error(_)) => false,
+        };
+        if !lost || attempt == ATTEMPTS {
+            return Ok(file);
+        }
+        attempt += 1;
+    }
+}
+
+/// Whether an open file is the one that a path names.
+#[cfg(unix)]
+pub fn is_named(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (file.metadata(), fs::symlink_metadata(path)) {
+        (Ok(open), Ok(named)) => (open.dev(), open.ino()) == (named.dev(), named.ino()),
+        _ => false,
+    }
+}
+
+/// Elsewhere an open file cannot be deleted, so it is.
+#[cfg(not(unix))]
+pub fn is_named(_file: &File, path: &Path) -> bool {
+    path.exists()
+}
+
+/// Syncs a file, gives it its name on the same file system, and syncs that name.
+///
+/// # Errors
+/// [`FileError::Io`].
+pub fn publish(file: NamedTempFile, target: &Path) -> Result<(), FileError> {
+    file.as_file().sync_all().map_err(FileError::io("sync", target))?;
+    file.persist(target)
+        .map_err(|error| FileError::io("rename a finished file to", target)(error.error))?;
+    sync_folder(parent(target))
+}
+
+/// Writes a file whole, over an older one if there is one. The temporary name lives in `folder`.
+///
+/// For a run's own folder; what a user named goes through [`crate::Output`].
+///
+/// # Errors
+/// [`FileError::Io`].
+pub fn write(folder: &Path, target: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    let mut file = begin(folder)?;
+    file.write_all(bytes).map_err(FileError::io("write", target))?;
+    publish(file, target)
+}
+
+/// Writes a file whole unless something is there; says whether this process was the one that wrote
+/// it.
+///
+/// # Errors
+/// [`FileError::Io`].
+pub fn create(folder: &Path, target: &Path, bytes: &[u8]) -> Result<bool, FileError> {
+    let mut file = begin(folder)?;
+    file.write_all(bytes).map_err(FileError::io("write", target))?;
+    file.as_file().sync_all().map_err(FileError::io("sync", target))?;
+    match file.persist_noclobber(target) {
+        Ok(_) => sync_folder(parent(target)).map(|()| true),
+        Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
+        Err(error) => Err(FileError::io("rename a finished file to", target)(error.error)),
+    }
+}
+
+/// Makes renames and removals in a folder last.
+///
+/// # Errors
+/// [`FileError::Io`].
+pub fn sync_folder(folder: &Path) -> Result<(), FileError> {
+    let synced = File::open(folder).and_then(|folder| folder.sync_all());
+    match synced {
+        // Some network file systems cannot sync a folder; there is nothing more to ask of them.
+        Err(error)
+            if matches!(error.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) =>
+        {
+            Ok(())
+        }
+        other => other.map_err(FileError::io("sync the folder", folder)),
+    }
+}
+
+/// Deletes what killed processes left in a folder: temporary files that nobody holds locked. A
+/// leftover that cannot be deleted hinders nobody, so nothing of this is an error.
+pub fn clear_leftovers(folder: &Path) {
+    let names = regular::names(folder).unwrap_or_default();
+    for name in names.iter().filter(|name| name.to_str().is_some_and(is_temporary)) {
+        let path = folder.join(name);
+        if let Ok(file) = regular::open_to_write(&path)
+            && file.try_lock().is_ok()
+        {
+            let _ = fs::remove_file(&path);
+        }
+    }
+}
+
+/// Deletes a file; one that is already gone is fine.
+///
+/// # Errors
+/// [`FileError::Io`].
+pub fn remove(path: &Path) -> Result<(), FileError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(FileError::io("delete", path)(error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The folder a path lives in.
+pub fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn create_leaves_the_first_and_write_replaces() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("x");
+        assert!(create(folder.path(), &target, b"first").unwrap());
+        assert!(!create(folder.path(), &target, b"second").unwrap());
+        assert_eq!(fs::read(&target).unwrap(), b"first");
+        write(folder.path(), &target, b"third").unwrap();
+        assert_eq!(fs::read(&target).unwrap(), b"third");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary stays behind");
+    }
+
+    #[test]
+    fn leftovers_go_and_everything_else_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let (left, held) = (folder.path().join(".sweep-1.tmp"), begin(folder.path()).unwrap());
+        fs::write(&left, "half a file").unwrap();
+        fs::write(folder.path().join("notes.tmp"), "mine").unwrap();
+        clear_leftovers(folder.path());
+        assert!(!left.exists());
+        assert!(held.path().exists(), "its process lives");
+        assert!(folder.path().join("notes.tmp").exists());
+        let path = held.path().to_owned();
+        // As after a kill: the file stays, the lock goes.
+        drop(held.keep().unwrap());
+        clear_leftovers(folder.path());
+        assert!(!path.exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_what_the_umask_lets_them() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let (ours, plain) = (folder.path().join("ours"), folder.path().join("plain"));
+        write(folder.path(), &ours, b"").unwrap();
+        File::create(&plain).unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
+    }
+
+    #[test]
+    fn a_vanished_folder_is_named_with_advice() {
+        let error = write(Path::new("/nonexistent/x.partial"), Path::new("/nonexistent/x"), b"")
+            .unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains("/nonexistent/x.partial") && text.contains("bring it back"),
+            "{text}"
+        );
+        assert!(!error.is_refusal());
+    }
+}

@@ -1,0 +1,143 @@
+//! A column's cells, whatever type of numbers or text a file keeps them in: ours may have been
+//! through other programs.
+
+use arrow_array::cast::{AsArray, as_dictionary_array};
+use arrow_array::types::{
+    ArrowDictionaryKeyType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
+    UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+};
+use arrow_array::{Array, BooleanArray};
+use arrow_schema::{ArrowError, DataType};
+
+fn unreadable(array: &dyn Array, wanted: &str) -> ArrowError {
+    ArrowError::SchemaError(format!("expected a column of {wanted}, found {}", array.data_type()))
+}
+
+/// Numbers of any width, one per row.
+///
+/// # Errors
+/// [`ArrowError::SchemaError`] if the column does not hold integers or floats.
+pub fn numbers(array: &dyn Array) -> Result<Vec<Option<f64>>, ArrowError> {
+    macro_rules! widened {
+        ($type:ty) => {
+            // Counts above 2^53 lose digits, as they would in any program that plots them.
+            array.as_primitive::<$type>().iter().map(|cell| cell.map(|cell| cell as f64)).collect()
+        };
+    }
+    Ok(match array.data_type() {
+        DataType::Float64 => array.as_primitive::<Float64Type>().iter().collect(),
+        DataType::Float32 => widened!(Float32Type),
+        DataType::UInt64 => widened!(UInt64Type),
+        DataType::UInt32 => widened!(UInt32Type),
+        DataType::UInt16 => widened!(UInt16Type),
+        DataType::UInt8 => widened!(UInt8Type),
+        DataType::Int64 => widened!(Int64Type),
+        DataType::Int32 => widened!(Int32Type),
+        DataType::Int16 => widened!(Int16Type),
+        DataType::Int8 => widened!(Int8Type),
+        _ => return Err(unreadable(array, "numbers")),
+    })
+}
+
+/// Whether [`numbers`] can read it.
+pub fn is_number(data_type: &DataType) -> bool {
+    data_type.is_integer() || matches!(data_type, DataType::Float64 | DataType::Float32)
+}
+
+/// Truth values, one per row.
+///
+/// # Errors
+/// [`ArrowError::SchemaError`] if the column does not hold such.
+pub fn flags(array: &dyn Array) -> Result<&BooleanArray, ArrowError> {
+    array.as_boolean_opt().ok_or_else(|| unreadable(array, "true and false"))
+}
+
+/// Texts, one per row, plain or dictionary coded.
+///
+/// # Errors
+/// [`ArrowError::SchemaError`] if the column does not hold such.
+pub fn texts(array: &dyn Array) -> Result<Vec<Option<&str>>, ArrowError> {
+    Ok(match array.data_type() {
+        DataType::Utf8 => array.as_string::<i32>().iter().collect(),
+        DataType::LargeUtf8 => array.as_string::<i64>().iter().collect(),
+        DataType::Utf8View => array.as_string_view().iter().collect(),
+        DataType::Dictionary(key, _) => match key.as_ref() {
+            DataType::Int8 => coded::<Int8Type>(array)?,
+            DataType::Int16 => coded::<Int16Type>(array)?,
+            DataType::Int32 => coded::<Int32Type>(array)?,
+            DataType::Int64 => coded::<Int64Type>(array)?,
+            DataType::UInt8 => coded::<UInt8Type>(array)?,
+            DataType::UInt16 => coded::<UInt16Type>(array)?,
+            DataType::UInt32 => coded::<UInt32Type>(array)?,
+            DataType::UInt64 => coded::<UInt64Type>(array)?,
+            _ => return Err(unreadable(array, "text")),
+        },
+        _ => return Err(unreadable(array, "text")),
+    })
+}
+
+/// Whether [`texts`] can read it.
+pub fn is_text(data_type: &DataType) -> bool {
+    match data_type {
+        DataType::Dictionary(_, value) => is_text(value),
+        other => matches!(other, DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View),
+    }
+}
+
+fn coded<K: ArrowDictionaryKeyType>(array: &dyn Array) -> Result<Vec<Option<&str>>, ArrowError> {
+    let coded = as_dictionary_array::<K>(array);
+    let names = texts(coded.values().as_ref())?;
+    let name = |row| coded.key(row).and_then(|key| names.get(key).copied().flatten());
+    Ok((0..coded.len()).map(name).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow_array::{
+        ArrayRef, DictionaryArray, Float32Array, Int8Array, LargeStringArray, StringArray,
+        StringViewArray, UInt8Array, UInt64Array,
+    };
+
+    use super::*;
+
+    #[test]
+    fn numbers_of_every_width_read_alike_and_nulls_stay_nulls() {
+        let arrays: [ArrayRef; 4] = [
+            Arc::new(UInt64Array::from(vec![Some(3), None])),
+            Arc::new(Int8Array::from(vec![Some(3), None])),
+            Arc::new(UInt8Array::from(vec![Some(3), None])),
+            Arc::new(Float32Array::from(vec![Some(3.0), None])),
+        ];
+        for array in arrays {
+            assert!(is_number(array.data_type()));
+            assert_eq!(numbers(&array).unwrap(), [Some(3.0), None], "{}", array.data_type());
+        }
+    }
+
+    #[test]
+    fn texts_read_alike_however_they_are_kept() {
+        let said = vec![Some("ok"), None, Some("diverged"), Some("ok")];
+        let arrays: [ArrayRef; 5] = [
+            Arc::new(StringArray::from(said.clone())),
+            Arc::new(LargeStringArray::from(said.clone())),
+            Arc::new(StringViewArray::from(said.clone())),
+            Arc::new(said.iter().copied().collect::<DictionaryArray<Int32Type>>()),
+            Arc::new(said.iter().copied().collect::<DictionaryArray<UInt8Type>>()),
+        ];
+        for array in arrays {
+            assert!(is_text(array.data_type()));
+            assert_eq!(texts(&array).unwrap(), said, "{}", array.data_type());
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_an_error_that_names_both_types() {
+        let names: ArrayRef = Arc::new(StringArray::from(vec!["ok"]));
+        let error = numbers(&names).unwrap_err().to_string();
+        assert!(error.contains("numbers") && error.contains("Utf8"), "{error}");
+        assert!(flags(&names).is_err() && texts(&BooleanArray::from(vec![true])).is_err());
+        assert!(!is_number(names.data_type()));
+    }
+}

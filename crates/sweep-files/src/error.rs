@@ -1,0 +1,98 @@
+//! What can go wrong with a file, each with the path and what to do about it.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A failure to read or write a file.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The file system said no.
+    #[error("cannot {action} {}: {source}\n  = help: {}", path.display(), advice(source))]
+    Io {
+        /// What was being done, in the infinitive.
+        action: &'static str,
+        /// To which file or folder.
+        path: PathBuf,
+        /// What the system answered.
+        source: io::Error,
+    },
+    /// Something stands at a path where this program must not write.
+    #[error("{} cannot be an output: {reason}\n  = help: {help}", path.display())]
+    Refused {
+        /// The path as given.
+        path: PathBuf,
+        /// Why not.
+        reason: String,
+        /// What to do.
+        help: &'static str,
+    },
+    /// A file that is not Parquet, or only a part of one.
+    #[error("{} is not a readable Parquet file: {reason}", path.display())]
+    NotParquet {
+        /// Which file.
+        path: PathBuf,
+        /// The reader's words.
+        reason: String,
+    },
+    /// A file of this program whose bytes have changed since it was written.
+    #[error(
+        "{} is damaged: {DAMAGED}\n  = help: \
+         restore it from a copy, or move it away and run the command again that wrote it",
+        path.display()
+    )]
+    Damaged {
+        /// Which file.
+        path: PathBuf,
+    },
+}
+
+/// How a damaged file is known.
+const DAMAGED: &str = "the digest that it carries is not that of its bytes";
+
+impl FileError {
+    /// Turns what the system answered into [`FileError::Io`]; `action` in the infinitive.
+    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_path_buf();
+        move |source| Self::Io { action, path, source }
+    }
+
+    /// Whether the request is at fault, and nothing was done.
+    #[must_use]
+    pub const fn is_refusal(&self) -> bool {
+        matches!(self, Self::Refused { .. })
+    }
+}
+
+/// What a user can do about an I/O failure. Finished chunks are whole whatever happened, so it ends
+/// alike.
+fn advice(source: &io::Error) -> &'static str {
+    match source.kind() {
+        io::ErrorKind::StorageFull => {
+            "the disk is full: free some space and run the same command again; finished chunks \
+             are kept"
+        }
+        io::ErrorKind::QuotaExceeded => {
+            "the quota is used up: free some space and run the same command again; finished chunks \
+             are kept"
+        }
+        io::ErrorKind::FileTooLarge => {
+            "a file-size limit was hit: raise it (ulimit -f) and run the same command again; \
+             finished chunks are kept"
+        }
+        io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied => {
+            "make it writable for this user, or write elsewhere with --out"
+        }
+        io::ErrorKind::NotFound => {
+            "it was there and has vanished, or its folder cannot be reached: bring it back and run \
+             the same command again; chunks that are still there are used"
+        }
+        io::ErrorKind::NotADirectory => {
+            "a part of that path is a file, not a folder: move it, or write elsewhere with --out"
+        }
+        io::ErrorKind::InvalidInput => "give the name of a regular file",
+        _ => {
+            "check the disk (the system's log may say more) and run the same command again; \
+             finished chunks are kept"
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! The kinds of files that this program writes, and how one is recognised before it is overwritten.
+
+use std::ffi::OsStr;
+use std::io::Read as _;
+use std::path::Path;
+
+use crate::regular;
+use crate::{FileError, ParquetFile};
+
+/// Keys of a Parquet file's own key-value metadata.
+pub mod key {
+    /// The plan as JSON: grid as run, full machine, method.
+    pub const PLAN: &str = "sweep.plan";
+    /// Hash over identity and plan, hexadecimal.
+    pub const PLAN_HASH: &str = "sweep.plan_hash";
+    /// Version of the program.
+    pub const VERSION: &str = "sweep.version";
+    /// Version of the program's numerics: what decides the numbers besides the plan.
+    pub const NUMERICS: &str = "sweep.numerics";
+    /// JSON object: column name to `type`, `unit`, `description`.
+    pub const COLUMNS: &str = "sweep.columns";
+    /// What was traced: quantity, limit, tolerance, lattice, trials, rounds. In boundary files
+    /// alone.
+    pub const BOUNDARY: &str = "sweep.boundary";
+    /// Which point, how often, how integrated, and how it ended. In traces alone.
+    pub const TRACE: &str = "sweep.trace";
+    /// Resonances and shapes. In modes files alone.
+    pub const MODES: &str = "sweep.modes";
+    /// BLAKE3 hash of the whole file with zeros in this place, hexadecimal.
+    pub const DIGEST: &str = "sweep.digest";
+}
+
+/// A kind of file. One may be written over another of the same kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileKind<'a> {
+    /// Result of `sweep run`.
+    Map,
+    /// Result of `sweep trace`.
+    Trace,
+    /// Result of `sweep modes`.
+    Modes,
+    /// Result of `sweep boundary`.
+    Boundary,
+    /// The JSON file beside a map that says how the run went.
+    Account {
+        /// Name of the map.
+        of: &'a OsStr,
+    },
+    /// An SVG picture without a prologue, as `sweep plot` writes them and drawing programs do not.
+    Svg,
+    /// A PNG picture.
+    Png,
+    /// An HTML page.
+    Html,
+    /// A manual page.
+    ManPage,
+}
+
+/// The longest account that is read: a session takes some hundred bytes, and a run has thousands
+/// of sessions at most.
+const LONGEST_ACCOUNT_BYTES: u64 = 64 << 20;
+
+impl FileKind<'_> {
+    /// The kind in words: "the file there is no <name>".
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Map => "result of `sweep run`",
+            Self::Trace => "result of `sweep trace`",
+            Self::Modes => "result of `sweep modes`",
+            Self::Boundary => "result of `sweep boundary`",
+            Self::Account { .. } => "account of the run with this --out",
+            Self::Svg => "SVG picture of `sweep plot`",
+            Self::Png => "PNG picture",
+            Self::Html => "HTML page",
+            Self::ManPage => "manual page of `sweep man`",
+        }
+    }
+
+    /// Says why the regular file at `path` is not of this kind; `None` if it is.
+    pub(crate) fn objection(self, path: &Path) -> Result<Option<String>, FileError> {
+        let begins = |with: &[u8]| {
+            let mut start = Vec::new();
+            let read = regular::open(path).and_then(|file| file.take(256).read_to_end(&mut start));
+            read.map_err(FileError::io("read", path))?;
+            Ok(start.starts_with(with))
+        };
+        let is_ours = match self {
+            Self::Map | Self::Trace | Self::Modes | Self::Boundary => match ParquetFile::look(path)
+            {
+                Ok(file) if self.has_keys(&|key| file.value(key).is_some()) => true,
+                Ok(_) => {
+                    // A damaged key makes one of ours look like another's.
+                    ParquetFile::open(path)?;
+                    false
+                }
+                Err(FileError::NotParquet { reason, .. }) => {
+                    let name = self.name();
+                    return Ok(Some(format!(
+                        "the file there is no {name}, nor a Parquet file ({reason})"
+                    )));
+                }
+                Err(error) => return Err(error),
+            },
+            Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,
+            Self::Svg => begins(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
+            Self::Png => begins(b"\x89PNG\r\n\x1a\n")?,
+            Self::Html => begins(b"<!doctype html>\n")?,
+            Self::ManPage => begins(b".ie \\n(.g ")?,
+        };
+        Ok(if is_ours { None } else { Some(format!("the file there is no {}", self.name())) })
+    }
+
+    /// Whether the metadata of one of our Parquet files says that it is of this kind.
+    pub fn has_keys(self, has: &dyn Fn(&str) -> bool) -> bool {
+        let own = match self {
+            Self::Map => {
+                return has(key::PLAN)
+                    && ![key::TRACE, key::MODES, key::BOUNDARY].into_iter().any(has);
+            }
+            Self::Trace => key::TRACE,
+            Self::Modes => key::MODES,
+            Self::Boundary => key::BOUNDARY,
+            Self::Account { .. } | Self::Svg | Self::Png | Self::Html | Self::ManPage => {
+                return false;
+            }
+        };
+        has(own)
+    }
+}
+
+fn is_account(path: &Path, of: &OsStr) -> std::io::Result<bool> {
+    let mut text = Vec::new();
+    regular::open(path)?.take(LONGEST_ACCOUNT_BYTES).read_to_end(&mut text)?;
+    let account: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
+    Ok(account["plan_hash"].is_string() && account["file"].as_str() == Some(&of.to_string_lossy()))
+}

@@ -1,0 +1,32 @@
+//! Files on disk: one rule for every command that writes one, and one gate for every file that is
+//! read.
+//!
+//! Writing ([`Output`]):
+//!
+//! * A command writes where nothing is, over an empty file, or over a regular file of the
+//!   [`FileKind`] that it writes. Anything else is refused before any work: folders, symbolic
+//!   links, FIFOs, devices, and every other file. A grid file, a machine file, a list and a plotted
+//!   file are of no such kind, so no input is ever overwritten, whatever path leads to it.
+//! * The bytes go into a temporary file beside it, which is synced and renamed; then the folder is
+//!   synced. A full disk, a signal or a power cut leaves the old file or the new one, never a part.
+//! * A temporary file is locked while its process lives. Those of killed processes are removed by
+//!   whoever writes to the folder next.
+//!
+//! Reading: `regular` opens regular files only, so that a FIFO cannot hold a command up;
+//! `ParquetFile` checks the digest that our files carry (`seal`) and turns every failure of the
+//! Parquet library, panics included, into an error with the file's name.
+
+pub mod atomic;
+pub mod cells;
+mod error;
+mod kind;
+mod output;
+pub mod panics;
+mod parquet;
+pub mod regular;
+pub mod seal;
+
+pub use error::FileError;
+pub use kind::{FileKind, key};
+pub use output::{Output, beside, judge, ready, write};
+pub use parquet::{Batches, ParquetFile};

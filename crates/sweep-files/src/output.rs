@@ -1,0 +1,294 @@
+//! A file that a command is about to write.
+
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use crate::{FileError, FileKind, atomic, regular};
+
+/// A file in the making. Before the command does any work, its path is judged, a missing folder is
+/// made, and its temporary file is opened: so a folder that cannot be written fails early.
+#[derive(Debug)]
+pub struct Output<'a> {
+    path: &'a Path,
+    kind: FileKind<'a>,
+    temporary: NamedTempFile,
+}
+
+impl<'a> Output<'a> {
+    /// Claims a path for a file of this kind. Without [`Output::finish`] nothing there changes.
+    ///
+    /// # Errors
+    /// [`FileError::Refused`] for what must not be overwritten, [`FileError::Io`].
+    pub fn begin(path: &'a Path, kind: FileKind<'a>) -> Result<Self, FileError> {
+        judge(path, kind)?;
+        let folder = atomic::parent(path);
+        ready(folder)?;
+        Ok(Self { path, kind, temporary: atomic::begin(folder)? })
+    }
+
+    /// Writes the file whole, or leaves what was there.
+    ///
+    /// # Errors
+    /// As [`Output::begin`], for what has come to stand there meanwhile.
+    pub fn finish(mut self, bytes: &[u8]) -> Result<(), FileError> {
+        self.temporary.write_all(bytes).map_err(FileError::io("write", self.path))?;
+        judge(self.path, self.kind)?;
+        atomic::publish(self.temporary, self.path)
+    }
+}
+
+/// Writes one of many files of a folder that is [`ready`].
+///
+/// # Errors
+/// As [`Output::begin`].
+pub fn write(path: &Path, kind: FileKind<'_>, bytes: &[u8]) -> Result<(), FileError> {
+    judge(path, kind)?;
+    let output = Output { path, kind, temporary: atomic::begin(atomic::parent(path))? };
+    output.finish(bytes)
+}
+
+/// Makes a folder with all above it, and clears it of what killed processes left.
+///
+/// # Errors
+/// [`FileError::Io`].
+pub fn ready(folder: &Path) -> Result<(), FileError> {
+    fs::create_dir_all(folder).map_err(FileError::io("make the folder", folder))?;
+    atomic::clear_leftovers(folder);
+    Ok(())
+}
+
+/// What stands beside a result under its name: `x.run.json` beside `x.parquet`, `v1.5.run.json`
+/// beside `v1.5`.
+pub fn beside(output: &Path, ending: &str) -> PathBuf {
+    let stem = if output.extension().is_some_and(|extension| extension == "parquet") {
+        output.file_stem()
+    } else {
+        output.file_name()
+    };
+    let mut name = stem.unwrap_or_default().to_owned();
+    name.push(".");
+    name.push(ending);
+    output.with_file_name(name)
+}
+
+/// The rule of what a file may be written over.
+///
+/// # Errors
+/// [`FileError::Refused`] for what must not be overwritten, [`FileError::Io`],
+/// [`FileError::Damaged`].
+pub fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
+    let refuse = |reason: &str, help| {
+        Err(FileError::Refused { path: path.to_path_buf(), reason: reason.to_owned(), help })
+    };
+    const NAME_A_FILE: &str = "give the name of a file, such as results/x.parquet";
+    if path.file_name().is_none() {
+        return refuse("it has no file name", NAME_A_FILE);
+    }
+    let text = path.to_string_lossy();
+    let folder_alike = |text: &str| text.ends_with(std::path::is_separator);
+    if folder_alike(&text) || text.strip_suffix('.').is_some_and(folder_alike) {
+        return refuse("it is the name of a folder", NAME_A_FILE);
+    }
+    let found = match fs::symlink_metadata(path) {
+        Ok(found) => found,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(FileError::io("look at", path)(error)),
+    };
+    if found.is_symlink() {
+        return refuse(
+            "it is a symbolic link",
+            "give the name of the file that the link leads to, or remove the link",
+        );
+    }
+    if let Some(what) = regular::what(found.file_type()) {
+        return refuse(&format!("it is {what}, not a regular file"), NAME_A_FILE);
+    }
+    if found.len() == 0 {
+        return Ok(());
+    }
+    match kind.objection(path)? {
+        None => Ok(()),
+        Some(reason) => refuse(&reason, "give another name, or move that file away first"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ffi::OsStr;
+    use std::io::Cursor;
+    use std::sync::Arc;
+
+    use arrow_array::{ArrayRef, Float64Array, RecordBatch};
+    use parquet::arrow::ArrowWriter;
+    use parquet::file::metadata::KeyValue;
+    use serde_json::json;
+
+    use super::*;
+    use crate::{key, seal};
+
+    const PARQUET: [FileKind<'_>; 4] =
+        [FileKind::Map, FileKind::Trace, FileKind::Modes, FileKind::Boundary];
+
+    /// A file as the commands write it, of each kind.
+    fn example(kind: FileKind<'_>) -> Vec<u8> {
+        let own = match kind {
+            FileKind::Map => key::PLAN,
+            FileKind::Trace => key::TRACE,
+            FileKind::Modes => key::MODES,
+            FileKind::Boundary => key::BOUNDARY,
+            FileKind::Account { of } => {
+                return json!({ "file": of.to_str(), "plan_hash": "00" }).to_string().into_bytes();
+            }
+            FileKind::Svg => {
+                return b"<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1\"/>".to_vec();
+            }
+            FileKind::Png => return b"\x89PNG\r\n\x1a\n...".to_vec(),
+            FileKind::Html => return b"<!doctype html>\n<title>x</title>".to_vec(),
+            FileKind::ManPage => return b".ie \\n(.g .ds Aq \\(aq\n".to_vec(),
+        };
+        sealed(&[key::PLAN, own])
+    }
+
+    /// A Parquet file of one number, with a digest and with these keys in its metadata.
+    fn sealed(keys: &[&str]) -> Vec<u8> {
+        let numbers: ArrayRef = Arc::new(Float64Array::from(vec![1.0]));
+        let batch = RecordBatch::try_from_iter([("x", numbers)]).unwrap();
+        let mut writer = ArrowWriter::try_new(Vec::new(), batch.schema(), None).unwrap();
+        writer.write(&batch).unwrap();
+        for key in keys {
+            let value = "{}".to_owned();
+            writer.append_key_value_metadata(KeyValue::new((*key).to_owned(), value));
+        }
+        writer.append_key_value_metadata(seal::blank());
+        let mut file = Cursor::new(writer.into_inner().unwrap());
+        seal::seal(&mut file).unwrap();
+        file.into_inner()
+    }
+
+    fn kinds() -> impl Iterator<Item = FileKind<'static>> {
+        let account = FileKind::Account { of: OsStr::new("x.parquet") };
+        PARQUET.into_iter().chain([
+            account,
+            FileKind::Svg,
+            FileKind::Png,
+            FileKind::Html,
+            FileKind::ManPage,
+        ])
+    }
+
+    fn refusal(path: &Path, kind: FileKind<'_>) -> String {
+        let error = Output::begin(path, kind).unwrap_err();
+        assert!(error.is_refusal(), "{error}");
+        let text = error.to_string();
+        assert!(text.contains("cannot be an output") && text.contains("= help: give"), "{text}");
+        text
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let names = regular::names(folder).unwrap();
+        names.into_iter().map(|name| name.into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_file_is_written_over_its_own_kind_and_no_other() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("file");
+        for kind in kinds() {
+            for other in kinds() {
+                let before = example(other);
+                fs::write(&path, &before).unwrap();
+                if kind == other {
+                    Output::begin(&path, kind).unwrap().finish(b"new").unwrap();
+                    assert_eq!(fs::read(&path).unwrap(), b"new");
+                } else {
+                    let said = refusal(&path, kind);
+                    assert!(said.contains(kind.name()), "{said}");
+                    assert!(fs::read(&path).unwrap() == before);
+                }
+            }
+            let account = FileKind::Account { of: OsStr::new("y.parquet") };
+            fs::write(&path, example(account)).unwrap();
+            refusal(&path, kind);
+            for mine in ["my thesis", "PAR1", "{}"] {
+                fs::write(&path, mine).unwrap();
+                refusal(&path, kind);
+                assert_eq!(fs::read_to_string(&path).unwrap(), mine);
+            }
+            fs::write(&path, "").unwrap();
+            Output::begin(&path, kind).unwrap().finish(b"over an empty file").unwrap();
+        }
+        assert_eq!(names(home.path()), ["file"]);
+    }
+
+    #[test]
+    fn names_that_differ_have_neighbours_that_differ() {
+        let named = |output| beside(Path::new(output), "svg");
+        assert_eq!(named("maps/x.parquet"), Path::new("maps/x.svg"));
+        assert_eq!(named("v1.0"), Path::new("v1.0.svg"));
+        assert_eq!(named("v1.5.parquet"), Path::new("v1.5.svg"));
+    }
+
+    #[test]
+    fn nothing_changes_before_the_end() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("made/for/it/x.svg");
+        let output = Output::begin(&path, FileKind::Svg).unwrap();
+        assert!(!path.exists());
+        drop(output);
+        assert!(names(path.parent().unwrap()).is_empty());
+
+        let output = Output::begin(&path, FileKind::Svg).unwrap();
+        fs::write(&path, "came meanwhile").unwrap();
+        assert!(output.finish(b"new").unwrap_err().is_refusal());
+        assert_eq!(fs::read_to_string(&path).unwrap(), "came meanwhile");
+        assert_eq!(names(path.parent().unwrap()), ["x.svg"]);
+    }
+
+    #[test]
+    fn names_of_folders_are_refused() {
+        let home = tempfile::tempdir().unwrap();
+        let said = refusal(home.path(), FileKind::Map);
+        assert!(said.contains("it is a folder"), "{said}");
+        for (name, expected) in [
+            ("new/", "it is the name of a folder"),
+            ("new/.", "it is the name of a folder"),
+            ("new/..", "it has no file name"),
+        ] {
+            let said =
+                refusal(&PathBuf::from(format!("{}/{name}", home.path().display())), FileKind::Map);
+            assert!(said.contains(expected), "{name}: {said}");
+        }
+        refusal(Path::new("/"), FileKind::Map);
+        refusal(Path::new(""), FileKind::Map);
+        assert!(names(home.path()).is_empty());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_devices_are_refused_and_what_they_lead_to_stays() {
+        let home = tempfile::tempdir().unwrap();
+        let [fifo, target, link, dangling] =
+            ["fifo", "target", "link", "dangling"].map(|name| home.path().join(name));
+        rustix::fs::mkfifoat(rustix::fs::CWD, &fifo, rustix::fs::Mode::RUSR).unwrap();
+        for kind in kinds() {
+            let _ = fs::remove_file(&link);
+            let _ = fs::remove_file(&dangling);
+            fs::write(&target, example(kind)).unwrap();
+            std::os::unix::fs::symlink(&target, &link).unwrap();
+            std::os::unix::fs::symlink("nowhere", &dangling).unwrap();
+            for (path, expected) in [
+                (&fifo, "it is a FIFO"),
+                (&link, "it is a symbolic link"),
+                (&dangling, "it is a symbolic link"),
+                (&PathBuf::from("/dev/null"), "it is a device"),
+            ] {
+                let said = refusal(path, kind);
+                assert!(said.contains(expected), "{said}");
+            }
+            assert!(fs::read(&target).unwrap() == example(kind));
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Panics of code that is called with what is not under our control.
+
+use std::any::Any;
+use std::cell::Cell;
+use std::panic::{self, AssertUnwindSafe};
+use std::sync::Once;
+
+use parquet::errors::ParquetError;
+
+thread_local! {
+    /// Whether a panic of this thread is caught and reported by [`caught`].
+    static CAUGHT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Calls `work`; a panic comes back as its message, and nothing is printed. What `work` has changed
+/// must not be used after that.
+///
+/// # Errors
+/// The message of a panic.
+pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !CAUGHT.get() {
+                before(info);
+            }
+        }));
+    });
+    let outer = CAUGHT.replace(true);
+    let result = panic::catch_unwind(AssertUnwindSafe(work));
+    CAUGHT.set(outer);
+    result.map_err(|panic| text(panic.as_ref()).to_owned())
+}
+
+/// As [`caught`], for the Parquet library; `what` a panic of it means. Reading, it panics at some
+/// damage and at some files of other programs; writing, where memory is refused.
+///
+/// # Errors
+/// The library's own; [`ParquetError::General`] for a panic.
+pub fn in_parquet<T>(
+    what: &str,
+    work: impl FnOnce() -> Result<T, ParquetError>,
+) -> Result<T, ParquetError> {
+    caught(work).unwrap_or_else(|panic| Err(ParquetError::General(format!("{what}: {panic}"))))
+}
+
+/// What a panic said.
+pub fn text(panic: &(dyn Any + Send)) -> &str {
+    panic
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("a panic without a message")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_comes_back_as_its_message() {
+        assert_eq!(caught(|| 7), Ok(7));
+        assert_eq!(
+            caught(|| -> u8 { panic!("row {} is no row", 3) }),
+            Err("row 3 is no row".to_owned())
+        );
+        let nested = caught(|| caught(|| -> u8 { panic!("inside") }));
+        assert_eq!(nested, Ok(Err("inside".to_owned())));
+        assert!(!CAUGHT.get());
+    }
+}

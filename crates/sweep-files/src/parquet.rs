@@ -1,0 +1,163 @@
+//! The gate through which every Parquet file is read.
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use arrow_array::RecordBatch;
+use arrow_schema::SchemaRef;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader,
+    ParquetRecordBatchReaderBuilder,
+};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{FileMetaData, KeyValue};
+
+use crate::panics;
+use crate::seal::{self, Seal};
+use crate::{FileError, key, regular};
+
+/// An open Parquet file, ours or another program's.
+#[derive(Debug)]
+pub struct ParquetFile {
+    path: PathBuf,
+    file: File,
+    metadata: ArrowReaderMetadata,
+    seal: Seal,
+}
+
+impl ParquetFile {
+    /// Opens a file, and if it is one of ours, makes sure of every byte.
+    ///
+    /// # Errors
+    /// [`FileError::Io`], [`FileError::NotParquet`], [`FileError::Damaged`].
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let mut file = regular::open(path).map_err(FileError::io("open", path))?;
+        let seal = seal::check(&mut file).map_err(FileError::io("read", path))?;
+        if seal == Seal::Broken {
+            return Err(FileError::Damaged { path: path.to_path_buf() });
+        }
+        let file = Self::parse(path, file, seal)?;
+        // A digest that the library finds and `seal` does not stands where none of ours would.
+        if seal == Seal::Absent && file.value(key::DIGEST).is_some() {
+            return Err(FileError::Damaged { path: path.to_path_buf() });
+        }
+        Ok(file)
+    }
+
+    /// Opens a file to see whose it is, without reading it through unless it makes no sense.
+    pub(crate) fn look(path: &Path) -> Result<Self, FileError> {
+        let open = || regular::open(path).map_err(FileError::io("open", path));
+        let parsed = Self::parse(path, open()?, Seal::Absent);
+        let is_damaged = matches!(parsed, Err(FileError::NotParquet { .. }))
+            && seal::check(&mut open()?).map_err(FileError::io("read", path))? == Seal::Broken;
+        if is_damaged { Err(FileError::Damaged { path: path.to_path_buf() }) } else { parsed }
+    }
+
+    fn parse(path: &Path, file: File, seal: Seal) -> Result<Self, FileError> {
+        let load = || ArrowReaderMetadata::load(&file, ArrowReaderOptions::new());
+        let metadata = guarded(load).map_err(not_parquet(path))?;
+        Ok(Self { path: path.to_path_buf(), file, metadata, seal })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether it carries a digest, which then fits.
+    pub fn is_sealed(&self) -> bool {
+        self.seal == Seal::Whole
+    }
+
+    fn about(&self) -> &FileMetaData {
+        self.metadata.metadata().file_metadata()
+    }
+
+    /// The columns: names, types, and the metadata of each.
+    pub fn schema(&self) -> &SchemaRef {
+        self.metadata.schema()
+    }
+
+    /// How many rows it has, by its own account.
+    pub fn rows(&self) -> u64 {
+        u64::try_from(self.about().num_rows()).unwrap_or(0)
+    }
+
+    /// The program that wrote it.
+    pub fn created_by(&self) -> Option<&str> {
+        self.about().created_by()
+    }
+
+    /// The file's own key-value metadata.
+    pub fn pairs(&self) -> impl Iterator<Item = &KeyValue> {
+        self.about().key_value_metadata().into_iter().flatten()
+    }
+
+    /// One value of them.
+    pub fn value(&self, key: &str) -> Option<&str> {
+        self.pairs().find(|pair| pair.key == key)?.value.as_deref()
+    }
+
+    /// The rows, of the columns and in the portions that `choose` asks for.
+    ///
+    /// # Errors
+    /// [`FileError::Io`], [`FileError::NotParquet`].
+    pub fn batches(
+        &self,
+        choose: impl FnOnce(
+            ParquetRecordBatchReaderBuilder<File>,
+        ) -> ParquetRecordBatchReaderBuilder<File>,
+    ) -> Result<Batches, FileError> {
+        let file = self.file.try_clone().map_err(FileError::io("open", &self.path))?;
+        let reader = guarded(|| {
+            choose(ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone()))
+                .build()
+        });
+        Ok(Batches {
+            path: self.path.clone(),
+            reader: Some(reader.map_err(not_parquet(&self.path))?),
+        })
+    }
+}
+
+/// Rows as they are read. After an error there are no more.
+pub struct Batches {
+    path: PathBuf,
+    reader: Option<ParquetRecordBatchReader>,
+}
+
+impl Iterator for Batches {
+    type Item = Result<RecordBatch, FileError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let reader = self.reader.as_mut()?;
+        let batch = guarded(|| reader.next().transpose().map_err(ParquetError::from)).transpose();
+        if !matches!(batch, Some(Ok(_))) {
+            // What a panic has left of it is of no use.
+            self.reader = None;
+        }
+        batch.map(|batch| batch.map_err(not_parquet(&self.path)))
+    }
+}
+
+/// Has the library read.
+fn guarded<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
+    panics::in_parquet("it makes no sense inside", work)
+}
+
+/// What the library reported, as a plain I/O failure where it was one.
+fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
+    let path = path.to_path_buf();
+    move |error| match error {
+        ParquetError::External(inner) => match inner.downcast::<io::Error>() {
+            Ok(source) => FileError::Io { action: "read", path, source: *source },
+            Err(inner) => FileError::NotParquet { path, reason: inner.to_string() },
+        },
+        error => {
+            let text = error.to_string();
+            let reason = text.strip_prefix("Parquet error: ").unwrap_or(&text).trim().to_owned();
+            FileError::NotParquet { path, reason }
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! Opening regular files and listing folders, without waiting for anybody and without a panic.
+
+use std::ffi::OsString;
+use std::fs::{self, File, FileType, OpenOptions};
+use std::io::{self, Read as _};
+use std::path::Path;
+
+/// Opens a regular file for reading. Anything else is an error that says what it is.
+///
+/// # Errors
+/// What the system answers, or that the path leads to something else, in words.
+pub fn open(path: &Path) -> io::Result<File> {
+    // Before opening too: opening is enough to set some devices going.
+    expect_regular(fs::metadata(path)?.file_type())?;
+    let file = without_waiting(OpenOptions::new().read(true)).open(path)?;
+    expect_regular(file.metadata()?.file_type())?;
+    Ok(file)
+}
+
+/// The bytes of a regular file.
+///
+/// # Errors
+/// What the system answers, or that the path leads to something else, in words.
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Opens a regular file to read and write. Follows no symbolic link.
+pub(crate) fn open_to_write(path: &Path) -> io::Result<File> {
+    expect_regular(fs::symlink_metadata(path)?.file_type())?;
+    let file = not_through_links(OpenOptions::new().read(true).write(true)).open(path)?;
+    expect_regular(file.metadata()?.file_type())?;
+    Ok(file)
+}
+
+/// As `open_to_write`, but makes the file if there is none.
+///
+/// # Errors
+/// What the system answers, or that the path leads to something else, in words.
+pub fn open_or_create(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    match not_through_links(options.read(true).write(true).create_new(true)).open(path) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => open_to_write(path),
+        made => made,
+    }
+}
+
+fn expect_regular(found: FileType) -> io::Result<()> {
+    match what(found) {
+        None => Ok(()),
+        Some(what) => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            format!("it is {what}, not a regular file"),
+        )),
+    }
+}
+
+/// What a path leads to, in words; `None` for a regular file.
+pub(crate) fn what(found: FileType) -> Option<&'static str> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt as _;
+        if found.is_fifo() {
+            return Some("a FIFO");
+        }
+        if found.is_socket() {
+            return Some("a socket");
+        }
+        if found.is_block_device() || found.is_char_device() {
+            return Some("a device");
+        }
+    }
+    if found.is_dir() {
+        Some("a folder")
+    } else if found.is_symlink() {
+        Some("a symbolic link")
+    } else {
+        None
+    }
+}
+
+#[cfg(unix)]
+fn without_waiting(options: &mut OpenOptions) -> &mut OpenOptions {
+    flags(options, rustix::fs::OFlags::NONBLOCK)
+}
+
+#[cfg(unix)]
+fn not_through_links(options: &mut OpenOptions) -> &mut OpenOptions {
+    flags(options, rustix::fs::OFlags::NONBLOCK | rustix::fs::OFlags::NOFOLLOW)
+}
+
+#[cfg(unix)]
+fn flags(options: &mut OpenOptions, flags: rustix::fs::OFlags) -> &mut OpenOptions {
+    use std::os::unix::fs::OpenOptionsExt as _;
+    // The bits of flags that fit the system's own type; the sign means nothing.
+    options.custom_flags(flags.bits().cast_signed())
+}
+
+/// Elsewhere no such file can be named by a path that a user would give.
+#[cfg(not(unix))]
+fn without_waiting(options: &mut OpenOptions) -> &mut OpenOptions {
+    options
+}
+
+#[cfg(not(unix))]
+fn not_through_links(options: &mut OpenOptions) -> &mut OpenOptions {
+    options
+}
+
+/// The names in a folder, sorted.
+///
+/// # Errors
+/// What the system answers.
+pub fn names(folder: &Path) -> io::Result<Vec<OsString>> {
+    let mut names = unsorted_names(folder)?;
+    names.sort_unstable();
+    Ok(names)
+}
+
+/// Not by the standard library, which panics when a folder cannot be closed.
+#[cfg(unix)]
+fn unsorted_names(folder: &Path) -> io::Result<Vec<OsString>> {
+    use rustix::fs::{Dir, Mode, OFlags, open};
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt as _;
+
+    let folder = open(folder, OFlags::RDONLY | OFlags::DIRECTORY | OFlags::CLOEXEC, Mode::empty())?;
+    let mut names = Vec::new();
+    for entry in Dir::new(folder)? {
+        let entry = entry?;
+        let name = entry.file_name().to_bytes();
+        if name != b"." && name != b".." {
+            names.push(OsStr::from_bytes(name).to_owned());
+        }
+    }
+    Ok(names)
+}
+
+#[cfg(not(unix))]
+fn unsorted_names(folder: &Path) -> io::Result<Vec<OsString>> {
+    fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.file_name())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_of_the_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["b", "a", ".hidden"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        fs::create_dir(folder.path().join("c")).unwrap();
+        assert_eq!(names(folder.path()).unwrap(), [".hidden", "a", "b", "c"]);
+        assert_eq!(names(&folder.path().join("d")).unwrap_err().kind(), io::ErrorKind::NotFound);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_regular_file_is_named_and_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let fifo = folder.path().join("fifo");
+        rustix::fs::mkfifoat(rustix::fs::CWD, &fifo, rustix::fs::Mode::RUSR).unwrap();
+        let said = |path: &Path| open(path).unwrap_err().to_string();
+        assert_eq!(said(&fifo), "it is a FIFO, not a regular file");
+        assert_eq!(said(folder.path()), "it is a folder, not a regular file");
+        assert_eq!(said(Path::new("/dev/null")), "it is a device, not a regular file");
+
+        let (target, link) = (folder.path().join("target"), folder.path().join("link"));
+        fs::write(&target, "mine").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        assert_eq!(read(&link).unwrap(), b"mine");
+        let error = open_or_create(&link).unwrap_err();
+        assert_eq!(error.to_string(), "it is a symbolic link, not a regular file");
+        open_or_create(&target).unwrap();
+        assert_eq!(read(&target).unwrap(), b"mine");
+    }
+}

@@ -1,0 +1,146 @@
+//! The digest by which a Parquet file of ours shows that its bytes are those that were written.
+//!
+//! It is the last entry of the file's key-value metadata ([`key::DIGEST`]): the BLAKE3 hash of the
+//! whole file with zeros in the digest's own place. So it covers the columns, the metadata and the
+//! file's structure, and it is found and checked without trusting any of them. It depends on the
+//! other bytes alone: the file stays a pure function of its input.
+
+use std::io::{self, Read, Seek, SeekFrom, Write};
+
+use parquet::file::metadata::KeyValue;
+
+use crate::key;
+
+/// Hexadecimal digits of a digest.
+const DIGITS: usize = 2 * blake3::OUT_LEN;
+const BLANK: [u8; DIGITS] = [b'0'; DIGITS];
+
+/// How far from the file's end a digest can begin: what follows it grows with the number of columns
+/// only.
+const TAIL_BYTES: u64 = 1 << 16;
+
+/// Whether a file is the one that its digest was taken of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Seal {
+    /// Every byte is as it was written.
+    Whole,
+    /// Some bytes have changed.
+    Broken,
+    /// The file has no digest where this program writes one.
+    Absent,
+}
+
+/// The metadata's last entry, for [`seal`] to fill.
+pub fn blank() -> KeyValue {
+    KeyValue::new(key::DIGEST.to_owned(), String::from_utf8_lossy(&BLANK).into_owned())
+}
+
+/// Writes the digest into a finished file that has a [`blank`] one.
+///
+/// # Errors
+/// What the system answers; a file without a [`blank`] digest.
+pub fn seal(file: &mut (impl Read + Write + Seek)) -> io::Result<()> {
+    let place = place(file)?.ok_or_else(|| io::Error::other("it has no place for its digest"))?;
+    let digest = digest(file, place)?;
+    file.seek(SeekFrom::Start(place))?;
+    file.write_all(digest.as_bytes())?;
+    file.flush()
+}
+
+/// Compares a file with its digest.
+pub(crate) fn check(file: &mut (impl Read + Seek)) -> io::Result<Seal> {
+    let Some(place) = place(file)? else { return Ok(Seal::Absent) };
+    let mut found = BLANK;
+    file.seek(SeekFrom::Start(place))?;
+    file.read_exact(&mut found)?;
+    Ok(if digest(file, place)?.as_bytes() == found { Seal::Whole } else { Seal::Broken })
+}
+
+/// Where the digest begins.
+fn place(file: &mut (impl Read + Seek)) -> io::Result<Option<u64>> {
+    let length = file.seek(SeekFrom::End(0))?;
+    let start = length.saturating_sub(TAIL_BYTES);
+    let mut tail = Vec::new();
+    file.seek(SeekFrom::Start(start))?;
+    file.take(TAIL_BYTES).read_to_end(&mut tail)?;
+    // An entry in Thrift's compact protocol: the key, then a text of so many bytes.
+    let mut entry = key::DIGEST.as_bytes().to_vec();
+    entry.extend_from_slice(&[0x18, DIGITS as u8]);
+    let found = tail.windows(entry.len()).rposition(|window| window == entry);
+    let place = found.map(|found| found + entry.len()).filter(|place| place + DIGITS <= tail.len());
+    Ok(place.map(|place| start + place as u64))
+}
+
+/// The digest of a file whose digest begins at `place`.
+fn digest(file: &mut (impl Read + Seek), place: u64) -> io::Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    file.seek(SeekFrom::Start(0))?;
+    update(&mut hasher, file.by_ref().take(place))?;
+    hasher.update(&BLANK);
+    file.seek(SeekFrom::Start(place + DIGITS as u64))?;
+    update(&mut hasher, file)?;
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+fn update(hasher: &mut blake3::Hasher, mut bytes: impl Read) -> io::Result<()> {
+    // Long enough for every lane of the hash, short enough for the cache.
+    let mut buffer = vec![0; 1 << 17];
+    loop {
+        match bytes.read(&mut buffer) {
+            Ok(0) => return Ok(()),
+            Ok(read) => {
+                hasher.update(&buffer[..read]);
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+
+    /// As a file's end is laid out, as far as it matters here.
+    fn sealed() -> Vec<u8> {
+        let mut bytes = b"PAR1 columns and metadata ".to_vec();
+        bytes.extend_from_slice(b"\x18\x0csweep.digest\x18\x40");
+        bytes.extend_from_slice(&BLANK);
+        bytes.extend_from_slice(b"\0 created by \x10\0\0\0PAR1");
+        let mut file = Cursor::new(bytes);
+        seal(&mut file).unwrap();
+        file.into_inner()
+    }
+
+    #[test]
+    fn every_flipped_bit_breaks_the_seal_or_hides_it() {
+        let whole = sealed();
+        assert_eq!(check(&mut Cursor::new(&whole)).unwrap(), Seal::Whole);
+        for bit in 0..8 * whole.len() {
+            let mut bytes = whole.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            assert_ne!(check(&mut Cursor::new(&bytes)).unwrap(), Seal::Whole, "bit {bit}");
+        }
+        for length in 0..whole.len() {
+            assert_ne!(
+                check(&mut Cursor::new(&whole[..length])).unwrap(),
+                Seal::Whole,
+                "{length} bytes"
+            );
+        }
+        let longer = [whole.as_slice(), b"x"].concat();
+        assert_eq!(check(&mut Cursor::new(&longer)).unwrap(), Seal::Broken);
+    }
+
+    #[test]
+    fn a_file_without_a_place_for_a_digest_has_none() {
+        assert_eq!(check(&mut Cursor::new(b"")).unwrap(), Seal::Absent);
+        assert_eq!(
+            check(&mut Cursor::new(b"sweep.digest\x18\x40 and too little")).unwrap(),
+            Seal::Absent
+        );
+        assert!(seal(&mut Cursor::new(b"PAR1".to_vec())).is_err());
+    }
+}

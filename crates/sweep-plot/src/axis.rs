@@ -1,0 +1,228 @@
+//! Scales and their ticks.
+
+use super::label;
+
+/// From values to a position, evenly or by the logarithm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Scale {
+    /// Even steps are equal factors.
+    pub(crate) log: bool,
+    /// Value at the start.
+    pub(crate) from: f64,
+    /// Value at the end.
+    pub(crate) to: f64,
+}
+
+/// A place on a scale that is marked.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tick {
+    /// Its value.
+    pub(crate) value: f64,
+    /// What stands beside it.
+    pub(crate) label: String,
+}
+
+impl Scale {
+    /// An even scale from one value to another.
+    pub(crate) fn linear(from: f64, to: f64) -> Self {
+        Self { log: false, from, to }
+    }
+
+    /// A logarithmic scale between two positive values.
+    pub(crate) fn log(from: f64, to: f64) -> Self {
+        Self { log: true, from, to }
+    }
+
+    /// An even scale that holds all `values` and 0 if it is near, with some room; 0 to 1 if there
+    /// are none.
+    pub(crate) fn around(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = extremes(values).unwrap_or((0.0, 1.0));
+        let room = if high > low { 0.05 * (high - low) } else { 0.05 * high.abs().max(1.0) };
+        Self::linear(low - room, high + room)
+    }
+
+    /// The value in the units in which the scale is even.
+    pub(crate) fn even(self, value: f64) -> f64 {
+        if self.log { value.ln() } else { value }
+    }
+
+    /// Position of a value, 0 at the start and 1 at the end.
+    pub(crate) fn position(self, value: f64) -> f64 {
+        let (from, to) = (self.even(self.from), self.even(self.to));
+        (self.even(value) - from) / (to - from)
+    }
+
+    /// About `count` round values within the scale.
+    pub(crate) fn ticks(self, count: usize) -> Vec<Tick> {
+        let (low, high) = (self.from.min(self.to), self.from.max(self.to));
+        if self.log { log_ticks(low, high, count) } else { even_ticks(low, high, count) }
+    }
+}
+
+/// Least and greatest of the finite values.
+pub(crate) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values.filter(|value| value.is_finite()).fold(None, |found, value| {
+        Some(
+            found.map_or((value, value), |(low, high): (f64, f64)| {
+                (low.min(value), high.max(value))
+            }),
+        )
+    })
+}
+
+/// A distance between ticks: 1, 2 or 5 times a power of ten.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Step {
+    mantissa: u8,
+    power: i32,
+}
+
+impl Step {
+    /// Every step that a page can need, the shortest first: from 1e-15 to 5e15 of an axis' unit.
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
+        let of_power = |power| [1, 2, 5].map(|mantissa| Self { mantissa, power });
+        (-15..=15).flat_map(of_power)
+    }
+
+    /// The shortest step that is not shorter than `rough`, a positive number.
+    fn at_least(rough: f64) -> Self {
+        let power = rough.log10().floor() as i32;
+        let factor = rough / 10_f64.powi(power);
+        match [1, 2, 5].into_iter().find(|&step| f64::from(step) >= factor) {
+            Some(mantissa) => Self { mantissa, power },
+            None => Self { mantissa: 1, power: power + 1 },
+        }
+    }
+
+    fn shorter(self) -> Self {
+        match self.mantissa {
+            5 => Self { mantissa: 2, ..self },
+            2 => Self { mantissa: 1, ..self },
+            _ => Self { mantissa: 5, power: self.power - 1 },
+        }
+    }
+
+    /// In the axis' unit.
+    pub(crate) fn length(self) -> f64 {
+        f64::from(self.mantissa) * 10_f64.powi(self.power)
+    }
+
+    /// Decimals of the numbers at such ticks.
+    pub(crate) fn decimals(self) -> usize {
+        usize::try_from(-self.power).unwrap_or_default()
+    }
+}
+
+fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
+    let rough = (high - low) / count.max(1) as f64;
+    if !(rough > 0.0 && rough.is_finite()) {
+        return Vec::new();
+    }
+    let mut step = Step::at_least(SLACK * rough);
+    // A step can leave fewer than three ticks, which do not make a scale: shorter ones then.
+    loop {
+        let (length, decimals) = (step.length(), step.decimals());
+        let (first, last) =
+            ((low / length - 1e-9).ceil() as i64, (high / length + 1e-9).floor() as i64);
+        if last - first + 1 >= LEAST_TICKS {
+            let tick = |k: i64| {
+                let value = k as f64 * length;
+                Tick { value, label: format!("{value:.decimals$}") }
+            };
+            return (first..=last).map(tick).collect();
+        }
+        step = step.shorter();
+    }
+}
+
+/// Fewer ticks do not make a scale.
+pub(crate) const LEAST_TICKS: i64 = 3;
+
+/// A step may be this part shorter than it should be: rounding shall not double it.
+pub(crate) const SLACK: f64 = 0.999;
+
+/// Ticks of a logarithmic scale from `low` to `high`, in ever denser sets.
+pub(crate) fn log_sets(low: f64, high: f64) -> [Vec<Tick>; 5] {
+    let sets: [&[f64]; 5] = [
+        &[1.0],
+        &[1.0, 3.0],
+        &[1.0, 2.0, 5.0],
+        &[1.0, 1.5, 2.0, 3.0, 5.0, 7.0],
+        &[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0],
+    ];
+    sets.map(|factors| {
+        let powers = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
+        let values =
+            powers.flat_map(|power| factors.iter().map(move |factor| factor * 10_f64.powi(power)));
+        values
+            .filter(|value| (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(value))
+            .map(|value| Tick { value, label: label::significant(value, 2) })
+            .collect()
+    })
+}
+
+fn log_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
+    let [mut best, denser @ ..] = log_sets(low, high);
+    for set in denser {
+        if best.len() >= 2 && set.len() > count.max(2) + 1 {
+            break;
+        }
+        best = set;
+    }
+    if best.len() < 2 { even_ticks(low, high, count) } else { best }
+}
+
+/// Whether values are spread more evenly by their logarithm; both choices hold for fewer than
+/// three.
+pub(crate) fn evenly_by_log(values: &[f64]) -> bool {
+    if values.len() < 3 || values.iter().any(|&value| value <= 0.0) {
+        return false;
+    }
+    let spread = |position: &dyn Fn(f64) -> f64| {
+        let steps = values.windows(2).map(|pair| position(pair[1]) - position(pair[0]));
+        extremes(steps).map_or(f64::INFINITY, |(least, greatest)| greatest / least)
+    };
+    // A plain even axis is read more easily, so the logarithm must be clearly the better fit.
+    spread(&f64::ln) * 1.2 < spread(&|value| value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(scale: Scale, count: usize) -> Vec<String> {
+        scale.ticks(count).into_iter().map(|tick| tick.label).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_and_lie_within() {
+        assert_eq!(labels(Scale::linear(0.0, 1.0), 5), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(
+            labels(Scale::linear(46.0, 314.0), 6),
+            ["50", "100", "150", "200", "250", "300"]
+        );
+        assert_eq!(labels(Scale::linear(-0.3, 0.3), 3), ["-0.2", "0.0", "0.2"]);
+        assert_eq!(labels(Scale::linear(-48.0, 48.0), 3), ["-40", "-20", "0", "20", "40"]);
+        assert_eq!(labels(Scale::log(1.0, 1000.0), 4), ["1", "10", "100", "1000"]);
+        assert_eq!(labels(Scale::log(1.0, 9.0), 4), ["1", "2", "5"]);
+        assert!(labels(Scale::linear(1.0, 1.0), 5).is_empty());
+    }
+
+    #[test]
+    fn steps_rise_and_each_is_the_one_before_the_next() {
+        let all: Vec<Step> = Step::all().collect();
+        for pair in all.windows(2) {
+            assert!(pair[0].length() < pair[1].length());
+            assert_eq!(pair[1].shorter(), pair[0]);
+            assert_eq!(Step::at_least(SLACK * pair[1].length()), pair[1]);
+        }
+    }
+
+    #[test]
+    fn spacing_is_recognised() {
+        assert!(!evenly_by_log(&[60.0, 120.0, 180.0, 240.0]));
+        assert!(evenly_by_log(&[1.0, 10.0, 100.0, 1000.0]));
+        assert!(!evenly_by_log(&[0.0, 1.0, 10.0]));
+        assert!(!evenly_by_log(&[1.0, 10.0]));
+    }
+}

@@ -1,0 +1,343 @@
+//! Curves over a common x axis, in panels one above the other: what all figures but the map are.
+
+use super::axis::{Scale, extremes};
+use super::colour::{BOTH as BOTH_SIDES, ColourScale};
+use super::decimate::envelope;
+use super::frame::{
+    HEADING_HEIGHT, LEGEND_ROW, Panel, Sign, TICK_SIZE, heading, legend, legend_rows,
+};
+use super::label::{self, Label};
+use super::raster::Typeface;
+use super::scene::{Colour, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
+
+/// A figure of curves.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Chart {
+    /// What is shown.
+    pub(crate) title: String,
+    /// Name of the run and conditions.
+    pub(crate) subtitle: String,
+    /// What the x axis shows.
+    pub(crate) x_label: Label,
+    /// The x axis is better read by its logarithm.
+    pub(crate) x_log: bool,
+    /// Rising values of x that series share; they refer to these by index.
+    pub(crate) grids: Vec<Vec<f64>>,
+    /// From top to bottom.
+    pub(crate) panels: Vec<ChartPanel>,
+    /// Upright lines through all panels.
+    pub(crate) marks: Vec<Mark>,
+    /// What the marks mean, in the legend.
+    pub(crate) mark_meaning: String,
+}
+
+/// One panel of a chart.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ChartPanel {
+    /// Short name, by which it is picked.
+    pub(crate) name: String,
+    /// What the y axis shows.
+    pub(crate) label: Label,
+    /// Shown in a picture, and at first in a page.
+    pub(crate) shown: bool,
+    /// By the logarithm.
+    pub(crate) log: bool,
+    /// y values between which the panel extends; by default what its series need.
+    pub(crate) range: Option<(f64, f64)>,
+    /// Height in a picture, px.
+    pub(crate) height: f64,
+    /// In drawing order.
+    pub(crate) series: Vec<Series>,
+    /// Level lines: value and meaning.
+    pub(crate) levels: Vec<(f64, String)>,
+    /// Starred points: x, y and a label.
+    pub(crate) stars: Vec<(f64, f64, String)>,
+    /// Ranges of x whose cells hold points on both sides of the level.
+    pub(crate) mixed: Vec<[f64; 2]>,
+}
+
+impl Mark {
+    /// A mark with a speed beside it, rpm.
+    pub(crate) fn of_speed(x: f64, speed_rpm: f64) -> Self {
+        let speed = format!("{speed_rpm:.1}");
+        Self { x, label: format!("{} rpm", label::trimmed(&speed)) }
+    }
+}
+
+impl ChartPanel {
+    /// A panel of these curves that is shown, even, as high as its series need, and 420 px tall.
+    pub(crate) fn new(name: &str, label: Label, series: Vec<Series>) -> Self {
+        Self {
+            name: name.to_owned(),
+            label,
+            shown: true,
+            log: false,
+            range: None,
+            height: 420.0,
+            series,
+            levels: Vec::new(),
+            stars: Vec::new(),
+            mixed: Vec::new(),
+        }
+    }
+}
+
+/// How a series is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Style {
+    /// A solid line of this width, px.
+    Solid(f64),
+    /// A dashed line.
+    Dashed,
+    /// The line, and the area between these two values at each point.
+    Band(Vec<f64>, Vec<f64>),
+}
+
+/// One curve.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Series {
+    /// Name in the legend.
+    pub(crate) name: String,
+    /// Its colour.
+    pub(crate) colour: Colour,
+    /// Index of its x values among the chart's grids.
+    pub(crate) grid: usize,
+    /// One per x; NaN breaks the line.
+    pub(crate) y: Vec<f64>,
+    /// How it is drawn.
+    pub(crate) style: Style,
+}
+
+/// An upright line.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Mark {
+    /// Where.
+    pub(crate) x: f64,
+    /// What stands beside it.
+    pub(crate) label: String,
+}
+
+const WIDTH: f64 = 880.0;
+const LEFT: f64 = 92.0;
+const RIGHT: f64 = 26.0;
+const BELOW: f64 = 64.0;
+const GAP: f64 = 14.0;
+/// What a star means, in the legend.
+const STARS: &str = "resonance speed";
+
+/// What the colour of one translucent curve over another means, in the legend.
+const BOTH: &str = "both, one over the other";
+
+/// Draws the panels that are shown.
+pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
+    let panels: Vec<&ChartPanel> = chart.panels.iter().filter(|panel| panel.shown).collect();
+    let entries = entries(chart, &panels);
+    let width = WIDTH - LEFT - RIGHT;
+    let legend_height = LEGEND_ROW * legend_rows(typeface, &entries, width) as f64;
+    let heights: f64 = panels.iter().map(|panel| panel.height + GAP).sum();
+    let strip = chart
+        .marks
+        .iter()
+        .map(|mark| typeface.width(&mark.label, TICK_SIZE, false) + 22.0)
+        .fold(0.0, f64::max);
+    let total = HEADING_HEIGHT + strip + heights + BELOW + legend_height + 4.0;
+    let mut scene = Scene::new(WIDTH, total, format!("{}. {}", chart.title, chart.subtitle));
+    heading(&mut scene, typeface, &chart.title, &chart.subtitle);
+    let xs = x_scale(chart);
+    let mut y = HEADING_HEIGHT + strip;
+    for (index, &content) in panels.iter().enumerate() {
+        let panel = Panel { x: LEFT, y, width, height: content.height, xs, ys: y_scale(content) };
+        panel.rules(&mut scene);
+        scene.clipped(panel.outline(), |scene| draw_panel(scene, chart, content, &panel));
+        draw_marks(&mut scene, chart, &panel, index == 0);
+        draw_stars(&mut scene, typeface, content, &panel);
+        let last = index + 1 == panels.len();
+        panel.frame(&mut scene, last, true);
+        panel.y_label(&mut scene, typeface, &content.label.to_string(), 62.0);
+        if last {
+            panel.x_label(&mut scene, &chart.x_label.to_string());
+        }
+        y += content.height + GAP;
+    }
+    legend(&mut scene, typeface, &entries, LEFT, y - GAP + BELOW + LEGEND_ROW / 2.0, width);
+    scene
+}
+
+/// The scale of the x axis: all that the grids hold.
+pub(crate) fn x_scale(chart: &Chart) -> Scale {
+    let (low, high) = extremes(chart.grids.iter().flatten().copied()).unwrap_or((0.0, 1.0));
+    let high = if high > low { high } else { low + 1.0 };
+    if chart.x_log { Scale::log(low, high) } else { Scale::linear(low, high) }
+}
+
+/// The scale of a panel's y axis: its range, or all that its series and levels need.
+pub(crate) fn y_scale(panel: &ChartPanel) -> Scale {
+    if let Some((low, high)) = panel.range {
+        return if panel.log { Scale::log(low, high) } else { Scale::linear(low, high) };
+    }
+    let bands = panel.series.iter().flat_map(|series| match &series.style {
+        Style::Band(low, high) => [&low[..], &high[..]],
+        _ => [&series.y[..], &[]],
+    });
+    let values = bands.flatten().copied().chain(panel.levels.iter().map(|(value, _)| *value));
+    if panel.log {
+        let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((1.0, 10.0));
+        Scale::log(low / 1.15, high * 1.15)
+    } else {
+        Scale::around(values)
+    }
+}
+
+fn draw_panel(scene: &mut Scene, chart: &Chart, content: &ChartPanel, panel: &Panel) {
+    if !content.mixed.is_empty() {
+        let mut mixed = Outline::default();
+        for range in &content.mixed {
+            let [from, to] = range.map(|x| panel.at_x(x));
+            // Narrower ones would not be seen.
+            mixed.add_rectangle(from, panel.y, (to - from).max(1.0), panel.height);
+        }
+        scene.fill(mixed, BOTH_SIDES);
+    }
+    for series in &content.series {
+        let xs = &chart.grids[series.grid];
+        let at = |ys: &[f64], k: usize| {
+            (xs[k].is_finite() && ys[k].is_finite()).then(|| panel.at(xs[k], ys[k]))
+        };
+        if let Style::Band(low, high) = &series.style {
+            let mut area: Vec<[f64; 2]> = (0..xs.len()).filter_map(|k| at(low, k)).collect();
+            area.extend((0..xs.len()).rev().filter_map(|k| at(high, k)));
+            let mut outline = Outline::default();
+            outline.add_polygon(&area);
+            scene.fill(outline, series.colour.with_alpha(90));
+        }
+        let kept = envelope(xs, &series.y, panel.xs.from, panel.xs.to, panel.width as usize);
+        let mut outline = Outline::default();
+        let mut line = Vec::new();
+        for k in kept {
+            match at(&series.y, k) {
+                Some(point) => line.push(point),
+                None => outline.add_line(&std::mem::take(&mut line)),
+            }
+        }
+        outline.add_line(&line);
+        scene.line(outline, stroke(series));
+    }
+    for (value, _) in &content.levels {
+        let y = panel.at_y(*value);
+        scene.line(Outline::line(&[[panel.x, y], [panel.x + panel.width, y]]), level_stroke());
+    }
+}
+
+fn stroke(series: &Series) -> Stroke {
+    match series.style {
+        Style::Solid(width) => Stroke::solid(series.colour, width),
+        Style::Dashed => Stroke::dashed(series.colour, 1.8, &[8.0, 5.0]),
+        Style::Band(..) => Stroke::solid(series.colour, 2.2),
+    }
+}
+
+fn level_stroke() -> Stroke {
+    Stroke::dashed(INK, 1.6, &[3.0, 3.0])
+}
+
+fn mark_stroke() -> Stroke {
+    Stroke::dashed(MUTED, 1.2, &[6.0, 4.0])
+}
+
+/// Radius of a star, px.
+const STAR: f64 = 10.0;
+
+/// Stars first, then their labels, each where it covers neither a star nor a label before it, if
+/// there is such a place.
+fn draw_stars(scene: &mut Scene, typeface: &Typeface, content: &ChartPanel, panel: &Panel) {
+    // Left, top, right, bottom, px.
+    let mut taken: Vec<[f64; 4]> = Vec::new();
+    for (x, y, _) in &content.stars {
+        let [x, y] = panel.at(*x, *y);
+        scene.fill(Outline::star([x, y], STAR), INK);
+        taken.push([x - STAR, y - STAR, x + STAR, y + STAR]);
+    }
+    for (x, y, label) in &content.stars {
+        let [x, y] = panel.at(*x, *y);
+        let width = typeface.width(label, TICK_SIZE, true);
+        let places = [
+            [x - STAR - 2.0 - width, y - 6.0],
+            [x + STAR + 2.0, y + 18.0],
+            [x - STAR - 2.0 - width, y - 24.0],
+            [x + STAR + 2.0, y + 36.0],
+        ];
+        let extent = |[left, base]: [f64; 2]| [left, base - TICK_SIZE, left + width, base + 4.0];
+        let free = |place: &&[f64; 2]| {
+            let [left, top, right, bottom] = extent(**place);
+            left > panel.x
+                && taken.iter().all(|other| {
+                    right < other[0] || left > other[2] || bottom < other[1] || top > other[3]
+                })
+        };
+        let place = *places.iter().find(free).unwrap_or(&places[1]);
+        taken.push(extent(place));
+        scene.text(Text::new(label.clone(), place, TICK_SIZE).bold().halo(PAPER));
+    }
+}
+
+/// Marks through a panel; above the first one their labels, moved aside where they would cover each
+/// other.
+fn draw_marks(scene: &mut Scene, chart: &Chart, panel: &Panel, labelled: bool) {
+    let mut free = f64::NEG_INFINITY;
+    for mark in &chart.marks {
+        let x = panel.at_x(mark.x);
+        scene.line(Outline::line(&[[x, panel.y], [x, panel.y + panel.height]]), mark_stroke());
+        let aside = x.max(free);
+        if labelled && aside <= panel.x + panel.width + 8.0 {
+            free = aside + TICK_SIZE + 2.0;
+            let leader = Outline::line(&[[x, panel.y], [aside, panel.y - 12.0]]);
+            scene.line(leader, Stroke::solid(MUTED, 1.2));
+            scene.text(
+                Text::new(mark.label.clone(), [aside + 5.0, panel.y - 16.0], TICK_SIZE).upright(),
+            );
+        }
+    }
+}
+
+fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
+    let mut entries: Vec<(Sign, String)> = Vec::new();
+    let mut add = |sign: Sign, name: &str| {
+        if !name.is_empty() && !entries.iter().any(|(_, known)| known == name) {
+            entries.push((sign, name.to_owned()));
+        }
+    };
+    for panel in panels {
+        for series in &panel.series {
+            let mut stroke = stroke(series);
+            stroke.width = stroke.width.max(2.2);
+            add(Sign::Line(stroke), &series.name);
+        }
+        if let [.., under, over] = &panel.series[..]
+            && over.colour.alpha < 255
+        {
+            let both = Stroke::solid(over.colour.over(under.colour), 2.2);
+            add(Sign::Line(both), BOTH);
+        }
+        for (_, meaning) in &panel.levels {
+            add(Sign::Line(level_stroke()), meaning);
+        }
+        if !panel.mixed.is_empty() {
+            add(Sign::Area(BOTH_SIDES), MIXED);
+        }
+        if !panel.stars.is_empty() {
+            add(Sign::Star(INK), STARS);
+        }
+    }
+    if !chart.marks.is_empty() {
+        add(Sign::Line(mark_stroke()), &chart.mark_meaning);
+    }
+    entries
+}
+
+/// What the ranges of [`ChartPanel::mixed`] are, in the legend.
+pub(crate) const MIXED: &str = "both: reliable and unreliable points";
+
+/// Whether positive values span so much that only a logarithm shows them all.
+pub(crate) fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
+    matches!(ColourScale::amplitude(values), ColourScale::Sequential(Scale { log: true, .. }))
+}

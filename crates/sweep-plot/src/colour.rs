@@ -1,0 +1,217 @@
+//! Colours that people with any colour vision can tell apart, and the scales that put values to
+//! them.
+
+use super::axis::{Scale, Tick, extremes};
+use super::scene::Colour;
+
+/// The calm side of a limit, from its end to the limit: after the light blues of ColorBrewer's
+/// Blues (colorbrewer2.org, C. Brewer, Apache-2.0), none as light as paper.
+const BELOW: [u32; 5] = [0xe1_ed_f8, 0xcf_e1_f2, 0xb5_d4_e9, 0x93_c3_df, 0x6b_ae_d6];
+
+/// The other side, from the limit to its end: the reds of ColorBrewer's RdBu, from where they are
+/// darker than [`BELOW`] on. Lightness falls from one end of both to the other, so that prints
+/// without colour show which side a cell is on; blue against red is safe for the colour-blind.
+const ABOVE: [u32; 5] = [0xe8_86_66, 0xd6_60_4d, 0xc4_3c_3c, 0xb2_18_2b, 0x67_00_1f];
+
+/// Every ninth or so colour of viridis (matplotlib, CC0).
+const SEQUENTIAL: [u32; 10] = [
+    0x44_01_54, 0x48_28_78, 0x3e_49_89, 0x31_68_8e, 0x26_82_8e, 0x1f_9e_89, 0x35_b7_79, 0x6e_ce_58,
+    0xb5_de_2b, 0xfd_e7_25,
+];
+
+/// Okabe and Ito's palette without yellow and black (jfly.uni-koeln.de/color), darkest contrasts
+/// first.
+pub(crate) const DISTINCT: [Colour; 6] = [
+    Colour::hex(0x0072b2),
+    Colour::hex(0xd55e00),
+    Colour::hex(0x009e73),
+    Colour::hex(0xcc79a7),
+    Colour::hex(0xe69f00),
+    Colour::hex(0x56b4e9),
+];
+
+/// The nonlinear model, in every figure.
+pub(crate) const NONLINEAR: Colour = DISTINCT[0];
+/// The linear model, in every figure.
+pub(crate) const LINEAR: Colour = DISTINCT[1];
+/// Cells with points on both sides of a limit: Okabe and Ito's yellow, which no scale here has.
+pub(crate) const BOTH: Colour = Colour::hex(0xf0e442);
+/// Points that failed.
+pub(crate) const FAILED: Colour = Colour::hex(0xbfc5cc);
+
+/// Steps of a colour scale: few enough that neighbours merge to one shape, enough to look smooth.
+pub(crate) const LEVELS: usize = 64;
+
+/// Values to colours.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum ColourScale {
+    /// Both sides of a centre have half the colours each, whatever their extent.
+    Diverging {
+        /// By the logarithm.
+        log: bool,
+        /// Value of the first colour.
+        low: f64,
+        /// Value of the middle.
+        centre: f64,
+        /// Value of the last colour.
+        high: f64,
+        /// The red side is the low one.
+        reversed: bool,
+    },
+    /// One run of colours, dark to light.
+    Sequential(Scale),
+}
+
+impl ColourScale {
+    /// For ratios around a limit.
+    pub(crate) fn ratio(values: impl Iterator<Item = f64>, limit: f64) -> Self {
+        let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((limit, limit));
+        Self::Diverging {
+            log: true,
+            low: low.min(limit / 2.0),
+            centre: limit,
+            high: high.max(limit * 2.0),
+            reversed: false,
+        }
+    }
+
+    /// For gaps: below zero there is contact. Gaps that are all open, or all closed, have all the
+    /// colours for themselves.
+    pub(crate) fn gap(values: impl Iterator<Item = f64>) -> Self {
+        match extremes(values) {
+            Some((low, high)) if low < 0.0 && high > 0.0 => {
+                Self::Diverging { log: false, low, centre: 0.0, high, reversed: true }
+            }
+            found => Self::even(found.map(<[f64; 2]>::from).into_iter().flatten()),
+        }
+    }
+
+    /// For what is read by its differences: from the least value to the greatest.
+    pub(crate) fn even(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = extremes(values).unwrap_or((0.0, 1.0));
+        let high = if high > low { high } else { low + (0.1 * low.abs()).max(f64::EPSILON) };
+        Self::Sequential(Scale::linear(low, high))
+    }
+
+    /// For amplitudes: by the logarithm when they span more than a factor of ten.
+    pub(crate) fn amplitude(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((0.5, 1.0));
+        let (low, high) = if high > low { (low, high) } else { (0.9 * low, 1.1 * low) };
+        Self::Sequential(if high > 10.0 * low {
+            Scale::log(low, high)
+        } else {
+            Scale::linear(low, high)
+        })
+    }
+
+    /// Place of a value among the colours, 0 to 1; values off the scale take its ends.
+    pub(crate) fn position(&self, value: f64) -> f64 {
+        let position = match *self {
+            Self::Diverging { log, low, centre, high, .. } => {
+                let even = |value: f64| if log { value.ln() } else { value };
+                let offset = even(value) - even(centre);
+                let half =
+                    if offset < 0.0 { even(centre) - even(low) } else { even(high) - even(centre) };
+                0.5 + 0.5 * offset / half
+            }
+            Self::Sequential(scale) => scale.position(value),
+        };
+        position.clamp(0.0, 1.0)
+    }
+
+    /// The step of the scale that holds a value.
+    pub(crate) fn level(&self, value: f64) -> usize {
+        ((self.position(value) * LEVELS as f64) as usize).min(LEVELS - 1)
+    }
+
+    /// Colour of a step of the scale.
+    pub(crate) fn colour(&self, level: usize) -> Colour {
+        let place = (level as f64 + 0.5) / LEVELS as f64;
+        match self {
+            Self::Diverging { reversed, .. } => {
+                let place = if *reversed { 1.0 - place } else { place };
+                if place < 0.5 {
+                    blend(&BELOW, 2.0 * place)
+                } else {
+                    blend(&ABOVE, 2.0 * place - 1.0)
+                }
+            }
+            Self::Sequential(_) => blend(&SEQUENTIAL, place),
+        }
+    }
+
+    /// Round values to mark on the colour bar.
+    pub(crate) fn ticks(&self) -> Vec<Tick> {
+        match *self {
+            Self::Diverging { log, low, centre, high, .. } => {
+                let scale =
+                    |from, to| if log { Scale::log(from, to) } else { Scale::linear(from, to) };
+                let centre_label = super::label::significant(centre, 3);
+                let mut ticks = scale(low, centre).ticks(3);
+                ticks.extend(scale(centre, high).ticks(4));
+                ticks.retain(|tick| (self.position(tick.value) - 0.5).abs() > 0.04);
+                ticks.push(Tick { value: centre, label: centre_label });
+                ticks
+            }
+            Self::Sequential(scale) => scale.ticks(6),
+        }
+    }
+}
+
+/// Colour at `place` (0 to 1) of evenly spaced anchors.
+fn blend(anchors: &[u32], place: f64) -> Colour {
+    let along = place.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
+    let first = (along as usize).min(anchors.len() - 2);
+    let part = along - first as f64;
+    let (from, to) = (Colour::hex(anchors[first]).rgb, Colour::hex(anchors[first + 1]).rgb);
+    let rgb = std::array::from_fn(|k| {
+        (f64::from(from[k]) * (1.0 - part) + f64::from(to[k]) * part).round() as u8
+    });
+    Colour { rgb, alpha: 255 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limit_is_the_middle_of_the_scale() {
+        let scale = ColourScale::ratio([1.0, 1.3, 50.0].into_iter(), 2.0);
+        assert_eq!(scale.position(1.0), 0.0);
+        assert_eq!(scale.position(2.0), 0.5);
+        assert_eq!(scale.position(50.0), 1.0);
+        assert!(
+            (scale.position(10.0) - 0.75).abs() < 1e-12,
+            "halfway between 2 and 50 by the logarithm"
+        );
+        assert_eq!(scale.level(1e9), LEVELS - 1);
+        let [red, _, blue] = scale.colour(LEVELS - 1).rgb;
+        assert!(red > blue, "the unreliable side is red");
+    }
+
+    #[test]
+    fn without_colour_a_scale_is_still_a_scale() {
+        let limit = ColourScale::ratio([1.0, 9.0].into_iter(), 2.0);
+        let light = |level| {
+            let [red, green, blue] = limit.colour(level).rgb.map(f64::from);
+            0.2126 * red + 0.7152 * green + 0.0722 * blue
+        };
+        assert!((1..LEVELS).all(|level| light(level) < light(level - 1)));
+        assert!(light(LEVELS / 2 - 1) - light(LEVELS / 2) > 8.0, "a step at the limit");
+    }
+
+    #[test]
+    fn gaps_without_contact_have_all_the_colours() {
+        let scale = ColourScale::gap([0.004, 0.012].into_iter());
+        assert_eq!([0.004, 0.012].map(|gap| scale.position(gap)), [0.0, 1.0]);
+        let mixed = ColourScale::gap([-0.001, 0.012].into_iter());
+        assert_eq!([-0.001, 0.0, 0.012].map(|gap| mixed.position(gap)), [0.0, 0.5, 1.0]);
+        assert!(ColourScale::even([3.0, 3.0].into_iter()).position(3.0).is_finite());
+    }
+
+    #[test]
+    fn contact_is_red() {
+        let [red, _, blue] = ColourScale::gap([-0.004, 0.008].into_iter()).colour(0).rgb;
+        assert!(red > blue);
+    }
+}

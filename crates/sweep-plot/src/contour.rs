@@ -1,0 +1,235 @@
+//! Level lines of values on a grid: marching squares that do not cross what is unknown.
+
+use std::collections::BTreeMap;
+
+/// An edge of the grid on which a line can cross: lower left node, and whether it runs along x,
+/// along y, or is one of the diagonals of the square above and right of the node.
+type Edge = (usize, usize, Run);
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Run {
+    AlongX,
+    AlongY,
+    /// From the lower left to the upper right node.
+    Rising,
+    /// From the upper left to the lower right node.
+    Falling,
+}
+
+/// Lines on which `value` is zero, as points `[x, y]`; a closed line ends where it starts.
+///
+/// `value(i, j)` is taken at `xs[i]`, `ys[j]`; between nodes it is taken as linear. Where it is not
+/// finite, the four squares around the node are reduced to the triangle of their other corners, and
+/// squares with two or more unknown corners are left out: no line is drawn through the unknown. A
+/// value of exactly zero counts as positive.
+pub fn zero_lines(
+    xs: &[f64],
+    ys: &[f64],
+    value: impl Fn(usize, usize) -> f64,
+) -> Vec<Vec<[f64; 2]>> {
+    let mut crossings: BTreeMap<Edge, [f64; 2]> = BTreeMap::new();
+    let mut links: BTreeMap<Edge, Vec<Edge>> = BTreeMap::new();
+    for i in 0..xs.len().saturating_sub(1) {
+        for j in 0..ys.len().saturating_sub(1) {
+            for (from, to) in square(i, j, &value) {
+                for edge in [from, to] {
+                    crossings.entry(edge).or_insert_with(|| crossing(edge, xs, ys, &value));
+                }
+                links.entry(from).or_default().push(to);
+                links.entry(to).or_default().push(from);
+            }
+        }
+    }
+    join(&mut links)
+        .into_iter()
+        .map(|line| line.into_iter().map(|edge| crossings[&edge]).collect())
+        .collect()
+}
+
+/// The pieces of line within one square, each from edge to edge.
+fn square(i: usize, j: usize, value: &impl Fn(usize, usize) -> f64) -> Vec<(Edge, Edge)> {
+    // Corners counter-clockwise from the lower left, and the edge from each to the next.
+    let corners = [value(i, j), value(i + 1, j), value(i + 1, j + 1), value(i, j + 1)];
+    let edges = [
+        (i, j, Run::AlongX),
+        (i + 1, j, Run::AlongY),
+        (i, j + 1, Run::AlongX),
+        (i, j, Run::AlongY),
+    ];
+    let above = corners.map(|corner| corner >= 0.0);
+    let unknown: Vec<usize> = (0..4).filter(|&k| !corners[k].is_finite()).collect();
+    match unknown[..] {
+        [] => {
+            let crossed: Vec<usize> = (0..4).filter(|&k| above[k] != above[(k + 1) % 4]).collect();
+            match crossed[..] {
+                [from, to] => vec![(edges[from], edges[to])],
+                [_, _, _, _] => {
+                    // A saddle: the middle tells which pair of opposite corners is joined; the
+                    // others are cut off.
+                    let middle_above = corners.iter().sum::<f64>() >= 0.0;
+                    if above[0] == middle_above {
+                        vec![(edges[0], edges[1]), (edges[2], edges[3])]
+                    } else {
+                        vec![(edges[3], edges[0]), (edges[1], edges[2])]
+                    }
+                }
+                _ => Vec::new(),
+            }
+        }
+        [missing] => {
+            let diagonal =
+                if missing % 2 == 0 { (i, j, Run::Falling) } else { (i, j, Run::Rising) };
+            let [next, opposite, last] = [1, 2, 3].map(|step| (missing + step) % 4);
+            let crossed: Vec<Edge> = [
+                (above[next] != above[opposite], edges[next]),
+                (above[opposite] != above[last], edges[opposite]),
+                (above[last] != above[next], diagonal),
+            ]
+            .into_iter()
+            .filter_map(|(crossed, edge)| crossed.then_some(edge))
+            .collect();
+            match crossed[..] {
+                [from, to] => vec![(from, to)],
+                _ => Vec::new(),
+            }
+        }
+        _ => Vec::new(),
+    }
+}
+
+fn crossing(
+    (i, j, run): Edge,
+    xs: &[f64],
+    ys: &[f64],
+    value: &impl Fn(usize, usize) -> f64,
+) -> [f64; 2] {
+    let [from, to] = match run {
+        Run::AlongX => [(i, j), (i + 1, j)],
+        Run::AlongY => [(i, j), (i, j + 1)],
+        Run::Rising => [(i, j), (i + 1, j + 1)],
+        Run::Falling => [(i, j + 1), (i + 1, j)],
+    };
+    let (start, end) = (value(from.0, from.1), value(to.0, to.1));
+    let part = start / (start - end);
+    [xs[from.0] + part * (xs[to.0] - xs[from.0]), ys[from.1] + part * (ys[to.1] - ys[from.1])]
+}
+
+/// Chains pieces into lines, open ones from their ends first.
+fn join(links: &mut BTreeMap<Edge, Vec<Edge>>) -> Vec<Vec<Edge>> {
+    let ends: Vec<Edge> =
+        links.iter().filter(|(_, next)| next.len() == 1).map(|(&edge, _)| edge).collect();
+    let all: Vec<Edge> = links.keys().copied().collect();
+    let mut lines = Vec::new();
+    for start in ends.into_iter().chain(all) {
+        let mut line = vec![start];
+        let mut here = start;
+        while let Some(next) = links.get_mut(&here).and_then(Vec::pop) {
+            if let Some(back) = links.get_mut(&next)
+                && let Some(place) = back.iter().position(|&edge| edge == here)
+            {
+                back.remove(place);
+            }
+            line.push(next);
+            here = next;
+        }
+        if line.len() > 1 {
+            lines.push(line);
+        }
+    }
+    lines
+}
+
+/// Points of level lines that a figure has room for.
+pub(crate) const MOST_POINTS: usize = 100_000;
+
+/// Leaves out the shortest lines of all cuts until at most `room` points are left.
+pub(crate) fn leave_out_shortest(lines: &mut [Vec<Vec<[f64; 2]>>], room: usize) {
+    let mut lengths: Vec<usize> = lines.iter().flatten().map(Vec::len).collect();
+    lengths.sort_unstable_by(|a, b| b.cmp(a));
+    let mut points = 0;
+    let kept = lengths.iter().take_while(|length| {
+        points += **length;
+        points <= room
+    });
+    let kept = kept.count();
+    if let Some(longest_left_out) = lengths.get(kept) {
+        for cut in lines {
+            cut.retain(|line| line.len() > *longest_left_out);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(count: usize) -> Vec<f64> {
+        (0..count).map(|k| k as f64).collect()
+    }
+
+    #[test]
+    fn a_plane_is_cut_by_one_straight_line() {
+        let lines = zero_lines(&numbers(6), &numbers(5), |i, j| 2.0 * i as f64 + j as f64 - 5.5);
+        assert_eq!(lines.len(), 1);
+        assert!(lines[0].iter().all(|[x, y]| (2.0 * x + y - 5.5).abs() < 1e-12));
+        let on_the_rim = |[x, y]: [f64; 2]| x == 0.0 || x == 5.0 || y == 0.0 || y == 4.0;
+        assert!(on_the_rim(lines[0][0]) && on_the_rim(*lines[0].last().unwrap()));
+    }
+
+    #[test]
+    fn an_island_is_closed() {
+        let lines =
+            zero_lines(&numbers(5), &numbers(5), |i, j| if (i, j) == (2, 2) { 1.0 } else { -1.0 });
+        assert_eq!(lines.len(), 1);
+        assert_eq!(lines[0].len(), 5);
+        assert_eq!(lines[0].first(), lines[0].last());
+    }
+
+    #[test]
+    fn a_saddle_keeps_its_two_lines_apart() {
+        let corners = [[1.0, -1.0], [-1.0, 3.0]];
+        let lines = zero_lines(&numbers(2), &numbers(2), |i, j| corners[i][j]);
+        // The middle is positive, so the positive corners are joined and the negative ones cut off.
+        assert_eq!(lines.len(), 2);
+        for line in lines {
+            let cut_off = if line[0][0] + line[1][0] > line[0][1] + line[1][1] {
+                [1.0, 0.0]
+            } else {
+                [0.0, 1.0]
+            };
+            for [x, y] in line {
+                assert!(x == cut_off[0] || y == cut_off[1]);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_drawn_beside_what_is_unknown() {
+        let unknown = |i: usize, j: usize| (i, j) == (2, 1) || (i, j) == (2, 2);
+        let value = |i: usize, j: usize| if unknown(i, j) { f64::NAN } else { i as f64 - 1.5 };
+        let lines = zero_lines(&numbers(5), &numbers(6), value);
+        assert!(lines.iter().flatten().all(|point| point.iter().all(|c| c.is_finite())));
+        assert!(lines.iter().flatten().all(|[_, y]| *y <= 0.5 || *y >= 3.0 - 0.5));
+        let reach: f64 =
+            lines.iter().map(|line| (line[0][1] - line[line.len() - 1][1]).abs()).sum();
+        assert!(reach > 1.9, "the line runs on where all corners are known: {lines:?}");
+    }
+
+    #[test]
+    fn a_value_at_the_level_belongs_to_the_upper_side() {
+        let lines = zero_lines(&numbers(3), &numbers(2), |i, _| i as f64 - 1.0);
+        assert_eq!(lines, [[[1.0, 0.0], [1.0, 1.0]]]);
+    }
+
+    #[test]
+    fn the_shortest_lines_make_room() {
+        let line = |points: usize| vec![[0.0, 0.0]; points];
+        let mut cuts = [vec![line(2), line(7)], vec![line(4), line(2)]];
+        leave_out_shortest(&mut cuts, 12);
+        assert_eq!(cuts, [vec![line(7)], vec![line(4)]]);
+        leave_out_shortest(&mut cuts, 11);
+        assert_eq!(cuts.iter().flatten().count(), 2);
+        leave_out_shortest(&mut cuts, 3);
+        assert_eq!(cuts.iter().flatten().count(), 0);
+    }
+}

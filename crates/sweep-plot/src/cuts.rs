@@ -1,0 +1,193 @@
+//! Where a map of three or more axes is cut: which values of the axes beyond the second are shown.
+
+use super::PlotOptions;
+use super::error::PlotError;
+use super::label;
+use super::read::Source;
+use super::swept::SweptAxis;
+
+/// Most values of a third axis that are drawn side by side.
+const MOST_PANELS: usize = 9;
+
+/// Most values of an axis that a message lists.
+const MOST_LISTED: usize = 24;
+
+/// Cells along either axis of a cut that a page keeps before it leaves out cuts.
+const LEAST_SIDE: usize = 64;
+
+/// The cuts that are shown.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Cuts {
+    /// Of each axis after the second, the values that are shown, by their place among all.
+    pub(crate) picks: Vec<Vec<usize>>,
+    /// In the order in which they are shown; a page opens with the first.
+    pub(crate) cuts: Vec<Cut>,
+    /// What is fixed or left out, in words.
+    pub(crate) notes: Vec<String>,
+}
+
+/// One cut.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Cut {
+    /// Place among the picks of each axis after the second.
+    pub(crate) rest: Vec<usize>,
+    /// What sets it apart from the others, in words.
+    pub(crate) name: Option<String>,
+}
+
+impl Cuts {
+    /// The cuts of a picture: one for each value of the third axis, or for the one that `--at`
+    /// names; every axis after it at one value, its first unless `--at` says otherwise.
+    ///
+    /// # Errors
+    /// As [`pins`].
+    pub(crate) fn of_picture(
+        source: &Source,
+        axes: &[SweptAxis],
+        options: &PlotOptions,
+    ) -> Result<Self, PlotError> {
+        let extra = axes.get(2..).unwrap_or_default();
+        let pins = pins(source, extra, options)?;
+        let mut notes = Vec::new();
+        let mut picks = Vec::new();
+        for (k, (axis, pin)) in extra.iter().zip(&pins).enumerate() {
+            // The third axis becomes panels unless it is pinned.
+            if k == 0 && pin.is_none() {
+                let shown = axis.values.len().min(MOST_PANELS);
+                picks.push(evenly(axis.values.len(), shown));
+                continue;
+            }
+            let pin = pin.unwrap_or(0);
+            picks.push(vec![pin]);
+            notes.push(axis.said(axis.values[pin]));
+        }
+        let mut cuts = vec![Cut { rest: vec![0; extra.len()], name: None }];
+        if let (Some(axis), Some(None)) = (extra.first(), pins.first()) {
+            if picks[0].len() < axis.values.len() {
+                notes.push(left_out(axis, picks[0].len()));
+            }
+            let named = |(place, pick): (usize, &usize)| {
+                let mut rest = vec![0; extra.len()];
+                rest[0] = place;
+                Cut { rest, name: Some(axis.said(axis.values[*pick])) }
+            };
+            cuts = picks[0].iter().enumerate().map(named).collect();
+        }
+        Ok(Self { picks, cuts, notes })
+    }
+
+    /// The cuts of a page of at most `most` cells: all of them, or else those at the values that
+    /// `--at` names and at values picked evenly of the other axes. It opens with the values that
+    /// `--at` names, or else the first.
+    ///
+    /// # Errors
+    /// As [`pins`].
+    pub(crate) fn of_page(
+        source: &Source,
+        axes: &[SweptAxis],
+        options: &PlotOptions,
+        most: usize,
+    ) -> Result<Self, PlotError> {
+        let extra = axes.get(2..).unwrap_or_default();
+        let pins = pins(source, extra, options)?;
+        let side = |axis: &SweptAxis| axis.values.len().min(LEAST_SIDE);
+        let most_cuts = (most / axes.iter().take(2).map(side).product::<usize>()).max(1);
+        let mut counts: Vec<usize> = extra.iter().map(|axis| axis.values.len()).collect();
+        let too_many = |counts: &[usize]| {
+            let cuts = counts.iter().try_fold(1_usize, |cuts, count| cuts.checked_mul(*count));
+            cuts.is_none_or(|cuts| cuts > most_cuts)
+        };
+        if too_many(&counts) {
+            for (count, _) in counts.iter_mut().zip(&pins).filter(|(_, pin)| pin.is_some()) {
+                *count = 1;
+            }
+        }
+        while too_many(&counts) {
+            let Some(greatest) = counts.iter_mut().max().filter(|count| **count > 1) else { break };
+            *greatest -= 1;
+        }
+        let mut notes = Vec::new();
+        let mut picks = Vec::new();
+        let mut first = Vec::new();
+        for ((axis, pin), count) in extra.iter().zip(&pins).zip(counts) {
+            let all = count == axis.values.len();
+            let pick = match pin {
+                Some(pin) if !all => vec![*pin],
+                _ => evenly(axis.values.len(), count),
+            };
+            if !all {
+                notes.push(left_out(axis, count));
+            }
+            let place = pin.and_then(|pin| pick.iter().position(|known| *known == pin));
+            first.push(place.unwrap_or(0));
+            picks.push(pick);
+        }
+        Ok(Self { picks, cuts: vec![Cut { rest: first, name: None }], notes })
+    }
+}
+
+/// `count` places out of `all`, spread evenly from the first to the last.
+fn evenly(all: usize, count: usize) -> Vec<usize> {
+    let last = (count - 1).max(1);
+    (0..count).map(|k| (k * (all - 1) + last / 2) / last).collect()
+}
+
+fn left_out(axis: &SweptAxis, shown: usize) -> String {
+    format!("{shown} of {} values of {}", axis.values.len(), axis.words.to_lowercase())
+}
+
+/// The value of each axis that `--at` names, by its place.
+///
+/// # Errors
+/// [`PlotError::NotThere`] when `--at` names no axis beyond the second, or a value that its axis
+/// does not have; [`PlotError::NotAGrid`] for an axis of more values than are kept.
+fn pins(
+    source: &Source,
+    extra: &[SweptAxis],
+    options: &PlotOptions,
+) -> Result<Vec<Option<usize>>, PlotError> {
+    if let Some(endless) = extra.iter().find(|axis| !axis.complete) {
+        let reason = format!("axis `{}` has too many values to choose from", endless.name);
+        return Err(PlotError::NotAGrid { path: source.path.clone(), reason });
+    }
+    let mut pins = vec![None; extra.len()];
+    for (name, value) in &options.at {
+        let missing = |what, known: String| PlotError::NotThere {
+            option: "--at",
+            given: format!("{name}={value}"),
+            path: source.path.clone(),
+            what,
+            known,
+        };
+        let place = extra.iter().position(|axis| axis.name == *name).ok_or_else(|| {
+            let known: Vec<&str> = extra.iter().map(|axis| axis.name.as_str()).collect();
+            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            missing("axis beyond the second", known)
+        })?;
+        let values = &extra[place].values;
+        let near = values.iter().position(|&known| SweptAxis::near(known, *value));
+        pins[place] = Some(near.ok_or_else(|| {
+            let said = |value: &f64| label::significant(*value, 6);
+            let known = match &values[..] {
+                [first, .., last] if values.len() > MOST_LISTED => {
+                    format!("{} of them from {} to {}", values.len(), said(first), said(last))
+                }
+                few => few.iter().map(said).collect::<Vec<_>>().join(", "),
+            };
+            missing("value of that axis", known)
+        })?);
+    }
+    Ok(pins)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn picks_run_from_the_first_to_the_last() {
+        assert_eq!(evenly(4, 4), [0, 1, 2, 3]);
+        assert_eq!(evenly(100, 3), [0, 50, 99]);
+        assert_eq!(evenly(7, 1), [0]);
+    }
+}

@@ -1,0 +1,71 @@
+//! Long time histories as the few points that a picture can show.
+
+/// Indices of the points that keep the envelope: of each of `buckets` equal stretches of `xs`
+/// between `from` and `to`, the least and the greatest, in order, and the ends of the line. Every
+/// peak that a pixel column would show stays.
+///
+/// `xs` rises. A point that is not finite ends the line: the first of each run of them is kept. All
+/// points are kept where there are no more than two to a stretch.
+pub(crate) fn envelope(xs: &[f64], ys: &[f64], from: f64, to: f64, buckets: usize) -> Vec<usize> {
+    if xs.len() <= 2 * buckets || buckets == 0 || to <= from {
+        return (0..xs.len()).collect();
+    }
+    let bucket = |index: usize| {
+        (((xs[index] - from) / (to - from) * buckets as f64) as usize).min(buckets - 1)
+    };
+    let mut kept = Vec::with_capacity(2 * buckets + 2);
+    let mut start = 0;
+    while start < xs.len() {
+        let finite = ys[start].is_finite();
+        let here = bucket(start);
+        let mut end = start;
+        let (mut least, mut greatest) = (start, start);
+        while end < xs.len() && ys[end].is_finite() == finite && (!finite || bucket(end) == here) {
+            if ys[end] < ys[least] {
+                least = end;
+            }
+            if ys[end] > ys[greatest] {
+                greatest = end;
+            }
+            end += 1;
+        }
+        let mut marks = if finite { vec![least, greatest] } else { vec![start] };
+        if finite && (start == 0 || !ys[start - 1].is_finite()) {
+            marks.push(start);
+        }
+        if finite && (end == xs.len() || !ys[end].is_finite()) {
+            marks.push(end - 1);
+        }
+        marks.sort_unstable();
+        marks.dedup();
+        kept.extend(marks);
+        start = end;
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_peak_stays_and_few_points_do() {
+        let xs: Vec<f64> = (0..100_000).map(|k| f64::from(k) * 1e-3).collect();
+        let mut ys: Vec<f64> = xs.iter().map(|x| (40.0 * x).sin()).collect();
+        ys[54_321] = 7.0;
+        let kept = envelope(&xs, &ys, 0.0, 100.0, 500);
+        assert!(kept.len() <= 1002 && kept.contains(&54_321), "{}", kept.len());
+        assert!(kept.windows(2).all(|pair| pair[0] < pair[1]));
+        assert_eq!((kept[0], *kept.last().unwrap()), (0, 99_999));
+    }
+
+    #[test]
+    fn a_hole_stays_a_hole() {
+        let xs: Vec<f64> = (0..10_000).map(f64::from).collect();
+        let mut ys = vec![1.0; 10_000];
+        ys[5000..6000].fill(f64::NAN);
+        let kept = envelope(&xs, &ys, 0.0, 10_000.0, 10);
+        assert_eq!(kept.iter().filter(|&&k| !ys[k].is_finite()).count(), 1);
+        assert_eq!(envelope(&xs[..20], &ys[..20], 0.0, 20.0, 10).len(), 20);
+    }
+}

@@ -1,0 +1,256 @@
+//! The traced curve on which a quantity is at its limit, with the bracket it is known to lie in.
+
+use serde_json::Value;
+
+use crate::axis::evenly_by_log;
+use crate::chart::{Chart, ChartPanel, Series, Style};
+use crate::colour::DISTINCT;
+use crate::error::PlotError;
+use crate::label::{self, Label};
+use crate::read::bracket;
+use crate::table::{Column, Table};
+
+/// One place of the file: where it is, and the bracket it lies in. The place is NaN where there is
+/// no such number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Place {
+    x: f64,
+    y: f64,
+    low: f64,
+    high: f64,
+    /// The quantity is above its limit on the far side, where the file says so: a curve keeps its
+    /// sides.
+    rising: Option<bool>,
+}
+
+/// The chart of a boundary file: its first column across, its second up, the bracket shaded; a
+/// curve for every combination of the axes beyond the second.
+///
+/// # Errors
+/// [`PlotError::Empty`] with fewer than two points.
+pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+    let columns: Vec<&Column> =
+        table.columns.iter().filter(|column| column.numbers().is_some()).collect();
+    let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+    let empty = || PlotError::Empty {
+        path: table.source.path.clone(),
+        reason: "a curve needs at least two points",
+    };
+    let (low, high) = bracket(&names).ok_or_else(empty)?;
+    let (x, y) = (columns[0], columns[1]);
+    let [xs, ys, lows, highs] = [
+        table.numbers(&x.name)?,
+        table.numbers(&y.name)?,
+        table.numbers(low)?,
+        table.numbers(high)?,
+    ];
+    let mut grid: Vec<f64> = xs.iter().copied().filter(|x| x.is_finite()).collect();
+    grid.sort_by(f64::total_cmp);
+    grid.dedup();
+    if grid.len() < 2 {
+        return Err(empty());
+    }
+    let sides =
+        ["quantity_low", "quantity_high"].map(|name| table.column(name).and_then(Column::numbers));
+    let rising = |row: usize| {
+        let [below, above] = sides.map(|values| values.map_or(f64::NAN, |values| values[row]));
+        below.partial_cmp(&above).map(std::cmp::Ordering::is_lt)
+    };
+    let mut curves: Vec<(String, Vec<Place>)> = Vec::new();
+    for row in 0..table.rows {
+        let place =
+            Place { x: xs[row], y: ys[row], low: lows[row], high: highs[row], rising: rising(row) };
+        let further = further(table, row);
+        match curves.iter_mut().find(|(name, _)| *name == further) {
+            Some((_, places)) => places.push(place),
+            None => curves.push((further, vec![place])),
+        }
+    }
+    let said = limit(table);
+    let mut series = Vec::new();
+    for (k, (further, places)) in curves.iter().enumerate() {
+        let name = if further.is_empty() {
+            format!("boundary: {said}, bracket shaded")
+        } else {
+            format!("{said}, {further}")
+        };
+        let colour = DISTINCT[k % DISTINCT.len()];
+        series.extend(branches(&grid, places).into_iter().map(|branch| {
+            let pick = |of: fn(&Place) -> f64| branch.iter().map(of).collect::<Vec<f64>>();
+            let style = Style::Band(pick(|place| place.low), pick(|place| place.high));
+            Series { name: name.clone(), colour, grid: 0, y: pick(|place| place.y), style }
+        }));
+    }
+    let side = far_side(&curves, quantity(table).starts_with("min_gap"));
+    Ok(Chart {
+        title: "Boundary of the linear model's reliability".to_owned(),
+        subtitle: table.source.subtitle(&format!(
+            "{} values of {}{side}",
+            grid.len(),
+            label::words(&x.name).to_lowercase()
+        )),
+        x_label: Label::new(&label::words(&x.name), &x.unit),
+        x_log: evenly_by_log(&grid),
+        grids: vec![grid],
+        panels: vec![ChartPanel {
+            height: 440.0,
+            ..ChartPanel::new("boundary", Label::new(&label::words(&y.name), &y.unit), series)
+        }],
+        marks: Vec::new(),
+        mark_meaning: String::new(),
+    })
+}
+
+/// What the region above the uppermost places is, where all of these say the same.
+fn far_side(curves: &[(String, Vec<Place>)], gap: bool) -> String {
+    let mut uppermost: Vec<Place> = Vec::new();
+    for place in curves.iter().flat_map(|(_, places)| places).filter(|place| place.y.is_finite()) {
+        match uppermost.iter_mut().find(|known| known.x == place.x) {
+            Some(known) if known.y < place.y => *known = *place,
+            Some(_) => {}
+            None => uppermost.push(*place),
+        }
+    }
+    let all = |rising: bool| {
+        !uppermost.is_empty() && uppermost.iter().all(|place| place.rising == Some(rising))
+    };
+    let side = match (gap, all(true), all(false)) {
+        (false, false, true) => "reliable",
+        (false, true, false) => "unreliable",
+        (true, true, false) => "gap open",
+        (true, false, true) => "gap closed",
+        _ => return String::new(),
+    };
+    let places: usize = curves
+        .iter()
+        .map(|(_, places)| places.iter().filter(|place| place.y.is_finite()).count())
+        .sum();
+    let line = if places > uppermost.len() { "highest line" } else { "line" };
+    format!(" · {side} above the {line}")
+}
+
+/// The quantity that is at its limit: its column's name in a map.
+fn quantity(table: &Table) -> &str {
+    table.source.find("quantity").and_then(Value::as_str).unwrap_or("ratio_max")
+}
+
+/// What is at its limit, as the file says, or else the ratio.
+fn limit(table: &Table) -> String {
+    let ratio = label::significant(table.source.ratio_limit(), 4);
+    match quantity(table) {
+        "ratio_max" => format!("ratio {ratio}"),
+        gap if gap.starts_with("min_gap") => format!("{} 0", label::words(gap)),
+        other => format!("{} {ratio}", label::words(other)),
+    }
+}
+
+/// The values of the axes beyond the second, which the plan in the file names.
+fn further(table: &Table, row: usize) -> String {
+    let axes = table.source.find("axis").and_then(Value::as_array);
+    let names =
+        axes.into_iter().flatten().skip(2).filter_map(|axis| axis.get("parameter")?.as_str());
+    let said = names.filter_map(|name| {
+        let column = table.column(name)?;
+        let value = label::significant(*column.numbers()?.get(row)?, 4);
+        Some(format!("{} {value} {}", label::words(name), column.unit))
+    });
+    said.collect::<Vec<_>>().join(", ").trim_end().to_owned()
+}
+
+/// A curve's places as lines that have one each along the grid: where there are several, each goes
+/// on from the line, of those with the same sides, whose last place is nearest.
+fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
+    let nowhere = |x: f64| Place { x, y: f64::NAN, low: f64::NAN, high: f64::NAN, rising: None };
+    let height =
+        |place: &Place| if place.y.is_nan() { 0.5 * (place.low + place.high) } else { place.y };
+    let mut lines: Vec<Vec<Place>> = Vec::new();
+    for (k, &x) in grid.iter().enumerate() {
+        let mut here: Vec<Place> = places
+            .iter()
+            .copied()
+            .filter(|place| place.x == x && height(place).is_finite())
+            .collect();
+        // Pairs of a line that was there at the last value and a place here, nearest first.
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        for (line, known) in lines.iter().enumerate() {
+            for (place, new) in here.iter().enumerate() {
+                let Some(last) = known.last() else { continue };
+                let apart = (height(last) - height(new)).abs();
+                if apart.is_finite() && last.rising == new.rising {
+                    pairs.push((apart, line, place));
+                }
+            }
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut taken = vec![None; here.len()];
+        for (_, line, place) in pairs {
+            if taken[place].is_none() && !taken.contains(&Some(line)) {
+                taken[place] = Some(line);
+            }
+        }
+        for (place, line) in here.drain(..).zip(taken) {
+            match line {
+                Some(line) => lines[line].push(place),
+                None => {
+                    let mut line: Vec<Place> = grid[..k].iter().map(|x| nowhere(*x)).collect();
+                    line.push(place);
+                    lines.push(line);
+                }
+            }
+        }
+        for line in &mut lines {
+            if line.len() == k {
+                line.push(nowhere(x));
+            }
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fold_goes_on_from_the_nearest_line() {
+        let place = |x: f64, y: f64| Place { x, y, low: y - 0.1, high: y + 0.1, rising: None };
+        let places = [
+            place(1.0, 250.0),
+            place(2.0, 238.0),
+            place(2.0, 239.0),
+            place(2.0, 259.0),
+            place(3.0, 243.0),
+            place(3.0, 265.0),
+        ];
+        let lines: Vec<Vec<f64>> = branches(&[1.0, 2.0, 3.0], &places)
+            .iter()
+            .map(|line| line.iter().map(|place| place.y).collect())
+            .collect();
+        assert_eq!(lines[0], [250.0, 259.0, 265.0]);
+        assert_eq!(lines.len(), 3);
+        assert!(lines[1][0].is_nan() && lines[1][1] == 238.0 && lines[1][2].is_nan());
+        assert_eq!(lines[2][1..], [239.0, 243.0]);
+    }
+
+    #[test]
+    fn the_edges_of_a_pocket_do_not_cross() {
+        let place = |x: f64, y: f64, rising| Place {
+            x,
+            y,
+            low: y - 0.1,
+            high: y + 0.1,
+            rising: Some(rising),
+        };
+        let places = [
+            place(1.0, 238.5, false),
+            place(1.0, 239.6, true),
+            place(2.0, 240.0, false),
+            place(2.0, 245.4, true),
+        ];
+        let lines: Vec<Vec<f64>> = branches(&[1.0, 2.0], &places)
+            .iter()
+            .map(|line| line.iter().map(|place| place.y).collect())
+            .collect();
+        assert_eq!(lines, [[238.5, 240.0], [239.6, 245.4]]);
+    }
+}

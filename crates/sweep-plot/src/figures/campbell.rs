@@ -1,0 +1,184 @@
+//! Natural frequencies over spin speed, and where they meet it (the paper's Fig. 7).
+
+use crate::axis::extremes;
+use crate::chart::{Chart, ChartPanel, Series, Style};
+use crate::colour::DISTINCT;
+use crate::error::PlotError;
+use crate::label::Label;
+use crate::read::Kind;
+use crate::scene::INK;
+use crate::table::Table;
+
+/// One mode over speed.
+pub(super) struct Mode {
+    pub(super) name: String,
+    pub(super) speed: Vec<f64>,
+    pub(super) frequency: Vec<f64>,
+    /// Least and greatest over a turn, if the file has them.
+    pub(super) band: Option<(Vec<f64>, Vec<f64>)>,
+}
+
+/// The chart of a modes file. Modes that lie wholly above the greatest speed are left out, and
+/// counted.
+///
+/// # Errors
+/// [`PlotError::Column`], or [`PlotError::Empty`] without two speeds.
+pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+    let modes = modes(table)?;
+    let top = modes.iter().flat_map(|mode| &mode.speed).fold(0.0_f64, |top, &speed| top.max(speed));
+    if top <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
+        return Err(PlotError::Empty {
+            path: table.source.path.clone(),
+            reason: "the modes are given at one speed only",
+        });
+    }
+    let (near, far): (Vec<Mode>, Vec<Mode>) = modes
+        .into_iter()
+        .partition(|mode| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top));
+    let (_, highest) =
+        extremes(near.iter().flat_map(|mode| mode.frequency.iter().copied())).unwrap_or((0.0, top));
+    let range = (0.0, (1.06 * top).min(1.25 * highest));
+
+    let mut grids = vec![vec![0.0, top]];
+    let mut series = Vec::new();
+    let mut stars = Vec::new();
+    for (k, mode) in near.into_iter().enumerate() {
+        for speed in crossings(&mode) {
+            stars.push((speed, speed, format!("{speed:.1} rpm")));
+        }
+        series.push(Series {
+            name: mode.name,
+            colour: DISTINCT[k % DISTINCT.len()],
+            grid: grids.len(),
+            y: mode.frequency,
+            style: match mode.band {
+                Some((low, high)) => Style::Band(low, high),
+                None => Style::Solid(2.2),
+            },
+        });
+        grids.push(mode.speed);
+    }
+    let line = Series {
+        name: "frequency = spin speed".to_owned(),
+        colour: INK,
+        grid: 0,
+        y: vec![0.0, top],
+        style: Style::Dashed,
+    };
+    series.push(line);
+    let mut notes: Vec<String> = table.source.run_name().map(str::to_owned).into_iter().collect();
+    if series.iter().any(|series| matches!(series.style, Style::Band(..))) {
+        notes.push("shaded: least to greatest over a turn of the drum".to_owned());
+    }
+    if !far.is_empty() {
+        let lie = if far.len() == 1 { "mode lies" } else { "modes lie" };
+        notes.push(format!("{} {lie} above", far.len()));
+    }
+    Ok(Chart {
+        title: "Natural frequencies over spin speed".to_owned(),
+        subtitle: notes.join(" · "),
+        x_label: Label::new("Spin speed", "rpm"),
+        x_log: false,
+        grids,
+        panels: vec![ChartPanel {
+            range: Some(range),
+            height: 500.0,
+            stars,
+            ..ChartPanel::new(
+                "frequency",
+                Label::new("Damped natural frequency", "cycles per minute"),
+                series,
+            )
+        }],
+        marks: Vec::new(),
+        mark_meaning: String::new(),
+    })
+}
+
+/// The resonance speeds of a modes file, rpm, rising: where a mode's damped frequency is the spin
+/// speed.
+///
+/// # Errors
+/// [`PlotError::Unfit`] when the file is not a modes file, [`PlotError::Column`] when it lacks a
+/// column.
+pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
+    if table.source.kind != Kind::Modes {
+        return Err(PlotError::Unfit(format!(
+            "`--modes {}`: this is a {} file; `sweep modes --out FILE` writes a modes file",
+            table.source.path.display(),
+            table.source.kind.name()
+        )));
+    }
+    let mut speeds: Vec<f64> = modes(table)?.iter().flat_map(crossings).collect();
+    speeds.sort_by(f64::total_cmp);
+    Ok(speeds)
+}
+
+/// Every mode of a file, by number.
+pub(super) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
+    let speed = table.numbers("speed_rpm")?;
+    let number = table.numbers("mode")?;
+    let frequency = table.numbers("frequency_rpm")?;
+    let over_turn = |word: &str| {
+        let mut columns = table.columns.iter().filter(|column| {
+            column.name.starts_with("frequency")
+                && column.unit == "rpm"
+                && column.name.split('_').any(|part| part == word)
+        });
+        columns.next().and_then(|column| column.numbers())
+    };
+    let band = over_turn("min").zip(over_turn("max"));
+    let names =
+        table.column("name").or_else(|| table.column("shape")).and_then(|column| column.words());
+
+    let mut numbers = number.to_vec();
+    numbers.sort_by(f64::total_cmp);
+    numbers.dedup();
+    Ok(numbers
+        .into_iter()
+        .map(|wanted| {
+            let mut rows: Vec<usize> =
+                (0..table.rows).filter(|&row| number[row] == wanted).collect();
+            rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
+            let pick = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
+            let said = names.and_then(|names| names.get(*rows.first()?));
+            Mode {
+                name: said.map_or(format!("mode {wanted}"), |said| format!("{wanted} {said}")),
+                speed: pick(speed),
+                frequency: pick(frequency),
+                band: band.map(|(low, high)| (pick(low), pick(high))),
+            }
+        })
+        .collect())
+}
+
+/// Speeds at which the mode's frequency, taken as linear between the given speeds, is the speed.
+pub(super) fn crossings(mode: &Mode) -> Vec<f64> {
+    let excess: Vec<f64> = mode
+        .frequency
+        .iter()
+        .zip(&mode.speed)
+        .map(|(frequency, speed)| frequency - speed)
+        .collect();
+    (1..excess.len())
+        .filter(|&k| excess[k - 1] > 0.0 && excess[k] <= 0.0)
+        .map(|k| {
+            let part = excess[k - 1] / (excess[k - 1] - excess[k]);
+            mode.speed[k - 1] + part * (mode.speed[k] - mode.speed[k - 1])
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mode_is_excited_where_its_frequency_is_the_speed() {
+        let speed: Vec<f64> = (0..=10).map(|k| 30.0 * f64::from(k)).collect();
+        let frequency = speed.iter().map(|speed| 150.0 - 0.02 * speed).collect();
+        let found = crossings(&Mode { name: String::new(), speed, frequency, band: None });
+        assert_eq!(found.len(), 1);
+        assert!((found[0] - 150.0 / 1.02).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,446 @@
+//! The map over the first two axes, with the line that divides it (the paper's Fig. 12).
+
+use std::collections::BTreeMap;
+
+use crate::axis::Scale;
+use crate::colour::{BOTH, ColourScale, DISTINCT, LEVELS};
+use crate::contour::{MOST_POINTS, leave_out_shortest, zero_lines};
+use crate::cuts::Cuts;
+use crate::error::PlotError;
+use crate::frame::{
+    HEADING_HEIGHT, LABEL_SIZE, LEGEND_ROW, Panel, Sign, TICK_SIZE, failed, failed_hatch, heading,
+    legend, legend_rows, sensitive_hatch, undefined,
+};
+use crate::gather::{Map, OK};
+use crate::grid::GridAxis;
+use crate::layer::{Layer, Level, Shown};
+use crate::raster::Typeface;
+use crate::region::roomiest;
+use crate::scene::{Anchor, Colour, Hatch, INK, Outline, PAPER, Scene, Stroke, Text};
+
+const WIDTH: f64 = 880.0;
+/// Left of a panel: numbers and label of the y axis.
+const LEFT: f64 = 86.0;
+/// Right of the panels: the colour bar with its numbers and label.
+const RIGHT: f64 = 128.0;
+/// Below a panel: numbers and label of the x axis.
+const BELOW: f64 = 64.0;
+/// Draws a map of two or more axes.
+///
+/// Over two axes it is one panel. A third axis becomes one panel for each of its values (at most
+/// nine, evenly picked); an axis beyond the second that is pinned by `--at`, and every one from the
+/// fourth on, is cut at one value (its first unless pinned), which the subtitle names.
+///
+/// # Errors
+/// As [`Shown::layer`].
+pub(crate) fn draw(
+    map: &Map,
+    cuts: &Cuts,
+    shown: Option<&Shown>,
+    typeface: &Typeface,
+) -> Result<Scene, PlotError> {
+    let mut cells = match shown {
+        Some(shown) => Cells::by_value(map, shown.layer(map)?),
+        None => Cells::by_status(map),
+    };
+    let grid = &map.grid;
+
+    let columns = match cuts.cuts.len() {
+        1 => 1,
+        2..=4 => 2,
+        _ => 3,
+    };
+    let rows = cuts.cuts.len().div_ceil(columns);
+    let single = cuts.cuts.len() == 1;
+    let bar = if cells.layer.is_some() { RIGHT } else { 24.0 };
+    let (gap, head) = if single { (0.0, 0.0) } else { (22.0, 26.0) };
+    let width = (WIDTH - LEFT - bar - gap * (columns - 1) as f64) / columns as f64;
+    let height = if single { 440.0 } else { 0.78 * width };
+    cells.refine_hatches([width, height]);
+    let entries = cells.legend(cuts);
+    let legend_height = LEGEND_ROW * legend_rows(typeface, &entries, WIDTH - LEFT - 20.0) as f64;
+    let panels_height = rows as f64 * (height + head) + gap * (rows - 1) as f64;
+    let total = HEADING_HEIGHT + panels_height + BELOW + legend_height + 14.0;
+
+    let [x_axis, y_axis] = [&grid.axes[0], &grid.axes[1]];
+    let described = format!("{}: {} over {}", cells.title, y_axis.label(), x_axis.label());
+    let mut scene = Scene::new(WIDTH, total, described);
+    heading(&mut scene, typeface, &cells.title, &subtitle(map, &cuts.notes));
+    for (index, cut) in cuts.cuts.iter().enumerate() {
+        let (column, row) = (index % columns, index / columns);
+        let panel = Panel {
+            x: LEFT + column as f64 * (width + gap),
+            y: HEADING_HEIGHT + head + row as f64 * (height + head + gap),
+            width,
+            height,
+            xs: x_axis.scale(),
+            ys: y_axis.scale(),
+        };
+        cells.draw(&mut scene, &panel, &cut.rest);
+        if let Some(layer) = &cells.layer
+            && let Some(level) = &layer.level
+        {
+            let room = MOST_POINTS / cuts.cuts.len();
+            cells.draw_line(&mut scene, &panel, (layer, level), &cut.rest, room);
+            cells.name_regions(&mut scene, typeface, &panel, (layer, level), &cut.rest);
+        }
+        let lowest = index + columns >= cuts.cuts.len();
+        panel.frame(&mut scene, lowest, column == 0);
+        if let Some(name) = &cut.name {
+            let at = [panel.x + width / 2.0, panel.y - 8.0];
+            scene.text(Text::new(name.clone(), at, TICK_SIZE).bold().anchor(Anchor::Middle));
+        }
+        if lowest {
+            panel.x_label(&mut scene, &x_axis.label());
+        }
+        if column == 0 {
+            panel.y_label(&mut scene, typeface, &y_axis.label(), 60.0);
+        }
+    }
+    if let Some(layer) = &cells.layer {
+        let area = [WIDTH - RIGHT + 20.0, HEADING_HEIGHT + head, 22.0, panels_height - head];
+        colour_bar(&mut scene, layer, area);
+    }
+    let y = HEADING_HEIGHT + panels_height + BELOW + LEGEND_ROW / 2.0;
+    legend(&mut scene, typeface, &entries, LEFT, y, WIDTH - LEFT - 20.0);
+    Ok(scene)
+}
+
+/// Name of the run, how many points it has and how many failed, and what is fixed, left out or
+/// merged.
+pub(crate) fn subtitle(map: &Map, notes: &[String]) -> String {
+    let mut parts: Vec<String> =
+        map.table.source.run_name().map(str::to_owned).into_iter().collect();
+    parts.push(format!("{} points", map.table.source.rows));
+    let failed = map.failed();
+    if failed > 0 {
+        parts.push(format!("{failed} failed"));
+    }
+    parts.extend(notes.iter().cloned());
+    parts.extend(map.grid.note());
+    parts.join(" · ")
+}
+
+/// What is drawn in a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Fill {
+    Level(usize),
+    Kind(usize),
+    /// Points on both sides of the level, or of several kinds.
+    Both,
+    Failed,
+    Undefined,
+}
+
+/// How each cell is drawn.
+struct Cells<'a> {
+    map: &'a Map,
+    title: String,
+    /// None where the file has no point.
+    fills: Vec<Option<Fill>>,
+    layer: Option<Layer>,
+    /// The kinds of [`Fill::Kind`], with the number of points of each.
+    kinds: Vec<(String, usize)>,
+    /// Over cells in which some points have no value, and over those with sensitive points.
+    hatches: [Hatch; 2],
+}
+
+impl<'a> Cells<'a> {
+    fn by_value(map: &'a Map, layer: Layer) -> Self {
+        let fill = |cell: usize| match (layer.values[cell].is_finite(), map.counts[cell].failed) {
+            (true, _) if layer.both(cell) => Fill::Both,
+            (true, _) => Fill::Level(layer.scale.level(layer.values[cell])),
+            (false, 0) => Fill::Undefined,
+            (false, _) => Fill::Failed,
+        };
+        let fills =
+            (0..map.counts.len()).map(|cell| map.filled(cell).then(|| fill(cell))).collect();
+        let (title, hatches) = (layer.title.clone(), [failed_hatch(), sensitive_hatch()]);
+        Self { map, title, fills, layer: Some(layer), kinds: Vec::new(), hatches }
+    }
+
+    fn by_status(map: &'a Map) -> Self {
+        let mut kinds: Vec<(String, usize)> =
+            map.statuses.iter().map(|(kind, points)| (kind.clone(), *points)).collect();
+        kinds.sort_by_key(|(kind, _)| (kind != OK, kind.clone()));
+        let fill = |cell: usize| {
+            map.status(cell).map_or(Fill::Both, |status| {
+                Fill::Kind(kinds.iter().position(|(kind, _)| kind == status).unwrap_or_default())
+            })
+        };
+        let fills =
+            (0..map.counts.len()).map(|cell| map.filled(cell).then(|| fill(cell))).collect();
+        let (title, hatches) =
+            ("How each point ended".to_owned(), [failed_hatch(), sensitive_hatch()]);
+        Self { map, title, fills, layer: None, kinds, hatches }
+    }
+
+    /// Makes hatches fine enough to show on the smallest cell of a panel of that size, px.
+    fn refine_hatches(&mut self, size: [f64; 2]) {
+        let smallest = [0, 1].map(|k| {
+            let axis = &self.map.grid.axes[k];
+            let scale = axis.scale();
+            let part = |pair: &[f64]| scale.position(pair[1]) - scale.position(pair[0]);
+            axis.borders.windows(2).map(part).fold(1.0, f64::min) * size[k]
+        });
+        self.hatches = self.hatches.clone().map(|hatch| hatch.within(smallest));
+    }
+
+    fn kind_colour(&self, kind: usize) -> Colour {
+        if self.kinds[kind].0 == OK {
+            Colour::hex(0xe8ebee)
+        } else {
+            DISTINCT[kind % DISTINCT.len()]
+        }
+    }
+
+    fn draw(&self, scene: &mut Scene, panel: &Panel, rest: &[usize]) {
+        // Cells of one colour are one shape, and runs of them along y one rectangle: small files,
+        // no seams.
+        let mut shapes: BTreeMap<Fill, Outline> = BTreeMap::new();
+        let mut lone: Vec<[f64; 4]> = Vec::new();
+        let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
+        let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.at_y(border)).collect();
+        for (x, pair) in x_axis.borders.windows(2).enumerate() {
+            let (left, right) = (panel.at_x(pair[0]), panel.at_x(pair[1]));
+            let fill = |y: usize| self.fills[self.map.grid.cell(x, y, rest)];
+            for (start, end, here) in runs(ys.len() - 1, fill, |fill| fill == Some(Fill::Undefined))
+            {
+                match here {
+                    Some(Fill::Undefined) => {
+                        lone.push([left, ys[end], right - left, ys[start] - ys[end]])
+                    }
+                    Some(fill) => {
+                        let shape = shapes.entry(fill).or_default();
+                        shape.add_rectangle(left, ys[end], right - left, ys[start] - ys[end]);
+                    }
+                    None => {}
+                }
+            }
+        }
+        for (fill, shape) in shapes {
+            match (fill, &self.layer) {
+                (Fill::Level(level), Some(layer)) => {
+                    scene.fill_crisp(shape, layer.scale.colour(level))
+                }
+                (Fill::Kind(kind), _) => scene.fill_crisp(shape, self.kind_colour(kind)),
+                (Fill::Both, _) => scene.fill_crisp(shape, BOTH),
+                _ => failed(scene, shape),
+            }
+        }
+        if !lone.is_empty() {
+            undefined(scene, &lone);
+        }
+        scene.hatch(self.area(panel, rest, |cell| self.partly_lost(cell)), &self.hatches[0]);
+        scene.hatch(self.area(panel, rest, |cell| self.sensitive(cell)), &self.hatches[1]);
+    }
+
+    /// The cells that `holds` is true of.
+    fn area(&self, panel: &Panel, rest: &[usize], holds: impl Fn(usize) -> bool) -> Outline {
+        let mut area = Outline::default();
+        let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
+        let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.at_y(border)).collect();
+        for (x, pair) in x_axis.borders.windows(2).enumerate() {
+            let (left, right) = (panel.at_x(pair[0]), panel.at_x(pair[1]));
+            let within = |y: usize| holds(self.map.grid.cell(x, y, rest));
+            for (start, end, _) in
+                runs(ys.len() - 1, within, |_| false).filter(|(_, _, within)| *within)
+            {
+                area.add_rectangle(left, ys[end], right - left, ys[start] - ys[end]);
+            }
+        }
+        area
+    }
+
+    /// Whether a cell has points that failed or have no value beside others that have one.
+    fn partly_lost(&self, cell: usize) -> bool {
+        matches!(self.fills[cell], Some(Fill::Level(_) | Fill::Both))
+            && self
+                .layer
+                .as_ref()
+                .is_some_and(|layer| self.some_failed(cell) || layer.undefined(cell))
+    }
+
+    fn some_failed(&self, cell: usize) -> bool {
+        self.map.counts[cell].failed > 0
+    }
+
+    /// Whether a cell's colour depends on a motion that is chaotic.
+    fn sensitive(&self, cell: usize) -> bool {
+        self.layer.as_ref().is_some_and(|layer| layer.nonlinear)
+            && self.map.counts[cell].sensitive > 0
+    }
+
+    /// Draws the level's line with at most `room` points.
+    fn draw_line(
+        &self,
+        scene: &mut Scene,
+        panel: &Panel,
+        (layer, level): (&Layer, &Level),
+        rest: &[usize],
+        room: usize,
+    ) {
+        let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
+        let lines = zero_lines(&x_axis.even(), &y_axis.even(), |x, y| {
+            level.offset(self.map.cell(x, y, rest).map_or(f64::NAN, |cell| layer.typical(cell)))
+        });
+        let mut lines = [lines];
+        leave_out_shortest(&mut lines, room);
+        let place = |scale: Scale, even: f64| {
+            if scale.log { scale.position(even.exp()) } else { scale.position(even) }
+        };
+        let mut outline = Outline::default();
+        for line in lines.into_iter().flatten() {
+            let points: Vec<[f64; 2]> = line
+                .into_iter()
+                .map(|[x, y]| {
+                    [
+                        panel.x + place(panel.xs, x) * panel.width,
+                        panel.y + (1.0 - place(panel.ys, y)) * panel.height,
+                    ]
+                })
+                .collect();
+            outline.add_line(&points);
+        }
+        scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
+        scene.line(outline, Stroke::solid(INK, 2.6));
+    }
+
+    fn name_regions(
+        &self,
+        scene: &mut Scene,
+        typeface: &Typeface,
+        panel: &Panel,
+        (layer, level): (&Layer, &Level),
+        rest: &[usize],
+    ) {
+        let place = |axis: &GridAxis, scale: Scale, part: f64| {
+            let found = axis.borders.partition_point(|&border| scale.position(border) <= part);
+            found.clamp(1, axis.borders.len() - 1) - 1
+        };
+        let axes = &self.map.grid.axes;
+        let offset = |[x, y]: [f64; 2]| {
+            let x = place(&axes[0], panel.xs, x / panel.width);
+            let y = place(&axes[1], panel.ys, 1.0 - y / panel.height);
+            let cell = self.map.cell(x, y, rest).filter(|&cell| !layer.both(cell));
+            level.offset(cell.map_or(f64::NAN, |cell| layer.values[cell]))
+        };
+        for (name, wanted_above) in [(&level.above[0], true), (&level.below[0], false)] {
+            // A cell without a value is on neither side.
+            let inside = |point: [f64; 2]| {
+                let offset = offset(point);
+                offset.is_finite() && (offset >= 0.0) == wanted_above
+            };
+            let size = [typeface.width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
+            if let Some([x, y]) = roomiest([panel.width, panel.height], size, inside) {
+                let at = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];
+                scene.text(
+                    Text::new(name, at, LABEL_SIZE).bold().anchor(Anchor::Middle).halo(PAPER),
+                );
+            }
+        }
+    }
+
+    fn legend(&self, cuts: &Cuts) -> Vec<(Sign, String)> {
+        let mut entries = Vec::new();
+        let shown = |wanted: &dyn Fn(usize) -> bool| {
+            let [xs, ys] = [0, 1].map(|k| self.map.grid.axes[k].values.len());
+            cuts.cuts.iter().any(|cut| {
+                let mut places = (0..xs).flat_map(|x| (0..ys).map(move |y| (x, y)));
+                places.any(|(x, y)| wanted(self.map.grid.cell(x, y, &cut.rest)))
+            })
+        };
+        let filled = |fill: Fill| shown(&|cell| self.fills[cell] == Some(fill));
+        if let Some(Layer { level: Some(level), scale, .. }) = &self.layer {
+            let quarter = |part: usize| scale.colour(part * LEVELS / 4);
+            entries.push((Sign::Line(Stroke::solid(INK, 2.6)), level.line.clone()));
+            entries.push((Sign::Area(quarter(3)), level.above[1].clone()));
+            entries.push((Sign::Area(quarter(1)), level.below[1].clone()));
+            if filled(Fill::Both) {
+                entries.push((Sign::Area(BOTH), level.both.clone()));
+            }
+        }
+        for (kind, (name, points)) in self.kinds.iter().enumerate() {
+            let text = format!("{} ({points})", name.replace('_', " "));
+            entries.push((Sign::Area(self.kind_colour(kind)), text));
+        }
+        if self.layer.is_none() && filled(Fill::Both) {
+            entries.push((Sign::Area(BOTH), "points of several kinds".to_owned()));
+        }
+        let only_failed =
+            |cell: usize| self.map.counts[cell].failed == self.map.counts[cell].points;
+        if shown(&|cell| self.fills[cell] == Some(Fill::Failed) && !only_failed(cell)) {
+            entries.push((Sign::Failed, "no result: failed or undefined".to_owned()));
+        } else if filled(Fill::Failed) {
+            entries.push((Sign::Failed, "failed: no result".to_owned()));
+        }
+        if shown(&|cell| self.partly_lost(cell)) {
+            let some_failed = shown(&|cell| self.partly_lost(cell) && self.some_failed(cell));
+            let undefined = |cell| self.layer.as_ref().is_some_and(|layer| layer.undefined(cell));
+            let some_undefined = shown(&|cell| self.partly_lost(cell) && undefined(cell));
+            let said = match (some_failed, some_undefined) {
+                (true, false) => "some points failed",
+                (true, true) => "some points failed or undefined",
+                (false, _) => "some points undefined",
+            };
+            entries.push((Sign::Hatched(self.hatches[0].clone()), said.to_owned()));
+        }
+        if shown(&|cell| self.sensitive(cell)) {
+            let said = if self.map.grid.merged() {
+                "some points sensitive: chaotic"
+            } else {
+                "sensitive: motion is chaotic"
+            };
+            entries.push((Sign::Hatched(self.hatches[1].clone()), said.to_owned()));
+        }
+        if filled(Fill::Undefined) {
+            entries.push((Sign::Undefined, "undefined: no excitation".to_owned()));
+        }
+        entries
+    }
+}
+
+/// Neighbouring places with the same content as `(first, one past the last, content)`, those alone
+/// that `lone` says.
+fn runs<T: Copy + PartialEq>(
+    count: usize,
+    content: impl Fn(usize) -> T,
+    lone: impl Fn(T) -> bool,
+) -> impl Iterator<Item = (usize, usize, T)> {
+    let mut next = 0;
+    std::iter::from_fn(move || {
+        if next >= count {
+            return None;
+        }
+        let (start, here) = (next, content(next));
+        next += 1;
+        while !lone(here) && next < count && content(next) == here {
+            next += 1;
+        }
+        Some((start, next, here))
+    })
+}
+
+fn colour_bar(scene: &mut Scene, layer: &Layer, [x, y, width, height]: [f64; 4]) {
+    let step = height / LEVELS as f64;
+    for level in 0..LEVELS {
+        let top = y + height - (level + 1) as f64 * step;
+        scene.fill_crisp(Outline::rectangle(x, top, width, step), layer.scale.colour(level));
+    }
+    scene.line(Outline::rectangle(x, y, width, height), Stroke::solid(INK, 1.2));
+    let mut marks = Outline::default();
+    for tick in layer.scale.ticks() {
+        let at = y + (1.0 - layer.scale.position(tick.value)) * height;
+        marks.add_line(&[[x + width, at], [x + width + 5.0, at]]);
+        let centre =
+            matches!(layer.scale, ColourScale::Diverging { centre, .. } if centre == tick.value);
+        let text = Text::new(tick.label, [x + width + 8.0, at + 0.35 * TICK_SIZE], TICK_SIZE);
+        scene.text(if centre { text.bold() } else { text });
+        if centre {
+            marks.add_line(&[[x, at], [x + width, at]]);
+        }
+    }
+    scene.line(marks, Stroke::solid(INK, 1.4));
+    let at = [x + width + 72.0, y + height / 2.0];
+    scene.text(Text::new(layer.label.clone(), at, TICK_SIZE).anchor(Anchor::Middle).upright());
+}

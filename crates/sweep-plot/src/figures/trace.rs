@@ -1,0 +1,324 @@
+//! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::PlotOptions;
+use crate::axis::extremes;
+use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
+use crate::colour::{LINEAR, NONLINEAR};
+use crate::error::PlotError;
+use crate::figures::campbell;
+use crate::label::{self, Label};
+use crate::read::Kind;
+use crate::scene::INK;
+use crate::table::Table;
+
+/// Channels that a picture shows by default: one for each way in which the tub can move.
+const USUAL: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
+
+/// The chart of a trace file.
+///
+/// # Errors
+/// [`PlotError::Column`] without time, [`PlotError::NotThere`] for an unknown channel, and as
+/// [`campbell::resonances`] for the modes file that gives the resonance speeds.
+pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
+    let time = table.numbers("time_s")?.to_vec();
+    if time.len() < 2 {
+        return Err(PlotError::Empty {
+            path: table.source.path.clone(),
+            reason: "a trace needs at least two instants",
+        });
+    }
+    let found = quantities(table);
+    let channels: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
+    if let Some(unknown) = options.channels.iter().find(|asked| !channels.contains(&asked.as_str()))
+    {
+        return Err(PlotError::NotThere {
+            option: "--channel",
+            given: unknown.clone(),
+            path: table.source.path.clone(),
+            what: "channel",
+            known: channels.join(", "),
+        });
+    }
+    let usual: Vec<&str> = USUAL.into_iter().filter(|name| channels.contains(name)).collect();
+    let shown: Vec<&str> = match (&options.channels[..], &usual[..]) {
+        ([], []) => {
+            found.iter().filter(|quantity| quantity.channel).map(|quantity| quantity.name).collect()
+        }
+        ([], usual) => usual.to_vec(),
+        (asked, _) => asked.iter().map(String::as_str).collect(),
+    };
+
+    let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
+    let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
+        // The second curve lies in front; where it hides the first one, this must shine through.
+        let front = LINEAR.with_alpha(165);
+        let [first, second] = &columns;
+        let curves = match &other {
+            Some(other) => {
+                [(table, first, said(table), NONLINEAR, 0), (other, first, said(other), front, 1)]
+            }
+            None => [
+                (table, first, "nonlinear model".to_owned(), NONLINEAR, 0),
+                (table, second, "linear model".to_owned(), front, 0),
+            ],
+        };
+        curves
+            .into_iter()
+            .filter_map(|(table, column, name, colour, grid)| {
+                let y =
+                    table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
+                Some(Series { name, colour, grid, y, style: Style::Solid(1.3) })
+            })
+            .collect()
+    };
+    let mut panels: Vec<ChartPanel> = found
+        .iter()
+        .map(|quantity| {
+            let (unit, factor) = label::shown(quantity.unit);
+            let words = if quantity.channel {
+                label::channel(quantity.name)
+            } else {
+                label::words(quantity.name)
+            };
+            panel(
+                quantity.name,
+                Label::new(&words, unit),
+                shown.contains(&quantity.name),
+                pair(quantity.columns(), factor),
+            )
+        })
+        .collect();
+    // Rows of two files that were thinned do not lie at the same instants.
+    let whole = other.as_ref().is_some_and(|other| table.stretch.or(other.stretch).is_none());
+    let apart = if whole { difference(&panels) } else { None };
+    let mut gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
+    if other.is_some() && gaps.len() < 2 {
+        gaps.clear();
+    }
+    let least = least_gaps(&gaps);
+    if !gaps.is_empty() {
+        // A gap that stays wide would be a flat line at the top of a panel that reaches down to
+        // contact.
+        let widest = gaps.iter().flat_map(|series| &series.y).copied().fold(0.0, f64::max);
+        let near = least.iter().any(|(_, gap)| *gap < 0.5 * widest);
+        let levels = if near { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() };
+        panels.push(ChartPanel {
+            levels,
+            ..panel("gap", Label::new("gap, drum to tub", "mm"), true, gaps)
+        });
+    }
+    let mut marks = Vec::new();
+    if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
+        for (x, resonance) in passages(&time, speed, &resonances(options)?) {
+            marks.push(Mark::of_speed(x, resonance));
+        }
+        let y = speed.to_vec();
+        let series =
+            Series { name: String::new(), colour: INK, grid: 0, y, style: Style::Solid(2.0) };
+        let height = 130.0;
+        panels.push(ChartPanel {
+            height,
+            ..panel("speed", Label::new("spin", "rpm"), true, vec![series])
+        });
+    }
+    Ok(Chart {
+        title: match &other {
+            Some(other) => {
+                format!(
+                    "Nonlinear motion from static equilibrium: {} and {}",
+                    said(table),
+                    said(other)
+                )
+            }
+            None => "Motion of both models from static equilibrium".to_owned(),
+        },
+        subtitle: subtitle(table, &least, apart),
+        x_label: Label::new("Time", "s"),
+        x_log: false,
+        grids: match &other {
+            Some(other) => vec![time, other.numbers("time_s")?.to_vec()],
+            None => vec![time],
+        },
+        panels,
+        marks,
+        mark_meaning: "resonance speed passed".to_owned(),
+    })
+}
+
+/// What a trace holds of both models over time.
+struct Quantity<'a> {
+    /// A channel's name; of a coordinate, a speed or a force what stands before the model's name:
+    /// `spring_1_tension`.
+    name: &'a str,
+    unit: &'a str,
+    /// The column's end after the model's name; empty for a channel.
+    end: &'a str,
+    channel: bool,
+}
+
+impl Quantity<'_> {
+    /// Columns of the nonlinear and of the linear model.
+    fn columns(&self) -> [String; 2] {
+        ["nonlinear", "linear"].map(|model| {
+            if self.channel {
+                format!("{model}_{}", self.name)
+            } else {
+                format!("{}_{model}_{}", self.name, self.end)
+            }
+        })
+    }
+}
+
+/// Channels first, then states and forces; the gap has its own panel.
+fn quantities(table: &Table) -> Vec<Quantity<'_>> {
+    let channels = table.with_prefix("nonlinear_").into_iter().map(|(name, column)| {
+        let unit = if column.unit.is_empty() { label::unit_of_channel(name) } else { &column.unit };
+        Quantity { name, unit, end: "", channel: true }
+    });
+    let further =
+        table.columns.iter().filter(|column| column.numbers().is_some()).filter_map(|column| {
+            let (name, end) =
+                column.name.split_once("_nonlinear_").filter(|(name, _)| *name != "gap")?;
+            Some(Quantity { name, unit: &column.unit, end, channel: false })
+        });
+    channels.chain(further).collect()
+}
+
+/// The largest difference of two curves over the same instants in any panel shown, as a share of
+/// the first one's peak.
+fn difference(panels: &[ChartPanel]) -> Option<f64> {
+    let shares = panels.iter().filter(|panel| panel.shown).filter_map(|panel| {
+        let [first, second] = &panel.series[..] else { return None };
+        let peak = first.y.iter().fold(0.0_f64, |peak, y| peak.max(y.abs()));
+        let apart =
+            first.y.iter().zip(&second.y).map(|(a, b)| (a - b).abs()).fold(0.0_f64, f64::max);
+        (first.y.len() == second.y.len() && peak > 0.0).then(|| apart / peak)
+    });
+    shares.reduce(f64::max)
+}
+
+/// The trace whose nonlinear model is drawn in place of the linear one.
+fn other_trace(path: &Path) -> Result<Table, PlotError> {
+    let table = Table::open(path)?;
+    if table.source.kind == Kind::Trace {
+        return Ok(table);
+    }
+    let kind = table.source.kind.name();
+    Err(PlotError::Unfit(format!(
+        "`--against {}`: this is a {kind} file, expected a trace",
+        path.display()
+    )))
+}
+
+/// What a run is called: its name, or else its file's.
+fn said(table: &Table) -> String {
+    let file = || table.source.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    table.source.run_name().map_or_else(file, str::to_owned)
+}
+
+/// The least gap of each model that has one, in the unit shown.
+fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
+    gaps.iter()
+        .filter_map(|series| {
+            let (least, _) = extremes(series.y.iter().copied())?;
+            Some((series.name.trim_end_matches(" model").to_owned(), least))
+        })
+        .collect()
+}
+
+/// Name of the run, its unbalance and damping, the rest of the point if the file says which, the
+/// least gaps (mm), and how far two runs are apart.
+pub(super) fn subtitle(
+    table: &Table,
+    least_gaps_mm: &[(String, f64)],
+    apart: Option<f64>,
+) -> String {
+    let mut parts: Vec<String> = table.source.run_name().map(str::to_owned).into_iter().collect();
+    let mut said: Vec<(&str, f64)> = machine(table);
+    for (name, value) in table.source.find("at").and_then(Value::as_object).into_iter().flatten() {
+        if let Some(value) = value.as_f64().filter(|_| !said.iter().any(|(known, _)| known == name))
+        {
+            said.push((name, value));
+        }
+    }
+    for (name, value) in said {
+        let (words, unit) = (label::words(name).to_lowercase(), label::unit_of_name(name));
+        parts.push(format!("{words} {} {unit}", label::significant(value, 4)));
+    }
+    let gaps: Vec<String> =
+        least_gaps_mm.iter().map(|(model, gap)| format!("{gap:.2} mm {model}")).collect();
+    if !gaps.is_empty() {
+        parts.push(format!("least gap {}", gaps.join(", ")));
+    }
+    if let Some(apart) = apart {
+        parts.push(format!("largest difference {apart:.1e} of the peak"));
+    }
+    if let Some(rows) = table.stretch {
+        parts.push(format!("least and greatest of every {rows} instants"));
+    }
+    parts.join(" · ")
+}
+
+/// The two numbers of the machine that reliability turns on, as far as the file has them and all
+/// dampers are alike.
+fn machine(table: &Table) -> Vec<(&'static str, f64)> {
+    let Some(machine) = table.source.find("machine") else { return Vec::new() };
+    let unbalance = machine.pointer("/unbalance/mass_kg").and_then(Value::as_f64);
+    let dampers = machine.get("dampers").and_then(Value::as_array).into_iter().flatten();
+    let mut dampings: Vec<f64> = dampers
+        .filter_map(|damper| damper.get("damping_n_s_per_m").and_then(Value::as_f64))
+        .collect();
+    dampings.dedup();
+    let damping = (dampings.len() == 1).then(|| dampings[0]);
+    let named = [("unbalance_mass_kg", unbalance), ("damping_n_s_per_m", damping)];
+    named.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
+}
+
+/// The resonance speeds that the options name, rpm.
+pub(super) fn resonances(options: &PlotOptions) -> Result<Vec<f64>, PlotError> {
+    let mut speeds = options.resonances_rpm.clone();
+    if let Some(path) = &options.modes {
+        speeds.extend(campbell::resonances(&Table::open(path)?)?);
+    }
+    Ok(speeds)
+}
+
+/// Instants at which the speed passes each resonance, upwards or downwards, in order of time.
+fn passages(time: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> {
+    let mut found = Vec::new();
+    for k in 1..time.len().min(speed.len()) {
+        for &resonance in resonances {
+            let (before, after) = (speed[k - 1] - resonance, speed[k] - resonance);
+            if (before < 0.0) != (after < 0.0) && before.is_finite() && after.is_finite() {
+                let part = before / (before - after);
+                found.push((time[k - 1] + part * (time[k] - time[k - 1]), resonance));
+            }
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // A peak that only touches a resonance is one passage, not one up and one down.
+    found.dedup();
+    found
+}
+
+fn panel(name: &str, label: Label, shown: bool, series: Vec<Series>) -> ChartPanel {
+    let label = Label { words: label::capitalised(&label.words), ..label };
+    ChartPanel { shown, height: 165.0, ..ChartPanel::new(name, label, series) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_resonance_is_passed_on_the_way_up_and_down() {
+        let time: Vec<f64> = (0..=8).map(f64::from).collect();
+        let speed: Vec<f64> = time.iter().map(|t| 50.0 * (4.0 - (t - 4.0).abs())).collect();
+        assert_eq!(passages(&time, &speed, &[75.0, 500.0]), [(1.5, 75.0), (6.5, 75.0)]);
+        assert_eq!(passages(&time, &speed, &[200.0]), [(4.0, 200.0)]);
+    }
+}

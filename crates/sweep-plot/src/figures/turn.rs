@@ -1,0 +1,74 @@
+//! How far natural frequencies vary over a turn of the drum (the paper's Fig. 7b).
+
+use crate::chart::{Chart, ChartPanel, Series, Style};
+use crate::colour::DISTINCT;
+use crate::error::PlotError;
+use crate::figures::campbell::{crossings, modes};
+use crate::label::Label;
+use crate::table::Table;
+
+/// The chart of a modes file: of each mode that has a resonance, half the distance from its least
+/// to its greatest frequency over a turn, as a share of the mean.
+///
+/// # Errors
+/// [`PlotError::Column`], or [`PlotError::Empty`] where no mode has a resonance.
+pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+    table.numbers("frequency_min_rpm")?;
+    table.numbers("frequency_max_rpm")?;
+    let mut grids = Vec::new();
+    let mut series = Vec::new();
+    let mut stars = Vec::new();
+    for (k, mode) in modes(table)?.into_iter().enumerate() {
+        let resonances = crossings(&mode);
+        let Some((least, greatest)) = mode.band.filter(|_| !resonances.is_empty()) else {
+            continue;
+        };
+        let percent: Vec<f64> = least
+            .iter()
+            .zip(&greatest)
+            .zip(&mode.frequency)
+            .map(|((least, greatest), mean)| 50.0 * (greatest - least) / mean)
+            .collect();
+        for speed in resonances {
+            stars.push((speed, between(&mode.speed, &percent, speed), format!("{speed:.1} rpm")));
+        }
+        series.push(Series {
+            name: mode.name,
+            colour: DISTINCT[k % DISTINCT.len()],
+            grid: grids.len(),
+            y: percent,
+            style: Style::Solid(2.2),
+        });
+        grids.push(mode.speed);
+    }
+    if series.is_empty() {
+        return Err(PlotError::Empty {
+            path: table.source.path.clone(),
+            reason: "no mode's frequency meets the spin speed",
+        });
+    }
+    Ok(Chart {
+        title: "Natural frequencies over a turn of the drum".to_owned(),
+        subtitle: table.source.subtitle("half the distance from least to greatest"),
+        x_label: Label::new("Spin speed", "rpm"),
+        x_log: false,
+        grids,
+        panels: vec![ChartPanel {
+            stars,
+            ..ChartPanel::new(
+                "variation",
+                Label::new("Variation over a turn", "± % of the mean"),
+                series,
+            )
+        }],
+        marks: Vec::new(),
+        mark_meaning: String::new(),
+    })
+}
+
+/// The value at `x`, linear between the given ones.
+fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
+    let after = xs.partition_point(|known| *known < x).clamp(1, xs.len() - 1);
+    let part = (x - xs[after - 1]) / (xs[after] - xs[after - 1]);
+    ys[after - 1] + part * (ys[after] - ys[after - 1])
+}

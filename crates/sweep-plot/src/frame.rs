@@ -1,0 +1,256 @@
+//! What all figures share: panels with axes, headings and legends.
+
+use super::axis::{Scale, Tick};
+use super::colour::FAILED;
+use super::raster::Typeface;
+use super::scene::{Anchor, Colour, FAINT, Hatch, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
+
+/// Type sizes, px: legible at half a figure's size.
+pub(crate) const TITLE_SIZE: f64 = 20.0;
+/// Axis labels, legends, subtitles.
+pub(crate) const LABEL_SIZE: f64 = 16.0;
+/// Numbers at ticks.
+pub(crate) const TICK_SIZE: f64 = 14.5;
+
+/// A rectangle with an x and a y scale.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Panel {
+    /// Left edge, px.
+    pub(crate) x: f64,
+    /// Top edge, px.
+    pub(crate) y: f64,
+    /// px.
+    pub(crate) width: f64,
+    /// px.
+    pub(crate) height: f64,
+    /// Left to right.
+    pub(crate) xs: Scale,
+    /// Bottom to top.
+    pub(crate) ys: Scale,
+}
+
+impl Panel {
+    /// Where a value stands, px.
+    pub(crate) fn at(&self, x: f64, y: f64) -> [f64; 2] {
+        [self.at_x(x), self.at_y(y)]
+    }
+
+    /// Where a value stands from left to right, px.
+    pub(crate) fn at_x(&self, x: f64) -> f64 {
+        self.x + self.xs.position(x) * self.width
+    }
+
+    /// Where a value stands from top to bottom, px.
+    pub(crate) fn at_y(&self, y: f64) -> f64 {
+        self.y + (1.0 - self.ys.position(y)) * self.height
+    }
+
+    /// Its edge.
+    pub(crate) fn outline(&self) -> Outline {
+        Outline::rectangle(self.x, self.y, self.width, self.height)
+    }
+
+    fn x_ticks(&self) -> Vec<Tick> {
+        self.xs.ticks((self.width / 75.0) as usize)
+    }
+
+    fn y_ticks(&self) -> Vec<Tick> {
+        self.ys.ticks((self.height / 36.0).max(3.0) as usize)
+    }
+
+    /// Faint lines at the ticks, to be drawn below the data.
+    pub(crate) fn rules(&self, scene: &mut Scene) {
+        let mut lines = Outline::default();
+        for tick in self.x_ticks() {
+            let x = self.at_x(tick.value);
+            lines.add_line(&[[x, self.y], [x, self.y + self.height]]);
+        }
+        for tick in self.y_ticks() {
+            let y = self.at_y(tick.value);
+            lines.add_line(&[[self.x, y], [self.x + self.width, y]]);
+        }
+        scene.line(lines, Stroke::solid(FAINT, 1.0));
+    }
+
+    /// Edge, ticks and numbers; without the numbers of an axis that is shared with the panel below
+    /// or to the left.
+    pub(crate) fn frame(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
+        let (bottom, stroke) = (self.y + self.height, Stroke::solid(INK, 1.2));
+        scene.line(self.outline(), stroke.clone());
+        let mut marks = Outline::default();
+        for tick in self.x_ticks() {
+            let x = self.at_x(tick.value);
+            marks.add_line(&[[x, bottom], [x, bottom + 5.0]]);
+            if x_numbers {
+                scene.text(
+                    Text::new(tick.label, [x, bottom + 21.0], TICK_SIZE).anchor(Anchor::Middle),
+                );
+            }
+        }
+        for tick in self.y_ticks() {
+            let y = self.at_y(tick.value);
+            marks.add_line(&[[self.x - 5.0, y], [self.x, y]]);
+            if y_numbers {
+                let at = [self.x - 9.0, y + 0.35 * TICK_SIZE];
+                scene.text(Text::new(tick.label, at, TICK_SIZE).anchor(Anchor::End));
+            }
+        }
+        scene.line(marks, stroke);
+    }
+
+    /// What the x axis shows.
+    pub(crate) fn x_label(&self, scene: &mut Scene, label: &str) {
+        let at = [self.x + self.width / 2.0, self.y + self.height + 44.0];
+        scene.text(Text::new(label, at, LABEL_SIZE).anchor(Anchor::Middle));
+    }
+
+    /// What the y axis shows, `distance` px left of the panel; in two lines where one is longer
+    /// than the panel is high.
+    pub(crate) fn y_label(
+        &self,
+        scene: &mut Scene,
+        typeface: &Typeface,
+        label: &str,
+        distance: f64,
+    ) {
+        let fits = |text: &str| typeface.width(text, LABEL_SIZE, false) <= self.height;
+        let split =
+            label.match_indices(' ').map(|(place, _)| place).rfind(|&place| fits(&label[..place]));
+        let lines = match split {
+            Some(place) if !fits(label) => vec![&label[..place], &label[place + 1..]],
+            _ => vec![label],
+        };
+        let first = self.x - distance - (lines.len() - 1) as f64 * 0.62 * LABEL_SIZE;
+        for (k, line) in lines.into_iter().enumerate() {
+            let at = [first + 1.2 * LABEL_SIZE * k as f64, self.y + self.height / 2.0];
+            scene.text(Text::new(line, at, LABEL_SIZE).anchor(Anchor::Middle).upright());
+        }
+    }
+}
+
+/// Title, and a line below it that is shortened to fit.
+pub(crate) fn heading(scene: &mut Scene, typeface: &Typeface, title: &str, subtitle: &str) {
+    let room = scene.width - 40.0;
+    scene.text(
+        Text::new(fit(typeface, title, TITLE_SIZE, true, room), [20.0, 32.0], TITLE_SIZE).bold(),
+    );
+    let subtitle = fit(typeface, subtitle, TICK_SIZE, false, room);
+    scene.text(Text::new(subtitle, [20.0, 55.0], TICK_SIZE).colour(MUTED));
+}
+
+/// Height taken by [`heading`], px.
+pub(crate) const HEADING_HEIGHT: f64 = 72.0;
+
+/// `text`, or as much of it as fits into `room` px.
+fn fit(typeface: &Typeface, text: &str, size: f64, bold: bool, room: f64) -> String {
+    let mut shown: String = text.to_owned();
+    while typeface.width(&shown, size, bold) > room {
+        let kept = shown.trim_end_matches('…').chars().count().saturating_sub(1);
+        shown = shown.chars().take(kept).collect::<String>().trim_end().to_owned() + "…";
+    }
+    shown
+}
+
+/// The sign before a legend's text.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Sign {
+    /// A line as drawn in the figure.
+    Line(Stroke),
+    /// A coloured area.
+    Area(Colour),
+    /// A hatched area: failed points.
+    Failed,
+    /// A hatch without a ground of its own.
+    Hatched(Hatch),
+    /// A dotted mark: undefined points.
+    Undefined,
+    /// A star.
+    Star(Colour),
+}
+
+/// Height of a row of a legend, px.
+pub(crate) const LEGEND_ROW: f64 = 25.0;
+
+/// Rows that a legend takes in `width` px.
+pub(crate) fn legend_rows(typeface: &Typeface, entries: &[(Sign, String)], width: f64) -> usize {
+    lay_out(typeface, entries, width).last().map_or(0, |(_, row)| row + 1)
+}
+
+/// Draws a legend with its first row's middle at `y`, px.
+pub(crate) fn legend(
+    scene: &mut Scene,
+    typeface: &Typeface,
+    entries: &[(Sign, String)],
+    x: f64,
+    y: f64,
+    width: f64,
+) {
+    for ((sign, text), (offset, row)) in entries.iter().zip(lay_out(typeface, entries, width)) {
+        let (x, y) = (x + offset, y + row as f64 * LEGEND_ROW);
+        match sign {
+            Sign::Line(stroke) => {
+                scene.line(Outline::line(&[[x, y], [x + 28.0, y]]), stroke.clone())
+            }
+            Sign::Area(colour) => {
+                scene.fill(Outline::rectangle(x, y - 8.0, 28.0, 16.0), *colour);
+                scene.line(Outline::rectangle(x, y - 8.0, 28.0, 16.0), Stroke::solid(MUTED, 1.0));
+            }
+            Sign::Failed => failed(scene, Outline::rectangle(x, y - 8.0, 28.0, 16.0)),
+            Sign::Hatched(hatch) => {
+                let area = Outline::rectangle(x, y - 8.0, 28.0, 16.0);
+                scene.hatch(area.clone(), hatch);
+                scene.line(area, Stroke::solid(MUTED, 1.0));
+            }
+            Sign::Undefined => undefined(scene, &[[x, y - 8.0, 28.0, 16.0]]),
+            Sign::Star(colour) => scene.fill(Outline::star([x + 14.0, y], 9.0), *colour),
+        }
+        scene.text(Text::new(text.clone(), [x + 36.0, y + 0.35 * TICK_SIZE], TICK_SIZE));
+    }
+}
+
+/// Offset and row of each entry.
+fn lay_out(typeface: &Typeface, entries: &[(Sign, String)], width: f64) -> Vec<(f64, usize)> {
+    let (mut x, mut row) = (0.0, 0);
+    entries
+        .iter()
+        .map(|(_, text)| {
+            let taken = 36.0 + typeface.width(text, TICK_SIZE, false);
+            if x > 0.0 && x + taken > width {
+                (x, row) = (0.0, row + 1);
+            }
+            let place = (x, row);
+            x += taken + 26.0;
+            place
+        })
+        .collect()
+}
+
+/// Draws an area of failed points: grey and hatched.
+pub(crate) fn failed(scene: &mut Scene, area: Outline) {
+    scene.fill_crisp(area.clone(), FAILED);
+    scene.hatch(area, &failed_hatch());
+}
+
+/// Lines over points that failed.
+pub(crate) fn failed_hatch() -> Hatch {
+    Hatch { strokes: vec![Stroke::solid(INK, 1.2)], spacing: 9.0, falling: false }
+}
+
+/// Lines over points whose motion is chaotic: light on dark, to show on every colour of a scale.
+pub(crate) fn sensitive_hatch() -> Hatch {
+    let strokes = vec![Stroke::solid(INK, 2.4), Stroke::solid(PAPER, 1.0)];
+    Hatch { strokes, spacing: 7.0, falling: true }
+}
+
+/// Draws cells `[x, y, width, height]` of undefined points: white with a dot in the middle.
+pub(crate) fn undefined(scene: &mut Scene, cells: &[[f64; 4]]) {
+    let (mut area, mut dots) = (Outline::default(), Outline::default());
+    for &[x, y, width, height] in cells {
+        area.add_rectangle(x, y, width, height);
+        let side = 4.0_f64.min(0.4 * width.min(height));
+        dots.add_rectangle(x + (width - side) / 2.0, y + (height - side) / 2.0, side, side);
+    }
+    scene.fill_crisp(area.clone(), PAPER);
+    scene.line(area, Stroke::solid(FAINT, 1.0));
+    scene.fill(dots, MUTED);
+}

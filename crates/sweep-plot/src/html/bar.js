@@ -1,0 +1,109 @@
+// Colour scales and their bars, and hatches.
+
+// Place of a value on a colour scale, from 0 to 1.
+function position(scale, value) {
+  const even = scale.log ? Math.log : (x) => x;
+  let place;
+  if (scale.centre === undefined) {
+    place = (even(value) - even(scale.low)) / (even(scale.high) - even(scale.low));
+  } else {
+    const offset = even(value) - even(scale.centre);
+    const end = even(offset < 0 ? scale.low : scale.high);
+    const half = Math.abs(end - even(scale.centre));
+    place = 0.5 + (0.5 * offset) / half;
+  }
+  return Math.min(Math.max(place, 0), 1);
+}
+
+// The colours of a layer, from the low end of its scale to the high one.
+function palette(layer) {
+  if (layer.scale.centre === undefined) return DATA.palettes.sequential;
+  const { diverging } = DATA.palettes;
+  return layer.scale.reversed ? [...diverging].reverse() : diverging;
+}
+
+// The colour bar below a narrow map, `right` px from the figure's edge.
+function drawBarBelow(context, box, layer, margin) {
+  const [y, thick, right] = [box.top + box.height + 72, 16, box.left + box.width];
+  const colours = palette(layer);
+  colours.forEach((colour, k) => {
+    const border = (step) => Math.round(box.left + (step / colours.length) * box.width);
+    context.fillStyle = colour;
+    context.fillRect(border(k), y, border(k + 1) - border(k), thick);
+  });
+  const ink = themed("ink");
+  context.strokeStyle = context.fillStyle = ink;
+  context.strokeRect(box.left, y, box.width, thick);
+  context.font = `13px ${FONT}`;
+  context.textAlign = "center";
+  // The limit first; what would touch a number before it is left out.
+  const isCentre = ([value]) => value === layer.scale.centre;
+  const taken = [];
+  for (const tick of [...layer.ticks].sort((a, b) => isCentre(b) - isCentre(a))) {
+    const [value, label] = tick;
+    const x = box.left + position(layer.scale, value) * box.width;
+    context.font = `${isCentre(tick) ? "bold " : ""}13px ${FONT}`;
+    const half = 0.5 * context.measureText(label).width + 4;
+    const colour = isCentre(tick) ? "#1b1f24" : ink;
+    drawLine(context, x, isCentre(tick) ? y : y + thick, x, y + thick + 4, [], colour);
+    if (taken.some(([low, high]) => x + half > low && x - half < high)) continue;
+    taken.push([x - half, x + half]);
+    const room = [box.left - 20 + half, right + margin - half];
+    context.fillText(label, Math.min(Math.max(x, room[0]), room[1]), y + thick + 18);
+  }
+  context.font = `13px ${FONT}`;
+  context.fillText(layer.label, box.left + box.width / 2, y + thick + 38, box.width + 50);
+}
+
+// The colour bar on the right of a map.
+function drawBarBeside(context, box, layer, width) {
+  const [x, thick] = [box.left + box.width + 22, 20];
+  const colours = palette(layer);
+  const bottom = box.top + box.height;
+  colours.forEach((colour, k) => {
+    const border = (step) => Math.round(bottom - (step / colours.length) * box.height);
+    const [low, high] = [border(k), border(k + 1)];
+    context.fillStyle = colour;
+    context.fillRect(x, high, thick, low - high);
+  });
+  context.strokeStyle = context.fillStyle = themed("ink");
+  context.strokeRect(x, box.top, thick, box.height);
+  context.textAlign = "left";
+  for (const [value, label] of layer.ticks) {
+    const y = bottom - position(layer.scale, value) * box.height;
+    const centre = value === layer.scale.centre;
+    const colour = centre ? "#1b1f24" : themed("ink");
+    drawLine(context, centre ? x : x + thick, y, x + thick + 5, y, [], colour);
+    context.font = `${centre ? "bold " : ""}13px ${FONT}`;
+    context.fillText(label, x + thick + 8, y + 4.5);
+  }
+  context.save();
+  context.font = `13px ${FONT}`;
+  context.translate(width - 8, box.top + box.height / 2);
+  context.rotate(-Math.PI / 2);
+  context.textAlign = "center";
+  context.fillText(layer.label, 0, 0);
+  context.restore();
+}
+
+// Slanted lines, on a ground of that colour or on what is there: each a colour and a width.
+// A finer one is for areas that could lie between the lines.
+function hatching(context, ground, { lines = [["#1b1f24", 1]], falling = false, side = 8 } = {}) {
+  const tile = element("canvas", { width: side, height: side });
+  const brush = tile.getContext("2d");
+  if (ground) {
+    brush.fillStyle = ground;
+    brush.fillRect(0, 0, side, side);
+  }
+  brush.beginPath();
+  for (const shift of [-side, 0, side]) {
+    brush.moveTo(shift, falling ? 0 : side);
+    brush.lineTo(shift + side, falling ? side : 0);
+  }
+  for (const [colour, width] of lines) {
+    brush.strokeStyle = colour;
+    brush.lineWidth = (width * side) / 8;
+    brush.stroke();
+  }
+  return context.createPattern(tile, "repeat");
+}

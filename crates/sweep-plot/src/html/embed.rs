@@ -1,0 +1,82 @@
+//! Numbers in a page: compact, and exact to what a reader can see.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+
+/// Values as little-endian 32 bit floats (7 digits), base64.
+pub(crate) fn floats(values: impl Iterator<Item = f64>) -> String {
+    STANDARD.encode(values.flat_map(|value| (value as f32).to_le_bytes()).collect::<Vec<u8>>())
+}
+
+/// Values as bytes, base64.
+pub(crate) fn bytes(values: impl Iterator<Item = u8>) -> String {
+    STANDARD.encode(values.collect::<Vec<u8>>())
+}
+
+/// Truth values as bits, the least of a byte first, base64.
+pub(crate) fn bits(values: &[bool]) -> String {
+    let byte = |values: &[bool]| {
+        values.iter().rev().fold(0, |byte: u8, value| byte << 1 | u8::from(*value))
+    };
+    STANDARD.encode(values.chunks(8).map(byte).collect::<Vec<u8>>())
+}
+
+/// Values as little-endian 16 bit integers, base64, and the size of their unit: a curve to 1/32767
+/// of its peak. What is not finite becomes the least integer.
+pub(crate) fn quantised(values: &[f64]) -> (String, f64) {
+    let peak = values
+        .iter()
+        .filter(|value| value.is_finite())
+        .fold(0.0_f64, |peak, value| peak.max(value.abs()));
+    let unit = short(if peak > 0.0 { peak * 1.001 / f64::from(i16::MAX) } else { 1.0 });
+    let integer =
+        |value: &f64| if value.is_finite() { (value / unit).round() as i16 } else { i16::MIN };
+    let data = values.iter().flat_map(|value| integer(value).to_le_bytes()).collect::<Vec<u8>>();
+    (STANDARD.encode(data), unit)
+}
+
+/// A number to six digits, so that it is written short.
+pub(crate) fn short(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn floats_are_little_endian() {
+        assert_eq!(
+            STANDARD.decode(floats([1.0, f64::NAN].into_iter())).unwrap()[..4],
+            [0, 0, 0x80, 0x3f]
+        );
+    }
+
+    #[test]
+    fn bits_start_with_the_least() {
+        let values: Vec<bool> = (0..10).map(|k| k == 1 || k == 9).collect();
+        assert_eq!(STANDARD.decode(bits(&values)).unwrap(), [0b10, 0b10]);
+    }
+
+    #[test]
+    fn a_quantised_curve_comes_back() {
+        let curve = [0.0, 0.07, -0.035, 1.0e-5, f64::NAN];
+        let (data, unit) = quantised(&curve);
+        let back: Vec<i16> = STANDARD
+            .decode(data)
+            .unwrap()
+            .chunks(2)
+            .map(|pair| i16::from_le_bytes([pair[0], pair[1]]))
+            .collect();
+        assert_eq!(back[4], i16::MIN);
+        for (value, integer) in curve.iter().zip(back).take(4) {
+            assert!((f64::from(integer) * unit - value).abs() <= 0.07 / 32_000.0);
+        }
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!(short(0.1 + 0.2).to_string(), "0.3");
+        assert!(short(f64::NAN).is_nan());
+    }
+}

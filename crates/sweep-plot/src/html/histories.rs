@@ -1,0 +1,102 @@
+//! Time histories beside a map: which trace file belongs to which point, and a form small enough
+//! for a page.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map as Object, Value, json};
+
+use super::embed;
+use crate::error::PlotError;
+use crate::gather::Map;
+use crate::label;
+use crate::read::{Kind, Source};
+use crate::table::Table;
+use sweep_files::{FileError, regular};
+
+/// Stretches of time that a history is cut into; of each, the least and the greatest value are
+/// kept.
+const STRETCHES: usize = 500;
+
+/// The trace files of a folder, by the place of their point in the grid:
+///
+/// ```text
+/// { "<place>": {
+///     "time_s": floats,
+///     "series": { "<column>": {
+///         "data": 16 bit integers, "unit": size of their unit, "shown": "mm", "factor": 1000,
+///         "words": "tub front, vertical" (of the nonlinear model's channels)
+///     } }
+/// } }
+/// ```
+///
+/// A file belongs to the point that its metadata names (`at`: axis to value), or else to the one
+/// whose index (column `point`) ends its name, as in `point-123.parquet`. Histories are cut into
+/// 500 stretches with two values each, the least and the greatest in the order in which they occur,
+/// at the stretch's first and middle instant.
+///
+/// # Errors
+/// [`PlotError::File`] for the folder; as [`Table::open`] for its files; [`PlotError::Unfit`] for a
+/// file that is not a trace or belongs to no point of the grid, and for a folder without any.
+pub(crate) fn read(folder: &Path, map: &Map) -> Result<Value, PlotError> {
+    let names = regular::names(folder).map_err(FileError::io("list", folder))?;
+    let mut files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
+    files.retain(|file| file.extension().is_some_and(|ending| ending == "parquet"));
+    if files.is_empty() {
+        return Err(PlotError::Unfit(format!(
+            "`--traces {}`: no trace files (.parquet) in it",
+            folder.display()
+        )));
+    }
+    let mut histories = Object::new();
+    for file in files {
+        let source = Source::open(&file)?;
+        let unfit =
+            |what: &str| PlotError::Unfit(format!("`--traces`: {}: {what}", file.display()));
+        if source.kind != Kind::Trace {
+            return Err(unfit("not a trace file"));
+        }
+        let cell = cell(&source, map).ok_or_else(|| {
+            unfit(
+                "it belongs to no point of this map: neither its metadata (`at`) nor its name \
+                   (point-<index>) says one",
+            )
+        })?;
+        histories.insert(cell.to_string(), history(&Table::read_thinned(source, STRETCHES)?)?);
+    }
+    Ok(Value::Object(histories))
+}
+
+/// The cell of a trace's point in the map's grid.
+fn cell(trace: &Source, map: &Map) -> Option<usize> {
+    if let Some(at) = trace.find("at").and_then(Value::as_object) {
+        let places: Option<Vec<usize>> = map
+            .grid
+            .axes
+            .iter()
+            .map(|axis| axis.place_near(at.get(&axis.name)?.as_f64()?))
+            .collect();
+        if let Some(places) = places {
+            return Some(map.grid.index(&places)).filter(|&cell| map.filled(cell));
+        }
+    }
+    let stem = trace.path.file_stem()?.to_str()?;
+    let digits = stem.rsplit(|letter: char| !letter.is_ascii_digit()).next()?;
+    let wanted: u32 = digits.parse().ok()?;
+    map.table.numbers("point").ok()?.iter().position(|point| *point == f64::from(wanted))
+}
+
+fn history(table: &Table) -> Result<Value, PlotError> {
+    let mut series = Object::new();
+    for column in &table.columns {
+        let Some(numbers) = column.numbers().filter(|_| column.name != "time_s") else { continue };
+        let (unit, factor) = label::shown(&column.unit);
+        let (data, size) = embed::quantised(numbers);
+        let mut facts = json!({ "data": data, "unit": size, "shown": unit, "factor": factor });
+        if let Some(channel) = column.name.strip_prefix("nonlinear_") {
+            facts["words"] = json!(label::channel(channel));
+        }
+        series.insert(column.name.clone(), facts);
+    }
+    let time = embed::floats(table.numbers("time_s")?.iter().copied());
+    Ok(json!({ "time_s": time, "series": series }))
+}

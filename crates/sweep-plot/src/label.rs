@@ -1,0 +1,153 @@
+//! Column names in plain words, units as engineers write them, numbers as short as they can be.
+
+use std::fmt;
+
+/// Suffixes of names and their units; a suffix comes before any that it ends with.
+const UNITS: [(&str, &str); 14] = [
+    ("_n_m_per_rad", "N m/rad"),
+    ("_n_s_per_m", "N s/m"),
+    ("_n_per_m", "N/m"),
+    ("_m_per_s2", "m/s²"),
+    ("_kg_m2", "kg m²"),
+    ("_rad_per_s", "rad/s"),
+    ("_rad", "rad"),
+    ("_rpm", "rpm"),
+    ("_deg", "°"),
+    ("_kg", "kg"),
+    ("_hz", "Hz"),
+    ("_n", "N"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
+/// The unit that a name's suffix says; empty if none.
+pub(crate) fn unit_of_name(name: &str) -> &'static str {
+    UNITS.iter().find(|(suffix, _)| name.ends_with(suffix)).map_or("", |(_, unit)| unit)
+}
+
+/// A parameter's or column's name in words, without its unit: `unbalance_mass_kg` is "Unbalance
+/// mass".
+pub(crate) fn words(name: &str) -> String {
+    let stem = UNITS.iter().find_map(|(suffix, _)| name.strip_suffix(suffix)).unwrap_or(name);
+    capitalised(&stem.replace('_', " "))
+}
+
+/// A channel's name in words: `tub_front_y` is "tub front, vertical".
+pub(crate) fn channel(name: &str) -> String {
+    for (suffix, words) in [("_y", ", vertical"), ("_z", ", horizontal")] {
+        if let Some(stem) = name.strip_suffix(suffix) {
+            return stem.replace('_', " ") + words;
+        }
+    }
+    name.replace('_', " ")
+}
+
+/// The unit of a channel whose file does not say it: angles are named after their axis, the rest
+/// are displacements.
+pub(crate) fn unit_of_channel(name: &str) -> &'static str {
+    match name.rsplit('_').next() {
+        Some("x" | "y" | "z") => "m",
+        Some("yaw" | "pitch" | "roll") => "rad",
+        _ => "",
+    }
+}
+
+/// With a capital first letter.
+pub(crate) fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// What an axis shows; as text, with the unit in brackets.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Label {
+    /// In words.
+    pub(crate) words: String,
+    /// Empty if there is none.
+    pub(crate) unit: String,
+}
+
+impl Label {
+    /// Words and unit.
+    pub(crate) fn new(words: &str, unit: &str) -> Self {
+        Self { words: words.to_owned(), unit: unit.to_owned() }
+    }
+}
+
+impl fmt::Display for Label {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&with_unit(&self.words, &self.unit))
+    }
+}
+
+/// Words and unit as an axis label.
+pub(crate) fn with_unit(words: &str, unit: &str) -> String {
+    if unit.is_empty() { words.to_owned() } else { format!("{words} ({unit})") }
+}
+
+/// The unit in which small motions are shown, and how many of it one of `unit` is.
+pub(crate) fn shown(unit: &str) -> (&str, f64) {
+    match unit {
+        "m" => ("mm", 1e3),
+        "rad" => ("mrad", 1e3),
+        unit => (unit, 1.0),
+    }
+}
+
+/// A number to `digits` significant digits, without trailing zeros.
+pub(crate) fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 { "0".to_owned() } else { "–".to_owned() };
+    }
+    // The exponent after rounding: 9.996 to three digits is 10.0.
+    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
+    let exponent: i32 =
+        scientific.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or_default();
+    if !(-4..7).contains(&exponent) {
+        return scientific;
+    }
+    let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or_default();
+    trimmed(&format!("{value:.decimals$}")).to_owned()
+}
+
+/// Without the zeros after the last digit of a decimal fraction.
+pub(crate) fn trimmed(number: &str) -> &str {
+    if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_words_and_units() {
+        for (name, plain, unit) in [
+            ("unbalance_mass_kg", "Unbalance mass", "kg"),
+            ("damping_n_s_per_m", "Damping", "N s/m"),
+            ("spring_stiffness_n_per_m", "Spring stiffness", "N/m"),
+            ("flexure_stiffness_n_m_per_rad", "Flexure stiffness", "N m/rad"),
+            ("spin_peak_rpm", "Spin peak", "rpm"),
+            ("min_gap_linear_m", "Min gap linear", "m"),
+            ("tub_inertia_11_kg_m2", "Tub inertia 11", "kg m²"),
+            ("ratio_max", "Ratio max", ""),
+        ] {
+            assert_eq!((words(name).as_str(), unit_of_name(name)), (plain, unit));
+        }
+        assert_eq!(channel("drum_front_z"), "drum front, horizontal");
+    }
+
+    #[test]
+    fn numbers_are_rounded_not_cut() {
+        for (value, text) in [
+            (9.996, "10"),
+            (0.1234, "0.123"),
+            (-140.0, "-140"),
+            (1.0e-9, "1.00e-9"),
+            (123_456.0, "123456"),
+            (0.0, "0"),
+            (f64::NAN, "–"),
+        ] {
+            assert_eq!(significant(value, 3), text);
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! Figures from this program's Parquet files: as SVG, as PNG, or as one HTML page that needs
+//! nothing else.
+//!
+//! A file's columns show its kind. A map becomes a picture of cells, any other file a chart of
+//! curves. Both are laid out as a scene of shapes and text, which is written as SVG or PNG. A page
+//! carries the numbers instead, and a script that draws them. The same file and options give the
+//! same bytes.
+
+mod axis;
+mod chart;
+mod colour;
+pub mod contour;
+mod cuts;
+mod decimate;
+mod error;
+mod figures;
+mod frame;
+mod gather;
+mod grid;
+mod html;
+mod label;
+mod layer;
+mod raster;
+mod read;
+mod region;
+#[cfg(test)]
+mod sample;
+mod scene;
+mod svg;
+mod swept;
+mod table;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod tests_long;
+mod thin;
+
+use std::path::{Path, PathBuf};
+
+pub use error::PlotError;
+
+use chart::Chart;
+use cuts::Cuts;
+use gather::Map;
+use grid::Grid;
+use raster::Typeface;
+use read::{Kind, Source};
+use scene::Scene;
+use table::Table;
+
+use sweep_files::{self as files, Output};
+
+/// Image pixels to a scene pixel in a PNG: sharp on dense screens and in print.
+const PNG_SCALE: f64 = 2.0;
+
+/// What a map shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+pub enum Quantity {
+    /// Nonlinear over linear amplitude: of `--channel`, or the largest of all
+    #[default]
+    Ratio,
+    /// Amplitude of `--channel` in the nonlinear model
+    Nonlinear,
+    /// Amplitude of `--channel` in the linear model
+    Linear,
+    /// Least gap between drum and tub in the nonlinear model
+    GapNonlinear,
+    /// Least gap between drum and tub in the linear model
+    GapLinear,
+    /// Greatest force on the cabinet in the nonlinear model, if the run has this metric
+    CabinetForceNonlinear,
+    /// Greatest force on the cabinet in the linear model, if the run has this metric
+    CabinetForceLinear,
+    /// How long drum and tub clash in the nonlinear model, if the run has this metric
+    ClashTimeNonlinear,
+    /// How long drum and tub clash in the linear model, if the run has this metric
+    ClashTimeLinear,
+    /// How far the tub sinks at rest, if the run has this metric
+    StaticSag,
+    /// How each point ended
+    Status,
+}
+
+/// Which figure of a file that has several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+pub enum View {
+    /// Modes: natural frequencies over spin speed, and where they meet it
+    Frequencies,
+    /// Modes: how far frequencies vary over a turn of the drum
+    Variation,
+    /// Modes: what moves at each resonance speed
+    Shapes,
+    /// Trace: motion over time
+    Time,
+    /// Trace: greatest deviation in each turn over spin speed, on the way up and down
+    Passages,
+}
+
+impl View {
+    /// The kind of file that it is a figure of.
+    const fn of(self) -> Kind {
+        match self {
+            Self::Frequencies | Self::Variation | Self::Shapes => Kind::Modes,
+            Self::Time | Self::Passages => Kind::Trace,
+        }
+    }
+}
+
+/// What to show; the default is the figure that fits the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlotOptions {
+    /// Modes, trace: which figure; by default the first.
+    pub view: Option<View>,
+    /// Map: what the colours are.
+    pub quantity: Quantity,
+    /// Map: the channel of the quantity. Trace: the channels shown.
+    pub channels: Vec<String>,
+    /// Map of three or more axes: where to cut an axis beyond the second, by name and value.
+    pub at: Vec<(String, f64)>,
+    /// Trace: resonance speeds whose passages are marked, rpm.
+    pub resonances_rpm: Vec<f64>,
+    /// Trace: a modes file whose resonance speeds are marked too.
+    pub modes: Option<PathBuf>,
+    /// Trace: another trace file, whose nonlinear model is drawn in place of the linear one.
+    pub against: Option<PathBuf>,
+    /// Map as a page: a folder of trace files; clicking a point that has one shows it.
+    pub traces: Option<PathBuf>,
+}
+
+/// How a figure is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Svg,
+    Png,
+    Html,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self, PlotError> {
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        match ending.to_ascii_lowercase().as_str() {
+            "svg" => Ok(Self::Svg),
+            "png" => Ok(Self::Png),
+            "html" | "htm" => Ok(Self::Html),
+            _ => Err(PlotError::Format { path: path.to_owned() }),
+        }
+    }
+
+    /// What such a figure may be written over.
+    const fn kind(self) -> files::FileKind<'static> {
+        match self {
+            Self::Svg => files::FileKind::Svg,
+            Self::Png => files::FileKind::Png,
+            Self::Html => files::FileKind::Html,
+        }
+    }
+}
+
+/// Draws the figure that fits `input` to `output`, whose ending (`.svg`, `.png`, `.html`) says how.
+///
+/// # Errors
+/// Any [`PlotError`]: an unreadable file, options that do not fit it, an output that cannot be
+/// written. The output's name and the options are judged before the output is touched.
+pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), PlotError> {
+    let format = Format::of(output)?;
+    let file = Output::begin(output, format.kind())?;
+    let source = Source::open(input)?;
+    check_options(&source, options, format)?;
+    let bytes = match source.kind {
+        Kind::Map => map(source, options, format)?,
+        Kind::Trace | Kind::Modes | Kind::Boundary => {
+            chart(&Table::read(source)?, options, format)?
+        }
+    };
+    Ok(file.finish(&bytes)?)
+}
+
+/// Most cells of a picture: two pixels or three to each.
+const PICTURE_CELLS: usize = 1 << 17;
+
+fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+    let axes = swept::axes(&source)?;
+    let limit = source.ratio_limit();
+    let divide = |name: &str| layer::divide(limit, name);
+    if format != Format::Html && axes.len() > 1 {
+        let shown = layer::chosen(&source, options)?;
+        let columns: Vec<&str> =
+            shown.iter().map(|shown| shown.column.as_str()).chain(["status"]).collect();
+        let cuts = Cuts::of_picture(&source, &axes, options)?;
+        let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
+        let map = Map::read(source, grid, &columns, divide)?;
+        let typeface = Typeface::load()?;
+        return image(&figures::map::draw(&map, &cuts, shown.as_ref(), &typeface)?, format);
+    }
+    let columns: Vec<String> =
+        html::carried(&source, &axes).into_iter().map(str::to_owned).collect();
+    let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let most = html::most_cells(columns.len());
+    let cuts = Cuts::of_page(&source, &axes, options, most)?;
+    let grid = Grid::new(&axes, &cuts.picks, most);
+    if axes.len() == 1 {
+        let map = Map::read(source, grid, &columns, divide)?;
+        return written(&map.table, &figures::curves::chart(&map, options)?, format);
+    }
+    // An amplitude without a channel is chosen on the page.
+    let choice = matches!(options.quantity, Quantity::Nonlinear | Quantity::Linear);
+    if !(choice && options.channels.is_empty()) {
+        layer::chosen(&source, options)?;
+    }
+    let map = Map::read(source, grid, &columns, divide)?;
+    Ok(html::map_page(&map, &cuts, options)?.into_bytes())
+}
+
+fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+    let chart = match (table.source.kind, options.view) {
+        (Kind::Trace, Some(View::Passages)) => figures::passages::chart(table, options)?,
+        (Kind::Trace, _) => figures::trace::chart(table, options)?,
+        (Kind::Modes, Some(View::Variation)) => figures::turn::chart(table)?,
+        (Kind::Modes, Some(View::Shapes)) => figures::shapes::chart(table)?,
+        (Kind::Modes, _) => figures::campbell::chart(table)?,
+        (Kind::Boundary | Kind::Map, _) => figures::boundary::chart(table)?,
+    };
+    written(table, &chart, format)
+}
+
+fn written(table: &Table, chart: &Chart, format: Format) -> Result<Vec<u8>, PlotError> {
+    match format {
+        Format::Html => Ok(html::chart_page(table, chart).into_bytes()),
+        Format::Svg | Format::Png => image(&chart::draw(chart, &Typeface::load()?), format),
+    }
+}
+
+fn image(scene: &Scene, format: Format) -> Result<Vec<u8>, PlotError> {
+    match format {
+        Format::Png => raster::write(scene, PNG_SCALE),
+        _ => Ok(svg::write(scene).into_bytes()),
+    }
+}
+
+/// What the view asked for is a figure of.
+fn view_of(options: &PlotOptions) -> &'static str {
+    match options.view.map(View::of) {
+        Some(Kind::Modes) => "modes files",
+        _ => "traces",
+    }
+}
+
+/// Refuses options that the file's kind or the output's format would leave without effect.
+fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
+    let (map, trace) = (source.kind == Kind::Map, source.kind == Kind::Trace);
+    let view_fits = options.view.is_some_and(|view| view.of() == source.kind);
+    let over_time = trace && options.view != Some(View::Passages);
+    let rules = [
+        ("--quantity", options.quantity != Quantity::default(), map, "maps"),
+        ("--channel", !options.channels.is_empty(), map || trace, "maps and traces"),
+        ("--at", !options.at.is_empty(), map, "maps"),
+        ("--resonances", !options.resonances_rpm.is_empty(), trace, "traces"),
+        ("--modes", options.modes.is_some(), trace, "traces"),
+        ("--view", options.view.is_some(), view_fits, view_of(options)),
+        ("--against", options.against.is_some(), over_time, "traces over time"),
+        (
+            "--traces",
+            options.traces.is_some(),
+            map && format == Format::Html,
+            "maps drawn as .html",
+        ),
+    ];
+    for (option, given, fits, where_it_does) in rules {
+        if given && !fits {
+            let kind = source.kind.name();
+            let path = source.path.display();
+            return Err(PlotError::Unfit(format!(
+                "`{option}` is for {where_it_does}; {path} is a {kind} file"
+            )));
+        }
+    }
+    Ok(())
+}

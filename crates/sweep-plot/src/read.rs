@@ -1,0 +1,313 @@
+//! One of this program's Parquet files, open: what it says of itself, and its rows, batch by batch.
+//!
+//! This is the one place that reads files. A map of ten million rows is read in several passes over
+//! the columns that a figure needs, and is never in memory whole.
+
+use std::path::{Path, PathBuf};
+
+use arrow_array::ArrayRef;
+use arrow_schema::{ArrowError, DataType, Field};
+use parquet::arrow::ProjectionMask;
+use serde_json::Value;
+
+use super::error::PlotError;
+use super::label;
+use sweep_files::cells;
+use sweep_files::{self as files, FileError, ParquetFile};
+
+/// What a file holds. Its columns show which.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// One row per grid point.
+    Map,
+    /// Time histories of both models at one point.
+    Trace,
+    /// Modes over spin speed.
+    Modes,
+    /// The curve on which the ratio is at its limit.
+    Boundary,
+}
+
+impl Kind {
+    /// As in "a map file".
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Map => "map",
+            Self::Trace => "trace",
+            Self::Modes => "modes",
+            Self::Boundary => "boundary",
+        }
+    }
+}
+
+/// What the cells of a column are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cells {
+    /// Any numeric type.
+    Numbers,
+    /// Text, plain or dictionary coded, and truth values as `true` and `false`.
+    Words,
+}
+
+/// A column, without its rows.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ColumnFacts {
+    /// As in the file.
+    pub(crate) name: String,
+    /// As the file's field metadata says, or else as the name's suffix does; empty for pure
+    /// numbers.
+    pub(crate) unit: String,
+    /// As the file's field metadata says; may be empty.
+    pub(crate) description: String,
+    /// What its cells are.
+    pub(crate) cells: Cells,
+    /// Its place among the file's fields.
+    field: usize,
+}
+
+/// A file whose columns are those of a figure.
+#[derive(Debug)]
+pub(crate) struct Source {
+    /// Where it is.
+    pub(crate) path: PathBuf,
+    /// What it holds.
+    pub(crate) kind: Kind,
+    /// In file order, without those of types that none of our files has.
+    pub(crate) columns: Vec<ColumnFacts>,
+    /// The file-level key-value metadata, parsed where it is JSON; in file order.
+    pub(crate) provenance: Vec<(String, Value)>,
+    /// Number of rows.
+    pub(crate) rows: usize,
+    file: ParquetFile,
+}
+
+/// Key under which Arrow keeps its own copy of the schema: no provenance.
+const ARROW_SCHEMA: &str = "ARROW:schema";
+
+/// Rows decoded at once.
+const BATCH_ROWS: usize = 1 << 12;
+
+impl Source {
+    /// Opens a file and reads what it says of itself.
+    ///
+    /// # Errors
+    /// [`PlotError::File`], or [`PlotError::UnknownKind`] when the columns are not those of a file
+    /// of ours.
+    pub(crate) fn open(path: &Path) -> Result<Self, PlotError> {
+        let file = ParquetFile::open(path)?;
+        let rows = usize::try_from(file.rows()).unwrap_or(usize::MAX);
+        let provenance = file
+            .pairs()
+            .filter(|entry| entry.key != ARROW_SCHEMA)
+            .map(|entry| {
+                let text = entry.value.clone().unwrap_or_default();
+                (entry.key.clone(), serde_json::from_str(&text).unwrap_or(Value::String(text)))
+            })
+            .collect();
+        let fields = file.schema().fields().iter().enumerate();
+        let columns: Vec<ColumnFacts> =
+            fields.filter_map(|(place, field)| column(field, place)).collect();
+        let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+        let kind = recognise(&names).ok_or_else(|| PlotError::UnknownKind {
+            path: path.to_owned(),
+            columns: names.join(", "),
+        })?;
+        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, file })
+    }
+
+    /// The rows of the named columns, from the first. Names that the file lacks are left out.
+    ///
+    /// # Errors
+    /// [`PlotError::File`].
+    pub(crate) fn batches(&self, names: &[&str]) -> Result<Batches<'_>, PlotError> {
+        let columns: Vec<&ColumnFacts> =
+            names.iter().filter_map(|name| self.column(name)).collect();
+        let mut fields: Vec<usize> = columns.iter().map(|column| column.field).collect();
+        fields.sort_unstable();
+        // Two columns of one name, in a file that is not ours, are the first of them twice.
+        fields.dedup();
+        let at = columns.iter().map(|column| fields.partition_point(|&field| field < column.field));
+        let at = at.collect();
+        let reader = self.file.batches(|builder| {
+            let mask = ProjectionMask::roots(builder.parquet_schema(), fields);
+            builder.with_projection(mask).with_batch_size(BATCH_ROWS)
+        })?;
+        Ok(Batches { path: &self.path, reader, columns, at })
+    }
+
+    /// The column of that name.
+    pub(crate) fn column(&self, name: &str) -> Option<&ColumnFacts> {
+        self.columns.iter().find(|column| column.name == name)
+    }
+
+    /// Columns of numbers whose name starts with `prefix`, without it.
+    pub(crate) fn with_prefix(&self, prefix: &str) -> Vec<(&str, &ColumnFacts)> {
+        self.numeric()
+            .filter_map(|column| Some((column.name.strip_prefix(prefix)?, column)))
+            .collect()
+    }
+
+    /// Columns of numbers.
+    pub(crate) fn numeric(&self) -> impl Iterator<Item = &ColumnFacts> {
+        self.columns.iter().filter(|column| column.cells == Cells::Numbers)
+    }
+
+    /// A column that this kind of file must have is missing.
+    pub(crate) fn lacks(&self, column: &str, expected: &'static str) -> PlotError {
+        PlotError::Column {
+            path: self.path.clone(),
+            kind: self.kind.name(),
+            expected,
+            column: column.to_owned(),
+        }
+    }
+
+    /// The first value stored under `key` in the provenance, outer levels before inner ones.
+    pub(crate) fn find(&self, key: &str) -> Option<&Value> {
+        self.provenance
+            .iter()
+            .find_map(|(name, value)| if name == key { Some(value) } else { find(value, key) })
+    }
+
+    /// Name of the run, if the file says it.
+    pub(crate) fn run_name(&self) -> Option<&str> {
+        self.find("name").and_then(Value::as_str)
+    }
+
+    /// The run's name, if the file says it, and `rest` as a figure's subtitle.
+    pub(crate) fn subtitle(&self, rest: &str) -> String {
+        self.run_name().map_or_else(|| rest.to_owned(), |name| format!("{name} · {rest}"))
+    }
+
+    /// What its ratios compare, by the run's criterion.
+    pub(crate) fn compared(&self) -> &'static str {
+        match self.find("criterion").and_then(Value::as_str) {
+            Some("envelope") => "amplitudes by turn",
+            Some("rms") => "root mean squares",
+            _ => "amplitudes",
+        }
+    }
+
+    /// The ratio from which on a point is unreliable: the run's limit, or else the paper's, 2.
+    pub(crate) fn ratio_limit(&self) -> f64 {
+        self.find("ratio_limit").and_then(Value::as_f64).filter(|limit| *limit > 0.0).unwrap_or(2.0)
+    }
+}
+
+/// The cells are not what the schema says.
+fn damaged(path: &Path, error: &ArrowError) -> PlotError {
+    FileError::NotParquet { path: path.to_owned(), reason: error.to_string() }.into()
+}
+
+/// The rows of some columns of a file, in file order.
+pub(crate) struct Batches<'a> {
+    path: &'a Path,
+    reader: files::Batches,
+    columns: Vec<&'a ColumnFacts>,
+    /// Place of each column in what the reader gives.
+    at: Vec<usize>,
+}
+
+impl<'a> Iterator for Batches<'a> {
+    type Item = Result<Batch<'a>, PlotError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let batch = self.reader.next()?.map_err(PlotError::from);
+        Some(batch.map(|batch| {
+            let cells = self.at.iter().map(|&place| batch.column(place).clone());
+            let columns = self.columns.iter().copied().zip(cells).collect();
+            Batch { path: self.path, columns, rows: batch.num_rows() }
+        }))
+    }
+}
+
+/// Some rows of some columns.
+pub(crate) struct Batch<'a> {
+    path: &'a Path,
+    columns: Vec<(&'a ColumnFacts, ArrayRef)>,
+    /// Number of rows.
+    pub(crate) rows: usize,
+}
+
+impl Batch<'_> {
+    fn array(&self, name: &str) -> Option<&ArrayRef> {
+        self.columns.iter().find(|(column, _)| column.name == name).map(|(_, array)| array)
+    }
+
+    /// The numbers of a column, null as NaN; none for a column that was not asked for.
+    ///
+    /// # Errors
+    /// [`PlotError::File`] if the cells are not what the schema says.
+    pub(crate) fn numbers(&self, name: &str) -> Result<Vec<f64>, PlotError> {
+        let Some(array) = self.array(name) else { return Ok(Vec::new()) };
+        let numbers = cells::numbers(array).map_err(|error| damaged(self.path, &error))?;
+        Ok(numbers.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
+    }
+
+    /// The words of a column; none for a column that was not asked for.
+    ///
+    /// # Errors
+    /// [`PlotError::File`] if the cells are not what the schema says.
+    pub(crate) fn words(&self, name: &str) -> Result<Vec<Option<&str>>, PlotError> {
+        let Some(array) = self.array(name) else { return Ok(Vec::new()) };
+        let words = if matches!(array.data_type(), DataType::Boolean) {
+            let word = |flag: bool| if flag { "true" } else { "false" };
+            cells::flags(array).map(|flags| flags.iter().map(|flag| flag.map(word)).collect())
+        } else {
+            cells::texts(array)
+        };
+        words.map_err(|error| damaged(self.path, &error))
+    }
+}
+
+fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
+    match value {
+        Value::Object(map) => {
+            map.get(key).or_else(|| map.values().find_map(|inner| find(inner, key)))
+        }
+        Value::Array(items) => items.iter().find_map(|inner| find(inner, key)),
+        _ => None,
+    }
+}
+
+fn recognise(names: &[&str]) -> Option<Kind> {
+    let has = |name: &str| names.contains(&name);
+    if has("status") && has("ratio_max") {
+        Some(Kind::Map)
+    } else if has("time_s") && names.iter().any(|name| name.starts_with("nonlinear_")) {
+        Some(Kind::Trace)
+    } else if has("mode") && has("frequency_rpm") && has("speed_rpm") {
+        Some(Kind::Modes)
+    } else if bracket(names).is_some() {
+        Some(Kind::Boundary)
+    } else {
+        None
+    }
+}
+
+/// The two columns between which a boundary is known to lie, after its two coordinates.
+pub(crate) fn bracket<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
+    let with_word = |words: &[&str]| {
+        names.iter().skip(2).copied().find(|name| name.split('_').any(|part| words.contains(&part)))
+    };
+    Some((with_word(&["low", "lower", "min"])?, with_word(&["high", "upper", "max"])?))
+}
+
+fn column(field: &Field, place: usize) -> Option<ColumnFacts> {
+    let cells = match field.data_type() {
+        DataType::Boolean => Cells::Words,
+        text if cells::is_text(text) => Cells::Words,
+        number if cells::is_number(number) => Cells::Numbers,
+        _ => return None,
+    };
+    let told = |key: &str| field.metadata().get(key).filter(|text| !text.is_empty()).cloned();
+    let unit = told("unit").unwrap_or_else(|| label::unit_of_name(field.name()).to_owned());
+    Some(ColumnFacts {
+        name: field.name().clone(),
+        // A pure number's unit is 1, which no label should say.
+        unit: if unit == "1" { String::new() } else { unit },
+        description: told("description").unwrap_or_default(),
+        cells,
+        field: place,
+    })
+}

@@ -1,0 +1,56 @@
+//! Where within a panel the name of a region has room.
+
+/// Samples across and down: enough to find room for a line of text.
+const SAMPLES: [usize; 2] = [44, 33];
+
+/// Centre of the place deepest inside the region `inside`, in a panel `[width, height]` px, for a
+/// text of `size` `[width, height]` px; `None` if it fits nowhere. Coordinates are px from the
+/// panel's top left.
+pub(crate) fn roomiest(
+    panel: [f64; 2],
+    size: [f64; 2],
+    inside: impl Fn([f64; 2]) -> bool,
+) -> Option<[f64; 2]> {
+    let at = |i: usize, j: usize| {
+        [
+            (i as f64 + 0.5) / SAMPLES[0] as f64 * panel[0],
+            (j as f64 + 0.5) / SAMPLES[1] as f64 * panel[1],
+        ]
+    };
+    let samples = (0..SAMPLES[0]).flat_map(|i| (0..SAMPLES[1]).map(move |j| at(i, j)));
+    let (within, outside): (Vec<_>, Vec<_>) = samples.partition(|&point| inside(point));
+    // Distance in units of the text's half extent, so that a wide text looks for a wide place.
+    let distance = |a: [f64; 2], b: [f64; 2]| {
+        let [dx, dy] = [0, 1].map(|k| 2.0 * (a[k] - b[k]).abs() / size[k]);
+        dx.max(dy)
+    };
+    let mut best: Option<(f64, [f64; 2])> = None;
+    for centre in within {
+        let rim = [0, 1].map(|k| 2.0 * centre[k].min(panel[k] - centre[k]) / size[k]);
+        let mut room = rim[0].min(rim[1]);
+        for &other in &outside {
+            room = room.min(distance(centre, other));
+            if best.is_some_and(|(most, _)| room <= most) {
+                break;
+            }
+        }
+        if room >= 1.0 && best.is_none_or(|(most, _)| room > most) {
+            best = Some((room, centre));
+        }
+    }
+    best.map(|(_, centre)| centre)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_set_in_the_wide_part() {
+        // A strip 60 px high over the whole width at the top, and a column 100 px wide below it.
+        let shape = |[x, y]: [f64; 2]| y < 60.0 || x < 100.0;
+        let [x, y] = roomiest([600.0, 400.0], [200.0, 20.0], shape).unwrap();
+        assert!((100.0..=500.0).contains(&x) && (10.0..=50.0).contains(&y), "{x} {y}");
+        assert_eq!(roomiest([600.0, 400.0], [200.0, 20.0], |[x, _]| x < 150.0), None);
+    }
+}

@@ -1,0 +1,256 @@
+//! Small files in the forms that this program writes, for tests.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow_array::types::Int32Type;
+use arrow_array::{
+    Array as _, ArrayRef, BooleanArray, DictionaryArray, Float64Array, RecordBatch, UInt64Array,
+};
+use arrow_schema::{Field, Schema};
+use parquet::arrow::ArrowWriter;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+
+/// Columns with their units, and metadata, on the way to a file.
+#[derive(Clone, Default)]
+pub(crate) struct Sample {
+    columns: Vec<(Field, ArrayRef)>,
+    metadata: Vec<KeyValue>,
+}
+
+impl Sample {
+    pub(crate) fn column(mut self, name: &str, unit: &str, array: ArrayRef) -> Self {
+        let metadata = if unit.is_empty() {
+            HashMap::new()
+        } else {
+            HashMap::from([
+                ("unit".to_owned(), unit.to_owned()),
+                ("description".to_owned(), format!("{name}, said")),
+            ])
+        };
+        let field = Field::new(name, array.data_type().clone(), true).with_metadata(metadata);
+        self.columns.push((field, array));
+        self
+    }
+
+    pub(crate) fn numbers(
+        self,
+        name: &str,
+        unit: &str,
+        values: impl IntoIterator<Item = f64>,
+    ) -> Self {
+        // As in the files: no value is null, not NaN.
+        let values = values.into_iter().map(|value| value.is_finite().then_some(value));
+        self.column(name, unit, Arc::new(values.collect::<Float64Array>()))
+    }
+
+    pub(crate) fn counts(self, name: &str, values: impl IntoIterator<Item = u64>) -> Self {
+        self.column(name, "1", Arc::new(UInt64Array::from_iter_values(values)))
+    }
+
+    pub(crate) fn words<'a>(
+        self,
+        name: &str,
+        values: impl IntoIterator<Item = Option<&'a str>>,
+    ) -> Self {
+        let array: DictionaryArray<Int32Type> = values.into_iter().collect();
+        self.column(name, "", Arc::new(array))
+    }
+
+    pub(crate) fn flags(self, name: &str, values: impl IntoIterator<Item = Option<bool>>) -> Self {
+        self.column(name, "", Arc::new(values.into_iter().collect::<BooleanArray>()))
+    }
+
+    pub(crate) fn metadata(mut self, key: &str, value: &str) -> Self {
+        self.metadata.push(KeyValue::new(key.to_owned(), value.to_owned()));
+        self
+    }
+
+    pub(crate) fn write(self, folder: &Path, name: &str) -> PathBuf {
+        write_all(folder, name, [self])
+    }
+}
+
+/// Writes samples of the same columns to one file, one after the other; the metadata is that of the
+/// first.
+fn write_all(folder: &Path, name: &str, samples: impl IntoIterator<Item = Sample>) -> PathBuf {
+    let path = folder.join(name);
+    let mut writer: Option<ArrowWriter<std::fs::File>> = None;
+    for sample in samples {
+        let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = sample.columns.into_iter().unzip();
+        let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap();
+        let writer = writer.get_or_insert_with(|| {
+            let properties =
+                WriterProperties::builder().set_key_value_metadata(Some(sample.metadata)).build();
+            let file = std::fs::File::create(&path).unwrap();
+            ArrowWriter::try_new(file, batch.schema(), Some(properties)).unwrap()
+        });
+        writer.write(&batch).unwrap();
+    }
+    writer.unwrap().close().unwrap();
+    path
+}
+
+/// A map's axes by name and values, and what the two models give at a point.
+pub(crate) struct MapSample<'a> {
+    pub(crate) axes: Vec<(&'a str, Vec<f64>)>,
+    pub(crate) limit: f64,
+    /// Amplitudes of `tub_yaw` in the nonlinear and the linear model, rad; `None` where the run
+    /// diverged.
+    pub(crate) yaw: &'a dyn Fn(&[f64]) -> Option<[f64; 2]>,
+    /// Where the motion is `sensitive`.
+    pub(crate) chaotic: &'a dyn Fn(&[f64]) -> bool,
+}
+
+impl MapSample<'_> {
+    pub(crate) fn sample(&self) -> Sample {
+        self.rows(0..self.points())
+    }
+
+    /// A file as long as the axes make it, some rows in memory at a time.
+    pub(crate) fn write_long(&self, folder: &Path, name: &str) -> PathBuf {
+        const ROWS: usize = 1 << 14;
+        let all = self.points();
+        write_all(
+            folder,
+            name,
+            (0..all).step_by(ROWS).map(|row| self.rows(row..all.min(row + ROWS))),
+        )
+    }
+
+    fn points(&self) -> usize {
+        self.axes.iter().map(|(_, values)| values.len()).product()
+    }
+
+    fn point(&self, index: usize) -> Vec<f64> {
+        let mut rest = index;
+        let mut at: Vec<f64> = Vec::with_capacity(self.axes.len());
+        for (_, values) in self.axes.iter().rev() {
+            at.push(values[rest % values.len()]);
+            rest /= values.len();
+        }
+        at.reverse();
+        at
+    }
+
+    fn rows(&self, rows: std::ops::Range<usize>) -> Sample {
+        let points: Vec<Vec<f64>> = rows.clone().map(|index| self.point(index)).collect();
+        let yaws: Vec<Option<[f64; 2]>> = points.iter().map(|at| (self.yaw)(at)).collect();
+        let model = |k: usize| {
+            yaws.iter().map(move |yaw| yaw.map_or(f64::NAN, |yaw| yaw[k])).collect::<Vec<f64>>()
+        };
+        let ratio: Vec<f64> = model(0)
+            .iter()
+            .zip(model(1))
+            .map(|(n, l)| if l > 0.0 { n / l } else { f64::NAN })
+            .collect();
+        let mut sample = Sample::default().counts("point", rows.start as u64..rows.end as u64);
+        for (k, (name, _)) in self.axes.iter().enumerate() {
+            sample = sample.numbers(name, "", points.iter().map(|at| at[k]));
+        }
+        let pitch = |factor: f64| move |value: f64| factor * value;
+        let known = |ratio: &f64| ratio.is_finite();
+        let channel = |ratio: &f64| known(ratio).then_some("tub_yaw");
+        let reliable = |ratio: &f64| known(ratio).then_some(*ratio < self.limit);
+        let status = |yaw: &Option<_>| Some(if yaw.is_some() { "ok" } else { "diverged" });
+        let fail_time = |yaw: &Option<_>| if yaw.is_some() { f64::NAN } else { 41.5 };
+        let plan = serde_json::json!({
+            "machine": { "name": "paper" }, "name": "sample",
+            "reliability": { "ratio_limit": self.limit },
+        });
+        sample
+            .numbers("nonlinear_tub_yaw", "rad", model(0))
+            .numbers("nonlinear_tub_pitch", "rad", model(0).into_iter().map(pitch(0.4)))
+            .numbers("linear_tub_yaw", "rad", model(1))
+            .numbers("linear_tub_pitch", "rad", model(1).into_iter().map(pitch(0.5)))
+            .numbers("ratio_tub_yaw", "1", ratio.iter().copied())
+            .numbers("ratio_tub_pitch", "1", ratio.iter().map(|ratio| 0.8 * ratio))
+            .numbers("ratio_max", "1", ratio.iter().copied())
+            .words("ratio_max_channel", ratio.iter().map(channel))
+            .flags("reliable", ratio.iter().map(reliable))
+            .flags("sensitive", points.iter().map(|at| Some((self.chaotic)(at))))
+            .numbers("min_gap_nonlinear_m", "m", model(0).into_iter().map(|yaw| 0.01 - 0.1 * yaw))
+            .numbers("min_gap_linear_m", "m", model(1).into_iter().map(|yaw| 0.01 - 0.1 * yaw))
+            .words("status", yaws.iter().map(status))
+            .numbers("fail_time_s", "s", yaws.iter().map(fail_time))
+            .counts("steps_nonlinear", points.iter().map(|_| 250_000))
+            .metadata("sweep.plan", &plan.to_string())
+            .metadata("sweep.version", "0.1.0")
+    }
+}
+
+/// A two-axis map whose boundary is the straight line damping = 50 + 200 mass, with a failed and an
+/// undefined point.
+pub(crate) fn map() -> Sample {
+    let axis = |from: f64, step: f64, count: i32| {
+        (0..count).map(|k| from + step * f64::from(k)).collect::<Vec<f64>>()
+    };
+    MapSample {
+        axes: vec![
+            ("unbalance_mass_kg", axis(0.1, 0.1, 10)),
+            ("damping_n_s_per_m", axis(60.0, 30.0, 9)),
+        ],
+        limit: 3.0,
+        yaw: &|at| match at {
+            [mass, damping] if *mass > 0.95 && *damping < 70.0 => None,
+            [mass, damping] if *mass < 0.15 && *damping > 290.0 => Some([0.0, 0.0]),
+            [mass, damping] => {
+                Some([0.009 * 3.0 * ((50.0 + 200.0 * mass - damping) / 60.0).exp(), 0.009])
+            }
+            _ => unreachable!("two axes"),
+        },
+        chaotic: &|_| false,
+    }
+    .sample()
+}
+
+/// Twelve seconds of both models, to 300 rpm and back.
+pub(crate) fn trace() -> Sample {
+    let time: Vec<f64> = (0..=6000).map(|k| 0.002 * f64::from(k)).collect();
+    let along = |factor: f64| {
+        time.iter().map(move |t| factor * (t / 12.0) * (20.0 * t).sin()).collect::<Vec<f64>>()
+    };
+    Sample::default()
+        .numbers("time_s", "s", time.iter().copied())
+        .numbers("speed_rpm", "rpm", time.iter().map(|t| 50.0 * (6.0 - (t - 6.0).abs())))
+        .numbers("nonlinear_tub_yaw", "rad", along(0.07))
+        .numbers("nonlinear_drum_front_y", "m", along(0.03))
+        .numbers("linear_tub_yaw", "rad", along(0.009))
+        .numbers("linear_drum_front_y", "m", along(0.02))
+        .numbers("gap_nonlinear_m", "m", along(0.002).into_iter().map(|g| 0.01 - g.abs()))
+        .numbers("gap_linear_m", "m", along(0.001).into_iter().map(|g| 0.01 - g.abs()))
+        .metadata("at", r#"{"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 120.0}"#)
+}
+
+/// Two modes that cross the speed at 100 and 200 rpm, and one far above.
+pub(crate) fn modes() -> Sample {
+    let rows: Vec<(f64, u64)> =
+        (0..=30).flat_map(|k| (1..=3).map(move |mode| (20.0 * f64::from(k), mode))).collect();
+    let frequency = |&(speed, mode): &(f64, u64)| match mode {
+        1 => 110.0 - 0.1 * speed,
+        2 => 190.0 + 0.05 * speed,
+        _ => 4000.0,
+    };
+    Sample::default()
+        .numbers("speed_rpm", "rpm", rows.iter().map(|row| row.0))
+        .counts("mode", rows.iter().map(|row| row.1))
+        .numbers("frequency_rpm", "rpm", rows.iter().map(frequency))
+        .numbers("frequency_hz", "Hz", rows.iter().map(|row| frequency(row) / 60.0))
+        .numbers("frequency_min_rpm", "rpm", rows.iter().map(|row| frequency(row) * 0.99))
+        .numbers("frequency_max_rpm", "rpm", rows.iter().map(|row| frequency(row) * 1.01))
+}
+
+/// A boundary with its bracket.
+pub(crate) fn boundary() -> Sample {
+    let mass: Vec<f64> = (1..=10).map(|k| 0.1 * f64::from(k)).collect();
+    let damping = |offset: f64| {
+        mass.iter().map(move |mass| 50.0 + 200.0 * mass + offset).collect::<Vec<f64>>()
+    };
+    Sample::default()
+        .numbers("unbalance_mass_kg", "kg", mass.iter().copied())
+        .numbers("damping_n_s_per_m", "N s/m", damping(0.0))
+        .numbers("damping_low_n_s_per_m", "N s/m", damping(-2.0))
+        .numbers("damping_high_n_s_per_m", "N s/m", damping(3.0))
+}

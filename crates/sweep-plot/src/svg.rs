@@ -1,0 +1,234 @@
+//! A scene as SVG 1.1 text.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use super::scene::{Anchor, Colour, Item, Outline, Scene, Segment, Stroke, Text};
+
+/// Tried in this order; the PNG always has the first, which it carries.
+const FAMILY: &str = "'Noto Sans', 'Segoe UI', 'Helvetica Neue', Arial, sans-serif";
+
+/// The scene as an SVG document. The same scene gives the same bytes.
+pub(crate) fn write(scene: &Scene) -> String {
+    let mut out = String::new();
+    let (width, height) = (number(scene.width), number(scene.height));
+    let view = format!(r#"viewBox="0 0 {width} {height}""#);
+    let role = format!(r#"role="img" font-family="{FAMILY}""#);
+    // Writing to a string cannot fail, so the results below carry nothing.
+    let _ = writeln!(
+        out,
+        r#"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" {view} {role}>"#
+    );
+    let _ = writeln!(out, "<title>{}</title>", escape(&scene.description));
+    let clips = write_clips(&mut out, scene);
+    for item in &scene.items {
+        match item {
+            Item::Fill { outline, colour, crisp } => {
+                let edges = if *crisp { r#" shape-rendering="crispEdges""# } else { "" };
+                let _ = writeln!(
+                    out,
+                    r#"<path d="{}"{}{edges}/>"#,
+                    path(outline),
+                    paint("fill", *colour)
+                );
+            }
+            Item::Line { outline, stroke } => {
+                let _ = writeln!(
+                    out,
+                    r#"<path d="{}" fill="none"{}/>"#,
+                    path(outline),
+                    stroke_style(stroke)
+                );
+            }
+            Item::Text(text) => write_text(&mut out, text),
+            Item::Clip(outline) => {
+                let _ = writeln!(out, r##"<g clip-path="url(#c{})">"##, clips[&path(outline)]);
+            }
+            Item::Unclip => out.push_str("</g>\n"),
+        }
+    }
+    out.push_str("</svg>\n");
+    out
+}
+
+/// Defines each clip outline once; returns their numbers by outline.
+fn write_clips(out: &mut String, scene: &Scene) -> BTreeMap<String, usize> {
+    let mut clips = BTreeMap::new();
+    for item in &scene.items {
+        let Item::Clip(outline) = item else { continue };
+        let outline = path(outline);
+        if !clips.contains_key(&outline) {
+            let id = clips.len();
+            let _ = writeln!(out, r#"<clipPath id="c{id}"><path d="{outline}"/></clipPath>"#);
+            clips.insert(outline, id);
+        }
+    }
+    clips
+}
+
+fn write_text(out: &mut String, text: &Text) {
+    let (x, y) = (number(text.at[0]), number(text.at[1]));
+    let place = if text.upright {
+        format!(r#"transform="translate({x} {y}) rotate(-90)""#)
+    } else {
+        format!(r#"x="{x}" y="{y}""#)
+    };
+    let anchor = match text.anchor {
+        Anchor::Start => "",
+        Anchor::Middle => r#" text-anchor="middle""#,
+        Anchor::End => r#" text-anchor="end""#,
+    };
+    let weight = if text.bold { r#" font-weight="bold""# } else { "" };
+    let size = number(text.size);
+    let halo = text.halo.map_or(String::new(), |colour| {
+        format!(
+            r#"{} stroke-width="{}" stroke-linejoin="round" paint-order="stroke""#,
+            paint("stroke", colour),
+            number(halo_width(text.size))
+        )
+    });
+    let _ = writeln!(
+        out,
+        r#"<text {place} font-size="{size}"{weight}{anchor}{}{halo}>{}</text>"#,
+        paint("fill", text.colour),
+        escape(&text.text)
+    );
+}
+
+/// Width of the outline behind letters of this height, px.
+pub(crate) fn halo_width(size: f64) -> f64 {
+    0.3 * size
+}
+
+fn paint(attribute: &str, colour: Colour) -> String {
+    if colour.alpha == 255 {
+        format!(r#" {attribute}="{}""#, colour.css())
+    } else {
+        let opacity = number(f64::from(colour.alpha) / 255.0);
+        format!(r#" {attribute}="{}" {attribute}-opacity="{opacity}""#, colour.css())
+    }
+}
+
+fn stroke_style(stroke: &Stroke) -> String {
+    let mut style = format!(
+        r#"{} stroke-width="{}" stroke-linejoin="round""#,
+        paint("stroke", stroke.colour),
+        number(stroke.width)
+    );
+    if !stroke.dash.is_empty() {
+        let dash: Vec<String> = stroke.dash.iter().map(|&length| number(length)).collect();
+        let _ = write!(style, r#" stroke-dasharray="{}""#, dash.join(" "));
+    }
+    style
+}
+
+/// Path data with relative steps, which are shorter: a transient has thousands of them.
+fn path(outline: &Outline) -> String {
+    let mut d = String::new();
+    // Rounded positions in hundredths of a pixel, so that rounding does not add up along the way.
+    let (mut here, mut start) = ([0_i64; 2], [0_i64; 2]);
+    for segment in &outline.0 {
+        match *segment {
+            Segment::Move(point) => {
+                here = hundredths(point);
+                start = here;
+                let _ = write!(d, "M{} {}", fixed(here[0]), fixed(here[1]));
+            }
+            Segment::Line(point) => {
+                let there = hundredths(point);
+                let step = [there[0] - here[0], there[1] - here[1]];
+                match step {
+                    [dx, 0] => {
+                        let _ = write!(d, "h{}", fixed(dx));
+                    }
+                    [0, dy] => {
+                        let _ = write!(d, "v{}", fixed(dy));
+                    }
+                    [dx, dy] => {
+                        let gap = if dy < 0 { "" } else { " " };
+                        let _ = write!(d, "l{}{gap}{}", fixed(dx), fixed(dy));
+                    }
+                }
+                here = there;
+            }
+            Segment::Close => {
+                d.push('z');
+                here = start;
+            }
+        }
+    }
+    d
+}
+
+fn hundredths(point: [f64; 2]) -> [i64; 2] {
+    point.map(|value| (value * 100.0).round() as i64)
+}
+
+/// Hundredths as a decimal number without needless characters.
+fn fixed(hundredths: i64) -> String {
+    let sign = if hundredths < 0 { "-" } else { "" };
+    let (whole, part) = (hundredths.unsigned_abs() / 100, hundredths.unsigned_abs() % 100);
+    match (whole, part) {
+        (_, 0) => format!("{sign}{whole}"),
+        (0, part) if part % 10 == 0 => format!("{sign}.{}", part / 10),
+        (0, part) => format!("{sign}.{part:02}"),
+        (_, part) if part % 10 == 0 => format!("{sign}{whole}.{}", part / 10),
+        (_, part) => format!("{sign}{whole}.{part:02}"),
+    }
+}
+
+/// A number of pixels, to a hundredth.
+fn number(value: f64) -> String {
+    fixed((value * 100.0).round() as i64)
+}
+
+/// Text as XML character data.
+pub(crate) fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            // XML 1.0 has no place for control characters, not even escaped.
+            letter if letter.is_control() => out.push(' '),
+            letter => out.push(letter),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_exact_to_a_hundredth() {
+        for (value, text) in [
+            (0.0, "0"),
+            (12.0, "12"),
+            (0.5, ".5"),
+            (-0.25, "-.25"),
+            (3.104, "3.1"),
+            (-7.006, "-7.01"),
+            (0.05, ".05"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn steps_do_not_accumulate_rounding() {
+        let points: Vec<[f64; 2]> = (0..1000).map(|k| [f64::from(k) * 0.333_33, 1.0]).collect();
+        let d = path(&Outline::line(&points));
+        let sum: f64 =
+            d[d.find('h').unwrap() + 1..].split('h').map(|step| step.parse::<f64>().unwrap()).sum();
+        assert!((sum - 999.0 * 0.333_33).abs() < 0.011, "{sum}");
+    }
+
+    #[test]
+    fn text_cannot_break_out_of_the_document() {
+        assert_eq!(escape("a<b & \"c\"\u{1}"), "a&lt;b &amp; &quot;c&quot; ");
+    }
+}

@@ -1,0 +1,147 @@
+//! The axes of a map file, found in its rows.
+
+use std::collections::BTreeSet;
+
+use super::axis::evenly_by_log;
+use super::error::PlotError;
+use super::label;
+use super::read::{Cells, ColumnFacts, Source};
+
+/// Most different values of an axis that are kept. An axis of more is known by its range alone.
+pub(crate) const MOST_VALUES: usize = 1 << 18;
+
+/// A swept parameter with all its values.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct SweptAxis {
+    /// Name of the parameter.
+    pub(crate) name: String,
+    /// Its name in words.
+    pub(crate) words: String,
+    /// Unit of the values.
+    pub(crate) unit: String,
+    /// Better shown by the logarithm.
+    pub(crate) log: bool,
+    /// The values, rising; of an axis of more than [`MOST_VALUES`] the least and the greatest
+    /// alone.
+    pub(crate) values: Vec<f64>,
+    /// Whether the values are all there.
+    pub(crate) complete: bool,
+}
+
+impl SweptAxis {
+    /// Whether two values are the same to the digits that text keeps.
+    pub(crate) fn near(known: f64, value: f64) -> bool {
+        (known - value).abs() <= 1e-9 * value.abs().max(known.abs())
+    }
+
+    /// A value of the axis, with its name and unit: "Damping 140 N s/m".
+    pub(crate) fn said(&self, value: f64) -> String {
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
+        format!("{} {}{unit}", self.words, label::significant(value, 4))
+    }
+}
+
+/// One axis while its values are gathered.
+struct Gathered {
+    seen: BTreeSet<u64>,
+    last: f64,
+    low: f64,
+    high: f64,
+    complete: bool,
+}
+
+impl Gathered {
+    fn new() -> Self {
+        Self {
+            seen: BTreeSet::new(),
+            last: f64::NAN,
+            low: f64::INFINITY,
+            high: f64::NEG_INFINITY,
+            complete: true,
+        }
+    }
+
+    fn take(&mut self, value: f64) {
+        // Rows in grid order repeat most axes' values.
+        if value == self.last {
+            return;
+        }
+        self.last = value;
+        (self.low, self.high) = (self.low.min(value), self.high.max(value));
+        // Zero has two signs and is one value.
+        let bits = (value + 0.0).to_bits();
+        if self.seen.len() < MOST_VALUES {
+            self.seen.insert(bits);
+        } else if !self.seen.contains(&bits) {
+            self.complete = false;
+        }
+    }
+
+    fn axis(self, column: &ColumnFacts) -> SweptAxis {
+        let mut values: Vec<f64> = self.seen.into_iter().map(f64::from_bits).collect();
+        values.sort_by(f64::total_cmp);
+        // The values that came first tell how an axis of too many is spaced.
+        let log = evenly_by_log(&values) && self.low > 0.0;
+        if !self.complete {
+            values = vec![self.low, self.high];
+        }
+        SweptAxis {
+            name: column.name.clone(),
+            words: label::words(&column.name),
+            unit: column.unit.clone(),
+            log,
+            values,
+            complete: self.complete,
+        }
+    }
+}
+
+/// The axes of a map file, in file order: the columns of numbers between the point's index and the
+/// results.
+///
+/// # Errors
+/// As [`Source::batches`]; [`PlotError::Empty`] without rows or axes; [`PlotError::NotAGrid`] for
+/// an axis value that is not a number, or rows that do not lie on a grid.
+pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
+    let empty = |reason| PlotError::Empty { path: source.path.clone(), reason };
+    if source.rows == 0 {
+        return Err(empty("the map has no rows"));
+    }
+    let no_grid = |reason: String| PlotError::NotAGrid { path: source.path.clone(), reason };
+    let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
+    let before_results = source.columns.iter().take_while(|column| !of_model(&column.name)).count();
+    let columns: Vec<&ColumnFacts> = source.columns[..before_results]
+        .iter()
+        .filter(|column| column.cells == Cells::Numbers && column.name != "point")
+        .collect();
+    if columns.is_empty() {
+        return Err(empty("the map has no axis"));
+    }
+    let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+    let mut gathered: Vec<Gathered> = names.iter().map(|_| Gathered::new()).collect();
+    for batch in source.batches(&names)? {
+        let batch = batch?;
+        for (name, gathered) in names.iter().zip(&mut gathered) {
+            for value in batch.numbers(name)? {
+                if !value.is_finite() {
+                    return Err(no_grid(format!("axis `{name}` has a row without a value")));
+                }
+                gathered.take(value);
+            }
+        }
+        // Checked batch by batch: scattered rows would fill the memory with values.
+        let mut known = gathered.iter().map(|axis| axis.seen.len());
+        let size = known.try_fold(1_usize, usize::checked_mul);
+        if size.is_none_or(|size| size > source.rows.saturating_add(MOST_MISSING)) {
+            return Err(no_grid("its rows are scattered over the axes' values".to_owned()));
+        }
+    }
+    // What the file says of its rows need not be so.
+    if gathered.iter().any(|axis| axis.seen.is_empty()) {
+        return Err(empty("the map has no rows"));
+    }
+    Ok(columns.iter().zip(gathered).map(|(column, gathered)| gathered.axis(column)).collect())
+}
+
+/// Most grid points without a row: beyond, the rows are not a grid.
+const MOST_MISSING: usize = 1_000_000;

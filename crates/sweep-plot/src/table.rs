@@ -1,0 +1,241 @@
+//! Columns in memory, as figures take them: every row of a small file, the extremes of stretches of
+//! a long trace, or one row per cell of a map.
+
+use std::path::Path;
+
+use super::error::PlotError;
+use super::read::{Cells, ColumnFacts, Kind, Source};
+use super::thin::{Keep, Stretches, Thinner};
+
+/// Most numbers of a file that are kept for a figure: what a page of some megabytes carries.
+pub(crate) const MOST_NUMBERS: usize = 1_400_000;
+
+/// The values of a column.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Values {
+    /// Any numeric type; null is NaN.
+    Numbers(Vec<f64>),
+    /// Words, by their numbers.
+    Words(Words),
+}
+
+/// Words of which few differ.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Words {
+    /// The words that occur.
+    pub(crate) names: Vec<String>,
+    /// One per row: a place among the names, [`NONE`] or [`SEVERAL`].
+    pub(crate) codes: Vec<u8>,
+    /// The name found last: neighbours mostly share theirs.
+    last: u8,
+}
+
+/// Code of a row without a word.
+pub(crate) const NONE: u8 = u8::MAX;
+/// Code of a cell whose points have different words.
+pub(crate) const SEVERAL: u8 = u8::MAX - 1;
+
+impl Words {
+    /// Rows without a word.
+    pub(crate) fn none(rows: usize) -> Self {
+        Self { codes: vec![NONE; rows], ..Self::default() }
+    }
+
+    /// The code of a word, which is taken up if it is new. Words past the first 254 could only come
+    /// from a file that is not ours, and have no code.
+    pub(crate) fn code(&mut self, word: Option<&str>) -> u8 {
+        let Some(word) = word else { return NONE };
+        if self.names.get(usize::from(self.last)).is_some_and(|name| name == word) {
+            return self.last;
+        }
+        let place = self.names.iter().position(|name| name == word).unwrap_or(self.names.len());
+        match u8::try_from(place) {
+            Ok(place) if place < SEVERAL => {
+                if usize::from(place) == self.names.len() {
+                    self.names.push(word.to_owned());
+                }
+                self.last = place;
+                place
+            }
+            _ => NONE,
+        }
+    }
+
+    /// The word of a row; none where it has none or several.
+    pub(crate) fn get(&self, row: usize) -> Option<&str> {
+        self.names.get(usize::from(*self.codes.get(row)?)).map(String::as_str)
+    }
+
+    /// Puts the names in order of the alphabet, whatever order the rows came in.
+    pub(crate) fn sort(&mut self) {
+        let mut sorted = self.names.clone();
+        sorted.sort();
+        let place = |name: &String| {
+            let place = sorted.binary_search(name).ok()?;
+            u8::try_from(place).ok()
+        };
+        let places: Vec<u8> = self.names.iter().map(|name| place(name).unwrap_or(NONE)).collect();
+        for code in &mut self.codes {
+            *code = places.get(usize::from(*code)).copied().unwrap_or(*code);
+        }
+        self.names = sorted;
+    }
+}
+
+/// A column.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Column {
+    /// As in the file.
+    pub(crate) name: String,
+    /// Empty for pure numbers.
+    pub(crate) unit: String,
+    /// May be empty.
+    pub(crate) description: String,
+    /// One per row.
+    pub(crate) values: Values,
+}
+
+impl Column {
+    /// A column of the file with these values.
+    pub(crate) fn new(facts: &ColumnFacts, values: Values) -> Self {
+        let ColumnFacts { name, unit, description, .. } = facts.clone();
+        Self { name, unit, description, values }
+    }
+
+    /// The values, if they are numbers.
+    pub(crate) fn numbers(&self) -> Option<&[f64]> {
+        match &self.values {
+            Values::Numbers(values) => Some(values),
+            Values::Words(_) => None,
+        }
+    }
+
+    /// The values, if they are words.
+    pub(crate) fn words(&self) -> Option<&Words> {
+        match &self.values {
+            Values::Words(words) => Some(words),
+            Values::Numbers(_) => None,
+        }
+    }
+}
+
+/// The columns of a file that a figure needs.
+#[derive(Debug)]
+pub(crate) struct Table {
+    /// The file.
+    pub(crate) source: Source,
+    /// In file order.
+    pub(crate) columns: Vec<Column>,
+    /// Number of rows here.
+    pub(crate) rows: usize,
+    /// Rows of the file that became two rows here, where it was thinned.
+    pub(crate) stretch: Option<usize>,
+}
+
+impl Table {
+    /// Reads a file whose rows are not a map's. A trace with more numbers than a figure keeps is
+    /// cut into stretches, as [`Table::read_thinned`] does.
+    ///
+    /// # Errors
+    /// As [`Source::batches`]; [`PlotError::TooMany`] for modes and boundaries beyond what a figure
+    /// keeps.
+    pub(crate) fn read(source: Source) -> Result<Self, PlotError> {
+        let most = MOST_NUMBERS / source.numeric().count().max(1);
+        if source.rows > most {
+            if source.kind == Kind::Trace {
+                return Self::read_thinned(source, most / 2);
+            }
+            let (path, kind, rows) = (source.path.clone(), source.kind.name(), source.rows);
+            return Err(PlotError::TooMany { path, kind, rows, most });
+        }
+        let names: Vec<&str> = source.columns.iter().map(|column| column.name.as_str()).collect();
+        let mut values: Vec<Values> = source
+            .columns
+            .iter()
+            .map(|column| match column.cells {
+                Cells::Numbers => Values::Numbers(Vec::with_capacity(source.rows)),
+                Cells::Words => Values::Words(Words::default()),
+            })
+            .collect();
+        let mut rows = 0;
+        for batch in source.batches(&names)? {
+            let batch = batch?;
+            for (name, values) in names.iter().zip(&mut values) {
+                match values {
+                    Values::Numbers(numbers) => numbers.extend(batch.numbers(name)?),
+                    Values::Words(words) => {
+                        for word in batch.words(name)? {
+                            let code = words.code(word);
+                            words.codes.push(code);
+                        }
+                    }
+                }
+            }
+            rows += batch.rows;
+            // What the file says of its rows need not be so.
+            if rows > most {
+                let (path, kind) = (source.path.clone(), source.kind.name());
+                return Err(PlotError::TooMany { path, kind, rows, most });
+            }
+        }
+        let columns = source.columns.iter().zip(values);
+        let columns = columns.map(|(facts, values)| Column::new(facts, values)).collect();
+        Ok(Self { source, columns, rows, stretch: None })
+    }
+
+    /// Reads the numbers of a trace in at most `count` stretches. Each leaves two rows: the least
+    /// and the greatest value of every column, in the order in which they occur, at the stretch's
+    /// first and middle instant.
+    ///
+    /// # Errors
+    /// As [`Source::batches`].
+    pub(crate) fn read_thinned(source: Source, count: usize) -> Result<Self, PlotError> {
+        let stretches = Stretches::new(source.rows, count);
+        let names: Vec<&str> = source.numeric().map(|column| column.name.as_str()).collect();
+        let keep = |name: &str| if name == "time_s" { Keep::Instants } else { Keep::Extremes };
+        let mut thinners: Vec<Thinner> =
+            names.iter().map(|name| Thinner::new(stretches, keep(name))).collect();
+        for batch in source.batches(&names)? {
+            let batch = batch?;
+            for (name, thinner) in names.iter().zip(&mut thinners) {
+                batch.numbers(name)?.into_iter().for_each(|value| thinner.push(value));
+            }
+        }
+        let kept = thinners.into_iter().map(|thinner| Values::Numbers(thinner.finish()));
+        let columns = source.numeric().zip(kept).map(|(facts, values)| Column::new(facts, values));
+        let columns: Vec<Column> = columns.collect();
+        let rows = columns.first().and_then(Column::numbers).map_or(0, <[f64]>::len);
+        Ok(Self { source, columns, rows, stretch: Some(stretches.longest()) })
+    }
+
+    /// Opens a file and reads it, as [`Table::read`].
+    ///
+    /// # Errors
+    /// As [`Source::open`] and [`Table::read`].
+    pub(crate) fn open(path: &Path) -> Result<Self, PlotError> {
+        Self::read(Source::open(path)?)
+    }
+
+    /// The column of that name.
+    pub(crate) fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|column| column.name == name)
+    }
+
+    /// The numbers of a column that this kind of file must have.
+    ///
+    /// # Errors
+    /// [`PlotError::Column`].
+    pub(crate) fn numbers(&self, name: &str) -> Result<&[f64], PlotError> {
+        let numbers = self.column(name).and_then(Column::numbers);
+        numbers.ok_or_else(|| self.source.lacks(name, "numeric"))
+    }
+
+    /// Columns of numbers whose name starts with `prefix`, without it.
+    pub(crate) fn with_prefix(&self, prefix: &str) -> Vec<(&str, &Column)> {
+        self.columns
+            .iter()
+            .filter(|column| column.numbers().is_some())
+            .filter_map(|column| Some((column.name.strip_prefix(prefix)?, column)))
+            .collect()
+    }
+}

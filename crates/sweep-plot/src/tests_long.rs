@@ -1,0 +1,340 @@
+//! Files of more rows than a figure can show: bounded memory, bounded pages, and what cells of
+//! several points say.
+
+use base64::Engine as _;
+use serde_json::Value;
+
+use super::sample::{MapSample, Sample};
+use super::tests::{carried, draw, message, svg};
+use super::*;
+
+/// Values from 0 in steps of 1.
+fn counted(count: usize) -> Vec<f64> {
+    (0..count).map(|k| k as f64).collect()
+}
+
+/// A map of `counts` points whose ratio is between twice the limit and half of it, but for some.
+fn map(counts: [usize; 2]) -> MapSample<'static> {
+    MapSample {
+        axes: vec![
+            ("unbalance_mass_kg", counted(counts[0])), // the first varies slowest
+            ("damping_n_s_per_m", counted(counts[1])),
+        ],
+        limit: 2.0,
+        yaw: &|at| Some([0.01 * ratio(at), 0.01]),
+        chaotic: &|_| false,
+    }
+}
+
+/// The ratio of a map's point.
+fn ratio(at: &[f64]) -> f64 {
+    // Now and then a point lies far off its neighbours, as chaotic motion does.
+    let off = if (at[0] * 31.0 + at[1] * 17.0) % 101.0 == 0.0 { 3.0 } else { 1.0 };
+    off * 4.0 / (1.0 + 3.0 * ((at[1] * 7.0 + at[0]) % 1000.0) / 1000.0)
+}
+
+fn render_to(input: &Path, name: &str) -> Vec<u8> {
+    let output = input.with_file_name(name);
+    render(input, &PlotOptions::default(), &output).unwrap();
+    std::fs::read(output).unwrap()
+}
+
+fn bits(text: &Value) -> Vec<bool> {
+    let bytes = base64::engine::general_purpose::STANDARD.decode(text.as_str().unwrap()).unwrap();
+    bytes.iter().flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1 == 1)).collect()
+}
+
+fn floats(text: &Value) -> Vec<f64> {
+    let bytes = base64::engine::general_purpose::STANDARD.decode(text.as_str().unwrap()).unwrap();
+    bytes.chunks(4).map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))).collect()
+}
+
+#[test]
+fn memory_and_page_do_not_grow_with_the_rows() {
+    const MOST_BYTES: u64 = 100 << 20;
+    let folder = tempfile::tempdir().unwrap();
+    let mut peaks: Vec<[u64; 3]> = Vec::new();
+    for counts in [[724, 724], [1448, 1448]] {
+        let input = map(counts).write_long(folder.path(), &format!("{}.parquet", counts[0]));
+        peaks.push(["a.svg", "a.png", "a.html"].map(|name| {
+            let mut written = 0;
+            let heap = allocation_counter::measure(|| written = render_to(&input, name).len());
+            let peak = heap.bytes_max;
+            let said = format!("{counts:?} {name}: {peak} bytes at most, {written} written");
+            println!("{said}");
+            assert!(peak < MOST_BYTES && written < 10_000_000, "{said}");
+            peak
+        }));
+    }
+    for (few, many) in peaks[0].iter().zip(peaks[1]) {
+        assert!(many < few + few / 2, "four times the rows: {few} bytes at most, then {many}");
+    }
+}
+
+#[test]
+fn a_cell_of_several_points_shows_the_worst_and_says_what_it_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let (counts, sample) = ([500, 600], map([500, 600]));
+    let data = carried(&render_to(&sample.write_long(folder.path(), "map.parquet"), "a.html"));
+    let spans = |k: usize| -> Vec<[f64; 2]> {
+        let spans = data["axes"][k]["spans"].as_array().unwrap();
+        spans.iter().map(|span| [0, 1].map(|end| span[end].as_f64().unwrap())).collect()
+    };
+    let [xs, ys] = [spans(0), spans(1)];
+    assert!(xs.len() < counts[0] && ys.len() < counts[1] && xs.len() * ys.len() > 20_000);
+    let [count, reliable, unreliable] =
+        ["points", "reliable", "unreliable"].map(|name| floats(&data["counts"][name]));
+    let worst = floats(&data["columns"]["ratio_max"]["data"]);
+    let index = floats(&data["columns"]["point"]["data"]);
+    let gap = floats(&data["columns"]["min_gap_nonlinear_m"]["data"]);
+    let says_both = bits(&data["layers"][0]["both"]);
+    let within = |span: &[f64; 2]| (span[0] as usize..=span[1] as usize).map(|k| k as f64);
+    let mut both = 0;
+    for (i, x) in xs.iter().enumerate() {
+        for (j, y) in ys.iter().enumerate() {
+            let cell = i * ys.len() + j;
+            let points = within(x).flat_map(|x| within(y).map(move |y| [x, y]));
+            let ratios: Vec<f64> = points.map(|at| ratio(&at)).collect();
+            let above = ratios.iter().filter(|ratio| **ratio >= 2.0).count();
+            let greatest = ratios.iter().copied().fold(0.0, f64::max);
+            let counted = [count[cell], reliable[cell], unreliable[cell]];
+            let expected = [ratios.len(), ratios.len() - above, above];
+            assert_eq!(counted, expected.map(|count| count as f64));
+            assert!((worst[cell] - greatest).abs() < 1e-6 * greatest);
+            let least_gap = 0.01 - 0.1 * 0.01 * greatest;
+            assert!((gap[cell] - least_gap).abs() < 1e-8, "the least gap of the cell");
+            let index = index[cell] as usize;
+            let at = [index / counts[1], index % counts[1]].map(|place| place as f64);
+            assert_eq!(ratio(&at), greatest, "the point named is the worst one");
+            assert_eq!(says_both[cell], above > 0 && above < ratios.len());
+            both += usize::from(says_both[cell]);
+        }
+    }
+    assert!(both > 100, "{both} cells hold both");
+    let all: f64 = count.iter().sum();
+    assert_eq!(all, 300_000.0);
+    let figure = String::from_utf8(render_to(&folder.path().join("map.parquet"), "a.svg")).unwrap();
+    assert!(figure.contains(">both: reliable and unreliable points<"));
+    assert!(figure.contains("300000 points · a cell holds 2 by 2 points"));
+}
+
+#[test]
+fn a_small_map_has_a_cell_for_every_point() {
+    let data = carried(&draw(map([30, 40]).sample(), &PlotOptions::default(), "a.html").unwrap());
+    assert!(data["counts"].is_null() && data["axes"][0]["spans"].is_null());
+    assert!(data["layers"][0]["both"].is_null() && data["layers"][0]["undefined"].is_null());
+    assert!(!svg(map([30, 40]).sample(), &PlotOptions::default()).contains("both:"));
+}
+
+#[test]
+fn points_that_failed_show_beside_others_in_their_cell() {
+    let yaw = |at: &[f64]| (at[1] % 50.0 != 0.0).then_some([0.01, 0.01]);
+    let failing = MapSample { yaw: &yaw, ..map([500, 600]) };
+    let folder = tempfile::tempdir().unwrap();
+    let input = failing.write_long(folder.path(), "map.parquet");
+    let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
+    assert!(figure.contains(">some points failed<") && !figure.contains(">failed: no result<"));
+    assert!(figure.contains("300000 points · 6000 failed"));
+    let data = carried(&render_to(&input, "a.html"));
+    assert_eq!(floats(&data["counts"]["failed"]).iter().sum::<f64>(), 6000.0);
+    assert_eq!(data["statuses"], serde_json::json!({ "ok": 294_000, "diverged": 6000 }));
+}
+
+#[test]
+fn undefined_and_sensitive_points_show_in_their_cell() {
+    let still = |at: &[f64]| at[1] % 50.0 == 7.0;
+    let chaotic = |at: &[f64]| (at[0] + at[1]) % 40.0 == 0.0;
+    let yaw = |at: &[f64]| Some(if still(at) { [0.0, 0.0] } else { [0.01, 0.01] });
+    let sample = MapSample { yaw: &yaw, chaotic: &chaotic, ..map([500, 600]) };
+    let folder = tempfile::tempdir().unwrap();
+    let input = sample.write_long(folder.path(), "map.parquet");
+    let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
+    for said in [">some points undefined<", ">some points sensitive: chaotic<"] {
+        assert!(figure.contains(said), "{said}");
+    }
+    assert!(!figure.contains("both:") && !figure.contains("failed"));
+    let data = carried(&render_to(&input, "a.html"));
+    let all = (0..500).flat_map(|x| (0..600).map(move |y| [f64::from(x), f64::from(y)]));
+    let sensitive = all.filter(|at| chaotic(at)).count();
+    assert_eq!(floats(&data["counts"]["sensitive"]).iter().sum::<f64>(), sensitive as f64);
+    let [points, reliable] = ["points", "reliable"].map(|name| floats(&data["counts"][name]));
+    let undefined = bits(&data["layers"][0]["undefined"]);
+    for cell in 0..points.len() {
+        assert_eq!(undefined[cell], reliable[cell] < points[cell], "cell {cell}");
+    }
+    // The linear model is never chaotic.
+    let output = folder.path().join("linear.svg");
+    let channels = vec!["tub_yaw".to_owned()];
+    let options = PlotOptions { quantity: Quantity::Linear, channels, ..PlotOptions::default() };
+    render(&input, &options, &output).unwrap();
+    assert!(!std::fs::read_to_string(output).unwrap().contains("sensitive"));
+}
+
+#[test]
+fn sensitive_points_are_hatched_in_small_maps_too() {
+    let chaotic = |at: &[f64]| at == [3.0, 4.0];
+    let sample = MapSample { chaotic: &chaotic, ..map([30, 40]) };
+    let drawn = svg(sample.sample(), &PlotOptions::default());
+    assert!(drawn.contains(">sensitive: motion is chaotic<"));
+    // Without them the picture is the same but for the hatch and its entry of the legend.
+    let none = svg(map([30, 40]).sample(), &PlotOptions::default());
+    assert!(!none.contains("sensitive") && drawn.len() > none.len());
+    let data = carried(&draw(sample.sample(), &PlotOptions::default(), "a.html").unwrap());
+    let words = &data["codes"]["sensitive"]["words"];
+    assert_eq!(*words, serde_json::json!(["false", "true"]));
+}
+
+#[test]
+fn an_axis_of_more_values_than_are_told_apart_goes_by_its_range() {
+    let one = MapSample { axes: vec![("damping_n_s_per_m", counted(300_000))], ..map([1, 1]) };
+    let one = MapSample { yaw: &|at| Some([0.02 - 1e-8 * at[0], 0.01]), ..one };
+    let folder = tempfile::tempdir().unwrap();
+    let input = one.write_long(folder.path(), "map.parquet");
+    let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
+    assert!(figure.contains("300000 points · a cell holds many points and shows the worst"));
+    assert!(render_to(&input, "a.html").len() < 10_000_000);
+}
+
+#[test]
+fn a_curve_marks_the_cells_that_hold_both_verdicts() {
+    // The ratio falls through the limit of 2 and is above it once more, at one point.
+    let yaw = |at: &[f64]| {
+        let again = if at[0] == 200_000.0 { 0.01 } else { 0.0 };
+        Some([0.03 - 1e-7 * (at[0] - 2.5) + again, 0.01])
+    };
+    let one = MapSample { axes: vec![("damping_n_s_per_m", counted(240_000))], ..map([1, 1]) };
+    let folder = tempfile::tempdir().unwrap();
+    let input = MapSample { yaw: &yaw, ..one }.write_long(folder.path(), "map.parquet");
+    let said = ">both: reliable and unreliable points<";
+    let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
+    assert!(figure.contains(said));
+    let data = carried(&render_to(&input, "a.html"));
+    let mixed = data["chart"]["panels"][0]["mixed"].as_array().unwrap();
+    let ranges: Vec<[f64; 2]> =
+        mixed.iter().map(|range| [0, 1].map(|end| range[end].as_f64().unwrap())).collect();
+    for point in [100_002.5, 200_000.0] {
+        assert!(ranges.iter().any(|[from, to]| *from <= point && point <= *to), "{ranges:?}");
+    }
+    assert!(ranges.len() == 2 && ranges.iter().all(|[from, to]| to - from < 50.0), "{ranges:?}");
+
+    // Every point has a cell of its own: none can hold both.
+    let few = vec![("damping_n_s_per_m", counted(240))];
+    let few = MapSample { axes: few, yaw: &yaw, ..map([1, 1]) };
+    assert!(!svg(few.sample(), &PlotOptions::default()).contains(said));
+}
+
+#[test]
+fn a_page_of_too_many_cuts_picks_some_and_keeps_the_one_asked_for() {
+    let values = || [40, 40, 60, 3].map(counted);
+    let names = ["unbalance_mass_kg", "damping_n_s_per_m", "spin_peak_rpm", "tub_mass_kg"];
+    let sample = || MapSample { axes: names.into_iter().zip(values()).collect(), ..map([1, 1]) };
+    let folder = tempfile::tempdir().unwrap();
+    let input = sample().write_long(folder.path(), "map.parquet");
+    let page = render_to(&input, "a.html");
+    assert!(page.len() < 10_000_000, "{}", page.len());
+    let data = carried(&page);
+    assert!(data["counts"].is_null(), "what is shown is shown point by point");
+    let picked = |data: &Value, k: usize| data["axes"][k]["values"].as_array().unwrap().len();
+    let [spins, masses] = [2, 3].map(|k| picked(&data, k));
+    let said = format!("{spins} of 60 values of spin peak");
+    assert!(spins < 60 && data["subtitle"].as_str().unwrap().contains(&said));
+    assert_eq!(masses, 3);
+
+    let at = vec![("spin_peak_rpm".to_owned(), 17.0)];
+    let options = PlotOptions { at, ..PlotOptions::default() };
+    let output = folder.path().join("b.html");
+    render(&input, &options, &output).unwrap();
+    let data = carried(&std::fs::read(output).unwrap());
+    assert_eq!(data["axes"][2]["values"], serde_json::json!([17.0]));
+}
+
+#[test]
+fn a_long_trace_keeps_its_peaks_within_a_page() {
+    const ROWS: usize = 400_000;
+    let wave = |k: usize| if k == 123_457 { 9.0 } else { (k as f64 * 0.01).sin() };
+    let trace = Sample::default()
+        .numbers("time_s", "s", (0..ROWS).map(|k| k as f64 * 1e-3))
+        .numbers("nonlinear_tub_yaw", "rad", (0..ROWS).map(wave))
+        .numbers("linear_tub_yaw", "rad", (0..ROWS).map(|k| (k as f64 * 0.01).cos()))
+        .numbers("gap_nonlinear_m", "m", (0..ROWS).map(|_| 0.01));
+    let page = draw(trace, &PlotOptions::default(), "a.html").unwrap();
+    assert!(page.len() < 10_000_000, "{}", page.len());
+    let data = carried(&page);
+    assert!(data["subtitle"].as_str().unwrap().contains("least and greatest of every 3 instants"));
+    let yaw = floats(&data["chart"]["panels"][0]["series"][0]["y"]);
+    assert_eq!(yaw.iter().copied().fold(0.0, f64::max), 9000.0, "mrad");
+    assert_eq!(yaw.len(), floats(&data["chart"]["grids"][0]).len());
+}
+
+#[test]
+fn modes_of_more_rows_than_a_figure_shows_are_refused() {
+    const ROWS: usize = 500_000;
+    let modes = Sample::default()
+        .numbers("speed_rpm", "rpm", (0..ROWS).map(|k| k as f64))
+        .counts("mode", (0..ROWS).map(|_| 1))
+        .numbers("frequency_rpm", "rpm", (0..ROWS).map(|_| 100.0));
+    let said = message(draw(modes, &PlotOptions::default(), "a.svg"));
+    assert!(said.contains("a modes file of 500000 rows is more than a figure can show"), "{said}");
+}
+
+#[test]
+fn rows_that_are_the_same_point_are_found_among_merged_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    // The last value of the first axis stands twice, which no grid has.
+    let mut sample = map([500, 600]);
+    sample.axes[0].1[499] = 498.0;
+    let input = sample.write_long(folder.path(), "map.parquet");
+    let drawn = render(&input, &PlotOptions::default(), &folder.path().join("a.svg"));
+    let said = drawn.unwrap_err().to_string();
+    assert!(said.contains("are the same point"), "{said}");
+}
+
+#[test]
+fn rows_that_are_no_grid_are_refused_before_they_fill_the_memory() {
+    const ROWS: usize = 300_000;
+    const AXES: usize = 40;
+    let mut sample = Sample::default().counts("point", 0..ROWS as u64);
+    for axis in 0..AXES {
+        let values = (0..ROWS).map(|k| (k * (axis + 1)) as f64);
+        sample = sample.numbers(&format!("x{axis}"), "", values);
+    }
+    let sample = sample
+        .numbers("nonlinear_tub_yaw", "rad", (0..ROWS).map(|_| 0.01))
+        .numbers("ratio_max", "1", (0..ROWS).map(|_| 1.0))
+        .words("status", (0..ROWS).map(|_| Some("ok")));
+    let folder = tempfile::tempdir().unwrap();
+    let input = sample.write(folder.path(), "map.parquet");
+    let mut said = String::new();
+    let peak = allocation_counter::measure(|| {
+        let drawn = render(&input, &PlotOptions::default(), &folder.path().join("a.svg"));
+        said = drawn.unwrap_err().to_string();
+    });
+    assert!(said.contains("scattered"), "{said}");
+    assert!(peak.bytes_max < 60 << 20, "{} bytes", peak.bytes_max);
+}
+
+#[test]
+fn columns_of_one_name_do_no_harm() {
+    let twice = map([30, 40]).sample().numbers("ratio_max", "1", (0..1200).map(|_| 1.0));
+    let twice = twice.numbers("later", "1", (0..1200).map(|_| 1.0));
+    for name in ["a.svg", "a.html"] {
+        assert!(draw(twice.clone(), &PlotOptions::default(), name).is_ok(), "{name}");
+    }
+    let time = || (0..50).map(f64::from);
+    let trace = Sample::default()
+        .numbers("time_s", "s", time())
+        .numbers("nonlinear_tub_yaw", "rad", time())
+        .numbers("nonlinear_tub_yaw", "rad", time())
+        .numbers("speed_rpm", "rpm", time());
+    assert!(draw(trace, &PlotOptions::default(), "a.svg").is_ok());
+}
+
+#[test]
+fn metadata_that_would_fill_a_page_is_cut_short() {
+    let long = serde_json::to_string(&counted(100_000)).unwrap();
+    let sample = map([3, 4]).sample().metadata("note", &long);
+    let data = carried(&draw(sample, &PlotOptions::default(), "a.html").unwrap());
+    let entries = data["provenance"].as_array().unwrap();
+    let note = entries.iter().find(|entry| entry[0] == "note").unwrap()[1].as_str().unwrap();
+    assert!(note.len() < 20_000 && note.ends_with("characters in all; the file has them)"));
+}

@@ -1,0 +1,85 @@
+//! Arguments that several subcommands take.
+
+use std::path::PathBuf;
+
+use crate::config::{self, Diagnostics};
+use crate::plan::Plan;
+
+/// A grid file and changes to its constants, as most commands take them.
+#[derive(Debug, clap::Args)]
+pub struct GridArgs {
+    /// Grid file
+    #[arg(value_name = "GRID.toml")]
+    pub grid: PathBuf,
+    /// Set a constant, over those of the grid file; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub sets: Vec<String>,
+}
+
+impl GridArgs {
+    /// The plan.
+    ///
+    /// # Errors
+    /// Every mistake in the grid file, its machine file and the constants.
+    pub fn load(&self) -> Result<Plan, Diagnostics> {
+        config::load(&self.grid, &self.sets)
+    }
+}
+
+/// A grid and where its result goes, as the commands about runs take them.
+#[derive(Debug, clap::Args)]
+pub struct ResultArgs {
+    /// The grid.
+    #[command(flatten)]
+    pub grid: GridArgs,
+    /// Result file [default: results/NAME.parquet]
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+impl ResultArgs {
+    /// The result file.
+    #[must_use]
+    pub fn output(&self, plan: &Plan) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{}.parquet", plan.name)))
+    }
+
+    /// A command line about the same run, for a user to copy.
+    #[must_use]
+    pub fn command(&self, verb: &str) -> String {
+        let mut line = format!("sweep {verb} {}", quoted(&self.grid.grid.display().to_string()));
+        for set in &self.grid.sets {
+            line.push_str(&format!(" --set {}", quoted(set)));
+        }
+        if let Some(out) = &self.out {
+            line.push_str(&format!(" --out {}", quoted(&out.display().to_string())));
+        }
+        line
+    }
+}
+
+/// A word as a shell takes it.
+pub(super) fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/._-=:,+".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_to_copy_survives_the_shell() {
+        let grid =
+            GridArgs { grid: "my grids/it's.toml".into(), sets: vec!["tub_mass_kg=20".into()] };
+        let target = ResultArgs { grid, out: Some("x.parquet".into()) };
+        assert_eq!(
+            target.command("merge"),
+            r"sweep merge 'my grids/it'\''s.toml' --set tub_mass_kg=20 --out x.parquet"
+        );
+    }
+}

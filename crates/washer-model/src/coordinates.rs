@@ -1,0 +1,55 @@
+//! The generalised coordinates by name (section 1 of the model page).
+
+use lane_ode::{Dual, Lane, N};
+
+/// Number of generalised coordinates.
+pub const COORDINATES: usize = 10;
+
+/// States: the coordinates, then their speeds.
+pub(crate) const STATES: usize = 2 * COORDINATES;
+
+/// q1: the tub's bearing midpoint P_T along c2 (m).
+pub(crate) const TUB_Y: usize = 0;
+/// q2: the same along c3 (m).
+pub(crate) const TUB_Z: usize = 1;
+/// q3: the shaft's bearing midpoint P_S along c2 (m).
+pub(crate) const SHAFT_Y: usize = 2;
+/// q4: the same along c3 (m).
+pub(crate) const SHAFT_Z: usize = 3;
+/// q5: yaw of the tub about c2 (rad).
+pub(crate) const TUB_YAW: usize = 4;
+/// q6: its pitch (rad).
+pub(crate) const TUB_PITCH: usize = 5;
+/// q7: yaw of the shaft about c2 (rad).
+pub(crate) const SHAFT_YAW: usize = 6;
+/// q8: its pitch (rad).
+pub(crate) const SHAFT_PITCH: usize = 7;
+/// q9: first angle of the hinge between shaft and drum (rad).
+pub(crate) const HINGE_YAW: usize = 8;
+/// q10: second angle of the hinge (rad).
+pub(crate) const HINGE_PITCH: usize = 9;
+
+/// The first coordinate that is an angle.
+pub(crate) const FIRST_ANGLE: usize = TUB_YAW;
+
+/// The coordinates of the tub.
+pub(crate) const TUB: [usize; 4] = [TUB_Y, TUB_Z, TUB_YAW, TUB_PITCH];
+/// Those that turn it.
+pub(crate) const TUB_TURNS: [usize; 2] = [TUB_YAW, TUB_PITCH];
+/// The coordinates that turn the rotor. Its forces depend on q3 and q4 through the bearings alone.
+pub(crate) const ROTOR_TURNS: [usize; 4] = [SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];
+
+/// `values` with a unit derivative (times `slope`) along coordinate `j`.
+#[inline(always)]
+pub(crate) fn seeded<T: Lane>(
+    values: &[N<T>; COORDINATES],
+    j: usize,
+    slope: f64,
+) -> [N<Dual<T>>; COORDINATES] {
+    let mut seeded = [values[0].constant(); COORDINATES];
+    for i in 0..COORDINATES {
+        seeded[i] = values[i].constant();
+    }
+    seeded[j].0.slope = values[j].lit(slope).0;
+    seeded
+}

@@ -1,0 +1,318 @@
+//! The linear model's outputs: exact first order in the coordinates, harmonics 0 and 1 in theta.
+//!
+//! The part of order zero turns with the drum while the machine rests at its equilibrium.
+
+use crate::channel::{CHANNELS, Channel, channels};
+use crate::coordinates::{
+    COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH,
+    TUB_Y, TUB_YAW, TUB_Z, seeded,
+};
+use crate::lanes::{Constant as _, InLanes as _, lane_struct};
+use crate::linear::sparse::sparse_sums;
+use crate::machine::spin::SpinState;
+use crate::nonlinear::coefficients::Bodies;
+use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
+use lane_ode::{Lane, N, Real, Sample};
+
+/// Columns of an expansion: the slope along each coordinate, then the value at equilibrium.
+const COLUMNS: usize = COORDINATES + 1;
+const AT_REST: usize = COORDINATES;
+
+/// Every channel, then the two components of the radial distance.
+const OUTPUTS: usize = CHANNELS + RADIAL;
+
+/// Angles that determine harmonics 0 and 1: cos and sin of 2 pi k / 3.
+const SAMPLES: [(f64, f64); 3] =
+    [(1.0, 0.0), (-0.5, 0.866_025_403_784_438_6), (-0.5, -0.866_025_403_784_438_6)];
+
+/// Entry of a part (0: steady, 1: of theta's cosine, 2: of its sine) of an output, among the terms
+/// of `outputs` outputs. Steady parts come first; the outputs of `turning` alone have the others.
+const fn entry(output: usize, part: usize, turning: &[usize], outputs: usize) -> usize {
+    if part == 0 {
+        return output;
+    }
+    let mut before = 0;
+    while turning[before] != output {
+        before += 1;
+    }
+    outputs + 2 * before + part - 1
+}
+
+macro_rules! expand {
+    ($($(#[$doc:meta])* $name:ident, $key:literal, $description:literal, $kind:ident, $from:tt,
+        steady [$($steady:ident)+]
+        $(, turning cos [$($cos:ident)+] sin [$($sin:ident)+] rest $rest:tt)?;
+    )+) => {
+        /// Which parts (steady, cosine, sine) of each channel there are at rest; none of those that
+        /// do not turn.
+        const RESTS: [Option<[bool; 3]>; CHANNELS] = [$(rest!($($rest)?)),+];
+
+        sparse_sums! {
+            /// Coefficients of the channels.
+            ChannelTerms: COORDINATES => CHANNEL_ENTRIES;
+            $(channel_entry(Channel::$name, 0) => $($steady)+;)+
+            $($(
+                channel_entry(Channel::$name, 1) => $($cos)+;
+                channel_entry(Channel::$name, 2) => $($sin)+;
+            )?)+
+        }
+    };
+}
+macro_rules! rest {
+    () => {
+        None
+    };
+    ($rest:tt) => {
+        Some($rest)
+    };
+}
+channels!(expand);
+
+/// How many channels turn, and how many of their parts there are at rest.
+const COUNTS: [usize; 2] = {
+    let mut counts = [0; 2];
+    let mut channel = 0;
+    while channel < CHANNELS {
+        if let Some([steady, cos, sin]) = RESTS[channel] {
+            counts[0] += 1;
+            counts[1] += steady as usize + cos as usize + sin as usize;
+        }
+        channel += 1;
+    }
+    counts
+};
+
+/// The channels that turn.
+const TURNING: [usize; COUNTS[0]] = {
+    let mut turning = [0; COUNTS[0]];
+    let (mut channel, mut next) = (0, 0);
+    while channel < CHANNELS {
+        if RESTS[channel].is_some() {
+            turning[next] = channel;
+            next += 1;
+        }
+        channel += 1;
+    }
+    turning
+};
+
+/// Entries of the channels' terms.
+const CHANNEL_ENTRIES: usize = CHANNELS + 2 * TURNING.len();
+
+const fn channel_entry(channel: Channel, part: usize) -> usize {
+    entry(channel.index(), part, &TURNING, CHANNELS)
+}
+
+/// Entries of the channels that hold a part of order zero.
+const CHANNELS_AT_REST: [usize; COUNTS[1]] = {
+    let mut entries = [0; COUNTS[1]];
+    let (mut channel, mut next) = (0, 0);
+    while channel < CHANNELS {
+        if let Some(parts) = RESTS[channel] {
+            let mut part = 0;
+            while part < 3 {
+                if parts[part] {
+                    entries[next] = entry(channel, part, &TURNING, CHANNELS);
+                    next += 1;
+                }
+                part += 1;
+            }
+        }
+        channel += 1;
+    }
+    entries
+};
+
+/// Both components of the radial distance turn.
+const RADIAL_TURNING: [usize; RADIAL] = [0, 1];
+/// Entries of their terms.
+const RADIAL_ENTRIES: usize = 3 * RADIAL;
+/// All of them hold a part of order zero.
+const RADIAL_AT_REST: [usize; RADIAL_ENTRIES] = [0, 1, 2, 3, 4, 5];
+
+const fn radial_entry(component: usize, part: usize) -> usize {
+    entry(component, part, &RADIAL_TURNING, RADIAL)
+}
+
+sparse_sums! {
+    /// Coefficients of the radial distance.
+    RadialTerms: COORDINATES => RADIAL_ENTRIES;
+    radial_entry(0, 0) => TUB_Y TUB_Z SHAFT_Y SHAFT_Z TUB_YAW TUB_PITCH SHAFT_YAW SHAFT_PITCH
+        HINGE_PITCH;
+    radial_entry(1, 0) => TUB_Z SHAFT_Z TUB_YAW SHAFT_YAW SHAFT_PITCH HINGE_PITCH;
+    radial_entry(0, 1) => TUB_YAW TUB_PITCH SHAFT_YAW SHAFT_PITCH HINGE_YAW HINGE_PITCH;
+    radial_entry(0, 2) => TUB_YAW TUB_PITCH SHAFT_YAW HINGE_YAW HINGE_PITCH;
+    radial_entry(1, 1) => TUB_YAW SHAFT_YAW SHAFT_PITCH HINGE_YAW HINGE_PITCH;
+    radial_entry(1, 2) => TUB_YAW SHAFT_YAW HINGE_YAW HINGE_PITCH;
+}
+
+lane_struct! {
+    /// The outputs of one machine in `f64`, of one per lane in `T`.
+    #[derive(Clone, Copy, Debug)]
+    LinearOutputs {
+        channels: ChannelTerms<T>,
+        channels_at_rest: [N<T>; CHANNELS_AT_REST.len()],
+        radial: RadialTerms<T>,
+        radial_at_rest: [N<T>; RADIAL_AT_REST.len()],
+    }
+}
+
+impl<T: Lane> LinearOutputs<T> {
+    /// Deviations of the channels from equilibrium, unbalance up.
+    #[inline(always)]
+    pub(crate) fn channels(&self, of: &LinearMotion<T>) -> [Sample<T>; CHANNELS] {
+        let mut sums = [[of.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
+        self.channels.sum(&of.coordinates, &mut sums);
+        add_at_rest(&mut sums, &CHANNELS_AT_REST, &self.channels_at_rest);
+        of.turned::<CHANNEL_ENTRIES, CHANNELS>(sums, &TURNING)
+    }
+
+    /// The drum's front centre from the tub axis, along t2 and t3.
+    #[inline(always)]
+    pub(crate) fn radial(&self, of: &LinearMotion<T>) -> [Sample<T>; RADIAL] {
+        let mut sums = [[of.cos[0].lit(0.0); 3]; RADIAL_ENTRIES];
+        self.radial.sum(&of.coordinates, &mut sums);
+        add_at_rest(&mut sums, &RADIAL_AT_REST, &self.radial_at_rest);
+        of.turned::<RADIAL_ENTRIES, RADIAL>(sums, &RADIAL_TURNING)
+    }
+}
+
+/// Adds the parts of order zero, which have no derivatives of their own: an entry's turn brings
+/// them.
+#[inline(always)]
+fn add_at_rest<T: Real, const ENTRIES: usize, const K: usize>(
+    sums: &mut [[N<T>; 3]; ENTRIES],
+    places: &[usize; K],
+    at_rest: &[N<T>; K],
+) {
+    for i in 0..K {
+        sums[places[i]][0] += at_rest[i];
+    }
+}
+
+/// What the outputs are made of, each with two time derivatives.
+pub(crate) struct LinearMotion<T> {
+    /// Deviations from equilibrium.
+    coordinates: [[N<T>; 3]; COORDINATES],
+    /// Of theta.
+    cos: [N<T>; 3],
+    sin: [N<T>; 3],
+}
+
+impl<T: Real> LinearMotion<T> {
+    /// Deviations from equilibrium at an instant.
+    #[inline(always)]
+    pub(crate) fn new(spin: &SpinState<T>, motion: &Motion<T>) -> Self {
+        let zero = spin.sin.lit(0.0);
+        let (n, nn, acceleration) = (spin.speed, (spin.speed * spin.speed).v(), spin.acceleration);
+        let mut coordinates = [[zero; 3]; COORDINATES];
+        for j in 0..COORDINATES {
+            coordinates[j] = [motion.q[j], motion.u[j], motion.a[j]];
+        }
+        Self {
+            coordinates,
+            cos: [spin.cos, -(n * spin.sin).v(), -(acceleration * spin.sin + nn * spin.cos)],
+            sin: [spin.sin, (n * spin.cos).v(), acceleration * spin.cos - nn * spin.sin],
+        }
+    }
+
+    /// Outputs from their sums, cos and sin parts after all others.
+    #[inline(always)]
+    fn turned<const ENTRIES: usize, const M: usize>(
+        &self,
+        mut sums: [[N<T>; 3]; ENTRIES],
+        turning: &[usize],
+    ) -> [Sample<T>; M] {
+        let zero = self.cos[0].lit(0.0);
+        let mut part = M;
+        for &output in turning {
+            for turn in [&self.cos, &self.sin] {
+                let product = product(turn, &sums[part]);
+                part += 1;
+                for w in 0..3 {
+                    sums[output][w] += product[w];
+                }
+            }
+        }
+        let mut outputs = [Sample::still(zero, zero); M];
+        for i in 0..M {
+            let [value, slope, curvature] = sums[i];
+            outputs[i] = Sample { value, slope, curvature };
+        }
+        outputs
+    }
+}
+
+/// A product with its two derivatives.
+#[inline(always)]
+fn product<T: Real>(a: &[N<T>; 3], b: &[N<T>; 3]) -> [N<T>; 3] {
+    let slope = a[0] * b[1] + a[1] * b[0];
+    let curvature = a[0] * b[2] + (a[2] * b[0] + 2.0 * (a[1] * b[1]).v());
+    [(a[0] * b[0]).v(), slope, curvature]
+}
+
+/// Expands the nonlinear outputs of one machine per lane about the equilibrium `q`.
+#[inline(always)]
+pub(crate) fn linearise_outputs<T: Lane>(
+    bodies: &Bodies<T>,
+    q: &[N<T>; COORDINATES],
+) -> Vec<LinearOutputs<f64>> {
+    let zero = q[0].lit(0.0);
+    let lifted = bodies.constant();
+    let still = [zero.constant(); COORDINATES];
+    let mut samples = [[[zero; COLUMNS]; OUTPUTS]; 3];
+    for (k, (cos, sin)) in SAMPLES.into_iter().enumerate() {
+        let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero, zero).constant();
+        for j in 0..COORDINATES {
+            let motion = Motion { q: seeded(q, j, 1.0), u: still, a: still };
+            let axes = Axes::new(&spin, &motion);
+            let (channels, radial) =
+                (axes.channels(&lifted, &motion), axes.radial(&lifted, &motion));
+            for (output, y) in channels.iter().chain(&radial).enumerate() {
+                samples[k][output][AT_REST] = N(y.value.0.value);
+                samples[k][output][j] = N(y.value.0.slope);
+            }
+        }
+    }
+    (0..T::LANES).map(|lane| of_lane(&samples.get_lane(lane))).collect()
+}
+
+fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64> {
+    let mut channels = [[0.0; COORDINATES]; CHANNEL_ENTRIES];
+    let mut channels_at_rest = [0.0; CHANNEL_ENTRIES];
+    let mut radial = [[0.0; COORDINATES]; RADIAL_ENTRIES];
+    let mut radial_at_rest = [0.0; RADIAL_ENTRIES];
+    for output in 0..OUTPUTS {
+        for column in 0..COLUMNS {
+            let values = samples.map(|sample| sample[output][column].0);
+            let mean = (values[0] + values[1] + values[2]) / 3.0;
+            let cos = (2.0 * values[0] - values[1] - values[2]) / 3.0;
+            let sin = (values[1] - values[2]) * 2.0 * SAMPLES[1].1 / 3.0;
+            // Channels are deviations from their values at theta = 0, where the cosine's part is
+            // whole.
+            let steady = if column == AT_REST && output < CHANNELS { -cos } else { mean };
+            for (part, coefficient) in [steady, cos, sin].into_iter().enumerate() {
+                let (entry, terms, at_rest) = if output >= CHANNELS {
+                    let entry = radial_entry(output - CHANNELS, part);
+                    (entry, &mut radial[..], &mut radial_at_rest[..])
+                } else if part == 0 || TURNING.contains(&output) {
+                    let entry = entry(output, part, &TURNING, CHANNELS);
+                    (entry, &mut channels[..], &mut channels_at_rest[..])
+                } else {
+                    continue;
+                };
+                if column == AT_REST {
+                    at_rest[entry] = coefficient;
+                } else {
+                    terms[entry][column] = coefficient;
+                }
+            }
+        }
+    }
+    LinearOutputs {
+        channels: ChannelTerms::gather(&channels),
+        channels_at_rest: CHANNELS_AT_REST.map(|entry| N(channels_at_rest[entry])),
+        radial: RadialTerms::gather(&radial),
+        radial_at_rest: RADIAL_AT_REST.map(|entry| N(radial_at_rest[entry])),
+    }
+}

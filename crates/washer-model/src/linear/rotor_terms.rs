@@ -1,0 +1,169 @@
+//! Which terms the rotor's linear equations have: the nonzero harmonics of its arrays, by entry.
+//!
+//! Rows are those of one half: y, z of its midpoint, then its rotations about the mass centre.
+//! Columns are q7 to q10, because the rotor's forces depend on q3 and q4 through the bearings
+//! alone. The places are the same for every machine: the drum's mass centre lies in the plane of d1
+//! and d2, which is upright at rest.
+
+use crate::lanes::lane_struct;
+use crate::linear::harmonics::{
+    ACCELERATION, COS, COS_2, FUNCTIONS, ONE, SIN, SIN_2, SPEED, SPEED_COS, SPEED_COS_2, SPEED_SIN,
+    SPEED_SIN_2, SPIN, SPIN_COS, SPIN_COS_2, SPIN_SIN, SPIN_SIN_2,
+};
+use crate::linear::sparse::sparse_sums;
+use lane_ode::N;
+
+/// Rows of the rotor.
+pub(crate) const ROWS: usize = 6;
+/// Its rotations.
+pub(crate) const TURNS: usize = 4;
+
+const ARM: usize = 0;
+const FORCE: usize = ARM + 2 * TURNS;
+const STIFFNESS: usize = FORCE + ROWS;
+const DAMPING: usize = STIFFNESS + ROWS * TURNS;
+
+/// Entries of all arrays of the rotor together but its inertia.
+pub(crate) const ENTRIES: usize = DAMPING + ROWS * TURNS;
+/// Entries of its inertia: the lower triangle.
+pub(crate) const INERTIA_ENTRIES: usize = TURNS * (TURNS + 1) / 2;
+
+/// Entry of the inertia matrix about the mass centre, `row` not less than `column`, among those of
+/// the inertia.
+pub(crate) const fn inertia(row: usize, column: usize) -> usize {
+    row * (row + 1) / 2 + column
+}
+
+/// Entry of the mass centre's partial velocity by a rotation, along y (0) or z (1).
+pub(crate) const fn arm(rotation: usize, direction: usize) -> usize {
+    ARM + 2 * rotation + direction
+}
+
+/// Entry of the force.
+pub(crate) const fn force(row: usize) -> usize {
+    FORCE + row
+}
+
+/// Whether a force depends on a rotation and its speed. The midpoint's y does not depend on the
+/// yaw.
+pub(crate) const fn moves(row: usize, column: usize) -> bool {
+    row > 0 || column > 0
+}
+
+/// Entry of the stiffness matrix.
+pub(crate) const fn stiffness(row: usize, column: usize) -> usize {
+    STIFFNESS + row * TURNS + column
+}
+
+/// Entry of the damping and gyroscopic matrix.
+pub(crate) const fn damping(row: usize, column: usize) -> usize {
+    DAMPING + row * TURNS + column
+}
+
+lane_struct! {
+    /// Coefficients of all terms of the rotor, of one machine in `f64`, of one per lane in `T`.
+    #[derive(Clone, Copy, Debug)]
+    Terms { inertia: InertiaTerms<T>, others: RotorTerms<T> }
+}
+
+impl Terms<f64> {
+    /// The inertia's entries and all others, at the functions of an instant.
+    pub(crate) fn at(
+        &self,
+        functions: &[[N<f64>; 1]; FUNCTIONS],
+    ) -> ([[N<f64>; 1]; INERTIA_ENTRIES], [[N<f64>; 1]; ENTRIES]) {
+        let (mut inertia, mut others) = ([[N(0.0)]; INERTIA_ENTRIES], [[N(0.0)]; ENTRIES]);
+        self.inertia.sum(functions, &mut inertia);
+        self.others.sum(functions, &mut others);
+        (inertia, others)
+    }
+}
+
+/// Partial velocities of the mass centre, among all entries.
+#[inline(always)]
+pub(crate) fn arms<T: Copy>(entries: &[[N<T>; 1]; ENTRIES]) -> [[N<T>; 2]; TURNS] {
+    let mut arms = [[entries[0][0]; 2]; TURNS];
+    for r in 0..TURNS {
+        arms[r] = [entries[arm(r, 0)][0], entries[arm(r, 1)][0]];
+    }
+    arms
+}
+
+sparse_sums! {
+    /// Coefficients of the inertia's terms.
+    InertiaTerms: FUNCTIONS => INERTIA_ENTRIES;
+    inertia(0, 0) => ONE COS SIN COS_2 SIN_2;
+    inertia(1, 0) => ONE COS SIN COS_2 SIN_2;
+    inertia(1, 1) => ONE COS COS_2;
+    inertia(2, 0) => ONE COS SIN COS_2 SIN_2;
+    inertia(2, 1) => ONE COS SIN COS_2 SIN_2;
+    inertia(2, 2) => ONE COS_2 SIN_2;
+    inertia(3, 0) => ONE COS SIN COS_2 SIN_2;
+    inertia(3, 1) => ONE COS SIN COS_2 SIN_2;
+    inertia(3, 2) => COS SIN COS_2 SIN_2;
+    inertia(3, 3) => ONE COS SIN COS_2 SIN_2;
+}
+
+sparse_sums! {
+    /// Coefficients of all other terms.
+    RotorTerms: FUNCTIONS => ENTRIES;
+    arm(0, 1) => ONE COS SIN;
+    arm(1, 0) => ONE COS;
+    arm(1, 1) => ONE COS;
+    arm(2, 0) => SIN;
+    arm(2, 1) => COS SIN;
+    arm(3, 0) => ONE COS;
+    arm(3, 1) => ONE COS SIN;
+    force(0) => SPIN_COS;
+    force(1) => SPIN_COS SPIN_SIN;
+    force(2) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    force(3) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    force(4) => SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    force(5) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
+    stiffness(0, 1) => SPIN_COS;
+    stiffness(0, 2) => SPIN_SIN;
+    stiffness(0, 3) => SPIN_COS;
+    stiffness(1, 0) => SPIN_COS SPIN_SIN;
+    stiffness(1, 1) => SPIN_COS;
+    stiffness(1, 2) => SPIN_COS SPIN_SIN;
+    stiffness(1, 3) => SPIN_COS SPIN_SIN;
+    stiffness(2, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
+    stiffness(2, 1) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(2, 2) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(2, 3) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(3, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(3, 1) => ONE COS SPIN SPIN_COS SPIN_COS_2;
+    stiffness(3, 2) => SIN SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(3, 3) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(4, 0) => SPIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(4, 1) => SIN SPIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(4, 2) => ONE SPIN SPIN_COS_2 SPIN_SIN_2;
+    stiffness(4, 3) => SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(5, 0) => SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(5, 1) => ONE COS SPIN SPIN_COS SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(5, 2) => SIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2 ACCELERATION;
+    stiffness(5, 3) => ONE COS SPIN SPIN_COS SPIN_SIN SPIN_COS_2 SPIN_SIN_2;
+    damping(0, 1) => SPEED_SIN;
+    damping(0, 2) => SPEED_COS;
+    damping(0, 3) => SPEED_SIN;
+    damping(1, 0) => SPEED_COS SPEED_SIN;
+    damping(1, 1) => SPEED_SIN;
+    damping(1, 2) => SPEED_COS SPEED_SIN;
+    damping(1, 3) => SPEED_COS SPEED_SIN;
+    damping(2, 0) => SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(2, 1) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(2, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(2, 3) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(3, 0) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(3, 1) => SPEED_SIN SPEED_SIN_2;
+    damping(3, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(3, 3) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(4, 0) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(4, 1) => SPEED SPEED_COS SPEED_COS_2 SPEED_SIN_2;
+    damping(4, 2) => SPEED_COS_2 SPEED_SIN_2;
+    damping(4, 3) => SPEED SPEED_COS_2 SPEED_SIN_2;
+    damping(5, 0) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(5, 1) => SPEED SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(5, 2) => SPEED SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+    damping(5, 3) => SPEED_COS SPEED_SIN SPEED_COS_2 SPEED_SIN_2;
+}

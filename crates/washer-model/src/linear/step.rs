@@ -1,0 +1,386 @@
+//! The linear model as an integrator evaluates it.
+//!
+//! Constants of a trajectory are computed once, functions of theta alone once per instant. The
+//! stages only multiply known matrices with coordinates, speeds and loads. Coordinates come before
+//! speeds: a stage's coordinates are known one stage earlier, so that few operations wait for the
+//! accelerations of the stage before.
+
+use crate::coordinates::{COORDINATES, ROTOR_TURNS, TUB};
+use crate::lanes::lane_struct;
+use crate::linear::Constants;
+use crate::linear::harmonics;
+use crate::linear::rotor_terms::{self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, Terms};
+use crate::linear::symmetric::Symmetric4;
+use crate::machine::spin::SpinState;
+use crate::nonlinear::coefficients::Bodies;
+use crate::nonlinear::coupling::{Coupling, Deflection, HingeMass, mass_scaled_system};
+use crate::nonlinear::floating::{Factors, Floating};
+use crate::nonlinear::forces::AxisLoad;
+use lane_ode::{Lane, N};
+
+lane_struct! {
+    /// The constants of one machine that the stages read; `N<f64>` for one, `N<T>` for one per
+    /// lane.
+    ///
+    /// Accelerations of the tub are those of `TUB`; loads are forces (y, z) and moments (y, z) on
+    /// the shaft's axis.
+    #[derive(Clone, Copy, Debug)]
+    StepConstants {
+        tub_per_position: [[N<T>; 4]; 4],
+        tub_per_speed: [[N<T>; 4]; 4],
+        tub_per_load: [[N<T>; 4]; 4],
+        /// Deflection by these accelerations; lower triangle.
+        tub_compliance: [[N<T>; 4]; 4],
+        tub_axis: [[N<T>; 2]; 2],
+        rotor_per_mass: N<T>,
+        rotor_axis: [[N<T>; 2]; 2],
+        /// The bearings' stiffness in one direction: force by offset, force by tilt, moment by
+        /// tilt.
+        bearing_stiffness: [N<T>; 3],
+        /// Its inverse.
+        bearing_compliance: [N<T>; 3],
+    }
+}
+
+impl StepConstants<f64> {
+    /// Of one machine.
+    pub(crate) fn new(b: &Bodies<f64>, c: &Constants<f64>) -> Self {
+        let zero = N(0.0);
+        let inertia = Factors::new(c.tub_inertia);
+        // Accelerations under forces and torques about the mass centre, and under loads of the
+        // axis.
+        let under = |[y, z, yaw, pitch]: [N<f64>; 4], load: [N<f64>; 4]| {
+            let floating = Floating {
+                per_mass: c.tub_per_mass,
+                force: [y, z],
+                drift: [zero; 2],
+                arm: c.tub_arm,
+                axis: c.tub_axis,
+                axis_drift: [zero; 2],
+                torque: [yaw, pitch],
+            };
+            let load = AxisLoad { force: [load[0], load[1]], moment: [load[2], load[3]] };
+            let ([y, z], [yaw, pitch]) = floating.accelerations(&inertia, &load);
+            [y, z, yaw, pitch]
+        };
+        let mut constants = Self {
+            tub_per_position: [[zero; 4]; 4],
+            tub_per_speed: [[zero; 4]; 4],
+            tub_per_load: [[zero; 4]; 4],
+            tub_compliance: [[zero; 4]; 4],
+            tub_axis: c.tub_axis,
+            rotor_per_mass: c.rotor_per_mass,
+            rotor_axis: c.rotor_axis,
+            bearing_stiffness: [
+                b.front_stiffness + b.rear_stiffness,
+                b.front_stiffness * b.bearing_front + b.rear_stiffness * b.bearing_rear,
+                b.front_stiffness * (b.bearing_front * b.bearing_front)
+                    + b.rear_stiffness * (b.bearing_rear * b.bearing_rear),
+            ],
+            bearing_compliance: [
+                b.bearing_force_compliance,
+                b.bearing_mixed_compliance,
+                b.bearing_moment_compliance,
+            ],
+        };
+        for column in 0..4 {
+            let of_matrix = |matrix: &[[N<f64>; 4]; 4]| matrix.map(|row| -row[column]);
+            let mut reaction = [zero; 4];
+            reaction[column] = N(-1.0);
+            let by_position = under(of_matrix(&c.tub_stiffness), [zero; 4]);
+            let by_speed = under(of_matrix(&c.tub_damping), [zero; 4]);
+            let by_load = under([zero; 4], reaction);
+            for row in 0..4 {
+                constants.tub_per_position[row][column] = by_position[row];
+                constants.tub_per_speed[row][column] = by_speed[row];
+                constants.tub_per_load[row][column] = by_load[row];
+            }
+            let felt = constants.deflection(&in_order(&by_load, &[zero; 2], &[zero; 4]));
+            for row in 0..4 {
+                constants.tub_compliance[row][column] = felt[row];
+            }
+        }
+        constants
+    }
+}
+
+impl<T: Lane> StepConstants<T> {
+    /// Offset (y, z) and tilt (y, z) that the bearings feel of coordinates; of accelerations alike.
+    #[inline(always)]
+    fn deflection(&self, q: &[N<T>; COORDINATES]) -> [N<T>; 4] {
+        Deflection::linear(q, &self.tub_axis, &self.rotor_axis).rows()
+    }
+
+    /// Load of the bearings, as springs, on the shaft.
+    #[inline(always)]
+    fn spring_load(&self, [y, z, tilt_y, tilt_z]: &[N<T>; 4]) -> [N<T>; 4] {
+        let [by_offset, mixed, by_tilt] = self.bearing_stiffness;
+        let zero = y.lit(0.0);
+        [
+            zero - by_offset * *y - mixed * *tilt_y,
+            zero - by_offset * *z - mixed * *tilt_z,
+            zero - mixed * *y - by_tilt * *tilt_y,
+            zero - mixed * *z - by_tilt * *tilt_z,
+        ]
+    }
+}
+
+/// The rotor's arrays at one instant.
+#[derive(Clone, Copy)]
+pub(crate) struct RotorAt<T> {
+    entries: [[N<T>; 1]; ENTRIES],
+    /// Of the inertia about the mass centre.
+    inverse: Symmetric4<T>,
+    bearings: BearingsAt<T>,
+}
+
+/// The bearings with mass at an instant (`nonlinear/coupling.rs`); not computed where they are
+/// springs.
+#[derive(Clone, Copy)]
+struct BearingsAt<T> {
+    /// Inverse of w^2 K^-1 + C.
+    system_inverse: Symmetric4<T>,
+    /// Factor of the deflection beside its second derivative: w^2 + theta'^2.
+    per_deflection: N<T>,
+    /// Accelerations of the rotor by loads: its midpoint (y, z), and its rotations.
+    translation_per_load: [[N<T>; 4]; 2],
+    rotation_per_load: [[N<T>; 4]; 4],
+}
+
+impl<T: Lane> RotorAt<T> {
+    /// At one instant.
+    #[inline(always)]
+    pub(crate) fn new(
+        constants: &StepConstants<T>,
+        coupling: &Coupling<T>,
+        terms: &Terms<T>,
+        spin: &SpinState<T>,
+        hinge_mass: Option<HingeMass<T>>,
+    ) -> Self {
+        let zero = spin.sin.lit(0.0);
+        let nothing = Symmetric4([[zero; 4]; 4]);
+        let bearings = BearingsAt {
+            system_inverse: nothing,
+            per_deflection: zero,
+            translation_per_load: [[zero; 4]; 2],
+            rotation_per_load: [[zero; 4]; 4],
+        };
+        let mut rotor = Self { entries: [[zero]; ENTRIES], inverse: nothing, bearings };
+        rotor.renew(constants, coupling, terms, spin, hinge_mass);
+        rotor
+    }
+
+    /// Overwrites the arrays with those of another instant of the same machine.
+    #[inline(always)]
+    pub(crate) fn renew(
+        &mut self,
+        constants: &StepConstants<T>,
+        coupling: &Coupling<T>,
+        terms: &Terms<T>,
+        spin: &SpinState<T>,
+        hinge_mass: Option<HingeMass<T>>,
+    ) {
+        let functions = harmonics::functions(spin);
+        let zero = spin.sin.lit(0.0);
+        terms.others.sum(&functions, &mut self.entries);
+        // The inverse comes last: it is a long chain of operations, and a stage begins with
+        // operations that do not need it.
+        let mut sums = [[zero]; INERTIA_ENTRIES];
+        terms.inertia.sum(&functions, &mut sums);
+        let mut inertia = [[zero; 4]; 4];
+        for row in 0..4 {
+            for column in 0..=row {
+                [inertia[row][column]] = sums[entry::inertia(row, column)];
+            }
+        }
+        if let Some(mass) = hinge_mass {
+            for (place, r) in [2, 3].into_iter().enumerate() {
+                inertia[r][r] += mass.inertia;
+                self.entries[entry::force(2 + r)][0] += mass.torque[place];
+            }
+            self.entries[entry::damping(4, 3)][0] -= mass.torque_per_speed;
+            self.entries[entry::damping(5, 2)][0] += mass.torque_per_speed;
+        }
+        self.inverse = Symmetric4(inertia).inverse();
+        if let Coupling::MassScaled(scaling) = coupling {
+            let arms = entry::arms(&self.entries);
+            let cap_squared = scaling.bearings_squared;
+            self.bearings =
+                BearingsAt::new(constants, cap_squared, spin.speed, &self.inverse, &arms);
+        }
+    }
+}
+
+impl<T: Lane> BearingsAt<T> {
+    /// From the inverse of the rotor's inertia and the partial velocities of its mass centre.
+    #[inline(always)]
+    fn new(
+        c: &StepConstants<T>,
+        cap_squared: N<T>,
+        speed: N<T>,
+        inverse: &Symmetric4<T>,
+        arm: &[[N<T>; 2]; 4],
+    ) -> Self {
+        let zero = cap_squared.lit(0.0);
+        let axis = &c.rotor_axis;
+        let mut rotation = [[zero; 4]; 4];
+        for row in 0..4 {
+            let (by_yaw, by_pitch) = (inverse.at(row, 0), inverse.at(row, 1));
+            // The yaw moves nothing along y.
+            let mut by_force =
+                [zero - by_pitch * arm[1][0], zero - by_yaw * arm[0][1] - by_pitch * arm[1][1]];
+            for r in 2..4 {
+                for i in 0..2 {
+                    by_force[i] -= inverse.at(row, r) * arm[r][i];
+                }
+            }
+            let by_moment =
+                [(by_pitch * axis[1][0]).v(), by_yaw * axis[0][1] + by_pitch * axis[1][1]];
+            rotation[row] = [by_force[0], by_force[1], by_moment[0], by_moment[1]];
+        }
+        // C: how midpoint and axis accelerate by loads, on the rotor's side.
+        let mut compliance = [[zero; 4]; 4];
+        compliance[0][0] = c.rotor_per_mass;
+        compliance[1][1] = c.rotor_per_mass;
+        for r in 0..4 {
+            if r > 0 {
+                compliance[0][0] -= arm[r][0] * rotation[r][0];
+            }
+            compliance[1][0] -= arm[r][1] * rotation[r][0];
+            compliance[1][1] -= arm[r][1] * rotation[r][1];
+        }
+        for column in 0..4 {
+            if column < 3 {
+                compliance[2][column] = (axis[1][0] * rotation[1][column]).v();
+            }
+            compliance[3][column] =
+                axis[0][1] * rotation[0][column] + axis[1][1] * rotation[1][column];
+        }
+        let compliance = Symmetric4(compliance);
+        let system =
+            mass_scaled_system(cap_squared, c.bearing_compliance, &c.tub_compliance, &compliance.0);
+        let mut translation = [[zero; 4]; 2];
+        for i in 0..2 {
+            for column in 0..4 {
+                translation[i][column] = compliance.at(i, column);
+            }
+        }
+        Self {
+            system_inverse: Symmetric4(system).inverse(),
+            per_deflection: cap_squared + speed * speed,
+            translation_per_load: translation,
+            rotation_per_load: rotation,
+        }
+    }
+
+    /// The load on the tub, from a deflection and its second derivative in absence of loads.
+    #[inline(always)]
+    fn reaction(&self, deflection: &[N<T>; 4], second: &[N<T>; 4]) -> [N<T>; 4] {
+        let mut sum = *second;
+        for i in 0..4 {
+            sum[i] += self.per_deflection * deflection[i];
+        }
+        self.system_inverse.times(&sum)
+    }
+}
+
+/// Accelerations du/dt at deviations `q` from equilibrium and speeds `u`.
+#[inline(always)]
+pub(crate) fn accelerations<T: Lane>(
+    c: &StepConstants<T>,
+    coupling: &Coupling<T>,
+    rotor_at: &RotorAt<T>,
+    q: &[N<T>; COORDINATES],
+    u: &[N<T>; COORDINATES],
+) -> [N<T>; COORDINATES] {
+    let deflection = c.deflection(q);
+    let mut tub = [q[0]; 4];
+    for row in 0..4 {
+        tub[row] = (c.tub_per_position[row][0] * q[TUB[0]]).v();
+        for column in 1..4 {
+            tub[row] += c.tub_per_position[row][column] * q[TUB[column]];
+        }
+    }
+    let e = &rotor_at.entries;
+    let arm = entry::arms(e);
+    let mut rotor = [q[0]; ROWS];
+    for row in 0..ROWS {
+        [rotor[row]] = e[entry::force(row)];
+        for column in 0..4 {
+            if entry::moves(row, column) {
+                let [stiffness] = e[entry::stiffness(row, column)];
+                rotor[row] -= stiffness * q[ROTOR_TURNS[column]];
+            }
+        }
+    }
+    if let Coupling::Springs = coupling {
+        let load = c.spring_load(&deflection);
+        for row in 0..4 {
+            for column in 0..4 {
+                tub[row] += c.tub_per_load[row][column] * load[column];
+            }
+        }
+        let [force_y, force_z, moment_y, moment_z] = load;
+        for r in 0..4 {
+            if r > 0 {
+                rotor[2 + r] -= arm[r][0] * force_y;
+            }
+            rotor[2 + r] -= arm[r][1] * force_z;
+        }
+        let axis = &c.rotor_axis;
+        rotor[2] += axis[0][1] * moment_z;
+        rotor[3] = rotor[3] + axis[1][0] * moment_y + axis[1][1] * moment_z;
+        rotor[0] += force_y;
+        rotor[1] += force_z;
+    }
+    for row in 0..4 {
+        for column in 0..4 {
+            tub[row] += c.tub_per_speed[row][column] * u[TUB[column]];
+        }
+    }
+    for row in 0..ROWS {
+        for column in 0..4 {
+            if entry::moves(row, column) {
+                let [damping] = e[entry::damping(row, column)];
+                rotor[row] -= damping * u[ROTOR_TURNS[column]];
+            }
+        }
+    }
+    let mut rotation = rotor_at.inverse.times(&[rotor[2], rotor[3], rotor[4], rotor[5]]);
+    let mut midpoint = [(rotor[0] * c.rotor_per_mass).v(), (rotor[1] * c.rotor_per_mass).v()];
+    for r in 0..4 {
+        if r > 0 {
+            midpoint[0] -= arm[r][0] * rotation[r];
+        }
+        midpoint[1] -= arm[r][1] * rotation[r];
+    }
+    if let Coupling::MassScaled(_) = coupling {
+        let bearings = &rotor_at.bearings;
+        let second = c.deflection(&in_order(&tub, &midpoint, &rotation));
+        let reaction = bearings.reaction(&deflection, &second);
+        for column in 0..4 {
+            for row in 0..4 {
+                tub[row] -= c.tub_per_load[row][column] * reaction[column];
+                rotation[row] -= bearings.rotation_per_load[row][column] * reaction[column];
+            }
+            for i in 0..2 {
+                midpoint[i] -= bearings.translation_per_load[i][column] * reaction[column];
+            }
+        }
+    }
+    in_order(&tub, &midpoint, &rotation)
+}
+
+/// Accelerations of the tub, of the rotor's midpoint and of its rotations, as coordinates are
+/// numbered.
+#[inline(always)]
+fn in_order<T: Copy>(
+    tub: &[N<T>; 4],
+    midpoint: &[N<T>; 2],
+    rotation: &[N<T>; 4],
+) -> [N<T>; COORDINATES] {
+    let [a1, a2, a5, a6] = *tub;
+    let [a3, a4] = *midpoint;
+    let [a7, a8, a9, a10] = *rotation;
+    [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
+}

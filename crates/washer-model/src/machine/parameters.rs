@@ -1,0 +1,393 @@
+//! The one table of parameters: every number of machine, spin and window under one flat,
+//! unit-suffixed name, with its unit, meaning, source and range. Grid axes, `[set]`, `--set`,
+//! reports and the machine file's checks all read it.
+
+mod table;
+
+use std::borrow::Cow;
+use std::fmt;
+
+use crate::{Damper, Machine, Spin, Spring};
+use table::{BLOCKS, TABLE};
+
+/// A number of the machine, the spin or the window that a user can name, set and sweep.
+///
+/// Most write one number. Some write several at once, such as `spring_stiffness_n_per_m` that of
+/// all springs; see [`Parameter::parts`].
+#[derive(Clone)]
+pub struct Parameter {
+    name: Cow<'static, str>,
+    row: &'static Row,
+    /// Which spring or damper, from 0; 0 where the row has only one.
+    index: usize,
+}
+
+/// Where a parameter's default comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Printed by the paper, at this place.
+    Paper(&'static str),
+    /// Follows from what the paper prints, in this way.
+    Derived(&'static str),
+    /// The paper is silent: this project's assumption, for this reason.
+    Assumed(&'static str),
+    /// A constant everybody uses.
+    Convention,
+    /// Has no default: the grid file's `[spin]` gives it.
+    Grid,
+    /// Has no default of its own: the grid file's `[time]` gives it.
+    Time,
+}
+
+/// What a parameter writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// One number of the machine.
+    Machine,
+    /// A number of both bearings, by its name after `bearing_front_` and `bearing_rear_`.
+    Bearings(&'static str),
+    /// A number of every spring, by its name after `spring_1_`.
+    Springs(&'static str),
+    /// A number of every damper, by its name after `damper_1_`.
+    Dampers(&'static str),
+    /// A number of the spin: of its profile, or of a point of its table.
+    Spin,
+    /// An edge of the window (0: the beginning, 1: the end), which neither machine nor spin holds:
+    /// [`Parameter::get`] finds nothing and [`Parameter::set`] writes nothing.
+    Window(usize),
+}
+
+/// Values that a parameter may take. No number above [`Range::LARGEST`] in magnitude is accepted,
+/// so that products of a few parameters stay finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Range {
+    /// Any finite number.
+    Any,
+    /// Greater than 0.
+    Positive,
+    /// 0 or greater.
+    NonNegative,
+    /// Less than 0.
+    Negative,
+    /// Within these bounds, both included.
+    Within(f64, f64),
+}
+
+/// Why a name is not a parameter of this machine and spin.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnknownParameter {
+    /// No row of the table has this name.
+    #[error("no parameter has this name")]
+    Name,
+    /// The name is one of a numbered spring or damper that the machine does not have.
+    #[error("the machine has {count} {element}s, numbered from 1")]
+    Number {
+        /// `"spring"` or `"damper"`.
+        element: &'static str,
+        /// How many there are.
+        count: usize,
+    },
+    /// The name is one of a numbered point of the spin's table that is not there.
+    #[error("the spin's table has {count} points, numbered from 1")]
+    TablePoint {
+        /// How many there are; 0 if the spin is not given as a table.
+        count: usize,
+    },
+    /// A spin given as a table has no peak and no ramp.
+    #[error("a spin given as a table has no such number")]
+    TableSpin,
+}
+
+/// One line of the table.
+struct Row {
+    /// The whole name, or what follows `spring_1_` and `damper_1_`.
+    name: &'static str,
+    unit: &'static str,
+    description: &'static str,
+    source: Source,
+    range: Range,
+    target: Target,
+    get: fn(&Machine, &Spin, usize) -> Option<f64>,
+    set: fn(&mut Machine, &mut Spin, usize, f64),
+}
+
+/// Rows of every element of a numbered kind.
+struct Block {
+    /// What names begin with; the number and the row's name follow.
+    prefix: &'static str,
+    rows: &'static [Row],
+    count: fn(&Machine, &Spin) -> usize,
+    /// The error for a number above the count.
+    missing: fn(usize) -> UnknownParameter,
+}
+
+impl Block {
+    fn parameter(&self, row: &'static Row, index: usize) -> Parameter {
+        let name = Cow::Owned(format!("{}{}_{}", self.prefix, index + 1, row.name));
+        Parameter { name, row, index }
+    }
+}
+
+impl Target {
+    /// Whether these are several numbers at once.
+    #[must_use]
+    pub const fn is_several(self) -> bool {
+        matches!(self, Self::Bearings(_) | Self::Springs(_) | Self::Dampers(_))
+    }
+}
+
+impl Range {
+    /// Greatest magnitude accepted of any number.
+    pub const LARGEST: f64 = 1e12;
+
+    /// Whether `value` is allowed; never for NaN or infinity.
+    #[must_use]
+    pub fn contains(self, value: f64) -> bool {
+        value.abs() <= Self::LARGEST
+            && match self {
+                Self::Any => true,
+                Self::Positive => value > 0.0,
+                Self::NonNegative => value >= 0.0,
+                Self::Negative => value < 0.0,
+                Self::Within(least, greatest) => (least..=greatest).contains(&value),
+            }
+    }
+}
+
+impl Range {
+    /// The values that would be accepted in place of a refused one.
+    #[must_use]
+    pub fn instead_of(self, value: f64) -> String {
+        if value.is_finite() && value.abs() > Self::LARGEST && !matches!(self, Self::Within(..)) {
+            format!("{self}, at most {:e} in magnitude", Self::LARGEST)
+        } else {
+            self.to_string()
+        }
+    }
+}
+
+/// A number as a message shows it: the shortest decimal that reads back the same, in powers of ten
+/// where it would be long.
+#[must_use]
+pub fn decimal(value: f64) -> String {
+    let text = format!("{value:?}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Any => f.write_str("a finite number"),
+            Self::Positive => f.write_str("a number greater than 0"),
+            Self::NonNegative => f.write_str("a number, 0 or greater"),
+            Self::Negative => f.write_str("a number less than 0"),
+            Self::Within(least, greatest) => {
+                write!(f, "a number from {} to {}", decimal(*least), decimal(*greatest))
+            }
+        }
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Paper(place) => write!(f, "paper, {place}"),
+            Self::Derived(how) => write!(f, "derived: {how}"),
+            Self::Assumed(why) => write!(f, "assumed: {why}"),
+            Self::Convention => f.write_str("convention"),
+            Self::Grid => f.write_str("the grid file's [spin]"),
+            Self::Time => f.write_str("the grid file's [time]"),
+        }
+    }
+}
+
+impl PartialEq for Parameter {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for Parameter {}
+
+impl fmt::Debug for Parameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Parameter").field(&self.name).finish()
+    }
+}
+
+/// How a name ends whose number is in this unit; `None` where names say nothing of it.
+#[must_use]
+pub fn unit_suffix(unit: &str) -> Option<&'static str> {
+    Some(match unit {
+        "m" => "_m",
+        "kg" => "_kg",
+        "s" => "_s",
+        "rpm" => "_rpm",
+        "N/m" => "_n_per_m",
+        "N s/m" => "_n_s_per_m",
+        "N m/rad" => "_n_m_per_rad",
+        "kg m^2" => "_kg_m2",
+        "m/s^2" => "_m_per_s2",
+        _ => return None,
+    })
+}
+
+impl Parameter {
+    /// Every parameter of this machine and spin, in the table's order, springs and dampers one by
+    /// one.
+    #[must_use]
+    pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
+        let tabled = matches!(spin, Spin::Table { .. });
+        let single =
+            TABLE.iter().filter(|row| !(tabled && row.target == Target::Spin)).map(Self::single);
+        let numbered = BLOCKS.iter().flat_map(|block| {
+            (0..(block.count)(machine, spin))
+                .flat_map(move |k| block.rows.iter().map(move |row| block.parameter(row, k)))
+        });
+        single.chain(numbered).collect()
+    }
+
+    /// The parameter of this name.
+    ///
+    /// # Errors
+    /// When the table has no such row, or this machine or spin no such number.
+    pub fn find(name: &str, machine: &Machine, spin: &Spin) -> Result<Self, UnknownParameter> {
+        if let Some(row) = TABLE.iter().find(|row| row.name == name) {
+            return if row.target == Target::Spin && matches!(spin, Spin::Table { .. }) {
+                Err(UnknownParameter::TableSpin)
+            } else {
+                Ok(Self::single(row))
+            };
+        }
+        for block in BLOCKS {
+            if let Some((k, rest)) = numbered(name, block.prefix) {
+                let row = block.rows.iter().find(|row| row.name == rest);
+                let row = row.ok_or(UnknownParameter::Name)?;
+                let count = (block.count)(machine, spin);
+                return if k < count {
+                    Ok(block.parameter(row, k))
+                } else {
+                    Err((block.missing)(count))
+                };
+            }
+        }
+        Err(UnknownParameter::Name)
+    }
+
+    /// Name in grid files, on the command line and of the result's column.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// SI unit (rpm for speeds), as in the name's suffix but readable.
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        self.row.unit
+    }
+
+    /// What it is, in a phrase.
+    #[must_use]
+    pub fn description(&self) -> &'static str {
+        self.row.description
+    }
+
+    /// Where the built-in machine's value comes from.
+    #[must_use]
+    pub fn source(&self) -> Source {
+        self.row.source
+    }
+
+    /// Values it may take.
+    #[must_use]
+    pub fn range(&self) -> Range {
+        self.row.range
+    }
+
+    /// What it writes.
+    #[must_use]
+    pub fn target(&self) -> Target {
+        self.row.target
+    }
+
+    /// Its value; `None` if it writes several numbers and they differ, or if the machine has no
+    /// such number.
+    #[must_use]
+    pub fn get(&self, machine: &Machine, spin: &Spin) -> Option<f64> {
+        (self.row.get)(machine, spin, self.index)
+    }
+
+    /// Writes the value, unchecked: [`Machine::violations`] judges the whole. Nothing is written if
+    /// the machine has no such number, which [`Parameter::find`] rules out.
+    pub fn set(&self, machine: &mut Machine, spin: &mut Spin, value: f64) {
+        (self.row.set)(machine, spin, self.index, value);
+    }
+
+    /// Names of the single numbers this parameter writes: its own name, unless it writes several at
+    /// once.
+    #[must_use]
+    pub fn parts(&self, machine: &Machine) -> Vec<Cow<'static, str>> {
+        let of_every = |count: usize, element: &str, number: &str| {
+            (1..=count).map(|k| format!("{element}_{k}_{number}").into()).collect()
+        };
+        match self.row.target {
+            Target::Bearings(number) => {
+                ["front", "rear"].map(|end| format!("bearing_{end}_{number}").into()).into()
+            }
+            Target::Springs(number) => of_every(machine.springs.len(), "spring", number),
+            Target::Dampers(number) => of_every(machine.dampers.len(), "damper", number),
+            Target::Machine | Target::Spin | Target::Window(_) => vec![self.name.clone()],
+        }
+    }
+
+    fn single(row: &'static Row) -> Self {
+        Self { name: Cow::Borrowed(row.name), row, index: 0 }
+    }
+}
+
+/// Points of a spin given as a table.
+fn table_points(spin: &Spin) -> usize {
+    match spin {
+        Spin::Table { time_s, speed_rpm } => time_s.len().min(speed_rpm.len()),
+        Spin::Cycloidal { .. } | Spin::Triangular { .. } | Spin::Ramp { .. } => 0,
+    }
+}
+
+/// `"spring_2_tub_x_m"` with `"spring_"` gives 1 (from 0) and `"tub_x_m"`. Only the canonical
+/// spelling counts (no `spring_02_`), so that one number has one name.
+fn numbered<'a>(name: &'a str, prefix: &str) -> Option<(usize, &'a str)> {
+    let (digits, rest) = name.strip_prefix(prefix)?.split_once('_')?;
+    let canonical = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
+    let number: usize = if canonical { digits.parse().ok()? } else { return None };
+    Some((number - 1, rest))
+}
+
+/// The value all items share.
+fn common<T>(items: &[T], value: fn(&T) -> f64) -> Option<f64> {
+    let first = value(items.first()?);
+    items.iter().all(|item| value(item).to_bits() == first.to_bits()).then_some(first)
+}
+
+impl Spring {
+    /// Distance between the ends as given, before the machine sags, in m.
+    #[must_use]
+    pub fn given_length_m(&self) -> f64 {
+        distance_m(self.cabinet_m, self.tub_m)
+    }
+}
+
+impl Damper {
+    /// Distance between the ends as given, before the machine sags, in m.
+    #[must_use]
+    pub fn given_length_m(&self) -> f64 {
+        distance_m(self.cabinet_m, self.tub_m)
+    }
+}
+
+fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    (x * x + y * y + z * z).sqrt()
+}
+
+#[cfg(test)]
+mod tests;

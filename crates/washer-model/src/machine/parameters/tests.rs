@@ -1,0 +1,173 @@
+//! Names, ranges and what each parameter writes.
+
+use super::Range::{Any, Negative, NonNegative, Positive};
+use super::Source::{Assumed, Paper};
+use super::*;
+
+fn spin() -> Spin {
+    Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 }
+}
+
+#[test]
+fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
+    for parameter in Parameter::all(&Machine::paper(), &spin()) {
+        let (mut machine, mut spin) = (Machine::paper(), spin());
+        assert_eq!(Parameter::find(parameter.name(), &machine, &spin).as_ref(), Ok(&parameter));
+        if matches!(parameter.target(), Target::Window(_)) {
+            assert_eq!(parameter.get(&machine, &spin), None);
+            continue;
+        }
+        let before =
+            parameter.get(&machine, &spin).expect("the paper's machine has one value for each");
+        assert!(parameter.range().contains(before), "{parameter:?} = {before}");
+        parameter.set(&mut machine, &mut spin, before + 0.125);
+        assert_eq!(parameter.get(&machine, &spin), Some(before + 0.125), "{parameter:?}");
+    }
+}
+
+#[test]
+fn each_parameter_writes_its_parts_and_nothing_else() {
+    let everything = Parameter::all(&Machine::paper(), &spin());
+    for parameter in &everything {
+        let (mut machine, mut spin) = (Machine::paper(), spin());
+        let before: Vec<_> = everything.iter().map(|p| p.get(&machine, &spin)).collect();
+        parameter.set(&mut machine, &mut spin, 0.875);
+        let parts = parameter.parts(&machine);
+        for (other, before) in everything.iter().zip(before) {
+            if other.parts(&machine).iter().all(|part| !parts.contains(part)) {
+                // A default free length follows the ends of its spring.
+                let follows =
+                    other.name().ends_with("free_length_m") && other.index == parameter.index;
+                assert!(
+                    follows || other.get(&machine, &spin) == before,
+                    "{parameter:?} wrote {other:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn names_end_with_their_unit_and_are_unique() {
+    let everything = Parameter::all(&Machine::paper(), &spin());
+    let mut names: Vec<_> = everything.iter().map(Parameter::name).collect();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), everything.len());
+    for parameter in &everything {
+        let unit = parameter.unit();
+        let suffix = unit_suffix(unit).unwrap_or_else(|| panic!("no suffix is known for {unit}"));
+        assert!(parameter.name().ends_with(suffix), "{parameter:?}");
+    }
+}
+
+#[test]
+fn sources_are_the_papers_own_places() {
+    let silent = [
+        "tub_front_x_m",
+        "drum_hinge_x_m",
+        "drum_front_x_m",
+        "bearing_front_x_m",
+        "bearing_rear_x_m",
+    ];
+    let mut counts = [0; 5];
+    for parameter in Parameter::all(&Machine::paper(), &spin()) {
+        let name = parameter.name();
+        let body = ["tub_", "shaft_"].iter().any(|body| name.starts_with(body));
+        let (expected, count) = if body && name.contains("_inertia_") {
+            (Paper("Table 3"), &mut counts[0])
+        } else if name.contains("_cabinet_") || (name.contains("_tub_") && !body) {
+            (Paper("Table 4"), &mut counts[1])
+        } else if ["n_per_m", "n_s_per_m", "n_m_per_rad"].iter().any(|unit| name.ends_with(unit)) {
+            (Paper("section 3.1"), &mut counts[2])
+        } else if body && !silent.contains(&name) {
+            (Paper("Table 2"), &mut counts[3])
+        } else if silent.contains(&name)
+            || name.ends_with("free_length_m")
+            || name == "radial_clearance_m"
+        {
+            assert!(matches!(parameter.source(), Assumed(_)), "{parameter:?}");
+            counts[4] += 1;
+            continue;
+        } else {
+            continue;
+        };
+        assert_eq!(parameter.source(), expected, "{parameter:?}");
+        *count += 1;
+    }
+    assert_eq!(counts, [6, 36, 12, 4, 10]);
+}
+
+#[test]
+fn numbers_beyond_the_machine_are_told_from_misspellings() {
+    let (machine, spin) = (Machine::paper(), spin());
+    let find = |name: &str| Parameter::find(name, &machine, &spin).map(|p| p.index);
+    assert_eq!(find("spring_4_tub_z_m"), Ok(3));
+    assert_eq!(
+        find("spring_5_tub_z_m"),
+        Err(UnknownParameter::Number { element: "spring", count: 4 })
+    );
+    assert_eq!(
+        find("damper_3_damping_n_s_per_m"),
+        Err(UnknownParameter::Number { element: "damper", count: 2 })
+    );
+    for name in [
+        "spring_0_tub_z_m",
+        "spring_01_tub_z_m",
+        "spring_+1_tub_z_m",
+        "spring__tub_z_m",
+        "spring_99999999999999999999_tub_z_m",
+        "spring_1_tub_w_m",
+        "tub_mass",
+        "",
+    ] {
+        assert_eq!(find(name), Err(UnknownParameter::Name), "{name}");
+    }
+    let table = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 100.0] };
+    assert_eq!(Parameter::find("spin_ramp_s", &machine, &table), Err(UnknownParameter::TableSpin));
+    let points: Vec<_> = Parameter::all(&machine, &table)
+        .into_iter()
+        .filter(|p| p.source() == Source::Grid)
+        .collect();
+    let names: Vec<_> = points.iter().map(Parameter::name).collect();
+    assert_eq!(
+        names,
+        [
+            "spin_table_1_time_s",
+            "spin_table_1_speed_rpm",
+            "spin_table_2_time_s",
+            "spin_table_2_speed_rpm"
+        ]
+    );
+    let mut changed = table.clone();
+    points[3].set(&mut machine.clone(), &mut changed, 90.0);
+    assert_eq!(changed, Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 90.0] });
+    assert_eq!(
+        Parameter::find("spin_table_3_time_s", &machine, &table),
+        Err(UnknownParameter::TablePoint { count: 2 })
+    );
+    let edges = ["window_from_s", "window_to_s", "tub_mass_kg"];
+    let edges = edges.map(|name| Parameter::find(name, &machine, &table).unwrap().target());
+    assert_eq!(edges, [Target::Window(0), Target::Window(1), Target::Machine]);
+}
+
+#[test]
+fn a_parameter_of_several_numbers_has_no_value_when_they_differ() {
+    let (mut machine, spin) = (Machine::paper(), spin());
+    let all = Parameter::find("damping_n_s_per_m", &machine, &spin).unwrap();
+    assert_eq!(all.get(&machine, &spin), Some(140.0));
+    machine.dampers[1].damping_n_s_per_m = 100.0;
+    assert_eq!(all.get(&machine, &spin), None);
+}
+
+#[test]
+fn ranges_refuse_what_is_not_a_number() {
+    for range in [Any, Positive, NonNegative, Negative, Range::Within(-1e5, 1e5)] {
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e13, -1e13] {
+            assert!(!range.contains(value), "{range:?} {value}");
+        }
+    }
+    assert!(!Positive.contains(0.0) && Positive.contains(1e-9));
+    assert!(NonNegative.contains(0.0) && !NonNegative.contains(-1e-9));
+    assert!(!Negative.contains(0.0) && Negative.contains(-1e-9));
+}

@@ -1,0 +1,246 @@
+//! The prescribed spin of the shaft: angle, speed and acceleration as functions of time.
+
+mod turns;
+
+pub(crate) use turns::cuts_s;
+
+use crate::lanes::{InLanes as _, lane_struct};
+use core::f64::consts::TAU;
+use lane_ode::{Lane, N, Real, trig};
+
+/// Speed of the drum over time, as a user describes it. Speeds in rpm, times in s.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Spin {
+    /// Cycloidal run-up, then constant (Eq. 42): w = peak (t/ramp - sin(2 pi t/ramp) / 2 pi).
+    Cycloidal {
+        /// Speed reached at the end of the ramp.
+        peak_rpm: f64,
+        /// Duration of the ramp.
+        ramp_s: f64,
+    },
+    /// Linear up over `ramp_s`, linear down over `ramp_s`, then at rest.
+    Triangular {
+        /// Speed at the turn.
+        peak_rpm: f64,
+        /// Duration of each flank.
+        ramp_s: f64,
+    },
+    /// Linear up over `ramp_s`, then constant.
+    Ramp {
+        /// Speed reached at the end of the ramp.
+        peak_rpm: f64,
+        /// Duration of the ramp.
+        ramp_s: f64,
+    },
+    /// Linear between the given points; constant beyond the last.
+    Table {
+        /// Times, increasing, the first 0.
+        time_s: Vec<f64>,
+        /// Speeds at these times.
+        speed_rpm: Vec<f64>,
+    },
+}
+
+lane_struct! {
+    /// The spin at one instant, as the equations read it.
+    #[derive(Clone, Copy, Debug)]
+    SpinState {
+        sin,
+        cos,
+        /// Of twice the angle.
+        sin_2,
+        cos_2,
+        /// theta', rad/s.
+        speed,
+        /// theta'', rad/s^2.
+        acceleration,
+    }
+}
+
+impl<T: Real> SpinState<T> {
+    /// From the sine and cosine of theta.
+    #[inline(always)]
+    pub(crate) fn new((sin, cos): (N<T>, N<T>), speed: N<T>, acceleration: N<T>) -> Self {
+        let sin_2 = (2.0 * (sin * cos).v()).v();
+        let cos_2 = 1.0 - 2.0 * (sin * sin).v();
+        Self { sin, cos, sin_2, cos_2, speed, acceleration }
+    }
+}
+
+/// A stretch of a spin profile over which one formula holds:
+/// turns = turns_at_start + a t + b t^2 + c (cos(2 pi f t) - 1), t from the stretch's start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SpinStretch {
+    /// Where it starts; it holds until the next one starts.
+    pub(crate) start_s: f64,
+    /// Turns made before, whole ones dropped.
+    turns_at_start: f64,
+    /// a
+    turns_per_s: f64,
+    /// b
+    turns_per_s2: f64,
+    /// c
+    wave_turns: f64,
+    /// f
+    wave_hz: f64,
+}
+
+impl SpinStretch {
+    /// Acceleration at a time within the stretch.
+    pub(crate) fn acceleration_rad_per_s2(&self, t_s: f64) -> f64 {
+        SpinLanes::splat(N(0.0), self).at(N(t_s)).acceleration.0
+    }
+
+    /// Speed at a time within the stretch.
+    pub(crate) fn speed_rad_per_s(&self, t_s: f64) -> f64 {
+        SpinLanes::splat(N(0.0), self).at(N(t_s)).speed.0
+    }
+}
+
+impl Spin {
+    /// The profile as stretches in order of time, the first from 0.
+    pub(crate) fn stretches(&self) -> Vec<SpinStretch> {
+        let per_s = |rpm: f64| rpm / 60.0;
+        match self {
+            Self::Cycloidal { peak_rpm, ramp_s } => {
+                let peak = per_s(*peak_rpm);
+                // Eq. 42 integrated: theta = w (t^2 / 2T + T (cos(2 pi t / T) - 1) / 4 pi^2).
+                let up = SpinStretch {
+                    turns_per_s2: peak / (2.0 * ramp_s),
+                    wave_turns: peak * ramp_s / (TAU * TAU),
+                    wave_hz: 1.0 / ramp_s,
+                    ..SpinStretch::at_rest(0.0, 0.0)
+                };
+                let level = SpinStretch {
+                    turns_per_s: peak,
+                    ..SpinStretch::at_rest(
+                        *ramp_s,
+                        up.turns_at_start + turns_of_ramp(0.0, peak, *ramp_s),
+                    )
+                };
+                vec![up, level]
+            }
+            Self::Triangular { peak_rpm, ramp_s } => {
+                linear_stretches(&[(0.0, 0.0), (*ramp_s, per_s(*peak_rpm)), (2.0 * ramp_s, 0.0)])
+            }
+            Self::Ramp { peak_rpm, ramp_s } => {
+                linear_stretches(&[(0.0, 0.0), (*ramp_s, per_s(*peak_rpm))])
+            }
+            Self::Table { time_s, speed_rpm } => {
+                let points: Vec<_> =
+                    time_s.iter().zip(speed_rpm).map(|(&t, &rpm)| (t, per_s(rpm))).collect();
+                linear_stretches(&points)
+            }
+        }
+    }
+
+    /// The fastest speed from 0 to `end_s`, rad/s.
+    #[must_use]
+    pub fn greatest_speed_rad_per_s(&self, end_s: f64) -> f64 {
+        let starts: Vec<f64> = self.stretches().iter().map(|stretch| stretch.start_s).collect();
+        let times_s = starts.into_iter().chain([end_s]).filter(|&t_s| t_s <= end_s);
+        self.speeds_rpm(times_s).map(f64::abs).fold(0.0, f64::max) * TAU / 60.0
+    }
+
+    /// Speeds at times (rpm).
+    pub fn speeds_rpm(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = f64> {
+        let stretches = self.stretches();
+        times_s.into_iter().map(move |t_s| {
+            let current = stretches.get(stretch_at(&stretches, t_s));
+            current.map_or(0.0, |stretch| stretch.speed_rad_per_s(t_s) * 60.0 / TAU)
+        })
+    }
+}
+
+/// Which of these stretches, in order of time, holds at a time; before all of them, the first.
+pub(crate) fn stretch_at(stretches: &[SpinStretch], t_s: f64) -> usize {
+    stretches.partition_point(|stretch| stretch.start_s <= t_s).saturating_sub(1)
+}
+
+/// Turns, whole ones dropped, of a ramp between two speeds (1/s).
+fn turns_of_ramp(from: f64, to: f64, duration_s: f64) -> f64 {
+    let mean = 0.5 * (from + to);
+    let turns = mean * duration_s;
+    // The product's rounding error is added after whole turns are dropped, which would absorb it.
+    (turns - turns.round_ties_even()) + mean.mul_add(duration_s, -turns)
+}
+
+/// Stretches between points (s, turns/s), constant beyond the last.
+fn linear_stretches(points: &[(f64, f64)]) -> Vec<SpinStretch> {
+    let mut turns = 0.0;
+    let mut stretches = Vec::with_capacity(points.len());
+    for (i, &(start_s, speed)) in points.iter().enumerate() {
+        let mut stretch =
+            SpinStretch { turns_per_s: speed, ..SpinStretch::at_rest(start_s, turns) };
+        if let Some(&(end_s, end_speed)) = points.get(i + 1) {
+            stretch.turns_per_s2 = 0.5 * (end_speed - speed) / (end_s - start_s);
+            turns += turns_of_ramp(speed, end_speed, end_s - start_s);
+            turns -= turns.round_ties_even();
+        }
+        stretches.push(stretch);
+    }
+    stretches
+}
+
+impl SpinStretch {
+    fn at_rest(start_s: f64, turns_at_start: f64) -> Self {
+        Self {
+            start_s,
+            turns_at_start,
+            turns_per_s: 0.0,
+            turns_per_s2: 0.0,
+            wave_turns: 0.0,
+            wave_hz: 0.0,
+        }
+    }
+}
+
+lane_struct! {
+    /// One stretch per lane.
+    #[derive(Clone, Copy, Debug)]
+    SpinLanes of SpinStretch {
+        start_s,
+        turns_at_start,
+        turns_per_s,
+        turns_per_s2,
+        wave_turns,
+        wave_hz,
+    }
+}
+
+impl<T: Lane> SpinLanes<T> {
+    /// The spin at time `t_s`.
+    #[inline(always)]
+    pub(crate) fn at(&self, t_s: N<T>) -> SpinState<T> {
+        let t = t_s - self.start_s;
+        // turns = t (a + b t) with the rounding errors of both products and the sum carried along,
+        // so that whole turns drop out exactly, however many.
+        let bt = (self.turns_per_s2 * t).v();
+        let bt_error = self.turns_per_s2 * t - bt;
+        let slope = self.turns_per_s + bt;
+        let slope_error = {
+            let of_bt = slope - self.turns_per_s;
+            (self.turns_per_s - (slope - of_bt)) + (bt - of_bt)
+        };
+        let whole = (slope * t).v();
+        let rest = (slope * t - whole) + (bt_error + slope_error) * t;
+        let mut turns = (whole - N(whole.0.round())) + (rest + self.turns_at_start);
+        let mut turn_rate = slope + bt;
+        let mut turn_acceleration = self.turns_per_s2 + self.turns_per_s2;
+        let zero = t.lit(0.0);
+        // Only a cycloidal ramp has a wave; without one in any lane its terms are zero.
+        if T::bits(zero.0.less(self.wave_hz.0)) != 0 {
+            let phase = (self.wave_hz * t).v();
+            let (sin, cos) = trig::sin_cos_turns(phase);
+            let rate = (TAU * (self.wave_turns * self.wave_hz).v()).v();
+            turns += self.wave_turns * (cos - 1.0);
+            turn_rate -= rate * sin;
+            turn_acceleration -= (TAU * (rate * self.wave_hz).v()).v() * cos;
+        }
+        SpinState::new(
+            trig::sin_cos_turns(turns),
+            (TAU * turn_rate).v(),
+            (TAU * turn_acceleration).v(),
+        )
+    }
+}

@@ -1,0 +1,221 @@
+//! Whole turns of the drum: when each is completed, and how they divide the window.
+
+use super::{Spin, SpinStretch};
+use core::f64::consts::TAU;
+use lane_ode::{N, trig};
+
+/// Limit of halvings and Newton steps in the search for an instant; a few are enough.
+const MOST_STEPS: usize = 64;
+
+/// A piece of a stretch in which the drum turns one way; times from the stretch's start.
+struct Piece<'a> {
+    stretch: &'a SpinStretch,
+    from: f64,
+    to: f64,
+}
+
+impl Spin {
+    /// Turns of the drum from one time to another (s), counted by the angle that it travels in
+    /// either direction.
+    #[must_use]
+    pub fn turns_within(&self, window_s: [f64; 2]) -> f64 {
+        let stretches = self.stretches();
+        let pieces = pieces(&stretches, window_s);
+        pieces.iter().filter(|piece| piece.start_s() >= window_s[0]).map(Piece::turns).sum()
+    }
+}
+
+/// Where a window is cut so that every part holds one whole turn of the drum, counted from the
+/// start of the run by the angle it travels (theta = 2 pi k where it never turns back). Parts of
+/// turns at the window's ends go with the whole turn beside them, so that a window with less than
+/// two whole turns is not cut.
+pub(crate) fn cuts_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
+    let mut whole = whole_turns_s(stretches, window_s);
+    whole.pop();
+    if !whole.is_empty() {
+        whole.remove(0);
+    }
+    whole
+}
+
+/// The times in the window, its edges included, at which the drum has made a whole number of turns.
+fn whole_turns_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
+    let mut times = Vec::new();
+    let mut travelled = 0.0_f64;
+    let mut next = 0.0;
+    for piece in pieces(stretches, window_s) {
+        let after = travelled + piece.turns();
+        if piece.start_s() >= window_s[0] {
+            next = travelled.ceil().max(next);
+            let mut earliest = piece.from;
+            while next <= after {
+                earliest = piece.when(next - travelled, earliest);
+                times.push((piece.stretch.start_s + earliest).clamp(window_s[0], window_s[1]));
+                next += 1.0;
+            }
+        }
+        travelled = after;
+    }
+    times
+}
+
+/// The run to the window's end, cut where the window begins and where the drum reverses.
+fn pieces(stretches: &[SpinStretch], [from_s, to_s]: [f64; 2]) -> Vec<Piece<'_>> {
+    let mut pieces = Vec::new();
+    for (k, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s < to_s) {
+        let end_s = stretches.get(k + 1).map_or(to_s, |next| next.start_s.min(to_s));
+        let length = end_s - stretch.start_s;
+        let mut edges = vec![0.0, length];
+        let mut cut = |at: f64| {
+            if 0.0 < at && at < length {
+                edges.push(at);
+            }
+        };
+        cut(from_s - stretch.start_s);
+        // A cycloidal ramp turns one way.
+        if stretch.wave_turns == 0.0 {
+            cut(-stretch.turns_per_s / (2.0 * stretch.turns_per_s2));
+        }
+        edges.sort_by(f64::total_cmp);
+        pieces.extend(edges.windows(2).map(|edge| Piece { stretch, from: edge[0], to: edge[1] }));
+    }
+    pieces
+}
+
+impl Piece<'_> {
+    /// When it begins, from the start of the run.
+    fn start_s(&self) -> f64 {
+        self.stretch.start_s + self.from
+    }
+
+    /// Turns made in it.
+    fn turns(&self) -> f64 {
+        self.turns_by(self.to)
+    }
+
+    /// Turns made in it up to a time.
+    fn turns_by(&self, t: f64) -> f64 {
+        (self.stretch.turns(t) - self.stretch.turns(self.from)).abs()
+    }
+
+    /// The time at which so many turns have been made in it; not before `earliest`.
+    fn when(&self, turns: f64, earliest: f64) -> f64 {
+        let stretch = self.stretch;
+        if stretch.wave_turns == 0.0 {
+            let way = if stretch.turns(self.to) < stretch.turns(self.from) { -1.0 } else { 1.0 };
+            let rate = way * stretch.rate(self.from);
+            // The root of turns = rate t + way b t^2 that does not cancel.
+            let root = (rate * rate + 4.0 * way * stretch.turns_per_s2 * turns).max(0.0).sqrt();
+            let after = if turns > 0.0 { 2.0 * turns / (rate + root) } else { 0.0 };
+            return (self.from + after).clamp(earliest, self.to);
+        }
+        let (mut low, mut high) = (earliest, self.to);
+        let mut t = low;
+        for _ in 0..MOST_STEPS {
+            let missing = turns - self.turns_by(t);
+            if missing > 0.0 {
+                low = t;
+            } else {
+                high = t;
+            }
+            let newton = t + missing / stretch.rate(t).abs();
+            let better = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
+            if better == t {
+                break;
+            }
+            t = better;
+        }
+        t
+    }
+}
+
+impl SpinStretch {
+    /// Turns made `t` after its start, whole ones included; below zero backwards.
+    fn turns(&self, t: f64) -> f64 {
+        let (_, cos) = trig::sin_cos_turns(N(self.wave_hz * t));
+        t * (self.turns_per_s + self.turns_per_s2 * t) + self.wave_turns * (cos.0 - 1.0)
+    }
+
+    /// Turns per second there.
+    fn rate(&self, t: f64) -> f64 {
+        let (sin, _) = trig::sin_cos_turns(N(self.wave_hz * t));
+        self.turns_per_s + 2.0 * self.turns_per_s2 * t
+            - TAU * self.wave_hz * self.wave_turns * sin.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::InLanes as _;
+    use crate::machine::spin::SpinLanes;
+
+    /// The angle in turns, whole ones dropped, as the equations of motion see it.
+    fn phase(spin: &Spin, t_s: f64) -> f64 {
+        let stretches = spin.stretches();
+        let stretch = stretches.iter().rev().find(|stretch| stretch.start_s <= t_s).unwrap();
+        let state = SpinLanes::splat(N(0.0), stretch).at(N(t_s));
+        state.sin.0.atan2(state.cos.0) / TAU
+    }
+
+    #[test]
+    fn whole_turns_are_where_theta_is_a_multiple_of_two_pi() {
+        for spin in [
+            Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 },
+            Spin::Cycloidal { peak_rpm: 1200.0, ramp_s: 20.0 },
+            Spin::Ramp { peak_rpm: -600.0, ramp_s: 4.0 },
+            Spin::Table {
+                time_s: vec![0.0, 5.0, 9.0, 20.0],
+                speed_rpm: vec![30.0, 200.0, 50.0, 700.0],
+            },
+        ] {
+            for window_s in [[0.0, 30.0], [13.3, 29.9]] {
+                let times = whole_turns_s(&spin.stretches(), window_s);
+                let turns = spin.turns_within(window_s);
+                assert!(
+                    (times.len() as f64 - turns).abs() <= 1.0,
+                    "{} for {turns}: {spin:?}",
+                    times.len()
+                );
+                assert!(times.is_sorted() && times.len() > 30, "{spin:?}");
+                for t_s in &times {
+                    assert!(window_s[0] <= *t_s && *t_s <= window_s[1]);
+                    assert!(phase(&spin, *t_s).abs() < 1e-9, "{t_s}: {spin:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn ends_of_turns_go_with_the_whole_turn_beside_them() {
+        // One turn a second after the first.
+        let spin = Spin::Ramp { peak_rpm: 60.0, ramp_s: 2.0 };
+        let cuts = |window_s| cuts_s(&spin.stretches(), window_s);
+        let near = |found: Vec<f64>, expected: &[f64]| {
+            assert_eq!(found.len(), expected.len(), "{found:?}");
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        };
+        near(cuts([2.5, 6.5]), &[4.0, 5.0]);
+        // Edges on whole turns: no part of a turn to be given away.
+        near(cuts([2.0, 5.0]), &[3.0, 4.0]);
+        near(cuts([2.5, 4.5]), &[]);
+        near(cuts([2.5, 3.4]), &[]);
+        near(cuts([3.2, 3.4]), &[]);
+        let still = Spin::Ramp { peak_rpm: 0.0, ramp_s: 2.0 };
+        near(cuts_s(&still.stretches(), [0.0, 100.0]), &[]);
+    }
+
+    #[test]
+    fn a_drum_that_turns_back_travels_on() {
+        // A turn a second forwards, then through rest to a turn a second backwards.
+        let spin = Spin::Table {
+            time_s: vec![0.0, 3.0, 7.0, 8.0],
+            speed_rpm: vec![60.0, 60.0, -60.0, -60.0],
+        };
+        let times = whole_turns_s(&spin.stretches(), [0.0, 10.0]);
+        let expected = [0.0, 1.0, 2.0, 3.0, 5.0, 7.0, 8.0, 9.0, 10.0];
+        assert_eq!(times.len(), expected.len(), "{times:?}");
+        assert!(times.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-7), "{times:?}");
+        assert!((spin.turns_within([1.0, 10.0]) - 7.0).abs() < 1e-12);
+    }
+}

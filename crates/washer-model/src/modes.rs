@@ -1,0 +1,303 @@
+//! Complex modal analysis of the linear model at one instant of the spin (Eqs. 43 to 45).
+//!
+//! With theta, its speed and so M, C and K frozen, M q'' + C q' + K q = 0 has solutions q = phi
+//! exp(s t).
+
+pub(crate) mod campbell;
+pub(crate) mod shape;
+
+use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, STATES};
+use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
+use crate::point::Point;
+use core::f64::consts::TAU;
+use faer::linalg::solvers::{Llt, Solve as _};
+use faer::{Mat, Side, c64};
+
+/// Coordinates of the hinge: q9, q10.
+const HINGE: [usize; 2] = [HINGE_YAW, HINGE_PITCH];
+
+/// Angles over a turn at which the highest frequency is looked for: M and K hold harmonics 0 to 2
+/// of theta.
+const ANGLES: usize = 8;
+
+/// The eigenvalues of a machine could not be found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoModes {
+    /// A body has no inertia.
+    #[error("the mass matrix is not positive definite: some body has no inertia")]
+    Mass,
+    /// They are not finite, or too far apart for double precision.
+    #[error(
+        "the eigenvalues cannot be found: masses and stiffnesses are too far apart for double \
+         precision"
+    )]
+    Eigenvalues,
+}
+
+/// One natural motion, q = Re(shape exp(s t)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mode {
+    /// Real part of s (1/s); negative when the motion decays.
+    pub re_per_s: f64,
+    /// Imaginary part of s (rad/s), the damped natural frequency; 0 for a motion that does not
+    /// swing.
+    pub im_rad_per_s: f64,
+    /// Undamped natural frequency |s| (rad/s): for a motion that does not swing, the root of the
+    /// product of its two rates.
+    pub magnitude_rad_per_s: f64,
+    /// Coordinates q1 to q10 (m, rad) as real and imaginary part, of unit modal mass: shape^H M
+    /// shape = 1.
+    pub shape: [[f64; 2]; COORDINATES],
+}
+
+impl Mode {
+    /// Share of critical damping: below 1 the motion swings, below 0 it grows.
+    #[must_use]
+    pub fn damping_ratio(&self) -> f64 {
+        -self.re_per_s / self.magnitude_rad_per_s
+    }
+
+    /// Share of the hinge in the strain energy at a motion's outermost points.
+    pub(crate) fn hinge_share(&self, point: &Point) -> f64 {
+        let squared = HINGE
+            .map(|q| self.shape[q][0] * self.shape[q][0] + self.shape[q][1] * self.shape[q][1]);
+        let stiffness = point.machine.bodies.flexure_stiffness.0;
+        stiffness * (squared[0] + squared[1])
+            / (self.magnitude_rad_per_s * self.magnitude_rad_per_s)
+    }
+
+    /// Damped natural frequency in cycles per minute.
+    #[must_use]
+    pub fn frequency_rpm(&self) -> f64 {
+        self.im_rad_per_s * 60.0 / TAU
+    }
+}
+
+/// Every natural motion at one instant, the slowest first, and the mass matrix by which their
+/// shapes compare.
+#[derive(Clone, Debug)]
+pub struct Modes {
+    /// One per coordinate: pairs of conjugate eigenvalues count once, real ones two by two.
+    pub modes: [Mode; COORDINATES],
+    pub(crate) mass: [[f64; COORDINATES]; COORDINATES],
+}
+
+/// Modal assurance criterion of two shapes of unit modal mass, with the mass matrix as weight: 1
+/// for the same motion, 0 for motions that share none.
+#[must_use]
+pub(crate) fn assurance(
+    mass: &[[f64; COORDINATES]; COORDINATES],
+    a: &[[f64; 2]; COORDINATES],
+    b: &[[f64; 2]; COORDINATES],
+) -> f64 {
+    let product = inner(mass, a, b);
+    product[0] * product[0] + product[1] * product[1]
+}
+
+/// a^H M b, real and imaginary part.
+pub(crate) fn inner(
+    mass: &[[f64; COORDINATES]; COORDINATES],
+    a: &[[f64; 2]; COORDINATES],
+    b: &[[f64; 2]; COORDINATES],
+) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for i in 0..COORDINATES {
+        for j in 0..COORDINATES {
+            let m = mass[i][j];
+            sum[0] += m * (a[i][0] * b[j][0] + a[i][1] * b[j][1]);
+            sum[1] += m * (a[i][0] * b[j][1] - a[i][1] * b[j][0]);
+        }
+    }
+    sum
+}
+
+/// The natural motions with theta frozen at `theta_rad` while the drum turns at `speed_rad_per_s`.
+///
+/// # Errors
+/// [`NoModes`] when the matrices are singular or not finite.
+pub fn modes(point: &Point, theta_rad: f64, speed_rad_per_s: f64) -> Result<Modes, NoModes> {
+    modes_with_caps(point, theta_rad, speed_rad_per_s, None)
+}
+
+/// The same, with caps on the modes of bearings and hinge if any are given (section 4.3 of the
+/// model page).
+pub(crate) fn modes_with_caps(
+    point: &Point,
+    theta_rad: f64,
+    speed_rad_per_s: f64,
+    caps: Option<&Caps>,
+) -> Result<Modes, NoModes> {
+    let (system, mass) = first_order(point, theta_rad, speed_rad_per_s, caps)?;
+    let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
+    let (values, vectors) = (decomposition.S().column_vector(), decomposition.U());
+    let motions = natural_motions((0..STATES).map(|k| values[k] * system.unit_per_s))?;
+    let modes = motions.map(|Motion { s, magnitude_rad_per_s, state }| Mode {
+        re_per_s: s.re,
+        im_rad_per_s: s.im,
+        magnitude_rad_per_s,
+        shape: unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, state)])),
+    });
+    Ok(Modes { modes, mass })
+}
+
+/// The eigenvalues of these motions alone, in a third of the time.
+pub(crate) fn motions_with_caps(
+    point: &Point,
+    speed_rad_per_s: f64,
+    caps: &Caps,
+) -> Result<[Motion; COORDINATES], NoModes> {
+    let (system, _) = first_order(point, 0.0, speed_rad_per_s, Some(caps))?;
+    let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
+    natural_motions(values.into_iter().map(|s| s * system.unit_per_s))
+}
+
+/// A natural motion by its eigenvalue.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Motion {
+    /// s (1/s); its imaginary part is not negative.
+    pub(crate) s: c64,
+    /// As in [`Mode`].
+    pub(crate) magnitude_rad_per_s: f64,
+    /// Which of the eigenvalues it is.
+    state: usize,
+}
+
+/// The natural motions of all eigenvalues, the slowest first.
+fn natural_motions(values: impl Iterator<Item = c64>) -> Result<[Motion; COORDINATES], NoModes> {
+    let mut swinging = Vec::with_capacity(COORDINATES);
+    let mut steady = Vec::new();
+    for (state, s) in values.enumerate() {
+        if !(s.re.is_finite() && s.im.is_finite()) {
+            return Err(NoModes::Eigenvalues);
+        }
+        if s.im > 0.0 {
+            swinging.push(Motion { s, magnitude_rad_per_s: magnitude(s), state });
+        } else if s.im == 0.0 {
+            steady.push((s.re, state));
+        }
+    }
+    // The two rates of one motion lie symmetrically about their mean, so neighbours belong
+    // together, not the slowest and the fastest.
+    steady.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+    for pair in steady.chunks_exact(2) {
+        let [(slow, state), (fast, _)] = [pair[0], pair[1]];
+        let s = c64::new(0.5 * (slow + fast), 0.0);
+        swinging.push(Motion { s, magnitude_rad_per_s: (slow * fast).abs().sqrt(), state });
+    }
+    swinging.sort_by(|a, b| a.magnitude_rad_per_s.total_cmp(&b.magnitude_rad_per_s));
+    swinging.try_into().map_err(|_| NoModes::Eigenvalues)
+}
+
+/// |s| from operations that round the same everywhere; `hypot` is each system's own.
+fn magnitude(s: c64) -> f64 {
+    s.norm_sqr().sqrt()
+}
+
+/// The vector scaled to unit modal mass and turned so that its largest entry is real and positive:
+/// phases then read as lags behind that entry.
+fn unit_mass(
+    mass: &[[f64; COORDINATES]; COORDINATES],
+    vector: &[c64; COORDINATES],
+) -> [[f64; 2]; COORDINATES] {
+    let largest = vector
+        .iter()
+        .fold(c64::new(0.0, 0.0), |m, v| if v.norm_sqr() > m.norm_sqr() { *v } else { m });
+    let turned = vector.map(|v| v * largest.conj() / largest.norm_sqr());
+    let pairs = turned.map(|v| [v.re, v.im]);
+    let scale = inner(mass, &pairs, &pairs)[0].sqrt();
+    pairs.map(|[re, im]| [re / scale, im / scale])
+}
+
+/// The largest |s| (rad/s) of a machine while its drum turns at `speed_rad_per_s`, over a turn of
+/// theta. It limits the step of an explicit method.
+///
+/// # Errors
+/// As [`modes`].
+pub fn highest_frequency_rad_per_s(point: &Point, speed_rad_per_s: f64) -> Result<f64, NoModes> {
+    highest_with_caps(point, speed_rad_per_s, None)
+}
+
+/// The same, with caps on the modes of bearings and hinge if any are given (section 4.3 of the
+/// model page).
+pub(crate) fn highest_with_caps(
+    point: &Point,
+    speed_rad_per_s: f64,
+    caps: Option<&Caps>,
+) -> Result<f64, NoModes> {
+    let mut highest = 0.0_f64;
+    for angle in 0..ANGLES {
+        let theta = TAU * angle as f64 / ANGLES as f64;
+        let (system, _) = first_order(point, theta, speed_rad_per_s, caps)?;
+        for s in system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)? {
+            let magnitude = magnitude(s) * system.unit_per_s;
+            if !magnitude.is_finite() {
+                return Err(NoModes::Eigenvalues);
+            }
+            highest = highest.max(magnitude);
+        }
+    }
+    Ok(highest)
+}
+
+/// x' = unit A x over x = (q, q' / unit).
+struct FirstOrder {
+    matrix: Mat<f64>,
+    /// A rate (1/s) that brings all blocks of the matrix to one size. Eigenvalues are then as
+    /// precise as the fastest of them, not as its square.
+    unit_per_s: f64,
+}
+
+fn first_order(
+    point: &Point,
+    theta_rad: f64,
+    speed_rad_per_s: f64,
+    caps: Option<&Caps>,
+) -> Result<(FirstOrder, [[f64; COORDINATES]; COORDINATES]), NoModes> {
+    let mut matrices = point.matrices(theta_rad, speed_rad_per_s, 0.0);
+    if let Some(caps) = caps {
+        let bodies = &point.machine.bodies;
+        let bearings = point.linear.bearing_stiffness(bodies);
+        let cap_squared = caps.bearings_rad_per_s * caps.bearings_rad_per_s;
+        let speed_squared = speed_rad_per_s * speed_rad_per_s;
+        for i in 0..COORDINATES {
+            for j in 0..COORDINATES {
+                matrices.mass[i][j] += bearings[i][j] / cap_squared;
+                matrices.stiffness[i][j] += bearings[i][j] * (speed_squared / cap_squared);
+            }
+        }
+        if let Some(cap) = caps.hinge_rad_per_s {
+            let inertia = bodies.flexure_stiffness.0 / (cap * cap);
+            for q in HINGE {
+                matrices.mass[q][q] += inertia;
+            }
+            let torque_per_speed = (1.0 + BACKWARD_SHARE) * speed_rad_per_s * inertia;
+            let [nine, ten] = HINGE;
+            matrices.damping[nine][ten] -= torque_per_speed;
+            matrices.damping[ten][nine] += torque_per_speed;
+        }
+    }
+    let full = |m: &[[f64; COORDINATES]; COORDINATES]| {
+        Mat::from_fn(COORDINATES, COORDINATES, |i, j| m[i][j])
+    };
+    let mass = full(&matrices.mass);
+    let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| NoModes::Mass)?;
+    let stiffness = factors.solve(full(&matrices.stiffness));
+    let damping = factors.solve(full(&matrices.damping));
+    let largest = (0..COORDINATES)
+        .flat_map(|i| (0..COORDINATES).map(move |j| (i, j)))
+        .fold(0.0_f64, |largest, at| largest.max(stiffness[at].abs()));
+    if !largest.is_finite() {
+        return Err(NoModes::Eigenvalues);
+    }
+    let unit_per_s = largest.sqrt().max(1.0);
+    let matrix = Mat::from_fn(STATES, STATES, |i, j| {
+        if i < COORDINATES {
+            f64::from(u8::from(j == i + COORDINATES))
+        } else if j < COORDINATES {
+            -stiffness[(i - COORDINATES, j)] / (unit_per_s * unit_per_s)
+        } else {
+            -damping[(i - COORDINATES, j - COORDINATES)] / unit_per_s
+        }
+    });
+    Ok((FirstOrder { matrix, unit_per_s }, matrices.mass))
+}

@@ -1,0 +1,265 @@
+//! Modes over spin speed, followed by their shapes, and the speeds at which they resonate (Eqs. 43
+//! to 45, the paper's Fig. 7).
+//!
+//! Where two frequencies cross, shapes identify the modes; the order of eigenvalues does not. From
+//! speed to speed and from angle to angle, a mode continues as the one most like it by the modal
+//! assurance criterion, with the mass matrix as weight. A stretch without clear likeness is halved
+//! until it has it.
+
+use crate::coordinates::COORDINATES;
+use crate::modes::shape::{Motion, motion};
+use crate::modes::{Mode, Modes, NoModes, assurance, modes};
+use crate::point::Point;
+use core::f64::consts::TAU;
+
+/// Angles of a turn over which frequencies are averaged. Frequencies vary with harmonics 1 and 2 of
+/// theta, so a dozen angles would do for the mean. Least and greatest are within 1 - cos(pi / 36),
+/// or 0.4 %, of the variation.
+const ANGLES: usize = 36;
+
+/// Two shapes are the same mode from this likeness (modal assurance criterion) on.
+const CLEAR: f64 = 0.9;
+
+/// A stretch is halved at most this often. Two modes of a shaft without a preferred direction are
+/// alike at any distance.
+const MAX_HALVINGS: u32 = 6;
+
+/// Error of a resonance speed (rpm).
+const RESONANCE_RPM: f64 = 1e-6;
+
+/// Steps of the search for a resonance; halving alone would need 30.
+const MAX_SEARCH: usize = 60;
+
+/// One mode at one speed, over a turn of theta.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModeAtSpeed {
+    /// Means over the turn: real part of s (1/s).
+    pub re_per_s: f64,
+    /// Imaginary part (rad/s).
+    pub im_rad_per_s: f64,
+    /// Share of critical damping.
+    pub damping_ratio: f64,
+    /// Damped natural frequency (cycles per minute): mean over the turn,
+    pub frequency_rpm: f64,
+    /// least,
+    pub least_rpm: f64,
+    /// and greatest.
+    pub greatest_rpm: f64,
+    /// Coordinates q1 to q10 (m, rad) as real and imaginary part, of unit modal mass, at theta = 0.
+    pub shape: [[f64; 2]; COORDINATES],
+}
+
+/// A spin speed that equals a mode's damped natural frequency, as a mean over a turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resonance {
+    /// Spin speed.
+    pub speed_rpm: f64,
+    /// The mode there.
+    pub mode: ModeAtSpeed,
+}
+
+/// One mode over speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModeOverSpeed {
+    /// The movement, at the first resonance or else at the lowest speed.
+    pub motion: Motion,
+    /// One per speed.
+    pub at_speed: Vec<ModeAtSpeed>,
+    /// In rising order; empty if the mode's frequency meets no speed of the range.
+    pub resonances: Vec<Resonance>,
+}
+
+/// Follows every mode over rising speeds (rpm, at least one), each averaged over a turn of theta;
+/// modes are in the order of their magnitude |s| at the lowest speed.
+///
+/// # Errors
+/// [`NoModes`] at any of the speeds.
+pub fn campbell(point: &Point, speeds_rpm: &[f64]) -> Result<Vec<ModeOverSpeed>, NoModes> {
+    let Some(&lowest) = speeds_rpm.first() else { return Ok(Vec::new()) };
+    let mut followed = Vec::with_capacity(speeds_rpm.len());
+    let mut current = modes(point, 0.0, rad_per_s(lowest))?;
+    for (k, &speed) in speeds_rpm.iter().enumerate() {
+        if k > 0 {
+            current = follow(&current, speeds_rpm[k - 1], speed, &|rpm| {
+                modes(point, 0.0, rad_per_s(rpm))
+            })?;
+        }
+        followed.push((over_turn(point, speed, &current)?, current.clone()));
+    }
+    (0..COORDINATES)
+        .map(|mode| {
+            let mut resonances = Vec::new();
+            for k in 1..speeds_rpm.len() {
+                let excess = [k - 1, k].map(|k| followed[k].0[mode].frequency_rpm - speeds_rpm[k]);
+                // A motion that does not swing has no resonance, not even at standstill.
+                if (excess[0] > 0.0) != (excess[1] > 0.0) && excess[0] != 0.0 {
+                    let from = &followed[k - 1].1;
+                    let between = [speeds_rpm[k - 1], speeds_rpm[k]];
+                    resonances.extend(resonance(point, mode, from, between, excess)?);
+                }
+            }
+            let at_speed: Vec<_> = followed.iter().map(|(turn, _)| turn[mode]).collect();
+            let described =
+                resonances.first().map_or(at_speed[0].shape, |resonance| resonance.mode.shape);
+            Ok(ModeOverSpeed {
+                motion: motion(point, &followed[0].1.mass, &described),
+                at_speed,
+                resonances,
+            })
+        })
+        .collect()
+}
+
+fn rad_per_s(rpm: f64) -> f64 {
+    rpm * TAU / 60.0
+}
+
+/// The modes at `to` in the order of those at `from`.
+fn follow(
+    start: &Modes,
+    from: f64,
+    to: f64,
+    at: &dyn Fn(f64) -> Result<Modes, NoModes>,
+) -> Result<Modes, NoModes> {
+    follow_halving(start, from, to, at, at(to)?, MAX_HALVINGS)
+}
+
+fn follow_halving(
+    start: &Modes,
+    from: f64,
+    to: f64,
+    at: &dyn Fn(f64) -> Result<Modes, NoModes>,
+    end: Modes,
+    halvings: u32,
+) -> Result<Modes, NoModes> {
+    let (order, likeness) = matched(start, &end);
+    if likeness >= CLEAR || halvings == 0 {
+        return Ok(Modes { modes: order.map(|k| end.modes[k]), ..end });
+    }
+    let middle = 0.5 * (from + to);
+    let between = follow_halving(start, from, middle, at, at(middle)?, halvings - 1)?;
+    follow_halving(&between, middle, to, at, end, halvings - 1)
+}
+
+/// For each mode of `start` the mode of `end` that continues it, the likest pairs first; and the
+/// likeness of the least like pair.
+fn matched(start: &Modes, end: &Modes) -> ([usize; COORDINATES], f64) {
+    let mut pairs = Vec::with_capacity(COORDINATES * COORDINATES);
+    for (i, before) in start.modes.iter().enumerate() {
+        for (j, after) in end.modes.iter().enumerate() {
+            pairs.push((assurance(&end.mass, &before.shape, &after.shape), i, j));
+        }
+    }
+    pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut order = [usize::MAX; COORDINATES];
+    let mut least = 1.0_f64;
+    for (likeness, i, j) in pairs {
+        if order[i] == usize::MAX && !order.contains(&j) {
+            order[i] = j;
+            least = least.min(likeness);
+        }
+    }
+    (order, least)
+}
+
+/// Every mode at one speed over a turn; `start` holds them at theta = 0.
+fn over_turn(
+    point: &Point,
+    speed_rpm: f64,
+    start: &Modes,
+) -> Result<[ModeAtSpeed; COORDINATES], NoModes> {
+    let speed = rad_per_s(speed_rpm);
+    let mut sums = start.modes.map(Turn::new);
+    let mut current = start.clone();
+    for k in 1..ANGLES {
+        let theta = |k: usize| TAU * k as f64 / ANGLES as f64;
+        current = follow(&current, theta(k - 1), theta(k), &|theta| modes(point, theta, speed))?;
+        for (sum, mode) in sums.iter_mut().zip(&current.modes) {
+            sum.add(mode);
+        }
+    }
+    Ok(sums.map(|sum| sum.mean()))
+}
+
+/// One mode, summed over the angles of a turn.
+struct Turn {
+    first: Mode,
+    re: f64,
+    im: f64,
+    magnitude: f64,
+    extremes: [f64; 2],
+}
+
+impl Turn {
+    fn new(mode: Mode) -> Self {
+        Self {
+            first: mode,
+            re: mode.re_per_s,
+            im: mode.im_rad_per_s,
+            magnitude: mode.magnitude_rad_per_s,
+            extremes: [mode.im_rad_per_s; 2],
+        }
+    }
+
+    fn add(&mut self, mode: &Mode) {
+        self.re += mode.re_per_s;
+        self.im += mode.im_rad_per_s;
+        self.magnitude += mode.magnitude_rad_per_s;
+        self.extremes =
+            [self.extremes[0].min(mode.im_rad_per_s), self.extremes[1].max(mode.im_rad_per_s)];
+    }
+
+    fn mean(&self) -> ModeAtSpeed {
+        let rpm = |rad_per_s: f64| rad_per_s * 60.0 / TAU;
+        let [re, im, magnitude] = [self.re, self.im, self.magnitude].map(|sum| sum / ANGLES as f64);
+        ModeAtSpeed {
+            re_per_s: re,
+            im_rad_per_s: im,
+            damping_ratio: -re / magnitude,
+            frequency_rpm: rpm(im),
+            least_rpm: rpm(self.extremes[0]),
+            greatest_rpm: rpm(self.extremes[1]),
+            shape: self.first.shape,
+        }
+    }
+}
+
+/// The speed between two at which the mode's frequency less the speed, of different sign at both,
+/// vanishes; by the Illinois method (M. Dowell, P. Jarratt, BIT 11 (1971) 168), which keeps the
+/// root between its two ends. `None` where the sign changes by a jump, as where a motion begins or
+/// stops to swing.
+fn resonance(
+    point: &Point,
+    mode: usize,
+    from: &Modes,
+    [start, end]: [f64; 2],
+    [mut low_excess, mut high_excess]: [f64; 2],
+) -> Result<Option<Resonance>, NoModes> {
+    let (mut low, mut high) = (start, end);
+    let mut side = 0;
+    for _ in 0..MAX_SEARCH {
+        let speed_rpm = (low * high_excess - high * low_excess) / (high_excess - low_excess);
+        let there = follow(from, start, speed_rpm, &|rpm| modes(point, 0.0, rad_per_s(rpm)))?;
+        let found = Resonance { speed_rpm, mode: over_turn(point, speed_rpm, &there)?[mode] };
+        let excess = found.mode.frequency_rpm - speed_rpm;
+        if excess.abs() < RESONANCE_RPM {
+            return Ok(Some(found));
+        }
+        if high - low < RESONANCE_RPM {
+            break;
+        }
+        if (excess > 0.0) == (high_excess > 0.0) {
+            (high, high_excess) = (speed_rpm, excess);
+            low_excess *= if side == 1 { 0.5 } else { 1.0 };
+            side = 1;
+        } else {
+            (low, low_excess) = (speed_rpm, excess);
+            high_excess *= if side == -1 { 0.5 } else { 1.0 };
+            side = -1;
+        }
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+mod tests;

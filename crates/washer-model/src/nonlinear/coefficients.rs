@@ -1,0 +1,117 @@
+//! The machine's numbers as the equations use them, one set per lane.
+
+use crate::lanes::lane_struct;
+use crate::machine::Machine;
+use crate::nonlinear::elements::Elements;
+use lane_ode::N;
+
+lane_struct! {
+    /// A whole machine.
+    #[derive(Clone, Debug)]
+    Coefficients { bodies: Bodies<T>, elements: Elements<T> }
+}
+
+impl Coefficients<f64> {
+    pub(crate) fn new(machine: &Machine) -> Self {
+        Self { bodies: Bodies::new(machine), elements: Elements::new(machine) }
+    }
+}
+
+lane_struct! {
+    /// Bodies, flexure and bearings (model page, sections 1 to 3).
+    #[derive(Clone, Copy, Debug)]
+    Bodies {
+        gravity,
+        tub_mass, tub_per_mass, tub_centre, tub_i11, tub_i22, tub_i33,
+        shaft_i11, shaft_i22, shaft_i33,
+        /// Mass of shaft, drum and unbalance.
+        rotor_mass, rotor_per_mass,
+        /// Of the whole mass.
+        tub_share, rotor_share,
+        /// The rotor's centre from the bearing midpoint is `along_shaft * s1 + drum_share * rho`.
+        along_shaft, drum_share,
+        /// rho, from the hinge P_D to the drum's mass centre, in drum axes: (L_DM, e, 0).
+        rho_1, rho_2,
+        /// Reduced mass of shaft and drum times the distance from the shaft's centre to the hinge.
+        mu_l,
+        /// Likewise times the distance squared.
+        mu_l2,
+        /// The drum's inertia about the hinge, of its own and of the reduced mass at rho; in drum
+        /// axes.
+        drum_i11, drum_i22, drum_i33, drum_i12,
+        flexure_stiffness,
+        bearing_front, bearing_rear, front_stiffness, rear_stiffness,
+        /// The bearings' stiffness over (offset, tilt) of their midpoint, inverted: offset by
+        /// force, offset by moment, tilt by moment.
+        bearing_force_compliance, bearing_mixed_compliance, bearing_moment_compliance,
+        tub_front, drum_hinge, hinge_to_front, clearance,
+    }
+}
+
+impl Bodies<f64> {
+    pub(crate) fn new(machine: &Machine) -> Self {
+        let Machine { tub, shaft, drum, unbalance, flexure, bearings, .. } = machine;
+        let m_0 = drum.mass_kg;
+        let m_u = unbalance.mass_kg;
+        let m_d = m_0 + m_u;
+        // Section 2: the drum of Tables 2 and 3 as a function of the unbalance mass.
+        let dx = unbalance.x_m - drum.centre_x_m;
+        let r_u = unbalance.radius_m;
+        let mu_r = m_u * m_0 / m_d;
+        let drum_inertia = [
+            drum.inertia_kg_m2[0] + mu_r * r_u * r_u,
+            drum.inertia_kg_m2[1] + mu_r * dx * dx,
+            drum.inertia_kg_m2[2] + mu_r * (r_u * r_u + dx * dx),
+        ];
+        let drum_i12 = -mu_r * dx * r_u;
+        let rho_1 = drum.centre_x_m + m_u / m_d * dx - drum.hinge_x_m;
+        let rho_2 = m_u / m_d * r_u;
+        // Shaft and drum about their common centre: the reduced mass moves with the line between
+        // their centres.
+        let m_s = shaft.mass_kg;
+        let rotor_mass = m_s + m_d;
+        let mu = m_s * m_d / rotor_mass;
+        let l = drum.hinge_x_m - shaft.centre_x_m;
+        let (front, rear) = (bearings.front_x_m, bearings.rear_x_m);
+        let (k_f, k_r) = (bearings.front_stiffness_n_per_m, bearings.rear_stiffness_n_per_m);
+        let span = front - rear;
+        Self {
+            gravity: N(machine.gravity_m_per_s2),
+            tub_mass: N(tub.mass_kg),
+            tub_per_mass: N(1.0 / tub.mass_kg),
+            tub_centre: N(tub.centre_x_m),
+            tub_i11: N(tub.inertia_kg_m2[0]),
+            tub_i22: N(tub.inertia_kg_m2[1]),
+            tub_i33: N(tub.inertia_kg_m2[2]),
+            shaft_i11: N(shaft.inertia_kg_m2[0]),
+            shaft_i22: N(shaft.inertia_kg_m2[1]),
+            shaft_i33: N(shaft.inertia_kg_m2[2]),
+            rotor_mass: N(rotor_mass),
+            rotor_per_mass: N(1.0 / rotor_mass),
+            tub_share: N(tub.mass_kg / (tub.mass_kg + rotor_mass)),
+            rotor_share: N(rotor_mass / (tub.mass_kg + rotor_mass)),
+            along_shaft: N((m_s * shaft.centre_x_m + m_d * drum.hinge_x_m) / rotor_mass),
+            drum_share: N(m_d / rotor_mass),
+            rho_1: N(rho_1),
+            rho_2: N(rho_2),
+            mu_l: N(mu * l),
+            mu_l2: N(mu * l * l),
+            drum_i11: N(drum_inertia[0] + mu * rho_2 * rho_2),
+            drum_i22: N(drum_inertia[1] + mu * rho_1 * rho_1),
+            drum_i33: N(drum_inertia[2] + mu * (rho_1 * rho_1 + rho_2 * rho_2)),
+            drum_i12: N(drum_i12 - mu * rho_1 * rho_2),
+            flexure_stiffness: N(flexure.stiffness_n_m_per_rad),
+            bearing_front: N(bearings.front_x_m),
+            bearing_rear: N(bearings.rear_x_m),
+            front_stiffness: N(bearings.front_stiffness_n_per_m),
+            rear_stiffness: N(bearings.rear_stiffness_n_per_m),
+            bearing_force_compliance: N((rear * rear / k_f + front * front / k_r) / (span * span)),
+            bearing_mixed_compliance: N((-rear / k_f - front / k_r) / (span * span)),
+            bearing_moment_compliance: N((1.0 / k_f + 1.0 / k_r) / (span * span)),
+            tub_front: N(tub.front_x_m),
+            drum_hinge: N(drum.hinge_x_m),
+            hinge_to_front: N(drum.front_x_m - drum.hinge_x_m),
+            clearance: N(machine.radial_clearance_m),
+        }
+    }
+}

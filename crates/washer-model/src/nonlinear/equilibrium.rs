@@ -1,0 +1,121 @@
+//! Static equilibrium: the place of rest under the machine's weight, unbalance up (section 4.2 of
+//! the model page).
+
+use crate::coordinates::{COORDINATES, seeded};
+use crate::lanes::Constant as _;
+use crate::machine::spin::SpinState;
+use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::floating::Factors;
+use crate::nonlinear::{Halves, halves};
+use lane_ode::{Lane, N, Real};
+
+/// Newton steps before giving up.
+const MAX_ITERATIONS: usize = 60;
+/// Longest step in any coordinate (m, rad): keeps a soft machine from being thrown through itself.
+const LONGEST_STEP: f64 = 0.1;
+/// A step below this (m, rad) is the last: Newton's method squares the error, so only rounding
+/// remains.
+const LAST_STEP: f64 = 1e-12;
+/// Added to the stiffness (N/m, N m/rad) where the machine is not stable, and raised tenfold until
+/// it is. Unloaded springs that hang straight hold nothing sideways; they do once the machine has
+/// sagged.
+const LEAST_SHIFT: f64 = 10.0;
+/// A machine that needs more has no place of rest.
+const GREATEST_SHIFT: f64 = 1e9;
+
+/// Coordinates at rest, and in which lanes they were found. A machine without a stable place of
+/// rest has none: its stiffness is not positive definite.
+#[inline(always)]
+pub(crate) fn find<T: Lane>(zero: N<T>, machine: &Coefficients<T>) -> ([N<T>; COORDINATES], u32) {
+    let one = zero.lit(1.0);
+    let machine = machine.constant();
+    let mut q = [zero; COORDINATES];
+    let mut found = 0_u32;
+    let mut lost = 0_u32;
+    let mut shift = zero;
+    for _ in 0..MAX_ITERATIONS {
+        let mut stiffness = [[zero; COORDINATES]; COORDINATES];
+        let mut force = [zero; COORDINATES];
+        for j in 0..COORDINATES {
+            let f = static_forces(&machine, &seeded(&q, j, 1.0));
+            for i in 0..COORDINATES {
+                stiffness[i][j] = N(f[i].0.slope.neg());
+                force[i] = N(f[i].0.value);
+            }
+            stiffness[j][j] += shift;
+        }
+        let factors = Factors::new(stiffness);
+        let is_stable = factors.is_positive();
+        let step = factors.solve(force);
+        let mut longest = zero;
+        for s in &step {
+            longest = N(s.0.abs().larger(longest.0));
+        }
+        let scale =
+            longest.where_less(zero.lit(LONGEST_STEP), one, zero.lit(LONGEST_STEP) / longest);
+        let going = !(found | lost);
+        for lane in (0..T::LANES).filter(|lane| going >> lane & 1 == 1) {
+            let (added, longest) = (shift.0.get(lane), longest.0.get(lane));
+            if is_stable >> lane & 1 == 0 || !longest.is_finite() {
+                lost |= u32::from(added > GREATEST_SHIFT) << lane;
+                shift.0.set(lane, (10.0 * added).max(LEAST_SHIFT));
+                continue;
+            }
+            for i in 0..COORDINATES {
+                q[i].0.set(lane, q[i].0.get(lane) + scale.0.get(lane) * step[i].0.get(lane));
+            }
+            found |= u32::from(added == 0.0 && longest < LAST_STEP) << lane;
+            shift.0.set(lane, if added > LEAST_SHIFT { 0.1 * added } else { 0.0 });
+        }
+        if (found | lost) & ((1 << T::LANES) - 1) == (1 << T::LANES) - 1 {
+            break;
+        }
+    }
+    (q, found)
+}
+
+/// Generalised forces at rest.
+#[inline(always)]
+fn static_forces<T: Real>(
+    machine: &Coefficients<T>,
+    q: &[N<T>; COORDINATES],
+) -> [N<T>; COORDINATES] {
+    let zero = q[0].lit(0.0);
+    let spin = SpinState::new((zero, zero.lit(1.0)), zero, zero);
+    let Halves { tub, rotor } = halves(machine, &spin, q, &[zero; COORDINATES]);
+    let ([f1, f2], [f5, f6]) = tub.floating.generalised_forces();
+    let ([f3, f4], [f7, f8, f9, f10]) = rotor.floating.generalised_forces();
+    [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::Machine;
+
+    #[test]
+    fn springs_that_hang_straight_hold_a_machine_once_it_has_sagged() {
+        let mut machine = Machine::paper();
+        for spring in &mut machine.springs {
+            spring.cabinet_m[2] = spring.tub_m[2];
+        }
+        let coefficients = Coefficients::new(&machine);
+        let (q, found) = find(N(0.0), &coefficients);
+        assert_eq!(found & 1, 1);
+        let weight_n = (23.87 + 4.34 + 4.04) * 9.81;
+        let sag_m = -(q[0].0 + 0.2068 * q[5].0);
+        assert!((sag_m - weight_n / 32_000.0).abs() < 1e-5, "{sag_m} m in the springs' mid-plane");
+        for force in static_forces(&coefficients.constant(), &seeded(&q, 0, 0.0)) {
+            assert!(force.0.value.abs() < 1e-5, "{} N or N m left", force.0.value);
+        }
+    }
+
+    #[test]
+    fn springs_that_cannot_carry_the_machine_hold_nothing() {
+        let mut machine = Machine::paper();
+        for spring in &mut machine.springs {
+            spring.stiffness_n_per_m = 1.0;
+        }
+        assert_eq!(find(N(0.0), &Coefficients::new(&machine)).1 & 1, 0);
+    }
+}

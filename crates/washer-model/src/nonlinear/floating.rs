@@ -1,0 +1,206 @@
+//! A body chain that floats in the cabinet's y-z plane: the form of both halves of the machine, tub
+//! (q1, q2; q5, q6) and rotor (q3, q4; q7 to q10).
+//!
+//! Written for the mass centre of the chain, its two translations decouple from the rotations
+//! (section 4.1 of the model page): J is 2x2 for the tub, 4x4 for the rotor.
+
+use crate::nonlinear::coupling::Response;
+use crate::nonlinear::forces::AxisLoad;
+use lane_ode::{Lane, N, Real};
+
+/// Equations of motion of one half of the machine, with `R` rotations. The first is the axis's yaw
+/// about c2, so that its partial velocities have no y component; the second is the axis's pitch.
+pub(crate) struct Floating<T, const R: usize> {
+    /// Reciprocal of the chain's mass.
+    pub(crate) per_mass: N<T>,
+    /// Force on the chain along y and z.
+    pub(crate) force: [N<T>; 2],
+    /// Acceleration of the mass centre relative to the bearing midpoint at constant speeds, y and
+    /// z.
+    pub(crate) drift: [N<T>; 2],
+    /// Partial velocities of the mass centre relative to the bearing midpoint, y and z.
+    pub(crate) arm: [[N<T>; 2]; R],
+    /// Partial derivatives of the axis (a1) by yaw and pitch, y and z.
+    pub(crate) axis: [[N<T>; 2]; 2],
+    /// Acceleration of the axis (a1) at constant speeds, y and z.
+    pub(crate) axis_drift: [N<T>; 2],
+    /// Generalised forces less inertia forces at constant speeds, about the mass centre.
+    pub(crate) torque: [N<T>; R],
+}
+
+impl<T: Real, const R: usize> Floating<T, R> {
+    /// Adds forces on the axis.
+    #[inline(always)]
+    pub(crate) fn apply(&mut self, load: &AxisLoad<T>) {
+        (self.force, self.torque) = self.under(load);
+    }
+
+    /// Force and torques with forces on the axis.
+    #[inline(always)]
+    fn under(&self, load: &AxisLoad<T>) -> ([N<T>; 2], [N<T>; R]) {
+        let [moment_y, moment_z] = load.moment;
+        let mut torque = self.torque;
+        torque[0] += self.axis[0][1] * moment_z;
+        torque[1] = torque[1] + self.axis[1][0] * moment_y + self.axis[1][1] * moment_z;
+        for r in 0..R {
+            if r > 0 {
+                torque[r] -= self.arm[r][0] * load.force[0];
+            }
+            torque[r] -= self.arm[r][1] * load.force[1];
+        }
+        ([self.force[0] + load.force[0], self.force[1] + load.force[1]], torque)
+    }
+
+    /// How midpoint and axis accelerate, and would under forces on the axis. `inertia` is J.
+    #[inline(always)]
+    pub(crate) fn response(&self, inertia: &Factors<T, R>) -> Response<T> {
+        let zero = self.per_mass.lit(0.0);
+        // Rows of G: what `apply` adds to the torques per unit of force and moment; a motion's work
+        // is the same sum.
+        let mut half = [[zero; 4]; R];
+        for r in 0..R {
+            half[r][0] = -self.arm[r][0];
+            half[r][1] = -self.arm[r][1];
+        }
+        for r in 0..2 {
+            half[r][2] = self.axis[r][0];
+            half[r][3] = self.axis[r][1];
+        }
+        let mut start = self.torque;
+        // C = 1/m + G^T J^-1 G with J = L D L^T: half of the solution on either side.
+        for j in 0..R {
+            for i in j + 1..R {
+                let l = inertia.below(i, j);
+                start[i] -= l * start[j];
+                for k in 0..4 {
+                    half[i][k] -= l * half[j][k];
+                }
+            }
+        }
+        let mut free = [
+            self.force[0] * self.per_mass - self.drift[0],
+            self.force[1] * self.per_mass - self.drift[1],
+            self.axis_drift[0],
+            self.axis_drift[1],
+        ];
+        let mut compliance = [[zero; 4]; 4];
+        compliance[0][0] = self.per_mass;
+        compliance[1][1] = self.per_mass;
+        for r in 0..R {
+            for i in 0..4 {
+                let weighted = (half[r][i] * inertia.reciprocal_pivot(r)).v();
+                free[i] += weighted * start[r];
+                for j in 0..=i {
+                    compliance[i][j] += weighted * half[r][j];
+                }
+            }
+        }
+        Response { free, compliance }
+    }
+
+    /// Accelerations with forces on the axis: y and z of the bearing midpoint, then the rotations.
+    /// `inertia` is J.
+    #[inline(always)]
+    pub(crate) fn accelerations(
+        &self,
+        inertia: &Factors<T, R>,
+        load: &AxisLoad<T>,
+    ) -> ([N<T>; 2], [N<T>; R]) {
+        let (force, torque) = self.under(load);
+        let rotation = inertia.solve(torque);
+        let mut translation =
+            [force[0] * self.per_mass - self.drift[0], force[1] * self.per_mass - self.drift[1]];
+        for r in 0..R {
+            if r > 0 {
+                translation[0] -= self.arm[r][0] * rotation[r];
+            }
+            translation[1] -= self.arm[r][1] * rotation[r];
+        }
+        (translation, rotation)
+    }
+
+    /// Forces that the coordinates (y and z of the bearing midpoint, then the rotations) see: `f`
+    /// in M q'' = f.
+    #[inline(always)]
+    pub(crate) fn generalised_forces(&self) -> ([N<T>; 2], [N<T>; R]) {
+        let midpoint = [
+            self.force[0] - self.drift[0] / self.per_mass,
+            self.force[1] - self.drift[1] / self.per_mass,
+        ];
+        let mut rotation = self.torque;
+        for r in 0..R {
+            rotation[r] = rotation[r] + self.arm[r][0] * midpoint[0] + self.arm[r][1] * midpoint[1];
+        }
+        (midpoint, rotation)
+    }
+}
+
+/// L D L^T factors of a symmetric positive definite matrix.
+#[derive(Clone, Copy)]
+pub(crate) struct Factors<T, const R: usize> {
+    /// L below the diagonal (unit diagonal not stored), 1/D on it.
+    packed: [[N<T>; R]; R],
+}
+
+impl<T: Real, const R: usize> Factors<T, R> {
+    /// Factors the lower triangle of `a`.
+    #[inline(always)]
+    pub(crate) fn new(mut a: [[N<T>; R]; R]) -> Self {
+        for j in 0..R {
+            let pivot = a[j][j].recip();
+            for i in j + 1..R {
+                let l = (a[i][j] * pivot).v();
+                for k in j + 1..=i {
+                    // a[k][j] still holds the unscaled column for k = i, and l * d for those above
+                    // it.
+                    let unscaled = if k == i { a[i][j] } else { a[j][k] };
+                    a[i][k] -= l * unscaled;
+                }
+                // The strict upper triangle keeps the unscaled column for the rows below.
+                a[j][i] = a[i][j];
+                a[i][j] = l;
+            }
+            a[j][j] = pivot;
+        }
+        Self { packed: a }
+    }
+
+    /// Entry (row, column) of L, below its diagonal.
+    #[inline(always)]
+    fn below(&self, row: usize, column: usize) -> N<T> {
+        self.packed[row][column]
+    }
+
+    /// 1/D.
+    #[inline(always)]
+    fn reciprocal_pivot(&self, row: usize) -> N<T> {
+        self.packed[row][row]
+    }
+
+    /// Bit i: the matrix of lane i is positive definite.
+    #[inline(always)]
+    pub(crate) fn is_positive(&self) -> u32
+    where
+        T: Lane,
+    {
+        let zero = self.packed[0][0].lit(0.0);
+        (0..R).fold(u32::MAX, |bits, j| bits & T::bits(zero.0.less(self.packed[j][j].0)))
+    }
+
+    /// Solves for one right-hand side.
+    #[inline(always)]
+    pub(crate) fn solve(&self, mut b: [N<T>; R]) -> [N<T>; R] {
+        for j in 0..R {
+            for i in j + 1..R {
+                b[i] -= self.packed[i][j] * b[j];
+            }
+        }
+        for j in (0..R).rev() {
+            b[j] = (b[j] * self.packed[j][j]).v();
+            for i in j + 1..R {
+                b[j] -= self.packed[i][j] * b[i];
+            }
+        }
+        b
+    }
+}

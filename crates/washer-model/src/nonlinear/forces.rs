@@ -1,0 +1,109 @@
+//! Forces between the bodies: bearings, and the flexure of the drum shaft (section 3 of the model
+//! page).
+
+use crate::lanes::lane_struct;
+use crate::nonlinear::coefficients::Bodies;
+use crate::nonlinear::coupling::Deflection;
+use lane_ode::{N, Real};
+
+lane_struct! {
+    /// Cabinet forces (y, z) on points of a body's axis.
+    #[derive(Clone, Copy, Debug)]
+    AxisLoad {
+        /// Their sum.
+        force: [N<T>; 2],
+        /// Their sum, each times its position along the axis.
+        moment: [N<T>; 2],
+    }
+}
+
+impl<T: Real> AxisLoad<T> {
+    /// The load on the other body.
+    #[inline(always)]
+    pub(crate) fn reaction(&self) -> Self {
+        let [[fy, fz], [my, mz]] = [self.force, self.moment];
+        Self { force: [-fy, -fz], moment: [-my, -mz] }
+    }
+}
+
+impl<T: Real> Deflection<T> {
+    /// Bearing forces on the shaft.
+    #[inline(always)]
+    pub(crate) fn load(&self, b: &Bodies<T>) -> AxisLoad<T> {
+        let zero = b.front_stiffness.lit(0.0);
+        let mut load = AxisLoad { force: [zero; 2], moment: [zero; 2] };
+        for (position, stiffness) in
+            [(b.bearing_front, b.front_stiffness), (b.bearing_rear, b.rear_stiffness)]
+        {
+            for i in 0..2 {
+                let force = -(stiffness * (self.offset[i] + position * self.tilt[i])).v();
+                load.force[i] += force;
+                load.moment[i] += position * force;
+            }
+        }
+        load
+    }
+}
+
+/// The drum shaft's flexure: derivatives of K_D phi^2 / 2 with cos phi = cos q9 cos q10.
+pub(crate) struct Flexure<T> {
+    pub(crate) about_9: N<T>,
+    pub(crate) about_10: N<T>,
+}
+
+impl<T: Real> Flexure<T> {
+    #[inline(always)]
+    pub(crate) fn new(stiffness: N<T>, s9: N<T>, c9: N<T>, s10: N<T>, c10: N<T>) -> Self {
+        // sin^2 phi without cancellation.
+        let sin_squared = s9 * s9 + (c9 * c9) * (s10 * s10);
+        let factor = (stiffness * phi_over_sin(sin_squared, (c9 * c10).v())).v();
+        Self { about_9: (factor * (s9 * c10)).v(), about_10: (factor * (c9 * s10)).v() }
+    }
+}
+
+/// Coefficients of asin(x)/x in powers of x^2: c_k = c_{k-1} (2k - 1)^2 / (2k (2k + 1)).
+const ASIN_SERIES: [f64; 22] = {
+    let mut c = [1.0; 22];
+    let mut k = 1;
+    while k < c.len() {
+        let two_k = 2.0 * k as f64;
+        c[k] = c[k - 1] * ((two_k - 1.0) * (two_k - 1.0)) / (two_k * (two_k + 1.0));
+        k += 1;
+    }
+    c
+};
+
+/// Up to here, sin^2 phi is small enough for a short series: its first dropped term is below 2e-17.
+const SMALL_SIN_SQUARED: f64 = 1.0 / 1024.0;
+
+/// phi / sin phi from sin^2 phi and cos phi, for phi up to pi/2 and beyond.
+#[inline(always)]
+fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
+    let mut short = sin_squared.lit(ASIN_SERIES[4]);
+    for k in (0..4).rev() {
+        short = short * sin_squared + ASIN_SERIES[k];
+    }
+    let bound = sin_squared.lit(SMALL_SIN_SQUARED);
+    let is_small = sin_squared.0.less(bound.0);
+    // A folded hinge has a small sine too.
+    let is_ahead = cos.lit(0.0).0.less(cos.0);
+    if T::all(is_small) && T::all(is_ahead) {
+        return short;
+    }
+    let long = phi_over_sin_by_quarters(sin_squared, cos);
+    N(T::select(is_ahead, T::select(is_small, short.0, long.0), long.0))
+}
+
+/// The same by quarter angles: with s = sin^2(phi/4), phi / sin phi = (asin sqrt(s) / sqrt(s)) /
+/// (cos(phi/4) cos(phi/2)).
+#[inline(always)]
+fn phi_over_sin_by_quarters<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
+    let half = 0.5 * (sin_squared / (1.0 + cos));
+    let cos_half_squared = 1.0 - half.v();
+    let quarter = (0.5 * (half.v() / (1.0 + cos_half_squared.sqrt()))).v();
+    let mut series = quarter.lit(ASIN_SERIES[21]);
+    for k in (0..21).rev() {
+        series = series * quarter + ASIN_SERIES[k];
+    }
+    series / ((1.0 - quarter) * cos_half_squared).v().sqrt()
+}

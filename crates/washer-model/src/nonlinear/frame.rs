@@ -1,0 +1,149 @@
+//! A body axis tilted by yaw and pitch, as the tub's and the shaft's are (Table 1, first two
+//! angles).
+//!
+//! The frame is R = Ry(yaw) Rz(pitch); its columns are the axis a1, a2 and a3. Vectors are in frame
+//! axes unless a name ends in `_c`: those are in cabinet axes.
+
+use crate::coordinates::{COORDINATES, SHAFT_PITCH, SHAFT_YAW, TUB_PITCH, TUB_YAW};
+use lane_ode::{N, Real};
+
+/// A vector's three components.
+pub(crate) type Vec3<T> = [N<T>; 3];
+
+/// k v
+#[inline(always)]
+pub(crate) fn scaled<T: Real, const K: usize>(k: N<T>, mut v: [N<T>; K]) -> [N<T>; K] {
+    for x in &mut v {
+        *x = (k * *x).v();
+    }
+    v
+}
+
+/// a + b
+#[inline(always)]
+pub(crate) fn sum<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [N<T>; K] {
+    for i in 0..K {
+        a[i] += b[i];
+    }
+    a
+}
+
+/// a - b
+#[inline(always)]
+pub(crate) fn difference<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [N<T>; K] {
+    for i in 0..K {
+        a[i] -= b[i];
+    }
+    a
+}
+
+/// j a + k b
+#[inline(always)]
+pub(crate) fn combination<T: Real>(j: N<T>, a: &Vec3<T>, k: N<T>, b: &Vec3<T>) -> Vec3<T> {
+    [j * a[0] + k * b[0], j * a[1] + k * b[1], j * a[2] + k * b[2]]
+}
+
+/// start + a x b
+#[inline(always)]
+pub(crate) fn plus_cross<T: Real>(start: &Vec3<T>, a: &Vec3<T>, b: &Vec3<T>) -> Vec3<T> {
+    [
+        start[0] + a[1] * b[2] - a[2] * b[1],
+        start[1] + a[2] * b[0] - a[0] * b[2],
+        start[2] + a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// a . b
+#[inline(always)]
+pub(crate) fn dot<T: Real>(a: &Vec3<T>, b: &Vec3<T>) -> N<T> {
+    a[0] * b[0] + (a[1] * b[1] + a[2] * b[2])
+}
+
+/// Orientation of a tilted axis.
+pub(crate) struct Tilt<T> {
+    pub(crate) sin_yaw: N<T>,
+    pub(crate) cos_yaw: N<T>,
+    pub(crate) sin_pitch: N<T>,
+    pub(crate) cos_pitch: N<T>,
+    /// a1 in cabinet axes.
+    pub(crate) axis_c: Vec3<T>,
+    /// a2 in cabinet axes.
+    pub(crate) second_c: Vec3<T>,
+}
+
+impl<T: Real> Tilt<T> {
+    /// Of the tub.
+    #[inline(always)]
+    pub(crate) fn of_tub(q: &[N<T>; COORDINATES]) -> Self {
+        Self::new(q[TUB_YAW], q[TUB_PITCH])
+    }
+
+    /// Of the shaft, before its spin.
+    #[inline(always)]
+    pub(crate) fn of_shaft(q: &[N<T>; COORDINATES]) -> Self {
+        Self::new(q[SHAFT_YAW], q[SHAFT_PITCH])
+    }
+
+    #[inline(always)]
+    pub(crate) fn new(yaw: N<T>, pitch: N<T>) -> Self {
+        let (sin_yaw, cos_yaw) = yaw.sin_cos();
+        let (sin_pitch, cos_pitch) = pitch.sin_cos();
+        Self {
+            sin_yaw,
+            cos_yaw,
+            sin_pitch,
+            cos_pitch,
+            axis_c: [(cos_yaw * cos_pitch).v(), sin_pitch, (-sin_yaw * cos_pitch).v()],
+            second_c: [(-cos_yaw * sin_pitch).v(), cos_pitch, (sin_yaw * sin_pitch).v()],
+        }
+    }
+
+    /// From frame axes to cabinet axes. a3 is (sin yaw, 0, cos yaw).
+    #[inline(always)]
+    pub(crate) fn to_cabinet(&self, v: &Vec3<T>) -> Vec3<T> {
+        let [a1, a2] = [&self.axis_c, &self.second_c];
+        [
+            a1[0] * v[0] + (a2[0] * v[1] + self.sin_yaw * v[2]),
+            a1[1] * v[0] + a2[1] * v[1],
+            a1[2] * v[0] + (a2[2] * v[1] + self.cos_yaw * v[2]),
+        ]
+    }
+
+    /// Angular velocity of the frame, and the angular acceleration and the axis's second derivative
+    /// that it has at constant generalised speeds.
+    #[inline(always)]
+    pub(crate) fn motion(&self, yaw_rate: N<T>, pitch_rate: N<T>) -> TiltMotion<T> {
+        let rate = [(yaw_rate * self.sin_pitch).v(), (yaw_rate * self.cos_pitch).v(), pitch_rate];
+        let [x, y, z] = rate;
+        TiltMotion {
+            rate,
+            acceleration_x: (y * z).v(),
+            acceleration_y: -(x * z).v(),
+            axis_acceleration: [-(y * y + z * z), (x * y).v(), (2.0 * (x * z).v()).v()],
+        }
+    }
+
+    /// Derivatives of the axis by yaw and by pitch, y and z; the first one's y component is zero.
+    #[inline(always)]
+    pub(crate) fn axis_partials(&self) -> [[N<T>; 2]; 2] {
+        [[self.sin_yaw.lit(0.0), self.axis_yaw_z()], [self.second_c[1], self.second_c[2]]]
+    }
+
+    /// The z component of the axis's derivative by yaw; its y component is zero.
+    #[inline(always)]
+    pub(crate) fn axis_yaw_z(&self) -> N<T> {
+        -self.axis_c[0]
+    }
+}
+
+/// Motion of a tilted axis at constant generalised speeds.
+pub(crate) struct TiltMotion<T> {
+    /// Angular velocity.
+    pub(crate) rate: Vec3<T>,
+    /// Angular acceleration about a1.
+    pub(crate) acceleration_x: N<T>,
+    /// Angular acceleration about a2; about a3 it is zero.
+    pub(crate) acceleration_y: N<T>,
+    /// Second derivative of a1.
+    pub(crate) axis_acceleration: Vec3<T>,
+}

@@ -1,0 +1,85 @@
+//! A bound on how far hinge and bearings swing after jumps of the drum's acceleration.
+//!
+//! Where the acceleration jumps, the load of the unbalance jumps by m_u r_u times as much. Every
+//! method follows the slow modes. Hinge and bearings have no damping of their own and swing about
+//! their new deflection from then on. Steps longer than their periods do not follow that swing, and
+//! two runs with such steps leave out the same, so that their comparison does not show it. The
+//! static deflection under the jump bounds it.
+
+use crate::channel::{CHANNELS, Channel, Kind};
+use crate::machine::Machine;
+use crate::machine::spin::SpinStretch;
+
+/// Free bodies swing by more than the static deflection, up to this factor.
+const MOST: f64 = 2.0;
+
+/// Motion of the tub as a share of the drum's swing: the drum has far less mass and inertia.
+const SHARE_OF_TUB: f64 = 0.25;
+
+/// The greatest swings of hinge and bearings.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ringing {
+    hinge_rad: f64,
+    bearings_m: f64,
+    /// From the hinge to the drum's front (m).
+    reach_m: f64,
+    /// Between the bearings (m).
+    span_m: f64,
+}
+
+/// All jumps of the drum's acceleration until `end_s`, added.
+pub(crate) fn jumps_rad_per_s2(stretches: &[SpinStretch], end_s: f64) -> f64 {
+    let mut acceleration = 0.0;
+    let mut jumps = 0.0;
+    for (i, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s <= end_s)
+    {
+        jumps += (stretch.acceleration_rad_per_s2(stretch.start_s) - acceleration).abs();
+        if let Some(next) = stretches.get(i + 1) {
+            acceleration = stretch.acceleration_rad_per_s2(next.start_s);
+        }
+    }
+    jumps
+}
+
+impl Ringing {
+    /// After jumps of the drum's acceleration whose sum is given (rad/s^2).
+    pub(crate) fn new(machine: &Machine, jumps_rad_per_s2: f64) -> Self {
+        let unbalance = &machine.unbalance;
+        let load_n = unbalance.mass_kg * unbalance.radius_m.abs() * jumps_rad_per_s2;
+        let bearings = &machine.bearings;
+        let span_m = (bearings.front_x_m - bearings.rear_x_m).abs();
+        let softer = bearings.front_stiffness_n_per_m.min(bearings.rear_stiffness_n_per_m);
+        let arm_m = (unbalance.x_m - machine.drum.hinge_x_m).abs();
+        Self {
+            hinge_rad: load_n * arm_m / machine.flexure.stiffness_n_m_per_rad,
+            bearings_m: load_n * (1.0 + unbalance.x_m.abs() / span_m) / softer,
+            reach_m: (machine.drum.front_x_m - machine.drum.hinge_x_m).abs(),
+            span_m,
+        }
+    }
+
+    /// The greatest swing of the gap between drum and tub (m).
+    pub(crate) fn gap_m(&self) -> f64 {
+        MOST * (1.0 + SHARE_OF_TUB) * self.drum_front_m()
+    }
+
+    fn tilt_rad(&self) -> f64 {
+        self.hinge_rad + self.bearings_m / self.span_m
+    }
+
+    fn drum_front_m(&self) -> f64 {
+        self.bearings_m + self.reach_m * self.tilt_rad()
+    }
+
+    /// The greatest swing of each channel (m, rad), in the order of `Channel::ALL`.
+    pub(crate) fn channels(&self) -> [f64; CHANNELS] {
+        Channel::ALL.map(|channel| {
+            let swing = match channel.kind() {
+                Kind::DrumPoint => self.drum_front_m(),
+                Kind::TubPoint => SHARE_OF_TUB * self.drum_front_m(),
+                Kind::TubAngle => SHARE_OF_TUB * self.tilt_rad(),
+            };
+            MOST * swing
+        })
+    }
+}

@@ -1,0 +1,212 @@
+//! One model of one point as plain functions of time and state, for integrators other than this
+//! project's own.
+
+use crate::channel::CHANNELS;
+use crate::coordinates::{COORDINATES, STATES};
+use crate::machine::spin::{SpinStretch, stretch_at};
+use crate::nonlinear::coupling::Coupling;
+use crate::point::Point;
+use crate::run::ModelKind;
+use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::tangent::Tangent;
+use lane_ode::{Dual, N, Partials, ScalarKernel, Simd};
+use std::sync::Arc;
+
+/// Numbers of a state: the ten coordinates q1 to q10 (m, rad), then their speeds.
+pub const STATE_LEN: usize = STATES;
+
+/// The equations of motion x' = f(t, x) of one point. The nonlinear model's coordinates are as in
+/// the model page, the linear model's are deviations from equilibrium.
+pub struct Equations {
+    model: Either,
+    at_rest: [f64; STATES],
+    stretches: Arc<[SpinStretch]>,
+    /// The stretch of the spin that holds since the last call.
+    stretch: usize,
+}
+
+/// A model and its derivatives.
+struct Differentiable<M, J> {
+    model: M,
+    tangent: Tangent<f64, J>,
+}
+
+enum Either {
+    Nonlinear(Box<Differentiable<Nonlinear<f64>, Nonlinear<Dual<f64>>>>),
+    Linear(Box<Differentiable<Linear<f64>, Linear<Dual<f64>>>>),
+}
+
+impl Equations {
+    /// One model's equations at a point.
+    #[must_use]
+    pub fn new(point: &Point, model: ModelKind) -> Self {
+        let (model, at_rest) = match model {
+            ModelKind::Nonlinear => (
+                Either::Nonlinear(Differentiable::new(point)),
+                <Nonlinear<f64> as Model<f64>>::at_rest(point),
+            ),
+            ModelKind::Linear => (
+                Either::Linear(Differentiable::new(point)),
+                <Linear<f64> as Model<f64>>::at_rest(point),
+            ),
+        };
+        Self { model, at_rest, stretches: Arc::clone(&point.stretches), stretch: 0 }
+    }
+
+    /// The state at rest in static equilibrium, from which trajectories start.
+    #[must_use]
+    pub const fn at_rest(&self) -> &[f64; STATE_LEN] {
+        &self.at_rest
+    }
+
+    /// Times (s) at which the spin's acceleration, and so f, may jump: integrate from one to the
+    /// next.
+    pub fn kinks_s(&self) -> impl Iterator<Item = f64> + '_ {
+        self.stretches.iter().skip(1).map(|stretch| stretch.start_s)
+    }
+
+    /// f at time `t_s`, at a kink from its right.
+    #[must_use]
+    pub fn derivative(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [f64; STATE_LEN] {
+        self.move_to(t_s);
+        match &self.model {
+            Either::Nonlinear(of) => Simd::one_lane(Derivative { model: &of.model, t_s, x }),
+            Either::Linear(of) => Simd::one_lane(Derivative { model: &of.model, t_s, x }),
+        }
+    }
+
+    /// The Jacobian of f by the state, row by row, exact to rounding.
+    #[must_use]
+    pub fn jacobian(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [[f64; STATE_LEN]; STATE_LEN] {
+        self.move_to(t_s);
+        let partials = match &self.model {
+            Either::Nonlinear(of) => Simd::one_lane(Jacobian { tangent: &of.tangent, t_s, x }),
+            Either::Linear(of) => Simd::one_lane(Jacobian { tangent: &of.tangent, t_s, x }),
+        };
+        let mut rows = [[0.0; STATES]; STATES];
+        for i in 0..COORDINATES {
+            rows[i][COORDINATES + i] = 1.0;
+            for j in 0..COORDINATES {
+                rows[COORDINATES + i][j] = partials.by_coordinate[i][j].0;
+                rows[COORDINATES + i][COORDINATES + j] = partials.by_speed[i][j].0;
+            }
+        }
+        rows
+    }
+
+    /// The channels' deviations from equilibrium (m, rad), in the order of [`crate::Channel::ALL`],
+    /// and their rates.
+    #[must_use]
+    pub fn channels(
+        &mut self,
+        t_s: f64,
+        x: &[f64; STATE_LEN],
+    ) -> ([f64; CHANNELS], [f64; CHANNELS]) {
+        self.move_to(t_s);
+        match &self.model {
+            Either::Nonlinear(of) => Simd::one_lane(Outputs { model: &of.model, t_s, x }),
+            Either::Linear(of) => Simd::one_lane(Outputs { model: &of.model, t_s, x }),
+        }
+    }
+
+    /// Puts the stretch of the spin in place that holds at a time.
+    fn move_to(&mut self, t_s: f64) {
+        let holds = |k: usize| self.stretches.get(k).is_none_or(|stretch| t_s < stretch.start_s);
+        if holds(self.stretch + 1) && (self.stretch == 0 || !holds(self.stretch)) {
+            return;
+        }
+        self.stretch = stretch_at(&self.stretches, t_s);
+        let stretch = &self.stretches[self.stretch];
+        match &mut self.model {
+            Either::Nonlinear(of) => of.set_spin(stretch),
+            Either::Linear(of) => of.set_spin(stretch),
+        }
+    }
+}
+
+impl<M: Model<f64>, J: Model<Dual<f64>>> Differentiable<M, J> {
+    fn new(point: &Point) -> Box<Self> {
+        Box::new(Self {
+            model: M::splat(N(0.0), point, Coupling::Springs),
+            tangent: Tangent::new(0.0, point),
+        })
+    }
+
+    fn set_spin(&mut self, stretch: &SpinStretch) {
+        self.model.set_spin(0, stretch);
+        self.tangent.set_spin(stretch);
+    }
+}
+
+struct Derivative<'a, M> {
+    model: &'a M,
+    t_s: f64,
+    x: &'a [f64; STATES],
+}
+
+impl<M: Model<f64>> ScalarKernel for Derivative<'_, M> {
+    type Output = [f64; STATES];
+    #[inline(always)]
+    fn run(self) -> [f64; STATES] {
+        let forcing = self.model.forcing(N(self.t_s));
+        plain(&self.model.derivative(&forcing, &numbers(self.x)))
+    }
+}
+
+struct Jacobian<'a, J> {
+    tangent: &'a Tangent<f64, J>,
+    t_s: f64,
+    x: &'a [f64; STATES],
+}
+
+impl<J: Model<Dual<f64>>> ScalarKernel for Jacobian<'_, J> {
+    type Output = Partials<COORDINATES>;
+    #[inline(always)]
+    fn run(self) -> Partials<COORDINATES> {
+        let mut partials = Partials::zero();
+        self.tangent.partials(self.t_s, &numbers(self.x), &mut partials);
+        partials
+    }
+}
+
+struct Outputs<'a, M> {
+    model: &'a M,
+    t_s: f64,
+    x: &'a [f64; STATES],
+}
+
+impl<M: Model<f64>> ScalarKernel for Outputs<'_, M> {
+    type Output = ([f64; CHANNELS], [f64; CHANNELS]);
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let x = numbers(self.x);
+        let forcing = self.model.forcing(N(self.t_s));
+        let dx = self.model.derivative(&forcing, &x);
+        let (mut values, mut rates) = ([0.0; CHANNELS], [0.0; CHANNELS]);
+        if let (_, Some(channels)) = self.model.observe(&forcing, &x, &dx, true) {
+            for i in 0..CHANNELS {
+                values[i] = channels[i].value.0;
+                rates[i] = channels[i].slope.0;
+            }
+        }
+        (values, rates)
+    }
+}
+
+#[inline(always)]
+fn numbers(x: &[f64; STATES]) -> [N<f64>; STATES] {
+    let mut numbers = [N(0.0); STATES];
+    for i in 0..STATES {
+        numbers[i] = N(x[i]);
+    }
+    numbers
+}
+
+#[inline(always)]
+fn plain(x: &[N<f64>; STATES]) -> [f64; STATES] {
+    let mut plain = [0.0; STATES];
+    for i in 0..STATES {
+        plain[i] = x[i].0;
+    }
+    plain
+}

@@ -1,0 +1,155 @@
+//! Time histories: against independent ones, and what must hold of any.
+
+use crate::coordinates::COORDINATES;
+use crate::{
+    Channel, History, Machine, Method, ModelKind, Point, Spin, Start, Timing, history, prepare,
+};
+use lane_ode::Simd;
+
+fn point(machine: Machine, spin: Spin, end_s: f64) -> Point {
+    let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
+    prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
+}
+
+/// Largest difference from a reference file's channels, as a share of each one's peak.
+fn difference(file: &str, history: &History<'_>) -> f64 {
+    let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let rows: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+    assert_eq!(history.len(), rows.len());
+    let ours: Vec<_> = (0..rows.len()).map(|k| history.instant(k).unwrap().channels).collect();
+    let mut worst = 0.0_f64;
+    for channel in Channel::ALL {
+        let name = format!("{}_{}", channel.name(), channel.unit());
+        let column = names.iter().position(|known| **known == name).unwrap();
+        let peak = rows.iter().fold(0.0_f64, |peak, row| peak.max(row[column].abs()));
+        for (ours, row) in ours.iter().zip(&rows) {
+            worst = worst.max((ours[channel.index()] - row[column]).abs() / peak);
+        }
+    }
+    worst
+}
+
+#[test]
+fn val_a_run_up_matches_an_independent_one() {
+    let spin = Spin::Cycloidal { peak_rpm: 600.0, ramp_s: 4.0 };
+    let point = point(Machine::paper(), spin, 6.0);
+    // Steps that do not divide the time between instants, so that most instants lie inside one.
+    let method = Method::Rk4 { step_s: 0.97e-4 };
+    for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
+        let history = history(model, &method, &point, &Start::default(), 0.01);
+        let worst = difference(&format!("cycloidal_600rpm_4s_{file}.csv"), &history);
+        assert!(worst < 1e-8, "{file}: {worst:e}");
+    }
+}
+
+#[test]
+fn val_a_run_up_and_down_matches_an_independent_one() {
+    let mut machine = Machine::paper();
+    machine.unbalance.mass_kg = 0.7;
+    machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 110.0);
+    let point = point(machine, Spin::Triangular { peak_rpm: 350.0, ramp_s: 8.0 }, 16.0);
+    let method = Method::Rk4 { step_s: 1e-4 };
+    for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
+        let history = history(model, &method, &point, &Start::default(), 0.01);
+        let worst = difference(&format!("triangular_350rpm_8s_{file}.csv"), &history);
+        assert!(worst < 1e-6, "{file}: {worst:e}");
+    }
+}
+
+#[test]
+fn a_trajectory_does_not_depend_on_how_often_it_is_read() {
+    let point = point(Machine::paper(), Spin::Ramp { peak_rpm: 300.0, ramp_s: 1.0 }, 1.0);
+    let adaptive = lane_ode::Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: 1_000_000 };
+    for method in
+        [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(adaptive), Method::Rodas5p(adaptive)]
+    {
+        let read = |every_s: f64| {
+            history(ModelKind::Nonlinear, &method, &point, &Start::default(), every_s)
+        };
+        let (seldom, often) = (read(0.25), read(0.25 / 1024.0));
+        assert_eq!((seldom.len(), often.len()), (5, 4097));
+        for k in 0..5 {
+            assert_eq!(seldom.instant(k), often.instant(1024 * k));
+        }
+    }
+}
+
+#[test]
+fn a_failed_trajectory_ends_before_the_time_of_its_failure() {
+    let point = point(Machine::paper(), Spin::Ramp { peak_rpm: 300.0, ramp_s: 1.0 }, 1.0);
+    let mut start = Start::default();
+    start.speeds[4] = 100.0;
+    let history =
+        history(ModelKind::Nonlinear, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 1e-4);
+    let (_, time_s) = history.failure.unwrap();
+    assert!(time_s > 0.0 && time_s < 1.0, "{time_s}");
+    assert!(history.len() as f64 * 1e-4 <= time_s + 1e-9);
+    assert!(history.len() as f64 * 1e-4 >= time_s - 1.1e-4);
+    assert!((0..history.len()).all(|k| history.instant(k).unwrap().gap_m.is_finite()));
+    assert_eq!(history.instant(history.len()), None);
+}
+
+#[test]
+fn at_rest_the_cabinet_carries_the_weight() {
+    let machine = Machine::paper();
+    let mass = machine.tub.mass_kg
+        + machine.shaft.mass_kg
+        + machine.drum.mass_kg
+        + machine.unbalance.mass_kg;
+    let weight = mass * machine.gravity_m_per_s2;
+    let point = point(machine, Spin::Ramp { peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
+    for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        let history = history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &Start::default(), 0.1);
+        let forces = history.forces(0).unwrap();
+        let [x, y, z] = forces.cabinet_n;
+        // Forces along the cabinet's axis need not cancel: the bodies are held along it.
+        assert!((y + weight).abs() < 1e-9 * weight && z.abs() < 1e-9 * weight, "{x} {y} {z}");
+        assert_eq!(forces.dampers_n, [0.0; 2]);
+        assert!(forces.springs_n.iter().all(|tension| *tension > 0.0), "{:?}", forces.springs_n);
+    }
+}
+
+#[test]
+fn linear_forces_are_the_nonlinear_ones_to_first_order() {
+    let point = point(Machine::paper(), Spin::Ramp { peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
+    let apart = |size: f64| {
+        let start = Start {
+            deviations: std::array::from_fn(|i| size * (0.3 + 0.1 * i as f64)),
+            speeds: std::array::from_fn(|i| size * (5.0 - i as f64)),
+        };
+        let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
+            history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 0.1).forces(0).unwrap()
+        });
+        let all = |forces: &crate::Forces| {
+            [&forces.springs_n[..], &forces.dampers_n[..], &forces.cabinet_n[..]].concat()
+        };
+        let pairs = all(&nonlinear).into_iter().zip(all(&linear));
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let (coarse, fine) = (apart(1e-2), apart(1e-3));
+    assert!(coarse > 1e-3, "{coarse}");
+    assert!((coarse / fine - 100.0).abs() < 10.0, "{coarse} {fine}");
+}
+
+#[test]
+fn both_models_start_where_they_are_told() {
+    let point = point(Machine::paper(), Spin::Ramp { peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
+    let start = Start {
+        deviations: std::array::from_fn(|i| 1e-3 * i as f64),
+        speeds: std::array::from_fn(|i| 0.1 - 0.01 * i as f64),
+    };
+    for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        let first =
+            history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 0.1).instant(0).unwrap();
+        for i in 0..COORDINATES {
+            assert!((first.deviations[i] - start.deviations[i]).abs() < 1e-15);
+            assert_eq!(first.speeds[i], start.speeds[i]);
+        }
+        let yaw = first.channels[Channel::TubYaw.index()];
+        assert!((yaw - start.deviations[4]).abs() < 1e-15, "{yaw}");
+    }
+}

@@ -1,0 +1,267 @@
+//! The two models as systems over lanes, and what they have in common.
+
+use crate::channel::CHANNELS;
+use crate::coordinates::{COORDINATES, FIRST_ANGLE, STATES};
+use crate::lanes::InLanes as _;
+use crate::linear::outputs::{LinearMotion, LinearOutputs};
+use crate::linear::rotor_terms::Terms;
+use crate::linear::step::{self, RotorAt, StepConstants};
+use crate::machine::spin::{SpinLanes, SpinState, SpinStretch};
+use crate::nonlinear;
+use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coupling::{Caps, Coupling, Sag};
+use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
+use crate::point::Point;
+use core::f64::consts::FRAC_PI_2;
+use lane_ode::{Lane, N, Sample, System};
+
+/// Coordinates farther than this from equilibrium (m) have left the machine.
+const FARTHEST_M: f64 = 10.0;
+
+/// One of the two models, over lanes.
+pub(crate) trait Model<T: Lane>: System<T, STATES> {
+    /// The same point in every lane.
+    fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self;
+    /// Puts a point into one lane.
+    fn set_point(&mut self, lane: usize, point: &Point);
+    /// Puts a stretch of its spin into one lane.
+    fn set_spin(&mut self, lane: usize, stretch: &SpinStretch);
+    /// Puts other caps into one lane.
+    fn set_caps(&mut self, lane: usize, caps: &Caps);
+    /// State at rest.
+    fn at_rest(point: &Point) -> [f64; STATES];
+    /// Position of the drum's front centre relative to the tub axis, and the channels' deviations
+    /// from equilibrium; the latter only `with_channels`. `dx` is the state's derivative.
+    fn observe(
+        &self,
+        forcing: &Self::Forcing,
+        x: &[N<T>; STATES],
+        dx: &[N<T>; STATES],
+        with_channels: bool,
+    ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>);
+}
+
+/// Coordinates with two derivatives, from a state and its derivative.
+#[inline(always)]
+fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> Motion<T> {
+    let (q, u) = split(x);
+    Motion { q, u, a: split(dx).1 }
+}
+
+/// Coordinates of a state.
+#[inline(always)]
+pub(crate) fn split<T: Copy>(x: &[N<T>; STATES]) -> ([N<T>; COORDINATES], [N<T>; COORDINATES]) {
+    (core::array::from_fn(|i| x[i]), core::array::from_fn(|i| x[COORDINATES + i]))
+}
+
+#[inline(always)]
+fn joined<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) -> [N<T>; STATES] {
+    core::array::from_fn(|i| if i < COORDINATES { u[i] } else { a[i - COORDINATES] })
+}
+
+/// The lanes whose angles are within a quarter turn and whose translations are within
+/// [`FARTHEST_M`].
+#[inline(always)]
+fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
+    // One sum of squares, each over its own limit: NaN and infinity fail the comparison too.
+    let mut sum = x[0].lit(0.0);
+    for (i, q) in x[..COORDINATES].iter().enumerate() {
+        let limit = if i < FIRST_ANGLE { FARTHEST_M } else { FRAC_PI_2 };
+        let share = (*q * (1.0 / limit)).v();
+        sum += share * share;
+    }
+    sum.0.less(sum.lit(1.0).0)
+}
+
+/// The nonlinear model.
+pub(crate) struct Nonlinear<T> {
+    coupling: Coupling<T>,
+    machine: Coefficients<T>,
+    spin: SpinLanes<T>,
+    /// Channels at the static equilibrium.
+    rest: [N<T>; CHANNELS],
+    sag: Sag<T>,
+}
+
+impl<T: Lane> System<T, STATES> for Nonlinear<T> {
+    type Forcing = SpinState<T>;
+
+    #[inline(always)]
+    fn forcing(&self, t_s: N<T>) -> SpinState<T> {
+        self.spin.at(t_s)
+    }
+
+    #[inline(always)]
+    fn derivative(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
+        let (q, u) = split(x);
+        joined(
+            &u,
+            &nonlinear::accelerations(&self.machine, &self.coupling, &self.sag, spin, &q, &u),
+        )
+    }
+
+    #[inline(always)]
+    fn in_range(&self, x: &[N<T>; STATES]) -> T::Mask {
+        in_range(x)
+    }
+}
+
+impl<T: Lane> Model<T> for Nonlinear<T> {
+    #[inline(always)]
+    fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
+        Self {
+            coupling,
+            machine: Coefficients::splat(zero, &point.machine),
+            spin: SpinLanes::splat(zero, &point.stretches[0]),
+            rest: point.rest.map(|y| zero.lit(y)),
+            sag: Sag::splat(zero, &Sag::new(&point.equilibrium)),
+        }
+    }
+
+    fn set_point(&mut self, lane: usize, point: &Point) {
+        self.machine.set_lane(lane, &point.machine);
+        self.rest.set_lane(lane, &point.rest.map(N));
+        self.sag.set_lane(lane, &Sag::new(&point.equilibrium));
+    }
+
+    fn set_spin(&mut self, lane: usize, stretch: &SpinStretch) {
+        self.spin.set_lane(lane, stretch);
+    }
+
+    fn set_caps(&mut self, lane: usize, caps: &Caps) {
+        self.coupling.set_caps(lane, caps);
+    }
+
+    fn at_rest(point: &Point) -> [f64; STATES] {
+        core::array::from_fn(|i| if i < COORDINATES { point.equilibrium[i] } else { 0.0 })
+    }
+
+    #[inline(always)]
+    fn observe(
+        &self,
+        spin: &SpinState<T>,
+        x: &[N<T>; STATES],
+        dx: &[N<T>; STATES],
+        with_channels: bool,
+    ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>) {
+        let motion = motion(x, dx);
+        let axes = Axes::new(spin, &motion);
+        let bodies = &self.machine.bodies;
+        let mut channels = None;
+        if with_channels {
+            let mut samples = axes.channels(bodies, &motion);
+            for i in 0..CHANNELS {
+                samples[i].value -= self.rest[i];
+            }
+            channels = Some(samples);
+        }
+        (axes.radial(bodies, &motion), channels)
+    }
+}
+
+/// The linear model.
+pub(crate) struct Linear<T> {
+    coupling: Coupling<T>,
+    flexure_stiffness: N<T>,
+    constants: StepConstants<T>,
+    terms: Terms<T>,
+    /// Of the hinge: q9, q10.
+    sag: [N<T>; 2],
+    outputs: LinearOutputs<T>,
+    spin: SpinLanes<T>,
+}
+
+/// The linear model's functions of time at an instant.
+#[derive(Clone, Copy)]
+pub(crate) struct LinearForcing<T> {
+    spin: SpinState<T>,
+    rotor: RotorAt<T>,
+}
+
+impl<T: Lane> System<T, STATES> for Linear<T> {
+    type Forcing = LinearForcing<T>;
+
+    #[inline(always)]
+    fn forcing(&self, t_s: N<T>) -> LinearForcing<T> {
+        let spin = self.spin.at(t_s);
+        let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &spin, self.sag);
+        let rotor = RotorAt::new(&self.constants, &self.coupling, &self.terms, &spin, hinge_mass);
+        LinearForcing { spin, rotor }
+    }
+
+    #[inline(always)]
+    fn renew(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
+        forcing.spin = self.spin.at(t_s);
+        let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &forcing.spin, self.sag);
+        forcing.rotor.renew(
+            &self.constants,
+            &self.coupling,
+            &self.terms,
+            &forcing.spin,
+            hinge_mass,
+        );
+    }
+
+    #[inline(always)]
+    fn derivative(&self, forcing: &LinearForcing<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
+        let (q, u) = split(x);
+        joined(&u, &step::accelerations(&self.constants, &self.coupling, &forcing.rotor, &q, &u))
+    }
+
+    #[inline(always)]
+    fn in_range(&self, x: &[N<T>; STATES]) -> T::Mask {
+        in_range(x)
+    }
+}
+
+fn step_constants(point: &Point) -> StepConstants<f64> {
+    StepConstants::new(&point.machine.bodies, &point.linear.constants)
+}
+
+impl<T: Lane> Model<T> for Linear<T> {
+    #[inline(always)]
+    fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
+        Self {
+            coupling,
+            flexure_stiffness: zero.lit(point.machine.bodies.flexure_stiffness.0),
+            constants: StepConstants::splat(zero, &step_constants(point)),
+            terms: Terms::splat(zero, &point.linear.terms),
+            sag: Sag::splat(zero, &Sag::new(&point.equilibrium)).hinge,
+            outputs: LinearOutputs::splat(zero, &point.linear_outputs),
+            spin: SpinLanes::splat(zero, &point.stretches[0]),
+        }
+    }
+
+    fn set_point(&mut self, lane: usize, point: &Point) {
+        self.flexure_stiffness.set_lane(lane, &point.machine.bodies.flexure_stiffness);
+        self.constants.set_lane(lane, &step_constants(point));
+        self.sag.set_lane(lane, &Sag::new(&point.equilibrium).hinge);
+        self.terms.set_lane(lane, &point.linear.terms);
+        self.outputs.set_lane(lane, &point.linear_outputs);
+    }
+
+    fn set_spin(&mut self, lane: usize, stretch: &SpinStretch) {
+        self.spin.set_lane(lane, stretch);
+    }
+
+    fn set_caps(&mut self, lane: usize, caps: &Caps) {
+        self.coupling.set_caps(lane, caps);
+    }
+
+    fn at_rest(_: &Point) -> [f64; STATES] {
+        [0.0; STATES]
+    }
+
+    #[inline(always)]
+    fn observe(
+        &self,
+        forcing: &LinearForcing<T>,
+        x: &[N<T>; STATES],
+        dx: &[N<T>; STATES],
+        with_channels: bool,
+    ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>) {
+        let motion = LinearMotion::new(&forcing.spin, &motion(x, dx));
+        let channels = if with_channels { Some(self.outputs.channels(&motion)) } else { None };
+        (self.outputs.radial(&motion), channels)
+    }
+}

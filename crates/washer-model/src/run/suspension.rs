@@ -1,0 +1,109 @@
+//! Forces of springs and dampers, and their sum on the cabinet.
+//!
+//! The laws are those of the equations (`nonlinear/elements.rs`). The linear model's forces are
+//! first order in its deviations, by automatic differentiation at the equilibrium.
+
+use crate::coordinates::{COORDINATES, STATES, TUB_Y, TUB_Z};
+use crate::lanes::Constant as _;
+use crate::nonlinear::elements::{CabinetLine, Ends, Law};
+use crate::nonlinear::frame::{Tilt, Vec3, dot};
+use crate::point::Point;
+use crate::run::ModelKind;
+use lane_ode::{Dual, N};
+
+/// Forces of the suspension at one instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Forces {
+    /// Tension of each spring (N); below zero it pushes.
+    pub springs_n: Vec<f64>,
+    /// Tension of each damper (N); above zero while it is drawn out.
+    pub dampers_n: Vec<f64>,
+    /// Sum of all forces on the cabinet (N), along c1, c2 and c3: at rest it is the weight.
+    pub cabinet_n: [f64; 3],
+}
+
+/// The forces at a state: whole coordinates of the nonlinear model, deviations of the linear one.
+pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> Forces {
+    let elements = &point.machine.elements;
+    let u: [f64; COORDINATES] = core::array::from_fn(|i| state[COORDINATES + i]);
+    let q: [f64; COORDINATES] = match model {
+        ModelKind::Nonlinear => core::array::from_fn(|i| state[i]),
+        ModelKind::Linear => point.equilibrium,
+    };
+    let tub = Tub {
+        model,
+        moving: along(&q, &u),
+        displaced: along(&q, &core::array::from_fn(|i| state[i])),
+    };
+    let mut forces = Forces { springs_n: Vec::new(), dampers_n: Vec::new(), cabinet_n: [0.0; 3] };
+    // How the force is divided among the axes differs by a rounding: results on record have it so.
+    for spring in &elements.springs {
+        let (tension, line) = tub.tension(&spring.constant());
+        let share = tension / line.length;
+        for k in 0..3 {
+            forces.cabinet_n[k] += first_order(model, (share * line.span[k]).v());
+        }
+        forces.springs_n.push(first_order(model, tension));
+    }
+    for damper in &elements.dampers {
+        let (tension, line) = tub.tension(&damper.constant());
+        let tension = first_order(model, tension);
+        for k in 0..3 {
+            forces.cabinet_n[k] += tension * line.span[k].0.value / line.length.0.value;
+        }
+        forces.dampers_n.push(tension);
+    }
+    forces
+}
+
+/// The tub at a state.
+struct Tub {
+    model: ModelKind,
+    /// Coordinates with their derivative in time.
+    moving: [N<Dual<f64>>; COORDINATES],
+    /// Coordinates with their first-order deviation.
+    displaced: [N<Dual<f64>>; COORDINATES],
+}
+
+impl Tub {
+    /// Tension of an element, and its line.
+    fn tension<E>(&self, element: &E) -> (N<Dual<f64>>, CabinetLine<Dual<f64>>)
+    where
+        E: Law<Dual<f64>, CabinetLine<Dual<f64>>>,
+    {
+        let ends = element.ends();
+        let span = tub_from_cabinet(&self.displaced, ends);
+        let moving = tub_from_cabinet(&self.moving, ends);
+        let rate = dot(&moving, &moving).sqrt().0.slope;
+        let rate = match self.model {
+            ModelKind::Nonlinear => Dual { value: rate, slope: 0.0 },
+            // Zero at equilibrium.
+            ModelKind::Linear => Dual { value: 0.0, slope: rate },
+        };
+        let line = CabinetLine { span, length: dot(&span, &span).sqrt(), rate: N(rate) };
+        (-element.push(&line), line)
+    }
+}
+
+/// The value itself, or for the linear model its first-order expansion.
+fn first_order(model: ModelKind, value: N<Dual<f64>>) -> f64 {
+    match model {
+        ModelKind::Nonlinear => value.0.value,
+        ModelKind::Linear => value.0.value + value.0.slope,
+    }
+}
+
+/// `q` with its derivative along `direction`.
+fn along(q: &[f64; COORDINATES], direction: &[f64; COORDINATES]) -> [N<Dual<f64>>; COORDINATES] {
+    core::array::from_fn(|i| N(Dual { value: q[i], slope: direction[i] }))
+}
+
+/// From the cabinet end to the tub end, in cabinet axes.
+fn tub_from_cabinet(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> Vec3<Dual<f64>> {
+    let tub = Tilt::of_tub(q).to_cabinet(&ends.tub);
+    [
+        tub[0] - ends.cabinet[0],
+        tub[1] + q[TUB_Y] - ends.cabinet[1],
+        tub[2] + q[TUB_Z] - ends.cabinet[2],
+    ]
+}

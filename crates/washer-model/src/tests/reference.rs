@@ -1,0 +1,199 @@
+//! Against numbers from programs independent of this one (`tests/reference/README.md` says how they
+//! were made).
+
+use crate::coordinates::COORDINATES;
+use crate::linear;
+use crate::machine::Machine;
+use crate::machine::spin::SpinState;
+use crate::nonlinear;
+use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coupling::{Coupling, Sag};
+use crate::nonlinear::equilibrium;
+use crate::{
+    Channel, Method, ModelKind, Spin, Timing, highest_frequency_rad_per_s, modes, prepare, simulate,
+};
+use core::f64::consts::TAU;
+use lane_ode::{N, Simd};
+use serde_json::Value;
+
+pub(crate) fn reference(file: &str) -> Value {
+    let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+pub(crate) fn numbers<const K: usize>(value: &Value) -> [f64; K] {
+    let list = value.as_array().unwrap();
+    std::array::from_fn(|i| list[i].as_f64().unwrap())
+}
+
+/// The paper's machine at a case's unbalance mass and damping.
+pub(crate) fn machine(case: &Value) -> Machine {
+    let mut machine = Machine::paper();
+    machine.unbalance.mass_kg = case["unbalance_mass"].as_f64().unwrap();
+    if let Some(damping) = case["damping"].as_f64() {
+        machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = damping);
+    }
+    machine
+}
+
+pub(crate) fn spin(case: &Value) -> SpinState<f64> {
+    let number = |name: &str| N(case[name].as_f64().unwrap());
+    SpinState::new(number("theta").sin_cos(), number("theta_dot"), number("theta_ddot"))
+}
+
+#[test]
+fn val_accelerations_match_an_independent_right_hand_side() {
+    for case in reference("rhs.json")["cases"].as_array().unwrap() {
+        let coefficients = Coefficients::new(&machine(case));
+        let [q, u] = ["q", "u"].map(|name| numbers::<COORDINATES>(&case[name]).map(N));
+        let ours = nonlinear::accelerations(
+            &coefficients,
+            &Coupling::Springs,
+            &Sag::new(&[0.0; COORDINATES]),
+            &spin(case),
+            &q,
+            &u,
+        );
+        let theirs: [f64; COORDINATES] = numbers(&case["acceleration"]);
+        let largest = theirs.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+        for i in 0..COORDINATES {
+            let error = (ours[i].0 - theirs[i]).abs() / largest;
+            assert!(error < 1e-9, "coordinate {}: {} against {}", i + 1, ours[i].0, theirs[i]);
+        }
+    }
+}
+
+#[test]
+fn val_equilibrium_matches_an_independent_solution() {
+    for case in reference("equilibrium.json")["cases"].as_array().unwrap() {
+        let (q, found) = equilibrium::find(N(0.0), &Coefficients::new(&machine(case)));
+        assert_eq!(found & 1, 1);
+        let theirs: [f64; COORDINATES] = numbers(&case["q"]);
+        for i in 0..COORDINATES {
+            assert!(
+                (q[i].0 - theirs[i]).abs() < 1e-12,
+                "q{}: {} against {}",
+                i + 1,
+                q[i].0,
+                theirs[i]
+            );
+        }
+    }
+}
+
+#[test]
+fn val_linear_matrices_match_an_independent_expansion() {
+    for case in reference("linear_matrices.json")["cases"].as_array().unwrap() {
+        let coefficients = Coefficients::new(&machine(case));
+        let (q, _) = equilibrium::find(N(0.0), &coefficients);
+        let point = linear::linearise(&coefficients, &q).remove(0);
+        let ours = point.matrices(&coefficients.bodies, &spin(case));
+        for (name, ours) in [("M", ours.mass), ("C", ours.damping), ("K", ours.stiffness)] {
+            let theirs: [[f64; COORDINATES]; COORDINATES] =
+                std::array::from_fn(|i| numbers(&case[name].as_array().unwrap()[i]));
+            let largest = theirs.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
+            for i in 0..COORDINATES {
+                for j in 0..COORDINATES {
+                    let error = (ours[i][j] - theirs[i][j]).abs() / largest;
+                    assert!(
+                        error < 1e-9,
+                        "{name}[{i}][{j}]: {} against {}",
+                        ours[i][j],
+                        theirs[i][j]
+                    );
+                }
+            }
+        }
+        let theirs: [f64; COORDINATES] = numbers(&case["F"]);
+        let largest = theirs.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+        for i in 0..COORDINATES {
+            let error = (ours.force[i] - theirs[i]).abs() / largest;
+            assert!(error < 1e-9, "F[{i}]: {} against {}", ours.force[i], theirs[i]);
+        }
+    }
+}
+
+#[test]
+fn val_eigenvalues_match_an_independent_solution() {
+    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
+    for case in reference("modes.json")["cases"].as_array().unwrap() {
+        let spin = Spin::Ramp { peak_rpm: 100.0, ramp_s: 1.0 };
+        let point = prepare(Simd::Scalar, &[(machine(case), spin)], &timing).remove(0).unwrap();
+        let speed = case["speed_rpm"].as_f64().unwrap() * TAU / 60.0;
+        let ours = modes(&point, case["theta"].as_f64().unwrap(), speed).unwrap().modes;
+        for (ours, theirs) in ours.iter().zip(case["eigenvalues"].as_array().unwrap()) {
+            let [re, im] = numbers(theirs);
+            let error = (ours.re_per_s - re).hypot(ours.im_rad_per_s - im) / re.hypot(im);
+            assert!(error < 1e-7, "{} {} against {re} {im}", ours.re_per_s, ours.im_rad_per_s);
+        }
+        let highest = highest_frequency_rad_per_s(&point, speed).unwrap();
+        let [re, im] = numbers(case["eigenvalues"].as_array().unwrap().last().unwrap());
+        // Theirs is at theta = 0 only.
+        assert!((highest / f64::hypot(re, im) - 1.0).abs() < 2e-3, "{highest} against {im}");
+    }
+}
+
+/// Columns of a reference CSV by name.
+fn table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let names = lines.next().unwrap().split(',').map(str::to_owned).collect();
+    let rows = lines.map(|line| line.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+    (names, rows)
+}
+
+#[test]
+fn val_reliability_map_matches_an_independent_one() {
+    let (names, rows) = table("reliability_map.csv");
+    let scenarios: Vec<_> = rows
+        .iter()
+        .map(|row| {
+            let mut machine = Machine::paper();
+            machine.unbalance.mass_kg = row[0];
+            machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = row[1]);
+            (machine, Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 })
+        })
+        .collect();
+    let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
+    let simd = Simd::best();
+    let points: Vec<_> =
+        prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
+    let points: Vec<_> = points.iter().collect();
+    let method = Method::Rk4 { step_s: 2e-4 };
+    let [nonlinear, linear] =
+        [ModelKind::Nonlinear, ModelKind::Linear].map(|m| simulate(simd, m, &method, &points));
+    let column = |name: &str| names.iter().position(|n| n == name).unwrap();
+    let mut compared = 0;
+    for (i, row) in rows.iter().enumerate() {
+        let mut largest_ratio = 0.0_f64;
+        for channel in Channel::ALL {
+            if matches!(channel, Channel::TotalCentreY | Channel::TotalCentreZ) {
+                continue;
+            }
+            let [ours_n, ours_l] = [&nonlinear, &linear].map(|r| r[i].amplitudes[channel.index()]);
+            largest_ratio = largest_ratio.max(ours_n / ours_l);
+            for (prefix, ours) in [("nonlinear", ours_n), ("linear", ours_l)] {
+                let theirs = row[column(&format!("{prefix}_{}", channel.name()))];
+                let is_regular = row[column("step_sensitivity")] < 1e-4;
+                if prefix == "linear" || is_regular {
+                    let error = (ours - theirs).abs() / theirs;
+                    assert!(
+                        error < 1e-4,
+                        "{prefix} {} at {:?}: {ours} against {theirs}",
+                        channel.name(),
+                        &row[..2]
+                    );
+                    compared += 1;
+                }
+            }
+        }
+        assert_eq!(
+            largest_ratio < 2.0,
+            row[column("ratio_max")] < 2.0,
+            "verdict at {:?}",
+            &row[..2]
+        );
+    }
+    assert!(compared > 500, "only {compared} amplitudes were regular enough to compare");
+}

@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# Everything that is measured of this project alone, in one command: ratios, kernels by instruction
+# set, instruction counts. Writes results/benchmarks/NAME.md with machine, versions and commands.
+#
+#     scripts/benchmarks/benchmark.sh [NAME] [ROUNDS]
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+name=${1:-kernels}
+rounds=${2:-5}
+out=results/benchmarks/$name.md
+mkdir -p results/benchmarks
+cargo build --release --bin sweep
+cargo bench --no-run
+
+fact() { lscpu | sed -n "s/^$1: *//p"; }
+{
+  echo "# Benchmarks"
+  echo
+  model="$(fact 'Model name') (family $(fact 'CPU family'), model $(fact Model))"
+  echo "Machine: $model, $(nproc) cores, $(uname -sr);"
+  echo "load when it began: $(cut -d' ' -f1 /proc/loadavg)." \
+    "$(rustc --version), commit $(git describe --always --dirty)."
+  echo "Command: \`scripts/benchmarks/benchmark.sh $name $rounds\`."
+  echo
+  echo "## Ratios"
+  echo
+  echo "\`cargo bench --bench ratios -- $rounds\`"
+  echo
+  cargo bench --quiet --bench ratios -- "$rounds"
+  echo "## Instructions"
+  echo
+  echo "\`scripts/benchmarks/instructions.sh\`"
+  echo
+  scripts/benchmarks/instructions.sh
+  echo
+  echo "## What a step executes"
+  echo
+  echo "\`scripts/benchmarks/kernel_profile.py\`"
+  echo
+  python3 scripts/benchmarks/kernel_profile.py
+  echo
+  echo "## Kernels"
+  echo
+  echo "\`cargo bench --bench kernels\`; items are evaluations or trajectories of single lanes"
+  echo
+  echo '```text'
+  cargo bench --quiet --bench kernels -- --color never
+  echo '```'
+} > "$out.partial"
+mv "$out.partial" "$out"
+echo "$out"

@@ -1,0 +1,75 @@
+#!/usr/bin/env python3
+"""Checks that the JSON Schemas of `sweep schema` accept every valid grid and machine file, and
+refuse broken ones.
+
+    python scripts/checks/check_schema.py [SWEEP_BINARY]
+
+Needs Python 3.11 and the package jsonschema.
+"""
+
+import json
+import pathlib
+import subprocess
+import sys
+import tomllib
+
+import jsonschema
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+BROKEN = ROOT / "crates/sweep/testdata/broken"
+# Mistakes that are within a schema's reach: one file, one value at a time.
+REFUSED = [
+    "axis_single_brackets", "axis_spacing_unknown", "axis_values_and_range", "axis_values_empty",
+    "channels_empty", "channels_unknown_and_repeated", "count_fraction", "count_negative",
+    "count_overflow", "count_zero", "dotted_keys", "end_beyond_reason", "end_zero", "key_missing",
+    "key_unknown",
+    "key_unknown_in_every_section", "measures_empty", "measures_unknown",
+    "method_left_out_with_keys_of_others", "method_unknown", "method_with_keys_of_others",
+    "name_is_a_path", "name_is_hidden", "number_huge",
+    "profile_unknown", "profile_with_keys_of_the_table", "section_missing", "set_out_of_range",
+    "set_with_a_string", "spin_out_of_range", "spin_table_empty", "spin_table_with_keys_of_a_ramp",
+    "step_zero", "type_wrong", "type_wrong_in_array", "window_negative", "window_of_three",
+]
+
+
+def main() -> int:
+    sweep = sys.argv[1] if len(sys.argv) > 1 else "sweep"
+
+    def run(*arguments: str) -> str:
+        command = [sweep, *arguments]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+    schemas = {}
+    for kind, arguments in {"grid": ["schema"], "machine": ["schema", "--machine"]}.items():
+        schema = json.loads(run(*arguments))
+        jsonschema.Draft202012Validator.check_schema(schema)
+        schemas[kind] = jsonschema.Draft202012Validator(schema)
+
+    failures = []
+
+    def expect(kind: str, name: str, text: str, accepted: bool) -> None:
+        errors = [error.message for error in schemas[kind].iter_errors(tomllib.loads(text))]
+        if accepted and errors:
+            failures.append(f"{name} should be accepted: {errors[0]}")
+        if not accepted and not errors:
+            failures.append(f"{name} should be refused")
+
+    grids = sorted((ROOT / "sweeps").glob("*.toml"))
+    for path in grids:
+        expect("grid", path.name, path.read_text(), True)
+    expect("grid", "sweep init", run("init", "-"), True)
+    expect("machine", "sweep init --machine", run("init", "--machine", "-"), True)
+    for name in REFUSED:
+        expect("grid", name, (BROKEN / f"{name}.toml").read_text(), False)
+    for name in ["empty", "impossible", "incomplete", "springless"]:
+        expect("machine", name, (BROKEN / f"machines/{name}.toml").read_text(), False)
+
+    for failure in failures:
+        print(failure, file=sys.stderr)
+    print(f"{len(grids) + 2} files accepted, {len(REFUSED) + 4} refused, {len(failures)} wrong",
+          file=sys.stderr)
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

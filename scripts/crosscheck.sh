@@ -1,9 +1,0 @@
-#!/bin/sh
-# scripts/crosscheck_exudyn.py with what it needs: scripts/crosscheck.sh [OPTION ...]
-#
-# Exudyn comes as wheels for CPython 3.11 to 3.14 on Linux (x86-64), macOS and Windows. Needs the
-# release binary (cargo build --release), or --sweep BINARY.
-set -eu
-here=$(dirname "$0")
-venv=$("$here/venv.sh" "$here/crosscheck_requirements.txt")
-exec "$venv/bin/python" "$here/crosscheck_exudyn.py" "$@"

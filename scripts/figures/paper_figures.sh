@@ -1,0 +1,55 @@
+#!/bin/sh
+# The paper's result figures (6 to 12) from this program, and for Fig. 6 from Exudyn as well, into
+# results/figures: scripts/figures/paper_figures.sh
+#
+# Builds the release binary unless SWEEP names one. Traces, modes and the map stay in results/ as
+# Parquet; the map of Fig. 12 is the longest, and is taken as it is if it is there.
+set -eu
+root=$(cd "$(dirname "$0")/../.." && pwd)
+cd "$root"
+if [ -z "${SWEEP:-}" ]; then
+    cargo build --release
+    SWEEP=$root/target/release/sweep
+fi
+figures=results/figures
+mkdir -p "$figures"
+
+"$SWEEP" modes --speed 0:1200:10 --out results/fig7.parquet
+"$SWEEP" plot results/fig7.parquet -o "$figures/fig7.svg"
+"$SWEEP" plot results/fig7.parquet --view variation -o "$figures/fig7b.svg"
+"$SWEEP" plot results/fig7.parquet --view shapes -o "$figures/fig8.svg"
+
+# Instants close enough that 1200 rpm, 20 turns a second, keeps its peaks.
+for name in fig6 fig10 fig11; do
+    "$SWEEP" trace "sweeps/$name.toml" --every 0.002 --out "results/$name.parquet"
+done
+"$SWEEP" plot results/fig6.parquet --modes results/fig7.parquet -o "$figures/fig9.svg"
+# The machine's mass centre, up and sideways.
+centre="--channel total_centre_y --channel total_centre_z"
+for name in fig10 fig11; do
+    "$SWEEP" plot "results/$name.parquet" --modes results/fig7.parquet -o "$figures/$name.svg"
+    # shellcheck disable=SC2086 # two options and their values
+    "$SWEEP" plot "results/$name.parquet" $centre --modes results/fig7.parquet \
+        -o "$figures/${name}_centre.svg"
+done
+
+# Each resonance in the motion that is most of it: late on the way up and on the way down, and at
+# held speeds.
+# shellcheck disable=SC2086
+"$SWEEP" plot results/fig10.parquet --view passages --channel tub_yaw --channel tub_pitch $centre \
+    --modes results/fig7.parquet -o "$figures/delay.svg"
+"$SWEEP" run sweeps/held.toml --progress plain
+# shellcheck disable=SC2086
+"$SWEEP" plot results/held.parquet --quantity linear --channel tub_yaw --channel tub_pitch $centre \
+    -o "$figures/held.svg"
+
+"$SWEEP" run sweeps/fig12.toml --progress plain
+"$SWEEP" plot results/fig12.parquet -o "$figures/fig12.svg"
+
+# Fig. 6 needs the other program, half a minute of it.
+scripts/crosscheck/run.sh --sweep "$SWEEP" --trace results/fig6_exudyn.parquet
+exudyn="--against results/fig6_exudyn.parquet --modes results/fig7.parquet"
+# shellcheck disable=SC2086
+"$SWEEP" plot results/fig6.parquet $exudyn -o "$figures/fig6.svg"
+# shellcheck disable=SC2086
+"$SWEEP" plot results/fig6.parquet $centre $exudyn -o "$figures/fig6_centre.svg"
