@@ -9,6 +9,7 @@ use std::process::ExitCode;
 use crate::boundary::product::BoundaryError;
 use crate::config::Diagnostics;
 use crate::engine::EngineError;
+use crate::memory::NoMemory;
 use crate::random_keys::NoRandomNumbers;
 use crate::store::StoreError;
 use crate::threads::ThreadsError;
@@ -119,6 +120,9 @@ pub enum Error {
     /// No threads.
     #[error(transparent)]
     Threads(#[from] ThreadsError),
+    /// No memory.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
     /// No random numbers.
     #[error(transparent)]
     Random(#[from] NoRandomNumbers),
@@ -154,7 +158,7 @@ impl Error {
             Self::Plot(error) if error.is_usage() => Exit::BadInput,
             Self::Plot(_) => Exit::Failed,
             Self::Store(_) | Self::Files(_) | Self::Threads(_) | Self::Random(_) => Exit::Failed,
-            Self::File { .. } | Self::Stdout(_) => Exit::Failed,
+            Self::Memory(_) | Self::File { .. } | Self::Stdout(_) => Exit::Failed,
         }
     }
 

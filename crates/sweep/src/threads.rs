@@ -2,6 +2,7 @@
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use crate::memory::{NoMemory, ensure_memory_for};
 use crate::random_keys::{NoRandomNumbers, draw_random_keys};
 
 /// Looks up a variable of a scheduler; the process environment outside tests.
@@ -33,6 +34,9 @@ pub enum ThreadsError {
         /// The variable's value.
         given: String,
     },
+    /// No memory for them.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
     /// No random numbers.
     #[error(transparent)]
     Random(#[from] NoRandomNumbers),
@@ -84,8 +88,9 @@ pub(crate) fn cores() -> usize {
 /// A pool of so many threads.
 ///
 /// # Errors
-/// [`ThreadsError::Start`], [`ThreadsError::Random`].
+/// [`ThreadsError::Start`], [`ThreadsError::Memory`], [`ThreadsError::Random`].
 pub(crate) fn pool(threads: usize) -> Result<ThreadPool, ThreadsError> {
+    ensure_memory_for(threads)?;
     let pool = ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|i| format!("sweep-{i}"))

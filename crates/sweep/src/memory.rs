@@ -1,0 +1,59 @@
+//! Address space, asked for before any work: where an allocation fails later, the process ends
+//! without a word of what to do.
+
+use std::hint::black_box;
+
+const MIB: usize = 1 << 20;
+
+/// What any command may need, beside its threads (measured: under 45 MB for a short trace).
+const BASE_BYTES: usize = 64 * MIB;
+
+/// A thread's stack, with its guard and the stack of its signal handler.
+const THREAD_BYTES: usize = 2 * MIB + MIB / 4;
+
+/// The system does not give the memory that a command needs.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "too little memory: the system refused {} MiB of address space\n  = help: raise the limit \
+     (`ulimit -v`, or that of the container), or use fewer threads",
+    bytes / MIB
+)]
+pub struct NoMemory {
+    bytes: usize,
+}
+
+/// Makes sure of the address space that a command needs beside its threads.
+///
+/// # Errors
+/// [`NoMemory`].
+pub fn ensure_memory() -> Result<(), NoMemory> {
+    ensure(BASE_BYTES)
+}
+
+/// The same, with so many threads.
+///
+/// # Errors
+/// [`NoMemory`].
+pub(crate) fn ensure_memory_for(threads: usize) -> Result<(), NoMemory> {
+    ensure(BASE_BYTES + threads * THREAD_BYTES)
+}
+
+/// Reserves as many bytes, and returns them untouched.
+fn ensure(bytes: usize) -> Result<(), NoMemory> {
+    let mut reserved = Vec::<u8>::new();
+    reserved.try_reserve_exact(bytes).map_err(|_| NoMemory { bytes })?;
+    black_box(&mut reserved);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_machine_has_is_refused_with_what_to_do() {
+        let error = ensure(isize::MAX as usize).unwrap_err().to_string();
+        assert!(error.contains("MiB of address space") && error.contains("ulimit -v"), "{error}");
+        assert!(ensure_memory_for(2).is_ok());
+    }
+}
