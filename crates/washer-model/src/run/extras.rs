@@ -68,8 +68,8 @@ pub(super) struct Extras<T> {
     squares: SquareIntegrals<T, CHANNELS>,
     turns: PartPeaks<T, CHANNELS>,
     force: Option<GreatestForce<T>>,
-    /// With the clearance as it is; where modes are capped, also with less and more, by what ringing
-    /// may add to the gap.
+    /// With the clearance as it is; where modes are capped, also with less and more, by what
+    /// ringing may add to the gap.
     clash: [TimeAbove<T>; 3],
     clearances_squared: [N<T>; 3],
     /// How many of these are in use.
