@@ -16,7 +16,7 @@ pub enum FileError {
         /// What the system answered.
         source: io::Error,
     },
-    /// Something stands at a path where this program must not write.
+    /// There is something at a path where this program must not write.
     #[error("{} cannot be an output: {reason}\n  = help: {help}", path.display())]
     Refused {
         /// The path as given.

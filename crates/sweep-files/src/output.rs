@@ -32,7 +32,7 @@ impl<'a> Output<'a> {
     /// Writes the file whole, or leaves what was there.
     ///
     /// # Errors
-    /// As [`Output::begin`], for what has come to stand there meanwhile.
+    /// As [`Output::begin`], for a file that has appeared there meanwhile.
     pub fn finish(mut self, bytes: &[u8]) -> Result<(), FileError> {
         self.temporary.write_all(bytes).map_err(FileError::io("write", self.path))?;
         judge(self.path, self.kind)?;
@@ -60,7 +60,7 @@ pub fn ready(folder: &Path) -> Result<(), FileError> {
     Ok(())
 }
 
-/// What stands beside a result under its name: `x.run.json` beside `x.parquet`, `v1.5.run.json`
+/// The sidecar beside a result, under its name: `x.run.json` beside `x.parquet`, `v1.5.run.json`
 /// beside `v1.5`.
 pub fn beside(output: &Path, ending: &str) -> PathBuf {
     let stem = if output.extension().is_some_and(|extension| extension == "parquet") {

@@ -18,7 +18,7 @@ pub(crate) struct Scale {
 pub(crate) struct Tick {
     /// Its value.
     pub(crate) value: f64,
-    /// What stands beside it.
+    /// Words and unit beside it.
     pub(crate) label: String,
 }
 

@@ -113,7 +113,7 @@ pub(crate) struct Series {
 pub(crate) struct Mark {
     /// Where.
     pub(crate) x: f64,
-    /// What stands beside it.
+    /// Words and unit beside it.
     pub(crate) label: String,
 }
 

@@ -30,17 +30,17 @@ pub(crate) struct Panel {
 }
 
 impl Panel {
-    /// Where a value stands, px.
+    /// The position of a value, px.
     pub(crate) fn at(&self, x: f64, y: f64) -> [f64; 2] {
         [self.at_x(x), self.at_y(y)]
     }
 
-    /// Where a value stands from left to right, px.
+    /// The position of a value from left to right, px.
     pub(crate) fn at_x(&self, x: f64) -> f64 {
         self.x + self.xs.position(x) * self.width
     }
 
-    /// Where a value stands from top to bottom, px.
+    /// The position of a value from top to bottom, px.
     pub(crate) fn at_y(&self, y: f64) -> f64 {
         self.y + (1.0 - self.ys.position(y)) * self.height
     }

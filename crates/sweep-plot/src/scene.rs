@@ -151,7 +151,7 @@ impl Hatch {
 /// Least spacing at which lines can be seen apart, px.
 const FINEST_HATCH: f64 = 2.0;
 
-/// Which part of a text stands at its position.
+/// Which part of a text is at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Anchor {
     /// The first letter.
@@ -175,7 +175,7 @@ pub(crate) struct Text {
     pub(crate) bold: bool,
     /// Colour of the letters.
     pub(crate) colour: Colour,
-    /// What stands at `at`.
+    /// Which part of it is at `at`.
     pub(crate) anchor: Anchor,
     /// Reads upwards.
     pub(crate) upright: bool,

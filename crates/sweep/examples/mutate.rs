@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Needs no instrumented build, so it finds less in a second than `scripts/checks/fuzz.sh` and can
-//! be started at once. Targets are `list`, `result` and `folder`. What is found stands in
+//! be started at once. Targets are `list`, `result` and `folder`. Findings are in
 //! `target/fuzz/findings`; exits with 1 if there is any.
 
 #[path = "../../../fuzz/src/targets/folder.rs"]

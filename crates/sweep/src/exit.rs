@@ -48,7 +48,7 @@ impl Exit {
         Self::Terminated,
     ];
 
-    /// What it tells a script.
+    /// What it means to a script.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         match self {

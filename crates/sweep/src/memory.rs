@@ -1,5 +1,5 @@
-//! Address space, asked for before any work: where an allocation fails later, the process ends
-//! without a word of what to do.
+//! Asks for address space before any work. An allocation that fails later aborts the process
+//! without advice.
 
 use std::hint::black_box;
 

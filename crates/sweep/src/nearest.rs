@@ -1,4 +1,4 @@
-//! The name that someone meant.
+//! The valid name nearest to a misspelt one.
 
 /// The valid name most like what was typed, if any is near.
 pub(crate) fn nearest<'a, I>(typed: &str, valid: I) -> Option<&'a str>

@@ -1,4 +1,4 @@
-//! What came of a grid point: one row of the result file.
+//! The outcome of a grid point: one row of the result file.
 
 use washer_model::Channel;
 

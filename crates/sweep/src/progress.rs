@@ -1,4 +1,4 @@
-//! How far the run is: a bar on a terminal, now and then a line elsewhere, or nothing.
+//! Progress of a run: a bar on a terminal, a line now and then elsewhere, or nothing.
 
 use std::io::{IsTerminal, Write};
 use std::str::FromStr;
@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// What `--progress` said.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ProgressMode {
-    /// A bar on a terminal; elsewhere a line a minute, which is what a batch job's log can bear.
+    /// A bar on a terminal; elsewhere a line a minute, which suits the log of a batch job.
     #[default]
     Auto,
     /// A line every five seconds.

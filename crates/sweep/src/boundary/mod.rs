@@ -71,7 +71,7 @@ pub(crate) struct Search {
     pub least: f64,
     /// Greatest value.
     pub greatest: f64,
-    /// The first axis is even in its logarithm, so that is what roots are carried along.
+    /// The first axis is even in its logarithm, so roots are carried along that.
     pub first_log: bool,
     /// The second axis is searched in its logarithm.
     pub second_log: bool,

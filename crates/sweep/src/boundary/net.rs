@@ -10,7 +10,7 @@ const MESH: f64 = 0.9;
 const MARGIN: f64 = 0.945;
 /// A root this close to an end of the bracket, in tolerances, is caught by one place beyond it.
 const CLOSE: f64 = 0.6;
-/// A spread of more than this part of the bracket tells nothing about where in it the root is.
+/// A spread of more than this part of the bracket does not say where in it the root is.
 const VAGUE: f64 = 0.2;
 /// A single place is this far from the expected root, in tolerances: what lies at its limit is
 /// the dearest to make sure of.

@@ -149,7 +149,7 @@ pub(super) fn nearest(run: &SideRange, moves: impl Iterator<Item = (f64, f64)>) 
 
 /// Changes of side that two rows have in common, as pairs of their numbers (of the run that begins
 /// there): every change of the row with fewer goes with the nearest of its kind in the other, in
-/// order. `before` is the row before `b`, seen from `a`: it tells how far those of `b` have moved
+/// order. `before` is the row before `b`, seen from `a`: it shows how far those of `b` have moved
 /// on their way.
 pub(super) fn shared(
     a: Neighbour<'_>,

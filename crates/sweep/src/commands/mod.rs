@@ -163,7 +163,7 @@ fn suggest(mut error: clap::Error) -> clap::Error {
 }
 
 impl Cli {
-    /// Reads this process's command line; on a mistake, or when asked for help, tells and ends the
+    /// Reads this process's command line. Prints a mistake or the help asked for, and ends the
     /// process.
     #[must_use]
     pub fn read() -> Self {

@@ -67,7 +67,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     execute(args, &plan, &engine)
 }
 
-/// Runs a plan, with an engine made for it, and tells how it went.
+/// Runs a plan, with an engine made for it, and prints a summary.
 ///
 /// # Errors
 /// Whatever of [`crate::store::StoreError`] kept it from its end; finished chunks are kept.

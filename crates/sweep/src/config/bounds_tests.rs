@@ -1,4 +1,4 @@
-//! What is too much: each bound at its edge, and that what is within it is checked at once.
+//! Bounds on input: each at its edge, and that input within it is checked at once.
 
 use std::fmt::Write as _;
 

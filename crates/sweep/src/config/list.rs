@@ -1,7 +1,7 @@
 //! Lists of points: files whose columns are parameters and whose rows are points.
 //!
-//! A list is read into memory as a whole. What bounds it is how many bytes the file has, packed and
-//! unpacked, and how many numbers it holds; each bound is checked before the memory is taken.
+//! A list is read into memory as a whole. The bytes of its file, packed and unpacked, and the
+//! numbers in it are bounded; each bound is checked before the memory is taken.
 
 mod csv;
 mod pages;

@@ -1,11 +1,10 @@
 //! From what a user typed to a [`Plan`], or to every mistake in it.
 //!
 //! A grid file, the machine file it names and the constants of the command line are walked once,
-//! each value with its place. Wrong values are reported and replaced by stand-ins,
-//! so that the walk goes on and one pass finds every mistake; a plan comes out only if there is
-//! none.
+//! each value with its place. Wrong values are reported and replaced by stand-ins, so that the walk
+//! goes on and one pass finds every mistake. There is a plan only if there are no mistakes.
 //!
-//! Left out: `name` is the file's own name, `machine` is `"paper"`, `window_s` the whole run,
+//! Defaults: `name` is the file's own name, `machine` is `"paper"`, `window_s` the whole run,
 //! `[integrator]` the defaults of [`crate::method`]'s table, `[reliability]` the ratio 2 over the
 //! six channels of tub and drum fronts and tub angles; without axes the grid is a single point.
 //! `[spin]` and `end_s` must be given, and a machine file is always whole.

@@ -1,7 +1,7 @@
 //! Every kind of mistake with its whole message, the defaults, precedence, and inputs no user would
 //! type.
 //!
-//! Each file of `testdata/broken` is a grid with mistakes; its snapshot stands beside it. A first
+//! Each file of `testdata/broken` is a grid with mistakes; its snapshot is beside it. A first
 //! line `# args: --set NAME=VALUE ...` adds the command line's part; `--at` makes it the load of a
 //! point.
 
@@ -16,7 +16,7 @@ use crate::measures::{Measures, Metric};
 use crate::method::Integrator;
 use crate::plan::AxisValues;
 
-/// What the fuzzer's inputs stand for.
+/// What the fuzzer's inputs are read as.
 #[path = "../../../../fuzz/src/input.rs"]
 mod input;
 

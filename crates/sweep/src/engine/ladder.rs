@@ -3,13 +3,11 @@
 //!
 //! The lower rungs cap the modes of bearings and hinge (`washer_model::Cases`), each for a smaller
 //! error than the one before; the last two are plain RK4 at two steps, the shorter one the
-//! reference. What a rung leaves of error shows in how far its trajectory is from the rung's
-//! before: the first-order difference of the two, over the whole course of the motion and in every
-//! number of the row. The rule knows by how much the rung's error is smaller than that of the one
-//! before, so the difference times that share is the error left, as long as errors are small enough
-//! to be of first order. Motions that pass through bands of instability amplify errors a
-//! thousandfold and climb; motions that are chaotic climb to the top, where RK4 does not agree with
-//! itself.
+//! reference. The error of a rung is estimated from its difference to the rung before, over the
+//! whole course of the motion and in every number of the row. Steps and caps say which share of
+//! that difference is left as error, as long as errors are small enough to be of first order.
+//! Motions that pass through bands of instability amplify errors a thousandfold and climb. Chaotic
+//! motions climb to the top, where RK4 does not agree with itself.
 //!
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 

@@ -1,4 +1,4 @@
-//! What the engine and whoever runs it ask of each other.
+//! What the engine and its caller ask of each other: whether to stop, and how many points are done.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 

@@ -15,7 +15,7 @@
 //! A record is the point (u64), flags, the two models' status codes and that of the method's level
 //! (u8 each), the error (f64, NaN where there is none), then for the nonlinear and the linear
 //! model: fail time, least gap (f64), steps, rejected (u64), C amplitudes and M metrics (f64). What
-//! a flag says is absent is zero. Behind both models stand B numbers (f64) of both together: ratios
+//! a flag says is absent is zero. After both models come B numbers (f64) of both together: ratios
 //! by turns, then the static sag; NaN where there is none. M and B follow from the plan, and are
 //! zero unless it asks for more than peaks.
 
@@ -30,7 +30,7 @@ const FORMAT: u32 = 2;
 const HEADER: usize = 8 + 4 + 4 + 32 + 3 * 8;
 const HASH: usize = blake3::OUT_LEN;
 
-/// Flag bits of a record; the linear model's stand three above the nonlinear one's.
+/// Flag bits of a record; the linear model's are three above the nonlinear one's.
 const AMPLITUDES: u8 = 1;
 const GAP: u8 = 1 << 1;
 const FAIL_TIME: u8 = 1 << 2;
@@ -270,7 +270,7 @@ fn read_record(bytes: &[u8], shape: &Shape) -> Option<Outcome> {
     Some(outcome)
 }
 
-/// A number, or none where NaN stands; nothing at all at the end of the bytes.
+/// A number, or none for NaN. Returns `None` at the end of the bytes.
 fn optional(rest: &mut &[u8]) -> Option<Option<f64>> {
     let number = f64::from_le_bytes(take(rest)?);
     Some((!number.is_nan()).then_some(number))

@@ -9,12 +9,12 @@
 //! | bytes | what |
 //! |---|---|
 //! | 24 | the point: three numbers |
-//! | 8 | the answer, an `f64`; one that is no number stands for none |
+//! | 8 | the answer, an `f64`; NaN where there is none |
 //! | 8 | of the BLAKE3 hash of the 32 bytes before, keyed by the plan's hash |
 //!
-//! A record whose hash does not fit, torn by a crash or of another plan, is none, and its trial is
-//! made again. What was written outlives the process at once, and a power cut once
-//! [`Trials::settle`] has returned.
+//! A record whose hash does not match, because a crash tore it or because it belongs to another
+//! plan, is ignored, and its trial is made again. What was written survives the process at once,
+//! and a power cut once [`Trials::settle`] has returned.
 
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -1,4 +1,4 @@
-//! What a column's pages take unpacked, from their own headers.
+//! The unpacked size of a column's pages, from their own headers.
 //!
 //! A page of a few kilobytes may unpack into gigabytes, and the library makes room for whatever a
 //! header declares. So the headers are walked beforehand. They are structs in Thrift's compact
