@@ -53,12 +53,8 @@ fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-short='
-    s/^end_s = .*/end_s = 4.0/; s/^window_s = .*/window_s = [3.0, 4.0]/
-    s/^ramp_s = .*/ramp_s = 4.0/; s/^peak_rpm = .*/peak_rpm = 100.0/
-    s/count = 9 }/count = 3, spacing = "log" }/; s/^accuracy = .*//'
 grid() { # NAME INTEGRATOR
-    sed -e "$short" -e "s/^method = .*/$2/" sweeps/quick.toml > "$work/$1.toml"
+    scripts/tools/short_grid.sh "$2" > "$work/$1.toml"
 }
 grid fast 'method = "rk4-mass-scaled"\naccuracy = 1e-3'
 grid rk4 'method = "rk4"\nstep_s = 2e-4'

@@ -28,13 +28,8 @@ fi
 # library could have a hand in.
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-short='
-    s/^end_s = .*/end_s = 4.0/; s/^window_s = .*/window_s = [3.0, 4.0]/
-    s/^ramp_s = .*/ramp_s = 4.0/; s/^peak_rpm = .*/peak_rpm = 100.0/
-    s/count = 9 }/count = 3, spacing = "log" }/; s/^accuracy = .*//
-    s/^ratio_limit = .*/ratio_limit = 1.05/'
 grid() { # NAME INTEGRATOR
-    sed -e "$short" -e "s/^method = .*/$2/" sweeps/quick.toml > "$work/$1.toml"
+    scripts/tools/short_grid.sh "$2" > "$work/$1.toml"
 }
 grid fast 'method = "rk4-mass-scaled"\naccuracy = 1e-3'
 grid dopri5 'method = "dopri5"\nrtol = 1e-6\natol = 1e-9'
