@@ -112,8 +112,8 @@ impl fmt::Display for Rung {
                 }
             }
             Method::Rk4 { step_s } => write!(f, "{name} (step {:.3} ms)", 1e3 * step_s),
-            // Methods outside the fast one's ladder are named, without their settings.
-            _ => write!(f, "{name}"),
+            // Not on the fast method's ladder.
+            Method::Dopri5(_) | Method::Rodas5p(_) => write!(f, "{name}"),
         }
     }
 }
