@@ -25,7 +25,7 @@ pub struct NoMemory {
 /// Makes sure of the address space that a command needs beside its threads.
 ///
 /// # Errors
-/// [`NoMemory`].
+/// What the system refused, and what to do.
 pub fn ensure_memory() -> Result<(), NoMemory> {
     ensure(BASE_BYTES)
 }
