@@ -1,11 +1,18 @@
 #!/bin/sh
-# Prints sweeps/quick.toml as a grid of 9 points and 4 s by another method:
+# Prints sweeps/quick.toml as a grid of 9 points and 4 s by a method:
 #
-#   scripts/tools/short_grid.sh 'method = "rk4"\nstep_s = 2e-4'
+#   scripts/tools/short_grid.sh fast|rk4|dopri5|rodas5p
 set -eu
+case $1 in
+    fast) method='method = "rk4-mass-scaled"\naccuracy = 1e-3' ;;
+    rk4) method='method = "rk4"\nstep_s = 2e-4' ;;
+    dopri5) method='method = "dopri5"\nrtol = 1e-6\natol = 1e-9' ;;
+    rodas5p) method='method = "rodas5p"\nrtol = 1e-4\natol = 1e-7' ;;
+    *) echo "no method $1: expected fast, rk4, dopri5 or rodas5p" >&2 && exit 2 ;;
+esac
 cd "$(dirname "$0")/../.."
 exec sed -e '
     s/^end_s = .*/end_s = 4.0/; s/^window_s = .*/window_s = [3.0, 4.0]/
     s/^ramp_s = .*/ramp_s = 4.0/; s/^peak_rpm = .*/peak_rpm = 100.0/
     s/count = 9 }/count = 3, spacing = "log" }/; s/^accuracy = .*//
-    s/^ratio_limit = .*/ratio_limit = 1.05/' -e "s/^method = .*/$1/" sweeps/quick.toml
+    s/^ratio_limit = .*/ratio_limit = 1.05/' -e "s/^method = .*/$method/" sweeps/quick.toml

@@ -5,7 +5,8 @@ use std::hint::black_box;
 
 const MIB: usize = 1 << 20;
 
-/// What any command may need, beside its threads (measured: under 45 MB for a short trace).
+/// What any command may need, beside its threads. A trace of 50 s ends under `ulimit -v 48000`,
+/// which the program itself counts towards, and is aborted under 44000.
 const BASE_BYTES: usize = 64 * MIB;
 
 /// A thread's stack, with its guard and the stack of its signal handler.

@@ -37,10 +37,9 @@ const WORTH_IT: f64 = 0.5;
 ///
 /// The linear model amplifies nothing: its first rung may be coarser, and a third is hardly ever
 /// asked for. Its second holds the row, and what a capped hinge does to motions that do not turn
-/// with the drum is more than the rule expects where a run-up is short: ten times was seen. Its
-/// matrices cost three times what they are multiplied for, at every instant that a formula asks
-/// for: two a step by order 4, eleven by order 8. So order 4 has the shorter time, and its shorter
-/// steps bear caps twice as high.
+/// with the drum is more than the rule expects where a run-up is short: ten times was seen. Most of
+/// its time goes into its matrices at every instant that a formula asks for: two a step by order 4,
+/// eleven by order 8. So order 4 takes less time, and its shorter steps bear caps twice as high.
 const fn aims(model: ModelKind) -> (Formula, &'static [f64]) {
     match model {
         ModelKind::Nonlinear => (Formula::Dop853, &[10.0, 0.15, 0.01]),
@@ -173,8 +172,8 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
     let (formula, aims) = aims(model);
     let mut chosen: Vec<(Level, Geared)> = Vec::new();
     for (level, aim) in [Level::Fast, Level::Fast, Level::Fine].into_iter().zip(aims) {
-        // One gear after the first: what instability amplifies later is small while the drum is
-        // slow, and a window may end early.
+        // The nonlinear model has one gear after the first: what instability amplifies later is
+        // small while the drum is slow, and a window may end early.
         let found = match chosen.is_empty() || model == ModelKind::Linear {
             true => cases.choose(formula, aim * accuracy),
             false => cases.choose_steady(formula, aim * accuracy),
