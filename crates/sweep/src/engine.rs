@@ -90,6 +90,11 @@ impl<'a> ModelEngine<'a> {
         self.ladders.get_or_init(|| self.find_ladders(&|| false))
     }
 
+    /// The rungs, if they were asked for.
+    pub(crate) fn ladders_found(&self) -> Option<&[Ladder; 2]> {
+        self.ladders.get()
+    }
+
     /// As [`Self::ladders`]; `None` if `watch` says to stop before they are found.
     fn ladders_under(&self, watch: &Watch<'_>) -> Option<&[Ladder; 2]> {
         if let Some(found) = self.ladders.get() {
@@ -170,6 +175,22 @@ impl<'a> ModelEngine<'a> {
         let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
         found.sort_by_key(|outcome| outcome.point);
         (found.len() == axis_values.len()).then_some(found)
+    }
+
+    /// Evaluates rows until `next` gives none, each with what it is known by and the values of the
+    /// axes, and hands each outcome to `keep`, in any order; fewer if `watch` stopped it. On all
+    /// threads of the rayon pool that it is called in.
+    pub(crate) fn evaluate_rows(
+        &self,
+        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
+        keep: &(dyn Fn(Outcome) + Sync),
+        watch: &Watch<'_>,
+    ) {
+        let feed = |most: usize| {
+            let rows = std::iter::from_fn(next).take(most);
+            rows.map(|(row, values)| (row, self.plan.scenario_at(&values))).collect()
+        };
+        self.through_lanes(Demand::Row, &feed, keep, watch);
     }
 
     /// Rows from a feed to a keeper, on all threads of the rayon pool this is called in.
@@ -301,11 +322,8 @@ impl Engine for ModelEngine<'_> {
         keep: &Keep<'_>,
         watch: &Watch<'_>,
     ) {
-        let feed = |most: usize| {
-            let points = std::iter::from_fn(feed).take(most);
-            points.map(|point| (point, self.plan.scenario(point))).collect()
-        };
-        self.through_lanes(Demand::Row, &feed, keep, watch);
+        let next = || feed().map(|point| (point, self.plan.axis_values(point)));
+        self.evaluate_rows(&next, keep, watch);
     }
 
     fn simd(&self) -> &str {

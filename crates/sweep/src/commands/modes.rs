@@ -4,22 +4,14 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use lane_ode::Simd;
-use parquet::errors::ParquetError;
-use serde_json::{Value, json};
-use washer_model::{
-    COORDINATES, Machine, ModeAtSpeed, ModeOverSpeed, Spin, Timing, campbell, decimal, prepare,
-};
+use washer_model::{ModeAtSpeed, ModeOverSpeed, decimal};
 
 use super::examples::Examples;
 use crate::config;
 use crate::exit::{Error, Exit, show, tell};
+use crate::library::modes::{MOST_SPEEDS, analysed, built_in, table, to_json};
 use crate::store::StoreError;
-use crate::table::Table;
-use sweep_files::{FileKind, Output, key};
-
-/// Most speeds that are accepted: an hour of computing.
-const MOST_SPEEDS: f64 = 100_000.0;
+use sweep_files::{FileKind, Output};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[
@@ -102,11 +94,7 @@ impl Speeds {
 /// cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let (name, machine, spin) = match &args.grid {
-        None => (
-            "paper".to_owned(),
-            Machine::paper(),
-            Spin::Ramp { peak_rpm: args.speed.to, ramp_s: 1.0 },
-        ),
+        None => built_in(args.speed.to),
         Some(grid) => {
             let plan = if args.at.is_empty() {
                 config::load(grid, &args.sets)?
@@ -116,15 +104,13 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
             (plan.name, plan.machine, plan.spin)
         }
     };
-    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
-    let point = prepare(Simd::Scalar, &[(machine.clone(), spin)], &timing).remove(0)?;
     let speeds = args.speed.values();
-    let modes = campbell(&point, &speeds)?;
+    let modes = analysed(&machine, &spin, &speeds)?;
     if let (Some(path), Some(output)) = (&args.out, output) {
-        let bytes =
-            bytes(&name, &machine, &speeds, &modes).map_err(StoreError::parquet("write", path))?;
+        let bytes = table(&name, &machine, &speeds, &modes).into_bytes();
+        let bytes = bytes.map_err(StoreError::parquet("write", path))?;
         output.finish(&bytes)?;
         tell(&format!(
             "wrote {}: {} modes at {} speeds",
@@ -136,12 +122,12 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     if args.json {
         return show(&format!("{:#}\n", to_json(&name, &speeds, &modes)));
     }
-    tell(table(&speeds, &modes).trim_end());
+    tell(listing(&speeds, &modes).trim_end());
     Ok(Exit::Done)
 }
 
 /// What a reader wants of each mode, a line each.
-fn table(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
+fn listing(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
     let lowest = decimal(speeds[0]);
     let mut text = format!(
         "mode   resonance   over a turn   damping   frequency   motion\n\
@@ -194,104 +180,6 @@ fn widest_swing(speeds: &[f64], modes: &[ModeOverSpeed]) -> Option<(f64, usize, 
         })
         .filter(|(swing, ..)| swing.is_finite())
         .max_by(|a, b| a.0.total_cmp(&b.0))
-}
-
-fn to_json(name: &str, speeds: &[f64], modes: &[ModeOverSpeed]) -> Value {
-    let modes = modes.iter().enumerate().map(|(k, mode)| {
-        let mut facts = facts(k, mode);
-        facts["at_speed"] =
-            speeds.iter().zip(&mode.at_speed).map(|(&speed, at)| at_speed(speed, at)).collect();
-        facts
-    });
-    json!({ "name": name, "modes": modes.collect::<Value>() })
-}
-
-/// A mode's name, what it moves, its resonances.
-fn facts(k: usize, mode: &ModeOverSpeed) -> Value {
-    let resonance =
-        |resonance: &washer_model::Resonance| at_speed(resonance.speed_rpm, &resonance.mode);
-    let motion = &mode.motion;
-    json!({
-        "mode": k + 1,
-        "name": motion.to_string(),
-        "participation": {
-            "translation_vertical": motion.vertical_translation,
-            "translation_horizontal": motion.horizontal_translation,
-            "rocking_horizontal": motion.yaw,
-            "rocking_vertical": motion.pitch,
-        },
-        "resonances": mode.resonances.iter().map(resonance).collect::<Value>(),
-    })
-}
-
-fn at_speed(speed_rpm: f64, at: &ModeAtSpeed) -> Value {
-    let coordinates = (0..COORDINATES).map(|i| (format!("q{}", i + 1), json!(at.shape[i])));
-    json!({
-        "speed_rpm": speed_rpm,
-        "frequency_rpm": at.frequency_rpm,
-        "frequency_min_rpm": at.least_rpm,
-        "frequency_max_rpm": at.greatest_rpm,
-        "damping_ratio": at.damping_ratio,
-        "eigenvalue": [at.re_per_s, at.im_rad_per_s],
-        "shape": coordinates.collect::<serde_json::Map<_, _>>(),
-    })
-}
-
-fn bytes(
-    name: &str,
-    machine: &Machine,
-    speeds: &[f64],
-    modes: &[ModeOverSpeed],
-) -> Result<Vec<u8>, ParquetError> {
-    let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
-    let mut table = Table::default();
-    table.numbers("speed_rpm", "rpm", "spin of the shaft", rows().map(|(k, _)| Some(speeds[k])));
-    table.counts(
-        "mode",
-        "number of the mode, by its frequency at the lowest speed",
-        rows().map(|(_, mode)| mode as u64 + 1),
-    );
-    let names: Vec<String> = modes.iter().map(|mode| mode.motion.to_string()).collect();
-    table.words(
-        "name",
-        "what moves, at the first resonance or the lowest speed",
-        rows().map(|(_, mode)| names[mode].as_str()),
-    );
-    let columns: [(&str, &str, &str, fn(&ModeAtSpeed) -> f64); 7] = [
-        (
-            "frequency_rpm",
-            "rpm",
-            "damped natural frequency in cycles per minute, mean over a turn",
-            |at| at.frequency_rpm,
-        ),
-        ("frequency_hz", "Hz", "the same in cycles per second", |at| at.frequency_rpm / 60.0),
-        ("damping_ratio", "1", "share of critical damping, mean over a turn", |at| {
-            at.damping_ratio
-        }),
-        ("eigenvalue_re", "1/s", "real part of the eigenvalue, mean over a turn", |at| at.re_per_s),
-        ("eigenvalue_im", "rad/s", "imaginary part of the eigenvalue, mean over a turn", |at| {
-            at.im_rad_per_s
-        }),
-        ("frequency_min_rpm", "rpm", "least damped natural frequency over a turn", |at| {
-            at.least_rpm
-        }),
-        ("frequency_max_rpm", "rpm", "greatest damped natural frequency over a turn", |at| {
-            at.greatest_rpm
-        }),
-    ];
-    for (column, unit, description, of) in columns {
-        table.numbers(
-            column,
-            unit,
-            description,
-            rows().map(|(k, mode)| Some(of(&modes[mode].at_speed[k]))),
-        );
-    }
-    let plan = json!({ "name": name, "machine": config::machine_json(machine) });
-    table.metadata(key::PLAN, &plan);
-    let all: Value = modes.iter().enumerate().map(|(k, mode)| facts(k, mode)).collect();
-    table.metadata(key::MODES, &all);
-    table.into_bytes()
 }
 
 #[cfg(test)]

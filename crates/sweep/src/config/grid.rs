@@ -11,7 +11,7 @@ use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, cut, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
-use super::{design, machine, parameters, spin};
+use super::{GridInput, design, machine, parameters, spin};
 use crate::measures::{Criterion, Measures, Metric};
 use crate::method::{Entry, Integrator, METHODS, settings};
 use crate::plan::{Plan, Reliability};
@@ -47,9 +47,10 @@ pub(super) struct Draft {
 
 /// Reads the grid file and its machine file and puts the constants in place. `None` if the grid
 /// file has no text.
-pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option<Draft> {
+pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
+    let GridInput { path, text, sets } = input;
     let shown = path.display();
-    let text = match read(path) {
+    let text = match text.clone().map_or_else(|| read(path), Ok) {
         Ok(text) => text,
         Err(error) => {
             let missing =

@@ -30,6 +30,7 @@ mod list;
 mod machine;
 mod origins;
 mod parameters;
+mod points;
 mod render;
 mod report;
 pub(crate) mod schema;
@@ -41,9 +42,10 @@ mod syntax;
 mod tests;
 mod validate;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-pub(crate) use report::Diagnostics;
+pub(crate) use points::{check_columns, not_numbers, other_length};
+pub use report::{Diagnostics, Mistake};
 
 use grid::Draft;
 use report::Report;
@@ -51,21 +53,61 @@ use washer_model::Machine;
 
 use crate::plan::Plan;
 
+/// A grid as a user gives it: a file or a text, with the constants `NAME=VALUE` over those it sets.
+#[derive(Clone, Debug)]
+pub struct GridInput {
+    path: PathBuf,
+    /// If it is not the file's.
+    text: Option<String>,
+    sets: Vec<String>,
+}
+
+impl GridInput {
+    /// A grid file. The paths in it are relative to its folder.
+    #[must_use]
+    pub fn file(path: PathBuf, sets: Vec<String>) -> Self {
+        Self { path, text: None, sets }
+    }
+
+    /// The text of a grid file. Messages call it by this name, which is also that of the run if the
+    /// text gives none. The paths in it are relative to the working directory.
+    #[must_use]
+    pub fn text(name: &str, text: String, sets: Vec<String>) -> Self {
+        Self { path: name.into(), text: Some(text), sets }
+    }
+
+    /// Reads the grid with its machine file, puts the constants in place, and checks the whole.
+    ///
+    /// # Errors
+    /// Every mistake found, in one pass.
+    pub fn load(&self) -> Result<Plan, Diagnostics> {
+        resolve(self, |_, _| ()).map(|(plan, ())| plan)
+    }
+
+    /// As [`Self::load`], for one point: `at` gives each axis of several values one (on the grid or
+    /// between its points), and any other parameter too. The plan has no axes; its machine and spin
+    /// are the point's. Beside it, what `at` says, by name.
+    ///
+    /// # Errors
+    /// Every mistake found, in one pass.
+    pub(crate) fn load_point(&self, at: &[String]) -> Result<(Plan, NamedValues), Diagnostics> {
+        resolve(self, |draft, report| parameters::point(at, draft, report))
+    }
+}
+
 /// Reads a grid file with its machine file, puts the constants `NAME=VALUE` in place, and checks
 /// the whole.
 ///
 /// # Errors
 /// Every mistake found, in one pass.
 pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
-    resolve(path, sets, |_, _| ()).map(|(plan, ())| plan)
+    GridInput::file(path.to_owned(), sets.to_vec()).load()
 }
 
 /// Parameters by name, with a value each.
 pub(crate) type NamedValues = Vec<(String, f64)>;
 
-/// As [`load`], for one point: `at` gives each axis of several values one (on the grid or between
-/// its points), and any other parameter too. The plan has no axes; its machine and spin are the
-/// point's. Beside it, what `at` says, by name.
+/// As [`load`], for one point: [`GridInput::load_point`].
 ///
 /// # Errors
 /// Every mistake found, in one pass.
@@ -74,16 +116,15 @@ pub(crate) fn load_point(
     sets: &[String],
     at: &[String],
 ) -> Result<(Plan, NamedValues), Diagnostics> {
-    resolve(path, sets, |draft, report| parameters::point(at, draft, report))
+    GridInput::file(path.to_owned(), sets.to_vec()).load_point(at)
 }
 
 fn resolve<T>(
-    path: &Path,
-    sets: &[String],
+    input: &GridInput,
     finish: impl FnOnce(&mut Draft, &mut Report) -> T,
 ) -> Result<(Plan, T), Diagnostics> {
     let mut report = Report::default();
-    let Some(mut draft) = grid::draft(path, sets, &mut report) else {
+    let Some(mut draft) = grid::draft(input, &mut report) else {
         return Err(report.into_diagnostics());
     };
     let finished = finish(&mut draft, &mut report);

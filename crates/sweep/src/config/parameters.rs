@@ -144,7 +144,7 @@ fn find(name: &Located<&str>, draft: &Draft, report: &mut Report) -> Option<Para
     None
 }
 
-fn unknown(
+pub(super) fn unknown(
     name: &Located<&str>,
     error: &UnknownParameter,
     machine: &Machine,

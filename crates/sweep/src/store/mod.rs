@@ -39,8 +39,9 @@ use serde_json::Value;
 
 pub(crate) use chunk::Shape;
 pub use error::StoreError;
+pub(crate) use merge::write_map;
 pub use open::{OpenOptions, OpenRun, Opened};
-pub(crate) use schema::{AxisColumn, Layout};
+pub(crate) use schema::{AxisColumn, BATCH_ROWS, Layout, ResultRows};
 pub use shard::{Shard, ShardRequest};
 pub(crate) use status::FolderStatus;
 pub use status::{State, status};

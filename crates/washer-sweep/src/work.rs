@@ -1,0 +1,75 @@
+//! The engine's work under Python's eyes: without the interpreter's lock, stopped by its signals.
+
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
+use pyo3::prelude::*;
+use sweep::Interrupt;
+
+/// How often signals are looked for.
+const LOOK_UP: Duration = Duration::from_millis(50);
+
+/// What came of a work, and what a signal's handler has raised meanwhile.
+pub(crate) struct Attended<T> {
+    pub(crate) value: T,
+    pub(crate) raised: Option<PyErr>,
+}
+
+impl<T> Attended<T> {
+    /// The value, unless a handler raised: Ctrl-C becomes what `interrupted` makes of the value,
+    /// and anything else goes on as it is.
+    pub(crate) fn or_raise(
+        self,
+        py: Python<'_>,
+        interrupted: impl FnOnce(T) -> PyErr,
+    ) -> PyResult<T> {
+        match self.raised {
+            None => Ok(self.value),
+            Some(raised) if raised.is_instance_of::<PyKeyboardInterrupt>(py) => {
+                Err(interrupted(self.value))
+            }
+            Some(raised) => Err(raised),
+        }
+    }
+}
+
+/// Does a work on a thread of its own while this one looks for signals. A signal whose handler
+/// raises, as Ctrl-C's does, raises the interrupt, and the work is waited for.
+pub(crate) fn attended<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&Interrupt) -> T + Send,
+) -> PyResult<Attended<T>> {
+    py.detach(|| {
+        let interrupt = Interrupt::new();
+        let mut raised = None;
+        std::thread::scope(|scope| {
+            let (done, ended) = channel();
+            let interrupt = &interrupt;
+            let work = move || {
+                // The receiver waits for it.
+                let _ = done.send(work(interrupt));
+            };
+            std::thread::Builder::new().spawn_scoped(scope, work).map_err(|error| {
+                PyRuntimeError::new_err(format!("cannot start a thread: {error}"))
+            })?;
+            loop {
+                match ended.recv_timeout(LOOK_UP) {
+                    Ok(value) => return Ok(Attended { value, raised }),
+                    Err(RecvTimeoutError::Timeout) if raised.is_none() => {
+                        raised = Python::attach(|py| py.check_signals().err());
+                        if raised.is_some() {
+                            // As SIGINT would.
+                            interrupt.raise(2);
+                        }
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    // The thread has panicked, and the scope says so.
+                    Err(RecvTimeoutError::Disconnected) => {
+                        return Err(PyRuntimeError::new_err("the engine panicked"));
+                    }
+                }
+            }
+        })
+    })
+}
