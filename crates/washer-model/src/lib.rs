@@ -81,7 +81,9 @@ pub use machine::parameters::{
 };
 pub use machine::spin::Spin;
 pub use machine::violations::Violation;
-pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};
+pub use machine::{
+    Bearings, BumpStop, Bushing, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance,
+};
 pub use modes::campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
 pub use modes::shape::{Motion, Movement, Plane};
 pub use modes::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};

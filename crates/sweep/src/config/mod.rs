@@ -15,7 +15,8 @@
 //!
 //! Bounds: files to 4 MiB; lists of points to 256 MiB, packed or not, and 2e7 numbers; a Sobol
 //! design to 2^32 points over 32 axes; 1e12 grid points; 1e6 s; 1e10 steps that stability asks for;
-//! spin tables of 20,000 rows; numbers to 1e12 in magnitude; 1000 springs and 1000 dampers.
+//! spin tables of 20,000 rows; numbers to 1e12 in magnitude; 1000 of each kind
+//! of element.
 //!
 //! Precedence, later over earlier: machine file, `[set]`, `--set`, axes. Within each of them no
 //! number may be written twice, not even under two names (`damping_n_s_per_m` writes every
@@ -133,6 +134,8 @@ fn resolve<T>(
     validate::stability(&draft, &mut report);
     report.finish((draft.plan, finished))
 }
+
+pub(crate) use machine::with_one_of_each;
 
 /// A machine in full, as a result file carries it.
 #[must_use]

@@ -7,7 +7,7 @@ use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::floating::Factors;
 use crate::nonlinear::{Halves, halves};
-use lane_ode::{Lane, N, Real};
+use lane_ode::{Lane, N};
 
 /// Newton steps before giving up.
 const MAX_ITERATIONS: usize = 60;
@@ -76,7 +76,7 @@ pub(crate) fn find<T: Lane>(zero: N<T>, machine: &Coefficients<T>) -> ([N<T>; CO
 
 /// Generalised forces at rest.
 #[inline(always)]
-fn static_forces<T: Real>(
+fn static_forces<T: Lane>(
     machine: &Coefficients<T>,
     q: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {

@@ -3,6 +3,7 @@
 mod allocation;
 mod bits;
 mod cost;
+mod elements;
 mod energy;
 mod expansion;
 mod extras;
