@@ -2,24 +2,25 @@
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use lane_ode::Simd;
 use parquet::errors::ParquetError;
 use serde_json::{Value, json};
 use washer_model::{
-    COORDINATES, Machine, ModeAtSpeed, ModeOverSpeed, Spin, Timing, campbell, decimal, prepare,
+    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Spin, Timing, campbell,
+    decimal, exact_motions, prepare,
 };
 
 use super::examples::Examples;
 use crate::config;
 use crate::exit::{Error, Exit, show, tell};
+use crate::speeds::Speeds;
 use crate::store::StoreError;
 use crate::table::Table;
 use sweep_files::{FileKind, Output, key};
 
-/// Most speeds that are accepted: an hour of computing.
-const MOST_SPEEDS: f64 = 100_000.0;
+/// Modes of the suspension, which differ from exact motions most.
+const SUSPENSION_MODES: usize = 4;
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[
@@ -45,54 +46,16 @@ pub struct Args {
     /// Spin speeds, in rpm
     #[arg(long, value_name = "FROM:TO:STEP", default_value = "0:1200:10")]
     speed: Speeds,
+    /// Beside each mode, the exact motion of the turning drum (Floquet exponents of the linear
+    /// model): two more columns, and a line on how far the two differ
+    #[arg(long)]
+    exact: bool,
     /// Print everything as JSON
     #[arg(long)]
     json: bool,
     /// Modes file to write: Parquet, one row per speed and mode
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-}
-
-/// Even speeds, both ends included.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Speeds {
-    from: f64,
-    to: f64,
-    step: f64,
-}
-
-impl FromStr for Speeds {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let numbers: Option<Vec<f64>> =
-            text.split(':').map(|part| part.trim().parse().ok()).collect();
-        let Some([from, to, step]) = numbers.as_deref() else {
-            return Err("expected FROM:TO:STEP in rpm, as in 0:1200:10".to_owned());
-        };
-        let (from, to, step) = (*from, *to, *step);
-        let count = (to - from) / step;
-        if !(from >= 0.0 && to > from && step > 0.0 && to.is_finite()) {
-            return Err(
-                "expected speeds of 0 rpm or more, TO above FROM, and a STEP above 0".to_owned()
-            );
-        }
-        if count > MOST_SPEEDS {
-            return Err(format!("these are {count:.0} speeds, expected at most {MOST_SPEEDS}"));
-        }
-        Ok(Self { from, to, step })
-    }
-}
-
-impl Speeds {
-    /// The speeds (rpm); the last is the end itself.
-    fn values(self) -> Vec<f64> {
-        // The quotient may come out a hair beside the whole number that was meant.
-        let steps = ((self.to - self.from) / self.step * (1.0 - 1e-12)).ceil().max(1.0) as usize;
-        (0..=steps)
-            .map(|k| if k == steps { self.to } else { self.from + k as f64 * self.step })
-            .collect()
-    }
 }
 
 /// Analyses, and prints or writes.
@@ -122,9 +85,10 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let point = prepare(Simd::Scalar, &[(machine.clone(), spin)], &timing).remove(0)?;
     let speeds = args.speed.values();
     let modes = campbell(&point, &speeds)?;
+    let exact = if args.exact { Some(exact(&point, &speeds, &modes)?) } else { None };
     if let (Some(path), Some(output)) = (&args.out, output) {
-        let bytes =
-            bytes(&name, &machine, &speeds, &modes).map_err(StoreError::parquet("write", path))?;
+        let bytes = bytes(&name, &machine, &speeds, &modes, exact.as_deref())
+            .map_err(StoreError::parquet("write", path))?;
         output.finish(&bytes)?;
         tell(&format!(
             "wrote {}: {} modes at {} speeds",
@@ -134,10 +98,68 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         ));
     }
     if args.json {
-        return show(&format!("{:#}\n", to_json(&name, &speeds, &modes)));
+        let json = to_json(&name, &speeds, &modes, exact.as_deref());
+        return show(&format!("{json:#}\n"));
     }
-    tell(table(&speeds, &modes).trim_end());
+    let mut text = table(&speeds, &modes);
+    if let Some(exact) = &exact {
+        text.push_str(&differences(&speeds, &modes, exact));
+    }
+    tell(text.trim_end());
     Ok(Exit::Done)
+}
+
+/// Of each speed and mode the exact motion; none at standstill, where theta is frozen indeed, and
+/// where a mode was not found at theta = 0.
+type ExactOver = [Vec<Option<Exact>>];
+
+fn exact(
+    point: &Point,
+    speeds: &[f64],
+    modes: &[ModeOverSpeed],
+) -> Result<Vec<Vec<Option<Exact>>>, Error> {
+    let at = |(k, &speed): (usize, &f64)| -> Result<Vec<Option<Exact>>, Error> {
+        if speed == 0.0 {
+            return Ok(vec![None; modes.len()]);
+        }
+        let motions = exact_motions(Simd::best(), point, speed)?;
+        let of = |mode: &ModeOverSpeed| {
+            motions.iter().find(|motion| motion.frozen.shape == mode.at_speed[k].shape).copied()
+        };
+        Ok(modes.iter().map(of).collect())
+    };
+    speeds.iter().enumerate().map(at).collect()
+}
+
+/// How far frozen and exact motions differ, the suspension's modes.
+fn differences(speeds: &[f64], modes: &[ModeOverSpeed], exact: &ExactOver) -> String {
+    let mut text =
+        "The table freezes theta, as the paper does (Eqs. 43 to 45). Over whole turns the \
+                    linear model's motions\nare its Floquet exponents; with these, most:\n"
+            .to_owned();
+    for mode in 0..modes.len().min(SUSPENSION_MODES) {
+        let most = |of: fn(&ModeAtSpeed, &Exact) -> f64| {
+            let at = |k: usize| {
+                let apart = of(&modes[mode].at_speed[k], exact[k][mode].as_ref()?);
+                apart.is_finite().then_some((100.0 * apart, speeds[k]))
+            };
+            let all = (0..speeds.len()).filter_map(at);
+            all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
+        };
+        let frequency = most(|frozen, exact| exact.frequency_rpm() / frozen.frequency_rpm - 1.0);
+        let damping = most(|frozen, exact| exact.damping_ratio() / frozen.damping_ratio - 1.0);
+        if let (Some((frequency, at)), Some((damping, damping_at))) = (frequency, damping) {
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                text,
+                "{:>4}  frequency {frequency:+.2} % at {} rpm, damping {damping:+.1} % at {} rpm",
+                mode + 1,
+                decimal(at),
+                decimal(damping_at)
+            );
+        }
+    }
+    text
 }
 
 /// What a reader wants of each mode, a line each.
@@ -196,11 +218,23 @@ fn widest_swing(speeds: &[f64], modes: &[ModeOverSpeed]) -> Option<(f64, usize, 
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-fn to_json(name: &str, speeds: &[f64], modes: &[ModeOverSpeed]) -> Value {
+fn to_json(
+    name: &str,
+    speeds: &[f64],
+    modes: &[ModeOverSpeed],
+    exact: Option<&ExactOver>,
+) -> Value {
     let modes = modes.iter().enumerate().map(|(k, mode)| {
         let mut facts = facts(k, mode);
-        facts["at_speed"] =
-            speeds.iter().zip(&mode.at_speed).map(|(&speed, at)| at_speed(speed, at)).collect();
+        let at = |(i, at): (usize, &ModeAtSpeed)| {
+            let mut at = at_speed(speeds[i], at);
+            if let Some(exact) = exact.and_then(|exact| exact[i][k]) {
+                at["exact_frequency_rpm"] = exact.frequency_rpm().into();
+                at["exact_damping_ratio"] = exact.damping_ratio().into();
+            }
+            at
+        };
+        facts["at_speed"] = mode.at_speed.iter().enumerate().map(at).collect();
         facts
     });
     json!({ "name": name, "modes": modes.collect::<Value>() })
@@ -242,6 +276,7 @@ fn bytes(
     machine: &Machine,
     speeds: &[f64],
     modes: &[ModeOverSpeed],
+    exact: Option<&ExactOver>,
 ) -> Result<Vec<u8>, ParquetError> {
     let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
     let mut table = Table::default();
@@ -287,37 +322,23 @@ fn bytes(
             rows().map(|(k, mode)| Some(of(&modes[mode].at_speed[k]))),
         );
     }
+    let columns: [(&str, &str, &str, fn(&Exact) -> f64); 2] = [
+        (
+            "exact_frequency_rpm",
+            "rpm",
+            "frequency by the linear model's Floquet exponent over whole turns, nearest to \
+             frequency_rpm; null at standstill",
+            Exact::frequency_rpm,
+        ),
+        ("exact_damping_ratio", "1", "share of critical damping by it", Exact::damping_ratio),
+    ];
+    for (column, unit, description, of) in exact.map_or(&[][..], |_| &columns[..]) {
+        let values = rows().map(|(k, mode)| exact?[k][mode].as_ref().map(of));
+        table.numbers(column, unit, description, values);
+    }
     let plan = json!({ "name": name, "machine": config::machine_json(machine) });
     table.metadata(key::PLAN, &plan);
     let all: Value = modes.iter().enumerate().map(|(k, mode)| facts(k, mode)).collect();
     table.metadata(key::MODES, &all);
     table.into_bytes()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn speeds_are_even_and_end_where_told() {
-        let values = |text: &str| text.parse::<Speeds>().map(Speeds::values);
-        assert_eq!(values("0:40:10").unwrap(), [0.0, 10.0, 20.0, 30.0, 40.0]);
-        assert_eq!(values("0:25:10").unwrap(), [0.0, 10.0, 20.0, 25.0]);
-        assert_eq!(values("5:6:100").unwrap(), [5.0, 6.0]);
-        assert_eq!(values("0:0.3:0.1").unwrap().len(), 4);
-        for (text, said) in [
-            ("", "FROM:TO:STEP"),
-            ("0:1", "FROM:TO:STEP"),
-            ("0:x:1", "FROM:TO:STEP"),
-            ("10:0:1", "TO above FROM"),
-            ("-1:10:1", "0 rpm or more"),
-            ("0:10:0", "STEP above 0"),
-            ("0:nan:1", "TO above FROM"),
-            ("0:inf:1", "TO above FROM"),
-            ("0:1e9:1", "at most"),
-        ] {
-            let refused = values(text).unwrap_err();
-            assert!(refused.contains(said), "{text}: {refused}");
-        }
-    }
 }

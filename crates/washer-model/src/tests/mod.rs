@@ -11,4 +11,4 @@ mod instruments;
 mod long_tables;
 mod mass;
 mod observation;
-mod reference;
+pub(crate) mod reference;
