@@ -15,6 +15,7 @@ mod goldens;
 mod home;
 mod limits;
 mod pictures;
+mod stability;
 
 use std::process::Command;
 

@@ -26,6 +26,8 @@ pub mod key {
     pub const TRACE: &str = "sweep.trace";
     /// Resonances and shapes. In modes files alone.
     pub const MODES: &str = "sweep.modes";
+    /// Speeds, and what the rows mean. In files of `sweep stability` alone.
+    pub const STABILITY: &str = "sweep.stability";
     /// BLAKE3 hash of the whole file with zeros in this place, hexadecimal.
     pub const DIGEST: &str = "sweep.digest";
 }
@@ -41,6 +43,8 @@ pub enum FileKind<'a> {
     Modes,
     /// Result of `sweep boundary`.
     Boundary,
+    /// Result of `sweep stability`.
+    Stability,
     /// The JSON file beside a map that says how the run went.
     Account {
         /// Name of the map.
@@ -68,6 +72,7 @@ impl FileKind<'_> {
             Self::Trace => "result of `sweep trace`",
             Self::Modes => "result of `sweep modes`",
             Self::Boundary => "result of `sweep boundary`",
+            Self::Stability => "result of `sweep stability`",
             Self::Account { .. } => "account of the run with this --out",
             Self::Svg => "SVG picture of `sweep plot`",
             Self::Png => "PNG picture",
@@ -85,22 +90,23 @@ impl FileKind<'_> {
             Ok(start.starts_with(with))
         };
         let is_ours = match self {
-            Self::Map | Self::Trace | Self::Modes | Self::Boundary => match ParquetFile::look(path)
-            {
-                Ok(file) if self.has_keys(&|key| file.value(key).is_some()) => true,
-                Ok(_) => {
-                    // A damaged key makes one of ours look like another's.
-                    ParquetFile::open(path)?;
-                    false
+            Self::Map | Self::Trace | Self::Modes | Self::Boundary | Self::Stability => {
+                match ParquetFile::look(path) {
+                    Ok(file) if self.has_keys(&|key| file.value(key).is_some()) => true,
+                    Ok(_) => {
+                        // A damaged key makes one of ours look like another's.
+                        ParquetFile::open(path)?;
+                        false
+                    }
+                    Err(FileError::NotParquet { reason, .. }) => {
+                        let name = self.name();
+                        return Ok(Some(format!(
+                            "the file there is no {name}, nor a Parquet file ({reason})"
+                        )));
+                    }
+                    Err(error) => return Err(error),
                 }
-                Err(FileError::NotParquet { reason, .. }) => {
-                    let name = self.name();
-                    return Ok(Some(format!(
-                        "the file there is no {name}, nor a Parquet file ({reason})"
-                    )));
-                }
-                Err(error) => return Err(error),
-            },
+            }
             Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,
             Self::Svg => begins(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
             Self::Png => begins(b"\x89PNG\r\n\x1a\n")?,
@@ -115,11 +121,14 @@ impl FileKind<'_> {
         let own = match self {
             Self::Map => {
                 return has(key::PLAN)
-                    && ![key::TRACE, key::MODES, key::BOUNDARY].into_iter().any(has);
+                    && ![key::TRACE, key::MODES, key::BOUNDARY, key::STABILITY]
+                        .into_iter()
+                        .any(has);
             }
             Self::Trace => key::TRACE,
             Self::Modes => key::MODES,
             Self::Boundary => key::BOUNDARY,
+            Self::Stability => key::STABILITY,
             Self::Account { .. } | Self::Svg | Self::Png | Self::Html | Self::ManPage => {
                 return false;
             }

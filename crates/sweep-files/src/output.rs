@@ -129,8 +129,8 @@ mod tests {
     use super::*;
     use crate::{key, seal};
 
-    const PARQUET: [FileKind<'_>; 4] =
-        [FileKind::Map, FileKind::Trace, FileKind::Modes, FileKind::Boundary];
+    const PARQUET: [FileKind<'_>; 5] =
+        [FileKind::Map, FileKind::Trace, FileKind::Modes, FileKind::Boundary, FileKind::Stability];
 
     /// A file as the commands write it, of each kind.
     fn example(kind: FileKind<'_>) -> Vec<u8> {
@@ -139,6 +139,7 @@ mod tests {
             FileKind::Trace => key::TRACE,
             FileKind::Modes => key::MODES,
             FileKind::Boundary => key::BOUNDARY,
+            FileKind::Stability => key::STABILITY,
             FileKind::Account { of } => {
                 return json!({ "file": of.to_str(), "plan_hash": "00" }).to_string().into_bytes();
             }

@@ -272,7 +272,10 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 
 fn recognise(names: &[&str]) -> Option<Kind> {
     let has = |name: &str| names.contains(&name);
-    if has("status") && has("ratio_max") {
+    if has("growth_per_s") && has("speed_rpm") {
+        // A result of `sweep stability`, of which there is no figure.
+        None
+    } else if has("status") && has("ratio_max") {
         Some(Kind::Map)
     } else if has("time_s") && names.iter().any(|name| name.starts_with("nonlinear_")) {
         Some(Kind::Trace)

@@ -302,7 +302,7 @@ impl<'a> ModelEngine<'a> {
 
 /// One result per item of a group. A panic over one item must not cost the others theirs: then each
 /// is done alone, which gives the same bits, and the one is a defect.
-fn together_or_alone<I, R>(
+pub(crate) fn together_or_alone<I, R>(
     items: &[I],
     together: impl Fn(&[I]) -> Vec<R>,
     defect: impl Fn() -> R,

@@ -15,7 +15,7 @@ use crate::store::StoreError;
 use crate::threads::ThreadsError;
 use sweep_files::FileError;
 use sweep_plot::PlotError;
-use washer_model::{NoEquilibrium, NoModes};
+use washer_model::{NoAnswer, NoEquilibrium, NoModes};
 
 /// Exit codes, a contract with scripts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,6 +104,9 @@ pub enum Error {
     /// A machine whose modes cannot be computed.
     #[error(transparent)]
     Modes(#[from] NoModes),
+    /// A machine whose motions over whole turns cannot be told.
+    #[error(transparent)]
+    Exact(#[from] NoAnswer),
     /// An option whose value makes no sense here.
     #[error("`{option} {given}`: expected {expected}")]
     Option {
@@ -147,9 +150,11 @@ impl Error {
     pub fn exit(&self) -> Exit {
         match self {
             Self::Input(_) => Exit::BadInput,
-            Self::Engine(_) | Self::Equilibrium(_) | Self::Modes(_) | Self::Option { .. } => {
-                Exit::BadInput
-            }
+            Self::Engine(_)
+            | Self::Equilibrium(_)
+            | Self::Modes(_)
+            | Self::Exact(_)
+            | Self::Option { .. } => Exit::BadInput,
             Self::Boundary(_) => Exit::BadInput,
             Self::Files(error) if error.is_refusal() => Exit::BadInput,
             Self::Threads(error) if error.is_refusal() => Exit::BadInput,

@@ -56,6 +56,8 @@ mod plan;
 mod progress;
 mod random_keys;
 mod run;
+mod speeds;
+mod stability;
 mod store;
 mod table;
 mod threads;

@@ -43,7 +43,7 @@ use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
 
 /// Modes of the suspension: yaw, pitch, two translations.
-const SUSPENSION_MODES: usize = 4;
+pub(crate) const SUSPENSION_MODES: usize = 4;
 
 /// The modes of the suspension and the two of the hinge. The other four are the bearings', faster
 /// unless the bearings are soft.
@@ -67,7 +67,7 @@ const LEAST_HALF_WIDTH: f64 = 0.01;
 /// suspension, whirls of the hinge can grow from a tiny start. The start depends on the ringing of
 /// the bearings, which all runs with caps leave out alike, so that their comparison does not show
 /// it.
-const HINGE_TO_DRUM: f64 = 3.2;
+pub(crate) const HINGE_TO_DRUM: f64 = 3.2;
 
 /// Bits of a step's fraction that are kept: 1e-6 of the step.
 const STEP_BITS: u32 = 20;
@@ -226,24 +226,35 @@ impl<'a> Case<'a> {
 
     /// Weighted shift (rad/s) of a suspension mode by a capped hinge while the drum turns.
     fn hinge_shift(&self, mode: &Mode, turning_rad_per_s: f64, caps: &Caps) -> f64 {
-        let Some(cap_rad_per_s) = caps.hinge_rad_per_s else { return 0.0 };
-        let frequency = mode.magnitude_rad_per_s;
         let is_of_suspension =
-            frequency <= self.rest.modes.modes[SUSPENSION_MODES].magnitude_rad_per_s;
+            mode.magnitude_rad_per_s <= self.rest.modes.modes[SUSPENSION_MODES].magnitude_rad_per_s;
         if !is_of_suspension {
             return 0.0;
         }
-        let softening =
-            (frequency * frequency - BACKWARD_SHARE * turning_rad_per_s * turning_rad_per_s).abs()
-                + (1.0 - BACKWARD_SHARE) * frequency * turning_rad_per_s;
-        let in_hinge = softening / (cap_rad_per_s * cap_rad_per_s);
-        FREE_SHARE * 0.5 * mode.hinge_share(self.point) * frequency * in_hinge
+        hinge_shift(self.point, mode, turning_rad_per_s, caps.hinge_rad_per_s)
     }
 
     /// Relative error of amplitudes by truncation.
     fn error_of_truncation(&self, formula: Formula, step_s: f64) -> f64 {
         formula.error_per_radian(step_s * self.fastest_followed_rad_per_s) / MEMORY_DAMPING_RATIO
     }
+}
+
+/// Weighted shift (rad/s) of a suspension mode by the hinge's cap, if it has one, while the drum
+/// turns.
+pub(crate) fn hinge_shift(
+    point: &Point,
+    mode: &Mode,
+    turning_rad_per_s: f64,
+    cap_rad_per_s: Option<f64>,
+) -> f64 {
+    let Some(cap_rad_per_s) = cap_rad_per_s else { return 0.0 };
+    let frequency = mode.magnitude_rad_per_s;
+    let softening =
+        (frequency * frequency - BACKWARD_SHARE * turning_rad_per_s * turning_rad_per_s).abs()
+            + (1.0 - BACKWARD_SHARE) * frequency * turning_rad_per_s;
+    let in_hinge = softening / (cap_rad_per_s * cap_rad_per_s);
+    FREE_SHARE * 0.5 * mode.hinge_share(point) * frequency * in_hinge
 }
 
 /// Relative error of an amplitude by a mode's shift (rad/s).

@@ -70,6 +70,7 @@ mod modes;
 mod nonlinear;
 mod point;
 mod run;
+mod stability;
 
 pub use channel::Channel;
 pub use coordinates::COORDINATES;
@@ -95,6 +96,7 @@ pub use run::suspension::Forces;
 pub use run::{
     Course, Extra, Method, ModelKind, Record, Stop, Wanted, simulate, simulate_until, simulate_with,
 };
+pub use stability::{Dwell, Exact, Kind, NoAnswer, Participant, Response, exact_motions, respond};
 
 #[cfg(test)]
 mod tests;

@@ -16,6 +16,7 @@ mod run;
 mod schema;
 mod show;
 mod slurm;
+mod stability;
 mod status;
 mod trace;
 
@@ -74,6 +75,8 @@ pub enum Command {
     Trace(trace::Args),
     /// Find the natural frequencies over spin speed, the resonance speeds and the mode shapes
     Modes(modes::Args),
+    /// Find the periodic response at constant speeds, and where it is unstable
+    Stability(stability::Args),
     /// Trace the curve where the ratio is at its limit, without filling the grid
     Boundary(boundary::Args),
     /// Draw the figure that fits a file: map, boundary, time histories or Campbell diagram
@@ -105,6 +108,7 @@ fn examples_of(name: &str) -> Examples {
         "show" => show::EXAMPLES,
         "trace" => trace::EXAMPLES,
         "modes" => modes::EXAMPLES,
+        "stability" => stability::EXAMPLES,
         "boundary" => boundary::EXAMPLES,
         "plot" => plot::EXAMPLES,
         "parameters" => parameters::EXAMPLES,
@@ -188,6 +192,7 @@ impl Command {
             Self::Show(args) => show::run(args),
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
+            Self::Stability(args) => stability::run(args),
             Self::Boundary(args) => boundary::run(args),
             Self::Plot(args) => plot::run(args),
             Self::Parameters(args) => parameters::run(args),

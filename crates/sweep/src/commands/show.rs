@@ -9,8 +9,9 @@ use super::examples::Examples;
 use super::run::{counts, line};
 use crate::exit::{Error, Exit, show};
 use crate::identity;
+use crate::stability::tongues;
 use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, overview, row, tally};
-use sweep_files::ParquetFile;
+use sweep_files::{FileKind, ParquetFile};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples =
@@ -19,7 +20,7 @@ pub(super) const EXAMPLES: Examples =
 /// Arguments of `sweep show`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A result, trace, modes or boundary file
+    /// A result, trace, modes, stability or boundary file
     #[arg(value_name = "FILE")]
     file: PathBuf,
 }
@@ -58,7 +59,14 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
             };
             text.push_str(&counts(&tally, limit, &at));
         }
-        None => line(&mut text, "made by", opened.created_by().unwrap_or("unknown")),
+        None => {
+            line(&mut text, "made by", opened.created_by().unwrap_or("unknown"));
+            if FileKind::Stability.has_keys(&|key| opened.value(key).is_some()) {
+                for (name, words) in tongues::summary(&opened)?.lines() {
+                    line(&mut text, name, &words);
+                }
+            }
+        }
     }
     columns(&mut text, &file);
     show(&text)

@@ -12,4 +12,4 @@ mod instruments;
 mod long_tables;
 mod mass;
 mod observation;
-mod reference;
+pub(crate) mod reference;
