@@ -20,6 +20,8 @@ pub enum TracedQuantity {
     GapNonlinear,
     /// The least gap between drum and tub, linear model.
     GapLinear,
+    /// The largest growth of a disturbance over the speeds of `[stability]`.
+    Growth,
 }
 
 impl TracedQuantity {
@@ -30,7 +32,7 @@ impl TracedQuantity {
         [Self::RatioMax]
             .into_iter()
             .chain(ratios)
-            .chain([Self::GapNonlinear, Self::GapLinear])
+            .chain([Self::GapNonlinear, Self::GapLinear, Self::Growth])
             .collect()
     }
 
@@ -42,15 +44,17 @@ impl TracedQuantity {
             Self::Ratio(channel) => format!("ratio_{}", channel.name()),
             Self::GapNonlinear => "min_gap_nonlinear_m".to_owned(),
             Self::GapLinear => "min_gap_linear_m".to_owned(),
+            Self::Growth => "growth".to_owned(),
         }
     }
 
-    /// `"1"` or `"m"`.
+    /// `"1"`, `"m"` or `"1/s"`.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
             Self::RatioMax | Self::Ratio(_) => "1",
             Self::GapNonlinear | Self::GapLinear => "m",
+            Self::Growth => "1/s",
         }
     }
 
@@ -59,7 +63,7 @@ impl TracedQuantity {
     pub const fn limit(self, plan: &Plan) -> f64 {
         match self {
             Self::RatioMax | Self::Ratio(_) => plan.reliability.ratio_limit,
-            Self::GapNonlinear | Self::GapLinear => 0.0,
+            Self::GapNonlinear | Self::GapLinear | Self::Growth => 0.0,
         }
     }
 
@@ -75,8 +79,8 @@ impl TracedQuantity {
     }
 
     /// Signed distance of an outcome of [`TracedQuantity::plan`] from the limit: negative where the
-    /// ratio is below it or a gap is left. The logarithm of a ratio over its limit, or a gap in
-    /// centimetres.
+    /// ratio is below it, a gap is left or disturbances decay. The logarithm of a ratio over its
+    /// limit, a gap in centimetres, or a growth in 1/s.
     #[must_use]
     pub fn distance(self, outcome: &Outcome, plan: &Plan) -> Option<f64> {
         match self {
@@ -90,6 +94,7 @@ impl TracedQuantity {
             }
             Self::GapNonlinear => outcome.nonlinear.min_gap_m.map(|gap_m| -gap_m / GAP_SCALE_M),
             Self::GapLinear => outcome.linear.min_gap_m.map(|gap_m| -gap_m / GAP_SCALE_M),
+            Self::Growth => Some(outcome.growth.as_ref()?.fastest.growth_per_s()),
         }
     }
 
@@ -99,6 +104,7 @@ impl TracedQuantity {
         match self {
             Self::RatioMax | Self::Ratio(_) => plan.reliability.ratio_limit * libm::exp(distance),
             Self::GapNonlinear | Self::GapLinear => -distance * GAP_SCALE_M,
+            Self::Growth => distance,
         }
     }
 }

@@ -10,7 +10,7 @@ use super::examples::Examples;
 use super::grid::{GridArgs, quoted};
 use super::run::line;
 use crate::boundary::file::{bytes, job};
-use crate::boundary::product::{BoundaryTask, Models, Stopped};
+use crate::boundary::product::{BoundaryError, BoundaryTask, Models, Stopped};
 use crate::boundary::quantity::TracedQuantity;
 use crate::boundary::{EdgeKind, Standing, Traced, trace};
 use crate::engine::ModelEngine;
@@ -97,6 +97,9 @@ search has found out stays in FILE.partial, and the same command goes on from th
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.grid.load()?;
     let plan = args.quantity.plan(&plan);
+    if args.quantity == TracedQuantity::Growth && plan.measures.growth_speeds.is_none() {
+        return Err(BoundaryError::Speeds.into());
+    }
     let task = BoundaryTask::new(&plan, args.tolerance, usize::from(args.lattice))?;
     let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
     let output = args.out.clone().unwrap_or_else(default);

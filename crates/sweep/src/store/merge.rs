@@ -12,7 +12,7 @@ use super::provenance::{self, Session};
 use super::read::{self, Tally};
 use super::schema::{self, BATCH_ROWS, ResultRows};
 use sweep_files::panics;
-use sweep_files::{self as files, FileKind, ParquetFile, atomic, seal};
+use sweep_files::{self as files, ParquetFile, atomic, seal};
 
 /// A finished result.
 #[derive(Debug)]
@@ -76,7 +76,7 @@ impl OpenRun {
         seal::seal(file.as_file_mut()).map_err(StoreError::io("write", &output))?;
         // Read back before it takes its place: what cannot be read must not replace anything.
         let tally = read::tally(&ParquetFile::open(file.path())?)?;
-        files::judge(&output, FileKind::Map)?;
+        files::judge(&output, job.layout.file_kind())?;
         atomic::publish(file, &output)?;
         Ok(Some(tally))
     }
