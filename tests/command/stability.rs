@@ -6,7 +6,8 @@ use std::fs;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
-use crate::{signal, sweep_binary};
+use crate::home::sweep_binary;
+use crate::signal;
 
 const GRID: &str = r#"
 machine = "paper"
@@ -116,15 +117,80 @@ fn what_makes_no_sense_is_refused_before_any_work() {
 }
 
 #[test]
-fn a_signal_stops_it_and_leaves_nothing() {
+fn what_a_signal_stops_goes_on_to_the_same_bytes() {
     let folder = folder_with("");
-    let mut command = sweep(&folder, &["stability", "grid.toml", "--speed", "60:1300:0.05"]);
+    let arguments = ["stability", "grid.toml", "--speed", "60:360:0.05", "--progress", "none"];
+    let mut command = sweep(&folder, &arguments);
     let child = command.stderr(Stdio::piped()).spawn().expect("it starts");
-    std::thread::sleep(Duration::from_secs(1));
+    // Once a chunk is there.
+    let partial = folder.path().join("results/grid-stability.parquet.partial");
+    let is_chunk = |entry: std::io::Result<fs::DirEntry>| {
+        entry.is_ok_and(|entry| entry.file_name().to_string_lossy().starts_with("chunk-"))
+    };
+    while !fs::read_dir(&partial).is_ok_and(|mut entries| entries.any(is_chunk)) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
     signal("TERM", child.id());
     let ended = child.wait_with_output().expect("it ends");
     assert_eq!(ended.status.code(), Some(143), "{}", said(&ended));
-    assert!(said(&ended).contains("nothing was written"), "{}", said(&ended));
-    let left: Vec<_> = fs::read_dir(folder.path().join("results")).into_iter().flatten().collect();
-    assert!(left.is_empty(), "{left:?}");
+    assert!(said(&ended).contains("sweep stability grid.toml --speed 60:360:0.05"));
+    let status = sweep(&folder, &["status", "grid.toml", "--speed", "60:360:0.05"]).output();
+    assert!(said(&status.expect("it starts")).contains("unfinished"));
+    let done = sweep(&folder, &arguments).output().expect("it starts");
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    assert!(said(&done).contains("going on: "), "{}", said(&done));
+    let whole = sweep(&folder, &arguments).args(["--out", "whole.parquet"]).output();
+    assert_eq!(whole.expect("it starts").status.code(), Some(0));
+    let bytes = |name: &str| fs::read(folder.path().join(name)).expect("it is there");
+    assert!(bytes("results/grid-stability.parquet") == bytes("whole.parquet"));
+    let again = sweep(&folder, &arguments).output().expect("it starts");
+    assert!(said(&again).contains("there already"), "{}", said(&again));
+}
+
+#[test]
+fn shards_join_to_the_same_bytes() {
+    let folder = folder_with("");
+    let speed = ["--speed", "210:330:0.5"];
+    let run = |more: &[&str]| {
+        let done = sweep(&folder, &[&["stability", "grid.toml"], &speed[..], more].concat());
+        let done = { done }.output().expect("it starts");
+        assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+        done
+    };
+    for shard in ["1/3", "3/3", "2/3"] {
+        run(&["--shard", shard]);
+    }
+    let merged = sweep(&folder, &[&["merge", "grid.toml"], &speed[..]].concat()).output();
+    let merged = merged.expect("it starts");
+    assert_eq!(merged.status.code(), Some(0), "{}", said(&merged));
+    run(&["--out", "whole.parquet"]);
+    let bytes = |name: &str| fs::read(folder.path().join(name)).expect("it is there");
+    assert!(bytes("results/grid-stability.parquet") == bytes("whole.parquet"));
+}
+
+#[test]
+fn growth_is_a_metric_of_maps_and_a_quantity_of_boundaries() {
+    // By the reference, 252.5 N s/m closes the last tongue at 0.4 kg.
+    let growth = "[stability]\nspeed_rpm = \"296:316:0.5\"\n";
+    let folder = folder_with("");
+    let grid = format!("metrics = [\"growth\"]\n{GRID}{growth}");
+    let grid =
+        grid.replace("values = [140.0, 300.0]", "range = { from = 240, to = 270, count = 2 }");
+    fs::write(folder.path().join("grid.toml"), grid).expect("it is written");
+    let done = sweep(&folder, &["run", "grid.toml"]).output().expect("it starts");
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    let shown = sweep(&folder, &["show", "results/grid.parquet"]).output().expect("it starts");
+    for column in ["growth_per_s", "growth_speed_rpm", "growth_kind", "growth_mode_1_name"] {
+        assert!(said(&shown).contains(column), "{column}: {}", said(&shown));
+    }
+    assert!(said(&shown).contains("period_doubling"), "{}", said(&shown));
+    let traced = sweep(&folder, &["boundary", "grid.toml", "--quantity", "growth"]).output();
+    let traced = traced.expect("it starts");
+    assert_eq!(traced.status.code(), Some(0), "{}", said(&traced));
+    assert!(said(&traced).contains("1 crossing"), "{}", said(&traced));
+    let plain = folder_with("");
+    let refused = sweep(&plain, &["boundary", "grid.toml", "--quantity", "growth"]).output();
+    let refused = refused.expect("it starts");
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(said(&refused).contains("[stability]"), "{}", said(&refused));
 }

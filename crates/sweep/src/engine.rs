@@ -1,11 +1,13 @@
 //! The engine: points through both models, in lanes, as far up the ladder of methods as each needs.
 
 mod climb;
+mod growth;
 mod ladder;
 mod pool;
 mod watch;
 
 pub(crate) use climb::Demand;
+pub(crate) use growth::responses;
 pub(crate) use ladder::{Ladder, reference_step_s};
 pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
 pub(crate) use watch::{Engine, Watch};
@@ -285,7 +287,7 @@ impl<'a> ModelEngine<'a> {
         let metrics = self.plan.measures.of_model().filter_map(|metric| match metric {
             Metric::CabinetForce => extra.cabinet_force_n,
             Metric::ClashTime => extra.clash_time_s,
-            Metric::StaticSag => None,
+            Metric::StaticSag | Metric::Growth => None,
         });
         Trajectory {
             status: Status::Ok,

@@ -10,11 +10,11 @@ pub(crate) const MOST_SPEEDS: f64 = 100_000.0;
 
 /// Even speeds, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Speeds {
+pub struct Speeds {
     /// First (rpm).
-    pub(crate) from: f64,
+    pub from: f64,
     /// Last (rpm).
-    pub(crate) to: f64,
+    pub to: f64,
     step: f64,
 }
 

@@ -6,9 +6,7 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use arrow_array::types::Int32Type;
-use arrow_array::{
-    ArrayRef, BooleanArray, DictionaryArray, Float64Array, RecordBatch, UInt64Array,
-};
+use arrow_array::{ArrayRef, DictionaryArray, Float64Array, RecordBatch, UInt64Array};
 use arrow_schema::{DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
@@ -76,50 +74,8 @@ impl Table {
         self.add(name, "", description, "string", Arc::new(array));
     }
 
-    /// Adds words of which there are few; what is not known is null.
-    pub(crate) fn words_if_known<'a>(
-        &mut self,
-        name: &str,
-        description: &str,
-        values: impl IntoIterator<Item = Option<&'a str>>,
-    ) {
-        let array: DictionaryArray<Int32Type> = values.into_iter().collect();
-        self.add_nullable(true, (name, "", description, "string"), Arc::new(array));
-    }
-
-    /// Adds counts; what is not known is null.
-    pub(crate) fn counts_if_known(
-        &mut self,
-        name: &str,
-        description: &str,
-        values: impl IntoIterator<Item = Option<u64>>,
-    ) {
-        let array: UInt64Array = values.into_iter().collect();
-        self.add_nullable(true, (name, "1", description, "uint64"), Arc::new(array));
-    }
-
-    /// Adds truths; what is not known is null.
-    pub(crate) fn flags(
-        &mut self,
-        name: &str,
-        description: &str,
-        values: impl IntoIterator<Item = Option<bool>>,
-    ) {
-        let array: BooleanArray = values.into_iter().collect();
-        self.add_nullable(true, (name, "", description, "bool"), Arc::new(array));
-    }
-
     fn add(&mut self, name: &str, unit: &str, description: &str, type_name: &str, array: ArrayRef) {
         let nullable = matches!(array.data_type(), DataType::Float64);
-        self.add_nullable(nullable, (name, unit, description, type_name), array);
-    }
-
-    fn add_nullable(
-        &mut self,
-        nullable: bool,
-        (name, unit, description, type_name): (&str, &str, &str, &str),
-        array: ArrayRef,
-    ) {
         self.fields.push(
             Field::new(name, array.data_type().clone(), nullable)
                 .with_metadata(field_metadata(unit, description)),

@@ -96,7 +96,9 @@ pub use run::suspension::Forces;
 pub use run::{
     Course, Extra, Method, ModelKind, Record, Stop, Wanted, simulate, simulate_until, simulate_with,
 };
-pub use stability::{Dwell, Exact, Kind, NoAnswer, Participant, Response, exact_motions, respond};
+pub use stability::{
+    Disturbance, Dwell, Exact, Kind, NoAnswer, Participant, Response, exact_motions, respond,
+};
 
 #[cfg(test)]
 mod tests;

@@ -95,7 +95,7 @@ search has found out stays in FILE.partial, and the same command goes on from th
 /// being written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.grid.load()?;
-    let plan = args.quantity.plan(&plan);
+    let plan = args.quantity.plan(&plan)?;
     let task = BoundaryTask::new(&plan, args.tolerance, usize::from(args.lattice))?;
     let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
     let output = args.out.clone().unwrap_or_else(default);

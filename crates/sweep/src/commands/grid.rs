@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use crate::config::{self, Diagnostics};
 use crate::plan::Plan;
+use crate::speeds::Speeds;
+use crate::store::Job;
 
 /// A grid file and changes to its constants, as most commands take them.
 #[derive(Debug, clap::Args)]
@@ -42,6 +44,19 @@ impl ResultArgs {
     #[must_use]
     pub fn output(&self, plan: &Plan) -> PathBuf {
         self.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{}.parquet", plan.name)))
+    }
+
+    /// What is asked for: the dwells of a grid at these speeds, or the grid itself, and where the
+    /// result goes.
+    pub(super) fn job<'a>(&self, plan: &'a Plan, speeds: Option<Speeds>) -> (Job<'a>, PathBuf) {
+        match speeds {
+            None => (Job::of(plan), self.output(plan)),
+            Some(speeds) => {
+                let default = || PathBuf::from(format!("results/{}-stability.parquet", plan.name));
+                let output = self.out.clone().unwrap_or_else(default);
+                (Job::of_dwells(plan, &speeds.values()), output)
+            }
+        }
     }
 
     /// A command line about the same run, for a user to copy.

@@ -10,7 +10,7 @@ use crate::config;
 use crate::exit::{Error, Exit, print};
 use crate::measures::{Criterion, Measures, Metric};
 use crate::method::{Entry, METHODS};
-use crate::store::schema::{AxisColumn, Layout};
+use crate::store::schema::{AxisColumn, Layout, RowKind};
 use crate::verdict::ROW_STATUSES;
 
 /// Arguments of `sweep reference`.
@@ -174,7 +174,13 @@ fn columns() -> String {
         })
         .collect();
     let measures = Measures { metrics: Metric::ALL.to_vec(), ..Measures::default() };
-    let layout = Layout { axes, channels: Channel::ALL.to_vec(), ratio_limit: 2.0, measures };
+    let layout = Layout {
+        axes,
+        channels: Channel::ALL.to_vec(),
+        ratio_limit: 2.0,
+        measures,
+        rows: RowKind::Run,
+    };
     row(&mut text, &["column", "type", "unit", "null", "meaning"]);
     row(&mut text, &["---"; 5]);
     for field in layout.schema().fields() {

@@ -32,6 +32,22 @@ pub struct Args {
     /// The run.
     #[command(flatten)]
     pub target: ResultArgs,
+    /// How it is done.
+    #[command(flatten)]
+    pub work: WorkArgs,
+    /// Keep the time histories of every point too, decimated, in NAME.traces beside NAME.parquet:
+    /// `sweep plot NAME.parquet --traces NAME.traces -o MAP.html` shows them on a click. They take
+    /// a run of their own, one trajectory at a time
+    #[arg(long)]
+    pub keep_traces: bool,
+    /// Exit with 3 if any row of the finished result failed
+    #[arg(long)]
+    pub fail_on_error: bool,
+}
+
+/// How a run is done, by whichever engine.
+#[derive(Debug, clap::Args)]
+pub struct WorkArgs {
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
     #[arg(long, value_name = "N", value_parser = threads::parse)]
     pub threads: Option<usize>,
@@ -47,14 +63,26 @@ pub struct Args {
     /// 5 s) or none
     #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
     pub progress: ProgressMode,
-    /// Keep the time histories of every point too, decimated, in NAME.traces beside NAME.parquet:
-    /// `sweep plot NAME.parquet --traces NAME.traces -o MAP.html` shows them on a click. They take
-    /// a run of their own, one trajectory at a time
-    #[arg(long)]
-    pub keep_traces: bool,
-    /// Exit with 3 if any row of the finished result failed
-    #[arg(long)]
-    pub fail_on_error: bool,
+}
+
+impl WorkArgs {
+    /// As the runner takes them.
+    ///
+    /// # Errors
+    /// A scheduler's number of threads that is none.
+    pub(super) fn options<'a>(
+        &self,
+        environment: Environment<'a>,
+    ) -> Result<RunOptions<'a>, Error> {
+        Ok(RunOptions {
+            threads: threads::count(self.threads, environment)?,
+            fresh: self.fresh,
+            shard: self.shard,
+            progress: self.progress,
+            environment,
+            tell: &tell,
+        })
+    }
 }
 
 /// Runs a grid.
@@ -86,14 +114,7 @@ pub(crate) fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<E
     })?;
     let (job, output) = (Job::of(plan), args.target.output(plan));
     let environment: Environment<'_> = &|name| std::env::var(name).ok();
-    let options = RunOptions {
-        threads: threads::count(args.threads, environment)?,
-        fresh: args.fresh,
-        shard: args.shard,
-        progress: args.progress,
-        environment,
-        tell: &tell,
-    };
+    let options = args.work.options(environment)?;
     let report = runner::run(engine, &job, &output, options, &interrupt)?;
     for note in &report.notes {
         tell(note);
@@ -192,7 +213,7 @@ fn go_on(args: &Args, session: Option<&Session>) -> String {
 }
 
 /// What this process did.
-fn work(session: &Session) -> String {
+pub(super) fn work(session: &Session) -> String {
     format!(
         "{} points in {}, {} on {} thread{} ({})",
         session.points,
@@ -206,6 +227,15 @@ fn work(session: &Session) -> String {
 
 /// A result's rows: verdicts, failures, extremes. At most six lines.
 pub(super) fn rows(tally: &Tally, job: &Job<'_>) -> String {
+    if let Some(dwells) = &tally.dwells {
+        let mut text = String::new();
+        let told = format!(
+            "{} of {} rows, {} not, {} without a response",
+            dwells.stable, tally.points, dwells.unstable, dwells.unknown
+        );
+        line(&mut text, "stable", &told);
+        return text;
+    }
     let at = |point: u64| {
         let values = (job.axis_values)(point);
         let place = job

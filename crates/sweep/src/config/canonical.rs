@@ -36,12 +36,15 @@ impl Plan {
         }
         // What is left out stands for the default, so that plans which do not ask for more read as
         // ever.
-        let Measures { criterion, metrics } = &self.measures;
+        let Measures { criterion, metrics, growth_speeds } = &self.measures;
         if *criterion != Criterion::default() {
             plan["reliability"]["criterion"] = criterion.name().into();
         }
         if !metrics.is_empty() {
             plan["metrics"] = metrics.iter().map(|metric| metric.name()).collect();
+        }
+        if let Some(speeds) = growth_speeds {
+            plan["stability"] = json!({ "speed_rpm": speeds.to_string() });
         }
         plan
     }

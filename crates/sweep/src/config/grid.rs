@@ -15,6 +15,7 @@ use super::{GridInput, design, machine, parameters, spin};
 use crate::measures::{Criterion, Measures, Metric};
 use crate::method::{Entry, Integrator, METHODS, settings};
 use crate::plan::{Plan, Reliability};
+use crate::speeds::{Speeds, turning};
 
 /// `machine` when the grid names none.
 pub(super) const DEFAULT_MACHINE: &str = "paper";
@@ -83,6 +84,8 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
     let integrator = integrator(&mut root, &mut origins, report);
     let metrics = names(&mut root, "metrics", "metric", &Metric::ALL, Metric::name, report);
     let (reliability, criterion) = reliability(&mut root, &mut origins, report);
+    let metrics = metrics.unwrap_or_default();
+    let growth_speeds = stability(&mut root, &metrics, report);
     let plan = Plan {
         name,
         machine,
@@ -93,7 +96,7 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
         axes: Vec::new(),
         design: None,
         reliability,
-        measures: Measures { criterion, metrics: metrics.unwrap_or_default() },
+        measures: Measures { criterion, metrics, growth_speeds },
     };
     let mut draft = Draft { plan, origins, constants: Vec::new() };
     parameters::constants(&mut root, sets, &mut draft, report);
@@ -311,6 +314,36 @@ fn reliability(
         channels: channels.unwrap_or(stand_in.channels),
     };
     (reliability, criterion.map(|found| Criterion::ALL[found.value]).unwrap_or_default())
+}
+
+/// The speeds that the metric `growth` is about. The section and the metric need each other.
+fn stability(root: &mut Section<'_>, metrics: &[Metric], report: &mut Report) -> Option<Speeds> {
+    let field = root.table("stability", "[stability]", report);
+    if let (Field::Given(section), false) = (&field, metrics.contains(&Metric::Growth)) {
+        let title = "[stability] is for the metric `growth`, which is not asked for";
+        let expected = "expected metrics = [\"growth\"] at the top of the file, or no [stability]; \
+                        `sweep stability` takes its speeds as --speed";
+        report.push(Diagnostic::new(title).at(&section.at, expected));
+    }
+    if let (Field::Absent, true) = (&field, metrics.contains(&Metric::Growth)) {
+        let title = "the metric `growth` needs speeds";
+        let expected = "expected a section [stability] with speed_rpm = \"FROM:TO:STEP\"";
+        report.push_missing(Diagnostic::new(title).at(root.at(), expected));
+    }
+    let mut section = field.given()?.value;
+    let field = section.text("speed_rpm", report);
+    let found =
+        section.require(field, "speed_rpm", "constant speeds as \"FROM:TO:STEP\" in rpm", report);
+    section.finish(report);
+    let found = found?;
+    match turning(found.value) {
+        Ok(speeds) => Some(speeds),
+        Err(expected) => {
+            let title = format!("`speed_rpm` = \"{}\" is no range of speeds", found.value);
+            report.push(Diagnostic::new(title).at(&found.at, expected));
+            None
+        }
+    }
 }
 
 /// A list of some of `all`, each once, by their names; an empty one is a mistake.

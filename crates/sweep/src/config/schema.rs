@@ -46,6 +46,7 @@ pub(crate) fn grid() -> Value {
         ("axis", axes),
         ("design", design()),
         ("reliability", reliability()),
+        ("stability", stability()),
     ];
     let mut schema = table(sections, &["spin", "time"]);
     // Whether a range has a count depends on whether there is a design.
@@ -304,6 +305,15 @@ fn metrics() -> Value {
         "uniqueItems": true,
         "description": "further columns of the result",
     })
+}
+
+fn stability() -> Value {
+    let speeds = json!({
+        "type": "string",
+        "description": "constant spin speeds FROM:TO:STEP in rpm, above 0, as in \"60:400:1\": \
+                        what `growth` among the metrics is about",
+    });
+    table([("speed_rpm", speeds)], &["speed_rpm"])
 }
 
 fn reliability() -> Value {

@@ -55,7 +55,7 @@ pub fn find_boundary(
         let given = options.lattice.to_string();
         return Err(Error::Option { option: "lattice", given, expected: "from 1 to 1000".into() });
     }
-    let plan = &quantity.plan(plan);
+    let plan = &quantity.plan(plan)?;
     let task = BoundaryTask::new(plan, options.tolerance, usize::from(options.lattice))?;
     let job = job(plan, quantity, &task);
     let begin = |path| Output::begin(path, FileKind::Boundary);

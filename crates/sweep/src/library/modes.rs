@@ -188,7 +188,7 @@ fn exact_over(
         if speed == 0.0 {
             return Ok(vec![None; modes.len()]);
         }
-        let motions = exact_motions(Simd::best(), point, speed)?;
+        let motions = exact_motions(point, speed)?;
         let of = |mode: &ModeOverSpeed| {
             motions.iter().find(|motion| motion.frozen.shape == mode.at_speed[k].shape).copied()
         };

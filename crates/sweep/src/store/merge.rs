@@ -16,7 +16,7 @@ use super::provenance::{self, Session};
 use super::read::{self, Tally};
 use super::schema::{self, BATCH_ROWS, ResultRows};
 use sweep_files::panics;
-use sweep_files::{self as files, FileKind, ParquetFile, atomic, seal};
+use sweep_files::{self as files, ParquetFile, atomic, seal};
 
 /// A finished result.
 #[derive(Debug)]
@@ -73,13 +73,13 @@ pub(crate) fn write_map(
     batches: &[RecordBatch],
     output: &Path,
 ) -> Result<(), StoreError> {
-    files::judge(output, FileKind::Map)?;
+    files::judge(output, job.layout.file_kind())?;
     let folder = atomic::parent(output);
     files::ready(folder)?;
     let mut writer = MapWriter::begin(job, atomic::begin(folder)?, output)?;
     batches.iter().try_for_each(|batch| writer.write(batch))?;
     let file = writer.finish()?;
-    files::judge(output, FileKind::Map)?;
+    files::judge(output, job.layout.file_kind())?;
     Ok(atomic::publish(file, output)?)
 }
 
@@ -124,7 +124,7 @@ impl OpenRun {
         let file = writer.finish()?;
         // Read back before it takes its place: what cannot be read must not replace anything.
         let tally = read::tally(&ParquetFile::open(file.path())?)?;
-        files::judge(&output, FileKind::Map)?;
+        files::judge(&output, job.layout.file_kind())?;
         atomic::publish(file, &output)?;
         Ok(Some(tally))
     }

@@ -66,7 +66,7 @@ pub struct FolderStatus {
 /// # Errors
 /// As [`super::OpenRun::open`], but never [`StoreError::Busy`].
 pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> {
-    let folder = Folder::of(output)?;
+    let folder = Folder::of(output, &job.layout)?;
     let points_a_chunk = chunk_points(job.points);
     let chunks = job.points.div_ceil(points_a_chunk);
     let mut status = FolderStatus {

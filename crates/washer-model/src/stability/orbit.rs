@@ -4,10 +4,10 @@
 //! drum (`coupling.rs`), by classical Runge-Kutta in few steps. The linear model's is affine, so
 //! that one linear solve finds what it returns to. From there the nonlinear model's fixed point is
 //! found by Newton's method: with the linear model's matrix as long as that brings it closer fast
-//! enough, else with the map's own, exact by dual numbers. What the map does to disturbances of the
-//! response is that matrix once more, taken where the search ended.
+//! enough, else with the response's own (`monodromy.rs`).
 
-use super::turn::{Clock, Unwatched, Watch, turn};
+use super::monodromy::{INSTANTS, monodromy, slopes_along};
+use super::turn::{Clock, Watch, turn};
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
 use crate::machine::spin::SpinStretch;
@@ -29,6 +29,8 @@ pub(super) struct Row<'a> {
     pub(super) steps: usize,
     /// On the modes of bearings and hinge; none if the steps follow these.
     pub(super) caps: Option<Caps>,
+    /// A response nearby, from which the search starts; else it starts from the linear model's.
+    pub(super) from: Option<[f64; STATES]>,
 }
 
 impl Row<'_> {
@@ -122,7 +124,11 @@ fn respond<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<Option<Box<Fou
             let deviation = states[i].0.get(lane);
             // Where even the linear model has none, the search starts at rest.
             let deviation = if deviation.is_finite() { deviation } else { 0.0 };
-            states[i].0.set(lane, rest[i] + deviation);
+            let start = match &rows[lane].from {
+                Some(from) => from[i],
+                None => rest[i] + deviation,
+            };
+            states[i].0.set(lane, start);
         }
     }
     let nonlinear: Nonlinear<T> = model(zero, rows);
@@ -140,7 +146,7 @@ fn respond<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<Option<Box<Fou
         let mut monodromy = [[N(0.0); STATES]; STATES];
         for i in 0..STATES {
             for j in 0..STATES {
-                monodromy[i][j] = N(columns[j][i].0.slope.get(lane) * unit(j) / unit(i));
+                monodromy[i][j] = N(columns[j][i].0.get(lane) * unit(j) / unit(i));
             }
         }
         found.push(Some(Box::new(Found {
@@ -185,6 +191,7 @@ fn linear_response<T: Lane>(
             ends[0] = answer.start;
         }
         let mut watched = Watched::new(zero, model, clock);
+        watched.with_peaks = is_known;
         turn(model, clock, &mut ends, if is_known { Some(&mut watched) } else { None });
         if is_known {
             answer.peaks = watched.peaks;
@@ -225,25 +232,28 @@ struct Search<'a, T> {
 }
 
 impl<T: Lane> Search<'_, T> {
-    /// Searches, and watches a last turn from what was found: its peaks, and how its end answers to
-    /// each coordinate and speed of its start.
+    /// Searches, and watches a last turn from what was found: its peaks, and what becomes of unit
+    /// disturbances of its start.
     #[inline(always)]
     fn run(
         &mut self,
         model: &Nonlinear<T>,
         tangent: &Nonlinear<Dual<T>>,
         clock: &Clock<T>,
-    ) -> (Peaks<T, CHANNELS>, Vec<[N<Dual<T>>; STATES]>) {
+    ) -> (Peaks<T, CHANNELS>, Vec<[N<T>; STATES]>) {
         let lanes = self.rows.len();
+        let zero = self.states[0].lit(0.0);
         let mut is_over = [false; lane_ode::MAX_LANES];
         let mut last = [f64::INFINITY; lane_ode::MAX_LANES];
-        let mut watched = Watched::new(self.states[0].lit(0.0), model, clock);
+        let mut watched = Watched::new(zero, model, clock);
         let mut are_all_over = false;
         let mut turns = 0;
         loop {
             let mut ends = [self.states];
             let is_last = are_all_over || turns == MOST_TURNS;
-            turn(model, clock, &mut ends, if is_last { Some(&mut watched) } else { None });
+            watched.states.clear();
+            watched.with_peaks = is_last;
+            turn(model, clock, &mut ends, Some(&mut watched));
             turns += 1;
             let mut is_slow = [false; lane_ode::MAX_LANES];
             let mut are_any_slow = false;
@@ -259,7 +269,8 @@ impl<T: Lane> Search<'_, T> {
             }
             // One call, for one copy of the model's code.
             if is_last || are_any_slow {
-                let columns = self.columns(tangent, clock);
+                let slopes = slopes_along(zero, tangent, clock, &watched.states);
+                let columns = monodromy(zero, &slopes, clock);
                 if is_last {
                     return (watched.peaks, columns);
                 }
@@ -296,25 +307,9 @@ impl<T: Lane> Search<'_, T> {
         missing / size
     }
 
-    /// How the turn's end answers to each coordinate and speed of its start.
+    /// Takes the matrices of these lanes from the turn itself.
     #[inline(always)]
-    fn columns(&self, tangent: &Nonlinear<Dual<T>>, clock: &Clock<T>) -> Vec<[N<Dual<T>>; STATES]> {
-        let zero = self.states[0].lit(0.0);
-        let clock = Clock { step_s: clock.step_s.constant(), steps: clock.steps };
-        let mut columns = vec![[zero.constant(); STATES]; STATES];
-        for (j, column) in columns.iter_mut().enumerate() {
-            for i in 0..STATES {
-                column[i] = self.states[i].constant();
-            }
-            column[j].0.slope = zero.lit(1.0).0;
-        }
-        turn(tangent, &clock, &mut columns, None::<&mut Unwatched>);
-        columns
-    }
-
-    /// Takes the matrices of these lanes from the map itself.
-    #[inline(always)]
-    fn renew(&mut self, columns: &[[N<Dual<T>>; STATES]], lanes: &[bool]) {
+    fn renew(&mut self, columns: &[[N<T>; STATES]], lanes: &[bool]) {
         for lane in 0..self.rows.len() {
             if !lanes[lane] {
                 continue;
@@ -322,7 +317,7 @@ impl<T: Lane> Search<'_, T> {
             let mut apart = [[N(0.0); STATES]; STATES];
             for i in 0..STATES {
                 for j in 0..STATES {
-                    apart[i][j] = N(-columns[j][i].0.slope.get(lane));
+                    apart[i][j] = N(-columns[j][i].0.get(lane));
                 }
                 apart[i][i] = apart[i][i] + 1.0;
             }
@@ -357,21 +352,32 @@ impl<T: Lane> Search<'_, T> {
 struct Watched<'m, T, M> {
     model: &'m M,
     clock: &'m Clock<T>,
+    with_peaks: bool,
     /// Above 0 in every lane.
     windows: N<T>,
     peaks: Peaks<T, CHANNELS>,
+    /// At even instants, the first at the turn's start.
+    states: Vec<[N<T>; STATES]>,
 }
 
 impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
     #[inline(always)]
     fn new(zero: N<T>, model: &'m M, clock: &'m Clock<T>) -> Self {
-        Self { model, clock, windows: zero.lit(1.0), peaks: Peaks::new(zero) }
+        let (windows, peaks) = (zero.lit(1.0), Peaks::new(zero));
+        let states = Vec::with_capacity(INSTANTS + 1);
+        Self { model, clock, with_peaks: false, windows, peaks, states }
     }
 }
 
 impl<T: Lane, M: Model<T>> Watch<T, M> for Watched<'_, T, M> {
     #[inline(always)]
     fn see(&mut self, k: usize, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
+        if k % (self.clock.steps / INSTANTS) == 0 {
+            self.states.push(*x);
+        }
+        if !self.with_peaks {
+            return;
+        }
         let everywhere = self.windows.lit(0.0).0.less(self.windows.0);
         if let (_, Some(channels)) = self.model.observe(forcing, x, dx, true) {
             if k == 0 {

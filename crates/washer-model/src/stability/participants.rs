@@ -1,10 +1,11 @@
 //! Which modes of the linear model take part in what grows.
 
-use super::{Case, Participant};
+use super::Participant;
 use crate::modes::Modes;
 
 use crate::coordinates::{COORDINATES, STATES};
 use crate::modes::shape;
+use crate::point::Point;
 use faer::linalg::solvers::Solve as _;
 use faer::{Mat, c64};
 
@@ -22,19 +23,23 @@ const ROUNDS: usize = 3;
 /// singular.
 const BESIDE: f64 = 1e-9;
 
-/// Of every mode, by its place, the share of the energy of the disturbance that belongs to a
-/// multiplier, at theta = 0; not finite where there is no such disturbance.
-pub(super) fn shares(case: &Case<'_>, monodromy: &Mat<f64>, multiplier: c64) -> Vec<(usize, f64)> {
-    let vector = vector_of(monodromy, multiplier);
-    let mut shares = energies(&case.frozen, &vector, case.row.unit_per_s());
+/// Of every mode, by its place, the share of a disturbance's energy at theta = 0; not finite where
+/// there is no such disturbance.
+pub(super) fn shares(frozen: &Modes, vector: &Mat<c64>, unit_per_s: f64) -> Vec<(usize, f64)> {
+    let mut shares = energies(frozen, vector, unit_per_s);
     let whole: f64 = shares.iter().map(|(_, energy)| energy).sum();
     shares.iter_mut().for_each(|(_, energy)| *energy /= whole);
     shares
 }
 
-/// The one or two modes that have most of the energy.
-pub(super) fn named(case: &Case<'_>, shares: &[(usize, f64)]) -> Vec<Participant> {
-    let mut shares = shares.to_vec();
+/// The one or two modes that have most of a disturbance's energy.
+pub(super) fn named(
+    point: &Point,
+    frozen: &Modes,
+    vector: &Mat<c64>,
+    unit_per_s: f64,
+) -> Vec<Participant> {
+    let mut shares = shares(frozen, vector, unit_per_s);
     shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let mut named = Vec::with_capacity(MOST);
     let mut sum = 0.0;
@@ -43,11 +48,11 @@ pub(super) fn named(case: &Case<'_>, shares: &[(usize, f64)]) -> Vec<Participant
             break;
         }
         sum += share;
-        let mode = &case.frozen.modes[k];
+        let mode = &frozen.modes[k];
         named.push(Participant {
             mode: k + 1,
             frequency_cpm: mode.frequency_rpm(),
-            motion: shape::motion(case.row.point, &case.frozen.mass, &mode.shape),
+            motion: shape::motion(point, &frozen.mass, &mode.shape),
             share,
         });
     }
@@ -55,7 +60,7 @@ pub(super) fn named(case: &Case<'_>, shares: &[(usize, f64)]) -> Vec<Participant
 }
 
 /// The eigenvector of a multiplier, by inverse iteration.
-fn vector_of(monodromy: &Mat<f64>, multiplier: c64) -> Mat<c64> {
+pub(super) fn vector_of(monodromy: &Mat<f64>, multiplier: c64) -> Mat<c64> {
     let beside = multiplier * (1.0 + BESIDE);
     let shifted = Mat::from_fn(STATES, STATES, |i, j| {
         let entry = c64::new(monodromy[(i, j)], 0.0);

@@ -50,7 +50,7 @@ fn at(machine: Machine, speed_rpm: f64) -> Response {
 /// The multipliers of the machine as it is, by plain Runge-Kutta.
 fn plain(machine: Machine, speed_rpm: f64, start: [f64; STATES]) -> Vec<c64> {
     let point = prepared(machine, speed_rpm);
-    let row = case(&Dwell { point: &point, speed_rpm }).unwrap().row;
+    let row = Settings::new(&point).case(speed_rpm).unwrap().row;
     let matrix = Simd::one_lane(Plain::new(&row, start, 1e4).unwrap()).unwrap();
     let matrix = Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0);
     let mut multipliers = matrix.eigenvalues().unwrap();
@@ -240,7 +240,7 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
             };
             of_model + turning
         });
-        let row = case(&Dwell { point: &point, speed_rpm }).unwrap().row;
+        let row = Settings::new(&point).case(speed_rpm).unwrap().row;
         let ours = found(&row).1;
         // The suspension's.
         let slow = system.eigenvalues().unwrap().into_iter().filter(|s| s.norm() < 100.0);
@@ -258,7 +258,7 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
 #[test]
 fn the_product_of_all_multipliers_is_the_exponential_of_the_trace() {
     let point = prepared(with(0.4, 140.0), 250.0);
-    let capped = case(&Dwell { point: &point, speed_rpm: 250.0 }).unwrap().row;
+    let capped = Settings::new(&point).case(250.0).unwrap().row;
     // With steps so short that the formula takes nothing from the capped modes.
     let row = Row { steps: 32 * capped.steps, ..capped };
     let (found, multipliers) = found(&row);
@@ -288,10 +288,10 @@ fn val_the_linear_models_exact_motions_differ_from_frozen_ones() {
     // By another program: 65.20 against 65.95 per minute in the first mode at 1200 rpm, and a
     // second mode whose damping differs by 8 % at its resonance.
     let point = prepared(with(0.4, 140.0), 100.0);
-    let first = exact_motions(Simd::best(), &point, 1200.0).unwrap()[0];
+    let first = exact_motions(&point, 1200.0).unwrap()[0];
     println!("{} {}", first.frequency_rpm(), first.frozen.frequency_rpm());
     assert!((first.frequency_rpm() - 65.20).abs() < 0.01);
-    let second = exact_motions(Simd::best(), &point, 147.76).unwrap()[1];
+    let second = exact_motions(&point, 147.76).unwrap()[1];
     let apart = second.damping_ratio() / second.frozen.damping_ratio() - 1.0;
     println!("{apart}");
     assert!((apart.abs() - 0.08).abs() < 0.03, "{apart}");

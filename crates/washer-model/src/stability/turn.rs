@@ -20,6 +20,13 @@ impl<T: Lane> Clock<T> {
     }
 }
 
+/// Of each stage of the formula which of start, middle and end of a step it is evaluated at,
+pub(super) const AT: [usize; 4] = [0, 1, 1, 2];
+/// how far along its slope the next stage is, as a share of the step,
+pub(super) const REACH: [f64; 4] = [0.5, 0.5, 1.0, 0.0];
+/// and what its slope has in the step.
+pub(super) const WEIGHT: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
+
 /// The forcing of a step: at its start, its middle and its end.
 pub(super) type Forcings<F> = [F; 3];
 
@@ -55,9 +62,6 @@ fn step<T: Lane, S: System<T, STATES>>(
     forcings: &Forcings<S::Forcing>,
     x: &mut [N<T>; STATES],
 ) -> [N<T>; STATES] {
-    const AT: [usize; 4] = [0, 1, 1, 2];
-    const REACH: [f64; 4] = [0.5, 0.5, 1.0, 0.0];
-    const WEIGHT: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
     let start = *x;
     let mut along = start;
     let mut first = start;
