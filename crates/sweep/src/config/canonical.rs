@@ -11,7 +11,8 @@ use crate::plan::{Axis, AxisValues, Plan};
 
 impl Plan {
     /// The whole plan with every default and constant in place, in the grid file's own terms:
-    /// `name`, `machine` (in full), `spin`, `time`, `integrator`, `axis`, `reliability`.
+    /// `name`, `machine` (in full), `spin`, `time`, `integrator`, `axis`, `reliability`, and
+    /// under `set` what `--set` has changed, if it has.
     ///
     /// Canonical: keys are sorted, and numbers are written as the shortest decimal that reads back
     /// to the same bits, so two plans are the same if and only if their texts are.
@@ -42,6 +43,9 @@ impl Plan {
         }
         if !metrics.is_empty() {
             plan["metrics"] = metrics.iter().map(|metric| metric.name()).collect();
+        }
+        if !self.set.is_empty() {
+            plan["set"] = self.set.iter().cloned().collect();
         }
         plan
     }

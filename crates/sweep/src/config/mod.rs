@@ -33,6 +33,7 @@ mod origins;
 mod parameters;
 mod render;
 mod report;
+mod scalars;
 pub(crate) mod schema;
 mod section;
 mod source;
@@ -47,7 +48,9 @@ use std::path::Path;
 pub(crate) use report::Diagnostics;
 
 use grid::Draft;
-use report::Report;
+use report::{Diagnostic, Report};
+use source::Location;
+use sweep_results::Mistake;
 use washer_model::Machine;
 
 use crate::plan::Plan;
@@ -59,6 +62,14 @@ use crate::plan::Plan;
 /// Every mistake found, in one pass.
 pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
     resolve(path, sets, |_, _| ()).map(|(plan, ())| plan)
+}
+
+/// The name of a run as the command line gives it, or what it should have been.
+///
+/// # Errors
+/// In words.
+pub(crate) fn plain_name(text: &str) -> Result<String, String> {
+    grid::plain_name(text)
 }
 
 /// Parameters by name, with a value each.
@@ -92,6 +103,25 @@ fn resolve<T>(
     validate::scenarios(&draft, &mut report);
     validate::stability(&draft, &mut report);
     report.finish((draft.plan, finished))
+}
+
+/// Mistakes in expressions that an option or argument takes, each with its text.
+#[must_use]
+pub(crate) fn mistakes_in_expressions<'a>(
+    option: &str,
+    mistakes: impl IntoIterator<Item = (&'a str, Mistake)>,
+) -> Diagnostics {
+    let mut report = Report::default();
+    for (text, mistake) in mistakes {
+        let source = report.sources.add(option, text);
+        let at = Location::new(source, mistake.span);
+        let mut diagnostic = Diagnostic::new(mistake.title).at(&at, mistake.expected);
+        if let Some((typed, names)) = &mistake.candidates {
+            diagnostic = diagnostic.nearest(typed, names.iter().map(String::as_str));
+        }
+        report.push(diagnostic);
+    }
+    report.into_diagnostics()
 }
 
 /// A machine in full, as a result file carries it.
