@@ -3,6 +3,7 @@
 mod boundary;
 mod cells;
 mod check;
+mod compare;
 mod completions;
 mod conditions;
 mod examples;
@@ -75,6 +76,8 @@ pub enum Command {
     Show(show::Args),
     /// Check that expressions hold of a result, and show the rows where they do not
     Require(require::Args),
+    /// Say what differs between two results
+    Compare(compare::Args),
     /// Write time histories of both models at one point
     Trace(trace::Args),
     /// Find the natural frequencies over spin speed, the resonance speeds and the mode shapes
@@ -109,6 +112,7 @@ fn examples_of(name: &str) -> Examples {
         "slurm" => slurm::EXAMPLES,
         "show" => show::EXAMPLES,
         "require" => require::EXAMPLES,
+        "compare" => compare::EXAMPLES,
         "trace" => trace::EXAMPLES,
         "modes" => modes::EXAMPLES,
         "boundary" => boundary::EXAMPLES,
@@ -193,6 +197,7 @@ impl Command {
             Self::Slurm(args) => slurm::run(args),
             Self::Show(args) => show::run(args),
             Self::Require(args) => require::run(args),
+            Self::Compare(args) => compare::run(args),
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Boundary(args) => boundary::run(args),

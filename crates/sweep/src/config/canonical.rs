@@ -54,7 +54,9 @@ impl Plan {
 fn design(design: &Design) -> Value {
     let method = design.method();
     match design {
-        Design::LatinHypercube { points, seed } | Design::Sobol { points, seed } => {
+        Design::LatinHypercube { points, seed }
+        | Design::Sobol { points, seed }
+        | Design::MonteCarlo { points, seed } => {
             json!({ "method": method, "points": points, "seed": seed })
         }
         Design::List { file, points, hash } => {

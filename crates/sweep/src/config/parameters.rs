@@ -269,7 +269,9 @@ pub(super) fn box_of_axes(
     let sections = root.tables("axis", report);
     let most = match &design.value {
         Design::Sobol { .. } => MOST_AXES,
-        Design::LatinHypercube { .. } | Design::List { .. } => usize::MAX,
+        Design::LatinHypercube { .. } | Design::MonteCarlo { .. } | Design::List { .. } => {
+            usize::MAX
+        }
     };
     if sections.is_empty() || sections.len() > most {
         let title =
