@@ -15,6 +15,7 @@ use crate::store::StoreError;
 use crate::threads::ThreadsError;
 use sweep_files::FileError;
 use sweep_plot::PlotError;
+use sweep_results::ResultsError;
 use washer_model::{NoAnswer, NoEquilibrium, NoModes};
 
 /// Exit codes, a contract with scripts.
@@ -28,6 +29,8 @@ pub enum Exit {
     BadInput = 2,
     /// Done, but some points failed and `--fail-on-error` was given.
     PointsFailed = 3,
+    /// What `require`, or `compare --fail-on`, was asked for does not hold.
+    NotHeld = 4,
     /// Another run holds this output.
     Busy = 75,
     /// Interrupted (SIGINT).
@@ -38,11 +41,12 @@ pub enum Exit {
 
 impl Exit {
     /// Every exit code.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Done,
         Self::Failed,
         Self::BadInput,
         Self::PointsFailed,
+        Self::NotHeld,
         Self::Busy,
         Self::Interrupted,
         Self::Terminated,
@@ -56,6 +60,7 @@ impl Exit {
             Self::Failed => "an I/O or internal failure",
             Self::BadInput => "bad input, refused before any work",
             Self::PointsFailed => "with --fail-on-error: done, but some points failed",
+            Self::NotHeld => "done: a `require`, or a `compare --fail-on`, does not hold",
             Self::Busy => "another run holds this output",
             Self::Interrupted => "interrupted; finished work is kept",
             Self::Terminated => "terminated; finished work is kept",
@@ -98,6 +103,9 @@ pub enum Error {
     /// A figure.
     #[error(transparent)]
     Plot(#[from] PlotError),
+    /// A result that does not answer.
+    #[error(transparent)]
+    Results(#[from] ResultsError),
     /// A machine without a static equilibrium.
     #[error(transparent)]
     Equilibrium(#[from] NoEquilibrium),
@@ -161,7 +169,8 @@ impl Error {
             Self::Store(StoreError::Busy { .. }) => Exit::Busy,
             Self::Store(error) if error.is_refusal() => Exit::BadInput,
             Self::Plot(error) if error.is_usage() => Exit::BadInput,
-            Self::Plot(_) => Exit::Failed,
+            Self::Results(error) if error.is_refusal() => Exit::BadInput,
+            Self::Plot(_) | Self::Results(_) => Exit::Failed,
             Self::Store(_) | Self::Files(_) | Self::Threads(_) | Self::Random(_) => Exit::Failed,
             Self::Memory(_) | Self::File { .. } | Self::Stdout(_) => Exit::Failed,
         }
@@ -253,7 +262,7 @@ mod tests {
 
     #[test]
     fn the_codes_are_the_contract() {
-        assert_eq!(Exit::ALL.map(|exit| exit as u8), [0, 1, 2, 3, 75, 130, 143]);
+        assert_eq!(Exit::ALL.map(|exit| exit as u8), [0, 1, 2, 3, 4, 75, 130, 143]);
         for exit in Exit::ALL {
             assert!(Exit::table().contains(exit.meaning()));
         }

@@ -1,6 +1,7 @@
 //! What a run is about to do, with every value resolved and checked: the one thing that flows from
 //! the configuration into the engine, the store and the reports.
 
+use serde_json::Value;
 use washer_model::{Channel, Machine, Parameter, Spin, Target};
 
 use crate::design::Design;
@@ -43,6 +44,8 @@ pub struct Plan {
     pub reliability: Reliability,
     /// What is measured of the motions.
     pub measures: Measures,
+    /// What `--set` has put in place, by name.
+    pub set: Vec<(String, Value)>,
 }
 
 /// One swept parameter.
@@ -328,6 +331,7 @@ mod tests {
             integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 },
             reliability: Reliability { ratio_limit: 2.0, channels: Channel::ALL.to_vec() },
             measures: Measures::default(),
+            set: Vec::new(),
         }
     }
 

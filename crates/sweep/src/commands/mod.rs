@@ -1,8 +1,11 @@
 //! The command line: one module a subcommand, each with its arguments and `run`.
 
 mod boundary;
+mod cells;
 mod check;
+mod compare;
 mod completions;
+mod conditions;
 mod examples;
 mod grid;
 mod init;
@@ -12,6 +15,7 @@ mod modes;
 mod parameters;
 mod plot;
 mod reference;
+mod require;
 mod run;
 mod schema;
 mod show;
@@ -71,6 +75,10 @@ pub enum Command {
     Slurm(slurm::Args),
     /// Show what a result file holds: counts, verdicts, extremes, provenance
     Show(show::Args),
+    /// Check that expressions hold of a result, and show the rows where they do not
+    Require(require::Args),
+    /// Say what differs between two results
+    Compare(compare::Args),
     /// Write time histories of both models at one point
     Trace(trace::Args),
     /// Find the natural frequencies over spin speed, the resonance speeds and the mode shapes
@@ -106,6 +114,8 @@ fn examples_of(name: &str) -> Examples {
         "status" => status::EXAMPLES,
         "slurm" => slurm::EXAMPLES,
         "show" => show::EXAMPLES,
+        "require" => require::EXAMPLES,
+        "compare" => compare::EXAMPLES,
         "trace" => trace::EXAMPLES,
         "modes" => modes::EXAMPLES,
         "stability" => stability::EXAMPLES,
@@ -190,6 +200,8 @@ impl Command {
             Self::Status(args) => status::run(args),
             Self::Slurm(args) => slurm::run(args),
             Self::Show(args) => show::run(args),
+            Self::Require(args) => require::run(args),
+            Self::Compare(args) => compare::run(args),
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Stability(args) => stability::run(args),

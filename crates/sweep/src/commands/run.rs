@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use super::cells::short;
 use super::examples::Examples;
 use super::grid::{ResultArgs, quoted};
 use crate::engine::{Engine, ModelEngine};
@@ -243,7 +244,7 @@ pub(super) fn rows(tally: &Tally, job: &Job<'_>) -> String {
             .axes
             .iter()
             .zip(values)
-            .map(|(axis, value)| format!("{} {value}", axis.name));
+            .map(|(axis, value)| format!("{} {}", axis.name, short(value)));
         place.collect::<Vec<_>>().join(", ")
     };
     counts(tally, job.layout.ratio_limit, &at)

@@ -11,7 +11,8 @@ use crate::plan::{Axis, AxisValues, Plan};
 
 impl Plan {
     /// The whole plan with every default and constant in place, in the grid file's own terms:
-    /// `name`, `machine` (in full), `spin`, `time`, `integrator`, `axis`, `reliability`.
+    /// `name`, `machine` (in full), `spin`, `time`, `integrator`, `axis`, `reliability`, and
+    /// under `set` what `--set` has changed, if it has.
     ///
     /// Canonical: keys are sorted, and numbers are written as the shortest decimal that reads back
     /// to the same bits, so two plans are the same if and only if their texts are.
@@ -46,6 +47,9 @@ impl Plan {
         if let Some(speeds) = growth_speeds {
             plan["stability"] = json!({ "speed_rpm": speeds.to_string() });
         }
+        if !self.set.is_empty() {
+            plan["set"] = self.set.iter().cloned().collect();
+        }
         plan
     }
 }
@@ -53,7 +57,9 @@ impl Plan {
 fn design(design: &Design) -> Value {
     let method = design.method();
     match design {
-        Design::LatinHypercube { points, seed } | Design::Sobol { points, seed } => {
+        Design::LatinHypercube { points, seed }
+        | Design::Sobol { points, seed }
+        | Design::MonteCarlo { points, seed } => {
             json!({ "method": method, "points": points, "seed": seed })
         }
         Design::List { file, points, hash } => {

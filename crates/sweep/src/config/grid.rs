@@ -11,7 +11,7 @@ use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, cut, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
-use super::{GridInput, design, machine, parameters, spin};
+use super::{GridInput, design, machine, parameters, scalars, spin};
 use crate::measures::{Criterion, Measures, Metric};
 use crate::method::{Entry, Integrator, METHODS, settings};
 use crate::plan::{Plan, Reliability};
@@ -97,6 +97,7 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
         design: None,
         reliability,
         measures: Measures { criterion, metrics, growth_speeds },
+        set: Vec::new(),
     };
     let mut draft = Draft { plan, origins, constants: Vec::new() };
     parameters::constants(&mut root, sets, &mut draft, report);
@@ -113,6 +114,7 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
             let _ = root.tables("axis", report);
         }
     }
+    scalars::apply(sets, &mut draft, report);
     root.finish(report);
     Some(draft)
 }
@@ -122,30 +124,39 @@ pub(super) fn is_blank(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim().is_empty()
 }
 
+/// What a name may be: it becomes a file's.
+const PLAIN_NAME: &str = "letters, digits, `-`, `_` and `.`, beginning with a letter or digit, at \
+                          most 100 characters";
+
+fn is_plain(name: &str) -> bool {
+    let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
+    first
+        && name.len() <= 100
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
+}
+
+/// A run's name from the command line.
+pub(super) fn plain_name(text: &str) -> Result<String, String> {
+    if is_plain(text) { Ok(text.to_owned()) } else { Err(format!("expected {PLAIN_NAME}")) }
+}
+
 fn name(root: &mut Section<'_>, path: &Path, report: &mut Report) -> String {
-    const EXPECTED: &str = "letters, digits, `-`, `_` and `.`, beginning with a letter or digit, \
-                            at most 100 characters";
-    let plain = |name: &str| {
-        let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
-        first
-            && name.len() <= 100
-            && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
-    };
     match root.text("name", report) {
-        Field::Given(found) if plain(found.value) => return found.value.to_owned(),
+        Field::Given(found) if is_plain(found.value) => return found.value.to_owned(),
         Field::Given(found) => {
             let title = "`name` is not a plain file name";
-            report.push(Diagnostic::new(title).at(&found.at, format!("expected {EXPECTED}")));
+            report.push(Diagnostic::new(title).at(&found.at, format!("expected {PLAIN_NAME}")));
         }
         Field::Bad => {}
         Field::Absent => {
             let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-            if plain(stem) {
+            if is_plain(stem) {
                 return stem.to_owned();
             }
             let title = "`name` is missing, and the file's own name cannot stand in for it";
-            report
-                .push_missing(Diagnostic::new(title).at(root.at(), format!("expected {EXPECTED}")));
+            report.push_missing(
+                Diagnostic::new(title).at(root.at(), format!("expected {PLAIN_NAME}")),
+            );
         }
     }
     String::new()

@@ -34,6 +34,7 @@ mod parameters;
 mod points;
 mod render;
 mod report;
+mod scalars;
 pub(crate) mod schema;
 mod section;
 mod source;
@@ -49,7 +50,8 @@ pub(crate) use points::{check_columns, not_numbers, other_length};
 pub use report::{Diagnostics, Mistake};
 
 use grid::Draft;
-use report::Report;
+use report::{Diagnostic, Report};
+use source::Location;
 use washer_model::Machine;
 
 use crate::plan::Plan;
@@ -105,6 +107,14 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
     GridInput::file(path.to_owned(), sets.to_vec()).load()
 }
 
+/// The name of a run as the command line gives it, or what it should have been.
+///
+/// # Errors
+/// In words.
+pub(crate) fn plain_name(text: &str) -> Result<String, String> {
+    grid::plain_name(text)
+}
+
 /// Parameters by name, with a value each.
 pub(crate) type NamedValues = Vec<(String, f64)>;
 
@@ -136,6 +146,24 @@ fn resolve<T>(
 }
 
 pub(crate) use machine::with_one_of_each;
+/// Mistakes in expressions that an option or argument takes, each with its text.
+#[must_use]
+pub(crate) fn mistakes_in_expressions<'a>(
+    option: &str,
+    mistakes: impl IntoIterator<Item = (&'a str, sweep_results::Mistake)>,
+) -> Diagnostics {
+    let mut report = Report::default();
+    for (text, mistake) in mistakes {
+        let source = report.sources.add(option, text);
+        let at = Location::new(source, mistake.span);
+        let mut diagnostic = Diagnostic::new(mistake.title).at(&at, mistake.expected);
+        if let Some((typed, names)) = &mistake.candidates {
+            diagnostic = diagnostic.nearest(typed, names.iter().map(String::as_str));
+        }
+        report.push(diagnostic);
+    }
+    report.into_diagnostics()
+}
 
 /// A machine in full, as a result file carries it.
 #[must_use]

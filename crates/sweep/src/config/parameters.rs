@@ -9,6 +9,7 @@ use super::NamedValues;
 use super::grid::Draft;
 use super::list::List;
 use super::report::{Diagnostic, Report};
+use super::scalars;
 use super::section::{Field, Section, check_number, quoted, refused_number, short};
 use super::source::{Located, Location};
 use crate::design::{Design, MOST_AXES};
@@ -57,7 +58,14 @@ pub(super) fn constants(
         }
         apply(&constants, draft, report);
     }
-    apply(&arguments("--set", sets, draft, report), draft, report);
+    let sets: Vec<String> =
+        sets.iter().filter(|argument| !scalars::is_one(argument)).cloned().collect();
+    let constants = arguments("--set", &sets, draft, report);
+    apply(&constants, draft, report);
+    draft.plan.set = constants
+        .iter()
+        .map(|constant| (constant.name.value.to_owned(), constant.value.value.into()))
+        .collect();
 }
 
 /// Puts one point in place of the axes: `--at` gives every axis of several values, and may give
@@ -154,9 +162,10 @@ pub(super) fn unknown(
     let diagnostic = Diagnostic::new(title).at(&name.at, error.to_string());
     let section = match name.value {
         "window_s" => Some("[time], or as `window_from_s` and `window_to_s` here"),
-        "end_s" => Some("[time]"),
-        "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator]"),
-        "ratio_limit" | "channels" => Some("[reliability]"),
+        "end_s" => Some("[time], or by `--set`,"),
+        "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator], or by `--set`,"),
+        "ratio_limit" | "criterion" => Some("[reliability], or by `--set`,"),
+        "channels" => Some("[reliability]"),
         _ => None,
     };
     match (error, section) {
@@ -260,7 +269,9 @@ pub(super) fn box_of_axes(
     let sections = root.tables("axis", report);
     let most = match &design.value {
         Design::Sobol { .. } => MOST_AXES,
-        Design::LatinHypercube { .. } | Design::List { .. } => usize::MAX,
+        Design::LatinHypercube { .. } | Design::MonteCarlo { .. } | Design::List { .. } => {
+            usize::MAX
+        }
     };
     if sections.is_empty() || sections.len() > most {
         let title =
