@@ -36,7 +36,7 @@ const KEPT_INSTANTS: f64 = 2000.0;
 pub(crate) struct Extras {
     /// Coordinates and their speeds.
     pub states: bool,
-    /// Forces of springs and dampers, and their sum.
+    /// Forces of the elements between cabinet and tub, and their sum.
     pub forces: bool,
 }
 
@@ -320,9 +320,24 @@ impl<'a> Columns<'a> {
                 at.dampers_n[k]
             });
         }
-        for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-            let description =
-                format!("force of all springs and dampers on the cabinet along c{}", k + 1);
+        for k in 0..first.stops_n.len() {
+            let what = format!("stop_{}_force", k + 1);
+            add(&what, "push between the tub and the stop", &|at| at.stops_n[k]);
+        }
+        let axes = ["x", "y", "z"];
+        for k in 0..first.bushings_n.len() {
+            for (i, axis) in axes.into_iter().enumerate() {
+                let what = format!("bushing_{}_force_{axis}", k + 1);
+                let description = format!("force of the bushing on the cabinet along c{}", i + 1);
+                add(&what, &description, &|at| at.bushings_n[k][i]);
+            }
+        }
+        let all = match first.stops_n.is_empty() && first.bushings_n.is_empty() {
+            true => "all springs and dampers",
+            false => "all springs, dampers, stops and bushings",
+        };
+        for (k, axis) in axes.into_iter().enumerate() {
+            let description = format!("force of {all} on the cabinet along c{}", k + 1);
             add(&format!("cabinet_force_{axis}"), &description, &|at| at.cabinet_n[k]);
         }
     }

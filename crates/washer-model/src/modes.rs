@@ -6,8 +6,8 @@
 pub(crate) mod campbell;
 pub(crate) mod shape;
 
-use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, STATES};
-use crate::linear::LinearPoint;
+use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT, STATES, TUB};
+use crate::linear::{LinearPoint, Matrices};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
@@ -242,6 +242,29 @@ pub(crate) fn highest_with_caps(
         }
     }
     Ok(highest)
+}
+
+/// The fastest swing (rad/s) of the tub with the rotor rigid in it, undamped, by a linear model's
+/// stiffness.
+///
+/// # Errors
+/// As [`modes`].
+pub(crate) fn fastest_rigid_rad_per_s(point: &Point, model: &LinearPoint) -> Result<f64, NoModes> {
+    let still = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
+    let Matrices { mass, stiffness, .. } = model.matrices(&point.machine.bodies, &still);
+    let together = |matrix: &[[f64; COORDINATES]; COORDINATES]| {
+        let with = |i: usize, j: usize| matrix[i][j];
+        Mat::from_fn(TUB.len(), TUB.len(), |i, j| {
+            let ([i, k], [j, l]) = ([TUB[i], SHAFT[i]], [TUB[j], SHAFT[j]]);
+            with(i, j) + with(i, l) + with(k, j) + with(k, l)
+        })
+    };
+    let mass = together(&mass);
+    let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| NoModes::Mass)?;
+    let values = factors.solve(together(&stiffness)).eigenvalues();
+    let values = values.map_err(|_| NoModes::Eigenvalues)?;
+    let fastest = values.iter().map(|square| magnitude(*square)).fold(0.0, f64::max).sqrt();
+    if fastest.is_finite() { Ok(fastest) } else { Err(NoModes::Eigenvalues) }
 }
 
 /// x' = unit A x over x = (q, q' / unit).

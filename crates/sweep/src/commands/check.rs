@@ -158,7 +158,9 @@ fn method(plan: &Plan, ladder: &Ladder) -> String {
         Steps::Checked(_) => {
             let rungs: Vec<String> =
                 ladder.rungs.iter().skip(1).map(|rung| rung.to_string()).collect();
-            format!(", until two rungs agree: {}", rungs.join("\n            then "))
+            let why = ladder.held_back.as_ref().map(|why| format!("\n            {why}"));
+            let rungs = rungs.join("\n            then ");
+            format!(", until two rungs agree: {rungs}{}", why.unwrap_or_default())
         }
     };
     format!("{}{steps}", plan.integrator)

@@ -34,7 +34,7 @@ pub struct Args {
     /// Add the ten coordinates and their speeds
     #[arg(long)]
     states: bool,
-    /// Add the tension of each spring and damper, and their sum on the cabinet
+    /// Add the force of each spring, damper, stop and bushing, and their sum on the cabinet
     #[arg(long)]
     forces: bool,
     /// Begin away from equilibrium, both models alike: a coordinate q1 to q10 (m, rad) or a speed

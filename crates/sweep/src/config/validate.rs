@@ -15,8 +15,8 @@ use crate::measures::{Criterion, MOST_TURNS};
 use crate::method::{REFERENCE_SHARE, Steps};
 use crate::plan::{MOST_STEPS, Plan, Scenario, shortest_step_s};
 
-/// Springs, dampers, other elements and rows of a spin's table that are looked at before a run, over all points of
-/// a list: some seconds' worth.
+/// Elements and rows of a spin's table that are looked at before a run, over all points of a list:
+/// some seconds' worth.
 const MOST_JUDGED: u64 = 1_000_000_000;
 
 /// Counting a row's turns takes as long as judging so many rows.
@@ -85,9 +85,8 @@ impl Swept {
             return false;
         }
         let title = format!(
-            "too many points to check: {points}, each with {elements} springs, dampers and the like and a \
-             spin of {rows} \
-             rows"
+            "too many points to check: {points}, each with {elements} springs, dampers \
+             and the like and a spin of {rows} rows"
         );
         let at = draft.origins.get("axis[0]");
         report.push(at.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
