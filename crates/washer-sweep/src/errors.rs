@@ -1,10 +1,11 @@
 //! Errors as Python's: `washer_sweep.PlanError` for what a user wrote, with each mistake as data;
-//! `OSError` for files; `SweepError` for the rest.
+//! `OSError` for files, `RuntimeError` for the rest.
 
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sweep::{Diagnostics, Error, Exit};
+use sweep::{Diagnostics, Error, Exit, StoreError};
+use sweep_plot::PlotError;
 
 /// A class of the package's own.
 fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -46,11 +47,14 @@ fn none_if_empty(text: String) -> Option<String> {
 pub(crate) fn error(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Input(mistakes) => plan_error(py, mistakes),
+        Error::Files(_)
+        | Error::File { .. }
+        | Error::Store(StoreError::File(_))
+        | Error::Plot(PlotError::File(_)) => PyOSError::new_err(worded(error)),
         other if other.exit() == Exit::BadInput => {
             let nothing = PyList::empty(py).into_any().unbind();
             raised(py, "PlanError", worded(other), nothing)
         }
-        Error::Files(_) | Error::File { .. } => PyOSError::new_err(worded(error)),
         _ => PyRuntimeError::new_err(worded(error)),
     }
 }

@@ -1,6 +1,6 @@
 //! `Plan`: a grid that was read and checked, and all that can be asked of it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -11,7 +11,7 @@ use sweep::{
 };
 
 use crate::result::PyResultTable;
-use crate::work::attended;
+use crate::work::{abandonable, attended};
 use crate::{columns, errors};
 
 /// Name of a plan that comes from no file, where it gives none.
@@ -137,8 +137,8 @@ impl PyPlan {
     ) -> PyResult<PyResultTable> {
         let (at, start) = (assignments(at)?, assignments(start)?);
         let options = TraceOptions { every_s: every, states, forces, start };
-        let traced = attended(py, |_| sweep::trace_point(&self.input, &at, &options))?;
-        let traced = traced.or_raise(py, |_| holding(py, "interrupted".to_owned(), None))?;
+        let input = self.input.clone();
+        let traced = abandonable(py, move || sweep::trace_point(&input, &at, &options))?;
         let (table, failures) = traced.map_err(|error| errors::error(py, &error))?;
         for failure in failures {
             py.import("warnings")?.call_method1("warn", (failure,))?;
@@ -235,8 +235,7 @@ pub(crate) fn modes(
     }
     let speeds = speeds_rpm.unwrap_or_else(|| (0..=120_u32).map(|k| 10.0 * f64::from(k)).collect());
     let input = plan.map(|plan| plan.get().input.clone());
-    let found = attended(py, |_| sweep::find_modes(input.as_ref(), &at, &speeds))?;
-    let found = found.or_raise(py, |_| holding(py, "interrupted".to_owned(), None))?;
+    let found = abandonable(py, move || sweep::find_modes(input.as_ref(), &at, &speeds))?;
     found.map(PyResultTable::new).map_err(|error| errors::error(py, &error))
 }
 
@@ -348,6 +347,11 @@ fn toml_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
         });
         return Ok(format!("{{ {} }}", entries.collect::<PyResult<Vec<_>>>()?.join(", ")));
     }
+    // Before numbers: an array of NumPy's with one value passes for a number.
+    if let Ok(entries) = value.try_iter() {
+        let entries = entries.map(|entry| toml_value(key, &entry?));
+        return Ok(format!("[{}]", entries.collect::<PyResult<Vec<_>>>()?.join(", ")));
+    }
     if let Ok(number) = value.extract::<i64>() {
         return Ok(number.to_string());
     }
@@ -355,14 +359,10 @@ fn toml_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
         return Ok(float(number));
     }
     if let Ok(path) = value.extract::<PathBuf>() {
-        return Ok(string(&Path::new(&path).display().to_string()));
+        return Ok(string(&path.display().to_string()));
     }
-    let entries = value.try_iter().map_err(|_| {
-        let found = value.get_type().name().map(|name| name.to_string()).unwrap_or_default();
-        PyTypeError::new_err(format!("`{key}`: a grid holds no `{found}`"))
-    })?;
-    let entries = entries.map(|entry| toml_value(key, &entry?)).collect::<PyResult<Vec<_>>>()?;
-    Ok(format!("[{}]", entries.join(", ")))
+    let found = value.get_type().name().map(|name| name.to_string()).unwrap_or_default();
+    Err(PyTypeError::new_err(format!("`{key}`: a grid holds no `{found}`")))
 }
 
 /// As TOML writes numbers: `nan` and `inf` too, which are then refused at their place.

@@ -9,7 +9,7 @@ use arrow_array::{Array, ArrayRef};
 use arrow_schema::{DataType, Field};
 use pyo3::exceptions::{PyKeyError, PyOSError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList};
+use pyo3::types::{PyByteArray, PyCapsule, PyDict, PyList};
 use sweep::ResultTable;
 use sweep_files::cells;
 use sweep_plot::PlotOptions;
@@ -100,7 +100,7 @@ impl PyResultTable {
                 return numpy.call_method("array", (values,), Some(&typed));
             }
         };
-        numpy.call_method1("frombuffer", (PyBytes::new(py, &bytes), kind))
+        numpy.call_method1("frombuffer", (PyByteArray::new(py, &bytes), kind))
     }
 
     /// Names of the columns.
@@ -136,10 +136,10 @@ impl PyResultTable {
     /// Writes it as `.parquet`, or its figure as `.svg`, `.png` or `.html`.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        let is_figure = ["svg", "png", "html", "htm"].contains(&ending.to_lowercase().as_str());
-        py.detach(|| match is_figure {
-            true => self.0.draw(&PlotOptions::default(), &path),
-            false => self.0.save(&path),
+        let is_rows = ending.eq_ignore_ascii_case("parquet");
+        py.detach(|| match is_rows {
+            true => self.0.save(&path),
+            false => self.0.draw(&PlotOptions::default(), &path),
         })
         .map_err(|error| errors::error(py, &error))
     }

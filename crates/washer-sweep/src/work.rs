@@ -34,6 +34,37 @@ impl<T> Attended<T> {
     }
 }
 
+/// As [`attended`], for a work that nothing stops: Ctrl-C leaves its thread to end by itself, and
+/// what comes of it is dropped.
+pub(crate) fn abandonable<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    py.detach(|| {
+        let (done, ended) = channel();
+        let work = move || {
+            // Nobody may wait for it any more.
+            let _ = done.send(work());
+        };
+        std::thread::Builder::new().spawn(work).map_err(no_thread)?;
+        loop {
+            match ended.recv_timeout(LOOK_UP) {
+                Ok(value) => return Ok(value),
+                Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals())?,
+                Err(RecvTimeoutError::Disconnected) => return Err(panicked()),
+            }
+        }
+    })
+}
+
+fn no_thread(error: std::io::Error) -> PyErr {
+    PyRuntimeError::new_err(format!("cannot start a thread: {error}"))
+}
+
+fn panicked() -> PyErr {
+    PyRuntimeError::new_err("the engine panicked: please report this with the plan")
+}
+
 /// Does a work on a thread of its own while this one looks for signals. A signal whose handler
 /// raises, as Ctrl-C's does, raises the interrupt, and the work is waited for.
 pub(crate) fn attended<T: Send>(
@@ -50,9 +81,8 @@ pub(crate) fn attended<T: Send>(
                 // The receiver waits for it.
                 let _ = done.send(work(interrupt));
             };
-            std::thread::Builder::new().spawn_scoped(scope, work).map_err(|error| {
-                PyRuntimeError::new_err(format!("cannot start a thread: {error}"))
-            })?;
+            let worker =
+                std::thread::Builder::new().spawn_scoped(scope, work).map_err(no_thread)?;
             loop {
                 match ended.recv_timeout(LOOK_UP) {
                     Ok(value) => return Ok(Attended { value, raised }),
@@ -64,9 +94,10 @@ pub(crate) fn attended<T: Send>(
                         }
                     }
                     Err(RecvTimeoutError::Timeout) => {}
-                    // The thread has panicked, and the scope says so.
                     Err(RecvTimeoutError::Disconnected) => {
-                        return Err(PyRuntimeError::new_err("the engine panicked"));
+                        // Joined here, or the scope would pass the panic on.
+                        let _ = worker.join();
+                        return Err(panicked());
                     }
                 }
             }

@@ -160,6 +160,8 @@ def test_figures_are_the_commands(sweep, short, tmp_path):
     for name in ("mine.png", "mine.html"):
         result.save(tmp_path / name)
         assert (tmp_path / name).stat().st_size > 10_000
+    with pytest.raises(washer_sweep.PlanError, match="svg"):
+        result.save(tmp_path / "mine.jpg")
     scattered = short.evaluate({"unbalance_mass_kg": [0.11, 0.5], "damping_n_s_per_m": [99, 60]})
     assert scattered._repr_svg_() is None, "points off a grid have no map"
     assert repr(scattered).startswith("<washer_sweep.Result: map of short, 2 rows,")
@@ -171,12 +173,12 @@ def test_nothing_of_a_users_is_written_over(short, tmp_path):
     thesis = tmp_path / "thesis.parquet"
     thesis.write_text("my thesis")
     for work in (lambda: short.run(progress=False).save(thesis), lambda: short.run(thesis)):
-        with pytest.raises((washer_sweep.PlanError, OSError), match="cannot be an output"):
+        with pytest.raises(OSError, match="cannot be an output"):
             work()
     assert thesis.read_text() == "my thesis"
     with pytest.raises(OSError, match="cannot open"):
         washer_sweep.read(tmp_path / "none.parquet")
-    with pytest.raises((OSError, washer_sweep.PlanError)):
+    with pytest.raises(OSError, match="thesis"):
         washer_sweep.read(thesis)
 
 

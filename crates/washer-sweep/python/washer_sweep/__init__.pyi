@@ -176,7 +176,7 @@ class Result:
         """The plan that it came of, as its file carries it."""
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes a figure as `.svg`, `.png` or `.html`, and the Parquet file by any other name.
+        """Writes the file as `.parquet`, or a figure as `.svg`, `.png` or `.html`.
 
         Parquet files have the bytes that the command writes. Nothing but a file of the same kind
         is written over.
