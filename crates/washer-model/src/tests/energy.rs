@@ -186,6 +186,8 @@ fn what_dampers_friction_stops_and_bushings_take_out_is_what_the_energy_loses() 
     let mut machine = with_every_element();
     // Wide enough for the trapezoidal rule.
     machine.stops.iter_mut().for_each(|stop| stop.softness_m = 1e-3);
+    // Within reach of the throw.
+    machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.004);
     machine.dampers.iter_mut().for_each(|damper| damper.friction_speed_m_per_s = 0.05);
     let coefficients = Coefficients::new(&machine);
     let every_s = 1e-4;
@@ -205,7 +207,7 @@ fn what_dampers_friction_stops_and_bushings_take_out_is_what_the_energy_loses() 
     eprintln!("of {given:.3} J given, {lost:.3} J lost; the balance is off by {worst:.1e}");
     assert!(lost > 0.9 * given && lost < given * (1.0 + 1e-6), "{lost} of {given} J");
     assert!(worst < 1e-6, "{worst:e}");
-    // Each element takes part: the motion closes stops, and leaves the springs' linear range.
+    // The stops take part.
     let closes = |stop: &BumpStop| {
         let depth = |at: &Instant| {
             let q = &at.deviations;
@@ -214,5 +216,5 @@ fn what_dampers_friction_stops_and_bushings_take_out_is_what_the_energy_loses() 
         };
         instants.iter().map(depth).fold(f64::NEG_INFINITY, f64::max)
     };
-    assert!(machine.stops.iter().any(|stop| closes(stop) > 1e-3));
+    assert!(machine.stops[..2].iter().all(|stop| closes(stop) > 1e-3));
 }
