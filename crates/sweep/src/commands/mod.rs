@@ -7,6 +7,7 @@ mod compare;
 mod completions;
 mod conditions;
 mod examples;
+mod export;
 mod grid;
 mod init;
 mod man;
@@ -78,6 +79,8 @@ pub enum Command {
     Require(require::Args),
     /// Say what differs between two results
     Compare(compare::Args),
+    /// Write a result as CSV, as an Excel workbook or as NetCDF, with units
+    Export(export::Args),
     /// Write time histories of both models at one point
     Trace(trace::Args),
     /// Find the natural frequencies over spin speed, the resonance speeds and the mode shapes
@@ -113,6 +116,7 @@ fn examples_of(name: &str) -> Examples {
         "show" => show::EXAMPLES,
         "require" => require::EXAMPLES,
         "compare" => compare::EXAMPLES,
+        "export" => export::EXAMPLES,
         "trace" => trace::EXAMPLES,
         "modes" => modes::EXAMPLES,
         "boundary" => boundary::EXAMPLES,
@@ -198,6 +202,7 @@ impl Command {
             Self::Show(args) => show::run(args),
             Self::Require(args) => require::run(args),
             Self::Compare(args) => compare::run(args),
+            Self::Export(args) => export::run(args),
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Boundary(args) => boundary::run(args),

@@ -41,6 +41,7 @@ pub(crate) use chunk::Shape;
 pub use error::StoreError;
 pub use open::{OpenOptions, OpenRun, Opened};
 pub(crate) use schema::{AxisColumn, Layout};
+pub(crate) use shard::list as shard_list;
 pub use shard::{Shard, ShardRequest};
 pub(crate) use status::FolderStatus;
 pub use status::{State, status};
