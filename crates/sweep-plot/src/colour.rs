@@ -75,6 +75,13 @@ impl ColourScale {
         }
     }
 
+    /// For factors: as far below 1 as above it, so that equal changes either way are equally dark.
+    pub(crate) fn change(values: impl Iterator<Item = f64>) -> Self {
+        let farthest = |so_far: f64, value: f64| so_far.max(value).max(1.0 / value);
+        let most = values.filter(|value| *value > 0.0).fold(1.001, farthest);
+        Self::Diverging { log: true, low: 1.0 / most, centre: 1.0, high: most, reversed: false }
+    }
+
     /// For gaps: below zero there is contact. Gaps that are all open, or all closed, have all the
     /// colours for themselves.
     pub(crate) fn gap(values: impl Iterator<Item = f64>) -> Self {

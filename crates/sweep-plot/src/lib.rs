@@ -78,6 +78,10 @@ pub enum Quantity {
     ClashTimeLinear,
     /// How far the tub sinks at rest, if the run has this metric
     StaticSag,
+    /// Of differences: how the greatest ratio changed, as a factor
+    RatioChange,
+    /// Of differences: how the least gap changed in the nonlinear model
+    GapChange,
     /// How each point ended
     Status,
 }
@@ -170,6 +174,7 @@ pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), 
     check_options(&source, options, format)?;
     let bytes = match source.kind {
         Kind::Map => map(source, options, format)?,
+        Kind::Differences => differences(source, options, format)?,
         Kind::Trace | Kind::Modes | Kind::Boundary => {
             chart(&Table::read(source)?, options, format)?
         }
@@ -213,6 +218,25 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
     Ok(html::map_page(&map, &cuts, options)?.into_bytes())
 }
 
+/// A picture of what differs between two maps: of ratios, unless the options say gaps.
+fn differences(
+    source: Source,
+    options: &PlotOptions,
+    format: Format,
+) -> Result<Vec<u8>, PlotError> {
+    let (path, axes) = (source.path.display().to_string(), swept::axes(&source)?.len());
+    if format == Format::Html || axes < 2 {
+        return Err(PlotError::Unfit(format!(
+            "{path} is a differences file, which is drawn as .svg or .png over two axes or more"
+        )));
+    }
+    let mut options = options.clone();
+    if options.quantity == Quantity::default() {
+        options.quantity = Quantity::RatioChange;
+    }
+    map(source, &options, format)
+}
+
 fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
     let chart = match (table.source.kind, options.view) {
         (Kind::Trace, Some(View::Passages)) => figures::passages::chart(table, options)?,
@@ -220,7 +244,7 @@ fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>
         (Kind::Modes, Some(View::Variation)) => figures::turn::chart(table)?,
         (Kind::Modes, Some(View::Shapes)) => figures::shapes::chart(table)?,
         (Kind::Modes, _) => figures::campbell::chart(table)?,
-        (Kind::Boundary | Kind::Map, _) => figures::boundary::chart(table)?,
+        (Kind::Boundary | Kind::Map | Kind::Differences, _) => figures::boundary::chart(table)?,
     };
     written(table, &chart, format)
 }
@@ -249,7 +273,8 @@ fn view_of(options: &PlotOptions) -> &'static str {
 
 /// Refuses options that the file's kind or the output's format would leave without effect.
 fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
-    let (map, trace) = (source.kind == Kind::Map, source.kind == Kind::Trace);
+    let map = matches!(source.kind, Kind::Map | Kind::Differences);
+    let trace = source.kind == Kind::Trace;
     let view_fits = options.view.is_some_and(|view| view.of() == source.kind);
     let over_time = trace && options.view != Some(View::Passages);
     let rules = [

@@ -26,6 +26,8 @@ pub(crate) enum Kind {
     Modes,
     /// The curve on which the ratio is at its limit.
     Boundary,
+    /// One row per grid point that two maps share.
+    Differences,
 }
 
 impl Kind {
@@ -36,6 +38,7 @@ impl Kind {
             Self::Trace => "trace",
             Self::Modes => "modes",
             Self::Boundary => "boundary",
+            Self::Differences => "differences",
         }
     }
 }
@@ -277,6 +280,8 @@ fn recognise(names: &[&str]) -> Option<Kind> {
         None
     } else if has("status") && has("ratio_max") {
         Some(Kind::Map)
+    } else if has("ratio_change") && has("flip") {
+        Some(Kind::Differences)
     } else if has("time_s") && names.iter().any(|name| name.starts_with("nonlinear_")) {
         Some(Kind::Trace)
     } else if has("mode") && has("frequency_rpm") && has("speed_rpm") {

@@ -31,8 +31,18 @@ pub enum ResultsError {
         /// Why not.
         reason: String,
     },
+    /// A format that has no room for a file.
+    #[error("{} cannot be exported as .{ending}: {reason}", path.display())]
+    Export {
+        /// The file.
+        path: PathBuf,
+        /// The format.
+        ending: &'static str,
+        /// Why not.
+        reason: String,
+    },
     /// A file of more cells than fit in memory.
-    #[error("{} has {cells} cells, more than {most}, which a comparison keeps in memory",
+    #[error("{} has {cells} cells, more than the {most} that are kept in memory",
         path.display())]
     TooLarge {
         /// The file.

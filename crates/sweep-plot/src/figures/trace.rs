@@ -53,15 +53,17 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     };
 
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
+    let names = other.as_ref().map(|other| told_apart(table, other));
     let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
         // The second curve lies in front; where it hides the first one, this must shine through.
         let front = LINEAR.with_alpha(165);
         let [first, second] = &columns;
-        let curves = match &other {
-            Some(other) => {
-                [(table, first, said(table), NONLINEAR, 0), (other, first, said(other), front, 1)]
-            }
-            None => [
+        let curves = match (&other, &names) {
+            (Some(other), Some([one, another])) => [
+                (table, first, one.clone(), NONLINEAR, 0),
+                (other, first, another.clone(), front, 1),
+            ],
+            _ => [
                 (table, first, "nonlinear model".to_owned(), NONLINEAR, 0),
                 (table, second, "linear model".to_owned(), front, 0),
             ],
@@ -126,17 +128,15 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         });
     }
     Ok(Chart {
-        title: match &other {
-            Some(other) => {
-                format!(
-                    "Nonlinear motion from static equilibrium: {} and {}",
-                    said(table),
-                    said(other)
-                )
-            }
+        title: match &names {
+            Some(_) => "Nonlinear motion from static equilibrium".to_owned(),
             None => "Motion of both models from static equilibrium".to_owned(),
         },
-        subtitle: subtitle(table, &least, apart),
+        subtitle: match &names {
+            // What one of them is would be wrong of the other.
+            Some(_) => of_both(&least, apart),
+            None => subtitle(table, &least, apart),
+        },
         x_label: Label::new("Time", "s"),
         x_log: false,
         grids: match &other {
@@ -218,6 +218,46 @@ fn other_trace(path: &Path) -> Result<Table, PlotError> {
 fn said(table: &Table) -> String {
     let file = || table.source.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     table.source.run_name().map_or_else(file, str::to_owned)
+}
+
+/// What two traces are called, so that they are told apart: by their runs' names, or what `--at`
+/// says otherwise of them, or else by their files.
+fn told_apart(one: &Table, other: &Table) -> [String; 2] {
+    let tables = [one, other];
+    let names = tables.map(said);
+    if names[0] != names[1] {
+        return names;
+    }
+    let at = tables.map(|table| {
+        let at = table.source.find("at").and_then(Value::as_object).into_iter().flatten();
+        at.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect::<Vec<_>>()
+    });
+    let own = |side: usize| -> Vec<String> {
+        let differs = at[side].iter().filter(|own| !at[1 - side].contains(own));
+        let words = differs.map(|(name, value)| {
+            let (words, unit) = (label::words(name).to_lowercase(), label::unit_of_name(name));
+            format!("{words} {} {unit}", label::significant(*value, 4)).trim_end().to_owned()
+        });
+        words.collect()
+    };
+    let named = [own(0), own(1)].map(|words| words.join(", "));
+    if named[0] != named[1] && named.iter().all(|name| !name.is_empty()) {
+        return named;
+    }
+    let files = tables.map(|table| table.source.path.file_stem().unwrap_or_default());
+    files.map(|file| file.to_string_lossy().into_owned())
+}
+
+/// What is so of two traces together.
+fn of_both(least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> String {
+    let gaps = least_gaps_mm.iter().map(|(name, gap)| format!("{gap:.2} mm {name}"));
+    let gaps = gaps.collect::<Vec<_>>().join(", ");
+    let mut parts = Vec::new();
+    if !gaps.is_empty() {
+        parts.push(format!("least gap {gaps}"));
+    }
+    parts.extend(apart.map(|apart| format!("largest difference {apart:.1e} of the peak")));
+    parts.join(" · ")
 }
 
 /// The least gap of each model that has one, in the unit shown.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::examples::Examples;
 use super::grid::GridArgs;
-use crate::design::Design;
+use crate::design::{Design, Distribution};
 use crate::engine::Ladder;
 use crate::estimate::{Estimate, size};
 use crate::exit::{Error, Exit, show, tell};
@@ -129,6 +129,10 @@ fn describe(axis: &Axis, design: Option<&Design>) -> String {
         }
         AxisValues::Log { from, to, .. } if design.is_some() => {
             format!("{name}: from {from} to {to}, logarithmic")
+        }
+        AxisValues::Distributed(Distribution { shape, from, to }) => {
+            let numbers = shape.numbers().map(|(key, number)| format!("{key} {number}"));
+            format!("{name}: {}, {}, from {from} to {to}", shape.name(), numbers.join(", "))
         }
         AxisValues::List(values) => {
             let shown: Vec<_> = values.iter().take(8).map(f64::to_string).collect();

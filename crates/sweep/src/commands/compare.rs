@@ -572,8 +572,13 @@ fn bytes(
     );
     table.words(
         "sensitive",
-        "yes where either file calls the row chaotic",
-        rows().map(|row| if row.sensitive { "yes" } else { "no" }),
+        "true where either file calls the row chaotic",
+        rows().map(|row| if row.sensitive { "true" } else { "false" }),
+    );
+    table.words(
+        "status",
+        "ok, or no_ratio where either file has none",
+        rows().map(|row| if row.ratio_change().is_some() { "ok" } else { "no_ratio" }),
     );
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let hashes =

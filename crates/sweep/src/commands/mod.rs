@@ -7,6 +7,7 @@ mod compare;
 mod completions;
 mod conditions;
 mod examples;
+mod export;
 mod grid;
 mod init;
 mod man;
@@ -79,6 +80,8 @@ pub enum Command {
     Require(require::Args),
     /// Say what differs between two results
     Compare(compare::Args),
+    /// Write a result as CSV, as an Excel workbook or as NetCDF, with units
+    Export(export::Args),
     /// Write time histories of both models at one point
     Trace(trace::Args),
     /// Find the natural frequencies over spin speed, the resonance speeds and the mode shapes
@@ -116,6 +119,7 @@ fn examples_of(name: &str) -> Examples {
         "show" => show::EXAMPLES,
         "require" => require::EXAMPLES,
         "compare" => compare::EXAMPLES,
+        "export" => export::EXAMPLES,
         "trace" => trace::EXAMPLES,
         "modes" => modes::EXAMPLES,
         "stability" => stability::EXAMPLES,
@@ -202,6 +206,7 @@ impl Command {
             Self::Show(args) => show::run(args),
             Self::Require(args) => require::run(args),
             Self::Compare(args) => compare::run(args),
+            Self::Export(args) => export::run(args),
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Stability(args) => stability::run(args),

@@ -184,7 +184,19 @@ fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &RunR
     match &report.ended {
         Ended::Already(..) | Ended::Finished(_) => {
             line(&mut text, "file", &output.display().to_string());
-            line(&mut text, "next", &format!("sweep plot {out}"));
+            // A design's points are scattered: there is no map of them to draw.
+            let scattered = plan.design.is_some();
+            let next = if scattered {
+                format!("sweep show {out} --top 10 --by ratio_max")
+            } else {
+                format!("sweep plot {out}")
+            };
+            if let (true, Ended::Already(_, tally) | Ended::Finished(tally)) =
+                (scattered, &report.ended)
+            {
+                line(&mut text, "share", &share(tally));
+            }
+            line(&mut text, "next", &next);
         }
         Ended::Shard(_) => {
             line(
@@ -250,6 +262,29 @@ pub(super) fn rows(tally: &Tally, job: &Job<'_>) -> String {
     counts(tally, job.layout.ratio_limit, &at)
 }
 
+/// The share of reliable points among those with a verdict, with the interval in which the true
+/// share lies with 95 % confidence if points are independent and at random.
+///
+/// E. B. Wilson, Probable inference, the law of succession, and statistical inference, Journal of
+/// the American Statistical Association 22 (1927), 209-212.
+fn share(tally: &Tally) -> String {
+    const Z: f64 = 1.959_963_984_540_054;
+    let count = (tally.reliable + tally.unreliable) as f64;
+    if count == 0.0 {
+        return "no point has a verdict".to_owned();
+    }
+    let part = tally.reliable as f64 / count;
+    let square = Z * Z / count;
+    let centre = (part + square / 2.0) / (1.0 + square);
+    let half = Z / (1.0 + square) * (part * (1.0 - part) / count + square / (4.0 * count)).sqrt();
+    format!(
+        "{:.1} % reliable, with 95 % confidence {:.1} to {:.1} % for points at random",
+        100.0 * part,
+        100.0 * (centre - half).max(0.0),
+        100.0 * (centre + half).min(1.0)
+    )
+}
+
 /// As [`rows`], where `at` says where a point lies.
 pub(super) fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String) -> String {
     let mut text = String::new();
@@ -311,5 +346,21 @@ impl clap::builder::ValueParserFactory for ProgressMode {
 
     fn value_parser() -> Self::Parser {
         clap::builder::ValueParser::new(|text: &str| text.parse::<ProgressMode>())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_share_has_wilsons_interval() {
+        let tally = |reliable, unreliable| Tally { reliable, unreliable, ..Tally::default() };
+        // By hand: 8 of 10, z = 1.96.
+        let said = share(&tally(8, 2));
+        assert!(said.starts_with("80.0 % reliable, with 95 % confidence 49.0 to 94.3 %"), "{said}");
+        let all = share(&tally(100, 0));
+        assert!(all.contains("96.3 to 100.0 %"), "{all}");
+        assert_eq!(share(&tally(0, 0)), "no point has a verdict");
     }
 }

@@ -11,6 +11,7 @@ use super::examples::Examples;
 use super::run::{counts, line};
 use crate::exit::{Error, Exit, show};
 use crate::identity;
+use crate::nearest::nearest;
 use crate::stability::tongues;
 use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, Tally, overview, row, tally};
 use sweep_files::{FileKind, ParquetFile, key};
@@ -128,14 +129,8 @@ fn rows(args: &Args) -> Result<Exit, Error> {
     let by = args.by.as_deref().map(|by| (by, order));
     let count = usize::from(args.top.unwrap_or(ROWS_SHOWN));
     let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-    let rows = top(&file, &names, keep.as_ref(), by, count).map_err(|error| match error {
-        ResultsError::Column { path, name, .. } => {
-            let names = file.columns.iter().map(|column| column.name.as_str());
-            let nearest = crate::nearest::nearest(&name, names).map(str::to_owned);
-            ResultsError::Column { path, name, nearest }
-        }
-        other => other,
-    })?;
+    let rows = top(&file, &names, keep.as_ref(), by, count);
+    let rows = rows.map_err(|error| with_nearest(error, &file))?;
     if args.json {
         let object = |row: &Vec<Cell>| {
             let cells = columns.iter().zip(row).map(|(name, cell)| (name.clone(), json!(cell)));
@@ -149,6 +144,18 @@ fn rows(args: &Args) -> Result<Exit, Error> {
         return show("no rows\n");
     }
     show(&table(&columns, &rows, ""))
+}
+
+/// An error about a column with the name that was meant.
+pub(super) fn with_nearest(error: ResultsError, file: &ResultTable) -> ResultsError {
+    match error {
+        ResultsError::Column { path, name, .. } => {
+            let names = file.columns.iter().map(|column| column.name.as_str());
+            let nearest = nearest(&name, names).map(str::to_owned);
+            ResultsError::Column { path, name, nearest }
+        }
+        other => other,
+    }
 }
 
 /// The columns to show of rows: those asked for, or where a row is, how its verdict came about, and

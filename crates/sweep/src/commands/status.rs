@@ -7,7 +7,7 @@ use super::grid::ResultArgs;
 use super::run::line;
 use crate::exit::{Error, Exit, show, tell};
 use crate::speeds::{Speeds, turning};
-use crate::store::{FolderStatus, State, status};
+use crate::store::{FolderStatus, State, shard_list, status};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[
@@ -76,8 +76,11 @@ fn summary(args: &Args, found: &FolderStatus) -> String {
     }
     if let Some(shards) = found.shards {
         line(&mut text, "shards", &shards.to_string());
-        if !found.missing_shards.is_empty() {
-            line(&mut text, "again", &format!("sbatch --array={} ...", found.missing_shards));
+        let missing = shard_list(found.missing_shard_numbers.iter().copied());
+        if !missing.is_empty() {
+            let run = format!("{} --shard I/{shards}", args.target.command("run"));
+            line(&mut text, "again", &format!("{run}, for I = {missing}"));
+            line(&mut text, "on Slurm", &format!("sbatch --array={} ...", found.missing_shards));
         }
     }
     let next = match found.state {

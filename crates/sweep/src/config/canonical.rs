@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use washer_model::Spin;
 
 use super::machine;
-use crate::design::Design;
+use crate::design::{Design, Distribution};
 use crate::measures::{Criterion, Measures};
 use crate::plan::{Axis, AxisValues, Plan};
 
@@ -97,6 +97,14 @@ fn axis(axis: &Axis, design: Option<&Design>) -> Value {
     };
     match axis.values {
         AxisValues::List(ref values) => json!({ "parameter": parameter, "values": values }),
+        AxisValues::Distributed(ref distribution) => {
+            let Distribution { shape, from, to } = *distribution;
+            let mut json = json!({ "kind": shape.name(), "from": from, "to": to });
+            for (key, number) in shape.numbers() {
+                json[key] = number.into();
+            }
+            json!({ "parameter": parameter, "distribution": json })
+        }
         AxisValues::Linear { from, to, count } => range(from, to, count, "linear"),
         AxisValues::Log { from, to, count } => range(from, to, count, "log"),
     }

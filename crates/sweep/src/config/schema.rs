@@ -80,6 +80,7 @@ fn design() -> Value {
         "oneOf": [
             one("latin_hypercube", "every axis cut into as many strata as there are points, one \
                                     point in each", MOST_POINTS),
+            one("monte_carlo", "every point at random, independent of all others", MOST_POINTS),
             one("sobol", "a scrambled Sobol sequence; a power of two points is the most \
                           even", MOST_SOBOL),
             table([("method", list), ("file", file)], &["method", "file"]),
@@ -336,6 +337,29 @@ fn reliability() -> Value {
     table([("ratio_limit", ratio_limit), ("channels", channels), ("criterion", criterion)], &[])
 }
 
+fn distribution() -> Value {
+    let one = |kind: &'static str, numbers: &[(&'static str, Range)], required: &[&str]| {
+        let mut properties = vec![("kind", json!({ "const": kind }))];
+        properties.extend(numbers.iter().map(|(key, range)| (*key, number(*range))));
+        properties.extend(["from", "to"].map(|key| (key, number(Range::Any))));
+        table(properties, required)
+    };
+    let (any, positive) = (Range::Any, Range::Positive);
+    json!({
+        "description": "of a design, cut at `from` and `to`; left out, they lie six standard \
+                        deviations from the middle",
+        "oneOf": [
+            one("normal", &[("mean", any), ("sd", positive)], &["kind", "mean", "sd"]),
+            one(
+                "lognormal",
+                &[("median", positive), ("sigma", positive)],
+                &["kind", "median", "sigma"],
+            ),
+            one("uniform", &[], &["kind", "from", "to"]),
+        ],
+    })
+}
+
 fn axis() -> Value {
     let parameter = json!({ "type": "string", "description": "a name of `sweep parameters`" });
     let range = table(
@@ -360,7 +384,11 @@ fn axis() -> Value {
     json!({
         "oneOf": [
             table([("parameter", parameter.clone()), ("values", values)], &["parameter", "values"]),
-            table([("parameter", parameter), ("range", range)], &["parameter", "range"]),
+            table([("parameter", parameter.clone()), ("range", range)], &["parameter", "range"]),
+            table(
+                [("parameter", parameter), ("distribution", distribution())],
+                &["parameter", "distribution"],
+            ),
         ],
     })
 }

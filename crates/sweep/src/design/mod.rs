@@ -4,9 +4,11 @@
 //! A point's place is a pure function of design and index: any shard, any resumed run, any machine
 //! finds the same.
 
+mod distribution;
 mod latin;
 mod sobol;
 
+pub(crate) use distribution::{Distribution, REACH, Shape};
 pub(crate) use sobol::MOST_AXES;
 
 /// How the points of a plan are laid out, if not as a grid.

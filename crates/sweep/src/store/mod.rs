@@ -42,6 +42,7 @@ pub use error::StoreError;
 pub(crate) use merge::write_map;
 pub use open::{OpenOptions, OpenRun, Opened};
 pub(crate) use schema::{AxisColumn, BATCH_ROWS, Layout, ResultRows, RowKind};
+pub(crate) use shard::list as shard_list;
 pub use shard::{Shard, ShardRequest};
 pub(crate) use status::FolderStatus;
 pub use status::{State, status};
