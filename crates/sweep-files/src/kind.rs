@@ -99,22 +99,23 @@ impl FileKind<'_> {
             Ok(start.starts_with(with))
         };
         let is_ours = match self {
-            Self::Map | Self::Trace | Self::Modes | Self::Boundary | Self::Differences => match ParquetFile::look(path)
-            {
-                Ok(file) if self.has_keys(&|key| file.value(key).is_some()) => true,
-                Ok(_) => {
-                    // A damaged key makes one of ours look like another's.
-                    ParquetFile::open(path)?;
-                    false
+            Self::Map | Self::Trace | Self::Modes | Self::Boundary | Self::Differences => {
+                match ParquetFile::look(path) {
+                    Ok(file) if self.has_keys(&|key| file.value(key).is_some()) => true,
+                    Ok(_) => {
+                        // A damaged key makes one of ours look like another's.
+                        ParquetFile::open(path)?;
+                        false
+                    }
+                    Err(FileError::NotParquet { reason, .. }) => {
+                        let name = self.name();
+                        return Ok(Some(format!(
+                            "the file there is no {name}, nor a Parquet file ({reason})"
+                        )));
+                    }
+                    Err(error) => return Err(error),
                 }
-                Err(FileError::NotParquet { reason, .. }) => {
-                    let name = self.name();
-                    return Ok(Some(format!(
-                        "the file there is no {name}, nor a Parquet file ({reason})"
-                    )));
-                }
-                Err(error) => return Err(error),
-            },
+            }
             Self::Exported { ending: "csv" } => begins(EXPORTED_CSV.as_bytes())?,
             Self::Exported { ending: "nc" } => begins(b"CDF\x02")?,
             Self::Exported { .. } => begins(b"PK\x03\x04")?,
@@ -132,7 +133,9 @@ impl FileKind<'_> {
         let own = match self {
             Self::Map => {
                 return has(key::PLAN)
-                    && ![key::TRACE, key::MODES, key::BOUNDARY, key::DIFFERENCES].into_iter().any(has);
+                    && ![key::TRACE, key::MODES, key::BOUNDARY, key::DIFFERENCES]
+                        .into_iter()
+                        .any(has);
             }
             Self::Trace => key::TRACE,
             Self::Modes => key::MODES,

@@ -83,14 +83,6 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// Reads a condition over the columns of a file.
-    ///
-    /// # Errors
-    /// The first mistake in it.
-    pub fn parse(text: &str, table: &ResultTable) -> Result<Self, Mistake> {
-        crate::parse::condition(text, &table.columns)
-    }
-
     /// Whether it speaks of single rows; if not, of the file as a whole.
     #[must_use]
     pub const fn is_by_row(&self) -> bool {
@@ -122,11 +114,9 @@ impl Node {
             Self::Calculate(operation, left, right) => {
                 number(operation.of(left.number(at), right.number(at)))
             }
-            Self::Not(_)
-            | Self::And(..)
-            | Self::Or(..)
-            | Self::IsNull(_)
-            | Self::Compare(..) => self.truth(at).map_or(Cell::Null, Cell::Flag),
+            Self::Not(_) | Self::And(..) | Self::Or(..) | Self::IsNull(_) | Self::Compare(..) => {
+                self.truth(at).map_or(Cell::Null, Cell::Flag)
+            }
         }
     }
 
@@ -232,8 +222,7 @@ impl Condition {
                         folding.counted += 1;
                         folding.sum += number;
                         folding.least = Some(folding.least.map_or(number, |l| l.min(number)));
-                        folding.greatest =
-                            Some(folding.greatest.map_or(number, |g| g.max(number)));
+                        folding.greatest = Some(folding.greatest.map_or(number, |g| g.max(number)));
                     }
                 }
             }

@@ -15,7 +15,7 @@
 use std::ops::Range;
 
 use crate::condition::{Comparison, Condition, Fold, Mistake, Node, Operation, Typed};
-use crate::rows::{Cell, CellKind, Column};
+use crate::rows::{Cell, CellKind, Column, ResultTable};
 
 /// Deepest nesting: what no person writes, and no stack minds.
 const DEEPEST: usize = 64;
@@ -57,9 +57,8 @@ fn tokens(text: &str) -> Result<Vec<Spanned>, Mistake> {
     let mut at = 0;
     while let Some(first) = text[at..].chars().next() {
         let rest = &text[at..];
-        let taken = |matches: &dyn Fn(char) -> bool| {
-            rest.find(|c: char| !matches(c)).unwrap_or(rest.len())
-        };
+        let taken =
+            |matches: &dyn Fn(char) -> bool| rest.find(|c: char| !matches(c)).unwrap_or(rest.len());
         let (token, length) = if first.is_whitespace() {
             at += first.len_utf8();
             continue;
@@ -68,7 +67,11 @@ fn tokens(text: &str) -> Result<Vec<Spanned>, Mistake> {
             let number = rest[..length].parse::<f64>().ok().filter(|number| number.is_finite());
             let Some(number) = number else {
                 let title = format!("`{}` is not a number", &rest[..length]);
-                return Err(mistake(title, at..at + length, "expected a number such as 1.5 or 2e-3"));
+                return Err(mistake(
+                    title,
+                    at..at + length,
+                    "expected a number such as 1.5 or 2e-3",
+                ));
             };
             (Token::Number(number), length)
         } else if first.is_alphabetic() || first == '_' {
@@ -77,7 +80,11 @@ fn tokens(text: &str) -> Result<Vec<Spanned>, Mistake> {
         } else if first == '"' || first == '\'' {
             let Some(end) = rest[1..].find(first) else {
                 let span = at..text.len();
-                return Err(mistake("a text without an end", span, format!("expected a closing {first}")));
+                return Err(mistake(
+                    "a text without an end",
+                    span,
+                    format!("expected a closing {first}"),
+                ));
             };
             (Token::Text(rest[1..=end].to_owned()), end + 2)
         } else if let Some((foreign, own)) = FOREIGN.iter().find(|(foreign, _)| {
@@ -111,6 +118,16 @@ fn number_length(text: &str) -> usize {
     .unwrap_or(text.len())
 }
 
+impl Condition {
+    /// Reads a condition over the columns of a file.
+    ///
+    /// # Errors
+    /// The first mistake in it.
+    pub fn parse(text: &str, table: &ResultTable) -> Result<Self, Mistake> {
+        condition(text, &table.columns)
+    }
+}
+
 struct Parser<'a> {
     tokens: Vec<Spanned>,
     next: usize,
@@ -123,7 +140,7 @@ struct Parser<'a> {
 }
 
 /// Reads a condition over these columns.
-pub(crate) fn condition(text: &str, columns: &[Column]) -> Result<Condition, Mistake> {
+fn condition(text: &str, columns: &[Column]) -> Result<Condition, Mistake> {
     let mut parser = Parser {
         tokens: tokens(text)?,
         next: 0,
@@ -141,7 +158,8 @@ pub(crate) fn condition(text: &str, columns: &[Column]) -> Result<Condition, Mis
         return Err(mistake("the expression goes on after its end", span, expected));
     }
     if root.kind != CellKind::Flag {
-        let title = format!("the expression is {}, which neither holds nor fails", root.kind.name());
+        let title =
+            format!("the expression is {}, which neither holds nor fails", root.kind.name());
         return Err(mistake(title, root.span, "expected a comparison, as in `ratio_max < 1.5`"));
     }
     let Parser { used, folds, by_row, .. } = parser;
@@ -272,9 +290,7 @@ impl Parser<'_> {
         let (token, span) = self.take();
         let typed = |node, kind| Ok(Typed { node, kind, span: span.clone() });
         match token {
-            Token::Number(number) => {
-                typed(Node::Literal(Cell::Number(number)), CellKind::Number)
-            }
+            Token::Number(number) => typed(Node::Literal(Cell::Number(number)), CellKind::Number),
             Token::Text(text) => typed(Node::Literal(Cell::Text(text)), CellKind::Text),
             Token::Sign("-") => {
                 let inner = self.deeper(Self::factor)?;

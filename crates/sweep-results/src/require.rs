@@ -87,9 +87,9 @@ pub fn check(
             let placed = places.iter().enumerate().map(|(k, name)| (*name, own + k));
             let read = condition.columns.iter().enumerate().map(|(k, name)| (name.as_str(), k));
             let read = read.filter(|(name, _)| !places.contains(name));
-            let cells = placed.chain(read).map(|(name, column)| {
-                (name.to_owned(), at.rows.cell(column, at.row))
-            });
+            let cells = placed
+                .chain(read)
+                .map(|(name, column)| (name.to_owned(), at.rows.cell(column, at.row)));
             checked.offenders.push(Offender {
                 row: at.rows.first + at.row as u64,
                 undefined: truth.is_none(),

@@ -225,9 +225,9 @@ impl Rows {
     #[must_use]
     pub fn cell(&self, column: usize, row: usize) -> Cell {
         match self.columns.get(column) {
-            Some(Decoded::Numbers(cells)) => cells[row]
-                .filter(|number| !number.is_nan())
-                .map_or(Cell::Null, Cell::Number),
+            Some(Decoded::Numbers(cells)) => {
+                cells[row].filter(|number| !number.is_nan()).map_or(Cell::Null, Cell::Number)
+            }
             Some(Decoded::Texts { names, codes }) => {
                 codes[row].map_or(Cell::Null, |code| Cell::Text(names[code].clone()))
             }
@@ -242,7 +242,10 @@ impl Rows {
 enum Decoded {
     Numbers(Vec<Option<f64>>),
     /// Few words are many rows' word.
-    Texts { names: Vec<String>, codes: Vec<Option<usize>> },
+    Texts {
+        names: Vec<String>,
+        codes: Vec<Option<usize>>,
+    },
     Flags(Vec<Option<bool>>),
 }
 

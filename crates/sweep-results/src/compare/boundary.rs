@@ -114,17 +114,13 @@ pub(super) fn of_boundaries(
     let (names, others) = (first.axes(), second.axes());
     let [_, axis, ..] = names[..] else { return Ok(None) };
     let unit = first.column(axis).map(|column| column.unit.clone()).unwrap_or_default();
-    let keys: Vec<&str> = names
-        .iter()
-        .copied()
-        .filter(|name| *name != axis && others.contains(name))
-        .collect();
+    let keys: Vec<&str> =
+        names.iter().copied().filter(|name| *name != axis && others.contains(name)).collect();
     let mut lines = Lines::new();
     for (side, table) in [first, second].into_iter().enumerate() {
         let bracket = ["_low", "_high"].map(|word| {
             let stem = table.columns.iter().find(|column| {
-                column.name.contains(word)
-                    && column.name.replacen(word, "", 1) == axis
+                column.name.contains(word) && column.name.replacen(word, "", 1) == axis
             });
             stem.map(|column| column.name.as_str()).unwrap_or_default()
         });
@@ -136,7 +132,8 @@ pub(super) fn of_boundaries(
                 let number = |place: usize| rows.cell(place, row).number();
                 let place: Option<Vec<f64>> = (0..keys.len()).map(number).collect();
                 let Some(place) = place else { continue };
-                let line = lines.entry(ordered(&place)).or_insert_with(|| (place, Default::default()));
+                let line =
+                    lines.entry(ordered(&place)).or_insert_with(|| (place, Default::default()));
                 let count = keys.len();
                 if let (Some(low), Some(high)) = (number(count + 1), number(count + 2)) {
                     let at = number(count).unwrap_or(f64::midpoint(low, high));

@@ -143,9 +143,7 @@ impl Comparison {
 
     /// Rows whose verdict differs; of `sensitive` ones, or of the others.
     pub fn flips(&self, sensitive: bool) -> impl Iterator<Item = &SharedRow> {
-        self.shared
-            .iter()
-            .filter(move |row| row.flip != Flip::None && row.sensitive == sensitive)
+        self.shared.iter().filter(move |row| row.flip != Flip::None && row.sensitive == sensitive)
     }
 
     /// The `count` rows with the greatest changes by `of`, those without a change left out; of
@@ -170,8 +168,8 @@ fn kind(table: &ResultTable) -> String {
     let prefix = key::PLAN.split('.').next().unwrap_or_default();
     let named = table.file().pairs().find_map(|pair| {
         let name = pair.key.strip_prefix(prefix)?.strip_prefix('.')?;
-        let is_kind = !["plan", "plan_hash", "version", "numerics", "columns", "digest"]
-            .contains(&name);
+        let is_kind =
+            !["plan", "plan_hash", "version", "numerics", "columns", "digest"].contains(&name);
         is_kind.then(|| name.to_owned())
     });
     let is_map = || table.column("ratio_max").is_some() && table.column("status").is_some();
@@ -281,11 +279,7 @@ fn numbered(side: &Side, row: usize, seen: &mut HashMap<Vec<u64>, usize>) -> (Ve
 }
 
 /// The columns that differ in the shared rows, which are marked.
-fn changes(
-    sides: &[Side; 2],
-    pairs: &[[usize; 2]],
-    shared: &mut [SharedRow],
-) -> Vec<ColumnChange> {
+fn changes(sides: &[Side; 2], pairs: &[[usize; 2]], shared: &mut [SharedRow]) -> Vec<ColumnChange> {
     let mut changes = Vec::new();
     for (column, first) in &sides[0].columns {
         let Some((_, second)) =

@@ -13,7 +13,10 @@ pub(super) enum Cells {
     /// Missing ones are NaN.
     Numbers(Vec<f64>),
     /// Places among the names; missing ones are the greatest.
-    Texts { names: Vec<String>, codes: Vec<u32> },
+    Texts {
+        names: Vec<String>,
+        codes: Vec<u32>,
+    },
     Flags(Vec<Option<bool>>),
 }
 

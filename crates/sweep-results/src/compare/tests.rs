@@ -38,9 +38,8 @@ fn planted_flips_are_found_and_sensitive_rows_stand_apart() {
     ratios[3] = Some(1.0); // failed before
     ratios[4] = Some(1.0); // not reliable before, and sensitive
     let found = compare(&map(&RATIOS), &map(&ratios)).unwrap();
-    let flips = |sensitive| {
-        found.flips(sensitive).map(|row| (row.rows[0], row.flip)).collect::<Vec<_>>()
-    };
+    let flips =
+        |sensitive| found.flips(sensitive).map(|row| (row.rows[0], row.flip)).collect::<Vec<_>>();
     assert_eq!(flips(false), [(1, Flip::Lost), (2, Flip::Gained), (3, Flip::Defined)]);
     assert_eq!(flips(true), [(4, Flip::Gained)]);
     let greatest = found.greatest(2, false, SharedRow::ratio_by);
@@ -95,7 +94,10 @@ fn an_axis_that_one_file_lacks_is_left_out_if_it_has_one_value() {
     let two = with_spin(&[300.0, 300.0, 300.0, 350.0, 350.0, 350.0]);
     let refused = compare(&map(&RATIOS), &two).unwrap_err();
     assert!(refused.is_refusal());
-    assert!(refused.to_string().contains("only the second has the axis `spin_peak_rpm`"), "{refused}");
+    assert!(
+        refused.to_string().contains("only the second has the axis `spin_peak_rpm`"),
+        "{refused}"
+    );
 }
 
 #[test]

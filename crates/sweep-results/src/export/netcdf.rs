@@ -177,8 +177,7 @@ fn laid_out<'a>(
         dimensions.push(("row".to_owned(), length(rows)));
     }
     let all: Vec<u32> = (0..length(dimensions.len())).collect();
-    let is_axis =
-        |name: &str| grid.iter().flatten().any(|(axis, _)| *axis == name);
+    let is_axis = |name: &str| grid.iter().flatten().any(|(axis, _)| *axis == name);
     for (column, values) in columns.iter().filter(|(column, _)| !is_axis(&column.name)) {
         let values = match values {
             Values::Numbers(numbers) => Values::Numbers(numbers.clone()),
@@ -407,6 +406,8 @@ mod tests {
         let table = ResultTable::open(&path).unwrap();
         let (dimensions, variables) = variables(&bytes(&table).unwrap());
         assert_eq!(dimensions, [("row".to_owned(), 5)]);
-        assert!(variables.iter().any(|(name, over, _)| name == "damping_n_s_per_m" && over == &[0]));
+        assert!(
+            variables.iter().any(|(name, over, _)| name == "damping_n_s_per_m" && over == &[0])
+        );
     }
 }

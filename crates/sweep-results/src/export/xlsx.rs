@@ -96,9 +96,7 @@ fn archive(sheets: &[String; 3]) -> io::Result<Vec<u8>> {
 
 /// Style 0 is plain, 1 bold.
 fn styles() -> String {
-    let font = |bold: &str| {
-        format!("<font>{bold}<sz val=\"11\"/><name val=\"Calibri\"/></font>")
-    };
+    let font = |bold: &str| format!("<font>{bold}<sz val=\"11\"/><name val=\"Calibri\"/></font>");
     let style = |font: u8| {
         format!("<xf numFmtId=\"0\" fontId=\"{font}\" fillId=\"0\" borderId=\"0\" xfId=\"0\"/>")
     };

@@ -33,11 +33,8 @@ pub(super) fn table(headings: &[String], rows: &[Vec<String>], indent: &str) -> 
     };
     let widths: Vec<usize> = (0..headings.len()).map(width).collect();
     let line = |cells: &[String]| {
-        let padded: Vec<String> = cells
-            .iter()
-            .zip(&widths)
-            .map(|(cell, &width)| format!("{cell:>width$}"))
-            .collect();
+        let padded: Vec<String> =
+            cells.iter().zip(&widths).map(|(cell, &width)| format!("{cell:>width$}")).collect();
         format!("{indent}{}\n", padded.join("  ").trim_end())
     };
     std::iter::once(line(headings)).chain(rows.iter().map(|row| line(row))).collect()

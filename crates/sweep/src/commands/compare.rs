@@ -121,30 +121,31 @@ impl FailOn {
     /// What of it is there, in words; `None` if nothing is.
     fn found(self, found: &Comparison) -> Option<String> {
         let steady = || found.shared.iter().filter(|row| !row.sensitive);
-        let counted = |count: usize, what: &str| {
-            let plural = if count == 1 { "" } else { "s" };
-            (count > 0).then(|| format!("{count} {what}{plural}"))
-        };
+        let counted = |what: &str, count: usize| (count > 0).then(|| format!("{what}: {count}"));
         match self {
             Self::Any => (!found.is_empty()).then(|| "the files differ".to_owned()),
-            Self::Plan => counted(found.plan.len(), "difference of the plan"),
-            Self::Rows => counted(found.alone.iter().sum::<u64>() as usize, "row of one file"),
-            Self::Flips => counted(found.flips(false).count(), "verdict that flipped"),
-            Self::Sensitive => counted(found.flips(true).count(), "sensitive verdict that flipped"),
+            Self::Plan => counted("differences of the plans", found.plan.len()),
+            Self::Rows => {
+                counted("rows of one file alone", found.alone.iter().sum::<u64>() as usize)
+            }
+            Self::Flips => counted("verdicts that flipped", found.flips(false).count()),
+            Self::Sensitive => {
+                counted("sensitive verdicts that flipped", found.flips(true).count())
+            }
             Self::Ratio(most) => {
-                let count = steady().filter(|row| row.ratio_by() > most).count();
-                counted(count, &format!("ratio that changed by more than {} %", short(100.0 * most)))
+                let what = format!("ratios that changed by more than {} %", short(100.0 * most));
+                counted(&what, steady().filter(|row| row.ratio_by() > most).count())
             }
             Self::Gap(most) => {
-                let count = steady().filter(|row| row.gap_by_m() > most).count();
-                counted(count, &format!("gap that changed by more than {} m", short(most)))
+                let what = format!("gaps that changed by more than {} m", short(most));
+                counted(&what, steady().filter(|row| row.gap_by_m() > most).count())
             }
             Self::Boundary(most) => {
                 let moved = found.boundary.as_ref()?;
                 let far = moved.crossings.iter().filter(|crossing| crossing.at_least() > most);
-                let count = far.count() + moved.unlike.len();
-                let what = format!("crossing that moved by more than {} {}", short(most), moved.unit);
-                counted(count, what.trim_end())
+                let what =
+                    format!("crossings that moved by more than {} {}", short(most), moved.unit);
+                counted(what.trim_end(), far.count() + moved.unlike.len())
             }
         }
     }
@@ -180,7 +181,11 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     } else {
         show(&text(args, &found))?;
         if let Some(out) = &args.out {
-            tell(&format!("wrote {0}: sweep plot {1}", out.display(), quoted(&out.display().to_string())));
+            tell(&format!(
+                "wrote {0}: sweep plot {1}",
+                out.display(),
+                quoted(&out.display().to_string())
+            ));
         }
         broken.iter().for_each(|broken| tell(&format!("--fail-on: {broken}")));
     }
@@ -549,7 +554,12 @@ fn bytes(
     for (side, which) in ["A", "B"].into_iter().enumerate() {
         let suffix = ["a", "b"][side];
         let values = rows().map(|row| row.ratio[side]);
-        table.numbers(&format!("ratio_max_{suffix}"), "1", &format!("ratio_max of {which}"), values);
+        table.numbers(
+            &format!("ratio_max_{suffix}"),
+            "1",
+            &format!("ratio_max of {which}"),
+            values,
+        );
     }
     table.words(
         "flip",
@@ -568,7 +578,8 @@ fn bytes(
         rows().map(|row| if row.ratio_change().is_some() { "ok" } else { "no_ratio" }),
     );
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let hashes = tables.each_ref().map(|table| table.file().value(key::PLAN_HASH).map(str::to_owned));
+    let hashes =
+        tables.each_ref().map(|table| table.file().value(key::PLAN_HASH).map(str::to_owned));
     table.metadata(
         key::DIFFERENCES,
         &json!({

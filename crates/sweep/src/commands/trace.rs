@@ -182,11 +182,8 @@ fn extreme_of(column: &str) -> &'static str {
 fn worst(args: &Args, plan: &Plan, column: &str) -> Result<u64, Error> {
     let default = || PathBuf::from(format!("results/{}.parquet", plan.name));
     let path = args.result.clone().unwrap_or_else(default);
-    let refused = |expected: String| Error::Option {
-        option: "--worst",
-        given: column.to_owned(),
-        expected,
-    };
+    let refused =
+        |expected: String| Error::Option { option: "--worst", given: column.to_owned(), expected };
     if !path.exists() {
         let run = format!("`sweep run {}`", quoted(&args.grid.grid.display().to_string()));
         let expected = format!("a result at {} (--result); {run} makes it", path.display());

@@ -150,8 +150,9 @@ fn name(root: &mut Section<'_>, path: &Path, report: &mut Report) -> String {
                 return stem.to_owned();
             }
             let title = "`name` is missing, and the file's own name cannot stand in for it";
-            report
-                .push_missing(Diagnostic::new(title).at(root.at(), format!("expected {PLAIN_NAME}")));
+            report.push_missing(
+                Diagnostic::new(title).at(root.at(), format!("expected {PLAIN_NAME}")),
+            );
         }
     }
     String::new()

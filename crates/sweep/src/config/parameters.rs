@@ -162,10 +162,9 @@ fn unknown(
     let diagnostic = Diagnostic::new(title).at(&name.at, error.to_string());
     let section = match name.value {
         "window_s" => Some("[time], or as `window_from_s` and `window_to_s` here"),
-        "end_s" => Some("[time], or by `--set`,"),
-        "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator], or by `--set`,"),
-        "ratio_limit" | "criterion" => Some("[reliability], or by `--set`,"),
-        "channels" => Some("[reliability]"),
+        "end_s" => Some("[time]"),
+        "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator]"),
+        "ratio_limit" | "criterion" | "channels" => Some("[reliability]"),
         _ => None,
     };
     match (error, section) {

@@ -132,9 +132,8 @@ fn put(written: &Written<'_>, draft: &mut Draft, report: &mut Report) -> Option<
             let entry = &METHODS[written.choice(&names, report)?];
             let was = plan.integrator.to_json();
             // Settings that both methods have stay as they are.
-            plan.integrator = (entry.with)(&mut |setting| {
-                was[setting.key].as_f64().unwrap_or(setting.default)
-            });
+            plan.integrator =
+                (entry.with)(&mut |setting| was[setting.key].as_f64().unwrap_or(setting.default));
             draft.origins.put("integrator".to_owned(), written.value.at.clone());
             json!(entry.name)
         }
@@ -144,8 +143,7 @@ fn put(written: &Written<'_>, draft: &mut Draft, report: &mut Report) -> Option<
                 settings().into_iter().find(|(setting, _)| setting.key == key)?;
             let was = plan.integrator.to_json();
             if !owners.contains(&plan.integrator.name()) {
-                let title =
-                    format!("the method \"{}\" has no `{key}`", plan.integrator.name());
+                let title = format!("the method \"{}\" has no `{key}`", plan.integrator.name());
                 let expected = format!("`{key}` belongs to \"{}\"", owners.join("\", \""));
                 report.push(Diagnostic::new(title).at(&written.name.at, expected));
                 return None;
@@ -178,7 +176,8 @@ fn design(written: &Written<'_>, draft: &mut Draft, report: &mut Report) -> Opti
             | Design::MonteCarlo { points, seed },
         ) => *(if name == "points" { points } else { seed }) = number,
         _ => {
-            let title = format!("`{name}` belongs to a design, and this grid has none that takes it");
+            let title =
+                format!("`{name}` belongs to a design, and this grid has none that takes it");
             let expected = "expected a grid file with [design]";
             report.push(Diagnostic::new(title).at(&written.name.at, expected));
             return None;

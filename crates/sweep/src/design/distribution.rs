@@ -80,11 +80,8 @@ impl Distribution {
     pub fn quantile(&self, place: f64) -> f64 {
         let [low, high] = [self.from, self.to].map(|bound| self.shape.deviations(bound));
         // Above the middle the part beyond is small and keeps its digits; so it is turned around.
-        let deviations = if low > 0.0 {
-            -between(-high, -low, 1.0 - place)
-        } else {
-            between(low, high, place)
-        };
+        let deviations =
+            if low > 0.0 { -between(-high, -low, 1.0 - place) } else { between(low, high, place) };
         self.shape.at(deviations).clamp(self.from, self.to)
     }
 }
