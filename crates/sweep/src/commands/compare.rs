@@ -583,6 +583,8 @@ fn bytes(
     table.metadata(
         key::DIFFERENCES,
         &json!({
+            // Figures say it under their title.
+            "name": format!("{} compared with {}", name(&args.second), name(&args.first)),
             "first": name(&args.first),
             "second": name(&args.second),
             "plan_hash": hashes,
