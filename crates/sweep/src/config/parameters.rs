@@ -61,9 +61,17 @@ pub(super) fn constants(
     let sets: Vec<String> =
         sets.iter().filter(|argument| !scalars::is_one(argument)).cloned().collect();
     let constants = arguments("--set", &sets, draft, report);
+    let before = draft.plan.clone();
     apply(&constants, draft, report);
+    // What is set to what it was leaves the plan as it was.
+    let changes = |constant: &&Constant<'_>| {
+        let mut after = before.clone();
+        write(&constant.parameter, &mut after, constant.value.value);
+        after != before
+    };
     draft.plan.set = constants
         .iter()
+        .filter(changes)
         .map(|constant| (constant.name.value.to_owned(), constant.value.value.into()))
         .collect();
 }
