@@ -75,7 +75,7 @@ impl ColourScale {
         }
     }
 
-    /// For factors: as far below 1 as above it, so that equal changes either way are equally dark.
+    /// For factors: the scale reaches as far below 1 as above it.
     pub(crate) fn change(values: impl Iterator<Item = f64>) -> Self {
         let farthest = |so_far: f64, value: f64| so_far.max(value).max(1.0 / value);
         let most = values.filter(|value| *value > 0.0).fold(1.001, farthest);

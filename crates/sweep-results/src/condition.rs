@@ -83,14 +83,6 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// Reads a condition over the columns of a file.
-    ///
-    /// # Errors
-    /// The first mistake in it.
-    pub fn parse(text: &str, table: &ResultTable) -> Result<Self, Mistake> {
-        crate::parse::condition(text, &table.columns)
-    }
-
     /// Whether it speaks of single rows; if not, of the file as a whole.
     #[must_use]
     pub const fn is_by_row(&self) -> bool {

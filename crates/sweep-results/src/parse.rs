@@ -15,7 +15,7 @@
 use std::ops::Range;
 
 use crate::condition::{Comparison, Condition, Fold, Mistake, Node, Operation, Typed};
-use crate::rows::{Cell, CellKind, Column};
+use crate::rows::{Cell, CellKind, Column, ResultTable};
 
 /// Deepest nesting: what no person writes, and no stack minds.
 const DEEPEST: usize = 64;
@@ -118,6 +118,16 @@ fn number_length(text: &str) -> usize {
     .unwrap_or(text.len())
 }
 
+impl Condition {
+    /// Reads a condition over the columns of a file.
+    ///
+    /// # Errors
+    /// The first mistake in it.
+    pub fn parse(text: &str, table: &ResultTable) -> Result<Self, Mistake> {
+        condition(text, &table.columns)
+    }
+}
+
 struct Parser<'a> {
     tokens: Vec<Spanned>,
     next: usize,
@@ -130,7 +140,7 @@ struct Parser<'a> {
 }
 
 /// Reads a condition over these columns.
-pub(crate) fn condition(text: &str, columns: &[Column]) -> Result<Condition, Mistake> {
+fn condition(text: &str, columns: &[Column]) -> Result<Condition, Mistake> {
     let mut parser = Parser {
         tokens: tokens(text)?,
         next: 0,

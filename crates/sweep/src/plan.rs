@@ -44,7 +44,7 @@ pub struct Plan {
     pub reliability: Reliability,
     /// What is measured of the motions.
     pub measures: Measures,
-    /// What `--set` has put in place, by name.
+    /// What `--set` has changed, by name.
     pub set: Vec<(String, Value)>,
 }
 

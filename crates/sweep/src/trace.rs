@@ -178,7 +178,7 @@ pub(crate) fn trace(
 }
 
 /// Traces of every point of a plan, one file each (`point-<index>.parquet`) in `folder`, until
-/// `stop` says so. A point without equilibrium has none.
+/// `stop` says so. A point without equilibrium has none. `done` hears of every point that is there.
 ///
 /// # Errors
 /// As `store`; and no more threads.
@@ -187,6 +187,7 @@ pub(crate) fn keep(
     folder: &Path,
     threads: usize,
     stop: &(dyn Fn() -> bool + Sync),
+    done: &(dyn Fn() + Sync),
 ) -> Result<(), StoreError> {
     files::ready(folder)?;
     threads::pool(threads)?.install(|| {
@@ -207,10 +208,12 @@ pub(crate) fn keep(
             ) {
                 Ok(trace) => {
                     let path = folder.join(format!("point-{point}.parquet"));
-                    Ok(files::write(&path, FileKind::Trace, &trace.into_bytes(&path)?)?)
+                    files::write(&path, FileKind::Trace, &trace.into_bytes(&path)?)?;
                 }
-                Err(NoEquilibrium) => Ok(()),
+                Err(NoEquilibrium) => {}
             }
+            done();
+            Ok(())
         })
     })
 }

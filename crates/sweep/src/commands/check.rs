@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::cells::short;
 use super::examples::Examples;
 use super::grid::GridArgs;
 use crate::design::{Design, Distribution};
@@ -132,6 +133,7 @@ fn describe(axis: &Axis, design: Option<&Design>) -> String {
         }
         AxisValues::Distributed(Distribution { shape, from, to }) => {
             let numbers = shape.numbers().map(|(key, number)| format!("{key} {number}"));
+            let [from, to] = [*from, *to].map(short);
             format!("{name}: {}, {}, from {from} to {to}", shape.name(), numbers.join(", "))
         }
         AxisValues::List(values) => {

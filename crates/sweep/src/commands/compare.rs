@@ -121,34 +121,31 @@ impl FailOn {
     /// What of it is there, in words; `None` if nothing is.
     fn found(self, found: &Comparison) -> Option<String> {
         let steady = || found.shared.iter().filter(|row| !row.sensitive);
-        let counted = |count: usize, what: &str| {
-            let plural = if count == 1 { "" } else { "s" };
-            (count > 0).then(|| format!("{count} {what}{plural}"))
-        };
+        let counted = |what: &str, count: usize| (count > 0).then(|| format!("{what}: {count}"));
         match self {
             Self::Any => (!found.is_empty()).then(|| "the files differ".to_owned()),
-            Self::Plan => counted(found.plan.len(), "difference of the plan"),
-            Self::Rows => counted(found.alone.iter().sum::<u64>() as usize, "row of one file"),
-            Self::Flips => counted(found.flips(false).count(), "verdict that flipped"),
-            Self::Sensitive => counted(found.flips(true).count(), "sensitive verdict that flipped"),
+            Self::Plan => counted("differences of the plans", found.plan.len()),
+            Self::Rows => {
+                counted("rows of one file alone", found.alone.iter().sum::<u64>() as usize)
+            }
+            Self::Flips => counted("verdicts that flipped", found.flips(false).count()),
+            Self::Sensitive => {
+                counted("sensitive verdicts that flipped", found.flips(true).count())
+            }
             Self::Ratio(most) => {
-                let count = steady().filter(|row| row.ratio_by() > most).count();
-                counted(
-                    count,
-                    &format!("ratio that changed by more than {} %", short(100.0 * most)),
-                )
+                let what = format!("ratios that changed by more than {} %", short(100.0 * most));
+                counted(&what, steady().filter(|row| row.ratio_by() > most).count())
             }
             Self::Gap(most) => {
-                let count = steady().filter(|row| row.gap_by_m() > most).count();
-                counted(count, &format!("gap that changed by more than {} m", short(most)))
+                let what = format!("gaps that changed by more than {} m", short(most));
+                counted(&what, steady().filter(|row| row.gap_by_m() > most).count())
             }
             Self::Boundary(most) => {
                 let moved = found.boundary.as_ref()?;
                 let far = moved.crossings.iter().filter(|crossing| crossing.at_least() > most);
-                let count = far.count() + moved.unlike.len();
                 let what =
-                    format!("crossing that moved by more than {} {}", short(most), moved.unit);
-                counted(count, what.trim_end())
+                    format!("crossings that moved by more than {} {}", short(most), moved.unit);
+                counted(what.trim_end(), far.count() + moved.unlike.len())
             }
         }
     }
@@ -586,6 +583,8 @@ fn bytes(
     table.metadata(
         key::DIFFERENCES,
         &json!({
+            // Figures say it under their title.
+            "name": format!("{} compared with {}", name(&args.second), name(&args.first)),
             "first": name(&args.first),
             "second": name(&args.second),
             "plan_hash": hashes,

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use super::cells::short;
 use super::examples::Examples;
@@ -10,7 +12,7 @@ use crate::engine::{Engine, ModelEngine};
 use crate::exit::{Error, Exit, tell};
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
-use crate::progress::{ProgressMode, duration, per_second};
+use crate::progress::{Progress, ProgressMode, duration, per_second};
 use crate::run::{self as runner, Ended, RunOptions, RunReport};
 use crate::store::provenance::Session;
 use crate::store::read::Tally;
@@ -123,7 +125,19 @@ pub(crate) fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<E
     tell(summary(args, plan, &job, &output, &report).trim_end());
     if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
         let folder = files::beside(&output, "traces");
-        trace::keep(plan, &folder, options.threads, &|| interrupt.stopped())?;
+        tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
+        let progress = Mutex::new(Progress::new(args.progress, plan.points(), 0));
+        let kept = AtomicU64::new(0);
+        let done = || {
+            let kept = kept.fetch_add(1, Ordering::Relaxed) + 1;
+            // A thread that finds another showing it goes on.
+            if let Ok(mut progress) = progress.try_lock() {
+                progress.show(kept);
+            }
+        };
+        let ended = trace::keep(plan, &folder, options.threads, &|| interrupt.stopped(), &done);
+        progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+        ended?;
         if let Some(signal) = interrupt.signal() {
             tell("interrupted; the map is kept, and the traces so far");
             return Ok(if signal == 15 { Exit::Terminated } else { Exit::Interrupted });

@@ -256,7 +256,8 @@ fn provenance(text: &mut String, result: &ResultFile) {
     for axis in axes(plan) {
         let name = axis["parameter"].as_str().unwrap_or_default();
         // The axes of a list are its columns, whose ranges stand below.
-        let values = axis.get("range").or(axis.get("values")).map(brief);
+        let values = ["range", "values", "distribution"].iter().find_map(|key| axis.get(key));
+        let values = values.map(brief);
         let values = values.map_or(String::new(), |values| format!(": {values}"));
         line(text, "axis", &format!("{name}{values}"));
     }

@@ -61,9 +61,17 @@ pub(super) fn constants(
     let sets: Vec<String> =
         sets.iter().filter(|argument| !scalars::is_one(argument)).cloned().collect();
     let constants = arguments("--set", &sets, draft, report);
+    let before = draft.plan.clone();
     apply(&constants, draft, report);
+    // What is set to what it was leaves the plan as it was.
+    let changes = |constant: &&Constant<'_>| {
+        let mut after = before.clone();
+        write(&constant.parameter, &mut after, constant.value.value);
+        after != before
+    };
     draft.plan.set = constants
         .iter()
+        .filter(changes)
         .map(|constant| (constant.name.value.to_owned(), constant.value.value.into()))
         .collect();
 }
@@ -162,10 +170,9 @@ pub(super) fn unknown(
     let diagnostic = Diagnostic::new(title).at(&name.at, error.to_string());
     let section = match name.value {
         "window_s" => Some("[time], or as `window_from_s` and `window_to_s` here"),
-        "end_s" => Some("[time], or by `--set`,"),
-        "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator], or by `--set`,"),
-        "ratio_limit" | "criterion" => Some("[reliability], or by `--set`,"),
-        "channels" => Some("[reliability]"),
+        "end_s" => Some("[time]"),
+        "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator]"),
+        "ratio_limit" | "criterion" | "channels" => Some("[reliability]"),
         _ => None,
     };
     match (error, section) {

@@ -90,7 +90,10 @@ pub(super) fn apply(sets: &[String], draft: &mut Draft, report: &mut Report) {
     // The method first: it decides which settings there are.
     written.sort_by_key(|written| written.name.value != "method");
     for written in &written {
-        if let Some(value) = put(written, draft, report) {
+        let before = draft.plan.clone();
+        if let Some(value) = put(written, draft, report)
+            && draft.plan != before
+        {
             draft.plan.set.push((written.name.value.to_owned(), value));
         }
     }
