@@ -30,7 +30,8 @@ GRID = {
 def dataset(result):
     """A result on its grid, with units where xarray's plots look for them."""
     axes = [axis["parameter"] for axis in result.plan["axis"]]
-    data = xr.Dataset.from_dataframe(pd.DataFrame.from_arrow(result).set_index(axes))
+    rows = pd.DataFrame({name: result[name] for name in result.columns})
+    data = xr.Dataset.from_dataframe(rows.set_index(axes))
     for name, unit in result.units.items():
         data[name].attrs = {"units": unit, "long_name": name,
                             "description": result.descriptions[name]}
