@@ -6,17 +6,17 @@ pub(crate) mod tongues;
 use std::collections::BTreeMap;
 
 use lane_ode::Simd;
-use washer_model::{Dwell, Point, Response, Target, Timing, prepare};
+use washer_model::{Dwell, Machine, Point, Response, Spin, Target, Timing, prepare};
 
 use crate::engine::{
     Engine, EngineError, Watch, responses, simd_from_environment, together_or_alone,
 };
 use crate::exit::Error;
 use crate::outcome::{Growth, Outcome, Status, Trajectory};
-use crate::plan::{Plan, Scenario};
+use crate::plan::Plan;
 
 /// Rows that a thread takes at once: enough to fill lanes, few enough that a signal is soon heard.
-const AT_ONCE: usize = 64;
+const AT_ONCE: usize = 128;
 
 /// Refuses a grid whose axes contradict the speeds, or mean nothing at a constant speed.
 ///
@@ -68,11 +68,10 @@ impl<'a> DwellEngine<'a> {
     /// These rows, those of neighbouring points and speeds in lanes together.
     fn rows(&self, rows: &[u64]) -> Vec<Outcome> {
         let speeds = self.speeds_rpm.len() as u64;
-        let mut points: BTreeMap<u64, Result<Point, Status>> = BTreeMap::new();
-        for row in rows {
-            let point = row / speeds;
-            points.entry(point).or_insert_with(|| self.ready(self.plan.scenario(point)));
-        }
+        let mut wanted: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
+        wanted.dedup();
+        let points: BTreeMap<u64, Result<Point, Status>> =
+            wanted.iter().copied().zip(self.ready(&wanted)).collect();
         let (mut outcomes, mut dwells) = (Vec::with_capacity(rows.len()), Vec::new());
         let mut asked = Vec::with_capacity(rows.len());
         for &row in rows {
@@ -94,18 +93,17 @@ impl<'a> DwellEngine<'a> {
         outcomes
     }
 
-    fn ready(&self, scenario: Scenario) -> Result<Point, Status> {
+    fn ready(&self, points: &[u64]) -> Vec<Result<Point, Status>> {
         // The response at a constant speed knows nothing of the run.
         let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-        let found = together_or_alone(
-            &[(scenario.machine, scenario.spin)],
-            |machine| {
-                let ready = prepare(self.simd, machine, &timing).into_iter();
-                ready.map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
-            },
-            || Err(Status::Panicked),
-        );
-        found.into_iter().next().unwrap_or(Err(Status::Panicked))
+        let scenarios = points.iter().map(|&point| self.plan.scenario(point));
+        let machines: Vec<(Machine, Spin)> =
+            scenarios.map(|scenario| (scenario.machine, scenario.spin)).collect();
+        let together = |machines: &[(Machine, Spin)]| {
+            let ready = prepare(self.simd, machines, &timing).into_iter();
+            ready.map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
+        };
+        together_or_alone(&machines, together, || Err(Status::Panicked))
     }
 
     fn outcome(&self, row: u64, response: &Response) -> Outcome {

@@ -12,7 +12,6 @@ use core::array::from_fn;
 use lane_ode::{Dual, Lane, N, System as _, trig};
 
 /// Instants a turn at which the derivatives are taken: harmonics of the turn up to the seventh.
-/// With twice as many no growth of the reference changes by more than 1e-9 /s.
 pub(super) const INSTANTS: usize = 16;
 
 /// Disturbances taken through a step at once, so that they stay in the nearest cache.
