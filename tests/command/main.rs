@@ -8,6 +8,7 @@
 
 mod boundary;
 mod determinism;
+mod explain;
 mod faults;
 mod files;
 mod flips;

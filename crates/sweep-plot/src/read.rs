@@ -26,6 +26,8 @@ pub(crate) enum Kind {
     Modes,
     /// The curve on which the ratio is at its limit.
     Boundary,
+    /// Periodic responses over constant speeds.
+    Stability,
 }
 
 impl Kind {
@@ -36,6 +38,7 @@ impl Kind {
             Self::Trace => "trace",
             Self::Modes => "modes",
             Self::Boundary => "boundary",
+            Self::Stability => "stability",
         }
     }
 }
@@ -273,8 +276,7 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 fn recognise(names: &[&str]) -> Option<Kind> {
     let has = |name: &str| names.contains(&name);
     if has("growth_per_s") && has("speed_rpm") {
-        // A result of `sweep stability`, of which there is no figure.
-        None
+        Some(Kind::Stability)
     } else if has("status") && has("ratio_max") {
         Some(Kind::Map)
     } else if has("time_s") && names.iter().any(|name| name.starts_with("nonlinear_")) {

@@ -42,6 +42,7 @@ mod design;
 mod engine;
 mod estimate;
 mod exit;
+mod explain;
 mod identity;
 mod interrupt;
 mod measures;

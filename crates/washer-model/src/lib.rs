@@ -94,7 +94,10 @@ pub use run::suspension::Forces;
 pub use run::{
     Course, Extra, Method, ModelKind, Record, Stop, Wanted, simulate, simulate_until, simulate_with,
 };
-pub use stability::{Dwell, Exact, Kind, NoAnswer, Participant, Response, exact_motions, respond};
+pub use stability::{
+    Crossed, Crossing, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant, Response, cross,
+    exact_motions, peaks_without_departures, respond,
+};
 
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! The machine at constant speeds: its periodic response, and whether that is stable.
 
+mod crossing;
 mod exponents;
 mod orbit;
 mod participants;
@@ -22,6 +23,7 @@ use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use orbit::{Found, Respond, Row};
 use participants::{named, shares};
 
+pub use crossing::{Crossed, Crossing, LeftRange, cross, peaks_without_departures};
 pub use exponents::{Exact, exact_motions};
 
 #[cfg(test)]

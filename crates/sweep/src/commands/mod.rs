@@ -4,6 +4,7 @@ mod boundary;
 mod check;
 mod completions;
 mod examples;
+mod explain;
 mod grid;
 mod init;
 mod man;
@@ -77,6 +78,8 @@ pub enum Command {
     Modes(modes::Args),
     /// Find the periodic response at constant speeds, and where it is unstable
     Stability(stability::Args),
+    /// Explain why the linear model fails at one point: the unstable speeds that the run crosses
+    Explain(explain::Args),
     /// Trace the curve where the ratio is at its limit, without filling the grid
     Boundary(boundary::Args),
     /// Draw the figure that fits a file: map, boundary, time histories or Campbell diagram
@@ -109,6 +112,7 @@ fn examples_of(name: &str) -> Examples {
         "trace" => trace::EXAMPLES,
         "modes" => modes::EXAMPLES,
         "stability" => stability::EXAMPLES,
+        "explain" => explain::EXAMPLES,
         "boundary" => boundary::EXAMPLES,
         "plot" => plot::EXAMPLES,
         "parameters" => parameters::EXAMPLES,
@@ -193,6 +197,7 @@ impl Command {
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Stability(args) => stability::run(args),
+            Self::Explain(args) => explain::run(args),
             Self::Boundary(args) => boundary::run(args),
             Self::Plot(args) => plot::run(args),
             Self::Parameters(args) => parameters::run(args),
