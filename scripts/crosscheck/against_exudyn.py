@@ -498,7 +498,7 @@ def grid(spin, end_s, machine="paper"):
     )
 
 
-def ours(sweep, spin, end_s, every_s, start=(), machine=None):
+def ours(sweep, spin, end_s, every_s, start=(), machine=None, with_speeds=False):
     """Deviations q1 to q10 by `sweep trace`, and the machine as run; `machine` is the text of its
     file."""
     with tempfile.TemporaryDirectory() as folder:
@@ -516,7 +516,10 @@ def ours(sweep, spin, end_s, every_s, start=(), machine=None):
         )
         table = pq.read_table(out)
         told = json.loads(pq.read_metadata(out).metadata[b"sweep.trace"])
-    columns = [f"q{i}_nonlinear_{'m' if i <= 4 else 'rad'}" for i in range(1, 11)]
+    units = ["m"] * 4 + ["rad"] * 6
+    columns = [f"q{i}_nonlinear_{unit}" for i, unit in enumerate(units, 1)]
+    if with_speeds:
+        columns += [f"u{i}_nonlinear_{unit}_per_s" for i, unit in enumerate(units, 1)]
     return np.array([table[name].to_numpy() for name in columns]).T, told
 
 

@@ -9,6 +9,7 @@
 mod boundary;
 mod decisions;
 mod determinism;
+mod explain;
 mod faults;
 mod files;
 mod flips;

@@ -28,6 +28,8 @@ pub(crate) enum Kind {
     Boundary,
     /// One row per grid point that two maps share.
     Differences,
+    /// Periodic responses over constant speeds.
+    Stability,
 }
 
 impl Kind {
@@ -39,6 +41,7 @@ impl Kind {
             Self::Modes => "modes",
             Self::Boundary => "boundary",
             Self::Differences => "differences",
+            Self::Stability => "stability",
         }
     }
 }
@@ -276,8 +279,7 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 fn recognise(names: &[&str]) -> Option<Kind> {
     let has = |name: &str| names.contains(&name);
     if has("growth_per_s") && has("speed_rpm") {
-        // A result of `sweep stability`, of which there is no figure.
-        None
+        Some(Kind::Stability)
     } else if has("status") && has("ratio_max") {
         Some(Kind::Map)
     } else if has("ratio_change") && has("flip") {

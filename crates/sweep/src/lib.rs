@@ -44,6 +44,7 @@ mod design;
 mod engine;
 mod estimate;
 mod exit;
+mod explain;
 mod identity;
 mod interrupt;
 mod library;

@@ -15,7 +15,8 @@ pub struct Speeds {
     pub from: f64,
     /// Last (rpm).
     pub to: f64,
-    step: f64,
+    /// Between two (rpm).
+    pub(crate) step: f64,
 }
 
 impl fmt::Display for Speeds {
@@ -49,6 +50,11 @@ impl FromStr for Speeds {
 }
 
 impl Speeds {
+    /// From one speed to a greater one, in steps above 0.
+    pub(crate) const fn new(from: f64, to: f64, step: f64) -> Self {
+        Self { from, to, step }
+    }
+
     /// The speeds (rpm); the last is the end itself.
     pub(crate) fn values(self) -> Vec<f64> {
         // The quotient may come out a hair beside the whole number that was meant.

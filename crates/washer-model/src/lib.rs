@@ -97,7 +97,8 @@ pub use run::{
     Course, Extra, Method, ModelKind, Record, Stop, Wanted, simulate, simulate_until, simulate_with,
 };
 pub use stability::{
-    Disturbance, Dwell, Exact, Kind, NoAnswer, Participant, Response, exact_motions, respond,
+    Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant, Response,
+    cross, exact_motions, peaks_without_departures, respond,
 };
 
 #[cfg(test)]

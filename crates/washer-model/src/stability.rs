@@ -1,5 +1,6 @@
 //! The machine at constant speeds: its periodic response, and whether that is stable.
 
+mod crossing;
 mod exponents;
 mod monodromy;
 mod orbit;
@@ -26,6 +27,7 @@ use participants::{named, shares, vector_of};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
+pub use crossing::{Crossed, Crossing, LeftRange, cross, peaks_without_departures};
 pub use exponents::{Exact, exact_motions};
 
 #[cfg(test)]

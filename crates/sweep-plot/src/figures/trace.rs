@@ -1,6 +1,6 @@
 //! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -9,7 +9,7 @@ use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
 use crate::colour::{LINEAR, NONLINEAR};
 use crate::error::PlotError;
-use crate::figures::campbell;
+use crate::figures::{campbell, stability};
 use crate::label::{self, Label};
 use crate::read::Kind;
 use crate::scene::INK;
@@ -114,10 +114,13 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         });
     }
     let mut marks = Vec::new();
+    let mut shades = Vec::new();
+    let unstable = unstable_speeds(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
         for (x, resonance) in passages(&time, speed, &resonances(options)?) {
             marks.push(Mark::of_speed(x, resonance));
         }
+        shades = stability::stretches_within(&time, speed, &unstable);
         let y = speed.to_vec();
         let series =
             Series { name: String::new(), colour: INK, grid: 0, y, style: Style::Solid(2.0) };
@@ -146,6 +149,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         panels,
         marks,
         mark_meaning: "resonance speed passed".to_owned(),
+        shades,
+        shade_meaning: stability::UNSTABLE.to_owned(),
     })
 }
 
@@ -305,7 +310,7 @@ pub(super) fn subtitle(
 
 /// The two numbers of the machine that reliability turns on, as far as the file has them and all
 /// dampers are alike.
-fn machine(table: &Table) -> Vec<(&'static str, f64)> {
+pub(super) fn machine(table: &Table) -> Vec<(&'static str, f64)> {
     let Some(machine) = table.source.find("machine") else { return Vec::new() };
     let unbalance = machine.pointer("/unbalance/mass_kg").and_then(Value::as_f64);
     let dampers = machine.get("dampers").and_then(Value::as_array).into_iter().flatten();
@@ -316,6 +321,15 @@ fn machine(table: &Table) -> Vec<(&'static str, f64)> {
     let damping = (dampings.len() == 1).then(|| dampings[0]);
     let named = [("unbalance_mass_kg", unbalance), ("damping_n_s_per_m", damping)];
     named.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
+}
+
+/// The ranges of unstable speeds that the options name, rpm.
+pub(super) fn unstable_speeds(
+    table: &Table,
+    options: &PlotOptions,
+) -> Result<Vec<[f64; 2]>, PlotError> {
+    let unstable = |path: &PathBuf| stability::unstable_of(table, path);
+    Ok(options.stability.as_ref().map(unstable).transpose()?.map_or_else(Vec::new, |it| it.speeds))
 }
 
 /// The resonance speeds that the options name, rpm.

@@ -7,6 +7,7 @@ mod compare;
 mod completions;
 mod conditions;
 mod examples;
+mod explain;
 mod export;
 mod grid;
 mod init;
@@ -88,6 +89,8 @@ pub enum Command {
     Modes(modes::Args),
     /// Find the periodic response at constant speeds, and where it is unstable
     Stability(stability::Args),
+    /// Explain why the linear model fails at one point: the unstable speeds that the run crosses
+    Explain(explain::Args),
     /// Trace the curve where the ratio is at its limit, without filling the grid
     Boundary(boundary::Args),
     /// Draw the figure that fits a file: map, boundary, time histories or Campbell diagram
@@ -123,6 +126,7 @@ fn examples_of(name: &str) -> Examples {
         "trace" => trace::EXAMPLES,
         "modes" => modes::EXAMPLES,
         "stability" => stability::EXAMPLES,
+        "explain" => explain::EXAMPLES,
         "boundary" => boundary::EXAMPLES,
         "plot" => plot::EXAMPLES,
         "parameters" => parameters::EXAMPLES,
@@ -210,6 +214,7 @@ impl Command {
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Stability(args) => stability::run(args),
+            Self::Explain(args) => explain::run(args),
             Self::Boundary(args) => boundary::run(args),
             Self::Plot(args) => plot::run(args),
             Self::Parameters(args) => parameters::run(args),

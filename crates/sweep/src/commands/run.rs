@@ -126,7 +126,7 @@ pub(crate) fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<E
     if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
         let folder = files::beside(&output, "traces");
         tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
-        let progress = Mutex::new(Progress::new(args.progress, plan.points(), 0));
+        let progress = Mutex::new(Progress::new(args.work.progress, plan.points(), 0));
         let kept = AtomicU64::new(0);
         let done = || {
             let kept = kept.fetch_add(1, Ordering::Relaxed) + 1;

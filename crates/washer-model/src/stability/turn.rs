@@ -56,7 +56,7 @@ fn next<T: Lane, S: System<T, STATES>>(
 
 /// One step; gives the slope at its start.
 #[inline(always)]
-fn step<T: Lane, S: System<T, STATES>>(
+pub(super) fn step<T: Lane, S: System<T, STATES>>(
     system: &S,
     h: N<T>,
     forcings: &Forcings<S::Forcing>,
