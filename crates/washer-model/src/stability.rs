@@ -459,7 +459,8 @@ fn answer(case: &Case<'_>, found: &Found) -> Result<Response, NoAnswer> {
         let shares = shares(&case.frozen, &vector, case.row.unit_per_s());
         let share: f64 =
             shares.iter().filter(|(mode, _)| *mode < case.judged).map(|(_, e)| e).sum();
-        if !(share >= JUDGED_SHARE) {
+        // Not finite where there is no such disturbance.
+        if share.is_nan() || share < JUDGED_SHARE {
             continue;
         }
         let mut response = Response {

@@ -118,9 +118,7 @@ fn between<T: Lane>(
 #[inline(always)]
 fn step<T: Lane>(zero: N<T>, h: N<T>, at: &[Slopes<T>], block: &mut [[N<T>; STATES]]) {
     let mut along = [[zero; STATES]; BLOCK];
-    for c in 0..BLOCK {
-        along[c] = block[c];
-    }
+    along.copy_from_slice(block);
     let start = along;
     for stage in 0..4 {
         let slopes = &at[AT[stage]];

@@ -372,7 +372,7 @@ impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
 impl<T: Lane, M: Model<T>> Watch<T, M> for Watched<'_, T, M> {
     #[inline(always)]
     fn see(&mut self, k: usize, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
-        if k % (self.clock.steps / INSTANTS) == 0 {
+        if k.is_multiple_of(self.clock.steps / INSTANTS) {
             self.states.push(*x);
         }
         if !self.with_peaks {
