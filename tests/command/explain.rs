@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::sweep_binary;
+use crate::home::sweep_binary;
 
 const AXES: &str = r#"
 [[axis]]
