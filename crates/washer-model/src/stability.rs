@@ -293,7 +293,7 @@ fn rounded(part: f64) -> f64 {
 }
 
 /// Steps a turn, at least, and what their number is a multiple of.
-const STEPS: usize = 64;
+const STEPS: usize = 96;
 
 /// Longest step times the fastest of the suspension's modes, all of which the steps must follow.
 const LONGEST_PHASE: f64 = 0.25;
