@@ -122,7 +122,7 @@ fn random_numbers_that_are_refused_are_told() {
 #[test]
 fn little_address_space_is_told() {
     let mut refused = 0;
-    for kilobytes in [24_000, 28_000, 32_000, 36_000, 40_000, 60_000, 90_000, 120_000, 400_000] {
+    for kilobytes in [32_000, 36_000, 40_000, 60_000, 90_000, 120_000, 400_000] {
         for words in [RUN, TRACE, BOUNDARY, SHOW, PLOT] {
             let home = fresh_home();
             let limit = format!("ulimit -v {kilobytes}; exec \"$@\"");

@@ -60,7 +60,7 @@ fn a_run_on_its_response_departs_by_nothing() {
     let point = point(Spin::Table { time_s: vec![0.0], speed_rpm: vec![225.0] });
     let response = respond(Simd::best(), &[Dwell { point: &point, speed_rpm: 225.0 }]);
     let response = response.into_iter().next().unwrap().unwrap();
-    for at_s in [0.0, 0.1, 0.2, 1.0] {
+    for at_s in [0.0_f64, 0.1, 0.2, 1.0] {
         let followed = run(&point, STEP_S, [0.0, at_s.max(1e-12)], &response.start).end;
         let expected = response_at(&point, STEP_S, &response, at_s);
         let apart = core::array::from_fn(|i| followed[i] - expected[i]);
