@@ -59,7 +59,7 @@ fn both_tongues_of_the_papers_machine_are_found_and_named() {
     let shown = said(&sweep(&folder, &["show", file]).output().expect("it starts"));
     for told in [&said(&done), &shown] {
         for line in [
-            "42 not, 0 without a response; 2 points",
+            "43 not, 0 without a response; 2 points",
             "point 0: 239 to 259 rpm, quasi periodic, up to 0.39",
             "point 0: 295 to 316 rpm, period doubling, up to 0.28",
             "rocking, vertical plane",

@@ -164,7 +164,10 @@ fn sums(modes: &[Mode], unstable: &Unstable) -> Vec<Mode> {
     }
     pairs.sort_unstable();
     let sum = |[a, b]: [usize; 2]| {
-        let number = |mode: usize| modes[mode].name.split(' ').next().unwrap_or_default();
+        let number = |mode: usize| {
+            let name = modes[mode].name.trim_start_matches("mode ");
+            name.split(' ').next().unwrap_or_default()
+        };
         let name = if a == b {
             format!("twice the frequency of mode {}", number(a))
         } else {

@@ -8,6 +8,7 @@ use crate::tests::reference::reference;
 use crate::{Machine, Method, ModelKind, Spin, Start, Timing, history, prepare};
 use faer::c64;
 use serde_json::Value;
+use std::f64::consts::PI;
 
 const TIMING: Timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints: 0 };
 
@@ -81,7 +82,10 @@ fn val_growth_and_amplitudes_match_an_independent_program() {
         for (channel, name) in [(6, "amplitude_tub_yaw_rad"), (7, "amplitude_tub_pitch_rad")] {
             let error = ours.nonlinear[channel] / number(&case, name) - 1.0;
             println!("{name} {error:e} growth {:e}", ours.growth_per_s() - growth);
-            assert!(error.abs() < 1e-5, "{case}: {error:e}");
+            // The reference takes the largest of its steps' ends, 1e-4 s apart, and so misses up to
+            // this of a peak.
+            let between_steps = 0.5 * (PI * 1e-4 * ours.speed_rpm / 60.0).powi(2);
+            assert!(-1e-5 < error && error < 1e-5 + between_steps, "{case}: {error:e}");
         }
         let kind = match (growth > 0.0, number(&case, "frequency_cpm")) {
             (false, _) => Kind::Stable,
