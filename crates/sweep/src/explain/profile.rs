@@ -37,7 +37,8 @@ pub(super) fn range(spin: &Spin, end_s: f64) -> Result<[f64; 2], Error> {
                 .to_owned(),
         });
     }
-    Ok([least, most])
+    // As they were written, without the last bits of the way through rad/s.
+    Ok([least, most].map(|rpm| (1e9 * rpm).round() / 1e9))
 }
 
 /// Even instants, and the kinks between them.
