@@ -7,8 +7,9 @@
 Exudyn (https://exudyn.readthedocs.io) is a general multibody program: three rigid bodies in
 absolute coordinates, joints, connectors, an implicit integrator. Nothing of this project's
 derivation is in it, as little as the paper's was in the commercial program that it compared with.
-Three comparisons: the static equilibrium, a run-up to 600 rpm in 4 s, and a release from 0.1 rad of
-rocking at 270 rpm; the motions at two steps of Exudyn's and extrapolated from these. Exit code 1 if
+Four comparisons: the static equilibrium, a run-up to 600 rpm in 4 s, a release from 0.1 rad of
+rocking at 270 rpm, and a run-up of a machine with friction dampers, a stop and a gasket; the
+motions at two steps of Exudyn's and extrapolated from these. Exit code 1 if
 any differs by more than its bound. With --trace no comparison: Exudyn's run-up of the paper's Fig.
 6 as a trace file, for `sweep plot --against`.
 """
@@ -49,7 +50,31 @@ BOUNDS = {
     ("run-up", "drum's hinge"): (1e-5, 1e-6),
     ("release", "tub and shaft"): (1e-5, 1e-6),
     ("release", "drum's hinge"): (1e-3, 1e-4),
+    ("elements", "tub and shaft"): (1e-4, 1e-5),
+    ("elements", "drum's hinge"): (1e-4, 1e-5),
 }
+# The machine with further elements: what stands in place of its dampers' lines, and what is added.
+# Friction and contact set in over widths that Exudyn's steps resolve.
+DAMPING = "damping_n_s_per_m = 140.0"
+FRICTION = """damping_n_s_per_m = 20.0
+friction_n = 40.0
+friction_speed_m_per_s = 0.05
+friction_linear_speed_m_per_s = 0.3"""
+FURTHER = """
+[[stops]]
+tub_m = [0.45, 0.0, 0.28]
+direction = [0.0, 0.6, 0.8]
+clearance_m = 0.002
+stiffness_n_per_m = 4e4
+damping_n_s_per_m = 100.0
+softness_m = 1e-3
+
+[[bushings]]
+tub_m = [0.45, 0.0, 0.0]
+stiffness_n_per_m = [0.0, 600.0, 600.0]
+cubic_n_per_m3 = [0.0, 5e6, 5e6]
+damping_n_s_per_m = [0.0, 12.0, 12.0]
+"""
 # Where the table stands in a page.
 TABLE_BEGINS, TABLE_ENDS = "<!-- table: scripts/crosscheck/run.sh -->", "<!-- end of table -->"
 
@@ -110,6 +135,43 @@ def coordinates(places, rotations):
     return np.array(
         [*places[0][1:], *places[1][1:], *angles(tub), *angles(shaft), *angles(shaft.T @ drum)]
     )
+
+
+def friction_force(damper):
+    """Tension of a friction damper, for Exudyn."""
+    friction, fades = damper["friction_n"], damper["friction_speed_m_per_s"]
+
+    def force(mbs, time, item, elongation, rate, *rest):
+        return friction * rate / math.hypot(rate, fades)
+
+    return force
+
+
+def stop_force(stop):
+    """Force of a stop, for Exudyn, along the displacement: as a spring's, not as on the tub."""
+    way = np.array(stop["direction"]) / np.linalg.norm(stop["direction"])
+    stiffness, damping = stop["stiffness_n_per_m"], stop["damping_n_s_per_m"]
+    clearance, softness = stop["clearance_m"], stop["softness_m"]
+
+    def force(mbs, time, item, displacement, velocity, *rest):
+        depth, speed = way @ displacement - clearance, way @ velocity
+        soft = math.hypot(depth, softness)
+        push = stiffness * (depth + soft) / 2 + damping * (1 + depth / soft) / 2 * speed
+        return list(push * way)
+
+    return force
+
+
+def bushing_force(bushing):
+    """Force of a bushing, for Exudyn, along the displacement."""
+    keys = ["stiffness_n_per_m", "cubic_n_per_m3", "damping_n_s_per_m"]
+    stiffness, cubic, damping = (np.array(bushing[key]) for key in keys)
+
+    def force(mbs, time, item, displacement, velocity, *rest):
+        d, v = np.array(displacement), np.array(velocity)
+        return list(stiffness * d + cubic * d**3 + damping * v)
+
+    return force
 
 
 class Washer:
@@ -245,6 +307,22 @@ class Washer:
                 referenceLength=1.0,
                 damping=damper["damping_n_s_per_m"],
             )
+            if damper.get("friction_n", 0):
+                mbs.CreateSpringDamper(
+                    itemNumbers=[ground, self.tub],
+                    localPosition0=list(damper["cabinet_m"]),
+                    localPosition1=list(damper["tub_m"]),
+                    referenceLength=1.0,
+                    springForceUserFunction=friction_force(damper),
+                )
+        for force, elements in [(stop_force, "stops"), (bushing_force, "bushings")]:
+            for element in machine.get(elements, []):
+                mbs.CreateCartesianSpringDamper(
+                    itemNumbers=[ground, self.tub],
+                    localPosition0=list(element["tub_m"]),
+                    localPosition1=list(element["tub_m"]),
+                    springForceUserFunction=force(element),
+                )
         mbs.Assemble()
         self.settings = exudyn.SimulationSettings()
         self.settings.solution.file.write = False
@@ -401,11 +479,12 @@ def riding_along(machine, q, speed):
     return settled(0.0), (settled(1e-3) - settled(-1e-3)) / 2e-3
 
 
-def grid(spin, end_s):
+def grid(spin, end_s, machine="paper"):
     """A grid file with accurate adaptive steps."""
     lines = [f"{key} = {json.dumps(value)}" for key, value in spin.items()]
     return "\n".join(
         [
+            f'machine = "{machine}"',
             "[spin]",
             *lines,
             "[time]",
@@ -419,11 +498,16 @@ def grid(spin, end_s):
     )
 
 
-def ours(sweep, spin, end_s, every_s, start=()):
-    """Deviations q1 to q10 by `sweep trace`, and the machine as run."""
+def ours(sweep, spin, end_s, every_s, start=(), machine=None, with_speeds=False):
+    """Deviations q1 to q10 by `sweep trace`, and the machine as run; `machine` is the text of its
+    file."""
     with tempfile.TemporaryDirectory() as folder:
         grid_file, out = pathlib.Path(folder) / "check.toml", pathlib.Path(folder) / "check.parquet"
-        grid_file.write_text(grid(spin, end_s))
+        named = "paper"
+        if machine:
+            named = "machine.toml"
+            (pathlib.Path(folder) / named).write_text(machine)
+        grid_file.write_text(grid(spin, end_s, named))
         starts = [word for pair in start for word in ("--start", pair)]
         subprocess.run(
             [sweep, "trace", grid_file, "--every", str(every_s), "--states", *starts, "--out", out],
@@ -432,7 +516,10 @@ def ours(sweep, spin, end_s, every_s, start=()):
         )
         table = pq.read_table(out)
         told = json.loads(pq.read_metadata(out).metadata[b"sweep.trace"])
-    columns = [f"q{i}_nonlinear_{'m' if i <= 4 else 'rad'}" for i in range(1, 11)]
+    units = ["m"] * 4 + ["rad"] * 6
+    columns = [f"q{i}_nonlinear_{unit}" for i, unit in enumerate(units, 1)]
+    if with_speeds:
+        columns += [f"u{i}_nonlinear_{unit}_per_s" for i, unit in enumerate(units, 1)]
     return np.array([table[name].to_numpy() for name in columns]).T, told
 
 
@@ -514,11 +601,10 @@ def main():
     arguments = parser.parse_args()
     exudyn.config.printToConsole = False
     sweep, every_s = arguments.sweep, 0.01
-    machine = tomllib.loads(
-        subprocess.run(
-            [sweep, "init", "--machine", "-"], check=True, capture_output=True, text=True
-        ).stdout
-    )
+    machine_file = subprocess.run(
+        [sweep, "init", "--machine", "-"], check=True, capture_output=True, text=True
+    ).stdout
+    machine = tomllib.loads(machine_file)
 
     still = np.zeros(10)
     rest = Washer(machine, still, still, lambda t: 0.0, 0.0).rest()
@@ -569,7 +655,31 @@ def main():
         arguments.step,
     )
 
-    lines, sound = table(arguments.step, np.abs(our_rest - rest).max(), motions)
+    # The same run-up, shorter and slower, with friction, a stop and a gasket.
+    assert machine_file.count(DAMPING) == len(machine["dampers"])
+    further_file = machine_file.replace(DAMPING, FRICTION) + FURTHER
+    further = tomllib.loads(further_file)
+    peak_rpm, ramp_s, end_s = 300, 2.0, 3.0
+    further_run_up, told = ours(
+        sweep,
+        {"profile": "cycloidal", "peak_rpm": peak_rpm, "ramp_s": ramp_s},
+        end_s,
+        every_s,
+        machine=further_file,
+    )
+    further_rest = Washer(further, still, still, lambda t: 0.0, 0.0).rest()
+    further_ours = np.array([told["equilibrium"][f"q{i}"] for i in range(1, 11)])
+    at_rest = np.abs(np.array([our_rest - rest, further_ours - further_rest])).max()
+    theta = cycloidal(peak_rpm, ramp_s)
+    title = f"run-up to {peak_rpm} rpm in {ramp_s:g} s, to {end_s:g} s, with friction, stop, gasket"
+    motions["elements", title] = compare(
+        further_run_up,
+        lambda step_s: Washer(further, further_rest, still, theta, 0.0).run(end_s, step_s, every_s)
+        - further_rest,
+        arguments.step,
+    )
+
+    lines, sound = table(arguments.step, at_rest, motions)
     print("\n".join(lines))
     if arguments.table:
         page = pathlib.Path(arguments.table)

@@ -7,7 +7,9 @@
 #![allow(missing_docs, reason = "a test is documented by its name")]
 
 mod boundary;
+mod decisions;
 mod determinism;
+mod explain;
 mod faults;
 mod files;
 mod flips;
@@ -15,6 +17,7 @@ mod goldens;
 mod home;
 mod limits;
 mod pictures;
+mod stability;
 
 use std::process::Command;
 

@@ -141,6 +141,7 @@ pub use control::Tolerance;
 pub use dual::Dual;
 pub use fixed::STEPS_AT_ONCE;
 pub use lane::{Aside, Lane, MAX_LANES};
+pub use linear_solve::Lu;
 pub use num::{N, Product};
 pub use part_peaks::PartPeaks;
 pub use partials::Partials;

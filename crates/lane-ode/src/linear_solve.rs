@@ -3,7 +3,7 @@
 use crate::num::N;
 
 /// Row-pivoted triangular factors of a square matrix.
-pub(crate) struct Lu<const C: usize> {
+pub struct Lu<const C: usize> {
     /// L below the diagonal (its unit diagonal not stored), U above it, the reciprocals of U's
     /// diagonal on it.
     packed: [[N<f64>; C]; C],
@@ -16,7 +16,8 @@ impl<const C: usize> Lu<C> {
     /// Loan, Matrix Computations, Algorithm 3.4.1). `None` if a column has nothing left but zeros,
     /// or something not finite.
     #[inline(always)]
-    pub(crate) fn new(mut a: [[N<f64>; C]; C]) -> Option<Self> {
+    #[must_use]
+    pub fn new(mut a: [[N<f64>; C]; C]) -> Option<Self> {
         let mut order = [0; C];
         for i in 0..C {
             order[i] = i;
@@ -50,7 +51,8 @@ impl<const C: usize> Lu<C> {
 
     /// Solves for one right-hand side.
     #[inline(always)]
-    pub(crate) fn solve(&self, b: &[N<f64>; C]) -> [N<f64>; C] {
+    #[must_use]
+    pub fn solve(&self, b: &[N<f64>; C]) -> [N<f64>; C] {
         let mut x = *b;
         for i in 0..C {
             x[i] = b[self.order[i]];

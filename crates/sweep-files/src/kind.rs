@@ -26,6 +26,10 @@ pub mod key {
     pub const TRACE: &str = "sweep.trace";
     /// Resonances and shapes. In modes files alone.
     pub const MODES: &str = "sweep.modes";
+    /// Speeds, and what the rows mean. In files of `sweep stability` alone.
+    pub const STABILITY: &str = "sweep.stability";
+    /// Which files were compared, and where their plans part. In files of differences alone.
+    pub const DIFFERENCES: &str = "sweep.differences";
     /// BLAKE3 hash of the whole file with zeros in this place, hexadecimal.
     pub const DIGEST: &str = "sweep.digest";
 }
@@ -41,6 +45,15 @@ pub enum FileKind<'a> {
     Modes,
     /// Result of `sweep boundary`.
     Boundary,
+    /// Result of `sweep stability`.
+    Stability,
+    /// Result of `sweep compare --out`.
+    Differences,
+    /// A table that `sweep export` wrote.
+    Exported {
+        /// Its ending: `csv`, `xlsx` or `nc`.
+        ending: &'static str,
+    },
     /// The JSON file beside a map that says how the run went.
     Account {
         /// Name of the map.
@@ -56,6 +69,9 @@ pub enum FileKind<'a> {
     ManPage,
 }
 
+/// The first line of an exported CSV file.
+pub const EXPORTED_CSV: &str = "# exported by sweep ";
+
 /// The longest account that is read: a session takes some hundred bytes, and a run has thousands
 /// of sessions at most.
 const LONGEST_ACCOUNT_BYTES: u64 = 64 << 20;
@@ -68,6 +84,9 @@ impl FileKind<'_> {
             Self::Trace => "result of `sweep trace`",
             Self::Modes => "result of `sweep modes`",
             Self::Boundary => "result of `sweep boundary`",
+            Self::Stability => "result of `sweep stability`",
+            Self::Differences => "result of `sweep compare --out`",
+            Self::Exported { .. } => "table of `sweep export`",
             Self::Account { .. } => "account of the run with this --out",
             Self::Svg => "SVG picture of `sweep plot`",
             Self::Png => "PNG picture",
@@ -85,8 +104,12 @@ impl FileKind<'_> {
             Ok(start.starts_with(with))
         };
         let is_ours = match self {
-            Self::Map | Self::Trace | Self::Modes | Self::Boundary => match ParquetFile::look(path)
-            {
+            Self::Map
+            | Self::Trace
+            | Self::Modes
+            | Self::Boundary
+            | Self::Stability
+            | Self::Differences => match ParquetFile::look(path) {
                 Ok(file) if self.has_keys(&|key| file.value(key).is_some()) => true,
                 Ok(_) => {
                     // A damaged key makes one of ours look like another's.
@@ -101,6 +124,9 @@ impl FileKind<'_> {
                 }
                 Err(error) => return Err(error),
             },
+            Self::Exported { ending: "csv" } => begins(EXPORTED_CSV.as_bytes())?,
+            Self::Exported { ending: "nc" } => begins(b"CDF\x02")?,
+            Self::Exported { .. } => begins(b"PK\x03\x04")?,
             Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,
             Self::Svg => begins(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
             Self::Png => begins(b"\x89PNG\r\n\x1a\n")?,
@@ -114,13 +140,21 @@ impl FileKind<'_> {
     pub fn has_keys(self, has: &dyn Fn(&str) -> bool) -> bool {
         let own = match self {
             Self::Map => {
-                return has(key::PLAN)
-                    && ![key::TRACE, key::MODES, key::BOUNDARY].into_iter().any(has);
+                const OF_OTHERS: [&str; 5] =
+                    [key::TRACE, key::MODES, key::BOUNDARY, key::STABILITY, key::DIFFERENCES];
+                return has(key::PLAN) && !OF_OTHERS.into_iter().any(has);
             }
             Self::Trace => key::TRACE,
             Self::Modes => key::MODES,
             Self::Boundary => key::BOUNDARY,
-            Self::Account { .. } | Self::Svg | Self::Png | Self::Html | Self::ManPage => {
+            Self::Stability => key::STABILITY,
+            Self::Differences => key::DIFFERENCES,
+            Self::Account { .. }
+            | Self::Exported { .. }
+            | Self::Svg
+            | Self::Png
+            | Self::Html
+            | Self::ManPage => {
                 return false;
             }
         };

@@ -27,6 +27,6 @@ pub mod regular;
 pub mod seal;
 
 pub use error::FileError;
-pub use kind::{FileKind, key};
+pub use kind::{EXPORTED_CSV, FileKind, key};
 pub use output::{Output, beside, judge, ready, write};
 pub use parquet::{Batches, ParquetFile};

@@ -129,8 +129,14 @@ mod tests {
     use super::*;
     use crate::{key, seal};
 
-    const PARQUET: [FileKind<'_>; 4] =
-        [FileKind::Map, FileKind::Trace, FileKind::Modes, FileKind::Boundary];
+    const PARQUET: [FileKind<'_>; 6] = [
+        FileKind::Map,
+        FileKind::Trace,
+        FileKind::Modes,
+        FileKind::Boundary,
+        FileKind::Stability,
+        FileKind::Differences,
+    ];
 
     /// A file as the commands write it, of each kind.
     fn example(kind: FileKind<'_>) -> Vec<u8> {
@@ -139,6 +145,13 @@ mod tests {
             FileKind::Trace => key::TRACE,
             FileKind::Modes => key::MODES,
             FileKind::Boundary => key::BOUNDARY,
+            FileKind::Stability => key::STABILITY,
+            FileKind::Differences => key::DIFFERENCES,
+            FileKind::Exported { ending: "csv" } => {
+                return format!("{}x\n", crate::EXPORTED_CSV).into_bytes();
+            }
+            FileKind::Exported { ending: "nc" } => return b"CDF\x02...".to_vec(),
+            FileKind::Exported { .. } => return b"PK\x03\x04...".to_vec(),
             FileKind::Account { of } => {
                 return json!({ "file": of.to_str(), "plan_hash": "00" }).to_string().into_bytes();
             }
@@ -176,6 +189,9 @@ mod tests {
             FileKind::Png,
             FileKind::Html,
             FileKind::ManPage,
+            FileKind::Exported { ending: "csv" },
+            FileKind::Exported { ending: "nc" },
+            FileKind::Exported { ending: "xlsx" },
         ])
     }
 

@@ -32,6 +32,15 @@ impl ParquetFile {
     /// # Errors
     /// [`FileError::Io`], [`FileError::NotParquet`], [`FileError::Damaged`].
     pub fn open(path: &Path) -> Result<Self, FileError> {
+        // Where a run keeps its work is easily taken for its result.
+        if path.extension().is_some_and(|ending| ending == "partial") && path.is_dir() {
+            let reason = format!(
+                "it is the folder of a run that is not finished; its result will be {}, and \
+                 `sweep status GRID.toml` says how far it is",
+                path.with_extension("").display()
+            );
+            return Err(FileError::NotParquet { path: path.to_path_buf(), reason });
+        }
         let mut file = regular::open(path).map_err(FileError::io("open", path))?;
         let seal = seal::check(&mut file).map_err(FileError::io("read", path))?;
         if seal == Seal::Broken {

@@ -1,7 +1,7 @@
 //! Curves over a common x axis, in panels one above the other: what all figures but the map are.
 
 use super::axis::{Scale, extremes};
-use super::colour::{BOTH as BOTH_SIDES, ColourScale};
+use super::colour::{BOTH as BOTH_SIDES, ColourScale, SHADE};
 use super::decimate::envelope;
 use super::frame::{
     HEADING_HEIGHT, LEGEND_ROW, Panel, Sign, TICK_SIZE, heading, legend, legend_rows,
@@ -29,6 +29,10 @@ pub(crate) struct Chart {
     pub(crate) marks: Vec<Mark>,
     /// What the marks mean, in the legend.
     pub(crate) mark_meaning: String,
+    /// Ranges of x that are shaded in all panels.
+    pub(crate) shades: Vec<[f64; 2]>,
+    /// What the shades mean, in the legend.
+    pub(crate) shade_meaning: String,
 }
 
 /// One panel of a chart.
@@ -189,14 +193,17 @@ pub(crate) fn y_scale(panel: &ChartPanel) -> Scale {
 }
 
 fn draw_panel(scene: &mut Scene, chart: &Chart, content: &ChartPanel, panel: &Panel) {
-    if !content.mixed.is_empty() {
-        let mut mixed = Outline::default();
-        for range in &content.mixed {
+    for (ranges, colour) in [(&chart.shades, SHADE), (&content.mixed, BOTH_SIDES)] {
+        if ranges.is_empty() {
+            continue;
+        }
+        let mut areas = Outline::default();
+        for range in ranges {
             let [from, to] = range.map(|x| panel.at_x(x));
             // Narrower ones would not be seen.
-            mixed.add_rectangle(from, panel.y, (to - from).max(1.0), panel.height);
+            areas.add_rectangle(from, panel.y, (to - from).max(1.0), panel.height);
         }
-        scene.fill(mixed, BOTH_SIDES);
+        scene.fill(areas, colour);
     }
     for series in &content.series {
         let xs = &chart.grids[series.grid];
@@ -330,6 +337,9 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
     }
     if !chart.marks.is_empty() {
         add(Sign::Line(mark_stroke()), &chart.mark_meaning);
+    }
+    if !chart.shades.is_empty() {
+        add(Sign::Area(SHADE), &chart.shade_meaning);
     }
     entries
 }

@@ -36,6 +36,8 @@ pub(crate) const NONLINEAR: Colour = DISTINCT[0];
 pub(crate) const LINEAR: Colour = DISTINCT[1];
 /// Cells with points on both sides of a limit: Okabe and Ito's yellow, which no scale here has.
 pub(crate) const BOTH: Colour = Colour::hex(0xf0e442);
+/// Ranges in which a dwell is unstable, behind curves of any colour.
+pub(crate) const SHADE: Colour = Colour::hex(0xcc79a7).with_alpha(70);
 /// Points that failed.
 pub(crate) const FAILED: Colour = Colour::hex(0xbfc5cc);
 
@@ -73,6 +75,13 @@ impl ColourScale {
             high: high.max(limit * 2.0),
             reversed: false,
         }
+    }
+
+    /// For factors: the scale reaches as far below 1 as above it.
+    pub(crate) fn change(values: impl Iterator<Item = f64>) -> Self {
+        let farthest = |so_far: f64, value: f64| so_far.max(value).max(1.0 / value);
+        let most = values.filter(|value| *value > 0.0).fold(1.001, farthest);
+        Self::Diverging { log: true, low: 1.0 / most, centre: 1.0, high: most, reversed: false }
     }
 
     /// For gaps: below zero there is contact. Gaps that are all open, or all closed, have all the

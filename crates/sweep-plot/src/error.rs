@@ -13,8 +13,8 @@ pub enum PlotError {
     File(#[from] FileError),
     /// A Parquet file, but none that this program writes.
     #[error(
-        "{}: its columns ({columns}) are those of no map, trace, modes or boundary file, so there \
-         is no figure that fits it",
+        "{}: its columns ({columns}) are those of no map, trace, modes, boundary or stability \
+         file, so there is no figure that fits it",
         path.display()
     )]
     UnknownKind {

@@ -106,7 +106,7 @@ pub(crate) struct Whole {
 }
 
 /// Every [`Whole`], in the order in which a page offers them.
-pub(crate) const WHOLE: [Whole; 4] = [
+pub(crate) const WHOLE: [Whole; 6] = [
     Whole {
         name: "gap",
         words: "least gap between drum and tub",
@@ -139,6 +139,18 @@ pub(crate) const WHOLE: [Whole; 4] = [
         words: "static sag of the tub",
         label: "static sag of the tub",
         columns: &[(Quantity::StaticSag, "", "static_sag_m")],
+    },
+    Whole {
+        name: "ratio_change",
+        words: "change of the greatest ratio, second over first",
+        label: "factor of the greatest ratio",
+        columns: &[(Quantity::RatioChange, "", "ratio_change")],
+    },
+    Whole {
+        name: "gap_change",
+        words: "change of the least gap, second less first",
+        label: "change of the least gap",
+        columns: &[(Quantity::GapChange, "", "gap_change_m")],
     },
 ];
 
@@ -288,6 +300,8 @@ impl Quantity {
             Self::ClashTimeNonlinear => "clash-time-nonlinear",
             Self::ClashTimeLinear => "clash-time-linear",
             Self::StaticSag => "static-sag",
+            Self::RatioChange => "ratio-change",
+            Self::GapChange => "gap-change",
             Self::Status => "status",
         }
     }
@@ -332,7 +346,10 @@ impl Shown {
         };
         let scale = match self.quantity {
             Quantity::Ratio => ColourScale::ratio(extent, limit),
-            Quantity::GapNonlinear | Quantity::GapLinear => ColourScale::gap(extent),
+            Quantity::RatioChange => ColourScale::change(extent),
+            Quantity::GapNonlinear | Quantity::GapLinear | Quantity::GapChange => {
+                ColourScale::gap(extent)
+            }
             Quantity::ClashTimeNonlinear | Quantity::ClashTimeLinear | Quantity::StaticSag => {
                 ColourScale::even(extent)
             }

@@ -33,6 +33,8 @@ mod table;
 mod tests;
 #[cfg(test)]
 mod tests_long;
+#[cfg(test)]
+mod tests_stability;
 mod thin;
 
 use std::path::{Path, PathBuf};
@@ -78,6 +80,10 @@ pub enum Quantity {
     ClashTimeLinear,
     /// How far the tub sinks at rest, if the run has this metric
     StaticSag,
+    /// Of differences: how the greatest ratio changed, as a factor
+    RatioChange,
+    /// Of differences: how the least gap changed in the nonlinear model
+    GapChange,
     /// How each point ended
     Status,
 }
@@ -96,6 +102,10 @@ pub enum View {
     Time,
     /// Trace: greatest deviation in each turn over spin speed, on the way up and down
     Passages,
+    /// Stability: how fast disturbances grow over constant speeds
+    Growth,
+    /// Stability: the periodic response of both models over constant speeds
+    Responses,
 }
 
 impl View {
@@ -104,6 +114,7 @@ impl View {
         match self {
             Self::Frequencies | Self::Variation | Self::Shapes => Kind::Modes,
             Self::Time | Self::Passages => Kind::Trace,
+            Self::Growth | Self::Responses => Kind::Stability,
         }
     }
 }
@@ -118,11 +129,15 @@ pub struct PlotOptions {
     /// Map: the channel of the quantity. Trace: the channels shown.
     pub channels: Vec<String>,
     /// Map of three or more axes: where to cut an axis beyond the second, by name and value.
+    /// Stability: values of the points that are shown.
     pub at: Vec<(String, f64)>,
     /// Trace: resonance speeds whose passages are marked, rpm.
     pub resonances_rpm: Vec<f64>,
     /// Trace: a modes file whose resonance speeds are marked too.
     pub modes: Option<PathBuf>,
+    /// Trace, modes: a stability file, whose unstable speeds are shaded; in modes, the sums of
+    /// frequencies behind them are drawn too.
+    pub stability: Option<PathBuf>,
     /// Trace: another trace file, whose nonlinear model is drawn in place of the linear one.
     pub against: Option<PathBuf>,
     /// Map as a page: a folder of trace files; clicking a point that has one shows it.
@@ -170,6 +185,8 @@ pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), 
     check_options(&source, options, format)?;
     let bytes = match source.kind {
         Kind::Map => map(source, options, format)?,
+        Kind::Differences => differences(source, options, format)?,
+        Kind::Stability => stability(&source, options, format)?,
         Kind::Trace | Kind::Modes | Kind::Boundary => {
             chart(&Table::read(source)?, options, format)?
         }
@@ -202,7 +219,7 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
     let grid = Grid::new(&axes, &cuts.picks, most);
     if axes.len() == 1 {
         let map = Map::read(source, grid, &columns, divide)?;
-        return written(&map.table, &figures::curves::chart(&map, options)?, format);
+        return written(&map.table.source, &figures::curves::chart(&map, options)?, format);
     }
     // An amplitude without a channel is chosen on the page.
     let choice = matches!(options.quantity, Quantity::Nonlinear | Quantity::Linear);
@@ -213,21 +230,50 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
     Ok(html::map_page(&map, &cuts, options)?.into_bytes())
 }
 
+/// A picture of what differs between two maps: of ratios, unless the options say gaps.
+fn differences(
+    source: Source,
+    options: &PlotOptions,
+    format: Format,
+) -> Result<Vec<u8>, PlotError> {
+    let (path, axes) = (source.path.display().to_string(), swept::axes(&source)?.len());
+    if format == Format::Html || axes < 2 {
+        return Err(PlotError::Unfit(format!(
+            "{path} is a differences file, which is drawn as .svg or .png over two axes or more"
+        )));
+    }
+    let mut options = options.clone();
+    if options.quantity == Quantity::default() {
+        options.quantity = Quantity::RatioChange;
+    }
+    map(source, &options, format)
+}
+
 fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
     let chart = match (table.source.kind, options.view) {
         (Kind::Trace, Some(View::Passages)) => figures::passages::chart(table, options)?,
         (Kind::Trace, _) => figures::trace::chart(table, options)?,
         (Kind::Modes, Some(View::Variation)) => figures::turn::chart(table)?,
         (Kind::Modes, Some(View::Shapes)) => figures::shapes::chart(table)?,
-        (Kind::Modes, _) => figures::campbell::chart(table)?,
-        (Kind::Boundary | Kind::Map, _) => figures::boundary::chart(table)?,
+        (Kind::Modes, _) => figures::campbell::chart(table, options)?,
+        (Kind::Boundary | Kind::Map | Kind::Differences | Kind::Stability, _) => {
+            figures::boundary::chart(table)?
+        }
     };
-    written(table, &chart, format)
+    written(&table.source, &chart, format)
 }
 
-fn written(table: &Table, chart: &Chart, format: Format) -> Result<Vec<u8>, PlotError> {
+fn stability(source: &Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+    let chart = match options.view {
+        Some(View::Responses) => figures::stability::responses(source, options)?,
+        _ => figures::stability::growth(source, options)?,
+    };
+    written(source, &chart, format)
+}
+
+fn written(source: &Source, chart: &Chart, format: Format) -> Result<Vec<u8>, PlotError> {
     match format {
-        Format::Html => Ok(html::chart_page(table, chart).into_bytes()),
+        Format::Html => Ok(html::chart_page(source, chart).into_bytes()),
         Format::Svg | Format::Png => image(&chart::draw(chart, &Typeface::load()?), format),
     }
 }
@@ -243,21 +289,37 @@ fn image(scene: &Scene, format: Format) -> Result<Vec<u8>, PlotError> {
 fn view_of(options: &PlotOptions) -> &'static str {
     match options.view.map(View::of) {
         Some(Kind::Modes) => "modes files",
+        Some(Kind::Stability) => "stability files",
         _ => "traces",
     }
 }
 
 /// Refuses options that the file's kind or the output's format would leave without effect.
 fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
-    let (map, trace) = (source.kind == Kind::Map, source.kind == Kind::Trace);
+    let map = matches!(source.kind, Kind::Map | Kind::Differences);
+    let trace = source.kind == Kind::Trace;
     let view_fits = options.view.is_some_and(|view| view.of() == source.kind);
+    let (modes, stability) = (source.kind == Kind::Modes, source.kind == Kind::Stability);
+    let over_modes = modes && matches!(options.view, None | Some(View::Frequencies));
+    let responses = stability && options.view == Some(View::Responses);
     let over_time = trace && options.view != Some(View::Passages);
     let rules = [
         ("--quantity", options.quantity != Quantity::default(), map, "maps"),
-        ("--channel", !options.channels.is_empty(), map || trace, "maps and traces"),
-        ("--at", !options.at.is_empty(), map, "maps"),
+        (
+            "--channel",
+            !options.channels.is_empty(),
+            map || trace || responses,
+            "maps, traces and responses of stability files",
+        ),
+        ("--at", !options.at.is_empty(), map || stability, "maps and stability files"),
         ("--resonances", !options.resonances_rpm.is_empty(), trace, "traces"),
         ("--modes", options.modes.is_some(), trace, "traces"),
+        (
+            "--stability",
+            options.stability.is_some(),
+            trace || over_modes,
+            "traces, and frequencies of modes files",
+        ),
         ("--view", options.view.is_some(), view_fits, view_of(options)),
         ("--against", options.against.is_some(), over_time, "traces over time"),
         (

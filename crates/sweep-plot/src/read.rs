@@ -26,6 +26,10 @@ pub(crate) enum Kind {
     Modes,
     /// The curve on which the ratio is at its limit.
     Boundary,
+    /// One row per grid point that two maps share.
+    Differences,
+    /// Periodic responses over constant speeds.
+    Stability,
 }
 
 impl Kind {
@@ -36,6 +40,8 @@ impl Kind {
             Self::Trace => "trace",
             Self::Modes => "modes",
             Self::Boundary => "boundary",
+            Self::Differences => "differences",
+            Self::Stability => "stability",
         }
     }
 }
@@ -272,8 +278,12 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 
 fn recognise(names: &[&str]) -> Option<Kind> {
     let has = |name: &str| names.contains(&name);
-    if has("status") && has("ratio_max") {
+    if has("growth_per_s") && has("speed_rpm") {
+        Some(Kind::Stability)
+    } else if has("status") && has("ratio_max") {
         Some(Kind::Map)
+    } else if has("ratio_change") && has("flip") {
+        Some(Kind::Differences)
     } else if has("time_s") && names.iter().any(|name| name.starts_with("nonlinear_")) {
         Some(Kind::Trace)
     } else if has("mode") && has("frequency_rpm") && has("speed_rpm") {

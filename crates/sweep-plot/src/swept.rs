@@ -109,7 +109,9 @@ pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
     }
     let no_grid = |reason: String| PlotError::NotAGrid { path: source.path.clone(), reason };
     let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
-    let before_results = source.columns.iter().take_while(|column| !of_model(&column.name)).count();
+    let is_result = |name: &str| of_model(name) || name == "ratio_change";
+    let before_results =
+        source.columns.iter().take_while(|column| !is_result(&column.name)).count();
     let columns: Vec<&ColumnFacts> = source.columns[..before_results]
         .iter()
         .filter(|column| column.cells == Cells::Numbers && column.name != "point")

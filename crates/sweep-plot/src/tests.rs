@@ -525,7 +525,7 @@ fn mistakes_are_told_apart_and_nothing_is_written() {
         (draw(doubled, &none, "a.svg"), "rows 0 and 1 are the same point"),
         (
             draw(Sample::default().numbers("x", "", [1.0]), &none, "a.svg"),
-            "no map, trace, modes or boundary file",
+            "no map, trace, modes, boundary or stability file",
         ),
     ] {
         assert!(message(result).contains(said), "{said}");

@@ -9,7 +9,8 @@ use std::time::Instant;
 
 use lane_ode::Simd;
 use washer_model::{
-    Cases, Formula, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate,
+    Cases, Dwell, Formula, Machine, Method, ModelKind, Point, Spin, Timing, prepare, respond,
+    simulate,
 };
 
 /// As many as the widest lanes hold.
@@ -25,6 +26,7 @@ fn main() {
     let once_s = methods(rounds);
     threads(rounds, once_s);
     boundaries(rounds);
+    dwells(rounds, once_s / 1287.0);
 }
 
 fn median(values: &[f64]) -> f64 {
@@ -230,6 +232,34 @@ fn boundaries(rounds: usize) {
         println!("| {criterion}: boundary against grid | {share:.3} |");
     }
     println!();
+}
+
+/// Responses at constant speeds, both models' with all multipliers; `pair_s` is what a point's two
+/// trajectories of 50 s take by the fast method.
+fn dwells(rounds: usize, pair_s: f64) {
+    let spin = Spin::Ramp { peak_rpm: 350.0, ramp_s: 50.0 };
+    let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
+    let mut machine = Machine::paper();
+    machine.unbalance.mass_kg = 0.4;
+    let point = prepare(Simd::best(), &[(machine, spin)], &timing)
+        .remove(0)
+        .expect("the paper's machine has an equilibrium");
+    let dwells: Vec<Dwell<'_>> =
+        (0..=140).map(|k| Dwell { point: &point, speed_rpm: 210.0 + f64::from(k) }).collect();
+    let mut times = vec![Vec::new()];
+    for _ in 0..rounds {
+        let begin = Instant::now();
+        let found = respond(Simd::best(), &dwells);
+        times[0].push(begin.elapsed().as_secs_f64() * 1e3 / dwells.len() as f64);
+        assert!(found.iter().all(Result::is_ok));
+    }
+    println!("One core, a point of 0.4 kg and 140 N s/m at 210 to 350 rpm, by 1 rpm:\n");
+    let medians = table("ms a speed", &["both responses, all multipliers".to_owned()], &times);
+    println!(
+        "| ratio | |\n|---|---|\n| a speed of a point against its two trajectories of 50 s, \
+         rk4-mass-scaled, 1e-3 | {:.3} |\n",
+        1e-3 * medians[0] / pair_s
+    );
 }
 
 /// Fig. 12 by the program itself; `once_s` is what the trajectories of its lowest rung that a row

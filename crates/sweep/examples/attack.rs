@@ -5,6 +5,7 @@
 //! cargo run --release -p sweep --example attack -- 20000 1    # rows, seed
 //! cargo run --release -p sweep --example attack -- 9 1000042  # the grid that an exception names
 //! cargo run --release -p sweep --example attack -- 900 1 grazing
+//! cargo run --release -p sweep --example attack -- 900 1 elements
 //! ```
 //!
 //! The promise: every row that is not flagged as sensitive has RK4's status, RK4's verdict and
@@ -14,7 +15,8 @@
 //! promise.
 //!
 //! With `grazing`, the clearance of each grid is such that drum and tub just touch in one of its
-//! rows, and the time of their clash is compared too.
+//! rows, and the time of their clash is compared too. With `elements`, machines have friction
+//! dampers, stops, a gasket and a second unbalance, those of docs/examples/friction.toml varied.
 
 use std::process::ExitCode;
 
@@ -55,6 +57,35 @@ const VARIED: [(&str, f64, f64); 14] = [
     ("tub_inertia_22_kg_m2", 1.61, 1.5),
     ("radial_clearance_m", 0.01, 2.0),
 ];
+
+/// The machine that has every element, but for a second unbalance.
+const WITH_ELEMENTS: &str = include_str!("../../../docs/examples/friction.toml");
+
+/// Numbers of its elements that vary, by powers of ten up to which.
+const ELEMENTS: [(&str, f64, f64); 14] = [
+    ("friction_n", 50.0, 0.5),
+    ("damper_2_friction_n", 50.0, 0.5),
+    ("friction_speed_m_per_s", 0.01, 0.7),
+    ("spring_1_cubic_n_per_m3", 1e6, 1.0),
+    ("spring_4_cubic_n_per_m3", 1e6, 1.0),
+    ("stop_1_clearance_m", 0.01, 0.5),
+    ("stop_2_clearance_m", 0.01, 0.5),
+    ("stop_3_clearance_m", 0.02, 0.3),
+    ("stop_1_stiffness_n_per_m", 4e5, 1.5),
+    ("stop_2_stiffness_n_per_m", 4e5, 1.5),
+    ("stop_3_stiffness_n_per_m", 4e4, 0.5),
+    ("stop_1_softness_m", 1e-4, 1.0),
+    ("bushing_1_cubic_y_n_per_m3", 5e6, 1.0),
+    ("unbalance_2_mass_kg", 0.1, 0.5),
+];
+
+/// What varies in a grid beside the machine's proportions.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Plain,
+    Grazing,
+    Elements,
+}
 
 /// Numbers from a seed: splitmix64.
 struct Rng(u64);
@@ -228,12 +259,32 @@ fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
     Some(format!("radial_clearance_m={}", reach_m * (1.0 - overlap)))
 }
 
+/// A grid over the machine that has elements.
+fn with_elements(seed: u64, grid: &str, folder: &std::path::Path) -> String {
+    let mut rng = Rng(seed.rotate_left(32));
+    let unbalance = "[[further_unbalances]]\nmass_kg = 0.1\nx_m = 0.1\nradius_m = -0.2\n";
+    std::fs::write(folder.join("machine.toml"), format!("{WITH_ELEMENTS}\n{unbalance}"))
+        .expect("the temporary folder can be written to");
+    let mut set = String::new();
+    for (name, value, powers) in ELEMENTS {
+        let is_of_one = name.starts_with("damper_2") && set.contains("friction_n");
+        if rng.next() < 0.5 && !is_of_one {
+            set += &format!("{name} = {}\n", value * 10f64.powf(rng.between(-powers, powers)));
+        }
+    }
+    grid.replacen("[set]\n", &format!("machine = \"machine.toml\"\n[set]\n{set}"), 1)
+}
+
 /// One grid's rows against RK4.
-fn attack(seed: u64, is_grazing: bool, folder: &std::path::Path) -> Found {
+fn attack(seed: u64, kind: Kind, folder: &std::path::Path) -> Found {
     let path = folder.join(format!("{seed}.toml"));
     let mut text = grid(seed);
+    let is_grazing = kind == Kind::Grazing;
     if is_grazing {
         text = text.replace("cabinet_force", "clash_time");
+    }
+    if kind == Kind::Elements {
+        text = with_elements(seed, &text, folder);
     }
     let accuracy = ACCURACIES[(seed % 3) as usize];
     std::fs::write(&path, &text).expect("the temporary folder can be written to");
@@ -295,10 +346,18 @@ fn main() -> ExitCode {
     let mut words = std::env::args().skip(1);
     let mut number = || words.next()?.parse::<u64>().ok();
     let (Some(rows), Some(first)) = (number(), number()) else {
-        eprintln!("usage: attack ROWS SEED [grazing]");
+        eprintln!("usage: attack ROWS SEED [grazing|elements]");
         return ExitCode::from(2);
     };
-    let is_grazing = words.next().is_some_and(|word| word == "grazing");
+    let kind = match words.next().as_deref() {
+        None => Kind::Plain,
+        Some("grazing") => Kind::Grazing,
+        Some("elements") => Kind::Elements,
+        Some(other) => {
+            eprintln!("{other} is neither grazing nor elements");
+            return ExitCode::from(2);
+        }
+    };
     let folder = std::env::temp_dir().join(format!("sweep-attack-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     let grids = rows.div_ceil(9);
@@ -310,7 +369,7 @@ fn main() -> ExitCode {
     };
     let found = seeds
         .into_par_iter()
-        .map(|seed| attack(seed, is_grazing, &folder))
+        .map(|seed| attack(seed, kind, &folder))
         .reduce(Found::default, Found::plus);
     // What is left in the temporary folder harms nobody.
     let _ = std::fs::remove_dir_all(&folder);

@@ -1,11 +1,13 @@
 //! The engine: points through both models, in lanes, as far up the ladder of methods as each needs.
 
 mod climb;
+mod growth;
 mod ladder;
 mod pool;
 mod watch;
 
 pub(crate) use climb::Demand;
+pub(crate) use growth::responses;
 pub(crate) use ladder::{Ladder, reference_step_s};
 pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
 pub(crate) use watch::{Engine, Watch};
@@ -90,6 +92,11 @@ impl<'a> ModelEngine<'a> {
         self.ladders.get_or_init(|| self.find_ladders(&|| false))
     }
 
+    /// The rungs, if they were asked for.
+    pub(crate) fn ladders_found(&self) -> Option<&[Ladder; 2]> {
+        self.ladders.get()
+    }
+
     /// As [`Self::ladders`]; `None` if `watch` says to stop before they are found.
     fn ladders_under(&self, watch: &Watch<'_>) -> Option<&[Ladder; 2]> {
         if let Some(found) = self.ladders.get() {
@@ -170,6 +177,22 @@ impl<'a> ModelEngine<'a> {
         let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
         found.sort_by_key(|outcome| outcome.point);
         (found.len() == axis_values.len()).then_some(found)
+    }
+
+    /// Evaluates rows until `next` gives none, each with what it is known by and the values of the
+    /// axes, and hands each outcome to `keep`, in any order; fewer if `watch` stopped it. On all
+    /// threads of the rayon pool that it is called in.
+    pub(crate) fn evaluate_rows(
+        &self,
+        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
+        keep: &(dyn Fn(Outcome) + Sync),
+        watch: &Watch<'_>,
+    ) {
+        let feed = |most: usize| {
+            let rows = std::iter::from_fn(next).take(most);
+            rows.map(|(row, values)| (row, self.plan.scenario_at(&values))).collect()
+        };
+        self.through_lanes(Demand::Row, &feed, keep, watch);
     }
 
     /// Rows from a feed to a keeper, on all threads of the rayon pool this is called in.
@@ -264,7 +287,7 @@ impl<'a> ModelEngine<'a> {
         let metrics = self.plan.measures.of_model().filter_map(|metric| match metric {
             Metric::CabinetForce => extra.cabinet_force_n,
             Metric::ClashTime => extra.clash_time_s,
-            Metric::StaticSag => None,
+            Metric::StaticSag | Metric::Growth => None,
         });
         Trajectory {
             status: Status::Ok,
@@ -281,7 +304,7 @@ impl<'a> ModelEngine<'a> {
 
 /// One result per item of a group. A panic over one item must not cost the others theirs: then each
 /// is done alone, which gives the same bits, and the one is a defect.
-fn together_or_alone<I, R>(
+pub(crate) fn together_or_alone<I, R>(
     items: &[I],
     together: impl Fn(&[I]) -> Vec<R>,
     defect: impl Fn() -> R,
@@ -301,11 +324,8 @@ impl Engine for ModelEngine<'_> {
         keep: &Keep<'_>,
         watch: &Watch<'_>,
     ) {
-        let feed = |most: usize| {
-            let points = std::iter::from_fn(feed).take(most);
-            points.map(|point| (point, self.plan.scenario(point))).collect()
-        };
-        self.through_lanes(Demand::Row, &feed, keep, watch);
+        let next = || feed().map(|point| (point, self.plan.axis_values(point)));
+        self.evaluate_rows(&next, keep, watch);
     }
 
     fn simd(&self) -> &str {

@@ -15,7 +15,8 @@ use crate::store::StoreError;
 use crate::threads::ThreadsError;
 use sweep_files::FileError;
 use sweep_plot::PlotError;
-use washer_model::{NoEquilibrium, NoModes};
+use sweep_results::ResultsError;
+use washer_model::{NoAnswer, NoEquilibrium, NoModes};
 
 /// Exit codes, a contract with scripts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +29,8 @@ pub enum Exit {
     BadInput = 2,
     /// Done, but some points failed and `--fail-on-error` was given.
     PointsFailed = 3,
+    /// What `require`, or `compare --fail-on`, was asked for does not hold.
+    NotHeld = 4,
     /// Another run holds this output.
     Busy = 75,
     /// Interrupted (SIGINT).
@@ -38,11 +41,12 @@ pub enum Exit {
 
 impl Exit {
     /// Every exit code.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Done,
         Self::Failed,
         Self::BadInput,
         Self::PointsFailed,
+        Self::NotHeld,
         Self::Busy,
         Self::Interrupted,
         Self::Terminated,
@@ -56,6 +60,7 @@ impl Exit {
             Self::Failed => "an I/O or internal failure",
             Self::BadInput => "bad input, refused before any work",
             Self::PointsFailed => "with --fail-on-error: done, but some points failed",
+            Self::NotHeld => "done: a `require`, or a `compare --fail-on`, does not hold",
             Self::Busy => "another run holds this output",
             Self::Interrupted => "interrupted; finished work is kept",
             Self::Terminated => "terminated; finished work is kept",
@@ -98,12 +103,18 @@ pub enum Error {
     /// A figure.
     #[error(transparent)]
     Plot(#[from] PlotError),
+    /// A result that does not answer.
+    #[error(transparent)]
+    Results(#[from] ResultsError),
     /// A machine without a static equilibrium.
     #[error(transparent)]
     Equilibrium(#[from] NoEquilibrium),
     /// A machine whose modes cannot be computed.
     #[error(transparent)]
     Modes(#[from] NoModes),
+    /// A machine whose motions over whole turns cannot be told.
+    #[error(transparent)]
+    Exact(#[from] NoAnswer),
     /// An option whose value makes no sense here.
     #[error("`{option} {given}`: expected {expected}")]
     Option {
@@ -147,16 +158,19 @@ impl Error {
     pub fn exit(&self) -> Exit {
         match self {
             Self::Input(_) => Exit::BadInput,
-            Self::Engine(_) | Self::Equilibrium(_) | Self::Modes(_) | Self::Option { .. } => {
-                Exit::BadInput
-            }
+            Self::Engine(_)
+            | Self::Equilibrium(_)
+            | Self::Modes(_)
+            | Self::Exact(_)
+            | Self::Option { .. } => Exit::BadInput,
             Self::Boundary(_) => Exit::BadInput,
             Self::Files(error) if error.is_refusal() => Exit::BadInput,
             Self::Threads(error) if error.is_refusal() => Exit::BadInput,
             Self::Store(StoreError::Busy { .. }) => Exit::Busy,
             Self::Store(error) if error.is_refusal() => Exit::BadInput,
             Self::Plot(error) if error.is_usage() => Exit::BadInput,
-            Self::Plot(_) => Exit::Failed,
+            Self::Results(error) if error.is_refusal() => Exit::BadInput,
+            Self::Plot(_) | Self::Results(_) => Exit::Failed,
             Self::Store(_) | Self::Files(_) | Self::Threads(_) | Self::Random(_) => Exit::Failed,
             Self::Memory(_) | Self::File { .. } | Self::Stdout(_) => Exit::Failed,
         }
@@ -237,7 +251,7 @@ pub(crate) fn print(text: &str) -> Result<Exit, Error> {
 }
 
 /// Writes a message for people to standard error; as in [`show`], text only.
-pub(crate) fn tell(text: &str) {
+pub fn tell(text: &str) {
     // As in `Error::report`: nobody is left to tell.
     let _ = writeln!(anstream::stderr(), "{}", escaped(text, is_unsafe));
 }
@@ -248,7 +262,7 @@ mod tests {
 
     #[test]
     fn the_codes_are_the_contract() {
-        assert_eq!(Exit::ALL.map(|exit| exit as u8), [0, 1, 2, 3, 75, 130, 143]);
+        assert_eq!(Exit::ALL.map(|exit| exit as u8), [0, 1, 2, 3, 4, 75, 130, 143]);
         for exit in Exit::ALL {
             assert!(Exit::table().contains(exit.meaning()));
         }

@@ -11,6 +11,8 @@
 //!   `identity` says which builds write the same bytes.
 //! * `boundary` traces the curve where the ratio is at its limit, `trace` writes one point's time
 //!   histories. [`sweep_plot`] draws any of these files.
+//! * `library` is the commands' work as functions with results in memory: an [`Evaluator`] takes
+//!   tables of points, a [`ResultTable`] is what came of anything.
 //! * `commands` is the command line, with `progress`, `interrupt` and `exit` for its manners.
 //!
 //! Exported is what the program, the fuzzer and the examples use; the rest is this crate's own.
@@ -42,8 +44,10 @@ mod design;
 mod engine;
 mod estimate;
 mod exit;
+mod explain;
 mod identity;
 mod interrupt;
+mod library;
 mod measures;
 mod memory;
 mod method;
@@ -53,6 +57,8 @@ mod plan;
 mod progress;
 mod random_keys;
 mod run;
+mod speeds;
+mod stability;
 mod store;
 mod table;
 mod threads;
@@ -60,11 +66,15 @@ mod trace;
 mod verdict;
 
 pub use commands::Cli;
-pub use config::load;
+pub use config::{Diagnostics, GridInput, Mistake, load};
 pub use engine::ModelEngine;
-pub use exit::{Error, Exit};
+pub use exit::{Error, Exit, tell};
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use interrupt::{Interrupt, survive_file_size_limits};
+pub use library::{
+    BoundaryOptions, Effort, Evaluated, Evaluator, PointTable, RanToFile, ResultKind, ResultTable,
+    TraceOptions, find_boundary, find_modes, list_parameters, run_to_file, trace_point,
+};
 pub use measures::Metric;
 pub use memory::ensure_memory;
 pub use method::Integrator;

@@ -4,6 +4,7 @@
 use washer_model::{Channel, Wanted};
 
 use crate::outcome::{Deviations, Outcome};
+use crate::speeds::Speeds;
 
 /// Deviations below this count as this (m, rad) where turns are compared: neither 0 over 0 nor what
 /// no machine feels decides.
@@ -79,11 +80,13 @@ pub enum Metric {
     ClashTime,
     /// How far the machine sinks under its weight.
     StaticSag,
+    /// How fast disturbances grow at constant speeds.
+    Growth,
 }
 
 impl Metric {
     /// Every metric.
-    pub const ALL: [Self; 3] = [Self::CabinetForce, Self::ClashTime, Self::StaticSag];
+    pub const ALL: [Self; 4] = [Self::CabinetForce, Self::ClashTime, Self::StaticSag, Self::Growth];
 
     /// Name in grid files.
     #[must_use]
@@ -92,13 +95,14 @@ impl Metric {
             Self::CabinetForce => "cabinet_force",
             Self::ClashTime => "clash_time",
             Self::StaticSag => "static_sag",
+            Self::Growth => "growth",
         }
     }
 
     /// Whether each model has its own; else it belongs to the machine.
     #[must_use]
     pub const fn is_of_model(self) -> bool {
-        !matches!(self, Self::StaticSag)
+        !matches!(self, Self::StaticSag | Self::Growth)
     }
 
     /// Unit.
@@ -108,6 +112,7 @@ impl Metric {
             Self::CabinetForce => "N",
             Self::ClashTime => "s",
             Self::StaticSag => "m",
+            Self::Growth => "1/s",
         }
     }
 
@@ -118,6 +123,7 @@ impl Metric {
             Self::CabinetForce => format!("cabinet_force_{model}_n"),
             Self::ClashTime => format!("clash_time_{model}_s"),
             Self::StaticSag => "static_sag_m".to_owned(),
+            Self::Growth => "growth_per_s".to_owned(),
         }
     }
 
@@ -135,17 +141,23 @@ impl Metric {
                  static equilibrium; null if \
                  there is none"
             }
+            Self::Growth => {
+                "how fast the fastest growing disturbance of the nonlinear response grows, at that \
+                 of the speeds of [stability] at which it is greatest"
+            }
         }
     }
 }
 
 /// What a run measures beyond peaks and gaps.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measures {
     /// What the models are compared by.
     pub criterion: Criterion,
     /// Metrics asked for, in column order.
     pub metrics: Vec<Metric>,
+    /// The constant speeds that [`Metric::Growth`] is about; `None` if it is not asked for.
+    pub growth_speeds: Option<Speeds>,
 }
 
 impl Measures {

@@ -1,6 +1,6 @@
 //! The outcome of a grid point: one row of the result file.
 
-use washer_model::Channel;
+use washer_model::{Channel, Disturbance, Response};
 
 use crate::method::Level;
 
@@ -19,17 +19,23 @@ pub enum Status {
     NoEquilibrium,
     /// The evaluation of this point panicked; a defect of this program, kept to the one row.
     Panicked,
+    /// No periodic response was found at a constant speed.
+    NoResponse,
+    /// Its multipliers could not be computed.
+    NoMultipliers,
 }
 
 impl Status {
     /// Every status; the position is its code in chunk files, so new ones go to the end.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 8] = [
         Self::Ok,
         Self::Diverged,
         Self::StepTooSmall,
         Self::StepLimit,
         Self::NoEquilibrium,
         Self::Panicked,
+        Self::NoResponse,
+        Self::NoMultipliers,
     ];
 }
 
@@ -76,6 +82,40 @@ impl Trajectory {
     }
 }
 
+/// What becomes of small disturbances of a response at a constant speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Growth {
+    /// The fastest growing one.
+    pub fastest: Disturbance,
+    /// Modes of the linear model that take part in what grows, most first.
+    pub modes: [Option<GrowingMode>; 2],
+}
+
+/// A mode of the linear model that takes part in what grows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GrowingMode {
+    /// Its number, the slowest's being 1.
+    pub number: u32,
+    /// Position of its name in `Motion::NAMES`.
+    pub name: u32,
+    /// Its damped natural frequency (cycles per minute).
+    pub frequency_cpm: f64,
+}
+
+impl From<&Response> for Growth {
+    fn from(response: &Response) -> Self {
+        let mode = |place: usize| {
+            let participant = response.participants.get(place)?;
+            Some(GrowingMode {
+                number: participant.mode as u32,
+                name: participant.motion.name_index() as u32,
+                frequency_cpm: participant.frequency_cpm,
+            })
+        };
+        Self { fastest: response.disturbance(), modes: [mode(0), mode(1)] }
+    }
+}
+
 /// Both models at one grid point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
@@ -98,6 +138,9 @@ pub struct Outcome {
     pub turn_ratios: Vec<Option<f64>>,
     /// How far the machine sinks to its equilibrium, if the plan asks for it and there is one.
     pub static_sag_m: Option<f64>,
+    /// What becomes of disturbances at a constant speed: the row's own, or the one of the plan's
+    /// speeds at which they grow fastest. `None` where it is not asked for or not known.
+    pub growth: Option<Growth>,
 }
 
 impl Outcome {
@@ -113,6 +156,7 @@ impl Outcome {
             sensitive: None,
             turn_ratios: Vec::new(),
             static_sag_m: None,
+            growth: None,
         }
     }
 }

@@ -1,9 +1,10 @@
 //! What a run is about to do, with every value resolved and checked: the one thing that flows from
 //! the configuration into the engine, the store and the reports.
 
+use serde_json::Value;
 use washer_model::{Channel, Machine, Parameter, Spin, Target};
 
-use crate::design::Design;
+use crate::design::{Design, Distribution};
 use crate::measures::Measures;
 use crate::method::Integrator;
 
@@ -43,6 +44,8 @@ pub struct Plan {
     pub reliability: Reliability,
     /// What is measured of the motions.
     pub measures: Measures,
+    /// What `--set` has changed, by name.
+    pub set: Vec<(String, Value)>,
 }
 
 /// One swept parameter.
@@ -68,6 +71,8 @@ pub enum AxisValues {
         /// How many, at least 1.
         count: u64,
     },
+    /// Of a design: as often as a distribution says, between its bounds.
+    Distributed(Distribution),
     /// Evenly spaced in the logarithm, both ends included.
     Log {
         /// First value.
@@ -86,6 +91,8 @@ impl AxisValues {
         match self {
             Self::List(values) => values.len() as u64,
             Self::Linear { count, .. } | Self::Log { count, .. } => *count,
+            // The bounds; a design finds the points between.
+            Self::Distributed(_) => 2,
         }
     }
 
@@ -120,6 +127,7 @@ impl AxisValues {
             Self::Linear { from, to, count } => {
                 at(from, to, count, &|i, last| i * ((to - from) / last) + from)
             }
+            Self::Distributed(Distribution { from, to, .. }) => at(from, to, 2, &|_, _| to),
             Self::Log { from, to, count } => at(from, to, count, &|i, last| {
                 from * libm::exp10(i * (libm::log10(to / from) / last))
             }),
@@ -135,6 +143,7 @@ impl AxisValues {
                 values[((place * values.len() as f64) as usize).min(values.len() - 1)]
             }
             Self::Linear { from, to, .. } => from + place * (to - from),
+            Self::Distributed(ref distribution) => distribution.quantile(place),
             Self::Log { from, to, .. } => from * libm::exp10(place * libm::log10(to / from)),
         }
     }
@@ -149,6 +158,7 @@ impl AxisValues {
                 let pairs = || values.iter().enumerate();
                 [index(pairs().min_by(by_value)), index(pairs().max_by(by_value))]
             }
+            Self::Distributed(_) => [0, 1],
             Self::Linear { from, to, count } | Self::Log { from, to, count } => {
                 if from <= to {
                     [0, count - 1]
@@ -328,6 +338,7 @@ mod tests {
             integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 },
             reliability: Reliability { ratio_limit: 2.0, channels: Channel::ALL.to_vec() },
             measures: Measures::default(),
+            set: Vec::new(),
         }
     }
 

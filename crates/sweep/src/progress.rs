@@ -70,13 +70,20 @@ impl Progress {
             }
             ProgressMode::Auto => lines(60),
         };
-        Self { shown, total, start, began: Instant::now() }
+        let mut progress = Self { shown, total, start, began: Instant::now() };
+        if template == BAR {
+            progress.show(start);
+        }
+        progress
     }
 
     /// Shows that `done` points of the total are there.
     pub(crate) fn show(&mut self, done: u64) {
         match &self.shown {
-            Shown::Bar(bar) => bar.set_position(done),
+            Shown::Bar(bar) => {
+                bar.set_position(done);
+                bar.set_message(self.line(done));
+            }
             Shown::Lines { next, .. } if Instant::now() >= *next => self.say(&self.line(done)),
             _ => {}
         }
@@ -133,17 +140,18 @@ impl Progress {
     fn line(&self, done: u64) -> String {
         let rate = self.rate(done);
         let percent = 100.0 * done as f64 / self.total.max(1) as f64;
-        let left = if rate > 0.0 {
-            format!("{} left", duration(self.total.saturating_sub(done) as f64 / rate))
-        } else {
-            "time left unknown".into()
-        };
-        format!("{done} of {} points ({percent:.1} %), {}, {left}", self.total, per_second(rate))
+        let so_far = format!("{done} of {} points ({percent:.1} %)", self.total);
+        // Before the first points are there, a rate of 0 and a time left would be no estimates.
+        if rate == 0.0 {
+            return so_far;
+        }
+        let left = duration(self.total.saturating_sub(done) as f64 / rate);
+        format!("{so_far}, {}, {left} left", per_second(rate))
     }
 }
 
 /// The bar with its numbers.
-const BAR: &str = "{wide_bar} {human_pos}/{human_len} points  {per_sec}  {eta} left";
+const BAR: &str = "{wide_bar} {msg}";
 
 /// The bar of a search.
 const ROWS: &str = "{wide_bar} {human_pos}/{human_len} rows  {msg}";
@@ -206,7 +214,7 @@ mod tests {
                 || line.ends_with("10.00 s left"),
             "{line}"
         );
-        assert!(progress.line(900).contains("unknown"));
+        assert_eq!(progress.line(900), "900 of 1000 points (90.0 %)");
     }
 
     #[test]

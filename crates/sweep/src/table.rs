@@ -94,11 +94,26 @@ impl Table {
         self.metadata.push(KeyValue::new(key.to_owned(), value));
     }
 
+    /// The plan that was added to the metadata; null if none was.
+    pub(crate) fn plan(&self) -> Value {
+        let plan = self.metadata.iter().find(|pair| pair.key == key::PLAN);
+        let plan = plan.and_then(|pair| serde_json::from_str(pair.value.as_deref()?).ok());
+        plan.unwrap_or_default()
+    }
+
     /// The file's bytes.
     ///
     /// # Errors
     /// What the Parquet library refuses: a defect of whoever filled the table.
-    pub(crate) fn into_bytes(mut self) -> Result<Vec<u8>, ParquetError> {
+    pub(crate) fn into_bytes(self) -> Result<Vec<u8>, ParquetError> {
+        self.finish().map(|(_, bytes)| bytes)
+    }
+
+    /// The columns, and the bytes of their file.
+    ///
+    /// # Errors
+    /// As [`Self::into_bytes`].
+    pub(crate) fn finish(mut self) -> Result<(RecordBatch, Vec<u8>), ParquetError> {
         let version = identity::VERSION;
         self.text(key::VERSION, version.to_owned());
         self.text(key::NUMERICS, identity::NUMERICS_VERSION.to_string());
@@ -114,14 +129,15 @@ impl Table {
             .build();
         let schema = Arc::new(Schema::new(self.fields));
         let batch = RecordBatch::try_new(schema.clone(), self.arrays)?;
+        let rows = batch.clone();
         let bytes = panics::in_parquet("the library gave up writing", move || {
             let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;
-            writer.write(&batch)?;
+            writer.write(&rows)?;
             writer.append_key_value_metadata(seal::blank());
             writer.into_inner()
         })?;
         let mut file = Cursor::new(bytes);
         seal::seal(&mut file)?;
-        Ok(file.into_inner())
+        Ok((batch, file.into_inner()))
     }
 }

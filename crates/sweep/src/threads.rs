@@ -37,6 +37,12 @@ pub enum ThreadsError {
     /// No memory for them.
     #[error(transparent)]
     Memory(#[from] NoMemory),
+    /// A program asks for none, or beyond reason.
+    #[error("{threads} threads: expected a number from 1 to {MOST}")]
+    Asked {
+        /// How many.
+        threads: usize,
+    },
     /// No random numbers.
     #[error(transparent)]
     Random(#[from] NoRandomNumbers),
@@ -47,9 +53,9 @@ impl ThreadsError {
         move |reason| Self::Start { threads, reason: reason.to_string() }
     }
 
-    /// Whether the scheduler's variable is wrong.
+    /// Whether the number asked for, or the scheduler's variable, is wrong.
     pub(crate) fn is_refusal(&self) -> bool {
-        matches!(self, Self::Scheduler { .. })
+        matches!(self, Self::Scheduler { .. } | Self::Asked { .. })
     }
 }
 
@@ -62,6 +68,15 @@ pub(crate) fn parse(text: &str) -> Result<usize, String> {
         Ok(threads @ 1..=MOST) => Ok(threads),
         _ => Err(format!("expected a number of threads from 1 to {MOST}; got `{text}`")),
     }
+}
+
+/// A number of threads that a program asks for.
+///
+/// # Errors
+/// [`ThreadsError::Asked`].
+pub(crate) fn checked(threads: usize) -> Result<usize, ThreadsError> {
+    let is_sensible = (1..=MOST).contains(&threads);
+    if is_sensible { Ok(threads) } else { Err(ThreadsError::Asked { threads }) }
 }
 
 /// The threads to work with: those asked for by `--threads`, else the cores that Slurm gave this

@@ -13,6 +13,7 @@ use washer_model::{
 
 use crate::config::NamedValues;
 use crate::engine::reference_step_s;
+use crate::exit::Error;
 use crate::method::Integrator;
 use crate::plan::{Plan, Scenario};
 use crate::store::StoreError;
@@ -22,7 +23,7 @@ use sweep_files::{self as files, FileKind, key};
 
 /// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as
 /// many.
-pub(crate) const MOST_INSTANTS: f64 = 2e6;
+const MOST_INSTANTS: f64 = 2e6;
 
 /// Most points whose traces a run keeps: at some 300 kB each.
 pub(crate) const MOST_KEPT: u64 = 10_000;
@@ -35,8 +36,71 @@ const KEPT_INSTANTS: f64 = 2000.0;
 pub(crate) struct Extras {
     /// Coordinates and their speeds.
     pub states: bool,
-    /// Forces of springs and dampers, and their sum.
+    /// Forces of the elements between cabinet and tub, and their sum.
     pub forces: bool,
+}
+
+/// One coordinate or speed at the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct StartValue {
+    is_speed: bool,
+    /// From 0.
+    index: usize,
+    value: f64,
+}
+
+/// Angles beyond a right angle, and shifts of metres, are no start of anything.
+const FARTHEST_START: f64 = 1.5;
+
+/// Reads `q5=0.1`.
+///
+/// # Errors
+/// What was expected instead.
+pub(crate) fn start_value(text: &str) -> Result<StartValue, String> {
+    let expected =
+        "expected a coordinate q1 to q10 or a speed u1 to u10 with its value, as in q5=0.1";
+    let (name, value) = text.split_once('=').ok_or(expected)?;
+    let (is_speed, number) = match (name.trim().strip_prefix('q'), name.trim().strip_prefix('u')) {
+        (Some(number), _) => (false, number),
+        (_, Some(number)) => (true, number),
+        _ => return Err(expected.to_owned()),
+    };
+    let index = number
+        .parse::<usize>()
+        .ok()
+        .filter(|number| (1..=COORDINATES).contains(number))
+        .ok_or(expected)?;
+    let value =
+        value.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or(expected)?;
+    if !is_speed && value.abs() > FARTHEST_START {
+        return Err(format!("expected at most {FARTHEST_START} m or rad from equilibrium"));
+    }
+    Ok(StartValue { is_speed, index: index - 1, value })
+}
+
+/// The start with these values, and everything else at equilibrium.
+pub(crate) fn start_of(values: &[StartValue]) -> Start {
+    let mut start = Start::default();
+    for StartValue { is_speed, index, value } in values {
+        if *is_speed { start.speeds[*index] = *value } else { start.deviations[*index] = *value }
+    }
+    start
+}
+
+/// The time between instants, if it makes a sensible number of them.
+///
+/// # Errors
+/// [`Error::Option`].
+pub(crate) fn every(every_s: f64, plan: &Plan) -> Result<f64, Error> {
+    let least = plan.end_s / MOST_INSTANTS;
+    if (least..=plan.end_s).contains(&every_s) {
+        return Ok(every_s);
+    }
+    Err(Error::Option {
+        option: "--every",
+        given: every_s.to_string(),
+        expected: format!("from {least:e} to {} s", plan.end_s),
+    })
 }
 
 /// The histories of one point.
@@ -114,7 +178,7 @@ pub(crate) fn trace(
 }
 
 /// Traces of every point of a plan, one file each (`point-<index>.parquet`) in `folder`, until
-/// `stop` says so. A point without equilibrium has none.
+/// `stop` says so. A point without equilibrium has none. `done` hears of every point that is there.
 ///
 /// # Errors
 /// As `store`; and no more threads.
@@ -123,6 +187,7 @@ pub(crate) fn keep(
     folder: &Path,
     threads: usize,
     stop: &(dyn Fn() -> bool + Sync),
+    done: &(dyn Fn() + Sync),
 ) -> Result<(), StoreError> {
     files::ready(folder)?;
     threads::pool(threads)?.install(|| {
@@ -143,10 +208,12 @@ pub(crate) fn keep(
             ) {
                 Ok(trace) => {
                     let path = folder.join(format!("point-{point}.parquet"));
-                    Ok(files::write(&path, FileKind::Trace, &trace.into_bytes(&path)?)?)
+                    files::write(&path, FileKind::Trace, &trace.into_bytes(&path)?)?;
                 }
-                Err(NoEquilibrium) => Ok(()),
+                Err(NoEquilibrium) => {}
             }
+            done();
+            Ok(())
         })
     })
 }
@@ -158,6 +225,11 @@ impl Trace {
     /// What the Parquet library refuses: a defect of this program.
     pub(crate) fn into_bytes(self, path: &Path) -> Result<Vec<u8>, StoreError> {
         self.table.into_bytes().map_err(StoreError::parquet("write", path))
+    }
+
+    /// The table, for its columns as well as its bytes.
+    pub(crate) fn into_table(self) -> Table {
+        self.table
     }
 }
 
@@ -251,9 +323,24 @@ impl<'a> Columns<'a> {
                 at.dampers_n[k]
             });
         }
-        for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-            let description =
-                format!("force of all springs and dampers on the cabinet along c{}", k + 1);
+        for k in 0..first.stops_n.len() {
+            let what = format!("stop_{}_force", k + 1);
+            add(&what, "push between the tub and the stop", &|at| at.stops_n[k]);
+        }
+        let axes = ["x", "y", "z"];
+        for k in 0..first.bushings_n.len() {
+            for (i, axis) in axes.into_iter().enumerate() {
+                let what = format!("bushing_{}_force_{axis}", k + 1);
+                let description = format!("force of the bushing on the cabinet along c{}", i + 1);
+                add(&what, &description, &|at| at.bushings_n[k][i]);
+            }
+        }
+        let all = match first.stops_n.is_empty() && first.bushings_n.is_empty() {
+            true => "all springs and dampers",
+            false => "all springs, dampers, stops and bushings",
+        };
+        for (k, axis) in axes.into_iter().enumerate() {
+            let description = format!("force of {all} on the cabinet along c{}", k + 1);
             add(&format!("cabinet_force_{axis}"), &description, &|at| at.cabinet_n[k]);
         }
     }
@@ -269,5 +356,22 @@ impl<'a> Columns<'a> {
             "the {} model {what} at {time_s:.4} s: its columns are null from there on",
             self.model
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_start_is_a_coordinate_or_a_speed() {
+        assert_eq!(start_value("q5=0.1"), Ok(StartValue { is_speed: false, index: 4, value: 0.1 }));
+        assert_eq!(
+            start_value(" u10 = -2"),
+            Ok(StartValue { is_speed: true, index: 9, value: -2.0 })
+        );
+        for wrong in ["", "q5", "q0=1", "q11=1", "x=1", "q1=nan", "u1=1e999", "q=1", "q5=2"] {
+            assert!(start_value(wrong).unwrap_err().contains("expected"), "{wrong}");
+        }
     }
 }

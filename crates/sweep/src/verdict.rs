@@ -7,7 +7,7 @@ use crate::outcome::{Outcome, Status};
 ///
 /// A row whose nonlinear model failed carries that model's reason, whatever became of the linear
 /// one; a row whose linear model alone failed carries that reason behind `linear_`.
-pub(crate) const ROW_STATUSES: [&str; 11] = [
+pub(crate) const ROW_STATUSES: [&str; 13] = [
     "ok",
     "diverged",
     "step_too_small",
@@ -19,16 +19,25 @@ pub(crate) const ROW_STATUSES: [&str; 11] = [
     "linear_step_limit",
     "linear_no_equilibrium",
     "linear_panicked",
+    "no_response",
+    "no_multipliers",
 ];
+
+/// Statuses that either model can have, each of which has a name behind `linear_` too.
+const OF_EITHER: usize = Status::Panicked as usize + 1;
 
 /// The row's entry in [`ROW_STATUSES`], and the failing model's time of failure.
 #[must_use]
 pub(crate) fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
-    let code = |status: Status| status as usize;
+    // Those of both models together stand behind those of either.
+    let code = |status: Status, of_linear: usize| match status as usize {
+        code if code < OF_EITHER => code + of_linear,
+        code => code + OF_EITHER - 1,
+    };
     if outcome.nonlinear.status != Status::Ok {
-        (code(outcome.nonlinear.status), outcome.nonlinear.fail_time_s)
+        (code(outcome.nonlinear.status, 0), outcome.nonlinear.fail_time_s)
     } else if outcome.linear.status != Status::Ok {
-        (Status::ALL.len() - 1 + code(outcome.linear.status), outcome.linear.fail_time_s)
+        (code(outcome.linear.status, OF_EITHER - 1), outcome.linear.fail_time_s)
     } else {
         (0, None)
     }

@@ -34,7 +34,9 @@ pub(crate) const FIRST_ANGLE: usize = TUB_YAW;
 
 /// The coordinates of the tub.
 pub(crate) const TUB: [usize; 4] = [TUB_Y, TUB_Z, TUB_YAW, TUB_PITCH];
-/// Those that turn it.
+/// The same of the shaft.
+pub(crate) const SHAFT: [usize; 4] = [SHAFT_Y, SHAFT_Z, SHAFT_YAW, SHAFT_PITCH];
+/// Those that turn the tub.
 pub(crate) const TUB_TURNS: [usize; 2] = [TUB_YAW, TUB_PITCH];
 /// The coordinates that turn the rotor. Its forces depend on q3 and q4 through the bearings alone.
 pub(crate) const ROTOR_TURNS: [usize; 4] = [SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];

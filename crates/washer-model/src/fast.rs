@@ -28,6 +28,12 @@
 //! of that is added to ds; on the paper's machine the effect on motions is smaller.
 //!
 //! The polynomial of degree 5 between steps bounds the step as well.
+//!
+//! Elements that are not linear (friction, stops, stiffening springs, bushings) count as their
+//! steepest tangents: a step is stable with friction at standing still and with every stop closed,
+//! and the motion to follow includes the tub's swing on closed stops. Where forces have corners
+//! ([`Cases::are_nonsmooth`]), one step serves all speeds of the drum, because a stop rings as fast
+//! at any.
 
 pub(crate) mod geared;
 
@@ -37,13 +43,14 @@ use core::iter;
 use crate::fast::geared::{Formula, GEARS, Gear, Geared, interpolation_phase};
 use crate::machine::spin::Spin;
 use crate::modes::{
-    Mode, Modes, Motion, NoModes, highest_with_caps, modes_with_caps, motions_with_caps,
+    Mode, Modes, Motion, NoModes, fastest_rigid_rad_per_s, highest_with_caps, modes_with_caps,
+    motions_with_caps,
 };
 use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
 
 /// Modes of the suspension: yaw, pitch, two translations.
-const SUSPENSION_MODES: usize = 4;
+pub(crate) const SUSPENSION_MODES: usize = 4;
 
 /// The modes of the suspension and the two of the hinge. The other four are the bearings', faster
 /// unless the bearings are soft.
@@ -67,7 +74,7 @@ const LEAST_HALF_WIDTH: f64 = 0.01;
 /// suspension, whirls of the hinge can grow from a tiny start. The start depends on the ringing of
 /// the bearings, which all runs with caps leave out alike, so that their comparison does not show
 /// it.
-const HINGE_TO_DRUM: f64 = 3.2;
+pub(crate) const HINGE_TO_DRUM: f64 = 3.2;
 
 /// Bits of a step's fraction that are kept: 1e-6 of the step.
 const STEP_BITS: u32 = 20;
@@ -105,6 +112,8 @@ struct Case<'a> {
     point: &'a Point,
     /// Fastest of the motions that the method has to follow.
     fastest_followed_rad_per_s: f64,
+    /// What `fastest_followed_rad_per_s` would be if all elements were as at rest.
+    fastest_at_rest_rad_per_s: f64,
     /// Fastest of all modes, at rest and turning.
     fastest_rad_per_s: f64,
     /// The hinge is stiff enough.
@@ -146,12 +155,22 @@ impl<'a> Case<'a> {
         let rest = State::new(point, 0.0)?;
         let [first, second, third] = GEAR_SHARES.map(|share| State::new(point, share * top));
         let slow = &rest.modes.modes;
-        let followed = top.max(slow[SUSPENSION_MODES - 1].magnitude_rad_per_s);
+        let at_rest = top.max(slow[SUSPENSION_MODES - 1].magnitude_rad_per_s);
+        let followed = match &point.steepest {
+            Some(steepest) => at_rest.max(fastest_rigid_rad_per_s(point, steepest)?),
+            None => at_rest,
+        };
         let hinge = slow[SUSPENSION_MODES].magnitude_rad_per_s;
         Ok(Self {
             point,
             // A soft hinge takes part in the motion.
-            fastest_followed_rad_per_s: if hinge < 2.0 * followed { hinge } else { followed },
+            // Stops may drive faster motions than the hinge's.
+            fastest_followed_rad_per_s: if hinge < 2.0 * followed {
+                hinge.max(followed)
+            } else {
+                followed
+            },
+            fastest_at_rest_rad_per_s: at_rest,
             may_be_capped: hinge >= HINGE_TO_DRUM * top,
             fastest_rad_per_s: highest_with_caps(point, 0.0, None)?
                 .max(highest_with_caps(point, top, None)?),
@@ -226,24 +245,35 @@ impl<'a> Case<'a> {
 
     /// Weighted shift (rad/s) of a suspension mode by a capped hinge while the drum turns.
     fn hinge_shift(&self, mode: &Mode, turning_rad_per_s: f64, caps: &Caps) -> f64 {
-        let Some(cap_rad_per_s) = caps.hinge_rad_per_s else { return 0.0 };
-        let frequency = mode.magnitude_rad_per_s;
         let is_of_suspension =
-            frequency <= self.rest.modes.modes[SUSPENSION_MODES].magnitude_rad_per_s;
+            mode.magnitude_rad_per_s <= self.rest.modes.modes[SUSPENSION_MODES].magnitude_rad_per_s;
         if !is_of_suspension {
             return 0.0;
         }
-        let softening =
-            (frequency * frequency - BACKWARD_SHARE * turning_rad_per_s * turning_rad_per_s).abs()
-                + (1.0 - BACKWARD_SHARE) * frequency * turning_rad_per_s;
-        let in_hinge = softening / (cap_rad_per_s * cap_rad_per_s);
-        FREE_SHARE * 0.5 * mode.hinge_share(self.point) * frequency * in_hinge
+        hinge_shift(self.point, mode, turning_rad_per_s, caps.hinge_rad_per_s)
     }
 
     /// Relative error of amplitudes by truncation.
     fn error_of_truncation(&self, formula: Formula, step_s: f64) -> f64 {
         formula.error_per_radian(step_s * self.fastest_followed_rad_per_s) / MEMORY_DAMPING_RATIO
     }
+}
+
+/// Weighted shift (rad/s) of a suspension mode by the hinge's cap, if it has one, while the drum
+/// turns.
+pub(crate) fn hinge_shift(
+    point: &Point,
+    mode: &Mode,
+    turning_rad_per_s: f64,
+    cap_rad_per_s: Option<f64>,
+) -> f64 {
+    let Some(cap_rad_per_s) = cap_rad_per_s else { return 0.0 };
+    let frequency = mode.magnitude_rad_per_s;
+    let softening =
+        (frequency * frequency - BACKWARD_SHARE * turning_rad_per_s * turning_rad_per_s).abs()
+            + (1.0 - BACKWARD_SHARE) * frequency * turning_rad_per_s;
+    let in_hinge = softening / (cap_rad_per_s * cap_rad_per_s);
+    FREE_SHARE * 0.5 * mode.hinge_share(point) * frequency * in_hinge
 }
 
 /// Relative error of an amplitude by a mode's shift (rad/s).
@@ -284,6 +314,24 @@ impl<'a> Cases<'a> {
         steps.reduce(f64::min).map(rounded_down)
     }
 
+    /// Whether some machine's forces have corners that steps longer than they are wide do not see:
+    /// friction and stops. There errors do not shrink with the step by the order of a formula.
+    #[must_use]
+    pub fn are_nonsmooth(&self) -> bool {
+        self.cases.iter().flatten().any(|case| case.point.machine.elements.are_nonsmooth())
+    }
+
+    /// Whether closed stops or stiffened springs make the tub swing faster (rad/s, given back) than
+    /// anything else that the method has to follow.
+    #[must_use]
+    pub fn stiffened_rad_per_s(&self) -> Option<f64> {
+        let stiffened = self.cases.iter().flatten().filter(|case| {
+            case.fastest_followed_rad_per_s > case.fastest_at_rest_rad_per_s
+                && case.point.steepest.is_some()
+        });
+        stiffened.map(|case| case.fastest_followed_rad_per_s).reduce(f64::max)
+    }
+
     fn with_modes(&self) -> Result<Vec<&Case<'a>>, NoModes> {
         self.cases.iter().map(|case| case.as_ref().map_err(|none| *none)).collect()
     }
@@ -299,6 +347,9 @@ impl<'a> Cases<'a> {
             return Ok(None);
         };
         let mut geared = Geared::steady(formula, trial.step_s, trial.caps);
+        if self.are_nonsmooth() {
+            return Ok(Some(geared));
+        }
         for gear in 0..TOP {
             let steps_s = [WORTH_A_GEAR * trial.step_s, search.longest_s / GEAR_SHARES[gear]];
             if let Some(Trial { step_s, caps, .. }) = search.longest(gear, steps_s)? {

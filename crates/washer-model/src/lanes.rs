@@ -1,5 +1,6 @@
 //! Structures of lane values: filled from plain numbers, and read, lane by lane.
 
+use core::marker::PhantomData;
 use lane_ode::{Dual, Lane, N, Real};
 
 /// A structure of lane values. `One` is the same structure of plain numbers, as one lane holds it.
@@ -115,6 +116,48 @@ impl<A: Constant> Constant for Vec<A> {
             list.push(item.constant());
         }
         list
+    }
+}
+
+/// Something that holds of some machines: whether it does of any that the lanes have held.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InAnyLane<T>(bool, PhantomData<T>);
+
+impl<T> InAnyLane<T> {
+    /// Whether it holds of this machine.
+    pub(crate) fn new(is_so: bool) -> Self {
+        Self(is_so, PhantomData)
+    }
+
+    /// Whether it holds of any.
+    #[inline(always)]
+    pub(crate) fn is_so(self) -> bool {
+        self.0
+    }
+}
+
+impl<T: Lane> InLanes for InAnyLane<T> {
+    type Number = N<T>;
+    type One = InAnyLane<f64>;
+    #[inline(always)]
+    fn splat(_: N<T>, one: &InAnyLane<f64>) -> Self {
+        Self::new(one.0)
+    }
+    #[inline(always)]
+    fn set_lane(&mut self, _: usize, one: &InAnyLane<f64>) {
+        self.0 |= one.0;
+    }
+    #[inline(always)]
+    fn get_lane(&self, _: usize) -> InAnyLane<f64> {
+        InAnyLane::new(self.0)
+    }
+}
+
+impl<T: Real> Constant for InAnyLane<T> {
+    type Dual = InAnyLane<Dual<T>>;
+    #[inline(always)]
+    fn constant(&self) -> InAnyLane<Dual<T>> {
+        InAnyLane::new(self.0)
     }
 }
 

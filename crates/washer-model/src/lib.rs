@@ -70,6 +70,7 @@ mod modes;
 mod nonlinear;
 mod point;
 mod run;
+mod stability;
 
 pub use channel::Channel;
 pub use coordinates::COORDINATES;
@@ -81,7 +82,9 @@ pub use machine::parameters::{
 };
 pub use machine::spin::Spin;
 pub use machine::violations::Violation;
-pub use machine::{Bearings, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance};
+pub use machine::{
+    Bearings, BumpStop, Bushing, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance,
+};
 pub use modes::campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
 pub use modes::shape::{Motion, Movement, Plane};
 pub use modes::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
@@ -92,6 +95,10 @@ pub use run::history::{History, Instant, Start, history};
 pub use run::suspension::Forces;
 pub use run::{
     Course, Extra, Method, ModelKind, Record, Stop, Wanted, simulate, simulate_until, simulate_with,
+};
+pub use stability::{
+    Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant, Response,
+    cross, exact_motions, peaks_without_departures, respond,
 };
 
 #[cfg(test)]

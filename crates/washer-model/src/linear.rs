@@ -65,23 +65,11 @@ pub(crate) fn linearise<T: Lane>(
     let still = [zero; COORDINATES];
     let bodies = &machine.bodies;
     let on_shaft = Deflection::new(q, &Tilt::of_tub(q), &Tilt::of_shaft(q)).load(bodies);
-    let on_tub = on_shaft.reaction();
     let lifted = machine.constant();
 
     // The tub does not depend on the spin.
     let at_rest = tub(machine, q, &still);
-    let mut tub_stiffness = [[zero; 4]; 4];
-    let mut tub_damping = [[zero; 4]; 4];
-    for (column, &j) in TUB.iter().enumerate() {
-        for (matrix, dq, du) in [(&mut tub_stiffness, 1.0, 0.0), (&mut tub_damping, 0.0, 1.0)] {
-            let Half { mut floating, .. } = tub(&lifted, &seeded(q, j, dq), &seeded(&still, j, du));
-            floating.apply(&on_tub.constant());
-            let rows: [_; 4] = about_centre(floating.generalised_forces(), &at_rest.floating.arm);
-            for (row, slope) in rows.iter().enumerate() {
-                matrix[row][column] = -*slope;
-            }
-        }
-    }
+    let [tub_stiffness, tub_damping] = tub_tangents(machine, q);
 
     let mut samples = [[[zero; HARMONICS]; ALL_ENTRIES]; 3];
     for (k, &(cos, sin)) in SAMPLES.iter().enumerate() {
@@ -147,6 +135,32 @@ pub(crate) fn linearise<T: Lane>(
         .collect()
 }
 
+/// Stiffness and damping of the tub about the equilibrium `q`, as in [`Constants`].
+#[inline(always)]
+pub(crate) fn tub_tangents<T: Lane>(
+    machine: &Coefficients<T>,
+    q: &[N<T>; COORDINATES],
+) -> [[[N<T>; 4]; 4]; 2] {
+    let zero = q[0].lit(0.0);
+    let still = [zero; COORDINATES];
+    let on_shaft = Deflection::new(q, &Tilt::of_tub(q), &Tilt::of_shaft(q)).load(&machine.bodies);
+    let on_tub = on_shaft.reaction().constant();
+    let arm = tub(machine, q, &still).floating.arm;
+    let lifted = machine.constant();
+    let mut tangents = [[[zero; 4]; 4]; 2];
+    for (column, &j) in TUB.iter().enumerate() {
+        for (matrix, (dq, du)) in tangents.iter_mut().zip([(1.0, 0.0), (0.0, 1.0)]) {
+            let Half { mut floating, .. } = tub(&lifted, &seeded(q, j, dq), &seeded(&still, j, du));
+            floating.apply(&on_tub);
+            let rows: [_; 4] = about_centre(floating.generalised_forces(), &arm);
+            for (row, slope) in rows.iter().enumerate() {
+                matrix[row][column] = -*slope;
+            }
+        }
+    }
+    tangents
+}
+
 /// Slopes of generalised forces, from the bearing midpoint's rows to the mass centre's: the inverse
 /// of what `Floating::generalised_forces` does, at the equilibrium's arms.
 #[inline(always)]
@@ -203,6 +217,14 @@ pub struct Matrices {
 }
 
 impl LinearPoint {
+    /// With another stiffness and damping of the tub.
+    pub(crate) fn with_tub(&self, [tub_stiffness, tub_damping]: [[[N<f64>; 4]; 4]; 2]) -> Self {
+        let mut other = self.clone();
+        other.constants.tub_stiffness = tub_stiffness;
+        other.constants.tub_damping = tub_damping;
+        other
+    }
+
     /// The bearings' share of the stiffness matrix, without that of their static load.
     pub(crate) fn bearing_stiffness(
         &self,

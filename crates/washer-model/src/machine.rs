@@ -21,6 +21,8 @@ pub struct Machine {
     pub drum: Drum,
     /// The laundry stuck to the drum's wall, a point mass.
     pub unbalance: Unbalance,
+    /// More such point masses, any number: laundry in further planes, or counterweights.
+    pub further_unbalances: Vec<Unbalance>,
     /// Bending flexibility between shaft and drum.
     pub flexure: Flexure,
     /// The two radial bearings between tub and shaft.
@@ -29,6 +31,10 @@ pub struct Machine {
     pub springs: Vec<Spring>,
     /// Dampers between cabinet and tub, any number.
     pub dampers: Vec<Damper>,
+    /// Stops between cabinet and tub, any number.
+    pub stops: Vec<BumpStop>,
+    /// Bushings between cabinet and tub, any number; a door gasket is one.
+    pub bushings: Vec<Bushing>,
 }
 
 /// Body T, which the springs hold.
@@ -70,14 +76,14 @@ pub struct Drum {
     pub front_x_m: f64,
 }
 
-/// The unbalance: a point mass on the drum's wall, along d2.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// An unbalance: a point mass fixed to the drum, along d2.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Unbalance {
     /// Mass m_u.
     pub mass_kg: f64,
     /// Position x_u along the axis.
     pub x_m: f64,
-    /// Distance r_u from the axis.
+    /// Distance r_u from the axis; that of a further unbalance is negative where it is opposite.
     pub radius_m: f64,
 }
 
@@ -112,9 +118,11 @@ pub struct Spring {
     pub stiffness_n_per_m: f64,
     /// Length without force; the distance between the ends as given if absent.
     pub free_length_m: Option<f64>,
+    /// Tension per cube of the elongation (k_3), beside that of the stiffness.
+    pub cubic_n_per_m3: f64,
 }
 
-/// A viscous damper between a cabinet point and a tub point.
+/// A damper between a cabinet point and a tub point, viscous, with friction, or both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Damper {
     /// End at the cabinet, in cabinet axes from O.
@@ -123,6 +131,68 @@ pub struct Damper {
     pub tub_m: [f64; 3],
     /// Damping along the line between the ends.
     pub damping_n_s_per_m: f64,
+    /// Friction F_f: its force at speeds well above `friction_speed_m_per_s`.
+    pub friction_n: f64,
+    /// Speed v_s below which friction fades to zero.
+    pub friction_speed_m_per_s: f64,
+    /// Speed amplitude V at which the linear model's viscous damping takes as much energy out of a
+    /// swing as friction does: 4 F_f / (pi V). It must be there where there is friction.
+    pub friction_linear_speed_m_per_s: Option<f64>,
+}
+
+/// A rubber stop at the cabinet, which a tub point meets after a clearance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BumpStop {
+    /// The tub point, in tub axes from P_T.
+    pub tub_m: [f64; 3],
+    /// The way from the tub to the stop, in cabinet axes; of any length but 0.
+    pub direction: [f64; 3],
+    /// How far the tub point may move that way from its place before loading.
+    pub clearance_m: f64,
+    /// Stiffness in contact.
+    pub stiffness_n_per_m: f64,
+    /// Damping in contact.
+    pub damping_n_s_per_m: f64,
+    /// Depth s over which contact sets in.
+    pub softness_m: f64,
+}
+
+impl BumpStop {
+    /// Softness of a stop that gives none.
+    pub const SOFTNESS_M: f64 = 1e-4;
+}
+
+impl Default for BumpStop {
+    /// Without stiffness, above the bearings' midpoint.
+    fn default() -> Self {
+        Self {
+            tub_m: [0.0; 3],
+            direction: [0.0, 1.0, 0.0],
+            clearance_m: 0.0,
+            stiffness_n_per_m: 0.0,
+            damping_n_s_per_m: 0.0,
+            softness_m: Self::SOFTNESS_M,
+        }
+    }
+}
+
+/// A bushing: springs and dampers along the cabinet's three axes on one tub point. It is without
+/// force where that point is before loading.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bushing {
+    /// The tub point, in tub axes from P_T.
+    pub tub_m: [f64; 3],
+    /// Stiffness along c1, c2 and c3.
+    pub stiffness_n_per_m: [f64; 3],
+    /// Force per cube of the displacement along each, beside that of the stiffness.
+    pub cubic_n_per_m3: [f64; 3],
+    /// Damping along each.
+    pub damping_n_s_per_m: [f64; 3],
+}
+
+impl Damper {
+    /// Speed v_s of a damper that gives none.
+    pub const FRICTION_SPEED_M_PER_S: f64 = 0.01;
 }
 
 impl Machine {
@@ -146,11 +216,15 @@ impl Machine {
             tub_m: [x, 0.1626, side * 0.1626],
             stiffness_n_per_m: 8000.0,
             free_length_m: None,
+            cubic_n_per_m3: 0.0,
         };
         let damper = |side: f64| Damper {
             cabinet_m: [0.3068, -0.2800, side * 0.2800],
             tub_m: [0.3068, -0.1626, side * 0.1626],
             damping_n_s_per_m: 140.0,
+            friction_n: 0.0,
+            friction_speed_m_per_s: Damper::FRICTION_SPEED_M_PER_S,
+            friction_linear_speed_m_per_s: None,
         };
         Self {
             gravity_m_per_s2: 9.81,
@@ -174,6 +248,7 @@ impl Machine {
                 front_x_m: 0.450,
             },
             unbalance,
+            further_unbalances: Vec::new(),
             flexure: Flexure { stiffness_n_m_per_rad: 29_670.0 },
             bearings: Bearings {
                 front_x_m: 0.050,
@@ -188,6 +263,8 @@ impl Machine {
                 spring(0.0868, -1.0),
             ],
             dampers: vec![damper(1.0), damper(-1.0)],
+            stops: Vec::new(),
+            bushings: Vec::new(),
         }
     }
 }

@@ -6,12 +6,15 @@
 pub(crate) mod campbell;
 pub(crate) mod shape;
 
-use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, STATES};
+use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT, STATES, TUB};
+use crate::linear::{LinearPoint, Matrices};
+use crate::machine::spin::SpinState;
 use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
 use core::f64::consts::TAU;
 use faer::linalg::solvers::{Llt, Solve as _};
 use faer::{Mat, Side, c64};
+use lane_ode::N;
 
 /// Coordinates of the hinge: q9, q10.
 const HINGE: [usize; 2] = [HINGE_YAW, HINGE_PITCH];
@@ -127,7 +130,7 @@ pub(crate) fn modes_with_caps(
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
 ) -> Result<Modes, NoModes> {
-    let (system, mass) = first_order(point, theta_rad, speed_rad_per_s, caps)?;
+    let (system, mass) = first_order(point, &point.linear, theta_rad, speed_rad_per_s, caps)?;
     let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
     let (values, vectors) = (decomposition.S().column_vector(), decomposition.U());
     let motions = natural_motions((0..STATES).map(|k| values[k] * system.unit_per_s))?;
@@ -146,7 +149,7 @@ pub(crate) fn motions_with_caps(
     speed_rad_per_s: f64,
     caps: &Caps,
 ) -> Result<[Motion; COORDINATES], NoModes> {
-    let (system, _) = first_order(point, 0.0, speed_rad_per_s, Some(caps))?;
+    let (system, _) = first_order(point, &point.linear, 0.0, speed_rad_per_s, Some(caps))?;
     let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
     natural_motions(values.into_iter().map(|s| s * system.unit_per_s))
 }
@@ -209,7 +212,8 @@ fn unit_mass(
 }
 
 /// The largest |s| (rad/s) of a machine while its drum turns at `speed_rad_per_s`, over a turn of
-/// theta. It limits the step of an explicit method.
+/// theta: about the equilibrium, and with every element as steep as it can be (friction at standing
+/// still, stops closed). It limits the step of an explicit method.
 ///
 /// # Errors
 /// As [`modes`].
@@ -225,9 +229,10 @@ pub(crate) fn highest_with_caps(
     caps: Option<&Caps>,
 ) -> Result<f64, NoModes> {
     let mut highest = 0.0_f64;
-    for angle in 0..ANGLES {
-        let theta = TAU * angle as f64 / ANGLES as f64;
-        let (system, _) = first_order(point, theta, speed_rad_per_s, caps)?;
+    let models = core::iter::once(&point.linear).chain(point.steepest.as_deref());
+    let angles = (0..ANGLES).map(|angle| TAU * angle as f64 / ANGLES as f64);
+    for (model, theta) in models.flat_map(|model| angles.clone().map(move |theta| (model, theta))) {
+        let (system, _) = first_order(point, model, theta, speed_rad_per_s, caps)?;
         for s in system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)? {
             let magnitude = magnitude(s) * system.unit_per_s;
             if !magnitude.is_finite() {
@@ -237,6 +242,29 @@ pub(crate) fn highest_with_caps(
         }
     }
     Ok(highest)
+}
+
+/// The fastest swing (rad/s) of the tub with the rotor rigid in it, undamped, by a linear model's
+/// stiffness.
+///
+/// # Errors
+/// As [`modes`].
+pub(crate) fn fastest_rigid_rad_per_s(point: &Point, model: &LinearPoint) -> Result<f64, NoModes> {
+    let still = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
+    let Matrices { mass, stiffness, .. } = model.matrices(&point.machine.bodies, &still);
+    let together = |matrix: &[[f64; COORDINATES]; COORDINATES]| {
+        let with = |i: usize, j: usize| matrix[i][j];
+        Mat::from_fn(TUB.len(), TUB.len(), |i, j| {
+            let ([i, k], [j, l]) = ([TUB[i], SHAFT[i]], [TUB[j], SHAFT[j]]);
+            with(i, j) + with(i, l) + with(k, j) + with(k, l)
+        })
+    };
+    let mass = together(&mass);
+    let factors = Llt::new(mass.as_ref(), Side::Lower).map_err(|_| NoModes::Mass)?;
+    let values = factors.solve(together(&stiffness)).eigenvalues();
+    let values = values.map_err(|_| NoModes::Eigenvalues)?;
+    let fastest = values.iter().map(|square| magnitude(*square)).fold(0.0, f64::max).sqrt();
+    if fastest.is_finite() { Ok(fastest) } else { Err(NoModes::Eigenvalues) }
 }
 
 /// x' = unit A x over x = (q, q' / unit).
@@ -249,14 +277,16 @@ struct FirstOrder {
 
 fn first_order(
     point: &Point,
+    model: &LinearPoint,
     theta_rad: f64,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
 ) -> Result<(FirstOrder, [[f64; COORDINATES]; COORDINATES]), NoModes> {
-    let mut matrices = point.matrices(theta_rad, speed_rad_per_s, 0.0);
+    let bodies = &point.machine.bodies;
+    let spin = SpinState::new(N(theta_rad).sin_cos(), N(speed_rad_per_s), N(0.0));
+    let mut matrices = model.matrices(bodies, &spin);
     if let Some(caps) = caps {
-        let bodies = &point.machine.bodies;
-        let bearings = point.linear.bearing_stiffness(bodies);
+        let bearings = model.bearing_stiffness(bodies);
         let cap_squared = caps.bearings_rad_per_s * caps.bearings_rad_per_s;
         let speed_squared = speed_rad_per_s * speed_rad_per_s;
         for i in 0..COORDINATES {

@@ -23,7 +23,7 @@ use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::floating::{Factors, Floating};
 use crate::nonlinear::forces::Flexure;
 use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
-use lane_ode::{N, Real};
+use lane_ode::{Lane, N, Real};
 
 /// One half of the machine: its equations without the bearings, its inertia (lower triangle), and
 /// its axis.
@@ -42,7 +42,7 @@ pub(crate) struct Halves<T> {
 /// Assembles the equations of motion at coordinates `q` (m, rad) and speeds `u`, with the bearing
 /// forces in both halves.
 #[inline(always)]
-pub(crate) fn halves<T: Real>(
+pub(crate) fn halves<T: Lane>(
     machine: &Coefficients<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
@@ -58,7 +58,7 @@ pub(crate) fn halves<T: Real>(
 
 /// Accelerations du/dt of all ten coordinates; `sag` at the same machine's equilibrium.
 #[inline(always)]
-pub(crate) fn accelerations<T: Real>(
+pub(crate) fn accelerations<T: Lane>(
     machine: &Coefficients<T>,
     coupling: &Coupling<T>,
     sag: &Sag<T>,
@@ -88,7 +88,7 @@ pub(crate) fn accelerations<T: Real>(
 
 /// Body T about its mass centre.
 #[inline(always)]
-pub(crate) fn tub<T: Real>(
+pub(crate) fn tub<T: Lane>(
     machine: &Coefficients<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],

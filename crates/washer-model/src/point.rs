@@ -6,7 +6,7 @@ use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, TUB_PITCH, TUB_Y};
 use crate::lanes::InLanes as _;
 use crate::linear::outputs::{LinearOutputs, linearise_outputs};
-use crate::linear::{LinearPoint, Matrices, linearise};
+use crate::linear::{LinearPoint, Matrices, linearise, tub_tangents};
 use crate::machine::Machine;
 use crate::machine::spin::{Spin, SpinState, SpinStretch, stretch_at};
 use crate::nonlinear::coefficients::Coefficients;
@@ -42,6 +42,9 @@ pub struct Point {
     pub(crate) rest: [f64; CHANNELS],
     pub(crate) linear: LinearPoint,
     pub(crate) linear_outputs: LinearOutputs<f64>,
+    /// The linear model of the machine at its steepest, if its elements are not linear along their
+    /// lines: what explicit steps must bear.
+    pub(crate) steepest: Option<Box<LinearPoint>>,
     pub(crate) stretches: Arc<[SpinStretch]>,
     pub(crate) legs: Arc<[PlannedLeg]>,
     pub(crate) ringing: Ringing,
@@ -141,12 +144,12 @@ impl Kernel for Prepare<'_> {
         for group in self.points.chunks(T::LANES) {
             let machines: Vec<_> =
                 group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
-            let mut lanes = Coefficients::splat(zero, &machines[0]);
-            for (lane, machine) in machines.iter().enumerate() {
-                lanes.set_lane(lane, machine);
-            }
+            let lanes = in_lanes(zero, &machines);
             let (q, found) = equilibrium::find(zero, &lanes);
-            let linear = linearise(&lanes, &q);
+            let steepest = steepest(&machines, &q);
+            let viscous: Vec<_> =
+                machines.iter().map(Coefficients::with_viscous_friction).collect();
+            let linear = linearise(&in_lanes(zero, &viscous), &q);
             let linear_outputs = linearise_outputs(&lanes.bodies, &q);
             let still = [zero; COORDINATES];
             let at_rest = Motion { q, u: still, a: still };
@@ -156,13 +159,18 @@ impl Kernel for Prepare<'_> {
                 .into_iter()
                 .zip(linear)
                 .zip(linear_outputs)
+                .zip(steepest)
                 .zip(group)
                 .zip(courses.by_ref());
             ready.extend(parts.enumerate().map(
-                |(lane, ((((coefficients, linear), linear_outputs), (machine, _)), course))| {
+                |(
+                    lane,
+                    (((((coefficients, linear), linear_outputs), steepest), (machine, _)), course),
+                )| {
                     if found >> lane & 1 == 0 {
                         return Err(NoEquilibrium);
                     }
+                    let steepest = steepest.map(|tangents| Box::new(linear.with_tub(tangents)));
                     Ok(Point {
                         ringing: Ringing::new(machine, course.jumps_rad_per_s2),
                         machine: coefficients,
@@ -170,6 +178,7 @@ impl Kernel for Prepare<'_> {
                         rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),
                         linear,
                         linear_outputs,
+                        steepest,
                         stretches: course.stretches,
                         legs: course.legs,
                     })
@@ -178,6 +187,30 @@ impl Kernel for Prepare<'_> {
         }
         ready
     }
+}
+
+/// Machines in lanes, the first also in those beyond the last.
+#[inline(always)]
+fn in_lanes<T: Lane>(zero: N<T>, machines: &[Coefficients<f64>]) -> Coefficients<T> {
+    let mut lanes = Coefficients::splat(zero, &machines[0]);
+    for (lane, machine) in machines.iter().enumerate() {
+        lanes.set_lane(lane, machine);
+    }
+    lanes
+}
+
+/// Stiffness and damping of each machine's tub at its steepest, with equilibria `q`; `None` where
+/// they are those of its linear model.
+fn steepest<T: Lane>(
+    machines: &[Coefficients<f64>],
+    q: &[N<T>; COORDINATES],
+) -> Vec<Option<[[[N<f64>; 4]; 4]; 2]>> {
+    let tangents = |(lane, machine): (usize, &Coefficients<f64>)| {
+        let q = q.map(|q| q.0.get(lane));
+        let elements = machine.elements.steepest(&q)?;
+        Some(tub_tangents(&Coefficients { elements, bodies: machine.bodies }, &q.map(N)))
+    };
+    machines.iter().enumerate().map(tangents).collect()
 }
 
 /// The course of a trajectory's spin.

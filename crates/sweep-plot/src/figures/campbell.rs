@@ -1,12 +1,14 @@
 //! Natural frequencies over spin speed, and where they meet it (the paper's Fig. 7).
 
+use crate::PlotOptions;
 use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
 use crate::error::PlotError;
+use crate::figures::stability::{self, Unstable};
 use crate::label::Label;
 use crate::read::Kind;
-use crate::scene::INK;
+use crate::scene::{INK, MUTED};
 use crate::table::Table;
 
 /// One mode over speed.
@@ -19,11 +21,15 @@ pub(super) struct Mode {
 }
 
 /// The chart of a modes file. Modes that lie wholly above the greatest speed are left out, and
-/// counted.
+/// counted. With a stability file, the sums of two modes' frequencies that feed what grows are
+/// drawn too, with a star where such a sum is the speed.
 ///
 /// # Errors
-/// [`PlotError::Column`], or [`PlotError::Empty`] without two speeds.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+/// [`PlotError::Column`], or [`PlotError::Empty`] without two speeds; as
+/// [`stability::unstable_of`].
+pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
+    let unstable = options.stability.as_ref();
+    let unstable = unstable.map(|path| stability::unstable_of(table, path)).transpose()?;
     let modes = modes(table)?;
     let top = modes.iter().flat_map(|mode| &mode.speed).fold(0.0_f64, |top, &speed| top.max(speed));
     if top <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
@@ -37,6 +43,9 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         .partition(|mode| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top));
     let (_, highest) =
         extremes(near.iter().flat_map(|mode| mode.frequency.iter().copied())).unwrap_or((0.0, top));
+    let sums = unstable.as_ref().map_or_else(Vec::new, |unstable| sums(&near, unstable));
+    let (_, highest) = extremes(sums.iter().flat_map(|sum| sum.frequency.iter().copied()))
+        .map_or((0.0, highest), |(_, of_sums)| (0.0, highest.max(of_sums)));
     let range = (0.0, (1.06 * top).min(1.25 * highest));
 
     let mut grids = vec![vec![0.0, top]];
@@ -57,6 +66,19 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
             },
         });
         grids.push(mode.speed);
+    }
+    for sum in sums {
+        for speed in crossings(&sum) {
+            stars.push((speed, speed, format!("{speed:.1} rpm")));
+        }
+        series.push(Series {
+            name: sum.name,
+            colour: MUTED,
+            grid: grids.len(),
+            y: sum.frequency,
+            style: Style::Dashed,
+        });
+        grids.push(sum.speed);
     }
     let line = Series {
         name: "frequency = spin speed".to_owned(),
@@ -92,6 +114,8 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         }],
         marks: Vec::new(),
         mark_meaning: String::new(),
+        shades: unstable.map_or_else(Vec::new, |unstable| unstable.speeds),
+        shade_meaning: stability::UNSTABLE.to_owned(),
     })
 }
 
@@ -112,6 +136,61 @@ pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
     let mut speeds: Vec<f64> = modes(table)?.iter().flat_map(crossings).collect();
     speeds.sort_by(f64::total_cmp);
     Ok(speeds)
+}
+
+/// The sums of frequencies that feed what grows: of the two modes that take part, or twice that of
+/// the one.
+fn sums(modes: &[Mode], unstable: &Unstable) -> Vec<Mode> {
+    let mut pairs: Vec<[usize; 2]> = Vec::new();
+    for (speed, frequencies) in &unstable.participants {
+        let nearest = |frequency: f64| {
+            let apart = |mode: &Mode| (at_speed(mode, *speed) - frequency).abs();
+            let places = 0..modes.len();
+            places.min_by(|&a, &b| apart(&modes[a]).total_cmp(&apart(&modes[b])))
+        };
+        // Of the pairs that could be meant, the one whose sum is nearest to the speed.
+        let named: Vec<usize> =
+            frequencies.iter().filter(|f| f.is_finite()).filter_map(|f| nearest(*f)).collect();
+        let all = named.iter().flat_map(|&a| named.iter().map(move |&b| [a.min(b), a.max(b)]));
+        let miss = |pair: &[usize; 2]| {
+            let sum: f64 = pair.iter().map(|&mode| at_speed(&modes[mode], *speed)).sum();
+            (sum - speed).abs()
+        };
+        if let Some(pair) = all.min_by(|a, b| miss(a).total_cmp(&miss(b)))
+            && !pairs.contains(&pair)
+        {
+            pairs.push(pair);
+        }
+    }
+    pairs.sort_unstable();
+    let sum = |[a, b]: [usize; 2]| {
+        let number = |mode: usize| {
+            let name = modes[mode].name.trim_start_matches("mode ");
+            name.split(' ').next().unwrap_or_default()
+        };
+        let name = if a == b {
+            format!("twice the frequency of mode {}", number(a))
+        } else {
+            format!("sum of the frequencies of modes {} and {}", number(a), number(b))
+        };
+        let speed = modes[a].speed.clone();
+        let of_both = |speed: &f64| at_speed(&modes[a], *speed) + at_speed(&modes[b], *speed);
+        let frequency = speed.iter().map(of_both).collect();
+        Mode { name, speed, frequency, band: None }
+    };
+    pairs.into_iter().map(sum).collect()
+}
+
+/// A mode's frequency at a speed, straight between the given ones.
+fn at_speed(mode: &Mode, speed: f64) -> f64 {
+    let above = mode.speed.partition_point(|known| *known < speed).min(mode.speed.len() - 1);
+    let below = above.saturating_sub(1);
+    let step = mode.speed[above] - mode.speed[below];
+    if step == 0.0 {
+        return mode.frequency[above];
+    }
+    let part = ((speed - mode.speed[below]) / step).clamp(0.0, 1.0);
+    mode.frequency[below] + part * (mode.frequency[above] - mode.frequency[below])
 }
 
 /// Every mode of a file, by number.

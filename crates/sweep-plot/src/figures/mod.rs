@@ -6,5 +6,6 @@ pub(crate) mod curves;
 pub(crate) mod map;
 pub(crate) mod passages;
 pub(crate) mod shapes;
+pub(crate) mod stability;
 pub(crate) mod trace;
 pub(crate) mod turn;

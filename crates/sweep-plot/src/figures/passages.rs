@@ -52,6 +52,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     chart.marks =
         trace::resonances(options)?.into_iter().map(|speed| Mark::of_speed(speed, speed)).collect();
     chart.mark_meaning = "resonance speed".to_owned();
+    chart.shades = trace::unstable_speeds(table, options)?;
     Ok(chart)
 }
 

@@ -75,6 +75,8 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         panels,
         marks: Vec::new(),
         mark_meaning: String::new(),
+        shades: Vec::new(),
+        shade_meaning: String::new(),
     })
 }
 

@@ -1,6 +1,6 @@
 //! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -9,7 +9,7 @@ use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
 use crate::colour::{LINEAR, NONLINEAR};
 use crate::error::PlotError;
-use crate::figures::campbell;
+use crate::figures::{campbell, stability};
 use crate::label::{self, Label};
 use crate::read::Kind;
 use crate::scene::INK;
@@ -53,15 +53,17 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     };
 
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
+    let names = other.as_ref().map(|other| told_apart(table, other));
     let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
         // The second curve lies in front; where it hides the first one, this must shine through.
         let front = LINEAR.with_alpha(165);
         let [first, second] = &columns;
-        let curves = match &other {
-            Some(other) => {
-                [(table, first, said(table), NONLINEAR, 0), (other, first, said(other), front, 1)]
-            }
-            None => [
+        let curves = match (&other, &names) {
+            (Some(other), Some([one, another])) => [
+                (table, first, one.clone(), NONLINEAR, 0),
+                (other, first, another.clone(), front, 1),
+            ],
+            _ => [
                 (table, first, "nonlinear model".to_owned(), NONLINEAR, 0),
                 (table, second, "linear model".to_owned(), front, 0),
             ],
@@ -112,10 +114,13 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         });
     }
     let mut marks = Vec::new();
+    let mut shades = Vec::new();
+    let unstable = unstable_speeds(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
         for (x, resonance) in passages(&time, speed, &resonances(options)?) {
             marks.push(Mark::of_speed(x, resonance));
         }
+        shades = stability::stretches_within(&time, speed, &unstable);
         let y = speed.to_vec();
         let series =
             Series { name: String::new(), colour: INK, grid: 0, y, style: Style::Solid(2.0) };
@@ -126,17 +131,15 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         });
     }
     Ok(Chart {
-        title: match &other {
-            Some(other) => {
-                format!(
-                    "Nonlinear motion from static equilibrium: {} and {}",
-                    said(table),
-                    said(other)
-                )
-            }
+        title: match &names {
+            Some(_) => "Nonlinear motion from static equilibrium".to_owned(),
             None => "Motion of both models from static equilibrium".to_owned(),
         },
-        subtitle: subtitle(table, &least, apart),
+        subtitle: match &names {
+            // What one of them is would be wrong of the other.
+            Some(_) => of_both(&least, apart),
+            None => subtitle(table, &least, apart),
+        },
         x_label: Label::new("Time", "s"),
         x_log: false,
         grids: match &other {
@@ -146,6 +149,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         panels,
         marks,
         mark_meaning: "resonance speed passed".to_owned(),
+        shades,
+        shade_meaning: stability::UNSTABLE.to_owned(),
     })
 }
 
@@ -220,6 +225,46 @@ fn said(table: &Table) -> String {
     table.source.run_name().map_or_else(file, str::to_owned)
 }
 
+/// What two traces are called, so that they are told apart: by their runs' names, or what `--at`
+/// says otherwise of them, or else by their files.
+fn told_apart(one: &Table, other: &Table) -> [String; 2] {
+    let tables = [one, other];
+    let names = tables.map(said);
+    if names[0] != names[1] {
+        return names;
+    }
+    let at = tables.map(|table| {
+        let at = table.source.find("at").and_then(Value::as_object).into_iter().flatten();
+        at.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect::<Vec<_>>()
+    });
+    let own = |side: usize| -> Vec<String> {
+        let differs = at[side].iter().filter(|own| !at[1 - side].contains(own));
+        let words = differs.map(|(name, value)| {
+            let (words, unit) = (label::words(name).to_lowercase(), label::unit_of_name(name));
+            format!("{words} {} {unit}", label::significant(*value, 4)).trim_end().to_owned()
+        });
+        words.collect()
+    };
+    let named = [own(0), own(1)].map(|words| words.join(", "));
+    if named[0] != named[1] && named.iter().all(|name| !name.is_empty()) {
+        return named;
+    }
+    let files = tables.map(|table| table.source.path.file_stem().unwrap_or_default());
+    files.map(|file| file.to_string_lossy().into_owned())
+}
+
+/// What is so of two traces together.
+fn of_both(least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> String {
+    let gaps = least_gaps_mm.iter().map(|(name, gap)| format!("{gap:.2} mm {name}"));
+    let gaps = gaps.collect::<Vec<_>>().join(", ");
+    let mut parts = Vec::new();
+    if !gaps.is_empty() {
+        parts.push(format!("least gap {gaps}"));
+    }
+    parts.extend(apart.map(|apart| format!("largest difference {apart:.1e} of the peak")));
+    parts.join(" · ")
+}
+
 /// The least gap of each model that has one, in the unit shown.
 fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
     gaps.iter()
@@ -265,7 +310,7 @@ pub(super) fn subtitle(
 
 /// The two numbers of the machine that reliability turns on, as far as the file has them and all
 /// dampers are alike.
-fn machine(table: &Table) -> Vec<(&'static str, f64)> {
+pub(super) fn machine(table: &Table) -> Vec<(&'static str, f64)> {
     let Some(machine) = table.source.find("machine") else { return Vec::new() };
     let unbalance = machine.pointer("/unbalance/mass_kg").and_then(Value::as_f64);
     let dampers = machine.get("dampers").and_then(Value::as_array).into_iter().flatten();
@@ -276,6 +321,15 @@ fn machine(table: &Table) -> Vec<(&'static str, f64)> {
     let damping = (dampings.len() == 1).then(|| dampings[0]);
     let named = [("unbalance_mass_kg", unbalance), ("damping_n_s_per_m", damping)];
     named.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
+}
+
+/// The ranges of unstable speeds that the options name, rpm.
+pub(super) fn unstable_speeds(
+    table: &Table,
+    options: &PlotOptions,
+) -> Result<Vec<[f64; 2]>, PlotError> {
+    let unstable = |path: &PathBuf| stability::unstable_of(table, path);
+    Ok(options.stability.as_ref().map(unstable).transpose()?.map_or_else(Vec::new, |it| it.speeds))
 }
 
 /// The resonance speeds that the options name, rpm.

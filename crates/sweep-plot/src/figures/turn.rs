@@ -63,6 +63,8 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         }],
         marks: Vec::new(),
         mark_meaning: String::new(),
+        shades: Vec::new(),
+        shade_meaning: String::new(),
     })
 }
 

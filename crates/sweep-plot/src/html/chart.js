@@ -3,7 +3,7 @@
 const CHART = { left: 84, right: 16, top: 12, gap: 14, bottom: 46 };
 
 // `spec` as the page's data has it, with decoded arrays: { xWords, xUnit, xLog, xTicks, grids,
-// panels, marks, markMeaning }.
+// panels, marks, markMeaning, shades, shadeMeaning }.
 function createChart(host, spec, name) {
   const even = (x) => (spec.xLog ? Math.log(x) : x);
   const back = (x) => (spec.xLog ? Math.exp(x) : x);
@@ -114,9 +114,11 @@ function createChart(host, spec, name) {
       context.beginPath();
       context.rect(box.left, top, box.width, panel.height);
       context.clip();
-      context.fillStyle = MIXED;
-      for (const [from, to] of panel.mixed) {
-        context.fillRect(atX(from), top, Math.max(atX(to) - atX(from), 1), panel.height);
+      for (const [ranges, colour] of [[spec.shades, SHADE], [panel.mixed, MIXED]]) {
+        context.fillStyle = colour;
+        for (const [from, to] of ranges) {
+          context.fillRect(atX(from), top, Math.max(atX(to) - atX(from), 1), panel.height);
+        }
       }
       for (const series of panel.series) drawSeries(context, series, atY, box);
       for (const [value] of panel.levels) {
@@ -283,6 +285,7 @@ function createChart(host, spec, name) {
     if (spec.marks.length) {
       add(spec.markMeaning, swatch("height:0;border-top:2px dashed currentColor"));
     }
+    if (spec.shades.length) add(spec.shadeMeaning, swatch(`background:${SHADE}`));
     if (shown().some((panel) => panel.stars.length)) add("★ resonance speed");
     legend.replaceChildren(...entries.values());
   }

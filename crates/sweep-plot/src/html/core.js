@@ -132,6 +132,7 @@ function surface(host, height, draw) {
 
 // Cells or ranges with points on both sides of a limit.
 const MIXED = DATA.both;
+const SHADE = DATA.shade;
 
 // Buttons for those who have no wheel; `zoom` takes the factor by which the view grows.
 function zoomButtons(zoom, reset) {

@@ -39,7 +39,7 @@ function createHistories(host, trace, channel) {
   }
   const spec = {
     xWords: "Time", xUnit: "s", xLog: false, xTicks: null, grids: [floats(trace.time_s)], panels,
-    marks: [], markMeaning: "",
+    marks: [], markMeaning: "", shades: [], shadeMeaning: "",
   };
   createChart(host, spec, "Time histories");
 }

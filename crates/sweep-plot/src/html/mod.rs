@@ -10,7 +10,7 @@ use super::PlotOptions;
 use super::Quantity;
 use super::axis::{LEAST_TICKS, SLACK, Scale, Step, Tick, log_sets};
 use super::chart::{Chart, ChartPanel, Series, Style, x_scale, y_scale};
-use super::colour::{BOTH, ColourScale, DISTINCT, FAILED, LEVELS};
+use super::colour::{BOTH, ColourScale, DISTINCT, FAILED, LEVELS, SHADE};
 use super::contour::{MOST_POINTS, leave_out_shortest, zero_lines};
 use super::cuts::Cuts;
 use super::error::PlotError;
@@ -120,13 +120,13 @@ fn provenance(source: &Source) -> Value {
 const MOST_PROVENANCE: usize = 100_000;
 
 /// The page of a chart: every panel, those that a picture shows at first.
-pub(crate) fn chart_page(table: &Table, chart: &Chart) -> String {
+pub(crate) fn chart_page(source: &Source, chart: &Chart) -> String {
     let data = json!({
         "kind": "chart",
         "title": chart.title,
         "subtitle": chart.subtitle,
         "chart": chart_json(chart),
-        "provenance": provenance(&table.source),
+        "provenance": provenance(source),
     });
     page(&chart.title, data, &[CORE, CHART, START])
 }
@@ -134,6 +134,7 @@ pub(crate) fn chart_page(table: &Table, chart: &Chart) -> String {
 fn page(title: &str, mut data: Value, scripts: &[&str]) -> String {
     data["ticks"] = ticks_json();
     data["both"] = json!(BOTH.css());
+    data["shade"] = json!(format!("{}{:02x}", SHADE.css(), SHADE.alpha));
     // Within a script element only `<` could end it, or start a comment.
     let data = data.to_string().replace('<', "\\u003c");
     PAGE.replace("{{title}}", &escape(title))
@@ -333,6 +334,8 @@ fn chart_json(chart: &Chart) -> Value {
         "panels": chart.panels.iter().map(panel_json).collect::<Vec<_>>(),
         "marks": marks.collect::<Vec<_>>(),
         "markMeaning": chart.mark_meaning,
+        "shades": chart.shades,
+        "shadeMeaning": chart.shade_meaning,
     })
 }
 

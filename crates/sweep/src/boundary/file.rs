@@ -1,7 +1,6 @@
 //! The boundary file: one row per place where the side changes, or per row of the first axis that
 //! has none.
 
-use parquet::errors::ParquetError;
 use serde_json::{Value, json};
 use washer_model::unit_suffix;
 
@@ -46,17 +45,14 @@ fn asked(quantity: TracedQuantity, task: &BoundaryTask) -> Value {
     })
 }
 
-/// The bytes of the file of a [`job`].
-///
-/// # Errors
-/// What the Parquet library refuses: a defect of this program.
-pub(crate) fn bytes(
+/// The file of a [`job`].
+pub(crate) fn table(
     job: &Job<'_>,
     plan: &Plan,
     quantity: TracedQuantity,
     task: &BoundaryTask,
     traced: &Traced,
-) -> Result<Vec<u8>, ParquetError> {
+) -> Table {
     let mut about = asked(quantity, task);
     about["limit"] = quantity.limit(plan).into();
     about["points"] = traced.trials.into();
@@ -66,7 +62,7 @@ pub(crate) fn bytes(
     table.metadata(key::PLAN, &job.plan);
     table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
     table.metadata(key::BOUNDARY, &about);
-    table.into_bytes()
+    table
 }
 
 fn add_columns(table: &mut Table, plan: &Plan, quantity: TracedQuantity, traced: &Traced) {

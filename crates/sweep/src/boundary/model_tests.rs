@@ -1,6 +1,6 @@
 //! The search over the real models, against the grid it stands for.
 
-use super::file::{bytes, job};
+use super::file::{job, table};
 use super::product::{BoundaryError, BoundaryTask, Models, Stopped};
 use super::quantity::TracedQuantity;
 use super::{Edge, EdgeKind, Traced, trace};
@@ -69,8 +69,9 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
     let interrupt = Interrupt::new();
     let traced = [1, 3].map(|threads| traced(&plan, &task, threads, &interrupt).unwrap());
     let job = job(&plan, TracedQuantity::RatioMax, &task);
-    let [one, three] =
-        [0, 1].map(|k| bytes(&job, &plan, TracedQuantity::RatioMax, &task, &traced[k]).unwrap());
+    let [one, three] = [0, 1].map(|k| {
+        table(&job, &plan, TracedQuantity::RatioMax, &task, &traced[k]).into_bytes().unwrap()
+    });
     assert!(one == three, "other bytes on three threads");
 
     let engine = ModelEngine::new(&plan).unwrap();
@@ -280,7 +281,12 @@ fn every_quantity_is_found_by_its_name_and_back_from_its_distance() {
     }
     assert!("ratio_tub".parse::<TracedQuantity>().unwrap_err().contains("ratio_tub_yaw"));
     assert_eq!(
-        TracedQuantity::Ratio(washer_model::Channel::TubYaw).plan(&plan).reliability.channels.len(),
+        TracedQuantity::Ratio(washer_model::Channel::TubYaw)
+            .plan(&plan)
+            .unwrap()
+            .reliability
+            .channels
+            .len(),
         1
     );
 }

@@ -38,6 +38,12 @@ pub enum BoundaryError {
          give [[axis]] twice"
     )]
     Design,
+    /// Growth is traced, and the grid says at which speeds for nobody.
+    #[error(
+        "--quantity growth is about constant speeds, and this grid file names none: put metrics = \
+         [\"growth\"] at its top, and a section [stability] with speed_rpm = \"FROM:TO:STEP\""
+    )]
+    Speeds,
     /// The second axis has no extent.
     #[error(
         "the second axis, `{0}`, has one value: give it the range to search, as range = {{ from, \
@@ -193,6 +199,7 @@ impl<'a> Models<'a> {
         match self.quantity {
             TracedQuantity::RatioMax | TracedQuantity::Ratio(_) => Demand::Side,
             TracedQuantity::GapNonlinear | TracedQuantity::GapLinear => Demand::Row,
+            TracedQuantity::Growth => Demand::Growth,
         }
     }
 

@@ -2,6 +2,7 @@
 
 use washer_model::Channel;
 
+use super::product::BoundaryError;
 use crate::outcome::Outcome;
 use crate::plan::Plan;
 use crate::verdict::Verdict;
@@ -20,6 +21,8 @@ pub enum TracedQuantity {
     GapNonlinear,
     /// The least gap between drum and tub, linear model.
     GapLinear,
+    /// The largest growth of a disturbance over the speeds of `[stability]`.
+    Growth,
 }
 
 impl TracedQuantity {
@@ -30,7 +33,7 @@ impl TracedQuantity {
         [Self::RatioMax]
             .into_iter()
             .chain(ratios)
-            .chain([Self::GapNonlinear, Self::GapLinear])
+            .chain([Self::GapNonlinear, Self::GapLinear, Self::Growth])
             .collect()
     }
 
@@ -42,15 +45,17 @@ impl TracedQuantity {
             Self::Ratio(channel) => format!("ratio_{}", channel.name()),
             Self::GapNonlinear => "min_gap_nonlinear_m".to_owned(),
             Self::GapLinear => "min_gap_linear_m".to_owned(),
+            Self::Growth => "growth".to_owned(),
         }
     }
 
-    /// `"1"` or `"m"`.
+    /// `"1"`, `"m"` or `"1/s"`.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
             Self::RatioMax | Self::Ratio(_) => "1",
             Self::GapNonlinear | Self::GapLinear => "m",
+            Self::Growth => "1/s",
         }
     }
 
@@ -59,24 +64,30 @@ impl TracedQuantity {
     pub const fn limit(self, plan: &Plan) -> f64 {
         match self {
             Self::RatioMax | Self::Ratio(_) => plan.reliability.ratio_limit,
-            Self::GapNonlinear | Self::GapLinear => 0.0,
+            Self::GapNonlinear | Self::GapLinear | Self::Growth => 0.0,
         }
     }
 
     /// The plan that computes it: a channel of its own is compared even if the grid file leaves it
     /// out.
-    #[must_use]
-    pub fn plan(self, plan: &Plan) -> Plan {
+    ///
+    /// # Errors
+    /// [`BoundaryError::Speeds`] where growth is asked for and the plan names no speeds.
+    pub fn plan(self, plan: &Plan) -> Result<Plan, BoundaryError> {
         let mut plan = plan.clone();
-        if let Self::Ratio(channel) = self {
-            plan.reliability.channels = vec![channel];
+        match self {
+            Self::Ratio(channel) => plan.reliability.channels = vec![channel],
+            Self::Growth if plan.measures.growth_speeds.is_none() => {
+                return Err(BoundaryError::Speeds);
+            }
+            Self::RatioMax | Self::GapNonlinear | Self::GapLinear | Self::Growth => {}
         }
-        plan
+        Ok(plan)
     }
 
     /// Signed distance of an outcome of [`TracedQuantity::plan`] from the limit: negative where the
-    /// ratio is below it or a gap is left. The logarithm of a ratio over its limit, or a gap in
-    /// centimetres.
+    /// ratio is below it, a gap is left or disturbances decay. The logarithm of a ratio over its
+    /// limit, a gap in centimetres, or a growth in 1/s.
     #[must_use]
     pub fn distance(self, outcome: &Outcome, plan: &Plan) -> Option<f64> {
         match self {
@@ -90,6 +101,7 @@ impl TracedQuantity {
             }
             Self::GapNonlinear => outcome.nonlinear.min_gap_m.map(|gap_m| -gap_m / GAP_SCALE_M),
             Self::GapLinear => outcome.linear.min_gap_m.map(|gap_m| -gap_m / GAP_SCALE_M),
+            Self::Growth => Some(outcome.growth.as_ref()?.fastest.growth_per_s()),
         }
     }
 
@@ -99,6 +111,7 @@ impl TracedQuantity {
         match self {
             Self::RatioMax | Self::Ratio(_) => plan.reliability.ratio_limit * libm::exp(distance),
             Self::GapNonlinear | Self::GapLinear => -distance * GAP_SCALE_M,
+            Self::Growth => distance,
         }
     }
 }

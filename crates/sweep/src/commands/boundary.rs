@@ -2,22 +2,21 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use super::examples::Examples;
 use super::grid::{GridArgs, quoted};
 use super::run::line;
-use crate::boundary::file::{bytes, job};
-use crate::boundary::product::{BoundaryTask, Models, Stopped};
+use crate::boundary::file::{job, table};
+use crate::boundary::product::{BoundaryTask, Stopped};
 use crate::boundary::quantity::TracedQuantity;
-use crate::boundary::{EdgeKind, Standing, Traced, trace};
-use crate::engine::ModelEngine;
+use crate::boundary::{EdgeKind, Traced};
 use crate::exit::{Error, Exit, tell};
 use crate::interrupt::Interrupt;
+use crate::library::Effort;
+use crate::library::boundary::search;
 use crate::plan::Plan;
-use crate::progress::{Progress, ProgressMode, duration};
+use crate::progress::{ProgressMode, duration};
 use crate::store::{OpenedTrials, StoreError, Trials};
 use crate::threads;
 use sweep_files::{FileKind, Output};
@@ -96,18 +95,16 @@ search has found out stays in FILE.partial, and the same command goes on from th
 /// being written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.grid.load()?;
-    let plan = args.quantity.plan(&plan);
+    let plan = args.quantity.plan(&plan)?;
     let task = BoundaryTask::new(&plan, args.tolerance, usize::from(args.lattice))?;
     let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
     let output = args.out.clone().unwrap_or_else(default);
-    let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
     let file = Output::begin(&output, FileKind::Boundary)?;
     let interrupt = Interrupt::install().map_err(|source| Error::File {
         action: "install signal handlers for",
         path: PathBuf::from("this process"),
         source,
     })?;
-    let engine = ModelEngine::new(&plan)?;
     let job = job(&plan, args.quantity, &task);
     let mut trials = match Trials::open(&output, &job, args.fresh)? {
         OpenedTrials::Open(trials) => *trials,
@@ -122,22 +119,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         tell(&format!("going on: {there} points are there"));
     }
     let began = Instant::now();
-    let rows = (task.firsts.len() * task.curves) as u64;
-    let rows_done = AtomicU64::new(0);
-    let progress = Mutex::new(Progress::of_search(args.progress, rows, there));
-    let shown = |points: u64| {
-        // A thread that finds another showing it goes on.
-        if let Ok(mut progress) = progress.try_lock() {
-            progress.show_search(rows_done.load(Ordering::Relaxed), points);
-        }
-    };
-    let models =
-        Models::new(&plan, engine, args.quantity, threads, &interrupt, &shown)?.keeping(trials);
-    let mut standing =
-        |standing: &Standing| rows_done.store(standing.rows as u64, Ordering::Relaxed);
-    let traced = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
-    progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
-    let trials = models.into_kept();
+    let effort = Effort { threads: args.threads, progress: args.progress, interrupt: &interrupt };
+    let (traced, trials) = search(&plan, args.quantity, &task, Some(trials), effort)?;
     let traced = match traced {
         Ok(traced) => traced,
         Err(Stopped::Failed(error)) => return Err(error.into()),
@@ -154,7 +137,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
             });
         }
     };
-    let bytes = bytes(&job, &plan, args.quantity, &task, &traced);
+    let bytes = table(&job, &plan, args.quantity, &task, &traced).into_bytes();
     file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);

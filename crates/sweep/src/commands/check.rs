@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
+use super::cells::short;
 use super::examples::Examples;
 use super::grid::GridArgs;
-use crate::design::Design;
+use crate::design::{Design, Distribution};
 use crate::engine::Ladder;
 use crate::estimate::{Estimate, size};
 use crate::exit::{Error, Exit, show, tell};
@@ -130,6 +131,11 @@ fn describe(axis: &Axis, design: Option<&Design>) -> String {
         AxisValues::Log { from, to, .. } if design.is_some() => {
             format!("{name}: from {from} to {to}, logarithmic")
         }
+        AxisValues::Distributed(Distribution { shape, from, to }) => {
+            let numbers = shape.numbers().map(|(key, number)| format!("{key} {number}"));
+            let [from, to] = [*from, *to].map(short);
+            format!("{name}: {}, {}, from {from} to {to}", shape.name(), numbers.join(", "))
+        }
         AxisValues::List(values) => {
             let shown: Vec<_> = values.iter().take(8).map(f64::to_string).collect();
             let more = if values.len() > shown.len() { ", ..." } else { "" };
@@ -158,7 +164,9 @@ fn method(plan: &Plan, ladder: &Ladder) -> String {
         Steps::Checked(_) => {
             let rungs: Vec<String> =
                 ladder.rungs.iter().skip(1).map(|rung| rung.to_string()).collect();
-            format!(", until two rungs agree: {}", rungs.join("\n            then "))
+            let why = ladder.held_back.as_ref().map(|why| format!("\n            {why}"));
+            let rungs = rungs.join("\n            then ");
+            format!(", until two rungs agree: {rungs}{}", why.unwrap_or_default())
         }
     };
     format!("{}{steps}", plan.integrator)

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use crate::config::{self, Diagnostics};
 use crate::plan::Plan;
+use crate::speeds::Speeds;
+use crate::store::Job;
 
 /// A grid file and changes to its constants, as most commands take them.
 #[derive(Debug, clap::Args)]
@@ -14,15 +16,31 @@ pub struct GridArgs {
     /// Set a constant, over those of the grid file; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub sets: Vec<String>,
+    /// Call a ratio below this reliable, over the grid file's limit
+    #[arg(long, value_name = "RATIO")]
+    pub ratio_limit: Option<f64>,
+    /// Name of the run, over the grid file's: a result's default file, and what figures say
+    #[arg(long, value_name = "NAME", value_parser = config::plain_name)]
+    pub name: Option<String>,
 }
 
 impl GridArgs {
+    /// What is set, in one list.
+    pub fn sets(&self) -> Vec<String> {
+        let limit = self.ratio_limit.map(|limit| format!("ratio_limit={limit}"));
+        self.sets.iter().cloned().chain(limit).collect()
+    }
+
     /// The plan.
     ///
     /// # Errors
     /// Every mistake in the grid file, its machine file and the constants.
     pub fn load(&self) -> Result<Plan, Diagnostics> {
-        config::load(&self.grid, &self.sets)
+        let mut plan = config::load(&self.grid, &self.sets())?;
+        if let Some(name) = &self.name {
+            plan.name.clone_from(name);
+        }
+        Ok(plan)
     }
 }
 
@@ -44,12 +62,28 @@ impl ResultArgs {
         self.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{}.parquet", plan.name)))
     }
 
+    /// What is asked for: the dwells of a grid at these speeds, or the grid itself, and where the
+    /// result goes.
+    pub(super) fn job<'a>(&self, plan: &'a Plan, speeds: Option<Speeds>) -> (Job<'a>, PathBuf) {
+        match speeds {
+            None => (Job::of(plan), self.output(plan)),
+            Some(speeds) => {
+                let default = || PathBuf::from(format!("results/{}-stability.parquet", plan.name));
+                let output = self.out.clone().unwrap_or_else(default);
+                (Job::of_dwells(plan, &speeds.values()), output)
+            }
+        }
+    }
+
     /// A command line about the same run, for a user to copy.
     #[must_use]
     pub fn command(&self, verb: &str) -> String {
         let mut line = format!("sweep {verb} {}", quoted(&self.grid.grid.display().to_string()));
-        for set in &self.grid.sets {
-            line.push_str(&format!(" --set {}", quoted(set)));
+        for set in self.grid.sets() {
+            line.push_str(&format!(" --set {}", quoted(&set)));
+        }
+        if let Some(name) = &self.grid.name {
+            line.push_str(&format!(" --name {}", quoted(name)));
         }
         if let Some(out) = &self.out {
             line.push_str(&format!(" --out {}", quoted(&out.display().to_string())));
@@ -74,12 +108,17 @@ mod tests {
 
     #[test]
     fn a_command_to_copy_survives_the_shell() {
-        let grid =
-            GridArgs { grid: "my grids/it's.toml".into(), sets: vec!["tub_mass_kg=20".into()] };
+        let grid = GridArgs {
+            grid: "my grids/it's.toml".into(),
+            sets: vec!["tub_mass_kg=20".into()],
+            ratio_limit: Some(1.5),
+            name: Some("light".into()),
+        };
         let target = ResultArgs { grid, out: Some("x.parquet".into()) };
         assert_eq!(
             target.command("merge"),
-            r"sweep merge 'my grids/it'\''s.toml' --set tub_mass_kg=20 --out x.parquet"
+            "sweep merge 'my grids/it'\\''s.toml' --set tub_mass_kg=20 --set ratio_limit=1.5 \
+             --name light --out x.parquet"
         );
     }
 }

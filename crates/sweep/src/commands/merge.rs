@@ -5,7 +5,8 @@ use super::grid::ResultArgs;
 use super::run::{line, rows};
 use crate::exit::{Error, Exit, tell};
 use crate::interrupt::Interrupt;
-use crate::store::{Job, OpenRun, Opened};
+use crate::speeds::{Speeds, turning};
+use crate::store::{OpenRun, Opened};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples =
@@ -16,6 +17,9 @@ pub(super) const EXAMPLES: Examples =
 pub struct Args {
     #[command(flatten)]
     target: ResultArgs,
+    /// Of `sweep stability` with these speeds, not of `sweep run`
+    #[arg(long, value_name = "FROM:TO:STEP", value_parser = turning, allow_hyphen_values = true)]
+    speed: Option<Speeds>,
 }
 
 /// Joins what the shards have left.
@@ -25,7 +29,7 @@ pub struct Args {
 /// its end.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.target.grid.load()?;
-    let (job, output) = (Job::of(&plan), args.target.output(&plan));
+    let (job, output) = args.target.job(&plan, args.speed);
     let interrupt = Interrupt::install().map_err(|source| Error::File {
         action: "install signal handlers for",
         path: "this process".into(),

@@ -1,9 +1,14 @@
 //! The command line: one module a subcommand, each with its arguments and `run`.
 
 mod boundary;
+mod cells;
 mod check;
+mod compare;
 mod completions;
+mod conditions;
 mod examples;
+mod explain;
+mod export;
 mod grid;
 mod init;
 mod man;
@@ -12,10 +17,12 @@ mod modes;
 mod parameters;
 mod plot;
 mod reference;
+mod require;
 mod run;
 mod schema;
 mod show;
 mod slurm;
+mod stability;
 mod status;
 mod trace;
 
@@ -70,10 +77,20 @@ pub enum Command {
     Slurm(slurm::Args),
     /// Show what a result file holds: counts, verdicts, extremes, provenance
     Show(show::Args),
+    /// Check that expressions hold of a result, and show the rows where they do not
+    Require(require::Args),
+    /// Say what differs between two results
+    Compare(compare::Args),
+    /// Write a result as CSV, as an Excel workbook or as NetCDF, with units
+    Export(export::Args),
     /// Write time histories of both models at one point
     Trace(trace::Args),
     /// Find the natural frequencies over spin speed, the resonance speeds and the mode shapes
     Modes(modes::Args),
+    /// Find the periodic response at constant speeds, and where it is unstable
+    Stability(stability::Args),
+    /// Explain why the linear model fails at one point: the unstable speeds that the run crosses
+    Explain(explain::Args),
     /// Trace the curve where the ratio is at its limit, without filling the grid
     Boundary(boundary::Args),
     /// Draw the figure that fits a file: map, boundary, time histories or Campbell diagram
@@ -103,8 +120,13 @@ fn examples_of(name: &str) -> Examples {
         "status" => status::EXAMPLES,
         "slurm" => slurm::EXAMPLES,
         "show" => show::EXAMPLES,
+        "require" => require::EXAMPLES,
+        "compare" => compare::EXAMPLES,
+        "export" => export::EXAMPLES,
         "trace" => trace::EXAMPLES,
         "modes" => modes::EXAMPLES,
+        "stability" => stability::EXAMPLES,
+        "explain" => explain::EXAMPLES,
         "boundary" => boundary::EXAMPLES,
         "plot" => plot::EXAMPLES,
         "parameters" => parameters::EXAMPLES,
@@ -186,8 +208,13 @@ impl Command {
             Self::Status(args) => status::run(args),
             Self::Slurm(args) => slurm::run(args),
             Self::Show(args) => show::run(args),
+            Self::Require(args) => require::run(args),
+            Self::Compare(args) => compare::run(args),
+            Self::Export(args) => export::run(args),
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
+            Self::Stability(args) => stability::run(args),
+            Self::Explain(args) => explain::run(args),
             Self::Boundary(args) => boundary::run(args),
             Self::Plot(args) => plot::run(args),
             Self::Parameters(args) => parameters::run(args),
@@ -219,6 +246,18 @@ mod tests {
         assert!(!refusal("xyzzy").contains("similar"), "{}", refusal("xyzzy"));
     }
 
+    /// The words of a line, as a shell takes them: single quotes keep spaces.
+    fn words(line: &str) -> Vec<String> {
+        let mut words = Vec::new();
+        for (place, part) in line.split('\'').enumerate() {
+            match place % 2 {
+                0 => words.extend(part.split_whitespace().map(str::to_owned)),
+                _ => words.push(part.to_owned()),
+            }
+        }
+        words
+    }
+
     #[test]
     fn every_visible_command_has_examples_and_every_example_parses() {
         let whole = command();
@@ -229,7 +268,7 @@ mod tests {
             assert!(lines.first().is_some_and(|[line, _]| line.starts_with(&own)), "{name}");
             for [line, _] in lines {
                 let line = line.split(" 2>").next().unwrap_or_default();
-                let parsed = command().try_get_matches_from(line.split_whitespace());
+                let parsed = command().try_get_matches_from(words(line));
                 assert!(parsed.is_ok(), "{line}: {parsed:?}");
             }
         }

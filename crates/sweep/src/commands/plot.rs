@@ -20,7 +20,7 @@ pub(super) const EXAMPLES: Examples = &[
 /// Arguments of `sweep plot`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Result of `sweep run`, `trace`, `modes` or `boundary`
+    /// Result of `sweep run`, `trace`, `modes`, `boundary` or `stability`
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
@@ -28,7 +28,7 @@ pub struct Args {
     #[arg(short, long, value_name = "IMAGE")]
     pub output: Option<PathBuf>,
 
-    /// Modes, trace: which of its figures [default: frequencies, time]
+    /// Modes, trace, stability: which of its figures [default: frequencies, time, growth]
     #[arg(long, value_enum)]
     pub view: Option<View>,
 
@@ -41,7 +41,8 @@ pub struct Args {
     #[arg(long = "channel", value_name = "NAME")]
     pub channels: Vec<String>,
 
-    /// Map of three or more axes: cut an axis beyond the second at this value
+    /// Map of three or more axes: cut an axis beyond the second at this value. Stability: show the
+    /// points at this value
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     pub at: Vec<(String, f64)>,
 
@@ -58,6 +59,10 @@ pub struct Args {
     /// Trace: mark where the resonance speeds of this modes file are passed
     #[arg(long, value_name = "FILE")]
     pub modes: Option<PathBuf>,
+
+    /// Trace, modes: shade the unstable speeds of this stability file
+    #[arg(long, value_name = "FILE")]
+    pub stability: Option<PathBuf>,
 
     /// Trace: compare with this trace: both nonlinear models, the linear one left out
     #[arg(long, value_name = "FILE")]
@@ -81,6 +86,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         at: args.at.clone(),
         resonances_rpm: args.resonances.clone(),
         modes: args.modes.clone(),
+        stability: args.stability.clone(),
         against: args.against.clone(),
         traces: args.traces.clone(),
     };

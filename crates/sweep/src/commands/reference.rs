@@ -4,12 +4,13 @@
 use std::fmt::Write as _;
 use std::iter;
 
-use washer_model::{Channel, Machine, Parameter, Range, Spin};
+use washer_model::{Channel, Machine, Parameter, Range, Spin, Target};
 
+use crate::config;
 use crate::exit::{Error, Exit, print};
 use crate::measures::{Criterion, Measures, Metric};
 use crate::method::{Entry, METHODS};
-use crate::store::schema::{AxisColumn, Layout};
+use crate::store::schema::{AxisColumn, Layout, RowKind};
 use crate::verdict::ROW_STATUSES;
 
 /// Arguments of `sweep reference`.
@@ -69,8 +70,9 @@ fn parameters() -> String {
          printed there, *derived*\n\
          follows from what is printed, *assumed* is this project's own choice where the paper is \
          silent.\n\
-         Springs and dampers are numbered in the order of the machine file; the table shows the \
-         first of each. The end of the run\n\
+         Springs, dampers, stops, bushings and unbalances are numbered in the order of the machine \
+         file; the table shows the first\n\
+         of each, and no value where the built-in machine has none. The end of the run\n\
          (`end_s`) and the integrator's settings are no parameters: `[time]` and `[integrator]` \
          set them once, because rows whose\n\
          runs differ in length or method would not compare. The window's edges are.\n\n",
@@ -79,15 +81,16 @@ fn parameters() -> String {
     row(&mut text, &["---"; 6]);
     let machine = Machine::paper();
     let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
-    for parameter in Parameter::all(&machine, &spin) {
+    for parameter in Parameter::all(&config::with_one_of_each(), &spin) {
         let name = parameter.name();
         if is_a_further_one(name) {
             continue;
         }
         let of_spin = name.starts_with("spin_");
         let value = parameter.get(&machine, &spin).filter(|_| !of_spin);
-        let value =
-            value.map_or_else(|| "as the grid file says".to_owned(), |value| value.to_string());
+        let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
+        let none = if of_grid { "as the grid file says" } else { "none" };
+        let value = value.map_or_else(|| none.to_owned(), |value| value.to_string());
         row(
             &mut text,
             &[
@@ -171,7 +174,13 @@ fn columns() -> String {
         })
         .collect();
     let measures = Measures { metrics: Metric::ALL.to_vec(), ..Measures::default() };
-    let layout = Layout { axes, channels: Channel::ALL.to_vec(), ratio_limit: 2.0, measures };
+    let layout = Layout {
+        axes,
+        channels: Channel::ALL.to_vec(),
+        ratio_limit: 2.0,
+        measures,
+        rows: RowKind::Run,
+    };
     row(&mut text, &["column", "type", "unit", "null", "meaning"]);
     row(&mut text, &["---"; 5]);
     for field in layout.schema().fields() {

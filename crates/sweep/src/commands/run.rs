@@ -2,14 +2,17 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
+use super::cells::short;
 use super::examples::Examples;
 use super::grid::{ResultArgs, quoted};
 use crate::engine::{Engine, ModelEngine};
 use crate::exit::{Error, Exit, tell};
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
-use crate::progress::{ProgressMode, duration, per_second};
+use crate::progress::{Progress, ProgressMode, duration, per_second};
 use crate::run::{self as runner, Ended, RunOptions, RunReport};
 use crate::store::provenance::Session;
 use crate::store::read::Tally;
@@ -32,6 +35,22 @@ pub struct Args {
     /// The run.
     #[command(flatten)]
     pub target: ResultArgs,
+    /// How it is done.
+    #[command(flatten)]
+    pub work: WorkArgs,
+    /// Keep the time histories of every point too, decimated, in NAME.traces beside NAME.parquet:
+    /// `sweep plot NAME.parquet --traces NAME.traces -o MAP.html` shows them on a click. They take
+    /// a run of their own, one trajectory at a time
+    #[arg(long)]
+    pub keep_traces: bool,
+    /// Exit with 3 if any row of the finished result failed
+    #[arg(long)]
+    pub fail_on_error: bool,
+}
+
+/// How a run is done, by whichever engine.
+#[derive(Debug, clap::Args)]
+pub struct WorkArgs {
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
     #[arg(long, value_name = "N", value_parser = threads::parse)]
     pub threads: Option<usize>,
@@ -47,14 +66,26 @@ pub struct Args {
     /// 5 s) or none
     #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
     pub progress: ProgressMode,
-    /// Keep the time histories of every point too, decimated, in NAME.traces beside NAME.parquet:
-    /// `sweep plot NAME.parquet --traces NAME.traces -o MAP.html` shows them on a click. They take
-    /// a run of their own, one trajectory at a time
-    #[arg(long)]
-    pub keep_traces: bool,
-    /// Exit with 3 if any row of the finished result failed
-    #[arg(long)]
-    pub fail_on_error: bool,
+}
+
+impl WorkArgs {
+    /// As the runner takes them.
+    ///
+    /// # Errors
+    /// A scheduler's number of threads that is none.
+    pub(super) fn options<'a>(
+        &self,
+        environment: Environment<'a>,
+    ) -> Result<RunOptions<'a>, Error> {
+        Ok(RunOptions {
+            threads: threads::count(self.threads, environment)?,
+            fresh: self.fresh,
+            shard: self.shard,
+            progress: self.progress,
+            environment,
+            tell: &tell,
+        })
+    }
 }
 
 /// Runs a grid.
@@ -86,14 +117,7 @@ pub(crate) fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<E
     })?;
     let (job, output) = (Job::of(plan), args.target.output(plan));
     let environment: Environment<'_> = &|name| std::env::var(name).ok();
-    let options = RunOptions {
-        threads: threads::count(args.threads, environment)?,
-        fresh: args.fresh,
-        shard: args.shard,
-        progress: args.progress,
-        environment,
-        tell: &tell,
-    };
+    let options = args.work.options(environment)?;
     let report = runner::run(engine, &job, &output, options, &interrupt)?;
     for note in &report.notes {
         tell(note);
@@ -101,7 +125,19 @@ pub(crate) fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<E
     tell(summary(args, plan, &job, &output, &report).trim_end());
     if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
         let folder = files::beside(&output, "traces");
-        trace::keep(plan, &folder, options.threads, &|| interrupt.stopped())?;
+        tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
+        let progress = Mutex::new(Progress::new(args.work.progress, plan.points(), 0));
+        let kept = AtomicU64::new(0);
+        let done = || {
+            let kept = kept.fetch_add(1, Ordering::Relaxed) + 1;
+            // A thread that finds another showing it goes on.
+            if let Ok(mut progress) = progress.try_lock() {
+                progress.show(kept);
+            }
+        };
+        let ended = trace::keep(plan, &folder, options.threads, &|| interrupt.stopped(), &done);
+        progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+        ended?;
         if let Some(signal) = interrupt.signal() {
             tell("interrupted; the map is kept, and the traces so far");
             return Ok(if signal == 15 { Exit::Terminated } else { Exit::Interrupted });
@@ -162,7 +198,19 @@ fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &RunR
     match &report.ended {
         Ended::Already(..) | Ended::Finished(_) => {
             line(&mut text, "file", &output.display().to_string());
-            line(&mut text, "next", &format!("sweep plot {out}"));
+            // A design's points are scattered: there is no map of them to draw.
+            let scattered = plan.design.is_some();
+            let next = if scattered {
+                format!("sweep show {out} --top 10 --by ratio_max")
+            } else {
+                format!("sweep plot {out}")
+            };
+            if let (true, Ended::Already(_, tally) | Ended::Finished(tally)) =
+                (scattered, &report.ended)
+            {
+                line(&mut text, "share", &share(tally));
+            }
+            line(&mut text, "next", &next);
         }
         Ended::Shard(_) => {
             line(
@@ -192,7 +240,7 @@ fn go_on(args: &Args, session: Option<&Session>) -> String {
 }
 
 /// What this process did.
-fn work(session: &Session) -> String {
+pub(super) fn work(session: &Session) -> String {
     format!(
         "{} points in {}, {} on {} thread{} ({})",
         session.points,
@@ -206,6 +254,15 @@ fn work(session: &Session) -> String {
 
 /// A result's rows: verdicts, failures, extremes. At most six lines.
 pub(super) fn rows(tally: &Tally, job: &Job<'_>) -> String {
+    if let Some(dwells) = &tally.dwells {
+        let mut text = String::new();
+        let told = format!(
+            "{} of {} rows, {} not, {} without a response",
+            dwells.stable, tally.points, dwells.unstable, dwells.unknown
+        );
+        line(&mut text, "stable", &told);
+        return text;
+    }
     let at = |point: u64| {
         let values = (job.axis_values)(point);
         let place = job
@@ -213,10 +270,33 @@ pub(super) fn rows(tally: &Tally, job: &Job<'_>) -> String {
             .axes
             .iter()
             .zip(values)
-            .map(|(axis, value)| format!("{} {value}", axis.name));
+            .map(|(axis, value)| format!("{} {}", axis.name, short(value)));
         place.collect::<Vec<_>>().join(", ")
     };
     counts(tally, job.layout.ratio_limit, &at)
+}
+
+/// The share of reliable points among those with a verdict, with the interval in which the true
+/// share lies with 95 % confidence if points are independent and at random.
+///
+/// E. B. Wilson, Probable inference, the law of succession, and statistical inference, Journal of
+/// the American Statistical Association 22 (1927), 209-212.
+fn share(tally: &Tally) -> String {
+    const Z: f64 = 1.959_963_984_540_054;
+    let count = (tally.reliable + tally.unreliable) as f64;
+    if count == 0.0 {
+        return "no point has a verdict".to_owned();
+    }
+    let part = tally.reliable as f64 / count;
+    let square = Z * Z / count;
+    let centre = (part + square / 2.0) / (1.0 + square);
+    let half = Z / (1.0 + square) * (part * (1.0 - part) / count + square / (4.0 * count)).sqrt();
+    format!(
+        "{:.1} % reliable, with 95 % confidence {:.1} to {:.1} % for points at random",
+        100.0 * part,
+        100.0 * (centre - half).max(0.0),
+        100.0 * (centre + half).min(1.0)
+    )
 }
 
 /// As [`rows`], where `at` says where a point lies.
@@ -280,5 +360,21 @@ impl clap::builder::ValueParserFactory for ProgressMode {
 
     fn value_parser() -> Self::Parser {
         clap::builder::ValueParser::new(|text: &str| text.parse::<ProgressMode>())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_share_has_wilsons_interval() {
+        let tally = |reliable, unreliable| Tally { reliable, unreliable, ..Tally::default() };
+        // By hand: 8 of 10, z = 1.96.
+        let said = share(&tally(8, 2));
+        assert!(said.starts_with("80.0 % reliable, with 95 % confidence 49.0 to 94.3 %"), "{said}");
+        let all = share(&tally(100, 0));
+        assert!(all.contains("96.3 to 100.0 %"), "{all}");
+        assert_eq!(share(&tally(0, 0)), "no point has a verdict");
     }
 }

@@ -6,7 +6,8 @@ use super::examples::Examples;
 use super::grid::ResultArgs;
 use super::run::line;
 use crate::exit::{Error, Exit, show, tell};
-use crate::store::{FolderStatus, Job, State, status};
+use crate::speeds::{Speeds, turning};
+use crate::store::{FolderStatus, State, shard_list, status};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[
@@ -19,6 +20,9 @@ pub(super) const EXAMPLES: Examples = &[
 pub struct Args {
     #[command(flatten)]
     target: ResultArgs,
+    /// Of `sweep stability` with these speeds, not of `sweep run`
+    #[arg(long, value_name = "FROM:TO:STEP", value_parser = turning, allow_hyphen_values = true)]
+    speed: Option<Speeds>,
     /// Print it as JSON
     #[arg(long)]
     json: bool,
@@ -30,8 +34,8 @@ pub struct Args {
 /// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.target.grid.load()?;
-    let output = args.target.output(&plan);
-    let found = status(&output, &Job::of(&plan))?;
+    let (job, output) = args.target.job(&plan, args.speed);
+    let found = status(&output, &job)?;
     if args.json {
         return show(&format!("{:#}\n", json!(found)));
     }
@@ -72,13 +76,21 @@ fn summary(args: &Args, found: &FolderStatus) -> String {
     }
     if let Some(shards) = found.shards {
         line(&mut text, "shards", &shards.to_string());
-        if !found.missing_shards.is_empty() {
-            line(&mut text, "again", &format!("sbatch --array={} ...", found.missing_shards));
+        let missing = shard_list(found.missing_shard_numbers.iter().copied());
+        if !missing.is_empty() {
+            let run = format!("{} --shard I/{shards}", args.target.command("run"));
+            line(&mut text, "again", &format!("{run}, for I = {missing}"));
+            line(&mut text, "on Slurm", &format!("sbatch --array={} ...", found.missing_shards));
         }
     }
     let next = match found.state {
         State::Complete => args.target.command("merge"),
+        _ if args.speed.is_some() => args.target.command("stability"),
         _ => args.target.command("run"),
+    };
+    let next = match args.speed {
+        Some(speeds) => format!("{next} --speed {speeds}"),
+        None => next,
     };
     if found.running.is_empty() && (found.shards.is_none() || found.state == State::Complete) {
         line(&mut text, "next", &next);

@@ -1,16 +1,23 @@
 //! `sweep trace GRID.toml`: time histories of both models at one point.
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use washer_model::{COORDINATES, Start};
-
+use super::cells::{short, table};
 use super::examples::Examples;
+use super::grid::quoted;
+use super::run::line;
 use crate::config;
+use crate::engine::ModelEngine;
 use crate::exit::{Error, Exit, tell};
+use crate::outcome::Trajectory;
 use crate::plan::Plan;
+use crate::store::Job;
 use crate::threads;
-use crate::trace::{Extras, MOST_INSTANTS, trace};
-use sweep_files::{FileKind, Output};
+use crate::trace::{Extras, StartValue, every, start_of, start_value, trace};
+use crate::verdict::Verdict;
+use sweep_files::{FileKind, Output, key};
+use sweep_results::{Cell, Order, ResultTable, top};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[
@@ -19,6 +26,7 @@ pub(super) const EXAMPLES: Examples = &[
                  rocking.parquet",
         "both models at one point",
     ],
+    ["sweep trace my.toml --worst --out worst.parquet", "the greatest ratio of its map"],
     ["sweep plot rocking.parquet", "drawn over time and spin speed"],
 ];
 
@@ -29,58 +37,39 @@ pub struct Args {
     grid: super::grid::GridArgs,
     /// The point: a value for each axis, on the grid or between its points, and for any other
     /// parameter; may be repeated
-    #[arg(long, value_name = "NAME=VALUE")]
+    #[arg(long, value_name = "NAME=VALUE", conflicts_with_all = ["point", "worst"])]
     at: Vec<String>,
+    /// The point of this number in the grid, as in a result's column `point`
+    #[arg(long, value_name = "N", conflicts_with = "worst")]
+    point: Option<u64>,
+    /// The point of the grid's result where this column is greatest, or a gap is least [default:
+    /// ratio_max]
+    #[arg(
+        long,
+        value_name = "COLUMN",
+        num_args = 0..=1,
+        default_missing_value = "ratio_max"
+    )]
+    worst: Option<String>,
+    /// The result that --worst looks into [default: results/NAME.parquet]
+    #[arg(long, value_name = "FILE", requires = "worst")]
+    result: Option<PathBuf>,
     /// Time between two instants of the file, in s; the integration's steps are its own
     #[arg(long, value_name = "S", default_value_t = 0.01)]
     every: f64,
     /// Add the ten coordinates and their speeds
     #[arg(long)]
     states: bool,
-    /// Add the tension of each spring and damper, and their sum on the cabinet
+    /// Add the force of each spring, damper, stop and bushing, and their sum on the cabinet
     #[arg(long)]
     forces: bool,
     /// Begin away from equilibrium, both models alike: a coordinate q1 to q10 (m, rad) or a speed
     /// u1 to u10 (per s); may be repeated
-    #[arg(long, value_name = "NAME=VALUE", value_parser = start)]
+    #[arg(long, value_name = "NAME=VALUE", value_parser = start_value)]
     start: Vec<StartValue>,
     /// Trace file to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-}
-
-/// One coordinate or speed at the start.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct StartValue {
-    is_speed: bool,
-    /// From 0.
-    index: usize,
-    value: f64,
-}
-
-/// Angles beyond a right angle, and shifts of metres, are no start of anything.
-const FARTHEST_START: f64 = 1.5;
-
-fn start(text: &str) -> Result<StartValue, String> {
-    let expected =
-        "expected a coordinate q1 to q10 or a speed u1 to u10 with its value, as in q5=0.1";
-    let (name, value) = text.split_once('=').ok_or(expected)?;
-    let (is_speed, number) = match (name.trim().strip_prefix('q'), name.trim().strip_prefix('u')) {
-        (Some(number), _) => (false, number),
-        (_, Some(number)) => (true, number),
-        _ => return Err(expected.to_owned()),
-    };
-    let index = number
-        .parse::<usize>()
-        .ok()
-        .filter(|number| (1..=COORDINATES).contains(number))
-        .ok_or(expected)?;
-    let value =
-        value.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or(expected)?;
-    if !is_speed && value.abs() > FARTHEST_START {
-        return Err(format!("expected at most {FARTHEST_START} m or rad from equilibrium"));
-    }
-    Ok(StartValue { is_speed, index: index - 1, value })
 }
 
 /// Integrates and writes.
@@ -89,13 +78,14 @@ fn start(text: &str) -> Result<StartValue, String> {
 /// Mistakes in the grid file or the options, a machine without equilibrium, and a file that cannot
 /// be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let (plan, at) = config::load_point(&args.grid.grid, &args.grid.sets, &args.at)?;
+    let chosen = chosen(args)?;
+    let (mut plan, at) = config::load_point(&args.grid.grid, &args.grid.sets(), &chosen)?;
+    if let Some(name) = &args.grid.name {
+        plan.name.clone_from(name);
+    }
     let every_s = every(args.every, &plan)?;
     let extras = Extras { states: args.states, forces: args.forces };
-    let mut start = Start::default();
-    for StartValue { is_speed, index, value } in &args.start {
-        if *is_speed { start.speeds[*index] = *value } else { start.deviations[*index] = *value }
-    }
+    let start = start_of(&args.start);
     let output = Output::begin(&args.out, FileKind::Trace)?;
     let work = || trace(&plan, plan.scenario(0), at, every_s, &start, extras);
     // A thread for each model, where there may be two; they write the same bytes as one.
@@ -107,32 +97,121 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let instants = trace.instants;
     output.finish(&trace.into_bytes(&args.out)?)?;
     tell(&format!("wrote {}: {instants} instants from 0 to {} s", args.out.display(), plan.end_s));
+    // A map's row is of machines that start at rest.
+    if args.start.is_empty() {
+        tell(compared(&plan, &chosen)?.trim_end());
+    }
     Ok(Exit::Done)
 }
 
-/// The time between instants, if it makes a sensible number of them.
-fn every(every_s: f64, plan: &Plan) -> Result<f64, Error> {
-    let least = plan.end_s / MOST_INSTANTS;
-    if (least..=plan.end_s).contains(&every_s) {
-        return Ok(every_s);
+/// The point as `--at` would give it.
+fn chosen(args: &Args) -> Result<Vec<String>, Error> {
+    if args.point.is_none() && args.worst.is_none() {
+        return Ok(args.at.clone());
     }
-    Err(Error::Option {
-        option: "--every",
-        given: every_s.to_string(),
-        expected: format!("from {least:e} to {} s", plan.end_s),
-    })
+    let plan = args.grid.load()?;
+    let point = match (&args.worst, args.point) {
+        (Some(column), _) => {
+            let point = worst(args, &plan, column)?;
+            tell(&format!("point {point} is where {column} is {}", extreme_of(column)));
+            point
+        }
+        (None, point) => point.unwrap_or_default(),
+    };
+    if point >= plan.points() {
+        return Err(Error::Option {
+            option: "--point",
+            given: point.to_string(),
+            expected: format!("from 0 to {}", plan.points() - 1),
+        });
+    }
+    let names = plan.axes.iter().map(|axis| axis.parameter.name());
+    // The shortest decimals read back to the same values.
+    Ok(names.zip(plan.axis_values(point)).map(|(name, value)| format!("{name}={value}")).collect())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The bad end of a column: a gap is worst where it is least.
+fn is_worst_where_least(column: &str) -> bool {
+    column.starts_with("min_gap_")
+}
 
-    #[test]
-    fn a_start_is_a_coordinate_or_a_speed() {
-        assert_eq!(start("q5=0.1"), Ok(StartValue { is_speed: false, index: 4, value: 0.1 }));
-        assert_eq!(start(" u10 = -2"), Ok(StartValue { is_speed: true, index: 9, value: -2.0 }));
-        for wrong in ["", "q5", "q0=1", "q11=1", "x=1", "q1=nan", "u1=1e999", "q=1", "q5=2"] {
-            assert!(start(wrong).unwrap_err().contains("expected"), "{wrong}");
-        }
+fn extreme_of(column: &str) -> &'static str {
+    if is_worst_where_least(column) { "least" } else { "greatest" }
+}
+
+/// The worst point of the grid's result.
+fn worst(args: &Args, plan: &Plan, column: &str) -> Result<u64, Error> {
+    let default = || PathBuf::from(format!("results/{}.parquet", plan.name));
+    let path = args.result.clone().unwrap_or_else(default);
+    let refused =
+        |expected: String| Error::Option { option: "--worst", given: column.to_owned(), expected };
+    if !path.exists() {
+        let run = format!("`sweep run {}`", quoted(&args.grid.grid.display().to_string()));
+        let expected = format!("a result at {} (--result); {run} makes it", path.display());
+        return Err(refused(expected));
     }
+    let file = ResultTable::open(&path)?;
+    let hash = Job::of(plan).hash().to_hex().to_string();
+    if file.file().value(key::PLAN_HASH) != Some(hash.as_str()) {
+        let expected = format!("a result of this very grid, which {} is not", path.display());
+        return Err(refused(expected));
+    }
+    let order = if is_worst_where_least(column) { Order::Ascending } else { Order::Descending };
+    let rows = top(&file, &["point", column], None, Some((column, order)), 1);
+    let rows = rows.map_err(|error| super::show::with_nearest(error, &file))?;
+    match rows.first().map(Vec::as_slice) {
+        Some([Cell::Number(point), Cell::Number(_) | Cell::Flag(_)]) => Ok(*point as u64),
+        _ => Err(refused(format!("a column that has values in {}", path.display()))),
+    }
+}
+
+/// Peaks of both models in the window, their ratios and the verdict: what the point's row of a map
+/// holds.
+fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
+    let engine = ModelEngine::new(plan)?;
+    let mut text = String::new();
+    for outcome in engine.evaluate_at(&[Vec::new()]) {
+        let channels = &plan.reliability.channels;
+        let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.ratio_limit);
+        let number = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), short);
+        let rows: Vec<Vec<String>> = channels
+            .iter()
+            .enumerate()
+            .map(|(k, channel)| {
+                let amplitude = |model: &Trajectory| number(model.amplitudes.get(k).copied());
+                vec![
+                    channel.name().to_owned(),
+                    channel.unit().to_owned(),
+                    amplitude(&outcome.nonlinear),
+                    amplitude(&outcome.linear),
+                    number(verdict.ratios.get(k).copied().flatten()),
+                ]
+            })
+            .collect();
+        let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
+        let [from, to] = plan.window_s;
+        let what = plan.measures.criterion.amplitude();
+        let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{what}, {} to {} s{place}:", short(from), short(to));
+        text.push_str(&table(&headings, &rows, ""));
+        let said = match (verdict.reliable, verdict.greatest) {
+            (Some(reliable), Some((channel, ratio))) => format!(
+                "{}: the greatest ratio is {} ({}), the limit {}",
+                if reliable { "reliable" } else { "not reliable" },
+                short(ratio),
+                channels.get(channel).map_or("", |channel| channel.name()),
+                short(plan.reliability.ratio_limit),
+            ),
+            _ => "undefined: no ratio is".to_owned(),
+        };
+        line(&mut text, "verdict", &said);
+        if outcome.sensitive == Some(true) {
+            line(&mut text, "sensitive", "chaotic: the digits are those of one trajectory");
+        }
+        let gaps = [&outcome.nonlinear, &outcome.linear].map(|model| number(model.min_gap_m));
+        let told = format!("{} m nonlinear, {} m linear, over the whole run", gaps[0], gaps[1]);
+        line(&mut text, "least gap", &told);
+    }
+    Ok(text)
 }

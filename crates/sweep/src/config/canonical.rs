@@ -5,13 +5,14 @@ use serde_json::{Value, json};
 use washer_model::Spin;
 
 use super::machine;
-use crate::design::Design;
+use crate::design::{Design, Distribution};
 use crate::measures::{Criterion, Measures};
 use crate::plan::{Axis, AxisValues, Plan};
 
 impl Plan {
     /// The whole plan with every default and constant in place, in the grid file's own terms:
-    /// `name`, `machine` (in full), `spin`, `time`, `integrator`, `axis`, `reliability`.
+    /// `name`, `machine` (in full), `spin`, `time`, `integrator`, `axis`, `reliability`, and
+    /// under `set` what `--set` has changed, if it has.
     ///
     /// Canonical: keys are sorted, and numbers are written as the shortest decimal that reads back
     /// to the same bits, so two plans are the same if and only if their texts are.
@@ -36,12 +37,18 @@ impl Plan {
         }
         // What is left out stands for the default, so that plans which do not ask for more read as
         // ever.
-        let Measures { criterion, metrics } = &self.measures;
+        let Measures { criterion, metrics, growth_speeds } = &self.measures;
         if *criterion != Criterion::default() {
             plan["reliability"]["criterion"] = criterion.name().into();
         }
         if !metrics.is_empty() {
             plan["metrics"] = metrics.iter().map(|metric| metric.name()).collect();
+        }
+        if let Some(speeds) = growth_speeds {
+            plan["stability"] = json!({ "speed_rpm": speeds.to_string() });
+        }
+        if !self.set.is_empty() {
+            plan["set"] = self.set.iter().cloned().collect();
         }
         plan
     }
@@ -50,7 +57,9 @@ impl Plan {
 fn design(design: &Design) -> Value {
     let method = design.method();
     match design {
-        Design::LatinHypercube { points, seed } | Design::Sobol { points, seed } => {
+        Design::LatinHypercube { points, seed }
+        | Design::Sobol { points, seed }
+        | Design::MonteCarlo { points, seed } => {
             json!({ "method": method, "points": points, "seed": seed })
         }
         Design::List { file, points, hash } => {
@@ -88,6 +97,14 @@ fn axis(axis: &Axis, design: Option<&Design>) -> Value {
     };
     match axis.values {
         AxisValues::List(ref values) => json!({ "parameter": parameter, "values": values }),
+        AxisValues::Distributed(ref distribution) => {
+            let Distribution { shape, from, to } = *distribution;
+            let mut json = json!({ "kind": shape.name(), "from": from, "to": to });
+            for (key, number) in shape.numbers() {
+                json[key] = number.into();
+            }
+            json!({ "parameter": parameter, "distribution": json })
+        }
         AxisValues::Linear { from, to, count } => range(from, to, count, "linear"),
         AxisValues::Log { from, to, count } => range(from, to, count, "log"),
     }

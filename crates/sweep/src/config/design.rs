@@ -10,7 +10,7 @@ use super::source::Located;
 use crate::design::Design;
 
 /// The methods by name.
-pub(super) const METHODS: [&str; 3] = ["latin_hypercube", "sobol", "list"];
+pub(super) const METHODS: [&str; 4] = ["latin_hypercube", "sobol", "monte_carlo", "list"];
 /// `seed` when the grid names none.
 pub(super) const DEFAULT_SEED: u64 = 0;
 /// Greatest seed: what JSON and TOML carry exactly everywhere.
@@ -39,7 +39,7 @@ pub(super) fn read(root: &mut Section<'_>, grid: &Path, report: &mut Report) -> 
     };
     let at = section.at().clone();
     let field = section.choice("method", &METHODS, report);
-    let expected = "`latin_hypercube`, `sobol` or `list`";
+    let expected = "`latin_hypercube`, `sobol`, `monte_carlo` or `list`";
     let Some(method) = section.require(field, "method", expected, report) else {
         // Which keys belong to a method that is none cannot be said, but what is wrong with any
         // can.
@@ -58,17 +58,18 @@ pub(super) fn read(root: &mut Section<'_>, grid: &Path, report: &mut Report) -> 
             .map_or(WrittenDesign::Bad, WrittenDesign::List)
     } else {
         section.misplace(&["file"], "only the method \"list\" has it");
-        let sobol = METHODS[method.value] == "sobol";
+        let chosen = METHODS[method.value];
+        let sobol = chosen == "sobol";
         let field = section.count("points", if sobol { MOST_SOBOL } else { MOST_POINTS }, report);
         let points = section.require(field, "points", "the number of points", report);
         let seed = section.whole("seed", 0..=MOST_SEED, report).or(DEFAULT_SEED);
         // Stand-ins for what was refused, so that the axes are read all the same.
         let (points, seed) =
             (points.map_or(1, |points| points.value), seed.unwrap_or(DEFAULT_SEED));
-        let design = if sobol {
-            Design::Sobol { points, seed }
-        } else {
-            Design::LatinHypercube { points, seed }
+        let design = match chosen {
+            "sobol" => Design::Sobol { points, seed },
+            "monte_carlo" => Design::MonteCarlo { points, seed },
+            _ => Design::LatinHypercube { points, seed },
         };
         WrittenDesign::Box(Located { value: design, at })
     };

@@ -11,10 +11,11 @@ use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, cut, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
-use super::{design, machine, parameters, spin};
+use super::{GridInput, design, machine, parameters, scalars, spin};
 use crate::measures::{Criterion, Measures, Metric};
 use crate::method::{Entry, Integrator, METHODS, settings};
 use crate::plan::{Plan, Reliability};
+use crate::speeds::{Speeds, turning};
 
 /// `machine` when the grid names none.
 pub(super) const DEFAULT_MACHINE: &str = "paper";
@@ -47,9 +48,10 @@ pub(super) struct Draft {
 
 /// Reads the grid file and its machine file and puts the constants in place. `None` if the grid
 /// file has no text.
-pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option<Draft> {
+pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
+    let GridInput { path, text, sets } = input;
     let shown = path.display();
-    let text = match read(path) {
+    let text = match text.clone().map_or_else(|| read(path), Ok) {
         Ok(text) => text,
         Err(error) => {
             let missing =
@@ -82,6 +84,8 @@ pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option
     let integrator = integrator(&mut root, &mut origins, report);
     let metrics = names(&mut root, "metrics", "metric", &Metric::ALL, Metric::name, report);
     let (reliability, criterion) = reliability(&mut root, &mut origins, report);
+    let metrics = metrics.unwrap_or_default();
+    let growth_speeds = stability(&mut root, &metrics, report);
     let plan = Plan {
         name,
         machine,
@@ -92,7 +96,8 @@ pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option
         axes: Vec::new(),
         design: None,
         reliability,
-        measures: Measures { criterion, metrics: metrics.unwrap_or_default() },
+        measures: Measures { criterion, metrics, growth_speeds },
+        set: Vec::new(),
     };
     let mut draft = Draft { plan, origins, constants: Vec::new() };
     parameters::constants(&mut root, sets, &mut draft, report);
@@ -109,6 +114,7 @@ pub(super) fn draft(path: &Path, sets: &[String], report: &mut Report) -> Option
             let _ = root.tables("axis", report);
         }
     }
+    scalars::apply(sets, &mut draft, report);
     root.finish(report);
     Some(draft)
 }
@@ -118,30 +124,39 @@ pub(super) fn is_blank(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim().is_empty()
 }
 
+/// What a name may be: it becomes a file's.
+const PLAIN_NAME: &str = "letters, digits, `-`, `_` and `.`, beginning with a letter or digit, at \
+                          most 100 characters";
+
+fn is_plain(name: &str) -> bool {
+    let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
+    first
+        && name.len() <= 100
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
+}
+
+/// A run's name from the command line.
+pub(super) fn plain_name(text: &str) -> Result<String, String> {
+    if is_plain(text) { Ok(text.to_owned()) } else { Err(format!("expected {PLAIN_NAME}")) }
+}
+
 fn name(root: &mut Section<'_>, path: &Path, report: &mut Report) -> String {
-    const EXPECTED: &str = "letters, digits, `-`, `_` and `.`, beginning with a letter or digit, \
-                            at most 100 characters";
-    let plain = |name: &str| {
-        let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
-        first
-            && name.len() <= 100
-            && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
-    };
     match root.text("name", report) {
-        Field::Given(found) if plain(found.value) => return found.value.to_owned(),
+        Field::Given(found) if is_plain(found.value) => return found.value.to_owned(),
         Field::Given(found) => {
             let title = "`name` is not a plain file name";
-            report.push(Diagnostic::new(title).at(&found.at, format!("expected {EXPECTED}")));
+            report.push(Diagnostic::new(title).at(&found.at, format!("expected {PLAIN_NAME}")));
         }
         Field::Bad => {}
         Field::Absent => {
             let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-            if plain(stem) {
+            if is_plain(stem) {
                 return stem.to_owned();
             }
             let title = "`name` is missing, and the file's own name cannot stand in for it";
-            report
-                .push_missing(Diagnostic::new(title).at(root.at(), format!("expected {EXPECTED}")));
+            report.push_missing(
+                Diagnostic::new(title).at(root.at(), format!("expected {PLAIN_NAME}")),
+            );
         }
     }
     String::new()
@@ -310,6 +325,36 @@ fn reliability(
         channels: channels.unwrap_or(stand_in.channels),
     };
     (reliability, criterion.map(|found| Criterion::ALL[found.value]).unwrap_or_default())
+}
+
+/// The speeds that the metric `growth` is about. The section and the metric need each other.
+fn stability(root: &mut Section<'_>, metrics: &[Metric], report: &mut Report) -> Option<Speeds> {
+    let field = root.table("stability", "[stability]", report);
+    if let (Field::Given(section), false) = (&field, metrics.contains(&Metric::Growth)) {
+        let title = "[stability] is for the metric `growth`, which is not asked for";
+        let expected = "expected metrics = [\"growth\"] at the top of the file, or no [stability]; \
+                        `sweep stability` takes its speeds as --speed";
+        report.push(Diagnostic::new(title).at(&section.at, expected));
+    }
+    if let (Field::Absent, true) = (&field, metrics.contains(&Metric::Growth)) {
+        let title = "the metric `growth` needs speeds";
+        let expected = "expected a section [stability] with speed_rpm = \"FROM:TO:STEP\"";
+        report.push_missing(Diagnostic::new(title).at(root.at(), expected));
+    }
+    let mut section = field.given()?.value;
+    let field = section.text("speed_rpm", report);
+    let found =
+        section.require(field, "speed_rpm", "constant speeds as \"FROM:TO:STEP\" in rpm", report);
+    section.finish(report);
+    let found = found?;
+    match turning(found.value) {
+        Ok(speeds) => Some(speeds),
+        Err(expected) => {
+            let title = format!("`speed_rpm` = \"{}\" is no range of speeds", found.value);
+            report.push(Diagnostic::new(title).at(&found.at, expected));
+            None
+        }
+    }
 }
 
 /// A list of some of `all`, each once, by their names; an empty one is a mistake.

@@ -26,6 +26,9 @@ const MOST_COLUMNS: usize = 1000;
 /// Most characters of a path in a message.
 const LONGEST_PATH: usize = 1000;
 
+/// Name of a column that is no parameter: it tells people which row is which.
+pub(super) const ID: &str = "id";
+
 /// A list of points.
 pub(super) struct List {
     pub(super) design: Design,
@@ -131,6 +134,11 @@ pub(super) fn read(file: &Located<&str>, grid: &Path, report: &mut Report) -> Op
         let title = format!("the list of points {shown} is empty");
         let expected = "expected a line of parameter names, and under it a row of numbers a point";
         report.push(Diagnostic::new(title).at(&file.at, expected));
+        return None;
+    }
+    if columns.iter().all(|column: &ListColumn| column.name.value == ID) {
+        let title = format!("the list of points {shown} has no column but `{ID}`");
+        report.push(Diagnostic::new(title).at(&file.at, "expected a column of a parameter"));
         return None;
     }
     let design = Design::List { file: file.value.to_owned(), points: points as u64, hash };

@@ -4,12 +4,12 @@
 use std::path::Path;
 
 use serde_json::{Map, Value};
-use washer_model::{Damper, Machine, Parameter, Spin, Spring};
+use washer_model::{BumpStop, Bushing, Damper, Machine, Parameter, Spin, Spring, Unbalance};
 
 use super::grid::is_blank;
 use super::origins::Origins;
 use super::report::{Diagnostic, Report};
-use super::section::Section;
+use super::section::{Field, Section};
 use super::source::Location;
 
 /// A section of the machine file. Parameters are named `<prefix>_<number>` and, for vectors, with
@@ -20,15 +20,41 @@ pub(super) struct Block {
     /// What its parameters' names begin with.
     pub(super) prefix: &'static str,
     pub(super) numbers: &'static [&'static str],
-    pub(super) vectors: &'static [(&'static str, [&'static str; 3])],
+    pub(super) vectors: &'static [Vector],
+}
+
+/// A key that holds three parameters.
+type Vector = (&'static str, [&'static str; 3]);
+
+/// A section that a machine file may have any number of times. Its prefix is completed by the
+/// element's number.
+pub(super) struct List {
+    pub(super) block: Block,
+    /// Number of the first element.
+    pub(super) first: usize,
+    /// Numbers that may be left out, and what they are then; none where that is no number of the
+    /// file.
+    pub(super) optional: &'static [(&'static str, Option<f64>)],
+    /// Vectors that may be left out. They are zero then.
+    pub(super) optional_vectors: &'static [Vector],
+    /// How many a machine has.
+    count: fn(&Machine) -> usize,
+    /// Gives a machine so many, each with what may be left out left out.
+    fill: fn(&mut Machine, usize),
+    /// What a machine needs one for, if it does.
+    pub(super) needed: Option<&'static str>,
+}
+
+impl List {
+    fn prefix(&self, k: usize) -> String {
+        format!("{}{}_", self.block.prefix, k + self.first)
+    }
 }
 
 const INERTIA: (&str, [&str; 3]) =
     ("inertia_kg_m2", ["inertia_11_kg_m2", "inertia_22_kg_m2", "inertia_33_kg_m2"]);
-const ENDS: &[(&str, [&str; 3])] = &[
-    ("cabinet_m", ["cabinet_x_m", "cabinet_y_m", "cabinet_z_m"]),
-    ("tub_m", ["tub_x_m", "tub_y_m", "tub_z_m"]),
-];
+const TUB_END: Vector = ("tub_m", ["tub_x_m", "tub_y_m", "tub_z_m"]);
+const ENDS: &[Vector] = &[("cabinet_m", ["cabinet_x_m", "cabinet_y_m", "cabinet_z_m"]), TUB_END];
 
 /// The sections that a machine file has once.
 #[rustfmt::skip]
@@ -64,17 +90,117 @@ pub(super) const BLOCKS: [Block; 7] = [
         ],
     },
 ];
-/// One `[[springs]]`; its prefix is completed by the number.
-pub(super) const SPRINGS: Block =
-    Block { section: "springs", prefix: "spring_", numbers: &["stiffness_n_per_m"], vectors: ENDS };
-/// One `[[dampers]]`; its prefix is completed by the number.
-pub(super) const DAMPERS: Block =
-    Block { section: "dampers", prefix: "damper_", numbers: &["damping_n_s_per_m"], vectors: ENDS };
-/// Most springs, and most dampers, of a machine: enough for any, and what depends on all of them
-/// stays quick.
+/// Springs by their place in [`LISTS`].
+const SPRINGS: usize = 0;
+/// The sections that a machine file has any number of times.
+pub(super) const LISTS: [List; 5] = [
+    List {
+        block: Block {
+            section: "springs",
+            prefix: "spring_",
+            numbers: &["stiffness_n_per_m"],
+            vectors: ENDS,
+        },
+        first: 1,
+        optional: &[(FREE_LENGTH, None), ("cubic_n_per_m3", Some(0.0))],
+        optional_vectors: &[],
+        count: |machine| machine.springs.len(),
+        fill: |machine, count| {
+            let like = Machine::paper().springs[0];
+            machine.springs = vec![Spring { free_length_m: None, ..like }; count];
+        },
+        needed: Some("at least one [[springs]]: nothing else carries the machine"),
+    },
+    List {
+        block: Block {
+            section: "dampers",
+            prefix: "damper_",
+            numbers: &["damping_n_s_per_m"],
+            vectors: ENDS,
+        },
+        first: 1,
+        optional: &[
+            ("friction_n", Some(0.0)),
+            ("friction_speed_m_per_s", Some(Damper::FRICTION_SPEED_M_PER_S)),
+            ("friction_linear_speed_m_per_s", None),
+        ],
+        optional_vectors: &[],
+        count: |machine| machine.dampers.len(),
+        fill: |machine, count| machine.dampers = vec![Machine::paper().dampers[0]; count],
+        needed: None,
+    },
+    List {
+        block: Block {
+            section: "stops",
+            prefix: "stop_",
+            numbers: &["clearance_m", "stiffness_n_per_m"],
+            vectors: &[TUB_END, ("direction", ["direction_x", "direction_y", "direction_z"])],
+        },
+        first: 1,
+        optional: &[("damping_n_s_per_m", Some(0.0)), ("softness_m", Some(BumpStop::SOFTNESS_M))],
+        optional_vectors: &[],
+        count: |machine| machine.stops.len(),
+        fill: |machine, count| machine.stops = vec![BumpStop::default(); count],
+        needed: None,
+    },
+    List {
+        block: Block {
+            section: "bushings",
+            prefix: "bushing_",
+            numbers: &[],
+            vectors: &[
+                TUB_END,
+                (
+                    "stiffness_n_per_m",
+                    ["stiffness_x_n_per_m", "stiffness_y_n_per_m", "stiffness_z_n_per_m"],
+                ),
+            ],
+        },
+        first: 1,
+        optional: &[],
+        optional_vectors: &[
+            ("cubic_n_per_m3", ["cubic_x_n_per_m3", "cubic_y_n_per_m3", "cubic_z_n_per_m3"]),
+            (
+                "damping_n_s_per_m",
+                ["damping_x_n_s_per_m", "damping_y_n_s_per_m", "damping_z_n_s_per_m"],
+            ),
+        ],
+        count: |machine| machine.bushings.len(),
+        fill: |machine, count| machine.bushings = vec![Bushing::default(); count],
+        needed: None,
+    },
+    List {
+        block: Block {
+            section: "further_unbalances",
+            prefix: "unbalance_",
+            numbers: &["mass_kg", "x_m", "radius_m"],
+            vectors: &[],
+        },
+        // The first is `[unbalance]`.
+        first: 2,
+        optional: &[],
+        optional_vectors: &[],
+        count: |machine| machine.further_unbalances.len(),
+        fill: |machine, count| {
+            machine.further_unbalances = vec![Unbalance::default(); count];
+        },
+        needed: None,
+    },
+];
+/// Most elements of one list: enough for any machine, and what depends on all of them stays quick.
 const MOST_ELEMENTS: usize = 1000;
-/// The one key that may be left out of a spring.
-pub(super) const FREE_LENGTH: &str = "free_length_m";
+/// A spring's free length follows its ends where it is left out.
+const FREE_LENGTH: &str = "free_length_m";
+
+/// The paper's machine with one of each element that it lacks: every kind of parameter has a name
+/// there.
+pub(crate) fn with_one_of_each() -> Machine {
+    let mut machine = Machine::paper();
+    for list in LISTS.iter().filter(|list| (list.count)(&Machine::paper()) == 0) {
+        (list.fill)(&mut machine, 1);
+    }
+    machine
+}
 
 /// Parameters of no machine file take a spin; this one has no number of its own.
 pub(super) fn no_spin() -> Spin {
@@ -113,28 +239,26 @@ pub(super) fn read(
         }
     }
 
-    let springs = reader.elements(&SPRINGS, &mut root);
-    let dampers = reader.elements(&DAMPERS, &mut root);
-    let like = Machine::paper();
-    reader.machine.springs = vec![Spring { free_length_m: None, ..like.springs[0] }; springs.len()];
-    reader.machine.dampers = vec![Damper { ..like.dampers[0] }; dampers.len()];
-    if springs.is_empty() {
-        root.missing(
-            SPRINGS.section,
-            "at least one [[springs]]: nothing else carries the machine",
-            reader.report,
-        );
-        reader.machine.springs.clone_from(&like.springs);
-    }
-    for (k, mut section) in springs.into_iter().enumerate() {
-        let prefix = format!("{}{}_", SPRINGS.prefix, k + 1);
-        reader.block(&SPRINGS, &prefix, &mut section);
-        reader.number(&prefix, FREE_LENGTH, false, &mut section);
-        section.finish(reader.report);
-    }
-    for (k, mut section) in dampers.into_iter().enumerate() {
-        reader.block(&DAMPERS, &format!("{}{}_", DAMPERS.prefix, k + 1), &mut section);
-        section.finish(reader.report);
+    for (place, list) in LISTS.iter().enumerate() {
+        let sections = reader.elements(&list.block, &mut root);
+        (list.fill)(reader.machine, sections.len());
+        if let Some(expected) = list.needed.filter(|_| sections.is_empty()) {
+            root.missing(list.block.section, expected, reader.report);
+            if place == SPRINGS {
+                reader.machine.springs = Machine::paper().springs;
+            }
+        }
+        for (k, mut section) in sections.into_iter().enumerate() {
+            let prefix = list.prefix(k);
+            reader.block(&list.block, &prefix, &mut section);
+            for &(key, _) in list.optional {
+                reader.number(&prefix, key, false, &mut section);
+            }
+            for (key, components) in list.optional_vectors {
+                reader.vector(&prefix, key, components, false, &mut section);
+            }
+            section.finish(reader.report);
+        }
     }
     root.finish(report);
     machine
@@ -147,7 +271,7 @@ struct MachineReader<'r> {
 }
 
 impl MachineReader<'_> {
-    /// The tables of springs or dampers, no more of them than are accepted.
+    /// The tables of a list, no more of them than are accepted.
     fn elements<'a>(&mut self, block: &Block, root: &mut Section<'a>) -> Vec<Section<'a>> {
         let mut sections = root.tables(block.section, self.report);
         if let Some(first_beyond) = sections.get(MOST_ELEMENTS) {
@@ -164,7 +288,7 @@ impl MachineReader<'_> {
             self.number(prefix, key, true, section);
         }
         for (key, components) in block.vectors {
-            self.vector(prefix, key, components, section);
+            self.vector(prefix, key, components, true, section);
         }
     }
 
@@ -178,6 +302,9 @@ impl MachineReader<'_> {
         let name = format!("{prefix}{key}");
         let Some(parameter) = self.find(&name) else { return };
         let field = section.number(key, parameter.range(), self.report);
+        if !required && matches!(field, Field::Absent) {
+            return;
+        }
         let found = if required {
             let expected = format!("{}: {}", parameter.description(), parameter.range());
             section.require(field, key, &expected, self.report)
@@ -195,12 +322,16 @@ impl MachineReader<'_> {
         prefix: &str,
         key: &'static str,
         components: &[&str; 3],
+        required: bool,
         section: &mut Section<'_>,
     ) {
         let names = components.map(|component| format!("{prefix}{component}"));
         let parameters: Vec<_> = names.iter().filter_map(|name| self.find(name)).collect();
         let Some(first) = parameters.first() else { return };
         let field = section.numbers(key, first.range(), self.report);
+        if !required && matches!(field, Field::Absent) {
+            return;
+        }
         let found = section.require(field, key, "an array of three numbers", self.report);
         match found {
             Some(numbers) if numbers.value.len() == parameters.len() => {
@@ -251,30 +382,58 @@ pub(crate) fn to_json(machine: &Machine) -> Value {
             root.insert(block.section.to_owned(), Value::Object(numbers));
         }
     }
-    let spring = |(k, spring): (usize, &Spring)| {
-        let mut numbers =
-            block_to_json(&SPRINGS, &format!("{}{}_", SPRINGS.prefix, k + 1), machine);
-        if let Some(free_length_m) = spring.free_length_m {
-            numbers.insert(FREE_LENGTH.to_owned(), free_length_m.into());
+    for list in &LISTS {
+        let count = (list.count)(machine);
+        // The two that machines have always had are written even where there are none.
+        let is_old = list.block.section == "springs" || list.block.section == "dampers";
+        if count == 0 && !is_old {
+            continue;
         }
-        Value::Object(numbers)
-    };
-    let springs = machine.springs.iter().enumerate().map(spring).collect();
-    root.insert(SPRINGS.section.to_owned(), springs);
-    let damper =
-        |k: usize| block_to_json(&DAMPERS, &format!("{}{}_", DAMPERS.prefix, k + 1), machine);
-    let dampers = (0..machine.dampers.len()).map(|k| Value::Object(damper(k))).collect();
-    root.insert(DAMPERS.section.to_owned(), dampers);
+        let element = |k: usize| {
+            let prefix = list.prefix(k);
+            let mut numbers = block_to_json(&list.block, &prefix, machine);
+            for (key, value) in given_numbers(list, k, machine) {
+                numbers.insert(key.to_owned(), value.into());
+            }
+            for (key, values) in given_vectors(list, k, machine) {
+                numbers.insert(key.to_owned(), values.to_vec().into());
+            }
+            Value::Object(numbers)
+        };
+        root.insert(list.block.section.to_owned(), (0..count).map(element).collect());
+    }
     Value::Object(root)
 }
 
-fn block_to_json(block: &Block, prefix: &str, machine: &Machine) -> Map<String, Value> {
-    let number = |name: &str| {
-        let parameter = Parameter::find(&format!("{prefix}{name}"), machine, &no_spin()).ok();
-        parameter
-            .and_then(|parameter| parameter.get(machine, &no_spin()))
-            .map_or(Value::Null, Value::from)
+/// A parameter's value.
+fn value(name: &str, machine: &Machine) -> Option<f64> {
+    Parameter::find(name, machine, &no_spin()).ok()?.get(machine, &no_spin())
+}
+
+/// The numbers of an element that may be left out and that it has.
+fn given_numbers(list: &List, k: usize, machine: &Machine) -> Vec<(&'static str, f64)> {
+    let given = |&(key, default): &(&'static str, Option<f64>)| {
+        let is_of_ends = key == FREE_LENGTH && machine.springs[k].free_length_m.is_none();
+        let value = value(&format!("{}{key}", list.prefix(k)), machine).filter(|_| !is_of_ends)?;
+        (default != Some(value)).then_some((key, value))
     };
+    list.optional.iter().filter_map(given).collect()
+}
+
+/// The same of vectors.
+fn given_vectors(list: &List, k: usize, machine: &Machine) -> Vec<(&'static str, [f64; 3])> {
+    let given = |(key, components): &Vector| {
+        let values = components.map(|component| {
+            value(&format!("{}{component}", list.prefix(k)), machine).unwrap_or(0.0)
+        });
+        (values != [0.0; 3]).then_some((*key, values))
+    };
+    list.optional_vectors.iter().filter_map(given).collect()
+}
+
+fn block_to_json(block: &Block, prefix: &str, machine: &Machine) -> Map<String, Value> {
+    let number =
+        |name: &str| value(&format!("{prefix}{name}"), machine).map_or(Value::Null, Value::from);
     let numbers = block.numbers.iter().map(|&key| (key.to_owned(), number(key)));
     let vector = |components: &[&str; 3]| components.iter().map(|name| number(name)).collect();
     let vectors =
@@ -294,20 +453,17 @@ pub(crate) fn to_toml(machine: &Machine) -> String {
             if block.section.is_empty() { String::new() } else { format!("[{}]", block.section) };
         text.push_str(&block_to_toml(block, block.prefix, &header, machine));
     }
-    for (k, spring) in machine.springs.iter().enumerate() {
-        let prefix = format!("{}{}_", SPRINGS.prefix, k + 1);
-        text.push_str(&block_to_toml(&SPRINGS, &prefix, "[[springs]]", machine));
-        if let Some(free_length_m) = spring.free_length_m {
-            text.push_str(&format!("{FREE_LENGTH} = {free_length_m:?}\n"));
+    for list in &LISTS {
+        let header = format!("[[{}]]", list.block.section);
+        for k in 0..(list.count)(machine) {
+            text.push_str(&block_to_toml(&list.block, &list.prefix(k), &header, machine));
+            for (key, value) in given_numbers(list, k, machine) {
+                text.push_str(&format!("{key} = {value:?}\n"));
+            }
+            for (key, values) in given_vectors(list, k, machine) {
+                text.push_str(&format!("{key} = {values:?}\n"));
+            }
         }
-    }
-    for k in 0..machine.dampers.len() {
-        text.push_str(&block_to_toml(
-            &DAMPERS,
-            &format!("{}{}_", DAMPERS.prefix, k + 1),
-            "[[dampers]]",
-            machine,
-        ));
     }
     text
 }

@@ -15,7 +15,8 @@
 //!
 //! Bounds: files to 4 MiB; lists of points to 256 MiB, packed or not, and 2e7 numbers; a Sobol
 //! design to 2^32 points over 32 axes; 1e12 grid points; 1e6 s; 1e10 steps that stability asks for;
-//! spin tables of 20,000 rows; numbers to 1e12 in magnitude; 1000 springs and 1000 dampers.
+//! spin tables of 20,000 rows; numbers to 1e12 in magnitude; 1000 of each kind
+//! of element.
 //!
 //! Precedence, later over earlier: machine file, `[set]`, `--set`, axes. Within each of them no
 //! number may be written twice, not even under two names (`damping_n_s_per_m` writes every
@@ -30,8 +31,10 @@ mod list;
 mod machine;
 mod origins;
 mod parameters;
+mod points;
 mod render;
 mod report;
+mod scalars;
 pub(crate) mod schema;
 mod section;
 mod source;
@@ -41,15 +44,59 @@ mod syntax;
 mod tests;
 mod validate;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-pub(crate) use report::Diagnostics;
+pub(crate) use points::{check_columns, not_numbers, other_length};
+pub use report::{Diagnostics, Mistake};
 
 use grid::Draft;
-use report::Report;
+use report::{Diagnostic, Report};
+use source::Location;
 use washer_model::Machine;
 
 use crate::plan::Plan;
+
+/// A grid as a user gives it: a file or a text, with the constants `NAME=VALUE` over those it sets.
+#[derive(Clone, Debug)]
+pub struct GridInput {
+    path: PathBuf,
+    /// If it is not the file's.
+    text: Option<String>,
+    sets: Vec<String>,
+}
+
+impl GridInput {
+    /// A grid file. The paths in it are relative to its folder.
+    #[must_use]
+    pub fn file(path: PathBuf, sets: Vec<String>) -> Self {
+        Self { path, text: None, sets }
+    }
+
+    /// The text of a grid file. Messages call it by this name, which is also that of the run if the
+    /// text gives none. The paths in it are relative to the working directory.
+    #[must_use]
+    pub fn text(name: &str, text: String, sets: Vec<String>) -> Self {
+        Self { path: name.into(), text: Some(text), sets }
+    }
+
+    /// Reads the grid with its machine file, puts the constants in place, and checks the whole.
+    ///
+    /// # Errors
+    /// Every mistake found, in one pass.
+    pub fn load(&self) -> Result<Plan, Diagnostics> {
+        resolve(self, |_, _| ()).map(|(plan, ())| plan)
+    }
+
+    /// As [`Self::load`], for one point: `at` gives each axis of several values one (on the grid or
+    /// between its points), and any other parameter too. The plan has no axes; its machine and spin
+    /// are the point's. Beside it, what `at` says, by name.
+    ///
+    /// # Errors
+    /// Every mistake found, in one pass.
+    pub(crate) fn load_point(&self, at: &[String]) -> Result<(Plan, NamedValues), Diagnostics> {
+        resolve(self, |draft, report| parameters::point(at, draft, report))
+    }
+}
 
 /// Reads a grid file with its machine file, puts the constants `NAME=VALUE` in place, and checks
 /// the whole.
@@ -57,15 +104,21 @@ use crate::plan::Plan;
 /// # Errors
 /// Every mistake found, in one pass.
 pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
-    resolve(path, sets, |_, _| ()).map(|(plan, ())| plan)
+    GridInput::file(path.to_owned(), sets.to_vec()).load()
+}
+
+/// The name of a run as the command line gives it, or what it should have been.
+///
+/// # Errors
+/// In words.
+pub(crate) fn plain_name(text: &str) -> Result<String, String> {
+    grid::plain_name(text)
 }
 
 /// Parameters by name, with a value each.
 pub(crate) type NamedValues = Vec<(String, f64)>;
 
-/// As [`load`], for one point: `at` gives each axis of several values one (on the grid or between
-/// its points), and any other parameter too. The plan has no axes; its machine and spin are the
-/// point's. Beside it, what `at` says, by name.
+/// As [`load`], for one point: [`GridInput::load_point`].
 ///
 /// # Errors
 /// Every mistake found, in one pass.
@@ -74,16 +127,15 @@ pub(crate) fn load_point(
     sets: &[String],
     at: &[String],
 ) -> Result<(Plan, NamedValues), Diagnostics> {
-    resolve(path, sets, |draft, report| parameters::point(at, draft, report))
+    GridInput::file(path.to_owned(), sets.to_vec()).load_point(at)
 }
 
 fn resolve<T>(
-    path: &Path,
-    sets: &[String],
+    input: &GridInput,
     finish: impl FnOnce(&mut Draft, &mut Report) -> T,
 ) -> Result<(Plan, T), Diagnostics> {
     let mut report = Report::default();
-    let Some(mut draft) = grid::draft(path, sets, &mut report) else {
+    let Some(mut draft) = grid::draft(input, &mut report) else {
         return Err(report.into_diagnostics());
     };
     let finished = finish(&mut draft, &mut report);
@@ -91,6 +143,26 @@ fn resolve<T>(
     validate::scenarios(&draft, &mut report);
     validate::stability(&draft, &mut report);
     report.finish((draft.plan, finished))
+}
+
+pub(crate) use machine::with_one_of_each;
+/// Mistakes in expressions that an option or argument takes, each with its text.
+#[must_use]
+pub(crate) fn mistakes_in_expressions<'a>(
+    option: &str,
+    mistakes: impl IntoIterator<Item = (&'a str, sweep_results::Mistake)>,
+) -> Diagnostics {
+    let mut report = Report::default();
+    for (text, mistake) in mistakes {
+        let source = report.sources.add(option, text);
+        let at = Location::new(source, mistake.span);
+        let mut diagnostic = Diagnostic::new(mistake.title).at(&at, mistake.expected);
+        if let Some((typed, names)) = &mistake.candidates {
+            diagnostic = diagnostic.nearest(typed, names.iter().map(String::as_str));
+        }
+        report.push(diagnostic);
+    }
+    report.into_diagnostics()
 }
 
 /// A machine in full, as a result file carries it.

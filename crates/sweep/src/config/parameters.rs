@@ -7,11 +7,12 @@ use washer_model::{Machine, Parameter, Range, Spin, UnknownParameter, decimal};
 
 use super::NamedValues;
 use super::grid::Draft;
-use super::list::List;
+use super::list::{self, List};
 use super::report::{Diagnostic, Report};
+use super::scalars;
 use super::section::{Field, Section, check_number, quoted, refused_number, short};
 use super::source::{Located, Location};
-use crate::design::{Design, MOST_AXES};
+use crate::design::{Design, Distribution, MOST_AXES, REACH, Shape};
 use crate::plan::{Axis, AxisValues, Plan};
 
 /// Most grid points that are accepted. A hundred thousand points a second would take four months.
@@ -57,7 +58,22 @@ pub(super) fn constants(
         }
         apply(&constants, draft, report);
     }
-    apply(&arguments("--set", sets, draft, report), draft, report);
+    let sets: Vec<String> =
+        sets.iter().filter(|argument| !scalars::is_one(argument)).cloned().collect();
+    let constants = arguments("--set", &sets, draft, report);
+    let before = draft.plan.clone();
+    apply(&constants, draft, report);
+    // What is set to what it was leaves the plan as it was.
+    let changes = |constant: &&Constant<'_>| {
+        let mut after = before.clone();
+        write(&constant.parameter, &mut after, constant.value.value);
+        after != before
+    };
+    draft.plan.set = constants
+        .iter()
+        .filter(changes)
+        .map(|constant| (constant.name.value.to_owned(), constant.value.value.into()))
+        .collect();
 }
 
 /// Puts one point in place of the axes: `--at` gives every axis of several values, and may give
@@ -144,7 +160,7 @@ fn find(name: &Located<&str>, draft: &Draft, report: &mut Report) -> Option<Para
     None
 }
 
-fn unknown(
+pub(super) fn unknown(
     name: &Located<&str>,
     error: &UnknownParameter,
     machine: &Machine,
@@ -156,7 +172,7 @@ fn unknown(
         "window_s" => Some("[time], or as `window_from_s` and `window_to_s` here"),
         "end_s" => Some("[time]"),
         "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator]"),
-        "ratio_limit" | "channels" => Some("[reliability]"),
+        "ratio_limit" | "criterion" | "channels" => Some("[reliability]"),
         _ => None,
     };
     match (error, section) {
@@ -260,7 +276,9 @@ pub(super) fn box_of_axes(
     let sections = root.tables("axis", report);
     let most = match &design.value {
         Design::Sobol { .. } => MOST_AXES,
-        Design::LatinHypercube { .. } | Design::List { .. } => usize::MAX,
+        Design::LatinHypercube { .. } | Design::MonteCarlo { .. } | Design::List { .. } => {
+            usize::MAX
+        }
     };
     if sections.is_empty() || sections.len() > most {
         let title =
@@ -280,10 +298,17 @@ pub(super) fn box_of_axes(
             &["values"],
             "a design spreads its points over `range = { from = ..., to = ... }`",
         );
-        let field = section.table("range", "range = { from, to }", report);
-        let spaced = section.require(field, "range", "`range = { from = ..., to = ... }`", report);
-        let values =
-            spaced.and_then(|spaced| extent(spaced.value, range, design.value.points(), report));
+        let distributed =
+            section.table("distribution", "distribution = { kind, ... }", report).given();
+        let values = if let Some(distributed) = distributed {
+            section.misplace(&["range"], "the distribution has its own `from` and `to`");
+            distribution(distributed.value, range, report)
+        } else {
+            let field = section.table("range", "range = { from, to }", report);
+            let spaced =
+                section.require(field, "range", "`range = { from = ..., to = ... }`", report);
+            spaced.and_then(|spaced| extent(spaced.value, range, design.value.points(), report))
+        };
         section.finish(report);
         let (Some(name), Some(parameter)) = (name, parameter) else { continue };
         if claim(&name, &parameter, &mut swept, draft, report)
@@ -311,6 +336,9 @@ pub(super) fn listed_axes(
     let mut swept = Swept::new();
     for (k, column) in std::mem::take(&mut list.columns).into_iter().enumerate() {
         let name = Located { value: column.name.value.as_str(), at: column.name.at.clone() };
+        if name.value == list::ID {
+            continue;
+        }
         let Some(parameter) = find(&name, draft, report) else { continue };
         let range = parameter.range();
         let mut sound = true;
@@ -329,6 +357,79 @@ pub(super) fn listed_axes(
         }
     }
     draft.plan.design = Some(list.design);
+}
+
+/// The kinds of distributions by name; "uniform" is a range by another name.
+const DISTRIBUTIONS: [&str; 3] = ["normal", "lognormal", "uniform"];
+
+/// A distribution, cut at `from` and `to`.
+fn distribution(
+    mut section: Section<'_>,
+    range: Range,
+    report: &mut Report,
+) -> Option<Located<AxisValues>> {
+    let at = section.at().clone();
+    let field = section.choice("kind", &DISTRIBUTIONS, report);
+    let expected = "`normal`, `lognormal` or `uniform`";
+    let kind = section.require(field, "kind", expected, report).map(|kind| kind.value);
+    let mut number = |key: &'static str, range: Range, needed: bool| {
+        let field = section.number(key, range, report);
+        if needed {
+            section.require(field, key, "a number", report).map(|number| number.value)
+        } else {
+            field.given().map(|number| number.value)
+        }
+    };
+    let shape = match kind {
+        Some(0) => {
+            let numbers = (number("mean", Range::Any, true), number("sd", Range::Positive, true));
+            numbers.0.zip(numbers.1).map(|(mean, sd)| Shape::Normal { mean, sd })
+        }
+        Some(1) => {
+            let median = number("median", Range::Positive, true);
+            let sigma = number("sigma", Range::Positive, true);
+            median.zip(sigma).map(|(median, sigma)| Shape::Lognormal { median, sigma })
+        }
+        _ => None,
+    };
+    let is_uniform = kind == Some(2);
+    let [from, to] = ["from", "to"].map(|key| number(key, range, is_uniform));
+    section.finish(report);
+    let refuse = |title: String, expected: String, report: &mut Report| {
+        report.push(Diagnostic::new(title).at(&at, expected));
+        None
+    };
+    let bounds = match shape {
+        Some(shape) => [from.unwrap_or(shape.at(-REACH)), to.unwrap_or(shape.at(REACH))],
+        None => [from?, to?],
+    };
+    let [from, to] = bounds;
+    if from.partial_cmp(&to) != Some(std::cmp::Ordering::Less) {
+        let title = format!("a distribution from {} to {}", decimal(from), decimal(to));
+        return refuse(title, "expected `from` below `to`".to_owned(), report);
+    }
+    if let Some(&beyond) = bounds.iter().find(|&&bound| !range.contains(bound)) {
+        let title = format!("the distribution reaches to {}", decimal(beyond));
+        let expected = format!("expected {range}: cut it by `from` and `to`");
+        return refuse(title, expected, report);
+    }
+    let value = match shape {
+        None => AxisValues::Linear { from, to, count: 2 },
+        Some(shape) => {
+            let reach = [shape.at(-REACH), shape.at(REACH)];
+            if to <= reach[0] || reach[1] <= from {
+                let title = format!(
+                    "nothing of the distribution lies from {} to {}",
+                    decimal(from),
+                    decimal(to)
+                );
+                let [low, high] = reach.map(decimal);
+                return refuse(title, format!("expected bounds within {low} and {high}"), report);
+            }
+            AxisValues::Distributed(Distribution { shape, from, to })
+        }
+    };
+    Some(Located { value, at })
 }
 
 /// A range without a count.

@@ -158,6 +158,12 @@ impl Diagnostics {
         self.found.len() + self.beyond
     }
 
+    /// Each mistake that is kept, in the order of the text.
+    #[must_use]
+    pub fn mistakes(&self) -> Vec<Mistake> {
+        self.found.iter().map(|diagnostic| Mistake::of(diagnostic, &self.sources)).collect()
+    }
+
     /// The whole text with terminal colours.
     #[must_use]
     pub fn styled(&self) -> String {
@@ -172,6 +178,38 @@ impl Diagnostics {
         }
         text.push_str(&render::summary(self.count(), self.beyond, colour));
         text
+    }
+}
+
+/// One mistake as data.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mistake {
+    /// The file that it is in, or the name of the option or text.
+    pub file: Option<String>,
+    /// From 1.
+    pub line: Option<usize>,
+    /// From 1, in characters.
+    pub column: Option<usize>,
+    /// What is wrong, in one line.
+    pub message: String,
+    /// What was expected at that place.
+    pub expected: Option<String>,
+    /// What to do, a line each.
+    pub hints: Vec<String>,
+}
+
+impl Mistake {
+    fn of(diagnostic: &Diagnostic, sources: &Sources) -> Self {
+        let place = diagnostic.places.first();
+        let line = place.map(|(at, _)| sources.line(at));
+        Self {
+            file: place.map(|(at, _)| sources.name(at.source).to_owned()),
+            line: line.as_ref().map(|line| line.number),
+            column: line.map(|line| line.text[..line.span.start].chars().count() + 1),
+            message: diagnostic.title.clone(),
+            expected: place.map(|(_, expected)| expected.clone()),
+            hints: diagnostic.help.clone(),
+        }
     }
 }
 

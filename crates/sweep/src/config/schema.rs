@@ -3,11 +3,11 @@
 //! left to [`super::load`].
 
 use serde_json::{Map, Value, json};
-use washer_model::{Channel, Machine, Parameter, Range, Spin};
+use washer_model::{Channel, Parameter, Range, Spin};
 
 use super::design::{DEFAULT_SEED, MOST_SEED, MOST_SOBOL};
 use super::grid::{DEFAULT_CHANNELS, DEFAULT_MACHINE, DEFAULT_RATIO_LIMIT, LONGEST_S};
-use super::machine::{BLOCKS, Block, DAMPERS, FREE_LENGTH, SPRINGS, no_spin};
+use super::machine::{BLOCKS, Block, LISTS, no_spin, with_one_of_each};
 use super::parameters::MOST_POINTS;
 use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
 use crate::measures::{Criterion, Metric};
@@ -46,6 +46,7 @@ pub(crate) fn grid() -> Value {
         ("axis", axes),
         ("design", design()),
         ("reliability", reliability()),
+        ("stability", stability()),
     ];
     let mut schema = table(sections, &["spin", "time"]);
     // Whether a range has a count depends on whether there is a design.
@@ -79,6 +80,7 @@ fn design() -> Value {
         "oneOf": [
             one("latin_hypercube", "every axis cut into as many strata as there are points, one \
                                     point in each", MOST_POINTS),
+            one("monte_carlo", "every point at random, independent of all others", MOST_POINTS),
             one("sobol", "a scrambled Sobol sequence; a power of two points is the most \
                           even", MOST_SOBOL),
             table([("method", list), ("file", file)], &["method", "file"]),
@@ -100,12 +102,28 @@ pub(crate) fn machine() -> Value {
             required.push(block.section);
         }
     }
-    let free_length = (FREE_LENGTH, parameter(&format!("{}1_{FREE_LENGTH}", SPRINGS.prefix)));
-    let springs = block_schema(&SPRINGS, &format!("{}1_", SPRINGS.prefix), &[free_length]);
-    properties.push((SPRINGS.section, json!({ "type": "array", "items": springs, "minItems": 1 })));
-    let dampers = block_schema(&DAMPERS, &format!("{}1_", DAMPERS.prefix), &[]);
-    properties.push((DAMPERS.section, json!({ "type": "array", "items": dampers })));
-    required.push(SPRINGS.section);
+    for list in &LISTS {
+        let prefix = format!("{}{}_", list.block.prefix, list.first);
+        let numbers = list.optional.iter().map(|&(key, default)| {
+            let mut schema = parameter(&format!("{prefix}{key}"));
+            if let Some(default) = default {
+                schema["default"] = default.into();
+            }
+            (key, schema)
+        });
+        let vectors = list
+            .optional_vectors
+            .iter()
+            .map(|(key, components)| (*key, vector(&format!("{prefix}{}", components[0]))));
+        let optional: Vec<_> = numbers.chain(vectors).collect();
+        let items = block_schema(&list.block, &prefix, &optional);
+        let mut schema = json!({ "type": "array", "items": items });
+        if list.needed.is_some() {
+            schema["minItems"] = 1.into();
+            required.push(list.block.section);
+        }
+        properties.push((list.block.section, schema));
+    }
     document("Machine file of sweep", table(properties, &required))
 }
 
@@ -145,10 +163,10 @@ fn described(mut schema: Value, default: f64, description: &str) -> Value {
     schema
 }
 
-/// A parameter's number, by name, of the built-in machine.
+/// A parameter's number, by name.
 fn parameter(name: &str) -> Value {
     let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
-    Parameter::find(name, &Machine::paper(), &spin)
+    Parameter::find(name, &with_one_of_each(), &spin)
         .map_or(json!({ "type": "number" }), |parameter| of(&parameter))
 }
 
@@ -160,16 +178,18 @@ fn of(parameter: &Parameter) -> Value {
 
 fn block_properties(block: &Block, prefix: &str) -> Vec<(&'static str, Value)> {
     let numbers = block.numbers.iter().map(|&key| (key, parameter(&format!("{prefix}{key}"))));
-    let vectors = block.vectors.iter().map(|(key, components)| {
-        let items = number_of(&format!("{prefix}{}", components[0]));
-        (*key, json!({ "type": "array", "items": items, "minItems": 3, "maxItems": 3 }))
-    });
+    let vectors = block
+        .vectors
+        .iter()
+        .map(|(key, components)| (*key, vector(&format!("{prefix}{}", components[0]))));
     numbers.chain(vectors).collect()
 }
 
-fn number_of(name: &str) -> Value {
-    Parameter::find(name, &Machine::paper(), &no_spin())
-        .map_or(number(Range::Any), |found| number(found.range()))
+/// Three numbers, of which `first` is a parameter's name.
+fn vector(first: &str) -> Value {
+    let range = Parameter::find(first, &with_one_of_each(), &no_spin())
+        .map_or(Range::Any, |found| found.range());
+    json!({ "type": "array", "items": number(range), "minItems": 3, "maxItems": 3 })
 }
 
 fn block_schema(block: &Block, prefix: &str, optional: &[(&'static str, Value)]) -> Value {
@@ -178,22 +198,25 @@ fn block_schema(block: &Block, prefix: &str, optional: &[(&'static str, Value)])
     table(properties.into_iter().chain(optional.iter().cloned()), &required)
 }
 
-/// Names of the table as properties; those of numbered springs and dampers as patterns.
+/// Names of the table as properties; those of numbered elements as patterns.
 fn set() -> Value {
     let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
-    let mut all = Parameter::all(&Machine::paper(), &spin);
+    let machine = with_one_of_each();
+    let mut all = Parameter::all(&machine, &spin);
     let table = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    all.extend(Parameter::all(&Machine::paper(), &table));
+    all.extend(Parameter::all(&machine, &table));
     let (mut properties, mut patterns) = (Map::new(), Map::new());
     for parameter in &all {
         let name = parameter.name();
-        match ["spring_", "damper_", "spin_table_"]
-            .iter()
-            .find_map(|prefix| Some((prefix, name.strip_prefix(prefix)?)))
+        let lists = LISTS.iter().map(|list| (list.block.prefix, list.first));
+        match lists
+            .chain([("spin_table_", 1)])
+            .find_map(|(prefix, first)| Some((prefix, first, name.strip_prefix(prefix)?)))
         {
-            Some((prefix, rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => {
+            Some((prefix, first, rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => {
                 let suffix = rest.trim_start_matches(|c: char| c.is_ascii_digit());
-                patterns.insert(format!("^{prefix}[1-9][0-9]*{suffix}$"), of(parameter));
+                let number = if first == 1 { "[1-9][0-9]*" } else { "([2-9]|[1-9][0-9]+)" };
+                patterns.insert(format!("^{prefix}{number}{suffix}$"), of(parameter));
             }
             _ => {
                 properties.insert(name.to_owned(), of(parameter));
@@ -285,6 +308,15 @@ fn metrics() -> Value {
     })
 }
 
+fn stability() -> Value {
+    let speeds = json!({
+        "type": "string",
+        "description": "constant spin speeds FROM:TO:STEP in rpm, above 0, as in \"60:400:1\": \
+                        what `growth` among the metrics is about",
+    });
+    table([("speed_rpm", speeds)], &["speed_rpm"])
+}
+
 fn reliability() -> Value {
     let criterion = json!({
         "enum": Criterion::ALL.map(Criterion::name),
@@ -303,6 +335,29 @@ fn reliability() -> Value {
     });
     let ratio_limit = described(number(Range::Positive), DEFAULT_RATIO_LIMIT, limit);
     table([("ratio_limit", ratio_limit), ("channels", channels), ("criterion", criterion)], &[])
+}
+
+fn distribution() -> Value {
+    let one = |kind: &'static str, numbers: &[(&'static str, Range)], required: &[&str]| {
+        let mut properties = vec![("kind", json!({ "const": kind }))];
+        properties.extend(numbers.iter().map(|(key, range)| (*key, number(*range))));
+        properties.extend(["from", "to"].map(|key| (key, number(Range::Any))));
+        table(properties, required)
+    };
+    let (any, positive) = (Range::Any, Range::Positive);
+    json!({
+        "description": "of a design, cut at `from` and `to`; left out, they lie six standard \
+                        deviations from the middle",
+        "oneOf": [
+            one("normal", &[("mean", any), ("sd", positive)], &["kind", "mean", "sd"]),
+            one(
+                "lognormal",
+                &[("median", positive), ("sigma", positive)],
+                &["kind", "median", "sigma"],
+            ),
+            one("uniform", &[], &["kind", "from", "to"]),
+        ],
+    })
 }
 
 fn axis() -> Value {
@@ -329,7 +384,11 @@ fn axis() -> Value {
     json!({
         "oneOf": [
             table([("parameter", parameter.clone()), ("values", values)], &["parameter", "values"]),
-            table([("parameter", parameter), ("range", range)], &["parameter", "range"]),
+            table([("parameter", parameter.clone()), ("range", range)], &["parameter", "range"]),
+            table(
+                [("parameter", parameter), ("distribution", distribution())],
+                &["parameter", "distribution"],
+            ),
         ],
     })
 }

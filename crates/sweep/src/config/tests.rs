@@ -195,13 +195,83 @@ fn a_written_machine_reads_back_the_same_bits() {
     machine.springs[1].free_length_m = Some(0.1);
     machine.springs.truncate(3);
     machine.dampers.clear();
-    for machine in [machine, Machine::paper()] {
+    let mut full = super::with_one_of_each();
+    full.springs[2].cubic_n_per_m3 = 2e6;
+    full.dampers[0].friction_n = 45.5;
+    full.dampers[0].friction_linear_speed_m_per_s = Some(0.31);
+    full.dampers[1].friction_speed_m_per_s = 0.02;
+    full.stops[0].direction = [0.0, 0.6, -0.8];
+    full.stops[0].softness_m = 2e-4;
+    full.bushings[0].damping_n_s_per_m = [0.0, 12.0, 12.0];
+    full.bushings[0].cubic_n_per_m3[1] = 5e6;
+    full.further_unbalances[0].radius_m = -0.2;
+    for machine in [machine, Machine::paper(), full] {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("machine.toml"), machine_file(&machine)).unwrap();
         let grid = folder.path().join("grid.toml");
         std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
         assert_eq!(load(&grid, &[]).unwrap().machine, machine);
     }
+}
+
+/// What is wrong with a machine file, made from the built-in one's.
+fn mistakes_of_machine(change: impl FnOnce(String) -> String, sets: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let file = change(machine_file(&Machine::paper()));
+    std::fs::write(folder.path().join("machine.toml"), file).unwrap();
+    let grid = folder.path().join("grid.toml");
+    std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
+    let sets: Vec<_> = sets.iter().map(|&set| set.to_owned()).collect();
+    load(&grid, &sets).map_or_else(|mistakes| mistakes.to_string(), |_| String::new())
+}
+
+#[test]
+fn mistakes_in_elements_are_pointed_at() {
+    let with = |text: &'static str| mistakes_of_machine(|file| format!("{file}{text}"), &[]);
+    let damper = "[[dampers]]\ncabinet_m = [0, -0.3, 0]\ntub_m = [0, -0.1, 0]\n\
+                  damping_n_s_per_m = 0\n";
+    let of_damper = |text: &str| mistakes_of_machine(|file| format!("{file}{damper}{text}"), &[]);
+    let found = of_damper("friction_n = -40\nfriction_linear_speed_m_per_s = 0.3\n");
+    assert!(found.contains("expected a number, 0 or greater"), "{found}");
+    let found = of_damper("friction_n = 40\n");
+    assert!(found.contains("damper 3 has friction, and nothing says"), "{found}");
+    assert!(found.contains("friction_n = 40"), "{found}");
+    let found = of_damper("friction_n = 40\nfriction_speed_m_per_s = 0\n");
+    assert!(found.contains("a number from 1e-6 to 1000"), "{found}");
+    assert_eq!(of_damper("friction_n = 40\nfriction_linear_speed_m_per_s = 0.3\n"), "");
+
+    let found =
+        with("[[stops]]\ntub_m = [0.4, 0, 0.2]\nclearance_m = 0.01\nstiffness_n_per_m = 4e4\n");
+    assert!(found.contains("`direction` is missing in"), "{found}");
+    let stop = |direction: &str| {
+        let text = format!(
+            "[[stops]]\ntub_m = [0.4, 0, 0.2]\ndirection = {direction}\nclearance_m = \
+             0.01\nstiffness_n_per_m = 4e4\n"
+        );
+        mistakes_of_machine(|file| format!("{file}{text}"), &[])
+    };
+    assert!(stop("[0, 0]").contains("`direction` has 2 numbers"));
+    assert!(stop("[0, 0, 0]").contains("stop 1 has no direction"));
+    assert_eq!(stop("[0, 3, -4]"), "", "any length is made 1");
+
+    let unbalance = "[[further_unbalances]]\nmass_kg = 0.2\nx_m = 0.1\nradius_m = 0\n";
+    let found = mistakes_of_machine(|file| format!("{file}{unbalance}"), &[]);
+    assert!(found.contains("unbalance 2 is on the drum's axis"), "{found}");
+    assert!(found.contains("radius_m = 0"), "{found}");
+    let found = with("[[bushings]]\ntub_m = [0.4, 0, 0]\nstiffness_n_per_m = 600\n");
+    assert!(found.contains("an array of numbers"), "{found}");
+
+    // What an option sets.
+    let found = mistakes_of_machine(|file| file, &["friction_n=50"]);
+    assert!(found.contains("damper 1 has friction") && found.contains("friction_n=50"), "{found}");
+    assert_eq!(
+        mistakes_of_machine(|file| file, &["friction_n=50", "friction_linear_speed_m_per_s=0.3"]),
+        ""
+    );
+    let found = mistakes_of_machine(|file| file, &["stop_1_clearance_m=0.01"]);
+    assert!(found.contains("the machine has 0 stops"), "{found}");
+    let found = mistakes_of_machine(|file| file, &["unbalance_2_mass_kg=0.01"]);
+    assert!(found.contains("the machine has 1 unbalance, numbered from 1"), "{found}");
 }
 
 #[test]

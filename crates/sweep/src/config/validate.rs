@@ -15,8 +15,8 @@ use crate::measures::{Criterion, MOST_TURNS};
 use crate::method::{REFERENCE_SHARE, Steps};
 use crate::plan::{MOST_STEPS, Plan, Scenario, shortest_step_s};
 
-/// Springs, dampers and rows of a spin's table that are looked at before a run, over all points of
-/// a list: some seconds' worth.
+/// Elements and rows of a spin's table that are looked at before a run, over all points of a list:
+/// some seconds' worth.
 const MOST_JUDGED: u64 = 1_000_000_000;
 
 /// Counting a row's turns takes as long as judging so many rows.
@@ -68,7 +68,9 @@ impl Swept {
     /// minutes.
     fn is_too_much(self, draft: &Draft, scenario: &Scenario, report: &mut Report) -> bool {
         let Scenario { machine, spin, .. } = scenario;
-        let elements = (machine.springs.len() + machine.dampers.len()) as u64;
+        let lists = [machine.springs.len(), machine.dampers.len(), machine.stops.len()];
+        let further = machine.bushings.len() + machine.further_unbalances.len();
+        let elements = (lists.iter().sum::<usize>() + further) as u64;
         let rows = match spin {
             Spin::Table { time_s, .. } => time_s.len() as u64,
             Spin::Cycloidal { .. } | Spin::Triangular { .. } | Spin::Ramp { .. } => 1,
@@ -83,9 +85,8 @@ impl Swept {
             return false;
         }
         let title = format!(
-            "too many points to check: {points}, each with {elements} springs and dampers and a \
-             spin of {rows} \
-             rows"
+            "too many points to check: {points}, each with {elements} springs, dampers \
+             and the like and a spin of {rows} rows"
         );
         let at = draft.origins.get("axis[0]");
         report.push(at.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {

@@ -19,6 +19,8 @@ pub enum Demand {
     Row,
     /// On which side of the limit the ratio is, and near the limit the ratio.
     Side,
+    /// How fast disturbances grow at constant speeds, and nothing of the run.
+    Growth,
 }
 
 /// Ratios further from the limit than this many times their error are on their side of it.
@@ -156,6 +158,10 @@ impl Climber {
             };
             return Next::Done(Box::new(outcome));
         }
+        if demand == Demand::Growth {
+            let none = || Trajectory::failed(Status::Ok);
+            return Next::Done(Box::new(Outcome::new(self.id, none(), none())));
+        }
         let outcome = self.outcome(ladders, accuracy, plan);
         let margin = outcome.as_ref().and_then(|outcome| margin(outcome, plan));
         let is_sure = |climb: &Climb| match (demand, margin) {
@@ -186,7 +192,7 @@ impl Climber {
                     Demand::Side if climb.error.is_some_and(|error| SHARE * error > margin) => {
                         runs.push((model, climb.rung + 1));
                     }
-                    Demand::Side => {}
+                    Demand::Side | Demand::Growth => {}
                 }
             }
         }
@@ -326,7 +332,7 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, plan: &Plan) -> f64
     for ((a, b), metric) in a.metrics.iter().zip(&b.metrics).zip(plan.measures.of_model()) {
         let least = match metric {
             Metric::ClashTime => clash_floor_s(plan),
-            Metric::CabinetForce | Metric::StaticSag => 0.0,
+            Metric::CabinetForce | Metric::StaticSag | Metric::Growth => 0.0,
         };
         compare(*a, *b, least);
     }

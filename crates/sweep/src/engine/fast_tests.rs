@@ -129,6 +129,40 @@ fn rows_are_rk4s_on_other_machines() {
 }
 
 #[test]
+fn rows_are_rk4s_on_machines_with_friction_stops_and_gasket() {
+    let machine = include_str!("../../../../docs/examples/friction.toml");
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("machine.toml"), machine).unwrap();
+    let stiff = "stop_1_stiffness_n_per_m = 1e7\nstop_2_stiffness_n_per_m = 1e7\n";
+    let sets = ["", "friction_n = 90\nfriction_speed_m_per_s = 0.003\n", stiff];
+    for (k, set) in sets.into_iter().enumerate() {
+        let path = folder.path().join(format!("grid-{k}.toml"));
+        let text = format!(
+            "name = \"elements-{k}\"\nmachine = \"machine.toml\"\n[set]\n{set}\
+             stop_1_clearance_m = 0.008\nstop_2_clearance_m = 0.008\n\
+             [spin]\nprofile = \"ramp\"\npeak_rpm = 350\nramp_s = 12\n[time]\nend_s = \
+             14\nwindow_s = [4, 14]\n\
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.2, \
+             count = 6 }}\n\
+             [[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = {{ from = 0, to = 100, count \
+             = 3 }}\n"
+        );
+        std::fs::write(&path, text).unwrap();
+        let plan = crate::config::load(&path, &[]).unwrap();
+        let rows = hold_against_rk4(&plan, 1e-3);
+        let sensitive = rows.iter().filter(|row| row.sensitive == Some(true)).count();
+        // Forces with corners make RK4 of first order, so that it settles fewer rows.
+        assert!(3 * sensitive <= rows.len(), "{set}: {sensitive} of {} rows", rows.len());
+        // Stops of 1e7 N/m swing the tub faster than capped steps follow.
+        let engine = ModelEngine::new(&plan).unwrap();
+        let why = engine.ladders()[0].held_back.clone().unwrap();
+        let says_rk4 = why.starts_with("rk4 alone");
+        assert_eq!(says_rk4, set == stiff, "{why}");
+        assert!(!says_rk4 || rows.iter().all(|row| row.method == Level::Rk4));
+    }
+}
+
+#[test]
 fn rows_by_other_criteria_are_rk4s() {
     for criterion in ["envelope", "rms"] {
         let plan = load(&format!(

@@ -9,6 +9,10 @@
 //! Motions that pass through bands of instability amplify errors a thousandfold and climb. Chaotic
 //! motions climb to the top, where RK4 does not agree with itself.
 //!
+//! Friction and stops give forces corners. A step that spans one errs by its own length, whatever
+//! the order of its formula. So with them the error left is reckoned of first order
+//! ([`left_by_corners`]), and the quick rungs are believed only where they really agree.
+//!
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
 use std::fmt;
@@ -73,6 +77,9 @@ const CONTRACTION_TO_RK4: f64 = 0.02;
 /// believed below this.
 const LEAST_EXPECTED_SHARE: f64 = 5e-3;
 
+/// Reserve of errors at corners.
+const RESERVE_AT_CORNERS: f64 = 2.0;
+
 /// A contraction better than this is not believed.
 const BEST_CONTRACTION: f64 = 1e-3;
 
@@ -83,7 +90,7 @@ pub(crate) struct Rung {
     pub(crate) level: Level,
     /// The method.
     pub(crate) method: Method,
-    /// Its error as a share of the rung's before; 1 for the first.
+    /// Its error as a share of its difference from the rung before; 1 for the first.
     contraction: f64,
     /// Up to which difference from that rung this is so.
     believed_to: f64,
@@ -123,22 +130,32 @@ pub(crate) struct Ladder {
     pub(crate) rungs: Vec<Rung>,
     /// Whether there is more than one, and the last two are plain RK4.
     is_checked: bool,
+    /// What elements of the machines hold the quick rungs back, if any do.
+    pub(crate) held_back: Option<String>,
 }
 
 impl Ladder {
     /// One method, which nothing is compared with.
     pub(crate) fn direct(level: Level, method: Method) -> Self {
         let rungs = vec![Rung { level, method, contraction: 1.0, believed_to: 0.0 }];
-        Self { rungs, is_checked: false }
+        Self { rungs, is_checked: false, held_back: None }
     }
 
     /// The fast method's for these cases.
     pub(crate) fn new(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Self {
+        let has_corners = model == ModelKind::Nonlinear && cases.are_nonsmooth();
         let mut rungs = capped(cases, model, accuracy);
         let reference_step_s = reference_step_s(cases);
-        let contraction = if rungs.is_empty() { 1.0 } else { CONTRACTION_TO_RK4 };
+        let longer_step_s = LONGER_STEP * reference_step_s;
+        let contraction = match rungs.last().map(|rung| &rung.method) {
+            Some(Method::Geared(geared)) if has_corners => {
+                CONTRACTION_TO_RK4.max(left_by_corners(geared.top().step_s, longer_step_s))
+            }
+            Some(_) => CONTRACTION_TO_RK4,
+            None => 1.0,
+        };
         let plain = [
-            (LONGER_STEP * reference_step_s, contraction, FIRST_ORDER_OF_RK4),
+            (longer_step_s, contraction, FIRST_ORDER_OF_RK4),
             (reference_step_s, REFERENCE_CONTRACTION, f64::INFINITY),
         ];
         rungs.extend(plain.map(|(step_s, contraction, believed_to)| Rung {
@@ -147,7 +164,8 @@ impl Ladder {
             contraction,
             believed_to,
         }));
-        Self { rungs, is_checked: true }
+        let held_back = held_back(cases, has_corners, rungs.len() > plain.len());
+        Self { rungs, is_checked: true, held_back }
     }
 
     /// The last rung, if there are others below it.
@@ -160,6 +178,19 @@ impl Ladder {
         let Rung { contraction, believed_to, .. } = self.rungs[rung];
         if difference <= believed_to { contraction * difference } else { difference }
     }
+}
+
+/// Why elements keep a machine from the quick rungs, or those from being believed.
+fn held_back(cases: &Cases<'_>, has_corners: bool, has_capped: bool) -> Option<String> {
+    if !has_capped && let Some(fastest) = cases.stiffened_rad_per_s() {
+        return Some(format!(
+            "rk4 alone, because stops or stiffened springs can swing the tub at {fastest:.0} \
+             rad/s, too fast for longer steps"
+        ));
+    }
+    (has_capped && has_corners).then(|| {
+        "longer steps are believed less, because friction and stops give forces corners".to_owned()
+    })
 }
 
 /// The rungs with capped modes, if any are worth their time.
@@ -188,13 +219,17 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
         .map(|(_, last)| refined(last));
     let finest = finest.filter(|it| it.evaluations_per_s() < WORTH_IT * plain_evaluations_per_s);
     chosen.extend(finest.map(|finest| (Level::Finest, finest)));
+    let has_corners = model == ModelKind::Nonlinear && cases.are_nonsmooth();
     let rung = |(place, (level, geared)): (usize, &(Level, Geared))| {
         let before = place.checked_sub(1).map(|before| &chosen[before].1);
+        let of_corners = before
+            .filter(|_| has_corners)
+            .map_or(0.0, |before| left_by_corners(before.top().step_s, geared.top().step_s));
         let contraction = before.map_or(1.0, |before| match model {
             ModelKind::Nonlinear => reserve(place) * geared.share_of_error(before),
             ModelKind::Linear => expected_share(cases, before, geared).max(LEAST_EXPECTED_SHARE),
         });
-        let contraction = contraction.clamp(BEST_CONTRACTION, 1.0);
+        let contraction = contraction.clamp(BEST_CONTRACTION, 1.0).max(of_corners);
         Rung {
             level: *level,
             method: Method::Geared(*geared),
@@ -203,6 +238,13 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
         }
     };
     chosen.iter().enumerate().map(rung).collect()
+}
+
+/// Error of steps across corners, as a share of the difference from longer steps: with errors in
+/// proportion to the step, 1 / (ratio - 1); and as much again in reserve, because where in a step a
+/// corner falls is chance.
+fn left_by_corners(longer_s: f64, shorter_s: f64) -> f64 {
+    RESERVE_AT_CORNERS * shorter_s / (longer_s - shorter_s)
 }
 
 /// Share that the rule expects to be left of a coarser choice's error.

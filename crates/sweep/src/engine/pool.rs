@@ -16,6 +16,7 @@ use lane_ode::MAX_LANES;
 use washer_model::Point;
 
 use super::climb::{Climber, Demand, Next};
+use super::growth::fastest_growth;
 use super::{ModelEngine, Watch};
 use crate::outcome::Outcome;
 use crate::plan::Scenario;
@@ -174,7 +175,7 @@ impl Pool<'_> {
                     }
                     state.rows.insert(position, row);
                 }
-                Next::Done(outcome) => done.push(*outcome),
+                Next::Done(outcome) => done.push((*outcome, row.point)),
             }
         }
         if let Some(at) = state.at_work.iter().position(|&level| level == finished) {
@@ -182,8 +183,11 @@ impl Pool<'_> {
         }
         drop(state);
         self.shared.changed.notify_all();
-        for mut outcome in done {
+        for (mut outcome, point) in done {
             outcome.forget_turns();
+            if let (Some(speeds), Ok(point)) = (&self.engine.plan.measures.growth_speeds, point) {
+                outcome.growth = fastest_growth(self.engine.simd, &point, &speeds.values());
+            }
             (self.keep)(outcome);
         }
     }

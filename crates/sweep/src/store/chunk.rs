@@ -9,26 +9,30 @@
 //! | 4 | channels C, u32 |
 //! | 32 | hash of the plan |
 //! | 8, 8, 8 | chunk index, first point, number of points, u64 |
-//! | points x (20 + 2 x (32 + 8 C + 8 M) + 8 B) | records |
+//! | points x (20 + 2 x (32 + 8 C + 8 M) + 8 B + 56 G) | records |
 //! | 32 | blake3 of everything before |
 //!
 //! A record is the point (u64), flags, the two models' status codes and that of the method's level
 //! (u8 each), the error (f64, NaN where there is none), then for the nonlinear and the linear
 //! model: fail time, least gap (f64), steps, rejected (u64), C amplitudes and M metrics (f64). What
 //! a flag says is absent is zero. After both models come B numbers (f64) of both together: ratios
-//! by turns, then the static sag; NaN where there is none. M and B follow from the plan, and are
-//! zero unless it asks for more than peaks.
+//! by turns, then the static sag; NaN where there is none. Where G is 1 a disturbance follows: its
+//! speed, NaN where there is none, and its multiplier (f64), then of two modes number, name (u32,
+//! number 0 where there is none) and frequency (f64). M, B and G follow from the plan, and are zero
+//! unless it asks for more than peaks.
 
 use super::error::StoreError;
 use super::schema::Layout;
 use crate::measures::{Criterion, Metric};
 use crate::method::Level;
-use crate::outcome::{Outcome, Status, Trajectory};
+use crate::outcome::{GrowingMode, Growth, Outcome, Status, Trajectory};
+use washer_model::{Disturbance, Motion};
 
 const MAGIC: [u8; 8] = *b"SWEEPCHK";
 const FORMAT: u32 = 2;
 const HEADER: usize = 8 + 4 + 4 + 32 + 3 * 8;
 const HASH: usize = blake3::OUT_LEN;
+const GROWTH_BYTES: usize = 3 * 8 + 2 * (4 + 4 + 8);
 
 /// Flag bits of a record; the linear model's are three above the nonlinear one's.
 const AMPLITUDES: u8 = 1;
@@ -49,6 +53,8 @@ pub(crate) struct Shape {
     pub(crate) by_turns: bool,
     /// Whether there is a static sag.
     pub(crate) with_sag: bool,
+    /// Whether a disturbance is kept.
+    pub(crate) with_growth: bool,
 }
 
 impl Shape {
@@ -60,6 +66,7 @@ impl Shape {
             metrics: count(layout.measures.of_model().count()),
             by_turns: layout.measures.criterion == Criterion::Envelope,
             with_sag: layout.measures.metrics.contains(&Metric::StaticSag),
+            with_growth: layout.with_growth(),
         }
     }
 
@@ -67,7 +74,8 @@ impl Shape {
     pub(crate) const fn bytes_a_point(&self) -> usize {
         let turn_ratios = if self.by_turns { self.channels as usize } else { 0 };
         let of_both = turn_ratios + self.with_sag as usize;
-        8 + 4 + 8 + 2 * (4 * 8 + 8 * (self.channels + self.metrics) as usize) + 8 * of_both
+        let growth = if self.with_growth { GROWTH_BYTES } else { 0 };
+        8 + 4 + 8 + 2 * (4 * 8 + 8 * (self.channels + self.metrics) as usize) + 8 * of_both + growth
     }
 }
 
@@ -241,6 +249,9 @@ fn record(outcome: &Outcome, shape: &Shape, bytes: &mut Vec<u8>) {
     if shape.with_sag {
         optional(outcome.static_sag_m);
     }
+    if shape.with_growth {
+        write_growth(outcome.growth.as_ref(), bytes);
+    }
 }
 
 /// Takes a fixed-length record apart; `None` where it makes no sense.
@@ -267,7 +278,40 @@ fn read_record(bytes: &[u8], shape: &Shape) -> Option<Outcome> {
     if shape.with_sag {
         outcome.static_sag_m = optional(&mut rest)?;
     }
+    if shape.with_growth {
+        outcome.growth = read_growth(&mut rest)?;
+    }
     Some(outcome)
+}
+
+fn write_growth(growth: Option<&Growth>, bytes: &mut Vec<u8>) {
+    let (speed_rpm, multiplier, modes) = match growth {
+        Some(growth) => (growth.fastest.speed_rpm, growth.fastest.multiplier, growth.modes),
+        None => (f64::NAN, [0.0; 2], [None; 2]),
+    };
+    for number in [speed_rpm, multiplier[0], multiplier[1]] {
+        bytes.extend_from_slice(&number.to_le_bytes());
+    }
+    for mode in modes {
+        let none = GrowingMode { number: 0, name: 0, frequency_cpm: 0.0 };
+        let GrowingMode { number, name, frequency_cpm } = mode.unwrap_or(none);
+        bytes.extend_from_slice(&number.to_le_bytes());
+        bytes.extend_from_slice(&name.to_le_bytes());
+        bytes.extend_from_slice(&frequency_cpm.to_le_bytes());
+    }
+}
+
+fn read_growth(rest: &mut &[u8]) -> Option<Option<Growth>> {
+    let mut number = || Some(f64::from_le_bytes(take(rest)?));
+    let fastest = Disturbance { speed_rpm: number()?, multiplier: [number()?, number()?] };
+    let mut mode = || {
+        let [number, name] = [u32::from_le_bytes(take(rest)?), u32::from_le_bytes(take(rest)?)];
+        let frequency_cpm = f64::from_le_bytes(take(rest)?);
+        let known = (name as usize) < Motion::NAMES.len();
+        known.then_some((number > 0).then_some(GrowingMode { number, name, frequency_cpm }))
+    };
+    let modes = [mode()?, mode()?];
+    Some((!fastest.speed_rpm.is_nan()).then_some(Growth { fastest, modes }))
 }
 
 /// A number, or none for NaN. Returns `None` at the end of the bytes.
@@ -321,7 +365,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn place(count: u64, channels: u32) -> Place {
-        let shape = Shape { channels, metrics: 0, by_turns: false, with_sag: false };
+        let shape =
+            Shape { channels, metrics: 0, by_turns: false, with_sag: false, with_growth: false };
         Place { plan: blake3::hash(b"plan"), shape, chunk: 3, first: 48, count }
     }
 
@@ -431,9 +476,10 @@ mod tests {
             ),
             by_turns: bool,
             with_sag: bool,
+            with_growth: bool,
         ) {
             let mut place = place(rows.len() as u64, 3);
-            place.shape = Shape { metrics: 2, by_turns, with_sag, ..place.shape };
+            place.shape = Shape { metrics: 2, by_turns, with_sag, with_growth, ..place.shape };
             let outcomes: Vec<Outcome> = rows
                 .into_iter()
                 .zip(place.first..)
@@ -446,6 +492,15 @@ mod tests {
                         outcome.turn_ratios = turn_ratios.map(number).to_vec();
                     }
                     outcome.static_sag_m = static_sag_m.filter(|sag_m| with_sag && !sag_m.is_nan());
+                    let number = |number: Option<f64>| number.filter(|number| !number.is_nan());
+                    let mode = GrowingMode { number: 2, name: 4, frequency_cpm: 150.0 };
+                    let growth = |speed_rpm: f64| {
+                        let multiplier = [number(turn_ratios[1]).unwrap_or(0.5), 1.0];
+                        let fastest = Disturbance { speed_rpm, multiplier };
+                        Growth { fastest, modes: [Some(mode), None] }
+                    };
+                    let speed_rpm = number(turn_ratios[0]).filter(|_| with_growth);
+                    outcome.growth = speed_rpm.map(growth);
                     outcome
                 })
                 .collect();
@@ -454,7 +509,7 @@ mod tests {
             // Through bytes, because NaN is not equal to itself.
             prop_assert_eq!(encode(&place, &back).unwrap(), bytes);
             let ratios = |outcomes: &[Outcome]| -> Vec<_> {
-                outcomes.iter().map(|o| (o.turn_ratios.clone(), o.static_sag_m)).collect()
+                outcomes.iter().map(|o| (o.turn_ratios.clone(), o.static_sag_m, o.growth)).collect()
             };
             prop_assert_eq!(ratios(&back), ratios(&outcomes));
         }

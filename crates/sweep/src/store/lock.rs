@@ -182,9 +182,10 @@ fn held_by(path: &Path, shard: Option<u64>) -> Option<Holder> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::synthetic;
 
     fn folder(home: &tempfile::TempDir) -> Folder {
-        Folder::of(&home.path().join("x.parquet")).unwrap()
+        Folder::of(&home.path().join("x.parquet"), &synthetic::layout()).unwrap()
     }
 
     fn busy(result: Result<Lock, StoreError>) -> Vec<Holder> {

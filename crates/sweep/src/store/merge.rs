@@ -1,9 +1,13 @@
 //! Joining the chunks into the one Parquet file, a row group at a time.
 
+use std::fs::File;
 use std::io::BufWriter;
+use std::path::Path;
 
+use arrow_array::RecordBatch;
 use parquet::arrow::ArrowWriter;
 use parquet::errors::ParquetError;
+use tempfile::NamedTempFile;
 
 use super::Job;
 use super::error::StoreError;
@@ -12,7 +16,7 @@ use super::provenance::{self, Session};
 use super::read::{self, Tally};
 use super::schema::{self, BATCH_ROWS, ResultRows};
 use sweep_files::panics;
-use sweep_files::{self as files, FileKind, ParquetFile, atomic, seal};
+use sweep_files::{self as files, ParquetFile, atomic, seal};
 
 /// A finished result.
 #[derive(Debug)]
@@ -21,6 +25,62 @@ pub struct Joined {
     pub tally: Tally,
     /// Things a user should hear of.
     pub notes: Vec<String>,
+}
+
+/// A result file in the making: batches of [`BATCH_ROWS`] rows, the last perhaps of fewer.
+struct MapWriter<'a> {
+    output: &'a Path,
+    file: NamedTempFile,
+    writer: ArrowWriter<BufWriter<File>>,
+}
+
+impl<'a> MapWriter<'a> {
+    /// Begins the file of a job, which is to be at `output`.
+    fn begin(job: &Job<'_>, file: NamedTempFile, output: &'a Path) -> Result<Self, StoreError> {
+        let (schema, properties) = (job.layout.schema(), schema::properties(job));
+        let handle = file.as_file().try_clone().map_err(StoreError::io("write", output))?;
+        let begin = || ArrowWriter::try_new(BufWriter::new(handle), schema, Some(properties));
+        let writer = panics::in_parquet("the library gave up writing", begin)
+            .map_err(StoreError::parquet("write", output))?;
+        Ok(Self { output, file, writer })
+    }
+
+    fn write(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
+        panics::in_parquet("the library gave up writing", || self.writer.write(batch))
+            .map_err(StoreError::parquet("write", self.output))
+    }
+
+    /// The whole file, with its digest.
+    fn finish(self) -> Result<NamedTempFile, StoreError> {
+        let Self { output, mut file, mut writer } = self;
+        // Closing flushes to the file. (Taking the file back out of the writer would tell a full
+        // disk as text only.)
+        writer.append_key_value_metadata(seal::blank());
+        panics::in_parquet("the library gave up writing", || writer.close())
+            .map_err(StoreError::parquet("write", output))?;
+        seal::seal(file.as_file_mut()).map_err(StoreError::io("write", output))?;
+        Ok(file)
+    }
+}
+
+/// Writes the result file of a job whose rows are in memory, in batches of [`BATCH_ROWS`]: the same
+/// bytes as a run's.
+///
+/// # Errors
+/// [`StoreError::File`].
+pub(crate) fn write_map(
+    job: &Job<'_>,
+    batches: &[RecordBatch],
+    output: &Path,
+) -> Result<(), StoreError> {
+    files::judge(output, job.layout.file_kind())?;
+    let folder = atomic::parent(output);
+    files::ready(folder)?;
+    let mut writer = MapWriter::begin(job, atomic::begin(folder)?, output)?;
+    batches.iter().try_for_each(|batch| writer.write(batch))?;
+    let file = writer.finish()?;
+    files::judge(output, job.layout.file_kind())?;
+    Ok(atomic::publish(file, output)?)
 }
 
 impl OpenRun {
@@ -39,14 +99,10 @@ impl OpenRun {
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<Tally>, StoreError> {
         let output = self.output().to_path_buf();
-        let mut file = atomic::begin(self.folder())?;
-        let failed = |error| StoreError::parquet("write", &output)(error);
-        let from_arrow = |error| failed(ParquetError::from(error));
+        let file = atomic::begin(self.folder())?;
+        let from_arrow = |error| StoreError::parquet("write", &output)(ParquetError::from(error));
         let mut rows = ResultRows::new(&job.layout);
-        let properties = schema::properties(job);
-        let begin = || ArrowWriter::try_new(BufWriter::new(&file), rows.schema(), Some(properties));
-        let mut writer =
-            panics::in_parquet("the library gave up writing", begin).map_err(failed)?;
+        let mut writer = MapWriter::begin(job, file, &output)?;
         for chunk in 0..self.chunks() {
             if stop() {
                 return Ok(None);
@@ -58,25 +114,17 @@ impl OpenRun {
             for outcome in outcomes {
                 rows.push((job.axis_values)(outcome.point), outcome);
                 if rows.len() == BATCH_ROWS {
-                    let batch = rows.take().map_err(from_arrow)?;
-                    panics::in_parquet("the library gave up writing", || writer.write(&batch))
-                        .map_err(failed)?;
+                    writer.write(&rows.take().map_err(from_arrow)?)?;
                 }
             }
         }
         if rows.len() > 0 {
-            let batch = rows.take().map_err(from_arrow)?;
-            panics::in_parquet("the library gave up writing", || writer.write(&batch))
-                .map_err(failed)?;
+            writer.write(&rows.take().map_err(from_arrow)?)?;
         }
-        // Closing flushes to the file. (Taking the file back out of the writer would tell a full
-        // disk as text only.)
-        writer.append_key_value_metadata(seal::blank());
-        panics::in_parquet("the library gave up writing", || writer.close()).map_err(failed)?;
-        seal::seal(file.as_file_mut()).map_err(StoreError::io("write", &output))?;
+        let file = writer.finish()?;
         // Read back before it takes its place: what cannot be read must not replace anything.
         let tally = read::tally(&ParquetFile::open(file.path())?)?;
-        files::judge(&output, FileKind::Map)?;
+        files::judge(&output, job.layout.file_kind())?;
         atomic::publish(file, &output)?;
         Ok(Some(tally))
     }

@@ -35,18 +35,21 @@ mod trials;
 
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 pub(crate) use chunk::Shape;
 pub use error::StoreError;
+pub(crate) use merge::write_map;
 pub use open::{OpenOptions, OpenRun, Opened};
-pub(crate) use schema::{AxisColumn, Layout};
+pub(crate) use schema::{AxisColumn, BATCH_ROWS, Layout, ResultRows, RowKind};
+pub(crate) use shard::list as shard_list;
 pub use shard::{Shard, ShardRequest};
 pub(crate) use status::FolderStatus;
 pub use status::{State, status};
 pub(crate) use trials::{Key, OpenedTrials, Trials};
 
 use crate::identity;
+use crate::measures::Measures;
 use crate::plan::{Axis, Plan};
 use sweep_files::{self as files, FileKind};
 
@@ -90,8 +93,39 @@ impl<'a> Job<'a> {
                 channels: plan.reliability.channels.clone(),
                 ratio_limit: plan.reliability.ratio_limit,
                 measures: plan.measures.clone(),
+                rows: RowKind::Run,
             },
             axis_values: Box::new(|point| plan.axis_values(point)),
+        }
+    }
+
+    /// The dwells of a plan's points at these speeds (rpm), for `sweep stability`: a row for each
+    /// point and speed, speeds varying fastest.
+    #[must_use]
+    pub(crate) fn of_dwells(plan: &'a Plan, speeds_rpm: &[f64]) -> Self {
+        let of_run = Self::of(plan);
+        let mut json = of_run.plan;
+        json["stability"] = json!({ "speed_rpm": speeds_rpm });
+        let mut layout = Layout { rows: RowKind::Dwell(speeds_rpm.to_vec()), ..of_run.layout };
+        // What is measured of a run is not of a dwell.
+        layout.measures = Measures::default();
+        layout.axes.push(AxisColumn {
+            name: "speed_rpm".to_owned(),
+            unit: "rpm".to_owned(),
+            description: "constant spin of the shaft".to_owned(),
+        });
+        let speeds_rpm = speeds_rpm.to_vec();
+        let speeds = speeds_rpm.len() as u64;
+        Self {
+            plan: json,
+            points: plan.points() * speeds,
+            layout,
+            axis_values: Box::new(move |row| {
+                let mut values = plan.axis_values(row / speeds);
+                values.push(speeds_rpm[(row % speeds) as usize]);
+                values
+            }),
+            ..of_run
         }
     }
 
@@ -136,8 +170,8 @@ pub(crate) struct Folder {
 impl Folder {
     /// Those of the run with this output. Neither it nor its sidecar is anything but absent or
     /// ours.
-    pub(crate) fn of(output: &Path) -> Result<Self, StoreError> {
-        let folder = Self::beside(output, FileKind::Map)?;
+    pub(crate) fn of(output: &Path, layout: &Layout) -> Result<Self, StoreError> {
+        let folder = Self::beside(output, layout.file_kind())?;
         files::judge(&folder.sidecar(), folder.account())?;
         Ok(folder)
     }

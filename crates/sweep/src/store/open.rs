@@ -67,7 +67,7 @@ impl OpenRun {
         job: &Job<'_>,
         options: OpenOptions<'_>,
     ) -> Result<Opened, StoreError> {
-        let folder = Folder::of(output)?;
+        let folder = Folder::of(output, &job.layout)?;
         if !options.fresh
             && !folder.path.exists()
             && let Some((file, tally)) = finished(&folder, job)?
@@ -120,7 +120,7 @@ impl OpenRun {
     /// # Errors
     /// [`StoreError::NoRun`] when nothing is there; else as [`OpenRun::open`].
     pub fn open_for_merge(output: &Path, job: &Job<'_>) -> Result<Opened, StoreError> {
-        let folder = Folder::of(output)?;
+        let folder = Folder::of(output, &job.layout)?;
         if !folder.path.exists() && !output.exists() {
             return Err(StoreError::NoRun { output: output.to_path_buf(), folder: folder.path });
         }
@@ -311,7 +311,7 @@ pub(super) fn finished(
     job: &Job<'_>,
 ) -> Result<Option<(ResultFile, Tally)>, StoreError> {
     let Some(file) = read::finished(&folder.output)? else { return Ok(None) };
-    let result = ResultFile::of(&file)?;
+    let result = ResultFile::of(&file, job.layout.file_kind())?;
     if result.plan_hash == job.hash().to_hex().as_str() {
         // Files of this build carry a digest.
         if !file.is_sealed() {

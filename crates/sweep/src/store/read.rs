@@ -41,17 +41,17 @@ impl ResultFile {
     ///
     /// # Errors
     /// [`StoreError::Parquet`] for a file that is not the result of a run.
-    pub(crate) fn of(file: &ParquetFile) -> Result<Self, StoreError> {
-        own_word(file).ok_or_else(|| {
-            let reason = "its metadata is not that of a result of `sweep run`";
+    pub(crate) fn of(file: &ParquetFile, kind: FileKind<'_>) -> Result<Self, StoreError> {
+        own_word(file, kind).ok_or_else(|| {
+            let reason = "its metadata is not that of a result of this command";
             StoreError::parquet("read", file.path())(ParquetError::General(reason.into()))
         })
     }
 }
 
-fn own_word(file: &ParquetFile) -> Option<ResultFile> {
+fn own_word(file: &ParquetFile, kind: FileKind<'_>) -> Option<ResultFile> {
     // Other files of this program carry the plan too: a boundary's rows are not points.
-    if !FileKind::Map.has_keys(&|key| file.value(key).is_some()) {
+    if !kind.has_keys(&|key| file.value(key).is_some()) {
         return None;
     }
     Some(ResultFile {
@@ -105,6 +105,20 @@ pub struct Tally {
     pub greatest_ratio: Option<Extreme>,
     /// The least gap of the nonlinear model, m.
     pub least_gap_nonlinear_m: Option<Extreme>,
+    /// Of a result of `sweep stability`, which has none of the verdicts above.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dwells: Option<DwellCounts>,
+}
+
+/// Rows of a result of `sweep stability`, counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct DwellCounts {
+    /// Rows whose disturbances all decay.
+    pub stable: u64,
+    /// Rows with one that grows.
+    pub unstable: u64,
+    /// Rows without a response.
+    pub unknown: u64,
 }
 
 /// Rows by status, in the order of [`ROW_STATUSES`].
@@ -145,9 +159,10 @@ impl Serialize for StatusCounts {
 /// # Errors
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
 pub(crate) fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 8] = [
+    const COLUMNS: [&str; 9] = [
         "point",
         "status",
+        "stable",
         "reliable",
         "sensitive",
         "method",
@@ -182,6 +197,18 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
             tally.by_status.add(status);
         }
     }
+    tally.points += batch.num_rows() as u64;
+    if let Some(stable) = batch.column_by_name("stable") {
+        let dwells = tally.dwells.get_or_insert_default();
+        for stable in cells::flags(stable)? {
+            match stable {
+                Some(true) => dwells.stable += 1,
+                Some(false) => dwells.unstable += 1,
+                None => dwells.unknown += 1,
+            }
+        }
+        return Ok(());
+    }
     for reliable in cells::flags(column("reliable")?)? {
         match reliable {
             Some(true) => tally.reliable += 1,
@@ -215,7 +242,6 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
     };
     extreme("ratio_max", &mut tally.greatest_ratio, |a, b| a > b)?;
     extreme("min_gap_nonlinear_m", &mut tally.least_gap_nonlinear_m, |a, b| a < b)?;
-    tally.points += batch.num_rows() as u64;
     Ok(())
 }
 
@@ -267,7 +293,7 @@ pub(crate) fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
             column.widen(array).map_err(|error| failed(error.into()))?;
         }
     }
-    Ok(Overview { result: own_word(file), rows: file.rows(), columns })
+    Ok(Overview { result: own_word(file, FileKind::Map), rows: file.rows(), columns })
 }
 
 impl ColumnRange {

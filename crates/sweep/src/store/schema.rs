@@ -14,16 +14,16 @@ use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 use parquet::schema::types::ColumnPath;
-use serde_json::{Map, Value};
-use washer_model::Channel;
+use serde_json::{Map, Value, json};
+use washer_model::{Channel, Disturbance, Kind, Motion};
 
 use super::Job;
-use crate::measures::Measures;
+use crate::measures::{Measures, Metric};
 use crate::method::Level;
 use crate::outcome::{Outcome, Trajectory};
 use crate::table::{dictionary_entry, field_metadata};
 use crate::verdict::{ROW_STATUSES, Verdict, row_status};
-use sweep_files::key;
+use sweep_files::{FileKind, key};
 
 /// Rows in a row group: fixed, so that chunking leaves no trace in the file. A group of 25 columns
 /// takes about 30 MB in memory while it is written.
@@ -55,6 +55,17 @@ pub struct Layout {
     pub ratio_limit: f64,
     /// What is measured of the motions.
     pub measures: Measures,
+    /// What a row is about.
+    pub rows: RowKind,
+}
+
+/// What a row is about.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RowKind {
+    /// A point over the run's time: `sweep run`.
+    Run,
+    /// A point at one of these speeds (rpm), speeds varying fastest: `sweep stability`.
+    Dwell(Vec<f64>),
 }
 
 /// What a row's cells are taken from.
@@ -72,6 +83,7 @@ type Get<T> = Box<dyn Fn(&ResultRow) -> T>;
 /// How a column takes its cell from a row, which settles its type too.
 enum Cell {
     Count(Get<u64>),
+    KnownCount(Get<Option<u64>>),
     /// A number that hardly ever repeats.
     Measured(Get<Option<f64>>),
     /// A swept value, never null.
@@ -104,6 +116,7 @@ impl ResultColumn {
         let names = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
         let (data_type, nullable) = match self.cell {
             Cell::Count(_) => (DataType::UInt64, false),
+            Cell::KnownCount(_) => (DataType::UInt64, true),
             Cell::Axis(_) => (DataType::Float64, false),
             Cell::Measured(_) | Cell::Time(_) => (DataType::Float64, true),
             Cell::Flag(_) => (DataType::Boolean, true),
@@ -116,6 +129,7 @@ impl ResultColumn {
     fn array(&self, rows: &[ResultRow]) -> Result<ArrayRef, ArrowError> {
         Ok(match &self.cell {
             Cell::Count(get) => Arc::new(UInt64Array::from_iter_values(rows.iter().map(get))),
+            Cell::KnownCount(get) => Arc::new(rows.iter().map(get).collect::<UInt64Array>()),
             Cell::Axis(get) => Arc::new(Float64Array::from_iter_values(rows.iter().map(get))),
             Cell::Measured(get) | Cell::Time(get) => {
                 Arc::new(rows.iter().map(get).collect::<Float64Array>())
@@ -133,7 +147,7 @@ impl ResultColumn {
     /// Name of the type in the column dictionary.
     const fn type_name(&self) -> &'static str {
         match self.cell {
-            Cell::Count(_) => "uint64",
+            Cell::Count(_) | Cell::KnownCount(_) => "uint64",
             Cell::Axis(_) | Cell::Measured(_) | Cell::Time(_) => "float64",
             Cell::Flag(_) => "bool",
             Cell::Name(..) => "string",
@@ -146,15 +160,39 @@ const MODELS: [(&str, fn(&Outcome) -> &Trajectory); 2] =
     [("nonlinear", |outcome| &outcome.nonlinear), ("linear", |outcome| &outcome.linear)];
 
 impl Layout {
+    /// Whether rows say what becomes of disturbances.
+    pub(crate) fn with_growth(&self) -> bool {
+        matches!(self.rows, RowKind::Dwell(_)) || self.measures.metrics.contains(&Metric::Growth)
+    }
+
+    /// The kind of the result file.
+    pub(crate) const fn file_kind(&self) -> FileKind<'static> {
+        match self.rows {
+            RowKind::Run => FileKind::Map,
+            RowKind::Dwell(_) => FileKind::Stability,
+        }
+    }
+
     /// Every column, in order: the one place that says what the file holds.
     fn columns(&self) -> Vec<ResultColumn> {
-        let point = Cell::Count(Box::new(|row| row.outcome.point));
+        let rows_a_point = match &self.rows {
+            RowKind::Run => 1,
+            RowKind::Dwell(speeds_rpm) => speeds_rpm.len() as u64,
+        };
+        let point = Cell::Count(Box::new(move |row| row.outcome.point / rows_a_point));
         let mut columns = vec![ResultColumn::new("point", "1", "index in grid order", point)];
         for (i, axis) in self.axes.iter().enumerate() {
             let cell = Cell::Axis(Box::new(move |row| {
                 row.axis_values.get(i).copied().unwrap_or(f64::NAN)
             }));
             columns.push(ResultColumn::new(&axis.name, &axis.unit, &axis.description, cell));
+        }
+        if let RowKind::Dwell(_) = self.rows {
+            columns.extend(growth_columns(""));
+            columns.extend(self.amplitude_columns());
+            let [greatest, channel, ..] = self.verdict_columns();
+            columns.extend([greatest, channel, dwell_status_column()]);
+            return columns;
         }
         columns.extend(self.amplitude_columns());
         columns.extend(self.verdict_columns());
@@ -168,8 +206,11 @@ impl Layout {
         let mut columns = Vec::new();
         for (model, of) in MODELS {
             for (i, channel) in self.channels.iter().enumerate() {
-                let (what, amplitude) =
-                    (channel.description(), self.measures.criterion.amplitude());
+                let amplitude = match self.rows {
+                    RowKind::Run => self.measures.criterion.amplitude(),
+                    RowKind::Dwell(_) => "largest deviation from equilibrium over a turn",
+                };
+                let what = channel.description();
                 let text = format!("{what}: {amplitude}, {model} model; null if it failed");
                 let cell = Cell::Measured(Box::new(move |row| {
                     of(&row.outcome).amplitudes.get(i).copied()
@@ -183,7 +224,11 @@ impl Layout {
             }
         }
         for (i, channel) in self.channels.iter().enumerate() {
-            let text = format!("{}: {}", channel.description(), self.measures.criterion.ratio());
+            let ratio = match self.rows {
+                RowKind::Run => self.measures.criterion.ratio(),
+                RowKind::Dwell(_) => "nonlinear over linear amplitude; null where that is zero",
+            };
+            let text = format!("{}: {ratio}", channel.description());
             let cell =
                 Cell::Measured(Box::new(move |row| row.verdict.ratios.get(i).copied().flatten()));
             columns.push(ResultColumn::new(format!("ratio_{}", channel.name()), "1", text, cell));
@@ -250,6 +295,10 @@ impl Layout {
         let mut columns = Vec::new();
         let mut position = 0;
         for metric in &self.measures.metrics {
+            if let Metric::Growth = metric {
+                columns.extend(growth_columns("growth_"));
+                continue;
+            }
             if !metric.is_of_model() {
                 let cell = Cell::Measured(Box::new(|row| row.outcome.static_sag_m));
                 columns.push(ResultColumn::new(
@@ -286,6 +335,113 @@ impl Layout {
         };
         Value::Object(self.columns().iter().map(entry).collect::<Map<_, _>>())
     }
+}
+
+/// Columns of the fastest growing disturbance at a constant speed. In maps they stand behind a
+/// prefix, and the speed is one of them.
+fn growth_columns(prefix: &str) -> Vec<ResultColumn> {
+    let in_map = !prefix.is_empty();
+    let mut columns = Vec::new();
+    let numbers: [(&str, &str, &str, fn(&Disturbance) -> f64); 6] = [
+        ("speed_rpm", "rpm", "the plan's speed at which a disturbance grows fastest", |fastest| {
+            fastest.speed_rpm
+        }),
+        (
+            "growth_per_s",
+            "1/s",
+            "how fast the fastest growing disturbance of the nonlinear response grows; negative \
+             where all decay",
+            Disturbance::growth_per_s,
+        ),
+        (
+            "frequency_cpm",
+            "1/min",
+            "its frequency in cycles per minute, known up to whole multiples of the speed and \
+             sign: the one from 0 to half the speed",
+            Disturbance::frequency_cpm,
+        ),
+        (
+            "other_frequency_cpm",
+            "1/min",
+            "the speed less frequency_cpm",
+            Disturbance::other_frequency_cpm,
+        ),
+        (
+            "multiplier_re",
+            "1",
+            "the suspension's largest Floquet multiplier, real part",
+            |fastest| fastest.multiplier[0],
+        ),
+        ("multiplier_im", "1", "its imaginary part, not negative", |fastest| fastest.multiplier[1]),
+    ];
+    let of_dwell = usize::from(!in_map);
+    for (name, unit, text, of) in numbers.into_iter().skip(of_dwell) {
+        let cell =
+            Cell::Measured(Box::new(move |row| Some(of(&row.outcome.growth.as_ref()?.fastest))));
+        let name =
+            if name.starts_with(prefix) { name.to_owned() } else { format!("{prefix}{name}") };
+        columns.push(ResultColumn::new(name, unit, text, cell));
+    }
+    let kind = |row: &ResultRow| {
+        let kind = row.outcome.growth.as_ref()?.fastest.kind();
+        Kind::ALL.iter().position(|known| *known == kind)
+    };
+    columns.push(ResultColumn::new(
+        format!("{prefix}kind"),
+        "",
+        "what a disturbance turns the response into: stable, period_doubling, quasi_periodic, fold",
+        Cell::Name(Kind::ALL.map(Kind::name).to_vec(), Box::new(kind)),
+    ));
+    if !in_map {
+        let stable =
+            |row: &ResultRow| Some(row.outcome.growth.as_ref()?.fastest.kind() == Kind::Stable);
+        let text = "true where every disturbance decays";
+        columns.push(ResultColumn::new("stable", "", text, Cell::Flag(Box::new(stable))));
+    }
+    for place in 0..2 {
+        columns.extend(growing_mode_columns(prefix, place));
+    }
+    columns
+}
+
+/// Columns of one of the modes that take part in what grows.
+fn growing_mode_columns(prefix: &str, place: usize) -> [ResultColumn; 3] {
+    let mode = move |row: &ResultRow| row.outcome.growth.as_ref()?.modes[place];
+    let which = if place == 0 { "that takes most part in" } else { "next to that in" };
+    let name = format!("{prefix}mode_{}", place + 1);
+    [
+        ResultColumn::new(
+            name.clone(),
+            "1",
+            format!(
+                "number, by frequency at this speed, of the linear model's mode {which} what \
+                 grows; null where nothing grows, or no such mode is needed"
+            ),
+            Cell::KnownCount(Box::new(move |row| Some(u64::from(mode(row)?.number)))),
+        ),
+        ResultColumn::new(
+            format!("{name}_name"),
+            "",
+            "what moves in it",
+            Cell::Name(Motion::NAMES.to_vec(), Box::new(move |row| Some(mode(row)?.name as usize))),
+        ),
+        ResultColumn::new(
+            format!("{name}_cpm"),
+            "1/min",
+            "its damped natural frequency at this speed in cycles per minute",
+            Cell::Measured(Box::new(move |row| Some(mode(row)?.frequency_cpm))),
+        ),
+    ]
+}
+
+/// The status of a dwell.
+fn dwell_status_column() -> ResultColumn {
+    ResultColumn::new(
+        "status",
+        "",
+        "ok, or why there is no response",
+        Cell::Name(ROW_STATUSES.to_vec(), Box::new(|row| Some(row.status))),
+    )
 }
 
 /// Columns of the least gaps, the same for every plan.
@@ -336,13 +492,16 @@ fn run_columns() -> Vec<ResultColumn> {
 /// run went.
 pub(crate) fn properties(job: &Job<'_>) -> WriterProperties {
     let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
-    let metadata = vec![
+    let mut metadata = vec![
         pair(key::PLAN, job.plan.to_string()),
         pair(key::PLAN_HASH, job.hash().to_hex().to_string()),
         pair(key::VERSION, job.version.to_owned()),
         pair(key::NUMERICS, job.numerics.to_string()),
         pair(key::COLUMNS, job.layout.dictionary().to_string()),
     ];
+    if let RowKind::Dwell(speeds_rpm) = &job.layout.rows {
+        metadata.push(pair(key::STABILITY, json!({ "speeds_rpm": speeds_rpm }).to_string()));
+    }
     let builder = WriterProperties::builder()
         // The library's own default names its version, and an upgrade would change the bytes.
         .set_created_by(format!("sweep version {}", job.version))
@@ -450,7 +609,7 @@ mod tests {
         let mut layout = synthetic::layout();
         let plain = layout.schema().fields().len();
         let metrics = vec![Metric::StaticSag, Metric::ClashTime, Metric::CabinetForce];
-        layout.measures = Measures { criterion: Criterion::Rms, metrics };
+        layout.measures = Measures { criterion: Criterion::Rms, metrics, ..Measures::default() };
         let mut rows = ResultRows::new(&layout);
         let mut outcome = synthetic::outcome(0, 2);
         outcome.static_sag_m = Some(0.013);

@@ -58,6 +58,8 @@ pub struct FolderStatus {
     /// Shards with something missing that nobody is working on, as the scheduler numbers them:
     /// `2,5-7`, for `sbatch --array=`; empty if none is.
     pub missing_shards: String,
+    /// The same shards by their numbers from 1, for `--shard I/N`.
+    pub missing_shard_numbers: Vec<u64>,
 }
 
 /// Looks at an output and its folder. What would stop a run is an error here too: another plan in
@@ -66,7 +68,7 @@ pub struct FolderStatus {
 /// # Errors
 /// As [`super::OpenRun::open`], but never [`StoreError::Busy`].
 pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> {
-    let folder = Folder::of(output)?;
+    let folder = Folder::of(output, &job.layout)?;
     let points_a_chunk = chunk_points(job.points);
     let chunks = job.points.div_ceil(points_a_chunk);
     let mut status = FolderStatus {
@@ -83,6 +85,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         running: Vec::new(),
         shards: None,
         missing_shards: String::new(),
+        missing_shard_numbers: Vec::new(),
     };
     let (ours, hash) = (PlanFile::of(job), job.hash());
     match PlanFile::read(&folder)? {
@@ -123,8 +126,10 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
             |shard: &u64| status.running.iter().any(|holder| holder.shard == Some(*shard));
         let missing =
             dealing.incomplete(chunks, &present).into_iter().filter(|shard| !running(shard));
-        status.missing_shards =
-            shard::list(missing.map(|shard| shard - 1 + dealing.first_array_id));
+        status.missing_shard_numbers = missing.collect();
+        let array_ids =
+            status.missing_shard_numbers.iter().map(|shard| shard - 1 + dealing.first_array_id);
+        status.missing_shards = shard::list(array_ids);
         status.shards = Some(dealing.shards);
     }
     Ok(status)

@@ -3,7 +3,7 @@
 use serde_json::json;
 use washer_model::Channel;
 
-use super::{AxisColumn, Job, Layout};
+use super::{AxisColumn, Job, Layout, RowKind};
 use crate::measures::Measures;
 use crate::method::Level;
 use crate::outcome::{Outcome, Status, Trajectory};
@@ -20,6 +20,7 @@ pub(crate) fn layout() -> Layout {
         channels: vec![Channel::TubFrontY, Channel::TubYaw],
         ratio_limit: 2.0,
         measures: Measures::default(),
+        rows: RowKind::Run,
     }
 }
 

@@ -7,7 +7,7 @@ mod table;
 use std::borrow::Cow;
 use std::fmt;
 
-use crate::{Damper, Machine, Spin, Spring};
+use crate::{BumpStop, Damper, Machine, Spin, Spring};
 use table::{BLOCKS, TABLE};
 
 /// A number of the machine, the spin or the window that a user can name, set and sweep.
@@ -18,7 +18,7 @@ use table::{BLOCKS, TABLE};
 pub struct Parameter {
     name: Cow<'static, str>,
     row: &'static Row,
-    /// Which spring or damper, from 0; 0 where the row has only one.
+    /// Which numbered element, from 0; 0 where the row has only one.
     index: usize,
 }
 
@@ -79,10 +79,10 @@ pub enum UnknownParameter {
     /// No row of the table has this name.
     #[error("no parameter has this name")]
     Name,
-    /// The name is one of a numbered spring or damper that the machine does not have.
-    #[error("the machine has {count} {element}s, numbered from 1")]
+    /// The name is one of a numbered element that the machine does not have.
+    #[error("the machine has {count} {element}{}, numbered from 1", plural(*count))]
     Number {
-        /// `"spring"` or `"damper"`.
+        /// `"spring"`, `"damper"`, `"stop"`, `"bushing"` or `"unbalance"`.
         element: &'static str,
         /// How many there are.
         count: usize,
@@ -100,7 +100,7 @@ pub enum UnknownParameter {
 
 /// One line of the table.
 struct Row {
-    /// The whole name, or what follows `spring_1_` and `damper_1_`.
+    /// The whole name, or what follows `spring_1_` and the like.
     name: &'static str,
     unit: &'static str,
     description: &'static str,
@@ -116,14 +116,16 @@ struct Block {
     /// What names begin with; the number and the row's name follow.
     prefix: &'static str,
     rows: &'static [Row],
+    /// Number of the first element.
+    first: usize,
     count: fn(&Machine, &Spin) -> usize,
-    /// The error for a number above the count.
+    /// The error for a number that no element has, by the count.
     missing: fn(usize) -> UnknownParameter,
 }
 
 impl Block {
     fn parameter(&self, row: &'static Row, index: usize) -> Parameter {
-        let name = Cow::Owned(format!("{}{}_{}", self.prefix, index + 1, row.name));
+        let name = Cow::Owned(format!("{}{}_{}", self.prefix, index + self.first, row.name));
         Parameter { name, row, index }
     }
 }
@@ -223,17 +225,21 @@ pub fn unit_suffix(unit: &str) -> Option<&'static str> {
         "kg" => "_kg",
         "s" => "_s",
         "rpm" => "_rpm",
+        "" => "",
+        "N" => "_n",
         "N/m" => "_n_per_m",
+        "N/m^3" => "_n_per_m3",
         "N s/m" => "_n_s_per_m",
         "N m/rad" => "_n_m_per_rad",
         "kg m^2" => "_kg_m2",
+        "m/s" => "_m_per_s",
         "m/s^2" => "_m_per_s2",
         _ => return None,
     })
 }
 
 impl Parameter {
-    /// Every parameter of this machine and spin, in the table's order, springs and dampers one by
+    /// Every parameter of this machine and spin, in the table's order, numbered elements one by
     /// one.
     #[must_use]
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
@@ -260,14 +266,13 @@ impl Parameter {
             };
         }
         for block in BLOCKS {
-            if let Some((k, rest)) = numbered(name, block.prefix) {
+            if let Some((number, rest)) = numbered(name, block.prefix) {
                 let row = block.rows.iter().find(|row| row.name == rest);
                 let row = row.ok_or(UnknownParameter::Name)?;
                 let count = (block.count)(machine, spin);
-                return if k < count {
-                    Ok(block.parameter(row, k))
-                } else {
-                    Err((block.missing)(count))
+                return match number.checked_sub(block.first) {
+                    Some(k) if k < count => Ok(block.parameter(row, k)),
+                    _ => Err((block.missing)(count)),
                 };
             }
         }
@@ -345,6 +350,11 @@ impl Parameter {
     }
 }
 
+/// The ending of a noun of so many.
+const fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
 /// Points of a spin given as a table.
 fn table_points(spin: &Spin) -> usize {
     match spin {
@@ -353,13 +363,13 @@ fn table_points(spin: &Spin) -> usize {
     }
 }
 
-/// `"spring_2_tub_x_m"` with `"spring_"` gives 1 (from 0) and `"tub_x_m"`. Only the canonical
+/// `"spring_2_tub_x_m"` with `"spring_"` gives 2 and `"tub_x_m"`. Only the canonical
 /// spelling counts (no `spring_02_`), so that one number has one name.
 fn numbered<'a>(name: &'a str, prefix: &str) -> Option<(usize, &'a str)> {
     let (digits, rest) = name.strip_prefix(prefix)?.split_once('_')?;
     let canonical = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
     let number: usize = if canonical { digits.parse().ok()? } else { return None };
-    Some((number - 1, rest))
+    Some((number, rest))
 }
 
 /// The value all items share.
@@ -381,6 +391,14 @@ impl Damper {
     #[must_use]
     pub fn given_length_m(&self) -> f64 {
         distance_m(self.cabinet_m, self.tub_m)
+    }
+}
+
+impl BumpStop {
+    /// Length of the direction as given.
+    #[must_use]
+    pub fn direction_length(&self) -> f64 {
+        distance_m(self.direction, [0.0; 3])
     }
 }
 

@@ -86,6 +86,11 @@ pub(crate) struct SpinStretch {
 }
 
 impl SpinStretch {
+    /// A drum that turns at one speed, its unbalance up at time 0.
+    pub(crate) fn steady(speed_rpm: f64) -> Self {
+        Self { turns_per_s: speed_rpm / 60.0, ..Self::at_rest(0.0, 0.0) }
+    }
+
     /// Acceleration at a time within the stretch.
     pub(crate) fn acceleration_rad_per_s2(&self, t_s: f64) -> f64 {
         SpinLanes::splat(N(0.0), self).at(N(t_s)).acceleration.0

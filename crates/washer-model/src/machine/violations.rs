@@ -40,6 +40,21 @@ pub enum Violation {
         /// Distance between its ends.
         length_m: f64,
     },
+    /// A damper with friction, of which the linear model does not know at what speed to take it.
+    FrictionWithoutLinearSpeed {
+        /// Which damper, from 1.
+        number: usize,
+    },
+    /// A stop whose direction has no length.
+    NoDirection {
+        /// Which stop, from 1.
+        number: usize,
+    },
+    /// An unbalance on the drum's axis, of a machine that has others.
+    OnAxis {
+        /// Which, from 1, the one that every machine has.
+        number: usize,
+    },
     /// Bearings at one place cannot hold the shaft's direction.
     BearingsTogether {
         /// Distance between them.
@@ -95,6 +110,15 @@ impl Violation {
                     ["x", "y", "z"].map(|axis| format!("{element}_{number}_{end}_{axis}_m"))
                 })
                 .collect(),
+            Self::FrictionWithoutLinearSpeed { number } => vec![
+                format!("damper_{number}_friction_n"),
+                format!("damper_{number}_friction_linear_speed_m_per_s"),
+            ],
+            Self::NoDirection { number } => {
+                ["x", "y", "z"].map(|axis| format!("stop_{number}_direction_{axis}")).into()
+            }
+            Self::OnAxis { number: 1 } => vec!["unbalance_radius_m".to_owned()],
+            Self::OnAxis { number } => vec![format!("unbalance_{number}_radius_m")],
             Self::BearingsTogether { .. } => {
                 vec!["bearing_rear_x_m".to_owned(), "bearing_front_x_m".to_owned()]
             }
@@ -113,6 +137,20 @@ impl Violation {
             Self::OutOfRange { parameter, value } => parameter.range().instead_of(*value),
             Self::Inertia { .. } => "each moment at most the sum of the other two".to_owned(),
             Self::ZeroLength { .. } => format!("ends at least {SHORTEST_M:e} m apart"),
+            Self::FrictionWithoutLinearSpeed { .. } => {
+                "`friction_linear_speed_m_per_s` beside it: the linear model has the viscous \
+                 damping 4 F / (pi V) of that speed amplitude V"
+                    .to_owned()
+            }
+            Self::NoDirection { .. } => {
+                "the way from the tub to the stop, such as [0, 0, 1]; any length but 0 is made 1"
+                    .to_owned()
+            }
+            Self::OnAxis { .. } => {
+                "a distance from the axis, negative on the other side; a mass on the axis belongs \
+                 to the drum"
+                    .to_owned()
+            }
             Self::BearingsTogether { .. } => format!("bearings at least {SHORTEST_M:e} m apart"),
             Self::NoSprings => "at least one spring".to_owned(),
             Self::TableLength { .. } => "as many speeds as times, at least one of each".to_owned(),
@@ -149,6 +187,16 @@ impl fmt::Display for Violation {
                     rounded(*length_m)
                 )
             }
+            Self::FrictionWithoutLinearSpeed { number } => write!(
+                f,
+                "damper {number} has friction, and nothing says at what speed the linear model \
+                 takes it"
+            ),
+            Self::NoDirection { number } => write!(f, "stop {number} has no direction"),
+            Self::OnAxis { number } => write!(
+                f,
+                "unbalance {number} is on the drum's axis and unbalances nothing, beside others"
+            ),
             Self::BearingsTogether { distance_m } => {
                 write!(
                     f,
@@ -221,6 +269,24 @@ impl Machine {
         for (k, (element, length_m)) in springs.chain(dampers) {
             if length_m < SHORTEST_M {
                 joint.push(Violation::ZeroLength { element, number: k + 1, length_m });
+            }
+        }
+        for (k, damper) in self.dampers.iter().enumerate() {
+            if damper.friction_n != 0.0 && damper.friction_linear_speed_m_per_s.is_none() {
+                joint.push(Violation::FrictionWithoutLinearSpeed { number: k + 1 });
+            }
+        }
+        for (k, stop) in self.stops.iter().enumerate() {
+            if stop.direction_length() < SHORTEST_M {
+                joint.push(Violation::NoDirection { number: k + 1 });
+            }
+        }
+        if !self.further_unbalances.is_empty() {
+            let unbalances = core::iter::once(&self.unbalance).chain(&self.further_unbalances);
+            for (k, unbalance) in unbalances.enumerate() {
+                if unbalance.mass_kg != 0.0 && unbalance.radius_m == 0.0 {
+                    joint.push(Violation::OnAxis { number: k + 1 });
+                }
             }
         }
         let distance_m = self.bearings.front_x_m - self.bearings.rear_x_m;

@@ -52,21 +52,37 @@ pub struct Motion {
     pub pitch: f64,
 }
 
+/// Every movement in every plane, in words.
+macro_rules! motion_names {
+    ($($what:literal)*) => {
+        [$(
+            concat!($what, ", horizontal plane"),
+            concat!($what, ", vertical plane"),
+            concat!($what, ", both planes"),
+        )*]
+    };
+}
+
+impl Motion {
+    /// Every name of a motion, by movement and then by plane.
+    pub const NAMES: [&str; 15] = motion_names![
+        "translation"
+        "rocking"
+        "drum bending on its shaft"
+        "shaft against tub in the bearings"
+        "shaft tilting in the bearings"
+    ];
+
+    /// Position of its name in [`Self::NAMES`].
+    #[must_use]
+    pub const fn name_index(&self) -> usize {
+        3 * self.movement as usize + self.plane as usize
+    }
+}
+
 impl fmt::Display for Motion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let what = match self.movement {
-            Movement::Translation => "translation",
-            Movement::Rocking => "rocking",
-            Movement::Bending => "drum bending on its shaft",
-            Movement::BearingTranslation => "shaft against tub in the bearings",
-            Movement::BearingTilt => "shaft tilting in the bearings",
-        };
-        let plane = match self.plane {
-            Plane::Horizontal => "horizontal plane",
-            Plane::Vertical => "vertical plane",
-            Plane::Both => "both planes",
-        };
-        write!(f, "{what}, {plane}")
+        f.write_str(Self::NAMES[self.name_index()])
     }
 }
 

@@ -15,6 +15,11 @@ impl Coefficients<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
         Self { bodies: Bodies::new(machine), elements: Elements::new(machine) }
     }
+
+    /// The machine of which the linear model is the first order.
+    pub(crate) fn with_viscous_friction(&self) -> Self {
+        Self { bodies: self.bodies, elements: self.elements.with_viscous_friction() }
+    }
 }
 
 lane_struct! {
@@ -50,22 +55,27 @@ lane_struct! {
 
 impl Bodies<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
-        let Machine { tub, shaft, drum, unbalance, flexure, bearings, .. } = machine;
-        let m_0 = drum.mass_kg;
-        let m_u = unbalance.mass_kg;
-        let m_d = m_0 + m_u;
-        // Section 2: the drum of Tables 2 and 3 as a function of the unbalance mass.
-        let dx = unbalance.x_m - drum.centre_x_m;
-        let r_u = unbalance.radius_m;
-        let mu_r = m_u * m_0 / m_d;
-        let drum_inertia = [
-            drum.inertia_kg_m2[0] + mu_r * r_u * r_u,
-            drum.inertia_kg_m2[1] + mu_r * dx * dx,
-            drum.inertia_kg_m2[2] + mu_r * (r_u * r_u + dx * dx),
-        ];
-        let drum_i12 = -mu_r * dx * r_u;
-        let rho_1 = drum.centre_x_m + m_u / m_d * dx - drum.hinge_x_m;
-        let rho_2 = m_u / m_d * r_u;
+        let Machine { tub, shaft, drum, flexure, bearings, .. } = machine;
+        // Section 2: the drum of Tables 2 and 3 as a function of its unbalances, one after the
+        // other.
+        let mut m_d = drum.mass_kg;
+        let [mut x_d, mut e] = [drum.centre_x_m, 0.0];
+        let [mut i11, mut i22, mut i33] = drum.inertia_kg_m2;
+        let mut i12 = 0.0;
+        for unbalance in core::iter::once(&machine.unbalance).chain(&machine.further_unbalances) {
+            let m_u = unbalance.mass_kg;
+            let whole = m_d + m_u;
+            let (dx, dr) = (unbalance.x_m - x_d, unbalance.radius_m - e);
+            let reduced = m_u * m_d / whole;
+            i11 += reduced * dr * dr;
+            i22 += reduced * dx * dx;
+            i33 += reduced * (dr * dr + dx * dx);
+            i12 -= reduced * dx * dr;
+            x_d += m_u / whole * dx;
+            e += m_u / whole * dr;
+            m_d = whole;
+        }
+        let (rho_1, rho_2) = (x_d - drum.hinge_x_m, e);
         // Shaft and drum about their common centre: the reduced mass moves with the line between
         // their centres.
         let m_s = shaft.mass_kg;
@@ -96,10 +106,10 @@ impl Bodies<f64> {
             rho_2: N(rho_2),
             mu_l: N(mu * l),
             mu_l2: N(mu * l * l),
-            drum_i11: N(drum_inertia[0] + mu * rho_2 * rho_2),
-            drum_i22: N(drum_inertia[1] + mu * rho_1 * rho_1),
-            drum_i33: N(drum_inertia[2] + mu * (rho_1 * rho_1 + rho_2 * rho_2)),
-            drum_i12: N(drum_i12 - mu * rho_1 * rho_2),
+            drum_i11: N(i11 + mu * rho_2 * rho_2),
+            drum_i22: N(i22 + mu * rho_1 * rho_1),
+            drum_i33: N(i33 + mu * (rho_1 * rho_1 + rho_2 * rho_2)),
+            drum_i12: N(i12 - mu * rho_1 * rho_2),
             flexure_stiffness: N(flexure.stiffness_n_m_per_rad),
             bearing_front: N(bearings.front_x_m),
             bearing_rear: N(bearings.rear_x_m),

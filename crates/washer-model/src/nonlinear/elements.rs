@@ -1,14 +1,18 @@
 //! Force elements between cabinet and tub: the law of each, once, for the equations and for the
 //! forces that a trace reports (section 3 of the model page).
 //!
-//! A law ([`Law`]) is a function of the line between an element's ends ([`Line`]); a line says in
-//! what it measures forces. To change a law is to change its `push`; a further kind of element is a
-//! structure with a law, a field of [`Elements`], and a line in `on_tub`.
+//! A law ([`Law`]) of a spring or a damper is a function of the line between its ends ([`Line`]); a
+//! line says in what it measures forces. Stops and bushings ([`StopOf`], [`BushingOf`]) have laws
+//! of a tub point's motion. To change a law is to change its `push`; a further kind of element is a
+//! structure with a law, a field of [`Elements`], and a line in [`Further`].
 
-use crate::lanes::lane_struct;
-use crate::machine::{Damper, Machine, Spring};
-use crate::nonlinear::frame::{Tilt, Vec3, dot, plus_cross, scaled, sum};
-use lane_ode::{N, Real};
+pub(crate) mod bounds;
+
+use crate::lanes::{InAnyLane, lane_struct};
+use crate::machine::{BumpStop, Bushing, Damper, Machine, Spring};
+use crate::nonlinear::frame::{Tilt, Vec3, difference, dot, plus_cross, scaled, sum};
+use core::f64::consts::PI;
+use lane_ode::{Aside, Lane, N, Real};
 
 lane_struct! {
     /// The force elements of a machine.
@@ -16,19 +20,54 @@ lane_struct! {
     Elements {
         springs: Vec<SpringOf<T>>,
         dampers: Vec<DamperOf<T>>,
+        /// One per spring.
+        stiffenings: Vec<StiffeningOf<T>>,
+        /// One per damper.
+        frictions: Vec<FrictionOf<T>>,
+        stops: Vec<StopOf<T>>,
+        bushings: Vec<BushingOf<T>>,
+        /// Whether some machine has more than springs and dampers that are linear along their
+        /// lines. Where none has, none pays.
+        has_further: InAnyLane<T>,
     }
 }
 
 impl Elements<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
+        let has_further = machine.springs.iter().any(|spring| spring.cubic_n_per_m3 != 0.0)
+            || machine.dampers.iter().any(|damper| damper.friction_n != 0.0)
+            || !machine.stops.is_empty()
+            || !machine.bushings.is_empty();
         Self {
             springs: machine.springs.iter().map(SpringOf::new).collect(),
             dampers: machine.dampers.iter().map(DamperOf::new).collect(),
+            stiffenings: machine.springs.iter().map(StiffeningOf::new).collect(),
+            frictions: machine.dampers.iter().map(FrictionOf::new).collect(),
+            stops: machine.stops.iter().map(StopOf::new).collect(),
+            bushings: machine.bushings.iter().map(BushingOf::new).collect(),
+            has_further: InAnyLane::new(has_further),
         }
+    }
+
+    /// Whether its forces have corners that steps longer than they are wide do not see: friction
+    /// and stops.
+    pub(crate) fn are_nonsmooth(&self) -> bool {
+        !self.stops.is_empty() || self.frictions.iter().any(|friction| friction.force.0 != 0.0)
+    }
+
+    /// The elements of which the linear model is the first order: friction has become the viscous
+    /// damping that takes as much energy out of a swing.
+    pub(crate) fn with_viscous_friction(&self) -> Self {
+        let mut elements = self.clone();
+        for (damper, friction) in elements.dampers.iter_mut().zip(&mut elements.frictions) {
+            damper.damping += friction.viscous;
+            friction.force = N(0.0);
+        }
+        elements
     }
 }
 
-impl<T: Real> Elements<T> {
+impl<T: Lane> Elements<T> {
     /// Force of all elements on the tub, and its moment about the bearing midpoint P_T; in tub
     /// axes, where their tub ends are fixed.
     #[inline(always)]
@@ -39,7 +78,42 @@ impl<T: Real> Elements<T> {
         if !self.dampers.is_empty() {
             add(&mut load, &self.dampers, tub, &tub.midpoint_velocity_in_tub());
         }
+        if self.has_further.is_so() {
+            // Copies: what is lent to a function must lie in memory, on every path.
+            let mut whole = load;
+            let (tilt, rate) = (*tub.tilt, *tub.rate);
+            let motion = TubMotion { tilt: &tilt, rate: &rate, ..*tub };
+            zero.0.aside(Further { elements: self, tub: &motion, load: &mut whole });
+            load = whole;
+        }
         load
+    }
+}
+
+/// What not every machine has, added to the load on the tub. A zero stiffness or friction adds a
+/// zero, so that no machine's bits depend on those in the other lanes.
+struct Further<'a, T> {
+    elements: &'a Elements<T>,
+    tub: &'a TubMotion<'a, T>,
+    load: &'a mut (Vec3<T>, Vec3<T>),
+}
+
+impl<T: Lane> Aside for Further<'_, T> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { elements, tub, load } = self;
+        let velocity = tub.midpoint_velocity_in_tub();
+        add(load, &elements.stiffenings, tub, &());
+        add(load, &elements.frictions, tub, &velocity);
+        for stop in &elements.stops {
+            let point = tub.point(&stop.tub, &velocity);
+            let push = stop.push(&point);
+            add_force(load, &stop.tub, &tub.tilt.to_frame(&scaled(-push, stop.direction)));
+        }
+        for bushing in &elements.bushings {
+            let force = bushing.force(&tub.point(&bushing.tub, &velocity));
+            add_force(load, &bushing.tub, &tub.tilt.to_frame(&force));
+        }
     }
 }
 
@@ -92,17 +166,153 @@ impl DamperOf<f64> {
     }
 }
 
+lane_struct! {
+    /// The part of a spring's force that grows with the cube of its elongation.
+    #[derive(Clone, Copy, Debug)]
+    StiffeningOf { ends: Ends<T>, cubic: N<T>, free_length: N<T> }
+}
+
+impl StiffeningOf<f64> {
+    fn new(spring: &Spring) -> Self {
+        let free_length_m = spring.free_length_m.unwrap_or_else(|| spring.given_length_m());
+        Self {
+            ends: Ends::new(spring.cabinet_m, spring.tub_m),
+            cubic: N(spring.cubic_n_per_m3),
+            free_length: N(free_length_m),
+        }
+    }
+}
+
+lane_struct! {
+    /// The friction of a damper.
+    #[derive(Clone, Copy, Debug)]
+    FrictionOf {
+        ends: Ends<T>,
+        force: N<T>,
+        /// v_s^2.
+        speed_squared: N<T>,
+        /// What the linear model has in its place (N s/m).
+        viscous: N<T>,
+    }
+}
+
+impl FrictionOf<f64> {
+    fn new(damper: &Damper) -> Self {
+        let of_speed = |speed_m_per_s: f64| 4.0 * damper.friction_n / (PI * speed_m_per_s);
+        Self {
+            ends: Ends::new(damper.cabinet_m, damper.tub_m),
+            force: N(damper.friction_n),
+            speed_squared: N(damper.friction_speed_m_per_s * damper.friction_speed_m_per_s),
+            viscous: N(damper.friction_linear_speed_m_per_s.map_or(0.0, of_speed)),
+        }
+    }
+}
+
+lane_struct! {
+    /// A stop.
+    #[derive(Clone, Copy, Debug)]
+    StopOf {
+        tub: [N<T>; 3],
+        /// Of unit length, cabinet axes.
+        direction: [N<T>; 3],
+        clearance: N<T>,
+        stiffness: N<T>,
+        damping: N<T>,
+        softness_squared: N<T>,
+    }
+}
+
+impl StopOf<f64> {
+    fn new(stop: &BumpStop) -> Self {
+        let length = stop.direction_length();
+        Self {
+            tub: stop.tub_m.map(N),
+            direction: stop.direction.map(|component| N(component / length)),
+            clearance: N(stop.clearance_m),
+            stiffness: N(stop.stiffness_n_per_m),
+            damping: N(stop.damping_n_s_per_m),
+            softness_squared: N(stop.softness_m * stop.softness_m),
+        }
+    }
+}
+
+impl<T: Real> StopOf<T> {
+    /// How far the tub point is beyond the clearance (m); below zero the stop is open.
+    #[inline(always)]
+    pub(crate) fn depth(&self, point: &PointMotion<T>) -> N<T> {
+        dot(&point.displacement, &self.direction) - self.clearance
+    }
+
+    /// The force with which stop and tub push each other apart (N): with the depth delta, w =
+    /// sqrt(delta^2 + s^2) and the speed v along the direction, (1 + delta / w) / 2 (k w + c v).
+    #[inline(always)]
+    pub(crate) fn push(&self, point: &PointMotion<T>) -> N<T> {
+        let depth = self.depth(point);
+        let speed = dot(&point.velocity, &self.direction);
+        let soft = (depth * depth + self.softness_squared).sqrt();
+        let closed = (0.5 * (1.0 + depth / soft)).v();
+        (closed * (self.stiffness * soft + self.damping * speed)).v()
+    }
+}
+
+lane_struct! {
+    /// A bushing.
+    #[derive(Clone, Copy, Debug)]
+    BushingOf {
+        tub: [N<T>; 3],
+        stiffness: [N<T>; 3],
+        cubic: [N<T>; 3],
+        damping: [N<T>; 3],
+    }
+}
+
+impl BushingOf<f64> {
+    fn new(bushing: &Bushing) -> Self {
+        Self {
+            tub: bushing.tub_m.map(N),
+            stiffness: bushing.stiffness_n_per_m.map(N),
+            cubic: bushing.cubic_n_per_m3.map(N),
+            damping: bushing.damping_n_s_per_m.map(N),
+        }
+    }
+}
+
+impl<T: Real> BushingOf<T> {
+    /// Force on the tub, cabinet axes: -(k_i d_i + k_3i d_i^3 + c_i v_i).
+    #[inline(always)]
+    pub(crate) fn force(&self, point: &PointMotion<T>) -> Vec3<T> {
+        let mut force = point.displacement;
+        for i in 0..3 {
+            let (d, v) = (point.displacement[i], point.velocity[i]);
+            let stiffness = self.cubic[i] * (d * d).v() + self.stiffness[i];
+            force[i] = -(stiffness * d + self.damping[i] * v);
+        }
+        force
+    }
+}
+
+/// A point of the tub, cabinet axes: how far it is from its place before loading, and its velocity.
+pub(crate) struct PointMotion<T> {
+    pub(crate) displacement: Vec3<T>,
+    pub(crate) velocity: Vec3<T>,
+}
+
 /// The line between an element's ends at an instant, with a measure of force of its own: newtons,
 /// or newtons per metre of the line's length, which saves the equations a root.
 pub(crate) trait Line<T> {
     /// A force (N) less `stiffness` (N/m) times the length.
     fn less_length(&self, force: N<T>, stiffness: N<T>) -> N<T>;
+    /// `stiffness` (N/m^3) times the cube of the length less `free_length` (m).
+    fn times_cube(&self, stiffness: N<T>, free_length: N<T>) -> N<T>;
 }
 
 /// A line that knows its rate.
 pub(crate) trait MovingLine<T>: Line<T> {
     /// `damping` (N s/m) times the rate at which the line grows.
     fn times_rate(&self, damping: N<T>) -> N<T>;
+    /// `force` (N) times r / sqrt(r^2 + s^2), r the rate at which the line grows and s^2 the
+    /// `speed_squared`.
+    fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T>;
 }
 
 /// An element between two points.
@@ -146,7 +356,38 @@ impl<T: Real, L: MovingLine<T>> Law<T, L> for DamperOf<T> {
     }
 }
 
+impl<T> Element<T> for StiffeningOf<T> {
+    #[inline(always)]
+    fn ends(&self) -> &Ends<T> {
+        &self.ends
+    }
+}
+
+/// F = -k_3 e^3, e the elongation.
+impl<T: Real, L: Line<T>> Law<T, L> for StiffeningOf<T> {
+    #[inline(always)]
+    fn push(&self, line: &L) -> N<T> {
+        -line.times_cube(self.cubic, self.free_length)
+    }
+}
+
+impl<T> Element<T> for FrictionOf<T> {
+    #[inline(always)]
+    fn ends(&self) -> &Ends<T> {
+        &self.ends
+    }
+}
+
+/// F = -F_f v / sqrt(v^2 + v_s^2), v the speed along the damper.
+impl<T: Real, L: MovingLine<T>> Law<T, L> for FrictionOf<T> {
+    #[inline(always)]
+    fn push(&self, line: &L) -> N<T> {
+        -line.times_sense(self.force, self.speed_squared)
+    }
+}
+
 /// The tub at an instant.
+#[derive(Clone, Copy)]
 pub(crate) struct TubMotion<'a, T> {
     pub(crate) tilt: &'a Tilt<T>,
     /// P_T along c2 and c3 (m), and its velocity.
@@ -166,6 +407,16 @@ impl<T: Real> TubMotion<'_, T> {
             tilt.second_c[1] * vy + tilt.second_c[2] * vz,
             (tilt.cos_yaw * vz).v(),
         ])
+    }
+
+    /// A point of the tub, given in its axes from P_T.
+    #[inline(always)]
+    fn point(&self, tub: &Vec3<T>, velocity: &MidpointVelocity<T>) -> PointMotion<T> {
+        let mut displacement = difference(self.tilt.to_cabinet(tub), tub);
+        displacement[1] += self.midpoint[0];
+        displacement[2] += self.midpoint[1];
+        let velocity = self.tilt.to_cabinet(&plus_cross(&velocity.0, self.rate, tub));
+        PointMotion { displacement, velocity }
     }
 }
 
@@ -189,6 +440,13 @@ impl<T: Real, V> Line<T> for TubLine<'_, T, V> {
     fn less_length(&self, force: N<T>, stiffness: N<T>) -> N<T> {
         force / dot(&self.span, &self.span).sqrt() - stiffness
     }
+
+    #[inline(always)]
+    fn times_cube(&self, stiffness: N<T>, free_length: N<T>) -> N<T> {
+        let length = dot(&self.span, &self.span).sqrt();
+        let elongation = length - free_length;
+        (stiffness * (elongation * elongation).v() * elongation).v() / length
+    }
 }
 
 impl<T: Real> MovingLine<T> for TubLine<'_, T, MidpointVelocity<T>> {
@@ -196,6 +454,16 @@ impl<T: Real> MovingLine<T> for TubLine<'_, T, MidpointVelocity<T>> {
     fn times_rate(&self, damping: N<T>) -> N<T> {
         let velocity = plus_cross(&self.velocity.0, self.rate, self.end);
         (damping * dot(&self.span, &velocity)).v() / dot(&self.span, &self.span)
+    }
+
+    #[inline(always)]
+    fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T> {
+        let velocity = plus_cross(&self.velocity.0, self.rate, self.end);
+        let along = dot(&self.span, &velocity);
+        let squared = dot(&self.span, &self.span);
+        // With v = along / length, by one root.
+        let root = (squared * (along * along + (speed_squared * squared).v())).v().sqrt();
+        (force * along).v() / root
     }
 }
 
@@ -213,6 +481,12 @@ impl<T: Real> Line<T> for CabinetLine<T> {
     fn less_length(&self, force: N<T>, stiffness: N<T>) -> N<T> {
         force - stiffness * self.length
     }
+
+    #[inline(always)]
+    fn times_cube(&self, stiffness: N<T>, free_length: N<T>) -> N<T> {
+        let elongation = self.length - free_length;
+        (stiffness * (elongation * elongation).v() * elongation).v()
+    }
 }
 
 impl<T: Real> MovingLine<T> for CabinetLine<T> {
@@ -220,12 +494,17 @@ impl<T: Real> MovingLine<T> for CabinetLine<T> {
     fn times_rate(&self, damping: N<T>) -> N<T> {
         (damping * self.rate).v()
     }
+
+    #[inline(always)]
+    fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T> {
+        (force * self.rate).v() / (self.rate * self.rate + speed_squared).sqrt()
+    }
 }
 
 /// Adds force and moment of elements of one law.
 #[inline(always)]
 fn add<'a, T: Real, V, E: Law<T, TubLine<'a, T, V>>>(
-    (force, moment): &mut (Vec3<T>, Vec3<T>),
+    load: &mut (Vec3<T>, Vec3<T>),
     elements: &'a [E],
     tub: &TubMotion<'a, T>,
     velocity: &'a V,
@@ -238,10 +517,16 @@ fn add<'a, T: Real, V, E: Law<T, TubLine<'a, T, V>>>(
             rate: tub.rate,
             velocity,
         };
-        let f = scaled(element.push(&line), line.span);
-        *force = sum(*force, &f);
-        *moment = plus_cross(moment, &ends.tub, &f);
+        let force = scaled(element.push(&line), line.span);
+        add_force(load, &ends.tub, &force);
     }
+}
+
+/// Adds a force on a tub point, both in tub axes, and its moment.
+#[inline(always)]
+fn add_force<T: Real>((all, moment): &mut (Vec3<T>, Vec3<T>), at: &Vec3<T>, force: &Vec3<T>) {
+    *all = sum(*all, force);
+    *moment = plus_cross(moment, at, force);
 }
 
 /// From the cabinet end to the tub end, in tub axes. t3 has no y component.

@@ -60,6 +60,7 @@ pub(crate) fn dot<T: Real>(a: &Vec3<T>, b: &Vec3<T>) -> N<T> {
 }
 
 /// Orientation of a tilted axis.
+#[derive(Clone, Copy)]
 pub(crate) struct Tilt<T> {
     pub(crate) sin_yaw: N<T>,
     pub(crate) cos_yaw: N<T>,
@@ -107,6 +108,12 @@ impl<T: Real> Tilt<T> {
             a1[1] * v[0] + a2[1] * v[1],
             a1[2] * v[0] + (a2[2] * v[1] + self.cos_yaw * v[2]),
         ]
+    }
+
+    /// From cabinet axes to frame axes.
+    #[inline(always)]
+    pub(crate) fn to_frame(&self, v: &Vec3<T>) -> Vec3<T> {
+        [dot(&self.axis_c, v), dot(&self.second_c, v), self.sin_yaw * v[0] + self.cos_yaw * v[2]]
     }
 
     /// Angular velocity of the frame, and the angular acceleration and the axis's second derivative

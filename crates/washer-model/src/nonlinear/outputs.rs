@@ -8,7 +8,7 @@ use crate::coordinates::{
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
 use crate::nonlinear::frame::{
-    Tilt, TiltMotion, Vec3, combination, difference, dot, plus_cross, scaled, sum,
+    Tilt, TiltMotion, Vec3, combination, difference, plus_cross, scaled, sum,
 };
 use crate::nonlinear::{into_spin, out_of_hinge, out_of_spin};
 use lane_ode::{N, Real, Sample};
@@ -146,9 +146,9 @@ impl<T: Real> Axes<T> {
         let tub_front = point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let drum_front = self.drum_front(b, motion);
         let [omega, alpha] = &self.tub_turn;
-        let apart = self.in_tub(&difference(drum_front.value, &tub_front.value));
-        let velocity = self.in_tub(&difference(drum_front.rate, &tub_front.rate));
-        let acceleration = self.in_tub(&difference(drum_front.second, &tub_front.second));
+        let apart = self.tub.to_frame(&difference(drum_front.value, &tub_front.value));
+        let velocity = self.tub.to_frame(&difference(drum_front.rate, &tub_front.rate));
+        let acceleration = self.tub.to_frame(&difference(drum_front.second, &tub_front.second));
         // As seen from the turning tub.
         let rate = plus_cross(&velocity, &apart, omega);
         let second =
@@ -183,16 +183,6 @@ impl<T: Real> Axes<T> {
             &blend(b.drum_hinge, &self.shaft_axis, b.hinge_to_front, &self.drum[0]),
             one,
         )
-    }
-
-    /// From cabinet to tub axes.
-    #[inline(always)]
-    fn in_tub(&self, v: &Vec3<T>) -> Vec3<T> {
-        [
-            dot(&self.tub.axis_c, v),
-            dot(&self.tub.second_c, v),
-            self.tub.sin_yaw * v[0] + self.tub.cos_yaw * v[2],
-        ]
     }
 }
 

@@ -44,15 +44,18 @@ pub(crate) fn jumps_rad_per_s2(stretches: &[SpinStretch], end_s: f64) -> f64 {
 impl Ringing {
     /// After jumps of the drum's acceleration whose sum is given (rad/s^2).
     pub(crate) fn new(machine: &Machine, jumps_rad_per_s2: f64) -> Self {
-        let unbalance = &machine.unbalance;
-        let load_n = unbalance.mass_kg * unbalance.radius_m.abs() * jumps_rad_per_s2;
         let bearings = &machine.bearings;
         let span_m = (bearings.front_x_m - bearings.rear_x_m).abs();
         let softer = bearings.front_stiffness_n_per_m.min(bearings.rear_stiffness_n_per_m);
-        let arm_m = (unbalance.x_m - machine.drum.hinge_x_m).abs();
+        let (mut moment_n_m, mut on_bearings_n) = (0.0, 0.0);
+        for unbalance in core::iter::once(&machine.unbalance).chain(&machine.further_unbalances) {
+            let load_n = unbalance.mass_kg * unbalance.radius_m.abs() * jumps_rad_per_s2;
+            moment_n_m += load_n * (unbalance.x_m - machine.drum.hinge_x_m).abs();
+            on_bearings_n += load_n * (1.0 + unbalance.x_m.abs() / span_m);
+        }
         Self {
-            hinge_rad: load_n * arm_m / machine.flexure.stiffness_n_m_per_rad,
-            bearings_m: load_n * (1.0 + unbalance.x_m.abs() / span_m) / softer,
+            hinge_rad: moment_n_m / machine.flexure.stiffness_n_m_per_rad,
+            bearings_m: on_bearings_n / softer,
             reach_m: (machine.drum.front_x_m - machine.drum.hinge_x_m).abs(),
             span_m,
         }

@@ -1,15 +1,16 @@
-//! Forces of springs and dampers, and their sum on the cabinet.
+//! Forces of the elements between cabinet and tub, and their sum on the cabinet.
 //!
 //! The laws are those of the equations (`nonlinear/elements.rs`). The linear model's forces are
 //! first order in its deviations, by automatic differentiation at the equilibrium.
 
 use crate::coordinates::{COORDINATES, STATES, TUB_Y, TUB_Z};
 use crate::lanes::Constant as _;
-use crate::nonlinear::elements::{CabinetLine, Ends, Law};
+use crate::nonlinear::elements::{CabinetLine, Ends, Law, PointMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
 use crate::point::Point;
 use crate::run::ModelKind;
 use lane_ode::{Dual, N};
+use std::borrow::Cow;
 
 /// Forces of the suspension at one instant.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,13 +19,20 @@ pub struct Forces {
     pub springs_n: Vec<f64>,
     /// Tension of each damper (N); above zero while it is drawn out.
     pub dampers_n: Vec<f64>,
+    /// Push of each stop (N), along its direction from the tub.
+    pub stops_n: Vec<f64>,
+    /// Force of each bushing on the cabinet (N), along c1, c2 and c3.
+    pub bushings_n: Vec<[f64; 3]>,
     /// Sum of all forces on the cabinet (N), along c1, c2 and c3: at rest it is the weight.
     pub cabinet_n: [f64; 3],
 }
 
 /// The forces at a state: whole coordinates of the nonlinear model, deviations of the linear one.
 pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> Forces {
-    let elements = &point.machine.elements;
+    let elements = match model {
+        ModelKind::Nonlinear => Cow::Borrowed(&point.machine.elements),
+        ModelKind::Linear => Cow::Owned(point.machine.elements.with_viscous_friction()),
+    };
     let u: [f64; COORDINATES] = core::array::from_fn(|i| state[COORDINATES + i]);
     let q: [f64; COORDINATES] = match model {
         ModelKind::Nonlinear => core::array::from_fn(|i| state[i]),
@@ -35,23 +43,47 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
         moving: along(&q, &u),
         displaced: along(&q, &core::array::from_fn(|i| state[i])),
     };
-    let mut forces = Forces { springs_n: Vec::new(), dampers_n: Vec::new(), cabinet_n: [0.0; 3] };
+    let mut forces = Forces {
+        springs_n: Vec::new(),
+        dampers_n: Vec::new(),
+        stops_n: Vec::new(),
+        bushings_n: Vec::new(),
+        cabinet_n: [0.0; 3],
+    };
     // How the force is divided among the axes differs by a rounding: results on record have it so.
-    for spring in &elements.springs {
+    for (spring, stiffening) in elements.springs.iter().zip(&elements.stiffenings) {
         let (tension, line) = tub.tension(&spring.constant());
+        let tension = tension - stiffening.constant().push(&line);
         let share = tension / line.length;
         for k in 0..3 {
             forces.cabinet_n[k] += first_order(model, (share * line.span[k]).v());
         }
         forces.springs_n.push(first_order(model, tension));
     }
-    for damper in &elements.dampers {
+    for (damper, friction) in elements.dampers.iter().zip(&elements.frictions) {
         let (tension, line) = tub.tension(&damper.constant());
-        let tension = first_order(model, tension);
+        let tension = first_order(model, tension - friction.constant().push(&line));
         for k in 0..3 {
             forces.cabinet_n[k] += tension * line.span[k].0.value / line.length.0.value;
         }
         forces.dampers_n.push(tension);
+    }
+    for stop in &elements.stops {
+        let stop = stop.constant();
+        let push = first_order(model, stop.push(&tub.point(&stop.tub)));
+        for k in 0..3 {
+            forces.cabinet_n[k] += push * stop.direction[k].0.value;
+        }
+        forces.stops_n.push(push);
+    }
+    for bushing in &elements.bushings {
+        let bushing = bushing.constant();
+        let on_tub = bushing.force(&tub.point(&bushing.tub));
+        let force = on_tub.map(|force| first_order(model, -force));
+        for k in 0..3 {
+            forces.cabinet_n[k] += force[k];
+        }
+        forces.bushings_n.push(force);
     }
     forces
 }
@@ -74,14 +106,28 @@ impl Tub {
         let ends = element.ends();
         let span = tub_from_cabinet(&self.displaced, ends);
         let moving = tub_from_cabinet(&self.moving, ends);
-        let rate = dot(&moving, &moving).sqrt().0.slope;
-        let rate = match self.model {
+        let rate = self.velocity(dot(&moving, &moving).sqrt());
+        let line = CabinetLine { span, length: dot(&span, &span).sqrt(), rate };
+        (-element.push(&line), line)
+    }
+
+    /// A tub point's motion.
+    fn point(&self, tub: &Vec3<Dual<f64>>) -> PointMotion<Dual<f64>> {
+        let at_first = Ends { cabinet: *tub, tub: *tub };
+        PointMotion {
+            displacement: tub_from_cabinet(&self.displaced, &at_first),
+            velocity: tub_from_cabinet(&self.moving, &at_first).map(|place| self.velocity(place)),
+        }
+    }
+
+    /// The rate of what has its derivative in time with it.
+    fn velocity(&self, moving: N<Dual<f64>>) -> N<Dual<f64>> {
+        let rate = moving.0.slope;
+        N(match self.model {
             ModelKind::Nonlinear => Dual { value: rate, slope: 0.0 },
             // Zero at equilibrium.
             ModelKind::Linear => Dual { value: 0.0, slope: rate },
-        };
-        let line = CabinetLine { span, length: dot(&span, &span).sqrt(), rate: N(rate) };
-        (-element.push(&line), line)
+        })
     }
 }
 

@@ -8,7 +8,7 @@ use crate::nonlinear::floating::Floating;
 use crate::nonlinear::{Half, Halves, halves};
 use crate::point::Point;
 use crate::{Machine, Parameter, Spin, Target, Timing, Wanted, prepare};
-use lane_ode::{N, Real, Simd};
+use lane_ode::{Lane, N, Real, Simd};
 
 /// Every record that there is.
 pub(super) const EVERYTHING: Wanted = Wanted {
@@ -111,7 +111,7 @@ pub(super) fn equations_of<T: Real>(
 }
 
 /// M(q, theta) a and f(q, u, theta, theta', theta'') of the nonlinear equations M a = f.
-pub(super) fn equations<T: Real>(
+pub(super) fn equations<T: Lane>(
     machine: &Coefficients<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],

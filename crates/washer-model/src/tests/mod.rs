@@ -3,6 +3,7 @@
 mod allocation;
 mod bits;
 mod cost;
+mod elements;
 mod energy;
 mod expansion;
 mod extras;
@@ -11,4 +12,4 @@ mod instruments;
 mod long_tables;
 mod mass;
 mod observation;
-mod reference;
+pub(crate) mod reference;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::super::report::{Diagnostic, Report};
 use super::super::section::short;
 use super::super::source::{Located, Location, SourceId};
-use super::{ListColumn, MOST_COLUMNS, Unreadable, fits};
+use super::{ID, ListColumn, MOST_COLUMNS, Unreadable, fits};
 
 /// The columns, and the byte at which each row's line begins; `None` after mistakes, which are
 /// reported.
@@ -57,6 +57,11 @@ pub(super) fn read(
         // Fits: no list is as long as 4 GiB.
         starts.push(start as u32);
         for ((cell, at), column) in cells(line, offset).zip(&mut columns) {
+            if column.name.value == ID {
+                // Whatever it says; a number holds its place.
+                column.values.push(0.0);
+                continue;
+            }
             if let Ok(value) = cell.parse::<f64>() {
                 column.values.push(value);
                 continue;

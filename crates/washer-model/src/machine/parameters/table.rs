@@ -1,9 +1,9 @@
 //! The rows of the table of parameters.
 
-use super::Range::{Any, Negative, NonNegative, Positive};
+use super::Range::{Any, Negative, NonNegative, Positive, Within};
 use super::Source::{Assumed, Convention, Derived, Grid, Paper, Time};
 use super::{Block, Range, Row, Source, Target, UnknownParameter, common, table_points};
-use crate::{Machine, Spin};
+use crate::{Damper, Machine, Spin};
 
 /// A row: name, unit, range, source, description, and at last what it reads and writes.
 macro_rules! row {
@@ -72,9 +72,13 @@ const TABLE_2: Source = Paper("Table 2");
 const TABLE_3: Source = Paper("Table 3");
 const TABLE_4: Source = Paper("Table 4");
 const SECTION_3_1: Source = Paper("section 3.1");
+const NONE: Source = Assumed("none in the paper's machine");
+const USUAL_SPEED: Source = Assumed("a usual value");
+/// Speeds at which friction is taken: what divides by them stays finite.
+const SPEED: Range = Within(1e-6, 1e3);
 const SPLIT: Source = Derived("the drum of Tables 2 and 3 less its 0.4 kg unbalance");
 
-/// Rows with a single number each, and the three that write several.
+/// Rows with a single number each, and those that write several.
 #[rustfmt::skip]
 pub(super) static TABLE: &[Row] = &[
     row!("gravity_m_per_s2", "m/s^2", NonNegative, Convention,
@@ -150,6 +154,26 @@ pub(super) static TABLE: &[Row] = &[
         "damping of all dampers (C)", Target::Dampers("damping_n_s_per_m"),
         get |m, _, _| common(&m.dampers, |d| d.damping_n_s_per_m),
         set |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = v)),
+    row!("friction_n", "N", NonNegative, NONE,
+        "friction of all dampers (F_f)", Target::Dampers("friction_n"),
+        get |m, _, _| common(&m.dampers, |d| d.friction_n),
+        set |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.friction_n = v)),
+    row!("friction_speed_m_per_s", "m/s", SPEED, USUAL_SPEED,
+        "speed below which the friction of all dampers fades (v_s)",
+        Target::Dampers("friction_speed_m_per_s"),
+        get |m, _, _| common(&m.dampers, |d| d.friction_speed_m_per_s),
+        set |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.friction_speed_m_per_s = v)),
+    row!("friction_linear_speed_m_per_s", "m/s", SPEED, NONE,
+        "speed amplitude at which the linear model takes the friction of all dampers (V)",
+        Target::Dampers("friction_linear_speed_m_per_s"),
+        get |m, _, _| {
+            let first = m.dampers.first()?.friction_linear_speed_m_per_s?;
+            let is_common = |d: &Damper| d.friction_linear_speed_m_per_s == Some(first);
+            m.dampers.iter().all(is_common).then_some(first)
+        },
+        set |m, _, _, v| {
+            m.dampers.iter_mut().for_each(|d| d.friction_linear_speed_m_per_s = Some(v));
+        }),
     row!("spin_peak_rpm", "rpm", Range::Within(-1e5, 1e5), Grid,
         "greatest spin speed; negative turns backwards", spin peak_rpm),
     row!("spin_ramp_s", "s", Positive, Grid,
@@ -172,6 +196,8 @@ static SPRING: &[Row] = &[
             m.springs.get(k).map(|s| s.free_length_m.unwrap_or_else(|| s.given_length_m()))
         },
         set |m, _, k, v| if let Some(s) = m.springs.get_mut(k) { s.free_length_m = Some(v) }),
+    row!("cubic_n_per_m3", "N/m^3", NonNegative, NONE,
+        "tension of this spring per cube of its elongation", of springs cubic_n_per_m3),
     row!("cabinet_x_m", "m", Any, TABLE_4,
         "cabinet end of this spring, towards the door", of springs cabinet_m[0]),
     row!("cabinet_y_m", "m", Any, TABLE_4,
@@ -191,6 +217,18 @@ static SPRING: &[Row] = &[
 static DAMPER: &[Row] = &[
     row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1,
         "damping of this damper", of dampers damping_n_s_per_m),
+    row!("friction_n", "N", NonNegative, NONE,
+        "friction of this damper (F_f)", of dampers friction_n),
+    row!("friction_speed_m_per_s", "m/s", SPEED, USUAL_SPEED,
+        "speed below which the friction of this damper fades (v_s)",
+        of dampers friction_speed_m_per_s),
+    row!("friction_linear_speed_m_per_s", "m/s", SPEED, NONE,
+        "speed amplitude at which the linear model takes the friction of this damper (V)",
+        Target::Machine,
+        get |m, _, k| m.dampers.get(k)?.friction_linear_speed_m_per_s,
+        set |m, _, k, v| if let Some(d) = m.dampers.get_mut(k) {
+            d.friction_linear_speed_m_per_s = Some(v)
+        }),
     row!("cabinet_x_m", "m", Any, TABLE_4,
         "cabinet end of this damper, towards the door", of dampers cabinet_m[0]),
     row!("cabinet_y_m", "m", Any, TABLE_4,
@@ -203,6 +241,73 @@ static DAMPER: &[Row] = &[
         "tub end of this damper, upwards", of dampers tub_m[1]),
     row!("tub_z_m", "m", Any, TABLE_4,
         "tub end of this damper, sideways", of dampers tub_m[2]),
+];
+
+/// Rows of each stop, after `stop_1_`.
+#[rustfmt::skip]
+static STOP: &[Row] = &[
+    row!("clearance_m", "m", Any, NONE,
+        "how far the tub may move before it meets this stop", of stops clearance_m),
+    row!("stiffness_n_per_m", "N/m", NonNegative, NONE,
+        "stiffness of this stop in contact", of stops stiffness_n_per_m),
+    row!("damping_n_s_per_m", "N s/m", NonNegative, NONE,
+        "damping of this stop in contact", of stops damping_n_s_per_m),
+    row!("softness_m", "m", Within(1e-9, 1.0), Assumed("a tenth of a millimetre"),
+        "depth over which contact with this stop sets in", of stops softness_m),
+    row!("tub_x_m", "m", Any, NONE,
+        "tub point of this stop, towards the door", of stops tub_m[0]),
+    row!("tub_y_m", "m", Any, NONE,
+        "tub point of this stop, upwards", of stops tub_m[1]),
+    row!("tub_z_m", "m", Any, NONE,
+        "tub point of this stop, sideways", of stops tub_m[2]),
+    row!("direction_x", "", Any, NONE,
+        "way from the tub to this stop, towards the door", of stops direction[0]),
+    row!("direction_y", "", Any, NONE,
+        "way from the tub to this stop, upwards", of stops direction[1]),
+    row!("direction_z", "", Any, NONE,
+        "way from the tub to this stop, sideways", of stops direction[2]),
+];
+
+/// Rows of each bushing, after `bushing_1_`.
+#[rustfmt::skip]
+static BUSHING: &[Row] = &[
+    row!("tub_x_m", "m", Any, NONE,
+        "tub point of this bushing, towards the door", of bushings tub_m[0]),
+    row!("tub_y_m", "m", Any, NONE,
+        "tub point of this bushing, upwards", of bushings tub_m[1]),
+    row!("tub_z_m", "m", Any, NONE,
+        "tub point of this bushing, sideways", of bushings tub_m[2]),
+    row!("stiffness_x_n_per_m", "N/m", NonNegative, NONE,
+        "stiffness of this bushing towards the door", of bushings stiffness_n_per_m[0]),
+    row!("stiffness_y_n_per_m", "N/m", NonNegative, NONE,
+        "stiffness of this bushing upwards", of bushings stiffness_n_per_m[1]),
+    row!("stiffness_z_n_per_m", "N/m", NonNegative, NONE,
+        "stiffness of this bushing sideways", of bushings stiffness_n_per_m[2]),
+    row!("cubic_x_n_per_m3", "N/m^3", NonNegative, NONE,
+        "force of this bushing per cube of its displacement towards the door",
+        of bushings cubic_n_per_m3[0]),
+    row!("cubic_y_n_per_m3", "N/m^3", NonNegative, NONE,
+        "the same upwards", of bushings cubic_n_per_m3[1]),
+    row!("cubic_z_n_per_m3", "N/m^3", NonNegative, NONE,
+        "the same sideways", of bushings cubic_n_per_m3[2]),
+    row!("damping_x_n_s_per_m", "N s/m", NonNegative, NONE,
+        "damping of this bushing towards the door", of bushings damping_n_s_per_m[0]),
+    row!("damping_y_n_s_per_m", "N s/m", NonNegative, NONE,
+        "damping of this bushing upwards", of bushings damping_n_s_per_m[1]),
+    row!("damping_z_n_s_per_m", "N s/m", NonNegative, NONE,
+        "damping of this bushing sideways", of bushings damping_n_s_per_m[2]),
+];
+
+/// Rows of each further unbalance, after `unbalance_2_`.
+#[rustfmt::skip]
+static FURTHER_UNBALANCE: &[Row] = &[
+    row!("mass_kg", "kg", NonNegative, NONE,
+        "mass of this further unbalance", of further_unbalances mass_kg),
+    row!("x_m", "m", Any, NONE,
+        "position of this further unbalance along the axis", of further_unbalances x_m),
+    row!("radius_m", "m", Any, NONE,
+        "distance of this further unbalance from the axis; negative opposite the first",
+        of further_unbalances radius_m),
 ];
 
 /// Rows of each point of a spin's table, after `spin_table_1_`.
@@ -219,18 +324,43 @@ pub(super) static BLOCKS: &[Block] = &[
     Block {
         prefix: "spring_",
         rows: SPRING,
+        first: 1,
         count: |machine, _| machine.springs.len(),
         missing: |count| UnknownParameter::Number { element: "spring", count },
     },
     Block {
         prefix: "damper_",
         rows: DAMPER,
+        first: 1,
         count: |machine, _| machine.dampers.len(),
         missing: |count| UnknownParameter::Number { element: "damper", count },
     },
     Block {
+        prefix: "stop_",
+        rows: STOP,
+        first: 1,
+        count: |machine, _| machine.stops.len(),
+        missing: |count| UnknownParameter::Number { element: "stop", count },
+    },
+    Block {
+        prefix: "bushing_",
+        rows: BUSHING,
+        first: 1,
+        count: |machine, _| machine.bushings.len(),
+        missing: |count| UnknownParameter::Number { element: "bushing", count },
+    },
+    Block {
+        prefix: "unbalance_",
+        rows: FURTHER_UNBALANCE,
+        // The first is that of every machine.
+        first: 2,
+        count: |machine, _| machine.further_unbalances.len(),
+        missing: |count| UnknownParameter::Number { element: "unbalance", count: count + 1 },
+    },
+    Block {
         prefix: "spin_table_",
         rows: SPIN_POINT,
+        first: 1,
         count: |_, spin| table_points(spin),
         missing: |count| UnknownParameter::TablePoint { count },
     },

@@ -1,0 +1,503 @@
+//! Responses at constant speeds: how fast disturbances grow, and how far the machine moves, over
+//! the speed.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::PlotOptions;
+use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
+use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
+use crate::error::PlotError;
+use crate::figures::trace;
+use crate::label::{self, Label};
+use crate::read::{Batch, Cells, ColumnFacts, Kind, Source};
+use crate::swept::SweptAxis;
+use crate::table::Table;
+
+/// Most points whose growth is drawn: each needs a colour.
+const MOST_CURVES: usize = DISTINCT.len();
+
+/// Channels whose responses are drawn by default: as of a trace.
+const USUAL: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
+
+/// Most edges that are marked with their speeds.
+const MOST_EDGES: usize = 16;
+
+/// What shades mean, in the legend.
+pub(super) const UNSTABLE: &str = "a dwell at this speed is unstable";
+
+/// One point over speed.
+pub(super) struct Swept {
+    /// Values of the file's axes.
+    values: Vec<f64>,
+    speed: Vec<f64>,
+    /// NaN where there is no response.
+    growth: Vec<f64>,
+    /// Of each column asked for.
+    columns: Vec<Vec<f64>>,
+}
+
+/// The point of a stability file with its axes' values, in file order.
+type Points = Vec<Vec<f64>>;
+
+/// The columns of numbers between the point's index and the speed.
+fn axes(source: &Source) -> Vec<&ColumnFacts> {
+    let before = source.columns.iter().take_while(|column| column.name != "speed_rpm");
+    before.filter(|column| column.cells == Cells::Numbers && column.name != "point").collect()
+}
+
+/// The chart of a stability file: growth over speed.
+///
+/// # Errors
+/// As [`points`], [`read`].
+pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
+    let axes = axes(source);
+    let all = points(source, &axes, &options.at, "--at")?;
+    let shown: Points = match all.len() {
+        count if count <= MOST_CURVES => all.clone(),
+        count => {
+            (0..MOST_CURVES).map(|k| all[k * (count - 1) / (MOST_CURVES - 1)].clone()).collect()
+        }
+    };
+    let swept = read(source, &axes, &shown, &[])?;
+    let differs = |k: usize| shown.iter().any(|point| point[k] != shown[0][k]);
+    let name = |point: &[f64]| {
+        let named = axes.iter().zip(point).enumerate().filter(|(k, _)| differs(*k));
+        let named: Vec<String> = named.map(|(_, (axis, value))| said(axis, *value)).collect();
+        if named.is_empty() { "growth".to_owned() } else { named.join(", ") }
+    };
+    let series = swept.iter().enumerate().map(|(k, point)| Series {
+        name: name(&point.values),
+        colour: DISTINCT[k],
+        grid: k,
+        y: point.growth.clone(),
+        style: Style::Solid(2.2),
+    });
+    let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
+    let common = axes.iter().zip(&shown[0]).enumerate().filter(|(k, _)| !differs(*k));
+    notes.extend(common.map(|(_, (axis, value))| said(axis, *value).to_lowercase()));
+    if shown.len() < all.len() {
+        notes.push(format!("{} of {} points", shown.len(), all.len()));
+    }
+    let panel = ChartPanel {
+        levels: vec![(0.0, "unstable above".to_owned())],
+        ..ChartPanel::new(
+            "growth",
+            Label::new("Growth of a small disturbance", "1/s"),
+            series.collect(),
+        )
+    };
+    let alone = match &swept[..] {
+        [one] => unstable(&one.speed, &one.growth),
+        _ => Vec::new(),
+    };
+    let edges = alone.iter().flatten().take(MOST_EDGES);
+    let marks = edges.map(|&edge| Mark::of_speed(edge, edge)).collect();
+    Ok(Chart {
+        title: "Where a dwell at constant speed is unstable".to_owned(),
+        subtitle: notes.join(" · "),
+        x_label: Label::new("Constant spin speed", "rpm"),
+        x_log: false,
+        grids: swept.into_iter().map(|point| point.speed).collect(),
+        panels: vec![panel],
+        marks,
+        mark_meaning: "edge".to_owned(),
+        shades: alone,
+        shade_meaning: UNSTABLE.to_owned(),
+    })
+}
+
+/// The chart of a stability file's one point: amplitudes of the periodic responses of both models
+/// over speed.
+///
+/// # Errors
+/// As [`one_point`]; [`PlotError::NotThere`] for an unknown channel.
+pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
+    let channels: Vec<(&str, &ColumnFacts)> = source
+        .with_prefix("nonlinear_")
+        .into_iter()
+        .filter(|(name, _)| source.column(&format!("linear_{name}")).is_some())
+        .collect();
+    let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
+    if let Some(unknown) = options.channels.iter().find(|asked| !names.contains(&asked.as_str())) {
+        return Err(PlotError::NotThere {
+            option: "--channel",
+            given: unknown.clone(),
+            path: source.path.clone(),
+            what: "channel",
+            known: names.join(", "),
+        });
+    }
+    let usual: Vec<&str> = USUAL.into_iter().filter(|name| names.contains(name)).collect();
+    let is_shown = |name: &str| match (&options.channels[..], &usual[..]) {
+        ([], []) => true,
+        ([], usual) => usual.contains(&name),
+        (asked, _) => asked.iter().any(|asked| asked == name),
+    };
+    let columns: Vec<String> = names
+        .iter()
+        .flat_map(|name| ["nonlinear", "linear"].map(|model| format!("{model}_{name}")))
+        .collect();
+    let axes = axes(source);
+    let point = one_point(source, &axes, &options.at, "--at")?;
+    let mut swept = read(source, &axes, &[point], &columns)?;
+    let one = swept.remove(0);
+    let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
+        let (unit, factor) = label::shown(&facts.unit);
+        let scaled = |place: usize| -> Vec<f64> {
+            one.columns[place].iter().map(|value| value * factor).collect()
+        };
+        let nonlinear = scaled(2 * k);
+        // Each dash begins and ends where the solid line does.
+        let of = |wanted: bool| -> Vec<f64> {
+            let at = |i: usize| one.growth.get(i).is_some_and(|growth| (*growth > 0.0) == wanted);
+            let near = |i: usize| at(i) || (!wanted && (i > 0 && at(i - 1) || at(i + 1)));
+            (0..nonlinear.len()).map(|i| if near(i) { nonlinear[i] } else { f64::NAN }).collect()
+        };
+        let series = |name: &str, colour, y, style| Series {
+            name: name.to_owned(),
+            colour,
+            grid: 0,
+            y,
+            style,
+        };
+        let lines = vec![
+            series("linear model", LINEAR, scaled(2 * k + 1), Style::Solid(1.6)),
+            series("nonlinear model, stable", NONLINEAR, of(false), Style::Solid(2.2)),
+            series("nonlinear model, unstable", NONLINEAR, of(true), Style::Dashed),
+        ];
+        let words = label::capitalised(&label::channel(name));
+        ChartPanel {
+            shown: is_shown(name),
+            height: 170.0,
+            ..ChartPanel::new(name, Label::new(&words, unit), lines)
+        }
+    });
+    let panels = panels.collect();
+    let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
+    let named = axes.iter().zip(&one.values);
+    notes.extend(named.map(|(axis, value)| said(axis, *value).to_lowercase()));
+    notes.push("largest deviation from equilibrium over a turn".to_owned());
+    Ok(Chart {
+        title: "Periodic responses at constant speed".to_owned(),
+        subtitle: notes.join(" · "),
+        x_label: Label::new("Constant spin speed", "rpm"),
+        x_log: false,
+        shades: unstable(&one.speed, &one.growth),
+        shade_meaning: UNSTABLE.to_owned(),
+        grids: vec![one.speed],
+        panels,
+        marks: Vec::new(),
+        mark_meaning: String::new(),
+    })
+}
+
+/// A file of `--stability`.
+///
+/// # Errors
+/// As [`Source::open`]; [`PlotError::Unfit`] for a file of another kind.
+fn open(path: &Path) -> Result<Source, PlotError> {
+    let source = Source::open(path)?;
+    if source.kind == Kind::Stability {
+        return Ok(source);
+    }
+    Err(PlotError::Unfit(format!(
+        "`--stability {}`: this is a {} file; `sweep stability` writes a stability file",
+        path.display(),
+        source.kind.name()
+    )))
+}
+
+/// What a stability file says of another file's machine.
+pub(super) struct Unstable {
+    /// Ranges of unstable speeds (rpm).
+    pub(super) speeds: Vec<[f64; 2]>,
+    /// At each unstable speed of the file (rpm) the damped frequencies of the one or two modes that
+    /// take part in what grows (cycles per minute), NaN for none.
+    pub(super) participants: Vec<(f64, [f64; 2])>,
+}
+
+/// The unstable speeds of the machine that a trace or a modes file is of.
+///
+/// # Errors
+/// As [`open`]; [`PlotError::Unfit`] or [`PlotError::NotThere`] where the stability file does not
+/// have this machine.
+pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
+    let source = open(path)?;
+    let axes = axes(&source);
+    let machine = |source: &Source| source.find("machine").cloned();
+    if axes.is_empty()
+        && let (Some(ours), Some(theirs)) = (machine(&table.source), machine(&source))
+        && ours != theirs
+    {
+        return Err(PlotError::Unfit(format!(
+            "`--stability {}`: this file is of another machine than {}",
+            path.display(),
+            table.source.path.display()
+        )));
+    }
+    let mut at: Vec<(String, f64)> =
+        trace::machine(table).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+    let named = table.source.find("at").and_then(Value::as_object).into_iter().flatten();
+    for (name, value) in named {
+        if let Some(value) = value.as_f64() {
+            at.retain(|(known, _)| known != name);
+            at.push((name.clone(), value));
+        }
+    }
+    at.retain(|(name, _)| axes.iter().any(|axis| axis.name == *name));
+    let point = one_point(&source, &axes, &at, "--stability")?;
+    let columns = ["mode_1_cpm", "mode_2_cpm"].map(str::to_owned);
+    let swept = read(&source, &axes, &[point], &columns)?;
+    let one = &swept[0];
+    let frequency = |place: usize, k: usize| one.columns[place].get(k).copied().unwrap_or(f64::NAN);
+    Ok(Unstable {
+        speeds: unstable(&one.speed, &one.growth),
+        participants: (0..one.speed.len())
+            .filter(|&k| one.growth[k] > 0.0)
+            .map(|k| (one.speed[k], [frequency(0, k), frequency(1, k)]))
+            .collect(),
+    })
+}
+
+fn said(axis: &ColumnFacts, value: f64) -> String {
+    let unit = if axis.unit.is_empty() { String::new() } else { format!(" {}", axis.unit) };
+    format!("{} {}{unit}", label::words(&axis.name), label::significant(value, 4))
+}
+
+/// The values of a row's axes, and whether it is at the values asked for.
+fn row_values(columns: &[Vec<f64>], row: usize) -> Vec<f64> {
+    columns.iter().map(|column| column[row]).collect()
+}
+
+fn axis_columns(batch: &Batch<'_>, axes: &[&ColumnFacts]) -> Result<Vec<Vec<f64>>, PlotError> {
+    axes.iter().map(|axis| batch.numbers(&axis.name)).collect()
+}
+
+/// Every point of the file at the values asked for, in file order.
+///
+/// # Errors
+/// As [`Source::batches`]; [`PlotError::NotThere`] for what is no axis, or no value of it;
+/// [`PlotError::Empty`] without rows.
+fn points(
+    source: &Source,
+    axes: &[&ColumnFacts],
+    at: &[(String, f64)],
+    option: &'static str,
+) -> Result<Points, PlotError> {
+    let mut pins: Vec<(usize, f64)> = Vec::with_capacity(at.len());
+    for (name, value) in at {
+        match axes.iter().position(|axis| axis.name == *name) {
+            Some(place) => pins.push((place, *value)),
+            None => {
+                let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
+                return Err(PlotError::NotThere {
+                    option,
+                    given: name.clone(),
+                    path: source.path.clone(),
+                    what: "axis",
+                    known: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
+                });
+            }
+        }
+    }
+    let names: Vec<&str> =
+        axes.iter().map(|axis| axis.name.as_str()).chain(["speed_rpm"]).collect();
+    let mut found: Points = Vec::new();
+    let mut seen_rows = false;
+    for batch in source.batches(&names)? {
+        let batch = batch?;
+        let columns = axis_columns(&batch, axes)?;
+        for row in 0..batch.rows {
+            seen_rows = true;
+            let values = row_values(&columns, row);
+            let is_pinned =
+                pins.iter().all(|&(place, value)| SweptAxis::near(values[place], value));
+            // Speeds vary fastest: a point's rows follow each other.
+            if is_pinned && found.last() != Some(&values) {
+                found.push(values);
+            }
+        }
+    }
+    if !seen_rows {
+        let reason = "the stability file has no rows";
+        return Err(PlotError::Empty { path: source.path.clone(), reason });
+    }
+    if found.is_empty() {
+        let given: Vec<String> = at.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        return Err(PlotError::NotThere {
+            option,
+            given: given.join(", "),
+            path: source.path.clone(),
+            what: "point",
+            known: "other values of these axes".to_owned(),
+        });
+    }
+    Ok(found)
+}
+
+/// The one point of the file, or the one at the values asked for.
+///
+/// # Errors
+/// As [`points`]; [`PlotError::Unfit`] where there are several.
+fn one_point(
+    source: &Source,
+    axes: &[&ColumnFacts],
+    at: &[(String, f64)],
+    option: &'static str,
+) -> Result<Vec<f64>, PlotError> {
+    let mut found = points(source, axes, at, option)?;
+    if found.len() > 1 {
+        let free: Vec<&str> = axes
+            .iter()
+            .filter(|axis| !at.iter().any(|(name, _)| *name == axis.name))
+            .map(|axis| axis.name.as_str())
+            .collect();
+        let free = free.join(", ");
+        let what = match option {
+            "--at" => format!("one is wanted: give --at NAME=VALUE for {free}"),
+            _ => format!("the file to be drawn does not say which by {free}"),
+        };
+        return Err(PlotError::Unfit(format!(
+            "{}: this stability file has {} points, and {what}",
+            source.path.display(),
+            found.len()
+        )));
+    }
+    Ok(found.remove(0))
+}
+
+/// Points over speed, with some columns.
+fn read(
+    source: &Source,
+    axes: &[&ColumnFacts],
+    points: &[Vec<f64>],
+    columns: &[String],
+) -> Result<Vec<Swept>, PlotError> {
+    let names: Vec<&str> = axes
+        .iter()
+        .map(|axis| axis.name.as_str())
+        .chain(["speed_rpm", "growth_per_s"])
+        .chain(columns.iter().map(String::as_str))
+        .collect();
+    let mut swept: Vec<Swept> = points
+        .iter()
+        .map(|values| Swept {
+            values: values.clone(),
+            speed: Vec::new(),
+            growth: Vec::new(),
+            columns: vec![Vec::new(); columns.len()],
+        })
+        .collect();
+    for batch in source.batches(&names)? {
+        let batch = batch?;
+        let of_axes = axis_columns(&batch, axes)?;
+        let (speed, growth) = (batch.numbers("speed_rpm")?, batch.numbers("growth_per_s")?);
+        let further: Vec<Vec<f64>> =
+            columns.iter().map(|name| batch.numbers(name)).collect::<Result<_, _>>()?;
+        for row in 0..batch.rows {
+            let values = row_values(&of_axes, row);
+            let Some(point) = swept.iter_mut().find(|point| point.values == values) else {
+                continue;
+            };
+            point.speed.push(speed[row]);
+            point.growth.push(growth[row]);
+            for (kept, column) in point.columns.iter_mut().zip(&further) {
+                kept.push(column[row]);
+            }
+        }
+    }
+    Ok(swept)
+}
+
+/// The ranges of speed in which growth is above 0, taken as linear between the given speeds.
+fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
+    let mut ranges: Vec<[f64; 2]> = Vec::new();
+    for k in 0..speed.len() {
+        if !(growth[k] > 0.0) {
+            continue;
+        }
+        // A neighbour that has no growth gives no edge between the two.
+        let edge = |other: Option<usize>| {
+            let other = other.filter(|&other| growth.get(other).is_some_and(|g| g.is_finite()));
+            other.map_or(speed[k], |other| {
+                let part = growth[k] / (growth[k] - growth[other]);
+                speed[k] + part * (speed[other] - speed[k])
+            })
+        };
+        let continues = k > 0 && growth[k - 1] > 0.0;
+        match ranges.last_mut() {
+            Some(last) if continues => last[1] = speed[k],
+            _ => ranges.push([edge(k.checked_sub(1)), speed[k]]),
+        }
+        if !growth.get(k + 1).is_some_and(|next| *next > 0.0)
+            && let Some(last) = ranges.last_mut()
+        {
+            last[1] = edge(Some(k + 1));
+        }
+    }
+    ranges
+}
+
+/// The stretches of x in which a curve over it is within one of these ranges; straight between its
+/// points.
+pub(super) fn stretches_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut found: Vec<[f64; 2]> = Vec::new();
+    for &[low, high] in ranges {
+        let mut open: Option<[f64; 2]> = None;
+        for k in 1..x.len().min(y.len()) {
+            let (from, to) = (y[k - 1], y[k]);
+            // The part of this piece, from 0 to 1, that is within.
+            let part = if from == to {
+                (low..=high).contains(&from).then_some([0.0, 1.0])
+            } else {
+                let [a, b] = [low, high].map(|edge| (edge - from) / (to - from));
+                let [first, last] = [a.min(b).max(0.0), a.max(b).min(1.0)];
+                (last > first).then_some([first, last])
+            };
+            let Some(part) = part else {
+                found.extend(open.take());
+                continue;
+            };
+            let [first, last] = part.map(|share| x[k - 1] + share * (x[k] - x[k - 1]));
+            match &mut open {
+                Some(stretch) if part[0] == 0.0 => stretch[1] = last,
+                _ => {
+                    found.extend(open.take());
+                    open = Some([first, last]);
+                }
+            }
+        }
+        found.extend(open);
+    }
+    found.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_are_where_growth_passes_zero() {
+        let speed = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+        let growth = [-1.0, 1.0, 2.0, -2.0, f64::NAN, 1.0, 1.0];
+        assert_eq!(unstable(&speed, &growth), [[1.5, 3.5], [6.0, 7.0]]);
+        assert!(unstable(&speed[..1], &growth[..1]).is_empty());
+    }
+
+    #[test]
+    fn a_ramp_is_within_a_band_on_the_way_up_and_down() {
+        let time: Vec<f64> = (0..=10).map(f64::from).collect();
+        let speed: Vec<f64> = time.iter().map(|t| 100.0 * (5.0 - (t - 5.0_f64).abs())).collect();
+        let found = stretches_within(&time, &speed, &[[150.0, 250.0], [500.0, 600.0]]);
+        assert_eq!(found, [[1.5, 2.5], [7.5, 8.5]]);
+        // A whole band within one step, and a dwell.
+        assert_eq!(stretches_within(&[0.0, 1.0], &[0.0, 100.0], &[[20.0, 30.0]]), [[0.2, 0.3]]);
+        assert_eq!(
+            stretches_within(&[0.0, 1.0, 4.0], &[7.0, 7.0, 7.0], &[[5.0, 9.0]]),
+            [[0.0, 4.0]]
+        );
+    }
+}

@@ -1,0 +1,147 @@
+//! Stability files in, figures out; and their unstable speeds in figures of other files.
+
+use std::path::Path;
+
+use super::sample::{Sample, modes, trace};
+use super::tests::{carried, draw, message, svg};
+use super::*;
+
+/// Points of these unbalances over 200 to 300 rpm. Growth is above 0 from 230 to 250 rpm, by as
+/// much as the unbalance.
+fn stability(masses: &[f64]) -> Sample {
+    let rows: Vec<(f64, f64)> = masses
+        .iter()
+        .flat_map(|&mass| (0..=20).map(move |k| (mass, 200.0 + 5.0 * f64::from(k))))
+        .collect();
+    let growth = |&(mass, speed): &(f64, f64)| mass * (10.0 - (speed - 240.0).abs()) / 10.0;
+    let is_in = |row: &(f64, f64)| growth(row) > 0.0;
+    let mode = |value: f64| move |row: &(f64, f64)| if is_in(row) { value } else { f64::NAN };
+    let words = |row: &(f64, f64)| Some(if is_in(row) { "quasi_periodic" } else { "stable" });
+    Sample::default()
+        .counts("point", rows.iter().map(|row| (row.0 * 10.0) as u64))
+        .numbers("unbalance_mass_kg", "kg", rows.iter().map(|row| row.0))
+        .numbers("speed_rpm", "rpm", rows.iter().map(|row| row.1))
+        .numbers("growth_per_s", "1/s", rows.iter().map(growth))
+        .words("kind", rows.iter().map(words))
+        .numbers("mode_1_cpm", "1/min", rows.iter().map(mode(86.0)))
+        .numbers("mode_2_cpm", "1/min", rows.iter().map(mode(202.0)))
+        .numbers("nonlinear_tub_yaw", "rad", rows.iter().map(|row| 0.002 * row.0))
+        .numbers("linear_tub_yaw", "rad", rows.iter().map(|row| 0.001 * row.0))
+        .words("status", rows.iter().map(|_| Some("ok")))
+        .metadata("sweep.plan", r#"{"name": "dwell"}"#)
+}
+
+fn page(sample: Sample, options: &PlotOptions) -> serde_json::Value {
+    carried(&draw(sample, options, "figure.html").unwrap())["chart"].clone()
+}
+
+fn viewed(view: View) -> PlotOptions {
+    PlotOptions { view: Some(view), ..PlotOptions::default() }
+}
+
+fn ranges(shades: &serde_json::Value) -> Vec<[f64; 2]> {
+    let ends = |range: &serde_json::Value| [0, 1].map(|end| range[end].as_f64().unwrap());
+    shades.as_array().unwrap().iter().map(ends).collect()
+}
+
+#[test]
+fn growth_of_one_point_is_shaded_between_its_marked_edges() {
+    let chart = page(stability(&[0.4]), &PlotOptions::default());
+    assert_eq!(ranges(&chart["shades"]), [[230.0, 250.0]]);
+    let marks: Vec<&str> =
+        chart["marks"].as_array().unwrap().iter().map(|mark| mark[1].as_str().unwrap()).collect();
+    assert_eq!(marks, ["230 rpm", "250 rpm"]);
+    let figure = svg(stability(&[0.4]), &PlotOptions::default());
+    for text in ["dwell · unbalance mass 0.4 kg", "a dwell at this speed is unstable", "230 rpm"] {
+        assert!(figure.contains(text), "{text}");
+    }
+}
+
+#[test]
+fn several_points_have_a_curve_each_and_too_many_are_thinned() {
+    let names = |masses: &[f64], at: Vec<(String, f64)>| -> Vec<String> {
+        let options = PlotOptions { at, ..PlotOptions::default() };
+        let chart = page(stability(masses), &options);
+        let series = chart["panels"][0]["series"].as_array().unwrap().clone();
+        series.iter().map(|one| one["name"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(names(&[0.2, 0.4], Vec::new()), ["Unbalance mass 0.2 kg", "Unbalance mass 0.4 kg"]);
+    let many: Vec<f64> = (1..=20).map(|k| 0.05 * f64::from(k)).collect();
+    let shown = names(&many, Vec::new());
+    assert_eq!((shown.len(), shown[5].as_str()), (6, "Unbalance mass 1 kg"));
+    assert_eq!(names(&[0.2, 0.4], vec![("unbalance_mass_kg".to_owned(), 0.4)]), ["growth"]);
+}
+
+#[test]
+fn responses_are_dashed_where_they_are_unstable() {
+    let chart = page(stability(&[0.4]), &viewed(View::Responses));
+    let series = chart["panels"][0]["series"].as_array().unwrap().clone();
+    let told: Vec<(&str, bool)> = series
+        .iter()
+        .map(|one| (one["name"].as_str().unwrap(), one["dashed"].as_bool().unwrap()))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            ("linear model", false),
+            ("nonlinear model, stable", false),
+            ("nonlinear model, unstable", true)
+        ]
+    );
+    assert_eq!(ranges(&chart["shades"]), [[230.0, 250.0]]);
+    let two = message(draw(stability(&[0.2, 0.4]), &viewed(View::Responses), "a.svg"));
+    assert!(two.contains("has 2 points") && two.contains("--at NAME=VALUE for unbalance"), "{two}");
+}
+
+#[test]
+fn other_figures_shade_the_unstable_speeds() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = stability(&[0.4]).write(folder.path(), "stability.parquet");
+    let options = PlotOptions { stability: Some(path.clone()), ..PlotOptions::default() };
+    let chart = page(trace(), &options);
+    let file = trace().write(folder.path(), "trace.parquet");
+    let table = Table::open(&file).unwrap();
+    let (time, speed) = (table.numbers("time_s").unwrap(), table.numbers("speed_rpm").unwrap());
+    let shades = ranges(&chart["shades"]);
+    assert!(!shades.is_empty());
+    for (time, speed) in time.iter().zip(speed) {
+        let is_shaded = shades.iter().any(|[from, to]| (from..=to).contains(&time));
+        let is_inside = (230.0..=250.0).contains(speed);
+        let is_at_an_edge = (speed - 230.0).abs() < 1e-6 || (speed - 250.0).abs() < 1e-6;
+        assert!(is_shaded == is_inside || is_at_an_edge, "{time} s, {speed} rpm");
+    }
+    let chart = page(modes(), &options);
+    assert_eq!(ranges(&chart["shades"]), [[230.0, 250.0]]);
+    let names: Vec<String> = chart["panels"][0]["series"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| one["name"].as_str().unwrap().to_owned())
+        .collect();
+    let sum = "sum of the frequencies of modes 1 and 2";
+    assert!(names.iter().any(|name| name == sum), "{names:?}");
+}
+
+#[test]
+fn what_does_not_fit_is_refused_with_what_would() {
+    let folder = tempfile::tempdir().unwrap();
+    let one = stability(&[0.4]).write(folder.path(), "one.parquet");
+    let two = stability(&[0.2, 0.7]).write(folder.path(), "two.parquet");
+    let no_trace = trace().write(folder.path(), "trace.parquet");
+    let with = |path: &Path| PlotOptions { stability: Some(path.to_owned()), ..Default::default() };
+    let at = PlotOptions { at: vec![("tub_mass_kg".to_owned(), 1.0)], ..Default::default() };
+    let value =
+        PlotOptions { at: vec![("unbalance_mass_kg".to_owned(), 9.0)], ..Default::default() };
+    for (result, said) in [
+        (draw(trace(), &with(&no_trace), "a.svg"), "`sweep stability` writes a stability file"),
+        (draw(stability(&[0.4]), &with(&one), "a.svg"), "`--stability` is for traces"),
+        (draw(stability(&[0.4]), &viewed(View::Time), "a.svg"), "`--view` is for traces"),
+        (draw(trace(), &viewed(View::Growth), "a.svg"), "`--view` is for stability files"),
+        (draw(stability(&[0.4]), &at, "a.svg"), "it has unbalance_mass_kg"),
+        (draw(stability(&[0.4]), &value, "a.svg"), "no such point"),
+        (draw(modes(), &with(&two), "a.svg"), "two.parquet"),
+    ] {
+        let message = message(result);
+        assert!(message.contains(said), "{said}: {message}");
+    }
+}

@@ -1,0 +1,293 @@
+//! Conditions over the columns of a result, with the three truth values of SQL: a comparison with a
+//! missing value is neither true nor false.
+
+use std::ops::Range;
+
+use crate::error::ResultsError;
+use crate::rows::{Cell, CellKind, ResultTable, Rows};
+
+/// A mistake in the text of a condition.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mistake {
+    /// What is wrong, in a sentence.
+    pub title: String,
+    /// Where, in bytes of the text.
+    pub span: Range<usize>,
+    /// What should stand there.
+    pub expected: String,
+    /// A word as typed, and the names that could have been meant.
+    pub candidates: Option<(String, Vec<String>)>,
+}
+
+/// How two values are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Comparison {
+    Less,
+    AtMost,
+    Greater,
+    AtLeast,
+    Equal,
+    NotEqual,
+}
+
+/// How two numbers become one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Operation {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+}
+
+/// How all rows become one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fold {
+    /// Rows for which a condition is true.
+    Count,
+    /// Those, as a part of all rows.
+    Share,
+    Least,
+    Greatest,
+    Mean,
+}
+
+/// A node of an expression; the parser has made sure of the types.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Node {
+    Literal(Cell),
+    /// A place among the condition's columns.
+    Column(usize),
+    /// A place among the condition's folds.
+    Folded(usize),
+    Negative(Box<Node>),
+    Absolute(Box<Node>),
+    Not(Box<Node>),
+    And(Box<Node>, Box<Node>),
+    Or(Box<Node>, Box<Node>),
+    IsNull(Box<Node>),
+    Compare(Comparison, Box<Node>, Box<Node>),
+    Calculate(Operation, Box<Node>, Box<Node>),
+}
+
+/// An expression that is true or false: of every row, or of a file as a whole.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Condition {
+    /// As typed.
+    pub text: String,
+    /// Names of the columns that it reads.
+    pub columns: Vec<String>,
+    pub(crate) root: Node,
+    pub(crate) folds: Vec<(Fold, Node)>,
+    /// Whether it speaks of single rows, not of the folds alone.
+    pub(crate) by_row: bool,
+}
+
+impl Condition {
+    /// Whether it speaks of single rows; if not, of the file as a whole.
+    #[must_use]
+    pub const fn is_by_row(&self) -> bool {
+        self.by_row
+    }
+
+    /// Whether it has functions over all rows.
+    #[must_use]
+    pub const fn has_folds(&self) -> bool {
+        !self.folds.is_empty()
+    }
+}
+
+/// What a node is evaluated on.
+pub(crate) struct Context<'a> {
+    pub(crate) rows: &'a Rows,
+    pub(crate) row: usize,
+    pub(crate) folded: &'a [Cell],
+}
+
+impl Node {
+    pub(crate) fn value(&self, at: &Context<'_>) -> Cell {
+        match self {
+            Self::Literal(cell) => cell.clone(),
+            Self::Column(column) => at.rows.cell(*column, at.row),
+            Self::Folded(fold) => at.folded.get(*fold).cloned().unwrap_or(Cell::Null),
+            Self::Negative(node) => number(node.number(at).map(|number| -number)),
+            Self::Absolute(node) => number(node.number(at).map(f64::abs)),
+            Self::Calculate(operation, left, right) => {
+                number(operation.of(left.number(at), right.number(at)))
+            }
+            Self::Not(_) | Self::And(..) | Self::Or(..) | Self::IsNull(_) | Self::Compare(..) => {
+                self.truth(at).map_or(Cell::Null, Cell::Flag)
+            }
+        }
+    }
+
+    fn number(&self, at: &Context<'_>) -> Option<f64> {
+        self.value(at).number()
+    }
+
+    /// True, false, or neither.
+    pub(crate) fn truth(&self, at: &Context<'_>) -> Option<bool> {
+        match self {
+            Self::Not(node) => node.truth(at).map(|truth| !truth),
+            Self::And(left, right) => match (left.truth(at), right.truth(at)) {
+                (Some(false), _) | (_, Some(false)) => Some(false),
+                (Some(true), Some(true)) => Some(true),
+                _ => None,
+            },
+            Self::Or(left, right) => match (left.truth(at), right.truth(at)) {
+                (Some(true), _) | (_, Some(true)) => Some(true),
+                (Some(false), Some(false)) => Some(false),
+                _ => None,
+            },
+            Self::IsNull(node) => Some(node.value(at) == Cell::Null),
+            Self::Compare(comparison, left, right) => {
+                comparison.of(&left.value(at), &right.value(at))
+            }
+            other => match other.value(at) {
+                Cell::Flag(flag) => Some(flag),
+                _ => None,
+            },
+        }
+    }
+}
+
+/// A result that is no number has no value.
+fn number(number: Option<f64>) -> Cell {
+    number.filter(|number| !number.is_nan()).map_or(Cell::Null, Cell::Number)
+}
+
+impl Operation {
+    fn of(self, left: Option<f64>, right: Option<f64>) -> Option<f64> {
+        let (left, right) = (left?, right?);
+        Some(match self {
+            Self::Add => left + right,
+            Self::Subtract => left - right,
+            Self::Multiply => left * right,
+            Self::Divide => left / right,
+        })
+    }
+}
+
+impl Comparison {
+    fn of(self, left: &Cell, right: &Cell) -> Option<bool> {
+        let order = match (left, right) {
+            (Cell::Number(left), Cell::Number(right)) => left.partial_cmp(right)?,
+            (Cell::Text(left), Cell::Text(right)) => left.cmp(right),
+            (Cell::Flag(left), Cell::Flag(right)) => left.cmp(right),
+            _ => return None,
+        };
+        Some(match self {
+            Self::Less => order.is_lt(),
+            Self::AtMost => order.is_le(),
+            Self::Greater => order.is_gt(),
+            Self::AtLeast => order.is_ge(),
+            Self::Equal => order.is_eq(),
+            Self::NotEqual => order.is_ne(),
+        })
+    }
+}
+
+/// The number that rows are folded into, on its way.
+#[derive(Clone, Copy, Debug, Default)]
+struct Folding {
+    rows: u64,
+    counted: u64,
+    sum: f64,
+    least: Option<f64>,
+    greatest: Option<f64>,
+}
+
+impl Condition {
+    /// Folds all rows that `keep` takes.
+    ///
+    /// # Errors
+    /// [`ResultsError::File`].
+    pub(crate) fn fold(
+        &self,
+        table: &ResultTable,
+        keep: Option<&Condition>,
+    ) -> Result<Vec<Cell>, ResultsError> {
+        if self.folds.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut foldings = vec![Folding::default(); self.folds.len()];
+        each_row(table, &[self], keep, |at| {
+            for ((fold, node), folding) in self.folds.iter().zip(&mut foldings) {
+                folding.rows += 1;
+                match fold {
+                    Fold::Count | Fold::Share => {
+                        folding.counted += u64::from(node.truth(at) == Some(true));
+                    }
+                    Fold::Least | Fold::Greatest | Fold::Mean => {
+                        let Some(number) = node.number(at) else { continue };
+                        folding.counted += 1;
+                        folding.sum += number;
+                        folding.least = Some(folding.least.map_or(number, |l| l.min(number)));
+                        folding.greatest = Some(folding.greatest.map_or(number, |g| g.max(number)));
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        let folds = self.folds.iter().zip(foldings);
+        Ok(folds.map(|((fold, _), folding)| folding.finish(*fold)).collect())
+    }
+}
+
+impl Folding {
+    fn finish(self, fold: Fold) -> Cell {
+        let some = |count: u64, value: f64| number((count > 0).then_some(value));
+        match fold {
+            Fold::Count => Cell::Number(self.counted as f64),
+            Fold::Share => some(self.rows, self.counted as f64 / self.rows as f64),
+            Fold::Least => number(self.least),
+            Fold::Greatest => number(self.greatest),
+            Fold::Mean => some(self.counted, self.sum / self.counted as f64),
+        }
+    }
+}
+
+/// Calls `work` for each row that `keep` takes, with the columns of the first of `conditions`.
+///
+/// # Errors
+/// [`ResultsError::File`], and whatever `work` says.
+pub(crate) fn each_row(
+    table: &ResultTable,
+    conditions: &[&Condition],
+    keep: Option<&Condition>,
+    mut work: impl FnMut(&Context<'_>) -> Result<(), ResultsError>,
+) -> Result<(), ResultsError> {
+    let own: Vec<&str> = conditions
+        .iter()
+        .flat_map(|condition| condition.columns.iter().map(String::as_str))
+        .collect();
+    // Every row counts, whether or not a column is read of it.
+    let counted = || table.columns.first().map(|column| column.name.as_str());
+    let own = if own.is_empty() { counted().into_iter().collect() } else { own };
+    let kept: Vec<&str> =
+        keep.into_iter().flat_map(|keep| keep.columns.iter().map(String::as_str)).collect();
+    let kept = if kept.is_empty() { counted().into_iter().collect() } else { kept };
+    let mut filter = keep.map(|_| table.read(&kept)).transpose()?;
+    for rows in table.read(&own)? {
+        let rows = rows?;
+        let beside = filter.as_mut().and_then(Iterator::next).transpose()?;
+        for row in 0..rows.count {
+            let is_kept = match (keep, &beside) {
+                (Some(keep), Some(beside)) => {
+                    keep.root.truth(&Context { rows: beside, row, folded: &[] }) == Some(true)
+                }
+                _ => true,
+            };
+            if is_kept {
+                work(&Context { rows: &rows, row, folded: &[] })?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What a node is, for the parser.
+pub(crate) struct Typed {
+    pub(crate) node: Node,
+    pub(crate) kind: CellKind,
+    pub(crate) span: Range<usize>,
+}

@@ -1,0 +1,98 @@
+//! Text that spreadsheets, pandas (`comment="#"`) and gnuplot read.
+
+use std::fmt::Write as _;
+
+use sweep_files::{EXPORTED_CSV, key};
+
+use super::names;
+use crate::error::ResultsError;
+use crate::rows::{Cell, ResultTable};
+
+pub(super) fn bytes(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
+    let version = table.file().value(key::VERSION).unwrap_or("of another version");
+    let mut text = format!("{EXPORTED_CSV}{}\n", one_line(version));
+    // Writing to a String cannot fail.
+    for column in &table.columns {
+        let unit = if column.unit.is_empty() { "-" } else { &column.unit };
+        let (unit, description) = (one_line(unit), one_line(&column.description));
+        let _ = writeln!(text, "# {} [{unit}]: {description}", one_line(&column.name));
+    }
+    if let Some(plan) = table.file().value(key::PLAN) {
+        let _ = writeln!(text, "# plan: {}", one_line(plan));
+    }
+    let names = names(table);
+    let headings: Vec<String> = names.iter().map(|name| quoted(name)).collect();
+    let _ = writeln!(text, "{}", headings.join(","));
+    for rows in table.read(&names)? {
+        let rows = rows?;
+        for row in 0..rows.count {
+            for column in 0..names.len() {
+                if column > 0 {
+                    text.push(',');
+                }
+                match rows.cell(column, row) {
+                    Cell::Null => {}
+                    // The shortest digits that read back to the same number.
+                    Cell::Number(number) => {
+                        let _ = write!(text, "{}", shortest(number));
+                    }
+                    Cell::Text(word) => text.push_str(&quoted(&word)),
+                    Cell::Flag(flag) => {
+                        let _ = write!(text, "{flag}");
+                    }
+                }
+            }
+            text.push('\n');
+        }
+    }
+    Ok(text.into_bytes())
+}
+
+/// The shortest digits of a number, with an exponent where that is shorter.
+fn shortest(number: f64) -> String {
+    let (plain, exponent) = (number.to_string(), format!("{number:e}"));
+    if plain.len() <= exponent.len() { plain } else { exponent }
+}
+
+fn one_line(text: &str) -> String {
+    text.replace(['\n', '\r'], " ")
+}
+
+/// A text as a cell: in quotes where it would be taken for more than one.
+fn quoted(text: &str) -> String {
+    // A sheet takes what begins like this for a formula.
+    let formula = text.starts_with(['=', '+', '-', '@']);
+    if formula || text.contains(['"', ',', '\n', '\r', '#']) {
+        let mark = if formula { "'" } else { "" };
+        format!("\"{mark}{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample;
+
+    #[test]
+    fn rows_stand_under_their_names_and_units_above() {
+        let text = String::from_utf8(bytes(&sample::table()).unwrap()).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0].starts_with("# exported by sweep "), "{}", lines[0]);
+        assert!(lines.iter().any(|line| line.starts_with("# damping_n_s_per_m [N s/m]")));
+        let head = lines.iter().position(|line| !line.starts_with('#')).unwrap();
+        assert!(lines[head].starts_with("point,unbalance_mass_kg,damping_n_s_per_m,"));
+        assert_eq!(lines[head + 1], "0,0.1,60,1,1,1,1,true,false,0.009000000000000001,ok");
+        assert_eq!(lines[head + 4], "3,0.2,60,,1,,,,false,,diverged");
+        assert_eq!(lines.len(), head + 7);
+    }
+
+    #[test]
+    fn texts_that_mean_more_are_quoted() {
+        assert_eq!(quoted("ok"), "ok");
+        assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
+        assert_eq!(quoted("=cmd()"), "\"'=cmd()\"");
+        assert_eq!([shortest(1e-7), shortest(0.25), shortest(1e22)], ["1e-7", "0.25", "1e22"]);
+    }
+}

@@ -1,0 +1,84 @@
+//! Results in the formats of other programs, with units.
+
+mod csv;
+mod netcdf;
+mod xlsx;
+mod zip;
+
+use std::path::Path;
+
+use sweep_files::FileKind;
+
+use crate::error::ResultsError;
+use crate::rows::ResultTable;
+
+/// A format, known by a file's ending.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Text: comments that begin with `#`, a line of names, a line per row.
+    Csv,
+    /// A workbook: the rows, the columns with units and descriptions, the plan.
+    Xlsx,
+    /// NetCDF classic, with 64-bit offsets: variables over the axes if the rows are a whole grid.
+    NetCdf,
+}
+
+impl Format {
+    /// Every format.
+    pub const ALL: [Self; 3] = [Self::Csv, Self::Xlsx, Self::NetCdf];
+
+    /// The ending of its files, without a point.
+    #[must_use]
+    pub const fn ending(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Xlsx => "xlsx",
+            Self::NetCdf => "nc",
+        }
+    }
+
+    /// The format of a file's name.
+    #[must_use]
+    pub fn of(path: &Path) -> Option<Self> {
+        let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+        Self::ALL.into_iter().find(|format| format.ending() == ending)
+    }
+
+    /// What such a file may be written over.
+    #[must_use]
+    pub const fn kind(self) -> FileKind<'static> {
+        FileKind::Exported { ending: self.ending() }
+    }
+}
+
+/// Most cells that are exported: the file is made in memory.
+const MOST_CELLS: u64 = 100_000_000;
+
+/// The bytes of a file with all rows of a result.
+///
+/// # Errors
+/// [`ResultsError::File`], [`ResultsError::TooLarge`], and [`ResultsError::Export`] where the
+/// format has no room for it.
+pub fn export(table: &ResultTable, format: Format) -> Result<Vec<u8>, ResultsError> {
+    let cells = table.rows().saturating_mul(table.columns.len() as u64);
+    if cells > MOST_CELLS {
+        let path = table.path().to_owned();
+        return Err(ResultsError::TooLarge { path, cells, most: MOST_CELLS });
+    }
+    match format {
+        Format::Csv => csv::bytes(table),
+        Format::Xlsx => xlsx::bytes(table),
+        Format::NetCdf => netcdf::bytes(table),
+    }
+}
+
+/// The names of all columns.
+fn names(table: &ResultTable) -> Vec<&str> {
+    table.columns.iter().map(|column| column.name.as_str()).collect()
+}
+
+/// A refusal of a format.
+fn no_room(table: &ResultTable, format: Format, reason: impl Into<String>) -> ResultsError {
+    let path = table.path().to_owned();
+    ResultsError::Export { path, ending: format.ending(), reason: reason.into() }
+}

@@ -1,0 +1,30 @@
+//! What is asked of finished results, from the files alone: whether conditions hold, which rows are
+//! extreme, what differs between two files, and the same rows in other formats.
+//!
+//! * [`ResultTable`] is an open file: its columns with units, its rows batch by batch.
+//! * [`Condition`] is an expression over its columns; [`check`] says which rows keep it, [`top`]
+//!   which rows come first in an order.
+//! * [`compare`] says what differs between two files, [`export`] writes one in another format.
+//!
+//! Nothing here knows the model; [`sweep_files`] opens every file, so a damaged one is refused.
+
+mod compare;
+mod condition;
+mod error;
+mod export;
+mod parse;
+mod require;
+mod rows;
+#[cfg(test)]
+mod sample;
+mod top;
+
+pub use compare::{
+    ColumnChange, Comparison, Crossing, Flip, Moved, PlanChange, SharedRow, compare,
+};
+pub use condition::{Condition, Mistake};
+pub use error::ResultsError;
+pub use export::{Format, export};
+pub use require::{Checked, Offender, check};
+pub use rows::{Cell, CellKind, Column, ResultTable};
+pub use top::{Order, top};

@@ -1,0 +1,182 @@
+//! Whether conditions hold, and where not.
+
+use serde::Serialize;
+
+use crate::condition::{Condition, Context, each_row};
+use crate::error::ResultsError;
+use crate::rows::{Cell, ResultTable};
+
+/// A row that does not keep a condition.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Offender {
+    /// Its number in the file, from 0.
+    pub row: u64,
+    /// Whether the condition is neither true nor false there, because a value is missing.
+    pub undefined: bool,
+    /// The columns that say where it is, and those that the condition reads.
+    pub cells: Vec<(String, Cell)>,
+}
+
+/// What came of one condition.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Checked {
+    /// The condition as typed.
+    pub expression: String,
+    /// Whether it is true: for every row, or of the file as a whole.
+    pub holds: bool,
+    /// Whether it speaks of single rows.
+    pub by_row: bool,
+    /// Rows it was evaluated on.
+    pub rows: u64,
+    /// Rows for which it is false.
+    pub failing: u64,
+    /// Rows for which it is neither true nor false.
+    pub undefined: u64,
+    /// Values of its functions over all rows, in the order of their closing parentheses.
+    pub folded: Vec<Cell>,
+    /// The first of the rows that do not keep it.
+    pub offenders: Vec<Offender>,
+}
+
+/// Checks a condition on the rows for which `keep` is true.
+///
+/// A row where a value is missing does not keep a condition unless that is true or false whatever
+/// the value is; with `allow_null` such rows pass. No rows at all keep no condition.
+///
+/// # Errors
+/// [`ResultsError::File`].
+pub fn check(
+    table: &ResultTable,
+    condition: &Condition,
+    keep: Option<&Condition>,
+    allow_null: bool,
+    most_offenders: usize,
+) -> Result<Checked, ResultsError> {
+    let folded = condition.fold(table, keep)?;
+    let mut checked = Checked {
+        expression: condition.text.clone(),
+        holds: false,
+        by_row: condition.by_row,
+        rows: 0,
+        failing: 0,
+        undefined: 0,
+        folded: folded.clone(),
+        offenders: Vec::new(),
+    };
+    let mut whole = None;
+    let places = table.places();
+    let place = Condition {
+        columns: places.iter().map(|name| (*name).to_owned()).collect(),
+        ..condition.clone()
+    };
+    each_row(table, &[condition, &place], keep, |at| {
+        checked.rows += 1;
+        let truth = condition.root.truth(&Context { folded: &folded, ..*at });
+        if !condition.by_row {
+            whole = Some(truth);
+            return Ok(());
+        }
+        match truth {
+            Some(true) => return Ok(()),
+            Some(false) => checked.failing += 1,
+            None => checked.undefined += 1,
+        }
+        let offends = !(allow_null && truth.is_none());
+        if offends && checked.offenders.len() < most_offenders {
+            let own = condition.columns.len();
+            let placed = places.iter().enumerate().map(|(k, name)| (*name, own + k));
+            let read = condition.columns.iter().enumerate().map(|(k, name)| (name.as_str(), k));
+            let read = read.filter(|(name, _)| !places.contains(name));
+            let cells = placed
+                .chain(read)
+                .map(|(name, column)| (name.to_owned(), at.rows.cell(column, at.row)));
+            checked.offenders.push(Offender {
+                row: at.rows.first + at.row as u64,
+                undefined: truth.is_none(),
+                cells: cells.collect(),
+            });
+        }
+        Ok(())
+    })?;
+    checked.holds = checked.rows > 0
+        && if condition.by_row {
+            checked.failing == 0 && (allow_null || checked.undefined == 0)
+        } else {
+            whole.flatten().unwrap_or(false)
+        };
+    Ok(checked)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample;
+
+    fn checked(text: &str, keep: Option<&str>, allow_null: bool) -> Checked {
+        let table = sample::table();
+        let condition = Condition::parse(text, &table).unwrap();
+        let keep = keep.map(|keep| Condition::parse(keep, &table).unwrap());
+        check(&table, &condition, keep.as_ref(), allow_null, 3).unwrap()
+    }
+
+    // Ratios of the sample: 1, 1.5, 2.5, null, 4, 1.2; reliable where below 2; row 3 diverged; row
+    // 4 is sensitive.
+    #[test]
+    fn rows_that_do_not_keep_a_condition_are_told_with_their_places() {
+        let found = checked("ratio_max < 2", None, false);
+        assert!(!found.holds && found.by_row);
+        assert_eq!((found.rows, found.failing, found.undefined), (6, 2, 1));
+        assert_eq!(found.offenders.iter().map(|o| o.row).collect::<Vec<_>>(), [2, 3, 4]);
+        let first = &found.offenders[0];
+        let names: Vec<&str> = first.cells.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["point", "unbalance_mass_kg", "damping_n_s_per_m", "ratio_max"]);
+        assert_eq!(first.cells[1].1, Cell::Number(0.1));
+        assert_eq!(first.cells[3].1, Cell::Number(2.5));
+        assert!(found.offenders[1].undefined);
+    }
+
+    #[test]
+    fn what_is_missing_keeps_nothing_unless_that_is_said() {
+        assert!(!checked("ratio_max < 9", None, false).holds);
+        assert!(checked("ratio_max < 9", None, true).holds);
+        assert!(checked("ratio_max < 9 or ratio_max is null", None, false).holds);
+        assert!(checked("ratio_max < 9 or status == 'diverged'", None, false).holds);
+        assert!(!checked("ratio_max is not null", None, false).holds);
+        assert!(!checked("not (ratio_max < 9)", None, true).holds);
+        assert_eq!(checked("not (ratio_max < 9)", None, true).undefined, 1);
+    }
+
+    #[test]
+    fn rows_left_out_are_not_checked_and_none_left_keep_nothing() {
+        let found = checked("ratio_max < 3", Some("not sensitive and status == \"ok\""), false);
+        assert!(found.holds, "{found:?}");
+        assert_eq!(found.rows, 4);
+        assert!(!checked("ratio_max < 3", Some("status == \"panicked\""), false).holds);
+        assert!(!checked("count(reliable) == 0", Some("status == \"panicked\""), false).holds);
+    }
+
+    #[test]
+    fn functions_fold_all_rows() {
+        for (text, holds) in [
+            ("count(true) == 6", true),
+            ("count(reliable) == 3", true),
+            ("count(not reliable) == 2", true),
+            ("share(reliable) == 0.5", true),
+            ("count(ratio_max is null) == 1", true),
+            ("min(ratio_max) == 1 and max(ratio_max) == 4", true),
+            ("mean(ratio_max) == (1 + 1.5 + 2.5 + 4 + 1.2) / 5", true),
+            ("max(abs(damping_n_s_per_m - 70)) <= 10", true),
+            ("max(-ratio_max) < -1", false),
+            ("count(status != \"ok\") < 1", false),
+        ] {
+            let found = checked(text, None, false);
+            assert!(!found.by_row);
+            assert_eq!(found.holds, holds, "{text}: {found:?}");
+        }
+        let mixed = checked("ratio_max <= max(ratio_max)", None, true);
+        assert!(mixed.holds && mixed.by_row);
+        assert_eq!(mixed.folded, [Cell::Number(4.0)]);
+        let kept = checked("max(ratio_max) == 2.5", Some("not sensitive"), false);
+        assert!(kept.holds, "{kept:?}");
+    }
+}

@@ -1,0 +1,287 @@
+//! A result file as columns and rows.
+
+use std::path::Path;
+
+use arrow_array::ArrayRef;
+use arrow_schema::{ArrowError, DataType, Field};
+use parquet::arrow::ProjectionMask;
+use serde::{Serialize, Serializer};
+use serde_json::Value;
+use sweep_files::{FileError, ParquetFile, cells, key};
+
+use crate::error::ResultsError;
+
+/// What the cells of a column are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellKind {
+    /// Integers or floats.
+    Number,
+    /// Words.
+    Text,
+    /// True or false.
+    Flag,
+}
+
+impl CellKind {
+    /// In a sentence: "a number".
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Number => "a number",
+            Self::Text => "a text",
+            Self::Flag => "true or false",
+        }
+    }
+}
+
+/// A column, without its rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// As in the file.
+    pub name: String,
+    /// From the field's metadata; empty for pure numbers and words.
+    pub unit: String,
+    /// From the field's metadata; may be empty.
+    pub description: String,
+    /// What its cells are.
+    pub kind: CellKind,
+    /// Whether the file keeps it as whole numbers.
+    pub whole: bool,
+    field: usize,
+}
+
+/// One cell.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// No value; a number that is none counts as such.
+    Null,
+    /// A number.
+    Number(f64),
+    /// Words.
+    Text(String),
+    /// True or false.
+    Flag(bool),
+}
+
+impl Cell {
+    /// The number, if it is one.
+    #[must_use]
+    pub const fn number(&self) -> Option<f64> {
+        match self {
+            Self::Number(number) => Some(*number),
+            _ => None,
+        }
+    }
+}
+
+impl Serialize for Cell {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Null => serializer.serialize_none(),
+            Self::Number(number) => serializer.serialize_f64(*number),
+            Self::Text(text) => serializer.serialize_str(text),
+            Self::Flag(flag) => serializer.serialize_bool(*flag),
+        }
+    }
+}
+
+/// Rows decoded at once.
+const BATCH_ROWS: usize = 1 << 12;
+
+/// An open result file of any kind.
+#[derive(Debug)]
+pub struct ResultTable {
+    /// Its columns in file order, without those of types that none of our files has.
+    pub columns: Vec<Column>,
+    /// The grid as run, the machine and the method, if it carries them.
+    pub plan: Option<Value>,
+    file: ParquetFile,
+}
+
+impl ResultTable {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// [`ResultsError::File`].
+    pub fn open(path: &Path) -> Result<Self, ResultsError> {
+        Ok(Self::of(ParquetFile::open(path)?))
+    }
+
+    /// The columns of an open file.
+    #[must_use]
+    pub fn of(file: ParquetFile) -> Self {
+        let fields = file.schema().fields().iter().enumerate();
+        let columns = fields.filter_map(|(place, field)| column(field, place)).collect();
+        let plan = file.value(key::PLAN).and_then(|plan| serde_json::from_str(plan).ok());
+        Self { columns, plan, file }
+    }
+
+    /// The file.
+    #[must_use]
+    pub const fn file(&self) -> &ParquetFile {
+        &self.file
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.file.path()
+    }
+
+    /// How many rows it has.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.file.rows()
+    }
+
+    /// The column of that name.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|column| column.name == name)
+    }
+
+    /// The names of the swept parameters that have a column: of a map all, in order.
+    #[must_use]
+    pub fn axes(&self) -> Vec<&str> {
+        let planned = self.plan.as_ref().and_then(|plan| plan["axis"].as_array());
+        if let Some(axes) = planned {
+            let names = axes.iter().filter_map(|axis| axis["parameter"].as_str());
+            return names.filter_map(|name| Some(self.column(name)?.name.as_str())).collect();
+        }
+        // Files that have been through other programs have lost the plan.
+        let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
+        let before = self.columns.iter().take_while(|column| !of_model(&column.name));
+        if self.column("ratio_max").is_none() {
+            return Vec::new();
+        }
+        before
+            .filter(|column| column.kind == CellKind::Number && column.name != "point")
+            .map(|column| column.name.as_str())
+            .collect()
+    }
+
+    /// The names of the columns that say where a row is: the point's index, the axes, and what
+    /// counts on along them in files that are no maps.
+    #[must_use]
+    pub fn places(&self) -> Vec<&str> {
+        let further = ["crossing", "speed_rpm", "mode", "time_s"];
+        let mut names: Vec<&str> = ["point"].into_iter().chain(self.axes()).collect();
+        names.extend(further.into_iter().filter(|name| !names.contains(name)).collect::<Vec<_>>());
+        names.retain(|name| self.column(name).is_some());
+        names
+    }
+
+    /// Reads the named columns, batch by batch. A name that the file lacks gives no column.
+    ///
+    /// # Errors
+    /// [`ResultsError::File`].
+    pub fn read(
+        &self,
+        names: &[&str],
+    ) -> Result<impl Iterator<Item = Result<Rows, ResultsError>> + use<'_>, ResultsError> {
+        let chosen: Vec<&Column> = names.iter().filter_map(|name| self.column(name)).collect();
+        let mut fields: Vec<usize> = chosen.iter().map(|column| column.field).collect();
+        fields.sort_unstable();
+        fields.dedup();
+        let places: Vec<(usize, CellKind)> = chosen
+            .iter()
+            .map(|column| {
+                let place = fields.iter().position(|field| *field == column.field);
+                (place.unwrap_or_default(), column.kind)
+            })
+            .collect();
+        let batches = self.file.batches(|builder| {
+            let mask = ProjectionMask::roots(builder.parquet_schema(), fields);
+            builder.with_projection(mask).with_batch_size(BATCH_ROWS)
+        })?;
+        let mut first = 0;
+        Ok(batches.map(move |batch| {
+            let batch = batch?;
+            let read = |(place, kind): &(usize, CellKind)| decode(batch.column(*place), *kind);
+            let columns = places.iter().map(read).collect::<Result<Vec<_>, _>>();
+            let columns = columns.map_err(|error| FileError::NotParquet {
+                path: self.path().to_owned(),
+                reason: error.to_string(),
+            })?;
+            let rows = Rows { first, count: batch.num_rows(), columns };
+            first += rows.count as u64;
+            Ok(rows)
+        }))
+    }
+}
+
+/// Some rows of some columns.
+#[derive(Debug)]
+pub struct Rows {
+    /// Number of the first of them in the file, from 0.
+    pub first: u64,
+    /// How many there are.
+    pub count: usize,
+    columns: Vec<Decoded>,
+}
+
+impl Rows {
+    /// The cell of a row in the `column`-th of the columns that were asked for.
+    #[must_use]
+    pub fn cell(&self, column: usize, row: usize) -> Cell {
+        match self.columns.get(column) {
+            Some(Decoded::Numbers(cells)) => {
+                cells[row].filter(|number| !number.is_nan()).map_or(Cell::Null, Cell::Number)
+            }
+            Some(Decoded::Texts { names, codes }) => {
+                codes[row].map_or(Cell::Null, |code| Cell::Text(names[code].clone()))
+            }
+            Some(Decoded::Flags(cells)) => cells[row].map_or(Cell::Null, Cell::Flag),
+            None => Cell::Null,
+        }
+    }
+}
+
+/// The cells of a batch's column.
+#[derive(Debug)]
+enum Decoded {
+    Numbers(Vec<Option<f64>>),
+    /// Few words are many rows' word.
+    Texts {
+        names: Vec<String>,
+        codes: Vec<Option<usize>>,
+    },
+    Flags(Vec<Option<bool>>),
+}
+
+fn decode(array: &ArrayRef, kind: CellKind) -> Result<Decoded, ArrowError> {
+    Ok(match kind {
+        CellKind::Number => Decoded::Numbers(cells::numbers(array)?),
+        CellKind::Flag => Decoded::Flags(cells::flags(array)?.iter().collect()),
+        CellKind::Text => {
+            let mut names: Vec<String> = Vec::new();
+            let mut code = |word: &str| {
+                names.iter().rposition(|name| name == word).unwrap_or_else(|| {
+                    names.push(word.to_owned());
+                    names.len() - 1
+                })
+            };
+            let codes = cells::texts(array)?.into_iter().map(|word| word.map(&mut code)).collect();
+            Decoded::Texts { names, codes }
+        }
+    })
+}
+
+fn column(field: &Field, place: usize) -> Option<Column> {
+    let kind = match field.data_type() {
+        DataType::Boolean => CellKind::Flag,
+        text if cells::is_text(text) => CellKind::Text,
+        number if cells::is_number(number) => CellKind::Number,
+        _ => return None,
+    };
+    let told = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
+    let unit = told("unit");
+    Some(Column {
+        name: field.name().clone(),
+        unit: if unit == "1" { String::new() } else { unit },
+        description: told("description"),
+        kind,
+        whole: field.data_type().is_integer(),
+        field: place,
+    })
+}

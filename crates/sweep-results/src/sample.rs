@@ -1,0 +1,103 @@
+//! Files for tests.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow_array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray, UInt64Array};
+use arrow_schema::{Field, Schema};
+use parquet::arrow::ArrowWriter;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use serde_json::{Value, json};
+use sweep_files::key;
+
+use crate::rows::ResultTable;
+
+/// A column of a file in the making: name, unit, cells.
+pub(crate) type Made = (&'static str, &'static str, ArrayRef);
+
+pub(crate) fn numbers(values: &[Option<f64>]) -> ArrayRef {
+    Arc::new(Float64Array::from(values.to_vec()))
+}
+
+pub(crate) fn flags(values: &[Option<bool>]) -> ArrayRef {
+    Arc::new(BooleanArray::from(values.to_vec()))
+}
+
+pub(crate) fn texts(values: &[&str]) -> ArrayRef {
+    Arc::new(StringArray::from(values.to_vec()))
+}
+
+/// Writes a file of these columns with these keys.
+pub(crate) fn write(path: &Path, columns: Vec<Made>, keys: &[(&str, Value)]) {
+    let field = |(name, unit, array): &Made| {
+        let unit = ("unit".to_owned(), (*unit).to_owned());
+        let metadata = std::collections::HashMap::from([unit]);
+        Field::new(*name, array.data_type().clone(), true).with_metadata(metadata)
+    };
+    let schema = Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<_>>()));
+    let arrays = columns.into_iter().map(|(_, _, array)| array).collect();
+    let batch = RecordBatch::try_new(schema.clone(), arrays).unwrap();
+    let pairs = keys.iter().map(|(key, value)| {
+        let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        KeyValue::new((*key).to_owned(), text)
+    });
+    let properties =
+        WriterProperties::builder().set_key_value_metadata(Some(pairs.collect())).build();
+    let file = File::create(path).unwrap();
+    let mut writer = ArrowWriter::try_new(file, schema, Some(properties)).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+}
+
+/// The plan of the sample.
+pub(crate) fn plan() -> Value {
+    json!({
+        "name": "sample",
+        "machine": { "tub": { "mass_kg": 24.0 } },
+        "axis": [
+            { "parameter": "unbalance_mass_kg", "values": [0.1, 0.2] },
+            { "parameter": "damping_n_s_per_m", "values": [60.0, 70.0, 80.0] },
+        ],
+        "reliability": { "ratio_limit": 2.0 },
+    })
+}
+
+/// The columns of a map of two masses by three dampings.
+pub(crate) fn map(ratios: &[Option<f64>]) -> Vec<Made> {
+    let rows = ratios.len();
+    let masses: Vec<_> = (0..rows).map(|i| Some(if i < 3 { 0.1 } else { 0.2 })).collect();
+    let dampings: Vec<_> = (0..rows).map(|i| Some(60.0 + 10.0 * (i % 3) as f64)).collect();
+    let reliable: Vec<_> = ratios.iter().map(|ratio| ratio.map(|ratio| ratio < 2.0)).collect();
+    let status: Vec<_> =
+        ratios.iter().map(|ratio| if ratio.is_some() { "ok" } else { "diverged" }).collect();
+    let sensitive: Vec<_> = (0..rows).map(|i| Some(i == 4)).collect();
+    let gaps: Vec<_> = ratios.iter().map(|ratio| ratio.map(|ratio| 0.01 - ratio * 1e-3)).collect();
+    vec![
+        ("point", "1", Arc::new(UInt64Array::from_iter_values(0..rows as u64))),
+        ("unbalance_mass_kg", "kg", numbers(&masses)),
+        ("damping_n_s_per_m", "N s/m", numbers(&dampings)),
+        ("nonlinear_tub_yaw", "rad", numbers(ratios)),
+        ("linear_tub_yaw", "rad", numbers(&vec![Some(1.0); rows])),
+        ("ratio_tub_yaw", "1", numbers(ratios)),
+        ("ratio_max", "1", numbers(ratios)),
+        ("reliable", "", flags(&reliable)),
+        ("sensitive", "", flags(&sensitive)),
+        ("min_gap_nonlinear_m", "m", numbers(&gaps)),
+        ("status", "", texts(&status)),
+    ]
+}
+
+/// Ratios of the sample.
+pub(crate) const RATIOS: [Option<f64>; 6] =
+    [Some(1.0), Some(1.5), Some(2.5), None, Some(4.0), Some(1.2)];
+
+/// A map of six rows: the fourth has diverged, the fifth is sensitive.
+pub(crate) fn table() -> ResultTable {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("sample.parquet");
+    write(&path, map(&RATIOS), &[(key::PLAN, plan())]);
+    // The open file outlives its name.
+    ResultTable::open(&path).unwrap()
+}

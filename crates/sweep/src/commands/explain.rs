@@ -1,0 +1,66 @@
+//! `sweep explain GRID.toml --at NAME=VALUE`: why the linear model fails at a point.
+
+use super::examples::Examples;
+use super::grid::GridArgs;
+use crate::config;
+use crate::engine::simd_from_environment;
+use crate::exit::{Error, Exit, show};
+use crate::explain::{explain, json, words};
+use crate::speeds::{Speeds, turning};
+use crate::threads;
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    [
+        "sweep explain my.toml --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=100",
+        "why the linear model fails there, and what would help",
+    ],
+    [
+        "sweep explain my.toml --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=100 --json",
+        "the same for programs",
+    ],
+];
+
+/// Arguments of `sweep explain`.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = LONG)]
+pub struct Args {
+    #[command(flatten)]
+    grid: GridArgs,
+    /// The point: a value for each axis, on the grid or between its points, and for any other
+    /// parameter; may be repeated
+    #[arg(long, value_name = "NAME=VALUE")]
+    at: Vec<String>,
+    /// Speeds to look at, in rpm, above 0 [default: from half of the slowest mode's frequency to
+    /// the profile's fastest speed, by 1]
+    #[arg(long, value_name = "FROM:TO:STEP", value_parser = turning, allow_hyphen_values = true)]
+    speed: Option<Speeds>,
+    /// Print everything as JSON
+    #[arg(long)]
+    json: bool,
+    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    threads: Option<usize>,
+}
+
+/// What `--help` adds.
+const LONG: &str = "\
+Runs the point as `sweep run` does, finds the bands of speed in which the turning machine's \
+periodic response is unstable, and follows small disturbances of the run through them. A \
+disturbance is measured by its energy. docs/stability.md explains every line.";
+
+/// Explains, and prints.
+///
+/// # Errors
+/// Mistakes in the grid file or the options, a profile that cannot be explained, and a machine
+/// without equilibrium or modes.
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+    let (plan, at) = config::load_point(&args.grid.grid, &args.grid.sets, &args.at)?;
+    let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
+    let simd = simd_from_environment()?;
+    let found = threads::pool(threads)?.install(|| explain(&plan, at, args.speed, simd))?;
+    if args.json {
+        return show(&format!("{:#}\n", json::of(&found)));
+    }
+    show(&words::of(&found))
+}

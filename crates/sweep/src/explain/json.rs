@@ -1,0 +1,139 @@
+//! An explanation as JSON.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+use washer_model::{LeftRange, Participant};
+
+use super::{Closing, End, Explanation, Passage, Resonance, Swept, Tongue};
+
+/// Everything that was found; units stand in the names.
+pub(crate) fn of(found: &Explanation) -> Value {
+    let tongues = found.tongues.iter().map(|(tongue, passages)| of_tongue(found, tongue, passages));
+    let without = found.without_departures.as_ref().map(|entered| match entered {
+        Ok(amplitudes) => {
+            let greatest = found.swept.greatest_of(amplitudes);
+            json!({
+                "amplitudes": by_channel(&found.swept, amplitudes),
+                "ratio_max": greatest.map(|(ratio, _)| ratio),
+                "ratio_max_channel": greatest.map(|(_, channel)| channel.name()),
+            })
+        }
+        Err(LeftRange { time_s }) => json!({ "left_range_at_s": time_s }),
+    });
+    json!({
+        "name": found.name,
+        "at": found.at.iter().cloned().collect::<BTreeMap<_, _>>(),
+        "swept": of_swept(&found.swept),
+        "speeds": {
+            "from_rpm": found.looked.from,
+            "to_rpm": found.looked.to,
+            "step_rpm": found.looked.step,
+            "without_response": found.without_response,
+        },
+        "profile_rpm": found.profile_rpm,
+        "tongues": tongues.collect::<Value>(),
+        "entered_on_responses": without,
+    })
+}
+
+fn by_channel(swept: &Swept, amplitudes: &[f64]) -> Value {
+    let channels = swept.channels.iter().zip(amplitudes);
+    channels
+        .map(|(channel, amplitude)| {
+            (format!("{}_{}", channel.name(), channel.unit()), json!(amplitude))
+        })
+        .collect()
+}
+
+fn of_swept(swept: &Swept) -> Value {
+    let ratios = swept.channels.iter().zip(&swept.verdict.ratios);
+    let greatest = swept.verdict.greatest;
+    json!({
+        "status": swept.status,
+        "fail_time_s": swept.fail_time_s,
+        "reliable": swept.verdict.reliable,
+        "ratio_limit": swept.ratio_limit,
+        "ratio_max": greatest.map(|(_, ratio)| ratio),
+        "ratio_max_channel": greatest.map(|(channel, _)| swept.channels[channel].name()),
+        "ratios": ratios
+            .map(|(channel, ratio)| (channel.name().to_owned(), json!(ratio)))
+            .collect::<Value>(),
+        "nonlinear": by_channel(swept, &swept.amplitudes[0]),
+        "linear": by_channel(swept, &swept.amplitudes[1]),
+        "window_s": swept.window_s,
+    })
+}
+
+fn of_tongue(found: &Explanation, tongue: &Tongue, passages: &[Passage]) -> Value {
+    let at = &tongue.at;
+    json!({
+        "from_rpm": tongue.from_to_rpm[0],
+        "to_rpm": tongue.from_to_rpm[1],
+        "ends": tongue.ends.map(end),
+        "kind": at.kind().name(),
+        "growth_per_s": at.growth_per_s(),
+        "growth_at_rpm": at.speed_rpm,
+        "frequency_cpm": at.frequency_cpm(),
+        "other_frequency_cpm": at.speed_rpm - at.frequency_cpm(),
+        "modes": at.participants.iter().map(participant).collect::<Value>(),
+        "resonance": tongue.resonance.as_ref().map(resonance),
+        "crossed": passages.iter().map(passage).collect::<Value>(),
+        "closed_by": tongue.closing.map(closing),
+        "out_of_profile_by_cpm": tongue.resonance.map(|resonance| {
+            resonance.rise_cpm(found.profile_rpm[1] - tongue.from_to_rpm[0])
+        }),
+    })
+}
+
+const fn end(end: End) -> &'static str {
+    match end {
+        End::Edge => "edge",
+        End::OtherKind => "other_kind",
+        End::Range => "range",
+        End::NoResponse => "no_response",
+    }
+}
+
+fn participant(mode: &Participant) -> Value {
+    json!({
+        "mode": mode.mode,
+        "name": mode.motion.to_string(),
+        "frequency_cpm": mode.frequency_cpm,
+        "share": mode.share,
+    })
+}
+
+fn resonance(resonance: &Resonance) -> Value {
+    json!({
+        "modes": resonance.modes,
+        "frequencies_cpm": resonance.frequencies_cpm,
+        "sign": resonance.sign,
+        "sum_cpm": resonance.sum_cpm(),
+        "order": resonance.order,
+        "sum_per_speed": resonance.slope,
+    })
+}
+
+fn passage(passage: &Passage) -> Value {
+    let crossed = passage.crossed.as_ref();
+    json!({
+        "from_s": passage.from_to_s[0],
+        "to_s": passage.from_to_s[1],
+        "is_cut_by_the_end": passage.is_cut,
+        "e_folds": passage.e_folds,
+        "amplification": crossed.ok().map(|crossed| crossed.amplification),
+        "departure_j": crossed.ok().map(|crossed| crossed.departure_j),
+        "left_range_at_s": crossed.err().map(|left| left.time_s),
+    })
+}
+
+fn closing(closing: Closing) -> Value {
+    match closing {
+        Closing::Factor(factor, damping) => {
+            json!({ "damping_factor": factor, "damping_n_s_per_m": damping })
+        }
+        Closing::NotUpTo(factor) => json!({ "damping_factor_above": factor }),
+        Closing::NoDampers => Value::Null,
+    }
+}

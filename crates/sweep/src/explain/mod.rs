@@ -1,0 +1,231 @@
+//! Why the linear model fails at a point: the tongues of instability that its run crosses, and what
+//! they do to the run.
+
+pub(crate) mod json;
+mod profile;
+mod tongue;
+pub(crate) mod words;
+
+use lane_ode::Simd;
+use washer_model::{
+    Cases, Channel, Crossed, Crossing, LeftRange, NoEquilibrium, Point, Response, Timing, cross,
+    modes, peaks_without_departures, prepare,
+};
+
+use crate::config::NamedValues;
+use crate::engine::{ModelEngine, reference_step_s};
+use crate::exit::Error;
+use crate::plan::{Plan, Scenario};
+use crate::speeds::Speeds;
+use crate::verdict::{ROW_STATUSES, Verdict, row_status};
+
+use tongue::{Asker, tongues};
+pub(crate) use tongue::{Closing, End, Resonance, Tongue};
+
+/// Distance between the speeds that are looked at (rpm), unless `--speed` says another.
+const STEP_RPM: f64 = 1.0;
+
+/// Speeds from this share of the slowest mode's frequency are looked at, unless `--speed` says
+/// others. Parametric resonances of a mode f are at 2 f / k: this is the fourth.
+const LOWEST_SHARE: f64 = 0.5;
+
+/// What is found at a point.
+pub(crate) struct Explanation {
+    /// The grid's name.
+    pub(crate) name: String,
+    /// The point: parameters by name.
+    pub(crate) at: NamedValues,
+    /// The swept verdict.
+    pub(crate) swept: Swept,
+    /// The speeds that were looked at.
+    pub(crate) looked: Speeds,
+    /// How many of them have no response.
+    pub(crate) without_response: usize,
+    /// From lowest to fastest speed of the profile within the run (rpm).
+    pub(crate) profile_rpm: [f64; 2],
+    /// Each, with the times at which the run crosses it.
+    pub(crate) tongues: Vec<(Tongue, Vec<Passage>)>,
+    /// The same run, each tongue entered on its periodic response: amplitudes in the window, per
+    /// channel of the plan; none where no tongue is crossed before the window ends.
+    pub(crate) without_departures: Option<Result<Vec<f64>, LeftRange>>,
+}
+
+/// What `sweep run` says of the point.
+pub(crate) struct Swept {
+    pub(crate) channels: Vec<Channel>,
+    pub(crate) window_s: [f64; 2],
+    pub(crate) ratio_limit: f64,
+    /// One of the result file's.
+    pub(crate) status: &'static str,
+    pub(crate) fail_time_s: Option<f64>,
+    /// Amplitudes by the nonlinear and the linear model, per channel; empty of a model that failed.
+    pub(crate) amplitudes: [Vec<f64>; 2],
+    pub(crate) verdict: Verdict,
+}
+
+impl Swept {
+    /// The greatest ratio of other amplitudes of the nonlinear model to the linear one's.
+    pub(crate) fn greatest_of(&self, nonlinear: &[f64]) -> Option<(f64, Channel)> {
+        let pairs = nonlinear.iter().zip(&self.amplitudes[1]).zip(&self.channels);
+        let ratios = pairs
+            .filter(|((_, linear), _)| **linear != 0.0)
+            .map(|((nonlinear, linear), channel)| (nonlinear / linear, *channel));
+        ratios.reduce(|most, next| if next.0 > most.0 { next } else { most })
+    }
+}
+
+/// A stretch of time in which the profile is inside a tongue.
+pub(crate) struct Passage {
+    /// From when to when (s).
+    pub(crate) from_to_s: [f64; 2],
+    /// Whether the run ends inside.
+    pub(crate) is_cut: bool,
+    /// The integral over it of the growth at the speed of each instant.
+    pub(crate) e_folds: f64,
+    /// What it does to disturbances.
+    pub(crate) crossed: Result<Crossed, LeftRange>,
+}
+
+/// Explains a plan's one point, on all threads of the rayon pool that it is called in.
+///
+/// # Errors
+/// A profile without a speed to look at, a machine without equilibrium or modes, and an instruction
+/// set that is not there.
+pub(crate) fn explain(
+    plan: &Plan,
+    at: NamedValues,
+    speeds: Option<Speeds>,
+    simd: Simd,
+) -> Result<Explanation, Error> {
+    let scenario = plan.scenario(0);
+    let profile_rpm = profile::range(&scenario.spin, plan.end_s)?;
+    let point = ready(simd, plan, &scenario)?;
+    let looked = match speeds {
+        Some(speeds) => speeds,
+        None => looked(&point, profile_rpm[1])?,
+    };
+    let asker = Asker { simd, plan, scenario: &scenario, point: &point };
+    let (found, swept) = rayon::join(|| tongues(&asker, looked), || swept(plan));
+    let ((found, without_response), swept) = (found, swept?);
+    let (crossings, closings) = rayon::join(
+        || crossings(&asker, &found, &swept),
+        || found.iter().map(|tongue| tongue.closing(&asker)).collect::<Vec<_>>(),
+    );
+    let (passages, without_departures) = crossings;
+    let tongues = found.into_iter().zip(closings).zip(passages);
+    let tongues = tongues.map(|((tongue, closing), passages)| {
+        (Tongue { closing: Some(closing), ..tongue }, passages)
+    });
+    Ok(Explanation {
+        name: plan.name.clone(),
+        at,
+        looked,
+        without_response,
+        profile_rpm,
+        tongues: tongues.collect(),
+        without_departures,
+        swept,
+    })
+}
+
+/// A machine with its spin, ready to be integrated.
+fn ready(simd: Simd, plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilibrium> {
+    let timing = Timing { end_s: plan.end_s, window_s: scenario.window_s, checkpoints: 0 };
+    prepare(simd, &[(scenario.machine.clone(), scenario.spin.clone())], &timing).remove(0)
+}
+
+/// The profile's speeds from half of the slowest mode's frequency up.
+fn looked(point: &Point, fastest_rpm: f64) -> Result<Speeds, Error> {
+    let slowest_rpm = modes(point, 0.0, 0.0)?.modes[0].frequency_rpm();
+    let from_rpm = (LOWEST_SHARE * slowest_rpm).floor().max(1.0);
+    if fastest_rpm > from_rpm {
+        return Ok(Speeds::new(from_rpm, fastest_rpm, STEP_RPM));
+    }
+    Err(Error::Option {
+        option: "[spin]",
+        given: format!("at most {fastest_rpm:.3} rpm"),
+        expected: format!(
+            "a profile that exceeds {from_rpm} rpm, half of the slowest mode's frequency, within \
+             the run; to look at other speeds, give --speed FROM:TO:STEP"
+        ),
+    })
+}
+
+fn swept(plan: &Plan) -> Result<Swept, Error> {
+    let scenario = plan.scenario(0);
+    let channels = plan.reliability.channels.clone();
+    let mut outcomes = ModelEngine::new(plan)?.evaluate_at(&[Vec::new()]);
+    let outcome = outcomes.remove(0);
+    let (status, fail_time_s) = row_status(&outcome);
+    let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.ratio_limit);
+    Ok(Swept {
+        channels,
+        window_s: scenario.window_s,
+        ratio_limit: plan.reliability.ratio_limit,
+        status: ROW_STATUSES[status],
+        fail_time_s,
+        amplitudes: [outcome.nonlinear.amplitudes, outcome.linear.amplitudes],
+        verdict,
+    })
+}
+
+type WithoutDepartures = Option<Result<Vec<f64>, LeftRange>>;
+
+/// When the run crosses each tongue and what comes of it; and the amplitudes of the run that enters
+/// them on their periodic responses.
+fn crossings(
+    asker: &Asker<'_>,
+    tongues: &[Tongue],
+    swept: &Swept,
+) -> (Vec<Vec<Passage>>, WithoutDepartures) {
+    let spin = &asker.scenario.spin;
+    let end_s = asker.plan.end_s;
+    // In order of time, with the tongue of each.
+    let mut times: Vec<(usize, [f64; 2])> = tongues
+        .iter()
+        .enumerate()
+        .flat_map(|(k, tongue)| {
+            let inside = profile::times_inside_s(spin, end_s, tongue.from_to_rpm);
+            inside.into_iter().map(move |from_to_s| (k, from_to_s))
+        })
+        .collect();
+    times.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+    for i in 1..times.len() {
+        // Neighbours share an edge, found twice.
+        times[i].1[0] = times[i].1[0].max(times[i - 1].1[1]);
+    }
+    let speeds: Vec<f64> =
+        spin.speeds_rpm(times.iter().flat_map(|(_, from_to_s)| *from_to_s)).collect();
+    let responses: Vec<Option<Response>> = asker.responses(&speeds);
+    let crossings: Vec<Crossing<'_>> = times
+        .iter()
+        .zip(responses.chunks(2))
+        .map(|((_, from_to_s), responses)| Crossing {
+            from_to_s: *from_to_s,
+            responses: [responses[0].as_ref(), responses[1].as_ref()],
+        })
+        .collect();
+    let step_s = reference_step_s(&Cases::new([(asker.point, spin)], end_s));
+    let before_end = |crossing: &&Crossing<'_>| crossing.from_to_s[0] < swept.window_s[1];
+    let (crossed, peaks) = rayon::join(
+        || cross(asker.point, step_s, &crossings),
+        || {
+            crossings.iter().find(before_end)?;
+            let peaks = peaks_without_departures(asker.point, step_s, &crossings, swept.window_s);
+            let of_plan = |peaks: [f64; Channel::ALL.len()]| {
+                swept.channels.iter().map(|channel| peaks[channel.index()]).collect()
+            };
+            Some(peaks.map(of_plan))
+        },
+    );
+    let mut passages: Vec<Vec<Passage>> = tongues.iter().map(|_| Vec::new()).collect();
+    for ((k, from_to_s), crossed) in times.into_iter().zip(crossed) {
+        passages[k].push(Passage {
+            from_to_s,
+            is_cut: from_to_s[1] >= end_s,
+            e_folds: profile::e_folds(spin, from_to_s, &tongues[k].growths),
+            crossed,
+        });
+    }
+    (passages, peaks)
+}

@@ -1,0 +1,176 @@
+//! The spin profile in time: its range, and when it is within a band of speeds.
+
+use washer_model::{Spin, decimal};
+
+use crate::exit::Error;
+
+/// Even instants at which a profile is looked at; it is smooth between kinks.
+const INSTANTS: usize = 4000;
+
+/// Halvings of a stretch between two instants.
+const HALVINGS: usize = 50;
+
+/// Parts of a passage over which growth is integrated.
+const PARTS: usize = 1000;
+
+/// Lowest and fastest speed (rpm) up to the run's end.
+///
+/// # Errors
+/// [`Error::Option`] where the drum turns backwards.
+pub(super) fn range(spin: &Spin, end_s: f64) -> Result<[f64; 2], Error> {
+    let times = instants_s(spin, end_s);
+    let speeds = spin.speeds_rpm(times.iter().copied());
+    let (mut least, mut most, mut least_at_s) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+    for (speed, &at_s) in speeds.zip(&times) {
+        if speed < least {
+            (least, least_at_s) = (speed, at_s);
+        }
+        most = most.max(speed);
+    }
+    if least < 0.0 {
+        return Err(Error::Option {
+            option: "[spin]",
+            given: format!("{least:.3} rpm at {} s", decimal(least_at_s)),
+            expected: "a drum that turns forwards or stands, at 0 rpm or more: the machine is not \
+                       the same backwards, and responses are found for forward speeds; explain a \
+                       profile that turns one way"
+                .to_owned(),
+        });
+    }
+    // As they were written, without the last bits of the way through rad/s.
+    Ok([least, most].map(|rpm| (1e9 * rpm).round() / 1e9))
+}
+
+/// Even instants, and the kinks between them.
+fn instants_s(spin: &Spin, end_s: f64) -> Vec<f64> {
+    let mut times: Vec<f64> =
+        (0..=INSTANTS).map(|k| end_s * (k as f64 / INSTANTS as f64)).collect();
+    let kinks = match spin {
+        Spin::Cycloidal { ramp_s, .. } | Spin::Ramp { ramp_s, .. } => vec![*ramp_s],
+        Spin::Triangular { ramp_s, .. } => vec![*ramp_s, 2.0 * ramp_s],
+        Spin::Table { time_s, .. } => time_s.clone(),
+    };
+    times.extend(kinks.into_iter().filter(|&kink_s| kink_s < end_s));
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    times
+}
+
+/// The stretches of time (s) in which the speed is within a band (rpm), in order.
+pub(super) fn times_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2]) -> Vec<[f64; 2]> {
+    let speed = |at_s: f64| spin.speeds_rpm([at_s]).next().unwrap_or(0.0);
+    let is_inside = |at_s: f64| (low..=high).contains(&speed(at_s));
+    let times = instants_s(spin, end_s);
+    let mut stretches: Vec<[f64; 2]> = Vec::new();
+    let mut since_s = is_inside(0.0).then_some(0.0);
+    for pair in times.windows(2) {
+        let [from_s, to_s] = [pair[0], pair[1]];
+        let (was, is) = (since_s.is_some(), is_inside(to_s));
+        // A ramp may pass the whole band between two instants.
+        let (from_rpm, to_rpm) = (speed(from_s), speed(to_s));
+        let passes = !was && !is && (from_rpm < low) != (to_rpm < low);
+        if passes {
+            let up = from_rpm < to_rpm;
+            let below = |edge: f64| move |speed: f64| (speed < edge) == up;
+            let (first, last) = if up { (low, high) } else { (high, low) };
+            let at = |edge: f64| turning_s(&|at_s| below(edge)(speed(at_s)), from_s, to_s);
+            stretches.push([at(first), at(last)]);
+        } else if was != is {
+            let at_s = turning_s(&|at_s| is_inside(at_s) == was, from_s, to_s);
+            match since_s.take() {
+                Some(since_s) => stretches.push([since_s, at_s]),
+                None => since_s = Some(at_s),
+            }
+        }
+    }
+    stretches.extend(since_s.map(|since_s| [since_s, end_s]));
+    stretches.retain(|[from_s, to_s]| to_s > from_s);
+    stretches
+}
+
+/// Where something that holds at the one time ceases to hold before the other.
+fn turning_s(holds: &dyn Fn(f64) -> bool, mut from_s: f64, mut to_s: f64) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle_s = 0.5 * (from_s + to_s);
+        if holds(middle_s) { from_s = middle_s } else { to_s = middle_s }
+    }
+    0.5 * (from_s + to_s)
+}
+
+/// The integral over time of the growth at the speed of each instant; of `growths` (rpm, 1/s) in
+/// order of speed, straight between them.
+pub(super) fn e_folds(spin: &Spin, [from_s, to_s]: [f64; 2], growths: &[[f64; 2]]) -> f64 {
+    let part_s = (to_s - from_s) / PARTS as f64;
+    let middles = (0..PARTS).map(|k| from_s + (k as f64 + 0.5) * part_s);
+    spin.speeds_rpm(middles).map(|speed| part_s * growth_at(growths, speed)).sum()
+}
+
+fn growth_at(growths: &[[f64; 2]], speed_rpm: f64) -> f64 {
+    let above = growths.partition_point(|[rpm, _]| *rpm < speed_rpm);
+    match (above.checked_sub(1).map(|below| growths[below]), growths.get(above)) {
+        (Some([low, at_low]), Some([high, at_high])) if high > &low => {
+            at_low + (at_high - at_low) * (speed_rpm - low) / (high - low)
+        }
+        (Some([_, growth]), _) => growth,
+        (None, Some([_, growth])) => *growth,
+        (None, None) => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(points: &[(f64, f64)]) -> Spin {
+        Spin::Table {
+            time_s: points.iter().map(|point| point.0).collect(),
+            speed_rpm: points.iter().map(|point| point.1).collect(),
+        }
+    }
+
+    fn close(a: f64, b: f64) -> bool {
+        (a - b).abs() < 1e-9 * b.abs().max(1.0)
+    }
+
+    #[test]
+    fn a_band_is_crossed_up_and_down() {
+        let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+        let inside = times_inside_s(&spin, 100.0, [140.0, 210.0]);
+        assert_eq!(inside.len(), 2);
+        for (found, meant) in inside.iter().flatten().zip([20.0, 30.0, 70.0, 80.0]) {
+            assert!(close(*found, meant), "{found} {meant}");
+        }
+        // Cut short by the run's end, and from the start of a run that begins inside.
+        let inside = times_inside_s(&spin, 25.0, [140.0, 210.0]);
+        assert!(inside.len() == 1 && close(inside[0][0], 20.0) && inside[0][1] == 25.0);
+        assert_eq!(times_inside_s(&table(&[(0.0, 200.0)]), 9.0, [140.0, 210.0]), [[0.0, 9.0]]);
+        assert!(times_inside_s(&spin, 100.0, [400.0, 500.0]).is_empty());
+    }
+
+    #[test]
+    fn a_band_is_seen_however_quickly_it_is_passed() {
+        let spin = table(&[(0.0, 0.0), (50.0, 0.0), (50.001, 400.0), (70.0, 400.0), (70.01, 0.0)]);
+        let inside = times_inside_s(&spin, 100.0, [100.0, 200.0]);
+        assert_eq!(inside.len(), 2);
+        for (found, meant) in inside.iter().flatten().zip([50.00025, 50.0005, 70.005, 70.0075]) {
+            assert!(close(*found, meant), "{found} {meant}");
+        }
+    }
+
+    #[test]
+    fn e_folds_are_the_area_under_growth_over_time() {
+        let spin = Spin::Ramp { peak_rpm: 100.0, ramp_s: 10.0 };
+        // A triangle of 20 rpm, which take 2 s, and a height of 0.5 /s.
+        let growths = [[40.0, 0.0], [50.0, 0.5], [60.0, 0.0]];
+        assert!((e_folds(&spin, [4.0, 6.0], &growths) - 0.5).abs() < 1e-5);
+        assert_eq!(growth_at(&growths, 30.0), 0.0);
+    }
+
+    #[test]
+    fn backwards_is_refused_with_its_time() {
+        let refused = range(&table(&[(0.0, 0.0), (3.0, 100.0), (6.0, -50.0)]), 10.0).unwrap_err();
+        let text = refused.to_string();
+        assert!(text.contains("-50.000 rpm at 6 s") && text.contains("forwards"), "{text}");
+        assert_eq!(range(&table(&[(0.0, 0.0), (3.0, 100.0)]), 10.0).unwrap(), [0.0, 100.0]);
+    }
+}

@@ -1,0 +1,412 @@
+//! An explanation in words.
+
+use std::fmt::Write as _;
+
+use washer_model::{Channel, Kind, LeftRange, decimal};
+
+use super::{Closing, End, Explanation, Passage, Resonance, Swept, Tongue};
+
+/// Where a line ends.
+const WIDTH: usize = 96;
+
+/// Width of the names before the text.
+const MARGIN: usize = 10;
+
+/// A text of lines with a name each; what follows in a paragraph is put beneath its start.
+#[derive(Default)]
+struct Text(String);
+
+impl Text {
+    fn line(&mut self, name: &str, words: &str) {
+        let mut line = format!("{name:>MARGIN$} ");
+        let mut is_empty = true;
+        for word in words.split_whitespace() {
+            if !is_empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
+                self.end(&line);
+                line = " ".repeat(MARGIN + 1);
+            }
+            line.push(' ');
+            line.push_str(word);
+            is_empty = false;
+        }
+        self.end(&line);
+    }
+
+    fn end(&mut self, line: &str) {
+        self.0.push_str(line.trim_end());
+        self.0.push('\n');
+    }
+}
+
+/// All of it.
+pub(crate) fn of(found: &Explanation) -> String {
+    let mut text = Text::default();
+    let at: Vec<String> =
+        found.at.iter().map(|(name, value)| format!("{name} {}", decimal(*value))).collect();
+    let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
+    text.end(&format!("{}{place}", found.name));
+    verdict(&mut text, &found.swept);
+    let [from, to] = [found.looked.from, found.looked.to].map(decimal);
+    if found.tongues.is_empty() {
+        text.line(
+            "dwells",
+            &format!(
+                "the periodic response is stable at every speed from {from} to {to} rpm, where \
+                 there is one"
+            ),
+        );
+    } else {
+        text.line(
+            "dwells",
+            &format!(
+                "the periodic response is unstable in {} from {from} to {to} rpm:",
+                match found.tongues.len() {
+                    1 => "one band of speed (a \"tongue\")".to_owned(),
+                    count => format!("{count} bands of speed (\"tongues\")"),
+                }
+            ),
+        );
+    }
+    for (tongue, passages) in &found.tongues {
+        text.end("");
+        of_tongue(&mut text, found, tongue, passages);
+    }
+    text.end("");
+    judgement(&mut text, found);
+    limits(&mut text, found);
+    text.0
+}
+
+fn milli(value: f64, channel: Channel) -> String {
+    format!("{} m{}", significant(1e3 * value), channel.unit())
+}
+
+/// Three digits that count.
+fn significant(value: f64) -> String {
+    let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    if !(-3.0..6.0).contains(&magnitude) {
+        return format!("{value:.2e}");
+    }
+    format!("{value:.*}", (2.0 - magnitude).max(0.0) as usize)
+}
+
+fn verdict(text: &mut Text, swept: &Swept) {
+    let [from, to] = swept.window_s.map(decimal);
+    let Some((place, ratio)) = swept.verdict.greatest else {
+        let when = swept.fail_time_s.map_or(String::new(), |at| format!(" at {at:.3} s"));
+        let why = match swept.status {
+            "ok" => "every linear amplitude is zero".to_owned(),
+            status => format!("the run ends as `{status}`{when}"),
+        };
+        text.line("swept", &format!("no ratio is defined: {why}"));
+        return;
+    };
+    let channel = swept.channels[place];
+    let word = if swept.verdict.reliable == Some(true) { "reliable" } else { "not reliable" };
+    let amplitudes: Vec<String> = swept
+        .amplitudes
+        .iter()
+        .filter_map(|of| of.get(place).map(|value| milli(*value, channel)))
+        .collect();
+    text.line(
+        "swept",
+        &format!(
+            "the linear model is {word}: most in {}, where the nonlinear motion is {} times the \
+             linear one ({} from {from} to {to} s); the limit is {}",
+            channel.name(),
+            significant(ratio),
+            amplitudes.join(" against "),
+            decimal(swept.ratio_limit)
+        ),
+    );
+    let others: Vec<String> = swept
+        .channels
+        .iter()
+        .zip(&swept.verdict.ratios)
+        .filter(|(of, _)| **of != channel)
+        .map(|(of, ratio)| match ratio {
+            Some(ratio) => format!("{} {}", of.name(), significant(*ratio)),
+            None => format!("{} none", of.name()),
+        })
+        .collect();
+    if !others.is_empty() {
+        text.line("ratios", &others.join(", "));
+    }
+}
+
+fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[Passage]) {
+    let at = &tongue.at;
+    let kind = match at.kind() {
+        Kind::PeriodDoubling => "its period doubles",
+        Kind::QuasiPeriodic => "two frequencies grow that no turn locks",
+        Kind::Fold => "it jumps to another motion",
+        Kind::Stable => "it is stable",
+    };
+    let [from, to] = tongue.from_to_rpm;
+    text.line(
+        "tongue",
+        &format!(
+            "{from:.2} to {to:.2} rpm: {kind}, at up to {:.4} /s at {:.2} rpm{}",
+            at.growth_per_s(),
+            at.speed_rpm,
+            ends(tongue)
+        ),
+    );
+    let (low, high) = (at.frequency_cpm(), at.speed_rpm - at.frequency_cpm());
+    let lines = match at.kind() {
+        Kind::PeriodDoubling => format!("at half the speed, {low:.2} per minute"),
+        Kind::Fold => "none beside those of the turn".to_owned(),
+        Kind::QuasiPeriodic | Kind::Stable => {
+            format!("at {low:.2} and {high:.2} per minute, which add up to the speed")
+        }
+    };
+    text.line("lines", &lines);
+    for mode in &at.participants {
+        text.line(
+            "mode",
+            &format!(
+                "{}, {}: {:.2} per minute at this speed; {:.0} % of the energy",
+                mode.mode,
+                mode.motion,
+                mode.frequency_cpm,
+                100.0 * mode.share
+            ),
+        );
+    }
+    let words = match &tongue.resonance {
+        Some(resonance) => meeting(resonance, at.speed_rpm),
+        None => "no sum or difference of these modes' frequencies is within 5 % of a multiple of \
+                 the speed: what feeds this is not explained"
+            .to_owned(),
+    };
+    text.line("meeting", &words);
+    if passages.is_empty() {
+        let [least, most] = found.profile_rpm.map(decimal);
+        text.line(
+            "crossed",
+            &format!("never: the profile stays between {least} and {most} rpm in this run"),
+        );
+    }
+    for passage in passages {
+        crossed(text, passage);
+    }
+    closes(text, found, tongue);
+}
+
+fn ends(tongue: &Tongue) -> String {
+    let mut words = String::new();
+    for (rpm, end) in tongue.from_to_rpm.iter().zip(tongue.ends) {
+        let why = match end {
+            End::Edge => continue,
+            End::OtherKind => "the motion grows on, in another way",
+            End::Range => "the speeds looked at end, and not the growth",
+            End::NoResponse => "no response is found beyond",
+        };
+        // Writing to a String cannot fail.
+        let _ = write!(words, "; at {rpm:.2} rpm {why}");
+    }
+    words
+}
+
+/// `f1 + f2`, `2 f2` or `f3 - f1`.
+fn sum_words(resonance: &Resonance) -> String {
+    let [a, b] = resonance.modes;
+    match (a == b, resonance.sign > 0.0) {
+        (true, _) => format!("2 f{a}"),
+        (false, true) => format!("f{a} + f{b}"),
+        (false, false) => format!("f{a} - f{b}"),
+    }
+}
+
+fn meeting(resonance: &Resonance, speed_rpm: f64) -> String {
+    let target = match resonance.order {
+        1 => "the speed".to_owned(),
+        order => format!("{order} times the speed"),
+    };
+    let multiple = f64::from(resonance.order) * speed_rpm;
+    let miss = 100.0 * (resonance.sum_cpm() / multiple - 1.0);
+    format!(
+        "{} = {:.2} per minute, against {target}, {multiple:.2} ({miss:+.2} %)",
+        sum_words(resonance),
+        resonance.sum_cpm()
+    )
+}
+
+fn crossed(text: &mut Text, passage: &Passage) {
+    let [from, to] = passage.from_to_s;
+    let cut = if passage.is_cut { ", where the run ends" } else { "" };
+    let mut words = format!(
+        "from {from:.3} to {to:.3} s{cut}: {:.2} e-folds, a factor of {}",
+        passage.e_folds,
+        significant(passage.e_folds.exp())
+    );
+    match &passage.crossed {
+        Err(LeftRange { time_s }) => {
+            let _ = write!(words, "; the run leaves the model's range at {time_s:.3} s");
+        }
+        Ok(crossed) => {
+            let _ = write!(
+                words,
+                "; in truth a small disturbance of the run grows at most {}-fold",
+                significant(crossed.amplification)
+            );
+            if let [Some(before), Some(after)] = crossed.departure_j {
+                let _ = write!(
+                    words,
+                    "; the run's own departure from the periodic response goes from {} to {} mJ, \
+                     a factor of {} in amplitude",
+                    significant(1e3 * before),
+                    significant(1e3 * after),
+                    significant((after / before).sqrt())
+                );
+            }
+        }
+    }
+    text.line("crossed", &words);
+}
+
+fn closes(text: &mut Text, found: &Explanation, tongue: &Tongue) {
+    let damping = match tongue.closing {
+        Some(Closing::Factor(factor, Some(damping))) => {
+            format!("{damping:.1} N s/m in every damper ({factor:.2} times) closes it")
+        }
+        Some(Closing::Factor(factor, None)) => {
+            format!("every damper {factor:.2} times as strong closes it")
+        }
+        Some(Closing::NotUpTo(factor)) => {
+            format!("dampers up to {factor} times as strong do not close it")
+        }
+        Some(Closing::NoDampers) | None => "the machine has no damping to raise".to_owned(),
+    };
+    let shift = tongue.resonance.map(|resonance| {
+        let fastest = found.profile_rpm[1];
+        let [from, to] = tongue.from_to_rpm;
+        let name = sum_words(&resonance);
+        if fastest <= from {
+            return format!("; the profile's {fastest:.0} rpm stay below it");
+        }
+        let above = format!(
+            "; {name} higher by {:.1} per minute moves it above the profile's {} rpm",
+            resonance.rise_cpm(fastest - from),
+            decimal(fastest)
+        );
+        if fastest < to {
+            let lower = -resonance.rise_cpm(fastest - to);
+            return format!(
+                "{above}; lower by {lower:.1} moves it below these, where it is only crossed"
+            );
+        }
+        above
+    });
+    text.line("remedy", &format!("{damping}{}", shift.unwrap_or_default()));
+}
+
+/// What the tongues have to do with the swept verdict.
+fn judgement(text: &mut Text, found: &Explanation) {
+    let swept = &found.swept;
+    let Some(reliable) = swept.verdict.reliable else {
+        text.line("so", "there is no verdict to explain");
+        return;
+    };
+    let words = match &found.without_departures {
+        None if reliable => {
+            "no tongue is crossed before the window ends, and the models agree".to_owned()
+        }
+        None => {
+            "no tongue is crossed before the window ends: what the linear model misses here is \
+                 not explained by an unstable response"
+                .to_owned()
+        }
+        Some(Err(LeftRange { time_s })) => format!(
+            "entered on its periodic responses, the run leaves the model's range at {time_s:.3} s: \
+             the failure does not rest on what earlier resonances left"
+        ),
+        Some(Ok(amplitudes)) => match swept.greatest_of(amplitudes) {
+            None => "entered on its periodic responses, the run has no ratio".to_owned(),
+            Some((ratio, channel)) => {
+                let same = format!(
+                    "the same run, put on the periodic response as it enters each tongue, has a \
+                     ratio of {} in {}",
+                    significant(ratio),
+                    channel.name()
+                );
+                match (reliable, ratio < swept.ratio_limit) {
+                    (false, true) => format!(
+                        "{same}, within the limit: the verdict rests on motion left over from \
+                         before the tongue, and would change with the ramp"
+                    ),
+                    (false, false) => format!(
+                        "{same}, still beyond the limit: the tongues alone make the verdict, \
+                         without what earlier resonances left"
+                    ),
+                    (true, true) => format!(
+                        "{same}: the point is reliable because the ramp is through before a \
+                         disturbance has grown; a dwell inside a tongue would not be"
+                    ),
+                    (true, false) => format!(
+                        "{same}, beyond the limit: here what earlier resonances left keeps the \
+                         motion down by chance"
+                    ),
+                }
+            }
+        },
+    };
+    text.line("so", &words);
+}
+
+fn limits(text: &mut Text, found: &Explanation) {
+    let mut words = format!(
+        "a tongue narrower than {} rpm may be missed. E-folds hold the speed still at each \
+         instant; equal e-folds do not mean equal ratios, and a map's boundary is no tongue's edge",
+        decimal(found.looked.step)
+    );
+    if found.without_response > 0 {
+        let _ = write!(
+            words,
+            ". No response was found at {} of the speeds, which are left out",
+            found.without_response
+        );
+    }
+    text.line("limits", &words);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_digits_count() {
+        let shown = [0.0, 1.0, 12.345, 123.45, 0.01234, 1234.5, 1e-5, 1e7].map(significant);
+        assert_eq!(shown, ["0.00", "1.00", "12.3", "123", "0.0123", "1234", "1.00e-5", "1.00e7"]);
+    }
+
+    #[test]
+    fn long_lines_are_folded_beneath_their_start() {
+        let mut text = Text::default();
+        text.line("name", &"word ".repeat(40));
+        let lines: Vec<&str> = text.0.lines().collect();
+        assert!(lines.len() > 1 && lines.iter().all(|line| line.chars().count() <= WIDTH));
+        assert!(lines[0].starts_with("      name  word"), "{}", lines[0]);
+        assert!(lines[1].starts_with("            word"), "{}", lines[1]);
+    }
+
+    #[test]
+    fn a_resonance_is_named_by_its_modes() {
+        let of = |modes, sign, order| Resonance {
+            modes,
+            frequencies_cpm: [150.0, 100.0],
+            sign,
+            order,
+            slope: 0.1,
+        };
+        assert_eq!(sum_words(&of([2, 2], 1.0, 1)), "2 f2");
+        assert_eq!(sum_words(&of([1, 2], 1.0, 1)), "f1 + f2");
+        assert_eq!(sum_words(&of([2, 1], -1.0, 1)), "f2 - f1");
+        let words = meeting(&of([1, 2], 1.0, 2), 125.0);
+        assert_eq!(
+            words,
+            "f1 + f2 = 250.00 per minute, against 2 times the speed, 250.00 (+0.00 %)"
+        );
+        assert_eq!(of([1, 2], 1.0, 1).rise_cpm(10.0), 9.0);
+    }
+}

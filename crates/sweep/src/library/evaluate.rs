@@ -1,0 +1,189 @@
+//! Points through the engine, into rows in memory.
+
+use std::collections::BTreeMap;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+
+use arrow_array::RecordBatch;
+use arrow_schema::ArrowError;
+use serde_json::json;
+
+use super::Effort;
+use super::points::PointTable;
+use super::result::{MapPlan, ResultTable};
+use crate::engine::{Ladder, ModelEngine, Watch};
+use crate::exit::Error;
+use crate::outcome::Outcome;
+use crate::plan::Plan;
+use crate::progress::Progress;
+use crate::random_keys::draw_random_keys;
+use crate::store::{BATCH_ROWS, Job, Layout, ResultRows, StoreError};
+use crate::threads::{self, ThreadsError};
+use sweep_files::panics;
+
+/// How often progress is shown while rows are computed.
+const SHOWN_EVERY: Duration = Duration::from_millis(100);
+
+/// A plan that is evaluated any number of times. The steps of its method are found once.
+pub struct Evaluator {
+    plan: Plan,
+    ladders: OnceLock<[Ladder; 2]>,
+}
+
+/// What came of an evaluation.
+#[derive(Debug)]
+pub struct Evaluated {
+    /// The rows that were computed, in the order of the points; the column `point` counts from 0.
+    pub table: ResultTable,
+    /// Whether those are all; if not, the interrupt was raised.
+    pub is_whole: bool,
+}
+
+impl Evaluator {
+    /// An evaluator of this plan.
+    #[must_use]
+    pub fn new(plan: Plan) -> Self {
+        Self { plan, ladders: OnceLock::new() }
+    }
+
+    /// The plan.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Evaluates points of a table. A row is the same, bit for bit, whatever the other rows are,
+    /// and the same as that of a run of the plan which has this point.
+    ///
+    /// Beside table and result, memory holds some thousand rows.
+    ///
+    /// # Errors
+    /// Columns or values that do not fit the plan's axes; no threads; `SWEEP_SIMD` naming nothing
+    /// this machine has.
+    pub fn evaluate(&self, table: &PointTable, effort: Effort<'_>) -> Result<Evaluated, Error> {
+        let points = table.on(&self.plan)?;
+        let mut job = Job::of(&self.plan);
+        job.points = table.rows() as u64;
+        job.plan["design"] = json!({
+            "method": "table", "points": job.points, "hash": points.hash(),
+        });
+        job.axis_values = Box::new(|point| points.axis_values(point));
+        self.rows(&job, effort)
+    }
+
+    /// Evaluates every point of the plan, in memory.
+    ///
+    /// # Errors
+    /// As [`Self::evaluate`].
+    pub fn run(&self, effort: Effort<'_>) -> Result<Evaluated, Error> {
+        self.rows(&Job::of(&self.plan), effort)
+    }
+
+    fn rows(&self, job: &Job<'_>, effort: Effort<'_>) -> Result<Evaluated, Error> {
+        draw_random_keys()?;
+        let engine = match self.ladders.get() {
+            Some(ladders) => ModelEngine::with_ladders(&self.plan, ladders.clone())?,
+            None => ModelEngine::new(&self.plan)?,
+        };
+        let threads = effort.threads()?;
+        let pool = threads::pool(threads)?;
+        let watch = Watch::new(effort.interrupt);
+        let next = Mutex::new(0..job.points);
+        let feed = || {
+            let point = if watch.stopped() { None } else { lock(&next).next() }?;
+            Some((point, (job.axis_values)(point)))
+        };
+        let gathered = Gathered::new(job);
+        let keep = |outcome| gathered.keep(outcome, &watch);
+        let mut progress = Progress::new(effort.progress, job.points, 0);
+        std::thread::scope(|scope| {
+            // Hung up when the work is done.
+            let (working, ended) = channel::<()>();
+            let (pool, engine, feed, keep, watch) = (&pool, &engine, &feed, &keep, &watch);
+            let work = move || {
+                let _working = working;
+                pool.install(|| engine.evaluate_rows(feed, keep, watch));
+            };
+            let work = std::thread::Builder::new()
+                .spawn_scoped(scope, work)
+                .map_err(|error| ThreadsError::start(threads + 1)(&error))?;
+            while ended.recv_timeout(SHOWN_EVERY) == Err(RecvTimeoutError::Timeout) {
+                progress.show(watch.points_done());
+            }
+            work.join().map_err(|panic| {
+                let reason = format!("the engine panicked: {}", panics::text(panic.as_ref()));
+                let last = job.points.saturating_sub(1);
+                Error::Store(StoreError::Engine { first: 0, last, reason })
+            })
+        })?;
+        progress.finish();
+        if let Some(found) = engine.ladders_found() {
+            // Another call may have found the same.
+            let _ = self.ladders.set(found.clone());
+        }
+        let is_whole = watch.points_done() == job.points;
+        let batches = gathered.into_batches().map_err(defect(job))?;
+        let plan = MapPlan::of(job, is_whole);
+        Ok(Evaluated { table: ResultTable::of_map(plan, batches), is_whole })
+    }
+}
+
+/// Rows that cannot be put in columns: a defect of this program.
+fn defect(job: &Job<'_>) -> impl Fn(ArrowError) -> StoreError {
+    let last = job.points.saturating_sub(1);
+    move |error| StoreError::Engine { first: 0, last, reason: error.to_string() }
+}
+
+/// Outcomes as they come, and the batches that are whole.
+struct Gathered<'a> {
+    job: &'a Job<'a>,
+    parts: Mutex<BTreeMap<u64, Vec<Outcome>>>,
+    batches: Mutex<BTreeMap<u64, Result<RecordBatch, ArrowError>>>,
+}
+
+impl<'a> Gathered<'a> {
+    fn new(job: &'a Job<'a>) -> Self {
+        Self { job, parts: Mutex::default(), batches: Mutex::default() }
+    }
+
+    fn keep(&self, outcome: Outcome, watch: &Watch<'_>) {
+        const ROWS: u64 = BATCH_ROWS as u64;
+        let place = outcome.point / ROWS;
+        let wanted = ROWS.min(self.job.points - place * ROWS);
+        let mut parts = lock(&self.parts);
+        let part = parts.entry(place).or_default();
+        part.push(outcome);
+        if part.len() as u64 == wanted {
+            let outcomes = parts.remove(&place).unwrap_or_default();
+            drop(parts);
+            let batch = self.batch(outcomes);
+            lock(&self.batches).insert(place, batch);
+        }
+        watch.done(1);
+    }
+
+    fn batch(&self, mut outcomes: Vec<Outcome>) -> Result<RecordBatch, ArrowError> {
+        outcomes.sort_by_key(|outcome| outcome.point);
+        let layout: &Layout = &self.job.layout;
+        let mut rows = ResultRows::new(layout);
+        for outcome in outcomes {
+            rows.push((self.job.axis_values)(outcome.point), outcome);
+        }
+        rows.take()
+    }
+
+    /// All batches in order, of what is there.
+    fn into_batches(self) -> Result<Vec<RecordBatch>, ArrowError> {
+        let parts = std::mem::take(&mut *lock(&self.parts));
+        let mut batches = std::mem::take(&mut *lock(&self.batches));
+        for (place, outcomes) in parts {
+            batches.insert(place, self.batch(outcomes));
+        }
+        batches.into_values().collect()
+    }
+}
+
+fn lock<T: ?Sized>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,229 @@
+//! The modes of a machine over spin speed, as a table.
+
+use lane_ode::Simd;
+use serde_json::{Value, json};
+use washer_model::{
+    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Spin, Timing, campbell,
+    exact_motions, prepare,
+};
+
+use super::result::{ResultKind, ResultTable};
+use crate::config::{self, GridInput};
+use crate::exit::Error;
+use crate::speeds::MOST_SPEEDS;
+use crate::table::Table;
+use sweep_files::key;
+
+/// The modes of a grid's machine at spin speeds (rpm, rising); `at` gives axes a value, which have
+/// none otherwise. Without a grid, those of the built-in machine.
+///
+/// # Errors
+/// Mistakes in the grid, speeds that do not rise, a machine without equilibrium or modes.
+pub fn find_modes(
+    grid: Option<&GridInput>,
+    at: &[String],
+    speeds_rpm: &[f64],
+) -> Result<ResultTable, Error> {
+    let rise = speeds_rpm.windows(2).all(|pair| pair[0] < pair[1]);
+    let are_speeds = speeds_rpm.iter().all(|speed| speed.is_finite() && *speed >= 0.0);
+    let count = speeds_rpm.len();
+    if !(rise && are_speeds && count > 1 && count as f64 <= MOST_SPEEDS + 1.0) {
+        return Err(Error::Option {
+            option: "speeds",
+            given: format!("with {count} values"),
+            expected: format!(
+                "from 2 to {MOST_SPEEDS} finite speeds in rpm, 0 or greater, each above the one \
+                 before"
+            ),
+        });
+    }
+    let (name, machine, spin) = match grid {
+        None => built_in(speeds_rpm[count - 1]),
+        Some(grid) => {
+            let plan = if at.is_empty() { grid.load()? } else { grid.load_point(at)?.0 };
+            (plan.name, plan.machine, plan.spin)
+        }
+    };
+    let analysis = Analysis::new(&machine, &spin, speeds_rpm, false)?;
+    ResultTable::of_table(ResultKind::Modes, analysis.table(&name, &machine))
+}
+
+/// The built-in machine by its name, on its way to a speed (rpm).
+pub(crate) fn built_in(greatest_rpm: f64) -> (String, Machine, Spin) {
+    ("paper".to_owned(), Machine::paper(), Spin::Ramp { peak_rpm: greatest_rpm, ramp_s: 1.0 })
+}
+
+/// The modes of a machine at spin speeds.
+pub(crate) struct Analysis {
+    pub(crate) speeds_rpm: Vec<f64>,
+    pub(crate) modes: Vec<ModeOverSpeed>,
+    /// Of each speed and mode the exact motion, where it was asked for; none at standstill, where
+    /// theta is frozen indeed, and where a mode was not found at theta = 0.
+    pub(crate) exact: Option<Vec<Vec<Option<Exact>>>>,
+}
+
+impl Analysis {
+    /// The modes at each speed (rpm), with exact motions if wanted.
+    ///
+    /// # Errors
+    /// A machine without equilibrium, or whose modes cannot be computed.
+    pub(crate) fn new(
+        machine: &Machine,
+        spin: &Spin,
+        speeds_rpm: &[f64],
+        is_exact: bool,
+    ) -> Result<Self, Error> {
+        let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
+        let point = prepare(Simd::Scalar, &[(machine.clone(), spin.clone())], &timing).remove(0)?;
+        let modes = campbell(&point, speeds_rpm)?;
+        let exact = if is_exact { Some(exact_over(&point, speeds_rpm, &modes)?) } else { None };
+        Ok(Self { speeds_rpm: speeds_rpm.to_vec(), modes, exact })
+    }
+
+    /// The modes as JSON.
+    pub(crate) fn to_json(&self, name: &str) -> Value {
+        let modes = self.modes.iter().enumerate().map(|(k, mode)| {
+            let mut facts = facts(k, mode);
+            let at = |(i, at): (usize, &ModeAtSpeed)| {
+                let mut at = at_speed(self.speeds_rpm[i], at);
+                if let Some(exact) = self.exact.as_ref().and_then(|exact| exact[i][k]) {
+                    at["exact_frequency_rpm"] = exact.frequency_rpm().into();
+                    at["exact_damping_ratio"] = exact.damping_ratio().into();
+                }
+                at
+            };
+            facts["at_speed"] = mode.at_speed.iter().enumerate().map(at).collect();
+            facts
+        });
+        json!({ "name": name, "modes": modes.collect::<Value>() })
+    }
+
+    /// The modes as columns, with what is known of each in the metadata.
+    pub(crate) fn table(&self, name: &str, machine: &Machine) -> Table {
+        let (speeds, modes) = (&self.speeds_rpm, &self.modes);
+        let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
+        let mut table = Table::default();
+        table.numbers(
+            "speed_rpm",
+            "rpm",
+            "spin of the shaft",
+            rows().map(|(k, _)| Some(speeds[k])),
+        );
+        table.counts(
+            "mode",
+            "number of the mode, by its frequency at the lowest speed",
+            rows().map(|(_, mode)| mode as u64 + 1),
+        );
+        let names: Vec<String> = modes.iter().map(|mode| mode.motion.to_string()).collect();
+        table.words(
+            "name",
+            "what moves, at the first resonance or the lowest speed",
+            rows().map(|(_, mode)| names[mode].as_str()),
+        );
+        let columns: [(&str, &str, &str, fn(&ModeAtSpeed) -> f64); 7] = [
+            (
+                "frequency_rpm",
+                "rpm",
+                "damped natural frequency in cycles per minute, mean over a turn",
+                |at| at.frequency_rpm,
+            ),
+            ("frequency_hz", "Hz", "the same in cycles per second", |at| at.frequency_rpm / 60.0),
+            ("damping_ratio", "1", "share of critical damping, mean over a turn", |at| {
+                at.damping_ratio
+            }),
+            ("eigenvalue_re", "1/s", "real part of the eigenvalue, mean over a turn", |at| {
+                at.re_per_s
+            }),
+            (
+                "eigenvalue_im",
+                "rad/s",
+                "imaginary part of the eigenvalue, mean over a turn",
+                |at| at.im_rad_per_s,
+            ),
+            ("frequency_min_rpm", "rpm", "least damped natural frequency over a turn", |at| {
+                at.least_rpm
+            }),
+            ("frequency_max_rpm", "rpm", "greatest damped natural frequency over a turn", |at| {
+                at.greatest_rpm
+            }),
+        ];
+        for (column, unit, description, of) in columns {
+            table.numbers(
+                column,
+                unit,
+                description,
+                rows().map(|(k, mode)| Some(of(&modes[mode].at_speed[k]))),
+            );
+        }
+        let columns: [(&str, &str, &str, fn(&Exact) -> f64); 2] = [
+            (
+                "exact_frequency_rpm",
+                "rpm",
+                "frequency by the linear model's Floquet exponent over whole turns, nearest to \
+                 frequency_rpm; null at standstill",
+                Exact::frequency_rpm,
+            ),
+            ("exact_damping_ratio", "1", "share of critical damping by it", Exact::damping_ratio),
+        ];
+        for (column, unit, description, of) in self.exact.as_ref().map_or(&[][..], |_| &columns[..])
+        {
+            let values = rows().map(|(k, mode)| self.exact.as_ref()?[k][mode].as_ref().map(of));
+            table.numbers(column, unit, description, values);
+        }
+        let plan = json!({ "name": name, "machine": config::machine_json(machine) });
+        table.metadata(key::PLAN, &plan);
+        let all: Value = modes.iter().enumerate().map(|(k, mode)| facts(k, mode)).collect();
+        table.metadata(key::MODES, &all);
+        table
+    }
+}
+
+/// The exact motions beside modes.
+fn exact_over(
+    point: &Point,
+    speeds_rpm: &[f64],
+    modes: &[ModeOverSpeed],
+) -> Result<Vec<Vec<Option<Exact>>>, Error> {
+    let at = |(k, &speed): (usize, &f64)| -> Result<Vec<Option<Exact>>, Error> {
+        if speed == 0.0 {
+            return Ok(vec![None; modes.len()]);
+        }
+        let motions = exact_motions(point, speed)?;
+        let of = |mode: &ModeOverSpeed| {
+            motions.iter().find(|motion| motion.frozen.shape == mode.at_speed[k].shape).copied()
+        };
+        Ok(modes.iter().map(of).collect())
+    };
+    speeds_rpm.iter().enumerate().map(at).collect()
+}
+
+/// A mode's name, what it moves, its resonances.
+fn facts(k: usize, mode: &ModeOverSpeed) -> Value {
+    let resonance =
+        |resonance: &washer_model::Resonance| at_speed(resonance.speed_rpm, &resonance.mode);
+    let motion = &mode.motion;
+    json!({
+        "mode": k + 1,
+        "name": motion.to_string(),
+        "participation": {
+            "translation_vertical": motion.vertical_translation,
+            "translation_horizontal": motion.horizontal_translation,
+            "rocking_horizontal": motion.yaw,
+            "rocking_vertical": motion.pitch,
+        },
+        "resonances": mode.resonances.iter().map(resonance).collect::<Value>(),
+    })
+}
+
+fn at_speed(speed_rpm: f64, at: &ModeAtSpeed) -> Value {
+    let coordinates = (0..COORDINATES).map(|i| (format!("q{}", i + 1), json!(at.shape[i])));
+    json!({
+        "speed_rpm": speed_rpm,
+        "frequency_rpm": at.frequency_rpm,
+        "frequency_min_rpm": at.least_rpm,
+        "frequency_max_rpm": at.greatest_rpm,
+        "damping_ratio": at.damping_ratio,
+        "eigenvalue": [at.re_per_s, at.im_rad_per_s],
+        "shape": coordinates.collect::<serde_json::Map<_, _>>(),
+    })
+}

@@ -1,0 +1,126 @@
+//! Points in memory: a table whose columns are parameters and whose rows are points.
+
+use std::sync::Arc;
+
+use arrow_array::{Array as _, ArrayRef, Float64Array, RecordBatch};
+use arrow_schema::{DataType, Schema};
+
+use crate::config::{Diagnostics, check_columns, not_numbers};
+use crate::plan::Plan;
+use sweep_files::cells;
+
+/// A table of points, column by column. Columns of `f64` are taken as they are, without a copy.
+#[derive(Clone, Debug)]
+pub struct PointTable {
+    names: Vec<String>,
+    /// Of each column, its part of each batch.
+    columns: Vec<Vec<Float64Array>>,
+    /// The first row of each batch.
+    starts: Vec<usize>,
+    rows: usize,
+}
+
+impl PointTable {
+    /// From batches of a schema; those of a stream, or of a table in one piece.
+    ///
+    /// # Errors
+    /// [`Diagnostics`] for a column that holds no numbers.
+    pub fn new(schema: &Schema, batches: &[RecordBatch]) -> Result<Self, Diagnostics> {
+        let names: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
+        let mut starts = Vec::with_capacity(batches.len());
+        let mut rows = 0;
+        for batch in batches {
+            starts.push(rows);
+            rows += batch.num_rows();
+        }
+        let mut columns = Vec::with_capacity(names.len());
+        for (k, field) in schema.fields().iter().enumerate() {
+            let refused = || not_numbers(&names, k, &field.data_type().to_string());
+            if !cells::is_number(field.data_type()) {
+                return Err(refused());
+            }
+            let parts = batches.iter().map(|batch| as_numbers(batch.column(k)));
+            columns.push(parts.collect::<Option<Vec<_>>>().ok_or_else(refused)?);
+        }
+        Ok(Self { names, columns, starts, rows })
+    }
+
+    /// From columns of equal length, each with its name.
+    ///
+    /// # Errors
+    /// [`Diagnostics`] for a column of another length than the first.
+    pub fn from_columns(columns: Vec<(String, Vec<f64>)>) -> Result<Self, Diagnostics> {
+        let rows = columns.first().map_or(0, |(_, values)| values.len());
+        let names: Vec<String> = columns.iter().map(|(name, _)| name.clone()).collect();
+        if let Some(k) = columns.iter().position(|(_, values)| values.len() != rows) {
+            return Err(crate::config::other_length(&names, k, columns[k].1.len(), rows));
+        }
+        let columns = columns.into_iter().map(|(_, values)| vec![values.into()]).collect();
+        Ok(Self { names, columns, starts: vec![0], rows })
+    }
+
+    /// How many points.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// A column's values in order.
+    fn values(&self, column: usize) -> impl Iterator<Item = Option<f64>> {
+        self.columns[column].iter().flatten()
+    }
+
+    fn value(&self, column: usize, row: usize) -> f64 {
+        let batch = self.starts.partition_point(|&start| start <= row) - 1;
+        self.columns[column][batch].value(row - self.starts[batch])
+    }
+
+    /// The points as those of a plan.
+    ///
+    /// # Errors
+    /// Every column that is unknown, no axis of the plan or missing, and every value off its axis.
+    pub(super) fn on<'a>(&'a self, plan: &'a Plan) -> Result<PointsOnAxes<'a>, Diagnostics> {
+        let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
+        let columns = check_columns(plan, &names, |column| self.values(column))?;
+        Ok(PointsOnAxes { table: self, plan, columns })
+    }
+}
+
+/// A table's column as numbers, if it holds such.
+fn as_numbers(column: &ArrayRef) -> Option<Float64Array> {
+    match column.data_type() {
+        DataType::Float64 => column.as_any().downcast_ref::<Float64Array>().cloned(),
+        _ => Some(cells::numbers(&Arc::clone(column)).ok()?.into()),
+    }
+}
+
+/// A table's points with the axes in a plan's order.
+pub(super) struct PointsOnAxes<'a> {
+    table: &'a PointTable,
+    plan: &'a Plan,
+    columns: Vec<Option<usize>>,
+}
+
+impl PointsOnAxes<'_> {
+    /// The value of each axis at a point.
+    pub(super) fn axis_values(&self, point: u64) -> Vec<f64> {
+        // A row of the table, whose rows are counted by `usize`.
+        let row = usize::try_from(point).unwrap_or(usize::MAX);
+        let value = |(axis, column): (&crate::plan::Axis, &Option<usize>)| match column {
+            Some(column) => self.table.value(*column, row),
+            None => axis.values.value(0),
+        };
+        self.plan.axes.iter().zip(&self.columns).map(value).collect()
+    }
+
+    /// BLAKE3 hash of the values, row by row, hexadecimal.
+    pub(super) fn hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        for row in 0..self.table.rows as u64 {
+            for value in self.axis_values(row) {
+                hasher.update(&value.to_bits().to_le_bytes());
+            }
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+}

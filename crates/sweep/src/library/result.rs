@@ -1,0 +1,232 @@
+//! Results in memory: rows as columns, and the file that they are or would be.
+
+use std::path::{Path, PathBuf};
+
+use arrow_array::RecordBatch;
+use arrow_schema::{Schema, SchemaRef};
+use serde_json::Value;
+
+use crate::exit::Error;
+use crate::identity;
+use crate::store::{Job, Layout, StoreError, write_map};
+use crate::table::Table;
+use sweep_files::{FileError, FileKind, Output, ParquetFile, key};
+use sweep_plot::{PlotOptions, render};
+
+/// What a result is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResultKind {
+    /// One row a point: of a run, or of an evaluation.
+    Map,
+    /// Where a quantity is at its limit.
+    Boundary,
+    /// Time histories at one point.
+    Trace,
+    /// Modes over spin speed.
+    Modes,
+}
+
+impl ResultKind {
+    /// In one word.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Map => "map",
+            Self::Boundary => "boundary",
+            Self::Trace => "trace",
+            Self::Modes => "modes",
+        }
+    }
+
+    const fn file(self) -> FileKind<'static> {
+        match self {
+            Self::Map => FileKind::Map,
+            Self::Boundary => FileKind::Boundary,
+            Self::Trace => FileKind::Trace,
+            Self::Modes => FileKind::Modes,
+        }
+    }
+}
+
+/// A result with its rows in memory.
+#[derive(Debug)]
+pub struct ResultTable {
+    kind: ResultKind,
+    plan: Value,
+    schema: SchemaRef,
+    batches: Vec<RecordBatch>,
+    file: FileContent,
+}
+
+/// Where a result's file is, or what it is made of.
+#[derive(Debug)]
+enum FileContent {
+    /// On disk.
+    At(PathBuf),
+    /// These bytes.
+    Bytes(Vec<u8>),
+    /// The rows, by the rules of a map's file.
+    Rows(Box<MapPlan>),
+}
+
+/// What a map's file says beside its rows.
+#[derive(Debug)]
+pub(super) struct MapPlan {
+    plan: Value,
+    points: u64,
+    layout: Layout,
+    is_whole: bool,
+}
+
+impl MapPlan {
+    pub(super) fn of(job: &Job<'_>, is_whole: bool) -> Self {
+        let (plan, layout) = (job.plan.clone(), job.layout.clone());
+        Self { plan, points: job.points, layout, is_whole }
+    }
+}
+
+impl ResultTable {
+    /// A map of these rows.
+    pub(super) fn of_map(map: MapPlan, batches: Vec<RecordBatch>) -> Self {
+        Self {
+            kind: ResultKind::Map,
+            plan: map.plan.clone(),
+            schema: map.layout.schema(),
+            batches,
+            file: FileContent::Rows(Box::new(map)),
+        }
+    }
+
+    /// A small result.
+    pub(super) fn of_table(kind: ResultKind, table: Table) -> Result<Self, Error> {
+        let plan = table.plan();
+        let (batch, bytes) =
+            table.finish().map_err(StoreError::parquet("write", Path::new("a table")))?;
+        let (schema, batches) = (batch.schema(), vec![batch]);
+        Ok(Self { kind, plan, schema, batches, file: FileContent::Bytes(bytes) })
+    }
+
+    /// Reads a result file of any kind, and checks its digest.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is damaged, or is no result of this program.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let file = ParquetFile::open(path)?;
+        let not_ours = || FileError::NotParquet {
+            path: path.to_path_buf(),
+            reason: "it is no result of this program".to_owned(),
+        };
+        let plan = file.value(key::PLAN).and_then(|plan| serde_json::from_str(plan).ok());
+        let plan = plan.ok_or_else(not_ours)?;
+        let has = |key| file.value(key).is_some();
+        let kind = match () {
+            () if has(key::BOUNDARY) => ResultKind::Boundary,
+            () if has(key::TRACE) => ResultKind::Trace,
+            () if has(key::MODES) => ResultKind::Modes,
+            () => ResultKind::Map,
+        };
+        let batches = file.batches(|builder| builder)?.collect::<Result<Vec<_>, _>>()?;
+        // The file's own keys are no part of the rows' schema.
+        let schema = SchemaRef::new(Schema::new(file.schema().fields().clone()));
+        let alike = |batch: RecordBatch| batch.with_schema(SchemaRef::clone(&schema));
+        let batches = batches.into_iter().map(alike).collect::<Result<Vec<_>, _>>();
+        let batches = batches.map_err(|error| FileError::NotParquet {
+            path: path.to_path_buf(),
+            reason: error.to_string(),
+        })?;
+        Ok(Self { kind, plan, schema, batches, file: FileContent::At(path.to_path_buf()) })
+    }
+
+    /// What it is.
+    #[must_use]
+    pub fn kind(&self) -> ResultKind {
+        self.kind
+    }
+
+    /// The plan as JSON, as the file carries it.
+    #[must_use]
+    pub fn plan(&self) -> &Value {
+        &self.plan
+    }
+
+    /// The columns: names, types, and in each field's metadata `unit` and `description`.
+    #[must_use]
+    pub fn schema(&self) -> &SchemaRef {
+        &self.schema
+    }
+
+    /// The rows.
+    #[must_use]
+    pub fn batches(&self) -> &[RecordBatch] {
+        &self.batches
+    }
+
+    /// How many rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.batches.iter().map(RecordBatch::num_rows).sum()
+    }
+
+    /// Writes the Parquet file: the bytes that the command writes.
+    ///
+    /// # Errors
+    /// A path that holds something else, what the file system refuses, and the rows of an
+    /// evaluation that was interrupted, which are no result.
+    pub fn save(&self, path: &Path) -> Result<(), Error> {
+        match &self.file {
+            FileContent::Rows(map) => Ok(map.write(&self.batches, path)?),
+            FileContent::Bytes(_) | FileContent::At(_) => {
+                self.finish(Output::begin(path, self.kind.file())?)
+            }
+        }
+    }
+
+    /// Writes a small result, or a copy of the file that this one is, to an output already begun.
+    pub(super) fn finish(&self, output: Output<'_>) -> Result<(), Error> {
+        match &self.file {
+            FileContent::Bytes(bytes) => Ok(output.finish(bytes)?),
+            FileContent::At(source) => {
+                let bytes = std::fs::read(source).map_err(FileError::io("read", source))?;
+                Ok(output.finish(&bytes)?)
+            }
+            FileContent::Rows(_) => Ok(()),
+        }
+    }
+
+    /// Draws the figure of it; the output's ending (`.svg`, `.png`, `.html`) says how.
+    ///
+    /// # Errors
+    /// As [`sweep_plot::render`] and [`Self::save`].
+    pub fn draw(&self, options: &PlotOptions, output: &Path) -> Result<(), Error> {
+        if let FileContent::At(path) = &self.file {
+            return Ok(render(path, options, output)?);
+        }
+        let here = Path::new("a temporary folder");
+        let folder = tempfile::tempdir().map_err(FileError::io("make", here))?;
+        let path = folder.path().join("result.parquet");
+        self.save(&path)?;
+        Ok(render(&path, options, output)?)
+    }
+}
+
+impl MapPlan {
+    fn write(&self, batches: &[RecordBatch], path: &Path) -> Result<(), Error> {
+        if !self.is_whole {
+            let rows: usize = batches.iter().map(RecordBatch::num_rows).sum();
+            return Err(Error::Option {
+                option: "save",
+                given: format!("with {rows} of {} rows", self.points),
+                expected: "a result that was not interrupted".to_owned(),
+            });
+        }
+        let job = Job {
+            plan: self.plan.clone(),
+            version: identity::VERSION,
+            numerics: identity::NUMERICS_VERSION,
+            points: self.points,
+            layout: self.layout.clone(),
+            axis_values: Box::new(|_| Vec::new()),
+        };
+        Ok(write_map(&job, batches, path)?)
+    }
+}

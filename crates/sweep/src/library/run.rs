@@ -1,0 +1,58 @@
+//! A run into a file, as the command's.
+
+use std::path::Path;
+
+use super::Effort;
+use super::result::ResultTable;
+use crate::engine::ModelEngine;
+use crate::exit::Error;
+use crate::plan::Plan;
+use crate::random_keys::draw_random_keys;
+use crate::run::{self as runner, Ended, RunOptions};
+use crate::store::Job;
+
+/// How a run into a file ended.
+#[derive(Debug)]
+pub enum RanToFile {
+    /// The file is in place; these are its rows.
+    Whole(ResultTable),
+    /// The interrupt was raised. What is done is kept, and the same call goes on.
+    Interrupted {
+        /// Points that are there.
+        kept: u64,
+        /// Of how many.
+        points: u64,
+    },
+}
+
+/// Runs a plan into a result file: the same bytes as `sweep run`, resumed if it was interrupted.
+/// The whole of it, also in a task of a Slurm array.
+///
+/// # Errors
+/// Everything that keeps the command from its end; finished chunks are kept whatever it is.
+pub fn run_to_file(
+    plan: &Plan,
+    output: &Path,
+    fresh: bool,
+    tell: &dyn Fn(&str),
+    effort: Effort<'_>,
+) -> Result<RanToFile, Error> {
+    draw_random_keys()?;
+    let (engine, job) = (ModelEngine::new(plan)?, Job::of(plan));
+    let options = RunOptions {
+        threads: effort.threads()?,
+        fresh,
+        shard: None,
+        progress: effort.progress,
+        environment: &|_| None,
+        tell,
+    };
+    let report = runner::run(&engine, &job, output, options, effort.interrupt)?;
+    report.notes.iter().for_each(|note| tell(note));
+    match report.ended {
+        Ended::Already(..) | Ended::Finished(_) => Ok(RanToFile::Whole(ResultTable::read(output)?)),
+        Ended::Interrupted { kept, points, .. } => Ok(RanToFile::Interrupted { kept, points }),
+        // Only what a scheduler's variables say makes a shard of a run.
+        Ended::Shard(_) => Ok(RanToFile::Interrupted { kept: 0, points: plan.points() }),
+    }
+}

@@ -1,0 +1,110 @@
+//! `--speed FROM:TO:STEP`: even spin speeds.
+
+use std::fmt;
+use std::str::FromStr;
+
+use washer_model::decimal;
+
+/// Most speeds that are accepted: an hour of computing.
+pub(crate) const MOST_SPEEDS: f64 = 100_000.0;
+
+/// Even speeds, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Speeds {
+    /// First (rpm).
+    pub from: f64,
+    /// Last (rpm).
+    pub to: f64,
+    /// Between two (rpm).
+    pub(crate) step: f64,
+}
+
+impl fmt::Display for Speeds {
+    /// As it is written on a command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", decimal(self.from), decimal(self.to), decimal(self.step))
+    }
+}
+
+impl FromStr for Speeds {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Option<Vec<f64>> =
+            text.split(':').map(|part| part.trim().parse().ok()).collect();
+        let Some([from, to, step]) = numbers.as_deref() else {
+            return Err("expected FROM:TO:STEP in rpm, as in 0:1200:10".to_owned());
+        };
+        let (from, to, step) = (*from, *to, *step);
+        let count = (to - from) / step;
+        if !(from >= 0.0 && to > from && step > 0.0 && to.is_finite()) {
+            return Err(
+                "expected speeds of 0 rpm or more, TO above FROM, and a STEP above 0".to_owned()
+            );
+        }
+        if count > MOST_SPEEDS {
+            return Err(format!("these are {count:.0} speeds, expected at most {MOST_SPEEDS}"));
+        }
+        Ok(Self { from, to, step })
+    }
+}
+
+impl Speeds {
+    /// From one speed to a greater one, in steps above 0.
+    pub(crate) const fn new(from: f64, to: f64, step: f64) -> Self {
+        Self { from, to, step }
+    }
+
+    /// The speeds (rpm); the last is the end itself.
+    pub(crate) fn values(self) -> Vec<f64> {
+        // The quotient may come out a hair beside the whole number that was meant.
+        let steps = ((self.to - self.from) / self.step * (1.0 - 1e-12)).ceil().max(1.0) as usize;
+        (0..=steps)
+            .map(|k| if k == steps { self.to } else { self.from + k as f64 * self.step })
+            .collect()
+    }
+}
+
+/// Speeds at which the drum turns.
+///
+/// # Errors
+/// What is no such range, in words.
+pub(crate) fn turning(text: &str) -> Result<Speeds, String> {
+    let speeds: Speeds = text.parse()?;
+    if speeds.from > 0.0 {
+        return Ok(speeds);
+    }
+    Err("expected speeds above 0 rpm, as in 60:400:1: a drum that does not turn has no turn to \
+         answer over"
+        .to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speeds_are_even_and_end_where_told() {
+        let values = |text: &str| text.parse::<Speeds>().map(Speeds::values);
+        assert_eq!(values("0:40:10").unwrap(), [0.0, 10.0, 20.0, 30.0, 40.0]);
+        assert_eq!(values("0:25:10").unwrap(), [0.0, 10.0, 20.0, 25.0]);
+        assert_eq!(values("5:6:100").unwrap(), [5.0, 6.0]);
+        assert_eq!(values("0:0.3:0.1").unwrap().len(), 4);
+        for (text, said) in [
+            ("", "FROM:TO:STEP"),
+            ("0:1", "FROM:TO:STEP"),
+            ("0:x:1", "FROM:TO:STEP"),
+            ("10:0:1", "TO above FROM"),
+            ("-1:10:1", "0 rpm or more"),
+            ("0:10:0", "STEP above 0"),
+            ("0:nan:1", "TO above FROM"),
+            ("0:inf:1", "TO above FROM"),
+            ("0:1e9:1", "at most"),
+        ] {
+            let refused = values(text).unwrap_err();
+            assert!(refused.contains(said), "{text}: {refused}");
+        }
+        assert!(turning("0:10:1").unwrap_err().contains("above 0 rpm"));
+        assert!(turning("-5:10:1").is_err() && turning("5:10:1").is_ok());
+    }
+}

@@ -1,0 +1,211 @@
+//! Tongues: runs of speeds at which a response is unstable, found in the rows of a stability file.
+
+use std::fmt::Write as _;
+
+use arrow_schema::ArrowError;
+use washer_model::decimal;
+
+use crate::store::StoreError;
+use sweep_files::{ParquetFile, cells};
+
+/// Tongues that a summary lists.
+const MOST_LISTED: usize = 12;
+
+/// What is read of a row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Row {
+    pub(crate) point: f64,
+    pub(crate) speed_rpm: f64,
+    /// Not finite where there is no response.
+    pub(crate) growth_per_s: f64,
+    pub(crate) frequency_cpm: f64,
+    pub(crate) kind: String,
+    /// What moves in the modes that take part, and their numbers.
+    pub(crate) modes: Vec<(f64, String)>,
+    pub(crate) status: String,
+}
+
+/// A run of unstable speeds of one point.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tongue {
+    /// The row of the largest growth.
+    pub(crate) at: Row,
+    /// First and last unstable speed (rpm).
+    pub(crate) from_to_rpm: [f64; 2],
+}
+
+/// What a file says as a whole.
+#[derive(Debug, Default)]
+pub(crate) struct Summary {
+    rows: u64,
+    points: u64,
+    without: u64,
+    unstable: u64,
+    tongues: Vec<Tongue>,
+    last: Option<Row>,
+}
+
+impl Summary {
+    /// Takes in the next row.
+    pub(crate) fn add(&mut self, row: Row) {
+        self.rows += 1;
+        let same_point = self.last.as_ref().is_some_and(|last| last.point == row.point);
+        let follows = same_point && self.last.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
+        self.points += u64::from(!same_point);
+        self.without += u64::from(row.status != "ok");
+        if row.growth_per_s > 0.0 {
+            self.unstable += 1;
+            match self.tongues.last_mut() {
+                // One tongue ends where the kind changes, even if the next begins at once.
+                Some(tongue) if follows && tongue.at.kind == row.kind => {
+                    tongue.from_to_rpm[1] = row.speed_rpm;
+                    if row.growth_per_s > tongue.at.growth_per_s {
+                        tongue.at = row.clone();
+                    }
+                }
+                _ => self
+                    .tongues
+                    .push(Tongue { at: row.clone(), from_to_rpm: [row.speed_rpm, row.speed_rpm] }),
+            }
+        }
+        self.last = Some(row);
+    }
+
+    /// In words, a line each with its name.
+    pub(crate) fn lines(&self) -> Vec<(&'static str, String)> {
+        let mut lines = vec![(
+            "stable",
+            format!(
+                "{} of {} rows, {} not, {} without a response; {} points",
+                self.rows - self.unstable - self.without,
+                self.rows,
+                self.unstable,
+                self.without,
+                self.points
+            ),
+        )];
+        // All of one point; else the worst, each point by its number.
+        let mut listed: Vec<&Tongue> = self.tongues.iter().collect();
+        if self.points > 1 {
+            listed.sort_by(|a, b| b.at.growth_per_s.total_cmp(&a.at.growth_per_s));
+        }
+        for tongue in listed.iter().take(MOST_LISTED) {
+            lines.push(("unstable", self.words(tongue)));
+        }
+        if listed.len() > MOST_LISTED {
+            lines.push(("", format!("and {} more tongues", listed.len() - MOST_LISTED)));
+        }
+        lines
+    }
+
+    fn words(&self, tongue: &Tongue) -> String {
+        let Tongue { at, from_to_rpm: [from, to] } = tongue;
+        let mut text = String::new();
+        if self.points > 1 {
+            // Writing to a String cannot fail.
+            let _ = write!(text, "point {}: ", at.point);
+        }
+        let speed = decimal(at.speed_rpm);
+        let _ = write!(
+            text,
+            "{} to {} rpm, {}, up to {:.4} /s at {speed} rpm ({:.1} and {:.1} per minute)",
+            decimal(*from),
+            decimal(*to),
+            at.kind.replace('_', " "),
+            at.growth_per_s,
+            at.frequency_cpm,
+            at.speed_rpm - at.frequency_cpm
+        );
+        for (number, name) in &at.modes {
+            let _ = write!(text, "; mode {number}: {name}");
+        }
+        text
+    }
+}
+
+/// Reads through a stability file.
+///
+/// # Errors
+/// [`StoreError::File`] and [`StoreError::Parquet`].
+pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, StoreError> {
+    let failed = StoreError::parquet("read", file.path());
+    let mut summary = Summary::default();
+    for batch in file.batches(|builder| builder)? {
+        let batch = batch?;
+        let missing = |name: &str| ArrowError::SchemaError(format!("there is no column {name}"));
+        let numbers =
+            |name: &str| cells::numbers(batch.column_by_name(name).ok_or_else(|| missing(name))?);
+        let words =
+            |name: &str| cells::texts(batch.column_by_name(name).ok_or_else(|| missing(name))?);
+        let mut add = || -> Result<(), ArrowError> {
+            let [point, speed, growth, frequency, mode_1, mode_2] =
+                ["point", "speed_rpm", "growth_per_s", "frequency_cpm", "mode_1", "mode_2"]
+                    .map(numbers);
+            let [kind, name_1, name_2, status] =
+                ["kind", "mode_1_name", "mode_2_name", "status"].map(words);
+            let (point, speed, growth, frequency) = (point?, speed?, growth?, frequency?);
+            let modes = [(mode_1?, name_1?), (mode_2?, name_2?)];
+            let (kind, status) = (kind?, status?);
+            for i in 0..batch.num_rows() {
+                let number = |of: &[Option<f64>]| of[i].unwrap_or(f64::NAN);
+                let word = |of: &[Option<&str>]| of[i].unwrap_or_default().to_owned();
+                let named = modes.iter().filter_map(|(numbers, names)| {
+                    Some((numbers[i]?, names[i].unwrap_or_default().to_owned()))
+                });
+                summary.add(Row {
+                    point: number(&point),
+                    speed_rpm: number(&speed),
+                    growth_per_s: number(&growth),
+                    frequency_cpm: number(&frequency),
+                    kind: word(&kind),
+                    modes: named.collect(),
+                    status: word(&status),
+                });
+            }
+            Ok(())
+        };
+        add().map_err(|error| failed(error.into()))?;
+    }
+    Ok(summary)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tongues_are_runs_of_one_point_and_kind() {
+        let mut summary = Summary::default();
+        let rows = [
+            (0.0, 1.0, -0.1, "stable"),
+            (0.0, 2.0, 0.1, "quasi_periodic"),
+            (0.0, 3.0, 0.3, "quasi_periodic"),
+            (0.0, 4.0, 0.2, "period_doubling"),
+            (1.0, 1.0, 0.2, "period_doubling"),
+            (1.0, 2.0, f64::NAN, ""),
+            (1.0, 3.0, 0.1, "fold"),
+        ];
+        for (point, speed_rpm, growth_per_s, kind) in rows {
+            let status = if growth_per_s.is_nan() { "no_response" } else { "ok" };
+            summary.add(Row {
+                point,
+                speed_rpm,
+                growth_per_s,
+                kind: kind.to_owned(),
+                status: status.to_owned(),
+                ..Row::default()
+            });
+        }
+        let found: Vec<_> =
+            summary.tongues.iter().map(|t| (t.from_to_rpm, t.at.speed_rpm)).collect();
+        assert_eq!(
+            found,
+            [([2.0, 3.0], 3.0), ([4.0, 4.0], 4.0), ([1.0, 1.0], 1.0), ([3.0, 3.0], 3.0)]
+        );
+        let lines = summary.lines();
+        assert_eq!(lines[0].1, "1 of 7 rows, 5 not, 1 without a response; 2 points");
+        assert!(
+            lines[1].1.starts_with("point 0: 2 to 3 rpm, quasi periodic, up to 0.3000 /s at 3")
+        );
+    }
+}

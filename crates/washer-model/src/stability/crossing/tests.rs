@@ -1,0 +1,105 @@
+use super::super::{Dwell, respond};
+use super::*;
+use crate::machine::Machine;
+use crate::machine::spin::Spin;
+use crate::point::{Timing, prepare};
+
+const STEP_S: f64 = 2e-4;
+
+fn point(spin: Spin) -> Point {
+    let timing = Timing { end_s: 4.0, window_s: [0.0, 4.0], checkpoints: 0 };
+    prepare(Simd::best(), &[(Machine::paper(), spin)], &timing).remove(0).unwrap()
+}
+
+/// A run that gains speed until 2 s, and is held from there.
+fn ramp() -> Point {
+    point(Spin::Ramp { peak_rpm: 250.0, ramp_s: 2.0 })
+}
+
+#[test]
+fn the_tangent_map_is_what_nearby_runs_do() {
+    let point = ramp();
+    let at_rest = <Nonlinear<f64> as Model<f64>>::at_rest(&point);
+    let entry = run(&point, STEP_S, [0.0, 1.8], &at_rest).end;
+    // Over the profile's kink.
+    let crossing = Crossing { from_to_s: [1.8, 2.2], responses: [None, None] };
+    let map = Simd::dispatch_narrow(Tangent {
+        point: &point,
+        step_s: STEP_S,
+        crossing: &crossing,
+        entry: &entry,
+    });
+    let end = |disturbance: f64, place: usize| {
+        let mut start = entry;
+        start[place] += disturbance;
+        run(&point, STEP_S, crossing.from_to_s, &start).end
+    };
+    for place in 0..STATES {
+        let size = if place < COORDINATES { 1e-7 } else { 1e-5 };
+        let (above, below) = (end(size, place), end(-size, place));
+        let largest = map[place].iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
+        for i in 0..STATES {
+            let slope = (above[i] - below[i]) / (2.0 * size);
+            let apart = (slope - map[place][i]).abs() / largest;
+            assert!(apart < 1e-6, "{place} {i}: {slope} {}", map[place][i]);
+        }
+    }
+}
+
+#[test]
+fn a_crossing_of_no_length_amplifies_nothing() {
+    let point = ramp();
+    let crossing = Crossing { from_to_s: [1.0, 1.0 + 1e-9], responses: [None, None] };
+    let crossed = cross(&point, STEP_S, &[crossing])[0].unwrap();
+    assert!((crossed.amplification - 1.0).abs() < 1e-4, "{crossed:?}");
+    assert_eq!(crossed.departure_j, [None, None]);
+}
+
+#[test]
+fn a_run_on_its_response_departs_by_nothing() {
+    let point = point(Spin::Table { time_s: vec![0.0], speed_rpm: vec![225.0] });
+    let response = respond(Simd::best(), &[Dwell { point: &point, speed_rpm: 225.0 }]);
+    let response = response.into_iter().next().unwrap().unwrap();
+    for at_s in [0.0_f64, 0.1, 0.2, 1.0] {
+        let followed = run(&point, STEP_S, [0.0, at_s.max(1e-12)], &response.start).end;
+        let expected = response_at(&point, STEP_S, &response, at_s);
+        let apart = core::array::from_fn(|i| followed[i] - expected[i]);
+        let whole = core::array::from_fn(|i| {
+            expected[i] - if i < COORDINATES { point.equilibrium()[i] } else { 0.0 }
+        });
+        let energy = Energy::new(&point, at_s);
+        let share = energy.of(&apart) / energy.of(&whole);
+        assert!(share < 1e-6, "{at_s}: {share}");
+    }
+}
+
+#[test]
+fn peaks_are_of_the_window_and_of_the_run_that_was_put_on_its_response() {
+    let point = ramp();
+    let at_rest = <Nonlinear<f64> as Model<f64>>::at_rest(&point);
+    let plain = run(&point, STEP_S, [0.0, 3.0], &at_rest).peaks;
+    let late = run(&point, STEP_S, [0.0, 1.0], &at_rest);
+    let late = run(&point, STEP_S, [1.0, 3.0], &late.end).peaks;
+    let whole = peaks_without_departures(&point, STEP_S, &[], [0.0, 3.0]).unwrap();
+    let part = peaks_without_departures(&point, STEP_S, &[], [1.0, 3.0]).unwrap();
+    for i in 0..CHANNELS {
+        assert!((whole[i] / plain[i] - 1.0).abs() < 1e-6);
+        assert!((part[i] / late[i] - 1.0).abs() < 1e-6);
+    }
+    // The ramp of two seconds leaves much that the response has not.
+    let response = respond(Simd::best(), &[Dwell { point: &point, speed_rpm: 225.0 }]);
+    let response = response.into_iter().next().unwrap().unwrap();
+    let crossing = Crossing { from_to_s: [1.8, 2.2], responses: [Some(&response), None] };
+    let quiet = peaks_without_departures(&point, STEP_S, &[crossing], [1.9, 3.0]).unwrap();
+    assert!(quiet.iter().zip(&plain).all(|(quiet, plain)| quiet < plain), "{quiet:?} {plain:?}");
+}
+
+#[test]
+fn a_run_that_leaves_its_range_says_when() {
+    let point = ramp();
+    // A speed that no suspension holds.
+    let mut start = <Nonlinear<f64> as Model<f64>>::at_rest(&point);
+    start[COORDINATES] = 1e4;
+    let failure = run(&point, STEP_S, [0.0, 1.0], &start).failure.unwrap();
+    assert!(failure.time_s > 0.0 && failure.time_s < 1.0, "{failure}");
+}

@@ -1,0 +1,287 @@
+//! Friction, stops, bushings, stiffening springs and further unbalances: against independent time
+//! histories and closed forms, and what a machine pays that has none.
+
+use super::instruments::{paper, ready};
+use super::reference::reference;
+use crate::coordinates::COORDINATES;
+use crate::{
+    BumpStop, Bushing, Channel, Damper, Machine, Method, ModelKind, Point, Spin, Spring, Start,
+    Unbalance, history, simulate,
+};
+use core::f64::consts::PI;
+use lane_ode::Simd;
+use serde_json::Value;
+
+/// The speed amplitude of the linear model's friction, where a test does not care.
+const LINEAR_SPEED_M_PER_S: f64 = 0.3;
+
+fn three(values: &[f64]) -> [f64; 3] {
+    [values[0], values[1], values[2]]
+}
+
+fn rows(case: &Value, key: &str) -> Vec<Vec<f64>> {
+    let rows = case[key].as_array().into_iter().flatten();
+    rows.map(|row| row.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()).collect()
+}
+
+/// The machine of a file of `tests/reference`, by the keys that its README explains.
+fn machine(case: &Value) -> Machine {
+    let number = |key: &str| case[key].as_f64();
+    let mut machine =
+        paper(number("unbalance_mass_kg").unwrap(), number("damping_n_s_per_m").unwrap());
+    for damper in &mut machine.dampers {
+        damper.friction_n = number("Ff").unwrap_or(0.0);
+        damper.friction_speed_m_per_s = number("vs").unwrap_or(damper.friction_speed_m_per_s);
+        damper.friction_linear_speed_m_per_s = Some(LINEAR_SPEED_M_PER_S);
+    }
+    for spring in &mut machine.springs {
+        spring.cubic_n_per_m3 = number("kc").unwrap_or(0.0);
+    }
+    machine.stops = rows(case, "stops")
+        .iter()
+        .map(|row| BumpStop {
+            tub_m: three(&row[0..3]),
+            direction: three(&row[3..6]),
+            clearance_m: row[6],
+            stiffness_n_per_m: row[7],
+            damping_n_s_per_m: row[8],
+            softness_m: 1e-4,
+        })
+        .collect();
+    machine.bushings = rows(case, "bush")
+        .iter()
+        .map(|row| Bushing {
+            tub_m: three(&row[0..3]),
+            stiffness_n_per_m: three(&row[3..6]),
+            cubic_n_per_m3: three(&row[6..9]),
+            damping_n_s_per_m: three(&row[9..12]),
+        })
+        .collect();
+    machine.further_unbalances = number("m2")
+        .map(|mass_kg| Unbalance {
+            mass_kg,
+            x_m: number("x2").unwrap(),
+            radius_m: number("r2").unwrap(),
+        })
+        .into_iter()
+        .collect();
+    machine
+}
+
+/// The machine of the references that has everything.
+pub(super) fn with_every_element() -> Machine {
+    machine(&reference("elements_all.json"))
+}
+
+/// The case of a reference made ready, and the largest difference from its history as a share of
+/// each channel's peak, by RK4 at two steps.
+fn held_against(name: &str, steps_s: [f64; 2]) -> [f64; 2] {
+    let case = reference(&format!("elements_{name}.json"));
+    let (peak_rpm, ramp_s) = (case["peak_rpm"].as_f64().unwrap(), case["ramp_s"].as_f64().unwrap());
+    let spin = match case["spin"].as_str().unwrap() {
+        "triangular" => Spin::Triangular { peak_rpm, ramp_s },
+        "cycloidal" => Spin::Cycloidal { peak_rpm, ramp_s },
+        other => panic!("{other}"),
+    };
+    let point = ready(machine(&case), spin, case["end_s"].as_f64().unwrap());
+    let at_rest = case["equilibrium_m_rad"].as_array().unwrap();
+    for i in 0..COORDINATES {
+        let expected = at_rest[i].as_f64().unwrap();
+        assert!((point.equilibrium[i] - expected).abs() < 1e-12, "{name}: q{}", i + 1);
+    }
+    let path = format!("{}/tests/reference/elements_{name}.csv", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let rows: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+    let channel = |name: &&str| {
+        let of_name = |channel: &Channel| format!("{}_{}", channel.name(), channel.unit()) == *name;
+        Channel::ALL.into_iter().find(of_name)
+    };
+    let channels: Vec<Channel> = names.iter().filter_map(channel).collect();
+    assert_eq!((names[0], channels.len()), ("time_s", 6));
+    steps_s.map(|step_s| {
+        let method = Method::Rk4 { step_s };
+        let history = history(ModelKind::Nonlinear, &method, &point, &Start::default(), 0.01);
+        assert_eq!(history.len(), rows.len());
+        let mut worst = 0.0_f64;
+        for (column, channel) in channels.iter().enumerate() {
+            let peak = rows.iter().fold(0.0_f64, |peak, row| peak.max(row[column + 1].abs()));
+            for (k, row) in rows.iter().enumerate() {
+                let ours = history.instant(k).unwrap().channels[channel.index()];
+                worst = worst.max((ours - row[column + 1]).abs() / peak);
+            }
+        }
+        worst
+    })
+}
+
+#[test]
+fn val_histories_with_every_element_match_independent_ones() {
+    for name in ["friction", "stops", "gasket_cubic", "second_unbalance", "all"] {
+        let [coarse, fine] = held_against(name, [1e-4, 5e-5]);
+        eprintln!("{name}: {coarse:.1e} of the peak at steps of 1e-4 s, {fine:.1e} at 5e-5 s");
+        assert!(fine < 1e-5, "{name}: {fine:e}");
+    }
+}
+
+/// Beside the closed forms the rotor's inertia deflects the bearings, by 8 kg x 20 m/s^2 / 4e8 N/m
+/// = 4e-7 m. They start without, and ring.
+const BEARINGS_GIVE_M: f64 = 8e-7;
+
+/// A machine that only heaves: every mass centre between the bearings, four springs that hang
+/// straight, and a shaft that hardly bends. And the natural frequency (rad/s) of its heave.
+fn heaving() -> (Machine, f64) {
+    let mut machine = paper(0.0, 0.0);
+    machine.tub.centre_x_m = 0.0;
+    machine.shaft.centre_x_m = 0.0;
+    machine.drum.centre_x_m = 0.0;
+    machine.drum.hinge_x_m = 0.0;
+    machine.unbalance.x_m = 0.0;
+    let spring = |x_m: f64, z_m: f64| Spring {
+        cabinet_m: [x_m, 0.4, z_m],
+        tub_m: [x_m, 0.1, z_m],
+        ..machine.springs[0]
+    };
+    machine.springs =
+        vec![spring(0.2, 0.2), spring(0.2, -0.2), spring(-0.2, 0.2), spring(-0.2, -0.2)];
+    machine.dampers.clear();
+    let mass_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;
+    (machine, (32_000.0 / mass_kg).sqrt())
+}
+
+/// The heights (m above equilibrium) every so long of a heaving machine let go from one.
+fn heights_m(machine: Machine, from_m: f64, every_s: f64, count: u32) -> Vec<f64> {
+    let end_s = every_s * f64::from(count) * (1.0 + 1e-9);
+    let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
+    let point = ready(machine, still, end_s);
+    let mut start = Start::default();
+    (start.deviations[0], start.deviations[2]) = (from_m, from_m);
+    let method = Method::Rk4 { step_s: 2e-5 };
+    let history = history(ModelKind::Nonlinear, &method, &point, &start, every_s);
+    (0..history.len()).map(|k| history.instant(k).unwrap().deviations[0]).collect()
+}
+
+#[test]
+fn friction_takes_the_same_length_off_every_half_swing() {
+    let (mut machine, w_rad_per_s) = heaving();
+    machine.dampers = vec![Damper {
+        cabinet_m: [0.0, -0.4, 0.0],
+        tub_m: [0.0, -0.1, 0.0],
+        damping_n_s_per_m: 0.0,
+        friction_n: 40.0,
+        friction_speed_m_per_s: 1e-4,
+        friction_linear_speed_m_per_s: Some(0.3),
+    }];
+    let heights = heights_m(machine, 0.02, PI / w_rad_per_s, 7);
+    assert_eq!(heights.len(), 8);
+    for (n, height) in heights.iter().enumerate() {
+        let left_m = 0.02 - 2.0 * n as f64 * 40.0 / 32_000.0;
+        let expected = if n % 2 == 0 { left_m } else { -left_m };
+        assert!(
+            (height - expected).abs() < BEARINGS_GIVE_M,
+            "half swing {n}: {height} m, not {expected} m"
+        );
+    }
+}
+
+#[test]
+fn a_stop_turns_a_swing_as_the_stiffer_spring_does() {
+    let (mut machine, w) = heaving();
+    let (stiffness, stop_stiffness) = (32_000.0, 40_000.0);
+    machine.stops = vec![BumpStop {
+        tub_m: [0.0, 0.1, 0.0],
+        // Any length.
+        direction: [0.0, 2.0, 0.0],
+        clearance_m: 0.0,
+        stiffness_n_per_m: stop_stiffness,
+        damping_n_s_per_m: 0.0,
+        softness_m: 1e-6,
+    }];
+    // It is open at rest by how far the machine sags, and its swing from 20 mm below closes it.
+    let gap_m = 9.81 / (w * w);
+    let below_m = 0.02;
+    let stiffer = w * (1.0 + stop_stiffness / stiffness).sqrt();
+    let centre_m = stop_stiffness * gap_m / (stiffness + stop_stiffness);
+    let speed = w * (below_m * below_m - gap_m * gap_m).sqrt();
+    let reach_m = (gap_m - centre_m).hypot(speed / stiffer);
+    let half_s = (-gap_m / below_m).acos() / w
+        + (0.5 * PI - ((gap_m - centre_m) / reach_m).asin()) / stiffer;
+    let heights = heights_m(machine, -below_m, half_s, 6);
+    for (n, height) in heights.iter().enumerate() {
+        let expected = if n % 2 == 0 { -below_m } else { centre_m + reach_m };
+        assert!(
+            (height - expected).abs() < BEARINGS_GIVE_M,
+            "half swing {n}: {height} m, not {expected} m"
+        );
+    }
+}
+
+#[test]
+fn friction_is_the_stated_viscous_damping_in_the_linear_model() {
+    let machine = with_every_element();
+    let mut viscous = machine.clone();
+    for damper in &mut viscous.dampers {
+        damper.damping_n_s_per_m += 4.0 * damper.friction_n / (PI * LINEAR_SPEED_M_PER_S);
+        damper.friction_n = 0.0;
+    }
+    let spin = || Spin::Ramp { peak_rpm: 300.0, ramp_s: 1.0 };
+    let [point, viscous] = [machine, viscous].map(|machine| ready(machine, spin(), 1.0));
+    let matrices = |point: &Point| {
+        let found = point.matrices(0.3, 20.0, 1.0);
+        (found.mass, found.damping, found.stiffness, found.force)
+    };
+    assert_eq!(matrices(&point), matrices(&viscous));
+}
+
+#[test]
+fn linear_forces_of_stops_and_bushings_are_first_order() {
+    let mut machine = with_every_element();
+    machine.dampers.iter_mut().for_each(|damper| damper.friction_n = 0.0);
+    // Closed at rest, and soft enough for a first order.
+    machine.stops[2].clearance_m = 0.01;
+    machine.stops.iter_mut().for_each(|stop| stop.softness_m = 0.05);
+    let point = ready(machine, Spin::Ramp { peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
+    let apart = |size: f64| {
+        let start = Start {
+            deviations: std::array::from_fn(|i| size * (0.3 + 0.1 * i as f64)),
+            speeds: std::array::from_fn(|i| size * (5.0 - i as f64)),
+        };
+        let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
+            history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &start, 0.1).forces(0).unwrap()
+        });
+        assert!(nonlinear.stops_n.iter().any(|push| *push > 100.0), "{nonlinear:?}");
+        let all = |forces: &crate::Forces| {
+            let bushings = forces.bushings_n.concat();
+            [&forces.springs_n[..], &forces.stops_n, &bushings, &forces.cabinet_n].concat()
+        };
+        let pairs = all(&nonlinear).into_iter().zip(all(&linear));
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let (coarse, fine) = (apart(1e-3), apart(1e-4));
+    assert!(coarse > 1e-4, "{coarse}");
+    assert!((coarse / fine - 100.0).abs() < 10.0, "{coarse} {fine}");
+}
+
+#[test]
+fn elements_without_force_and_other_machines_in_the_lanes_leave_the_bits_alone() {
+    let plain = paper(0.6, 90.0);
+    let mut idle = plain.clone();
+    idle.dampers.iter_mut().for_each(|d| d.friction_linear_speed_m_per_s = Some(0.2));
+    let mut rubbing = idle.clone();
+    rubbing.dampers.iter_mut().for_each(|d| d.friction_n = 60.0);
+    rubbing.springs.iter_mut().for_each(|s| s.cubic_n_per_m3 = 1e6);
+    let spin = || Spin::Ramp { peak_rpm: 350.0, ramp_s: 1.0 };
+    let [plain, idle, rubbing] = [plain, idle, rubbing].map(|machine| ready(machine, spin(), 1.5));
+    let method = Method::Rk4 { step_s: 2e-4 };
+    for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
+        let of = |points: &[&Point]| simulate(simd, ModelKind::Nonlinear, &method, points);
+        let [alone, of_idle] = [of(&[&plain])[0], of(&[&idle])[0]];
+        assert_eq!(alone, of_idle, "{simd:?}");
+        let together = of(&[&plain, &rubbing, &idle, &rubbing, &plain]);
+        assert_eq!([together[0], together[2], together[4]], [alone; 3], "{simd:?}");
+        assert_eq!([together[1], together[3]], [of(&[&rubbing])[0]; 2], "{simd:?}");
+        assert!(together[1].amplitudes[0] < 0.8 * alone.amplitudes[0], "{together:?}");
+    }
+}

@@ -1,0 +1,217 @@
+//! From one map to a decision: `require`, `compare`, `export`, rows of `show`, `trace --point`,
+//! `--set` of the grid file's scalars.
+
+use std::fs;
+use std::process::Output;
+
+use serde_json::Value;
+
+use crate::home::{Home, grid, said};
+
+/// A folder with a finished map of six points, `results/short.parquet`.
+fn mapped() -> Home {
+    let home = Home::new(&grid(3, 2));
+    let done = home.sweep(&["run", "g.toml", "--progress", "none"]);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    home
+}
+
+const MAP: &str = "results/short.parquet";
+
+fn code(output: &Output) -> Option<i32> {
+    output.status.code()
+}
+
+fn printed(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
+        panic!("{error} in {}\n{}", printed(output), said(output));
+    })
+}
+
+#[test]
+fn a_gate_opens_or_names_the_rows_and_exits_with_4() {
+    let home = mapped();
+    let opened = home.sweep(&["require", MAP, "ratio_max < 1e6", "count(status == 'ok') == 6"]);
+    assert_eq!(code(&opened), Some(0), "{}", said(&opened));
+    assert!(said(&opened).contains("holds  ratio_max < 1e6: 6 rows"), "{}", said(&opened));
+
+    let closed = home.sweep(&["require", MAP, "unbalance_mass_kg < 0.9", "share(reliable) >= 0"]);
+    assert_eq!(code(&closed), Some(4));
+    let text = said(&closed);
+    assert!(text.contains("FAILS  unbalance_mass_kg < 0.9: 2 of 6 rows false"), "{text}");
+    assert!(text.contains("holds  share(reliable) >= 0"), "{text}");
+
+    let parsed = json(&home.sweep(&["require", MAP, "point < 2", "--json"]));
+    assert_eq!(parsed["holds"], false);
+    assert_eq!(parsed["expressions"][0]["failing"], 4);
+    assert_eq!(parsed["expressions"][0]["offenders"][0]["row"], 2);
+
+    let none = home.sweep(&["require", MAP, "reliable", "--where", "false"]);
+    assert_eq!(code(&none), Some(4));
+    assert!(said(&none).contains("no row"), "{}", said(&none));
+}
+
+#[test]
+fn mistakes_in_a_gate_are_pointed_at_all_of_them() {
+    let home = mapped();
+    let refused = home.sweep(&["require", MAP, "ratio_mx < 2", "reliable = true"]);
+    assert_eq!(code(&refused), Some(2));
+    let text = said(&refused);
+    assert!(text.contains("did you mean `ratio_max`?") && text.contains("expected `==`"), "{text}");
+    let folded = home.sweep(&["require", MAP, "reliable", "--where", "max(ratio_max) > 2"]);
+    assert_eq!(code(&folded), Some(2), "{}", said(&folded));
+    let absent = home.sweep(&["require", "no.parquet", "reliable"]);
+    assert_eq!(code(&absent), Some(1), "{}", said(&absent));
+}
+
+#[test]
+fn show_sorts_filters_and_speaks_json() {
+    let home = mapped();
+    let top = json(&home.sweep(&["show", MAP, "--top", "2", "--by", "ratio_tub_yaw", "--json"]));
+    let rows = top.as_array().expect("rows");
+    let ratios: Vec<f64> = rows.iter().filter_map(|row| row["ratio_tub_yaw"].as_f64()).collect();
+    assert!(ratios.len() == 2 && ratios[0] >= ratios[1], "{top}");
+    let whole = json(&home.sweep(&["show", MAP, "--json"]));
+    assert_eq!(whole["summary"]["points"], 6);
+    assert_eq!(whole["plan"]["name"], "short");
+    let filtered = home.sweep(&["show", MAP, "--where", "damping_n_s_per_m > 200"]);
+    assert_eq!(printed(&filtered).lines().count(), 4, "{}", printed(&filtered));
+    let wrong = home.sweep(&["show", MAP, "--by", "ratio_tub_yw"]);
+    assert_eq!(code(&wrong), Some(2));
+    assert!(said(&wrong).contains("`ratio_tub_yaw`"), "{}", said(&wrong));
+}
+
+#[test]
+fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
+    let home = mapped();
+    let same = home.sweep(&["compare", MAP, MAP, "--fail-on", "any"]);
+    assert_eq!(code(&same), Some(0), "{}", printed(&same));
+    assert!(printed(&same).contains("not at all"), "{}", printed(&same));
+
+    let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--name", "light"];
+    let done = home.sweep(&[&light[..], &["--progress", "none"]].concat());
+    assert_eq!(code(&done), Some(0), "{}", said(&done));
+    let shown = printed(&home.sweep(&["show", "results/light.parquet"]));
+    assert!(shown.contains("--set  tub_mass_kg = 20"), "{shown}");
+
+    let arguments = ["compare", MAP, "results/light.parquet"];
+    let differs = home.sweep(&[&arguments[..], &["--fail-on", "ratio=0", "--json"]].concat());
+    assert_eq!(code(&differs), Some(4), "{}", said(&differs));
+    let found = json(&differs);
+    let paths: Vec<&str> = found["plan"]
+        .as_array()
+        .expect("changes")
+        .iter()
+        .filter_map(|change| change["path"].as_str())
+        .collect();
+    assert!(paths.contains(&"machine.tub.mass_kg") && paths.contains(&"set"), "{paths:?}");
+    assert_eq!(found["rows"]["in_both"], 6);
+
+    let markdown = printed(&home.sweep(&[&arguments[..], &["--markdown"]].concat()));
+    assert!(markdown.starts_with("### `results/light.parquet` compared with"), "{markdown}");
+    let written = home.sweep(&[&arguments[..], &["--out", "d.parquet"]].concat());
+    assert_eq!(code(&written), Some(0), "{}", said(&written));
+    for quantity in ["ratio-change", "gap-change"] {
+        let drawn = home.sweep(&["plot", "d.parquet", "-o", "d.svg", "--quantity", quantity]);
+        assert_eq!(code(&drawn), Some(0), "{}", said(&drawn));
+    }
+    let refused = home.sweep(&["compare", MAP, "d.parquet"]);
+    assert_eq!(code(&refused), Some(2), "{}", said(&refused));
+}
+
+#[test]
+fn exports_open_with_their_kind_and_nothing_else_is_overwritten() {
+    let home = mapped();
+    for (name, begins) in
+        [("m.csv", &b"# exported by sweep "[..]), ("m.xlsx", b"PK\x03\x04"), ("m.nc", b"CDF\x02")]
+    {
+        for _ in 0..2 {
+            let done = home.sweep(&["export", MAP, name]);
+            assert_eq!(code(&done), Some(0), "{}", said(&done));
+        }
+        let bytes = fs::read(home.path(name)).expect("the export is there");
+        assert!(bytes.starts_with(begins), "{name}");
+    }
+    fs::write(home.path("mine.csv"), "my,own\n1,2\n").expect("written");
+    assert_eq!(code(&home.sweep(&["export", MAP, "mine.csv"])), Some(2));
+    assert_eq!(code(&home.sweep(&["export", MAP, "m.ods"])), Some(2));
+}
+
+#[test]
+fn a_point_is_traced_by_its_number_or_as_the_worst_and_its_row_is_told() {
+    let home = mapped();
+    let traced = home.sweep(&["trace", "g.toml", "--point", "3", "--out", "t.parquet"]);
+    assert_eq!(code(&traced), Some(0), "{}", said(&traced));
+    let row = json(&home.sweep(&["show", MAP, "--where", "point == 3", "--json"]));
+    let ratio = row[0]["ratio_max"].as_f64().expect("a ratio");
+    let text = said(&traced);
+    assert!(text.contains("verdict  ") && text.contains(&format!("{ratio:.4}")[..5]), "{text}");
+
+    let worst = home.sweep(&["trace", "g.toml", "--worst", "--out", "t.parquet"]);
+    assert_eq!(code(&worst), Some(0), "{}", said(&worst));
+    let first = json(&home.sweep(&["show", MAP, "--top", "1", "--by", "ratio_max", "--json"]));
+    let told = format!("point {} is where ratio_max is greatest", first[0]["point"]);
+    // A count comes back as a float.
+    assert!(said(&worst).contains(&told.replace(".0", "")), "{told}: {}", said(&worst));
+
+    let beyond = home.sweep(&["trace", "g.toml", "--point", "6", "--out", "t.parquet"]);
+    assert_eq!(code(&beyond), Some(2));
+    assert!(said(&beyond).contains("from 0 to 5"), "{}", said(&beyond));
+    let other = ["trace", "g.toml", "--worst", "--set", "tub_mass_kg=20", "--out", "t.parquet"];
+    let other = home.sweep(&other);
+    assert_eq!(code(&other), Some(2));
+    assert!(said(&other).contains("of this very grid"), "{}", said(&other));
+}
+
+#[test]
+fn every_scalar_of_the_grid_file_can_be_set() {
+    let home = Home::new(&grid(3, 2));
+    let plan = |sets: &[&str]| json(&home.sweep(&[&["check", "g.toml", "--json"], sets].concat()));
+    let set = plan(&["--set", "end_s=0.2", "--ratio-limit", "1.5", "--set", "step_s=1e-4"]);
+    assert_eq!(set["time"]["end_s"], 0.2);
+    assert_eq!(set["reliability"]["ratio_limit"], 1.5);
+    assert_eq!(set["integrator"]["step_s"], 1e-4);
+    assert_eq!(set["set"]["ratio_limit"], 1.5);
+    let method = plan(&["--set", "method=dopri5", "--set", "rtol=1e-5", "--set", "criterion=rms"]);
+    assert_eq!(method["integrator"]["rtol"], 1e-5);
+    assert_eq!(method["reliability"]["criterion"], "rms");
+    assert!(plan(&[])["set"].is_null(), "a plan without --set reads as ever");
+    for (sets, expected) in [
+        (["--set", "rtol=1e-5"], "the method \"rk4\" has no `rtol`"),
+        (["--set", "method=dopri"], "did you mean `dopri5`?"),
+        (["--set", "end_s=-1"], "`end_s`"),
+        (["--set", "end_s=0.01"], "window"),
+        (["--set", "seed=1"], "this grid has none"),
+        (["--ratio-limit", "nan"], "ratio_limit"),
+        (["--name", "a/b"], "expected letters"),
+    ] {
+        let refused = home.sweep(&[&["check", "g.toml"], &sets[..]].concat());
+        assert_eq!(code(&refused), Some(2), "{sets:?}: {}", said(&refused));
+        assert!(said(&refused).contains(expected), "{sets:?}: {}", said(&refused));
+    }
+}
+
+#[test]
+fn a_list_says_its_axes_and_an_unfinished_run_what_it_is() {
+    let home = Home::new(&grid(3, 2));
+    fs::write(home.path("list.csv"), "unbalance_mass_kg\n0.1\n0.2\n").expect("written");
+    let listed = "name = \"short\"\n\
+        spin = { profile = \"triangular\", peak_rpm = 350, ramp_s = 50 }\n\
+        time = { end_s = 0.1 }\n\
+        integrator = { method = \"rk4\" }\n\
+        design = { method = \"list\", file = \"list.csv\" }\n";
+    fs::write(home.path("list.toml"), listed).expect("written");
+    let done = home.sweep(&["run", "list.toml", "--progress", "none"]);
+    assert_eq!(code(&done), Some(0), "{}", said(&done));
+    let shown = printed(&home.sweep(&["show", MAP]));
+    assert!(shown.contains("design  file list.csv"), "{shown}");
+    assert!(shown.contains("axis  unbalance_mass_kg\n"), "{shown}");
+
+    fs::create_dir(home.path("x.parquet.partial")).expect("made");
+    let folder = home.sweep(&["show", "x.parquet.partial"]);
+    assert!(said(&folder).contains("a run that is not finished"), "{}", said(&folder));
+}
