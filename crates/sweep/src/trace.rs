@@ -198,19 +198,12 @@ pub(crate) fn keep(
             let values = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
             let at = values.zip(plan.axis_values(point)).collect();
             let every_s = plan.end_s / KEPT_INSTANTS;
-            match trace(
-                plan,
-                plan.scenario(point),
-                at,
-                every_s,
-                &Start::default(),
-                Extras::default(),
-            ) {
-                Ok(trace) => {
-                    let path = folder.join(format!("point-{point}.parquet"));
-                    files::write(&path, FileKind::Trace, &trace.into_bytes(&path)?)?;
-                }
-                Err(NoEquilibrium) => {}
+            let scenario = plan.scenario(point);
+            let found = trace(plan, scenario, at, every_s, &Start::default(), Extras::default());
+            // The row of a point without an equilibrium says so.
+            if let Ok(trace) = found {
+                let path = folder.join(format!("point-{point}.parquet"));
+                files::write(&path, FileKind::Trace, &trace.into_bytes(&path)?)?;
             }
             done();
             Ok(())

@@ -131,7 +131,7 @@ impl<T> InAnyLane<T> {
 
     /// Whether it holds of any.
     #[inline(always)]
-    pub(crate) fn is_so(self) -> bool {
+    pub(crate) fn holds(self) -> bool {
         self.0
     }
 }

@@ -122,7 +122,7 @@ pub(crate) fn tub<T: Lane>(
     let arm_yaw_x = (centre * tilt.axis_c[2]).v();
     let arm_yaw_z = (centre * tilt.axis_yaw_z()).v();
     let arm_pitch = scaled(centre, tilt.second_c);
-    let axis_drift = tilt.to_cabinet(&motion.axis_acceleration);
+    let axis_drift = tilt.in_cabinet_axes(&motion.axis_acceleration);
     let drift = scaled(centre, axis_drift);
 
     let axial = (b.tub_mass * drift[0]).v();
@@ -227,12 +227,12 @@ pub(crate) fn rotor<T: Real>(
     // acceleration; in cabinet axes.
     let rho_s = [(c9 * rho[0]).v(), rho[1], -(s9 * rho[0]).v()];
     let rho_a = out_of_spin(spin, &rho_s);
-    let w = tilt.to_cabinet(&[
+    let w = tilt.in_cabinet_axes(&[
         b.along_shaft + b.drum_share * rho_a[0],
         (b.drum_share * rho_a[1]).v(),
         (b.drum_share * rho_a[2]).v(),
     ]);
-    let drift = tilt.to_cabinet(&combination(
+    let drift = tilt.in_cabinet_axes(&combination(
         b.along_shaft,
         axis_acceleration,
         b.drum_share,
@@ -241,11 +241,11 @@ pub(crate) fn rotor<T: Real>(
     let arm_9 = {
         let share = -(b.drum_share * rho[0]).v();
         let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];
-        scaled(share, tilt.to_cabinet(&d3_a))
+        scaled(share, tilt.in_cabinet_axes(&d3_a))
     };
     let arm_10 = {
         let [x, y] = [-(b.drum_share * rho[1]).v(), (b.drum_share * rho[0]).v()];
-        tilt.to_cabinet(&out_of_spin(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
+        tilt.in_cabinet_axes(&out_of_spin(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
     };
     let zero = s9.lit(0.0);
     let arm_7_z = -w[0];
@@ -262,7 +262,7 @@ pub(crate) fn rotor<T: Real>(
         -(flexure.about_10 + drum_moment_e[2]),
     ];
     let axial = (b.rotor_mass * drift[0]).v();
-    let axis_drift = tilt.to_cabinet(axis_acceleration);
+    let axis_drift = tilt.in_cabinet_axes(axis_acceleration);
 
     let mut inertia = rotor_inertia(b, spin, &tilt, &k, &rho_s, (s9, c9));
     for r in 0..4 {

@@ -414,10 +414,8 @@ fn read(
 /// The ranges of speed in which growth is above 0, taken as linear between the given speeds.
 fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
     let mut ranges: Vec<[f64; 2]> = Vec::new();
-    for k in 0..speed.len() {
-        if !(growth[k] > 0.0) {
-            continue;
-        }
+    // A speed without an answer has no growth (NaN), and is no part of a range.
+    for k in (0..speed.len()).filter(|&k| growth[k] > 0.0) {
         // A neighbour that has no growth gives no edge between the two.
         let edge = |other: Option<usize>| {
             let other = other.filter(|&other| growth.get(other).is_some_and(|g| g.is_finite()));

@@ -10,8 +10,8 @@
 //! motions climb to the top, where RK4 does not agree with itself.
 //!
 //! Friction and stops give forces corners. A step that spans one errs by its own length, whatever
-//! the order of its formula. So with them the error left is reckoned of first order
-//! ([`left_by_corners`]), and the quick rungs are believed only where they really agree.
+//! the order of its formula, and two long steps that pass the same corner in the same way agree on
+//! an error that neither shows. So the nonlinear model with them is plain RK4's alone.
 //!
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
@@ -77,7 +77,8 @@ const CONTRACTION_TO_RK4: f64 = 0.02;
 /// believed below this.
 const LEAST_EXPECTED_SHARE: f64 = 5e-3;
 
-/// Reserve of errors at corners.
+/// By how much errors at corners may be greater than of first order: where in a step a corner falls
+/// is chance.
 const RESERVE_AT_CORNERS: f64 = 2.0;
 
 /// A contraction better than this is not believed.
@@ -144,19 +145,17 @@ impl Ladder {
     /// The fast method's for these cases.
     pub(crate) fn new(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Self {
         let has_corners = model == ModelKind::Nonlinear && cases.are_nonsmooth();
-        let mut rungs = capped(cases, model, accuracy);
+        let mut rungs = if has_corners { Vec::new() } else { capped(cases, model, accuracy) };
         let reference_step_s = reference_step_s(cases);
         let longer_step_s = LONGER_STEP * reference_step_s;
-        let contraction = match rungs.last().map(|rung| &rung.method) {
-            Some(Method::Geared(geared)) if has_corners => {
-                CONTRACTION_TO_RK4.max(left_by_corners(geared.top().step_s, longer_step_s))
-            }
-            Some(_) => CONTRACTION_TO_RK4,
-            None => 1.0,
+        let contraction = if rungs.is_empty() { 1.0 } else { CONTRACTION_TO_RK4 };
+        let of_reference = match has_corners {
+            true => REFERENCE_CONTRACTION.max(left_by_corners(longer_step_s, reference_step_s)),
+            false => REFERENCE_CONTRACTION,
         };
         let plain = [
             (longer_step_s, contraction, FIRST_ORDER_OF_RK4),
-            (reference_step_s, REFERENCE_CONTRACTION, f64::INFINITY),
+            (reference_step_s, of_reference, f64::INFINITY),
         ];
         rungs.extend(plain.map(|(step_s, contraction, believed_to)| Rung {
             level: Level::Rk4,
@@ -180,17 +179,19 @@ impl Ladder {
     }
 }
 
-/// Why elements keep a machine from the quick rungs, or those from being believed.
+/// Why elements keep a machine from the quick rungs, if they do.
 fn held_back(cases: &Cases<'_>, has_corners: bool, has_capped: bool) -> Option<String> {
-    if !has_capped && let Some(fastest) = cases.stiffened_rad_per_s() {
-        return Some(format!(
-            "rk4 alone, because stops or stiffened springs can swing the tub at {fastest:.0} \
-             rad/s, too fast for longer steps"
-        ));
+    if has_corners {
+        return Some(
+            "rk4 alone, because friction and stops give forces corners, which longer steps miss"
+                .to_owned(),
+        );
     }
-    (has_capped && has_corners).then(|| {
-        "longer steps are believed less, because friction and stops give forces corners".to_owned()
-    })
+    let fastest = cases.stiffened_rad_per_s().filter(|_| !has_capped)?;
+    Some(format!(
+        "rk4 alone, because stiffened springs and bushings can swing the tub at {fastest:.0} rad/s, \
+         too fast for longer steps"
+    ))
 }
 
 /// The rungs with capped modes, if any are worth their time.
@@ -219,17 +220,13 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
         .map(|(_, last)| refined(last));
     let finest = finest.filter(|it| it.evaluations_per_s() < WORTH_IT * plain_evaluations_per_s);
     chosen.extend(finest.map(|finest| (Level::Finest, finest)));
-    let has_corners = model == ModelKind::Nonlinear && cases.are_nonsmooth();
     let rung = |(place, (level, geared)): (usize, &(Level, Geared))| {
         let before = place.checked_sub(1).map(|before| &chosen[before].1);
-        let of_corners = before
-            .filter(|_| has_corners)
-            .map_or(0.0, |before| left_by_corners(before.top().step_s, geared.top().step_s));
         let contraction = before.map_or(1.0, |before| match model {
             ModelKind::Nonlinear => reserve(place) * geared.share_of_error(before),
             ModelKind::Linear => expected_share(cases, before, geared).max(LEAST_EXPECTED_SHARE),
         });
-        let contraction = contraction.clamp(BEST_CONTRACTION, 1.0).max(of_corners);
+        let contraction = contraction.clamp(BEST_CONTRACTION, 1.0);
         Rung {
             level: *level,
             method: Method::Geared(*geared),

@@ -223,7 +223,7 @@ fn edge_rpm(asker: &Asker<'_>, kind: Kind, mut inside: f64, mut outside: f64) ->
 /// The response of a run that grows most, between its speeds too.
 fn peak(asker: &Asker<'_>, kind: Kind, run: &[&Response], growths: &[[f64; 2]]) -> Response {
     let most = |a: &&Response, b: &&Response| a.growth_per_s().total_cmp(&b.growth_per_s());
-    let mut best: Response = (*run.iter().copied().max_by(most).unwrap_or(&run[0])).clone();
+    let mut best: Response = (*run.iter().copied().max_by(most).unwrap_or(run[0])).clone();
     let place = growths.partition_point(|[rpm, _]| *rpm < best.speed_rpm);
     let rpm_at = |k: usize| growths.get(k).map_or(best.speed_rpm, |[rpm, _]| *rpm);
     let mut around = [rpm_at(place.saturating_sub(1)), rpm_at(place + 1)];

@@ -78,7 +78,7 @@ impl<T: Lane> Elements<T> {
         if !self.dampers.is_empty() {
             add(&mut load, &self.dampers, tub, &tub.midpoint_velocity_in_tub());
         }
-        if self.has_further.is_so() {
+        if self.has_further.holds() {
             // Copies: what is lent to a function must lie in memory, on every path.
             let mut whole = load;
             let (tilt, rate) = (*tub.tilt, *tub.rate);
@@ -108,11 +108,11 @@ impl<T: Lane> Aside for Further<'_, T> {
         for stop in &elements.stops {
             let point = tub.point(&stop.tub, &velocity);
             let push = stop.push(&point);
-            add_force(load, &stop.tub, &tub.tilt.to_frame(&scaled(-push, stop.direction)));
+            add_force(load, &stop.tub, &tub.tilt.in_own_axes(&scaled(-push, stop.direction)));
         }
         for bushing in &elements.bushings {
             let force = bushing.force(&tub.point(&bushing.tub, &velocity));
-            add_force(load, &bushing.tub, &tub.tilt.to_frame(&force));
+            add_force(load, &bushing.tub, &tub.tilt.in_own_axes(&force));
         }
     }
 }
@@ -412,10 +412,10 @@ impl<T: Real> TubMotion<'_, T> {
     /// A point of the tub, given in its axes from P_T.
     #[inline(always)]
     fn point(&self, tub: &Vec3<T>, velocity: &MidpointVelocity<T>) -> PointMotion<T> {
-        let mut displacement = difference(self.tilt.to_cabinet(tub), tub);
+        let mut displacement = difference(self.tilt.in_cabinet_axes(tub), tub);
         displacement[1] += self.midpoint[0];
         displacement[2] += self.midpoint[1];
-        let velocity = self.tilt.to_cabinet(&plus_cross(&velocity.0, self.rate, tub));
+        let velocity = self.tilt.in_cabinet_axes(&plus_cross(&velocity.0, self.rate, tub));
         PointMotion { displacement, velocity }
     }
 }

@@ -146,9 +146,9 @@ impl<T: Real> Axes<T> {
         let tub_front = point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let drum_front = self.drum_front(b, motion);
         let [omega, alpha] = &self.tub_turn;
-        let apart = self.tub.to_frame(&difference(drum_front.value, &tub_front.value));
-        let velocity = self.tub.to_frame(&difference(drum_front.rate, &tub_front.rate));
-        let acceleration = self.tub.to_frame(&difference(drum_front.second, &tub_front.second));
+        let apart = self.tub.in_own_axes(&difference(drum_front.value, &tub_front.value));
+        let velocity = self.tub.in_own_axes(&difference(drum_front.rate, &tub_front.rate));
+        let acceleration = self.tub.in_own_axes(&difference(drum_front.second, &tub_front.second));
         // As seen from the turning tub.
         let rate = plus_cross(&velocity, &apart, omega);
         let second =
@@ -245,7 +245,7 @@ fn axis_course<T: Real>(
     let zero = rates[0].lit(0.0);
     let by_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
     let by_pitch = &tilt.second_c;
-    let at_constant_speeds = tilt.to_cabinet(&at.axis_acceleration);
+    let at_constant_speeds = tilt.in_cabinet_axes(&at.axis_acceleration);
     let by_accelerations = combination(seconds[0], &by_yaw, seconds[1], by_pitch);
     Course {
         value: tilt.axis_c,
@@ -284,7 +284,7 @@ fn out_of_drum<T: Real>(
     v: &Vec3<T>,
 ) -> Vec3<T> {
     let (s9, c9) = hinge.first;
-    shaft.to_cabinet(&out_of_spin(spin, &out_of_hinge(s9, c9, v)))
+    shaft.in_cabinet_axes(&out_of_spin(spin, &out_of_hinge(s9, c9, v)))
 }
 
 /// A point `reach` along an axis from a bearing midpoint, whose y is coordinate `first`; midpoints

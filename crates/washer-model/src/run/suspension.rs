@@ -146,7 +146,7 @@ fn along(q: &[f64; COORDINATES], direction: &[f64; COORDINATES]) -> [N<Dual<f64>
 
 /// From the cabinet end to the tub end, in cabinet axes.
 fn tub_from_cabinet(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> Vec3<Dual<f64>> {
-    let tub = Tilt::of_tub(q).to_cabinet(&ends.tub);
+    let tub = Tilt::of_tub(q).in_cabinet_axes(&ends.tub);
     [
         tub[0] - ends.cabinet[0],
         tub[1] + q[TUB_Y] - ends.cabinet[1],

@@ -16,7 +16,7 @@ impl Elements<f64> {
     /// Elements whose tangents at the equilibrium `q` are the steepest that these have anywhere
     /// near it; `None` if these are linear along their lines.
     pub(crate) fn steepest(&self, q: &[f64; COORDINATES]) -> Option<Self> {
-        if !self.has_further.is_so() {
+        if !self.has_further.holds() {
             return None;
         }
         let mut steepest = self.clone();
