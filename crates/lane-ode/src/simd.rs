@@ -46,6 +46,15 @@ impl Simd {
         Self::ALL.into_iter().find(|simd| simd.is_available()).unwrap_or(Self::Scalar)
     }
 
+    /// What [`Self::dispatch_narrow`] runs on.
+    #[must_use]
+    pub fn narrow() -> Self {
+        [Self::Avx2, Self::Neon]
+            .into_iter()
+            .find(|simd| simd.is_available())
+            .unwrap_or(Self::Scalar)
+    }
+
     /// Whether this processor has it.
     #[must_use]
     pub fn is_available(self) -> bool {

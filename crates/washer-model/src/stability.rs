@@ -204,7 +204,7 @@ pub enum NoAnswer {
 /// # Errors
 /// Per dwell: [`NoAnswer`].
 #[must_use]
-pub fn respond(simd: Simd, dwells: &[Dwell<'_>]) -> Vec<Result<Response, NoAnswer>> {
+pub fn respond(dwells: &[Dwell<'_>]) -> Vec<Result<Response, NoAnswer>> {
     let mut settings: Vec<Settings<'_>> = Vec::new();
     let cases: Vec<Result<Case<'_>, NoAnswer>> = dwells
         .iter()
@@ -215,7 +215,7 @@ pub fn respond(simd: Simd, dwells: &[Dwell<'_>]) -> Vec<Result<Response, NoAnswe
             settings.last_mut().ok_or(NoAnswer::Eigenvalues)?.case(dwell.speed_rpm)
         })
         .collect();
-    let mut answers = answers(simd, &cases);
+    let mut answers = answers(&cases);
     // What is close to an edge is asked of the machine as it is.
     let close: Vec<usize> = (0..answers.len())
         .filter(|&k| {
@@ -232,14 +232,14 @@ pub fn respond(simd: Simd, dwells: &[Dwell<'_>]) -> Vec<Result<Response, NoAnswe
             cases[k].as_ref().map_err(|none| *none)?.without_caps(start)
         })
         .collect();
-    for (k, response) in close.into_iter().zip(self::answers(simd, &plain)) {
+    for (k, response) in close.into_iter().zip(self::answers(&plain)) {
         answers[k] = response;
     }
     answers
 }
 
 /// The answers of some cases, on lanes.
-fn answers(simd: Simd, cases: &[Result<Case<'_>, NoAnswer>]) -> Vec<Result<Response, NoAnswer>> {
+fn answers(cases: &[Result<Case<'_>, NoAnswer>]) -> Vec<Result<Response, NoAnswer>> {
     let mut order: Vec<(usize, &Case<'_>)> =
         cases.iter().enumerate().filter_map(|(k, case)| Some((k, case.as_ref().ok()?))).collect();
     // Lanes turn in equally many steps, all with caps or none.
@@ -251,9 +251,9 @@ fn answers(simd: Simd, cases: &[Result<Case<'_>, NoAnswer>]) -> Vec<Result<Respo
         .collect();
     for together in order.chunk_by(|a, b| alike(a) == alike(b)) {
         let rows: Vec<Row<'_>> = together.iter().map(|(_, case)| case.row).collect();
-        let found = simd.dispatch(Respond { rows: &rows });
+        let found = Simd::dispatch_narrow(Respond { rows: &rows });
         for ((k, case), found) in together.iter().zip(found) {
-            let found = found.or_else(|| followed(simd, case));
+            let found = found.or_else(|| followed(case));
             answers[*k] = found.ok_or(NoAnswer::NoResponse).and_then(|found| answer(case, &found));
         }
     }
@@ -262,9 +262,11 @@ fn answers(simd: Simd, cases: &[Result<Case<'_>, NoAnswer>]) -> Vec<Result<Respo
 
 /// A response that is followed from lower speeds, each the start of the search at the next: first
 /// from a little below, then from farther below.
-fn followed(simd: Simd, case: &Case<'_>) -> Option<Box<Found>> {
+fn followed(case: &Case<'_>) -> Option<Box<Found>> {
     let one = |speed_rpm: f64, from: Option<[f64; STATES]>| {
-        simd.dispatch(Respond { rows: &[Row { speed_rpm, from, ..case.row }] }).pop().flatten()
+        Simd::dispatch_narrow(Respond { rows: &[Row { speed_rpm, from, ..case.row }] })
+            .pop()
+            .flatten()
     };
     let speed_rpm = case.row.speed_rpm;
     FOLLOWED_FROM.iter().find_map(|below| {

@@ -1,15 +1,14 @@
 //! Disturbances of periodic responses at constant speeds.
 
-use lane_ode::Simd;
 use washer_model::{Dwell, NoAnswer, Point, Response, respond};
 
 use super::together_or_alone;
 use crate::outcome::{Growth, Status};
 
 /// The periodic responses of points at constant speeds, or why there is none.
-pub(crate) fn responses(simd: Simd, dwells: &[Dwell<'_>]) -> Vec<Result<Response, Status>> {
+pub(crate) fn responses(dwells: &[Dwell<'_>]) -> Vec<Result<Response, Status>> {
     let together = |dwells: &[Dwell<'_>]| {
-        let answers = respond(simd, dwells).into_iter();
+        let answers = respond(dwells).into_iter();
         let status = |none| match none {
             NoAnswer::NoResponse => Status::NoResponse,
             NoAnswer::Eigenvalues => Status::NoMultipliers,
@@ -21,10 +20,10 @@ pub(crate) fn responses(simd: Simd, dwells: &[Dwell<'_>]) -> Vec<Result<Response
 
 /// The fastest growing disturbance at any of these speeds; the first speed wins a tie. Speeds
 /// without a response are left out.
-pub(super) fn fastest_growth(simd: Simd, point: &Point, speeds_rpm: &[f64]) -> Option<Growth> {
+pub(super) fn fastest_growth(point: &Point, speeds_rpm: &[f64]) -> Option<Growth> {
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
-    let found = responses(simd, &dwells);
+    let found = responses(&dwells);
     let fastest = found
         .iter()
         .flatten()

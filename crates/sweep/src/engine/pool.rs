@@ -186,7 +186,7 @@ impl Pool<'_> {
         for (mut outcome, point) in done {
             outcome.forget_turns();
             if let (Some(speeds), Ok(point)) = (&self.engine.plan.measures.growth_speeds, point) {
-                outcome.growth = fastest_growth(self.engine.simd, &point, &speeds.values());
+                outcome.growth = fastest_growth(&point, &speeds.values());
             }
             (self.keep)(outcome);
         }

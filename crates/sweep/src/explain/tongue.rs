@@ -56,15 +56,15 @@ pub(crate) struct Asker<'a> {
 impl Asker<'_> {
     /// The responses at some speeds, on all threads; none where there is none.
     pub(crate) fn responses(&self, speeds_rpm: &[f64]) -> Vec<Option<Response>> {
-        responses(self.simd, self.point, speeds_rpm)
+        responses(self.point, speeds_rpm)
     }
 }
 
-fn responses(simd: Simd, point: &Point, speeds_rpm: &[f64]) -> Vec<Option<Response>> {
+fn responses(point: &Point, speeds_rpm: &[f64]) -> Vec<Option<Response>> {
     let of_part = |speeds: &[f64]| {
         let dwells: Vec<Dwell<'_>> =
             speeds.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
-        respond(simd, &dwells).into_iter().map(Result::ok).collect::<Vec<_>>()
+        respond(&dwells).into_iter().map(Result::ok).collect::<Vec<_>>()
     };
     let parts: Vec<_> = speeds_rpm.par_chunks(AT_ONCE).map(of_part).collect();
     parts.into_iter().flatten().collect()
@@ -347,7 +347,7 @@ impl Tongue {
         let mut count = TRIAL_SPEEDS;
         for _ in 0..=PEAK_ROUNDS {
             let trials = between(around[0], around[1], count);
-            let found = responses(asker.simd, &point, &trials);
+            let found = responses(&point, &trials);
             let found = || found.iter().flatten();
             if found().any(|response| response.kind() == kind) {
                 return true;

@@ -84,7 +84,7 @@ impl<'a> DwellEngine<'a> {
                 Err(status) => outcomes.push(failed(row, *status)),
             }
         }
-        for (row, found) in asked.into_iter().zip(responses(self.simd, &dwells)) {
+        for (row, found) in asked.into_iter().zip(responses(&dwells)) {
             outcomes.push(match found {
                 Ok(response) => self.outcome(row, &response),
                 Err(status) => failed(row, status),
@@ -140,6 +140,6 @@ impl Engine for DwellEngine<'_> {
     }
 
     fn simd(&self) -> &str {
-        self.simd.name()
+        Simd::narrow().name()
     }
 }
