@@ -126,6 +126,8 @@ mod tests {
                 direction: [0.0, -1.0, 0.0],
                 clearance_m: 0.005,
                 stiffness_n_per_m,
+                // Its force before it closes, k s^2 / (4 |depth|), is to be none.
+                softness_m: 1e-6,
                 ..BumpStop::default()
             }];
             let (q, found) = find(N(0.0), &Coefficients::new(&machine));

@@ -186,8 +186,8 @@ fn what_dampers_friction_stops_and_bushings_take_out_is_what_the_energy_loses() 
     let mut machine = with_every_element();
     // Wide enough for the trapezoidal rule.
     machine.stops.iter_mut().for_each(|stop| stop.softness_m = 1e-3);
-    // Within reach of the throw.
-    machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.004);
+    // Within reach of the throw, which friction ends after some 4 mm.
+    machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.001);
     machine.dampers.iter_mut().for_each(|damper| damper.friction_speed_m_per_s = 0.05);
     let coefficients = Coefficients::new(&machine);
     let every_s = 1e-4;
@@ -208,7 +208,7 @@ fn what_dampers_friction_stops_and_bushings_take_out_is_what_the_energy_loses() 
     // Most of it within 3 s.
     assert!(lost > 0.5 * given && lost < given * (1.0 + 1e-6), "{lost} of {given} J");
     assert!(worst < 1e-6, "{worst:e}");
-    // The stops take part.
+    // The stop that the throw goes to takes part.
     let closes = |stop: &BumpStop| {
         let depth = |at: &Instant| {
             let q = &at.deviations;
@@ -217,5 +217,6 @@ fn what_dampers_friction_stops_and_bushings_take_out_is_what_the_energy_loses() 
         };
         instants.iter().map(depth).fold(f64::NEG_INFINITY, f64::max)
     };
-    assert!(machine.stops[..2].iter().all(|stop| closes(stop) > 1e-3));
+    let deepest_m = machine.stops[..2].iter().map(closes).fold(f64::NEG_INFINITY, f64::max);
+    assert!(deepest_m > 1e-3, "{deepest_m} m");
 }
