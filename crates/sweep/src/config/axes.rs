@@ -175,7 +175,20 @@ fn distribution(
             let sigma = number("sigma", Range::Positive, true);
             median.zip(sigma).map(|(median, sigma)| Shape::Lognormal { median, sigma })
         }
-        _ => None,
+        Some(_) => None,
+        None => {
+            // Which keys belong to a kind that is none cannot be said, but what is wrong with any
+            // can.
+            for (key, range) in [
+                ("mean", Range::Any),
+                ("sd", Range::Positive),
+                ("median", Range::Positive),
+                ("sigma", Range::Positive),
+            ] {
+                number(key, range, false);
+            }
+            None
+        }
     };
     let is_uniform = kind == Some(2);
     let [from, to] = ["from", "to"].map(|key| number(key, range, is_uniform));
