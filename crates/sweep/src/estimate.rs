@@ -22,6 +22,11 @@ const BUDGET: Duration = Duration::from_millis(350);
 const FIRST_END_S: f64 = 1e-3;
 const FIRST_STEPS: f64 = 1e4;
 
+/// Where whole trajectories are so short that more of them fit, as many are integrated together as
+/// take this long if they cost as much as the first few.
+const TOGETHER_S: f64 = 2.0;
+const MOST_TOGETHER: u64 = 64;
+
 /// Parts of the way through the grid at which points are tried.
 const PLACES: [f64; 3] = [0.5, 0.9, 0.1];
 
@@ -71,10 +76,14 @@ impl Estimate {
         let engine = ModelEngine::new(plan)?;
         let ladders = engine.ladders();
         let began = Instant::now();
-        let mut samples = Vec::new();
-        for place in PLACES {
-            if samples.is_empty() || began.elapsed() < BUDGET {
-                samples.push(Measured::take(plan, ladders, place)?);
+        let first = Measured::take(plan, ladders, PLACES[0])?;
+        let mut samples = match Measured::spread(plan, ladders, &first)? {
+            Some(spread) => vec![spread],
+            None => vec![first],
+        };
+        for place in &PLACES[1..] {
+            if samples[0].integrated_s < plan.end_s && began.elapsed() < BUDGET {
+                samples.push(Measured::take(plan, ladders, *place)?);
             }
         }
         let core_s_per_point = samples.iter().map(|sample| sample.core_s_per_point).sum::<f64>()
@@ -118,7 +127,7 @@ impl Measured {
         loop {
             cut.end_s = end_s;
             cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
-            let cost_s = cost_s(&cut, ladders, first..first + points)?;
+            let cost_s = cost_s(&cut, ladders, &mut (first..first + points))?;
             if end_s >= plan.end_s || cost_s >= LONG_ENOUGH.as_secs_f64() {
                 // What does not grow with the length (the equilibrium) must not be multiplied.
                 let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
@@ -133,6 +142,27 @@ impl Measured {
             shorter = Some((end_s, cost_s));
             end_s = (4.0 * end_s).min(plan.end_s);
         }
+    }
+}
+
+impl Measured {
+    /// Whole trajectories of points from all over the grid, integrated together: the rows that are
+    /// left to a slower rung then share its lanes, as in the run. Few points leave such lanes
+    /// empty, and cost several times as much each.
+    fn spread(
+        plan: &Plan,
+        ladders: &[Ladder; 2],
+        first: &Self,
+    ) -> Result<Option<Self>, EngineError> {
+        if first.integrated_s < plan.end_s || plan.points() <= first.points {
+            return Ok(None);
+        }
+        let affordable = (TOGETHER_S / first.core_s_per_point) as u64;
+        let points = affordable.clamp(first.points, MOST_TOGETHER).min(plan.points());
+        let place = |k| (u128::from(plan.points()) * u128::from(k) / u128::from(points)) as u64;
+        let cost_s = cost_s(plan, ladders, &mut (0..points).map(place))?;
+        let core_s_per_point = cost_s / points as f64;
+        Ok(Some(Self { core_s_per_point, points, integrated_s: plan.end_s }))
     }
 }
 
@@ -152,7 +182,7 @@ fn first_end_s(plan: &Plan) -> f64 {
 fn cost_s(
     cut: &Plan,
     ladders: &[Ladder; 2],
-    points: std::ops::Range<u64>,
+    points: &mut dyn Iterator<Item = u64>,
 ) -> Result<f64, EngineError> {
     // A shorter run alone would be slower spin, and longer steps.
     let engine = ModelEngine::with_ladders(cut, ladders.clone())?;
