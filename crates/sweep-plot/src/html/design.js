@@ -38,11 +38,17 @@ function createMatrix(host, data) {
   const tip = element("div", { class: "tip", hidden: true });
   const said = element("p", { class: "unseen", "aria-live": "polite" });
   const legend = element("ul", { class: "legend" });
-  for (const side of data.sides.filter((side) => side.count)) {
-    const sign = element("i");
-    sign.style.cssText = `width:14px;border-radius:7px;background:${lineColour(side.colour)}`;
+  // As the points are drawn: a dot, a diamond, a ring, a cross.
+  const signs = ["background:COLOUR;border-radius:50%", "background:COLOUR;transform:rotate(45deg)",
+    "border:2px solid COLOUR;border-radius:50%", ""];
+  data.sides.forEach((side, k) => {
+    if (!side.count) return;
+    const sign = element("i", {}, k === 3 ? "×" : "");
+    const colour = lineColour(k === 3 ? "ink" : side.colour);
+    sign.style.cssText = `width:10px;height:10px;line-height:10px;${signs[k]}`
+      .replace("COLOUR", colour);
     legend.append(element("li", {}, sign, `${side.words} (${side.count})`));
-  }
+  });
   if (data.level) {
     const sign = element("i");
     sign.style.cssText = "height:0;border-top:2px dotted currentColor";
