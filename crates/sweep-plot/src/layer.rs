@@ -374,7 +374,8 @@ impl Shown {
         })
     }
 
-    fn words(&self, compared: &str, unit: &str) -> (String, String) {
+    /// For the heading, and beside the colours.
+    pub(crate) fn words(&self, compared: &str, unit: &str) -> (String, String) {
         let channel = self.channel.as_deref().map(label::channel);
         match (self.quantity, channel) {
             (Quantity::Ratio, None) => (
@@ -398,7 +399,8 @@ impl Shown {
         }
     }
 
-    fn level(&self, limit: f64) -> Option<Level> {
+    /// The level that divides its values, if one does.
+    pub(crate) fn level(&self, limit: f64) -> Option<Level> {
         let said = label::significant(limit, 4);
         let words = |[inside, legend]: [&str; 2]| [inside.to_owned(), legend.to_owned()];
         match (self.quantity, &self.channel) {

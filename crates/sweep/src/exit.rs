@@ -250,7 +250,7 @@ pub(crate) fn print(text: &str) -> Result<Exit, Error> {
     }
 }
 
-/// Writes a message for people to standard error; as in [`show`], text only.
+/// Writes a message for people to standard error; as in `show`, text only.
 pub fn tell(text: &str) {
     // As in `Error::report`: nobody is left to tell.
     let _ = writeln!(anstream::stderr(), "{}", escaped(text, is_unsafe));

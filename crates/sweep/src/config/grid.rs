@@ -11,7 +11,7 @@ use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, cut, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
-use super::{GridInput, design, machine, parameters, scalars, spin};
+use super::{GridInput, axes, design, machine, parameters, scalars, spin};
 use crate::measures::{Criterion, Measures, Metric};
 use crate::method::{Entry, Integrator, METHODS, settings};
 use crate::plan::{Plan, Reliability};
@@ -102,13 +102,11 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
     let mut draft = Draft { plan, origins, constants: Vec::new() };
     parameters::constants(&mut root, sets, &mut draft, report);
     match design::read(&mut root, path, report) {
-        design::WrittenDesign::None => parameters::axes(&mut root, &mut draft, report),
+        design::WrittenDesign::None => axes::axes(&mut root, &mut draft, report),
         design::WrittenDesign::Box(design) => {
-            parameters::box_of_axes(&mut root, design, &mut draft, report)
+            axes::box_of_axes(&mut root, design, &mut draft, report)
         }
-        design::WrittenDesign::List(list) => {
-            parameters::listed_axes(&mut root, list, &mut draft, report)
-        }
+        design::WrittenDesign::List(list) => axes::listed_axes(&mut root, list, &mut draft, report),
         design::WrittenDesign::Bad => {
             // Which axes are right depends on what cannot be known.
             let _ = root.tables("axis", report);

@@ -5,10 +5,10 @@
 use serde_json::{Map, Value, json};
 use washer_model::{Channel, Parameter, Range, Spin};
 
+use super::axes::MOST_POINTS;
 use super::design::{DEFAULT_SEED, MOST_SEED, MOST_SOBOL};
 use super::grid::{DEFAULT_CHANNELS, DEFAULT_MACHINE, DEFAULT_RATIO_LIMIT, LONGEST_S};
 use super::machine::{BLOCKS, Block, LISTS, no_spin, with_one_of_each};
-use super::parameters::MOST_POINTS;
 use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
 use crate::measures::{Criterion, Metric};
 use crate::method::{Entry, METHODS};

@@ -11,8 +11,8 @@
 //!
 //! Friction and stops give forces corners. A step that spans one errs by its own length, whatever
 //! the order of its formula, and two long steps that pass the same corner in the same way agree on
-//! an error that neither shows. So the nonlinear model with them climbs by plain RK4 alone, from the
-//! reference's step to a quarter of it.
+//! an error that neither shows. So the nonlinear model with them climbs by plain RK4 alone, from
+//! the reference's step to a quarter of it.
 //!
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
@@ -193,8 +193,8 @@ const AT_CORNERS: &str =
 fn too_fast(cases: &Cases<'_>) -> Option<String> {
     let fastest = cases.stiffened_rad_per_s()?;
     Some(format!(
-        "rk4 alone, because stiffened springs and bushings can swing the tub at {fastest:.0} rad/s, \
-         too fast for longer steps"
+        "rk4 alone, because stiffened springs and bushings can swing the tub at {fastest:.0} \
+         rad/s, too fast for longer steps"
     ))
 }
 
