@@ -42,7 +42,11 @@ pub(crate) fn check(plan: &Plan, given: &str) -> Result<(), Error> {
                      turn, and has no window; remove the axis"
                 ));
             }
-            Target::Machine | Target::Bearings(_) | Target::Springs(_) | Target::Dampers(_) => {}
+            Target::Machine
+            | Target::Cabinet
+            | Target::Bearings(_)
+            | Target::Springs(_)
+            | Target::Dampers(_) => {}
         }
     }
     Ok(())
