@@ -87,6 +87,22 @@ pub enum Quantity {
     ClashTimeLinear,
     /// How far the tub sinks at rest, if the run has this metric
     StaticSag,
+    /// Greatest push of a stop in the nonlinear model, if the run has this metric
+    StopForceNonlinear,
+    /// Greatest push of a stop in the linear model, if the run has this metric
+    StopForceLinear,
+    /// How long a stop is closed in the nonlinear model, if the run has this metric
+    StopContactNonlinear,
+    /// How long a stop is closed in the linear model, if the run has this metric
+    StopContactLinear,
+    /// Least load of a foot in the nonlinear model, if the run has this metric
+    FootLoadNonlinear,
+    /// Least load of a foot in the linear model, if the run has this metric
+    FootLoadLinear,
+    /// Least margin against slipping in the nonlinear model, if the run has this metric
+    SlipMarginNonlinear,
+    /// Least margin against slipping in the linear model, if the run has this metric
+    SlipMarginLinear,
     /// Of differences: how the greatest ratio changed, as a factor
     RatioChange,
     /// Of differences: how the least gap changed in the nonlinear model

@@ -85,6 +85,7 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
     let metrics = names(&mut root, "metrics", "metric", &Metric::ALL, Metric::name, report);
     let (reliability, criterion) = reliability(&mut root, &mut origins, report);
     let metrics = metrics.unwrap_or_default();
+    judge_metrics(&metrics, &machine, &root, report);
     let growth_speeds = stability(&mut root, &metrics, report);
     let plan = Plan {
         name,
@@ -351,6 +352,28 @@ fn stability(root: &mut Section<'_>, metrics: &[Metric], report: &mut Report) ->
             let title = format!("`speed_rpm` = \"{}\" is no range of speeds", found.value);
             report.push(Diagnostic::new(title).at(&found.at, expected));
             None
+        }
+    }
+}
+
+/// Metrics of what the machine has not got.
+fn judge_metrics(metrics: &[Metric], machine: &Machine, root: &Section<'_>, report: &mut Report) {
+    for metric in metrics {
+        let (is_there, what) = match metric {
+            Metric::StopForce | Metric::StopContact => {
+                (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file")
+            }
+            Metric::FootLoad | Metric::SlipMargin => (
+                machine.cabinet.is_some(),
+                "cabinet: expected [cabinet] and three or four [[feet]] in the machine file",
+            ),
+            Metric::CabinetForce | Metric::ClashTime | Metric::StaticSag | Metric::Growth => {
+                continue;
+            }
+        };
+        if !is_there {
+            let title = format!("the metric `{}` needs a machine with more parts", metric.name());
+            report.push(Diagnostic::new(title).at(root.at(), format!("the machine has no {what}")));
         }
     }
 }

@@ -143,6 +143,7 @@ fn resolve<T>(
     validate::steps(&draft, &mut report);
     validate::scenarios(&draft, &mut report);
     validate::stability(&draft, &mut report);
+    validate::growth(&draft, &mut report);
     report.finish((draft.plan, finished))
 }
 

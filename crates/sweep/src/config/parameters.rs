@@ -184,7 +184,8 @@ pub(super) fn unknown(
         (
             UnknownParameter::Number { .. }
             | UnknownParameter::TablePoint { .. }
-            | UnknownParameter::TableSpin,
+            | UnknownParameter::TableSpin
+            | UnknownParameter::NoCabinet,
             _,
         ) => diagnostic,
     }
