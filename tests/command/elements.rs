@@ -48,7 +48,7 @@ fn column(csv: &str, name: &str) -> Vec<f64> {
 #[test]
 fn loads_of_stops_and_feet_are_columns() {
     let home = home(&example());
-    let run = home.sweep(&["run", "grid.toml", "--out", "map.parquet"]);
+    let run = home.sweep(&["run", "g.toml", "--out", "map.parquet"]);
     assert!(run.status.success(), "{}", said(&run));
     let export = home.sweep(&["export", "map.parquet", "map.csv"]);
     assert!(export.status.success(), "{}", said(&export));
@@ -68,7 +68,7 @@ fn what_needs_stops_or_a_cabinet_says_so() {
     let text = example();
     let bare = text.split("[[stops]]").next().expect("a first part");
     let home = home(bare);
-    let run = home.sweep(&["run", "grid.toml"]);
+    let run = home.sweep(&["run", "g.toml"]);
     assert_eq!(run.status.code(), Some(2), "{}", said(&run));
     let told = said(&run);
     for part in ["`stop_force` needs", "`foot_load` needs", "[[stops]]", "[cabinet]"] {
@@ -89,7 +89,7 @@ fn feet_that_do_not_hold_the_cabinet_are_refused() {
         (two, "the cabinet stands on 2 feet"),
         (without.as_str(), "feet without a cabinet"),
     ] {
-        let run = home(machine).sweep(&["run", "grid.toml"]);
+        let run = home(machine).sweep(&["run", "g.toml"]);
         assert_eq!(run.status.code(), Some(2), "{}", said(&run));
         assert!(said(&run).contains(expected), "{expected} is not in {}", said(&run));
     }
@@ -99,10 +99,9 @@ fn feet_that_do_not_hold_the_cabinet_are_refused() {
 fn stability_is_for_smooth_forces() {
     let home = home(&example());
     let at = "unbalance_mass_kg=1";
-    for words in [
-        &["stability", "grid.toml", "--speed", "240:260:10"][..],
-        &["explain", "grid.toml", "--at", at],
-    ] {
+    for words in
+        [&["stability", "g.toml", "--speed", "240:260:10"][..], &["explain", "g.toml", "--at", at]]
+    {
         let found = home.sweep(words);
         assert_eq!(found.status.code(), Some(2), "{words:?}: {}", said(&found));
         assert!(said(&found).contains("dampers with friction, and stops"), "{}", said(&found));
