@@ -49,12 +49,14 @@ pub use share::Share;
 
 use chart::Chart;
 use cuts::Cuts;
+use figures::boundary::Overlay;
 use gather::Map;
 use grid::Grid;
 use raster::Typeface;
 use read::{Kind, Source};
 use scatter::Scatter;
 use scene::Scene;
+use swept::SweptAxis;
 use table::Table;
 
 use sweep_files::{self as files, Output};
@@ -168,6 +170,8 @@ pub struct PlotOptions {
     /// Trace, modes: a stability file, whose unstable speeds are shaded; in modes, the sums of
     /// frequencies behind them are drawn too.
     pub stability: Option<PathBuf>,
+    /// Map as a picture: a boundary file over the same axes, whose line is drawn too.
+    pub boundary: Option<PathBuf>,
     /// Trace: another trace file, whose nonlinear model is drawn in place of the linear one.
     pub against: Option<PathBuf>,
     /// Map as a page: a folder of trace files; clicking a point that has one shows it.
@@ -269,7 +273,12 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
         let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
         let map = Map::read(source, grid, &columns, divide)?;
         let typeface = Typeface::load()?;
-        return image(&figures::map::draw(&map, &cuts, shown.as_ref(), &typeface)?, format);
+        let overlay = match &options.boundary {
+            Some(path) => Some(overlay(path, &axes)?),
+            None => None,
+        };
+        let scene = figures::map::draw(&map, &cuts, shown.as_ref(), overlay.as_ref(), &typeface)?;
+        return image(&scene, format);
     }
     let columns: Vec<String> =
         html::carried(&source, &axes).into_iter().map(str::to_owned).collect();
@@ -288,6 +297,19 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
     }
     let map = Map::read(source, grid, &columns, divide)?;
     Ok(html::map_page(&map, &cuts, options)?.into_bytes())
+}
+
+/// The boundary file beside a map of these axes.
+fn overlay(path: &Path, axes: &[SweptAxis]) -> Result<Overlay, PlotError> {
+    let source = Source::open(path)?;
+    if source.kind != Kind::Boundary {
+        return Err(PlotError::Unfit(format!(
+            "`--boundary` takes a boundary file; {} is a {} file",
+            path.display(),
+            source.kind.name()
+        )));
+    }
+    figures::boundary::overlay(&Table::read(source)?, [&axes[0].name, &axes[1].name])
 }
 
 /// A picture of what differs between two maps: of ratios, unless the options say gaps.
@@ -381,6 +403,12 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
             options.stability.is_some(),
             trace || over_modes,
             "traces, and frequencies of modes files",
+        ),
+        (
+            "--boundary",
+            options.boundary.is_some(),
+            map && format != Format::Html,
+            "maps drawn as .svg or .png",
         ),
         ("--view", options.view.is_some(), view_fits, view_of(options)),
         ("--against", options.against.is_some(), over_time, "traces over time"),

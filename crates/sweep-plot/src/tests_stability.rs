@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::sample::{Sample, modes, trace};
+use super::sample::{Sample, boundary, map, modes, trace};
 use super::tests::{carried, draw, message, svg};
 use super::*;
 
@@ -120,6 +120,37 @@ fn other_figures_shade_the_unstable_speeds() {
         .collect();
     let sum = "sum of the frequencies of modes 1 and 2";
     assert!(names.iter().any(|name| name == sum), "{names:?}");
+}
+
+#[test]
+fn a_map_takes_the_line_of_a_boundary_over_its_axes() {
+    let over = |axes: [&str; 2]| {
+        let [x, y] = axes.map(|name| format!(r#"{{"parameter": "{name}", "values": [1, 2]}}"#));
+        let plan =
+            format!(r#"{{"name": "dwell", "quantity": "growth_per_s", "axis": [{x}, {y}]}}"#);
+        boundary().metadata("sweep.plan", &plan)
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let same = over(["unbalance_mass_kg", "damping_n_s_per_m"]).write(folder.path(), "a.parquet");
+    let other = over(["unbalance_mass_kg", "tub_mass_kg"]).write(folder.path(), "b.parquet");
+    let no_boundary = trace().write(folder.path(), "trace.parquet");
+    let with = |path: &Path| PlotOptions { boundary: Some(path.to_owned()), ..Default::default() };
+    let plain = svg(map(), &PlotOptions::default());
+    let figure = svg(map(), &with(&same));
+    assert!(figure.contains(">boundary: no growth at any speed<"), "the legend names the line");
+    let dashed = |figure: &str| figure.matches("stroke-dasharray").count();
+    // The line and its sign in the legend.
+    assert_eq!(dashed(&figure), dashed(&plain) + 2);
+    for (path, format, said) in [
+        (&other, "a.svg", "is a boundary over unbalance_mass_kg, tub_mass_kg"),
+        (&no_boundary, "a.svg", "`--boundary` takes a boundary file"),
+        (&same, "a.html", "`--boundary` is for maps drawn as .svg or .png"),
+    ] {
+        let refused = message(draw(map(), &with(path), format));
+        assert!(refused.contains(said), "{refused}");
+    }
+    let own = svg(over(["unbalance_mass_kg", "damping_n_s_per_m"]), &PlotOptions::default());
+    assert!(own.contains(">Where the machine may dwell at any speed<"), "the title");
 }
 
 #[test]

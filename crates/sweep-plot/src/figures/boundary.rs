@@ -81,9 +81,13 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
             Series { name: name.clone(), colour, grid: 0, y: pick(|place| place.y), style }
         }));
     }
-    let side = far_side(&curves, quantity(table).starts_with("min_gap"));
+    let side = far_side(&curves, quantity(table));
     Ok(Chart {
-        title: "Boundary of the linear model's reliability".to_owned(),
+        title: if is_growth(quantity(table)) {
+            "Where the machine may dwell at any speed".to_owned()
+        } else {
+            "Boundary of the linear model's reliability".to_owned()
+        },
         subtitle: table.source.subtitle(&format!(
             "{} values of {}{side}",
             grid.len(),
@@ -104,7 +108,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
 }
 
 /// What the region above the uppermost places is, where all of these say the same.
-fn far_side(curves: &[(String, Vec<Place>)], gap: bool) -> String {
+fn far_side(curves: &[(String, Vec<Place>)], quantity: &str) -> String {
     let mut uppermost: Vec<Place> = Vec::new();
     for place in curves.iter().flat_map(|(_, places)| places).filter(|place| place.y.is_finite()) {
         match uppermost.iter_mut().find(|known| known.x == place.x) {
@@ -116,11 +120,14 @@ fn far_side(curves: &[(String, Vec<Place>)], gap: bool) -> String {
     let all = |rising: bool| {
         !uppermost.is_empty() && uppermost.iter().all(|place| place.rising == Some(rising))
     };
-    let side = match (gap, all(true), all(false)) {
-        (false, false, true) => "reliable",
-        (false, true, false) => "unreliable",
-        (true, true, false) => "gap open",
-        (true, false, true) => "gap closed",
+    let [falling, rising] = match quantity {
+        gap if gap.starts_with("min_gap") => ["gap closed", "gap open"],
+        growth if is_growth(growth) => ["stable", "unstable"],
+        _ => ["reliable", "unreliable"],
+    };
+    let side = match (all(true), all(false)) {
+        (false, true) => falling,
+        (true, false) => rising,
         _ => return String::new(),
     };
     let places: usize = curves
@@ -136,12 +143,50 @@ fn quantity(table: &Table) -> &str {
     table.source.find("quantity").and_then(Value::as_str).unwrap_or("ratio_max")
 }
 
+/// Whether that is the growth of disturbances.
+fn is_growth(quantity: &str) -> bool {
+    quantity.starts_with("growth")
+}
+
+/// A boundary over a map's two axes.
+pub(crate) struct Overlay {
+    /// What it says.
+    pub(crate) name: String,
+    /// Its lines, by the values of both axes; NaN where a line has a gap.
+    pub(crate) lines: Vec<Vec<[f64; 2]>>,
+}
+
+/// The lines of a boundary file over these two axes.
+///
+/// # Errors
+/// [`PlotError::Unfit`] if it has others, or further ones; otherwise as [`chart`].
+pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay, PlotError> {
+    let named = table.source.find("axis").and_then(Value::as_array);
+    let names: Vec<&str> =
+        named.into_iter().flatten().filter_map(|axis| axis.get("parameter")?.as_str()).collect();
+    if names != axes {
+        return Err(PlotError::Unfit(format!(
+            "{} is a boundary over {}; the map is over {}",
+            table.source.path.display(),
+            names.join(", "),
+            axes.join(", ")
+        )));
+    }
+    let chart = chart(table)?;
+    let name = format!("boundary: {}", limit(table));
+    let xs = chart.grids.into_iter().next().unwrap_or_default();
+    let series = chart.panels.into_iter().flat_map(|panel| panel.series);
+    let lines = series.map(|series| xs.iter().zip(series.y).map(|(&x, y)| [x, y]).collect());
+    Ok(Overlay { name, lines: lines.collect() })
+}
+
 /// What is at its limit, as the file says, or else the ratio.
 fn limit(table: &Table) -> String {
     let ratio = label::significant(table.source.ratio_limit(), 4);
     match quantity(table) {
         "ratio_max" => format!("ratio {ratio}"),
         gap if gap.starts_with("min_gap") => format!("{} 0", label::words(gap)),
+        growth if is_growth(growth) => "no growth at any speed".to_owned(),
         other => format!("{} {ratio}", label::words(other)),
     }
 }

@@ -7,6 +7,7 @@ use crate::colour::{BOTH, ColourScale, DISTINCT, LEVELS};
 use crate::contour::{MOST_POINTS, leave_out_shortest, zero_lines};
 use crate::cuts::Cuts;
 use crate::error::PlotError;
+use crate::figures::boundary::Overlay;
 use crate::frame::{
     HEADING_HEIGHT, LABEL_SIZE, LEGEND_ROW, Panel, Sign, TICK_SIZE, failed, failed_hatch, heading,
     legend, legend_rows, sensitive_hatch, undefined,
@@ -19,6 +20,8 @@ use crate::region::roomiest;
 use crate::scene::{Anchor, Colour, Hatch, INK, Outline, PAPER, Scene, Stroke, Text};
 
 const WIDTH: f64 = 880.0;
+/// The line of another file: on neither side of the colours.
+const OVERLAY: Colour = Colour::hex(0x0b6b3a);
 /// Left of a panel: numbers and label of the y axis.
 const LEFT: f64 = 86.0;
 /// Right of the panels: the colour bar with its numbers and label.
@@ -37,6 +40,7 @@ pub(crate) fn draw(
     map: &Map,
     cuts: &Cuts,
     shown: Option<&Shown>,
+    overlay: Option<&Overlay>,
     typeface: &Typeface,
 ) -> Result<Scene, PlotError> {
     let mut cells = match shown {
@@ -57,7 +61,10 @@ pub(crate) fn draw(
     let width = (WIDTH - LEFT - bar - gap * (columns - 1) as f64) / columns as f64;
     let height = if single { 440.0 } else { 0.78 * width };
     cells.refine_hatches([width, height]);
-    let entries = cells.legend(cuts);
+    let mut entries = cells.legend(cuts);
+    if let Some(overlay) = overlay {
+        entries.push((Sign::Line(overlay_stroke()), overlay.name.clone()));
+    }
     let legend_height = LEGEND_ROW * legend_rows(typeface, &entries, WIDTH - LEFT - 20.0) as f64;
     let panels_height = rows as f64 * (height + head) + gap * (rows - 1) as f64;
     let total = HEADING_HEIGHT + panels_height + BELOW + legend_height + 14.0;
@@ -84,6 +91,9 @@ pub(crate) fn draw(
             cells.draw_line(&mut scene, &panel, (layer, level), &cut.rest, room);
             cells.name_regions(&mut scene, typeface, &panel, (layer, level), &cut.rest);
         }
+        if let Some(overlay) = overlay {
+            draw_overlay(&mut scene, &panel, overlay);
+        }
         let lowest = index + columns >= cuts.cuts.len();
         panel.frame(&mut scene, lowest, column == 0);
         if let Some(name) = &cut.name {
@@ -104,6 +114,28 @@ pub(crate) fn draw(
     let y = HEADING_HEIGHT + panels_height + BELOW + LEGEND_ROW / 2.0;
     legend(&mut scene, typeface, &entries, LEFT, y, WIDTH - LEFT - 20.0);
     Ok(scene)
+}
+
+/// How the line of another file is drawn.
+fn overlay_stroke() -> Stroke {
+    Stroke { dash: vec![9.0, 5.0], ..Stroke::solid(OVERLAY, 3.0) }
+}
+
+/// Draws the line of another file, as far as it is within the panel.
+fn draw_overlay(scene: &mut Scene, panel: &Panel, overlay: &Overlay) {
+    let mut outline = Outline::default();
+    for line in &overlay.lines {
+        let places = line.iter().map(|[x, y]| [panel.xs.position(*x), panel.ys.position(*y)]);
+        let places: Vec<[f64; 2]> = places.collect();
+        let inside = |place: &[f64; 2]| place.iter().all(|part| (0.0..=1.0).contains(part));
+        for part in places.split(|place| !inside(place)).filter(|part| part.len() > 1) {
+            let at =
+                |[x, y]: &[f64; 2]| [panel.x + x * panel.width, panel.y + (1.0 - y) * panel.height];
+            outline.add_line(&part.iter().map(at).collect::<Vec<_>>());
+        }
+    }
+    scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
+    scene.line(outline, overlay_stroke());
 }
 
 /// Name of the run, how many points it has and how many failed, and what is fixed, left out or

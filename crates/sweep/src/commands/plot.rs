@@ -66,6 +66,10 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub stability: Option<PathBuf>,
 
+    /// Map as .svg or .png: draw the line of this boundary file too
+    #[arg(long, value_name = "FILE")]
+    pub boundary: Option<PathBuf>,
+
     /// Trace: compare with this trace: both nonlinear models, the linear one left out
     #[arg(long, value_name = "FILE")]
     pub against: Option<PathBuf>,
@@ -89,6 +93,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         resonances_rpm: args.resonances.clone(),
         modes: args.modes.clone(),
         stability: args.stability.clone(),
+        boundary: args.boundary.clone(),
         against: args.against.clone(),
         traces: args.traces.clone(),
     };
