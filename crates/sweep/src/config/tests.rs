@@ -205,6 +205,9 @@ fn a_written_machine_reads_back_the_same_bits() {
     full.bushings[0].damping_n_s_per_m = [0.0, 12.0, 12.0];
     full.bushings[0].cubic_n_per_m3[1] = 5e6;
     full.further_unbalances[0].radius_m = -0.2;
+    let corners = [[0.5, -0.45, 0.26], [0.5, -0.45, -0.26], [-0.1, -0.45, 0.01]];
+    full.feet = corners.map(|foot_m| washer_model::Foot { foot_m }).to_vec();
+    full.cabinet = Some(washer_model::Cabinet { mass_kg: 31.5, ..Default::default() });
     for machine in [machine, Machine::paper(), full] {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("machine.toml"), machine_file(&machine)).unwrap();
