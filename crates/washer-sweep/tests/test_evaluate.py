@@ -1,6 +1,7 @@
 """A table of designs in, a table of results out."""
 
 import itertools
+import types
 
 import duckdb
 import numpy as np
@@ -57,7 +58,10 @@ def test_every_source_of_columns_is_the_same(short):
         {name: list(values) for name, values in table.items()},
         {name: values[::-1].copy()[::-1] for name, values in table.items()},
         dict(reversed(table.items())),
-        short.run(progress=False).__class__ and pa.table(expected.select(AXES)),
+        types.MappingProxyType(table),
+        {name: pd.Series(values) for name, values in table.items()},
+        {name: pl.Series(values) for name, values in table.items()},
+        pa.table(expected.select(AXES)),
     ):
         assert pa.table(short.evaluate(source)) == expected, type(source)
     whole = {"unbalance_mass_kg": np.array([1]), "damping_n_s_per_m": np.array([60, 300])[:1]}
@@ -106,8 +110,9 @@ def test_what_is_no_table_is_refused(short):
             short.evaluate(table)
     with pytest.raises(TypeError, match="column `unbalance_mass_kg`: expected numbers"):
         short.evaluate({"unbalance_mass_kg": ["a"], "damping_n_s_per_m": [60]})
-    with pytest.raises(TypeError, match="expected numbers"):
-        short.evaluate({"unbalance_mass_kg": np.ones((2, 2)), "damping_n_s_per_m": [60]})
+    for square in (np.ones((2, 2)), np.ones((2, 2), int), np.ones((2, 1)), np.ones((2, 1), int)):
+        with pytest.raises(TypeError, match="expected numbers"):
+            short.evaluate({"unbalance_mass_kg": square, "damping_n_s_per_m": [60, 60]})
     for threads in (0, 5000):
         with pytest.raises(PlanError, match="expected a number from 1 to 4096"):
             short.evaluate(columns(short), threads=threads)

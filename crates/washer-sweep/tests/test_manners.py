@@ -56,7 +56,7 @@ def test_ctrl_c_ends_an_evaluation_and_leaves_its_rows(short):
         stopped.result.save("never.parquet")
 
 
-@pytest.mark.parametrize("work", ["run", "evaluate", "boundary", "trace"])
+@pytest.mark.parametrize("work", ["run", "evaluate", "boundary", "trace", "stability", "explain"])
 def test_ctrl_c_is_answered_in_half_a_second(long, work):
     point = {"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100.0}
     stopped, answered_s = interrupted({
@@ -64,10 +64,12 @@ def test_ctrl_c_is_answered_in_half_a_second(long, work):
         "evaluate": lambda: long.evaluate(table(1000)),
         "boundary": lambda: long.boundary(progress=False),
         "trace": lambda: long.trace(point, every=1.0),
+        "stability": lambda: washer_sweep.stability(long, np.arange(60, 400, 0.1), progress=False),
+        "explain": lambda: washer_sweep.explain(long, point),
     }[work], 0.3)
     assert answered_s < ANSWERED_S
-    # A trace has no rows before its end.
-    assert isinstance(stopped, washer_sweep.Interrupted) or work == "trace"
+    # Traces and explanations have nothing before their end.
+    assert isinstance(stopped, washer_sweep.Interrupted) or work in ("trace", "explain")
 
 
 def test_a_run_into_a_file_goes_on_where_ctrl_c_left_it(short, tmp_path):

@@ -1,5 +1,6 @@
 """Plans, and what is told of those that are none."""
 
+import importlib.metadata
 import pickle
 
 import numpy as np
@@ -22,6 +23,10 @@ def test_a_file_its_text_and_a_dictionary_are_one_plan():
     # What a plan says of itself is a plan again, but for the machine, which a file would hold.
     again = {k: v for k, v in from_file.to_dict().items() if k != "machine"}
     assert Plan(again).to_dict() == from_file.to_dict()
+
+
+def test_the_package_has_the_engines_version():
+    assert washer_sweep.__version__ == importlib.metadata.version("washer-sweep")
 
 
 def test_a_dictionary_takes_what_numpy_and_pathlib_give():
