@@ -1,5 +1,6 @@
 //! `Result`: rows as columns, for whoever speaks Arrow.
 
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -10,7 +11,7 @@ use arrow_schema::{DataType, Field};
 use pyo3::exceptions::{PyKeyError, PyOSError};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyCapsule, PyDict, PyList};
-use sweep::ResultTable;
+use sweep::{ResultKind, ResultTable};
 use sweep_files::cells;
 use sweep_plot::PlotOptions;
 
@@ -32,6 +33,22 @@ impl PyResultTable {
                 self.0.schema().fields().iter().map(|field| field.name().as_str()).collect();
             PyKeyError::new_err(format!("no column `{name}`; there are {}", names.join(", ")))
         })
+    }
+
+    /// Whether the rows are points of a table that leave out some of the grid over their values:
+    /// a map of them would be mostly empty.
+    fn is_scattered(&self) -> bool {
+        let plan = self.0.plan();
+        if self.0.kind() != ResultKind::Map || plan["design"].is_null() {
+            return false;
+        }
+        let axes = plan["axis"].as_array().map_or(&[][..], Vec::as_slice);
+        let distinct = axes.iter().filter_map(|axis| axis["parameter"].as_str()).map(|name| {
+            let parts = self.0.batches().iter().filter_map(|batch| batch.column_by_name(name));
+            let values = parts.flat_map(|part| cells::numbers(part).unwrap_or_default());
+            values.map(|value| value.map(f64::to_bits)).collect::<HashSet<_>>().len()
+        });
+        distinct.product::<usize>() != self.0.rows()
     }
 
     /// One entry of every field's metadata.
@@ -146,6 +163,9 @@ impl PyResultTable {
 
     /// The program's own figure, where there is one: points off a grid have none.
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        if self.is_scattered() {
+            return Ok(None);
+        }
         let drawn = py.detach(|| {
             let folder = tempfile::tempdir()?;
             let path = folder.path().join("figure.svg");

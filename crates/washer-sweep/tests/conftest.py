@@ -3,12 +3,23 @@
 import os
 import pathlib
 
+import pyarrow as pa
 import pytest
 from conftest_grid import SHORT
 
 import washer_sweep
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
+
+
+def rows(result):
+    """Rows as a table of pyarrow's, words as such: a file's dictionaries hold those words alone
+    that appear in it, and a result's in memory all that may."""
+    table = pa.table(result)
+    words = [field.with_type(pa.string()) if pa.types.is_dictionary(field.type) else field
+             for field in table.schema]
+    return table.cast(pa.schema(words)).combine_chunks()
+
 
 @pytest.fixture
 def short():

@@ -9,7 +9,7 @@ import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
-from conftest import ROOT
+from conftest import ROOT, rows
 from conftest_grid import SHORT
 
 import washer_sweep
@@ -31,15 +31,15 @@ def test_fig12_has_the_bits_of_the_commands_rows(sweep, tmp_path):
     grid = ROOT / "sweeps/fig12.toml"
     subprocess.run([sweep, "run", grid, "--out", path, "--progress", "none"], check=True,
                    capture_output=True)
-    table = pa.table(washer_sweep.read(path))
+    table = rows(washer_sweep.read(path))
     # In another order, in pieces, and only some at first.
     order = np.random.default_rng(1).permutation(len(table))
     plan = Plan.from_toml(grid)
     for some in (order[:37], order):
         points = pa.concat_tables([table.select(AXES).take(part)
                                    for part in np.array_split(some, 3)])
-        found = pa.table(plan.evaluate(points)).drop_columns("point")
-        assert found.combine_chunks() == table.take(some).drop_columns("point").combine_chunks()
+        found = rows(plan.evaluate(points)).drop_columns("point")
+        assert found == table.take(some).drop_columns("point").combine_chunks()
 
 
 def test_every_source_of_columns_is_the_same(short):

@@ -128,7 +128,8 @@ impl ResultTable {
             path: path.to_path_buf(),
             reason: "it is no result of this program".to_owned(),
         };
-        let plan = file.value(key::PLAN).and_then(|plan| serde_json::from_str(plan).ok());
+        let plan = file.value(key::PLAN).or_else(|| file.value(key::DIFFERENCES));
+        let plan = plan.and_then(|plan| serde_json::from_str(plan).ok());
         let plan = plan.ok_or_else(not_ours)?;
         let has = |key| file.value(key).is_some();
         let kind = match () {
@@ -157,7 +158,7 @@ impl ResultTable {
         self.kind
     }
 
-    /// The plan as JSON, as the file carries it.
+    /// The plan as JSON, as the file carries it; of differences, what was compared.
     #[must_use]
     pub fn plan(&self) -> &Value {
         &self.plan

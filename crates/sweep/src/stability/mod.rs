@@ -16,7 +16,7 @@ use crate::outcome::{Growth, Outcome, Status, Trajectory};
 use crate::plan::Plan;
 
 /// Rows that a thread takes at once: enough to fill lanes, few enough that a signal is soon heard.
-const AT_ONCE: usize = 128;
+const AT_ONCE: usize = 32;
 
 /// Refuses a grid whose axes contradict the speeds, or mean nothing at a constant speed. `option`
 /// is what gave the speeds.

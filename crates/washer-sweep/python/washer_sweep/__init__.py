@@ -22,11 +22,15 @@ from washer_sweep._native import (
     read,
     stability,
 )
+from washer_sweep._types import ArrowStream, Diagnostic, Parameter
 
 __all__ = [
     "NUMERICS_VERSION",
+    "ArrowStream",
+    "Diagnostic",
     "Explanation",
     "Interrupted",
+    "Parameter",
     "Plan",
     "PlanError",
     "Result",

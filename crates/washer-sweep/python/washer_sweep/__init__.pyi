@@ -2,58 +2,42 @@
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, Protocol, TypedDict
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from washer_sweep._errors import Interrupted, PlanError
+from washer_sweep._explanation import Explanation
+from washer_sweep._types import ArrowStream, Diagnostic, Parameter
+
+__all__ = [
+    "NUMERICS_VERSION",
+    "ArrowStream",
+    "Diagnostic",
+    "Explanation",
+    "Interrupted",
+    "Parameter",
+    "Plan",
+    "PlanError",
+    "Result",
+    "__version__",
+    "explain",
+    "modes",
+    "parameters",
+    "read",
+    "stability",
+]
 
 NUMERICS_VERSION: int
 """Builds of one version and this number compute the same bits."""
 __version__: str
 
-class ArrowStream(Protocol):
-    """A table of polars, pyarrow, pandas, DuckDB, or any other that speaks Arrow's C stream."""
-
-    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
-
-class Diagnostic(TypedDict):
-    """One mistake."""
-
-    file: str | None
-    """The file, or the name of the option, text or table."""
-    line: int | None
-    """From 1."""
-    column: int | None
-    """From 1."""
-    message: str
-    expected: str | None
-    hint: str | None
-
-class PlanError(ValueError):
-    """What was given makes no plan, or does not fit one. Nothing was done."""
-
-    diagnostics: list[Diagnostic]
-
-class Interrupted(KeyboardInterrupt):
-    """Ctrl-C ended the work. `result` has the rows that were computed, or is None where a file
-    keeps them."""
-
-    result: Result | None
-
-class Parameter(TypedDict):
-    """A number that can be set or swept."""
-
-    name: str
-    value: float | None
-    unit: str
-    description: str
-    range: dict[str, Any]
-    source: str
-
+@final
 class Plan:
     """A validated plan: a machine, a spin, a method, axes."""
 
-    def __init__(self, grid: Mapping[str, Any], *, set: Mapping[str, float] | None = None) -> None:
+    def __new__(cls, grid: Mapping[str, Any], *, set: Mapping[str, float] | None = None) -> Plan:
         """A plan with the keys of a grid file. `set` overrides constants.
 
         Raises `PlanError` with every mistake. Lines and columns are those of the dictionary as
@@ -149,15 +133,7 @@ class Plan:
     def __len__(self) -> int:
         """How many points."""
 
-class Explanation(dict[str, Any]):
-    """What was found at a point: the keys of `sweep explain --json`.
-
-    As text, and in a notebook, it is what `sweep explain` prints.
-    """
-
-    text: str
-    def __init__(self, found: Mapping[str, Any], text: str) -> None: ...
-
+@final
 class Result:
     """Rows of a result, which any library that speaks Arrow takes without a copy:
     `polars.DataFrame(result)`, `pyarrow.table(result)`, `pandas.DataFrame.from_arrow(result)`.
@@ -168,10 +144,10 @@ class Result:
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
     def __arrow_c_schema__(self) -> object: ...
-    def __getitem__(self, name: str) -> NDArray[Any]:
+    def __getitem__(self, name: str, /) -> NDArray[Any]:
         """A column as an array of NumPy's: numbers with nan for null, else objects with None."""
 
-    def __contains__(self, name: str) -> bool: ...
+    def __contains__(self, name: str, /) -> bool: ...
     def __len__(self) -> int: ...
     @property
     def columns(self) -> list[str]: ...
@@ -185,7 +161,7 @@ class Result:
     ) -> Literal["map", "boundary", "trace", "modes", "stability", "differences"]: ...
     @property
     def plan(self) -> dict[str, Any]:
-        """The plan that it came of, as its file carries it."""
+        """The plan that it came of, as its file carries it; of differences, what was compared."""
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the file as `.parquet`, or a figure as `.svg`, `.png` or `.html`.

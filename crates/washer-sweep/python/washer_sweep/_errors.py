@@ -1,6 +1,13 @@
 """Exceptions. They are Python's own classes, because the stable C API of Python 3.11 lets no
 extension derive from one with fields."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from washer_sweep import Diagnostic, Result
+
 
 class PlanError(ValueError):
     """What was given makes no plan, or does not fit one. Nothing was done.
@@ -9,11 +16,13 @@ class PlanError(ValueError):
     for each: `file`, `line`, `column`, `message`, `expected` and `hint`, None where there is none.
     """
 
-    def __init__(self, text, diagnostics):
+    diagnostics: list[Diagnostic]
+
+    def __init__(self, text: str, diagnostics: list[Diagnostic]) -> None:
         super().__init__(text)
         self.diagnostics = diagnostics
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[type[PlanError], tuple[str, list[Diagnostic]]]:
         return type(self), (self.args[0], self.diagnostics)
 
 
@@ -23,6 +32,8 @@ class Interrupted(KeyboardInterrupt):
     `result` has the rows that were computed, each whole, or is None where a file keeps them.
     """
 
-    def __init__(self, text, result):
+    result: Result | None
+
+    def __init__(self, text: str, result: Result | None) -> None:
         super().__init__(text)
         self.result = result
