@@ -86,8 +86,8 @@ def main():
     if len(sys.argv) > 1:
         figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
         axes.plot(1e3 * others[:, 0], others[:, 1], ".", color="0.8", label="at random")
-        drawn = axes.scatter(1e3 * values[:, 0], values[:, 1], c=designs[:, 1], label="front")
-        figure.colorbar(drawn, label="damping, N s/m")
+        drawn = axes.scatter(1e3 * values[:, 0], values[:, 1], c=designs[:, 0], label="front")
+        figure.colorbar(drawn, label="springs, N/m")
         axes.set_xlabel("greatest travel of the tub's front, mm")
         axes.set_ylabel("greatest force on the cabinet, N")
         axes.legend()

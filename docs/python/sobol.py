@@ -67,7 +67,7 @@ def yaw():
         }
         return plan.evaluate(columns)["nonlinear_tub_yaw"]
 
-    return names, analysed(problem, 128, amplitude)
+    return names, analysed(problem, 512, amplitude)
 
 
 def main():
@@ -88,7 +88,7 @@ def main():
         axes.set_yticks(places, names)
         axes.invert_yaxis()
         axes.set_xlabel("share of the variance of the tub's yaw amplitude")
-        axes.legend()
+        axes.legend(loc="lower right")
         figure.savefig(sys.argv[1], metadata={"Date": None})
 
 
