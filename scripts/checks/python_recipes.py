@@ -3,8 +3,8 @@ holds what these print against their pages.
 
     python scripts/checks/python_recipes.py [--write]
 
-The blocks of a document are one program, in a folder with `sweeps/`. The first `text` block of a page holds what its script prints. --write renews these blocks and the
-pictures beside them.
+The blocks of a document are one program, in a folder with `sweeps/`. The first `text` block of a
+page holds what its script prints. --write renews these blocks and the pictures beside them.
 """
 
 import pathlib
