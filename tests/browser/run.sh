@@ -1,5 +1,5 @@
 #!/bin/sh
-# The pages of a map and of a trace in a real browser:
+# The pages of a map, of a trace and of a design in a real browser:
 # tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
 #
 # Needs chromium and chromedriver on the PATH, and on Debian installs them if they are not there.
@@ -28,4 +28,22 @@ fi
 "$sweep" trace "$root/sweeps/fig11.toml" --every 0.02 --out "$work/trace.parquet"
 "$sweep" plot "$work/trace.parquet" --modes "$work/modes.parquet" -o "$work/trace.html"
 "$venv/bin/python" "$here/check_chart.py" "$work/trace.parquet" "$work/trace.html" \
+    ${SHOTS:+--screenshots "$SHOTS"}
+
+# The page of a design: points by pairs of parameters, the histogram, the influences.
+cat > "$work/design.toml" << 'END'
+name = "design"
+spin = { profile = "triangular", peak_rpm = 350, ramp_s = 50 }
+time = { end_s = 50, window_s = [30, 50] }
+design = { method = "latin_hypercube", points = 60 }
+[[axis]]
+parameter = "unbalance_mass_kg"
+range = { from = 0.1, to = 1.0 }
+[[axis]]
+parameter = "damping_n_s_per_m"
+range = { from = 60, to = 300 }
+END
+"$sweep" run "$work/design.toml" --out "$work/design.parquet" --progress none
+"$sweep" plot "$work/design.parquet" -o "$work/design.html"
+"$venv/bin/python" "$here/check_design.py" "$work/design.parquet" "$work/design.html" \
     ${SHOTS:+--screenshots "$SHOTS"}

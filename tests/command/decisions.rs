@@ -4,7 +4,7 @@
 use std::fs;
 use std::process::Output;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::home::{Home, grid, said};
 
@@ -26,7 +26,7 @@ fn printed(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-fn json(output: &Output) -> Value {
+fn parsed(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
         panic!("{error} in {}\n{}", printed(output), said(output));
     })
@@ -45,10 +45,10 @@ fn a_gate_opens_or_names_the_rows_and_exits_with_4() {
     assert!(text.contains("FAILS  unbalance_mass_kg < 0.9: 2 of 6 rows false"), "{text}");
     assert!(text.contains("holds  share(reliable) >= 0"), "{text}");
 
-    let parsed = json(&home.sweep(&["require", MAP, "point < 2", "--json"]));
-    assert_eq!(parsed["holds"], false);
-    assert_eq!(parsed["expressions"][0]["failing"], 4);
-    assert_eq!(parsed["expressions"][0]["offenders"][0]["row"], 2);
+    let gate = parsed(&home.sweep(&["require", MAP, "point < 2", "--json"]));
+    assert_eq!(gate["holds"], false);
+    assert_eq!(gate["expressions"][0]["failing"], 4);
+    assert_eq!(gate["expressions"][0]["offenders"][0]["row"], 2);
 
     let none = home.sweep(&["require", MAP, "reliable", "--where", "false"]);
     assert_eq!(code(&none), Some(4));
@@ -71,11 +71,11 @@ fn mistakes_in_a_gate_are_pointed_at_all_of_them() {
 #[test]
 fn show_sorts_filters_and_speaks_json() {
     let home = mapped();
-    let top = json(&home.sweep(&["show", MAP, "--top", "2", "--by", "ratio_tub_yaw", "--json"]));
+    let top = parsed(&home.sweep(&["show", MAP, "--top", "2", "--by", "ratio_tub_yaw", "--json"]));
     let rows = top.as_array().expect("rows");
     let ratios: Vec<f64> = rows.iter().filter_map(|row| row["ratio_tub_yaw"].as_f64()).collect();
     assert!(ratios.len() == 2 && ratios[0] >= ratios[1], "{top}");
-    let whole = json(&home.sweep(&["show", MAP, "--json"]));
+    let whole = parsed(&home.sweep(&["show", MAP, "--json"]));
     assert_eq!(whole["summary"]["points"], 6);
     assert_eq!(whole["plan"]["name"], "short");
     let filtered = home.sweep(&["show", MAP, "--where", "damping_n_s_per_m > 200"]);
@@ -101,7 +101,7 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
     let arguments = ["compare", MAP, "results/light.parquet"];
     let differs = home.sweep(&[&arguments[..], &["--fail-on", "ratio=0", "--json"]].concat());
     assert_eq!(code(&differs), Some(4), "{}", said(&differs));
-    let found = json(&differs);
+    let found = parsed(&differs);
     let paths: Vec<&str> = found["plan"]
         .as_array()
         .expect("changes")
@@ -146,14 +146,14 @@ fn a_point_is_traced_by_its_number_or_as_the_worst_and_its_row_is_told() {
     let home = mapped();
     let traced = home.sweep(&["trace", "g.toml", "--point", "3", "--out", "t.parquet"]);
     assert_eq!(code(&traced), Some(0), "{}", said(&traced));
-    let row = json(&home.sweep(&["show", MAP, "--where", "point == 3", "--json"]));
+    let row = parsed(&home.sweep(&["show", MAP, "--where", "point == 3", "--json"]));
     let ratio = row[0]["ratio_max"].as_f64().expect("a ratio");
     let text = said(&traced);
     assert!(text.contains("verdict  ") && text.contains(&format!("{ratio:.4}")[..5]), "{text}");
 
     let worst = home.sweep(&["trace", "g.toml", "--worst", "--out", "t.parquet"]);
     assert_eq!(code(&worst), Some(0), "{}", said(&worst));
-    let first = json(&home.sweep(&["show", MAP, "--top", "1", "--by", "ratio_max", "--json"]));
+    let first = parsed(&home.sweep(&["show", MAP, "--top", "1", "--by", "ratio_max", "--json"]));
     let told = format!("point {} is where ratio_max is greatest", first[0]["point"]);
     // A count comes back as a float.
     assert!(said(&worst).contains(&told.replace(".0", "")), "{told}: {}", said(&worst));
@@ -170,7 +170,8 @@ fn a_point_is_traced_by_its_number_or_as_the_worst_and_its_row_is_told() {
 #[test]
 fn every_scalar_of_the_grid_file_can_be_set() {
     let home = Home::new(&grid(3, 2));
-    let plan = |sets: &[&str]| json(&home.sweep(&[&["check", "g.toml", "--json"], sets].concat()));
+    let plan =
+        |sets: &[&str]| parsed(&home.sweep(&[&["check", "g.toml", "--json"], sets].concat()));
     let set = plan(&["--set", "end_s=0.2", "--ratio-limit", "1.5", "--set", "step_s=1e-4"]);
     assert_eq!(set["time"]["end_s"], 0.2);
     assert_eq!(set["reliability"]["ratio_limit"], 1.5);
@@ -180,12 +181,24 @@ fn every_scalar_of_the_grid_file_can_be_set() {
     assert_eq!(method["integrator"]["rtol"], 1e-5);
     assert_eq!(method["reliability"]["criterion"], "rms");
     assert!(plan(&[])["set"].is_null(), "a plan without --set reads as ever");
+    let named = ["--set", "profile=ramp", "--set", "channels=tub_yaw, tub_pitch"];
+    let named = plan(&[&named[..], &["--set", "metrics=static_sag,clash_time"]].concat());
+    assert_eq!(named["spin"]["profile"], "ramp");
+    assert_eq!(named["spin"]["peak_rpm"], plan(&[])["spin"]["peak_rpm"]);
+    assert_eq!(named["reliability"]["channels"], json!(["tub_yaw", "tub_pitch"]));
+    assert_eq!(named["metrics"], json!(["static_sag", "clash_time"]));
+    assert_eq!(named["set"]["metrics"], "static_sag,clash_time");
     for (sets, expected) in [
         (["--set", "rtol=1e-5"], "the method \"rk4\" has no `rtol`"),
         (["--set", "method=dopri"], "did you mean `dopri5`?"),
         (["--set", "end_s=-1"], "`end_s`"),
         (["--set", "end_s=0.01"], "window"),
         (["--set", "seed=1"], "this grid has none"),
+        (["--set", "profile=table"], "unknown profile"),
+        (["--set", "channels=tub_yw"], "did you mean `tub_yaw`?"),
+        (["--set", "channels=tub_yaw,tub_yaw"], "given twice"),
+        (["--set", "channels="], "unknown channel"),
+        (["--set", "metrics=growth"], "needs speeds"),
         (["--ratio-limit", "nan"], "ratio_limit"),
         (["--name", "a/b"], "expected letters"),
     ] {
@@ -214,4 +227,69 @@ fn a_list_says_its_axes_and_an_unfinished_run_what_it_is() {
     fs::create_dir(home.path("x.parquet.partial")).expect("made");
     let folder = home.sweep(&["show", "x.parquet.partial"]);
     assert!(said(&folder).contains("a run that is not finished"), "{}", said(&folder));
+}
+
+#[test]
+fn what_was_set_is_told_by_a_figure() {
+    let home = mapped();
+    let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--set", "channels=tub_yaw"];
+    let done = home.sweep(&[&light[..], &["--name", "light", "--progress", "none"]].concat());
+    assert_eq!(code(&done), Some(0), "{}", said(&done));
+    let drawn = home.sweep(&["plot", "results/light.parquet", "-o", "light.svg"]);
+    assert_eq!(code(&drawn), Some(0), "{}", said(&drawn));
+    let figure = fs::read_to_string(home.path("light.svg")).expect("a figure");
+    assert!(figure.contains("tub_mass_kg = 20") && figure.contains("channels = tub_yaw"));
+}
+
+#[test]
+fn a_small_result_takes_no_more_than_was_said() {
+    let home = mapped();
+    let checked = said(&home.sweep(&["check", "g.toml"]));
+    let end = checked.find(" kB for the result").expect("a size in kB");
+    let most = checked[..end].rsplit(' ').next().and_then(|kb| kb.parse::<f64>().ok());
+    let most = most.expect("a number") * 1e3;
+    let bytes = fs::metadata(home.path(MAP)).expect("a result").len() as f64;
+    assert!(bytes <= most && most < 2.0 * bytes, "{bytes} of {most}: {checked}");
+}
+
+/// A grid file of a design over two parameters.
+fn designed(method: &str) -> String {
+    format!(
+        "name = \"short\"\n\
+         spin = {{ profile = \"triangular\", peak_rpm = 350, ramp_s = 50 }}\n\
+         time = {{ end_s = 0.1 }}\n\
+         integrator = {{ method = \"rk4\" }}\n\
+         design = {{ method = \"{method}\", points = 32 }}\n\
+         [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.0 }}\n\
+         [[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = {{ from = 60, to = 300 }}\n"
+    )
+}
+
+#[test]
+fn a_run_of_a_design_recommends_a_figure_that_can_be_drawn() {
+    for method in ["latin_hypercube", "sobol", "monte_carlo"] {
+        let home = Home::new(&designed(method));
+        let done = home.sweep(&["run", "g.toml", "--progress", "none"]);
+        assert_eq!(code(&done), Some(0), "{}", said(&done));
+        let text = said(&done);
+        assert!(text.contains("share  ") && text.contains("next  sweep plot "), "{text}");
+        let next = home.sweep(&["plot", MAP]);
+        assert_eq!(code(&next), Some(0), "{}", said(&next));
+        for (view, expected) in [
+            ("scatter", "Greatest ratio"),
+            ("histogram", "% confidence"),
+            ("influence", "Rank correlation (Spearman)"),
+        ] {
+            for name in ["a.svg", "a.png", "a.html"] {
+                let drawn = home.sweep(&["plot", MAP, "--view", view, "-o", name]);
+                assert_eq!(code(&drawn), Some(0), "{}", said(&drawn));
+            }
+            let figure = fs::read_to_string(home.path("a.svg")).expect("a figure");
+            assert!(figure.contains(expected), "{method}, {view}");
+        }
+    }
+    let home = mapped();
+    let refused = home.sweep(&["plot", MAP, "--view", "influence", "-o", "a.svg"]);
+    assert_eq!(code(&refused), Some(2));
+    assert!(said(&refused).contains("`--view` is for designs"), "{}", said(&refused));
 }

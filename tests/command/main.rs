@@ -9,6 +9,7 @@
 mod boundary;
 mod decisions;
 mod determinism;
+mod elements;
 mod explain;
 mod faults;
 mod files;

@@ -36,6 +36,10 @@ pub(crate) const NONLINEAR: Colour = DISTINCT[0];
 pub(crate) const LINEAR: Colour = DISTINCT[1];
 /// Cells with points on both sides of a limit: Okabe and Ito's yellow, which no scale here has.
 pub(crate) const BOTH: Colour = Colour::hex(0xf0e442);
+/// Points on the calm side of a limit: the blue of [`BELOW`]'s family that a dot needs on paper.
+pub(crate) const CALM: Colour = Colour::hex(0x3182bd);
+/// Points on the other side.
+pub(crate) const HARSH: Colour = Colour::hex(ABOVE[3]);
 /// Ranges in which a dwell is unstable, behind curves of any colour.
 pub(crate) const SHADE: Colour = Colour::hex(0xcc79a7).with_alpha(70);
 /// Points that failed.

@@ -166,6 +166,8 @@ pub(crate) enum Sign {
     Undefined,
     /// A star.
     Star(Colour),
+    /// A dot around the origin, filled or not.
+    Dot((Outline, bool), Colour),
 }
 
 /// Height of a row of a legend, px.
@@ -202,6 +204,14 @@ pub(crate) fn legend(
                 scene.line(area, Stroke::solid(MUTED, 1.0));
             }
             Sign::Undefined => undefined(scene, &[[x, y - 8.0, 28.0, 16.0]]),
+            Sign::Dot((outline, filled), colour) => {
+                let outline = outline.moved([x + 14.0, y]);
+                if *filled {
+                    scene.fill(outline, *colour);
+                } else {
+                    scene.line(outline, Stroke::solid(*colour, 1.4));
+                }
+            }
             Sign::Star(colour) => scene.fill(Outline::star([x + 14.0, y], 9.0), *colour),
         }
         scene.text(Text::new(text.clone(), [x + 36.0, y + 0.35 * TICK_SIZE], TICK_SIZE));

@@ -106,7 +106,7 @@ pub(crate) struct Whole {
 }
 
 /// Every [`Whole`], in the order in which a page offers them.
-pub(crate) const WHOLE: [Whole; 6] = [
+pub(crate) const WHOLE: [Whole; 10] = [
     Whole {
         name: "gap",
         words: "least gap between drum and tub",
@@ -139,6 +139,42 @@ pub(crate) const WHOLE: [Whole; 6] = [
         words: "static sag of the tub",
         label: "static sag of the tub",
         columns: &[(Quantity::StaticSag, "", "static_sag_m")],
+    },
+    Whole {
+        name: "stop_force",
+        words: "greatest push of a stop",
+        label: "greatest push in the window",
+        columns: &[
+            (Quantity::StopForceNonlinear, "nonlinear", "stop_force_nonlinear_n"),
+            (Quantity::StopForceLinear, "linear", "stop_force_linear_n"),
+        ],
+    },
+    Whole {
+        name: "stop_contact",
+        words: "time that a stop is closed",
+        label: "time of contact in the window",
+        columns: &[
+            (Quantity::StopContactNonlinear, "nonlinear", "stop_contact_nonlinear_s"),
+            (Quantity::StopContactLinear, "linear", "stop_contact_linear_s"),
+        ],
+    },
+    Whole {
+        name: "foot_load",
+        words: "least load of a foot",
+        label: "least load in the window",
+        columns: &[
+            (Quantity::FootLoadNonlinear, "nonlinear", "foot_load_nonlinear_n"),
+            (Quantity::FootLoadLinear, "linear", "foot_load_linear_n"),
+        ],
+    },
+    Whole {
+        name: "slip_margin",
+        words: "least margin against slipping",
+        label: "least margin in the window",
+        columns: &[
+            (Quantity::SlipMarginNonlinear, "nonlinear", "slip_margin_nonlinear_n"),
+            (Quantity::SlipMarginLinear, "linear", "slip_margin_linear_n"),
+        ],
     },
     Whole {
         name: "ratio_change",
@@ -300,6 +336,14 @@ impl Quantity {
             Self::ClashTimeNonlinear => "clash-time-nonlinear",
             Self::ClashTimeLinear => "clash-time-linear",
             Self::StaticSag => "static-sag",
+            Self::StopForceNonlinear => "stop-force-nonlinear",
+            Self::StopForceLinear => "stop-force-linear",
+            Self::StopContactNonlinear => "stop-contact-nonlinear",
+            Self::StopContactLinear => "stop-contact-linear",
+            Self::FootLoadNonlinear => "foot-load-nonlinear",
+            Self::FootLoadLinear => "foot-load-linear",
+            Self::SlipMarginNonlinear => "slip-margin-nonlinear",
+            Self::SlipMarginLinear => "slip-margin-linear",
             Self::RatioChange => "ratio-change",
             Self::GapChange => "gap-change",
             Self::Status => "status",
@@ -347,12 +391,20 @@ impl Shown {
         let scale = match self.quantity {
             Quantity::Ratio => ColourScale::ratio(extent, limit),
             Quantity::RatioChange => ColourScale::change(extent),
-            Quantity::GapNonlinear | Quantity::GapLinear | Quantity::GapChange => {
-                ColourScale::gap(extent)
-            }
-            Quantity::ClashTimeNonlinear | Quantity::ClashTimeLinear | Quantity::StaticSag => {
-                ColourScale::even(extent)
-            }
+            Quantity::GapNonlinear
+            | Quantity::GapLinear
+            | Quantity::GapChange
+            | Quantity::FootLoadNonlinear
+            | Quantity::FootLoadLinear
+            | Quantity::SlipMarginNonlinear
+            | Quantity::SlipMarginLinear => ColourScale::gap(extent),
+            Quantity::ClashTimeNonlinear
+            | Quantity::ClashTimeLinear
+            | Quantity::StopForceNonlinear
+            | Quantity::StopForceLinear
+            | Quantity::StopContactNonlinear
+            | Quantity::StopContactLinear
+            | Quantity::StaticSag => ColourScale::even(extent),
             _ => ColourScale::amplitude(extent),
         };
         let (title, label) = self.words(map.table.source.compared(), unit);
@@ -374,7 +426,8 @@ impl Shown {
         })
     }
 
-    fn words(&self, compared: &str, unit: &str) -> (String, String) {
+    /// For the heading, and beside the colours.
+    pub(crate) fn words(&self, compared: &str, unit: &str) -> (String, String) {
         let channel = self.channel.as_deref().map(label::channel);
         match (self.quantity, channel) {
             (Quantity::Ratio, None) => (
@@ -398,7 +451,8 @@ impl Shown {
         }
     }
 
-    fn level(&self, limit: f64) -> Option<Level> {
+    /// The level that divides its values, if one does.
+    pub(crate) fn level(&self, limit: f64) -> Option<Level> {
         let said = label::significant(limit, 4);
         let words = |[inside, legend]: [&str; 2]| [inside.to_owned(), legend.to_owned()];
         match (self.quantity, &self.channel) {

@@ -18,6 +18,7 @@ mod frame;
 mod gather;
 mod grid;
 mod html;
+mod influence;
 mod label;
 mod layer;
 mod raster;
@@ -25,12 +26,16 @@ mod read;
 mod region;
 #[cfg(test)]
 mod sample;
+mod scatter;
 mod scene;
+mod share;
 mod svg;
 mod swept;
 mod table;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_designs;
 #[cfg(test)]
 mod tests_long;
 #[cfg(test)]
@@ -40,6 +45,7 @@ mod thin;
 use std::path::{Path, PathBuf};
 
 pub use error::PlotError;
+pub use share::Share;
 
 use chart::Chart;
 use cuts::Cuts;
@@ -47,6 +53,7 @@ use gather::Map;
 use grid::Grid;
 use raster::Typeface;
 use read::{Kind, Source};
+use scatter::Scatter;
 use scene::Scene;
 use table::Table;
 
@@ -80,6 +87,22 @@ pub enum Quantity {
     ClashTimeLinear,
     /// How far the tub sinks at rest, if the run has this metric
     StaticSag,
+    /// Greatest push of a stop in the nonlinear model, if the run has this metric
+    StopForceNonlinear,
+    /// Greatest push of a stop in the linear model, if the run has this metric
+    StopForceLinear,
+    /// How long a stop is closed in the nonlinear model, if the run has this metric
+    StopContactNonlinear,
+    /// How long a stop is closed in the linear model, if the run has this metric
+    StopContactLinear,
+    /// Least load of a foot in the nonlinear model, if the run has this metric
+    FootLoadNonlinear,
+    /// Least load of a foot in the linear model, if the run has this metric
+    FootLoadLinear,
+    /// Least margin against slipping in the nonlinear model, if the run has this metric
+    SlipMarginNonlinear,
+    /// Least margin against slipping in the linear model, if the run has this metric
+    SlipMarginLinear,
     /// Of differences: how the greatest ratio changed, as a factor
     RatioChange,
     /// Of differences: how the least gap changed in the nonlinear model
@@ -102,6 +125,12 @@ pub enum View {
     Time,
     /// Trace: greatest deviation in each turn over spin speed, on the way up and down
     Passages,
+    /// Design: points over every pair of parameters, and the quantity over each
+    Scatter,
+    /// Design: how the quantity is distributed, and the share of reliable points
+    Histogram,
+    /// Design: how much the quantity depends on each parameter
+    Influence,
     /// Stability: how fast disturbances grow over constant speeds
     Growth,
     /// Stability: the periodic response of both models over constant speeds
@@ -114,6 +143,7 @@ impl View {
         match self {
             Self::Frequencies | Self::Variation | Self::Shapes => Kind::Modes,
             Self::Time | Self::Passages => Kind::Trace,
+            Self::Scatter | Self::Histogram | Self::Influence => Kind::Design,
             Self::Growth | Self::Responses => Kind::Stability,
         }
     }
@@ -122,11 +152,11 @@ impl View {
 /// What to show; the default is the figure that fits the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlotOptions {
-    /// Modes, trace: which figure; by default the first.
+    /// Modes, trace, design, stability: which figure; by default the first.
     pub view: Option<View>,
-    /// Map: what the colours are.
+    /// Map: what the colours are. Design: what depends on the parameters.
     pub quantity: Quantity,
-    /// Map: the channel of the quantity. Trace: the channels shown.
+    /// Map, design: the channel of the quantity. Trace: the channels shown.
     pub channels: Vec<String>,
     /// Map of three or more axes: where to cut an axis beyond the second, by name and value.
     /// Stability: values of the points that are shown.
@@ -181,10 +211,14 @@ impl Format {
 pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), PlotError> {
     let format = Format::of(output)?;
     let file = Output::begin(output, format.kind())?;
-    let source = Source::open(input)?;
+    let mut source = Source::open(input)?;
+    if is_scattered(&source, options)? {
+        source.kind = Kind::Design;
+    }
     check_options(&source, options, format)?;
     let bytes = match source.kind {
         Kind::Map => map(source, options, format)?,
+        Kind::Design => design(source, options, format)?,
         Kind::Differences => differences(source, options, format)?,
         Kind::Stability => stability(&source, options, format)?,
         Kind::Trace | Kind::Modes | Kind::Boundary => {
@@ -192,6 +226,32 @@ pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), 
         }
     };
     Ok(file.finish(&bytes)?)
+}
+
+/// Whether a map file's points are a design's. One that lists a whole grid, or spreads points over
+/// a single parameter, has a map or curves unless a figure of designs is asked for.
+fn is_scattered(source: &Source, options: &PlotOptions) -> Result<bool, PlotError> {
+    if source.kind != Kind::Map || source.design_method().is_none() {
+        return Ok(false);
+    }
+    match options.view {
+        Some(view) => Ok(view.of() == Kind::Design),
+        None => Ok(!swept::is_whole(source)?),
+    }
+}
+
+fn design(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+    let scatter = Scatter::read(source, options)?;
+    if format == Format::Html {
+        return Ok(html::design_page(&scatter, options.view).into_bytes());
+    }
+    let typeface = Typeface::load()?;
+    let scene = match options.view {
+        Some(View::Histogram) => chart::draw(&figures::histogram::chart(&scatter), &typeface),
+        Some(View::Influence) => figures::influence::draw(&scatter, &typeface),
+        _ => figures::matrix::draw(&scatter, &typeface),
+    };
+    image(&scene, format)
 }
 
 /// Most cells of a picture: two pixels or three to each.
@@ -256,7 +316,7 @@ fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>
         (Kind::Modes, Some(View::Variation)) => figures::turn::chart(table)?,
         (Kind::Modes, Some(View::Shapes)) => figures::shapes::chart(table)?,
         (Kind::Modes, _) => figures::campbell::chart(table, options)?,
-        (Kind::Boundary | Kind::Map | Kind::Differences | Kind::Stability, _) => {
+        (Kind::Boundary | Kind::Map | Kind::Design | Kind::Differences | Kind::Stability, _) => {
             figures::boundary::chart(table)?
         }
     };
@@ -290,6 +350,7 @@ fn view_of(options: &PlotOptions) -> &'static str {
     match options.view.map(View::of) {
         Some(Kind::Modes) => "modes files",
         Some(Kind::Stability) => "stability files",
+        Some(Kind::Design) => "designs: results of a grid file with [design]",
         _ => "traces",
     }
 }
@@ -297,6 +358,7 @@ fn view_of(options: &PlotOptions) -> &'static str {
 /// Refuses options that the file's kind or the output's format would leave without effect.
 fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
     let map = matches!(source.kind, Kind::Map | Kind::Differences);
+    let design = source.kind == Kind::Design;
     let trace = source.kind == Kind::Trace;
     let view_fits = options.view.is_some_and(|view| view.of() == source.kind);
     let (modes, stability) = (source.kind == Kind::Modes, source.kind == Kind::Stability);
@@ -304,11 +366,11 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
     let responses = stability && options.view == Some(View::Responses);
     let over_time = trace && options.view != Some(View::Passages);
     let rules = [
-        ("--quantity", options.quantity != Quantity::default(), map, "maps"),
+        ("--quantity", options.quantity != Quantity::default(), map || design, "maps"),
         (
             "--channel",
             !options.channels.is_empty(),
-            map || trace || responses,
+            map || design || trace || responses,
             "maps, traces and responses of stability files",
         ),
         ("--at", !options.at.is_empty(), map || stability, "maps and stability files"),

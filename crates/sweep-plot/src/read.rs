@@ -20,6 +20,8 @@ use sweep_files::{self as files, FileError, ParquetFile};
 pub(crate) enum Kind {
     /// One row per grid point.
     Map,
+    /// One row per point, scattered.
+    Design,
     /// Time histories of both models at one point.
     Trace,
     /// Modes over spin speed.
@@ -37,6 +39,7 @@ impl Kind {
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Map => "map",
+            Self::Design => "design",
             Self::Trace => "trace",
             Self::Modes => "modes",
             Self::Boundary => "boundary",
@@ -84,6 +87,8 @@ pub(crate) struct Source {
     pub(crate) provenance: Vec<(String, Value)>,
     /// Number of rows.
     pub(crate) rows: usize,
+    /// Name of the run with what its command line set, if the file says them.
+    named: Option<String>,
     file: ParquetFile,
 }
 
@@ -102,7 +107,7 @@ impl Source {
     pub(crate) fn open(path: &Path) -> Result<Self, PlotError> {
         let file = ParquetFile::open(path)?;
         let rows = usize::try_from(file.rows()).unwrap_or(usize::MAX);
-        let provenance = file
+        let provenance: Vec<(String, Value)> = file
             .pairs()
             .filter(|entry| entry.key != ARROW_SCHEMA)
             .map(|entry| {
@@ -118,7 +123,8 @@ impl Source {
             path: path.to_owned(),
             columns: names.join(", "),
         })?;
-        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, file })
+        let named = named(&provenance);
+        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, named, file })
     }
 
     /// The rows of the named columns, from the first. Names that the file lacks are left out.
@@ -170,14 +176,12 @@ impl Source {
 
     /// The first value stored under `key` in the provenance, outer levels before inner ones.
     pub(crate) fn find(&self, key: &str) -> Option<&Value> {
-        self.provenance
-            .iter()
-            .find_map(|(name, value)| if name == key { Some(value) } else { find(value, key) })
+        find_in(&self.provenance, key)
     }
 
-    /// Name of the run, if the file says it.
+    /// Name of the run, if the file says it, with what its command line set.
     pub(crate) fn run_name(&self) -> Option<&str> {
-        self.find("name").and_then(Value::as_str)
+        self.named.as_deref()
     }
 
     /// The run's name, if the file says it, and `rest` as a figure's subtitle.
@@ -192,6 +196,19 @@ impl Source {
             Some("rms") => "root mean squares",
             _ => "amplitudes",
         }
+    }
+
+    /// How the points were placed, of a file whose points are no grid by its plan.
+    pub(crate) fn design_method(&self) -> Option<&str> {
+        self.find("design")?.get("method")?.as_str()
+    }
+
+    /// Whether the plan spreads an axis by the logarithm.
+    pub(crate) fn is_log(&self, parameter: &str) -> bool {
+        let axes = self.find("axis").and_then(Value::as_array).into_iter().flatten();
+        axes.filter(|axis| axis["parameter"] == parameter).any(|axis| {
+            axis["range"]["spacing"] == "log" || axis["distribution"]["kind"] == "lognormal"
+        })
     }
 
     /// The ratio from which on a point is unreliable: the run's limit, or else the paper's, 2.
@@ -264,6 +281,29 @@ impl Batch<'_> {
         };
         words.map_err(|error| damaged(self.path, &error))
     }
+}
+
+fn find_in<'a>(provenance: &'a [(String, Value)], key: &str) -> Option<&'a Value> {
+    provenance
+        .iter()
+        .find_map(|(name, value)| if name == key { Some(value) } else { find(value, key) })
+}
+
+/// As in "fig12, tub_mass_kg = 20".
+fn named(provenance: &[(String, Value)]) -> Option<String> {
+    let mut named = find_in(provenance, "name")?.as_str()?.to_owned();
+    let sets = find_in(provenance, "set").and_then(Value::as_object);
+    for (name, value) in sets.into_iter().flatten() {
+        let value = match value {
+            Value::String(text) => text.clone(),
+            Value::Number(number) => {
+                number.as_f64().map_or(number.to_string(), |value| label::significant(value, 6))
+            }
+            other => other.to_string(),
+        };
+        named.push_str(&format!(", {name} = {value}"));
+    }
+    Some(named)
 }
 
 fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {

@@ -85,6 +85,21 @@ impl Outline {
         outline
     }
 
+    /// The same, elsewhere.
+    pub(crate) fn moved(&self, [dx, dy]: [f64; 2]) -> Self {
+        let moved = |[x, y]: [f64; 2]| [x + dx, y + dy];
+        Self(
+            self.0
+                .iter()
+                .map(|segment| match *segment {
+                    Segment::Move(point) => Segment::Move(moved(point)),
+                    Segment::Line(point) => Segment::Line(moved(point)),
+                    Segment::Close => Segment::Close,
+                })
+                .collect(),
+        )
+    }
+
     /// A five-pointed star around `centre`, `radius` from centre to tip.
     pub(crate) fn star(centre: [f64; 2], radius: f64) -> Self {
         let points: Vec<[f64; 2]> = (0..10)

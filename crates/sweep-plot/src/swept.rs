@@ -96,8 +96,32 @@ impl Gathered {
     }
 }
 
-/// The axes of a map file, in file order: the columns of numbers between the point's index and the
-/// results.
+/// The columns of a map file that are its axes, in file order: those of numbers between the point's
+/// index and the results.
+pub(crate) fn columns(source: &Source) -> Vec<&ColumnFacts> {
+    let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
+    let is_result = |name: &str| of_model(name) || name == "ratio_change";
+    let before = source.columns.iter().take_while(|column| !is_result(&column.name));
+    before.filter(|column| column.cells == Cells::Numbers && column.name != "point").collect()
+}
+
+/// Whether a map file's rows are a whole grid over two axes or more, or a curve over one.
+///
+/// # Errors
+/// As [`axes`], but for rows that do not lie on a grid.
+pub(crate) fn is_whole(source: &Source) -> Result<bool, PlotError> {
+    let axes = match axes(source) {
+        Ok(axes) => axes,
+        Err(PlotError::NotAGrid { .. }) => return Ok(false),
+        Err(error) => return Err(error),
+    };
+    let varying: Vec<&SweptAxis> = axes.iter().filter(|axis| axis.values.len() > 1).collect();
+    let mut sizes = axes.iter().map(|axis| axis.values.len());
+    let size = sizes.try_fold(1_usize, usize::checked_mul);
+    Ok(varying.len() < 2 || size == Some(source.rows) && axes.iter().all(|axis| axis.complete))
+}
+
+/// The axes of a map file, in file order.
 ///
 /// # Errors
 /// As [`Source::batches`]; [`PlotError::Empty`] without rows or axes; [`PlotError::NotAGrid`] for
@@ -108,14 +132,7 @@ pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
         return Err(empty("the map has no rows"));
     }
     let no_grid = |reason: String| PlotError::NotAGrid { path: source.path.clone(), reason };
-    let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
-    let is_result = |name: &str| of_model(name) || name == "ratio_change";
-    let before_results =
-        source.columns.iter().take_while(|column| !is_result(&column.name)).count();
-    let columns: Vec<&ColumnFacts> = source.columns[..before_results]
-        .iter()
-        .filter(|column| column.cells == Cells::Numbers && column.name != "point")
-        .collect();
+    let columns = columns(source);
     if columns.is_empty() {
         return Err(empty("the map has no axis"));
     }

@@ -35,7 +35,7 @@ pub(super) fn carried(page: &[u8]) -> Value {
 }
 
 /// A curve as a page carries it.
-fn curve(series: &Value) -> Vec<f64> {
+pub(super) fn curve(series: &Value) -> Vec<f64> {
     use base64::Engine as _;
     let bytes =
         base64::engine::general_purpose::STANDARD.decode(series["y"].as_str().unwrap()).unwrap();

@@ -287,6 +287,10 @@ impl<'a> ModelEngine<'a> {
         let metrics = self.plan.measures.of_model().filter_map(|metric| match metric {
             Metric::CabinetForce => extra.cabinet_force_n,
             Metric::ClashTime => extra.clash_time_s,
+            Metric::StopForce => extra.stop_force_n,
+            Metric::StopContact => extra.stop_contact_s,
+            Metric::FootLoad => extra.foot_load_n,
+            Metric::SlipMargin => extra.slip_margin_n,
             Metric::StaticSag | Metric::Growth => None,
         });
         Trajectory {

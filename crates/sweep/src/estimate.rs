@@ -22,6 +22,11 @@ const BUDGET: Duration = Duration::from_millis(350);
 const FIRST_END_S: f64 = 1e-3;
 const FIRST_STEPS: f64 = 1e4;
 
+/// Where whole trajectories are so short that more of them fit, as many are integrated together as
+/// take this long if they cost as much as the first few.
+const TOGETHER_S: f64 = 2.0;
+const MOST_TOGETHER: u64 = 64;
+
 /// Parts of the way through the grid at which points are tried.
 const PLACES: [f64; 3] = [0.5, 0.9, 0.1];
 
@@ -31,6 +36,10 @@ const BASE_BYTES: f64 = 14e6;
 /// What a cell of a row group takes while it is encoded, besides its own 8 bytes (measured:
 /// docs/scaling.md).
 const CELL_BYTES: f64 = 5.0;
+
+/// What a column of a result takes besides its cells, with its share of the plan: 767 and 768 bytes
+/// in results of one point with 35 and 40 columns.
+const RESULT_COLUMN_BYTES: f64 = 800.0;
 
 /// What a run will take. Every number is an estimate.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,8 +58,10 @@ pub(crate) struct Estimate {
     pub sampled_s: f64,
     /// Memory at its peak.
     pub memory_bytes: f64,
-    /// Disk for the run's folder, and at most as much again for the result.
+    /// Disk for the run's folder.
     pub disk_bytes: f64,
+    /// Disk for the result, at most.
+    pub result_bytes: f64,
     /// The nonlinear model's rungs.
     pub(crate) ladder: Ladder,
 }
@@ -65,15 +76,22 @@ impl Estimate {
         let engine = ModelEngine::new(plan)?;
         let ladders = engine.ladders();
         let began = Instant::now();
-        let mut samples = Vec::new();
-        for place in PLACES {
-            if samples.is_empty() || began.elapsed() < BUDGET {
-                samples.push(Measured::take(plan, ladders, place)?);
+        let first = Measured::take(plan, ladders, PLACES[0])?;
+        let mut samples = match Measured::spread(plan, ladders, &first)? {
+            Some(spread) => vec![spread],
+            None => vec![first],
+        };
+        for place in &PLACES[1..] {
+            if samples[0].integrated_s < plan.end_s && began.elapsed() < BUDGET {
+                samples.push(Measured::take(plan, ladders, *place)?);
             }
         }
         let core_s_per_point = samples.iter().map(|sample| sample.core_s_per_point).sum::<f64>()
             / samples.len() as f64;
         let chunk = chunk_points(plan.points());
+        let layout = &Job::of(plan).layout;
+        let disk_bytes = plan.points() as f64 * Shape::of(layout).bytes_a_point() as f64;
+        let columns = layout.schema().fields().len() as f64;
         // A chunk is one thread's work, so the last round of chunks may leave threads without any.
         let rounds = plan.points().div_ceil(chunk).div_ceil(threads as u64);
         let points_a_thread = (rounds * chunk).min(plan.points());
@@ -85,8 +103,8 @@ impl Estimate {
             sampled_points: samples.iter().map(|sample| sample.points).sum(),
             sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
             memory_bytes: memory_bytes(plan, threads),
-            disk_bytes: plan.points() as f64
-                * Shape::of(&Job::of(plan).layout).bytes_a_point() as f64,
+            disk_bytes,
+            result_bytes: disk_bytes + columns * RESULT_COLUMN_BYTES,
             ladder: ladders[0].clone(),
         })
     }
@@ -109,7 +127,7 @@ impl Measured {
         loop {
             cut.end_s = end_s;
             cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
-            let cost_s = cost_s(&cut, ladders, first..first + points)?;
+            let cost_s = cost_s(&cut, ladders, &mut (first..first + points))?;
             if end_s >= plan.end_s || cost_s >= LONG_ENOUGH.as_secs_f64() {
                 // What does not grow with the length (the equilibrium) must not be multiplied.
                 let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
@@ -124,6 +142,27 @@ impl Measured {
             shorter = Some((end_s, cost_s));
             end_s = (4.0 * end_s).min(plan.end_s);
         }
+    }
+}
+
+impl Measured {
+    /// Whole trajectories of points from all over the grid, integrated together: the rows that are
+    /// left to a slower rung then share its lanes, as in the run. Few points leave such lanes
+    /// empty, and cost several times as much each.
+    fn spread(
+        plan: &Plan,
+        ladders: &[Ladder; 2],
+        first: &Self,
+    ) -> Result<Option<Self>, EngineError> {
+        if first.integrated_s < plan.end_s || plan.points() <= first.points {
+            return Ok(None);
+        }
+        let affordable = (TOGETHER_S / first.core_s_per_point) as u64;
+        let points = affordable.clamp(first.points, MOST_TOGETHER).min(plan.points());
+        let place = |k| (u128::from(plan.points()) * u128::from(k) / u128::from(points)) as u64;
+        let cost_s = cost_s(plan, ladders, &mut (0..points).map(place))?;
+        let core_s_per_point = cost_s / points as f64;
+        Ok(Some(Self { core_s_per_point, points, integrated_s: plan.end_s }))
     }
 }
 
@@ -143,7 +182,7 @@ fn first_end_s(plan: &Plan) -> f64 {
 fn cost_s(
     cut: &Plan,
     ladders: &[Ladder; 2],
-    points: std::ops::Range<u64>,
+    points: &mut dyn Iterator<Item = u64>,
 ) -> Result<f64, EngineError> {
     // A shorter run alone would be slower spin, and longer steps.
     let engine = ModelEngine::with_ladders(cut, ladders.clone())?;

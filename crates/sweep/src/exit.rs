@@ -115,6 +115,15 @@ pub enum Error {
     /// A machine whose motions over whole turns cannot be told.
     #[error(transparent)]
     Exact(#[from] NoAnswer),
+    /// Stability asked of a machine whose forces have corners.
+    #[error(
+        "the machine has {what}: small disturbances are followed through smooth forces alone; \
+         let the drum dwell by a spin table instead (docs/friction.md)"
+    )]
+    Corners {
+        /// `"stops"`.
+        what: &'static str,
+    },
     /// An option whose value makes no sense here.
     #[error("`{option} {given}`: expected {expected}")]
     Option {
@@ -162,7 +171,8 @@ impl Error {
             | Self::Equilibrium(_)
             | Self::Modes(_)
             | Self::Exact(_)
-            | Self::Option { .. } => Exit::BadInput,
+            | Self::Option { .. }
+            | Self::Corners { .. } => Exit::BadInput,
             Self::Boundary(_) => Exit::BadInput,
             Self::Files(error) if error.is_refusal() => Exit::BadInput,
             Self::Threads(error) if error.is_refusal() => Exit::BadInput,
@@ -250,7 +260,7 @@ pub(crate) fn print(text: &str) -> Result<Exit, Error> {
     }
 }
 
-/// Writes a message for people to standard error; as in [`show`], text only.
+/// Writes a message for people to standard error; as in `show`, text only.
 pub fn tell(text: &str) {
     // As in `Error::report`: nobody is left to tell.
     let _ = writeln!(anstream::stderr(), "{}", escaped(text, is_unsafe));

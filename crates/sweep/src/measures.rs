@@ -80,13 +80,30 @@ pub enum Metric {
     ClashTime,
     /// How far the machine sinks under its weight.
     StaticSag,
+    /// The greatest push of a stop.
+    StopForce,
+    /// How long a stop is closed.
+    StopContact,
+    /// The least load of a foot of the cabinet.
+    FootLoad,
+    /// The least margin of the cabinet against slipping.
+    SlipMargin,
     /// How fast disturbances grow at constant speeds.
     Growth,
 }
 
 impl Metric {
     /// Every metric.
-    pub const ALL: [Self; 4] = [Self::CabinetForce, Self::ClashTime, Self::StaticSag, Self::Growth];
+    pub const ALL: [Self; 8] = [
+        Self::CabinetForce,
+        Self::ClashTime,
+        Self::StaticSag,
+        Self::StopForce,
+        Self::StopContact,
+        Self::FootLoad,
+        Self::SlipMargin,
+        Self::Growth,
+    ];
 
     /// Name in grid files.
     #[must_use]
@@ -95,6 +112,10 @@ impl Metric {
             Self::CabinetForce => "cabinet_force",
             Self::ClashTime => "clash_time",
             Self::StaticSag => "static_sag",
+            Self::StopForce => "stop_force",
+            Self::StopContact => "stop_contact",
+            Self::FootLoad => "foot_load",
+            Self::SlipMargin => "slip_margin",
             Self::Growth => "growth",
         }
     }
@@ -109,8 +130,8 @@ impl Metric {
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
-            Self::CabinetForce => "N",
-            Self::ClashTime => "s",
+            Self::CabinetForce | Self::StopForce | Self::FootLoad | Self::SlipMargin => "N",
+            Self::ClashTime | Self::StopContact => "s",
             Self::StaticSag => "m",
             Self::Growth => "1/s",
         }
@@ -123,6 +144,10 @@ impl Metric {
             Self::CabinetForce => format!("cabinet_force_{model}_n"),
             Self::ClashTime => format!("clash_time_{model}_s"),
             Self::StaticSag => "static_sag_m".to_owned(),
+            Self::StopForce => format!("stop_force_{model}_n"),
+            Self::StopContact => format!("stop_contact_{model}_s"),
+            Self::FootLoad => format!("foot_load_{model}_n"),
+            Self::SlipMargin => format!("slip_margin_{model}_n"),
             Self::Growth => "growth_per_s".to_owned(),
         }
     }
@@ -140,6 +165,21 @@ impl Metric {
                 "how far the tub's mass centre sinks from where the machine file draws it to the \
                  static equilibrium; null if \
                  there is none"
+            }
+            Self::StopForce => {
+                "greatest push of any stop in the window; the linear model has the tangents of the \
+                 stops at equilibrium, next to nothing while they are open"
+            }
+            Self::StopContact => {
+                "time in the window that the stop is closed that is closed longest"
+            }
+            Self::FootLoad => {
+                "least vertical load of any foot of the cabinet in the window, by statics; below \
+                 zero it would lift"
+            }
+            Self::SlipMargin => {
+                "least margin of the cabinet against slipping in the window: friction on all feet \
+                 together less the horizontal force"
             }
             Self::Growth => {
                 "how fast the fastest growing disturbance of the nonlinear response grows, at that \
@@ -169,11 +209,14 @@ impl Measures {
     /// What trajectories must record.
     #[must_use]
     pub fn wanted(&self) -> Wanted {
+        let asked = |metric: &Metric| self.metrics.contains(metric);
         Wanted {
             root_mean_squares: self.criterion == Criterion::Rms,
             turns: self.criterion == Criterion::Envelope,
             cabinet_force: self.metrics.contains(&Metric::CabinetForce),
             clash_time: self.metrics.contains(&Metric::ClashTime),
+            stops: [Metric::StopForce, Metric::StopContact].iter().any(asked),
+            feet: [Metric::FootLoad, Metric::SlipMargin].iter().any(asked),
             course: false,
         }
     }

@@ -14,6 +14,9 @@ const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
 /// Share of the longest stable step that plain RK4 uses as the fast method's reference.
 pub(crate) const REFERENCE_SHARE: f64 = 0.75;
 
+/// The shortest step of RK4 where forces have corners, as a share of the reference's.
+pub(crate) const SHORTEST_AT_CORNERS: f64 = 0.25;
+
 /// A number that a method takes, under a key of `[integrator]`.
 pub(crate) struct Setting {
     /// As in grid files.

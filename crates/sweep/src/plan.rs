@@ -177,6 +177,19 @@ impl Plan {
     /// Most corners at which machines are made ready before a run.
     const MOST_PREPARED: u64 = 256;
 
+    /// What gives forces corners at some point, in words; `None` where all are smooth.
+    #[must_use]
+    pub(crate) fn corners_of_forces(&self) -> Option<&'static str> {
+        let rubs = self.machine.dampers.iter().any(|damper| damper.friction_n != 0.0);
+        let may_rub = self.axes.iter().any(|axis| axis.parameter.name().ends_with("friction_n"));
+        match (rubs || may_rub, self.machine.stops.is_empty()) {
+            (true, true) => Some("dampers with friction"),
+            (true, false) => Some("dampers with friction, and stops"),
+            (false, false) => Some("stops"),
+            (false, true) => None,
+        }
+    }
+
     /// Number of points, of the design or of the grid; 1 without axes.
     #[must_use]
     pub fn points(&self) -> u64 {

@@ -83,7 +83,8 @@ pub use machine::parameters::{
 pub use machine::spin::Spin;
 pub use machine::violations::Violation;
 pub use machine::{
-    Bearings, BumpStop, Bushing, Damper, Drum, Flexure, Machine, Shaft, Spring, Tub, Unbalance,
+    Bearings, BumpStop, Bushing, Cabinet, Damper, Drum, Flexure, Foot, Machine, Shaft, Spring, Tub,
+    Unbalance,
 };
 pub use modes::campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
 pub use modes::shape::{Motion, Movement, Plane};

@@ -1,5 +1,6 @@
 //! The machine in SI units, as a machine file describes it.
 
+pub(crate) mod feet;
 pub(crate) mod parameters;
 pub(crate) mod spin;
 pub(crate) mod violations;
@@ -35,6 +36,10 @@ pub struct Machine {
     pub stops: Vec<BumpStop>,
     /// Bushings between cabinet and tub, any number; a door gasket is one.
     pub bushings: Vec<Bushing>,
+    /// The cabinet, if it is described; only the loads of its feet depend on it.
+    pub cabinet: Option<Cabinet>,
+    /// Where the cabinet stands: three or four feet, if it is described.
+    pub feet: Vec<Foot>,
 }
 
 /// Body T, which the springs hold.
@@ -190,12 +195,39 @@ pub struct Bushing {
     pub damping_n_s_per_m: [f64; 3],
 }
 
+/// The cabinet with everything fixed to it. It does not move.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cabinet {
+    /// Mass.
+    pub mass_kg: f64,
+    /// Mass centre.
+    pub centre_m: [f64; 3],
+    /// Coefficient of friction between feet and floor.
+    pub friction: f64,
+}
+
+/// A foot of the cabinet.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Foot {
+    /// Where it meets the floor.
+    pub foot_m: [f64; 3],
+}
+
 impl Damper {
     /// Speed v_s of a damper that gives none.
     pub const FRICTION_SPEED_M_PER_S: f64 = 0.01;
 }
 
 impl Machine {
+    /// Weight of tub, shaft, drum and unbalances (N).
+    #[must_use]
+    pub fn weight_n(&self) -> f64 {
+        let of_bodies = self.tub.mass_kg + self.shaft.mass_kg + self.drum.mass_kg;
+        let of_laundry = self.further_unbalances.iter().map(|unbalance| unbalance.mass_kg);
+        let mass_kg = of_bodies + self.unbalance.mass_kg + of_laundry.sum::<f64>();
+        self.gravity_m_per_s2 * mass_kg
+    }
+
     /// The machine of Park, Jeong and Yoo (Machines 2021, 9(11), 289): Tables 2 to 4 and section
     /// 3.1, the bare drum and unbalance split of the equations page, and this project's assumptions
     /// where the paper is silent (bearing positions, hinge, fronts, clearance, free lengths of the
@@ -265,6 +297,8 @@ impl Machine {
             dampers: vec![damper(1.0), damper(-1.0)],
             stops: Vec::new(),
             bushings: Vec::new(),
+            cabinet: None,
+            feet: Vec::new(),
         }
     }
 }

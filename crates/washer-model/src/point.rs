@@ -8,6 +8,7 @@ use crate::lanes::InLanes as _;
 use crate::linear::outputs::{LinearOutputs, linearise_outputs};
 use crate::linear::{LinearPoint, Matrices, linearise, tub_tangents};
 use crate::machine::Machine;
+use crate::machine::feet::Feet;
 use crate::machine::spin::{Spin, SpinState, SpinStretch, stretch_at};
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
@@ -48,6 +49,10 @@ pub struct Point {
     pub(crate) stretches: Arc<[SpinStretch]>,
     pub(crate) legs: Arc<[PlannedLeg]>,
     pub(crate) ringing: Ringing,
+    /// Weight of all bodies (N).
+    pub(crate) weight_n: f64,
+    /// What the cabinet's feet take of its loads, if it is described.
+    pub(crate) feet: Option<Feet>,
 }
 
 /// A stretch of the run between two kinks: of the spin, or of what is recorded.
@@ -85,6 +90,12 @@ impl Point {
     #[must_use]
     pub fn ringing(&self) -> [f64; CHANNELS] {
         self.ringing.channels()
+    }
+
+    /// Weight (N) of what the springs carry.
+    #[must_use]
+    pub const fn weight_n(&self) -> f64 {
+        self.weight_n
     }
 
     /// The gap between drum and tub at rest (m).
@@ -181,6 +192,8 @@ impl Kernel for Prepare<'_> {
                         steepest,
                         stretches: course.stretches,
                         legs: course.legs,
+                        weight_n: machine.weight_n(),
+                        feet: Feet::new(machine),
                     })
                 },
             ));

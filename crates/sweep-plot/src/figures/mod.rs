@@ -3,7 +3,10 @@
 pub(crate) mod boundary;
 pub(crate) mod campbell;
 pub(crate) mod curves;
+pub(crate) mod histogram;
+pub(crate) mod influence;
 pub(crate) mod map;
+pub(crate) mod matrix;
 pub(crate) mod passages;
 pub(crate) mod shapes;
 pub(crate) mod stability;

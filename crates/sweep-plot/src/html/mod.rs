@@ -1,8 +1,11 @@
 //! One self-contained page: the numbers, and the script that draws them. Opens from a disk, needs
 //! no network.
 
+mod design;
 mod embed;
 mod histories;
+
+pub(crate) use design::page_of as design_page;
 
 use serde_json::{Map as Object, Value, json};
 
@@ -32,6 +35,7 @@ const CHART: &str = include_str!("chart.js");
 const BAR: &str = include_str!("bar.js");
 const HISTORIES: &str = include_str!("histories.js");
 const MAP: &str = include_str!("map.js");
+const DESIGN: &str = include_str!("design.js");
 const START: &str = include_str!("start.js");
 
 /// Bytes of a page that the values of a map's cells may take.

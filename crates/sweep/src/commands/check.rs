@@ -95,12 +95,12 @@ fn summary(plan: &Plan, estimate: &Estimate) -> String {
         ),
     );
     line("takes", took(plan, estimate));
-    let (memory, disk) = (size(estimate.memory_bytes), size(estimate.disk_bytes));
+    let [memory, disk, result] =
+        [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(size);
     line(
         "",
         format!(
-            "{memory} of memory; on disk {disk} while it runs, and at most as much again for the \
-             result"
+            "{memory} of memory; on disk {disk} while it runs, and at most {result} for the result"
         ),
     );
     text

@@ -1,10 +1,11 @@
 //! `sweep compare A B`: what differs between two results.
 
+mod differences;
+mod fail_on;
+
 use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::str::FromStr;
 
-use parquet::errors::ParquetError;
 use serde_json::{Value, json};
 
 use super::cells::{short, table};
@@ -13,8 +14,8 @@ use super::grid::quoted;
 use super::run::line;
 use crate::exit::{Error, Exit, show, tell};
 use crate::store::StoreError;
-use crate::table::Table;
-use sweep_files::{FileKind, Output, key};
+use fail_on::FailOn;
+use sweep_files::{FileKind, Output};
 use sweep_results::{Comparison, Flip, Moved, PlanChange, ResultTable, SharedRow, compare};
 
 /// Shown by `--help`.
@@ -72,85 +73,6 @@ What --fail-on takes:
   boundary=2      the boundary moved by more than 2 in the second axis's unit, whatever the brackets
                   leave open, or has other numbers of crossings";
 
-/// What makes the comparison fail.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum FailOn {
-    Any,
-    Plan,
-    Rows,
-    Flips,
-    Sensitive,
-    Ratio(f64),
-    Gap(f64),
-    Boundary(f64),
-}
-
-impl FromStr for FailOn {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || {
-            "expected any, plan, rows, flips, sensitive, ratio=PART, gap=M or boundary=WIDTH"
-                .to_owned()
-        };
-        let (name, value) = match text.split_once('=') {
-            Some((name, value)) => (name, Some(value)),
-            None => (text, None),
-        };
-        let number = || {
-            let number = value.and_then(|value| value.trim().parse::<f64>().ok());
-            number
-                .filter(|number| number.is_finite() && *number >= 0.0)
-                .ok_or_else(|| format!("expected a number of at least 0, as in {name}=0.05"))
-        };
-        match (name.trim(), value) {
-            ("any", None) => Ok(Self::Any),
-            ("plan", None) => Ok(Self::Plan),
-            ("rows", None) => Ok(Self::Rows),
-            ("flips", None) => Ok(Self::Flips),
-            ("sensitive", None) => Ok(Self::Sensitive),
-            ("ratio", _) => Ok(Self::Ratio(number()?)),
-            ("gap", _) => Ok(Self::Gap(number()?)),
-            ("boundary", _) => Ok(Self::Boundary(number()?)),
-            _ => Err(expected()),
-        }
-    }
-}
-
-impl FailOn {
-    /// What of it is there, in words; `None` if nothing is.
-    fn found(self, found: &Comparison) -> Option<String> {
-        let steady = || found.shared.iter().filter(|row| !row.sensitive);
-        let counted = |what: &str, count: usize| (count > 0).then(|| format!("{what}: {count}"));
-        match self {
-            Self::Any => (!found.is_empty()).then(|| "the files differ".to_owned()),
-            Self::Plan => counted("differences of the plans", found.plan.len()),
-            Self::Rows => {
-                counted("rows of one file alone", found.alone.iter().sum::<u64>() as usize)
-            }
-            Self::Flips => counted("verdicts that flipped", found.flips(false).count()),
-            Self::Sensitive => {
-                counted("sensitive verdicts that flipped", found.flips(true).count())
-            }
-            Self::Ratio(most) => {
-                let what = format!("ratios that changed by more than {} %", short(100.0 * most));
-                counted(&what, steady().filter(|row| row.ratio_by() > most).count())
-            }
-            Self::Gap(most) => {
-                let what = format!("gaps that changed by more than {} m", short(most));
-                counted(&what, steady().filter(|row| row.gap_by_m() > most).count())
-            }
-            Self::Boundary(most) => {
-                let moved = found.boundary.as_ref()?;
-                let far = moved.crossings.iter().filter(|crossing| crossing.at_least() > most);
-                let what =
-                    format!("crossings that moved by more than {} {}", short(most), moved.unit);
-                counted(what.trim_end(), far.count() + moved.unlike.len())
-            }
-        }
-    }
-}
-
 /// Compares the files.
 ///
 /// # Errors
@@ -169,7 +91,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
                 expected: "two maps: other files have no differences row by row".to_owned(),
             });
         }
-        let bytes = bytes(args, &found, &tables).map_err(StoreError::parquet("write", path))?;
+        let bytes = differences::bytes(args, &found, &tables)
+            .map_err(StoreError::parquet("write", path))?;
         output.finish(&bytes)?;
     }
     let broken: Vec<String> =
@@ -524,96 +447,9 @@ fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
     })
 }
 
-/// The file of differences: one row per row that both have.
-fn bytes(
-    args: &Args,
-    found: &Comparison,
-    tables: &[ResultTable; 2],
-) -> Result<Vec<u8>, ParquetError> {
-    let mut table = Table::default();
-    let rows = || found.shared.iter();
-    table.counts("point", "row of A, from 0", rows().map(|row| row.rows[0]));
-    for (k, (name, unit)) in found.keys.iter().zip(&found.key_units).enumerate() {
-        let description =
-            tables[0].column(name).map_or("", |column| column.description.as_str()).to_owned();
-        let unit = if unit.is_empty() { "1" } else { unit };
-        table.numbers(name, unit, &description, rows().map(|row| Some(row.place[k])));
-    }
-    table.numbers(
-        "ratio_change",
-        "1",
-        "ratio_max of B over that of A; null where either has none",
-        rows().map(SharedRow::ratio_change),
-    );
-    table.numbers(
-        "gap_change_m",
-        "m",
-        "least gap of the nonlinear model in B less that in A; null where either has none",
-        rows().map(SharedRow::gap_change_m),
-    );
-    for (side, which) in ["A", "B"].into_iter().enumerate() {
-        let suffix = ["a", "b"][side];
-        let values = rows().map(|row| row.ratio[side]);
-        table.numbers(
-            &format!("ratio_max_{suffix}"),
-            "1",
-            &format!("ratio_max of {which}"),
-            values,
-        );
-    }
-    table.words(
-        "flip",
-        "none, lost (reliable in A alone), gained (reliable in B alone), defined (a verdict in one \
-         file alone)",
-        rows().map(|row| row.flip.name()),
-    );
-    table.words(
-        "sensitive",
-        "true where either file calls the row chaotic",
-        rows().map(|row| if row.sensitive { "true" } else { "false" }),
-    );
-    table.words(
-        "status",
-        "ok, or no_ratio where either file has none",
-        rows().map(|row| if row.ratio_change().is_some() { "ok" } else { "no_ratio" }),
-    );
-    let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let hashes =
-        tables.each_ref().map(|table| table.file().value(key::PLAN_HASH).map(str::to_owned));
-    table.metadata(
-        key::DIFFERENCES,
-        &json!({
-            // Figures say it under their title.
-            "name": format!("{} compared with {}", name(&args.second), name(&args.first)),
-            "first": name(&args.first),
-            "second": name(&args.second),
-            "plan_hash": hashes,
-            "plan": found.plan,
-        }),
-    );
-    table.into_bytes()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_makes_it_fail_is_read_as_documented() {
-        assert_eq!("flips".parse(), Ok(FailOn::Flips));
-        assert_eq!("ratio=0.05".parse(), Ok(FailOn::Ratio(0.05)));
-        assert_eq!("boundary=2".parse(), Ok(FailOn::Boundary(2.0)));
-        for (text, said) in [
-            ("flip", "expected any, plan"),
-            ("flips=3", "expected any, plan"),
-            ("ratio", "as in ratio=0.05"),
-            ("gap=-1", "at least 0"),
-            ("ratio=nan", "at least 0"),
-        ] {
-            let refused = text.parse::<FailOn>().unwrap_err();
-            assert!(refused.contains(said), "{text}: {refused}");
-        }
-    }
 
     #[test]
     fn markdown_shows_texts_as_they_are() {

@@ -15,6 +15,7 @@ pub(super) const EXAMPLES: Examples = &[
         "sweep plot results/first.parquet --quantity nonlinear --channel tub_yaw",
         "one channel's amplitude",
     ],
+    ["sweep plot results/design.parquet --view influence", "which parameters of a design matter"],
 ];
 
 /// Arguments of `sweep plot`.
@@ -28,11 +29,12 @@ pub struct Args {
     #[arg(short, long, value_name = "IMAGE")]
     pub output: Option<PathBuf>,
 
-    /// Modes, trace, stability: which of its figures [default: frequencies, time, growth]
+    /// Modes, trace, design, stability: which of its figures [default: frequencies, time, scatter,
+    /// growth]; a page of a design has all three
     #[arg(long, value_enum)]
     pub view: Option<View>,
 
-    /// Map: what the colours show
+    /// Map: what the colours show. Design: what is shown over the parameters
     #[arg(long, value_enum, default_value_t)]
     pub quantity: Quantity,
 

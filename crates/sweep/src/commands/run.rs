@@ -20,6 +20,7 @@ use crate::store::{Job, ShardRequest};
 use crate::threads::{self, Environment};
 use crate::trace::{self, MOST_KEPT};
 use sweep_files as files;
+use sweep_plot::Share;
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[
@@ -198,19 +199,12 @@ fn summary(args: &Args, plan: &Plan, job: &Job<'_>, output: &Path, report: &RunR
     match &report.ended {
         Ended::Already(..) | Ended::Finished(_) => {
             line(&mut text, "file", &output.display().to_string());
-            // A design's points are scattered: there is no map of them to draw.
-            let scattered = plan.design.is_some();
-            let next = if scattered {
-                format!("sweep show {out} --top 10 --by ratio_max")
-            } else {
-                format!("sweep plot {out}")
-            };
             if let (true, Ended::Already(_, tally) | Ended::Finished(tally)) =
-                (scattered, &report.ended)
+                (plan.design.is_some(), &report.ended)
             {
                 line(&mut text, "share", &share(tally));
             }
-            line(&mut text, "next", &next);
+            line(&mut text, "next", &format!("sweep plot {out}"));
         }
         Ended::Shard(_) => {
             line(
@@ -278,25 +272,16 @@ pub(super) fn rows(tally: &Tally, job: &Job<'_>) -> String {
 
 /// The share of reliable points among those with a verdict, with the interval in which the true
 /// share lies with 95 % confidence if points are independent and at random.
-///
-/// E. B. Wilson, Probable inference, the law of succession, and statistical inference, Journal of
-/// the American Statistical Association 22 (1927), 209-212.
 fn share(tally: &Tally) -> String {
-    const Z: f64 = 1.959_963_984_540_054;
-    let count = (tally.reliable + tally.unreliable) as f64;
-    if count == 0.0 {
-        return "no point has a verdict".to_owned();
+    match Share::of(tally.reliable, tally.reliable + tally.unreliable) {
+        None => "no point has a verdict".to_owned(),
+        Some(Share { part, low, high }) => format!(
+            "{:.1} % reliable, with 95 % confidence {:.1} to {:.1} % for points at random",
+            100.0 * part,
+            100.0 * low,
+            100.0 * high
+        ),
     }
-    let part = tally.reliable as f64 / count;
-    let square = Z * Z / count;
-    let centre = (part + square / 2.0) / (1.0 + square);
-    let half = Z / (1.0 + square) * (part * (1.0 - part) / count + square / (4.0 * count)).sqrt();
-    format!(
-        "{:.1} % reliable, with 95 % confidence {:.1} to {:.1} % for points at random",
-        100.0 * part,
-        100.0 * (centre - half).max(0.0),
-        100.0 * (centre + half).min(1.0)
-    )
 }
 
 /// As [`rows`], where `at` says where a point lies.
@@ -368,13 +353,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_share_has_wilsons_interval() {
+    fn the_share_is_of_points_with_a_verdict() {
         let tally = |reliable, unreliable| Tally { reliable, unreliable, ..Tally::default() };
-        // By hand: 8 of 10, z = 1.96.
         let said = share(&tally(8, 2));
         assert!(said.starts_with("80.0 % reliable, with 95 % confidence 49.0 to 94.3 %"), "{said}");
-        let all = share(&tally(100, 0));
-        assert!(all.contains("96.3 to 100.0 %"), "{all}");
         assert_eq!(share(&tally(0, 0)), "no point has a verdict");
     }
 }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use super::axes::MOST_POINTS;
 use super::list::{self, List};
-use super::parameters::MOST_POINTS;
 use super::report::Report;
 use super::section::{Field, Section};
 use super::source::Located;

@@ -11,7 +11,7 @@ use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, cut, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
-use super::{GridInput, design, machine, parameters, scalars, spin};
+use super::{GridInput, axes, design, machine, parameters, scalars, spin};
 use crate::measures::{Criterion, Measures, Metric};
 use crate::method::{Entry, Integrator, METHODS, settings};
 use crate::plan::{Plan, Reliability};
@@ -85,6 +85,7 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
     let metrics = names(&mut root, "metrics", "metric", &Metric::ALL, Metric::name, report);
     let (reliability, criterion) = reliability(&mut root, &mut origins, report);
     let metrics = metrics.unwrap_or_default();
+    judge_metrics(&metrics, &machine, &root, report);
     let growth_speeds = stability(&mut root, &metrics, report);
     let plan = Plan {
         name,
@@ -102,13 +103,11 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
     let mut draft = Draft { plan, origins, constants: Vec::new() };
     parameters::constants(&mut root, sets, &mut draft, report);
     match design::read(&mut root, path, report) {
-        design::WrittenDesign::None => parameters::axes(&mut root, &mut draft, report),
+        design::WrittenDesign::None => axes::axes(&mut root, &mut draft, report),
         design::WrittenDesign::Box(design) => {
-            parameters::box_of_axes(&mut root, design, &mut draft, report)
+            axes::box_of_axes(&mut root, design, &mut draft, report)
         }
-        design::WrittenDesign::List(list) => {
-            parameters::listed_axes(&mut root, list, &mut draft, report)
-        }
+        design::WrittenDesign::List(list) => axes::listed_axes(&mut root, list, &mut draft, report),
         design::WrittenDesign::Bad => {
             // Which axes are right depends on what cannot be known.
             let _ = root.tables("axis", report);
@@ -353,6 +352,28 @@ fn stability(root: &mut Section<'_>, metrics: &[Metric], report: &mut Report) ->
             let title = format!("`speed_rpm` = \"{}\" is no range of speeds", found.value);
             report.push(Diagnostic::new(title).at(&found.at, expected));
             None
+        }
+    }
+}
+
+/// Metrics of what the machine has not got.
+fn judge_metrics(metrics: &[Metric], machine: &Machine, root: &Section<'_>, report: &mut Report) {
+    for metric in metrics {
+        let (is_there, what) = match metric {
+            Metric::StopForce | Metric::StopContact => {
+                (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file")
+            }
+            Metric::FootLoad | Metric::SlipMargin => (
+                machine.cabinet.is_some(),
+                "cabinet: expected [cabinet] and three or four [[feet]] in the machine file",
+            ),
+            Metric::CabinetForce | Metric::ClashTime | Metric::StaticSag | Metric::Growth => {
+                continue;
+            }
+        };
+        if !is_there {
+            let title = format!("the metric `{}` needs a machine with more parts", metric.name());
+            report.push(Diagnostic::new(title).at(root.at(), format!("the machine has no {what}")));
         }
     }
 }

@@ -4,7 +4,9 @@
 use std::path::Path;
 
 use serde_json::{Map, Value};
-use washer_model::{BumpStop, Bushing, Damper, Machine, Parameter, Spin, Spring, Unbalance};
+use washer_model::{
+    BumpStop, Bushing, Cabinet, Damper, Foot, Machine, Parameter, Spin, Spring, Unbalance,
+};
 
 use super::grid::is_blank;
 use super::origins::Origins;
@@ -90,10 +92,17 @@ pub(super) const BLOCKS: [Block; 7] = [
         ],
     },
 ];
+/// The section that a machine file has once or not at all.
+pub(super) const CABINET: Block = Block {
+    section: "cabinet",
+    prefix: "cabinet_",
+    numbers: &["mass_kg", "friction"],
+    vectors: &[("centre_m", ["centre_x_m", "centre_y_m", "centre_z_m"])],
+};
 /// Springs by their place in [`LISTS`].
 const SPRINGS: usize = 0;
 /// The sections that a machine file has any number of times.
-pub(super) const LISTS: [List; 5] = [
+pub(super) const LISTS: [List; 6] = [
     List {
         block: Block {
             section: "springs",
@@ -186,6 +195,20 @@ pub(super) const LISTS: [List; 5] = [
         },
         needed: None,
     },
+    List {
+        block: Block {
+            section: "feet",
+            prefix: "foot_",
+            numbers: &[],
+            vectors: &[("foot_m", ["x_m", "y_m", "z_m"])],
+        },
+        first: 1,
+        optional: &[],
+        optional_vectors: &[],
+        count: |machine| machine.feet.len(),
+        fill: |machine, count| machine.feet = vec![Foot::default(); count],
+        needed: None,
+    },
 ];
 /// Most elements of one list: enough for any machine, and what depends on all of them stays quick.
 const MOST_ELEMENTS: usize = 1000;
@@ -195,7 +218,7 @@ const FREE_LENGTH: &str = "free_length_m";
 /// The paper's machine with one of each element that it lacks: every kind of parameter has a name
 /// there.
 pub(crate) fn with_one_of_each() -> Machine {
-    let mut machine = Machine::paper();
+    let mut machine = Machine { cabinet: Some(Cabinet::default()), ..Machine::paper() };
     for list in LISTS.iter().filter(|list| (list.count)(&Machine::paper()) == 0) {
         (list.fill)(&mut machine, 1);
     }
@@ -237,6 +260,12 @@ pub(super) fn read(
             }
             None => reader.doubt(block, block.prefix),
         }
+    }
+
+    if let Some(mut section) = root.table(CABINET.section, "[cabinet]", reader.report).given() {
+        reader.machine.cabinet = Some(Cabinet::default());
+        reader.block(&CABINET, CABINET.prefix, &mut section.value);
+        section.value.finish(reader.report);
     }
 
     for (place, list) in LISTS.iter().enumerate() {
@@ -382,6 +411,10 @@ pub(crate) fn to_json(machine: &Machine) -> Value {
             root.insert(block.section.to_owned(), Value::Object(numbers));
         }
     }
+    if machine.cabinet.is_some() {
+        let numbers = block_to_json(&CABINET, CABINET.prefix, machine);
+        root.insert(CABINET.section.to_owned(), Value::Object(numbers));
+    }
     for list in &LISTS {
         let count = (list.count)(machine);
         // The two that machines have always had are written even where there are none.
@@ -452,6 +485,9 @@ pub(crate) fn to_toml(machine: &Machine) -> String {
         let header =
             if block.section.is_empty() { String::new() } else { format!("[{}]", block.section) };
         text.push_str(&block_to_toml(block, block.prefix, &header, machine));
+    }
+    if machine.cabinet.is_some() {
+        text.push_str(&block_to_toml(&CABINET, CABINET.prefix, "[cabinet]", machine));
     }
     for list in &LISTS {
         let header = format!("[[{}]]", list.block.section);

@@ -22,6 +22,7 @@
 //! number may be written twice, not even under two names (`damping_n_s_per_m` writes every
 //! `damper_1_damping_n_s_per_m`), because nothing would say which comes last.
 
+mod axes;
 #[cfg(test)]
 mod bounds_tests;
 mod canonical;
@@ -142,6 +143,7 @@ fn resolve<T>(
     validate::steps(&draft, &mut report);
     validate::scenarios(&draft, &mut report);
     validate::stability(&draft, &mut report);
+    validate::growth(&draft, &mut report);
     report.finish((draft.plan, finished))
 }
 

@@ -2,20 +2,31 @@
 //! point, and no axis sweeps them.
 
 use serde_json::{Value, json};
-use washer_model::{Range, decimal};
+use washer_model::{Channel, Range, decimal};
 
+use super::axes::MOST_POINTS;
 use super::design::{MOST_SEED, MOST_SOBOL};
 use super::grid::{Draft, LONGEST_S};
-use super::parameters::MOST_POINTS;
 use super::report::{Diagnostic, Report};
 use super::section::{check_number, quoted, short, unknown_word};
 use super::source::{Located, Location};
+use super::spin;
 use crate::design::Design;
-use crate::measures::Criterion;
+use crate::measures::{Criterion, Metric};
 use crate::method::{METHODS, settings};
 
 /// Those that stand outside of `[integrator]`.
-const OWN: [&str; 6] = ["end_s", "ratio_limit", "criterion", "method", "points", "seed"];
+const OWN: [&str; 9] = [
+    "profile",
+    "end_s",
+    "ratio_limit",
+    "criterion",
+    "channels",
+    "metrics",
+    "method",
+    "points",
+    "seed",
+];
 
 /// Every name.
 pub(super) fn names() -> impl Iterator<Item = &'static str> {
@@ -65,6 +76,38 @@ impl Written<'_> {
             report.push_with(|_| unknown_word(self.name.value, &self.value, choices));
         }
         place
+    }
+}
+
+impl Written<'_> {
+    /// Names separated by commas, each once and at least one.
+    fn list<T: Copy + PartialEq>(
+        &self,
+        what: &str,
+        all: &[T],
+        name: fn(T) -> &'static str,
+        report: &mut Report,
+    ) -> Option<Vec<T>> {
+        let known: Vec<&str> = all.iter().copied().map(name).collect();
+        let Located { value: text, at } = &self.value;
+        let mut chosen: Vec<T> = Vec::new();
+        let mut is_sound = true;
+        for part in text.split(',').map(str::trim) {
+            let found = Located { value: part, at: at.clone() };
+            let Some(&one) = all.iter().find(|one| name(**one) == part) else {
+                report.push_with(|_| unknown_word(what, &found, &known));
+                is_sound = false;
+                continue;
+            };
+            if chosen.contains(&one) {
+                let title = format!("the {what} \"{part}\" is given twice");
+                let expected = format!("expected each {what} once");
+                report.push(Diagnostic::new(title).at(at, expected));
+                is_sound = false;
+            }
+            chosen.push(one);
+        }
+        is_sound.then_some(chosen)
     }
 }
 
@@ -118,6 +161,38 @@ fn put(written: &Written<'_>, draft: &mut Draft, report: &mut Report) -> Option<
             plan.end_s = end_s;
             draft.origins.put("time.end_s".to_owned(), written.value.at.clone());
             json!(end_s)
+        }
+        "profile" => {
+            let names = spin::RAMPED.map(|profile| profile.name);
+            let profile = &spin::RAMPED[written.choice(&names, report)?];
+            let Some(spun) = spin::by_profile(&plan.spin, profile) else {
+                let title = "the grid's spin is a table, which has no peak and no ramp";
+                let expected = "expected a grid file with `peak_rpm` and `ramp_s`";
+                report.push(Diagnostic::new(title).at(&written.name.at, expected));
+                return None;
+            };
+            plan.spin = spun;
+            json!(profile.name)
+        }
+        "channels" => {
+            let all = Channel::ALL;
+            let channels = written.list("channel", &all, Channel::name, report)?;
+            plan.reliability.channels = channels;
+            json!(written.value.value)
+        }
+        "metrics" => {
+            let metrics = written.list("metric", &Metric::ALL, Metric::name, report)?;
+            let speeds = &mut plan.measures.growth_speeds;
+            if !metrics.contains(&Metric::Growth) {
+                *speeds = None;
+            } else if speeds.is_none() {
+                let title = "the metric `growth` needs speeds";
+                let expected = "expected a grid file with this metric and a section [stability]";
+                report.push(Diagnostic::new(title).at(&written.value.at, expected));
+                return None;
+            }
+            plan.measures.metrics = metrics;
+            json!(written.value.value)
         }
         "ratio_limit" => {
             plan.reliability.ratio_limit = written.number(Range::Positive, report)?;

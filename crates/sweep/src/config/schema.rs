@@ -5,10 +5,10 @@
 use serde_json::{Map, Value, json};
 use washer_model::{Channel, Parameter, Range, Spin};
 
+use super::axes::MOST_POINTS;
 use super::design::{DEFAULT_SEED, MOST_SEED, MOST_SOBOL};
 use super::grid::{DEFAULT_CHANNELS, DEFAULT_MACHINE, DEFAULT_RATIO_LIMIT, LONGEST_S};
-use super::machine::{BLOCKS, Block, LISTS, no_spin, with_one_of_each};
-use super::parameters::MOST_POINTS;
+use super::machine::{BLOCKS, Block, CABINET, LISTS, no_spin, with_one_of_each};
 use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
 use crate::measures::{Criterion, Metric};
 use crate::method::{Entry, METHODS};
@@ -102,6 +102,7 @@ pub(crate) fn machine() -> Value {
             required.push(block.section);
         }
     }
+    properties.push((CABINET.section, block_schema(&CABINET, CABINET.prefix, &[])));
     for list in &LISTS {
         let prefix = format!("{}{}_", list.block.prefix, list.first);
         let numbers = list.optional.iter().map(|&(key, default)| {

@@ -50,6 +50,16 @@ pub(super) const fn name(spin: &Spin) -> &'static str {
     }
 }
 
+/// The same spin by another profile that a peak and a ramp give; none of a table.
+pub(super) fn by_profile(spin: &Spin, profile: &Ramped) -> Option<Spin> {
+    match *spin {
+        Spin::Cycloidal { peak_rpm, ramp_s }
+        | Spin::Triangular { peak_rpm, ramp_s }
+        | Spin::Ramp { peak_rpm, ramp_s } => Some((profile.make)(peak_rpm, ramp_s)),
+        Spin::Table { .. } => None,
+    }
+}
+
 /// What `profile` says.
 #[derive(Clone, Copy)]
 enum Profile {

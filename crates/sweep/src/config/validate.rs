@@ -12,7 +12,7 @@ use super::grid::Draft;
 use super::report::{Diagnostic, Report};
 use super::source::{Location, Sources};
 use crate::measures::{Criterion, MOST_TURNS};
-use crate::method::{REFERENCE_SHARE, Steps};
+use crate::method::{REFERENCE_SHARE, SHORTEST_AT_CORNERS, Steps};
 use crate::plan::{MOST_STEPS, Plan, Scenario, shortest_step_s};
 
 /// Elements and rows of a spin's table that are looked at before a run, over all points of a list:
@@ -270,6 +270,17 @@ pub(super) fn steps(draft: &Draft, report: &mut Report) {
     );
 }
 
+/// Growth is asked of machines whose forces are smooth.
+pub(super) fn growth(draft: &Draft, report: &mut Report) {
+    let is_asked = draft.plan.measures.growth_speeds.is_some();
+    let Some(what) = draft.plan.corners_of_forces().filter(|_| is_asked) else { return };
+    let title = format!("the metric `growth` is for smooth forces, and the machine has {what}");
+    report.push(
+        Diagnostic::new(title)
+            .help("let the drum dwell by a spin table instead (docs/friction.md)"),
+    );
+}
+
 /// A machine whose fastest motion is too fast for an explicit method: for any number of steps that
 /// is accepted, or for the plan's own step. Only a sound plan can be judged.
 pub(super) fn stability(draft: &Draft, report: &mut Report) {
@@ -277,7 +288,10 @@ pub(super) fn stability(draft: &Draft, report: &mut Report) {
     let (step_s, share) = match draft.plan.integrator.steps() {
         Steps::Fixed(step_s) => (Some(step_s), 1.0),
         Steps::Explicit => (None, 1.0),
-        // No rung costs more than the reference.
+        // No rung costs more than the last.
+        Steps::Checked(_) if draft.plan.corners_of_forces().is_some() => {
+            (None, REFERENCE_SHARE * SHORTEST_AT_CORNERS)
+        }
         Steps::Checked(_) => (None, REFERENCE_SHARE),
         // Stable at any step.
         Steps::Implicit => return,

@@ -331,7 +331,11 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, plan: &Plan) -> f64
     }
     for ((a, b), metric) in a.metrics.iter().zip(&b.metrics).zip(plan.measures.of_model()) {
         let least = match metric {
-            Metric::ClashTime => clash_floor_s(plan),
+            Metric::ClashTime | Metric::StopContact => clash_floor_s(plan),
+            // These may pass through zero.
+            Metric::FootLoad | Metric::SlipMargin => point.weight_n(),
+            // Of open stops no more is left than rounding.
+            Metric::StopForce => METRIC_FLOOR * point.weight_n(),
             Metric::CabinetForce | Metric::StaticSag | Metric::Growth => 0.0,
         };
         compare(*a, *b, least);

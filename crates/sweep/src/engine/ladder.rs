@@ -11,8 +11,8 @@
 //!
 //! Friction and stops give forces corners. A step that spans one errs by its own length, whatever
 //! the order of its formula, and two long steps that pass the same corner in the same way agree on
-//! an error that neither shows. So the nonlinear model with them climbs by plain RK4 alone, from the
-//! reference's step to a quarter of it.
+//! an error that neither shows. So the nonlinear model with them climbs by plain RK4 alone, from
+//! the reference's step to a quarter of it.
 //!
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
@@ -21,7 +21,7 @@ use std::fmt;
 use lane_ode::dop853::DOP853_STABILITY_LIMIT;
 use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind};
 
-use crate::method::{Level, REFERENCE_SHARE};
+use crate::method::{Level, REFERENCE_SHARE, SHORTEST_AT_CORNERS};
 
 /// Step of the reference method, where the machine allows it (s): amplitudes are converged to about
 /// 1e-9.
@@ -80,7 +80,7 @@ const LEAST_EXPECTED_SHARE: f64 = 5e-3;
 
 /// Steps of RK4 where forces have corners, as shares of the reference's. With friction of 90 N that
 /// turns within 3 mm/s, amplitudes err by up to 7e-3 at the first, 5e-4 and 1e-4 at the others.
-const STEPS_AT_CORNERS: [f64; 3] = [1.0, 0.5, 0.25];
+const STEPS_AT_CORNERS: [f64; 3] = [1.0, 0.5, SHORTEST_AT_CORNERS];
 
 /// Error of one of these steps as a share of its difference from the one before: 1 where errors are
 /// of first order; and as much again, because where in a step a corner falls is chance.
@@ -193,8 +193,8 @@ const AT_CORNERS: &str =
 fn too_fast(cases: &Cases<'_>) -> Option<String> {
     let fastest = cases.stiffened_rad_per_s()?;
     Some(format!(
-        "rk4 alone, because stiffened springs and bushings can swing the tub at {fastest:.0} rad/s, \
-         too fast for longer steps"
+        "rk4 alone, because stiffened springs and bushings can swing the tub at {fastest:.0} \
+         rad/s, too fast for longer steps"
     ))
 }
 

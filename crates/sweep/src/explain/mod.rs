@@ -17,6 +17,7 @@ use crate::engine::{ModelEngine, reference_step_s};
 use crate::exit::Error;
 use crate::plan::{Plan, Scenario};
 use crate::speeds::Speeds;
+use crate::stability::smooth;
 use crate::verdict::{ROW_STATUSES, Verdict, row_status};
 
 use tongue::{Asker, tongues};
@@ -97,6 +98,7 @@ pub(crate) fn explain(
     speeds: Option<Speeds>,
     simd: Simd,
 ) -> Result<Explanation, Error> {
+    smooth(plan)?;
     let scenario = plan.scenario(0);
     let profile_rpm = profile::range(&scenario.spin, plan.end_s)?;
     let point = ready(simd, plan, &scenario)?;

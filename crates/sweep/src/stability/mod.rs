@@ -22,8 +22,9 @@ const AT_ONCE: usize = 32;
 /// is what gave the speeds.
 ///
 /// # Errors
-/// [`Error::Option`].
+/// [`Error::Option`]; [`Error::Corners`].
 pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<(), Error> {
+    smooth(plan)?;
     let refuse =
         |expected: String| Err(Error::Option { option, given: given.to_owned(), expected });
     for axis in &plan.axes {
@@ -42,10 +43,23 @@ pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<()
                      turn, and has no window; remove the axis"
                 ));
             }
-            Target::Machine | Target::Bearings(_) | Target::Springs(_) | Target::Dampers(_) => {}
+            Target::Machine
+            | Target::Cabinet
+            | Target::Bearings(_)
+            | Target::Springs(_)
+            | Target::Dampers(_) => {}
         }
     }
     Ok(())
+}
+
+/// Refuses machines whose forces have corners: the derivatives along a response are taken at a few
+/// instants of a turn, between which they are to be smooth.
+///
+/// # Errors
+/// [`Error::Corners`].
+pub(crate) fn smooth(plan: &Plan) -> Result<(), Error> {
+    plan.corners_of_forces().map_or(Ok(()), |what| Err(Error::Corners { what }))
 }
 
 /// Both models' periodic responses at a plan's points and speeds. Row r is the point r / speeds at

@@ -44,6 +44,8 @@ pub enum Source {
 pub enum Target {
     /// One number of the machine.
     Machine,
+    /// A number of the cabinet, which not every machine has.
+    Cabinet,
     /// A number of both bearings, by its name after `bearing_front_` and `bearing_rear_`.
     Bearings(&'static str),
     /// A number of every spring, by its name after `spring_1_`.
@@ -80,9 +82,9 @@ pub enum UnknownParameter {
     #[error("no parameter has this name")]
     Name,
     /// The name is one of a numbered element that the machine does not have.
-    #[error("the machine has {count} {element}{}, numbered from 1", plural(*count))]
+    #[error("the machine has {count} {}, numbered from 1", plural(element, *count))]
     Number {
-        /// `"spring"`, `"damper"`, `"stop"`, `"bushing"` or `"unbalance"`.
+        /// `"spring"`, `"damper"`, `"stop"`, `"bushing"`, `"unbalance"` or `"foot"`.
         element: &'static str,
         /// How many there are.
         count: usize,
@@ -93,6 +95,9 @@ pub enum UnknownParameter {
         /// How many there are; 0 if the spin is not given as a table.
         count: usize,
     },
+    /// The machine has no cabinet.
+    #[error("the machine has no [cabinet]")]
+    NoCabinet,
     /// A spin given as a table has no peak and no ramp.
     #[error("a spin given as a table has no such number")]
     TableSpin,
@@ -244,8 +249,12 @@ impl Parameter {
     #[must_use]
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
         let tabled = matches!(spin, Spin::Table { .. });
-        let single =
-            TABLE.iter().filter(|row| !(tabled && row.target == Target::Spin)).map(Self::single);
+        let is_there = |row: &&Row| match row.target {
+            Target::Spin => !tabled,
+            Target::Cabinet => machine.cabinet.is_some(),
+            _ => true,
+        };
+        let single = TABLE.iter().filter(is_there).map(Self::single);
         let numbered = BLOCKS.iter().flat_map(|block| {
             (0..(block.count)(machine, spin))
                 .flat_map(move |k| block.rows.iter().map(move |row| block.parameter(row, k)))
@@ -259,10 +268,12 @@ impl Parameter {
     /// When the table has no such row, or this machine or spin no such number.
     pub fn find(name: &str, machine: &Machine, spin: &Spin) -> Result<Self, UnknownParameter> {
         if let Some(row) = TABLE.iter().find(|row| row.name == name) {
-            return if row.target == Target::Spin && matches!(spin, Spin::Table { .. }) {
-                Err(UnknownParameter::TableSpin)
-            } else {
-                Ok(Self::single(row))
+            return match row.target {
+                Target::Spin if matches!(spin, Spin::Table { .. }) => {
+                    Err(UnknownParameter::TableSpin)
+                }
+                Target::Cabinet if machine.cabinet.is_none() => Err(UnknownParameter::NoCabinet),
+                _ => Ok(Self::single(row)),
             };
         }
         for block in BLOCKS {
@@ -341,7 +352,9 @@ impl Parameter {
             }
             Target::Springs(number) => of_every(machine.springs.len(), "spring", number),
             Target::Dampers(number) => of_every(machine.dampers.len(), "damper", number),
-            Target::Machine | Target::Spin | Target::Window(_) => vec![self.name.clone()],
+            Target::Machine | Target::Cabinet | Target::Spin | Target::Window(_) => {
+                vec![self.name.clone()]
+            }
         }
     }
 
@@ -350,9 +363,13 @@ impl Parameter {
     }
 }
 
-/// The ending of a noun of so many.
-const fn plural(count: usize) -> &'static str {
-    if count == 1 { "" } else { "s" }
+/// A noun of so many.
+fn plural(noun: &str, count: usize) -> String {
+    match (noun, count) {
+        (_, 1) => noun.to_owned(),
+        ("foot", _) => "feet".to_owned(),
+        _ => format!("{noun}s"),
+    }
 }
 
 /// Points of a spin given as a table.

@@ -3,6 +3,7 @@
 
 use std::fmt;
 
+use crate::machine::feet::{FEET, Feet};
 use crate::{Machine, Parameter, Range, Spin, decimal};
 
 /// Ends of a spring or damper closer than this have no direction; bearings closer than this hold no
@@ -54,6 +55,21 @@ pub enum Violation {
     OnAxis {
         /// Which, from 1, the one that every machine has.
         number: usize,
+    },
+    /// A cabinet whose feet do not hold it: not three or four of them, all in a line, or feet
+    /// without a cabinet.
+    Feet {
+        /// How many.
+        count: usize,
+        /// Whether there is a cabinet on them.
+        has_cabinet: bool,
+    },
+    /// A foot that carries nothing even at rest: the machine's mass centre is beyond the others.
+    FootInTheAir {
+        /// Which, from 1.
+        number: usize,
+        /// Its load (N).
+        load_n: f64,
     },
     /// Bearings at one place cannot hold the shaft's direction.
     BearingsTogether {
@@ -119,6 +135,8 @@ impl Violation {
             }
             Self::OnAxis { number: 1 } => vec!["unbalance_radius_m".to_owned()],
             Self::OnAxis { number } => vec![format!("unbalance_{number}_radius_m")],
+            Self::Feet { count, .. } => (1..=*count).flat_map(places_of_foot).collect(),
+            Self::FootInTheAir { number, .. } => places_of_foot(*number).into(),
             Self::BearingsTogether { .. } => {
                 vec!["bearing_rear_x_m".to_owned(), "bearing_front_x_m".to_owned()]
             }
@@ -150,6 +168,15 @@ impl Violation {
                 "a distance from the axis, negative on the other side; a mass on the axis belongs \
                  to the drum"
                     .to_owned()
+            }
+            Self::Feet { has_cabinet: false, .. } => {
+                "a section [cabinet] with mass_kg, centre_m and friction, or no [[feet]]".to_owned()
+            }
+            Self::Feet { .. } => {
+                "three or four [[feet]] with foot_m = [x, y, z], not all in a line".to_owned()
+            }
+            Self::FootInTheAir { .. } => {
+                "feet around the mass centre of cabinet and machine together".to_owned()
             }
             Self::BearingsTogether { .. } => format!("bearings at least {SHORTEST_M:e} m apart"),
             Self::NoSprings => "at least one spring".to_owned(),
@@ -197,6 +224,16 @@ impl fmt::Display for Violation {
                 f,
                 "unbalance {number} is on the drum's axis and unbalances nothing, beside others"
             ),
+            Self::Feet { has_cabinet: false, .. } => f.write_str("feet without a cabinet"),
+            Self::Feet { count: count @ 3..=FEET, .. } => {
+                write!(f, "the cabinet's {count} feet are in a line and do not hold it")
+            }
+            Self::Feet { count, .. } => {
+                write!(f, "the cabinet stands on {count} feet, and loads are reckoned for 3 or 4")
+            }
+            Self::FootInTheAir { number, load_n } => {
+                write!(f, "foot {number} lifts at rest: it would carry {load_n:.1} N")
+            }
             Self::BearingsTogether { distance_m } => {
                 write!(
                     f,
@@ -223,6 +260,11 @@ impl fmt::Display for Violation {
             }
         }
     }
+}
+
+/// Parameters of where a foot is.
+fn places_of_foot(number: usize) -> [String; 3] {
+    ["x", "y", "z"].map(|axis| format!("foot_{number}_{axis}_m"))
 }
 
 /// A computed number for a message, without the last digits' rounding error.
@@ -280,6 +322,20 @@ impl Machine {
             if stop.direction_length() < SHORTEST_M {
                 joint.push(Violation::NoDirection { number: k + 1 });
             }
+        }
+        let has_cabinet = self.cabinet.is_some();
+        match Feet::new(self) {
+            Some(feet) => {
+                let loads_n = feet.at_rest_n(self).into_iter().enumerate();
+                let lifted = loads_n.filter(|(_, load_n)| *load_n <= 0.0);
+                joint.extend(
+                    lifted.map(|(k, load_n)| Violation::FootInTheAir { number: k + 1, load_n }),
+                );
+            }
+            None if has_cabinet || !self.feet.is_empty() => {
+                joint.push(Violation::Feet { count: self.feet.len(), has_cabinet });
+            }
+            None => {}
         }
         if !self.further_unbalances.is_empty() {
             let unbalances = core::iter::once(&self.unbalance).chain(&self.further_unbalances);

@@ -90,6 +90,16 @@ impl<T: Lane> Elements<T> {
     }
 }
 
+impl<T: Lane> Elements<T> {
+    /// How deep a stop's tub point is in it (m; below zero it is open), and its push (N).
+    #[inline(always)]
+    pub(crate) fn stop(&self, number: usize, tub: &TubMotion<'_, T>) -> [N<T>; 2] {
+        let stop = &self.stops[number];
+        let point = tub.point(&stop.tub, &tub.midpoint_velocity_in_tub());
+        [stop.depth(&point), stop.push(&point)]
+    }
+}
+
 /// What not every machine has, added to the load on the tub. A zero stiffness or friction adds a
 /// zero, so that no machine's bits depend on those in the other lanes.
 struct Further<'a, T> {

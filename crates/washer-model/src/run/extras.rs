@@ -4,6 +4,7 @@
 //! that the loop over steps does not change where they are not in use.
 
 use super::cabinet_force::GreatestForce;
+use super::loads::Loads;
 use super::{Course, Method, ModelKind};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -26,6 +27,10 @@ pub struct Wanted {
     pub cabinet_force: bool,
     /// How long drum and tub overlap.
     pub clash_time: bool,
+    /// The greatest push of a stop, and how long one is closed.
+    pub stops: bool,
+    /// The least load of a foot of the cabinet, and the least margin against slipping.
+    pub feet: bool,
     /// The coordinates at the ends of legs ([`Timing::checkpoints`](crate::Timing)).
     pub course: bool,
 }
@@ -50,6 +55,16 @@ pub struct Extra {
     /// (s). Where drum and tub only just touch, it is much of the time itself. Absent where modes
     /// are not capped, because such runs follow the ringing.
     pub clash_doubt_s: Option<f64>,
+    /// The greatest push of any stop (N); absent if the machine has none.
+    pub stop_force_n: Option<f64>,
+    /// How long the stop that is closed longest is closed (s).
+    pub stop_contact_s: Option<f64>,
+    /// The least vertical load of any foot (N), below zero where it would lift; absent if the
+    /// machine has no cabinet.
+    pub foot_load_n: Option<f64>,
+    /// The least margin against slipping (N): friction on all feet together less the horizontal
+    /// force; below zero the cabinet slips.
+    pub slip_margin_n: Option<f64>,
     /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed.
     /// Empty unless asked for.
     pub course: Course,
@@ -68,6 +83,7 @@ pub(super) struct Extras<T> {
     squares: SquareIntegrals<T, CHANNELS>,
     turns: PartPeaks<T, CHANNELS>,
     force: Option<GreatestForce<T>>,
+    loads: Option<Loads<T>>,
     /// With the clearance as it is; where modes are capped, also with less and more, by what
     /// ringing may add to the gap.
     clash: [TimeAbove<T>; 3],
@@ -102,11 +118,17 @@ impl<T: Lane> Extras<T> {
         } else {
             None
         };
+        let loads = if wanted.stops || wanted.feet {
+            Some(Loads::new(zero, model, point, parts))
+        } else {
+            None
+        };
         Some(Self {
             wanted,
             squares: SquareIntegrals::new(zero),
             turns: PartPeaks::new(zero),
             force,
+            loads,
             clash: [TimeAbove::new(zero); 3],
             clearances_squared: [zero; 3],
             clearances,
@@ -130,6 +152,9 @@ impl<T: Lane> Extras<T> {
         if let Some(force) = &mut self.force {
             force.set_point(lane, point);
         }
+        if let Some(loads) = &mut self.loads {
+            loads.set_point(lane, point);
+        }
     }
 
     /// Ends a lane's trajectory, that of point `index`. A failed one leaves no record.
@@ -143,7 +168,13 @@ impl<T: Lane> Extras<T> {
         let mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let wanted = self.wanted;
         let [clash_s, longer_s, shorter_s] = self.clash.map(|clash| clash.lane(lane));
+        let stops = self.loads.as_ref().and_then(|loads| loads.stops(lane));
+        let feet = self.loads.as_ref().and_then(|loads| loads.feet_n(lane));
         self.found[index] = Extra {
+            stop_force_n: stops.map(|[push_n, _]| push_n),
+            stop_contact_s: stops.map(|[_, contact_s]| contact_s),
+            foot_load_n: feet.map(|[load_n, _]| load_n),
+            slip_margin_n: feet.map(|[_, margin_n]| margin_n),
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),
             turns,
             cabinet_force_n: self.force.as_ref().map(|force| force.lane_n(lane)),
@@ -187,6 +218,13 @@ impl<T: Lane> Aside for Seen<'_, T> {
         }
         if let Some(force) = &mut extras.force {
             force.see(step, x, dx, inside);
+        }
+        if let Some(loads) = &mut extras.loads {
+            let length_s = match step {
+                Some((_, length_s)) => Some(length_s),
+                None => None,
+            };
+            loads.see(length_s, x, dx, inside);
         }
         if wanted.clash_time {
             let distance_squared = squared(radial);

@@ -1,19 +1,13 @@
 //! After set-up a trajectory leaves the heap alone, however long.
 
-use super::instruments::{paper, ready, triangular};
+use super::instruments::{EVERYTHING, paper, ready, triangular};
 use crate::{Method, ModelKind, Wanted, simulate_with};
 use lane_ode::{Simd, Tolerance};
 
 #[test]
 fn a_longer_trajectory_asks_no_more_of_the_heap_than_a_short_one() {
     let tolerance = Tolerance { relative: 1e-4, absolute: 1e-7, max_steps: 1_000_000 };
-    let everything = Wanted {
-        root_mean_squares: true,
-        turns: true,
-        cabinet_force: true,
-        clash_time: true,
-        course: true,
-    };
+    let everything = EVERYTHING;
     let asked = |simd, model, method: &Method, wanted, end_s| {
         // More points than lanes: lanes that take up another are counted too.
         let points: Vec<_> = (0..11)

@@ -51,17 +51,24 @@ fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
     let mut bits: Vec<_> = amplitudes.iter().map(|a| a.to_bits()).collect();
     bits.extend([min_gap_m.to_bits(), *steps, *rejected]);
     bits.extend(failure.iter().flat_map(|(reason, time_s)| [*reason as u64, time_s.to_bits()]));
-    let Extra { root_mean_squares, turns, cabinet_force_n, clash_time_s, clash_doubt_s, course } =
-        extra;
+    let Extra {
+        root_mean_squares,
+        turns,
+        cabinet_force_n,
+        clash_time_s,
+        clash_doubt_s,
+        stop_force_n,
+        stop_contact_s,
+        foot_load_n,
+        slip_margin_n,
+        course,
+    } = extra;
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
     bits.extend(course.iter().flatten().map(|q| q.to_bits()));
-    bits.extend(
-        cabinet_force_n
-            .iter()
-            .chain(clash_time_s)
-            .chain(clash_doubt_s)
-            .map(|metric| metric.to_bits()),
-    );
+    let of_motion = [cabinet_force_n, clash_time_s, clash_doubt_s];
+    let of_loads = [stop_force_n, stop_contact_s, foot_load_n, slip_margin_n];
+    let metrics = of_motion.into_iter().chain(of_loads).flatten();
+    bits.extend(metrics.map(|metric| metric.to_bits()));
     bits
 }
 

@@ -13,13 +13,13 @@ use lane_ode::N;
 type Vec3 = [f64; 3];
 
 /// The first two columns of Ry(yaw) Rz(pitch), and the third (Table 1).
-fn axes(yaw: f64, pitch: f64) -> [Vec3; 3] {
+pub(super) fn axes(yaw: f64, pitch: f64) -> [Vec3; 3] {
     let ((sy, cy), (sp, cp)) = (yaw.sin_cos(), pitch.sin_cos());
     [[cy * cp, sp, -sy * cp], [-cy * sp, cp, sy * sp], [sy, 0.0, cy]]
 }
 
 /// start + sum of components times axes.
-fn place(start: Vec3, axes: &[Vec3; 3], components: Vec3) -> Vec3 {
+pub(super) fn place(start: Vec3, axes: &[Vec3; 3], components: Vec3) -> Vec3 {
     std::array::from_fn(|i| start[i] + (0..3).map(|k| components[k] * axes[k][i]).sum::<f64>())
 }
 

@@ -16,6 +16,8 @@ pub(super) const EVERYTHING: Wanted = Wanted {
     turns: true,
     cabinet_force: true,
     clash_time: true,
+    stops: true,
+    feet: true,
     course: true,
 };
 

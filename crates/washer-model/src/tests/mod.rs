@@ -9,6 +9,7 @@ mod expansion;
 mod extras;
 mod findings;
 mod instruments;
+mod loads;
 mod long_tables;
 mod mass;
 mod observation;

@@ -26,6 +26,12 @@ macro_rules! row {
             get |m, _, _| Some(m.$($field)+), set |m, _, _, v| m.$($field)+ = v)
     };
     ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal,
+        cabinet $($field:tt)+) => {
+        row!($name, $unit, $range, $source, $description, Target::Cabinet,
+            get |m, _, _| m.cabinet.as_ref().map(|cabinet| cabinet.$($field)+),
+            set |m, _, _, v| if let Some(cabinet) = &mut m.cabinet { cabinet.$($field)+ = v })
+    };
+    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal,
         of $list:ident $($field:tt)+) => {
         row!($name, $unit, $range, $source, $description, Target::Machine,
             get |m, _, k| m.$list.get(k).map(|item| item.$($field)+),
@@ -179,6 +185,16 @@ pub(super) static TABLE: &[Row] = &[
     row!("spin_ramp_s", "s", Positive, Grid,
         "duration of the run-up, and of a triangle's run-down (Figs. 10 to 12: 50 s, assumed)",
         spin ramp_s),
+    row!("cabinet_mass_kg", "kg", NonNegative, NONE,
+        "mass of the cabinet with all that is fixed to it", cabinet mass_kg),
+    row!("cabinet_centre_x_m", "m", Any, NONE,
+        "mass centre of the cabinet, towards the door", cabinet centre_m[0]),
+    row!("cabinet_centre_y_m", "m", Any, NONE,
+        "mass centre of the cabinet, upwards", cabinet centre_m[1]),
+    row!("cabinet_centre_z_m", "m", Any, NONE,
+        "mass centre of the cabinet, sideways", cabinet centre_m[2]),
+    row!("cabinet_friction", "", Within(0.0, 10.0), NONE,
+        "coefficient of friction between feet and floor", cabinet friction),
     row!("window_from_s", "s", NonNegative, Time,
         "when amplitudes begin to be taken", window 0),
     row!("window_to_s", "s", NonNegative, Time,
@@ -310,6 +326,14 @@ static FURTHER_UNBALANCE: &[Row] = &[
         of further_unbalances radius_m),
 ];
 
+/// Rows of each foot, after `foot_1_`.
+#[rustfmt::skip]
+static FOOT: &[Row] = &[
+    row!("x_m", "m", Any, NONE, "place of this foot, towards the door", of feet foot_m[0]),
+    row!("y_m", "m", Any, NONE, "place of this foot, upwards", of feet foot_m[1]),
+    row!("z_m", "m", Any, NONE, "place of this foot, sideways", of feet foot_m[2]),
+];
+
 /// Rows of each point of a spin's table, after `spin_table_1_`.
 #[rustfmt::skip]
 static SPIN_POINT: &[Row] = &[
@@ -356,6 +380,13 @@ pub(super) static BLOCKS: &[Block] = &[
         first: 2,
         count: |machine, _| machine.further_unbalances.len(),
         missing: |count| UnknownParameter::Number { element: "unbalance", count: count + 1 },
+    },
+    Block {
+        prefix: "foot_",
+        rows: FOOT,
+        first: 1,
+        count: |machine, _| machine.feet.len(),
+        missing: |count| UnknownParameter::Number { element: "foot", count },
     },
     Block {
         prefix: "spin_table_",

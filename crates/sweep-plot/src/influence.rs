@@ -1,0 +1,149 @@
+//! How much a quantity of scattered points depends on each of their parameters.
+
+/// Two measures of one parameter, both of ranks: they do not depend on units or on logarithms, and
+/// one point far away does not decide them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Influence {
+    /// Rank correlation, -1 to 1: where the quantity rises with the parameter, or falls, all the
+    /// way.
+    ///
+    /// C. Spearman, The proof and measurement of association between two things, American Journal
+    /// of Psychology 15 (1904), 72-101.
+    pub(crate) rank: f64,
+    /// Root of the share of the ranks' variance that goes by the parameter alone, 0 to 1: as large
+    /// as the magnitude of `rank` where the quantity only rises or only falls, and larger where it
+    /// does both. None of too few points.
+    ///
+    /// Its square is the correlation ratio without the bias that bins bring: T. L. Kelley, An
+    /// unbiased correlation ratio measure, Proceedings of the National Academy of Sciences 21
+    /// (1935), 554-559.
+    pub(crate) any: Option<f64>,
+}
+
+impl Influence {
+    /// Of `x` on `y`, in pairs that have both values.
+    pub(crate) fn of(x: &[f64], y: &[f64]) -> Option<Self> {
+        let both = x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite());
+        let (x, y): (Vec<f64>, Vec<f64>) = both.unzip();
+        let (x_ranks, y_ranks) = (ranks(&x), ranks(&y));
+        Some(Self { rank: correlation(&x_ranks, &y_ranks)?, any: by_bins(&x_ranks, &y_ranks) })
+    }
+
+    /// The larger of both, by which parameters are put in order.
+    pub(crate) fn size(self) -> f64 {
+        self.rank.abs().max(self.any.unwrap_or_default())
+    }
+}
+
+/// Magnitude of a rank correlation that chance alone exceeds in one of twenty samples of so many
+/// points, where the quantity does not depend on the parameter.
+pub(crate) fn chance(points: usize) -> f64 {
+    if points < 2 { 1.0 } else { (1.96 / ((points - 1) as f64).sqrt()).min(1.0) }
+}
+
+/// Places in the order, from 1; equal values share the mean of theirs.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut ranks = vec![0.0; values.len()];
+    for run in order.chunk_by(|&a, &b| values[a] == values[b]) {
+        // A run of m after k others has the ranks k + 1 to k + m.
+        let before = order.partition_point(|&other| values[other] < values[run[0]]);
+        let rank = before as f64 + (run.len() + 1) as f64 / 2.0;
+        run.iter().for_each(|&place| ranks[place] = rank);
+    }
+    ranks
+}
+
+/// Of what does not vary there is none.
+fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
+    let mean = (x.len() + 1) as f64 / 2.0;
+    let sum = |of: &dyn Fn(usize) -> f64| (0..x.len()).map(of).sum::<f64>();
+    let xy = sum(&|k| (x[k] - mean) * (y[k] - mean));
+    let xx = sum(&|k| (x[k] - mean).powi(2));
+    let yy = sum(&|k| (y[k] - mean).powi(2));
+    (xx > 0.0 && yy > 0.0).then(|| xy / (xx * yy).sqrt())
+}
+
+/// Most bins of the correlation ratio.
+const MOST_BINS: usize = 20;
+/// Least points to a bin.
+const LEAST_IN_BIN: usize = 10;
+
+/// The root of the corrected correlation ratio of ranks, over bins of as many points each. Equal
+/// values of `x` share a bin.
+fn by_bins(x: &[f64], y: &[f64]) -> Option<f64> {
+    let points = x.len();
+    let most = (points / LEAST_IN_BIN).min(MOST_BINS);
+    if most < 2 {
+        return None;
+    }
+    let mut sums = vec![(0_usize, 0.0); most];
+    for (x, y) in x.iter().zip(y) {
+        let bin = ((x - 0.5) / points as f64 * most as f64) as usize;
+        let (count, sum) = &mut sums[bin.min(most - 1)];
+        (*count, *sum) = (*count + 1, *sum + y);
+    }
+    let mean = (points + 1) as f64 / 2.0;
+    let filled: Vec<(usize, f64)> = sums.into_iter().filter(|(count, _)| *count > 0).collect();
+    let between =
+        filled.iter().map(|(count, sum)| *count as f64 * (sum / *count as f64 - mean).powi(2));
+    let total: f64 = y.iter().map(|y| (y - mean).powi(2)).sum();
+    let bins = filled.len();
+    if bins < 2 || bins >= points || total <= 0.0 {
+        return None;
+    }
+    let share = between.sum::<f64>() / total;
+    let corrected = 1.0 - (1.0 - share) * (points - 1) as f64 / (points - bins) as f64;
+    Some(corrected.max(0.0).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(count: i32) -> Vec<f64> {
+        (0..count).map(f64::from).collect()
+    }
+
+    #[test]
+    fn ranks_share_their_mean_where_values_are_equal() {
+        assert_eq!(ranks(&[5.0, 1.0, 5.0, 9.0]), [2.5, 1.0, 2.5, 4.0]);
+    }
+
+    #[test]
+    fn spearman_is_as_by_hand() {
+        // Differences of ranks 0, 1, -1, 0: 1 - 6 * 2 / (4 * 15).
+        let found = Influence::of(&[1.0, 2.0, 3.0, 4.0], &[10.0, 30.0, 20.0, 900.0]).unwrap();
+        assert!((found.rank - 0.8).abs() < 1e-12);
+        assert_eq!(found.any, None, "four points are too few for bins");
+        assert_eq!(Influence::of(&[1.0, 1.0], &[1.0, 2.0]), None);
+    }
+
+    #[test]
+    fn what_rises_all_the_way_has_both_and_what_also_falls_only_one() {
+        let x = line(400);
+        let up: Vec<f64> = x.iter().map(|x| (0.1 * x).exp()).collect();
+        let found = Influence::of(&x, &up).unwrap();
+        assert!(found.rank == 1.0 && found.any.unwrap() > 0.99, "{found:?}");
+        let hill: Vec<f64> = x.iter().map(|x| -(x - 199.5).abs()).collect();
+        let found = Influence::of(&x, &hill).unwrap();
+        assert!(found.rank.abs() < 1e-3 && found.any.unwrap() > 0.99, "{found:?}");
+    }
+
+    #[test]
+    fn what_does_not_depend_has_less_than_chance() {
+        // A step of nearly the golden section's: no order left.
+        let x = line(400);
+        let y: Vec<f64> = x.iter().map(|x| (x * 0.618_033_988_749_895).fract()).collect();
+        let found = Influence::of(&x, &y).unwrap();
+        assert!(found.rank.abs() < chance(400) && found.any.unwrap() < 0.2, "{found:?}");
+        assert!((chance(400) - 0.098).abs() < 1e-3);
+    }
+
+    #[test]
+    fn pairs_without_a_value_are_left_out() {
+        let found = Influence::of(&[1.0, 2.0, 3.0, 4.0], &[1.0, f64::NAN, 3.0, 4.0]).unwrap();
+        assert_eq!(found.rank, 1.0);
+    }
+}

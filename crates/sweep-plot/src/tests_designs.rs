@@ -1,0 +1,147 @@
+//! Figures of scattered points.
+
+use super::sample::Sample;
+use super::tests::{carried, draw, message, svg};
+use super::*;
+
+/// Points whose ratio is 4 where the mass is above a half, whatever the damping; of the rows, the
+/// last failed and the one before it is undefined.
+fn points(count: u32) -> Sample {
+    let part = |k: u32, step: f64| (f64::from(k) * step).fract();
+    let mass: Vec<f64> = (0..count).map(|k| part(k, 0.618_033_988_749_895)).collect();
+    let damping = (0..count).map(|k| 60.0 + 240.0 * part(k, 0.414_213_562_373_095));
+    let lost = |k: usize| k + 2 >= count as usize;
+    let ratio = |k: usize| (!lost(k)).then(|| if mass[k] > 0.5 { 4.0 } else { 1.0 + mass[k] });
+    let of = |value: &dyn Fn(usize) -> Option<f64>| -> Vec<f64> {
+        (0..count as usize).map(|k| value(k).unwrap_or(f64::NAN)).collect()
+    };
+    let plan = r#"{
+        "name": "sample", "reliability": { "ratio_limit": 2.0 },
+        "design": { "method": "monte_carlo", "points": 0, "seed": 0 }
+    }"#;
+    Sample::default()
+        .counts("point", 0..u64::from(count))
+        .numbers("unbalance_mass_kg", "kg", mass.iter().copied())
+        .numbers("damping_n_s_per_m", "N s/m", damping)
+        .numbers("gravity_m_per_s2", "m/s^2", mass.iter().map(|_| 9.81))
+        .numbers("nonlinear_tub_yaw", "rad", of(&|k| Some(0.01 * ratio(k)?)))
+        .numbers("linear_tub_yaw", "rad", of(&|k| ratio(k).map(|_| 0.01)))
+        .numbers("ratio_tub_yaw", "1", of(&ratio))
+        .numbers("ratio_max", "1", of(&ratio))
+        .flags("reliable", (0..count as usize).map(|k| ratio(k).map(|ratio| ratio < 2.0)))
+        .numbers("min_gap_nonlinear_m", "m", of(&|k| ratio(k).map(|ratio| 0.003 - 0.001 * ratio)))
+        .words("status", (0..count).map(|k| Some(if k + 1 == count { "diverged" } else { "ok" })))
+        .metadata("sweep.plan", plan)
+}
+
+fn view(view: View) -> PlotOptions {
+    PlotOptions { view: Some(view), ..PlotOptions::default() }
+}
+
+/// How many panels of a picture have an x axis label, by the label.
+fn times(figure: &str, text: &str) -> usize {
+    figure.matches(&format!(">{text}<")).count()
+}
+
+#[test]
+fn a_design_has_a_panel_for_each_pair_and_names_its_points() {
+    let figure = svg(points(202), &PlotOptions::default());
+    for said in [
+        "Where the linear model can be trusted",
+        "sample · 202 points at random",
+        "Damping (N s/m)",
+        "Greatest ratio",
+        "boundary: ratio 2",
+        "undefined: no excitation (1)",
+        "failed: no result (1)",
+    ] {
+        assert!(figure.contains(&format!(">{said}<")), "{said}");
+    }
+    assert_eq!(times(&figure, "Unbalance mass (kg)"), 1);
+    assert!(!figure.contains("Gravity"), "what is the same at every point is no axis");
+    let of = |side: &str| {
+        let start = figure.find(side).unwrap() + side.len();
+        figure[start..start + 5].split(['(', ')']).nth(1).unwrap().parse::<u32>().unwrap()
+    };
+    assert_eq!(of(">reliable: below 2 ") + of(">unreliable: ratio 2 or more "), 200);
+}
+
+#[test]
+fn a_histogram_tells_the_share_and_how_sure_it_is() {
+    let figure = svg(points(102), &view(View::Histogram));
+    // Of 0.618 k modulo 1 with k below 100, 49 are above a half. Wilson's interval is by hand.
+    assert!(figure.contains("51.0 % of the points reliable"), "{figure}");
+    assert!(figure.contains("41.3 to 60.6 % (Wilson)"), "{figure}");
+    assert!(figure.contains("1 undefined · 1 failed"), "{figure}");
+    let quantity = Quantity::GapNonlinear;
+    let gap = svg(points(102), &PlotOptions { quantity, ..view(View::Histogram) });
+    assert!(gap.contains("51.0 % of the points apart"), "{gap}");
+    let yaw = PlotOptions {
+        quantity: Quantity::Nonlinear,
+        channels: vec!["tub_yaw".to_owned()],
+        ..view(View::Histogram)
+    };
+    assert!(svg(points(102), &yaw).contains("51.0 % of the points reliable"));
+}
+
+#[test]
+fn bins_hold_every_point_once_on_its_side() {
+    let page = carried(&draw(points(102), &view(View::Histogram), "a.html").unwrap());
+    let series = page["histogram"]["chart"]["panels"][0]["series"].as_array().unwrap();
+    let shares = series.iter().map(|series| {
+        // Each bin has two ends.
+        let ends = super::tests::curve(series);
+        ends.iter().filter(|share| share.is_finite()).sum::<f64>() / 2.0
+    });
+    let shares: Vec<f64> = shares.collect();
+    let near = |share: f64, expected: f64| (share - expected).abs() < 1e-3;
+    assert!(near(shares[0], 51.0) && near(shares[1], 49.0), "{shares:?}");
+}
+
+#[test]
+fn influence_puts_first_what_matters() {
+    let page = carried(&draw(points(402), &view(View::Influence), "a.html").unwrap());
+    assert_eq!(
+        (page["kind"].as_str(), page["first"].as_str()),
+        (Some("design"), Some("influence"))
+    );
+    let rows = page["influence"]["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 2);
+    assert_eq!(rows[0][0], "Unbalance mass");
+    // Half of the ratios share the greatest rank.
+    assert!(rows[0][1].as_f64().unwrap() > 0.9 && rows[0][2].as_f64().unwrap() > 0.9, "{rows:?}");
+    let chance = page["influence"]["chance"].as_f64().unwrap();
+    assert!(rows[1][1].as_f64().unwrap().abs() < chance, "{rows:?}");
+    let figure = svg(points(402), &view(View::Influence));
+    let [mass, damping] = [">Unbalance mass<", ">Damping<"].map(|name| figure.find(name).unwrap());
+    assert!(mass < damping);
+}
+
+#[test]
+fn many_points_are_picked_not_all_drawn_and_all_counted() {
+    let page = carried(&draw(points(250_002), &PlotOptions::default(), "a.html").unwrap());
+    let scatter = &page["scatter"];
+    let sides = scatter["sides"].as_array().unwrap().iter();
+    assert_eq!(sides.map(|side| side["count"].as_u64().unwrap()).sum::<u64>(), 250_002);
+    let drawn = scatter["of"].as_array().unwrap().len();
+    assert!((3000..5000).contains(&drawn), "{drawn}");
+    assert!(page["subtitle"].as_str().unwrap().contains("picked at random"));
+    let size = draw(points(250_002), &PlotOptions::default(), "a.svg").unwrap().len();
+    assert!(size < 2_000_000, "{size}");
+}
+
+#[test]
+fn a_grid_is_no_design_and_a_list_of_a_grid_is_a_map() {
+    let refused = message(draw(super::sample::map(), &view(View::Scatter), "a.svg"));
+    assert!(refused.contains("`--view` is for designs"), "{refused}");
+    let status = PlotOptions { quantity: Quantity::Status, ..PlotOptions::default() };
+    assert!(message(draw(points(50), &status, "a.svg")).contains("no number"));
+    let at = PlotOptions { at: vec![("x".to_owned(), 1.0)], ..PlotOptions::default() };
+    assert!(message(draw(points(50), &at, "a.svg")).contains("`--at` is for maps"));
+    let listed = || {
+        let plan = r#"{ "design": { "method": "list" } }"#;
+        super::sample::map().metadata("sweep.listed", plan)
+    };
+    assert!(svg(listed(), &PlotOptions::default()).contains("linear model unreliable"));
+    assert!(svg(listed(), &view(View::Histogram)).contains("Share of the points (%)"));
+}

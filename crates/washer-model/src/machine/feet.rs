@@ -1,0 +1,177 @@
+//! What the cabinet's feet carry: the floor holds a cabinet that does not move against its own
+//! weight and the forces of the suspension.
+
+use crate::machine::Machine;
+
+/// Most feet.
+pub(crate) const FEET: usize = 4;
+
+/// Components of a load on the cabinet: its force along c1, c2 and c3 (N), and its moment about O
+/// (N m).
+pub(crate) const LOAD: usize = 6;
+
+/// Feet closer to one line than this share of their distances hold no cabinet upright.
+const IN_LINE: f64 = 1e-6;
+
+/// How loads on the cabinet spread over its feet.
+///
+/// Three feet carry what statics says. Four are taken as equally stiff under a rigid cabinet: then
+/// the loads are the linear function of x and z that balances forces and moments. The horizontal
+/// force is taken by the feet together, at their mean height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Feet {
+    /// How many there are, 3 or 4.
+    pub(crate) count: usize,
+    /// Vertical load of each by the cabinet's own weight (N).
+    pub(crate) own_n: [f64; FEET],
+    /// What each takes of a load on the cabinet.
+    pub(crate) shares: [[f64; LOAD]; FEET],
+    /// Coefficient of friction.
+    pub(crate) friction: f64,
+    /// Weight of the cabinet (N).
+    pub(crate) weight_n: f64,
+}
+
+impl Feet {
+    /// Those of a machine; `None` if it has no cabinet, not three or four feet, or all in a line.
+    pub(crate) fn new(machine: &Machine) -> Option<Self> {
+        let cabinet = machine.cabinet?;
+        let count = machine.feet.len();
+        if !(3..=FEET).contains(&count) {
+            return None;
+        }
+        let mean = |axis: usize| {
+            machine.feet.iter().map(|foot| foot.foot_m[axis]).sum::<f64>() / count as f64
+        };
+        let [mean_x, mean_y, mean_z] = [mean(0), mean(1), mean(2)];
+        let places: Vec<[f64; 2]> = machine
+            .feet
+            .iter()
+            .map(|foot| [foot.foot_m[0] - mean_x, foot.foot_m[2] - mean_z])
+            .collect();
+        let sum = |term: fn(&[f64; 2]) -> f64| places.iter().map(term).sum::<f64>();
+        let [xx, xz, zz] = [sum(|p| p[0] * p[0]), sum(|p| p[0] * p[1]), sum(|p| p[1] * p[1])];
+        let det = xx * zz - xz * xz;
+        let span = xx + zz;
+        if det.is_nan() || det <= IN_LINE * span * span {
+            return None;
+        }
+        let weight_n = cabinet.mass_kg * machine.gravity_m_per_s2;
+        let [centre_x, _, centre_z] = cabinet.centre_m;
+        let (mut own_n, mut shares) = ([0.0; FEET], [[0.0; LOAD]; FEET]);
+        for (k, [x, z]) in places.into_iter().enumerate() {
+            // Of the sum of loads, and of their first moments about the feet's mean place.
+            let of_sum = 1.0 / count as f64;
+            let of_x = (zz * x - xz * z) / det;
+            let of_z = (xx * z - xz * x) / det;
+            own_n[k] =
+                weight_n * (of_sum + of_x * (centre_x - mean_x) + of_z * (centre_z - mean_z));
+            // The sum is -F_y, the moments of x and z are -M_z - y F_x and M_x - y F_z.
+            shares[k] = [
+                -of_x * mean_y,
+                of_x * mean_x + of_z * mean_z - of_sum,
+                -of_z * mean_y,
+                of_z,
+                0.0,
+                -of_x,
+            ];
+        }
+        Some(Self { count, own_n, shares, friction: cabinet.friction, weight_n })
+    }
+
+    /// The vertical loads of the feet (N) under a load on the cabinet.
+    pub(crate) fn loads_n(&self, load: &[f64; LOAD]) -> Vec<f64> {
+        let of_foot = |k: usize| {
+            let shared: f64 = self.shares[k].iter().zip(load).map(|(share, of)| share * of).sum();
+            self.own_n[k] + shared
+        };
+        (0..self.count).map(of_foot).collect()
+    }
+
+    /// The loads before the machine sags.
+    pub(crate) fn at_rest_n(&self, machine: &Machine) -> Vec<f64> {
+        let bodies = [
+            (machine.tub.mass_kg, machine.tub.centre_x_m),
+            (machine.shaft.mass_kg, machine.shaft.centre_x_m),
+            (machine.drum.mass_kg, machine.drum.centre_x_m),
+            (machine.unbalance.mass_kg, machine.unbalance.x_m),
+        ];
+        let further = machine.further_unbalances.iter().map(|u| (u.mass_kg, u.x_m));
+        let (mut weight_n, mut moment_n_m) = (0.0, 0.0);
+        for (mass_kg, x_m) in bodies.into_iter().chain(further) {
+            weight_n += machine.gravity_m_per_s2 * mass_kg;
+            moment_n_m += machine.gravity_m_per_s2 * mass_kg * x_m;
+        }
+        self.loads_n(&[0.0, -weight_n, 0.0, 0.0, 0.0, -moment_n_m])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::{Cabinet, Foot};
+
+    fn on(feet: &[[f64; 3]]) -> Machine {
+        let mut machine = Machine::paper();
+        machine.cabinet =
+            Some(Cabinet { mass_kg: 30.0, centre_m: [0.2, -0.1, 0.01], friction: 0.4 });
+        machine.feet = feet.iter().map(|&foot_m| Foot { foot_m }).collect();
+        machine
+    }
+
+    /// Force and moment about O that are left when the floor's forces are added.
+    fn left(machine: &Machine, load: &[f64; LOAD]) -> [f64; LOAD] {
+        let feet = Feet::new(machine).unwrap();
+        let cross = |a: [f64; 3], b: [f64; 3]| {
+            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        };
+        let cabinet = machine.cabinet.unwrap();
+        let mut forces = vec![(cabinet.centre_m, [0.0, -9.81 * cabinet.mass_kg, 0.0])];
+        for (foot, load_n) in machine.feet.iter().zip(feet.loads_n(load)) {
+            let share = 1.0 / machine.feet.len() as f64;
+            forces.push((foot.foot_m, [-share * load[0], load_n, -share * load[2]]));
+        }
+        let mut sum = *load;
+        for (at, force) in forces {
+            let moment = cross(at, force);
+            for i in 0..3 {
+                sum[i] += force[i];
+                sum[3 + i] += moment[i];
+            }
+        }
+        sum
+    }
+
+    const CORNERS: [[f64; 3]; 4] =
+        [[0.5, -0.5, 0.25], [0.5, -0.5, -0.25], [-0.1, -0.5, 0.25], [-0.1, -0.5, -0.25]];
+
+    #[test]
+    fn loads_of_feet_balance_forces_and_moments() {
+        let load = [30.0, -350.0, 40.0, 12.0, 5.0, -70.0];
+        for feet in [&CORNERS[..], &[[0.5, -0.5, 0.2], [0.45, -0.5, -0.3], [-0.1, -0.5, 0.1]]] {
+            let machine = on(feet);
+            let left = left(&machine, &load);
+            // What turns the cabinet about the vertical is the friction of single feet.
+            for i in [0, 1, 2, 3, 5] {
+                assert!(left[i].abs() < 1e-10, "{i}: {}", left[i]);
+            }
+        }
+    }
+
+    #[test]
+    fn at_rest_feet_carry_the_weight() {
+        let machine = on(&CORNERS);
+        let loads_n = Feet::new(&machine).unwrap().at_rest_n(&machine);
+        let weight_n = 9.81 * (30.0 + 23.87 + 4.34 + 3.64 + 0.4);
+        assert!((loads_n.iter().sum::<f64>() - weight_n).abs() < 1e-9, "{loads_n:?}");
+        // The cabinet's centre is off to c3: the feet there carry more.
+        assert!(loads_n[0] > loads_n[1] && loads_n[2] > loads_n[3], "{loads_n:?}");
+    }
+
+    #[test]
+    fn feet_in_a_line_hold_nothing() {
+        let line = [[0.0, -0.5, 0.0], [0.1, -0.5, 0.1], [0.3, -0.5, 0.3]];
+        assert_eq!(Feet::new(&on(&line)), None);
+        assert_eq!(Feet::new(&on(&CORNERS[..2])), None);
+    }
+}

@@ -1,0 +1,368 @@
+//! Loads of stops and of the cabinet's feet, over lanes.
+//!
+//! The laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers for
+//! their rates; the linear model's are first order in its deviations from equilibrium.
+
+use crate::coordinates::{COORDINATES, STATES, TUB};
+use crate::lanes::{Constant as _, InLanes as _};
+use crate::machine::feet::{FEET, LOAD};
+use crate::nonlinear::elements::{Elements, TubMotion};
+use crate::nonlinear::frame::Tilt;
+use crate::point::Point;
+use crate::run::ModelKind;
+use lane_ode::{Dual, Lane, N, Peaks, Sample};
+
+/// Least values are found as greatest distances below this (N), farther than any load.
+const FAR_N: f64 = 1_048_576.0;
+
+/// Added under the root of the horizontal force (N^2), which has no rate at 0.
+const LEAST_SQUARED_N2: f64 = 1e-18;
+
+/// The margin against slipping, after the feet.
+const SLIP: usize = FEET;
+
+/// Coordinates of the tub and their speeds, in the order of [`TUB`].
+struct TubState<T> {
+    q: [N<T>; 4],
+    u: [N<T>; 4],
+}
+
+/// Calls `$use` with the motion of the tub in a state.
+macro_rules! with_motion {
+    ($state:expr, $motion:ident => $use:expr) => {{
+        let TubState { q, u } = $state;
+        let tilt = Tilt::new(q[2], q[3]);
+        let rate = tilt.motion(u[2], u[3]).rate;
+        let $motion = TubMotion {
+            tilt: &tilt,
+            midpoint: [q[0], q[1]],
+            midpoint_velocity: [u[0], u[1]],
+            rate: &rate,
+        };
+        $use
+    }};
+}
+
+/// Force (N) and moment about O (N m) of the suspension on the cabinet, cabinet axes.
+#[inline(always)]
+fn on_cabinet<T: Lane>(elements: &Elements<T>, tub: &TubMotion<'_, T>) -> [N<T>; LOAD] {
+    let (force, moment) = elements.on_tub(tub);
+    let [fx, fy, fz] = tub.tilt.in_cabinet_axes(&force);
+    let [mx, my, mz] = tub.tilt.in_cabinet_axes(&moment);
+    let [y, z] = tub.midpoint;
+    // What is on the tub, turned round; P_T is at (0, y, z).
+    [-fx, -fy, -fz, -(mx + (y * fz - z * fy)), -(my + z * fx), -(mz - y * fx)]
+}
+
+/// First order of something in the tub's deviations from equilibrium.
+#[derive(Clone, Copy)]
+struct FirstOrder<T> {
+    rest: N<T>,
+    by_place: [N<T>; 4],
+    by_speed: [N<T>; 4],
+}
+
+impl<T: Lane> FirstOrder<T> {
+    #[inline(always)]
+    fn new(zero: N<T>) -> Self {
+        Self { rest: zero, by_place: [zero; 4], by_speed: [zero; 4] }
+    }
+
+    fn set(&mut self, lane: usize, rest: f64, k: usize, by_place: f64, by_speed: f64) {
+        self.rest.0.set(lane, rest);
+        self.by_place[k].0.set(lane, by_place);
+        self.by_speed[k].0.set(lane, by_speed);
+    }
+
+    #[inline(always)]
+    fn at(&self, tub: &[Sample<T>; 4]) -> N<Dual<T>> {
+        let mut value = self.rest;
+        let mut slope = self.rest.lit(0.0);
+        for k in 0..4 {
+            value += self.by_place[k] * tub[k].value;
+            value += self.by_speed[k] * tub[k].slope;
+            slope += self.by_place[k] * tub[k].slope;
+            slope += self.by_speed[k] * tub[k].curvature;
+        }
+        N(Dual { value: value.0, slope: slope.0 })
+    }
+}
+
+/// One of the two models' loads.
+enum Laws<T> {
+    /// Of the machine's elements, over duals for rates.
+    Nonlinear(Elements<Dual<T>>),
+    /// Loads on the cabinet; then of each stop depth and push.
+    Linear { load: [FirstOrder<T>; LOAD], stops: Vec<[FirstOrder<T>; 2]> },
+}
+
+impl<T: Lane> Laws<T> {
+    /// Puts a point into one lane.
+    fn set_point(&mut self, lane: usize, point: &Point) {
+        match self {
+            Self::Nonlinear(elements) => elements.set_lane(lane, &point.machine.elements),
+            Self::Linear { load, stops } => {
+                let elements = point.machine.elements.with_viscous_friction().constant();
+                let rest = TUB.map(|q| point.equilibrium[q]);
+                for k in 0..4 {
+                    let of_place = |by: f64| {
+                        let q = core::array::from_fn(|i| {
+                            N(Dual { value: rest[i], slope: if i == k { by } else { 0.0 } })
+                        });
+                        let u = core::array::from_fn(|i| {
+                            let by = if i == k { 1.0 - by } else { 0.0 };
+                            N(Dual { value: 0.0, slope: by })
+                        });
+                        TubState { q, u }
+                    };
+                    let [place, speed] = [of_place(1.0), of_place(0.0)];
+                    let by_place = with_motion!(&place, tub => on_cabinet(&elements, &tub));
+                    let by_speed = with_motion!(&speed, tub => on_cabinet(&elements, &tub));
+                    for (i, load) in load.iter_mut().enumerate() {
+                        let (place, speed) = (by_place[i].0, by_speed[i].0);
+                        load.set(lane, place.value, k, place.slope, speed.slope);
+                    }
+                    for (number, stop) in stops.iter_mut().enumerate() {
+                        let by_place = with_motion!(&place, tub => elements.stop(number, &tub));
+                        let by_speed = with_motion!(&speed, tub => elements.stop(number, &tub));
+                        for (i, stop) in stop.iter_mut().enumerate() {
+                            let (place, speed) = (by_place[i].0, by_speed[i].0);
+                            stop.set(lane, place.value, k, place.slope, speed.slope);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What has been seen of one stop.
+struct SeenStop<T> {
+    push: Peaks<T, 1>,
+    contact_s: N<T>,
+    /// Depth where the next step begins (m).
+    depth: N<T>,
+}
+
+/// The loads so far, over lanes.
+///
+/// They have no second derivative here. So the motion between the ends of a long step is
+/// interpolated first, and the loads evaluated at a few places of it.
+pub(crate) struct Loads<T> {
+    laws: Laws<T>,
+    /// How far the loads of the feet are below [`FAR_N`], and then the margin against slipping.
+    below: Peaks<T, { FEET + 1 }>,
+    own: [N<T>; FEET],
+    shares: [[N<T>; LOAD]; FEET],
+    friction: N<T>,
+    weight: N<T>,
+    feet: usize,
+    stops: Vec<SeenStop<T>>,
+    /// Coordinates, speeds and accelerations of [`TUB`] where the next step begins.
+    last: [Sample<T>; 4],
+    /// Parts that a step is cut into.
+    parts: u32,
+}
+
+impl<T: Lane> Loads<T> {
+    /// Nothing seen yet, with the same point in every lane.
+    #[inline(always)]
+    pub(crate) fn new(zero: N<T>, model: ModelKind, point: &Point, parts: u32) -> Self {
+        let elements = &point.machine.elements;
+        let number = elements.stops.len();
+        let laws = match model {
+            ModelKind::Nonlinear => Laws::Nonlinear(Elements::splat(zero.constant(), elements)),
+            ModelKind::Linear => {
+                let none = FirstOrder::new(zero);
+                Laws::Linear { load: [none; LOAD], stops: vec![[none; 2]; number] }
+            }
+        };
+        let mut stops = Vec::with_capacity(number);
+        for _ in 0..number {
+            stops.push(SeenStop { push: Peaks::new(zero), contact_s: zero, depth: zero });
+        }
+        let mut loads = Self {
+            laws,
+            below: Peaks::new(zero),
+            own: [zero; FEET],
+            shares: [[zero; LOAD]; FEET],
+            friction: zero,
+            weight: zero,
+            feet: 0,
+            stops,
+            last: [Sample::still(zero, zero); 4],
+            parts,
+        };
+        for lane in 0..T::LANES {
+            loads.set_point(lane, point);
+        }
+        loads
+    }
+
+    /// Begins a point's trajectory in one lane.
+    pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
+        self.laws.set_point(lane, point);
+        self.below.reset(lane);
+        for stop in &mut self.stops {
+            stop.push.reset(lane);
+            stop.contact_s.0.set(lane, 0.0);
+        }
+        if let Some(feet) = &point.feet {
+            self.feet = feet.count;
+            for k in 0..FEET {
+                self.own[k].0.set(lane, feet.own_n[k]);
+                for i in 0..LOAD {
+                    self.shares[k][i].0.set(lane, feet.shares[k][i]);
+                }
+            }
+            self.friction.0.set(lane, feet.friction);
+            self.weight.0.set(lane, feet.weight_n);
+        }
+    }
+
+    /// The least load of any foot and the least margin against slipping of one lane (N); none
+    /// without feet.
+    pub(crate) fn feet_n(&self, lane: usize) -> Option<[f64; 2]> {
+        let below = self.below.lane(lane);
+        let lowest = below[..self.feet].iter().copied().reduce(f64::max)?;
+        Some([FAR_N - lowest, FAR_N - below[SLIP]])
+    }
+
+    /// The greatest push of any stop (N), and the longest that one was closed (s), of one lane;
+    /// none without stops.
+    pub(crate) fn stops(&self, lane: usize) -> Option<[f64; 2]> {
+        let of_stop = |stop: &SeenStop<T>| {
+            let [push_n] = stop.push.lane(lane);
+            [push_n, stop.contact_s.0.get(lane)]
+        };
+        self.stops.iter().map(of_stop).reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
+    }
+
+    /// A state whose derivative is `dx`: at the end of a step, of which the length (s) is given, or
+    /// where a leg begins. `counts` says in which lanes it counts.
+    #[inline(always)]
+    pub(crate) fn see(
+        &mut self,
+        length_s: Option<N<T>>,
+        x: &[N<T>; STATES],
+        dx: &[N<T>; STATES],
+        counts: T::Mask,
+    ) {
+        let mut now = self.last;
+        for (sample, q) in now.iter_mut().zip(TUB) {
+            *sample = Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] };
+        }
+        let parts = if length_s.is_some() { self.parts } else { 1 };
+        let share = 1.0 / f64::from(parts);
+        // One loop, for one copy of the laws' code.
+        for part in 1..=parts {
+            let mut tub = now;
+            let mut step_s = None;
+            if let Some(length_s) = length_s {
+                step_s = Some((share * length_s).v());
+                if part < parts {
+                    for k in 0..4 {
+                        let at = share * f64::from(part);
+                        tub[k] = Sample::between(&self.last[k], &now[k], length_s, at);
+                    }
+                }
+            }
+            self.see_instant(step_s, &tub, counts);
+        }
+        self.last = now;
+    }
+
+    #[inline(always)]
+    fn see_instant(&mut self, step_s: Option<N<T>>, tub: &[Sample<T>; 4], counts: T::Mask) {
+        let mut q = [tub[0].value.constant(); 4];
+        let mut u = q;
+        for k in 0..4 {
+            q[k] = N(Dual { value: tub[k].value.0, slope: tub[k].slope.0 });
+            u[k] = N(Dual { value: tub[k].slope.0, slope: tub[k].curvature.0 });
+        }
+        let state = TubState { q, u };
+        if self.feet > 0 {
+            let mut load = [q[0]; LOAD];
+            match &self.laws {
+                Laws::Nonlinear(elements) => {
+                    load = with_motion!(&state, motion => on_cabinet(elements, &motion));
+                }
+                Laws::Linear { load: first_order, .. } => {
+                    for i in 0..LOAD {
+                        load[i] = first_order[i].at(tub);
+                    }
+                }
+            }
+            self.see_feet(step_s, &load, counts);
+        }
+        for k in 0..self.stops.len() {
+            let [depth, push] = match &self.laws {
+                Laws::Nonlinear(elements) => {
+                    with_motion!(&state, motion => elements.stop(k, &motion))
+                }
+                Laws::Linear { stops, .. } => [stops[k][0].at(tub), stops[k][1].at(tub)],
+            };
+            self.see_stop(k, step_s, N(depth.0.value), &sample(push), counts);
+        }
+    }
+
+    #[inline(always)]
+    fn see_feet(&mut self, step_s: Option<N<T>>, load: &[N<Dual<T>>; LOAD], counts: T::Mask) {
+        let far = load[0].lit(FAR_N);
+        let mut below = [sample(far); FEET + 1];
+        for k in 0..FEET {
+            let mut carried = self.own[k].constant();
+            for i in 0..LOAD {
+                carried += self.shares[k][i].constant() * load[i];
+            }
+            below[k] = sample(far - carried);
+        }
+        let squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(LEAST_SQUARED_N2);
+        let margin = self.friction.constant() * (self.weight.constant() - load[1]);
+        below[SLIP] = sample(far - (margin - squared.sqrt()));
+        match step_s {
+            Some(step_s) => self.below.advance_by_slopes(step_s, &below, counts),
+            None => self.below.begin(&below, counts),
+        }
+    }
+
+    #[inline(always)]
+    fn see_stop(
+        &mut self,
+        k: usize,
+        step_s: Option<N<T>>,
+        depth: N<T>,
+        push: &Sample<T>,
+        counts: T::Mask,
+    ) {
+        let stop = &mut self.stops[k];
+        match step_s {
+            Some(step_s) => {
+                stop.push.advance_by_slopes(step_s, &[*push], counts);
+                let share = share_above(stop.depth, depth);
+                let zero = depth.lit(0.0);
+                stop.contact_s += N(T::select(counts, (share * step_s).v().0, zero.0));
+            }
+            None => stop.push.begin(&[*push], counts),
+        }
+        stop.depth = depth;
+    }
+}
+
+/// A value with its rate.
+#[inline(always)]
+fn sample<T: Lane>(dual: N<Dual<T>>) -> Sample<T> {
+    let (value, slope) = (N(dual.0.value), N(dual.0.slope));
+    Sample { value, slope, curvature: value.lit(0.0) }
+}
+
+/// The part of a straight line's way from `a` to `b` that is above zero.
+#[inline(always)]
+fn share_above<T: Lane>(a: N<T>, b: N<T>) -> N<T> {
+    let (zero, one) = (a.lit(0.0), a.lit(1.0));
+    let higher = N(a.0.larger(b.0).larger(zero.0));
+    let depth = N((-a).0.larger((-b).0));
+    // Never 0: both are compared with the smallest of numbers.
+    let whole = N((a.abs() + b.abs()).0.larger(a.lit(f64::MIN_POSITIVE).0));
+    depth.where_less(zero, one, higher / whole)
+}

@@ -1,0 +1,160 @@
+//! Loads of stops and feet, against the forces of densely sampled time histories.
+
+use super::elements::with_every_element;
+use super::energy::{axes, place};
+use crate::machine::feet::{Feet, LOAD};
+use crate::machine::{Cabinet, Foot, Machine};
+use crate::{
+    Extra, Method, ModelKind, Point, Spin, Start, Timing, Wanted, history, prepare, simulate_with,
+};
+use lane_ode::Simd;
+
+const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.5, 2.9], checkpoints: 0 };
+const EVERY_S: f64 = 1e-4;
+const WANTED: Wanted = Wanted {
+    root_mean_squares: false,
+    turns: false,
+    cabinet_force: false,
+    clash_time: false,
+    stops: true,
+    feet: true,
+    course: false,
+};
+
+fn on_feet(mut machine: Machine) -> Machine {
+    machine.cabinet = Some(Cabinet { mass_kg: 35.0, centre_m: [0.18, -0.1, 0.02], friction: 0.4 });
+    let corners = [[0.47, 0.26], [0.47, -0.26], [-0.07, 0.26], [-0.07, -0.26]];
+    machine.feet = corners.map(|[x, z]| Foot { foot_m: [x, -0.45, z] }).to_vec();
+    machine
+}
+
+fn point(machine: Machine) -> Point {
+    let spin = Spin::Ramp { peak_rpm: 300.0, ramp_s: 2.0 };
+    prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
+}
+
+fn found(point: &Point, model: ModelKind, simd: Simd) -> Extra {
+    let method = Method::Rk4 { step_s: 1e-4 };
+    let (_, mut extras) = simulate_with(simd, model, &method, &[point], WANTED);
+    extras.remove(0)
+}
+
+/// Force and moment about O on the cabinet at an instant: from the forces of the elements, each
+/// along its line or at its point.
+fn load(
+    machine: &Machine,
+    point: &Point,
+    deviations: &[f64; 10],
+    forces: &crate::Forces,
+) -> [f64; LOAD] {
+    let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + deviations[i]);
+    let tub = axes(q[4], q[5]);
+    let place_of = |at: [f64; 3]| place([0.0, q[0], q[1]], &tub, at);
+    let mut load = [0.0; LOAD];
+    let mut add = |at: [f64; 3], force: [f64; 3]| {
+        for i in 0..3 {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            load[i] += force[i];
+            load[3 + i] += at[j] * force[k] - at[k] * force[j];
+        }
+    };
+    let springs = machine.springs.iter().map(|s| (s.cabinet_m, s.tub_m)).zip(&forces.springs_n);
+    let dampers = machine.dampers.iter().map(|d| (d.cabinet_m, d.tub_m)).zip(&forces.dampers_n);
+    for ((cabinet_m, tub_m), tension_n) in springs.chain(dampers) {
+        let end = place_of(tub_m);
+        let span: [f64; 3] = std::array::from_fn(|i| end[i] - cabinet_m[i]);
+        let length = span.iter().map(|s| s * s).sum::<f64>().sqrt();
+        add(cabinet_m, span.map(|s| tension_n * s / length));
+    }
+    for (stop, push_n) in machine.stops.iter().zip(&forces.stops_n) {
+        let length = stop.direction_length();
+        add(place_of(stop.tub_m), stop.direction.map(|d| push_n * d / length));
+    }
+    for (bushing, force_n) in machine.bushings.iter().zip(&forces.bushings_n) {
+        add(place_of(bushing.tub_m), *force_n);
+    }
+    load
+}
+
+#[test]
+fn they_are_what_a_densely_sampled_history_shows() {
+    let mut machine = on_feet(with_every_element());
+    machine.unbalance.mass_kg = 0.9;
+    machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.003);
+    let point = point(machine.clone());
+    let feet = Feet::new(&machine).unwrap();
+    let method = Method::Rk4 { step_s: 1e-4 };
+    let history = history(ModelKind::Nonlinear, &method, &point, &Start::default(), EVERY_S);
+    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
+    let (mut foot_n, mut margin_n, mut push_n) = (f64::INFINITY, f64::INFINITY, 0.0_f64);
+    let mut closed_s = vec![0.0_f64; machine.stops.len()];
+    for k in first..=last {
+        let forces = history.forces(k).unwrap();
+        let instant = history.instant(k).unwrap();
+        let load = load(&machine, &point, &instant.deviations, &forces);
+        for i in 0..3 {
+            assert!((load[i] - forces.cabinet_n[i]).abs() < 1e-9);
+        }
+        let loads_n = feet.loads_n(&load);
+        foot_n = loads_n.into_iter().fold(foot_n, f64::min);
+        let horizontal_n = (load[0] * load[0] + load[2] * load[2]).sqrt();
+        margin_n = margin_n.min(0.4 * (feet.weight_n - load[1]) - horizontal_n);
+        push_n = forces.stops_n.iter().copied().fold(push_n, f64::max);
+        let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + instant.deviations[i]);
+        for (closed_s, stop) in closed_s.iter_mut().zip(&machine.stops) {
+            let at = place([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
+            let length = stop.direction_length();
+            let along: f64 =
+                (0..3).map(|i| (at[i] - stop.tub_m[i]) * stop.direction[i] / length).sum();
+            *closed_s += if along > stop.clearance_m { EVERY_S } else { 0.0 };
+        }
+    }
+    let contact_s = closed_s.into_iter().fold(0.0, f64::max);
+    assert!(push_n > 20.0 && contact_s > 0.05, "{push_n} N, {contact_s} s");
+    let extra = found(&point, ModelKind::Nonlinear, Simd::best());
+    let close = |what: &str, found: Option<f64>, expected: f64, allowed: f64| {
+        let found = found.unwrap();
+        assert!((found - expected).abs() < allowed, "{what}: {found} for {expected}");
+    };
+    close("least load", extra.foot_load_n, foot_n, 1e-2);
+    close("margin", extra.slip_margin_n, margin_n, 1e-2);
+    close("push", extra.stop_force_n, push_n, 1e-3 * push_n);
+    // Every swing may be off by a sample at both ends.
+    close("contact", extra.stop_contact_s, contact_s, 40.0 * EVERY_S);
+    assert_eq!(found(&point, ModelKind::Nonlinear, Simd::Scalar), extra);
+}
+
+#[test]
+fn in_small_motions_both_models_load_the_feet_alike() {
+    let mut machine = on_feet(with_every_element());
+    machine.dampers.iter_mut().for_each(|damper| {
+        damper.friction_n = 0.0;
+        damper.damping_n_s_per_m = 100.0;
+    });
+    machine.unbalance.mass_kg = 1e-3;
+    machine.further_unbalances.clear();
+    let point = point(machine.clone());
+    let feet = Feet::new(&machine).unwrap();
+    let history = history(
+        ModelKind::Nonlinear,
+        &Method::Rk4 { step_s: 1e-4 },
+        &point,
+        &Start::default(),
+        0.1,
+    );
+    let at_rest = load(&machine, &point, &[0.0; 10], &history.forces(0).unwrap());
+    let rest_n = feet.loads_n(&at_rest).into_iter().fold(f64::INFINITY, f64::min);
+    let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
+        let extra = found(&point, model, Simd::best());
+        rest_n - extra.foot_load_n.unwrap()
+    });
+    assert!(nonlinear > 0.01, "{nonlinear} N");
+    assert!((linear / nonlinear - 1.0).abs() < 5e-3, "{linear} N for {nonlinear} N");
+}
+
+#[test]
+fn a_machine_without_stops_or_cabinet_has_no_such_loads() {
+    let point = point(Machine::paper());
+    let extra = found(&point, ModelKind::Nonlinear, Simd::best());
+    assert_eq!(extra, Extra::default());
+}
