@@ -72,8 +72,9 @@ pub use exit::{Error, Exit, tell};
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use interrupt::{Interrupt, survive_file_size_limits};
 pub use library::{
-    BoundaryOptions, Effort, Evaluated, Evaluator, PointTable, RanToFile, ResultKind, ResultTable,
-    TraceOptions, find_boundary, find_modes, list_parameters, run_to_file, trace_point,
+    BoundaryOptions, Effort, Evaluated, Evaluator, Explained, PointTable, RanToFile, ResultKind,
+    ResultTable, TraceOptions, explain_point, find_boundary, find_modes, find_stability,
+    list_parameters, run_to_file, stability_to_file, trace_point,
 };
 pub use measures::Metric;
 pub use memory::ensure_memory;

@@ -55,6 +55,20 @@ impl Speeds {
         Self { from, to, step }
     }
 
+    /// Those of which [`Self::values`] gives these speeds, but for rounding.
+    pub(crate) fn of_values(speeds_rpm: &[f64]) -> Option<Self> {
+        let (&[from, second, ..], &[.., to]) = (speeds_rpm, speeds_rpm) else { return None };
+        let speeds = Self::new(from, to, second - from);
+        let is_range = from >= 0.0 && to > from && speeds.step > 0.0 && to.is_finite();
+        if !(is_range && (to - from) / speeds.step <= MOST_SPEEDS) {
+            return None;
+        }
+        let alike = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * to;
+        let values = speeds.values();
+        let is_even = values.len() == speeds_rpm.len() && values.iter().zip(speeds_rpm).all(alike);
+        is_even.then_some(speeds)
+    }
+
     /// The speeds (rpm); the last is the end itself.
     pub(crate) fn values(self) -> Vec<f64> {
         // The quotient may come out a hair beside the whole number that was meant.
@@ -103,6 +117,16 @@ mod tests {
         ] {
             let refused = values(text).unwrap_err();
             assert!(refused.contains(said), "{text}: {refused}");
+        }
+        for text in ["0:40:10", "0:25:10", "5:6:100", "0:0.3:0.1", "60:400:1"] {
+            let speeds: Speeds = text.parse().unwrap();
+            let again = Speeds::of_values(&speeds.values()).unwrap();
+            assert_eq!(again.values().len(), speeds.values().len(), "{text}");
+        }
+        for uneven in
+            [&[][..], &[1.0], &[1.0, 1.0], &[1.0, 2.0, 4.0], &[2.0, 1.0], &[1.0, f64::NAN]]
+        {
+            assert_eq!(Speeds::of_values(uneven), None, "{uneven:?}");
         }
         assert!(turning("0:10:1").unwrap_err().contains("above 0 rpm"));
         assert!(turning("-5:10:1").is_err() && turning("5:10:1").is_ok());

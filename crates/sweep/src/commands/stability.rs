@@ -61,7 +61,7 @@ command goes on from there.";
 /// finished chunks are kept.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan = args.target.grid.load()?;
-    check(&plan, &args.speed.to_string())?;
+    check(&plan, "--speed", &args.speed.to_string())?;
     let speeds_rpm = args.speed.values();
     let engine = DwellEngine::new(&plan, &speeds_rpm)?;
     let (job, output) = args.target.job(&plan, Some(args.speed));

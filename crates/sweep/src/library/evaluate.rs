@@ -34,7 +34,7 @@ pub struct Evaluator {
 /// What came of an evaluation.
 #[derive(Debug)]
 pub struct Evaluated {
-    /// The rows that were computed, in the order of the points; the column `point` counts from 0.
+    /// The rows that were computed, in order; the column `point` counts points from 0.
     pub table: ResultTable,
     /// Whether those are all; if not, the interrupt was raised.
     pub is_whole: bool,
@@ -86,47 +86,65 @@ impl Evaluator {
             Some(ladders) => ModelEngine::with_ladders(&self.plan, ladders.clone())?,
             None => ModelEngine::new(&self.plan)?,
         };
-        let threads = effort.threads()?;
-        let pool = threads::pool(threads)?;
-        let watch = Watch::new(effort.interrupt);
-        let next = Mutex::new(0..job.points);
-        let feed = || {
-            let point = if watch.stopped() { None } else { lock(&next).next() }?;
-            Some((point, (job.axis_values)(point)))
-        };
-        let gathered = Gathered::new(job);
-        let keep = |outcome| gathered.keep(outcome, &watch);
-        let mut progress = Progress::new(effort.progress, job.points, 0);
-        std::thread::scope(|scope| {
-            // Hung up when the work is done.
-            let (working, ended) = channel::<()>();
-            let (pool, engine, feed, keep, watch) = (&pool, &engine, &feed, &keep, &watch);
-            let work = move || {
-                let _working = working;
-                pool.install(|| engine.evaluate_rows(feed, keep, watch));
-            };
-            let work = std::thread::Builder::new()
-                .spawn_scoped(scope, work)
-                .map_err(|error| ThreadsError::start(threads + 1)(&error))?;
-            while ended.recv_timeout(SHOWN_EVERY) == Err(RecvTimeoutError::Timeout) {
-                progress.show(watch.points_done());
-            }
-            work.join().map_err(|panic| {
-                let reason = format!("the engine panicked: {}", panics::text(panic.as_ref()));
-                let last = job.points.saturating_sub(1);
-                Error::Store(StoreError::Engine { first: 0, last, reason })
-            })
+        let evaluated = in_memory(job, effort, &|next, keep, watch| {
+            let feed = || next().map(|point| (point, (job.axis_values)(point)));
+            engine.evaluate_rows(&feed, keep, watch);
         })?;
-        progress.finish();
         if let Some(found) = engine.ladders_found() {
             // Another call may have found the same.
             let _ = self.ladders.set(found.clone());
         }
-        let is_whole = watch.points_done() == job.points;
-        let batches = gathered.into_batches().map_err(defect(job))?;
-        let plan = MapPlan::of(job, is_whole);
-        Ok(Evaluated { table: ResultTable::of_map(plan, batches), is_whole })
+        Ok(evaluated)
     }
+}
+
+/// Computes rows: takes their numbers from the first until there are no more, and hands on the
+/// outcome of each.
+type Compute<'a> =
+    dyn Fn(&(dyn Fn() -> Option<u64> + Sync), &(dyn Fn(Outcome) + Sync), &Watch<'_>) + Sync + 'a;
+
+/// Every row of a job, in memory.
+///
+/// # Errors
+/// No threads, and a panic of the engine.
+pub(super) fn in_memory(
+    job: &Job<'_>,
+    effort: Effort<'_>,
+    compute: &Compute<'_>,
+) -> Result<Evaluated, Error> {
+    let threads = effort.threads()?;
+    let pool = threads::pool(threads)?;
+    let watch = Watch::new(effort.interrupt);
+    let rows = Mutex::new(0..job.points);
+    let next = || if watch.stopped() { None } else { lock(&rows).next() };
+    let gathered = Gathered::new(job);
+    let keep = |outcome| gathered.keep(outcome, &watch);
+    let mut progress = Progress::new(effort.progress, job.points, 0);
+    std::thread::scope(|scope| {
+        // Hung up when the work is done.
+        let (working, ended) = channel::<()>();
+        let (pool, next, keep, watch) = (&pool, &next, &keep, &watch);
+        let work = move || {
+            let _working = working;
+            pool.install(|| compute(next, keep, watch));
+        };
+        let work = std::thread::Builder::new()
+            .spawn_scoped(scope, work)
+            .map_err(|error| ThreadsError::start(threads + 1)(&error))?;
+        while ended.recv_timeout(SHOWN_EVERY) == Err(RecvTimeoutError::Timeout) {
+            progress.show(watch.points_done());
+        }
+        work.join().map_err(|panic| {
+            let reason = format!("the engine panicked: {}", panics::text(panic.as_ref()));
+            let last = job.points.saturating_sub(1);
+            Error::Store(StoreError::Engine { first: 0, last, reason })
+        })
+    })?;
+    progress.finish();
+    let is_whole = watch.points_done() == job.points;
+    let batches = gathered.into_batches().map_err(defect(job))?;
+    let plan = MapPlan::of(job, is_whole);
+    Ok(Evaluated { table: ResultTable::of_rows(plan, batches), is_whole })
 }
 
 /// Rows that cannot be put in columns: a defect of this program.

@@ -6,20 +6,24 @@
 
 pub(crate) mod boundary;
 mod evaluate;
+mod explain;
 pub(crate) mod modes;
 pub(crate) mod parameters;
 mod points;
 mod result;
 mod run;
+mod stability;
 mod trace;
 
 pub use boundary::{BoundaryOptions, find_boundary};
 pub use evaluate::{Evaluated, Evaluator};
+pub use explain::{Explained, explain_point};
 pub use modes::find_modes;
 pub use parameters::list_parameters;
 pub use points::PointTable;
 pub use result::{ResultKind, ResultTable};
 pub use run::{RanToFile, run_to_file};
+pub use stability::{find_stability, stability_to_file};
 pub use trace::{TraceOptions, trace_point};
 
 /// What a search or an evaluation needs beside its question.
@@ -42,4 +46,10 @@ impl Effort<'_> {
             None => crate::threads::count(None, &environment),
         }
     }
+}
+
+/// Speeds that make no sense.
+fn refused_speeds(count: usize, expected: String) -> crate::exit::Error {
+    let given = format!("with {count} values");
+    crate::exit::Error::Option { option: "speeds", given, expected }
 }

@@ -7,6 +7,7 @@ use washer_model::{
     exact_motions, prepare,
 };
 
+use super::refused_speeds;
 use super::result::{ResultKind, ResultTable};
 use crate::config::{self, GridInput};
 use crate::exit::Error;
@@ -28,14 +29,13 @@ pub fn find_modes(
     let are_speeds = speeds_rpm.iter().all(|speed| speed.is_finite() && *speed >= 0.0);
     let count = speeds_rpm.len();
     if !(rise && are_speeds && count > 1 && count as f64 <= MOST_SPEEDS + 1.0) {
-        return Err(Error::Option {
-            option: "speeds",
-            given: format!("with {count} values"),
-            expected: format!(
+        return Err(refused_speeds(
+            count,
+            format!(
                 "from 2 to {MOST_SPEEDS} finite speeds in rpm, 0 or greater, each above the one \
                  before"
             ),
-        });
+        ));
     }
     let (name, machine, spin) = match grid {
         None => built_in(speeds_rpm[count - 1]),

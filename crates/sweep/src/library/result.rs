@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::exit::Error;
 use crate::identity;
-use crate::store::{Job, Layout, StoreError, write_map};
+use crate::store::{Job, Layout, RowKind, StoreError, write_map};
 use crate::table::Table;
 use sweep_files::{FileError, FileKind, Output, ParquetFile, key};
 use sweep_plot::{PlotOptions, render};
@@ -24,6 +24,10 @@ pub enum ResultKind {
     Trace,
     /// Modes over spin speed.
     Modes,
+    /// Periodic responses at constant speeds.
+    Stability,
+    /// What differs between two results.
+    Differences,
 }
 
 impl ResultKind {
@@ -35,6 +39,8 @@ impl ResultKind {
             Self::Boundary => "boundary",
             Self::Trace => "trace",
             Self::Modes => "modes",
+            Self::Stability => "stability",
+            Self::Differences => "differences",
         }
     }
 
@@ -44,6 +50,8 @@ impl ResultKind {
             Self::Boundary => FileKind::Boundary,
             Self::Trace => FileKind::Trace,
             Self::Modes => FileKind::Modes,
+            Self::Stability => FileKind::Stability,
+            Self::Differences => FileKind::Differences,
         }
     }
 }
@@ -65,11 +73,11 @@ enum FileContent {
     At(PathBuf),
     /// These bytes.
     Bytes(Vec<u8>),
-    /// The rows, by the rules of a map's file.
+    /// The rows, by the rules of a run's file.
     Rows(Box<MapPlan>),
 }
 
-/// What a map's file says beside its rows.
+/// What a run's file says beside its rows.
 #[derive(Debug)]
 pub(super) struct MapPlan {
     plan: Value,
@@ -86,10 +94,14 @@ impl MapPlan {
 }
 
 impl ResultTable {
-    /// A map of these rows.
-    pub(super) fn of_map(map: MapPlan, batches: Vec<RecordBatch>) -> Self {
+    /// The rows of a run, or of one at constant speeds.
+    pub(super) fn of_rows(map: MapPlan, batches: Vec<RecordBatch>) -> Self {
+        let kind = match map.layout.rows {
+            RowKind::Run => ResultKind::Map,
+            RowKind::Dwell(_) => ResultKind::Stability,
+        };
         Self {
-            kind: ResultKind::Map,
+            kind,
             plan: map.plan.clone(),
             schema: map.layout.schema(),
             batches,
@@ -116,13 +128,16 @@ impl ResultTable {
             path: path.to_path_buf(),
             reason: "it is no result of this program".to_owned(),
         };
-        let plan = file.value(key::PLAN).and_then(|plan| serde_json::from_str(plan).ok());
+        let plan = file.value(key::PLAN).or_else(|| file.value(key::DIFFERENCES));
+        let plan = plan.and_then(|plan| serde_json::from_str(plan).ok());
         let plan = plan.ok_or_else(not_ours)?;
         let has = |key| file.value(key).is_some();
         let kind = match () {
             () if has(key::BOUNDARY) => ResultKind::Boundary,
             () if has(key::TRACE) => ResultKind::Trace,
             () if has(key::MODES) => ResultKind::Modes,
+            () if has(key::STABILITY) => ResultKind::Stability,
+            () if has(key::DIFFERENCES) => ResultKind::Differences,
             () => ResultKind::Map,
         };
         let batches = file.batches(|builder| builder)?.collect::<Result<Vec<_>, _>>()?;
@@ -143,7 +158,7 @@ impl ResultTable {
         self.kind
     }
 
-    /// The plan as JSON, as the file carries it.
+    /// The plan as JSON, as the file carries it; of differences, what was compared.
     #[must_use]
     pub fn plan(&self) -> &Value {
         &self.plan

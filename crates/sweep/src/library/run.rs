@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::Effort;
 use super::result::ResultTable;
-use crate::engine::ModelEngine;
+use crate::engine::{Engine, ModelEngine};
 use crate::exit::Error;
 use crate::plan::Plan;
 use crate::random_keys::draw_random_keys;
@@ -18,7 +18,7 @@ pub enum RanToFile {
     Whole(ResultTable),
     /// The interrupt was raised. What is done is kept, and the same call goes on.
     Interrupted {
-        /// Points that are there.
+        /// Rows that are there.
         kept: u64,
         /// Of how many.
         points: u64,
@@ -37,8 +37,22 @@ pub fn run_to_file(
     tell: &dyn Fn(&str),
     effort: Effort<'_>,
 ) -> Result<RanToFile, Error> {
+    into_file(&ModelEngine::new(plan)?, &Job::of(plan), output, fresh, tell, effort)
+}
+
+/// Computes a job into its result file.
+///
+/// # Errors
+/// As [`run_to_file`].
+pub(super) fn into_file(
+    engine: &dyn Engine,
+    job: &Job<'_>,
+    output: &Path,
+    fresh: bool,
+    tell: &dyn Fn(&str),
+    effort: Effort<'_>,
+) -> Result<RanToFile, Error> {
     draw_random_keys()?;
-    let (engine, job) = (ModelEngine::new(plan)?, Job::of(plan));
     let options = RunOptions {
         threads: effort.threads()?,
         fresh,
@@ -47,12 +61,12 @@ pub fn run_to_file(
         environment: &|_| None,
         tell,
     };
-    let report = runner::run(&engine, &job, output, options, effort.interrupt)?;
+    let report = runner::run(engine, job, output, options, effort.interrupt)?;
     report.notes.iter().for_each(|note| tell(note));
     match report.ended {
         Ended::Already(..) | Ended::Finished(_) => Ok(RanToFile::Whole(ResultTable::read(output)?)),
         Ended::Interrupted { kept, points, .. } => Ok(RanToFile::Interrupted { kept, points }),
         // Only what a scheduler's variables say makes a shard of a run.
-        Ended::Shard(_) => Ok(RanToFile::Interrupted { kept: 0, points: plan.points() }),
+        Ended::Shard(_) => Ok(RanToFile::Interrupted { kept: 0, points: job.points }),
     }
 }

@@ -16,25 +16,25 @@ use crate::outcome::{Growth, Outcome, Status, Trajectory};
 use crate::plan::Plan;
 
 /// Rows that a thread takes at once: enough to fill lanes, few enough that a signal is soon heard.
-const AT_ONCE: usize = 128;
+const AT_ONCE: usize = 32;
 
-/// Refuses a grid whose axes contradict the speeds, or mean nothing at a constant speed.
+/// Refuses a grid whose axes contradict the speeds, or mean nothing at a constant speed. `option`
+/// is what gave the speeds.
 ///
 /// # Errors
 /// [`Error::Option`]; [`Error::Corners`].
-pub(crate) fn check(plan: &Plan, given: &str) -> Result<(), Error> {
+pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<(), Error> {
     smooth(plan)?;
-    let refuse = |expected: String| {
-        Err(Error::Option { option: "--speed", given: given.to_owned(), expected })
-    };
+    let refuse =
+        |expected: String| Err(Error::Option { option, given: given.to_owned(), expected });
     for axis in &plan.axes {
         let name = axis.parameter.name();
         match axis.parameter.target() {
             Target::Spin => {
                 return refuse(format!(
                     "a grid without the axis `{name}`: here the drum turns at each speed of \
-                     --speed in turn, whatever its profile; remove the axis, and give its range \
-                     as --speed"
+                     {option} in turn, whatever its profile; remove the axis, and give its range \
+                     as {option}"
                 ));
             }
             Target::Window(_) => {

@@ -1,0 +1,43 @@
+"""A washing machine's suspension, linear and nonlinear, over tables of designs.
+
+The engine of the command `sweep`, as functions: the same numbers, bit for bit.
+
+    import washer_sweep
+
+    plan = washer_sweep.Plan.from_toml("sweeps/fig12.toml")
+    result = plan.evaluate({"unbalance_mass_kg": [0.4, 0.6], "damping_n_s_per_m": [100, 200]})
+    result["ratio_max"]
+"""
+
+from washer_sweep._errors import Interrupted, PlanError
+from washer_sweep._explanation import Explanation
+from washer_sweep._native import (
+    NUMERICS_VERSION,
+    Plan,
+    Result,
+    __version__,
+    explain,
+    modes,
+    parameters,
+    read,
+    stability,
+)
+from washer_sweep._types import ArrowStream, Diagnostic, Parameter
+
+__all__ = [
+    "NUMERICS_VERSION",
+    "ArrowStream",
+    "Diagnostic",
+    "Explanation",
+    "Interrupted",
+    "Parameter",
+    "Plan",
+    "PlanError",
+    "Result",
+    "__version__",
+    "explain",
+    "modes",
+    "parameters",
+    "read",
+    "stability",
+]

@@ -1,0 +1,28 @@
+"""What `explain` returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+
+class Explanation(dict[str, Any]):
+    """What was found at a point: the keys of `sweep explain --json`.
+
+    As text, and in a notebook, it is what `sweep explain` prints.
+    """
+
+    text: str
+
+    def __init__(self, found: Mapping[str, Any], text: str) -> None:
+        super().__init__(found)
+        self.text = text
+
+    def __reduce__(self) -> tuple[type[Explanation], tuple[dict[str, Any], str]]:
+        return type(self), (dict(self), self.text)
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
+        printer.text(self.text)

@@ -1,0 +1,73 @@
+//! Errors as Python's: `washer_sweep.PlanError` for what a user wrote, with each mistake as data;
+//! `OSError` for files, `RuntimeError` for the rest.
+
+use pyo3::exceptions::{PyOSError, PyRuntimeError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use sweep::{Diagnostics, Error, Exit, StoreError};
+use sweep_plot::PlotError;
+
+/// A class of the package's own.
+fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+    py.import("washer_sweep._errors")?.getattr(name)
+}
+
+fn raised(py: Python<'_>, name: &str, text: String, with: Py<PyAny>) -> PyErr {
+    match class(py, name).and_then(|class| class.call1((text, with))) {
+        Ok(error) => PyErr::from_value(error),
+        Err(error) => error,
+    }
+}
+
+/// Mistakes in a plan, or in a table given to it.
+pub(crate) fn plan_error(py: Python<'_>, mistakes: &Diagnostics) -> PyErr {
+    let listed = PyList::empty(py);
+    for mistake in mistakes.mistakes() {
+        let entry = PyDict::new(py);
+        let filled = entry
+            .set_item("file", mistake.file)
+            .and_then(|()| entry.set_item("line", mistake.line))
+            .and_then(|()| entry.set_item("column", mistake.column))
+            .and_then(|()| entry.set_item("message", mistake.message))
+            .and_then(|()| entry.set_item("expected", mistake.expected))
+            .and_then(|()| entry.set_item("hint", none_if_empty(mistake.hints.join("\n"))))
+            .and_then(|()| listed.append(entry));
+        if let Err(error) = filled {
+            return error;
+        }
+    }
+    raised(py, "PlanError", mistakes.to_string(), listed.into_any().unbind())
+}
+
+fn none_if_empty(text: String) -> Option<String> {
+    if text.is_empty() { None } else { Some(text) }
+}
+
+/// Any error of the engine's.
+pub(crate) fn error(py: Python<'_>, error: &Error) -> PyErr {
+    match error {
+        Error::Input(mistakes) => plan_error(py, mistakes),
+        Error::Files(_)
+        | Error::File { .. }
+        | Error::Store(StoreError::File(_))
+        | Error::Plot(PlotError::File(_)) => PyOSError::new_err(worded(error)),
+        other if other.exit() == Exit::BadInput => {
+            let nothing = PyList::empty(py).into_any().unbind();
+            raised(py, "PlanError", worded(other), nothing)
+        }
+        _ => PyRuntimeError::new_err(worded(error)),
+    }
+}
+
+/// The text with what to do about it.
+fn worded(error: &Error) -> String {
+    match error.hint() {
+        Some(hint) => format!("{error}\n  = help: {hint}"),
+        None => error.to_string(),
+    }
+}
+
+/// What Ctrl-C raises: `KeyboardInterrupt`, with what was computed.
+pub(crate) fn interrupted(py: Python<'_>, text: String, result: Py<PyAny>) -> PyErr {
+    raised(py, "Interrupted", text, result)
+}

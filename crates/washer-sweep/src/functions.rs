@@ -1,0 +1,95 @@
+//! What is asked of a plan, or of the built-in machine, beside the methods of `Plan`.
+
+use std::path::PathBuf;
+
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::PyMapping;
+use sweep::{Effort, Interrupt, ProgressMode};
+
+use crate::ended;
+use crate::errors;
+use crate::plan::PyPlan;
+use crate::result::PyResultTable;
+use crate::toml::assignments;
+use crate::work::{abandonable, attended};
+
+/// Natural frequencies over spin speed.
+#[pyfunction]
+#[pyo3(signature = (plan=None, *, speeds_rpm=None, at=None))]
+pub(crate) fn modes(
+    py: Python<'_>,
+    plan: Option<&Bound<'_, PyPlan>>,
+    speeds_rpm: Option<Vec<f64>>,
+    at: Option<&Bound<'_, PyMapping>>,
+) -> PyResult<PyResultTable> {
+    let at = assignments(at)?;
+    if plan.is_none() && !at.is_empty() {
+        return Err(PyTypeError::new_err("`at` needs a plan"));
+    }
+    let speeds = speeds_rpm.unwrap_or_else(|| (0..=120_u32).map(|k| 10.0 * f64::from(k)).collect());
+    let input = plan.map(|plan| plan.get().input.clone());
+    let found = abandonable(py, move || sweep::find_modes(input.as_ref(), &at, &speeds))?;
+    found.map(PyResultTable::new).map_err(|error| errors::error(py, &error))
+}
+
+/// Periodic responses at constant speeds, and whether they are stable.
+#[pyfunction]
+#[pyo3(signature = (plan, speeds_rpm, out=None, *, threads=None, progress=true, fresh=false))]
+pub(crate) fn stability(
+    plan: &Bound<'_, PyPlan>,
+    speeds_rpm: Vec<f64>,
+    out: Option<PathBuf>,
+    threads: Option<usize>,
+    progress: bool,
+    fresh: bool,
+) -> PyResult<PyResultTable> {
+    let py = plan.py();
+    let plan = plan.get().evaluator.plan();
+    let mode = ended::mode(progress);
+    let Some(out) = out else {
+        let found = attended(py, |interrupt| {
+            let effort = Effort { threads, progress: mode, interrupt };
+            sweep::find_stability(plan, &speeds_rpm, effort)
+        })?;
+        return ended::rows(py, found);
+    };
+    let ran = attended(py, |interrupt| {
+        let effort = Effort { threads, progress: mode, interrupt };
+        let tell = ended::teller(progress);
+        sweep::stability_to_file(plan, &speeds_rpm, &out, fresh, tell, effort)
+    })?;
+    ended::file(py, ran, &out)
+}
+
+/// Why the linear model fails at a point.
+#[pyfunction]
+#[pyo3(signature = (plan, at=None, *, speeds_rpm=None, threads=None))]
+pub(crate) fn explain<'py>(
+    plan: &Bound<'py, PyPlan>,
+    at: Option<&Bound<'py, PyMapping>>,
+    speeds_rpm: Option<Vec<f64>>,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = plan.py();
+    let (at, input) = (assignments(at)?, plan.get().input.clone());
+    let explained = abandonable(py, move || {
+        let interrupt = &Interrupt::new();
+        let effort = Effort { threads, progress: ProgressMode::None, interrupt };
+        sweep::explain_point(&input, &at, speeds_rpm.as_deref(), effort)
+    })?;
+    let explained = explained.map_err(|error| errors::error(py, &error))?;
+    let found = py.import("json")?.call_method1("loads", (explained.found.to_string(),))?;
+    py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((found, explained.text))
+}
+
+/// Every number that can be set or swept.
+#[pyfunction]
+#[pyo3(signature = (plan=None))]
+pub(crate) fn parameters<'py>(
+    py: Python<'py>,
+    plan: Option<&Bound<'py, PyPlan>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let text = sweep::list_parameters(plan.map(|plan| plan.get().evaluator.plan()));
+    py.import("json")?.call_method1("loads", (text,))
+}

@@ -1,0 +1,193 @@
+//! `Plan`: a grid that was read and checked, and all that can be asked of it.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyMapping, PyString};
+use sweep::{BoundaryOptions, Effort, Evaluator, GridInput, TraceOptions};
+
+use crate::result::PyResultTable;
+use crate::toml::{assignments, toml};
+use crate::work::{abandonable, attended};
+use crate::{columns, ended, errors};
+
+/// Name of a plan that comes from no file, where it gives none.
+const UNNAMED: &str = "plan";
+
+/// A validated plan.
+#[pyclass(name = "Plan", module = "washer_sweep", frozen)]
+pub(crate) struct PyPlan {
+    pub(crate) input: GridInput,
+    pub(crate) evaluator: Evaluator,
+}
+
+impl PyPlan {
+    fn load(py: Python<'_>, input: GridInput) -> PyResult<Self> {
+        let plan = py.detach(|| input.load()).map_err(|wrong| errors::plan_error(py, &wrong))?;
+        Ok(Self { input, evaluator: Evaluator::new(plan) })
+    }
+}
+
+#[pymethods]
+impl PyPlan {
+    /// A plan with the keys of a grid file.
+    #[new]
+    #[pyo3(signature = (grid, *, set=None))]
+    fn new(grid: &Bound<'_, PyMapping>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
+        let py = grid.py();
+        let text = toml(grid)?;
+        Self::load(py, GridInput::text(UNNAMED, text, assignments(set)?))
+    }
+
+    /// A plan from a grid file, or from the text of one.
+    #[staticmethod]
+    #[pyo3(signature = (source, *, set=None))]
+    fn from_toml(source: &Bound<'_, PyAny>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
+        let py = source.py();
+        let sets = assignments(set)?;
+        // A path has no line of its own with an assignment or a table.
+        let text = source.cast::<PyString>().ok().map(|text| text.to_string());
+        let text = text.filter(|text| text.contains('\n') || text.contains('='));
+        let input = match text {
+            Some(text) => GridInput::text(UNNAMED, text, sets),
+            None => GridInput::file(source.extract()?, sets),
+        };
+        Self::load(py, input)
+    }
+
+    /// Rows of designs in, rows of results out.
+    #[pyo3(signature = (table, *, threads=None, progress=false))]
+    fn evaluate(
+        &self,
+        table: &Bound<'_, PyAny>,
+        threads: Option<usize>,
+        progress: bool,
+    ) -> PyResult<PyResultTable> {
+        let py = table.py();
+        let points = columns::points(table)?;
+        let evaluated = attended(py, |interrupt| {
+            let effort = Effort { threads, progress: ended::mode(progress), interrupt };
+            self.evaluator.evaluate(&points, effort)
+        })?;
+        ended::rows(py, evaluated)
+    }
+
+    /// Every point of the grid.
+    #[pyo3(signature = (out=None, *, threads=None, progress=true, fresh=false))]
+    fn run(
+        &self,
+        py: Python<'_>,
+        out: Option<PathBuf>,
+        threads: Option<usize>,
+        progress: bool,
+        fresh: bool,
+    ) -> PyResult<PyResultTable> {
+        let Some(out) = out else {
+            let evaluated = attended(py, |interrupt| {
+                let effort = Effort { threads, progress: ended::mode(progress), interrupt };
+                self.evaluator.run(effort)
+            })?;
+            return ended::rows(py, evaluated);
+        };
+        let ran = attended(py, |interrupt| {
+            let effort = Effort { threads, progress: ended::mode(progress), interrupt };
+            sweep::run_to_file(self.evaluator.plan(), &out, fresh, ended::teller(progress), effort)
+        })?;
+        ended::file(py, ran, &out)
+    }
+
+    /// Time histories of both models at one point.
+    #[pyo3(signature = (at=None, *, every=0.01, states=false, forces=false, start=None))]
+    fn trace(
+        &self,
+        py: Python<'_>,
+        at: Option<&Bound<'_, PyMapping>>,
+        every: f64,
+        states: bool,
+        forces: bool,
+        start: Option<&Bound<'_, PyMapping>>,
+    ) -> PyResult<PyResultTable> {
+        let (at, start) = (assignments(at)?, assignments(start)?);
+        let options = TraceOptions { every_s: every, states, forces, start };
+        let input = self.input.clone();
+        let traced = abandonable(py, move || sweep::trace_point(&input, &at, &options))?;
+        let (table, failures) = traced.map_err(|error| errors::error(py, &error))?;
+        for failure in failures {
+            py.import("warnings")?.call_method1("warn", (failure,))?;
+        }
+        Ok(PyResultTable::new(table))
+    }
+
+    /// The curve on which a quantity is at its limit.
+    #[pyo3(signature = (
+        quantity="ratio_max", *, tolerance=None, lattice=6, out=None, threads=None, progress=true,
+        fresh=false
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn boundary(
+        &self,
+        py: Python<'_>,
+        quantity: &str,
+        tolerance: Option<f64>,
+        lattice: u16,
+        out: Option<PathBuf>,
+        threads: Option<usize>,
+        progress: bool,
+        fresh: bool,
+    ) -> PyResult<PyResultTable> {
+        let output = out.as_deref();
+        let options = BoundaryOptions { quantity, tolerance, lattice, output, fresh };
+        let found = attended(py, |interrupt| {
+            let effort = Effort { threads, progress: ended::mode(progress), interrupt };
+            sweep::find_boundary(self.evaluator.plan(), options, effort)
+        })?;
+        let interrupted = || {
+            let text = match output {
+                Some(out) => format!(
+                    "interrupted; what was found is kept beside {}, and the same call goes on",
+                    out.display()
+                ),
+                None => "interrupted; with `out` the search would have kept what it found".into(),
+            };
+            ended::holding(py, text, None)
+        };
+        let found = found.or_raise(py, |_| interrupted())?;
+        let found = found.map_err(|error| errors::error(py, &error))?;
+        found.map(PyResultTable::new).ok_or_else(interrupted)
+    }
+
+    /// Name of the plan.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.evaluator.plan().name
+    }
+
+    /// Names of the axes with the least and the greatest value of each.
+    #[getter]
+    fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let axes = PyDict::new(py);
+        for axis in &self.evaluator.plan().axes {
+            let [least, greatest] = axis.values.extremes().map(|k| axis.values.value(k));
+            axes.set_item(axis.parameter.name(), (least, greatest))?;
+        }
+        Ok(axes)
+    }
+
+    /// How many points its grid or design has.
+    fn __len__(&self) -> PyResult<usize> {
+        Ok(usize::try_from(self.evaluator.plan().points())?)
+    }
+
+    /// Every default and constant in place, with the keys of a grid file.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = self.evaluator.plan().to_json().to_string();
+        py.import("json")?.call_method1("loads", (text,))
+    }
+
+    fn __repr__(&self) -> String {
+        let plan = self.evaluator.plan();
+        let axes: Vec<&str> = plan.axes.iter().map(|axis| axis.parameter.name()).collect();
+        let axes = if axes.is_empty() { "no axes".to_owned() } else { axes.join(", ") };
+        format!("<washer_sweep.Plan {}: {} points over {axes}>", plan.name, plan.points())
+    }
+}

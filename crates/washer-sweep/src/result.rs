@@ -1,0 +1,202 @@
+//! `Result`: rows as columns, for whoever speaks Arrow.
+
+use std::collections::HashSet;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use arrow_array::cast::AsArray as _;
+use arrow_array::types::UInt64Type;
+use arrow_array::{Array, ArrayRef};
+use arrow_schema::{DataType, Field};
+use pyo3::exceptions::{PyKeyError, PyOSError};
+use pyo3::prelude::*;
+use pyo3::types::{PyByteArray, PyCapsule, PyDict, PyList};
+use sweep::{ResultKind, ResultTable};
+use sweep_files::cells;
+use sweep_plot::PlotOptions;
+
+use crate::arrow;
+use crate::errors;
+
+/// Rows of a result in memory.
+#[pyclass(name = "Result", module = "washer_sweep", frozen)]
+pub(crate) struct PyResultTable(Arc<ResultTable>);
+
+impl PyResultTable {
+    pub(crate) fn new(table: ResultTable) -> Self {
+        Self(Arc::new(table))
+    }
+
+    fn field(&self, name: &str) -> PyResult<&Field> {
+        self.0.schema().field_with_name(name).map_err(|_| {
+            let names: Vec<&str> =
+                self.0.schema().fields().iter().map(|field| field.name().as_str()).collect();
+            PyKeyError::new_err(format!("no column `{name}`; there are {}", names.join(", ")))
+        })
+    }
+
+    /// Whether the rows are points of a table that leave out some of the grid over their values:
+    /// a map of them would be mostly empty.
+    fn is_scattered(&self) -> bool {
+        let plan = self.0.plan();
+        if self.0.kind() != ResultKind::Map || plan["design"].is_null() {
+            return false;
+        }
+        let axes = plan["axis"].as_array().map_or(&[][..], Vec::as_slice);
+        let distinct = axes.iter().filter_map(|axis| axis["parameter"].as_str()).map(|name| {
+            let parts = self.0.batches().iter().filter_map(|batch| batch.column_by_name(name));
+            let values = parts.flat_map(|part| cells::numbers(part).unwrap_or_default());
+            values.map(|value| value.map(f64::to_bits)).collect::<HashSet<_>>().len()
+        });
+        distinct.product::<usize>() != self.0.rows()
+    }
+
+    /// One entry of every field's metadata.
+    fn said<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyDict>> {
+        let said = PyDict::new(py);
+        for field in self.0.schema().fields() {
+            said.set_item(field.name(), field.metadata().get(key))?;
+        }
+        Ok(said)
+    }
+}
+
+#[pymethods]
+impl PyResultTable {
+    #[pyo3(signature = (requested_schema=None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        // The protocol lets a producer answer with its own schema.
+        drop(requested_schema);
+        arrow::stream(py, self.0.schema(), self.0.batches())
+    }
+
+    fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
+        arrow::schema(py, self.0.schema())
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.rows()
+    }
+
+    fn __contains__(&self, name: &str) -> bool {
+        self.field(name).is_ok()
+    }
+
+    /// A column as an array of NumPy's.
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let field = self.field(name)?;
+        let parts: Vec<&ArrayRef> =
+            self.0.batches().iter().filter_map(|batch| batch.column_by_name(name)).collect();
+        let numpy = py.import("numpy")?;
+        let (bytes, kind) = match field.data_type() {
+            DataType::UInt64 => {
+                let counts =
+                    parts.iter().flat_map(|part| part.as_primitive::<UInt64Type>().values());
+                (counts.flat_map(|count| count.to_ne_bytes()).collect::<Vec<u8>>(), "uint64")
+            }
+            number if cells::is_number(number) => {
+                let mut bytes = Vec::with_capacity(8 * self.0.rows());
+                for part in parts {
+                    for value in cells::numbers(part).unwrap_or_default() {
+                        bytes.extend(value.unwrap_or(f64::NAN).to_ne_bytes());
+                    }
+                }
+                (bytes, "float64")
+            }
+            _ => {
+                let values = PyList::empty(py);
+                for part in parts {
+                    append(&values, part)?;
+                }
+                let typed = PyDict::new(py);
+                typed.set_item("dtype", "object")?;
+                return numpy.call_method("array", (values,), Some(&typed));
+            }
+        };
+        numpy.call_method1("frombuffer", (PyByteArray::new(py, &bytes), kind))
+    }
+
+    /// Names of the columns.
+    #[getter]
+    fn columns(&self) -> Vec<String> {
+        self.0.schema().fields().iter().map(|field| field.name().clone()).collect()
+    }
+
+    /// Unit of each column.
+    #[getter]
+    fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.said(py, "unit")
+    }
+
+    /// What each column is.
+    #[getter]
+    fn descriptions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.said(py, "description")
+    }
+
+    /// `"map"`, `"boundary"`, `"trace"` or `"modes"`.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.0.kind().name()
+    }
+
+    /// The plan that it came of, as its file carries it.
+    #[getter]
+    fn plan<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        py.import("json")?.call_method1("loads", (self.0.plan().to_string(),))
+    }
+
+    /// Writes it as `.parquet`, or its figure as `.svg`, `.png` or `.html`.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        let is_rows = ending.eq_ignore_ascii_case("parquet");
+        py.detach(|| match is_rows {
+            true => self.0.save(&path),
+            false => self.0.draw(&PlotOptions::default(), &path),
+        })
+        .map_err(|error| errors::error(py, &error))
+    }
+
+    /// The program's own figure, where there is one: points off a grid have none.
+    fn _repr_svg_(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        if self.is_scattered() {
+            return Ok(None);
+        }
+        let drawn = py.detach(|| {
+            let folder = tempfile::tempdir()?;
+            let path = folder.path().join("figure.svg");
+            match self.0.draw(&PlotOptions::default(), &path) {
+                Ok(()) => std::fs::read_to_string(&path).map(Some),
+                Err(_) => Ok(None),
+            }
+        });
+        drawn.map_err(|error| PyOSError::new_err(format!("cannot draw: {error}")))
+    }
+
+    fn __repr__(&self) -> String {
+        let name = self.0.plan()["name"].as_str().unwrap_or("unnamed");
+        let (kind, rows) = (self.0.kind().name(), self.0.rows());
+        let columns = self.0.schema().fields().len();
+        format!("<washer_sweep.Result: {kind} of {name}, {rows} rows, {columns} columns>")
+    }
+}
+
+/// Adds flags or words to a list, none as `None`.
+fn append(values: &Bound<'_, PyList>, part: &ArrayRef) -> PyResult<()> {
+    if let Ok(flags) = cells::flags(part) {
+        return flags.iter().try_for_each(|flag| values.append(flag));
+    }
+    let words = cells::texts(part).unwrap_or_else(|_| vec![None; part.len()]);
+    words.into_iter().try_for_each(|word| values.append(word))
+}
+
+/// Reads a result file of any kind.
+#[pyfunction]
+pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<PyResultTable> {
+    let table = py.detach(|| ResultTable::read(&path));
+    table.map(PyResultTable::new).map_err(|error| errors::error(py, &error))
+}

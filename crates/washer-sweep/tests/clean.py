@@ -1,0 +1,19 @@
+"""The package with nothing beside it but Python: `scripts/checks/python.sh` runs this in an
+environment that holds the wheel alone."""
+
+import importlib.util
+import pathlib
+
+import washer_sweep
+
+from conftest_grid import SHORT
+
+assert importlib.util.find_spec("numpy") is None, "the environment is not clean"
+assert (pathlib.Path(washer_sweep.__file__).parent / "py.typed").exists()
+result = washer_sweep.Plan(SHORT).evaluate(
+    {"unbalance_mass_kg": [0.1, 0.5], "damping_n_s_per_m": [60, 100.0]}
+)
+assert len(result) == 2
+assert result.units["unbalance_mass_kg"] == "kg"
+assert "<svg" in washer_sweep.modes()._repr_svg_()
+print(result)

@@ -1,0 +1,12 @@
+"""The grid that most tests share."""
+
+# Two seconds of a short run-up: the whole machinery at a hundredth of the cost of Fig. 12.
+SHORT = {
+    "name": "short",
+    "spin": {"profile": "ramp", "peak_rpm": 300, "ramp_s": 1.5},
+    "time": {"end_s": 2.0, "window_s": [0.5, 2.0]},
+    "axis": [
+        {"parameter": "unbalance_mass_kg", "range": {"from": 0.1, "to": 0.9, "count": 5}},
+        {"parameter": "damping_n_s_per_m", "range": {"from": 60, "to": 300, "count": 4}},
+    ],
+}

@@ -1,0 +1,136 @@
+"""A table of designs in, a table of results out."""
+
+import itertools
+import types
+
+import duckdb
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+from conftest import ROOT, rows
+from conftest_grid import SHORT
+
+import washer_sweep
+from washer_sweep import Plan, PlanError
+
+AXES = ["unbalance_mass_kg", "damping_n_s_per_m"]
+
+
+def columns(plan):
+    """The plan's grid as columns."""
+    points = itertools.product(np.linspace(0.1, 0.9, 5), np.linspace(60.0, 300.0, 4))
+    return dict(zip(AXES, map(np.array, zip(*points)), strict=True))
+
+
+def test_fig12_has_the_bits_of_the_commands_rows(sweep, tmp_path):
+    import subprocess
+
+    path = tmp_path / "fig12.parquet"
+    grid = ROOT / "sweeps/fig12.toml"
+    subprocess.run([sweep, "run", grid, "--out", path, "--progress", "none"], check=True,
+                   capture_output=True)
+    table = rows(washer_sweep.read(path))
+    # In another order, in pieces, and only some at first.
+    order = np.random.default_rng(1).permutation(len(table))
+    plan = Plan.from_toml(grid)
+    for some in (order[:37], order):
+        points = pa.concat_tables([table.select(AXES).take(part)
+                                   for part in np.array_split(some, 3)])
+        found = rows(plan.evaluate(points)).drop_columns("point")
+        assert found == table.take(some).drop_columns("point").combine_chunks()
+
+
+def test_every_source_of_columns_is_the_same(short):
+    table = columns(short)
+    expected = pa.table(short.evaluate(table))
+    assert expected == pa.table(short.run(progress=False))
+    relation = pd.DataFrame(table)
+    for source in (
+        pa.table(table),
+        pa.table(table).to_batches()[0],
+        pa.RecordBatchReader.from_batches(pa.table(table).schema,
+                                          pa.table(table).to_batches(max_chunksize=7)),
+        pl.DataFrame(table),
+        relation,
+        duckdb.sql("select * from relation"),
+        {name: list(values) for name, values in table.items()},
+        {name: values[::-1].copy()[::-1] for name, values in table.items()},
+        dict(reversed(table.items())),
+        types.MappingProxyType(table),
+        {name: pd.Series(values) for name, values in table.items()},
+        {name: pl.Series(values) for name, values in table.items()},
+        pa.table(expected.select(AXES)),
+    ):
+        assert pa.table(short.evaluate(source)) == expected, type(source)
+    whole = {"unbalance_mass_kg": np.array([1]), "damping_n_s_per_m": np.array([60, 300])[:1]}
+    plan = Plan({**SHORT, "axis": [{"parameter": AXES[0], "values": [1, 0.1]},
+                                   {"parameter": AXES[1], "values": [60, 300]}]})
+    assert plan.evaluate(whole)["unbalance_mass_kg"].tolist() == [1.0]
+
+
+def test_no_row_depends_on_the_others_or_on_threads(short):
+    table = columns(short)
+    expected = pa.table(short.evaluate(table))
+    for row in (0, 7, 19):
+        alone = {name: values[row : row + 1] for name, values in table.items()}
+        found = pa.table(short.evaluate(alone, threads=1)).drop_columns("point")
+        assert found == expected.slice(row, 1).drop_columns("point")
+    assert pa.table(short.evaluate(table, threads=1)) == expected
+    assert pa.table(short.evaluate(table, threads=3)) == expected
+
+
+@pytest.mark.parametrize(("table", "said"), [
+    ({"unbalance_mass_kg": [0.1]}, "the table has no column `damping_n_s_per_m`"),
+    ({"unbalance_mass": [0.1], "damping_n_s_per_m": [60]}, "did you mean `unbalance_mass_kg`"),
+    ({"unbalance_mass_kg": [0.1], "damping_n_s_per_m": [60], "tub_mass_kg": [20]},
+     "`tub_mass_kg` is no axis of this plan"),
+    ({"unbalance_mass_kg": [0.1, 0.95], "damping_n_s_per_m": [60, 60]},
+     "row 2 of `unbalance_mass_kg` = 0.95 is off the plan's axis"),
+    ({"unbalance_mass_kg": [-1], "damping_n_s_per_m": [60]}, "= -1 is out of range"),
+    ({"unbalance_mass_kg": [float("nan")], "damping_n_s_per_m": [60]}, "is not a number"),
+    ({"unbalance_mass_kg": [0.1, 0.2], "damping_n_s_per_m": [60]}, "has 1 values"),
+    (pa.table({"unbalance_mass_kg": [0.1, None], "damping_n_s_per_m": [60.0, 70.0]}),
+     "row 2 of `unbalance_mass_kg` has no value"),
+    (pa.table({"unbalance_mass_kg": ["a"], "damping_n_s_per_m": [60.0]}), "holds no numbers"),
+    (pa.table([[0.1], [0.1], [60.0]], names=[*AXES[:1], *AXES[:1], AXES[1]]), "is given twice"),
+    ({}, "has no column `unbalance_mass_kg`"),
+])
+def test_a_table_that_does_not_fit_is_refused_with_its_place(short, table, said):
+    with pytest.raises(PlanError) as caught:
+        short.evaluate(table)
+    assert said in str(caught.value)
+    assert caught.value.diagnostics[0]["file"] == "table"
+
+
+def test_what_is_no_table_is_refused(short):
+    for table in ([1, 2], None, "x", 3.0):
+        with pytest.raises(TypeError, match="__arrow_c_stream__"):
+            short.evaluate(table)
+    with pytest.raises(TypeError, match="column `unbalance_mass_kg`: expected numbers"):
+        short.evaluate({"unbalance_mass_kg": ["a"], "damping_n_s_per_m": [60]})
+    for square in (np.ones((2, 2)), np.ones((2, 2), int), np.ones((2, 1)), np.ones((2, 1), int)):
+        with pytest.raises(TypeError, match="expected numbers"):
+            short.evaluate({"unbalance_mass_kg": square, "damping_n_s_per_m": [60, 60]})
+    for threads in (0, 5000):
+        with pytest.raises(PlanError, match="expected a number from 1 to 4096"):
+            short.evaluate(columns(short), threads=threads)
+
+
+def test_no_rows_are_no_rows(short):
+    found = short.evaluate({"unbalance_mass_kg": [], "damping_n_s_per_m": []})
+    assert len(found) == 0
+    assert pa.table(found).schema == pa.table(short.run(progress=False)).schema
+
+
+def test_an_axis_of_one_value_may_be_left_out():
+    plan = Plan({**SHORT, "axis": [*SHORT["axis"], {"parameter": "tub_mass_kg", "values": [20]}]})
+    found = plan.evaluate({"unbalance_mass_kg": [0.4], "damping_n_s_per_m": [100]})
+    assert found["tub_mass_kg"].tolist() == [20.0]
+
+
+def test_a_million_refused_rows_are_told_in_a_moment(short):
+    with pytest.raises(PlanError, match=r"1000000 mistakes \(100 shown\)"):
+        short.evaluate({"unbalance_mass_kg": np.full(1_000_000, 2.0),
+                        "damping_n_s_per_m": np.full(1_000_000, 60.0)})

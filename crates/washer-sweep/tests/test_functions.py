@@ -1,0 +1,92 @@
+"""Stability and explanations: the command's bytes and words."""
+
+import json
+import pickle
+import subprocess
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from conftest import ROOT, rows
+from conftest_grid import SHORT
+
+import washer_sweep
+from washer_sweep import Plan, PlanError
+
+QUICK = ROOT / "sweeps/quick.toml"
+POINT = {"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100.0}
+
+
+def told(*words):
+    """What the command prints."""
+    return subprocess.run(words, check=True, capture_output=True, text=True).stdout
+
+
+def test_stability_has_the_commands_bytes(sweep, tmp_path):
+    by_command, by_call, saved = (tmp_path / f"{name}.parquet" for name in "abc")
+    told(sweep, "stability", QUICK, "--speed", "240:320:20", "--out", by_command,
+         "--progress", "none")
+    plan = Plan.from_toml(QUICK)
+    result = washer_sweep.stability(plan, range(240, 321, 20), by_call, progress=False)
+    assert by_call.read_bytes() == by_command.read_bytes()
+    in_memory = washer_sweep.stability(plan, np.arange(240.0, 321.0, 20.0), progress=False)
+    in_memory.save(saved)
+    assert saved.read_bytes() == by_command.read_bytes()
+    assert rows(in_memory) == rows(result)
+    assert result.kind == in_memory.kind == washer_sweep.read(by_command).kind == "stability"
+    assert len(result) == 5 * len(plan)
+    assert (result["stable"] == False).any(), "250 rpm is unstable"  # noqa: E712
+    with pytest.raises(PlanError, match="another plan"):
+        washer_sweep.stability(plan, [240.0], by_call, progress=False)
+
+
+def test_an_explanation_is_the_commands(sweep):
+    words = [sweep, "explain", QUICK, "--speed", "240:320:4"]
+    for name, value in POINT.items():
+        words += ["--at", f"{name}={value}"]
+    found = washer_sweep.explain(Plan.from_toml(QUICK), POINT, speeds_rpm=range(240, 321, 4))
+    assert found == json.loads(told(*words, "--json"))
+    assert str(found) == found.text == told(*words)
+    again = pickle.loads(pickle.dumps(found))
+    assert (again, again.text) == (found, found.text)
+
+
+def test_growth_is_a_metric_of_a_table_too(tmp_path):
+    grid = {**SHORT, "metrics": ["growth"], "stability": {"speed_rpm": "240:260:10"}}
+    plan = Plan(grid)
+    by_run = rows(plan.run(tmp_path / "x.parquet", progress=False))
+    by_table = plan.evaluate(by_run.select(list(POINT)))
+    assert rows(by_table) == by_run
+    assert not np.isnan(by_table["growth_per_s"]).any()
+
+
+def test_differences_are_read(sweep, tmp_path):
+    old, new, out = (tmp_path / f"{name}.parquet" for name in ("old", "new", "out"))
+    Plan(SHORT).run(old, progress=False)
+    Plan(SHORT, set={"tub_mass_kg": 20}).run(new, progress=False)
+    told(sweep, "compare", old, new, "--out", out)
+    found = washer_sweep.read(out)
+    assert found.kind == "differences"
+    assert len(found) == 20
+
+
+@pytest.mark.parametrize(("work", "said"), [
+    (lambda plan: washer_sweep.stability(plan, []), "from 1 to 100000 finite speeds"),
+    (lambda plan: washer_sweep.stability(plan, [0.0]), "above 0"),
+    (lambda plan: washer_sweep.stability(plan, [100.0, 100.0]), "each above the one before"),
+    (lambda plan: washer_sweep.stability(plan, [float("inf")]), "finite"),
+    (lambda plan: washer_sweep.explain(plan), "needs a value of"),
+    (lambda plan: washer_sweep.explain(plan, POINT, speeds_rpm=[200, 210, 230]), "even distances"),
+    (lambda plan: washer_sweep.explain(plan, POINT, speeds_rpm=[0, 10]), "above 0"),
+    (lambda plan: washer_sweep.explain(plan, POINT, threads=0), "expected a number from 1"),
+])
+def test_what_makes_no_sense_is_refused(short, work, said):
+    with pytest.raises(PlanError, match=said):
+        work(short)
+
+
+def test_speeds_replace_those_of_a_profile():
+    axis = {"parameter": "spin_peak_rpm", "range": {"from": 200, "to": 300, "count": 3}}
+    plan = Plan({**SHORT, "axis": [axis]})
+    with pytest.raises(PlanError, match="give its range as speeds"):
+        washer_sweep.stability(plan, [240.0], progress=False)

@@ -1,0 +1,156 @@
+"""Signals, threads and forks."""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+import washer_sweep
+
+# Answered in half a second, on a machine that may be busy with other work.
+ANSWERED_S = 0.5
+
+
+def table(rows):
+    """Points of the short grid's box."""
+    rng = np.random.default_rng(2)
+    return {"unbalance_mass_kg": rng.uniform(0.1, 0.9, rows),
+            "damping_n_s_per_m": rng.uniform(60.0, 300.0, rows)}
+
+
+def interrupted(work, after_s, ready=lambda: True):
+    """What Ctrl-C makes of a work, and how long it took to answer; sent when `ready` says so."""
+    sent = []
+
+    def send():
+        while not ready():
+            time.sleep(0.01)
+        sent.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(after_s, send)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt) as caught:
+        work()
+    answered_s = time.perf_counter() - sent[0]
+    timer.join()
+    return caught.value, answered_s
+
+
+def test_ctrl_c_ends_an_evaluation_and_leaves_its_rows(short):
+    points = table(20_000)
+    stopped, answered_s = interrupted(lambda: short.evaluate(points, threads=2), 2.0)
+    assert answered_s < ANSWERED_S
+    rows = pa.table(stopped.result)
+    assert 0 < len(rows) < 20_000
+    some = rows["point"].to_numpy()[:20]
+    again = short.evaluate({name: values[some] for name, values in points.items()})
+    expected = rows.slice(0, 20).drop_columns("point").combine_chunks()
+    assert pa.table(again).drop_columns("point").combine_chunks() == expected
+    with pytest.raises(washer_sweep.PlanError, match="not interrupted"):
+        stopped.result.save("never.parquet")
+
+
+@pytest.mark.parametrize("work", ["run", "evaluate", "boundary", "trace", "stability", "explain"])
+def test_ctrl_c_is_answered_in_half_a_second(long, work):
+    point = {"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100.0}
+    stopped, answered_s = interrupted({
+        "run": lambda: long.run(progress=False),
+        "evaluate": lambda: long.evaluate(table(1000)),
+        "boundary": lambda: long.boundary(progress=False),
+        "trace": lambda: long.trace(point, every=1.0),
+        "stability": lambda: washer_sweep.stability(long, np.arange(60, 400, 0.1), progress=False),
+        "explain": lambda: washer_sweep.explain(long, point),
+    }[work], 0.3)
+    assert answered_s < ANSWERED_S
+    # Traces and explanations have nothing before their end.
+    assert isinstance(stopped, washer_sweep.Interrupted) or work in ("trace", "explain")
+
+
+def test_a_run_into_a_file_goes_on_where_ctrl_c_left_it(short, tmp_path):
+    path, whole = tmp_path / "x.parquet", tmp_path / "whole.parquet"
+    grid = short.to_dict()
+    grid.pop("machine")
+    for axis, count in zip(grid["axis"], (40, 30), strict=True):
+        axis["range"]["count"] = count
+    plan = washer_sweep.Plan(grid)
+
+    def chunks():
+        return list((tmp_path / "x.parquet.partial").glob("chunk-*.bin"))
+
+    stopped, _ = interrupted(lambda: plan.run(path, progress=False), 0.0, ready=chunks)
+    assert stopped.result is None
+    assert "the same call goes on" in str(stopped)
+    assert not path.exists()
+    assert chunks()
+    plan.run(path, progress=False)
+    plan.run(whole, progress=False)
+    assert path.read_bytes() == whole.read_bytes()
+
+
+def test_the_interpreter_goes_on_meanwhile(short):
+    ticks = []
+    done = threading.Event()
+
+    def tick():
+        while not done.wait(0.005):
+            ticks.append(time.perf_counter())
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    began = time.perf_counter()
+    short.evaluate(table(500), threads=1)
+    took_s = time.perf_counter() - began
+    done.set()
+    thread.join()
+    assert len(ticks) > took_s / 0.1, "the lock was held"
+
+
+def test_two_threads_may_call_at_once(short):
+    expected = pa.table(short.evaluate(table(60)))
+    found = []
+    calls = [threading.Thread(target=lambda: found.append(pa.table(short.evaluate(table(60)))))
+             for _ in range(2)]
+    for call in calls:
+        call.start()
+    for call in calls:
+        call.join()
+    assert found == [expected, expected]
+
+
+def child(queue):
+    """A forked process that uses the engine."""
+    from conftest_grid import SHORT
+
+    queue.put(washer_sweep.Plan(SHORT).evaluate(table(20))["ratio_max"].tolist())
+
+
+def test_a_fork_after_use_works(short):
+    expected = short.evaluate(table(20))["ratio_max"].tolist()
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    process = context.Process(target=child, args=(queue,))
+    process.start()
+    assert queue.get(timeout=60) == expected
+    process.join(timeout=60)
+    assert process.exitcode == 0
+
+
+def test_sigterm_of_a_script_ends_it():
+    script = ("import conftest_grid, washer_sweep\n"
+              "grid = {**conftest_grid.SHORT, 'time': {'end_s': 500.0}}\n"
+              "print('ready', flush=True)\n"
+              "washer_sweep.Plan(grid).run(progress=False)\n")
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
+                          cwd=os.path.dirname(__file__)) as process:
+        process.stdout.readline()
+        time.sleep(0.5)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=5) == -signal.SIGTERM

@@ -1,0 +1,94 @@
+"""Plans, and what is told of those that are none."""
+
+import importlib.metadata
+import pickle
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from conftest_grid import SHORT
+
+import washer_sweep
+from washer_sweep import Plan, PlanError
+
+
+def test_a_file_its_text_and_a_dictionary_are_one_plan():
+    path = ROOT / "sweeps/fig12.toml"
+    from_file = Plan.from_toml(path)
+    assert Plan.from_toml(str(path)).to_dict() == from_file.to_dict()
+    from_text = Plan.from_toml(path.read_text()).to_dict()
+    assert from_text | {"name": "fig12"} == from_file.to_dict()
+    assert len(from_file) == 1287
+    assert from_file.axes["damping_n_s_per_m"] == (60.0, 300.0)
+    # What a plan says of itself is a plan again, but for the machine, which a file would hold.
+    again = {k: v for k, v in from_file.to_dict().items() if k != "machine"}
+    assert Plan(again).to_dict() == from_file.to_dict()
+
+
+def test_the_package_has_the_engines_version():
+    assert washer_sweep.__version__ == importlib.metadata.version("washer-sweep")
+
+
+def test_a_dictionary_takes_what_numpy_and_pathlib_give():
+    axis = [{"parameter": "unbalance_mass_kg", "values": np.linspace(0.1, 0.9, 3)},
+            {"parameter": "damping_n_s_per_m", "values": (np.int64(60), np.float32(80.0))}]
+    plan = Plan({**SHORT, "axis": axis})
+    assert plan.to_dict()["axis"][0]["values"] == [0.1, 0.5, 0.9]
+    assert plan.to_dict()["axis"][1]["values"] == [60.0, 80.0]
+    with pytest.raises(PlanError, match="cannot read the machine file"):
+        Plan({**SHORT, "machine": ROOT / "none.toml"})
+
+
+def test_constants_override():
+    plan = Plan(SHORT, set={"tub_mass_kg": 20.123456789012345})
+    assert plan.to_dict()["machine"]["tub"]["mass_kg"] == 20.123456789012345
+    with pytest.raises(PlanError, match="unknown parameter `tub_mass`"):
+        Plan(SHORT, set={"tub_mass": 20})
+    with pytest.raises(TypeError, match="`tub_mass_kg`: expected a number, got `str`"):
+        Plan(SHORT, set={"tub_mass_kg": "20"})
+
+
+def test_a_mistake_is_data_and_the_commands_text(sweep, tmp_path):
+    import subprocess
+
+    path = tmp_path / "wrong.toml"
+    path.write_text('[spin]\nprofile = "ramp"\npeak_rpm = 300\nramp_s = -1\n'
+                    "[time]\nend_s = 2\nwindow = [0, 1]\n")
+    with pytest.raises(PlanError) as caught:
+        Plan.from_toml(path)
+    first, second = caught.value.diagnostics
+    assert (first["line"], first["column"], first["file"]) == (4, 10, str(path))
+    assert first["message"] == "`ramp_s` = -1 is out of range"
+    assert second["hint"] == "did you mean `window_s`?"
+    told = subprocess.run([sweep, "check", path], capture_output=True, text=True, check=False)
+    assert told.returncode == 2
+    assert told.stderr.strip() == str(caught.value).strip()
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert again.diagnostics == caught.value.diagnostics
+
+
+@pytest.mark.parametrize(("grid", "error"), [
+    ({}, PlanError),
+    ({"spin": 3}, PlanError),
+    ({"spin": None}, TypeError),
+    ({3: 4}, TypeError),
+    ({**SHORT, "name": "a\nb"}, PlanError),
+    ({**SHORT, "axis": [{"parameter": "x\x00"}]}, PlanError),
+    ({**SHORT, "time": {"end_s": float("nan")}}, PlanError),
+    ({**SHORT, "axis": [3]}, PlanError),
+    ({**SHORT, "time": {"end_s": 10**30}}, PlanError),
+])
+def test_what_is_no_plan_is_refused(grid, error):
+    with pytest.raises(error):
+        Plan(grid)
+
+
+def test_parameters_are_the_commands(sweep):
+    import json
+    import subprocess
+
+    told = subprocess.run([sweep, "parameters", "--json"], capture_output=True, check=True)
+    assert washer_sweep.parameters() == json.loads(told.stdout)
+    heavy = Plan(SHORT, set={"tub_mass_kg": 31})
+    value = {entry["name"]: entry["value"] for entry in washer_sweep.parameters(heavy)}
+    assert value["tub_mass_kg"] == 31

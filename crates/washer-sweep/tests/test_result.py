@@ -1,0 +1,195 @@
+"""Results: rows without a copy, files with the command's bytes, figures."""
+
+import subprocess
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+from conftest import ROOT, rows
+
+import washer_sweep
+from washer_sweep import Plan
+
+QUICK = ROOT / "sweeps/quick.toml"
+
+
+def addresses(table):
+    """Where the buffers of every column lie."""
+    return [buffer.address for column in table.columns for chunk in column.chunks
+            for buffer in chunk.buffers() if buffer is not None]
+
+
+def test_rows_are_not_copied(short):
+    result = short.run(progress=False)
+    first, second = pa.table(result), pa.table(result)
+    assert addresses(first) == addresses(second) != []
+    # And from there to NumPy neither.
+    steps = first["steps_nonlinear"].chunk(0)
+    assert steps.to_numpy(zero_copy_only=True).ctypes.data == steps.buffers()[1].address
+    frame = pl.DataFrame(result)
+    assert frame["steps_nonlinear"].to_numpy().ctypes.data == steps.buffers()[1].address
+
+
+def test_rows_outlive_their_result(short):
+    table = pa.table(short.run(progress=False))
+    copy = table.to_pydict()
+    short.run(progress=False)
+    assert table.to_pydict() == copy
+
+
+def test_a_table_given_is_not_copied():
+    # A table of 200 MB whose values are all refused: a copy would show in the peak of memory.
+    script = """
+import resource, numpy as np, pyarrow as pa, washer_sweep
+from conftest_grid import SHORT
+plan = washer_sweep.Plan(SHORT)
+n = 12_500_000
+table = pa.table({"unbalance_mass_kg": np.full(n, 2.0), "damping_n_s_per_m": np.full(n, 60.0)})
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+try:
+    plan.evaluate(table)
+except washer_sweep.PlanError:
+    pass
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+"""
+    import sys
+
+    told = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True,
+                          text=True, cwd=ROOT / "crates/washer-sweep/tests")
+    assert int(told.stdout) < 20_000, "kB beside the table"
+
+
+def test_units_and_descriptions_travel(short):
+    result = short.run(progress=False)
+    assert result.units["min_gap_nonlinear_m"] == "m"
+    field = pa.table(result).schema.field("min_gap_nonlinear_m")
+    assert field.metadata[b"unit"] == b"m"
+    assert field.metadata[b"description"].decode() == result.descriptions["min_gap_nonlinear_m"]
+    assert result.columns[:3] == ["point", "unbalance_mass_kg", "damping_n_s_per_m"]
+    assert "ratio_max" in result and "nothing" not in result
+    with pytest.raises(KeyError, match="no column `nothing`"):
+        result["nothing"]
+
+
+def test_columns_are_arrays_of_numpys(short):
+    result = short.run(progress=False)
+    frame = pd.DataFrame.from_arrow(result)
+    assert result["steps_linear"].dtype == np.uint64
+    np.testing.assert_array_equal(result["ratio_max"], frame["ratio_max"].to_numpy(float))
+    assert np.isnan(result["fail_time_s"]).all()
+    assert set(result["status"]) == {"ok"}
+    assert set(result["reliable"]) <= {True, False, None}
+
+
+def test_a_run_writes_the_commands_bytes(sweep, tmp_path):
+    by_command, by_run, saved = (tmp_path / f"{name}.parquet" for name in "abc")
+    subprocess.run([sweep, "run", QUICK, "--out", by_command, "--progress", "none"], check=True,
+                   capture_output=True)
+    plan = Plan.from_toml(QUICK)
+    result = plan.run(by_run, progress=False)
+    assert by_run.read_bytes() == by_command.read_bytes()
+    plan.run(progress=False).save(saved)
+    assert saved.read_bytes() == by_command.read_bytes()
+    assert pa.table(result) == pa.table(washer_sweep.read(by_command))
+    # It is there already, and read again.
+    assert pa.table(plan.run(by_run, progress=False)) == pa.table(result)
+    with pytest.raises(washer_sweep.PlanError, match="already holds the result of another plan"):
+        Plan.from_toml(QUICK, set={"tub_mass_kg": 20}).run(by_run, progress=False)
+
+
+def test_traces_boundaries_and_modes_have_the_commands_bytes(sweep, tmp_path):
+    def command(*words):
+        subprocess.run([sweep, *words], check=True, capture_output=True)
+
+    mine, commands = tmp_path / "mine.parquet", tmp_path / "commands.parquet"
+    plan = Plan.from_toml(QUICK)
+    mass, damping = 0.4, 100.0
+    plan.trace({"unbalance_mass_kg": mass, "damping_n_s_per_m": damping}, every=0.05, states=True,
+               forces=True, start={"q5": 0.01}).save(mine)
+    command("trace", QUICK, "--at", f"unbalance_mass_kg={mass}", "--at",
+            f"damping_n_s_per_m={damping}", "--every", "0.05", "--states", "--forces", "--start",
+            "q5=0.01", "--out", commands)
+    assert mine.read_bytes() == commands.read_bytes()
+    mine.unlink()
+    commands.unlink()
+    found = plan.boundary(tolerance=20.0, lattice=2, progress=False)
+    found.save(mine)
+    command("boundary", QUICK, "--tolerance", "20", "--lattice", "2", "--out", commands,
+            "--progress", "none")
+    assert mine.read_bytes() == commands.read_bytes()
+    mine.unlink()
+    kept = plan.boundary(tolerance=20.0, lattice=2, out=mine, progress=False)
+    assert mine.read_bytes() == commands.read_bytes()
+    assert pa.table(kept) == pa.table(found)
+    mine.unlink()
+    commands.unlink()
+    washer_sweep.modes(plan, speeds_rpm=[0, 100, 200],
+                       at={"unbalance_mass_kg": mass, "damping_n_s_per_m": damping}).save(mine)
+    command("modes", QUICK, "--at", f"unbalance_mass_kg={mass}", "--at",
+            f"damping_n_s_per_m={damping}", "--speed", "0:200:100", "--out", commands)
+    assert mine.read_bytes() == commands.read_bytes()
+    assert [washer_sweep.read(mine).kind, found.kind] == ["modes", "boundary"]
+
+
+def test_options_that_make_no_sense_are_refused(short):
+    point = {"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100}
+    for work, said in [
+        (lambda: short.trace({"unbalance_mass_kg": 0.4}), "a point of the grid needs a value of"),
+        (lambda: short.trace(point, every=9), "expected from"),
+        (lambda: short.trace(point, start={"q11": 1}), "a coordinate q1 to q10"),
+        (lambda: short.boundary("ratio"), "expected"),
+        (lambda: short.boundary(lattice=0), "from 1 to 1000"),
+        (lambda: short.boundary(tolerance=-1), "out of range"),
+        (lambda: washer_sweep.modes(speeds_rpm=[100, 0]), "each above the one before"),
+        (lambda: washer_sweep.modes(speeds_rpm=[0, float("inf")]), "finite"),
+    ]:
+        with pytest.raises(washer_sweep.PlanError, match=said):
+            work()
+
+
+def test_figures_are_the_commands(sweep, short, tmp_path):
+    file, drawn, mine = (tmp_path / name for name in ("m.parquet", "drawn.svg", "mine.svg"))
+    result = short.run(file, progress=False)
+    subprocess.run([sweep, "plot", file, "-o", drawn], check=True, capture_output=True)
+    result.save(mine)
+    assert mine.read_bytes() == drawn.read_bytes()
+    assert result._repr_svg_() == drawn.read_text()
+    assert short.run(progress=False)._repr_svg_() == drawn.read_text()
+    for name in ("mine.png", "mine.html"):
+        result.save(tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 10_000
+    with pytest.raises(washer_sweep.PlanError, match="svg"):
+        result.save(tmp_path / "mine.jpg")
+    scattered = short.evaluate({"unbalance_mass_kg": [0.11, 0.5], "damping_n_s_per_m": [99, 60]})
+    assert scattered._repr_svg_() is None, "a map of them would be empty"
+    points = short.run(progress=False)
+    whole = short.evaluate({name: points[name] for name in short.axes})
+    assert "<svg" in whole._repr_svg_()
+    assert repr(scattered).startswith("<washer_sweep.Result: map of short, 2 rows,")
+    trace = short.trace({"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100})
+    assert "<svg" in trace._repr_svg_()
+
+
+def test_nothing_of_a_users_is_written_over(short, tmp_path):
+    thesis = tmp_path / "thesis.parquet"
+    thesis.write_text("my thesis")
+    for work in (lambda: short.run(progress=False).save(thesis), lambda: short.run(thesis)):
+        with pytest.raises(OSError, match="cannot be an output"):
+            work()
+    assert thesis.read_text() == "my thesis"
+    with pytest.raises(OSError, match="cannot open"):
+        washer_sweep.read(tmp_path / "none.parquet")
+    with pytest.raises(OSError, match="thesis"):
+        washer_sweep.read(thesis)
+
+
+def test_what_is_evaluated_can_be_saved_and_read(short, tmp_path):
+    file = tmp_path / "points.parquet"
+    found = short.evaluate({"unbalance_mass_kg": [0.11, 0.5], "damping_n_s_per_m": [99, 60]})
+    found.save(file)
+    again = washer_sweep.read(file)
+    assert rows(again) == rows(found)
+    assert again.plan == found.plan
+    assert found.plan["design"]["method"] == "table"
