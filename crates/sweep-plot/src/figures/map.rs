@@ -84,15 +84,17 @@ pub(crate) fn draw(
             ys: y_axis.scale(),
         };
         cells.draw(&mut scene, &panel, &cut.rest);
-        if let Some(layer) = &cells.layer
-            && let Some(level) = &layer.level
-        {
+        let divided = cells.layer.as_ref().and_then(|layer| Some((layer, layer.level.as_ref()?)));
+        if let Some(divided) = divided {
             let room = MOST_POINTS / cuts.cuts.len();
-            cells.draw_line(&mut scene, &panel, (layer, level), &cut.rest, room);
-            cells.name_regions(&mut scene, typeface, &panel, (layer, level), &cut.rest);
+            cells.draw_line(&mut scene, &panel, divided, &cut.rest, room);
         }
         if let Some(overlay) = overlay {
             draw_overlay(&mut scene, &panel, overlay);
+        }
+        // Above the lines, which they interrupt.
+        if let Some(divided) = divided {
+            cells.name_regions(&mut scene, typeface, &panel, divided, &cut.rest);
         }
         let lowest = index + columns >= cuts.cuts.len();
         panel.frame(&mut scene, lowest, column == 0);
