@@ -42,7 +42,8 @@ fn column(csv: &str, name: &str) -> Vec<f64> {
     let mut lines = csv.lines().filter(|line| !line.starts_with('#'));
     let header = lines.next().expect("a header");
     let place = header.split(',').position(|column| column == name).expect("the column is there");
-    lines.map(|row| row.split(',').nth(place).and_then(|v| v.parse().ok()).unwrap()).collect()
+    let value = |row: &str| row.split(',').nth(place).and_then(|value| value.parse().ok());
+    lines.map(|row| value(row).expect("a number")).collect()
 }
 
 #[test]

@@ -220,11 +220,7 @@ impl<T: Lane> Aside for Seen<'_, T> {
             force.see(step, x, dx, inside);
         }
         if let Some(loads) = &mut extras.loads {
-            let length_s = match step {
-                Some((_, length_s)) => Some(length_s),
-                None => None,
-            };
-            loads.see(length_s, x, dx, inside);
+            loads.see(step, x, dx, inside);
         }
         if wanted.clash_time {
             let distance_squared = squared(radial);

@@ -238,12 +238,12 @@ impl<T: Lane> Loads<T> {
         self.stops.iter().map(of_stop).reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
     }
 
-    /// A state whose derivative is `dx`: at the end of a step, of which the length (s) is given, or
-    /// where a leg begins. `counts` says in which lanes it counts.
+    /// A state whose derivative is `dx`: at the end of a step, of which end and length (s) are
+    /// given, or where a leg begins. `counts` says in which lanes it counts.
     #[inline(always)]
     pub(crate) fn see(
         &mut self,
-        length_s: Option<N<T>>,
+        step: Option<(N<T>, N<T>)>,
         x: &[N<T>; STATES],
         dx: &[N<T>; STATES],
         counts: T::Mask,
@@ -252,13 +252,13 @@ impl<T: Lane> Loads<T> {
         for (sample, q) in now.iter_mut().zip(TUB) {
             *sample = Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] };
         }
-        let parts = if length_s.is_some() { self.parts } else { 1 };
+        let parts = if step.is_some() { self.parts } else { 1 };
         let share = 1.0 / f64::from(parts);
         // One loop, for one copy of the laws' code.
         for part in 1..=parts {
             let mut tub = now;
             let mut step_s = None;
-            if let Some(length_s) = length_s {
+            if let Some((_, length_s)) = step {
                 step_s = Some((share * length_s).v());
                 if part < parts {
                     for k in 0..4 {
