@@ -33,6 +33,11 @@ for name in fig10 fig11; do
         -o "$figures/${name}_centre.svg"
 done
 
+# The speeds at which a dwell would be unstable, in the run of Fig. 11.
+"$SWEEP" stability sweeps/fig11.toml --speed 60:350:1 --out results/fig11-stability.parquet
+"$SWEEP" plot results/fig11.parquet --stability results/fig11-stability.parquet \
+    --channel tub_yaw --channel tub_pitch -o "$figures/fig11_tongues.svg"
+
 # Each resonance in the motion that is most of it: late on the way up and on the way down, and at
 # held speeds.
 # shellcheck disable=SC2086
