@@ -132,8 +132,12 @@ impl<T: Real> Coupling<T> {
     #[inline(always)]
     pub(crate) fn new(zero: N<T>, caps: Option<&Caps>) -> Self {
         let Some(caps) = caps else { return Self::Springs };
-        let [bearings_squared, per_hinge_squared] = caps.squares().map(|square| zero.lit(square));
-        Self::MassScaled(Scaling { bearings_squared, per_hinge_squared })
+        // No closure: it would be compiled without the instruction set.
+        let [bearings_squared, per_hinge_squared] = caps.squares();
+        Self::MassScaled(Scaling {
+            bearings_squared: zero.lit(bearings_squared),
+            per_hinge_squared: zero.lit(per_hinge_squared),
+        })
     }
 
     /// Sets the caps of one lane. Bearings that are springs have none.

@@ -2,7 +2,7 @@
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, FIRST_ANGLE, STATES};
-use crate::lanes::InLanes as _;
+use crate::lanes::InLanes;
 use crate::linear::outputs::{LinearMotion, LinearOutputs};
 use crate::linear::rotor_terms::Terms;
 use crate::linear::step::{self, RotorAt, StepConstants};
@@ -113,7 +113,7 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
             coupling,
             machine: Coefficients::splat(zero, &point.machine),
             spin: SpinLanes::splat(zero, &point.stretches[0]),
-            rest: point.rest.map(|y| zero.lit(y)),
+            rest: InLanes::splat(zero, &point.rest.map(N)),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)),
         }
     }
