@@ -200,6 +200,9 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
     }
 }
 
+/// Sums that are kept in registers; AVX2 has sixteen.
+const SUMS: usize = 10;
+
 /// A state some weighted slopes away from another.
 #[inline(always)]
 fn along<T: Lane, const D: usize, const K: usize, const S: usize>(
@@ -210,16 +213,22 @@ fn along<T: Lane, const D: usize, const K: usize, const S: usize>(
     from: usize,
     to: usize,
 ) {
-    let mut reach = [h; DOP853_STAGES];
-    for (k, (_, weight)) in row.iter().enumerate() {
-        reach[k] = (h * *weight).v();
-    }
-    for i in 0..D {
-        let mut x = states[from][i];
-        for (k, (stage, _)) in row.iter().enumerate() {
-            x += reach[k] * slopes[*stage][i];
+    // As many coordinates at once as registers hold sums: each weight is then read once for all of
+    // them, and no sum waits for itself.
+    for first in (0..D).step_by(SUMS) {
+        let mut x = [h; SUMS];
+        for i in 0..SUMS.min(D - first) {
+            x[i] = states[from][first + i];
         }
-        states[to][i] = x;
+        for (stage, weight) in row {
+            let reach = (h * *weight).v();
+            for i in 0..SUMS.min(D - first) {
+                x[i] += reach * slopes[*stage][first + i];
+            }
+        }
+        for i in 0..SUMS.min(D - first) {
+            states[to][first + i] = x[i];
+        }
     }
 }
 

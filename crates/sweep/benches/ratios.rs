@@ -9,8 +9,7 @@ use std::time::Instant;
 
 use lane_ode::Simd;
 use washer_model::{
-    Cases, Dwell, Formula, Machine, Method, ModelKind, Point, Spin, Timing, prepare, respond,
-    simulate,
+    Cases, Dwell, Machine, Method, ModelKind, Point, Spin, Timing, prepare, respond, simulate,
 };
 
 /// As many as the widest lanes hold.
@@ -123,21 +122,25 @@ fn methods(rounds: usize) -> f64 {
     let last = points.len() - 1;
     let corners = [0, 32, last - 32, last].map(|corner| (&points[corner], &spin));
     let cases = Cases::new(corners, end_s);
+    let models = [("nonlinear", ModelKind::Nonlinear), ("linear", ModelKind::Linear)];
     let fast = |accuracy| {
-        let geared =
-            cases.choose(Formula::Dop853, accuracy).expect("the paper's machine has modes");
-        Method::Geared(geared.expect("its bearings are stiff"))
+        models.map(|(_, model)| {
+            let geared = cases.choose(model, accuracy).expect("the paper's machine has modes");
+            Method::Geared(geared.expect("its bearings are stiff"))
+        })
     };
     let methods = [
-        (format!("rk4, {STEP_S:e} s"), Method::Rk4 { step_s: STEP_S }),
+        (format!("rk4, {STEP_S:e} s"), [Method::Rk4 { step_s: STEP_S }; 2]),
         ("rk4-mass-scaled, 1e-3".to_owned(), fast(1e-3)),
         ("rk4-mass-scaled, 1e-6".to_owned(), fast(1e-6)),
     ];
-    let models = [("nonlinear", ModelKind::Nonlinear), ("linear", ModelKind::Linear)];
     let subjects: Vec<_> = methods
         .iter()
-        .flat_map(|(name, method)| {
-            models.map(|(model, kind)| (format!("{model}, {name}"), kind, *method))
+        .flat_map(|(name, by_model)| {
+            core::array::from_fn::<_, 2, _>(|i| {
+                let (model, kind) = models[i];
+                (format!("{model}, {name}"), kind, by_model[i])
+            })
         })
         .collect();
     let points: Vec<_> = points.iter().collect();

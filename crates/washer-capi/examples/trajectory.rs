@@ -8,8 +8,7 @@ use std::time::Instant;
 
 use lane_ode::{Simd, Tolerance};
 use washer_model::{
-    Cases, Channel, Formula, Gear, Machine, Method, ModelKind, Point, Spin, Timing, prepare,
-    simulate,
+    Cases, Channel, Gear, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate,
 };
 
 const END_S: f64 = 50.0;
@@ -55,7 +54,7 @@ fn method(words: &[&str], point: &Point, spin: &Spin) -> Result<(Method, &'stati
         ["rk4", step] => Ok((Method::Rk4 { step_s: number(step)? }, "RK4")),
         ["rk4-mass-scaled", accuracy] => {
             let geared =
-                Cases::new([(point, spin)], END_S).choose(Formula::Dop853, number(accuracy)?);
+                Cases::new([(point, spin)], END_S).choose(ModelKind::Nonlinear, number(accuracy)?);
             let geared = geared.map_err(|error| Failed::Because(error.to_string()))?;
             let geared =
                 geared.ok_or_else(|| Failed::Because("plain RK4 is cheaper".to_owned()))?;

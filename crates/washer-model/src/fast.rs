@@ -48,6 +48,7 @@ use crate::modes::{
 };
 use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
+use crate::run::ModelKind;
 
 /// Modes of the suspension: yaw, pitch, two translations.
 pub(crate) const SUSPENSION_MODES: usize = 4;
@@ -336,17 +337,17 @@ impl<'a> Cases<'a> {
         self.cases.iter().map(|case| case.as_ref().map_err(|none| *none)).collect()
     }
 
-    /// The longest steps of a formula, with their caps, at which the relative error of amplitudes
+    /// The longest steps of a model's formula, with their caps, at which the relative error of amplitudes
     /// should be below `accuracy` at all points; `None` if plain RK4 at its longest stable step is
     /// cheaper.
     ///
     /// # Errors
     /// [`NoModes`] of a machine that has none.
-    pub fn choose(&self, formula: Formula, accuracy: f64) -> Result<Option<Geared>, NoModes> {
-        let Some((mut search, trial)) = self.choose_top(formula, accuracy)? else {
+    pub fn choose(&self, model: ModelKind, accuracy: f64) -> Result<Option<Geared>, NoModes> {
+        let Some((mut search, trial)) = self.choose_top(model.formula(), accuracy)? else {
             return Ok(None);
         };
-        let mut geared = Geared::steady(formula, trial.step_s, trial.caps);
+        let mut geared = Geared::steady(trial.step_s, trial.caps);
         if self.are_nonsmooth() {
             return Ok(Some(geared));
         }
@@ -370,11 +371,11 @@ impl<'a> Cases<'a> {
     /// As there.
     pub fn choose_steady(
         &self,
-        formula: Formula,
+        model: ModelKind,
         accuracy: f64,
     ) -> Result<Option<Geared>, NoModes> {
-        let chosen = self.choose_top(formula, accuracy)?;
-        Ok(chosen.map(|(_, trial)| Geared::steady(formula, trial.step_s, trial.caps)))
+        let chosen = self.choose_top(model.formula(), accuracy)?;
+        Ok(chosen.map(|(_, trial)| Geared::steady(trial.step_s, trial.caps)))
     }
 
     /// The choice for the fastest drum, and the search that found it.
@@ -405,11 +406,11 @@ impl<'a> Cases<'a> {
     ///
     /// # Errors
     /// [`NoModes`] of a machine that has none.
-    pub fn expected_error(&self, geared: &Geared) -> Result<f64, NoModes> {
+    pub fn expected_error(&self, model: ModelKind, geared: &Geared) -> Result<f64, NoModes> {
         let Gear { step_s, caps, .. } = *geared.top();
         let mut error = 0.0_f64;
         for case in self.with_modes()? {
-            error = error.max(case.error_of_truncation(geared.formula, step_s));
+            error = error.max(case.error_of_truncation(model.formula(), step_s));
             let state = &case.turning[TOP];
             let of_bearings = case.motions_with_capped_bearings(state, &caps)?;
             let of_caps = case.error_of_caps(state, &of_bearings, &caps, state.speed_rad_per_s);
@@ -519,7 +520,7 @@ mod tests {
         let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
         let ready: Vec<_> = points.iter().flatten().map(|point| (point, &spin)).collect();
         let cases = Cases::new(ready, timing.end_s);
-        (cases.choose(Formula::Dop853, 1e-3).unwrap().unwrap(), cases.plain_step_s())
+        (cases.choose(ModelKind::Nonlinear, 1e-3).unwrap().unwrap(), cases.plain_step_s())
     }
 
     #[test]
@@ -549,7 +550,7 @@ mod tests {
             work(&Cases::until(ready, timing.end_s, &is_stopped));
             asked.get()
         };
-        let choose = |cases: &Cases<'_>| cases.choose(Formula::Dop853, 1e-3).unwrap();
+        let choose = |cases: &Cases<'_>| cases.choose(ModelKind::Nonlinear, 1e-3).unwrap();
         let whole = ask_until(u32::MAX, &|cases| assert!(choose(cases).is_some()));
         assert!(whole > 24, "{whole}");
         assert_eq!(ask_until(3, &|cases| assert_eq!(cases.cases.len(), 2)), 3);
@@ -567,9 +568,9 @@ mod tests {
         let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
         let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
         let cases = Cases::new(points.iter().flatten().map(|point| (point, &spin)), timing.end_s);
-        let geared = cases.choose(Formula::Dop853, 1e-3).unwrap().unwrap();
-        let steady = cases.choose_steady(Formula::Dop853, 1e-3).unwrap().unwrap();
-        assert_eq!(steady, Geared::steady(geared.formula, geared.top().step_s, geared.top().caps));
+        let geared = cases.choose(ModelKind::Nonlinear, 1e-3).unwrap().unwrap();
+        let steady = cases.choose_steady(ModelKind::Nonlinear, 1e-3).unwrap().unwrap();
+        assert_eq!(steady, Geared::steady(geared.top().step_s, geared.top().caps));
     }
 
     #[test]

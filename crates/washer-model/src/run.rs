@@ -15,7 +15,7 @@ pub use extras::{Extra, Wanted};
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
-use crate::fast::geared::{Formula, Geared};
+use crate::fast::geared::{Formula, Geared, Precision};
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::outputs::{RADIAL, squared};
 use crate::point::{PlannedLeg, Point};
@@ -45,6 +45,23 @@ pub enum Method {
     Rodas5p(Tolerance),
 }
 
+impl Method {
+    /// Trajectories of a model side by side on the widest lanes.
+    #[must_use]
+    pub const fn lanes(&self, model: ModelKind) -> usize {
+        if self.is_single(model) { MAX_LANES } else { MAX_LANES / 2 }
+    }
+
+    /// Whether a model's trajectories are in single precision.
+    #[must_use]
+    pub const fn is_single(&self, model: ModelKind) -> bool {
+        matches!(
+            (model, self),
+            (ModelKind::Linear, Self::Geared(Geared { linear_precision: Precision::Single, .. }))
+        )
+    }
+}
+
 /// Which of the two models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ModelKind {
@@ -52,6 +69,21 @@ pub enum ModelKind {
     Nonlinear,
     /// Its first-order expansion.
     Linear,
+}
+
+impl ModelKind {
+    /// The formula of its steps where modes are capped.
+    ///
+    /// Most of the linear model's time goes into its matrices at every instant that a formula asks
+    /// for: two a step by order 4, eleven by order 8. So order 4 takes less time, and its shorter
+    /// steps bear caps twice as high.
+    #[must_use]
+    pub const fn formula(self) -> Formula {
+        match self {
+            Self::Nonlinear => Formula::Dop853,
+            Self::Linear => Formula::Rk4,
+        }
+    }
 }
 
 /// First step that an adaptive method tries.
@@ -134,8 +166,8 @@ pub fn simulate_until(
         return Some((Vec::new(), Vec::new()));
     }
     let stepper = match method {
-        Method::Rk4 { .. } | Method::Geared(Geared { formula: Formula::Rk4, .. }) => Stepper::Rk4,
-        Method::Geared(Geared { formula: Formula::Dop853, .. }) => Stepper::Dop853,
+        Method::Rk4 { .. } => Stepper::Plain,
+        Method::Geared(_) => Stepper::Capped,
         Method::Dopri5(tolerance) => Stepper::Dopri5(*tolerance),
         Method::Rodas5p(tolerance) => {
             return stiff::simulate(model, tolerance, points, wanted, stop);
@@ -144,14 +176,16 @@ pub fn simulate_until(
     let order = Order { points, method, stepper, wanted, stop };
     match model {
         ModelKind::Nonlinear => simd.dispatch(Simulate::<OfNonlinear>(order, PhantomData)),
+        ModelKind::Linear if method.is_single(model) => simd.dispatch_single(SimulateSingle(order)),
         ModelKind::Linear => simd.dispatch(Simulate::<OfLinear>(order, PhantomData)),
     }
 }
 
 /// The integrators whose lanes are trajectories.
 enum Stepper {
-    Rk4,
-    Dop853,
+    Plain,
+    /// By the model's formula for capped modes.
+    Capped,
     Dopri5(Tolerance),
 }
 
@@ -159,6 +193,7 @@ enum Stepper {
 pub(crate) trait Family {
     type Over<T: Lane>: Model<T>;
     const KIND: ModelKind;
+    const FORMULA: Formula = Self::KIND.formula();
 }
 
 pub(crate) enum OfNonlinear {}
@@ -191,11 +226,27 @@ impl<F: Family> Kernel for Simulate<'_, F> {
         let Order { points, method, stepper, wanted, stop } = self.0;
         let mut run = Run::<T, F::Over<T>>::new(N(zero), points, method, stop);
         run.record(N(zero), wanted, F::KIND);
-        match stepper {
-            Stepper::Rk4 => rk4::integrate(zero, &mut run),
-            Stepper::Dop853 => dop853::integrate(zero, &mut run),
-            Stepper::Dopri5(tolerance) => dopri5::integrate(zero, &mut run, &tolerance),
+        match (stepper, F::FORMULA) {
+            (Stepper::Plain, _) | (Stepper::Capped, Formula::Rk4) => rk4::integrate(zero, &mut run),
+            (Stepper::Capped, Formula::Dop853) => dop853::integrate(zero, &mut run),
+            (Stepper::Dopri5(tolerance), _) => dopri5::integrate(zero, &mut run, &tolerance),
         }
+        run.recorded()
+    }
+}
+
+/// The linear model with capped modes, in single precision.
+struct SimulateSingle<'a>(Order<'a>);
+
+impl Kernel for SimulateSingle<'_> {
+    type Output = Option<(Vec<Record>, Vec<Extra>)>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
+        let Order { points, method, wanted, stop, .. } = self.0;
+        let mut run = Run::<T, Linear<T>>::new(N(zero), points, method, stop);
+        run.record(N(zero), wanted, ModelKind::Linear);
+        rk4::integrate(zero, &mut run);
         run.recorded()
     }
 }
@@ -217,7 +268,7 @@ struct LaneState {
 }
 
 /// The task: every point through one model.
-struct Run<'a, T, M> {
+struct Run<'a, T: Lane, M> {
     model: M,
     points: &'a [&'a Point],
     stop: Stop<'a>,
@@ -364,7 +415,7 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     #[inline(always)]
     fn show(
         &mut self,
-        step: Option<(N<T>, N<T>)>,
+        step: Option<(N<T::Wide>, N<T>)>,
         (x, dx): (&[N<T>; STATES], &[N<T>; STATES]),
         radial: &[Sample<T>; RADIAL],
         channels: &[Sample<T>; CHANNELS],

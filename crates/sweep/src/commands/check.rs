@@ -14,6 +14,7 @@ use crate::method::Steps;
 use crate::plan::{Axis, AxisValues, Plan};
 use crate::progress::duration;
 use crate::threads;
+use washer_model::ModelKind;
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[
@@ -162,8 +163,12 @@ fn method(plan: &Plan, ladder: &Ladder) -> String {
         Steps::Explicit => ": steps as it needs".to_owned(),
         Steps::Implicit => ": steps as it needs, one trajectory at a time".to_owned(),
         Steps::Checked(_) => {
-            let rungs: Vec<String> =
-                ladder.rungs.iter().skip(1).map(|rung| rung.to_string()).collect();
+            let rungs: Vec<String> = ladder
+                .rungs
+                .iter()
+                .skip(1)
+                .map(|rung| rung.describe(ModelKind::Nonlinear))
+                .collect();
             let why = ladder.held_back.as_ref().map(|why| format!("\n            {why}"));
             let rungs = rungs.join("\n            then ");
             format!(", until two rungs agree: {rungs}{}", why.unwrap_or_default())

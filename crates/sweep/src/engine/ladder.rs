@@ -16,10 +16,8 @@
 //!
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
-use std::fmt;
-
 use lane_ode::dop853::DOP853_STABILITY_LIMIT;
-use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind};
+use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind, Precision};
 
 use crate::method::{Level, REFERENCE_SHARE, SHORTEST_AT_CORNERS};
 
@@ -37,20 +35,22 @@ const REFERENCE_CONTRACTION: f64 = 4.0;
 /// A finest rung is climbed if it costs less than this share of the reference.
 const WORTH_IT: f64 = 0.5;
 
-/// The formula of a model's capped rungs, and for what errors they are chosen, in parts of the
-/// accuracy. The first one only shows the error of the second.
+/// For what errors a model's capped rungs are chosen, in parts of the accuracy. The first one only
+/// shows the error of the second.
 ///
 /// The linear model amplifies nothing: its first rung may be coarser, and a third is hardly ever
 /// asked for. Its second holds the row, and what a capped hinge does to motions that do not turn
-/// with the drum is more than the rule expects where a run-up is short: ten times was seen. Most of
-/// its time goes into its matrices at every instant that a formula asks for: two a step by order 4,
-/// eleven by order 8. So order 4 takes less time, and its shorter steps bear caps twice as high.
-const fn aims(model: ModelKind) -> (Formula, &'static [f64]) {
+/// with the drum is more than the rule expects where a run-up is short: ten times was seen.
+const fn aims(model: ModelKind) -> &'static [f64] {
     match model {
-        ModelKind::Nonlinear => (Formula::Dop853, &[10.0, 0.15, 0.01]),
-        ModelKind::Linear => (Formula::Rk4, &[100.0, 0.12, 0.01]),
+        ModelKind::Nonlinear => &[10.0, 0.15, 0.01],
+        ModelKind::Linear => &[100.0, 0.12, 0.01],
     }
 }
+
+/// The least accuracy at which the linear model's quick rungs are in single precision: ten times
+/// what rounding was seen to leave, 6e-6.
+const FINEST_IN_SINGLE: f64 = 1e-4;
 
 /// By how much the finest capped rung's steps are shorter than those of the rung before.
 const FINEST_STEP: f64 = 2.5;
@@ -102,30 +102,31 @@ pub(crate) struct Rung {
     believed_to: f64,
 }
 
-impl fmt::Display for Rung {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Rung {
+    /// The rung in words, as one of this model's.
+    pub(crate) fn describe(&self, model: ModelKind) -> String {
         let name = self.level.name();
         match &self.method {
             Method::Geared(geared) => {
                 let Gear { step_s, caps, .. } = geared.top();
-                let order = match geared.formula {
+                let order = match model.formula() {
                     Formula::Rk4 => 4,
                     Formula::Dop853 => 8,
                 };
                 let bearings = caps.bearings_rad_per_s;
-                write!(
-                    f,
-                    "{name} (order {order}, step {:.3} ms, bearings capped at {bearings:.0}",
+                let hinge = match caps.hinge_rad_per_s {
+                    Some(hinge) => format!(" and hinge at {hinge:.0}"),
+                    None => String::new(),
+                };
+                format!(
+                    "{name} (order {order}, step {:.3} ms, bearings capped at {bearings:.0}{hinge} \
+                     rad/s)",
                     1e3 * step_s
-                )?;
-                match caps.hinge_rad_per_s {
-                    Some(hinge) => write!(f, " and hinge at {hinge:.0} rad/s)"),
-                    None => write!(f, " rad/s)"),
-                }
+                )
             }
-            Method::Rk4 { step_s } => write!(f, "{name} (step {:.3} ms)", 1e3 * step_s),
+            Method::Rk4 { step_s } => format!("{name} (step {:.3} ms)", 1e3 * step_s),
             // Not on the fast method's ladder.
-            Method::Dopri5(_) | Method::Rodas5p(_) => write!(f, "{name}"),
+            Method::Dopri5(_) | Method::Rodas5p(_) => name.to_owned(),
         }
     }
 }
@@ -205,30 +206,33 @@ fn too_fast(cases: &Cases<'_>) -> Option<String> {
 /// alone, it is what the rule expects. Corners without an equilibrium or without modes are rows
 /// that say so; the rest climbs by plain RK4.
 fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
-    let (formula, aims) = aims(model);
     let mut chosen: Vec<(Level, Geared)> = Vec::new();
-    for (level, aim) in [Level::Fast, Level::Fast, Level::Fine].into_iter().zip(aims) {
+    for (level, aim) in [Level::Fast, Level::Fast, Level::Fine].into_iter().zip(aims(model)) {
         // The nonlinear model has one gear after the first: what instability amplifies later is
         // small while the drum is slow, and a window may end early.
         let found = match chosen.is_empty() || model == ModelKind::Linear {
-            true => cases.choose(formula, aim * accuracy),
-            false => cases.choose_steady(formula, aim * accuracy),
+            true => cases.choose(model, aim * accuracy),
+            false => cases.choose_steady(model, aim * accuracy),
         };
         let Ok(Some(geared)) = found else { break };
-        chosen.push((level, geared));
+        let is_quick = level == Level::Fast && accuracy >= FINEST_IN_SINGLE;
+        let linear_precision = if is_quick { Precision::Single } else { Precision::Double };
+        chosen.push((level, Geared { linear_precision, ..geared }));
     }
     let plain_evaluations_per_s = Formula::Rk4.evaluations_per_s(reference_step_s(cases));
-    let finest = chosen
-        .last()
-        .filter(|(_, last)| last.formula == Formula::Dop853)
-        .map(|(_, last)| refined(last));
-    let finest = finest.filter(|it| it.evaluations_per_s() < WORTH_IT * plain_evaluations_per_s);
+    let evaluations_per_s =
+        |geared: &Geared| model.formula().evaluations_per_s(geared.top().step_s);
+    let finest =
+        chosen.last().filter(|_| model == ModelKind::Nonlinear).map(|(_, last)| refined(last));
+    let finest = finest.filter(|it| evaluations_per_s(it) < WORTH_IT * plain_evaluations_per_s);
     chosen.extend(finest.map(|finest| (Level::Finest, finest)));
     let rung = |(place, (level, geared)): (usize, &(Level, Geared))| {
         let before = place.checked_sub(1).map(|before| &chosen[before].1);
         let contraction = before.map_or(1.0, |before| match model {
             ModelKind::Nonlinear => reserve(place) * geared.share_of_error(before),
-            ModelKind::Linear => expected_share(cases, before, geared).max(LEAST_EXPECTED_SHARE),
+            ModelKind::Linear => {
+                expected_share(cases, model, before, geared).max(LEAST_EXPECTED_SHARE)
+            }
         });
         let contraction = contraction.clamp(BEST_CONTRACTION, 1.0);
         Rung {
@@ -242,9 +246,9 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
 }
 
 /// Share that the rule expects to be left of a coarser choice's error.
-fn expected_share(cases: &Cases<'_>, coarser: &Geared, finer: &Geared) -> f64 {
+fn expected_share(cases: &Cases<'_>, model: ModelKind, coarser: &Geared, finer: &Geared) -> f64 {
     let [coarser, finer] =
-        [coarser, finer].map(|geared| cases.expected_error(geared).unwrap_or(f64::INFINITY));
+        [coarser, finer].map(|geared| cases.expected_error(model, geared).unwrap_or(f64::INFINITY));
     if finer.is_finite() { finer / coarser } else { 1.0 }
 }
 

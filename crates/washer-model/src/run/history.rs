@@ -8,7 +8,7 @@
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
-use crate::fast::geared::{Formula, Geared};
+use crate::fast::geared::Formula;
 use crate::machine::spin::stretch_at;
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::squared;
@@ -171,12 +171,11 @@ impl<F: Family> ScalarKernel for Sample<'_, F> {
             failure: None,
         };
         match self.method {
-            Method::Rk4 { .. } | Method::Geared(Geared { formula: Formula::Rk4, .. }) => {
-                rk4::integrate(0.0, &mut sampling);
-            }
-            Method::Geared(Geared { formula: Formula::Dop853, .. }) => {
-                dop853::integrate(0.0, &mut sampling);
-            }
+            Method::Rk4 { .. } => rk4::integrate(0.0, &mut sampling),
+            Method::Geared(_) => match F::FORMULA {
+                Formula::Rk4 => rk4::integrate(0.0, &mut sampling),
+                Formula::Dop853 => dop853::integrate(0.0, &mut sampling),
+            },
             Method::Dopri5(tolerance) => dopri5::integrate(0.0, &mut sampling, tolerance),
             Method::Rodas5p(tolerance) => {
                 let mut task =

@@ -2,7 +2,7 @@
 
 use super::instruments::{EVERYTHING, paper, random_machine, random_spin};
 use crate::{
-    Caps, Extra, Formula, Gear, Geared, Machine, Method, ModelKind, Point, Record, Spin, Timing,
+    Caps, Extra, Gear, Geared, Machine, Method, ModelKind, Point, Precision, Record, Spin, Timing,
     Wanted, prepare, simulate_until, simulate_with,
 };
 use core::cell::Cell;
@@ -16,14 +16,14 @@ const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
 const CAPS: Caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: Some(1200.0) };
 /// Two gears, of which spins of all kinds see both.
 const GEARED: Geared = {
-    let mut geared = Geared::steady(Formula::Rk4, 1e-3, CAPS);
+    let mut geared = Geared::steady(1e-3, CAPS);
     geared.gears[0] = Gear { up_to_rad_per_s: 15.0, step_s: 1.3e-3, caps: CAPS };
     geared
 };
 const METHODS: [Method; 4] = [
     Method::Rk4 { step_s: 1e-4 },
     Method::Geared(GEARED),
-    Method::Geared(Geared::steady(Formula::Dop853, 2e-3, CAPS)),
+    Method::Geared(Geared { linear_precision: Precision::Single, ..GEARED }),
     Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
 
@@ -177,7 +177,7 @@ fn a_leg_is_cut_where_no_bit_shows_it() {
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let all: Vec<_> = points.iter().collect();
-    let dop853 = Method::Geared(Geared::steady(Formula::Dop853, 2e-5, CAPS));
+    let dop853 = Method::Geared(Geared::steady(2e-5, CAPS));
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853] {
         for model in MODELS {
             let together = simulate_with(simd, model, &method, &all, EVERYTHING);
@@ -201,7 +201,7 @@ fn a_stop_is_answered_within_a_leg_by_every_method() {
     let scenario = (paper(0.4, 90.0), Spin::Ramp { peak_rpm: 350.0, ramp_s: 1.0 });
     let point = prepare(Simd::best(), &[scenario], &timing).remove(0).unwrap();
     let tolerance = Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000 };
-    let dop853 = Method::Geared(Geared::steady(Formula::Dop853, 2e-5, CAPS));
+    let dop853 = Method::Geared(Geared::steady(2e-5, CAPS));
     let stiff = Method::Rodas5p(tolerance);
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853, Method::Dopri5(tolerance), stiff] {
         for model in MODELS {
