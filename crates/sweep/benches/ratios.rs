@@ -9,7 +9,8 @@ use std::time::Instant;
 
 use lane_ode::Simd;
 use washer_model::{
-    Cases, Dwell, Machine, Method, ModelKind, Point, Spin, Timing, prepare, respond, simulate,
+    BumpStop, Bushing, Cases, Dwell, Machine, Method, ModelKind, Point, Spin, Timing, prepare,
+    respond, simulate,
 };
 
 /// As many as the widest lanes hold.
@@ -26,6 +27,7 @@ fn main() {
     threads(rounds, once_s);
     boundaries(rounds);
     dwells(rounds, once_s / 1287.0);
+    elements(rounds);
 }
 
 fn median(values: &[f64]) -> f64 {
@@ -287,4 +289,89 @@ fn threads(rounds: usize, once_s: f64) {
         medians[0] / medians[1],
         medians[0] / once_s
     );
+}
+
+/// What each element of a suspension adds to a step, by machines that have two friction dampers,
+/// three stops, a gasket or four stiffening springs, with the numbers of
+/// `docs/examples/friction.toml`; what stiffening springs have is assumed.
+fn elements(rounds: usize) {
+    let friction = |machine: &mut Machine| {
+        for damper in &mut machine.dampers {
+            damper.friction_n = 50.0;
+            damper.friction_speed_m_per_s = 0.01;
+            damper.friction_linear_speed_m_per_s = Some(0.15);
+        }
+    };
+    let stops = |machine: &mut Machine| {
+        let places = [
+            ([0.35, 0.0, 0.28], [0.0, 0.0, 1.0], 0.02),
+            ([0.35, 0.0, -0.28], [0.0, 0.0, -1.0], 0.02),
+            ([0.3, -0.28, 0.0], [0.0, -1.0, 0.0], 0.03),
+        ];
+        machine.stops = places
+            .map(|(tub_m, direction, clearance_m)| BumpStop {
+                tub_m,
+                direction,
+                clearance_m,
+                stiffness_n_per_m: 4e4,
+                damping_n_s_per_m: 100.0,
+                softness_m: 1e-4,
+            })
+            .to_vec();
+    };
+    let gasket = |machine: &mut Machine| {
+        machine.bushings = vec![Bushing {
+            tub_m: [0.45, 0.0, 0.0],
+            stiffness_n_per_m: [0.0, 600.0, 600.0],
+            cubic_n_per_m3: [0.0, 5e6, 5e6],
+            damping_n_s_per_m: [0.0, 12.0, 12.0],
+        }];
+    };
+    let stiffening = |machine: &mut Machine| {
+        machine.springs.iter_mut().for_each(|spring| spring.cubic_n_per_m3 = 2e5);
+    };
+    type Fit<'a> = &'a dyn Fn(&mut Machine);
+    let subjects: [(&str, &[Fit<'_>]); 6] = [
+        ("none", &[]),
+        ("two friction dampers", &[&friction]),
+        ("three stops", &[&stops]),
+        ("gasket", &[&gasket]),
+        ("four stiffening springs", &[&stiffening]),
+        ("all of these", &[&friction, &stops, &gasket, &stiffening]),
+    ];
+    let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
+    let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+    let machines = subjects.map(|(_, fits)| {
+        let scenarios: Vec<_> = (0..TRAJECTORIES)
+            .map(|i| {
+                let mut machine = Machine::paper();
+                machine.unbalance.mass_kg = 0.1 + 0.3 * i as f64 / TRAJECTORIES as f64;
+                fits.iter().for_each(|fit| fit(&mut machine));
+                (machine, spin.clone())
+            })
+            .collect();
+        prepare(Simd::best(), &scenarios, &timing)
+    });
+    let mut times = vec![Vec::new(); subjects.len()];
+    for _ in 0..rounds {
+        for (points, times) in machines.iter().zip(&mut times) {
+            let points: Vec<&Point> = points
+                .iter()
+                .map(|point| point.as_ref().expect("every machine here has an equilibrium"))
+                .collect();
+            let begin = Instant::now();
+            for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+                let records = simulate(Simd::best(), model, &Method::Rk4 { step_s: 2e-4 }, &points);
+                assert!(records.iter().all(|record| record.failure.is_none()));
+            }
+            times.push(begin.elapsed().as_secs_f64() * 1e3 / TRAJECTORIES as f64);
+        }
+    }
+    println!("One core, both models by RK4 at 2e-4 s, machines with elements:\n");
+    let names = subjects.map(|(name, _)| name.to_owned());
+    let medians = table("ms a point", &names, &times);
+    println!("| against a machine without them | |\n|---|---|");
+    for (name, median) in names.iter().zip(&medians).skip(1) {
+        println!("| {name} | {:.2} |", median / medians[0]);
+    }
 }
