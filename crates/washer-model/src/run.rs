@@ -15,7 +15,7 @@ pub use extras::{Extra, Wanted};
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
-use crate::fast::geared::{Formula, Geared, Precision};
+use crate::fast::geared::{Formula, Geared};
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::outputs::{RADIAL, squared};
 use crate::point::{PlannedLeg, Point};
@@ -43,23 +43,6 @@ pub enum Method {
     /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others.
     /// One trajectory at a time.
     Rodas5p(Tolerance),
-}
-
-impl Method {
-    /// Trajectories of a model side by side on the widest lanes.
-    #[must_use]
-    pub const fn lanes(&self, model: ModelKind) -> usize {
-        if self.is_single(model) { MAX_LANES } else { MAX_LANES / 2 }
-    }
-
-    /// Whether a model's trajectories are in single precision.
-    #[must_use]
-    pub const fn is_single(&self, model: ModelKind) -> bool {
-        matches!(
-            (model, self),
-            (ModelKind::Linear, Self::Geared(Geared { linear_precision: Precision::Single, .. }))
-        )
-    }
 }
 
 /// Which of the two models.
@@ -176,7 +159,6 @@ pub fn simulate_until(
     let order = Order { points, method, stepper, wanted, stop };
     match model {
         ModelKind::Nonlinear => simd.dispatch(Simulate::<OfNonlinear>(order, PhantomData)),
-        ModelKind::Linear if method.is_single(model) => simd.dispatch_single(SimulateSingle(order)),
         ModelKind::Linear => simd.dispatch(Simulate::<OfLinear>(order, PhantomData)),
     }
 }
@@ -235,22 +217,6 @@ impl<F: Family> Kernel for Simulate<'_, F> {
     }
 }
 
-/// The linear model with capped modes, in single precision.
-struct SimulateSingle<'a>(Order<'a>);
-
-impl Kernel for SimulateSingle<'_> {
-    type Output = Option<(Vec<Record>, Vec<Extra>)>;
-
-    #[inline(always)]
-    fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let Order { points, method, wanted, stop, .. } = self.0;
-        let mut run = Run::<T, Linear<T>>::new(N(zero), points, method, stop);
-        run.record(N(zero), wanted, ModelKind::Linear);
-        rk4::integrate(zero, &mut run);
-        run.recorded()
-    }
-}
-
 const EMPTY: Record = Record {
     failure: None,
     amplitudes: [f64::NAN; CHANNELS],
@@ -268,7 +234,7 @@ struct LaneState {
 }
 
 /// The task: every point through one model.
-struct Run<'a, T: Lane, M> {
+struct Run<'a, T, M> {
     model: M,
     points: &'a [&'a Point],
     stop: Stop<'a>,
@@ -415,7 +381,7 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     #[inline(always)]
     fn show(
         &mut self,
-        step: Option<(N<T::Wide>, N<T>)>,
+        step: Option<(N<T>, N<T>)>,
         (x, dx): (&[N<T>; STATES], &[N<T>; STATES]),
         radial: &[Sample<T>; RADIAL],
         channels: &[Sample<T>; CHANNELS],

@@ -17,7 +17,7 @@
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
 use lane_ode::dop853::DOP853_STABILITY_LIMIT;
-use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind, Precision};
+use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind};
 
 use crate::method::{Level, REFERENCE_SHARE, SHORTEST_AT_CORNERS};
 
@@ -47,10 +47,6 @@ const fn aims(model: ModelKind) -> &'static [f64] {
         ModelKind::Linear => &[100.0, 0.12, 0.01],
     }
 }
-
-/// The least accuracy at which the linear model's quick rungs are in single precision: ten times
-/// what rounding was seen to leave, 6e-6.
-const FINEST_IN_SINGLE: f64 = 1e-4;
 
 /// By how much the finest capped rung's steps are shorter than those of the rung before.
 const FINEST_STEP: f64 = 2.5;
@@ -215,9 +211,7 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
             false => cases.choose_steady(model, aim * accuracy),
         };
         let Ok(Some(geared)) = found else { break };
-        let is_quick = level == Level::Fast && accuracy >= FINEST_IN_SINGLE;
-        let linear_precision = if is_quick { Precision::Single } else { Precision::Double };
-        chosen.push((level, Geared { linear_precision, ..geared }));
+        chosen.push((level, geared));
     }
     let plain_evaluations_per_s = Formula::Rk4.evaluations_per_s(reference_step_s(cases));
     let evaluations_per_s =

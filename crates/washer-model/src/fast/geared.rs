@@ -77,22 +77,9 @@ pub struct Gear {
 /// How many gears there are.
 pub(crate) const GEARS: usize = 3;
 
-/// The numbers that trajectories are made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Precision {
-    /// 53 bits.
-    Double,
-    /// 24 bits, but for time and the drum's angle: twice as many lanes.
-    Single,
-}
-
 /// Steps and caps of a model's formula, by gears.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geared {
-    /// The numbers of the linear model's trajectories. The nonlinear model's are double: weights of
-    /// up to 43 in its formula multiply rounding errors, which left amplitudes off by 1e-4, and by
-    /// up to 7e-3 where motions are amplified; the linear model's by 6e-6 at most.
-    pub linear_precision: Precision,
     /// From the slowest drum to the fastest; the last has no upper speed.
     pub gears: [Gear; GEARS],
 }
@@ -101,10 +88,7 @@ impl Geared {
     /// The same step and caps at every speed.
     #[must_use]
     pub const fn steady(step_s: f64, caps: Caps) -> Self {
-        Self {
-            linear_precision: Precision::Double,
-            gears: [Gear { up_to_rad_per_s: f64::INFINITY, step_s, caps }; GEARS],
-        }
+        Self { gears: [Gear { up_to_rad_per_s: f64::INFINITY, step_s, caps }; GEARS] }
     }
 
     /// The gear of the fastest drum.

@@ -2,8 +2,8 @@
 
 use super::instruments::{EVERYTHING, paper, random_machine, random_spin};
 use crate::{
-    Caps, Extra, Gear, Geared, Machine, Method, ModelKind, Point, Precision, Record, Spin, Timing,
-    Wanted, prepare, simulate_until, simulate_with,
+    Caps, Extra, Gear, Geared, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted,
+    prepare, simulate_until, simulate_with,
 };
 use core::cell::Cell;
 use lane_ode::{STEPS_AT_ONCE, Simd, Tolerance};
@@ -20,10 +20,9 @@ const GEARED: Geared = {
     geared.gears[0] = Gear { up_to_rad_per_s: 15.0, step_s: 1.3e-3, caps: CAPS };
     geared
 };
-const METHODS: [Method; 4] = [
+const METHODS: [Method; 3] = [
     Method::Rk4 { step_s: 1e-4 },
     Method::Geared(GEARED),
-    Method::Geared(Geared { linear_precision: Precision::Single, ..GEARED }),
     Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
 
