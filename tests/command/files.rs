@@ -182,6 +182,22 @@ fn traces_beside_a_result_are_named_as_it_is() {
     }
 }
 
+#[test]
+fn kept_traces_are_the_trajectories_of_their_rows() {
+    let home = fresh_home();
+    let fast = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[time]\nend_s = 2\n\
+                [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.2, 0.3]\n";
+    fs::write(home.path("fast.toml"), fast).expect("the grid is written");
+    let run = home.sweep(&["run", "fast.toml", "--keep-traces", "--out", "x.parquet"]);
+    assert!(run.status.success(), "{}", said(&run));
+    assert!(said(&run).contains("rows by method: 3 fast"), "{}", said(&run));
+    for point in 0..3 {
+        let bytes = fs::read(home.path(&format!("x.traces/point-{point}.parquet")));
+        let bytes = bytes.expect("the point has a trace");
+        assert!(String::from_utf8_lossy(&bytes).contains(r#""row":"fast""#), "point {point}");
+    }
+}
+
 /// A bit of this file is flipped, read by `look`, and flipped back.
 fn with_flipped_bit<T>(path: &Path, at: u64, bit: u8, look: impl FnOnce() -> T) -> T {
     let flip = || {

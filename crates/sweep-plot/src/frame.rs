@@ -12,6 +12,11 @@ pub(crate) const LABEL_SIZE: f64 = 16.0;
 /// Numbers at ticks.
 pub(crate) const TICK_SIZE: f64 = 14.5;
 
+/// How far the numbers at an x axis reach beyond its ends at most, px.
+const OVERHANG: f64 = 7.0;
+/// Least room between two of them, px.
+const BETWEEN_NUMBERS: f64 = 6.0;
+
 /// A rectangle with an x and a y scale.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Panel {
@@ -72,20 +77,62 @@ impl Panel {
         scene.line(lines, Stroke::solid(FAINT, 1.0));
     }
 
+    /// The numbers at the x axis, and where their middles are, px: as many as have room beside each
+    /// other, at every tick, every second one and so on. Those at the ends do not reach into the
+    /// panels beside this one.
+    fn numbers_that_fit(&self, typeface: &Typeface) -> Vec<(f64, String)> {
+        let numbers = self.x_ticks().into_iter().map(|tick| {
+            let width = typeface.width(&tick.label, TICK_SIZE, false);
+            let (left, right) = (self.x - OVERHANG, self.x + self.width + OVERHANG);
+            let middle = self.at_x(tick.value).min(right - width / 2.0).max(left + width / 2.0);
+            (middle, width, tick.label)
+        });
+        let numbers: Vec<_> = numbers.collect();
+        let chosen = |every: usize, first: usize| numbers.iter().skip(first).step_by(every);
+        let fits = |&(every, first): &(usize, usize)| {
+            chosen(every, first).zip(chosen(every, first).skip(1)).all(|(one, next)| {
+                (next.0 - one.0).abs() >= (one.1 + next.1) / 2.0 + BETWEEN_NUMBERS
+            })
+        };
+        let choices = (1..=numbers.len()).flat_map(|every| (0..every).map(move |k| (every, k)));
+        let best = choices.filter(fits).max_by_key(|&(every, first)| {
+            (chosen(every, first).count(), std::cmp::Reverse((every, first)))
+        });
+        let Some((every, first)) = best else { return Vec::new() };
+        chosen(every, first).map(|(middle, _, number)| (*middle, number.clone())).collect()
+    }
+
     /// Edge, ticks and numbers; without the numbers of an axis that is shared with the panel below
     /// or to the left.
     pub(crate) fn frame(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
+        let numbers = self.x_ticks().into_iter().map(|tick| (self.at_x(tick.value), tick.label));
+        let numbers = numbers.filter(|_| x_numbers).collect();
+        self.frame_with(scene, numbers, y_numbers);
+    }
+
+    /// The same with others close beside it.
+    pub(crate) fn frame_beside(
+        &self,
+        scene: &mut Scene,
+        typeface: &Typeface,
+        x_numbers: bool,
+        y_numbers: bool,
+    ) {
+        let numbers = if x_numbers { self.numbers_that_fit(typeface) } else { Vec::new() };
+        self.frame_with(scene, numbers, y_numbers);
+    }
+
+    fn frame_with(&self, scene: &mut Scene, x_numbers: Vec<(f64, String)>, y_numbers: bool) {
         let (bottom, stroke) = (self.y + self.height, Stroke::solid(INK, 1.2));
         scene.line(self.outline(), stroke.clone());
         let mut marks = Outline::default();
         for tick in self.x_ticks() {
             let x = self.at_x(tick.value);
             marks.add_line(&[[x, bottom], [x, bottom + 5.0]]);
-            if x_numbers {
-                scene.text(
-                    Text::new(tick.label, [x, bottom + 21.0], TICK_SIZE).anchor(Anchor::Middle),
-                );
-            }
+        }
+        for (x, number) in x_numbers {
+            let text = Text::new(number, [x, bottom + 21.0], TICK_SIZE);
+            scene.text(text.anchor(Anchor::Middle));
         }
         for tick in self.y_ticks() {
             let y = self.at_y(tick.value);
@@ -114,8 +161,10 @@ impl Panel {
         distance: f64,
     ) {
         let fits = |text: &str| typeface.width(text, LABEL_SIZE, false) <= self.height;
-        let split =
-            label.match_indices(' ').map(|(place, _)| place).rfind(|&place| fits(&label[..place]));
+        // A unit, in brackets, stays whole.
+        let words_end = label.rfind(" (").map_or(label.len(), |place| place + 1);
+        let spaces = label[..words_end].match_indices(' ').map(|(place, _)| place);
+        let split = { spaces }.rfind(|&place| fits(&label[..place]));
         let lines = match split {
             Some(place) if !fits(label) => vec![&label[..place], &label[place + 1..]],
             _ => vec![label],

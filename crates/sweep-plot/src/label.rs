@@ -2,34 +2,64 @@
 
 use std::fmt;
 
-/// Suffixes of names and their units; a suffix comes before any that it ends with.
-const UNITS: [(&str, &str); 14] = [
-    ("_n_m_per_rad", "N m/rad"),
-    ("_n_s_per_m", "N s/m"),
-    ("_n_per_m", "N/m"),
-    ("_m_per_s2", "m/s²"),
-    ("_kg_m2", "kg m²"),
-    ("_rad_per_s", "rad/s"),
-    ("_rad", "rad"),
-    ("_rpm", "rpm"),
-    ("_deg", "°"),
-    ("_kg", "kg"),
-    ("_hz", "Hz"),
-    ("_n", "N"),
-    ("_m", "m"),
-    ("_s", "s"),
+/// The units that suffixes of names are made of: `_n_s_per_m` is N s/m, `_kg_m2` is kg m².
+const BASES: [(&str, &str); 8] = [
+    ("n", "N"),
+    ("m", "m"),
+    ("kg", "kg"),
+    ("s", "s"),
+    ("rad", "rad"),
+    ("rpm", "rpm"),
+    ("deg", "°"),
+    ("hz", "Hz"),
 ];
 
+/// A unit in a name, with its power.
+fn base(word: &str) -> Option<String> {
+    let stem = word.trim_end_matches(['2', '3']);
+    let (_, unit) = BASES.iter().find(|(base, _)| *base == stem)?;
+    let power = match &word[stem.len()..] {
+        "" => "",
+        "2" => "²",
+        "3" => "³",
+        _ => return None,
+    };
+    Some(format!("{unit}{power}"))
+}
+
+/// A name's words without those of its unit, and the unit; empty if the name says none.
+fn parted(name: &str) -> (Vec<&str>, String) {
+    let mut words: Vec<&str> = name.split('_').collect();
+    let mut parts = [Vec::new(), Vec::new()];
+    // From behind: a denominator if there turns out to be one.
+    let mut is_over = false;
+    while let [_, .., word] = words[..] {
+        match base(word) {
+            Some(unit) => parts[usize::from(is_over)].insert(0, unit),
+            None if word == "per" && !is_over && !parts[0].is_empty() => is_over = true,
+            None => break,
+        }
+        words.pop();
+    }
+    let [mut below, mut above] = parts.map(|units| units.join(" "));
+    if !is_over {
+        std::mem::swap(&mut below, &mut above);
+    } else if above.is_empty() {
+        above = "1".to_owned();
+    }
+    let unit = if below.is_empty() { above } else { format!("{above}/{below}") };
+    (words, unit)
+}
+
 /// The unit that a name's suffix says; empty if none.
-pub(crate) fn unit_of_name(name: &str) -> &'static str {
-    UNITS.iter().find(|(suffix, _)| name.ends_with(suffix)).map_or("", |(_, unit)| unit)
+pub(crate) fn unit_of_name(name: &str) -> String {
+    parted(name).1
 }
 
 /// A parameter's or column's name in words, without its unit: `unbalance_mass_kg` is "Unbalance
 /// mass".
 pub(crate) fn words(name: &str) -> String {
-    let stem = UNITS.iter().find_map(|(suffix, _)| name.strip_suffix(suffix)).unwrap_or(name);
-    capitalised(&stem.replace('_', " "))
+    capitalised(&parted(name).0.join(" "))
 }
 
 /// A channel's name in words: `tub_front_y` is "tub front, vertical".
@@ -129,9 +159,15 @@ mod tests {
             ("spin_peak_rpm", "Spin peak", "rpm"),
             ("min_gap_linear_m", "Min gap linear", "m"),
             ("tub_inertia_11_kg_m2", "Tub inertia 11", "kg m²"),
+            ("friction_speed_m_per_s", "Friction speed", "m/s"),
+            ("spring_1_cubic_n_per_m3", "Spring 1 cubic", "N/m³"),
+            ("gravity_m_per_s2", "Gravity", "m/s²"),
+            ("tub_front_x_m", "Tub front x", "m"),
+            ("growth_per_s", "Growth", "1/s"),
             ("ratio_max", "Ratio max", ""),
+            ("s", "S", ""),
         ] {
-            assert_eq!((words(name).as_str(), unit_of_name(name)), (plain, unit));
+            assert_eq!((words(name).as_str(), unit_of_name(name).as_str()), (plain, unit));
         }
         assert_eq!(channel("drum_front_z"), "drum front, horizontal");
     }

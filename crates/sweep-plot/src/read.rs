@@ -351,7 +351,7 @@ fn column(field: &Field, place: usize) -> Option<ColumnFacts> {
         _ => return None,
     };
     let told = |key: &str| field.metadata().get(key).filter(|text| !text.is_empty()).cloned();
-    let unit = told("unit").unwrap_or_else(|| label::unit_of_name(field.name()).to_owned());
+    let unit = told("unit").unwrap_or_else(|| label::unit_of_name(field.name()));
     Some(ColumnFacts {
         name: field.name().clone(),
         // A pure number's unit is 1, which no label should say.

@@ -7,6 +7,11 @@ use super::*;
 /// Points whose ratio is 4 where the mass is above a half, whatever the damping; of the rows, the
 /// last failed and the one before it is undefined.
 fn points(count: u32) -> Sample {
+    points_with(count, |sample| sample)
+}
+
+/// The same with further parameters.
+fn points_with(count: u32, further: impl Fn(Sample) -> Sample) -> Sample {
     let part = |k: u32, step: f64| (f64::from(k) * step).fract();
     let mass: Vec<f64> = (0..count).map(|k| part(k, 0.618_033_988_749_895)).collect();
     let damping = (0..count).map(|k| 60.0 + 240.0 * part(k, 0.414_213_562_373_095));
@@ -19,11 +24,12 @@ fn points(count: u32) -> Sample {
         "name": "sample", "reliability": { "ratio_limit": 2.0 },
         "design": { "method": "monte_carlo", "points": 0, "seed": 0 }
     }"#;
-    Sample::default()
+    let parameters = Sample::default()
         .counts("point", 0..u64::from(count))
         .numbers("unbalance_mass_kg", "kg", mass.iter().copied())
         .numbers("damping_n_s_per_m", "N s/m", damping)
-        .numbers("gravity_m_per_s2", "m/s^2", mass.iter().map(|_| 9.81))
+        .numbers("gravity_m_per_s2", "m/s^2", mass.iter().map(|_| 9.81));
+    further(parameters)
         .numbers("nonlinear_tub_yaw", "rad", of(&|k| Some(0.01 * ratio(k)?)))
         .numbers("linear_tub_yaw", "rad", of(&|k| ratio(k).map(|_| 0.01)))
         .numbers("ratio_tub_yaw", "1", of(&ratio))
@@ -64,6 +70,67 @@ fn a_design_has_a_panel_for_each_pair_and_names_its_points() {
         figure[start..start + 5].split(['(', ')']).nth(1).unwrap().parse::<u32>().unwrap()
     };
     assert_eq!(of(">reliable: below 2 ") + of(">unreliable: ratio 2 or more "), 200);
+}
+
+/// Five parameters with long names and numbers of five digits.
+fn long_numbers() -> Sample {
+    let spread = |from: f64, to: f64, step: f64| {
+        (0..80).map(move |k| from + (to - from) * (f64::from(k) * step).fract())
+    };
+    points_with(80, |sample| {
+        sample
+            .numbers("spring_stiffness_n_per_m", "N/m", spread(5000.0, 12000.0, 0.732))
+            .numbers("flexure_stiffness_n_m_per_rad", "N m/rad", spread(15000.0, 30000.0, 0.236))
+            .numbers("tub_inertia_11_kg_m2", "kg m^2", spread(0.8, 1.6, 0.141))
+    })
+}
+
+/// The horizontal texts of a picture: where the middle is, the size and the text.
+fn middles(figure: &str) -> Vec<([f64; 2], f64, String)> {
+    let number = |text: &str, name: &str| {
+        let (_, rest) = text.split_once(&format!(" {name}=\""))?;
+        rest.split('"').next()?.parse::<f64>().ok()
+    };
+    let texts = figure.split("<text").skip(1).filter_map(|text| {
+        let (tag, rest) = text.split_once('>')?;
+        let is_plain = tag.contains("middle") && !tag.contains("rotate");
+        let at = [number(tag, "x")?, number(tag, "y")?];
+        is_plain.then_some((at, number(tag, "font-size")?, rest.split('<').next()?.to_owned()))
+    });
+    texts.collect()
+}
+
+#[test]
+fn numbers_below_neighbouring_panels_do_not_touch() {
+    let figure = svg(long_numbers(), &PlotOptions::default());
+    let typeface = raster::Typeface::load().unwrap();
+    let texts = middles(&figure);
+    let numbers: Vec<_> = texts.iter().filter(|(_, _, text)| text.parse::<f64>().is_ok()).collect();
+    assert!(numbers.len() >= 10, "two below each panel: {numbers:?}");
+    let mut ends: Vec<_> = numbers
+        .iter()
+        .map(|([x, _], size, text)| {
+            let half = typeface.width(text, *size, false) / 2.0;
+            (x - half, x + half, text)
+        })
+        .collect();
+    ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for pair in ends.windows(2) {
+        assert!(pair[1].0 - pair[0].1 >= 5.9, "{pair:?}");
+    }
+}
+
+#[test]
+fn a_unit_is_not_broken() {
+    let figure = svg(long_numbers(), &PlotOptions::default());
+    for unit in ["(kg m^2)", "(N m/rad)", "(N/m)", "(kg)"] {
+        assert!(figure.contains(&format!("{unit}<")), "{unit}");
+    }
+    let broken = figure.split("<text").skip(1).filter_map(|text| {
+        let text = text.split_once('>')?.1.split('<').next()?;
+        (text.contains('(') != text.contains(')')).then(|| text.to_owned())
+    });
+    assert_eq!(broken.collect::<Vec<_>>(), [""; 0]);
 }
 
 #[test]

@@ -25,7 +25,7 @@ use washer_model::{
 
 use crate::interrupt::Interrupt;
 use crate::measures::{Criterion, Metric};
-use crate::method::Steps;
+use crate::method::{Level, Steps};
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::plan::{Plan, Scenario};
 
@@ -38,6 +38,16 @@ pub enum EngineError {
     /// `SWEEP_SIMD` names nothing this machine has.
     #[error("SWEEP_SIMD={0}: expected one that this machine has: {1}")]
     Simd(String, String),
+}
+
+/// What a row by capped modes came from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Quick {
+    pub(crate) level: Level,
+    /// The nonlinear model's, the linear one's.
+    pub(crate) methods: [Method; 2],
+    /// Steps end at so many parts of the run, and gears change there.
+    pub(crate) checkpoints: u32,
 }
 
 /// Both models over a plan's points.
@@ -87,6 +97,11 @@ impl<'a> ModelEngine<'a> {
         Ok(Self { ladders: OnceLock::from(ladders), ..Self::new(plan)? })
     }
 
+    /// What it computes.
+    pub(crate) const fn plan(&self) -> &'a Plan {
+        self.plan
+    }
+
     /// The rungs of both models.
     pub(crate) fn ladders(&self) -> &[Ladder; 2] {
         self.ladders.get_or_init(|| self.find_ladders(&|| false))
@@ -109,6 +124,17 @@ impl<'a> ModelEngine<'a> {
         let found = self.find_ladders(&|| watch.stopped());
         // They may have been cut short.
         if watch.stopped() { None } else { Some(self.ladders.get_or_init(|| found)) }
+    }
+
+    /// How the trajectories of a row of this level were integrated; `None` where modes were not
+    /// capped.
+    pub(crate) fn quick(&self, level: Level) -> Option<Quick> {
+        if !level.is_capped() {
+            return None;
+        }
+        let [nonlinear, linear] = self.ladders();
+        let methods = [nonlinear.capped(level)?, linear.capped(level)?];
+        Some(Quick { level, methods, checkpoints: self.timing.checkpoints })
     }
 
     fn find_ladders(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {

@@ -187,11 +187,26 @@ fn cost_s(
     // A shorter run alone would be slower spin, and longer steps.
     let engine = ModelEngine::with_ladders(cut, ladders.clone())?;
     let axis_values: Vec<Vec<f64>> = points.map(|point| cut.axis_values(point)).collect();
-    let began = Instant::now();
+    let began_s = busy_s();
     let outcomes = engine.evaluate_at(&axis_values);
-    let cost_s = began.elapsed().as_secs_f64();
+    let cost_s = busy_s() - began_s;
     drop(outcomes);
     Ok(cost_s)
+}
+
+/// Time that this thread has had a core for: what others do on the machine meanwhile is no cost of
+/// the plan.
+#[cfg(unix)]
+fn busy_s() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+/// Time on the wall, where the system has no other clock that is known here.
+#[cfg(not(unix))]
+fn busy_s() -> f64 {
+    static BEGAN: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+    BEGAN.elapsed().as_secs_f64()
 }
 
 /// Chunks in hand and on their way to the disk, then one row group of the result.
@@ -266,6 +281,35 @@ mod tests {
             assert!(estimate.wall_s.is_finite() && estimate.wall_s > 0.0, "{estimate:?}");
             assert_eq!(estimate.sampled_s >= end_s, sampled_whole, "{estimate:?}");
             assert_eq!(estimate.threads, 1);
+        }
+    }
+
+    #[test]
+    fn work_beside_it_is_not_counted() {
+        // Of beginnings, and of whole trajectories.
+        for end_s in [1e5, 5.0] {
+            let plan = plan(16, end_s);
+            // The least of some, because others are at work in any case.
+            let least = || {
+                let reckoned = (0..3).map(|_| Estimate::of(&plan, 1).unwrap().core_s_per_point);
+                reckoned.fold(f64::INFINITY, f64::min)
+            };
+            let alone_s = least();
+            let is_over = std::sync::atomic::AtomicBool::new(false);
+            let beside_s = std::thread::scope(|scope| {
+                for _ in 0..8 * crate::threads::cores() {
+                    scope.spawn(|| {
+                        while !is_over.load(std::sync::atomic::Ordering::Relaxed) {
+                            std::hint::spin_loop();
+                        }
+                    });
+                }
+                let beside_s = least();
+                is_over.store(true, std::sync::atomic::Ordering::Relaxed);
+                beside_s
+            });
+            // A ninth of a core was left for it.
+            assert!(beside_s < 3.0 * alone_s, "{beside_s} s beside others, {alone_s} s alone");
         }
     }
 

@@ -7,7 +7,7 @@ const MIB: usize = 1 << 20;
 
 /// What any command may need, beside its threads. A trace of 50 s ends under `ulimit -v 48000`,
 /// which the program itself counts towards, and is aborted under 44000.
-const BASE_BYTES: usize = 64 * MIB;
+const BASE_BYTES: usize = 32 * MIB;
 
 /// A thread's stack, with its guard and the stack of its signal handler.
 const THREAD_BYTES: usize = 2 * MIB + MIB / 4;

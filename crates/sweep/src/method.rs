@@ -202,7 +202,7 @@ impl fmt::Display for Integrator {
 }
 
 /// Which method a row's numbers come from, and which rung if it has several.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
     /// The lowest rung that a row may hold: bearings and hinge with capped modes.
     Fast,

@@ -1,11 +1,12 @@
 //! The runner: takes missing chunks in order, has the engine compute them on all cores, keeps each
-//! as it comes, and joins the whole.
+//! as it comes, and joins the whole. Of chunks that a signal or an error cuts short it keeps the
+//! rows that are there.
 //!
 //! Memory: a chunk (at most 4096 points, about 2 MB) in hand for each thread and as many again on
 //! their way to the disk, then about 40 MB for the join; nothing grows with the number of points
 //! but one set entry a chunk.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
@@ -213,20 +214,32 @@ struct Hand<'a> {
     run: &'a OpenRun,
     /// Points of missing chunks that have not gone out.
     left: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
-    /// Outcomes of chunks that are not whole.
+    /// Outcomes of chunks that are not whole, those of an interrupted process among them.
     parts: Mutex<BTreeMap<u64, Vec<Outcome>>>,
     whole: SyncSender<(u64, Vec<Outcome>)>,
 }
 
 impl<'a> Hand<'a> {
     fn new(run: &'a OpenRun, whole: SyncSender<(u64, Vec<Outcome>)>) -> Self {
+        let parts = run.take_parts();
+        let there: BTreeSet<u64> = parts.values().flatten().map(|outcome| outcome.point).collect();
         let missing = (0..run.chunks()).filter(|&chunk| run.is_missing(chunk));
         let left = missing.flat_map(|chunk| run.chunk_range(chunk));
-        Self { run, left: Mutex::new(Box::new(left)), parts: Mutex::default(), whole }
+        let left = left.filter(move |point| !there.contains(point));
+        Self { run, left: Mutex::new(Box::new(left)), parts: Mutex::new(parts), whole }
     }
 
-    /// Has the engine evaluate everything that is missing.
+    /// Has the engine evaluate everything that is missing, and keeps what there is of chunks that
+    /// did not become whole.
     fn fill(self, engine: &dyn Engine, watch: &Watch<'_>) -> Result<(), StoreError> {
+        let evaluated = self.evaluate(engine, watch);
+        let parts = std::mem::take(&mut *lock(&self.parts));
+        // A part that makes no sense costs itself.
+        let kept = parts.into_iter().map(|(chunk, part)| self.run.write_part(chunk, part));
+        kept.fold(evaluated, Result::and)
+    }
+
+    fn evaluate(&self, engine: &dyn Engine, watch: &Watch<'_>) -> Result<(), StoreError> {
         let next = || if watch.stopped() { None } else { lock(&self.left).next() };
         let keep = |outcome| self.keep(outcome, watch);
         let panic = catch_unwind(AssertUnwindSafe(|| engine.evaluate(&next, &keep, watch))).err();

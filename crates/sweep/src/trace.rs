@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use lane_ode::{Failure, Simd};
-use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
+use rayon::iter::{IndexedParallelIterator as _, IntoParallelIterator as _, ParallelIterator as _};
 use serde_json::{Value, json};
 use washer_model::{
     COORDINATES, Cases, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium, Point,
@@ -12,14 +12,14 @@ use washer_model::{
 };
 
 use crate::config::NamedValues;
-use crate::engine::reference_step_s;
+use crate::engine::{ModelEngine, Quick, reference_step_s};
 use crate::exit::Error;
 use crate::method::Integrator;
 use crate::plan::{Plan, Scenario};
-use crate::store::StoreError;
+use crate::store::{StoreError, read};
 use crate::table::Table;
 use crate::threads;
-use sweep_files::{self as files, FileKind, key};
+use sweep_files::{self as files, FileKind, ParquetFile, key};
 
 /// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as
 /// many.
@@ -115,7 +115,8 @@ pub(crate) struct Trace {
 /// Integrates both models of a scenario and reads them every `every_s` from 0 to the end; in a
 /// pool, both at once.
 ///
-/// `at` names the point: parameters with their values. Both models begin at `start`.
+/// `at` names the point: parameters with their values. Both models begin at `start`. With `quick`
+/// it is the trajectories of the point's row.
 ///
 /// # Errors
 /// [`NoEquilibrium`].
@@ -126,16 +127,20 @@ pub(crate) fn trace(
     every_s: f64,
     start: &Start,
     extras: Extras,
+    quick: Option<Quick>,
 ) -> Result<Trace, NoEquilibrium> {
     let Scenario { machine, spin, window_s } = scenario;
-    let timing = Timing { end_s: plan.end_s, window_s, checkpoints: 0 };
+    let checkpoints = quick.map_or(0, |quick| quick.checkpoints);
+    let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
     let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
-    let (method, method_json) = method(plan, &point, &spin);
-    let run = |model| history(model, &method, &point, start, every_s);
+    let ([by_nonlinear, by_linear], method_json) = methods(plan, &point, &spin, quick);
+    let run = |model, method| history(model, method, &point, start, every_s);
+    let nonlinear = || run(ModelKind::Nonlinear, &by_nonlinear);
+    let linear = || run(ModelKind::Linear, &by_linear);
     let (nonlinear, linear) = match rayon::current_thread_index() {
-        Some(_) => rayon::join(|| run(ModelKind::Nonlinear), || run(ModelKind::Linear)),
+        Some(_) => rayon::join(nonlinear, linear),
         // rayon's own pool is not sure to start, and it panics if it does not.
-        None => (run(ModelKind::Nonlinear), run(ModelKind::Linear)),
+        None => (nonlinear(), linear()),
     };
 
     // The quotient may come out a hair below the whole number that was meant.
@@ -177,29 +182,38 @@ pub(crate) fn trace(
     Ok(Trace { table, instants, failures: failures.into_iter().flatten().collect() })
 }
 
-/// Traces of every point of a plan, one file each (`point-<index>.parquet`) in `folder`, until
-/// `stop` says so. A point without equilibrium has none. `done` hears of every point that is there.
+/// Traces of every point of the plan that `engine` made `result` of, one file each
+/// (`point-<index>.parquet`) in `folder`, until `stop` says so. A point without equilibrium has
+/// none. `done` hears of every point that is there.
+///
+/// A row by capped modes has the trace that its numbers come from (of the linear model, one as
+/// accurate), in a fraction of the time that `sweep trace` takes.
 ///
 /// # Errors
 /// As `store`; and no more threads.
 pub(crate) fn keep(
-    plan: &Plan,
+    engine: &ModelEngine<'_>,
+    result: &ParquetFile,
     folder: &Path,
     threads: usize,
     stop: &(dyn Fn() -> bool + Sync),
     done: &(dyn Fn() + Sync),
 ) -> Result<(), StoreError> {
+    let plan = engine.plan();
     files::ready(folder)?;
+    let levels = read::levels(result)?;
     threads::pool(threads)?.install(|| {
-        (0..plan.points()).into_par_iter().try_for_each(|point| {
+        levels.into_par_iter().enumerate().try_for_each(|(point, level)| {
+            let point = point as u64;
             if stop() {
                 return Ok(());
             }
             let values = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
             let at = values.zip(plan.axis_values(point)).collect();
             let every_s = plan.end_s / KEPT_INSTANTS;
-            let scenario = plan.scenario(point);
-            let found = trace(plan, scenario, at, every_s, &Start::default(), Extras::default());
+            let (start, extras) = (Start::default(), Extras::default());
+            let quick = level.and_then(|level| engine.quick(level));
+            let found = trace(plan, plan.scenario(point), at, every_s, &start, extras, quick);
             // The row of a point without an equilibrium says so.
             if let Ok(trace) = found {
                 let path = folder.join(format!("point-{point}.parquet"));
@@ -235,14 +249,19 @@ fn named(letter: char, values: &[f64; COORDINATES]) -> Value {
         .collect()
 }
 
-/// The plan's method. A map may scale the bearings' mass to be quick; a single trajectory keeps
-/// them as they are, in stable steps.
-fn method(plan: &Plan, point: &Point, spin: &Spin) -> (Method, Value) {
+/// What integrates the nonlinear model and the linear one. A map may scale the bearings' mass to be
+/// quick; a single trajectory that is no row's keeps them as they are, in stable steps.
+fn methods(plan: &Plan, point: &Point, spin: &Spin, quick: Option<Quick>) -> ([Method; 2], Value) {
+    if let Some(Quick { level, methods, .. }) = quick {
+        let mut json = plan.integrator.to_json();
+        json["row"] = level.name().into();
+        return (methods, json);
+    }
     match plan.integrator.direct() {
-        Some((_, method)) => (method, plan.integrator.to_json()),
+        Some((_, method)) => ([method; 2], plan.integrator.to_json()),
         None => {
             let step_s = reference_step_s(&Cases::new([(point, spin)], plan.end_s));
-            (Method::Rk4 { step_s }, Integrator::Rk4 { step_s }.to_json())
+            ([Method::Rk4 { step_s }; 2], Integrator::Rk4 { step_s }.to_json())
         }
     }
 }
@@ -354,6 +373,10 @@ impl<'a> Columns<'a> {
 
 #[cfg(test)]
 mod tests {
+    use arrow_array::RecordBatch;
+    use arrow_array::cast::AsArray as _;
+    use arrow_array::types::Float64Type;
+
     use super::*;
 
     #[test]
@@ -366,5 +389,49 @@ mod tests {
         for wrong in ["", "q5", "q0=1", "q11=1", "x=1", "q1=nan", "u1=1e999", "q=1", "q5=2"] {
             assert!(start_value(wrong).unwrap_err().contains("expected"), "{wrong}");
         }
+    }
+
+    /// The greatest magnitude of a column from an instant on.
+    fn peak(rows: &RecordBatch, column: &str, from: usize) -> f64 {
+        let values = rows.column_by_name(column).unwrap().as_primitive::<Float64Type>();
+        values.values()[from..].iter().fold(0.0, |peak, value| value.abs().max(peak))
+    }
+
+    #[test]
+    fn a_trace_by_a_rows_method_is_the_trajectory_of_the_row() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("grid.toml");
+        let grid = "spin = { profile = \"triangular\", peak_rpm = 350, ramp_s = 50 }\n\
+             time = { end_s = 50, window_s = [30, 50] }\n\
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.05, 0.3, 0.8]\n\
+             [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100, 300]\n";
+        std::fs::write(&path, grid).unwrap();
+        let plan = crate::config::load(&path, &[]).unwrap();
+        let engine = ModelEngine::new(&plan).unwrap();
+        let points: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
+        let (every_s, start) = (0.002, Start::default());
+        let from = (plan.window_s[0] / every_s) as usize;
+        let mut quick_rows = 0;
+        for row in engine.evaluate_at(&points) {
+            let Some(quick) = engine.quick(row.method) else { continue };
+            quick_rows += 1;
+            assert_eq!(quick.level, row.method);
+            let (scenario, extras) = (plan.scenario(row.point), Extras::default());
+            let by_row = trace(&plan, scenario, Vec::new(), every_s, &start, extras, Some(quick));
+            let (rows, _) = by_row.unwrap().into_table().finish().unwrap();
+            // The row says the nonlinear model's rung; the linear one's may have been another.
+            for (name, model, over) in
+                [("nonlinear", &row.nonlinear, 1e-9), ("linear", &row.linear, 1e-3)]
+            {
+                for (channel, amplitude) in plan.reliability.channels.iter().zip(&model.amplitudes)
+                {
+                    let seen = peak(&rows, &format!("{name}_{}", channel.name()), from);
+                    // The peak itself is between two instants.
+                    let share = seen / amplitude;
+                    assert!((0.998..1.0 + over).contains(&share), "{row:?} {channel:?}: {share}");
+                }
+            }
+        }
+        assert!(quick_rows >= 3, "{quick_rows}");
     }
 }

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
-use sweep::{Effort, Interrupt, ProgressMode};
+use sweep::{Effort, ProgressMode};
 
 use crate::ended;
 use crate::errors;
@@ -29,7 +29,7 @@ pub(crate) fn modes(
     }
     let speeds = speeds_rpm.unwrap_or_else(|| (0..=120_u32).map(|k| 10.0 * f64::from(k)).collect());
     let input = plan.map(|plan| plan.get().input.clone());
-    let found = abandonable(py, move || sweep::find_modes(input.as_ref(), &at, &speeds))?;
+    let found = abandonable(py, move |_| sweep::find_modes(input.as_ref(), &at, &speeds))?;
     found.map(PyResultTable::new).map_err(|error| errors::error(py, &error))
 }
 
@@ -73,12 +73,12 @@ pub(crate) fn explain<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = plan.py();
     let (at, input) = (assignments(at)?, plan.get().input.clone());
-    let explained = abandonable(py, move || {
-        let interrupt = &Interrupt::new();
+    let explained = abandonable(py, move |interrupt| {
         let effort = Effort { threads, progress: ProgressMode::None, interrupt };
         sweep::explain_point(&input, &at, speeds_rpm.as_deref(), effort)
     })?;
     let explained = explained.map_err(|error| errors::error(py, &error))?;
+    let explained = explained.ok_or_else(|| PyKeyboardInterrupt::new_err("interrupted"))?;
     let found = py.import("json")?.call_method1("loads", (explained.found.to_string(),))?;
     py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((found, explained.text))
 }

@@ -110,7 +110,7 @@ impl PyPlan {
         let (at, start) = (assignments(at)?, assignments(start)?);
         let options = TraceOptions { every_s: every, states, forces, start };
         let input = self.input.clone();
-        let traced = abandonable(py, move || sweep::trace_point(&input, &at, &options))?;
+        let traced = abandonable(py, move |_| sweep::trace_point(&input, &at, &options))?;
         let (table, failures) = traced.map_err(|error| errors::error(py, &error))?;
         for failure in failures {
             py.import("warnings")?.call_method1("warn", (failure,))?;

@@ -34,23 +34,33 @@ impl<T> Attended<T> {
     }
 }
 
-/// As [`attended`], for a work that nothing stops: Ctrl-C leaves its thread to end by itself, and
-/// what comes of it is dropped.
+/// As [`attended`], for a work of which nothing is worth waiting for: Ctrl-C raises the interrupt
+/// and leaves the thread to end by itself, and what comes of it is dropped. One trajectory, and the
+/// modes at all speeds, do not look at the interrupt and go on to their end.
 pub(crate) fn abandonable<T: Send + 'static>(
     py: Python<'_>,
-    work: impl FnOnce() -> T + Send + 'static,
+    work: impl FnOnce(&Interrupt) -> T + Send + 'static,
 ) -> PyResult<T> {
     py.detach(|| {
         let (done, ended) = channel();
+        let interrupt = Interrupt::new();
+        let of_work = interrupt.clone();
         let work = move || {
             // Nobody may wait for it any more.
-            let _ = done.send(work());
+            let _ = done.send(work(&of_work));
         };
         std::thread::Builder::new().spawn(work).map_err(no_thread)?;
         loop {
             match ended.recv_timeout(LOOK_UP) {
                 Ok(value) => return Ok(value),
-                Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals())?,
+                Err(RecvTimeoutError::Timeout) => {
+                    // As SIGINT would.
+                    let raised = |error| {
+                        interrupt.raise(2);
+                        error
+                    };
+                    Python::attach(|py| py.check_signals()).map_err(raised)?;
+                }
                 Err(RecvTimeoutError::Disconnected) => return Err(panicked()),
             }
         }

@@ -17,6 +17,9 @@ import washer_sweep
 # Answered in half a second, on a machine that may be busy with other work.
 ANSWERED_S = 0.5
 
+# A point of the grids.
+AT = {"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100.0}
+
 
 def table(rows):
     """Points of the short grid's box."""
@@ -60,18 +63,31 @@ def test_ctrl_c_ends_an_evaluation_and_leaves_its_rows(short):
 
 @pytest.mark.parametrize("work", ["run", "evaluate", "boundary", "trace", "stability", "explain"])
 def test_ctrl_c_is_answered_in_half_a_second(long, work):
-    point = {"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100.0}
     stopped, answered_s = interrupted({
         "run": lambda: long.run(progress=False),
         "evaluate": lambda: long.evaluate(table(1000)),
         "boundary": lambda: long.boundary(progress=False),
-        "trace": lambda: long.trace(point, every=1.0),
+        "trace": lambda: long.trace(AT, every=1.0),
         "stability": lambda: washer_sweep.stability(long, np.arange(60, 400, 0.1), progress=False),
-        "explain": lambda: washer_sweep.explain(long, point),
+        "explain": lambda: washer_sweep.explain(long, AT),
     }[work], 0.3)
     assert answered_s < ANSWERED_S
     # Traces and explanations have nothing before their end.
     assert isinstance(stopped, washer_sweep.Interrupted) or work in ("trace", "explain")
+
+
+def test_ctrl_c_ends_the_threads_of_an_explanation(long):
+    def threads():
+        return len(os.listdir("/proc/self/task"))
+
+    before = threads()
+    speeds = np.arange(60, 400, 0.01)
+    interrupted(lambda: washer_sweep.explain(long, AT, speeds_rpm=speeds), 0.5)
+    end_s = time.perf_counter() + 10.0
+    # The timer's thread has ended by itself.
+    while threads() > before and time.perf_counter() < end_s:
+        time.sleep(0.05)
+    assert threads() <= before
 
 
 def test_a_run_into_a_file_goes_on_where_ctrl_c_left_it(short, tmp_path):

@@ -132,7 +132,7 @@ pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> Scene {
                 }
                 dots.draw(scene, &panel, x.values, y.values);
             });
-            panel.frame(&mut scene, last, column == 0);
+            panel.frame_beside(&mut scene, typeface, last, column == 0);
             if last {
                 x_label(&mut scene, typeface, &panel, x.label);
             }
@@ -150,10 +150,11 @@ fn level_stroke() -> Stroke {
     Stroke::dashed(INK, 1.6, &[3.0, 3.0])
 }
 
-/// A label in lines that fit below a panel.
+/// A label in lines that fit below a panel; its unit stays whole.
 fn x_lines(typeface: &Typeface, label: &Label, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in label.to_string().split(' ') {
+    let unit = (!label.unit.is_empty()).then(|| format!("({})", label.unit));
+    for word in label.words.split(' ').chain(unit.as_deref()) {
         let longer = lines.last().map(|line| format!("{line} {word}"));
         match longer {
             Some(longer) if typeface.width(&longer, LABEL_SIZE, false) <= width => {

@@ -6,6 +6,7 @@ use crate::config;
 use crate::engine::simd_from_environment;
 use crate::exit::{Error, Exit, show};
 use crate::explain::{explain, json, words};
+use crate::interrupt::Interrupt;
 use crate::speeds::{Speeds, turning};
 use crate::threads;
 
@@ -58,7 +59,10 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let (plan, at) = config::load_point(&args.grid.grid, &args.grid.sets, &args.at)?;
     let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
     let simd = simd_from_environment()?;
-    let found = threads::pool(threads)?.install(|| explain(&plan, at, args.speed, simd))?;
+    // A signal ends the process: there is nothing to keep.
+    let interrupt = Interrupt::new();
+    let work = || explain(&plan, at, args.speed, simd, &interrupt);
+    let found = threads::pool(threads)?.install(work)?;
     if args.json {
         return show(&format!("{:#}\n", json::of(&found)));
     }

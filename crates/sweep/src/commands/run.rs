@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use super::cells::short;
 use super::examples::Examples;
 use super::grid::{ResultArgs, quoted};
-use crate::engine::{Engine, ModelEngine};
+use crate::engine::ModelEngine;
 use crate::exit::{Error, Exit, tell};
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
@@ -19,7 +19,7 @@ use crate::store::read::Tally;
 use crate::store::{Job, ShardRequest};
 use crate::threads::{self, Environment};
 use crate::trace::{self, MOST_KEPT};
-use sweep_files as files;
+use sweep_files::{self as files, ParquetFile};
 use sweep_plot::Share;
 
 /// Shown by `--help`.
@@ -41,7 +41,7 @@ pub struct Args {
     pub work: WorkArgs,
     /// Keep the time histories of every point too, decimated, in NAME.traces beside NAME.parquet:
     /// `sweep plot NAME.parquet --traces NAME.traces -o MAP.html` shows them on a click. They take
-    /// a run of their own, one trajectory at a time
+    /// a run of their own, some three times as long as the map
     #[arg(long)]
     pub keep_traces: bool,
     /// Exit with 3 if any row of the finished result failed
@@ -103,7 +103,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 ///
 /// # Errors
 /// Whatever of [`crate::store::StoreError`] kept it from its end; finished chunks are kept.
-pub(crate) fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<Exit, Error> {
+fn execute(args: &Args, plan: &Plan, engine: &ModelEngine<'_>) -> Result<Exit, Error> {
     if args.keep_traces && plan.points() > MOST_KEPT {
         return Err(Error::Option {
             option: "--keep-traces",
@@ -136,7 +136,9 @@ pub(crate) fn execute(args: &Args, plan: &Plan, engine: &dyn Engine) -> Result<E
                 progress.show(kept);
             }
         };
-        let ended = trace::keep(plan, &folder, options.threads, &|| interrupt.stopped(), &done);
+        let map = ParquetFile::open(&output)?;
+        let stop = || interrupt.stopped();
+        let ended = trace::keep(engine, &map, &folder, options.threads, &stop, &done);
         progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
         ended?;
         if let Some(signal) = interrupt.signal() {

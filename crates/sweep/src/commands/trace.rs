@@ -87,7 +87,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let extras = Extras { states: args.states, forces: args.forces };
     let start = start_of(&args.start);
     let output = Output::begin(&args.out, FileKind::Trace)?;
-    let work = || trace(&plan, plan.scenario(0), at, every_s, &start, extras);
+    let work = || trace(&plan, plan.scenario(0), at, every_s, &start, extras, None);
     // A thread for each model, where there may be two; they write the same bytes as one.
     let trace = match threads::pool(2) {
         Ok(pool) => pool.install(work)?,

@@ -175,6 +175,13 @@ impl Ladder {
         self.is_checked.then(|| self.rungs.len() - 1)
     }
 
+    /// The method of the rows that capped modes of this level hold; of a ladder without such a
+    /// rung, the finest capped one's below it.
+    pub(crate) fn capped(&self, level: Level) -> Option<Method> {
+        let is_capped = |rung: &&Rung| rung.level.is_capped() && rung.level <= level;
+        self.rungs.iter().rfind(is_capped).map(|rung| rung.method)
+    }
+
     /// The error left at a rung whose run differs so much from that of the rung before.
     pub(crate) fn error_left(&self, rung: usize, difference: f64) -> f64 {
         let Rung { contraction, believed_to, .. } = self.rungs[rung];

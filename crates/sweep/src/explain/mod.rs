@@ -13,8 +13,10 @@ use washer_model::{
 };
 
 use crate::config::NamedValues;
-use crate::engine::{ModelEngine, reference_step_s};
+use crate::engine::{Demand, ModelEngine, Watch, reference_step_s};
 use crate::exit::Error;
+use crate::interrupt::Interrupt;
+use crate::outcome::{Outcome, Status, Trajectory};
 use crate::plan::{Plan, Scenario};
 use crate::speeds::Speeds;
 use crate::stability::smooth;
@@ -87,7 +89,8 @@ pub(crate) struct Passage {
     pub(crate) crossed: Result<Crossed, LeftRange>,
 }
 
-/// Explains a plan's one point, on all threads of the rayon pool that it is called in.
+/// Explains a plan's one point, on all threads of the rayon pool that it is called in. Once
+/// `interrupt` is raised it ends early, and what it returns means nothing.
 ///
 /// # Errors
 /// A profile without a speed to look at, a machine without equilibrium or modes, and an instruction
@@ -97,6 +100,7 @@ pub(crate) fn explain(
     at: NamedValues,
     speeds: Option<Speeds>,
     simd: Simd,
+    interrupt: &Interrupt,
 ) -> Result<Explanation, Error> {
     smooth(plan)?;
     let scenario = plan.scenario(0);
@@ -106,8 +110,8 @@ pub(crate) fn explain(
         Some(speeds) => speeds,
         None => looked(&point, profile_rpm[1])?,
     };
-    let asker = Asker { simd, plan, scenario: &scenario, point: &point };
-    let (found, swept) = rayon::join(|| tongues(&asker, looked), || swept(plan));
+    let asker = Asker { simd, plan, scenario: &scenario, point: &point, interrupt };
+    let (found, swept) = rayon::join(|| tongues(&asker, looked), || swept(plan, interrupt));
     let ((found, without_response), swept) = (found, swept?);
     let (crossings, closings) = rayon::join(
         || crossings(&asker, &found, &swept),
@@ -153,11 +157,15 @@ fn looked(point: &Point, fastest_rpm: f64) -> Result<Speeds, Error> {
     })
 }
 
-fn swept(plan: &Plan) -> Result<Swept, Error> {
+fn swept(plan: &Plan, interrupt: &Interrupt) -> Result<Swept, Error> {
     let scenario = plan.scenario(0);
     let channels = plan.reliability.channels.clone();
-    let mut outcomes = ModelEngine::new(plan)?.evaluate_at(&[Vec::new()]);
-    let outcome = outcomes.remove(0);
+    let (engine, watch) = (ModelEngine::new(plan)?, Watch::new(interrupt));
+    let outcomes = engine.evaluate_for(&[Vec::new()], Demand::Row, &|_| {}, &watch);
+    // Where it was stopped: nothing.
+    let none = || Trajectory::failed(Status::Panicked);
+    let outcome = outcomes.and_then(|mut outcomes| outcomes.pop());
+    let outcome = outcome.unwrap_or_else(|| Outcome::new(0, none(), none()));
     let (status, fail_time_s) = row_status(&outcome);
     let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.ratio_limit);
     Ok(Swept {
@@ -207,6 +215,9 @@ fn crossings(
             responses: [responses[0].as_ref(), responses[1].as_ref()],
         })
         .collect();
+    if asker.interrupt.stopped() {
+        return (Vec::new(), None);
+    }
     let step_s = reference_step_s(&Cases::new([(asker.point, spin)], end_s));
     let before_end = |crossing: &&Crossing<'_>| crossing.from_to_s[0] < swept.window_s[1];
     let (crossed, peaks) = rayon::join(

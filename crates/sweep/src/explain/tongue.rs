@@ -7,6 +7,7 @@ use rayon::slice::ParallelSlice as _;
 use washer_model::{Dwell, Kind, Point, Response, modes, respond};
 
 use super::ready;
+use crate::interrupt::Interrupt;
 use crate::plan::{Plan, Scenario};
 use crate::speeds::Speeds;
 
@@ -51,23 +52,28 @@ pub(crate) struct Asker<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) scenario: &'a Scenario,
     pub(crate) point: &'a Point,
+    /// Once it is raised, no response is found, and what is made of that means nothing.
+    pub(crate) interrupt: &'a Interrupt,
 }
 
 impl Asker<'_> {
     /// The responses at some speeds, on all threads; none where there is none.
     pub(crate) fn responses(&self, speeds_rpm: &[f64]) -> Vec<Option<Response>> {
-        responses(self.point, speeds_rpm)
+        self.responses_of(self.point, speeds_rpm)
     }
-}
 
-fn responses(point: &Point, speeds_rpm: &[f64]) -> Vec<Option<Response>> {
-    let of_part = |speeds: &[f64]| {
-        let dwells: Vec<Dwell<'_>> =
-            speeds.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
-        respond(&dwells).into_iter().map(Result::ok).collect::<Vec<_>>()
-    };
-    let parts: Vec<_> = speeds_rpm.par_chunks(AT_ONCE).map(of_part).collect();
-    parts.into_iter().flatten().collect()
+    fn responses_of(&self, point: &Point, speeds_rpm: &[f64]) -> Vec<Option<Response>> {
+        let of_part = |speeds: &[f64]| {
+            if self.interrupt.stopped() {
+                return vec![None; speeds.len()];
+            }
+            let dwells: Vec<Dwell<'_>> =
+                speeds.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
+            respond(&dwells).into_iter().map(Result::ok).collect::<Vec<_>>()
+        };
+        let parts: Vec<_> = speeds_rpm.par_chunks(AT_ONCE).map(of_part).collect();
+        parts.into_iter().flatten().collect()
+    }
 }
 
 /// What a tongue ends in.
@@ -347,7 +353,7 @@ impl Tongue {
         let mut count = TRIAL_SPEEDS;
         for _ in 0..=PEAK_ROUNDS {
             let trials = between(around[0], around[1], count);
-            let found = responses(&point, &trials);
+            let found = asker.responses_of(&point, &trials);
             let found = || found.iter().flatten();
             if found().any(|response| response.kind() == kind) {
                 return true;

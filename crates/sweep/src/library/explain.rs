@@ -22,7 +22,7 @@ pub struct Explained {
 
 /// Explains a point of a grid, or its only one: `at` gives each axis a value, and any other
 /// parameter, as `NAME=VALUE`. Looks at even speeds (rpm), without any from half of the slowest
-/// mode's frequency to the profile's fastest speed. Nothing interrupts it.
+/// mode's frequency to the profile's fastest speed; `None` if it was interrupted.
 ///
 /// # Errors
 /// Mistakes in the grid or the options, a profile that cannot be explained, and a machine without
@@ -32,7 +32,7 @@ pub fn explain_point(
     at: &[String],
     speeds_rpm: Option<&[f64]>,
     effort: Effort<'_>,
-) -> Result<Explained, Error> {
+) -> Result<Option<Explained>, Error> {
     draw_random_keys()?;
     let (plan, at) = grid.load_point(at)?;
     let even = |speeds: &[f64]| {
@@ -44,6 +44,42 @@ pub fn explain_point(
     };
     let speeds = speeds_rpm.map(even).transpose()?;
     let (threads, simd) = (effort.threads()?, simd_from_environment()?);
-    let found = threads::pool(threads)?.install(|| explain(&plan, at, speeds, simd))?;
-    Ok(Explained { found: json::of(&found), text: words::of(&found) })
+    let work = || explain(&plan, at, speeds, simd, effort.interrupt);
+    let found = threads::pool(threads)?.install(work)?;
+    if effort.interrupt.stopped() {
+        return Ok(None);
+    }
+    Ok(Some(Explained { found: json::of(&found), text: words::of(&found) }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use super::*;
+    use crate::interrupt::Interrupt;
+    use crate::progress::ProgressMode;
+
+    #[test]
+    fn an_interrupt_ends_it() {
+        let text =
+            "spin = { profile = \"ramp\", peak_rpm = 350, ramp_s = 5 }\ntime = { end_s = 5 }\n";
+        let grid = GridInput::text("grid", text.to_owned(), Vec::new());
+        // Minutes of work.
+        let speeds: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
+        let interrupt = Interrupt::new();
+        let effort =
+            Effort { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
+        let found = std::thread::scope(|scope| {
+            let work = scope.spawn(|| explain_point(&grid, &[], Some(&speeds), effort));
+            std::thread::sleep(Duration::from_millis(500));
+            assert!(!work.is_finished(), "it is too short");
+            let raised = Instant::now();
+            interrupt.raise(2);
+            let found = work.join().unwrap();
+            assert!(raised.elapsed() < Duration::from_secs(5), "{:?}", raised.elapsed());
+            found
+        });
+        assert!(found.unwrap().is_none());
+    }
 }

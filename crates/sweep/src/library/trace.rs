@@ -42,7 +42,7 @@ pub fn trace_point(
     });
     let start = start_of(&start.collect::<Result<Vec<_>, _>>()?);
     let extras = Extras { states: options.states, forces: options.forces };
-    let work = || trace::trace(&plan, plan.scenario(0), at, every_s, &start, extras);
+    let work = || trace::trace(&plan, plan.scenario(0), at, every_s, &start, extras, None);
     // A thread for each model, where there may be two; they give the same bits as one.
     let trace = match threads::pool(2) {
         Ok(pool) => pool.install(work)?,

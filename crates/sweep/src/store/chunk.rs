@@ -20,6 +20,9 @@
 //! speed, NaN where there is none, and its multiplier (f64), then of two modes number, name (u32,
 //! number 0 where there is none) and frequency (f64). M, B and G follow from the plan, and are zero
 //! unless it asks for more than peaks.
+//!
+//! A part is what an interrupted process has of a chunk: the same with `SWEEPPRT`, and records of
+//! some of the points, in order.
 
 use super::error::StoreError;
 use super::schema::Layout;
@@ -29,6 +32,7 @@ use crate::outcome::{GrowingMode, Growth, Outcome, Status, Trajectory};
 use washer_model::{Disturbance, Motion};
 
 const MAGIC: [u8; 8] = *b"SWEEPCHK";
+const PART_MAGIC: [u8; 8] = *b"SWEEPPRT";
 const FORMAT: u32 = 2;
 const HEADER: usize = 8 + 4 + 4 + 32 + 3 * 8;
 const HASH: usize = blake3::OUT_LEN;
@@ -130,9 +134,6 @@ pub(crate) fn encode(place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, Sto
             format!("{} outcomes for {} points", outcomes.len(), place.count),
         ));
     }
-    let shape = &place.shape;
-    let mut bytes = Vec::with_capacity(HEADER + outcomes.len() * shape.bytes_a_point() + HASH);
-    bytes.extend_from_slice(&header(place));
     for (outcome, point) in outcomes.iter().zip(place.first..) {
         if outcome.point != point {
             return Err(reject(
@@ -140,6 +141,33 @@ pub(crate) fn encode(place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, Sto
                 format!("an outcome of point {} in the place of {point}", outcome.point),
             ));
         }
+    }
+    write(MAGIC, place, outcomes)
+}
+
+/// The file of a part of a chunk: outcomes of some of its points, in order.
+pub(crate) fn encode_part(place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, StoreError> {
+    if !is_part(place, outcomes) {
+        let reason = format!("{} outcomes that are no part of the chunk", outcomes.len());
+        return Err(reject(place, reason));
+    }
+    write(PART_MAGIC, place, outcomes)
+}
+
+/// Whether these are some of a chunk's points, in order, and not all.
+fn is_part(place: &Place, outcomes: &[Outcome]) -> bool {
+    let points = place.first..place.first.saturating_add(place.count);
+    (outcomes.len() as u64) < place.count
+        && outcomes.iter().all(|outcome| points.contains(&outcome.point))
+        && outcomes.is_sorted_by(|a, b| a.point < b.point)
+}
+
+fn write(magic: [u8; 8], place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, StoreError> {
+    let shape = &place.shape;
+    let mut bytes = Vec::with_capacity(HEADER + outcomes.len() * shape.bytes_a_point() + HASH);
+    bytes.extend_from_slice(&header(magic, place));
+    for outcome in outcomes {
+        let point = outcome.point;
         for (model, name) in [(&outcome.nonlinear, "nonlinear"), (&outcome.linear, "linear")] {
             let is_ok = model.status == Status::Ok;
             for (got, many, what) in [
@@ -167,32 +195,41 @@ pub(crate) fn encode(place: &Place, outcomes: &[Outcome]) -> Result<Vec<u8>, Sto
 /// The outcomes in a chunk's file, if every byte is as it was written and it is the chunk looked
 /// for.
 pub(crate) fn decode(place: &Place, bytes: &[u8]) -> Result<Vec<Outcome>, Damage> {
+    let outcomes = read(MAGIC, place, bytes)?;
+    if outcomes.len() as u64 != place.count {
+        return Err(Damage::Length);
+    }
+    let is_whole =
+        outcomes.iter().zip(place.first..).all(|(outcome, point)| outcome.point == point);
+    if is_whole { Ok(outcomes) } else { Err(Damage::Record) }
+}
+
+/// As [`decode`], of a part of the chunk.
+pub(crate) fn decode_part(place: &Place, bytes: &[u8]) -> Result<Vec<Outcome>, Damage> {
+    let outcomes = read(PART_MAGIC, place, bytes)?;
+    if is_part(place, &outcomes) { Ok(outcomes) } else { Err(Damage::Record) }
+}
+
+fn read(magic: [u8; 8], place: &Place, bytes: &[u8]) -> Result<Vec<Outcome>, Damage> {
     let (body, hash) = bytes.split_last_chunk::<HASH>().ok_or(Damage::Length)?;
     if blake3::hash(body) != *hash {
         return Err(Damage::Hash);
     }
     let (found, records) = body.split_at_checked(HEADER).ok_or(Damage::Length)?;
-    if found != header(place) {
+    if found != header(magic, place) {
         return Err(Damage::Foreign);
     }
     let shape = &place.shape;
-    let length = shape.bytes_a_point();
-    if records.len() as u64 != place.count.saturating_mul(length as u64) {
+    let records = records.chunks_exact(shape.bytes_a_point());
+    if !records.remainder().is_empty() {
         return Err(Damage::Length);
     }
-    records
-        .chunks_exact(length)
-        .zip(place.first..)
-        .map(|(bytes, point)| {
-            let outcome = read_record(bytes, shape).ok_or(Damage::Record)?;
-            if outcome.point == point { Ok(outcome) } else { Err(Damage::Record) }
-        })
-        .collect()
+    records.map(|bytes| read_record(bytes, shape).ok_or(Damage::Record)).collect()
 }
 
-fn header(place: &Place) -> Vec<u8> {
+fn header(magic: [u8; 8], place: &Place) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER);
-    bytes.extend_from_slice(&MAGIC);
+    bytes.extend_from_slice(&magic);
     bytes.extend_from_slice(&FORMAT.to_le_bytes());
     bytes.extend_from_slice(&place.shape.channels.to_le_bytes());
     bytes.extend_from_slice(place.plan.as_bytes());
@@ -430,6 +467,32 @@ mod tests {
         let mut more = good.clone();
         more[0].nonlinear.metrics = vec![1.0];
         assert!(reason(&more).contains("1 metrics where 0 belong"), "{}", reason(&more));
+    }
+
+    #[test]
+    fn a_part_is_some_points_in_order_and_no_chunk() {
+        let place = place(4, 2);
+        let all = outcomes(&place);
+        for some in [&all[..0], &all[1..2], &all[..3]] {
+            let bytes = encode_part(&place, some).unwrap();
+            assert_eq!(decode_part(&place, &bytes).as_deref(), Ok(some));
+            assert_eq!(decode(&place, &bytes), Err(Damage::Foreign));
+            for at in 0..bytes.len() {
+                let mut broken = bytes.clone();
+                broken[at] ^= 1;
+                assert_eq!(decode_part(&place, &broken), Err(Damage::Hash), "byte {at}");
+                assert!(decode_part(&place, &bytes[..at]).is_err(), "cut to {at}");
+            }
+        }
+        let elsewhere = [synthetic::outcome(place.first + 4, 2)];
+        let backwards = [all[1].clone(), all[0].clone()];
+        for wrong in [all.as_slice(), &elsewhere, &backwards] {
+            assert!(encode_part(&place, wrong).is_err(), "{wrong:?}");
+            let bytes = write(PART_MAGIC, &place, wrong).unwrap();
+            assert_eq!(decode_part(&place, &bytes), Err(Damage::Record));
+        }
+        let whole = encode(&place, &all).unwrap();
+        assert_eq!(decode_part(&place, &whole), Err(Damage::Foreign));
     }
 
     fn model(channels: usize, metrics: usize) -> impl Strategy<Value = Trajectory> {

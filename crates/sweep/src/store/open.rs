@@ -1,6 +1,6 @@
 //! Opening a run on an output: whose it is, what is there, what is missing.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{self, ErrorKind, Read as _};
 use std::ops::Range;
@@ -13,7 +13,7 @@ use super::lock::{self, Lock};
 use super::plan_file::{Found, PlanFile, set_aside};
 use super::read::{self, ResultFile, Tally};
 use super::shard::{self, Dealing, Shard, ShardRequest};
-use super::{Folder, Job, chunk_of_name, chunk_points, provenance, trials};
+use super::{Folder, Job, Named, chunk_points, provenance, trials};
 use crate::outcome::Outcome;
 use crate::threads::Environment;
 use sweep_files::{FileError, atomic, regular};
@@ -50,6 +50,8 @@ pub struct OpenRun {
     /// This process's chunks that are there; behind a lock because workers look while the writer
     /// adds.
     present: Mutex<BTreeSet<u64>>,
+    /// What there is of this process's other chunks, until it is taken.
+    parts: Mutex<BTreeMap<u64, Vec<Outcome>>>,
     notes: Vec<String>,
 }
 
@@ -109,6 +111,7 @@ impl OpenRun {
             chunk_points: chunk_points(job.points),
             dealt,
             present: Mutex::default(),
+            parts: Mutex::default(),
             notes,
         };
         run.rescan()?;
@@ -133,7 +136,7 @@ impl OpenRun {
     /// [`StoreError::File`].
     pub fn rescan(&mut self) -> Result<(), StoreError> {
         let mut present = BTreeSet::new();
-        for chunk in chunks_named(&self.folder)? {
+        for chunk in chunks_named(&self.folder, Named::Chunk)? {
             if chunk >= self.chunks() || !self.owns(chunk) {
                 continue;
             }
@@ -142,24 +145,46 @@ impl OpenRun {
             }
         }
         *self.present() = present;
+        let mut parts = BTreeMap::new();
+        for chunk in chunks_named(&self.folder, Named::Part)? {
+            if chunk < self.chunks() && self.is_missing(chunk) {
+                let path = self.folder.part(chunk);
+                let found = read_part(&self.folder, &self.place(chunk))?;
+                let outcomes = self.undamaged(found, &path)?;
+                parts.extend(outcomes.map(|outcomes| (chunk, outcomes)));
+            }
+        }
+        *lock_of(&self.parts) = parts;
         Ok(())
     }
 
     /// A chunk's outcomes; `None`, with the file set aside and noted, if it is damaged, or if it is
     /// not there.
     pub(super) fn read_chunk(&mut self, chunk: u64) -> Result<Option<Vec<Outcome>>, StoreError> {
-        match read_chunk(&self.folder, &self.place(chunk))? {
+        let found = read_chunk(&self.folder, &self.place(chunk))?;
+        let outcomes = self.undamaged(found, &self.folder.chunk(chunk))?;
+        if outcomes.is_none() {
+            self.present().remove(&chunk);
+        }
+        Ok(outcomes)
+    }
+
+    /// What a file holds; a damaged one is set aside and noted.
+    fn undamaged(
+        &mut self,
+        found: ChunkFile,
+        path: &Path,
+    ) -> Result<Option<Vec<Outcome>>, StoreError> {
+        match found {
             ChunkFile::Whole(outcomes) => Ok(Some(outcomes)),
             ChunkFile::Absent => Ok(None),
             ChunkFile::Damaged(damage) => {
-                let path = self.folder.chunk(chunk);
-                let aside = set_aside(&path)?;
+                let aside = set_aside(path)?;
                 self.notes.push(format!(
                     "{}: {damage}; kept as {} and computed again",
                     path.display(),
                     aside.file_name().unwrap_or_default().to_string_lossy()
                 ));
-                self.present().remove(&chunk);
                 Ok(None)
             }
         }
@@ -174,6 +199,28 @@ impl OpenRun {
         let bytes = chunk::encode(&self.place(chunk), outcomes)?;
         atomic::write(&self.folder.path, &self.folder.chunk(chunk), &bytes)?;
         self.present().insert(chunk);
+        Ok(())
+    }
+
+    /// The outcomes there are of chunks that are not whole, to go on from.
+    pub(crate) fn take_parts(&self) -> BTreeMap<u64, Vec<Outcome>> {
+        std::mem::take(&mut *lock_of(&self.parts))
+    }
+
+    /// Keeps what there is of a chunk, in any order, for the next process to go on from. Once the
+    /// chunk is there, nobody reads the part.
+    ///
+    /// # Errors
+    /// As [`OpenRun::write_chunk`].
+    pub(crate) fn write_part(
+        &self,
+        chunk: u64,
+        mut outcomes: Vec<Outcome>,
+    ) -> Result<(), StoreError> {
+        outcomes.sort_by_key(|outcome| outcome.point);
+        let bytes = chunk::encode_part(&self.place(chunk), &outcomes)?;
+        atomic::write(&self.folder.path, &self.folder.part(chunk), &bytes)?;
+        lock_of(&self.parts).insert(chunk, outcomes);
         Ok(())
     }
 
@@ -213,7 +260,7 @@ impl OpenRun {
     }
 
     fn present(&self) -> MutexGuard<'_, BTreeSet<u64>> {
-        self.present.lock().unwrap_or_else(PoisonError::into_inner)
+        lock_of(&self.present)
     }
 
     /// Points this process answers for, and how many of them are there.
@@ -230,7 +277,9 @@ impl OpenRun {
             Some(last) if self.owns(last) => self.chunk_points - length(last),
             _ => 0,
         };
-        let there = self.present().iter().map(|&chunk| length(chunk)).sum();
+        let whole: u64 = self.present().iter().map(|&chunk| length(chunk)).sum();
+        let there =
+            whole + lock_of(&self.parts).values().map(|part| part.len() as u64).sum::<u64>();
         (own.saturating_mul(self.chunk_points).saturating_sub(short), there)
     }
 
@@ -278,29 +327,45 @@ pub(super) enum ChunkFile {
     Damaged(Damage),
 }
 
+fn lock_of<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Reads and verifies a chunk, leaving the file alone.
 pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
-    let path = folder.chunk(place.chunk);
+    read_file(&folder.chunk(place.chunk), place, chunk::decode)
+}
+
+/// As [`read_chunk`], of what there is of a chunk.
+pub(super) fn read_part(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
+    read_file(&folder.part(place.chunk), place, chunk::decode_part)
+}
+
+fn read_file(
+    path: &Path,
+    place: &Place,
+    decode: fn(&Place, &[u8]) -> Result<Vec<Outcome>, Damage>,
+) -> Result<ChunkFile, StoreError> {
     let mut bytes = Vec::new();
     // A byte too many is enough to know that it is too long.
     let read =
-        regular::open(&path).and_then(|file| file.take(place.bytes() + 1).read_to_end(&mut bytes));
+        regular::open(path).and_then(|file| file.take(place.bytes() + 1).read_to_end(&mut bytes));
     match read {
         Ok(_) => {}
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(ChunkFile::Absent),
-        Err(error) => return Err(StoreError::io("read", &path)(error)),
+        Err(error) => return Err(StoreError::io("read", path)(error)),
     }
-    Ok(match chunk::decode(place, &bytes) {
+    Ok(match decode(place, &bytes) {
         Ok(outcomes) => ChunkFile::Whole(outcomes),
         Err(damage) => ChunkFile::Damaged(damage),
     })
 }
 
-/// Chunks that a folder has by name, unread.
-pub(super) fn chunks_named(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
+/// Chunks that a folder has such files of by name, unread.
+pub(super) fn chunks_named(folder: &Folder, named: Named) -> Result<BTreeSet<u64>, StoreError> {
     let mut chunks = BTreeSet::new();
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
-        chunks.extend(name.to_str().and_then(chunk_of_name));
+        chunks.extend(name.to_str().and_then(|name| named.chunk_of(name)));
     }
     Ok(chunks)
 }
@@ -387,7 +452,7 @@ pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
 fn is_ours(name: &str) -> bool {
     let whole = name.strip_suffix(".damaged").unwrap_or(name);
     ["plan.json", "shards.json", trials::NAME].contains(&whole)
-        || chunk_of_name(whole).is_some()
+        || [Named::Chunk, Named::Part].iter().any(|named| named.chunk_of(whole).is_some())
         || lock::shard_of_name(name).is_some()
         || provenance::is_session(name)
         || atomic::is_temporary(name)

@@ -17,6 +17,7 @@ use serde::ser::{SerializeMap, Serializer};
 use serde_json::Value;
 
 use super::error::StoreError;
+use crate::method::Level;
 use crate::verdict::ROW_STATUSES;
 use sweep_files::cells;
 use sweep_files::{FileKind, ParquetFile, key};
@@ -243,6 +244,30 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
     extreme("ratio_max", &mut tally.greatest_ratio, |a, b| a > b)?;
     extreme("min_gap_nonlinear_m", &mut tally.least_gap_nonlinear_m, |a, b| a < b)?;
     Ok(())
+}
+
+/// Which method each row's numbers come from; nothing where the file does not say.
+///
+/// # Errors
+/// [`StoreError::File`], and [`StoreError::Parquet`] for a file without such a column.
+pub(crate) fn levels(file: &ParquetFile) -> Result<Vec<Option<Level>>, StoreError> {
+    let failed = StoreError::parquet("read", file.path());
+    let absent = || ParquetError::General("there is no column `method`".to_owned());
+    let mut levels = Vec::new();
+    let batches = file.batches(|builder| {
+        let mask = ProjectionMask::columns(builder.parquet_schema(), ["method"]);
+        builder.with_projection(mask)
+    })?;
+    for batch in batches {
+        let batch = batch?;
+        let names = batch.column_by_name("method").ok_or_else(absent).map_err(&failed)?;
+        let names = cells::texts(names).map_err(|error| failed(error.into()))?;
+        levels.extend(names.into_iter().map(|name| {
+            let name = name?;
+            Level::ALL.into_iter().find(|level| level.name() == name)
+        }));
+    }
+    Ok(levels)
 }
 
 /// What one column of any file holds.

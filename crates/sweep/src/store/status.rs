@@ -7,11 +7,12 @@ use serde::Serialize;
 
 use super::chunk::{Place, Shape};
 use super::error::{Holder, StoreError};
-use super::open::{self, ChunkFile, chunks_named, read_chunk};
+use super::open::{self, ChunkFile, chunks_named, read_chunk, read_part};
 use super::plan_file::{Found, PlanFile};
 use super::read::StatusCounts;
 use super::shard::{self, Dealing};
-use super::{Folder, Job, chunk_points, lock};
+use super::{Folder, Job, Named, chunk_points, lock};
+use crate::outcome::Outcome;
 use crate::verdict::row_status;
 
 /// How far a run is.
@@ -104,16 +105,25 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         Place { plan: hash, shape, chunk, first, count: points_a_chunk.min(job.points - first) }
     };
     let mut present = BTreeSet::new();
-    for chunk in chunks_named(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
+    let count = |outcomes: &[Outcome], status: &mut FolderStatus| {
+        status.points_done += outcomes.len() as u64;
+        outcomes.iter().for_each(|outcome| status.by_status.add(row_status(outcome).0));
+    };
+    let named = |named| Ok::<_, StoreError>(chunks_named(&folder, named)?.into_iter());
+    for chunk in named(Named::Chunk)?.filter(|chunk| *chunk < chunks) {
         match read_chunk(&folder, &place(chunk))? {
             ChunkFile::Whole(outcomes) => {
                 present.insert(chunk);
-                status.points_done += outcomes.len() as u64;
-                outcomes.iter().for_each(|outcome| status.by_status.add(row_status(outcome).0));
+                count(&outcomes, &mut status);
             }
             ChunkFile::Damaged(_) => status.chunks_damaged.push(chunk),
             // The run was finished, or the chunk set aside, a moment ago.
             ChunkFile::Absent => {}
+        }
+    }
+    for chunk in named(Named::Part)?.filter(|chunk| *chunk < chunks && !present.contains(chunk)) {
+        if let ChunkFile::Whole(outcomes) = read_part(&folder, &place(chunk))? {
+            count(&outcomes, &mut status);
         }
     }
     status.chunks_done = present.len() as u64;

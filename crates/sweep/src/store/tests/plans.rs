@@ -1,0 +1,100 @@
+//! The frozen plan: other plans, other builds, older folders.
+
+use super::*;
+
+#[test]
+fn another_plan_is_refused_with_the_difference_until_fresh() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    write(&open(&home.output(), &job), 0);
+    let other = Job {
+        plan: json!({ "name": "synthetic", "points": POINTS, "step_s": 1.0e-4 }),
+        ..synthetic::job(POINTS)
+    };
+    let error = OpenRun::open(&home.output(), &other, options()).unwrap_err();
+    assert!(error.is_refusal());
+    let text = error.to_string();
+    assert!(text.contains("/step_s: was 0.0002, is 0.0001") && text.contains("--fresh"), "{text}");
+
+    let newer = Job { version: "9.9.9", ..synthetic::job(POINTS) };
+    let text = OpenRun::open(&home.output(), &newer, options()).unwrap_err().to_string();
+    assert!(text.contains(r#"/sweep_version: was "0.0.0-test", is "9.9.9""#), "{text}");
+
+    let fresh = OpenOptions { fresh: true, ..options() };
+    let Opened::Run(run) = OpenRun::open(&home.output(), &other, fresh).unwrap() else {
+        panic!("must run")
+    };
+    assert!(run.is_missing(0));
+    drop(run);
+    assert!(
+        OpenRun::open(&home.output(), &job, options()).is_err(),
+        "the folder is the other plan's now"
+    );
+}
+
+#[test]
+fn another_build_of_the_version_is_another_run() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let other = Job { numerics: 2, ..synthetic::job(POINTS) };
+    let refusal = |what: Result<Opened, StoreError>| {
+        let error = what.unwrap_err();
+        assert!(error.is_refusal());
+        assert!(error.to_string().contains("/numerics: was 1, is 2"), "{error}");
+    };
+    let run = open(&home.output(), &job);
+    write(&run, 0);
+    drop(run);
+    refusal(OpenRun::open(&home.output(), &other, options()));
+    refusal(OpenRun::open_for_merge(&home.output(), &other));
+    assert!(
+        status(&home.output(), &other).unwrap_err().to_string().contains("/numerics: was 1, is 2")
+    );
+
+    // A chunk of that build under this one's plan.
+    let foreign = write_bytes(&other, 3);
+    fs::write(home.partial().join(Named::Chunk.name(3)), foreign).unwrap();
+    let mut run = open(&home.output(), &job);
+    assert!(run.is_missing(3) && !run.is_missing(0));
+    let notes = run.take_notes();
+    assert!(notes[0].contains("another plan, place or version"), "{notes:?}");
+
+    write_missing(&run);
+    finish(run, &job);
+    refusal(OpenRun::open(&home.output(), &other, options()));
+    let fresh = OpenOptions { fresh: true, ..options() };
+    assert!(matches!(OpenRun::open(&home.output(), &other, fresh).unwrap(), Opened::Run(_)));
+}
+
+#[test]
+fn a_folder_of_an_older_format_is_refused_as_such() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    fs::create_dir(home.partial()).unwrap();
+    let old = json!({
+        "format": 1, "version": job.version, "plan_hash": "00", "points": POINTS, "chunk_points": 8,
+        "plan": job.plan,
+    });
+    fs::write(home.partial().join("plan.json"), old.to_string()).unwrap();
+    let error = OpenRun::open(&home.output(), &job, options()).unwrap_err();
+    assert!(error.is_refusal());
+    let text = error.to_string();
+    assert!(
+        text.contains("/store_format: was 1, is 2") && text.contains("/numerics: was 0"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_damaged_plan_is_set_aside_and_its_chunks_are_used() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    write(&open(&home.output(), &job), 0);
+    let plan = home.partial().join("plan.json");
+    let text = fs::read_to_string(&plan).unwrap();
+    for broken in
+        [text.replace("synthetic", "synthetik"), text[..text.len() / 2].to_owned(), String::new()]
+    {
+        fs::write(&plan, broken).unwrap();
+        let mut run = open(&home.output(), &job);
+        assert!(run.take_notes()[0].contains("the frozen plan was damaged"));
+        assert!(!run.is_missing(0) && run.is_missing(1));
+        assert_eq!(fs::read_to_string(&plan).unwrap(), text);
+    }
+}
