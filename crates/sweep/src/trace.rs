@@ -8,7 +8,7 @@ use rayon::iter::{IndexedParallelIterator as _, IntoParallelIterator as _, Paral
 use serde_json::{Value, json};
 use washer_model::{
     COORDINATES, Cases, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium, Point,
-    Spin, Start, Timing, history, prepare,
+    Spin, Start, Timing, history_until, prepare,
 };
 
 use crate::config::NamedValues;
@@ -103,6 +103,17 @@ pub(crate) fn every(every_s: f64, plan: &Plan) -> Result<f64, Error> {
     })
 }
 
+/// What of a point's histories is looked at.
+pub(crate) struct View {
+    /// Time between two instants, s.
+    pub(crate) every_s: f64,
+    /// Where both models begin.
+    pub(crate) start: Start,
+    pub(crate) extras: Extras,
+    /// For the trajectories of the point's row, how that was found.
+    pub(crate) quick: Option<Quick>,
+}
+
 /// The histories of one point.
 pub(crate) struct Trace {
     table: Table,
@@ -115,8 +126,8 @@ pub(crate) struct Trace {
 /// Integrates both models of a scenario and reads them every `every_s` from 0 to the end; in a
 /// pool, both at once.
 ///
-/// `at` names the point: parameters with their values. Both models begin at `start`. With `quick`
-/// it is the trajectories of the point's row.
+/// `at` names the point: parameters with their values. Once `stop` says so it ends early, and what
+/// it returns means nothing.
 ///
 /// # Errors
 /// [`NoEquilibrium`].
@@ -124,17 +135,16 @@ pub(crate) fn trace(
     plan: &Plan,
     scenario: Scenario,
     at: NamedValues,
-    every_s: f64,
-    start: &Start,
-    extras: Extras,
-    quick: Option<Quick>,
+    view: &View,
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Trace, NoEquilibrium> {
+    let View { every_s, ref start, extras, quick } = *view;
     let Scenario { machine, spin, window_s } = scenario;
     let checkpoints = quick.map_or(0, |quick| quick.checkpoints);
     let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
     let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
     let ([by_nonlinear, by_linear], method_json) = methods(plan, &point, &spin, quick);
-    let run = |model, method| history(model, method, &point, start, every_s);
+    let run = |model, method| history_until(model, method, &point, start, every_s, stop);
     let nonlinear = || run(ModelKind::Nonlinear, &by_nonlinear);
     let linear = || run(ModelKind::Linear, &by_linear);
     let (nonlinear, linear) = match rayon::current_thread_index() {
@@ -210,10 +220,16 @@ pub(crate) fn keep(
             }
             let values = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
             let at = values.zip(plan.axis_values(point)).collect();
-            let every_s = plan.end_s / KEPT_INSTANTS;
-            let (start, extras) = (Start::default(), Extras::default());
-            let quick = level.and_then(|level| engine.quick(level));
-            let found = trace(plan, plan.scenario(point), at, every_s, &start, extras, quick);
+            let view = View {
+                every_s: plan.end_s / KEPT_INSTANTS,
+                start: Start::default(),
+                extras: Extras::default(),
+                quick: level.and_then(|level| engine.quick(level)),
+            };
+            let found = trace(plan, plan.scenario(point), at, &view, stop);
+            if stop() {
+                return Ok(());
+            }
             // The row of a point without an equilibrium says so.
             if let Ok(trace) = found {
                 let path = folder.join(format!("point-{point}.parquet"));
@@ -417,7 +433,8 @@ mod tests {
             quick_rows += 1;
             assert_eq!(quick.level, row.method);
             let (scenario, extras) = (plan.scenario(row.point), Extras::default());
-            let by_row = trace(&plan, scenario, Vec::new(), every_s, &start, extras, Some(quick));
+            let view = View { every_s, start, extras, quick: Some(quick) };
+            let by_row = trace(&plan, scenario, Vec::new(), &view, &|| false);
             let (rows, _) = by_row.unwrap().into_table().finish().unwrap();
             // The row says the nonlinear model's rung; the linear one's may have been another.
             for (name, model, over) in

@@ -86,13 +86,13 @@ pub use machine::{
     Bearings, BumpStop, Bushing, Cabinet, Damper, Drum, Flexure, Foot, Machine, Shaft, Spring, Tub,
     Unbalance,
 };
-pub use modes::campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell};
+pub use modes::campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell, campbell_until};
 pub use modes::shape::{Motion, Movement, Plane};
 pub use modes::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
 pub use nonlinear::coupling::Caps;
 pub use point::{NoEquilibrium, Point, Timing, prepare};
 pub use run::equations::{Equations, STATE_LEN};
-pub use run::history::{History, Instant, Start, history};
+pub use run::history::{History, Instant, Start, history, history_until};
 pub use run::suspension::Forces;
 pub use run::{
     Course, Extra, Method, ModelKind, Record, Stop, Wanted, simulate, simulate_until, simulate_with,

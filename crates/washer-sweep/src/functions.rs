@@ -29,8 +29,10 @@ pub(crate) fn modes(
     }
     let speeds = speeds_rpm.unwrap_or_else(|| (0..=120_u32).map(|k| 10.0 * f64::from(k)).collect());
     let input = plan.map(|plan| plan.get().input.clone());
-    let found = abandonable(py, move |_| sweep::find_modes(input.as_ref(), &at, &speeds))?;
-    found.map(PyResultTable::new).map_err(|error| errors::error(py, &error))
+    let work = move |interrupt: &_| sweep::find_modes(input.as_ref(), &at, &speeds, interrupt);
+    let found = abandonable(py, work)?;
+    let found = found.map_err(|error| errors::error(py, &error))?;
+    found.map(PyResultTable::new).ok_or_else(|| PyKeyboardInterrupt::new_err("interrupted"))
 }
 
 /// Periodic responses at constant speeds, and whether they are stable.

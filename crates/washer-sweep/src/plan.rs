@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
 use sweep::{BoundaryOptions, Effort, Evaluator, GridInput, TraceOptions};
@@ -110,8 +111,10 @@ impl PyPlan {
         let (at, start) = (assignments(at)?, assignments(start)?);
         let options = TraceOptions { every_s: every, states, forces, start };
         let input = self.input.clone();
-        let traced = abandonable(py, move |_| sweep::trace_point(&input, &at, &options))?;
-        let (table, failures) = traced.map_err(|error| errors::error(py, &error))?;
+        let work = move |interrupt: &_| sweep::trace_point(&input, &at, &options, interrupt);
+        let traced = abandonable(py, work)?.map_err(|error| errors::error(py, &error))?;
+        let (table, failures) =
+            traced.ok_or_else(|| PyKeyboardInterrupt::new_err("interrupted"))?;
         for failure in failures {
             py.import("warnings")?.call_method1("warn", (failure,))?;
         }

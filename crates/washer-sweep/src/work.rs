@@ -35,8 +35,7 @@ impl<T> Attended<T> {
 }
 
 /// As [`attended`], for a work of which nothing is worth waiting for: Ctrl-C raises the interrupt
-/// and leaves the thread to end by itself, and what comes of it is dropped. One trajectory, and the
-/// modes at all speeds, do not look at the interrupt and go on to their end.
+/// and leaves the thread to end by itself, and what comes of it is dropped.
 pub(crate) fn abandonable<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Interrupt) -> T + Send + 'static,

@@ -72,7 +72,10 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
     let speeds = args.speed.values();
-    let analysis = Analysis::new(&machine, &spin, &speeds, args.exact)?;
+    // A signal ends the process: there is nothing to keep.
+    let Some(analysis) = Analysis::new(&machine, &spin, &speeds, args.exact, &|| false)? else {
+        return Ok(Exit::Interrupted);
+    };
     if let (Some(path), Some(output)) = (&args.out, output) {
         let bytes = analysis.table(&name, &machine).into_bytes();
         let bytes = bytes.map_err(StoreError::parquet("write", path))?;

@@ -14,7 +14,7 @@ use crate::outcome::Trajectory;
 use crate::plan::Plan;
 use crate::store::Job;
 use crate::threads;
-use crate::trace::{Extras, StartValue, every, start_of, start_value, trace};
+use crate::trace::{Extras, StartValue, View, every, start_of, start_value, trace};
 use crate::verdict::Verdict;
 use sweep_files::{FileKind, Output, key};
 use sweep_results::{Cell, Order, ResultTable, top};
@@ -87,7 +87,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let extras = Extras { states: args.states, forces: args.forces };
     let start = start_of(&args.start);
     let output = Output::begin(&args.out, FileKind::Trace)?;
-    let work = || trace(&plan, plan.scenario(0), at, every_s, &start, extras, None);
+    let view = View { every_s, start, extras, quick: None };
+    // A signal ends the process: there is nothing to keep.
+    let work = || trace(&plan, plan.scenario(0), at, &view, &|| false);
     // A thread for each model, where there may be two; they write the same bytes as one.
     let trace = match threads::pool(2) {
         Ok(pool) => pool.install(work)?,

@@ -3,20 +3,21 @@
 use lane_ode::Simd;
 use serde_json::{Value, json};
 use washer_model::{
-    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Spin, Timing, campbell,
-    exact_motions, prepare,
+    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Spin, Stop, Timing,
+    campbell_until, exact_motions, prepare,
 };
 
 use super::refused_speeds;
 use super::result::{ResultKind, ResultTable};
 use crate::config::{self, GridInput};
 use crate::exit::Error;
+use crate::interrupt::Interrupt;
 use crate::speeds::MOST_SPEEDS;
 use crate::table::Table;
 use sweep_files::key;
 
 /// The modes of a grid's machine at spin speeds (rpm, rising); `at` gives axes a value, which have
-/// none otherwise. Without a grid, those of the built-in machine.
+/// none otherwise. Without a grid, those of the built-in machine. `None` if it was interrupted.
 ///
 /// # Errors
 /// Mistakes in the grid, speeds that do not rise, a machine without equilibrium or modes.
@@ -24,7 +25,8 @@ pub fn find_modes(
     grid: Option<&GridInput>,
     at: &[String],
     speeds_rpm: &[f64],
-) -> Result<ResultTable, Error> {
+    interrupt: &Interrupt,
+) -> Result<Option<ResultTable>, Error> {
     let rise = speeds_rpm.windows(2).all(|pair| pair[0] < pair[1]);
     let are_speeds = speeds_rpm.iter().all(|speed| speed.is_finite() && *speed >= 0.0);
     let count = speeds_rpm.len();
@@ -44,8 +46,11 @@ pub fn find_modes(
             (plan.name, plan.machine, plan.spin)
         }
     };
-    let analysis = Analysis::new(&machine, &spin, speeds_rpm, false)?;
-    ResultTable::of_table(ResultKind::Modes, analysis.table(&name, &machine))
+    let stop = || interrupt.stopped();
+    let Some(analysis) = Analysis::new(&machine, &spin, speeds_rpm, false, &stop)? else {
+        return Ok(None);
+    };
+    ResultTable::of_table(ResultKind::Modes, analysis.table(&name, &machine)).map(Some)
 }
 
 /// The built-in machine by its name, on its way to a speed (rpm).
@@ -63,7 +68,7 @@ pub(crate) struct Analysis {
 }
 
 impl Analysis {
-    /// The modes at each speed (rpm), with exact motions if wanted.
+    /// The modes at each speed (rpm), with exact motions if wanted; `None` once `stop` says so.
     ///
     /// # Errors
     /// A machine without equilibrium, or whose modes cannot be computed.
@@ -72,12 +77,13 @@ impl Analysis {
         spin: &Spin,
         speeds_rpm: &[f64],
         is_exact: bool,
-    ) -> Result<Self, Error> {
+        stop: Stop<'_>,
+    ) -> Result<Option<Self>, Error> {
         let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
         let point = prepare(Simd::Scalar, &[(machine.clone(), spin.clone())], &timing).remove(0)?;
-        let modes = campbell(&point, speeds_rpm)?;
+        let Some(modes) = campbell_until(&point, speeds_rpm, stop)? else { return Ok(None) };
         let exact = if is_exact { Some(exact_over(&point, speeds_rpm, &modes)?) } else { None };
-        Ok(Self { speeds_rpm: speeds_rpm.to_vec(), modes, exact })
+        Ok(Some(Self { speeds_rpm: speeds_rpm.to_vec(), modes, exact }))
     }
 
     /// The modes as JSON.

@@ -3,9 +3,10 @@
 use super::result::{ResultKind, ResultTable};
 use crate::config::GridInput;
 use crate::exit::Error;
+use crate::interrupt::Interrupt;
 use crate::random_keys::draw_random_keys;
 use crate::threads;
-use crate::trace::{self, Extras, every, start_of, start_value};
+use crate::trace::{self, Extras, View, every, start_of, start_value};
 
 /// What a trace holds.
 #[derive(Clone, Debug)]
@@ -21,7 +22,8 @@ pub struct TraceOptions {
 }
 
 /// Time histories of both models at a point of a grid, or of its only one: `at` gives each axis a
-/// value, and any other parameter, as `NAME=VALUE`. Beside them, how each model failed that did.
+/// value, and any other parameter, as `NAME=VALUE`. Beside them, how each model failed that did;
+/// `None` if it was interrupted.
 ///
 /// # Errors
 /// Mistakes in the grid or the options; a machine without equilibrium.
@@ -29,7 +31,8 @@ pub fn trace_point(
     grid: &GridInput,
     at: &[String],
     options: &TraceOptions,
-) -> Result<(ResultTable, Vec<String>), Error> {
+    interrupt: &Interrupt,
+) -> Result<Option<(ResultTable, Vec<String>)>, Error> {
     draw_random_keys()?;
     let (plan, at) = grid.load_point(at)?;
     let every_s = every(options.every_s, &plan)?;
@@ -42,12 +45,38 @@ pub fn trace_point(
     });
     let start = start_of(&start.collect::<Result<Vec<_>, _>>()?);
     let extras = Extras { states: options.states, forces: options.forces };
-    let work = || trace::trace(&plan, plan.scenario(0), at, every_s, &start, extras, None);
+    let view = View { every_s, start, extras, quick: None };
+    let stop = || interrupt.stopped();
+    let work = || trace::trace(&plan, plan.scenario(0), at, &view, &stop);
     // A thread for each model, where there may be two; they give the same bits as one.
     let trace = match threads::pool(2) {
         Ok(pool) => pool.install(work)?,
         Err(_) => work()?,
     };
+    if interrupt.stopped() {
+        return Ok(None);
+    }
     let failures = trace.failures.clone();
-    Ok((ResultTable::of_table(ResultKind::Trace, trace.into_table())?, failures))
+    Ok(Some((ResultTable::of_table(ResultKind::Trace, trace.into_table())?, failures)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::library::find_modes;
+
+    #[test]
+    fn an_interrupt_ends_a_trace_and_modes() {
+        // Hours of work each.
+        let text = "spin = { profile = \"ramp\", peak_rpm = 350, ramp_s = 5 }\n\
+             time = { end_s = 1e5 }\nintegrator = { method = \"rk4\", step_s = 1e-5 }\n";
+        let grid = GridInput::text("grid", text.to_owned(), Vec::new());
+        let speeds: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
+        let interrupt = Interrupt::new();
+        interrupt.raise(2);
+        let options =
+            TraceOptions { every_s: 1.0, states: false, forces: false, start: Vec::new() };
+        assert!(trace_point(&grid, &[], &options, &interrupt).unwrap().is_none());
+        assert!(find_modes(Some(&grid), &[], &speeds, &interrupt).unwrap().is_none());
+    }
 }

@@ -10,6 +10,7 @@ use crate::coordinates::COORDINATES;
 use crate::modes::shape::{Motion, motion};
 use crate::modes::{Mode, Modes, NoModes, assurance, modes};
 use crate::point::Point;
+use crate::run::Stop;
 use core::f64::consts::TAU;
 
 /// Angles of a turn over which frequencies are averaged. Frequencies vary with harmonics 1 and 2 of
@@ -75,10 +76,25 @@ pub struct ModeOverSpeed {
 /// # Errors
 /// [`NoModes`] at any of the speeds.
 pub fn campbell(point: &Point, speeds_rpm: &[f64]) -> Result<Vec<ModeOverSpeed>, NoModes> {
-    let Some(&lowest) = speeds_rpm.first() else { return Ok(Vec::new()) };
+    Ok(campbell_until(point, speeds_rpm, &|| false)?.unwrap_or_default())
+}
+
+/// As [`campbell`]; `None` once `stop` says so. It is asked at every speed.
+///
+/// # Errors
+/// As there.
+pub fn campbell_until(
+    point: &Point,
+    speeds_rpm: &[f64],
+    stop: Stop<'_>,
+) -> Result<Option<Vec<ModeOverSpeed>>, NoModes> {
+    let Some(&lowest) = speeds_rpm.first() else { return Ok(Some(Vec::new())) };
     let mut followed = Vec::with_capacity(speeds_rpm.len());
     let mut current = modes(point, 0.0, rad_per_s(lowest))?;
     for (k, &speed) in speeds_rpm.iter().enumerate() {
+        if stop() {
+            return Ok(None);
+        }
         if k > 0 {
             current = follow(&current, speeds_rpm[k - 1], speed, &|rpm| {
                 modes(point, 0.0, rad_per_s(rpm))
@@ -86,7 +102,7 @@ pub fn campbell(point: &Point, speeds_rpm: &[f64]) -> Result<Vec<ModeOverSpeed>,
         }
         followed.push((over_turn(point, speed, &current)?, current.clone()));
     }
-    (0..COORDINATES)
+    let over_speed = (0..COORDINATES)
         .map(|mode| {
             let mut resonances = Vec::new();
             for k in 1..speeds_rpm.len() {
@@ -107,7 +123,8 @@ pub fn campbell(point: &Point, speeds_rpm: &[f64]) -> Result<Vec<ModeOverSpeed>,
                 resonances,
             })
         })
-        .collect()
+        .collect::<Result<_, _>>()?;
+    Ok(Some(over_speed))
 }
 
 fn rad_per_s(rpm: f64) -> f64 {

@@ -16,7 +16,7 @@ use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::stiff::{OnLeg, StiffTask};
 use crate::run::suspension::{Forces, forces};
-use crate::run::{Family, Method, ModelKind, OfLinear, OfNonlinear, coupling, first_step};
+use crate::run::{Family, Method, ModelKind, OfLinear, OfNonlinear, Stop, coupling, first_step};
 use core::marker::PhantomData;
 use lane_ode::{
     Dual, Ended, Failure, Leg, N, ScalarKernel, Simd, Step, Task, dop853, dopri5, rk4, rodas,
@@ -68,12 +68,27 @@ pub fn history<'a>(
     start: &Start,
     every_s: f64,
 ) -> History<'a> {
+    history_until(model, method, point, start, every_s, &|| false)
+}
+
+/// As [`history`], as far as it has come when `stop` says so. It is asked every
+/// [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps at least.
+#[must_use]
+pub fn history_until<'a>(
+    model: ModelKind,
+    method: &Method,
+    point: &'a Point,
+    start: &Start,
+    every_s: f64,
+    stop: Stop<'_>,
+) -> History<'a> {
     let (states, failure) = match model {
         ModelKind::Nonlinear => Simd::one_lane(Sample::<OfNonlinear> {
             point,
             method,
             start,
             every_s,
+            stop,
             family: PhantomData,
         }),
         ModelKind::Linear => Simd::one_lane(Sample::<OfLinear> {
@@ -81,6 +96,7 @@ pub fn history<'a>(
             method,
             start,
             every_s,
+            stop,
             family: PhantomData,
         }),
     };
@@ -147,6 +163,7 @@ struct Sample<'a, F> {
     method: &'a Method,
     start: &'a Start,
     every_s: f64,
+    stop: Stop<'a>,
     family: PhantomData<F>,
 }
 
@@ -165,6 +182,7 @@ impl<F: Family> ScalarKernel for Sample<'_, F> {
             point: self.point,
             every_s: self.every_s,
             method: self.method,
+            stop: self.stop,
             leg: None,
             start,
             states: vec![start],
@@ -194,6 +212,7 @@ struct Sampling<'a, M> {
     point: &'a Point,
     every_s: f64,
     method: &'a Method,
+    stop: Stop<'a>,
     /// Which leg it is on, once it has begun.
     leg: Option<usize>,
     start: [f64; STATES],
@@ -256,6 +275,10 @@ impl<M: Model<f64>> Task<f64, STATES> for Sampling<'_, M> {
             let share = (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0);
             self.states.push(step.at(N(share)).map(|x| x.0));
         }
+    }
+
+    fn is_stopped(&self) -> bool {
+        (self.stop)()
     }
 }
 
