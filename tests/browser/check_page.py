@@ -409,7 +409,7 @@ def stands_alone(page):
     """Nothing was fetched but the page."""
     entries = "performance.getEntriesByType('resource')"
     fetched = page.driver.execute_script(f"return {entries}.map((entry) => entry.name)")
-    outside = [name for name in fetched if not name.startswith("data:")]
+    outside = [name for name in fetched if not name.startswith(("data:", "blob:"))]
     check(not outside, f"the page fetched {outside}")
     return "nothing fetched"
 
