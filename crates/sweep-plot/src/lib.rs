@@ -207,6 +207,8 @@ pub struct Live {
     pub rungs: [Vec<String>; 2],
     /// Of the program that chose them.
     pub version: String,
+    /// Of each resonance of the linear model: motion, speed (rpm), damping ratio.
+    pub resonances: Vec<[String; 3]>,
 }
 
 /// A parameter that a page can move.
@@ -288,8 +290,7 @@ fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>
 fn of_still(options: &PlotOptions) -> PlotOptions {
     let mut still = PlotOptions { traces: None, live: None, ..options.clone() };
     // A page lets its reader choose the channel.
-    if still.channels.is_empty()
-        && matches!(still.quantity, Quantity::Nonlinear | Quantity::Linear)
+    if still.channels.is_empty() && matches!(still.quantity, Quantity::Nonlinear | Quantity::Linear)
     {
         still.quantity = Quantity::default();
     }
@@ -476,12 +477,7 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
         ),
         ("--view", options.view.is_some(), view_fits, view_of(options)),
         ("--against", options.against.is_some(), over_time, "traces over time"),
-        (
-            "--live",
-            options.live.is_some(),
-            map && format == Format::Html,
-            "maps drawn as .html",
-        ),
+        ("--live", options.live.is_some(), map && format == Format::Html, "maps drawn as .html"),
         (
             "--traces",
             options.traces.is_some(),

@@ -1,12 +1,14 @@
 //! What a live page computes with: the plan of a map as the setup of `washer-live`'s module.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
+use lane_ode::Simd;
 use serde_json::Value;
 use sweep_files::{ParquetFile, key};
 use sweep_plot::{Live, Slider};
 use washer_live::{Setup, Sliders};
-use washer_model::{Channel, Parameter};
+use washer_model::{Channel, ModeOverSpeed, Parameter, Timing, campbell, prepare};
 
 use crate::config::GridInput;
 use crate::engine::{CHECKPOINTS, Ladder, ModelEngine};
@@ -36,6 +38,9 @@ const EVERY_S: f64 = 0.01;
 
 /// Most instants of a history, so that a page of a long run stays quick.
 const MOST_INSTANTS: f64 = 8000.0;
+
+/// Speeds at which modes are followed (rpm).
+const MODES_EVERY_RPM: f64 = 10.0;
 
 /// A parameter with the ends of its range, as `--slider` gives them.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,7 +99,30 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         ratio_limit: setup.ratio_limit,
         rungs: words,
         version: crate::VERSION.to_owned(),
+        resonances: resonances(&plan),
     })
+}
+
+/// Resonances of the plan's own machine, before the axes, up to the map's greatest speed; none where
+/// it has no modes.
+fn resonances(plan: &Plan) -> Vec<[String; 3]> {
+    let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
+    let machines = [(plan.machine.clone(), plan.spin.clone())];
+    let greatest_rpm = plan.spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
+    let count = (greatest_rpm / MODES_EVERY_RPM).ceil() as u32;
+    let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODES_EVERY_RPM * f64::from(k)).collect();
+    let points = prepare(Simd::Scalar, &machines, &timing);
+    let Some(Ok(point)) = points.into_iter().next() else { return Vec::new() };
+    let modes = campbell(&point, &speeds_rpm).unwrap_or_default();
+    let of_mode = |mode: ModeOverSpeed| {
+        let motion = mode.motion.to_string();
+        let resonances = mode.resonances.into_iter().map(move |at| {
+            let (speed, damping) = (at.speed_rpm, at.mode.damping_ratio);
+            [motion.clone(), format!("{speed:.1}"), format!("{damping:.4}")]
+        });
+        resonances.collect::<Vec<_>>()
+    };
+    modes.into_iter().flat_map(of_mode).collect()
 }
 
 fn slider(parameter: &Parameter, from: f64, to: f64, value: Option<f64>) -> Slider {
@@ -175,7 +203,10 @@ fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Range>, Error> {
             return Err(refused(range, expected));
         }
         if let Some(end) = [*from, *to].into_iter().find(|end| !parameter.range().contains(*end)) {
-            return Err(refused(range, format!("{} at both ends", parameter.range().instead_of(end))));
+            return Err(refused(
+                range,
+                format!("{} at both ends", parameter.range().instead_of(end)),
+            ));
         }
         found.push((parameter, *from, *to));
         if found.len() > MOST_SLIDERS {

@@ -38,9 +38,9 @@ function createLive(host, data) {
     element("h2", { id: "live-title" }, "Any point, computed in this page"),
     element("div", { class: "columns" },
       element("div", {}, element("div", { class: "sliders" }, ...inputs.map((one) => one.row)),
-        element("div", { class: "controls" }, reset, refine)),
+        element("div", { class: "controls" }, reset, refine), status),
       told),
-    status, charts, computedWith()));
+    charts, computedWith()));
 
   const pool = createPool(decode(live.module), doubles(live.setup), (state) => {
     if (state.error) status.textContent = `This browser cannot compute here: ${state.error}.`;
@@ -69,9 +69,8 @@ function createLive(host, data) {
         changed();
       },
     });
-    const words = `${slider.words}${slider.axis ? ", an axis" : ""}`;
     return { number, range, row: element("label", { title: slider.description },
-      element("span", {}, words), range, number, element("span", {}, slider.unit)) };
+      element("span", {}, slider.words), range, number, element("span", {}, slider.unit)) };
   }
 
   function set(k, value) {
@@ -333,6 +332,8 @@ function createCurves(host, live, data) {
   const perBin = 1 / (size * live.everyS);
   const bins = Math.min(Math.floor(HIGHEST / perBin), size / 2);
   const frequencies = Float32Array.from({ length: bins }, (_, k) => k * perBin);
+  // Of the motions that are there.
+  let version = 0;
   const line = (name, colour, count, alpha = 1) => ({
     name, colour, alpha, grid: 0, width: 1.3, dashed: false, y: new Float32Array(count).fill(NaN),
   });
@@ -347,8 +348,19 @@ function createCurves(host, live, data) {
     channel.unit, k === first, both(instants)));
   const gap = panel("gap", "Gap, drum to tub", "mm", false, both(instants));
   const speed = panel("speed", "Spin", "rpm", true, [line("", "ink", instants)], 80);
+  // Spectra are found when they are drawn.
+  const ofWindow = (one, source) => {
+    const [y, found] = [new Float32Array(bins).fill(NaN), { version: -1 }];
+    return Object.defineProperty({ ...one }, "y", { get() {
+      if (found.version === version) return y;
+      found.version = version;
+      y.set(spectrum(Array.from(source.y.subarray(from, to + 1)), live.everyS, bins));
+      return y;
+    } });
+  };
   const spectra = live.channels.map((channel, k) => panel(channel.name,
-    capitalised(channel.words), channel.unit, k === first, both(bins)));
+    capitalised(channel.words), channel.unit, k === first,
+    both(bins).map((one, model) => ofWindow(one, motion[k].series[model]))));
   const spec = (xWords, xUnit, grid, panels) => ({
     xWords, xUnit, xLog: false, xTicks: null, grids: [grid], panels, marks: [], markMeaning: "",
     shades: [], shadeMeaning: "",
@@ -373,13 +385,11 @@ function createCurves(host, live, data) {
           }
         };
         live.channels.forEach((channel, k) => {
-          const { y } = motion[k].series[model];
-          column(k, channel.factor, y);
-          const window = Array.from(y.subarray(from, to + 1));
-          spectra[k].series[model].y.set(spectrum(window, live.everyS, bins));
+          column(k, channel.factor, motion[k].series[model].y);
         });
         column(columns - 1, 1e3, gap.series[model].y);
       });
+      version += 1;
       speed.series[0].y.set(speeds.subarray(0, instants));
       charts.forEach((chart) => chart.changed());
     },

@@ -10,11 +10,8 @@ use crate::{Live, Slider, label};
 const MODULE: &[u8] = include_bytes!("../../assets/live.wasm");
 
 /// What the page's workers run.
-pub(crate) const WORKER: &str = concat!(
-    "<script type=\"text/plain\" id=\"worker\">",
-    include_str!("worker.js"),
-    "</script>\n"
-);
+pub(crate) const WORKER: &str =
+    concat!("<script type=\"text/plain\" id=\"worker\">", include_str!("worker.js"), "</script>\n");
 
 pub(crate) fn json(live: &Live, axes: &[GridAxis]) -> Value {
     let channel = |name: &String| {

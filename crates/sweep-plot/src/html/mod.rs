@@ -115,6 +115,7 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
         return Ok(page(title, data, &[CORE, CHART, BAR, HISTORIES, CELLS, MAP, REPORT, START]));
     };
     data["live"] = live::json(live, &map.grid.axes);
+    data["resonances"] = json!(live.resonances);
     let scripts = [CORE, CHART, BAR, HISTORIES, SPECTRUM, POOL, LIVE, CELLS, MAP, REPORT, START];
     Ok(page(title, data, &scripts))
 }

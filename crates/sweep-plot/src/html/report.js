@@ -25,7 +25,7 @@ function createReport(host, data, map, panel) {
   const table = createTable();
   host.append(take, said, element("section", { id: "about" },
     ...(data.about.length ? [element("h2", {}, "What was run"), about] : []),
-    ...(data.modes?.length ? [element("h2", {}, "Modes of the linear model"), modes()] : []),
+    ...(data.resonances?.length ? [element("h2", {}, "Resonances of the machine as given"), modes()] : []),
     element("h2", {}, "What to be careful about"),
     element("ul", {}, ...caveats().map((text) => element("li", {}, text))),
     element("h2", {}, "Points, the worst first"), table));
@@ -35,7 +35,7 @@ function createReport(host, data, map, panel) {
     return element("table", { class: "modes" },
       element("thead", {}, element("tr", {}, ...heads.map((text) => element("th",
         { scope: "col" }, text)))),
-      element("tbody", {}, ...data.modes.map(([motion, speed, damping]) => element("tr", {},
+      element("tbody", {}, ...data.resonances.map(([motion, speed, damping]) => element("tr", {},
         element("th", { scope: "row" }, motion), element("td", {}, speed),
         element("td", {}, damping)))));
   }

@@ -66,8 +66,10 @@ fn a_point_beyond_the_axes_is_the_row_of_a_wider_grid() {
 
 #[test]
 fn a_setup_comes_back_from_its_numbers() {
-    let mut plan = plan(&GRID.replace("\"triangular\", peak_rpm = 350, ramp_s = 50",
-        "\"table\", time_s = [0, 20, 50], speed_rpm = [0, 350, 100]"));
+    let mut plan = plan(&GRID.replace(
+        "\"triangular\", peak_rpm = 350, ramp_s = 50",
+        "\"table\", time_s = [0, 20, 50], speed_rpm = [0, 350, 100]",
+    ));
     plan.machine = crate::config::with_one_of_each();
     plan.machine.springs[1].free_length_m = Some(0.2);
     plan.machine.dampers[0].friction_n = 20.0;
