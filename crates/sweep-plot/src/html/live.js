@@ -83,7 +83,7 @@ function createLive(host, data) {
     latest += 1;
     clearTimeout(resting);
     pool.drop("check");
-    map?.request();
+    map?.mark();
     if (isBusy) isMoved = true;
     else preview();
   }
@@ -226,6 +226,7 @@ function createLive(host, data) {
     const far = ([i, j]) => Math.hypot(i - middle, j - middle);
     places.sort((a, b) => far(a) - far(b));
     [fine, fineLeft] = [[], places.length];
+    map.request();
     for (let k = 0; k < places.length; k += FINE.together) {
       const part = places.slice(k, k + FINE.together).map((place) => {
         const cell = place.map((at, axis) => edges[axis][0] + at * step[axis]);

@@ -461,10 +461,10 @@ function createMap(host, data, panel) {
         const middle = even[k](at[k]);
         return [Math.max(middle - half, low), Math.min(middle + half, high)];
       }),
+      mark: over.request,
       request: () => {
         tellLegend(currentLayer());
         cells.request();
-        over.request();
       },
     };
   }
