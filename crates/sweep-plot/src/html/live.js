@@ -23,6 +23,8 @@ function createLive(host, data) {
   let isMoved = false;
   let fine = [];
   let fineLeft = 0;
+  // Its ends along both axes, as the map spaces them.
+  let fineEdges = null;
 
   const status = element("p", { id: "live-status", role: "status" }, "Starting.");
   const inputs = live.sliders.map((slider, k) => createSlider(slider, k));
@@ -217,6 +219,7 @@ function createLive(host, data) {
   function refineMap() {
     pool.drop("fine");
     const edges = map.region([values[map.sliders[0]], values[map.sliders[1]]], FINE.cells);
+    fineEdges = edges;
     const step = edges.map(([low, high]) => (high - low) / FINE.points);
     const places = [];
     for (let i = 0; i < FINE.points; i++) {
@@ -226,6 +229,7 @@ function createLive(host, data) {
     const far = ([i, j]) => Math.hypot(i - middle, j - middle);
     places.sort((a, b) => far(a) - far(b));
     [fine, fineLeft] = [[], places.length];
+    map.mark();
     map.request();
     for (let k = 0; k < places.length; k += FINE.together) {
       const part = places.slice(k, k + FINE.together).map((place) => {
@@ -309,6 +313,17 @@ function createLive(host, data) {
       }
     },
     over(context, at) {
+      if (fineEdges) {
+        const [[left, low], [right, high]] = [0, 1].map((end) => at(...fineEdges
+          .map((ends) => ends[end])));
+        for (const [colour, dash] of [["#ffffff", []], ["#1b1f24", [5, 4]]]) {
+          context.strokeStyle = colour;
+          context.lineWidth = 1.5;
+          context.setLineDash(dash);
+          context.strokeRect(left, high, right - left, low - high);
+        }
+        context.setLineDash([]);
+      }
       const [x, y] = at(...map.sliders.slice(0, 2).map((k, axis) => map.even(axis, values[k])));
       for (const [colour, thick] of [["#ffffff", 5], ["#1b1f24", 2]]) {
         context.strokeStyle = colour;

@@ -322,7 +322,9 @@ function createMap(host, data, panel) {
       add(`background:repeating-linear-gradient(45deg,${lines})`,
         counts ? "some points sensitive: chaotic" : "sensitive: motion is chaotic");
     }
-    if (layer && panel?.hasFine()) add("", "smaller cells: preview, not checked");
+    if (layer && panel?.hasFine()) {
+      add("border:1.5px dashed currentColor", "finer cells: preview, not checked");
+    }
     if (layer?.group === "ratio" && anyUndefined(layer)) {
       const dot = `radial-gradient(circle,${themed("muted")} 2px,${themed("paper")} 2.5px)`;
       add(`background:${dot};outline:1px solid ${themed("faint")}`, "undefined: no excitation");
@@ -579,6 +581,7 @@ function createMap(host, data, panel) {
         cutAt(k, left % extra[k].values.length);
         left = Math.floor(left / extra[k].values.length);
       }
+      hover(null);
       cursor = [i, j];
       pin(cursor);
       changed();

@@ -25,19 +25,20 @@ function createReport(host, data, map, panel) {
   const table = createTable();
   host.append(take, said, element("section", { id: "about" },
     ...(data.about.length ? [element("h2", {}, "What was run"), about] : []),
-    ...(data.resonances?.length ? [element("h2", {}, "Resonances of the machine as given"), modes()] : []),
+    ...(data.resonances?.length ? [modes()] : []),
     element("h2", {}, "What to be careful about"),
     element("ul", {}, ...caveats().map((text) => element("li", {}, text))),
     element("h2", {}, "Points, the worst first"), table));
 
   function modes() {
     const heads = ["Motion", "Resonance (rpm)", "Damping ratio"];
-    return element("table", { class: "modes" },
+    const title = element("h2", {}, "Resonances of the machine as given");
+    return element("div", {}, title, element("table", { class: "modes" },
       element("thead", {}, element("tr", {}, ...heads.map((text) => element("th",
         { scope: "col" }, text)))),
       element("tbody", {}, ...data.resonances.map(([motion, speed, damping]) => element("tr", {},
         element("th", { scope: "row" }, motion), element("td", {}, speed),
-        element("td", {}, damping)))));
+        element("td", {}, damping))))));
   }
 
   function caveats() {
@@ -57,16 +58,16 @@ function createReport(host, data, map, panel) {
       found.push("A cell holds several points and shows the worst of them. The file has all.");
     }
     found.push("A map shows one course of speeds. Whether the machine may stay at a speed is "
-      + "another question, which `sweep stability` answers.");
-    found.push("Numbers that the paper does not print are assumed: lengths, clearance and free "
-      + "lengths of the springs. `sweep parameters` marks them.");
+      + "another question; the command sweep stability answers it.");
+    found.push("Numbers of the built-in machine that the paper does not print are assumed: "
+      + "lengths, clearance and free lengths of the springs. The command sweep parameters marks "
+      + "them.");
     return found;
   }
 
   function createTable() {
-    const names = [...data.axes.map((axis) => axis.name)];
-    const heads = [...data.axes.map((axis) => withUnit(axis.words, axis.unit)), "Largest ratio",
-      "in", "Verdict", ""];
+    const heads = ["", ...data.axes.map((axis) => withUnit(axis.words, axis.unit)),
+      "Largest ratio", "in", "Verdict"];
     const body = element("tbody");
     const more = button(`${ROWS_AT_ONCE} more`, "more", () => extend());
     let shown = 0;
@@ -81,13 +82,13 @@ function createReport(host, data, map, panel) {
       const values = valuesOf(cell).map((value) => element("td", {}, significant(value)));
       const largest = word("ratio_max_channel", cell);
       const of = data.rows.find((one) => one.name === largest)?.words ?? "";
-      return element("tr", { "data-cell": cell }, ...values,
+      return element("tr", {},
+        element("td", {}, button("show", null, () => map.go(cell))), ...values,
         element("td", {}, shownValue("ratio_max", cell)), element("td", {}, of),
-        element("td", {}, verdict(cell)),
-        element("td", {}, button("show", null, () => map.go(cell))));
+        element("td", {}, verdict(cell).replace("linear model ", "")));
     }
     extend();
-    return element("div", { class: "wide-table", "data-axes": names.join(" ") },
+    return element("div", { class: "wide-table" },
       element("table", { id: "points" },
         element("thead", {}, element("tr", {}, ...heads.map((text) => element("th",
           { scope: "col" }, text)))), body), more);
