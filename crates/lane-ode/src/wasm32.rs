@@ -1,10 +1,10 @@
 //! Lanes of WebAssembly's vectors (simd128): intrinsics behind a newtype.
 //!
-//! WebAssembly has no fused multiply-add, and one in software takes a hundred times as long as a
-//! multiplication and an addition. So the fused operations round twice here, and in one lane of
-//! this target too: results are not the bits of other instruction sets. Amplitudes at reliable
-//! points of the paper's map differ by less than 1e-9 of themselves (`tests/browser/check_live.py`).
-//! They are the same bits in every browser, because each operation is correctly rounded.
+//! WebAssembly has no fused multiply-add, and one in software is far slower than a multiplication
+//! and an addition. So the fused operations round twice here, and in one lane of this target too:
+//! results are not the bits of other instruction sets. Amplitudes at reliable points of the paper's
+//! map differ by less than 1e-9 of themselves (`tests/browser/check_live.py`). They are the same
+//! bits in every browser, because each operation is correctly rounded.
 //!
 //! An engine validates a module before it runs, so a value of this type exists only where the
 //! instructions do, which makes the `unsafe` below sound.

@@ -461,12 +461,8 @@ fn a_page_needs_nothing_but_itself() {
 
 #[test]
 fn a_live_page_carries_the_module_and_its_setup() {
-    let slider = |name: &str, value| Slider {
-        name: name.to_owned(),
-        to: 2.0,
-        value,
-        ..Slider::default()
-    };
+    let slider =
+        |name: &str, value| Slider { name: name.to_owned(), to: 2.0, value, ..Slider::default() };
     let live = Live {
         setup: vec![0.1, f64::INFINITY],
         sliders: vec![slider("unbalance_mass_kg", None), slider("tub_mass_kg", Some(1.5))],
@@ -485,7 +481,9 @@ fn a_live_page_carries_the_module_and_its_setup() {
     assert_eq!(live["sliders"][1]["words"], "Tub mass");
     assert_eq!(live["channels"][0]["unit"], "mrad");
     assert!(String::from_utf8(page).unwrap().contains("id=\"worker\""));
-    assert!(message(draw(map(), &options, "a.svg")).contains("`--live` is for maps drawn as .html"));
+    assert!(
+        message(draw(map(), &options, "a.svg")).contains("`--live` is for maps drawn as .html")
+    );
 }
 
 #[test]

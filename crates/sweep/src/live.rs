@@ -103,8 +103,8 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     })
 }
 
-/// Resonances of the plan's own machine, before the axes, up to the map's greatest speed; none where
-/// it has no modes.
+/// Resonances of the plan's own machine, before the axes, up to its greatest speed; none where it
+/// has no modes.
 fn resonances(plan: &Plan) -> Vec<[String; 3]> {
     let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
     let machines = [(plan.machine.clone(), plan.spin.clone())];
