@@ -8,9 +8,6 @@ use washer_model::{
 
 use crate::setup::{Rung, Setup};
 
-/// The rung of quick answers: the lowest that a row may hold. The one below only shows its error.
-const QUICK: usize = 1;
-
 /// Why a point has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoPoint {
@@ -123,9 +120,13 @@ pub fn peaks(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Peaks, NoPoint>> {
     found
 }
 
-/// The rung of quick answers; every ladder has one.
+/// The rung of quick answers: the lowest that a row may hold, because the one below only shows its
+/// error. Where there is nothing but plain RK4, its longest step.
 fn quick(rungs: &[Rung]) -> &Rung {
-    &rungs[QUICK.min(rungs.len() - 1)]
+    match rungs.get(1) {
+        Some(second) if second.is_capped => second,
+        _ => &rungs[0],
+    }
 }
 
 /// The motion of one model at a point by a rung of its ladder, or by the quick one, every `every_s`

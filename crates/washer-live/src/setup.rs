@@ -31,7 +31,7 @@ pub struct Setup {
     pub channels: Vec<Channel>,
     /// What a point gives values.
     pub sliders: Sliders,
-    /// Rungs of the nonlinear and of the linear model while only axes move.
+    /// Rungs of the nonlinear and of the linear model while only axes move; at least one of each.
     pub ladders: [Vec<Rung>; 2],
     /// The same while any slider may be anywhere in its range.
     pub wide_ladders: [Vec<Rung>; 2],
@@ -151,7 +151,7 @@ impl Setup {
         let sliders = from.counted()?.iter().map(slider).collect::<Option<_>>()?;
         let sliders = Sliders { parameters: sliders, axes: from.count(MOST)? };
         let mut ladder = || -> Option<Vec<Rung>> {
-            let count = from.count(MOST)?;
+            let count = from.count(MOST).filter(|count| *count > 0)?;
             (0..count).map(|_| read_rung(&mut from)).collect()
         };
         let ladders = [ladder()?, ladder()?];
