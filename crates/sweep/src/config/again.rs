@@ -70,7 +70,7 @@ range = { from = 1e7, to = 2e8, count = 4, spacing = "log" }
         };
         assert_eq!(again(&plan), plan);
         plan.machine = with_one_of_each();
-        plan.machine.feet = [[0.2, -0.4, 0.3], [0.2, -0.4, -0.3], [-0.2, -0.4, 0.0]]
+        plan.machine.feet = [[0.5, -0.4, 0.3], [0.5, -0.4, -0.3], [-0.2, -0.4, 0.0]]
             .map(|foot_m| washer_model::Foot { foot_m })
             .to_vec();
         assert_eq!(again(&plan), plan);
