@@ -394,6 +394,49 @@ def widths_and_schemes(page):
     return "400 and 1400 px, light and dark"
 
 
+def report_and_downloads(page, data):
+    """The run in words, the worst point, what can be saved, a link that brings the view back."""
+    said = page.text("about")
+    for words in ("Machine", "Spin", "Method", "Verdict"):
+        check(words in said, f"the report has no {words}")
+    script = "return document.querySelector('noscript').textContent"
+    still = page.driver.execute_script(script)
+    check("data:image/png;base64,iVBOR" in still, "no picture where scripts are switched off")
+    worst = max((row for row in data.rows if row["ratio_max"] is not None),
+                key=lambda row: row["ratio_max"])
+    page.driver.execute_script("document.querySelector('#points button').click()")
+    page.wait(lambda: page.text("readout").startswith(f"Point {worst['point']}"),
+              f"the first row of the table is not point {worst['point']}")
+    folder = pathlib.Path(page.profile.name) / "saved"
+    page.driver.execute_cdp_cmd("Browser.setDownloadBehavior",
+                                {"behavior": "allow", "downloadPath": str(folder)})
+    saved = {"numbers": f"point-{worst['point']}.csv", "picture": "map.png"}
+    for button, name in saved.items():
+        page.driver.execute_script(f"document.getElementById('{button}').click()")
+        page.wait((folder / name).exists, f"{button} saves no {name}")
+    lines = (folder / saved["numbers"]).read_text().split()
+    numbers = dict(line.split(",") for line in lines)
+    for name in ("ratio_max", *data.axes, *(f"nonlinear_{of}" for of in data.channels)):
+        check(same(float(numbers[name]), worst[name]), f"saved {name}: {numbers[name]}")
+    check((folder / "map.png").read_bytes()[:4] == b"\x89PNG", "the picture is no PNG")
+    page.press("+")
+    quantity = Select(page.driver.find_element(By.ID, "quantity"))
+    quantity.select_by_value("gap-nonlinear")
+    page.driver.execute_script("document.getElementById('link').click()")
+    view, address = page.figure().get_attribute("data-view"), page.driver.current_url
+    check("#" in address, "the link holds nothing")
+    page.driver.get("about:blank")
+    page.driver.get(address)
+    page.wait(page.drawn, "the linked page is not drawn")
+    page.wait(lambda: page.figure().get_attribute("data-view") == view, "the view is not back")
+    check(page.figure().get_attribute("data-layer") == "min_gap_nonlinear_m",
+          "the quantity is not back")
+    check(page.text("readout").startswith(f"Point {worst['point']}"), "the point is not back")
+    page.driver.get(address.partition("#")[0])
+    page.wait(page.drawn, "the page is not drawn again")
+    return f"point {worst['point']} first; CSV, PNG; a link with view, quantity and point"
+
+
 def redraw_time(page):
     """Median milliseconds of drawing all cells once more."""
     script = """const done = arguments[0]; const times = [];
@@ -409,7 +452,7 @@ def stands_alone(page):
     """Nothing was fetched but the page."""
     entries = "performance.getEntriesByType('resource')"
     fetched = page.driver.execute_script(f"return {entries}.map((entry) => entry.name)")
-    outside = [name for name in fetched if not name.startswith("data:")]
+    outside = [name for name in fetched if not name.startswith(("data:", "blob:"))]
     check(not outside, f"the page fetched {outside}")
     return "nothing fetched"
 
@@ -436,6 +479,7 @@ def main():
             ("zoom", lambda: zoom_moves_and_returns(page, data, log)),
             ("keys", lambda: keys_do_all_of_it(page, data)),
             ("histories", lambda: clicking_shows_histories(page, data, log)),
+            ("report", lambda: report_and_downloads(page, data)),
             ("widths", lambda: widths_and_schemes(page)),
             ("speed", lambda: redraw_time(page)),
         ]:

@@ -1,6 +1,8 @@
 #!/bin/sh
-# The pages of a map, of a trace and of a design in a real browser:
+# The pages of a map, of a trace and of a design, and a page that computes, in a real browser:
 # tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
+#
+# MAP.parquet is the result of sweeps/quick.toml, or of another grid over the same axes.
 #
 # Needs chromium and chromedriver on the PATH, and on Debian installs them if they are not there.
 # SWEEP names another binary than the release build, SHOTS a folder for screenshots.
@@ -28,6 +30,13 @@ fi
 "$sweep" trace "$root/sweeps/fig11.toml" --every 0.02 --out "$work/trace.parquet"
 "$sweep" plot "$work/trace.parquet" --modes "$work/modes.parquet" -o "$work/trace.html"
 "$venv/bin/python" "$here/check_chart.py" "$work/trace.parquet" "$work/trace.html" \
+    ${SHOTS:+--screenshots "$SHOTS"}
+
+# A page that computes, against the map and the trace of a point between its own.
+"$sweep" plot "$map" --live -o "$work/live.html"
+"$sweep" trace "$root/sweeps/quick.toml" --at unbalance_mass_kg=0.12 --at damping_n_s_per_m=222 \
+    --out "$work/between.parquet"
+"$venv/bin/python" "$here/check_live.py" "$map" "$work/between.parquet" "$work/live.html" \
     ${SHOTS:+--screenshots "$SHOTS"}
 
 # The page of a design: points by pairs of parameters, the histogram, the influences.

@@ -1,5 +1,5 @@
 //! Integrators over SIMD lanes: each lane a trajectory with its own time, no heap after set-up, the
-//! same bits on every instruction set.
+//! same bits on every instruction set but WebAssembly's, which cannot fuse ([`Simd::Simd128`]).
 //!
 //! One trajectory of a small system cannot fill a processor's vector units; eight trajectories side
 //! by side can. So a value here ([`Lane`]) carries 1, 2, 4 or 8 numbers, one per trajectory, and
@@ -132,8 +132,10 @@ mod squares;
 mod system;
 mod time_above;
 pub mod trig;
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32"))]
 mod vector;
+#[cfg(target_arch = "wasm32")]
+mod wasm32;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 

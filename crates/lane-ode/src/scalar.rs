@@ -38,15 +38,15 @@ impl Real for f64 {
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
-        f64::mul_add(self, b, c)
+        fused(self, b, c)
     }
     #[inline(always)]
     fn mul_sub(self, b: Self, c: Self) -> Self {
-        f64::mul_add(self, b, -c)
+        fused(self, b, -c)
     }
     #[inline(always)]
     fn neg_mul_add(self, b: Self, c: Self) -> Self {
-        f64::mul_add(-self, b, c)
+        fused(-self, b, c)
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
@@ -98,4 +98,10 @@ impl Lane for f64 {
     fn aside<W: Aside>(self, work: W) {
         Simd::aside(work);
     }
+}
+
+/// `a * b + c`, rounded once; twice where that is what lanes do.
+#[inline(always)]
+fn fused(a: f64, b: f64, c: f64) -> f64 {
+    if cfg!(target_arch = "wasm32") { a * b + c } else { f64::mul_add(a, b, c) }
 }

@@ -14,6 +14,9 @@ pub enum Simd {
     Avx512,
     /// Two lanes of NEON.
     Neon,
+    /// Two lanes of WebAssembly's vectors, which have no fused multiply-add: other bits (see
+    /// `wasm32.rs`).
+    Simd128,
 }
 
 /// Work that is written once and compiled for every instruction set.
@@ -38,7 +41,7 @@ pub trait ScalarKernel {
 
 impl Simd {
     /// Every instruction set, the widest first.
-    pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Scalar];
+    pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Simd128, Self::Scalar];
 
     /// The best that this processor has.
     #[must_use]
@@ -49,7 +52,7 @@ impl Simd {
     /// What [`Self::dispatch_narrow`] runs on.
     #[must_use]
     pub fn narrow() -> Self {
-        [Self::Avx2, Self::Neon]
+        [Self::Avx2, Self::Neon, Self::Simd128]
             .into_iter()
             .find(|simd| simd.is_available())
             .unwrap_or(Self::Scalar)
@@ -70,6 +73,8 @@ impl Simd {
                     && is_x86_feature_detected!("avx512vl")
             }
             Self::Neon => cfg!(target_arch = "aarch64"),
+            // A module with these instructions is loaded where they are, or not at all.
+            Self::Simd128 => cfg!(target_arch = "wasm32"),
             #[cfg(not(target_arch = "x86_64"))]
             Self::Avx2 | Self::Avx512 => false,
         }
@@ -83,6 +88,7 @@ impl Simd {
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
             Self::Neon => "neon",
+            Self::Simd128 => "simd128",
         }
     }
 
@@ -93,7 +99,7 @@ impl Simd {
             Self::Scalar => 1,
             Self::Avx2 => 4,
             Self::Avx512 => 8,
-            Self::Neon => 2,
+            Self::Neon | Self::Simd128 => 2,
         }
     }
 
@@ -110,6 +116,8 @@ impl Simd {
             Self::Scalar if Self::Avx2.is_available() => x86::scalar(kernel),
             #[cfg(target_arch = "aarch64")]
             Self::Neon => aarch64::neon(kernel),
+            #[cfg(target_arch = "wasm32")]
+            Self::Simd128 => wasm32::simd128(kernel),
             _ => kernel.run(0.0_f64),
         }
     }
@@ -149,13 +157,17 @@ impl Simd {
         {
             aarch64::neon(kernel)
         }
-        #[cfg(not(target_arch = "aarch64"))]
+        #[cfg(target_arch = "wasm32")]
+        {
+            wasm32::simd128(kernel)
+        }
+        #[cfg(not(any(target_arch = "aarch64", target_arch = "wasm32")))]
         kernel.run(0.0_f64)
     }
 }
 
 /// An entry function with an instruction set, and a safe one around it that checks for it.
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32"))]
 macro_rules! entry {
     ($name:ident, $features:literal, $simd:expr, $first:expr) => {
         pub(super) fn $name<K: Kernel>(kernel: K) -> K::Output {
@@ -167,8 +179,12 @@ macro_rules! entry {
                 $simd.is_available(),
                 "dispatched to an instruction set that this processor lacks"
             );
+            // WebAssembly's features make no call unsafe.
+            #[allow(unused_unsafe)]
             // SAFETY: asserted above.
-            unsafe { inner(kernel) }
+            unsafe {
+                inner(kernel)
+            }
         }
     };
 }
@@ -222,4 +238,14 @@ mod aarch64 {
 
     // SAFETY (of `first`): inside the entry function of its instruction set.
     entry!(neon, "neon", super::Simd::Neon, unsafe { F64x2::first(0.0) });
+}
+
+#[cfg(target_arch = "wasm32")]
+#[allow(unsafe_code)]
+mod wasm32 {
+    use super::Kernel;
+    use crate::wasm32::F64x2;
+
+    // SAFETY (of `first`): inside the entry function of its instruction set.
+    entry!(simd128, "simd128", super::Simd::Simd128, unsafe { F64x2::first(0.0) });
 }

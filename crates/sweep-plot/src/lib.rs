@@ -176,6 +176,54 @@ pub struct PlotOptions {
     pub against: Option<PathBuf>,
     /// Map as a page: a folder of trace files; clicking a point that has one shows it.
     pub traces: Option<PathBuf>,
+    /// Map as a page: what it computes with.
+    pub live: Option<Live>,
+}
+
+/// What a page computes with, beside the module that every such page has.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Live {
+    /// What the module is set up with, in its own terms.
+    pub setup: Vec<f64>,
+    /// What can be moved, the map's axes first.
+    pub sliders: Vec<Slider>,
+    /// Time between two instants of a history (s).
+    pub every_s: f64,
+    /// The end of the run (s).
+    pub end_s: f64,
+    /// When amplitudes are taken (s).
+    pub window_s: [f64; 2],
+    /// The channels of the module's records, in their order.
+    pub channels: Vec<String>,
+    /// Those that the verdict compares, by their places.
+    pub compared: Vec<usize>,
+    /// Names of the levels that the module counts.
+    pub levels: Vec<String>,
+    /// Largest error of a checked amplitude, relative.
+    pub accuracy: f64,
+    /// Ratios below it are reliable.
+    pub ratio_limit: f64,
+    /// The rungs of the nonlinear and of the linear model, in words.
+    pub rungs: [Vec<String>; 2],
+    /// Of the program that chose them.
+    pub version: String,
+    /// Of each resonance of the linear model: motion, speed (rpm), damping ratio.
+    pub resonances: Vec<[String; 3]>,
+}
+
+/// A parameter that a page can move.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Slider {
+    /// As in grid files.
+    pub name: String,
+    /// In a phrase.
+    pub description: String,
+    /// The least value.
+    pub from: f64,
+    /// The greatest value.
+    pub to: f64,
+    /// The map's own value; none of an axis.
+    pub value: Option<f64>,
 }
 
 /// How a figure is written.
@@ -215,21 +263,38 @@ impl Format {
 pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), PlotError> {
     let format = Format::of(output)?;
     let file = Output::begin(output, format.kind())?;
+    let mut bytes = figure(input, options, format)?;
+    if format == Format::Html {
+        let still = figure(input, &of_still(options), Format::Png)?;
+        bytes = html::with_still(&bytes, &still);
+    }
+    Ok(file.finish(&bytes)?)
+}
+
+fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
     let mut source = Source::open(input)?;
     if is_scattered(&source, options)? {
         source.kind = Kind::Design;
     }
     check_options(&source, options, format)?;
-    let bytes = match source.kind {
-        Kind::Map => map(source, options, format)?,
-        Kind::Design => design(source, options, format)?,
-        Kind::Differences => differences(source, options, format)?,
-        Kind::Stability => stability(&source, options, format)?,
-        Kind::Trace | Kind::Modes | Kind::Boundary => {
-            chart(&Table::read(source)?, options, format)?
-        }
-    };
-    Ok(file.finish(&bytes)?)
+    match source.kind {
+        Kind::Map => map(source, options, format),
+        Kind::Design => design(source, options, format),
+        Kind::Differences => differences(source, options, format),
+        Kind::Stability => stability(&source, options, format),
+        Kind::Trace | Kind::Modes | Kind::Boundary => chart(&Table::read(source)?, options, format),
+    }
+}
+
+/// The options of the picture that a page shows where scripts are switched off.
+fn of_still(options: &PlotOptions) -> PlotOptions {
+    let mut still = PlotOptions { traces: None, live: None, ..options.clone() };
+    // A page lets its reader choose the channel.
+    if still.channels.is_empty() && matches!(still.quantity, Quantity::Nonlinear | Quantity::Linear)
+    {
+        still.quantity = Quantity::default();
+    }
+    still
 }
 
 /// Whether a map file's points are a design's. One that lists a whole grid, or spreads points over
@@ -412,6 +477,7 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
         ),
         ("--view", options.view.is_some(), view_fits, view_of(options)),
         ("--against", options.against.is_some(), over_time, "traces over time"),
+        ("--live", options.live.is_some(), map && format == Format::Html, "maps drawn as .html"),
         (
             "--traces",
             options.traces.is_some(),

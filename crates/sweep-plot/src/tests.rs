@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 use super::sample::{MapSample, Sample, boundary, map, modes, trace};
@@ -444,6 +446,9 @@ fn a_page_needs_nothing_but_itself() {
     let hostile = || map().metadata("note", "</script><img src=x>");
     let page =
         String::from_utf8(draw(hostile(), &PlotOptions::default(), "a.html").unwrap()).unwrap();
+    let still = "src=\"data:image/png;base64,iVBOR";
+    assert_eq!(page.matches(still).count(), 1, "a picture where scripts are switched off");
+    let page = page.replace(still, "");
     for outside in ["http:", "https:", "src=\"", "@import", "url("] {
         assert!(!page.contains(outside), "{outside}");
     }
@@ -451,6 +456,33 @@ fn a_page_needs_nothing_but_itself() {
     assert_eq!(
         data(hostile(), &PlotOptions::default())["provenance"][2][1],
         "</script><img src=x>"
+    );
+}
+
+#[test]
+fn a_live_page_carries_the_module_and_its_setup() {
+    let slider =
+        |name: &str, value| Slider { name: name.to_owned(), to: 2.0, value, ..Slider::default() };
+    let live = Live {
+        setup: vec![0.1, f64::INFINITY],
+        sliders: vec![slider("unbalance_mass_kg", None), slider("tub_mass_kg", Some(1.5))],
+        channels: vec!["tub_yaw".to_owned()],
+        ..Live::default()
+    };
+    let options = PlotOptions { live: Some(live), ..PlotOptions::default() };
+    let page = draw(map(), &options, "a.html").unwrap();
+    let live = &carried(&page)["live"];
+    let module = STANDARD.decode(live["module"].as_str().unwrap()).unwrap();
+    assert_eq!(module[..8], *b"\0asm\x01\0\0\0");
+    let setup = STANDARD.decode(live["setup"].as_str().unwrap()).unwrap();
+    assert_eq!(setup, [0.1, f64::INFINITY].map(f64::to_le_bytes).concat());
+    assert_eq!(live["sliders"][0]["axis"], true);
+    assert_eq!(live["sliders"][1]["axis"], false);
+    assert_eq!(live["sliders"][1]["words"], "Tub mass");
+    assert_eq!(live["channels"][0]["unit"], "mrad");
+    assert!(String::from_utf8(page).unwrap().contains("id=\"worker\""));
+    assert!(
+        message(draw(map(), &options, "a.svg")).contains("`--live` is for maps drawn as .html")
     );
 }
 

@@ -8,7 +8,7 @@ mod watch;
 
 pub(crate) use climb::Demand;
 pub(crate) use growth::responses;
-pub(crate) use ladder::{Ladder, reference_step_s};
+pub(crate) use ladder::{Ladder, Rung, reference_step_s};
 pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
 pub(crate) use watch::{Engine, Watch};
 
@@ -30,7 +30,7 @@ use crate::outcome::{Outcome, Status, Trajectory};
 use crate::plan::{Plan, Scenario};
 
 /// Parts of a run at whose ends two runs of a trajectory are compared.
-const CHECKPOINTS: u32 = 128;
+pub(crate) const CHECKPOINTS: u32 = 128;
 
 /// Why there is no engine for a plan.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

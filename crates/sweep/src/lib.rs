@@ -48,6 +48,7 @@ mod explain;
 mod identity;
 mod interrupt;
 mod library;
+mod live;
 mod measures;
 mod memory;
 mod method;

@@ -43,7 +43,8 @@ const ATOL: Setting = Setting {
     default: 1e-9,
     description: "absolute tolerance per component",
 };
-const ACCURACY: Setting = Setting {
+/// Of the fast method.
+pub(crate) const ACCURACY: Setting = Setting {
     key: "accuracy",
     range: Range::Within(1e-9, 1e-1),
     default: 1e-3,

@@ -107,3 +107,34 @@ function hatching(context, ground, { lines = [["#1b1f24", 1]], falling = false, 
   }
   return context.createPattern(tile, "repeat");
 }
+
+// Frame, ticks and labels of a map; `at` are the places of values on the screen.
+function drawMapAxes(context, box, [xAxis, yAxis], view, [toX, toY]) {
+  const ink = themed("ink");
+  context.strokeStyle = context.fillStyle = ink;
+  context.lineWidth = 1;
+  context.strokeRect(box.left, box.top, box.width, box.height);
+  context.font = `13px ${FONT}`;
+  const range = (axis, k) => view[k].map((even) => (axis.log ? Math.exp(even) : even));
+  const bottom = box.top + box.height;
+  context.textAlign = "center";
+  for (const [value, label] of ticks(...range(xAxis, 0), box.width / 90, xAxis.ticks)) {
+    const x = toX(value);
+    drawLine(context, x, bottom, x, bottom + 5, [], ink);
+    context.fillText(label, x, bottom + 19);
+  }
+  context.textAlign = "right";
+  for (const [value, label] of ticks(...range(yAxis, 1), box.height / 55, yAxis.ticks)) {
+    const y = toY(value);
+    drawLine(context, box.left - 5, y, box.left, y, [], ink);
+    context.fillText(label, box.left - 8, y + 4.5);
+  }
+  context.font = `15px ${FONT}`;
+  context.textAlign = "center";
+  context.fillText(withUnit(xAxis.words, xAxis.unit), box.left + box.width / 2, bottom + 42);
+  context.save();
+  context.translate(17, box.top + box.height / 2);
+  context.rotate(-Math.PI / 2);
+  context.fillText(withUnit(yAxis.words, yAxis.unit), 0, 0);
+  context.restore();
+}

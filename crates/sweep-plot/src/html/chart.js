@@ -395,6 +395,7 @@ function createChart(host, spec, name) {
   });
   darkTheme.addEventListener("change", changed);
   changed();
+  return { changed };
 }
 
 function drawLine(context, x0, y0, x1, y1, dash, colour) {

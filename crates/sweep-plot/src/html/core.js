@@ -13,6 +13,10 @@ function floats(text) {
   return Float32Array.from({ length: view.byteLength / 4 }, (_, k) => view.getFloat32(4 * k, true));
 }
 
+function doubles(text) {
+  return new Float64Array(decode(text).buffer);
+}
+
 // Integers of 16 bits times their unit; the least integer means no value.
 function quantised(text, unit) {
   const view = new DataView(decode(text).buffer);

@@ -8,6 +8,11 @@ pub(crate) fn floats(values: impl Iterator<Item = f64>) -> String {
     STANDARD.encode(values.flat_map(|value| (value as f32).to_le_bytes()).collect::<Vec<u8>>())
 }
 
+/// Values as little-endian 64 bit floats, base64.
+pub(crate) fn doubles(values: &[f64]) -> String {
+    STANDARD.encode(values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())
+}
+
 /// Values as bytes, base64.
 pub(crate) fn bytes(values: impl Iterator<Item = u8>) -> String {
     STANDARD.encode(values.collect::<Vec<u8>>())

@@ -2,54 +2,20 @@
 // histories on a click. A cell is one point, or a block of points where the file has more than a
 // page carries: then its values are the worst of them, and `counts` says how many are what.
 
-// Codes of a cell without a word, and of one whose points differ.
-const [NO_WORD, SEVERAL_WORDS] = [255, 254];
-
 // Margins with the colour bar beside the map, and below it where the page is narrow.
 const WIDE = { left: 76, right: 128, top: 10, bottom: 52, height: 560 };
 const NARROW = { left: 58, right: 14, top: 10, bottom: 130, height: 470 };
 // Narrower figures, px, have their colour bar below.
 const NARROWEST_WIDE = 560;
 
-function createMap(host, data) {
+// `panel` computes: it paints finer cells and marks its point.
+function createMap(host, data, panel) {
   const [xAxis, yAxis] = data.axes;
   const extra = data.axes.slice(2);
   const [nx, ny] = [xAxis.values.length, yAxis.values.length];
   const cuts = extra.reduce((product, axis) => product * axis.values.length, 1);
-  const columns = {};
-  for (const [name, column] of Object.entries(data.columns)) {
-    columns[name] = { ...column, values: floats(column.data) };
-  }
-  const codes = {};
-  for (const [name, coded] of Object.entries(data.codes)) {
-    codes[name] = { ...coded, values: decode(coded.data) };
-  }
-  const word = (name, cell) => codes[name]?.words[codes[name].values[cell]] ?? null;
-  const counts = data.counts
-    && Object.fromEntries(Object.entries(data.counts).map(([name, text]) => [name, floats(text)]));
-  // Cells of several points with some on either side of a layer's level, and with some that did not
-  // fail and yet have no value.
-  for (const layer of data.layers) {
-    for (const name of ["both", "undefined"]) if (layer[name]) layer[name] = decode(layer[name]);
-  }
-  const wordsOf = Object.fromEntries(data.rows.map((row) => [row.name, row.words]));
-  const bit = (bits, cell) => bits !== undefined && ((bits[cell >> 3] >> (cell & 7)) & 1) === 1;
-  // Whether the file has a point in a cell, and whether any of its points failed.
-  const filled = (cell) => (counts
-    ? counts.points[cell] > 0 : codes.status.values[cell] !== NO_WORD);
-  const failed = (cell) => (counts ? counts.failed[cell] > 0 : word("status", cell) !== "ok");
-  const hasValue = (layer, cell) => {
-    const value = columns[layer.column].values[cell];
-    return Number.isFinite(value) && (layer.group !== "ratio" || value > 0);
-  };
-  // Without any value, because of points that failed.
-  const isLost = (layer, cell) => filled(cell) && failed(cell) && !hasValue(layer, cell);
-  // Points that failed or have no value beside others that have one.
-  const partlyLost = (layer, cell) => counts !== undefined && hasValue(layer, cell)
-    && (counts.failed[cell] > 0 || bit(layer.undefined, cell));
-  // Cells whose colour depends on a motion that is chaotic.
-  const sensitive = (layer, cell) => layer.nonlinear
-    && (counts ? counts.sensitive[cell] > 0 : word("sensitive", cell) === "true");
+  const { columns, codes, word, counts, wordsOf, bit, filled, failed, hasValue, isLost,
+    partlyLost, sensitive, verdict } = createCells(data);
 
   const evenOf = (axis) => (axis.log ? Math.log : (value) => value);
   const [evenX, evenY] = [evenOf(xAxis), evenOf(yAxis)];
@@ -175,17 +141,21 @@ function createMap(host, data) {
       return (cell) => (status.values[cell] === SEVERAL_WORDS
         ? MIXED : kinds[status.values[cell]] ?? null);
     }
-    const colours = palette(layer);
     const { values, factor } = columns[layer.column];
     return (cell) => {
       if (hasValue(layer, cell)) {
         if (bit(layer.both, cell)) return MIXED;
-        const place = position(layer.scale, values[cell] * factor);
-        return colours[Math.min(Math.floor(place * colours.length), colours.length - 1)];
+        return colourOf(layer, values[cell] * factor);
       }
       if (!filled(cell)) return null;
       return failed(cell) ? "failed" : "undefined";
     };
+  }
+
+  function colourOf(layer, value) {
+    const colours = palette(layer);
+    const place = position(layer.scale, value);
+    return colours[Math.min(Math.floor(place * colours.length), colours.length - 1)];
   }
 
   function kindColours() {
@@ -226,6 +196,7 @@ function createMap(host, data) {
         }
       }
     }
+    panel?.cells(context, layer, (x, y) => [toPx(box, x), toPy(box, y)], colourOf);
     if (layer) {
       const least = (list) => Math.min(...list.slice(1).map((at, k) => Math.abs(at - list[k])));
       const side = Math.min(Math.max(Math.round((least(xs) + least(ys)) / 1.5), 3), 8);
@@ -260,41 +231,12 @@ function createMap(host, data) {
       }
     }
     context.restore();
-    drawAxes(context, box);
+    drawMapAxes(context, box, [xAxis, yAxis], view,
+      [(value) => toPx(box, evenX(value)), (value) => toPy(box, evenY(value))]);
     if (layer && margins() === NARROW) drawBarBelow(context, box, layer, NARROW.right);
     else if (layer) drawBarBeside(context, box, layer, width);
     figure.dataset.area = [box.left, box.top, box.width, box.height].join(" ");
     figure.dataset.view = view.flat().join(" ");
-  }
-
-  function drawAxes(context, box) {
-    const ink = themed("ink");
-    context.strokeStyle = context.fillStyle = ink;
-    context.lineWidth = 1;
-    context.strokeRect(box.left, box.top, box.width, box.height);
-    context.font = `13px ${FONT}`;
-    const range = (axis, k) => view[k].map((even) => (axis.log ? Math.exp(even) : even));
-    const bottom = box.top + box.height;
-    context.textAlign = "center";
-    for (const [value, label] of ticks(...range(xAxis, 0), box.width / 90, xAxis.ticks)) {
-      const x = toPx(box, evenX(value));
-      drawLine(context, x, bottom, x, bottom + 5, [], ink);
-      context.fillText(label, x, bottom + 19);
-    }
-    context.textAlign = "right";
-    for (const [value, label] of ticks(...range(yAxis, 1), box.height / 55, yAxis.ticks)) {
-      const y = toPy(box, evenY(value));
-      drawLine(context, box.left - 5, y, box.left, y, [], ink);
-      context.fillText(label, box.left - 8, y + 4.5);
-    }
-    context.font = `15px ${FONT}`;
-    context.textAlign = "center";
-    context.fillText(withUnit(xAxis.words, xAxis.unit), box.left + box.width / 2, bottom + 42);
-    context.save();
-    context.translate(17, box.top + box.height / 2);
-    context.rotate(-Math.PI / 2);
-    context.fillText(withUnit(yAxis.words, yAxis.unit), 0, 0);
-    context.restore();
   }
 
   function paintOver(context) {
@@ -320,6 +262,7 @@ function createMap(host, data) {
         }
       }
     }
+    panel?.over(context, (x, y) => [toPx(box, x), toPy(box, y)]);
     for (const [place, thick] of [[hovered, 2], [pinned, 3.5]]) {
       if (!place) continue;
       const [i, j] = place;
@@ -379,6 +322,9 @@ function createMap(host, data) {
       add(`background:repeating-linear-gradient(45deg,${lines})`,
         counts ? "some points sensitive: chaotic" : "sensitive: motion is chaotic");
     }
+    if (layer && panel?.hasFine()) {
+      add("border:1.5px dashed currentColor", "finer cells: preview, not checked");
+    }
     if (layer?.group === "ratio" && anyUndefined(layer)) {
       const dot = `radial-gradient(circle,${themed("muted")} 2px,${themed("paper")} 2.5px)`;
       add(`background:${dot};outline:1px solid ${themed("faint")}`, "undefined: no excitation");
@@ -388,26 +334,6 @@ function createMap(host, data) {
   function anyUndefined(layer) {
     return columns[layer.column].values.some((value, cell) => filled(cell) && !failed(cell)
       && !Number.isFinite(value));
-  }
-
-  function verdict(cell) {
-    if (!filled(cell)) return "not in the file";
-    const points = counts?.points[cell] ?? 1;
-    if (points > 1) {
-      const [reliable, unreliable, lost] = ["reliable", "unreliable", "failed"]
-        .map((kind) => counts[kind][cell]);
-      const kinds = [[reliable, "reliable"], [unreliable, "unreliable"], [lost, "failed"],
-        [points - reliable - unreliable - lost, "undefined"]].filter(([count]) => count > 0);
-      if (kinds.length > 1) return kinds.map(([count, kind]) => `${count} ${kind}`).join(", ");
-      const said = { reliable: "linear model reliable", unreliable: "linear model unreliable",
-        failed: "failed", undefined: "undefined: no excitation" }[kinds[0][1]];
-      return `${said} at all ${points} points`;
-    }
-    const reliable = word("reliable", cell);
-    if (reliable !== null) return `linear model ${reliable === "true" ? "" : "un"}reliable`;
-    const status = word("status", cell) ?? "unknown";
-    const ended = status.replaceAll("_", " ");
-    return status === "ok" ? "undefined: no excitation" : `failed: ${ended}`;
   }
 
   function coordinates([i, j]) {
@@ -509,7 +435,40 @@ function createMap(host, data) {
     pinned = place;
     over.request();
     showHistories(place);
+    if (place) panel?.pinned(valuesAt(place));
     tell();
+  }
+
+  // Values of all axes at a place.
+  const valuesAt = (place) => data.axes.map((axis, k) => axis.values[k < 2 ? place[k]
+    : rest[k - 2]]);
+
+  function cutAt(k, index) {
+    rest[k] = index;
+    controls.querySelectorAll("select[data-axis]")[k].value = index;
+  }
+
+  // What a panel needs of the map: where its axes are among the sliders, and how to redraw.
+  function connected() {
+    const even = [evenX, evenY, ...extra.map(evenOf)];
+    return {
+      sliders: data.axes.map(({ name }) => data.live.sliders.findIndex((one) => one.name === name)),
+      start: valuesAt(cursor),
+      even: (k, value) => even[k](value),
+      back: (k, value) => (data.axes[k].log ? Math.exp(value) : value),
+      // About a point, so many cells wide; the view, if it is zoomed.
+      region: (at, cells) => view.map(([low, high], k) => {
+        if (low > full[k][0] || high < full[k][1]) return [low, high];
+        const half = (0.5 * cells * (high - low)) / (k === 0 ? nx : ny);
+        const middle = even[k](at[k]);
+        return [Math.max(middle - half, low), Math.min(middle + half, high)];
+      }),
+      mark: over.request,
+      request: () => {
+        tellLegend(currentLayer());
+        cells.request();
+      },
+    };
   }
 
   function showHistories(place) {
@@ -589,4 +548,44 @@ function createMap(host, data) {
   });
   darkTheme.addEventListener("change", () => tellLegend(currentLayer()));
   offerChannels();
+  panel?.connect(connected());
+  return {
+    cells: { columns, counts, filled, word, verdict, shownValue },
+    // The parts of the picture, from below.
+    canvases: [cells.canvas, over.canvas],
+    title: () => document.getElementById("title").textContent,
+    // The point that is kept, or the one under the pointer.
+    chosen: () => pinned ?? hovered,
+    index: pointAt,
+    coordinates,
+    // What a link holds, and back.
+    state: () => ({ show: quantity.value, of: channel.value, rest, view: view.flat(), pinned }),
+    restore(state) {
+      const offers = (select, value) => [...select.options].some((one) => one.value === value);
+      if (offers(quantity, state.show)) quantity.value = state.show;
+      offerChannels();
+      if (offers(channel, state.of)) channel.value = state.of;
+      extra.forEach((axis, k) => {
+        if (state.rest?.[k] >= 0 && state.rest[k] < axis.values.length) cutAt(k, state.rest[k]);
+      });
+      const [x0, x1, y0, y1] = state.view ?? [];
+      if (x1 > x0 && y1 > y0) setView([[x0, x1], [y0, y1]]);
+      const [i, j] = state.pinned ?? [];
+      if (i >= 0 && i < nx && j >= 0 && j < ny) pin([i, j]);
+      changed();
+    },
+    go(cell) {
+      const [i, j] = [Math.floor(cell / cuts / ny), Math.floor(cell / cuts) % ny];
+      let left = cell % cuts;
+      for (let k = extra.length - 1; k >= 0; k--) {
+        cutAt(k, left % extra[k].values.length);
+        left = Math.floor(left / extra[k].values.length);
+      }
+      hover(null);
+      cursor = [i, j];
+      pin(cursor);
+      changed();
+      figure.focus();
+    },
+  };
 }

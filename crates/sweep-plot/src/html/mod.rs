@@ -4,6 +4,8 @@
 mod design;
 mod embed;
 mod histories;
+mod live;
+mod report;
 
 pub(crate) use design::page_of as design_page;
 
@@ -34,8 +36,13 @@ const CORE: &str = include_str!("core.js");
 const CHART: &str = include_str!("chart.js");
 const BAR: &str = include_str!("bar.js");
 const HISTORIES: &str = include_str!("histories.js");
+const CELLS: &str = include_str!("cells.js");
 const MAP: &str = include_str!("map.js");
 const DESIGN: &str = include_str!("design.js");
+const SPECTRUM: &str = include_str!("spectrum.js");
+const POOL: &str = include_str!("pool.js");
+const LIVE: &str = include_str!("live.js");
+const REPORT: &str = include_str!("report.js");
 const START: &str = include_str!("start.js");
 
 /// Bytes of a page that the values of a map's cells may take.
@@ -98,12 +105,19 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
         },
         "statuses": map.statuses,
         "traces": traces,
+        "about": report::about(source),
         "provenance": provenance(source),
     });
     if map.grid.merged() {
         data["counts"] = counts_json(map);
     }
-    Ok(page(title, data, &[CORE, CHART, BAR, HISTORIES, MAP, START]))
+    let Some(live) = &options.live else {
+        return Ok(page(title, data, &[CORE, CHART, BAR, HISTORIES, CELLS, MAP, REPORT, START]));
+    };
+    data["live"] = live::json(live, &map.grid.axes);
+    data["resonances"] = json!(live.resonances);
+    let scripts = [CORE, CHART, BAR, HISTORIES, SPECTRUM, POOL, LIVE, CELLS, MAP, REPORT, START];
+    Ok(page(title, data, &scripts))
 }
 
 /// The file's own word about itself, without what would fill the page: a list of a million values,
@@ -135,14 +149,23 @@ pub(crate) fn chart_page(source: &Source, chart: &Chart) -> String {
     page(&chart.title, data, &[CORE, CHART, START])
 }
 
+/// A page with the picture that it shows where scripts are switched off.
+pub(crate) fn with_still(page: &[u8], picture: &[u8]) -> Vec<u8> {
+    let picture = embed::bytes(picture.iter().copied());
+    // It stands before the data, which might hold anything.
+    String::from_utf8_lossy(page).replacen("{{still}}", &picture, 1).into_bytes()
+}
+
 fn page(title: &str, mut data: Value, scripts: &[&str]) -> String {
     data["ticks"] = ticks_json();
     data["both"] = json!(BOTH.css());
     data["shade"] = json!(format!("{}{:02x}", SHADE.css(), SHADE.alpha));
+    let worker = if data.get("live").is_some() { live::WORKER } else { "" };
     // Within a script element only `<` could end it, or start a comment.
     let data = data.to_string().replace('<', "\\u003c");
     PAGE.replace("{{title}}", &escape(title))
         .replace("{{style}}", STYLE)
+        .replace("{{worker}}", worker)
         .replace("{{script}}", &scripts.concat())
         .replace("{{data}}", &data)
 }

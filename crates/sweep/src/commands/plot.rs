@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::examples::Examples;
 use crate::exit::{Error, Exit, tell};
+use crate::live::{SliderRange, live, slider_range};
 use sweep_files::beside;
 use sweep_plot::{PlotOptions, Quantity, View, render};
 
@@ -11,6 +12,7 @@ use sweep_plot::{PlotOptions, Quantity, View, render};
 pub(super) const EXAMPLES: Examples = &[
     ["sweep plot results/first.parquet", "results/first.svg: ratios, and the line of the limit"],
     ["sweep plot results/first.parquet -o map.html", "a page to point and click in"],
+    ["sweep plot results/first.parquet -o map.html --live", "one that computes any point itself"],
     [
         "sweep plot results/first.parquet --quantity nonlinear --channel tub_yaw",
         "one channel's amplitude",
@@ -74,6 +76,20 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub against: Option<PathBuf>,
 
+    /// Map as .html: a page that computes, with both models in it: any point by sliders, without a
+    /// network
+    #[arg(long)]
+    pub live: bool,
+
+    /// With --live: a slider for this parameter; may be repeated [default: a usual choice]
+    #[arg(
+        long = "slider",
+        value_name = "NAME=FROM:TO",
+        requires = "live",
+        value_parser = slider_range
+    )]
+    pub sliders: Vec<SliderRange>,
+
     /// Map as .html: folder of trace files; clicking a point that has one shows its time histories
     #[arg(long, value_name = "FOLDER")]
     pub traces: Option<PathBuf>,
@@ -85,7 +101,7 @@ pub struct Args {
 /// As [`render`].
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.file));
-    let options = PlotOptions {
+    let mut options = PlotOptions {
         view: args.view,
         quantity: args.quantity,
         channels: args.channels.clone(),
@@ -96,7 +112,11 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         boundary: args.boundary.clone(),
         against: args.against.clone(),
         traces: args.traces.clone(),
+        live: None,
     };
+    if args.live {
+        options.live = Some(live(&args.file, &args.sliders)?);
+    }
     render(&args.file, &options, &output)?;
     tell(&format!("wrote {}", output.display()));
     Ok(Exit::Done)

@@ -49,7 +49,7 @@ pub(super) struct Draft {
 /// Reads the grid file and its machine file and puts the constants in place. `None` if the grid
 /// file has no text.
 pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
-    let GridInput { path, text, sets } = input;
+    let GridInput { path, text, machine: machine_text, sets } = input;
     let shown = path.display();
     let text = match text.clone().map_or_else(|| read(path), Ok) {
         Ok(text) => text,
@@ -78,7 +78,10 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
 
     let name = name(&mut root, path, report);
     let mut origins = Origins::default();
-    let machine = machine(&mut root, path, &mut origins, report);
+    let machine = match machine_text {
+        Some(text) => machine_of(text, "its machine", &mut origins, report),
+        None => machine(&mut root, path, &mut origins, report),
+    };
     let spin = spin::read(&mut root, &mut origins, report);
     let [end_s, from_s, to_s] = time(&mut root, &mut origins, report);
     let integrator = integrator(&mut root, &mut origins, report);
@@ -187,10 +190,15 @@ fn machine(
             return Machine::paper();
         }
     };
-    let source = report.sources.add(path.display().to_string(), text.as_str());
-    let table = parse(&text, source, report);
+    machine_of(&text, &path.display().to_string(), origins, report)
+}
+
+/// The machine of a machine file's text.
+fn machine_of(text: &str, name: &str, origins: &mut Origins, report: &mut Report) -> Machine {
+    let source = report.sources.add(name.to_owned(), text);
+    let table = parse(text, source, report);
     let root = Section::new("the machine file", Location::new(source, 0..0), table.get_ref());
-    machine::read(&text, root, origins, report)
+    machine::read(text, root, origins, report)
 }
 
 /// End and both edges of the window, in s.

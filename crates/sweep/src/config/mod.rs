@@ -22,6 +22,7 @@
 //! number may be written twice, not even under two names (`damping_n_s_per_m` writes every
 //! `damper_1_damping_n_s_per_m`), because nothing would say which comes last.
 
+mod again;
 mod axes;
 #[cfg(test)]
 mod bounds_tests;
@@ -52,6 +53,7 @@ pub use report::{Diagnostics, Mistake};
 
 use grid::Draft;
 use report::{Diagnostic, Report};
+use serde_json::Value;
 use source::Location;
 use washer_model::Machine;
 
@@ -63,6 +65,8 @@ pub struct GridInput {
     path: PathBuf,
     /// If it is not the file's.
     text: Option<String>,
+    /// The text of a machine file, in place of the machine that the grid names.
+    machine: Option<String>,
     sets: Vec<String>,
 }
 
@@ -70,14 +74,24 @@ impl GridInput {
     /// A grid file. The paths in it are relative to its folder.
     #[must_use]
     pub fn file(path: PathBuf, sets: Vec<String>) -> Self {
-        Self { path, text: None, sets }
+        Self { path, text: None, machine: None, sets }
     }
 
     /// The text of a grid file. Messages call it by this name, which is also that of the run if the
     /// text gives none. The paths in it are relative to the working directory.
     #[must_use]
     pub fn text(name: &str, text: String, sets: Vec<String>) -> Self {
-        Self { path: name.into(), text: Some(text), sets }
+        Self { path: name.into(), text: Some(text), machine: None, sets }
+    }
+
+    /// The grid that a result was made of, by its plan in the result (`Plan::to_json`). What
+    /// measures more than amplitudes is left out, and the points of a design.
+    pub(crate) fn of_plan(name: &str, plan: &Value) -> Self {
+        let parts = ["name", "spin", "time", "integrator", "axis", "reliability"];
+        let lines = parts.iter().filter_map(|key| Some((*key, again::toml(plan.get(key)?)?)));
+        let text = lines.map(|(key, value)| format!("{key} = {value}\n")).collect();
+        let machine = plan.get("machine").and_then(again::toml_file);
+        Self { path: name.into(), text: Some(text), machine, sets: Vec::new() }
     }
 
     /// Reads the grid with its machine file, puts the constants in place, and checks the whole.

@@ -93,9 +93,9 @@ pub(crate) struct Rung {
     /// The method.
     pub(crate) method: Method,
     /// Its error as a share of its difference from the rung before; 1 for the first.
-    contraction: f64,
+    pub(crate) contraction: f64,
     /// Up to which difference from that rung this is so.
-    believed_to: f64,
+    pub(crate) believed_to: f64,
 }
 
 impl Rung {

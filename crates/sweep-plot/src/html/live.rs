@@ -1,0 +1,49 @@
+//! What a page computes with: the module, its setup and the sliders.
+
+use serde_json::{Value, json};
+
+use super::embed;
+use crate::grid::GridAxis;
+use crate::{Live, Slider, label};
+
+/// The module of `crates/washer-live`; `scripts/release/build_live.sh` makes it.
+const MODULE: &[u8] = include_bytes!("../../assets/live.wasm");
+
+/// What the page's workers run.
+pub(crate) const WORKER: &str =
+    concat!("<script type=\"text/plain\" id=\"worker\">", include_str!("worker.js"), "</script>\n");
+
+pub(crate) fn json(live: &Live, axes: &[GridAxis]) -> Value {
+    let channel = |name: &String| {
+        let (unit, factor) = label::shown(label::unit_of_channel(name));
+        json!({ "name": name, "words": label::channel(name), "unit": unit, "factor": factor })
+    };
+    json!({
+        "module": embed::bytes(MODULE.iter().copied()),
+        "setup": embed::doubles(&live.setup),
+        "sliders": live.sliders.iter().map(|one| slider(one, axes)).collect::<Vec<_>>(),
+        "everyS": live.every_s,
+        "endS": live.end_s,
+        "windowS": live.window_s,
+        "channels": live.channels.iter().map(channel).collect::<Vec<_>>(),
+        "compared": live.compared,
+        "levels": live.levels,
+        "accuracy": live.accuracy,
+        "ratioLimit": live.ratio_limit,
+        "rungs": live.rungs,
+        "version": live.version,
+    })
+}
+
+fn slider(slider: &Slider, axes: &[GridAxis]) -> Value {
+    json!({
+        "name": slider.name,
+        "words": label::words(&slider.name),
+        "unit": label::unit_of_name(&slider.name),
+        "description": slider.description,
+        "from": slider.from,
+        "to": slider.to,
+        "value": slider.value.unwrap_or(slider.from),
+        "axis": axes.iter().any(|axis| axis.name == slider.name),
+    })
+}

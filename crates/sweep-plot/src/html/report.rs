@@ -1,0 +1,86 @@
+//! A run in words: what a reader of the page must know of it without the program.
+
+use serde_json::{Value, json};
+
+use crate::label::{significant, unit_of_name, words};
+use crate::read::Source;
+use sweep_files::key;
+
+/// Title and text of what was run, from the plan in the file; empty if it carries none.
+pub(crate) fn about(source: &Source) -> Vec<Value> {
+    let Some(plan) = source.find(key::PLAN) else { return Vec::new() };
+    let lines = [
+        ("Machine", machine(&plan["machine"])),
+        ("Spin", spin(&plan["spin"])),
+        ("Time", time(&plan["time"])),
+        ("Method", method(&plan["integrator"])),
+        ("Verdict", verdict(&plan["reliability"])),
+    ];
+    lines.into_iter().filter_map(|(title, text)| Some(json!([title, text?]))).collect()
+}
+
+/// A number under a key, with the unit that the key's end says.
+fn quantity(of: &Value, key: &str) -> Option<String> {
+    let value = significant(of.get(key)?.as_f64()?, 4);
+    Some(format!("{value} {}", unit_of_name(key)).trim_end().to_owned())
+}
+
+fn machine(machine: &Value) -> Option<String> {
+    let mass = |body: &str| quantity(&machine[body], "mass_kg");
+    let mut parts = vec![format!(
+        "tub {}, shaft {}, drum {}, unbalance {} at radius {}",
+        mass("tub")?,
+        mass("shaft")?,
+        mass("drum")?,
+        mass("unbalance")?,
+        quantity(&machine["unbalance"], "radius_m")?
+    )];
+    let mut elements = |list: &str, number: &str| {
+        let all = machine.get(list).and_then(Value::as_array)?;
+        let of_first = quantity(all.first()?, number)?;
+        let alike = all.iter().all(|one| one[number] == all[0][number]);
+        let each = if alike { format!(" of {of_first}") } else { String::new() };
+        parts.push(format!("{} {list}{each}", all.len()));
+        Some(())
+    };
+    elements("springs", "stiffness_n_per_m");
+    elements("dampers", "damping_n_s_per_m");
+    elements("stops", "stiffness_n_per_m");
+    elements("bushings", "stiffness_n_per_m");
+    if let Some(gap) = quantity(machine, "radial_clearance_m") {
+        parts.push(format!("a gap of {gap} between drum and tub"));
+    }
+    Some(format!("{}; what the axes name is each point's own", parts.join("; ")))
+}
+
+fn spin(spin: &Value) -> Option<String> {
+    let profile = spin["profile"].as_str()?;
+    match (quantity(spin, "peak_rpm"), quantity(spin, "ramp_s")) {
+        (Some(peak), Some(ramp)) => Some(format!("{profile}, up to {peak} in {ramp}")),
+        _ => Some(format!("{profile} of {} points", spin["time_s"].as_array()?.len())),
+    }
+}
+
+fn time(time: &Value) -> Option<String> {
+    let number = |value: &Value| value.as_f64().map(|value| significant(value, 4));
+    let [from, to] = [number(&time["window_s"][0])?, number(&time["window_s"][1])?];
+    let end = number(&time["end_s"])?;
+    Some(format!("0 to {end} s; amplitudes are the largest deviations from {from} to {to} s"))
+}
+
+fn method(integrator: &Value) -> Option<String> {
+    let name = integrator["method"].as_str()?;
+    let settings = integrator.as_object()?.iter().filter(|(key, _)| *key != "method");
+    let settings = settings.map(|(key, value)| format!("{} {value}", words(key).to_lowercase()));
+    let said: Vec<String> = std::iter::once(name.to_owned()).chain(settings).collect();
+    Some(said.join(", "))
+}
+
+fn verdict(reliability: &Value) -> Option<String> {
+    let limit = significant(reliability["ratio_limit"].as_f64()?, 4);
+    let channels = reliability["channels"].as_array()?.len();
+    Some(format!(
+        "the linear model is reliable where the ratio of nonlinear to linear amplitude is below \
+         {limit} in all of {channels} channels"
+    ))
+}

@@ -1,0 +1,48 @@
+"use strict";
+// One worker: the module with its setup, and one call after another. The first message is the
+// module and the setup; later ones are calls: { id, call, numbers, rest }.
+let module = null;
+let setup = null;
+let api = null;
+
+function write(numbers) {
+  const at = api.input(numbers.length);
+  new Float64Array(api.memory.buffer, at, numbers.length).set(numbers);
+}
+
+async function start() {
+  const instance = await WebAssembly.instantiate(module, {});
+  api = instance.exports;
+  write(setup);
+  if (api.setup() !== 1) throw new Error("the module does not take its setup");
+}
+
+async function answer({ id, call, numbers, rest = [] }) {
+  try {
+    if (!api) await start();
+    const started = performance.now();
+    write(numbers);
+    const count = api[call](...rest);
+    const ms = performance.now() - started;
+    const found = new Float64Array(api.memory.buffer, api.output(), count).slice();
+    postMessage({ id, found, ms }, [found.buffer]);
+  } catch (error) {
+    // A module that trapped is not used again.
+    api = null;
+    postMessage({ id, error: String(error) });
+  }
+}
+
+onmessage = async ({ data }) => {
+  if (data.call) {
+    await answer(data);
+    return;
+  }
+  ({ module, setup } = data);
+  try {
+    await start();
+    postMessage({ ready: true, lanes: api.lanes() });
+  } catch (error) {
+    postMessage({ ready: false, error: String(error) });
+  }
+};

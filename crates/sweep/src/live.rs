@@ -1,0 +1,281 @@
+//! What a live page computes with: the plan of a map as the setup of `washer-live`'s module.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use lane_ode::Simd;
+use serde_json::Value;
+use sweep_files::{ParquetFile, key};
+use sweep_plot::{Live, Slider};
+use washer_live::{Setup, Sliders};
+use washer_model::{Channel, ModeOverSpeed, Parameter, Timing, campbell, prepare};
+
+use crate::config::GridInput;
+use crate::engine::{CHECKPOINTS, Ladder, ModelEngine};
+use crate::exit::Error;
+use crate::measures::{Criterion, Measures};
+use crate::method::{ACCURACY, Integrator, Level, Steps};
+use crate::plan::{Axis, AxisValues, Plan};
+
+/// Parameters that a page offers beside the axes, where the machine has them.
+const OFFERED: [&str; 6] = [
+    "unbalance_mass_kg",
+    "damping_n_s_per_m",
+    "spring_stiffness_n_per_m",
+    "tub_mass_kg",
+    "unbalance_x_m",
+    "spin_peak_rpm",
+];
+
+/// How far their values go either way, as a share.
+const SPREAD: f64 = 0.3;
+
+/// Most sliders beside the axes: rungs are chosen for every corner of their ranges.
+const MOST_SLIDERS: usize = 6;
+
+/// Time between two instants of a history (s): at 1200 rpm five to a turn.
+const EVERY_S: f64 = 0.01;
+
+/// Most instants of a history, so that a page of a long run stays quick.
+const MOST_INSTANTS: f64 = 8000.0;
+
+/// Speeds at which modes are followed (rpm).
+const MODES_EVERY_RPM: f64 = 10.0;
+
+/// A parameter with the ends of its range, as `--slider` gives them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SliderRange {
+    name: String,
+    from: f64,
+    to: f64,
+}
+
+/// Reads `tub_mass_kg=20:30`.
+///
+/// # Errors
+/// What was expected instead.
+pub(crate) fn slider_range(text: &str) -> Result<SliderRange, String> {
+    let expected = "expected NAME=FROM:TO, as in tub_mass_kg=20:30";
+    let (name, range) = text.split_once('=').ok_or(expected)?;
+    let (from, to) = range.split_once(':').ok_or(expected)?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    match (number(from), number(to)) {
+        (Some(from), Some(to)) if from < to => {
+            Ok(SliderRange { name: name.trim().to_owned(), from, to })
+        }
+        (Some(_), Some(_)) => Err("expected a range that goes up, as in 20:30".to_owned()),
+        _ => Err(expected.to_owned()),
+    }
+}
+
+/// What the page of a map file computes with. Without `ranges` it has the usual sliders.
+///
+/// # Errors
+/// A file that is not the map of a grid with its plan; ranges that no machine can have.
+pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
+    let plan = plan_of(file)?;
+    let sliders = match ranges {
+        [] => usual(&plan),
+        _ => chosen(&plan, ranges)?,
+    };
+    let (setup, words) = setup(&plan, &sliders)?;
+    let axis = |axis: &Axis| {
+        let [least, greatest] = axis.values.extremes().map(|at| axis.values.value(at));
+        slider(&axis.parameter, least, greatest, None)
+    };
+    let further = sliders.iter().map(|(parameter, from, to)| {
+        slider(parameter, *from, *to, parameter.get(&plan.machine, &plan.spin))
+    });
+    Ok(Live {
+        setup: setup.to_numbers(),
+        sliders: plan.axes.iter().map(axis).chain(further).collect(),
+        every_s: EVERY_S.max(plan.end_s / MOST_INSTANTS),
+        end_s: plan.end_s,
+        window_s: plan.window_s,
+        channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
+        compared: plan.reliability.channels.iter().map(|channel| channel.index()).collect(),
+        levels: Level::ALL.map(|level| level.name().to_owned()).to_vec(),
+        accuracy: setup.accuracy,
+        ratio_limit: setup.ratio_limit,
+        rungs: words,
+        version: crate::VERSION.to_owned(),
+        resonances: resonances(&plan),
+    })
+}
+
+/// Resonances of the plan's own machine, before the axes, up to its greatest speed; none where it
+/// has no modes.
+fn resonances(plan: &Plan) -> Vec<[String; 3]> {
+    let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
+    let machines = [(plan.machine.clone(), plan.spin.clone())];
+    let greatest_rpm = plan.spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
+    let count = (greatest_rpm / MODES_EVERY_RPM).ceil() as u32;
+    let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODES_EVERY_RPM * f64::from(k)).collect();
+    let points = prepare(Simd::Scalar, &machines, &timing);
+    let Some(Ok(point)) = points.into_iter().next() else { return Vec::new() };
+    let modes = campbell(&point, &speeds_rpm).unwrap_or_default();
+    let of_mode = |mode: ModeOverSpeed| {
+        let motion = mode.motion.to_string();
+        let resonances = mode.resonances.into_iter().map(move |at| {
+            let (speed, damping) = (at.speed_rpm, at.mode.damping_ratio);
+            [motion.clone(), format!("{speed:.1}"), format!("{damping:.4}")]
+        });
+        resonances.collect::<Vec<_>>()
+    };
+    modes.into_iter().flat_map(of_mode).collect()
+}
+
+fn slider(parameter: &Parameter, from: f64, to: f64, value: Option<f64>) -> Slider {
+    let (name, description) = (parameter.name().to_owned(), parameter.description().to_owned());
+    Slider { name, description, from, to, value }
+}
+
+/// The plan that a map was made by.
+fn plan_of(file: &Path) -> Result<Plan, Error> {
+    let refused = |expected: &str| Error::Option {
+        option: "--live",
+        given: file.display().to_string(),
+        expected: expected.to_owned(),
+    };
+    let text = ParquetFile::open(file)?.value(key::PLAN).map(str::to_owned);
+    let json = text.and_then(|text| serde_json::from_str::<Value>(&text).ok());
+    let json = json.ok_or_else(|| refused("a map by `sweep run`, which carries its plan"))?;
+    if json.get("design").is_some() {
+        return Err(refused("the map of a grid; this one's points are a design's"));
+    }
+    let criterion = json.pointer("/reliability/criterion").and_then(Value::as_str);
+    if criterion.is_some_and(|criterion| criterion != Criterion::Peak.name()) {
+        return Err(refused("a map by the criterion `peak`: a page knows no other"));
+    }
+    let mut plan = GridInput::of_plan(&file.display().to_string(), &json).load()?;
+    if plan.axes.len() < 2 {
+        return Err(refused("a map of two axes or more"));
+    }
+    plan.measures = Measures::default();
+    Ok(plan)
+}
+
+/// What checked amplitudes are good for: the map's own accuracy, or the usual one.
+fn accuracy(plan: &Plan) -> f64 {
+    match plan.integrator.steps() {
+        Steps::Checked(accuracy) => accuracy,
+        Steps::Fixed(_) | Steps::Explicit | Steps::Implicit => ACCURACY.default,
+    }
+}
+
+type Range = (Parameter, f64, f64);
+
+/// The usual sliders: about the plan's values, as far as machines can be.
+fn usual(plan: &Plan) -> Vec<Range> {
+    let is_axis = |name: &str| plan.axes.iter().any(|axis| axis.parameter.name() == name);
+    let offered = OFFERED.into_iter().filter(|name| !is_axis(name));
+    let range = |name| {
+        let parameter = Parameter::find(name, &plan.machine, &plan.spin).ok()?;
+        let value = parameter.get(&plan.machine, &plan.spin).filter(|value| *value != 0.0)?;
+        let ends = [(1.0 - SPREAD) * value, (1.0 + SPREAD) * value];
+        let [from, to] = if value > 0.0 { ends } else { [ends[1], ends[0]] };
+        let range = (parameter, from, to);
+        is_sound(plan, std::slice::from_ref(&range)).then_some(range)
+    };
+    offered.filter_map(range).collect()
+}
+
+/// The sliders that `--slider` asks for.
+fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Range>, Error> {
+    let refused = |range: &SliderRange, expected: String| Error::Option {
+        option: "--slider",
+        given: format!("{}={}:{}", range.name, range.from, range.to),
+        expected,
+    };
+    let mut found: Vec<Range> = Vec::new();
+    for range in ranges {
+        let SliderRange { name, from, to } = range;
+        let parameter = Parameter::find(name, &plan.machine, &plan.spin)
+            .map_err(|why| refused(range, format!("a name of `sweep parameters`: {why}")))?;
+        if plan.axes.iter().any(|axis| axis.parameter == parameter)
+            || found.iter().any(|(other, ..)| *other == parameter)
+        {
+            return Err(refused(range, "a parameter that has no slider yet".to_owned()));
+        }
+        let is_spread = parameter.get(&plan.machine, &plan.spin).is_none();
+        if is_spread {
+            let expected = "a parameter that has one value in this map".to_owned();
+            return Err(refused(range, expected));
+        }
+        if let Some(end) = [*from, *to].into_iter().find(|end| !parameter.range().contains(*end)) {
+            return Err(refused(
+                range,
+                format!("{} at both ends", parameter.range().instead_of(end)),
+            ));
+        }
+        found.push((parameter, *from, *to));
+        if found.len() > MOST_SLIDERS {
+            return Err(refused(range, format!("at most {MOST_SLIDERS} sliders")));
+        }
+        if !is_sound(plan, &found) {
+            return Err(refused(range, "values that a machine can have together".to_owned()));
+        }
+    }
+    Ok(found)
+}
+
+/// Whether machines and spins can be everywhere within these ranges.
+fn is_sound(plan: &Plan, sliders: &[Range]) -> bool {
+    let wide = widened(plan, sliders);
+    wide.some_corners().iter().all(|corner| {
+        let scenario = wide.scenario_at(corner);
+        scenario.machine.violations().is_empty() && scenario.spin.violations().is_empty()
+    })
+}
+
+/// The plan with the sliders as further axes.
+fn widened(plan: &Plan, sliders: &[Range]) -> Plan {
+    let axis = |(parameter, from, to): &Range| {
+        let values = AxisValues::Linear { from: *from, to: *to, count: 2 };
+        Axis { parameter: parameter.clone(), values }
+    };
+    let axes = plan.axes.iter().cloned().chain(sliders.iter().map(axis)).collect();
+    Plan { axes, ..plan.clone() }
+}
+
+/// The setup, and the rungs of both models in words.
+fn setup(plan: &Plan, sliders: &[Range]) -> Result<(Setup, [Vec<String>; 2]), Error> {
+    // By the fast method, whatever the map's.
+    let accuracy = accuracy(plan);
+    let plan = &Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
+    let ladders = ModelEngine::new(plan)?.ladders().clone();
+    let wide = widened(plan, sliders);
+    let wide_ladders = ModelEngine::new(&wide)?.ladders().clone();
+    let words = [0, 1].map(|model: usize| {
+        ladders[model].rungs.iter().map(ToString::to_string).collect::<Vec<String>>()
+    });
+    let parameters = wide.axes.iter().map(|axis| axis.parameter.clone()).collect();
+    let setup = Setup {
+        machine: plan.machine.clone(),
+        spin: plan.spin.clone(),
+        end_s: plan.end_s,
+        window_s: plan.window_s,
+        checkpoints: CHECKPOINTS,
+        accuracy,
+        ratio_limit: plan.reliability.ratio_limit,
+        channels: plan.reliability.channels.clone(),
+        sliders: Sliders { parameters, axes: plan.axes.len() },
+        ladders: ladders.map(|ladder| rungs(&ladder)),
+        wide_ladders: wide_ladders.map(|ladder| rungs(&ladder)),
+    };
+    Ok((setup, words))
+}
+
+fn rungs(ladder: &Ladder) -> Vec<washer_live::Rung> {
+    let rung = |rung: &crate::engine::Rung| washer_live::Rung {
+        level: rung.level as u8,
+        is_capped: rung.level.is_capped(),
+        method: rung.method,
+        contraction: rung.contraction,
+        believed_to: rung.believed_to,
+    };
+    ladder.rungs.iter().map(rung).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,101 @@
+//! A page's checked points against the program's rows: the same rungs, errors and bits.
+
+use super::*;
+use crate::outcome::{Outcome, Status};
+
+const GRID: &str = r#"
+name = "live"
+spin = { profile = "triangular", peak_rpm = 350, ramp_s = 50 }
+time = { end_s = 50, window_s = [30, 50] }
+[[axis]]
+parameter = "unbalance_mass_kg"
+values = [0.1, 0.4, 0.95]
+[[axis]]
+parameter = "damping_n_s_per_m"
+values = [60, 180, 300]
+"#;
+
+fn plan(text: &str) -> Plan {
+    GridInput::text("live", text.to_owned(), Vec::new()).load().unwrap()
+}
+
+fn is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
+    let checked = washer_live::check(setup, values).unwrap();
+    assert_eq!(Some(checked.is_sensitive), outcome.sensitive, "{values:?}");
+    assert_eq!(checked.models[0].level, outcome.method as u8, "{values:?}");
+    let errors = checked.models.map(|model| model.error);
+    let greatest = errors[0].zip(errors[1]).map(|(a, b)| a.max(b));
+    assert_eq!(greatest, outcome.error, "{values:?}");
+    for (model, row) in checked.models.iter().zip([&outcome.nonlinear, &outcome.linear]) {
+        let has_failed = row.status != Status::Ok;
+        assert_eq!(model.record.failure.is_some(), has_failed, "{values:?}");
+        assert_eq!(model.record.steps, row.steps, "{values:?}");
+        if has_failed {
+            continue;
+        }
+        assert_eq!(Some(model.record.min_gap_m), row.min_gap_m, "{values:?}");
+        let of_channels = setup.channels.iter().map(|of| model.record.amplitudes[of.index()]);
+        assert_eq!(of_channels.collect::<Vec<_>>(), row.amplitudes, "{values:?}");
+    }
+}
+
+#[test]
+fn a_checked_point_is_the_row_of_the_map() {
+    let plan = plan(GRID);
+    let (setup, _) = setup(&plan, &usual(&plan)).unwrap();
+    // What a page computes with is what came back from its numbers.
+    let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
+    let engine = ModelEngine::new(&plan).unwrap();
+    // Settled at once, settled late, and chaotic.
+    for values in [[0.1, 300.0], [0.4, 180.0], [0.95, 180.0]] {
+        let outcomes = engine.evaluate_at(&[values.to_vec()]);
+        is_row(&outcomes[0], &setup, &values);
+    }
+}
+
+#[test]
+fn a_point_beyond_the_axes_is_the_row_of_a_wider_grid() {
+    let plan = plan(GRID);
+    let sliders = chosen(&plan, &[slider_range("tub_mass_kg=20:28").unwrap()]).unwrap();
+    let (setup, _) = setup(&plan, &sliders).unwrap();
+    let wide = widened(&plan, &sliders);
+    let engine = ModelEngine::new(&wide).unwrap();
+    let values = [0.4, 240.0, 26.0];
+    is_row(&engine.evaluate_at(&[values.to_vec()])[0], &setup, &values);
+}
+
+#[test]
+fn a_setup_comes_back_from_its_numbers() {
+    let mut plan = plan(&GRID.replace(
+        "\"triangular\", peak_rpm = 350, ramp_s = 50",
+        "\"table\", time_s = [0, 20, 50], speed_rpm = [0, 350, 100]",
+    ));
+    plan.machine = crate::config::with_one_of_each();
+    plan.machine.springs[1].free_length_m = Some(0.2);
+    plan.machine.dampers[0].friction_n = 20.0;
+    plan.machine.dampers[0].friction_linear_speed_m_per_s = Some(0.1);
+    let (setup, _) = setup(&plan, &[]).unwrap();
+    let numbers = setup.to_numbers();
+    assert_eq!(Setup::from_numbers(&numbers), Some(setup));
+    assert_eq!(Setup::from_numbers(&numbers[..numbers.len() - 1]), None);
+    assert_eq!(Setup::from_numbers(&[f64::NAN; 400]), None);
+}
+
+#[test]
+fn sliders_that_cannot_be_are_refused() {
+    let plan = plan(GRID);
+    for (text, expected) in [
+        ("tub_mas_kg=1:2", "no parameter has this name"),
+        ("damping_n_s_per_m=1:2", "no slider yet"),
+        ("tub_mass_kg=-1:2", "greater than 0"),
+    ] {
+        let error = chosen(&plan, &[slider_range(text).unwrap()]).unwrap_err().to_string();
+        assert!(error.contains(expected), "{text}: {error}");
+    }
+    for text in ["tub_mass_kg", "tub_mass_kg=1", "tub_mass_kg=2:1", "tub_mass_kg=a:b"] {
+        assert!(slider_range(text).is_err(), "{text}");
+    }
+    assert!(usual(&plan).iter().all(|(parameter, from, to)| {
+        from < to && !["unbalance_mass_kg", "damping_n_s_per_m"].contains(&parameter.name())
+    }));
+}

@@ -1,0 +1,163 @@
+//! The module's exports. A caller writes numbers where [`input`] says and calls a function with how
+//! many they are; what it returns is how many numbers stand at [`output`], 0 if there is no answer.
+//!
+//! Numbers are 64 bit floats. A record is `failure` (0 none, 1 diverged, 2 step too small, 3 step
+//! limit), its time (s), `steps`, the least gap (m), and the amplitude of each channel.
+#![allow(unsafe_code)]
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use lane_ode::{Failure, Simd};
+use washer_model::{Channel, ModelKind, Record};
+
+use crate::point::{NoPoint, Scenario, motion, peaks};
+use crate::setup::Setup;
+use crate::{Climbed, check};
+
+#[derive(Default)]
+struct State {
+    input: Vec<f64>,
+    output: Vec<f64>,
+    setup: Option<Setup>,
+}
+
+static STATE: Mutex<State> =
+    Mutex::new(State { input: Vec::new(), output: Vec::new(), setup: None });
+
+fn state() -> MutexGuard<'static, State> {
+    STATE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Makes room for so many numbers and says where.
+// SAFETY (of every export): no other symbol of the module has its name.
+#[unsafe(no_mangle)]
+pub extern "C" fn input(count: usize) -> *mut f64 {
+    let mut state = state();
+    state.input.clear();
+    state.input.resize(count, 0.0);
+    state.input.as_mut_ptr()
+}
+
+/// Where the last answer stands, until the next call.
+#[unsafe(no_mangle)]
+pub extern "C" fn output() -> *const f64 {
+    state().output.as_ptr()
+}
+
+/// Trajectories side by side.
+#[unsafe(no_mangle)]
+pub extern "C" fn lanes() -> usize {
+    Simd::best().lanes()
+}
+
+/// Takes a setup; 1 if it is one.
+#[unsafe(no_mangle)]
+pub extern "C" fn setup() -> usize {
+    let state = &mut *state();
+    state.setup = Setup::from_numbers(&state.input);
+    usize::from(state.setup.is_some())
+}
+
+/// Both models by the quick rung at points of so many values each. For each point: 1, 0 if it is
+/// impossible or -1 if it has no equilibrium; the two records.
+#[unsafe(no_mangle)]
+pub extern "C" fn quick(values: usize) -> usize {
+    let state = &mut *state();
+    let Some(setup) = &state.setup else { return 0 };
+    let points: Vec<&[f64]> = state.input.chunks_exact(values.max(1)).collect();
+    state.output.clear();
+    for found in peaks(setup, &points) {
+        state.output.push(code(found.as_ref().err()));
+        let empty = [None; 2];
+        for record in found.map_or(empty, |records| records.map(Some)) {
+            write_record(&mut state.output, record.as_ref());
+        }
+    }
+    state.output.len()
+}
+
+/// One checked point: 1, 0 or -1 as above, whether it is sensitive; for each model the rung, its
+/// level, the error left (NaN if unknown), the record.
+#[unsafe(no_mangle)]
+pub extern "C" fn checked() -> usize {
+    let state = &mut *state();
+    let Some(setup) = &state.setup else { return 0 };
+    state.output.clear();
+    match check(setup, &state.input) {
+        Err(why) => state.output.push(code(Some(&why))),
+        Ok(found) => {
+            state.output.extend([1.0, f64::from(u8::from(found.is_sensitive))]);
+            for Climbed { record, rung, level, error } in found.models {
+                let error = error.unwrap_or(f64::NAN);
+                state.output.extend([rung as f64, f64::from(level), error]);
+                write_record(&mut state.output, Some(&record));
+            }
+        }
+    }
+    state.output.len()
+}
+
+/// The motion of a model (0 nonlinear, 1 linear) at a point by a rung, or by the quick one if there
+/// is none of this number: 1, 0 or -1 as above, the failure and its time, how many instants; of
+/// each, the channels and the gap.
+#[unsafe(no_mangle)]
+pub extern "C" fn history(model: usize, rung: usize, every_s: f64) -> usize {
+    let state = &mut *state();
+    let Some(setup) = &state.setup else { return 0 };
+    let model = if model == 0 { ModelKind::Nonlinear } else { ModelKind::Linear };
+    state.output.clear();
+    match motion(setup, &state.input, model, Some(rung), every_s) {
+        Err(why) => state.output.push(code(Some(&why))),
+        Ok(motion) => {
+            let (failure, time_s) = failure(motion.failure);
+            state.output.extend([1.0, failure, time_s, motion.gaps_m.len() as f64]);
+            for (channels, gap_m) in motion.channels.iter().zip(&motion.gaps_m) {
+                state.output.extend(channels);
+                state.output.push(*gap_m);
+            }
+        }
+    }
+    state.output.len()
+}
+
+/// Speeds (rpm) at a point, every `every_s` from 0 to the end.
+#[unsafe(no_mangle)]
+pub extern "C" fn speeds(every_s: f64) -> usize {
+    let state = &mut *state();
+    let Some(setup) = &state.setup else { return 0 };
+    state.output.clear();
+    if let Ok(scenario) = Scenario::new(setup, &state.input) {
+        let instants = 1 + (setup.end_s / every_s * (1.0 + 1e-12)) as usize;
+        let times_s = (0..instants).map(|k| k as f64 * every_s);
+        state.output.extend(scenario.spin.speeds_rpm(times_s));
+    }
+    state.output.len()
+}
+
+fn code(why: Option<&NoPoint>) -> f64 {
+    match why {
+        None => 1.0,
+        Some(NoPoint::Impossible) => 0.0,
+        Some(NoPoint::NoEquilibrium) => -1.0,
+    }
+}
+
+fn failure(failure: Option<(Failure, f64)>) -> (f64, f64) {
+    match failure {
+        None => (0.0, f64::NAN),
+        Some((Failure::Diverged, time_s)) => (1.0, time_s),
+        Some((Failure::StepTooSmall, time_s)) => (2.0, time_s),
+        Some((Failure::StepLimit, time_s)) => (3.0, time_s),
+    }
+}
+
+fn write_record(output: &mut Vec<f64>, record: Option<&Record>) {
+    match record {
+        None => output.extend([f64::NAN; 4 + Channel::ALL.len()]),
+        Some(record) => {
+            let (failure, time_s) = failure(record.failure);
+            output.extend([failure, time_s, record.steps as f64, record.min_gap_m]);
+            output.extend(record.amplitudes);
+        }
+    }
+}

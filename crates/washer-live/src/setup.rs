@@ -1,0 +1,221 @@
+//! What a page computes with.
+
+use washer_model::{
+    BumpStop, Bushing, Cabinet, Caps, Channel, Foot, Formula, Gear, Geared, Machine, Method,
+    Parameter, Spin, Unbalance,
+};
+
+use crate::numbers::{Reader, Writer};
+
+/// Most elements of a kind, and most rungs: what a page was written with has fewer.
+const MOST: usize = 100_000;
+
+/// The machine, its spin, what a point can change, and how points are integrated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setup {
+    /// The machine, but for what a point changes.
+    pub machine: Machine,
+    /// The spin, but for what a point changes.
+    pub spin: Spin,
+    /// The run is from 0 to here.
+    pub end_s: f64,
+    /// Amplitudes are taken over this closed interval, unless a point changes it.
+    pub window_s: [f64; 2],
+    /// Into how many parts a run is cut, at whose ends two runs of it are compared.
+    pub checkpoints: u32,
+    /// Largest error of a checked amplitude, relative.
+    pub accuracy: f64,
+    /// Ratios below it are reliable.
+    pub ratio_limit: f64,
+    /// What the verdict compares.
+    pub channels: Vec<Channel>,
+    /// What a point gives values.
+    pub sliders: Sliders,
+    /// Rungs of the nonlinear and of the linear model while only axes move; at least one of each.
+    pub ladders: [Vec<Rung>; 2],
+    /// The same while any slider may be anywhere in its range.
+    pub wide_ladders: [Vec<Rung>; 2],
+}
+
+/// The parameters that a point gives values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sliders {
+    /// Axes of the map first.
+    pub parameters: Vec<Parameter>,
+    /// How many are axes.
+    pub axes: usize,
+}
+
+/// One way to integrate a model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rung {
+    /// What the program calls it, by its place among its levels.
+    pub level: u8,
+    /// Whether modes of bearings and hinge are capped.
+    pub is_capped: bool,
+    /// RK4 or a geared formula; a page has no other.
+    pub method: Method,
+    /// Its error as a share of its difference from the rung before.
+    pub contraction: f64,
+    /// Up to which difference that is so.
+    pub believed_to: f64,
+}
+
+impl Setup {
+    /// As numbers.
+    #[must_use]
+    pub fn to_numbers(&self) -> Vec<f64> {
+        let mut out = Writer::default();
+        let machine = &self.machine;
+        let counts = [
+            machine.springs.len(),
+            machine.dampers.len(),
+            machine.stops.len(),
+            machine.bushings.len(),
+            machine.further_unbalances.len(),
+            machine.feet.len(),
+            usize::from(machine.cabinet.is_some()),
+        ];
+        counts.into_iter().for_each(|count| out.count(count));
+        match &self.spin {
+            Spin::Cycloidal { .. } => out.count(0),
+            Spin::Triangular { .. } => out.count(1),
+            Spin::Ramp { .. } => out.count(2),
+            Spin::Table { time_s, .. } => out.count(3 + time_s.len()),
+        }
+        let parameters = Parameter::all(machine, &self.spin);
+        for parameter in &parameters {
+            out.optional(parameter.get(machine, &self.spin));
+        }
+        // A spring's length without force may follow from where its ends are.
+        machine.springs.iter().for_each(|spring| out.optional(spring.free_length_m));
+        out.number(self.end_s);
+        self.window_s.into_iter().for_each(|edge_s| out.number(edge_s));
+        out.number(f64::from(self.checkpoints));
+        out.number(self.accuracy);
+        out.number(self.ratio_limit);
+        let channels: Vec<f64> = self.channels.iter().map(|of| of.index() as f64).collect();
+        out.counted(&channels);
+        let place = |slider: &Parameter| {
+            let at = parameters.iter().position(|parameter| parameter == slider);
+            at.map_or(f64::NAN, |at| at as f64)
+        };
+        let sliders: Vec<f64> = self.sliders.parameters.iter().map(place).collect();
+        out.counted(&sliders);
+        out.count(self.sliders.axes);
+        for rungs in self.ladders.iter().chain(&self.wide_ladders) {
+            out.count(rungs.len());
+            rungs.iter().for_each(|rung| write_rung(&mut out, rung));
+        }
+        out.0
+    }
+
+    /// From [`Self::to_numbers`]; `None` from anything else.
+    #[must_use]
+    pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
+        let mut from = Reader(numbers);
+        let mut machine = Machine::paper();
+        let mut count = || from.count(MOST);
+        let (spring, damper) = (machine.springs[0], machine.dampers[0]);
+        machine.springs = vec![spring; count()?];
+        machine.dampers = vec![damper; count()?];
+        machine.stops = vec![BumpStop::default(); count()?];
+        machine.bushings = vec![Bushing::default(); count()?];
+        machine.further_unbalances = vec![Unbalance::default(); count()?];
+        machine.feet = vec![Foot::default(); count()?];
+        machine.cabinet = (count()? > 0).then(Cabinet::default);
+        let (peak_rpm, ramp_s) = (0.0, 0.0);
+        let mut spin = match count()? {
+            0 => Spin::Cycloidal { peak_rpm, ramp_s },
+            1 => Spin::Triangular { peak_rpm, ramp_s },
+            2 => Spin::Ramp { peak_rpm, ramp_s },
+            more => Spin::Table { time_s: vec![0.0; more - 3], speed_rpm: vec![0.0; more - 3] },
+        };
+        let parameters = Parameter::all(&machine, &spin);
+        // Numbers of single elements stand after those of all.
+        for parameter in &parameters {
+            if let Some(value) = from.optional()? {
+                parameter.set(&mut machine, &mut spin, value);
+            }
+        }
+        for spring in &mut machine.springs {
+            spring.free_length_m = from.optional()?;
+        }
+        let end_s = from.number()?;
+        let window_s = [from.number()?, from.number()?];
+        let checkpoints = u32::try_from(from.count(MOST)?).ok()?;
+        let (accuracy, ratio_limit) = (from.number()?, from.number()?);
+        let channel = |of: &f64| Channel::ALL.get(*of as usize).copied();
+        let channels = from.counted()?.iter().map(channel).collect::<Option<_>>()?;
+        let slider = |of: &f64| parameters.get(*of as usize).cloned();
+        let sliders = from.counted()?.iter().map(slider).collect::<Option<_>>()?;
+        let sliders = Sliders { parameters: sliders, axes: from.count(MOST)? };
+        let mut ladder = || -> Option<Vec<Rung>> {
+            let count = from.count(MOST).filter(|count| *count > 0)?;
+            (0..count).map(|_| read_rung(&mut from)).collect()
+        };
+        let ladders = [ladder()?, ladder()?];
+        let wide_ladders = [ladder()?, ladder()?];
+        Some(Self {
+            machine,
+            spin,
+            end_s,
+            window_s,
+            checkpoints,
+            accuracy,
+            ratio_limit,
+            channels,
+            sliders,
+            ladders,
+            wide_ladders,
+        })
+    }
+}
+
+fn write_rung(out: &mut Writer, rung: &Rung) {
+    out.number(f64::from(rung.level));
+    out.count(usize::from(rung.is_capped));
+    out.number(rung.contraction);
+    out.number(rung.believed_to);
+    match rung.method {
+        Method::Geared(Geared { formula, gears }) => {
+            out.count(match formula {
+                Formula::Rk4 => 1,
+                Formula::Dop853 => 2,
+            });
+            for Gear { up_to_rad_per_s, step_s, caps } in gears {
+                out.number(up_to_rad_per_s);
+                out.number(step_s);
+                out.number(caps.bearings_rad_per_s);
+                out.optional(caps.hinge_rad_per_s);
+            }
+        }
+        Method::Rk4 { step_s } => {
+            out.count(0);
+            out.number(step_s);
+        }
+        // Nothing that reads this knows them.
+        Method::Dopri5(_) | Method::Rodas5p(_) => out.number(f64::NAN),
+    }
+}
+
+fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
+    let level = u8::try_from(from.count(MOST)?).ok()?;
+    let is_capped = from.count(2)? == 1;
+    let (contraction, believed_to) = (from.number()?, from.number()?);
+    let method = match from.count(3)? {
+        0 => Method::Rk4 { step_s: from.number()? },
+        kind => {
+            let formula = if kind == 1 { Formula::Rk4 } else { Formula::Dop853 };
+            let mut gear = || -> Option<Gear> {
+                let (up_to_rad_per_s, step_s) = (from.number()?, from.number()?);
+                let bearings_rad_per_s = from.number()?;
+                let hinge_rad_per_s = from.optional()?;
+                let caps = Caps { bearings_rad_per_s, hinge_rad_per_s };
+                Some(Gear { up_to_rad_per_s, step_s, caps })
+            };
+            Method::Geared(Geared { formula, gears: [gear()?, gear()?, gear()?] })
+        }
+    };
+    Some(Rung { level, is_capped, method, contraction, believed_to })
+}
