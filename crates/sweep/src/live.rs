@@ -8,7 +8,7 @@ use serde_json::Value;
 use sweep_files::{ParquetFile, key};
 use sweep_plot::{Live, Slider};
 use washer_live::{Setup, Sliders};
-use washer_model::{Channel, ModeOverSpeed, Parameter, Timing, campbell, prepare};
+use washer_model::{Channel, ModeOverSpeed, ModelKind, Parameter, Timing, campbell, prepare};
 
 use crate::config::GridInput;
 use crate::engine::{CHECKPOINTS, Ladder, ModelEngine};
@@ -246,8 +246,9 @@ fn setup(plan: &Plan, sliders: &[Range]) -> Result<(Setup, [Vec<String>; 2]), Er
     let ladders = ModelEngine::new(plan)?.ladders().clone();
     let wide = widened(plan, sliders);
     let wide_ladders = ModelEngine::new(&wide)?.ladders().clone();
-    let words = [0, 1].map(|model: usize| {
-        ladders[model].rungs.iter().map(ToString::to_string).collect::<Vec<String>>()
+    let models = [(&ladders[0], ModelKind::Nonlinear), (&ladders[1], ModelKind::Linear)];
+    let words = models.map(|(ladder, model)| {
+        ladder.rungs.iter().map(|rung| rung.describe(model)).collect::<Vec<String>>()
     });
     let parameters = wide.axes.iter().map(|axis| axis.parameter.clone()).collect();
     let setup = Setup {

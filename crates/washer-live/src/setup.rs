@@ -1,8 +1,8 @@
 //! What a page computes with.
 
 use washer_model::{
-    BumpStop, Bushing, Cabinet, Caps, Channel, Foot, Formula, Gear, Geared, Machine, Method,
-    Parameter, Spin, Unbalance,
+    BumpStop, Bushing, Cabinet, Caps, Channel, Foot, Gear, Geared, Machine, Method, Parameter,
+    Spin, Unbalance,
 };
 
 use crate::numbers::{Reader, Writer};
@@ -178,11 +178,8 @@ fn write_rung(out: &mut Writer, rung: &Rung) {
     out.number(rung.contraction);
     out.number(rung.believed_to);
     match rung.method {
-        Method::Geared(Geared { formula, gears }) => {
-            out.count(match formula {
-                Formula::Rk4 => 1,
-                Formula::Dop853 => 2,
-            });
+        Method::Geared(Geared { gears }) => {
+            out.count(1);
             for Gear { up_to_rad_per_s, step_s, caps } in gears {
                 out.number(up_to_rad_per_s);
                 out.number(step_s);
@@ -203,10 +200,9 @@ fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
     let level = u8::try_from(from.count(MOST)?).ok()?;
     let is_capped = from.count(2)? == 1;
     let (contraction, believed_to) = (from.number()?, from.number()?);
-    let method = match from.count(3)? {
+    let method = match from.count(2)? {
         0 => Method::Rk4 { step_s: from.number()? },
-        kind => {
-            let formula = if kind == 1 { Formula::Rk4 } else { Formula::Dop853 };
+        _ => {
             let mut gear = || -> Option<Gear> {
                 let (up_to_rad_per_s, step_s) = (from.number()?, from.number()?);
                 let bearings_rad_per_s = from.number()?;
@@ -214,7 +210,7 @@ fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
                 let caps = Caps { bearings_rad_per_s, hinge_rad_per_s };
                 Some(Gear { up_to_rad_per_s, step_s, caps })
             };
-            Method::Geared(Geared { formula, gears: [gear()?, gear()?, gear()?] })
+            Method::Geared(Geared { gears: [gear()?, gear()?, gear()?] })
         }
     };
     Some(Rung { level, is_capped, method, contraction, believed_to })

@@ -1,10 +1,11 @@
 //! For benchmarks: parts of a step that the public interface does not expose.
 
 use crate::coordinates::STATES;
+use crate::kind::ModelKind;
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::point::Point;
 use crate::run::model::Model;
-use crate::run::{Family, ModelKind, OfLinear, OfNonlinear};
+use crate::run::{Family, OfLinear, OfNonlinear};
 use core::hint::black_box;
 use core::marker::PhantomData;
 use lane_ode::{Kernel, Lane, N, Simd, System};

@@ -41,6 +41,7 @@ use crate::coordinates::COORDINATES;
 use core::iter;
 
 use crate::fast::geared::{Formula, GEARS, Gear, Geared, interpolation_phase};
+use crate::kind::ModelKind;
 use crate::machine::spin::Spin;
 use crate::modes::{
     Mode, Modes, Motion, NoModes, fastest_rigid_rad_per_s, highest_with_caps, modes_with_caps,
@@ -48,7 +49,6 @@ use crate::modes::{
 };
 use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
-use crate::run::ModelKind;
 
 /// Modes of the suspension: yaw, pitch, two translations.
 pub(crate) const SUSPENSION_MODES: usize = 4;
@@ -337,14 +337,14 @@ impl<'a> Cases<'a> {
         self.cases.iter().map(|case| case.as_ref().map_err(|none| *none)).collect()
     }
 
-    /// The longest steps of a model's formula, with their caps, at which the relative error of amplitudes
-    /// should be below `accuracy` at all points; `None` if plain RK4 at its longest stable step is
-    /// cheaper.
+    /// The longest steps of a model's formula, with their caps, at which the relative error of
+    /// amplitudes should be below `accuracy` at all points; `None` if plain RK4 at its longest
+    /// stable step is cheaper.
     ///
     /// # Errors
     /// [`NoModes`] of a machine that has none.
     pub fn choose(&self, model: ModelKind, accuracy: f64) -> Result<Option<Geared>, NoModes> {
-        let Some((mut search, trial)) = self.choose_top(model.formula(), accuracy)? else {
+        let Some((mut search, trial)) = self.choose_top(Formula::of(model), accuracy)? else {
             return Ok(None);
         };
         let mut geared = Geared::steady(trial.step_s, trial.caps);
@@ -374,7 +374,7 @@ impl<'a> Cases<'a> {
         model: ModelKind,
         accuracy: f64,
     ) -> Result<Option<Geared>, NoModes> {
-        let chosen = self.choose_top(model.formula(), accuracy)?;
+        let chosen = self.choose_top(Formula::of(model), accuracy)?;
         Ok(chosen.map(|(_, trial)| Geared::steady(trial.step_s, trial.caps)))
     }
 
@@ -410,7 +410,7 @@ impl<'a> Cases<'a> {
         let Gear { step_s, caps, .. } = *geared.top();
         let mut error = 0.0_f64;
         for case in self.with_modes()? {
-            error = error.max(case.error_of_truncation(model.formula(), step_s));
+            error = error.max(case.error_of_truncation(Formula::of(model), step_s));
             let state = &case.turning[TOP];
             let of_bearings = case.motions_with_capped_bearings(state, &caps)?;
             let of_caps = case.error_of_caps(state, &of_bearings, &caps, state.speed_rad_per_s);

@@ -63,6 +63,7 @@ pub mod bench;
 mod channel;
 mod coordinates;
 mod fast;
+mod kind;
 mod lanes;
 mod linear;
 mod machine;
@@ -76,6 +77,7 @@ pub use channel::Channel;
 pub use coordinates::COORDINATES;
 pub use fast::Cases;
 pub use fast::geared::{Formula, Gear, Geared};
+pub use kind::ModelKind;
 pub use linear::Matrices;
 pub use machine::parameters::{
     Parameter, Range, Source, Target, UnknownParameter, decimal, unit_suffix,
@@ -95,7 +97,7 @@ pub use run::equations::{Equations, STATE_LEN};
 pub use run::history::{History, Instant, Start, history, history_until};
 pub use run::suspension::Forces;
 pub use run::{
-    Course, Extra, Method, ModelKind, Record, Stop, Wanted, simulate, simulate_until, simulate_with,
+    Course, Extra, Method, Record, Stop, Wanted, simulate, simulate_until, simulate_with,
 };
 pub use stability::{
     Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant, Response,

@@ -16,6 +16,7 @@ pub use extras::{Extra, Wanted};
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
 use crate::fast::geared::{Formula, Geared};
+use crate::kind::ModelKind;
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::outputs::{RADIAL, squared};
 use crate::point::{PlannedLeg, Point};
@@ -43,30 +44,6 @@ pub enum Method {
     /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others.
     /// One trajectory at a time.
     Rodas5p(Tolerance),
-}
-
-/// Which of the two models.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ModelKind {
-    /// Section 4 of the model page.
-    Nonlinear,
-    /// Its first-order expansion.
-    Linear,
-}
-
-impl ModelKind {
-    /// The formula of its steps where modes are capped.
-    ///
-    /// Most of the linear model's time goes into its matrices at every instant that a formula asks
-    /// for: two a step by order 4, eleven by order 8. So order 4 takes less time, and its shorter
-    /// steps bear caps twice as high.
-    #[must_use]
-    pub const fn formula(self) -> Formula {
-        match self {
-            Self::Nonlinear => Formula::Dop853,
-            Self::Linear => Formula::Rk4,
-        }
-    }
 }
 
 /// First step that an adaptive method tries.
@@ -175,7 +152,7 @@ enum Stepper {
 pub(crate) trait Family {
     type Over<T: Lane>: Model<T>;
     const KIND: ModelKind;
-    const FORMULA: Formula = Self::KIND.formula();
+    const FORMULA: Formula = Formula::of(Self::KIND);
 }
 
 pub(crate) enum OfNonlinear {}

@@ -105,7 +105,7 @@ impl Rung {
         match &self.method {
             Method::Geared(geared) => {
                 let Gear { step_s, caps, .. } = geared.top();
-                let order = match model.formula() {
+                let order = match Formula::of(model) {
                     Formula::Rk4 => 4,
                     Formula::Dop853 => 8,
                 };
@@ -222,7 +222,7 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
     }
     let plain_evaluations_per_s = Formula::Rk4.evaluations_per_s(reference_step_s(cases));
     let evaluations_per_s =
-        |geared: &Geared| model.formula().evaluations_per_s(geared.top().step_s);
+        |geared: &Geared| Formula::of(model).evaluations_per_s(geared.top().step_s);
     let finest =
         chosen.last().filter(|_| model == ModelKind::Nonlinear).map(|(_, last)| refined(last));
     let finest = finest.filter(|it| evaluations_per_s(it) < WORTH_IT * plain_evaluations_per_s);

@@ -10,7 +10,6 @@ use crate::coordinates::COORDINATES;
 use crate::modes::shape::{Motion, motion};
 use crate::modes::{Mode, Modes, NoModes, assurance, modes};
 use crate::point::Point;
-use crate::run::Stop;
 use core::f64::consts::TAU;
 
 /// Angles of a turn over which frequencies are averaged. Frequencies vary with harmonics 1 and 2 of
@@ -86,7 +85,7 @@ pub fn campbell(point: &Point, speeds_rpm: &[f64]) -> Result<Vec<ModeOverSpeed>,
 pub fn campbell_until(
     point: &Point,
     speeds_rpm: &[f64],
-    stop: Stop<'_>,
+    stop: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<ModeOverSpeed>>, NoModes> {
     let Some(&lowest) = speeds_rpm.first() else { return Ok(Some(Vec::new())) };
     let mut followed = Vec::with_capacity(speeds_rpm.len());

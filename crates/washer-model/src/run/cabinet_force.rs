@@ -1,11 +1,11 @@
 //! The force that reaches the cabinet through springs and dampers, over lanes.
 
 use crate::coordinates::{COORDINATES, STATES, TUB};
+use crate::kind::ModelKind;
 use crate::lanes::InLanes as _;
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::{Tilt, dot};
 use crate::point::Point;
-use crate::run::ModelKind;
 use crate::run::suspension::forces;
 use lane_ode::{Dual, Lane, N, Peaks, Sample};
 

@@ -1,7 +1,8 @@
 //! The difference of two runs of one trajectory.
 
-use super::{Course, ModelKind};
+use super::Course;
 use crate::coordinates::COORDINATES;
+use crate::kind::ModelKind;
 use crate::point::Point;
 
 /// Coordinates that follow the motion of interest. The hinge's two are left out: they also ring,

@@ -3,10 +3,10 @@
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
+use crate::kind::ModelKind;
 use crate::machine::spin::{SpinStretch, stretch_at};
 use crate::nonlinear::coupling::Coupling;
 use crate::point::Point;
-use crate::run::ModelKind;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::tangent::Tangent;
 use lane_ode::{Dual, N, Partials, ScalarKernel, Simd};

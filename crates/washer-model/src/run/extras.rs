@@ -5,9 +5,10 @@
 
 use super::cabinet_force::GreatestForce;
 use super::loads::Loads;
-use super::{Course, Method, ModelKind};
+use super::{Course, Method};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
+use crate::kind::ModelKind;
 use crate::machine::spin::cuts_s;
 use crate::nonlinear::outputs::{RADIAL, squared};
 use crate::point::Point;

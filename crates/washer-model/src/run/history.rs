@@ -9,6 +9,7 @@
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
 use crate::fast::geared::Formula;
+use crate::kind::ModelKind;
 use crate::machine::spin::stretch_at;
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::squared;
@@ -16,7 +17,7 @@ use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::stiff::{OnLeg, StiffTask};
 use crate::run::suspension::{Forces, forces};
-use crate::run::{Family, Method, ModelKind, OfLinear, OfNonlinear, Stop, coupling, first_step};
+use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, first_step};
 use core::marker::PhantomData;
 use lane_ode::{
     Dual, Ended, Failure, Leg, N, ScalarKernel, Simd, Step, Task, dop853, dopri5, rk4, rodas,

@@ -4,12 +4,12 @@
 //! their rates; the linear model's are first order in its deviations from equilibrium.
 
 use crate::coordinates::{COORDINATES, STATES, TUB};
+use crate::kind::ModelKind;
 use crate::lanes::{Constant as _, InLanes as _};
 use crate::machine::feet::{FEET, LOAD};
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::Tilt;
 use crate::point::Point;
-use crate::run::ModelKind;
 use lane_ode::{Dual, Lane, N, Peaks, Sample};
 
 /// Least values are found as greatest distances below this (N), farther than any load.

@@ -1,7 +1,8 @@
 //! Trajectories by the stiff method: one at a time, its derivatives by lanes of dual numbers.
 
-use super::{Extra, Family, Method, ModelKind, OfLinear, OfNonlinear, Record, Run, Stop, Wanted};
+use super::{Extra, Family, Method, OfLinear, OfNonlinear, Record, Run, Stop, Wanted};
 use crate::coordinates::{COORDINATES, STATES};
+use crate::kind::ModelKind;
 use crate::point::Point;
 use crate::run::model::Model;
 use crate::run::tangent::Tangent;

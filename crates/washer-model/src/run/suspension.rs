@@ -4,11 +4,11 @@
 //! first order in its deviations, by automatic differentiation at the equilibrium.
 
 use crate::coordinates::{COORDINATES, STATES, TUB_Y, TUB_Z};
+use crate::kind::ModelKind;
 use crate::lanes::Constant as _;
 use crate::nonlinear::elements::{CabinetLine, Ends, Law, PointMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
 use crate::point::Point;
-use crate::run::ModelKind;
 use lane_ode::{Dual, N};
 use std::borrow::Cow;
 
