@@ -204,6 +204,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
 const SUMS: usize = 10;
 
 /// A state some weighted slopes away from another.
+#[expect(clippy::manual_memcpy, reason = "sums are registers, not memory")]
 #[inline(always)]
 fn along<T: Lane, const D: usize, const K: usize, const S: usize>(
     h: N<T>,

@@ -268,7 +268,7 @@ fn refined(geared: &Geared) -> Geared {
         let hinge_rad_per_s = gear.caps.hinge_rad_per_s.map(|cap| higher * cap);
         Gear { step_s, caps: Caps { bearings_rad_per_s, hinge_rad_per_s }, ..gear }
     };
-    Geared { gears: geared.gears.map(refined), ..*geared }
+    Geared { gears: geared.gears.map(refined) }
 }
 
 /// Step of the reference method.
