@@ -183,13 +183,14 @@ fn methods(rounds: usize) -> f64 {
 
 const FIG12: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../sweeps/fig12.toml");
 
-/// How long the program takes with these arguments, in a folder for its output (s).
+/// How long the program takes with these arguments, in a folder for its output (s); a map's name is
+/// no boundary's.
 fn program_s(folder: &Path, arguments: &[&str]) -> f64 {
     let begin = Instant::now();
     let run = Command::new(env!("CARGO_BIN_EXE_sweep"))
         .args(arguments)
         .args(["--fresh", "--progress", "none", "--out"])
-        .arg(folder.join("out.parquet"))
+        .arg(folder.join(format!("{}.parquet", arguments[0])))
         .output();
     let took_s = begin.elapsed().as_secs_f64();
     let run = run.expect("the sweep program starts");
