@@ -6,7 +6,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use arrow_array::RecordBatch;
-use arrow_schema::ArrowError;
+use arrow_schema::{ArrowError, SchemaRef};
 use serde_json::json;
 
 use super::Effort;
@@ -156,13 +156,16 @@ fn defect(job: &Job<'_>) -> impl Fn(ArrowError) -> StoreError {
 /// Outcomes as they come, and the batches that are whole.
 struct Gathered<'a> {
     job: &'a Job<'a>,
+    /// Of every batch.
+    schema: SchemaRef,
     parts: Mutex<BTreeMap<u64, Vec<Outcome>>>,
     batches: Mutex<BTreeMap<u64, Result<RecordBatch, ArrowError>>>,
 }
 
 impl<'a> Gathered<'a> {
     fn new(job: &'a Job<'a>) -> Self {
-        Self { job, parts: Mutex::default(), batches: Mutex::default() }
+        let schema = job.layout.schema();
+        Self { job, schema, parts: Mutex::default(), batches: Mutex::default() }
     }
 
     fn keep(&self, outcome: Outcome, watch: &Watch<'_>) {
@@ -184,7 +187,7 @@ impl<'a> Gathered<'a> {
     fn batch(&self, mut outcomes: Vec<Outcome>) -> Result<RecordBatch, ArrowError> {
         outcomes.sort_by_key(|outcome| outcome.point);
         let layout: &Layout = &self.job.layout;
-        let mut rows = ResultRows::new(layout);
+        let mut rows = ResultRows::sharing(layout, SchemaRef::clone(&self.schema));
         for outcome in outcomes {
             rows.push((self.job.axis_values)(outcome.point), outcome);
         }
@@ -204,4 +207,31 @@ impl<'a> Gathered<'a> {
 
 fn lock<T: ?Sized>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::config::GridInput;
+    use crate::interrupt::Interrupt;
+    use crate::progress::ProgressMode;
+
+    #[test]
+    fn batches_share_their_schema() {
+        let text = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 0.01 }\n\
+             time = { end_s = 0.01 }\nintegrator = { method = \"rk4\", step_s = 2e-4 }\n\
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\n\
+             range = { from = 0.1, to = 0.9, count = 4097 }\n";
+        let grid = GridInput::text("grid", text.to_owned(), Vec::new());
+        let evaluator = Evaluator::new(grid.load().unwrap());
+        let interrupt = Interrupt::new();
+        let effort =
+            Effort { threads: Some(2), progress: ProgressMode::None, interrupt: &interrupt };
+        let found = evaluator.run(effort).unwrap();
+        let [first, second] = found.table.batches() else { panic!("{:?}", found.table) };
+        assert_eq!([first.num_rows(), second.num_rows()], [BATCH_ROWS, 1]);
+        assert!(Arc::ptr_eq(&first.schema(), &second.schema()));
+    }
 }

@@ -6,7 +6,7 @@
 //! found by Newton's method: with the linear model's matrix as long as that brings it closer fast
 //! enough, else with the response's own (`monodromy.rs`).
 
-use super::monodromy::{INSTANTS, monodromy, slopes_along};
+use super::monodromy::{INSTANTS, monodromy, slopes_along, weights};
 use super::turn::{Clock, Watch, turn};
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
@@ -86,8 +86,10 @@ impl Kernel for Respond<'_> {
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut found = Vec::with_capacity(self.rows.len());
+        let Some(first) = self.rows.first() else { return found };
+        let weights = weights(first.steps);
         for rows in self.rows.chunks(T::LANES) {
-            respond(N(zero), rows, &mut found);
+            respond(N(zero), rows, &weights, &mut found);
         }
         found
     }
@@ -110,7 +112,12 @@ pub(super) fn model<T: Lane, M: Model<T>>(zero: N<T>, rows: &[Row<'_>]) -> M {
 }
 
 #[inline(always)]
-fn respond<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<Option<Box<Found>>>) {
+fn respond<T: Lane>(
+    zero: N<T>,
+    rows: &[Row<'_>],
+    weights: &[[f64; INSTANTS]],
+    found: &mut Vec<Option<Box<Found>>>,
+) {
     let mut clock = Clock { step_s: zero, steps: rows[0].steps };
     for lane in 0..T::LANES {
         clock.step_s.0.set(lane, rows[lane.min(rows.len() - 1)].step_s());
@@ -134,7 +141,7 @@ fn respond<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<Option<Box<Fou
     let nonlinear: Nonlinear<T> = model(zero, rows);
     let tangent: Nonlinear<Dual<T>> = model(zero.constant(), rows);
     let is_found = [false; lane_ode::MAX_LANES];
-    let mut search = Search { rows, states, jacobians: answer.jacobians, is_found };
+    let mut search = Search { rows, weights, states, jacobians: answer.jacobians, is_found };
     let (peaks, columns) = search.run(&nonlinear, &tangent, &clock);
     for lane in 0..rows.len() {
         if !search.is_found[lane] {
@@ -225,6 +232,8 @@ fn linear_response<T: Lane>(
 /// The search for the nonlinear responses.
 struct Search<'a, T> {
     rows: &'a [Row<'a>],
+    /// [`weights`] of the rows' turns.
+    weights: &'a [[f64; INSTANTS]],
     states: [N<T>; STATES],
     /// Factors of 1 - Phi of each lane.
     jacobians: Vec<Option<Lu<STATES>>>,
@@ -270,7 +279,7 @@ impl<T: Lane> Search<'_, T> {
             // One call, for one copy of the model's code.
             if is_last || are_any_slow {
                 let slopes = slopes_along(zero, tangent, clock, &watched.states);
-                let columns = monodromy(zero, &slopes, clock);
+                let columns = monodromy(zero, &slopes, self.weights, clock);
                 if is_last {
                     return (watched.peaks, columns);
                 }
