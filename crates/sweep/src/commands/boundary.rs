@@ -38,7 +38,7 @@ pub struct Args {
     #[command(flatten)]
     pub grid: GridArgs,
     /// Boundary file [default: results/NAME-boundary.parquet]
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// What is at its limit: ratio_max, ratio_CHANNEL, min_gap_nonlinear_m or min_gap_linear_m (at
     /// no gap)

@@ -42,7 +42,7 @@ pub struct Args {
     #[arg(long)]
     markdown: bool,
     /// Write the differences of maps, row by row, to a Parquet file that `sweep plot` draws
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Exit with 4 if this differs: any, plan, flips, sensitive, rows, ratio=PART, gap=M or
     /// boundary=WIDTH; may be repeated

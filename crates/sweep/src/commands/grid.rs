@@ -51,7 +51,7 @@ pub struct ResultArgs {
     #[command(flatten)]
     pub grid: GridArgs,
     /// Result file [default: results/NAME.parquet]
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
 

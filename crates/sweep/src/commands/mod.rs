@@ -246,6 +246,23 @@ mod tests {
         assert!(!refusal("xyzzy").contains("similar"), "{}", refusal("xyzzy"));
     }
 
+    #[test]
+    fn every_command_that_names_its_output_takes_it_by_either_flag() {
+        let mut count = 0;
+        for subcommand in command().get_subcommands() {
+            for flag in subcommand.get_arguments() {
+                let long: Vec<&str> = flag.get_long_and_visible_aliases().unwrap_or_default();
+                if long.contains(&"out") || flag.get_short() == Some('o') {
+                    let name = subcommand.get_name();
+                    assert!(long.contains(&"out"), "{name} --out");
+                    assert_eq!(flag.get_short(), Some('o'), "{name} -o");
+                    count += 1;
+                }
+            }
+        }
+        assert!(count > 5, "{count}");
+    }
+
     /// The words of a line, as a shell takes them: single quotes keep spaces.
     fn words(line: &str) -> Vec<String> {
         let mut words = Vec::new();

@@ -48,7 +48,7 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     /// Modes file to write: Parquet, one row per speed and mode
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 

@@ -28,7 +28,7 @@ pub struct Args {
     pub file: PathBuf,
 
     /// Where to write; the ending .svg, .png or .html says how [default: FILE with .svg]
-    #[arg(short, long, value_name = "IMAGE")]
+    #[arg(short, long, visible_alias = "out", value_name = "IMAGE")]
     pub output: Option<PathBuf>,
 
     /// Modes, trace, design, stability: which of its figures [default: frequencies, time, scatter,

@@ -68,7 +68,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME=VALUE", value_parser = start_value)]
     start: Vec<StartValue>,
     /// Trace file to write
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
 }
 
