@@ -88,9 +88,11 @@ impl GridInput {
     /// measures more than amplitudes is left out, and the points of a design.
     pub(crate) fn of_plan(name: &str, plan: &Value) -> Self {
         let parts = ["name", "spin", "time", "integrator", "axis", "reliability"];
-        let lines = parts.iter().filter_map(|key| Some((*key, again::toml(plan.get(key)?)?)));
-        let text = lines.map(|(key, value)| format!("{key} = {value}\n")).collect();
-        let machine = plan.get("machine").and_then(again::toml_file);
+        let text = again::file(parts.map(|key| (key, plan.get(key))));
+        let machine = plan.get("machine").and_then(Value::as_object);
+        let machine = machine.map(|machine| {
+            again::file(machine.iter().map(|(key, value)| (key.as_str(), Some(value))))
+        });
         Self { path: name.into(), text: Some(text), machine, sets: Vec::new() }
     }
 
