@@ -272,8 +272,7 @@ fn rungs(ladder: &Ladder) -> Vec<washer_live::Rung> {
         level: rung.level as u8,
         is_capped: rung.level.is_capped(),
         method: rung.method,
-        contraction: rung.contraction,
-        believed_to: rung.believed_to,
+        convergence: rung.convergence,
     };
     ladder.rungs.iter().map(rung).collect()
 }

@@ -108,14 +108,10 @@ impl Climb {
         if let (Some(before), Some(now)) = (&self.run, &now) {
             let found = difference(before, now, point, model, of);
             let unseen = unseen(&now.0, &rungs[rung], point, of);
-            self.error = found.map(|found| error_left(&rungs[rung], found).max(unseen));
+            self.error = found.map(|found| rungs[rung].convergence.error_left(found, unseen));
         }
         (self.rung, self.run) = (rung, now);
     }
-}
-
-fn error_left(rung: &Rung, difference: f64) -> f64 {
-    if difference <= rung.believed_to { rung.contraction * difference } else { difference }
 }
 
 /// How far the greatest ratio is from the limit, as a share of the limit.

@@ -1,8 +1,8 @@
 //! What a page computes with.
 
 use washer_model::{
-    BumpStop, Bushing, Cabinet, Caps, Channel, Foot, Gear, Geared, Machine, Method, Parameter,
-    Spin, Unbalance,
+    BumpStop, Bushing, Cabinet, Caps, Channel, Convergence, Foot, Gear, Geared, Machine, Method,
+    Parameter, Spin, Unbalance,
 };
 
 use crate::numbers::{Reader, Writer};
@@ -55,10 +55,8 @@ pub struct Rung {
     pub is_capped: bool,
     /// RK4 or a geared formula; a page has no other.
     pub method: Method,
-    /// Its error as a share of its difference from the rung before.
-    pub contraction: f64,
-    /// Up to which difference that is so.
-    pub believed_to: f64,
+    /// What its difference from the rung before says.
+    pub convergence: Convergence,
 }
 
 impl Setup {
@@ -175,8 +173,10 @@ impl Setup {
 fn write_rung(out: &mut Writer, rung: &Rung) {
     out.number(f64::from(rung.level));
     out.count(usize::from(rung.is_capped));
-    out.number(rung.contraction);
-    out.number(rung.believed_to);
+    let Convergence { contraction, believed_to, own_error, expected } = rung.convergence;
+    for number in [contraction, believed_to, own_error, expected] {
+        out.number(number);
+    }
     match rung.method {
         Method::Geared(Geared { gears }) => {
             out.count(1);
@@ -199,7 +199,12 @@ fn write_rung(out: &mut Writer, rung: &Rung) {
 fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
     let level = u8::try_from(from.count(MOST)?).ok()?;
     let is_capped = from.count(2)? == 1;
-    let (contraction, believed_to) = (from.number()?, from.number()?);
+    let convergence = Convergence {
+        contraction: from.number()?,
+        believed_to: from.number()?,
+        own_error: from.number()?,
+        expected: from.number()?,
+    };
     let method = match from.count(2)? {
         0 => Method::Rk4 { step_s: from.number()? },
         _ => {
@@ -213,5 +218,5 @@ fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
             Method::Geared(Geared { gears: [gear()?, gear()?, gear()?] })
         }
     };
-    Some(Rung { level, is_capped, method, contraction, believed_to })
+    Some(Rung { level, is_capped, method, convergence })
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use washer_model::{Course, ModelKind, Point};
 
-use super::ladder::Ladder;
+use super::ladder::{Ladder, Rung};
 use super::pool::ModelRung;
 use crate::measures::{Metric, TURN_FLOOR};
 use crate::method::Level;
@@ -85,8 +85,9 @@ impl Climb {
             return;
         };
         let found = difference(&before, &now, point, model, plan);
-        let unseen = unseen(&now, ladder.rungs[rung].level, point, plan);
-        self.error = found.map(|found| ladder.error_left(rung, found.greatest()).max(unseen));
+        let Rung { level, convergence, .. } = &ladder.rungs[rung];
+        let unseen = unseen(&now, *level, point, plan);
+        self.error = found.map(|found| convergence.error_left(found.greatest(), unseen));
         self.spread = found.map(|found| found.of_numbers);
         (self.rung, self.run) = (rung, Some(now));
     }

@@ -17,7 +17,7 @@
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
 use lane_ode::dop853::DOP853_STABILITY_LIMIT;
-use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind};
+use washer_model::{Caps, Cases, Convergence, Formula, Gear, Geared, Method, ModelKind};
 
 use crate::method::{Level, REFERENCE_SHARE, SHORTEST_AT_CORNERS};
 
@@ -66,9 +66,15 @@ const fn first_order(model: ModelKind) -> f64 {
 /// smaller by orders of magnitude.
 const FIRST_ORDER_OF_RK4: f64 = 0.2;
 
-/// Error of plain RK4 at its longer step as a share of its difference from the finest capped rung.
-/// Mostly it is far less; 0.013 was seen where the motion is amplified.
+/// Error of plain RK4 at its longer step as a share of its difference from the finest capped rung,
+/// as far as it grows with that. Mostly it is far less; 0.013 was seen where the motion is
+/// amplified.
 const CONTRACTION_TO_RK4: f64 = 0.02;
+
+/// What it may err by itself, however near the finest capped rung is, where a violent motion
+/// amplifies ringing of the hinge: 2.2e-4 was seen, of a difference of 7.5e-4, and 1.4e-4 of
+/// 3.4e-4.
+const OWN_ERROR_OF_RK4: f64 = 3e-4;
 
 /// A contraction that the rule expects, and that does not follow from steps and caps, is not
 /// believed below this.
@@ -92,10 +98,8 @@ pub(crate) struct Rung {
     pub(crate) level: Level,
     /// The method.
     pub(crate) method: Method,
-    /// Its error as a share of its difference from the rung before; 1 for the first.
-    pub(crate) contraction: f64,
-    /// Up to which difference from that rung this is so.
-    pub(crate) believed_to: f64,
+    /// What its difference from the rung before says.
+    pub(crate) convergence: Convergence,
 }
 
 impl Rung {
@@ -140,7 +144,7 @@ pub(crate) struct Ladder {
 impl Ladder {
     /// One method, which nothing is compared with.
     pub(crate) fn direct(level: Level, method: Method) -> Self {
-        let rungs = vec![Rung { level, method, contraction: 1.0, believed_to: 0.0 }];
+        let rungs = vec![Rung { level, method, convergence: Convergence::NONE }];
         Self { rungs, is_checked: false, held_back: None }
     }
 
@@ -150,8 +154,7 @@ impl Ladder {
         let plain = |step_s: f64, contraction: f64, believed_to: f64| Rung {
             level: Level::Rk4,
             method: Method::Rk4 { step_s },
-            contraction,
-            believed_to,
+            convergence: Convergence { contraction, believed_to, ..Convergence::NONE },
         };
         let reference_step_s = reference_step_s(cases);
         if has_corners {
@@ -162,11 +165,12 @@ impl Ladder {
         }
         let mut rungs = capped(cases, model, accuracy);
         let held_back = if rungs.is_empty() { too_fast(cases) } else { None };
-        let to_capped = if rungs.is_empty() { 1.0 } else { CONTRACTION_TO_RK4 };
-        rungs.extend([
-            plain(LONGER_STEP * reference_step_s, to_capped, FIRST_ORDER_OF_RK4),
-            plain(reference_step_s, REFERENCE_CONTRACTION, f64::INFINITY),
-        ]);
+        let mut longer = plain(LONGER_STEP * reference_step_s, 1.0, FIRST_ORDER_OF_RK4);
+        if !rungs.is_empty() {
+            longer.convergence.contraction = CONTRACTION_TO_RK4;
+            longer.convergence.own_error = OWN_ERROR_OF_RK4;
+        }
+        rungs.extend([longer, plain(reference_step_s, REFERENCE_CONTRACTION, f64::INFINITY)]);
         Self { rungs, is_checked: true, held_back }
     }
 
@@ -180,12 +184,6 @@ impl Ladder {
     pub(crate) fn capped(&self, level: Level) -> Option<Method> {
         let is_capped = |rung: &&Rung| rung.level.is_capped() && rung.level <= level;
         self.rungs.iter().rfind(is_capped).map(|rung| rung.method)
-    }
-
-    /// The error left at a rung whose run differs so much from that of the rung before.
-    pub(crate) fn error_left(&self, rung: usize, difference: f64) -> f64 {
-        let Rung { contraction, believed_to, .. } = self.rungs[rung];
-        if difference <= believed_to { contraction * difference } else { difference }
     }
 }
 
@@ -239,8 +237,14 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
         Rung {
             level: *level,
             method: Method::Geared(*geared),
-            contraction,
-            believed_to: first_order(model),
+            convergence: Convergence {
+                contraction,
+                believed_to: first_order(model),
+                own_error: 0.0,
+                expected: place
+                    .checked_sub(1)
+                    .map_or(f64::INFINITY, |before| aims(model)[before] * accuracy),
+            },
         }
     };
     chosen.iter().enumerate().map(rung).collect()
