@@ -309,14 +309,18 @@ impl Layout {
                 ));
                 continue;
             }
-            for (model, of) in MODELS {
-                let text = format!("{}, {model} model; null if it failed", metric.description());
-                let cell = Cell::Measured(Box::new(move |row| {
-                    of(&row.outcome).metrics.get(position).copied()
-                }));
-                columns.push(ResultColumn::new(metric.column(model), metric.unit(), text, cell));
+            for number in self.measures.numbers_of(*metric) {
+                for (model, of) in MODELS {
+                    let text =
+                        format!("{}, {model} model; null if it failed", number.description());
+                    let cell = Cell::Measured(Box::new(move |row| {
+                        of(&row.outcome).metrics.get(position).copied()
+                    }));
+                    let name = number.column(model);
+                    columns.push(ResultColumn::new(name, metric.unit(), text, cell));
+                }
+                position += 1;
             }
-            position += 1;
         }
         columns
     }
