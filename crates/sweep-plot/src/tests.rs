@@ -163,6 +163,55 @@ fn every_quantity_has_its_figure() {
 }
 
 #[test]
+fn single_stops_are_channels_of_their_quantity() {
+    let with_stops = || {
+        let rising = |from: f64| (0..90).map(move |k| from + f64::from(k));
+        map()
+            .numbers("stop_force_nonlinear_n", "N", rising(400.0))
+            .numbers("stop_force_linear_n", "N", rising(0.0))
+            .numbers("stop_1_force_nonlinear_n", "N", rising(400.0))
+            .numbers("stop_1_force_linear_n", "N", rising(0.0))
+            .numbers("stop_2_force_nonlinear_n", "N", rising(100.0))
+            .numbers("stop_2_force_linear_n", "N", rising(0.0))
+            .numbers("slip_margin_nonlinear_n", "N", rising(50.0))
+    };
+    let of = |quantity, channel: &str| PlotOptions {
+        quantity,
+        channels: vec![channel.to_owned()],
+        ..PlotOptions::default()
+    };
+    let second = of(Quantity::StopForceNonlinear, "stop_2");
+    let figure = svg(with_stops(), &second);
+    assert!(figure.contains(">Greatest push of a stop, nonlinear model: stop 2<"));
+    assert!(figure.contains(">greatest push in the window (N)<"));
+    let data = data(with_stops(), &second);
+    let layers = data["layers"].as_array().unwrap();
+    let offered: Vec<_> = layers
+        .iter()
+        .filter(|layer| layer["group"] == "stop-force-nonlinear")
+        .map(|layer| [&layer["channelWords"], &layer["column"]].map(|it| it.as_str().unwrap()))
+        .collect();
+    assert_eq!(
+        offered,
+        [
+            ["all together", "stop_force_nonlinear_n"],
+            ["stop 1", "stop_1_force_nonlinear_n"],
+            ["stop 2", "stop_2_force_nonlinear_n"]
+        ]
+    );
+    let row = data["rows"].as_array().unwrap().last().unwrap();
+    assert_eq!(row["name"], "stop_2_force");
+    assert_eq!(row["columns"][1], "stop_2_force_linear_n");
+    for (options, expected) in [
+        (of(Quantity::StopForceLinear, "stop_3"), "stop_1, stop_2"),
+        (of(Quantity::SlipMarginNonlinear, "stop_1"), "belongs to no channel"),
+    ] {
+        let said = message(draw(with_stops(), &options, "a.svg"));
+        assert!(said.contains(expected), "{said}");
+    }
+}
+
+#[test]
 fn metrics_are_drawn_where_the_run_has_them() {
     let with_metrics = || {
         let rising = |from: f64| (0..90).map(move |k| from + f64::from(k));

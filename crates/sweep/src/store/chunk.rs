@@ -449,6 +449,7 @@ mod tests {
             Place { first: 49, ..ours },
             Place { count: 3, ..ours },
             Place { shape: Shape { channels: 3, ..ours.shape }, ..ours },
+            Place { shape: Shape { metrics: 1, ..ours.shape }, ..ours },
         ];
         for other in others {
             assert_eq!(decode(&other, &bytes), Err(Damage::Foreign));
