@@ -16,8 +16,8 @@
 //!
 //! With `grazing`, the clearance of each grid is such that drum and tub just touch in one of its
 //! rows, and the time of their clash is compared too. With `elements`, machines have friction
-//! dampers, stops, a gasket and a second unbalance, those of docs/examples/friction.toml varied; the
-//! loads of each stop and foot are compared too.
+//! dampers, stops, a gasket, feet and a second unbalance, those of docs/examples/friction.toml
+//! varied, and the loads of each stop and foot are compared too.
 
 use std::process::ExitCode;
 
