@@ -62,7 +62,7 @@ fn three_axes() -> Sample {
     .sample()
 }
 
-fn one_axis() -> Sample {
+pub(super) fn one_axis() -> Sample {
     MapSample {
         axes: vec![("damping_n_s_per_m", vec![60.0, 100.0, 140.0, 180.0])],
         limit: 2.0,

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::sample::map;
-use super::tests::{data, draw, message, svg};
+use super::tests::{data, draw, message, one_axis, svg};
 use super::*;
 
 #[test]
@@ -53,6 +53,30 @@ fn single_stops_are_channels_of_their_quantity() {
         let said = message(draw(with_stops(), &options, "a.svg"));
         assert!(said.contains(expected), "{said}");
     }
+}
+
+#[test]
+fn over_one_axis_a_single_stop_has_a_panel() {
+    let with_stops = || {
+        ["stop_force", "stop_1_force", "stop_2_force"].into_iter().fold(
+            one_axis(),
+            |sample, name| {
+                let rising = (0..4).map(|k| 400.0 + f64::from(k));
+                let sample = sample.numbers(&format!("{name}_nonlinear_n"), "N", rising.clone());
+                sample.numbers(&format!("{name}_linear_n"), "N", rising)
+            },
+        )
+    };
+    let asked = |channels: &[&str]| {
+        let channels = channels.iter().map(|&channel| channel.to_owned()).collect();
+        let quantity = Quantity::StopForceNonlinear;
+        svg(with_stops(), &PlotOptions { quantity, channels, ..PlotOptions::default() })
+    };
+    let [of_all, of_second] =
+        [">Greatest push of a stop (N)<", ">Greatest push of a stop: stop 2 (N)<"];
+    let [all, second] = [asked(&[]), asked(&["stop_2"])];
+    assert!(all.contains(of_all) && !all.contains(of_second));
+    assert!(!second.contains(of_all) && second.contains(of_second));
 }
 
 #[test]
