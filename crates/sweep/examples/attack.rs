@@ -232,14 +232,21 @@ const PUSH_FLOOR: f64 = 1e-3;
 fn difference(plan: &Plan, a: &Outcome, b: &Outcome) -> f64 {
     let models = [(&a.nonlinear, &b.nonlinear), (&a.linear, &b.linear)];
     let amplitudes = models.iter().map(|(a, b)| amplitudes_differ(a, b));
+    let metrics = metrics_differ(plan, a, b).into_iter().map(|(_, share)| share);
     let turns = a.turn_ratios.iter().flatten().zip(b.turn_ratios.iter().flatten());
     // A ratio has the errors of both models.
     let of_ratios = turns.map(relative).fold(0.0, f64::max) / 2.0;
+    metrics.chain(amplitudes).fold(of_ratios, f64::max)
+}
+
+/// The relative difference of each metric, by its column.
+fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
+    let models = [("nonlinear", &a.nonlinear, &b.nonlinear), ("linear", &a.linear, &b.linear)];
     let [from_s, to_s] = plan.window_s;
     let machine = &plan.machine;
     let moving_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;
     let weight_n = moving_kg * machine.gravity_m_per_s2;
-    let metrics = models.iter().flat_map(|(a, b)| {
+    let metrics = models.iter().flat_map(|(model, a, b)| {
         plan.measures.of_model().zip(a.metrics.iter().zip(&b.metrics)).map(|(number, (a, b))| {
             let least = match number.metric {
                 Metric::ClashTime | Metric::StopContact => CLASH_FLOOR * (to_s - from_s),
@@ -247,10 +254,10 @@ fn difference(plan: &Plan, a: &Outcome, b: &Outcome) -> f64 {
                 Metric::FootLoad | Metric::SlipMargin => weight_n,
                 Metric::CabinetForce | Metric::StaticSag | Metric::Growth => 0.0,
             };
-            relative_from(least, *a, *b)
+            (number.column(model), relative_from(least, *a, *b))
         })
     });
-    metrics.chain(amplitudes).fold(of_ratios, f64::max)
+    metrics.collect()
 }
 
 fn verdict(plan: &Plan, outcome: &Outcome) -> Option<bool> {
@@ -344,9 +351,12 @@ fn attack(seed: u64, kind: Kind, folder: &std::path::Path) -> Found {
             *count(&mut found) += 1;
             let (method, said) = (row.method.name(), row.error.unwrap_or(f64::NAN));
             let of_linear = amplitudes_differ(&row.linear, &halved.linear);
+            let metrics = metrics_differ(&plan, row, halved).into_iter();
+            let worst = metrics.max_by(|(_, a), (_, b)| a.total_cmp(b));
+            let (metric, share) = worst.unwrap_or_default();
             found.exceptions.push(format!(
-                "seed {seed}, row {i}, {method}: {what}; {error:.2e} ({of_linear:.2e} linear), \
-                 said {said:.2e}"
+                "seed {seed}, row {i}, {method}: {what}; {error:.2e} ({of_linear:.2e} linear, \
+                 {share:.2e} {metric}), said {said:.2e}"
             ));
         };
         if statuses(row) != statuses(halved) {
