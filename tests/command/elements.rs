@@ -64,6 +64,77 @@ fn loads_of_stops_and_feet_are_columns() {
     assert!(feet[1] < feet[0] - 50.0 && margins[1] < margins[0] - 50.0, "{feet:?}, {margins:?}");
 }
 
+/// A column of a trace in the window, which is all of it.
+fn extreme(csv: &str, name: &str, extreme: fn(f64, f64) -> f64) -> f64 {
+    column(csv, name).into_iter().reduce(extreme).expect("a trace has instants")
+}
+
+#[test]
+fn each_stop_and_foot_has_what_the_trace_shows_of_it() {
+    let home = home(&example());
+    // Steps of its own, so that map and trace are one trajectory, and every step is an instant.
+    let grid = format!("{GRID}[integrator]\nmethod = \"rk4\"\nstep_s = 1e-4\n");
+    fs::write(home.path("g.toml"), grid).expect("the grid is written");
+    let csv_of = |words: &[&str], file: &str| {
+        let done = home.sweep(&[words, &["--out", &format!("{file}.parquet")]].concat());
+        assert!(done.status.success(), "{}", said(&done));
+        let [from, to] = ["parquet", "csv"].map(|ending| format!("{file}.{ending}"));
+        assert!(home.sweep(&["export", &from, &to]).status.success());
+        fs::read_to_string(home.path(&to)).expect("it was written")
+    };
+    let map = csv_of(&["run", "g.toml"], "map");
+    let at = "unbalance_mass_kg=1";
+    let trace = csv_of(&["trace", "g.toml", "--at", at, "--every", "1e-4", "--forces"], "trace");
+    let of_row = |name: String| column(&map, &name)[1];
+    for model in ["nonlinear", "linear"] {
+        let close = |what: String, traced: f64, found: f64, allowed: f64| {
+            assert!(
+                (traced - found).abs() < allowed,
+                "{what}: {traced} traced, {found} in the map"
+            );
+        };
+        let pushes: Vec<f64> =
+            (1..=3).map(|k| of_row(format!("stop_{k}_force_{model}_n"))).collect();
+        let loads: Vec<f64> = (1..=4).map(|k| of_row(format!("foot_{k}_load_{model}_n"))).collect();
+        let contacts: Vec<f64> =
+            (1..=3).map(|k| of_row(format!("stop_{k}_contact_{model}_s"))).collect();
+        for (k, push) in (1..).zip(&pushes) {
+            let name = format!("stop_{k}_force_{model}_n");
+            let traced = extreme(&trace, &name, f64::max);
+            close(name, traced, *push, 2e-3 * push.max(1.0));
+        }
+        for (k, load) in (1..).zip(&loads) {
+            let name = format!("foot_{k}_load_{model}_n");
+            close(name.clone(), extreme(&trace, &name, f64::min), *load, 0.5);
+        }
+        let name = format!("slip_margin_{model}_n");
+        close(name.clone(), extreme(&trace, &name, f64::min), of_row(name), 0.5);
+        let of_all = |values: &[f64], extreme: fn(f64, f64) -> f64| {
+            values.iter().copied().reduce(extreme).expect("there are some")
+        };
+        assert_eq!(of_row(format!("stop_force_{model}_n")), of_all(&pushes, f64::max));
+        assert_eq!(of_row(format!("stop_contact_{model}_s")), of_all(&contacts, f64::max));
+        assert_eq!(of_row(format!("foot_load_{model}_n")), of_all(&loads, f64::min));
+        let differ = |values: &[f64]| values.windows(2).all(|pair| pair[0] != pair[1]);
+        assert!(differ(&pushes) && differ(&loads), "{pushes:?} N, {loads:?} N");
+    }
+    let closed = |k: usize| of_row(format!("stop_{k}_contact_nonlinear_s"));
+    assert!(closed(1) > 0.01 && closed(2) > 0.01 && closed(1) != closed(2));
+
+    let drawn = |channel: &str| {
+        let quantity = ["--quantity", "stop-force-nonlinear", "--channel", channel];
+        home.sweep(&[&["plot", "map.parquet", "-o", "map.svg"], &quantity[..]].concat())
+    };
+    assert!(drawn("stop_2").status.success());
+    let picture = fs::read_to_string(home.path("map.svg")).expect("it was written");
+    assert!(picture.contains("Greatest push of a stop: stop 2"));
+    let refused = drawn("stop_4");
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(said(&refused).contains("stop_1, stop_2, stop_3"), "{}", said(&refused));
+    let met = home.sweep(&["require", "map.parquet", "stop_3_contact_nonlinear_s == 0"]);
+    assert_eq!(met.status.success(), closed(3) == 0.0, "{}", said(&met));
+}
+
 #[test]
 fn what_needs_stops_or_a_cabinet_says_so() {
     let text = example();

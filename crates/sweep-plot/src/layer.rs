@@ -12,7 +12,7 @@ use super::{PlotOptions, Quantity};
 pub(crate) struct Shown {
     /// What it is.
     pub(crate) quantity: Quantity,
-    /// The channel it is of, if it is of one.
+    /// The channel it is of, if it is of one; of a stop's or a foot's load which one.
     pub(crate) channel: Option<String>,
     /// Name of its column.
     pub(crate) column: String,
@@ -198,6 +198,49 @@ pub(crate) fn channels<'a>(source: &'a Source, prefix: &str) -> Vec<(&'a str, &'
     columns
 }
 
+/// What one stop or foot has of a [`Whole`].
+pub(crate) struct OfPart<'a> {
+    /// The part, as a channel: `stop_2`.
+    pub(crate) part: &'a str,
+    /// Short name, as [`Whole::name`]: `stop_2_force`.
+    pub(crate) name: String,
+    /// As [`Whole::words`].
+    pub(crate) words: String,
+    /// The columns by model.
+    pub(crate) columns: [(&'static str, &'a str); 2],
+}
+
+impl Whole {
+    /// What each stop or foot has of it in a file, if there are several.
+    pub(crate) fn parts<'a>(&self, source: &'a Source) -> Vec<OfPart<'a>> {
+        let [(_, first, of_first), (_, second, of_second)] = self.columns else {
+            return Vec::new();
+        };
+        let what = self.name.split('_').next_back().unwrap_or_default();
+        let pairs = parts(source, of_first).into_iter().zip(parts(source, of_second));
+        pairs
+            .map(|((part, of_first), (_, of_second))| OfPart {
+                part,
+                name: format!("{part}_{what}"),
+                words: format!("{}: {}", self.words, label::channel(part)),
+                columns: [(*first, &of_first.name), (*second, &of_second.name)],
+            })
+            .collect()
+    }
+}
+
+/// The columns of single stops or feet beside the one of all, as channels: beside
+/// `stop_force_linear_n` stands `stop_2_force_linear_n`, of `stop_2`.
+pub(crate) fn parts<'a>(source: &'a Source, column: &str) -> Vec<(&'a str, &'a ColumnFacts)> {
+    let Some((kind, what)) = column.split_once('_') else { return Vec::new() };
+    let of_part = |facts: &'a ColumnFacts| {
+        let part = facts.name.strip_suffix(what)?.strip_suffix('_')?;
+        let number = part.strip_prefix(kind)?.strip_prefix('_')?;
+        number.parse::<u32>().is_ok().then_some((part, facts))
+    };
+    source.columns.iter().filter_map(of_part).collect()
+}
+
 /// What the options ask for; none if that is the status, which has no values.
 ///
 /// # Errors
@@ -223,26 +266,42 @@ pub(crate) fn chosen(source: &Source, options: &PlotOptions) -> Result<Option<Sh
             listed(&channels(source, prefix))
         ))),
         (Some(prefix), Some(channel)) => {
-            let known = channels(source, prefix);
-            match known.iter().find(|(name, _)| *name == channel) {
-                Some((name, column)) => Ok(Some(Shown::of_channel(quantity, name, column))),
-                None => Err(PlotError::NotThere {
-                    option: "--channel",
-                    given: channel.to_owned(),
-                    path: source.path.clone(),
-                    what: "channel",
-                    known: listed(&known),
-                }),
-            }
+            find(source, quantity, &channels(source, prefix), channel).map(Some)
         }
-        (None, Some(_)) => Err(PlotError::Unfit(format!(
-            "{} belongs to no channel: leave out `--channel`",
-            quantity.name().replace('-', " ")
-        ))),
+        (None, Some(channel)) => {
+            quantity.there(source)?;
+            let known = quantity.column().map_or_else(Vec::new, |column| parts(source, column));
+            if known.is_empty() {
+                return Err(PlotError::Unfit(format!(
+                    "{} belongs to no channel: leave out `--channel`",
+                    quantity.name().replace('-', " ")
+                )));
+            }
+            find(source, quantity, &known, channel).map(Some)
+        }
         (None, None) => {
             quantity.there(source)?;
             Ok(quantity.column().map(|column| Shown::whole(quantity, column)))
         }
+    }
+}
+
+/// The channel that was asked for, among those that the quantity has.
+fn find(
+    source: &Source,
+    quantity: Quantity,
+    known: &[(&str, &ColumnFacts)],
+    channel: &str,
+) -> Result<Shown, PlotError> {
+    match known.iter().find(|(name, _)| *name == channel) {
+        Some((name, column)) => Ok(Shown::of_channel(quantity, name, column)),
+        None => Err(PlotError::NotThere {
+            option: "--channel",
+            given: channel.to_owned(),
+            path: source.path.clone(),
+            what: "channel",
+            known: listed(known),
+        }),
     }
 }
 
@@ -256,7 +315,11 @@ pub(crate) fn all(source: &Source) -> Vec<Shown> {
     }
     let whole = WHOLE.iter().flat_map(|whole| whole.columns);
     let there = whole.filter(|(_, _, column)| source.column(column).is_some());
-    shown.extend(there.map(|(quantity, _, column)| Shown::whole(*quantity, column)));
+    for (quantity, _, column) in there {
+        shown.push(Shown::whole(*quantity, column));
+        let parts = parts(source, column).into_iter();
+        shown.extend(parts.map(|(name, column)| Shown::of_channel(*quantity, name, column)));
+    }
     shown
 }
 
@@ -439,10 +502,13 @@ impl Shown {
                 format!("ratio of {compared}, nonlinear / linear"),
             ),
             (quantity, channel) => match quantity.whole() {
-                Some((whole, model, _)) => (
-                    label::capitalised(&of_model(whole.words, model)),
-                    label::with_unit(whole.label, unit),
-                ),
+                Some((whole, model, _)) => {
+                    let of_part = channel.map_or_else(String::new, |part| format!(": {part}"));
+                    (
+                        label::capitalised(&of_model(whole.words, model)) + &of_part,
+                        label::with_unit(whole.label, unit),
+                    )
+                }
                 None => {
                     let title = format!("{}: {}", quantity.words(), channel.unwrap_or_default());
                     (label::capitalised(&title), label::with_unit(&quantity.words(), unit))

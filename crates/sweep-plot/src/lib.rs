@@ -39,6 +39,8 @@ mod tests_designs;
 #[cfg(test)]
 mod tests_long;
 #[cfg(test)]
+mod tests_metrics;
+#[cfg(test)]
 mod tests_stability;
 mod thin;
 

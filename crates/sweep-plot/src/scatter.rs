@@ -263,7 +263,12 @@ const SECOND: u64 = 0x5bf0_3635_0000_0000;
 fn short(shown: &Shown) -> String {
     let channel = shown.channel.as_deref().map(label::channel);
     match (shown.quantity.whole(), channel) {
-        (Some((whole, ..)), _) => label::capitalised(&whole.name.replace('_', " ")),
+        (Some((whole, ..)), None) => label::capitalised(&whole.name.replace('_', " ")),
+        // The part stands first, as in the column's name.
+        (Some((whole, ..)), Some(part)) => {
+            let what = whole.name.split('_').next_back().unwrap_or_default();
+            label::capitalised(&format!("{part} {what}"))
+        }
         (None, None) => "Greatest ratio".to_owned(),
         (None, Some(channel)) => label::capitalised(&channel),
     }

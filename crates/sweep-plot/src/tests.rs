@@ -25,7 +25,7 @@ pub(super) fn svg(sample: Sample, options: &PlotOptions) -> String {
     String::from_utf8(draw(sample, options, "figure.svg").unwrap()).unwrap()
 }
 
-fn data(sample: Sample, options: &PlotOptions) -> Value {
+pub(super) fn data(sample: Sample, options: &PlotOptions) -> Value {
     carried(&draw(sample, options, "figure.html").unwrap())
 }
 
@@ -62,7 +62,7 @@ fn three_axes() -> Sample {
     .sample()
 }
 
-fn one_axis() -> Sample {
+pub(super) fn one_axis() -> Sample {
     MapSample {
         axes: vec![("damping_n_s_per_m", vec![60.0, 100.0, 140.0, 180.0])],
         limit: 2.0,
@@ -160,62 +160,6 @@ fn every_quantity_has_its_figure() {
     ] {
         assert!(figure.contains(said), "{said}");
     }
-}
-
-#[test]
-fn metrics_are_drawn_where_the_run_has_them() {
-    let with_metrics = || {
-        let rising = |from: f64| (0..90).map(move |k| from + f64::from(k));
-        map()
-            .numbers("cabinet_force_nonlinear_n", "N", rising(400.0))
-            .numbers("cabinet_force_linear_n", "N", rising(300.0))
-            .numbers("clash_time_nonlinear_s", "s", rising(0.0))
-            .numbers("static_sag_m", "m", rising(0.0).map(|k| 0.013 + 1e-5 * k))
-    };
-    let asked = |quantity| PlotOptions { quantity, ..PlotOptions::default() };
-    for (quantity, title, label) in [
-        (
-            Quantity::CabinetForceLinear,
-            ">Greatest force on the cabinet, linear model<",
-            ">greatest force in the window (N)<",
-        ),
-        (
-            Quantity::ClashTimeNonlinear,
-            ">Time of clash between drum and tub, nonlinear model<",
-            ">time of clash in the window (s)<",
-        ),
-        (Quantity::StaticSag, ">Static sag of the tub<", ">static sag of the tub (mm)<"),
-    ] {
-        let figure = svg(with_metrics(), &asked(quantity));
-        assert!(figure.contains(title) && figure.contains(label), "{title} {label}");
-    }
-    let data = data(with_metrics(), &asked(Quantity::StaticSag));
-    let names = |list: &Value, of: fn(&Value) -> &Value| -> Vec<String> {
-        let list = list.as_array().unwrap().iter();
-        list.map(|entry| of(entry).as_str().unwrap().to_owned()).collect()
-    };
-    assert_eq!(data["first"]["group"], "static-sag");
-    let offered = names(&data["quantities"], |entry| &entry[0]);
-    assert!(offered.ends_with(&[
-        "cabinet-force-nonlinear".to_owned(),
-        "cabinet-force-linear".to_owned(),
-        "clash-time-nonlinear".to_owned(),
-        "static-sag".to_owned(),
-        "status".to_owned()
-    ]));
-    let rows = names(&data["rows"], |row| &row["name"]);
-    assert_eq!(rows[2..], ["gap", "cabinet_force", "clash_time", "static_sag"]);
-    for output in ["a.svg", "a.html"] {
-        let said = message(draw(map(), &asked(Quantity::StaticSag), output));
-        let known = "`--quantity static-sag`";
-        assert!(said.contains(known) && said.contains("it has ratio, nonlinear, linear"), "{said}");
-    }
-    let said = message(draw(one_axis(), &asked(Quantity::ClashTimeLinear), "a.svg"));
-    assert!(said.contains("no such quantity"), "{said}");
-    let force = (0..4).map(|k| 400.0 + f64::from(k));
-    let curves = one_axis().numbers("cabinet_force_nonlinear_n", "N", force);
-    let figure = svg(curves, &asked(Quantity::CabinetForceNonlinear));
-    assert!(figure.contains(">Greatest force on the cabinet (N)<"));
 }
 
 #[test]

@@ -16,7 +16,8 @@
 //!
 //! With `grazing`, the clearance of each grid is such that drum and tub just touch in one of its
 //! rows, and the time of their clash is compared too. With `elements`, machines have friction
-//! dampers, stops, a gasket and a second unbalance, those of docs/examples/friction.toml varied.
+//! dampers, stops, a gasket, feet and a second unbalance, those of docs/examples/friction.toml
+//! varied, and the loads of each stop and foot are compared too.
 
 use std::process::ExitCode;
 
@@ -62,7 +63,7 @@ const VARIED: [(&str, f64, f64); 14] = [
 const WITH_ELEMENTS: &str = include_str!("../../../docs/examples/friction.toml");
 
 /// Numbers of its elements that vary, by powers of ten up to which.
-const ELEMENTS: [(&str, f64, f64); 14] = [
+const ELEMENTS: [(&str, f64, f64); 17] = [
     ("friction_n", 50.0, 0.5),
     ("damper_2_friction_n", 50.0, 0.5),
     ("friction_speed_m_per_s", 0.01, 0.7),
@@ -77,6 +78,9 @@ const ELEMENTS: [(&str, f64, f64); 14] = [
     ("stop_1_softness_m", 1e-4, 1.0),
     ("bushing_1_cubic_y_n_per_m3", 5e6, 1.0),
     ("unbalance_2_mass_kg", 0.1, 0.5),
+    ("cabinet_friction", 0.4, 0.3),
+    ("foot_1_x_m", 0.47, 0.1),
+    ("foot_2_z_m", -0.26, 0.1),
 ];
 
 /// What varies in a grid beside the machine's proportions.
@@ -205,32 +209,55 @@ impl Found {
 }
 
 fn relative((a, b): (&f64, &f64)) -> f64 {
-    if a == b { 0.0 } else { (a - b).abs() / b.abs() }
+    relative_from(0.0, *a, *b)
+}
+
+/// As [`relative`], where numbers below `least` count as that.
+fn relative_from(least: f64, a: f64, b: f64) -> f64 {
+    if a == b { 0.0 } else { (a - b).abs() / b.abs().max(least) }
 }
 
 fn amplitudes_differ(a: &Trajectory, b: &Trajectory) -> f64 {
     a.amplitudes.iter().zip(&b.amplitudes).map(relative).fold(0.0, f64::max)
 }
 
-/// A time of clash is compared with this part of the window where it is shorter.
+/// A time of clash or of contact is compared with this part of the window where it is shorter.
 const CLASH_FLOOR: f64 = 1e-2;
+
+/// A push is compared with this part of the weight where it is smaller: stops that stay open push
+/// by next to nothing.
+const PUSH_FLOOR: f64 = 1e-3;
 
 /// The greatest relative difference of two rows' numbers.
 fn difference(plan: &Plan, a: &Outcome, b: &Outcome) -> f64 {
     let models = [(&a.nonlinear, &b.nonlinear), (&a.linear, &b.linear)];
     let amplitudes = models.iter().map(|(a, b)| amplitudes_differ(a, b));
-    let metrics = models.iter().flat_map(|(a, b)| a.metrics.iter().zip(&b.metrics));
+    let metrics = metrics_differ(plan, a, b).into_iter().map(|(_, share)| share);
     let turns = a.turn_ratios.iter().flatten().zip(b.turn_ratios.iter().flatten());
     // A ratio has the errors of both models.
     let of_ratios = turns.map(relative).fold(0.0, f64::max) / 2.0;
+    metrics.chain(amplitudes).fold(of_ratios, f64::max)
+}
+
+/// The relative difference of each metric, by its column.
+fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
+    let models = [("nonlinear", &a.nonlinear, &b.nonlinear), ("linear", &a.linear, &b.linear)];
     let [from_s, to_s] = plan.window_s;
-    let least = if plan.measures.metrics.contains(&Metric::ClashTime) {
-        CLASH_FLOOR * (to_s - from_s)
-    } else {
-        0.0
-    };
-    let of_metric = |(a, b): (&f64, &f64)| relative((&a.max(least), &b.max(least)));
-    metrics.map(of_metric).chain(amplitudes).fold(of_ratios, f64::max)
+    let machine = &plan.machine;
+    let moving_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;
+    let weight_n = moving_kg * machine.gravity_m_per_s2;
+    let metrics = models.iter().flat_map(|(model, a, b)| {
+        plan.measures.of_model().zip(a.metrics.iter().zip(&b.metrics)).map(|(number, (a, b))| {
+            let least = match number.metric {
+                Metric::ClashTime | Metric::StopContact => CLASH_FLOOR * (to_s - from_s),
+                Metric::StopForce => PUSH_FLOOR * weight_n,
+                Metric::FootLoad | Metric::SlipMargin => weight_n,
+                Metric::CabinetForce | Metric::StaticSag | Metric::Growth => 0.0,
+            };
+            (number.column(model), relative_from(least, *a, *b))
+        })
+    });
+    metrics.collect()
 }
 
 fn verdict(plan: &Plan, outcome: &Outcome) -> Option<bool> {
@@ -284,6 +311,9 @@ fn attack(seed: u64, kind: Kind, folder: &std::path::Path) -> Found {
         text = text.replace("cabinet_force", "clash_time");
     }
     if kind == Kind::Elements {
+        let loads = "\"cabinet_force\", \"stop_force\", \"stop_contact\", \"foot_load\", \
+                     \"slip_margin\"";
+        text = text.replace("\"cabinet_force\"", loads);
         text = with_elements(seed, &text, folder);
     }
     let accuracy = ACCURACIES[(seed % 3) as usize];
@@ -321,9 +351,12 @@ fn attack(seed: u64, kind: Kind, folder: &std::path::Path) -> Found {
             *count(&mut found) += 1;
             let (method, said) = (row.method.name(), row.error.unwrap_or(f64::NAN));
             let of_linear = amplitudes_differ(&row.linear, &halved.linear);
+            let metrics = metrics_differ(&plan, row, halved).into_iter();
+            let worst = metrics.max_by(|(_, a), (_, b)| a.total_cmp(b));
+            let (metric, share) = worst.unwrap_or_default();
             found.exceptions.push(format!(
-                "seed {seed}, row {i}, {method}: {what}; {error:.2e} ({of_linear:.2e} linear), \
-                 said {said:.2e}"
+                "seed {seed}, row {i}, {method}: {what}; {error:.2e} ({of_linear:.2e} linear, \
+                 {share:.2e} {metric}), said {said:.2e}"
             ));
         };
         if statuses(row) != statuses(halved) {

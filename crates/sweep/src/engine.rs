@@ -24,7 +24,7 @@ use washer_model::{
 };
 
 use crate::interrupt::Interrupt;
-use crate::measures::{Criterion, Metric};
+use crate::measures::Criterion;
 use crate::method::{Level, Steps};
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::plan::{Plan, Scenario};
@@ -310,15 +310,7 @@ impl<'a> ModelEngine<'a> {
             Criterion::Peak | Criterion::Envelope => record.amplitudes,
             Criterion::Rms => extra.root_mean_squares.unwrap_or(record.amplitudes),
         };
-        let metrics = self.plan.measures.of_model().filter_map(|metric| match metric {
-            Metric::CabinetForce => extra.cabinet_force_n,
-            Metric::ClashTime => extra.clash_time_s,
-            Metric::StopForce => extra.stop_force_n,
-            Metric::StopContact => extra.stop_contact_s,
-            Metric::FootLoad => extra.foot_load_n,
-            Metric::SlipMargin => extra.slip_margin_n,
-            Metric::StaticSag | Metric::Growth => None,
-        });
+        let metrics = self.plan.measures.of_model().filter_map(|number| number.of(&extra));
         Trajectory {
             status: Status::Ok,
             fail_time_s: None,

@@ -1,7 +1,7 @@
 //! What a run measures of its motions: which amplitude the two models are compared by, and metrics
 //! beside it.
 
-use washer_model::{Channel, Wanted};
+use washer_model::{Channel, Extra, Wanted};
 
 use crate::outcome::{Deviations, Outcome};
 use crate::speeds::Speeds;
@@ -187,6 +187,110 @@ impl Metric {
             }
         }
     }
+
+    /// What each stop or each foot has of it; none if there is no such thing.
+    const fn of_each(self) -> Option<OfEach> {
+        let (part, what, description) = match self {
+            Self::StopForce => (
+                Part::Stop,
+                "force",
+                "greatest push of the stop in the window; the linear model has its tangent at \
+                 equilibrium, next to nothing while it is open",
+            ),
+            Self::StopContact => {
+                (Part::Stop, "contact", "time in the window that the stop is closed")
+            }
+            Self::FootLoad => (
+                Part::Foot,
+                "load",
+                "least vertical load of the foot in the window, by statics; below zero it would \
+                 lift",
+            ),
+            Self::CabinetForce
+            | Self::ClashTime
+            | Self::StaticSag
+            | Self::SlipMargin
+            | Self::Growth => return None,
+        };
+        Some(OfEach { part, what, description })
+    }
+}
+
+/// A part that a machine may have several of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Stop,
+    Foot,
+}
+
+/// What each part has of a metric.
+struct OfEach {
+    part: Part,
+    /// In the column's name, behind the part's number.
+    what: &'static str,
+    description: &'static str,
+}
+
+/// A number that each model has of its own: a metric of the whole machine, or what one stop or foot
+/// has of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Measured {
+    /// Of all parts together, or of one.
+    pub metric: Metric,
+    /// Which part, from 0; none for all together.
+    pub part: Option<usize>,
+}
+
+impl Measured {
+    fn of_part(self) -> Option<(OfEach, usize)> {
+        self.metric.of_each().zip(self.part)
+    }
+
+    /// The column's name.
+    #[must_use]
+    pub fn column(self, model: &str) -> String {
+        let Some((OfEach { part, what, .. }, index)) = self.of_part() else {
+            return self.metric.column(model);
+        };
+        let part = match part {
+            Part::Stop => "stop",
+            Part::Foot => "foot",
+        };
+        let unit = self.metric.unit().to_lowercase();
+        format!("{part}_{}_{what}_{model}_{unit}", index + 1)
+    }
+
+    /// One line for column dictionaries and docs.
+    #[must_use]
+    pub fn description(self) -> &'static str {
+        self.of_part().map_or(self.metric.description(), |(of_each, _)| of_each.description)
+    }
+
+    /// Its value in a trajectory's records, if it was recorded.
+    pub(crate) fn of(self, extra: &Extra) -> Option<f64> {
+        let stops = extra.stops.iter();
+        match self.metric {
+            Metric::CabinetForce => extra.cabinet_force_n,
+            Metric::ClashTime => extra.clash_time_s,
+            Metric::StopForce => self.one_or(stops.map(|stop| stop.push_n), f64::max),
+            Metric::StopContact => self.one_or(stops.map(|stop| stop.contact_s), f64::max),
+            Metric::FootLoad => self.one_or(extra.foot_loads_n.iter().copied(), f64::min),
+            Metric::SlipMargin => extra.slip_margin_n,
+            Metric::StaticSag | Metric::Growth => None,
+        }
+    }
+
+    /// The part's value, or the extreme of all.
+    fn one_or(
+        self,
+        mut values: impl Iterator<Item = f64>,
+        extreme: fn(f64, f64) -> f64,
+    ) -> Option<f64> {
+        match self.part {
+            Some(index) => values.nth(index),
+            None => values.reduce(extreme),
+        }
+    }
 }
 
 /// What a run measures beyond peaks and gaps.
@@ -198,12 +302,32 @@ pub struct Measures {
     pub metrics: Vec<Metric>,
     /// The constant speeds that [`Metric::Growth`] is about; `None` if it is not asked for.
     pub growth_speeds: Option<Speeds>,
+    /// How many stops the machine has.
+    pub stops: usize,
+    /// How many feet the machine has.
+    pub feet: usize,
 }
 
 impl Measures {
-    /// Metrics that each model has its own of, in column order.
-    pub fn of_model(&self) -> impl Iterator<Item = Metric> + '_ {
-        self.metrics.iter().copied().filter(|metric| metric.is_of_model())
+    /// Numbers that each model has its own of, in the order of trajectories and columns.
+    pub fn of_model(&self) -> impl Iterator<Item = Measured> + '_ {
+        self.metrics
+            .iter()
+            .filter(|metric| metric.is_of_model())
+            .flat_map(|metric| self.numbers_of(*metric))
+    }
+
+    /// The numbers of a metric that each model has its own of: of all parts, then of each if there
+    /// are several.
+    pub(crate) fn numbers_of(&self, metric: Metric) -> impl Iterator<Item = Measured> + use<> {
+        let parts = match metric.of_each().map(|of_each| of_each.part) {
+            Some(Part::Stop) => self.stops,
+            Some(Part::Foot) => self.feet,
+            None => 0,
+        };
+        let of_each = if parts > 1 { 0..parts } else { 0..0 };
+        let of_all = Measured { metric, part: None };
+        std::iter::once(of_all).chain(of_each.map(move |k| Measured { part: Some(k), ..of_all }))
     }
 
     /// What trajectories must record.
@@ -249,6 +373,8 @@ impl Outcome {
 
 #[cfg(test)]
 mod tests {
+    use washer_model::StopLoad;
+
     use super::*;
     use crate::outcome::{Status, Trajectory};
 
@@ -282,6 +408,43 @@ mod tests {
     fn without_any_linear_motion_there_is_no_ratio() {
         assert_eq!(outcome(&[[1e-3, 1e-3]; 3], &[[0.0, 1e-3]; 3]).turn_ratios, [None, Some(1.0)]);
         assert!(outcome(&[], &[[1.0, 1.0]]).turn_ratios.is_empty(), "a model failed");
+    }
+
+    #[test]
+    fn each_of_several_stops_and_feet_has_columns_behind_those_of_all() {
+        let metrics = vec![Metric::SlipMargin, Metric::StopContact, Metric::FootLoad];
+        let mut measures = Measures { metrics, stops: 3, feet: 1, ..Measures::default() };
+        let columns = |measures: &Measures| -> Vec<String> {
+            measures.of_model().map(|number| number.column("linear")).collect()
+        };
+        let expected = [
+            "slip_margin_linear_n",
+            "stop_contact_linear_s",
+            "stop_1_contact_linear_s",
+            "stop_2_contact_linear_s",
+            "stop_3_contact_linear_s",
+            "foot_load_linear_n",
+        ];
+        assert_eq!(columns(&measures), expected);
+        measures.stops = 1;
+        measures.feet = 3;
+        assert_eq!(columns(&measures)[1..3], ["stop_contact_linear_s", "foot_load_linear_n"]);
+        assert_eq!(columns(&measures)[5], "foot_3_load_linear_n");
+    }
+
+    #[test]
+    fn the_number_of_all_is_the_extreme_of_each() {
+        let stops = [(20.0, 0.3), (50.0, 0.1)];
+        let stops = stops.map(|(push_n, contact_s)| StopLoad { push_n, contact_s });
+        let extra = Extra {
+            stops: stops.to_vec(),
+            foot_loads_n: vec![90.0, -5.0, 70.0],
+            ..Extra::default()
+        };
+        let metrics = vec![Metric::StopForce, Metric::StopContact, Metric::FootLoad];
+        let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
+        let found: Vec<_> = measures.of_model().filter_map(|number| number.of(&extra)).collect();
+        assert_eq!(found, [50.0, 20.0, 50.0, 0.3, 0.3, 0.1, -5.0, 90.0, -5.0, 70.0]);
     }
 
     #[test]

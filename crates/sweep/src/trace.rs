@@ -36,7 +36,7 @@ const KEPT_INSTANTS: f64 = 2000.0;
 pub(crate) struct Extras {
     /// Coordinates and their speeds.
     pub states: bool,
-    /// Forces of the elements between cabinet and tub, and their sum.
+    /// Forces of the elements between cabinet and tub, their sum, and what the feet carry.
     pub forces: bool,
 }
 
@@ -370,6 +370,17 @@ impl<'a> Columns<'a> {
         for (k, axis) in axes.into_iter().enumerate() {
             let description = format!("force of {all} on the cabinet along c{}", k + 1);
             add(&format!("cabinet_force_{axis}"), &description, &|at| at.cabinet_n[k]);
+        }
+        for k in 0..first.feet_n.len() {
+            let what = format!("foot_{}_load", k + 1);
+            add(&what, "vertical load of the foot, negative where it would lift", &|at| {
+                at.feet_n[k]
+            });
+        }
+        if first.slip_margin_n.is_some() {
+            let description = "margin of the cabinet against slipping, friction on all feet \
+                               together less the horizontal force";
+            add("slip_margin", description, &|at| at.slip_margin_n.unwrap_or(f64::NAN));
         }
     }
 

@@ -11,7 +11,7 @@ pub(crate) mod stiff;
 pub(crate) mod suspension;
 mod tangent;
 
-pub use extras::{Extra, Wanted};
+pub use extras::{Extra, StopLoad, Wanted};
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};

@@ -16,7 +16,7 @@ use sweep::{
 use tempfile::TempDir;
 
 /// Bytes of a chunk before its records, and of the hash behind them.
-const HEADER: usize = 72;
+const HEADER: usize = 76;
 const HASH: usize = 32;
 
 const NAMES: [&str; 8] = [

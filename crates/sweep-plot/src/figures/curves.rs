@@ -32,8 +32,11 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
         let values = column.numbers().unwrap_or_default();
         cells.iter().map(|&cell| values[cell] * factor).collect()
     };
-    let names: Vec<&str> =
+    let mut names: Vec<&str> =
         channels(&table.source, "nonlinear_").into_iter().map(|(name, _)| name).collect();
+    if let Some((whole, ..)) = options.quantity.whole() {
+        names.extend(whole.parts(&table.source).into_iter().map(|of_part| of_part.part));
+    }
     for asked in &options.channels {
         if !names.contains(&asked.as_str()) {
             return Err(PlotError::NotThere {
@@ -67,9 +70,9 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
         });
     }
     let model_colour = |model: &str| if model == "linear" { LINEAR } else { NONLINEAR };
-    for whole in &WHOLE {
+    let panel = |name: &str, words: &str, columns: &[(&str, &str)]| {
         let mut unit = "";
-        let lines = whole.columns.iter().filter_map(|(_, model, name)| {
+        let lines = columns.iter().filter_map(|(model, name)| {
             let column = table.column(name)?;
             let factor;
             (unit, factor) = label::shown(&column.unit);
@@ -77,12 +80,26 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
             Some(line(&said, model_colour(model), values(column, factor)))
         });
         let lines: Vec<Series> = lines.collect();
+        ChartPanel::new(name, Label::new(&label::capitalised(words), unit), lines)
+    };
+    for whole in &WHOLE {
+        let columns: Vec<_> =
+            whole.columns.iter().map(|(_, model, name)| (*model, *name)).collect();
         let gap = whole.name == "gap";
+        let asked = whole.columns.iter().any(|(quantity, ..)| *quantity == options.quantity);
+        let parts = whole.parts(&table.source);
+        let asked_part = |part: &str| asked && options.channels.iter().any(|name| name == part);
         panels.push(ChartPanel {
-            shown: whole.columns.iter().any(|(quantity, ..)| *quantity == options.quantity),
+            shown: asked && !parts.iter().any(|of_part| asked_part(of_part.part)),
             levels: if gap { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() },
-            ..ChartPanel::new(whole.name, Label::new(&label::capitalised(whole.words), unit), lines)
+            ..panel(whole.name, whole.words, &columns)
         });
+        for of_part in &parts {
+            panels.push(ChartPanel {
+                shown: asked_part(of_part.part),
+                ..panel(&of_part.name, &of_part.words, &of_part.columns)
+            });
+        }
     }
     panels.retain(|panel| !panel.series.is_empty());
 

@@ -84,12 +84,11 @@ function createMap(host, data, panel) {
 
   function offerChannels() {
     const before = channel.value || data.first.channel;
-    const offered = data.layers.filter((layer) => layer.group === quantity.value
-      && (layer.channel || layer.group === "ratio"));
+    const layers = data.layers.filter((layer) => layer.group === quantity.value);
+    const offered = layers.some((layer) => layer.channel) ? layers : [];
     channel.replaceChildren();
     for (const layer of offered) {
-      const words = layer.channel ? layer.channelWords : "all channels (largest)";
-      channel.append(element("option", { value: layer.channel }, words));
+      channel.append(element("option", { value: layer.channel }, layer.channelWords));
     }
     channel.disabled = offered.length === 0;
     if (offered.length === 0) channel.append(element("option", { value: "" }, "no channel"));

@@ -222,7 +222,11 @@ fn rows_json(source: &Source) -> Value {
         let [nonlinear, linear] = [0, 1].map(|_| Some(columns.next()??.name.clone()));
         nonlinear.is_some().then(|| row(whole.name, whole.words, [nonlinear, linear, None]))
     });
-    channels.chain(whole).collect()
+    let parts = layer::WHOLE.iter().flat_map(|whole| whole.parts(source)).map(|part| {
+        let [nonlinear, linear] = part.columns.map(|(_, column)| Some(column.to_owned()));
+        row(&part.name, &part.words, [nonlinear, linear, None])
+    });
+    channels.chain(whole).chain(parts).collect()
 }
 
 fn axis_json(axis: &GridAxis) -> Value {
@@ -301,7 +305,11 @@ fn layer_json(map: &Map, shown: &Shown, layer: &Layer, room: usize) -> Value {
     let mut data = json!({
         "group": shown.quantity.name(),
         "channel": channel,
-        "channelWords": label::channel(channel),
+        "channelWords": match (shown.quantity, channel) {
+            (Quantity::Ratio, "") => "all channels (largest)".to_owned(),
+            (_, "") => "all together".to_owned(),
+            (_, channel) => label::channel(channel),
+        },
         "title": layer.title,
         "label": layer.label,
         "column": shown.column,

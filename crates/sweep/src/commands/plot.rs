@@ -40,8 +40,8 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t)]
     pub quantity: Quantity,
 
-    /// Channel to show, as in the column names (tub_yaw, drum_front_y, ...); again for more of them
-    /// in a trace
+    /// Channel to show, as in the column names (tub_yaw, drum_front_y, ...); of a load, which stop
+    /// or foot (stop_2, foot_1); again for more of them in a trace
     #[arg(long = "channel", value_name = "NAME")]
     pub channels: Vec<String>,
 

@@ -106,9 +106,9 @@ fn parameters() -> String {
     text
 }
 
-/// Whether a name is that of the second or a later spring or damper.
+/// Whether a name is that of the second or a later one of several parts.
 fn is_a_further_one(name: &str) -> bool {
-    ["spring_", "damper_"].into_iter().any(|kind| {
+    ["spring_", "damper_", "stop_", "foot_"].into_iter().any(|kind| {
         let number = name.strip_prefix(kind).and_then(|rest| rest.split('_').next());
         number.and_then(|number| number.parse::<usize>().ok()).is_some_and(|number| number > 1)
     })
@@ -173,7 +173,8 @@ fn columns() -> String {
             description: parameter.description().to_owned(),
         })
         .collect();
-    let measures = Measures { metrics: Metric::ALL.to_vec(), ..Measures::default() };
+    let metrics = Metric::ALL.to_vec();
+    let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
     let layout = Layout {
         axes,
         channels: Channel::ALL.to_vec(),
@@ -183,7 +184,7 @@ fn columns() -> String {
     };
     row(&mut text, &["column", "type", "unit", "null", "meaning"]);
     row(&mut text, &["---"; 5]);
-    for field in layout.schema().fields() {
+    for field in layout.schema().fields().iter().filter(|field| !is_a_further_one(field.name())) {
         let told = |key: &str| field.metadata().get(key).map_or("", String::as_str);
         let data_type = match field.data_type() {
             arrow_schema::DataType::Dictionary(..) => "text".to_owned(),
@@ -210,7 +211,8 @@ fn columns() -> String {
     let _ = writeln!(
         text,
         "\nThe columns of a metric ({}) are there only where the grid file's `metrics` names it, \
-         in its order.",
+         in its order. Machines with two stops or more have those of `stop_1` for each of them \
+         (`stop_2_force_nonlinear_n`), and so have feet.",
         metrics.join(", ")
     );
     let statuses: Vec<String> = ROW_STATUSES.iter().map(|status| format!("`{status}`")).collect();
@@ -246,7 +248,9 @@ mod tests {
     #[test]
     fn further_springs_and_dampers_are_left_out_and_nothing_else() {
         assert!(
-            is_a_further_one("spring_2_tub_x_m") && is_a_further_one("damper_12_damping_n_s_per_m")
+            is_a_further_one("spring_2_tub_x_m")
+                && is_a_further_one("damper_12_damping_n_s_per_m")
+                && is_a_further_one("foot_3_load_linear_n")
         );
         assert!(
             !is_a_further_one("spring_1_tub_x_m") && !is_a_further_one("spring_stiffness_n_per_m")

@@ -60,7 +60,8 @@ pub struct Args {
     /// Add the ten coordinates and their speeds
     #[arg(long)]
     states: bool,
-    /// Add the force of each spring, damper, stop and bushing, and their sum on the cabinet
+    /// Add the force of each spring, damper, stop and bushing, their sum on the cabinet, and the
+    /// load of each foot
     #[arg(long)]
     forces: bool,
     /// Begin away from equilibrium, both models alike: a coordinate q1 to q10 (m, rad) or a speed

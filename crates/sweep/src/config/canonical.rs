@@ -37,7 +37,8 @@ impl Plan {
         }
         // What is left out stands for the default, so that plans which do not ask for more read as
         // ever.
-        let Measures { criterion, metrics, growth_speeds } = &self.measures;
+        // The machine says how many stops and feet it has.
+        let Measures { criterion, metrics, growth_speeds, stops: _, feet: _ } = &self.measures;
         if *criterion != Criterion::default() {
             plan["reliability"]["criterion"] = criterion.name().into();
         }

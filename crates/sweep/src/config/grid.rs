@@ -90,6 +90,7 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
     let metrics = metrics.unwrap_or_default();
     judge_metrics(&metrics, &machine, &root, report);
     let growth_speeds = stability(&mut root, &metrics, report);
+    let (stops, feet) = (machine.stops.len(), machine.feet.len());
     let plan = Plan {
         name,
         machine,
@@ -100,7 +101,7 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
         axes: Vec::new(),
         design: None,
         reliability,
-        measures: Measures { criterion, metrics, growth_speeds },
+        measures: Measures { criterion, metrics, growth_speeds, stops, feet },
         set: Vec::new(),
     };
     let mut draft = Draft { plan, origins, constants: Vec::new() };

@@ -301,7 +301,8 @@ fn unseen(run: &RungRun, level: Level, point: &Point, plan: &Plan) -> f64 {
             .map(|channel| share(swings[channel.index()], turn[channel.index()].max(TURN_FLOOR)))
     });
     let metrics = plan.measures.of_model().zip(&numbers.metrics);
-    let clash_s = metrics.filter(|(metric, _)| *metric == Metric::ClashTime).map(|(_, time)| *time);
+    let of_clash = metrics.filter(|(number, _)| number.metric == Metric::ClashTime);
+    let clash_s = of_clash.map(|(_, time)| *time);
     let of_clash = clash_s
         .zip(run.clash_doubt_s)
         .map(|(time_s, doubt_s)| doubt_s / time_s.max(clash_floor_s(plan)));
@@ -330,8 +331,8 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, plan: &Plan) -> f64
     if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
         compare(a, b, point.clearance_m());
     }
-    for ((a, b), metric) in a.metrics.iter().zip(&b.metrics).zip(plan.measures.of_model()) {
-        let least = match metric {
+    for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(plan.measures.of_model()) {
+        let least = match number.metric {
             Metric::ClashTime | Metric::StopContact => clash_floor_s(plan),
             // These may pass through zero.
             Metric::FootLoad | Metric::SlipMargin => point.weight_n(),

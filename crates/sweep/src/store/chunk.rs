@@ -7,6 +7,7 @@
 //! | 8 | `SWEEPCHK` |
 //! | 4 | format, u32 |
 //! | 4 | channels C, u32 |
+//! | 4 | metrics M of a model, u32 |
 //! | 32 | hash of the plan |
 //! | 8, 8, 8 | chunk index, first point, number of points, u64 |
 //! | points x (20 + 2 x (32 + 8 C + 8 M) + 8 B + 56 G) | records |
@@ -33,8 +34,8 @@ use washer_model::{Disturbance, Motion};
 
 const MAGIC: [u8; 8] = *b"SWEEPCHK";
 const PART_MAGIC: [u8; 8] = *b"SWEEPPRT";
-const FORMAT: u32 = 2;
-const HEADER: usize = 8 + 4 + 4 + 32 + 3 * 8;
+const FORMAT: u32 = 3;
+const HEADER: usize = 8 + 4 + 4 + 4 + 32 + 3 * 8;
 const HASH: usize = blake3::OUT_LEN;
 const GROWTH_BYTES: usize = 3 * 8 + 2 * (4 + 4 + 8);
 
@@ -88,7 +89,7 @@ impl Shape {
 pub(crate) struct Place {
     /// Hash of the plan.
     pub(crate) plan: blake3::Hash,
-    /// Numbers of a record; the hash tells shapes with as many channels apart.
+    /// Numbers of a record; the hash tells shapes with as many channels and metrics apart.
     pub(crate) shape: Shape,
     /// Index of the chunk.
     pub(crate) chunk: u64,
@@ -232,6 +233,7 @@ fn header(magic: [u8; 8], place: &Place) -> Vec<u8> {
     bytes.extend_from_slice(&magic);
     bytes.extend_from_slice(&FORMAT.to_le_bytes());
     bytes.extend_from_slice(&place.shape.channels.to_le_bytes());
+    bytes.extend_from_slice(&place.shape.metrics.to_le_bytes());
     bytes.extend_from_slice(place.plan.as_bytes());
     for number in [place.chunk, place.first, place.count] {
         bytes.extend_from_slice(&number.to_le_bytes());
@@ -447,6 +449,7 @@ mod tests {
             Place { first: 49, ..ours },
             Place { count: 3, ..ours },
             Place { shape: Shape { channels: 3, ..ours.shape }, ..ours },
+            Place { shape: Shape { metrics: 1, ..ours.shape }, ..ours },
         ];
         for other in others {
             assert_eq!(decode(&other, &bytes), Err(Damage::Foreign));

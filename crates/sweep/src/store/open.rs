@@ -7,10 +7,12 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use arrow_schema::SchemaRef;
+
 use super::chunk::{self, Damage, Place, Shape};
 use super::error::StoreError;
 use super::lock::{self, Lock};
-use super::plan_file::{Found, PlanFile, set_aside};
+use super::plan_file::{Found, PlanDifference, PlanFile, set_aside};
 use super::read::{self, ResultFile, Tally};
 use super::shard::{self, Dealing, Shard, ShardRequest};
 use super::{Folder, Job, Named, chunk_points, provenance, trials};
@@ -377,7 +379,14 @@ pub(super) fn finished(
 ) -> Result<Option<(ResultFile, Tally)>, StoreError> {
     let Some(file) = read::finished(&folder.output)? else { return Ok(None) };
     let result = ResultFile::of(&file, job.layout.file_kind())?;
-    if result.plan_hash == job.hash().to_hex().as_str() {
+    let same_plan = result.plan_hash == job.hash().to_hex().as_str();
+    let schema = job.layout.schema();
+    let [was, is] = [file.schema(), &schema].map(column_names);
+    if same_plan && was != is {
+        let differences = vec![columns_apart(&was, &is)];
+        return Err(StoreError::OutputDiffers { output: folder.output.clone(), differences });
+    }
+    if same_plan {
         // Files of this build carry a digest.
         if !file.is_sealed() {
             return Err(FileError::Damaged { path: folder.output.clone() }.into());
@@ -393,6 +402,19 @@ pub(super) fn finished(
     };
     let differences = was.differences(&PlanFile::of(job));
     Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
+}
+
+fn column_names(schema: &SchemaRef) -> Vec<&str> {
+    schema.fields().iter().map(|field| field.name().as_str()).collect()
+}
+
+/// The columns that only one of two builds has for the same plan.
+fn columns_apart(was: &[&str], is: &[&str]) -> PlanDifference {
+    let only = |some: &[&str], others: &[&str]| {
+        let of_some: Vec<_> = some.iter().filter(|name| !others.contains(name)).copied().collect();
+        (!of_some.is_empty()).then(|| of_some.join(", "))
+    };
+    PlanDifference { pointer: "/columns".to_owned(), was: only(was, is), is: only(is, was) }
 }
 
 /// Finds this plan frozen in the folder, or freezes it. Where there was none, `finished` has the

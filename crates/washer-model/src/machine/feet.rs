@@ -88,6 +88,12 @@ impl Feet {
         (0..self.count).map(of_foot).collect()
     }
 
+    /// The margin against slipping (N) under a load on the cabinet.
+    pub(crate) fn slip_margin_n(&self, load: &[f64; LOAD]) -> f64 {
+        let [along_x, along_y, along_z, ..] = *load;
+        self.friction * (self.weight_n - along_y) - (along_x * along_x + along_z * along_z).sqrt()
+    }
+
     /// The loads before the machine sags.
     pub(crate) fn at_rest_n(&self, machine: &Machine) -> Vec<f64> {
         let bodies = [

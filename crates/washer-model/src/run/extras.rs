@@ -28,12 +28,21 @@ pub struct Wanted {
     pub cabinet_force: bool,
     /// How long drum and tub overlap.
     pub clash_time: bool,
-    /// The greatest push of a stop, and how long one is closed.
+    /// The greatest push of each stop, and how long it is closed.
     pub stops: bool,
-    /// The least load of a foot of the cabinet, and the least margin against slipping.
+    /// The least load of each foot of the cabinet, and the least margin against slipping.
     pub feet: bool,
     /// The coordinates at the ends of legs ([`Timing::checkpoints`](crate::Timing)).
     pub course: bool,
+}
+
+/// The record of one stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StopLoad {
+    /// Its greatest push (N).
+    pub push_n: f64,
+    /// How long it is closed (s).
+    pub contact_s: f64,
 }
 
 /// The records that [`Wanted`] asks for, of one trajectory, within the window.
@@ -56,15 +65,13 @@ pub struct Extra {
     /// (s). Where drum and tub only just touch, it is much of the time itself. Absent where modes
     /// are not capped, because such runs follow the ringing.
     pub clash_doubt_s: Option<f64>,
-    /// The greatest push of any stop (N); absent if the machine has none.
-    pub stop_force_n: Option<f64>,
-    /// How long the stop that is closed longest is closed (s).
-    pub stop_contact_s: Option<f64>,
-    /// The least vertical load of any foot (N), below zero where it would lift; absent if the
-    /// machine has no cabinet.
-    pub foot_load_n: Option<f64>,
+    /// Of each stop, in the machine's order.
+    pub stops: Vec<StopLoad>,
+    /// The least vertical load of each foot (N), below zero where it would lift, in the machine's
+    /// order; empty if it has no cabinet.
+    pub foot_loads_n: Vec<f64>,
     /// The least margin against slipping (N): friction on all feet together less the horizontal
-    /// force; below zero the cabinet slips.
+    /// force; below zero the cabinet slips. Absent if the machine has no cabinet.
     pub slip_margin_n: Option<f64>,
     /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed.
     /// Empty unless asked for.
@@ -169,13 +176,11 @@ impl<T: Lane> Extras<T> {
         let mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let wanted = self.wanted;
         let [clash_s, longer_s, shorter_s] = self.clash.map(|clash| clash.lane(lane));
-        let stops = self.loads.as_ref().and_then(|loads| loads.stops(lane));
-        let feet = self.loads.as_ref().and_then(|loads| loads.feet_n(lane));
+        let loads = self.loads.as_ref();
         self.found[index] = Extra {
-            stop_force_n: stops.map(|[push_n, _]| push_n),
-            stop_contact_s: stops.map(|[_, contact_s]| contact_s),
-            foot_load_n: feet.map(|[load_n, _]| load_n),
-            slip_margin_n: feet.map(|[_, margin_n]| margin_n),
+            stops: loads.map_or_else(Vec::new, |loads| loads.stops(lane)),
+            foot_loads_n: loads.map_or_else(Vec::new, |loads| loads.foot_loads_n(lane)),
+            slip_margin_n: loads.and_then(|loads| loads.slip_margin_n(lane)),
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),
             turns,
             cabinet_force_n: self.force.as_ref().map(|force| force.lane_n(lane)),

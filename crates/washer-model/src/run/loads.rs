@@ -3,6 +3,7 @@
 //! The laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers for
 //! their rates; the linear model's are first order in its deviations from equilibrium.
 
+use super::extras::StopLoad;
 use crate::coordinates::{COORDINATES, STATES, TUB};
 use crate::kind::ModelKind;
 use crate::lanes::{Constant as _, InLanes as _};
@@ -52,6 +53,30 @@ fn on_cabinet<T: Lane>(elements: &Elements<T>, tub: &TubMotion<'_, T>) -> [N<T>;
     let [y, z] = tub.midpoint;
     // What is on the tub, turned round; P_T is at (0, y, z).
     [-fx, -fy, -fz, -(mx + (y * fz - z * fy)), -(my + z * fx), -(mz - y * fx)]
+}
+
+/// The same as a number, at a state: whole coordinates of the nonlinear model, deviations of the
+/// linear one.
+pub(crate) fn load_on_cabinet(
+    point: &Point,
+    model: ModelKind,
+    state: &[f64; STATES],
+) -> [f64; LOAD] {
+    let elements = &point.machine.elements;
+    let elements = match model {
+        ModelKind::Nonlinear => elements.constant(),
+        ModelKind::Linear => elements.with_viscous_friction().constant(),
+    };
+    let dual = |at_rest: f64, number: f64| match model {
+        ModelKind::Nonlinear => N(Dual { value: number, slope: 0.0 }),
+        ModelKind::Linear => N(Dual { value: at_rest, slope: number }),
+    };
+    let tub = TubState {
+        q: TUB.map(|q| dual(point.equilibrium[q], state[q])),
+        u: TUB.map(|q| dual(0.0, state[COORDINATES + q])),
+    };
+    let load = with_motion!(&tub, motion => on_cabinet(&elements, &motion));
+    load.map(|N(first_order)| first_order.value + first_order.slope)
 }
 
 /// First order of something in the tub's deviations from equilibrium.
@@ -220,22 +245,23 @@ impl<T: Lane> Loads<T> {
         }
     }
 
-    /// The least load of any foot and the least margin against slipping of one lane (N); none
-    /// without feet.
-    pub(crate) fn feet_n(&self, lane: usize) -> Option<[f64; 2]> {
-        let below = self.below.lane(lane);
-        let lowest = below[..self.feet].iter().copied().reduce(f64::max)?;
-        Some([FAR_N - lowest, FAR_N - below[SLIP]])
+    /// The least load of each foot of one lane (N); empty without feet.
+    pub(crate) fn foot_loads_n(&self, lane: usize) -> Vec<f64> {
+        self.below.lane(lane)[..self.feet].iter().map(|below| FAR_N - below).collect()
     }
 
-    /// The greatest push of any stop (N), and the longest that one was closed (s), of one lane;
-    /// none without stops.
-    pub(crate) fn stops(&self, lane: usize) -> Option<[f64; 2]> {
+    /// The least margin against slipping of one lane (N); none without feet.
+    pub(crate) fn slip_margin_n(&self, lane: usize) -> Option<f64> {
+        (self.feet > 0).then(|| FAR_N - self.below.lane(lane)[SLIP])
+    }
+
+    /// What one lane has seen of each stop; empty without stops.
+    pub(crate) fn stops(&self, lane: usize) -> Vec<StopLoad> {
         let of_stop = |stop: &SeenStop<T>| {
             let [push_n] = stop.push.lane(lane);
-            [push_n, stop.contact_s.0.get(lane)]
+            StopLoad { push_n, contact_s: stop.contact_s.0.get(lane) }
         };
-        self.stops.iter().map(of_stop).reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
+        self.stops.iter().map(of_stop).collect()
     }
 
     /// A state whose derivative is `dx`: at the end of a step, of which end and length (s) are

@@ -1,4 +1,5 @@
-//! Forces of the elements between cabinet and tub, and their sum on the cabinet.
+//! Forces of the elements between cabinet and tub, their sum on the cabinet, and what its feet
+//! carry of it.
 //!
 //! The laws are those of the equations (`nonlinear/elements.rs`). The linear model's forces are
 //! first order in its deviations, by automatic differentiation at the equilibrium.
@@ -9,6 +10,7 @@ use crate::lanes::Constant as _;
 use crate::nonlinear::elements::{CabinetLine, Ends, Law, PointMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
 use crate::point::Point;
+use crate::run::loads::load_on_cabinet;
 use lane_ode::{Dual, N};
 use std::borrow::Cow;
 
@@ -25,6 +27,10 @@ pub struct Forces {
     pub bushings_n: Vec<[f64; 3]>,
     /// Sum of all forces on the cabinet (N), along c1, c2 and c3: at rest it is the weight.
     pub cabinet_n: [f64; 3],
+    /// Vertical load of each foot (N), below zero where it would lift; empty without a cabinet.
+    pub feet_n: Vec<f64>,
+    /// Margin of the cabinet against slipping (N); absent without a cabinet.
+    pub slip_margin_n: Option<f64>,
 }
 
 /// The forces at a state: whole coordinates of the nonlinear model, deviations of the linear one.
@@ -49,6 +55,8 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
         stops_n: Vec::new(),
         bushings_n: Vec::new(),
         cabinet_n: [0.0; 3],
+        feet_n: Vec::new(),
+        slip_margin_n: None,
     };
     // How the force is divided among the axes differs by a rounding: results on record have it so.
     for (spring, stiffening) in elements.springs.iter().zip(&elements.stiffenings) {
@@ -84,6 +92,11 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
             forces.cabinet_n[k] += force[k];
         }
         forces.bushings_n.push(force);
+    }
+    if let Some(feet) = &point.feet {
+        let load = load_on_cabinet(point, model, state);
+        forces.feet_n = feet.loads_n(&load);
+        forces.slip_margin_n = Some(feet.slip_margin_n(&load));
     }
     forces
 }

@@ -56,18 +56,16 @@ fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
         cabinet_force_n,
         clash_time_s,
         clash_doubt_s,
-        stop_force_n,
-        stop_contact_s,
-        foot_load_n,
+        stops,
+        foot_loads_n,
         slip_margin_n,
         course,
     } = extra;
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
     bits.extend(course.iter().flatten().map(|q| q.to_bits()));
-    let of_motion = [cabinet_force_n, clash_time_s, clash_doubt_s];
-    let of_loads = [stop_force_n, stop_contact_s, foot_load_n, slip_margin_n];
-    let metrics = of_motion.into_iter().chain(of_loads).flatten();
-    bits.extend(metrics.map(|metric| metric.to_bits()));
+    let metrics = [cabinet_force_n, clash_time_s, clash_doubt_s, slip_margin_n];
+    bits.extend(metrics.into_iter().flatten().chain(foot_loads_n).map(|load| load.to_bits()));
+    bits.extend(stops.iter().flat_map(|stop| [stop.push_n.to_bits(), stop.contact_s.to_bits()]));
     bits
 }
 

@@ -5,7 +5,8 @@ use super::energy::{axes, place};
 use crate::machine::feet::{Feet, LOAD};
 use crate::machine::{Cabinet, Foot, Machine};
 use crate::{
-    Extra, Method, ModelKind, Point, Spin, Start, Timing, Wanted, history, prepare, simulate_with,
+    Extra, Method, ModelKind, Point, Spin, Start, StopLoad, Timing, Wanted, history, prepare,
+    simulate_with,
 };
 use lane_ode::Simd;
 
@@ -31,6 +32,19 @@ fn on_feet(mut machine: Machine) -> Machine {
 fn point(machine: Machine) -> Point {
     let spin = Spin::Ramp { peak_rpm: 300.0, ramp_s: 2.0 };
     prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
+}
+
+/// The least of each number over instants.
+fn least(instants: impl Iterator<Item = Vec<f64>>) -> Vec<f64> {
+    let least = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(&b).map(|(a, b)| a.min(*b)).collect();
+    instants.reduce(least).unwrap()
+}
+
+fn all_close(what: &str, found: &[f64], expected: &[f64], allowed: f64) {
+    assert_eq!(found.len(), expected.len(), "{what}");
+    for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
+        assert!((found - expected).abs() < allowed, "{what} {}: {found} for {expected}", k + 1);
+    }
 }
 
 fn found(point: &Point, model: ModelKind, simd: Simd) -> Extra {
@@ -86,8 +100,8 @@ fn they_are_what_a_densely_sampled_history_shows() {
     let method = Method::Rk4 { step_s: 1e-4 };
     let history = history(ModelKind::Nonlinear, &method, &point, &Start::default(), EVERY_S);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
-    let (mut foot_n, mut margin_n, mut push_n) = (f64::INFINITY, f64::INFINITY, 0.0_f64);
-    let mut closed_s = vec![0.0_f64; machine.stops.len()];
+    let (mut feet_n, mut margin_n) = (vec![f64::INFINITY; 4], f64::INFINITY);
+    let (mut pushes_n, mut closed_s) = (vec![0.0_f64; 3], vec![0.0_f64; 3]);
     for k in first..=last {
         let forces = history.forces(k).unwrap();
         let instant = history.instant(k).unwrap();
@@ -96,10 +110,15 @@ fn they_are_what_a_densely_sampled_history_shows() {
             assert!((load[i] - forces.cabinet_n[i]).abs() < 1e-9);
         }
         let loads_n = feet.loads_n(&load);
-        foot_n = loads_n.into_iter().fold(foot_n, f64::min);
+        all_close("a history's load of foot", &forces.feet_n, &loads_n, 1e-9);
         let horizontal_n = (load[0] * load[0] + load[2] * load[2]).sqrt();
-        margin_n = margin_n.min(0.4 * (feet.weight_n - load[1]) - horizontal_n);
-        push_n = forces.stops_n.iter().copied().fold(push_n, f64::max);
+        let margin_now_n = 0.4 * (feet.weight_n - load[1]) - horizontal_n;
+        assert!((forces.slip_margin_n.unwrap() - margin_now_n).abs() < 1e-9);
+        margin_n = margin_n.min(margin_now_n);
+        feet_n = least([feet_n, loads_n].into_iter());
+        for (push_n, now_n) in pushes_n.iter_mut().zip(&forces.stops_n) {
+            *push_n = push_n.max(*now_n);
+        }
         let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + instant.deviations[i]);
         for (closed_s, stop) in closed_s.iter_mut().zip(&machine.stops) {
             let at = place([0.0, q[0], q[1]], &axes(q[4], q[5]), stop.tub_m);
@@ -109,19 +128,39 @@ fn they_are_what_a_densely_sampled_history_shows() {
             *closed_s += if along > stop.clearance_m { EVERY_S } else { 0.0 };
         }
     }
-    let contact_s = closed_s.into_iter().fold(0.0, f64::max);
-    assert!(push_n > 20.0 && contact_s > 0.05, "{push_n} N, {contact_s} s");
+    let hit = pushes_n.iter().zip(&closed_s).filter(|(push_n, s)| **push_n > 20.0 && **s > 0.01);
+    assert!(hit.count() >= 2, "{pushes_n:?} N, {closed_s:?} s");
     let extra = found(&point, ModelKind::Nonlinear, Simd::best());
-    let close = |what: &str, found: Option<f64>, expected: f64, allowed: f64| {
-        let found = found.unwrap();
-        assert!((found - expected).abs() < allowed, "{what}: {found} for {expected}");
-    };
-    close("least load", extra.foot_load_n, foot_n, 1e-2);
-    close("margin", extra.slip_margin_n, margin_n, 1e-2);
-    close("push", extra.stop_force_n, push_n, 1e-3 * push_n);
+    all_close("least load of foot", &extra.foot_loads_n, &feet_n, 1e-2);
+    all_close("margin", &[extra.slip_margin_n.unwrap()], &[margin_n], 1e-2);
+    let of_stops = |of: fn(&StopLoad) -> f64| extra.stops.iter().map(of).collect::<Vec<_>>();
+    let greatest_n = pushes_n.iter().copied().fold(0.0, f64::max);
+    all_close("push of stop", &of_stops(|stop| stop.push_n), &pushes_n, 1e-3 * greatest_n);
     // Every swing may be off by a sample at both ends.
-    close("contact", extra.stop_contact_s, contact_s, 40.0 * EVERY_S);
+    all_close("contact of stop", &of_stops(|stop| stop.contact_s), &closed_s, 40.0 * EVERY_S);
     assert_eq!(found(&point, ModelKind::Nonlinear, Simd::Scalar), extra);
+}
+
+#[test]
+fn the_linear_models_loads_are_those_of_its_history() {
+    let mut machine = on_feet(with_every_element());
+    machine.unbalance.mass_kg = 0.9;
+    let point = point(machine);
+    let method = Method::Rk4 { step_s: 1e-4 };
+    let history = history(ModelKind::Linear, &method, &point, &Start::default(), EVERY_S);
+    let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
+    let forces: Vec<_> = (first..=last).map(|k| history.forces(k).unwrap()).collect();
+    let feet_n = least(forces.iter().map(|forces| forces.feet_n.clone()));
+    let margin_n = least(forces.iter().map(|forces| vec![forces.slip_margin_n.unwrap()]));
+    let below_n = least(forces.iter().map(|forces| forces.stops_n.iter().map(|n| -n).collect()));
+    let pushes_n: Vec<f64> = below_n.iter().map(|below_n| -below_n).collect();
+    let extra = found(&point, ModelKind::Linear, Simd::best());
+    let at_rest = history.forces(0).unwrap();
+    assert!(at_rest.feet_n.iter().zip(&feet_n).all(|(rest_n, n)| rest_n - n > 10.0), "{feet_n:?}");
+    all_close("least load of foot", &extra.foot_loads_n, &feet_n, 1e-2);
+    all_close("margin", &[extra.slip_margin_n.unwrap()], &margin_n, 1e-2);
+    let found_n: Vec<f64> = extra.stops.iter().map(|stop| stop.push_n).collect();
+    all_close("push of stop", &found_n, &pushes_n, 1e-6);
 }
 
 #[test]
@@ -146,7 +185,7 @@ fn in_small_motions_both_models_load_the_feet_alike() {
     let rest_n = feet.loads_n(&at_rest).into_iter().fold(f64::INFINITY, f64::min);
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
         let extra = found(&point, model, Simd::best());
-        rest_n - extra.foot_load_n.unwrap()
+        rest_n - extra.foot_loads_n.into_iter().fold(f64::INFINITY, f64::min)
     });
     assert!(nonlinear > 0.01, "{nonlinear} N");
     assert!((linear / nonlinear - 1.0).abs() < 5e-3, "{linear} N for {nonlinear} N");

@@ -97,9 +97,9 @@ class Plan:
         """Time histories of both models at one point, every `every` s.
 
         `at` gives a value to each axis, and to any other parameter. `states` adds the ten
-        coordinates and their speeds, `forces` the tension of springs and dampers. `start` begins
-        away from equilibrium: q1 to q10 (m, rad), u1 to u10 (per s). Warns of a model that failed;
-        its values are null from there on.
+        coordinates and their speeds, `forces` those of springs, dampers, stops and bushings, and
+        what the feet carry. `start` begins away from equilibrium: q1 to q10 (m, rad), u1 to u10
+        (per s). Warns of a model that failed; its values are null from there on.
         """
 
     def boundary(

@@ -1,6 +1,7 @@
 //! The result file and its sidecar: what they say, and what is taken for them.
 
 use super::*;
+use crate::measures::{Measures, Metric};
 
 #[test]
 fn every_cell_is_what_the_outcome_says() {
@@ -123,6 +124,18 @@ fn a_finished_output_is_left_alone() {
     let error = OpenRun::open(&home.output(), &other, options()).unwrap_err();
     assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.is_refusal(), "{error}");
     assert!(error.to_string().contains(r#"/name: was "synthetic", is "other""#), "{error}");
+
+    // A build with further columns for the same plan does not take it for its own.
+    let measures =
+        |stops| Measures { metrics: vec![Metric::StopContact], stops, ..Measures::default() };
+    let with = |stops| {
+        let mut job = synthetic::job(POINTS);
+        job.layout.measures = measures(stops);
+        job
+    };
+    let error = OpenRun::open(&home.output(), &with(2), options()).unwrap_err();
+    assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.is_refusal(), "{error}");
+    assert!(error.to_string().contains("stop_2_contact_linear_s"), "{error}");
 
     // Started over, the old result stays until the new one takes its place, interrupted or not.
     let before = fs::read(home.output()).unwrap();
