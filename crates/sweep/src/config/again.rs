@@ -59,6 +59,8 @@ range = { from = 1e7, to = 2e8, count = 4, spacing = "log" }
         plan.machine.feet = [[0.5, -0.4, 0.3], [0.5, -0.4, -0.3], [-0.2, -0.4, 0.0]]
             .map(|foot_m| washer_model::Foot { foot_m })
             .to_vec();
+        plan.measures.stops = plan.machine.stops.len();
+        plan.measures.feet = plan.machine.feet.len();
         assert_eq!(again(&plan), plan);
     }
 }
