@@ -82,10 +82,7 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
     pub fn advance_by_slopes(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let mut samples = *samples;
         for i in 0..M {
-            let (last, now) = (&mut self.last[i], &mut samples[i]);
-            let mean_slope = (now.value - last.value) / length_s;
-            last.curvature = (6.0 * mean_slope - (4.0 * last.slope + 2.0 * now.slope)) / length_s;
-            now.curvature = (2.0 * last.slope + 4.0 * now.slope - 6.0 * mean_slope) / length_s;
+            Sample::curve_as_cubic(length_s, &mut self.last[i], &mut samples[i]);
         }
         self.advance(length_s, &samples, counts);
     }

@@ -24,6 +24,14 @@ impl<T: Copy> Sample<T> {
 }
 
 impl<T: Lane> Sample<T> {
+    /// Gives the ends of a step the curvatures of the cubic through their values and slopes.
+    #[inline(always)]
+    pub(crate) fn curve_as_cubic(length_s: N<T>, last: &mut Self, now: &mut Self) {
+        let mean_slope = (now.value - last.value) / length_s;
+        last.curvature = (6.0 * mean_slope - (4.0 * last.slope + 2.0 * now.slope)) / length_s;
+        now.curvature = (2.0 * last.slope + 4.0 * now.slope - 6.0 * mean_slope) / length_s;
+    }
+
     /// The output between two samples, at a `share` (0 to 1) of the step of `length_s` from one to
     /// the other: that of the polynomial of degree 5 which meets both.
     #[inline(always)]

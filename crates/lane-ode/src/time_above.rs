@@ -65,6 +65,15 @@ impl<T: Lane> TimeAbove<T> {
         self.time_s += N(T::select(counts, (share * length_s).v().0, zero.0));
         self.last = *sample;
     }
+
+    /// As [`TimeAbove::advance`], for an output whose curvature is not known: then a step is the
+    /// cubic through values and slopes.
+    #[inline(always)]
+    pub fn advance_by_slopes(&mut self, length_s: N<T>, sample: &Sample<T>, counts: T::Mask) {
+        let mut sample = *sample;
+        Sample::curve_as_cubic(length_s, &mut self.last, &mut sample);
+        self.advance(length_s, &sample, counts);
+    }
 }
 
 /// Which part of the step the polynomial is above zero.

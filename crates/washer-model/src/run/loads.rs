@@ -11,7 +11,7 @@ use crate::machine::feet::{FEET, LOAD};
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::Tilt;
 use crate::point::Point;
-use lane_ode::{Dual, Lane, N, Peaks, Sample};
+use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
 
 /// Least values are found as greatest distances below this (N), farther than any load.
 const FAR_N: f64 = 1_048_576.0;
@@ -164,9 +164,8 @@ impl<T: Lane> Laws<T> {
 /// What has been seen of one stop.
 struct SeenStop<T> {
     push: Peaks<T, 1>,
-    contact_s: N<T>,
-    /// Depth where the next step begins (m).
-    depth: N<T>,
+    /// Time with a depth above zero.
+    contact: TimeAbove<T>,
 }
 
 /// The loads so far, over lanes.
@@ -204,7 +203,7 @@ impl<T: Lane> Loads<T> {
         };
         let mut stops = Vec::with_capacity(number);
         for _ in 0..number {
-            stops.push(SeenStop { push: Peaks::new(zero), contact_s: zero, depth: zero });
+            stops.push(SeenStop { push: Peaks::new(zero), contact: TimeAbove::new(zero) });
         }
         let mut loads = Self {
             laws,
@@ -230,7 +229,7 @@ impl<T: Lane> Loads<T> {
         self.below.reset(lane);
         for stop in &mut self.stops {
             stop.push.reset(lane);
-            stop.contact_s.0.set(lane, 0.0);
+            stop.contact.reset(lane);
         }
         if let Some(feet) = &point.feet {
             self.feet = feet.count;
@@ -259,7 +258,7 @@ impl<T: Lane> Loads<T> {
     pub(crate) fn stops(&self, lane: usize) -> Vec<StopLoad> {
         let of_stop = |stop: &SeenStop<T>| {
             let [push_n] = stop.push.lane(lane);
-            StopLoad { push_n, contact_s: stop.contact_s.0.get(lane) }
+            StopLoad { push_n, contact_s: stop.contact.lane(lane) }
         };
         self.stops.iter().map(of_stop).collect()
     }
@@ -328,7 +327,7 @@ impl<T: Lane> Loads<T> {
                 }
                 Laws::Linear { stops, .. } => [stops[k][0].at(tub), stops[k][1].at(tub)],
             };
-            self.see_stop(k, step_s, N(depth.0.value), &sample(push), counts);
+            self.see_stop(k, step_s, &sample(depth), &sample(push), counts);
         }
     }
 
@@ -357,7 +356,7 @@ impl<T: Lane> Loads<T> {
         &mut self,
         k: usize,
         step_s: Option<N<T>>,
-        depth: N<T>,
+        depth: &Sample<T>,
         push: &Sample<T>,
         counts: T::Mask,
     ) {
@@ -365,13 +364,13 @@ impl<T: Lane> Loads<T> {
         match step_s {
             Some(step_s) => {
                 stop.push.advance_by_slopes(step_s, &[*push], counts);
-                let share = share_above(stop.depth, depth);
-                let zero = depth.lit(0.0);
-                stop.contact_s += N(T::select(counts, (share * step_s).v().0, zero.0));
+                stop.contact.advance_by_slopes(step_s, depth, counts);
             }
-            None => stop.push.begin(&[*push], counts),
+            None => {
+                stop.push.begin(&[*push], counts);
+                stop.contact.begin(depth);
+            }
         }
-        stop.depth = depth;
     }
 }
 
@@ -380,15 +379,4 @@ impl<T: Lane> Loads<T> {
 fn sample<T: Lane>(dual: N<Dual<T>>) -> Sample<T> {
     let (value, slope) = (N(dual.0.value), N(dual.0.slope));
     Sample { value, slope, curvature: value.lit(0.0) }
-}
-
-/// The part of a straight line's way from `a` to `b` that is above zero.
-#[inline(always)]
-fn share_above<T: Lane>(a: N<T>, b: N<T>) -> N<T> {
-    let (zero, one) = (a.lit(0.0), a.lit(1.0));
-    let higher = N(a.0.larger(b.0).larger(zero.0));
-    let depth = N((-a).0.larger((-b).0));
-    // Never 0: both are compared with the smallest of numbers.
-    let whole = N((a.abs() + b.abs()).0.larger(a.lit(f64::MIN_POSITIVE).0));
-    depth.where_less(zero, one, higher / whole)
 }
