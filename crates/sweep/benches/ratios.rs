@@ -156,8 +156,8 @@ fn methods(rounds: usize) -> f64 {
         }
     }
     println!(
-        "One core, {}, the {} points of Fig. 12, each trajectory once; what a run adds (runs that \
-         are compared, rows that climb) is below:\n",
+        "One core, {}, the {} points of Fig. 12, each trajectory once; what a run adds (runs\n\
+         that are compared, rows that climb) is below:\n",
         Simd::best().name(),
         points.len()
     );
