@@ -52,7 +52,7 @@ mod tests {
         assert_eq!(of.error_left(1e-6, 1e-6), 1e-6);
         // Eight and a half times what is expected: a row that was off by 2.2e-4.
         assert!(of.error_left(8.5e-5, 1.3e-5) > 2.2e-4);
-        assert_eq!(of.error_left(8.5e-5, 0.0), 8.5e-6);
+        assert_eq!(of.error_left(8.5e-5, 0.0), 0.1 * 8.5e-5);
         assert_eq!(of.error_left(0.2, 0.0), 0.2);
     }
 
