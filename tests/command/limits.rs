@@ -144,6 +144,23 @@ fn little_address_space_is_told() {
 }
 
 #[test]
+fn little_address_space_for_a_large_trace_is_told() {
+    let program = fs::metadata(env!("CARGO_BIN_EXE_sweep")).expect("the program is built").len();
+    let large = ["--states", "--forces", "--every", "5e-6"];
+    let words = [TRACE, large.as_slice()].concat();
+    let mut made = 0;
+    for megabytes in (30..300).step_by(15) {
+        let home = fresh_home();
+        let kilobytes = program / 1000 + megabytes * 1000;
+        let limit = format!("ulimit -v {kilobytes}; exec \"$@\"");
+        let run = under(&home, &["sh", "-c", &limit, "sh"], &words);
+        assert_told(&run, &format!("{megabytes} MB"));
+        made += u32::from(run.status.success());
+    }
+    assert!((1..18).contains(&made), "{made} of 18");
+}
+
+#[test]
 fn more_cores_than_there_can_be_are_refused_at_once() {
     let home = fresh_home();
     for words in [RUN, BOUNDARY, &["check", "g.toml"]] {

@@ -12,6 +12,10 @@ const BASE_BYTES: usize = 32 * MIB;
 /// A thread's stack, with its guard and the stack of its signal handler.
 const THREAD_BYTES: usize = 2 * MIB + MIB / 4;
 
+/// What the allocator may set aside for a thread's heap, and once more while it aligns one: glibc's
+/// sizes. A thread whose heap has no room takes from the others', which can then be too small.
+const HEAP_BYTES: usize = 64 * MIB;
+
 /// The system does not give the memory that a command needs.
 #[derive(Debug, thiserror::Error)]
 #[error(
@@ -37,6 +41,23 @@ pub fn ensure_memory() -> Result<(), NoMemory> {
 /// [`NoMemory`].
 pub(crate) fn ensure_memory_for(threads: usize) -> Result<(), NoMemory> {
     ensure(BASE_BYTES + threads * THREAD_BYTES)
+}
+
+/// Makes sure of the address space for results of so many bytes, which are in memory whole.
+///
+/// # Errors
+/// [`NoMemory`].
+pub(crate) fn ensure_memory_of(bytes: usize) -> Result<(), NoMemory> {
+    ensure((BASE_BYTES / 2).saturating_add(bytes))
+}
+
+/// The same, with so many threads that all take part in making them.
+///
+/// # Errors
+/// [`NoMemory`].
+pub(crate) fn ensure_heaps(threads: usize, bytes: usize) -> Result<(), NoMemory> {
+    let heaps = threads * (THREAD_BYTES + HEAP_BYTES) + HEAP_BYTES;
+    ensure_memory_of(heaps.saturating_add(bytes))
 }
 
 /// Reserves as many bytes, and returns them untouched.

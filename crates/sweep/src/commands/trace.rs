@@ -10,11 +10,14 @@ use super::run::line;
 use crate::config;
 use crate::engine::ModelEngine;
 use crate::exit::{Error, Exit, tell};
+use crate::memory::{ensure_heaps, ensure_memory_of};
 use crate::outcome::Trajectory;
 use crate::plan::Plan;
 use crate::store::Job;
 use crate::threads;
-use crate::trace::{Extras, StartValue, View, every, start_of, start_value, trace};
+use crate::trace::{
+    Extras, StartValue, View, bytes, every, instants, start_of, start_value, trace,
+};
 use crate::verdict::Verdict;
 use sweep_files::{FileKind, Output, key};
 use sweep_results::{Cell, Order, ResultTable, top};
@@ -91,10 +94,13 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let view = View { every_s, start, extras, quick: None };
     // A signal ends the process: there is nothing to keep.
     let work = || trace(&plan, plan.scenario(0), at, &view, &|| false);
+    let bytes = bytes(instants(&plan, every_s), extras);
+    ensure_memory_of(bytes)?;
     // A thread for each model, where there may be two; they write the same bytes as one.
-    let trace = match threads::pool(2) {
-        Ok(pool) => pool.install(work)?,
-        Err(_) => work()?,
+    let pool = ensure_heaps(2, bytes).ok().and_then(|()| threads::pool(2).ok());
+    let trace = match pool {
+        Some(pool) => pool.install(work)?,
+        None => work()?,
     };
     trace.failures.iter().for_each(|failure| tell(failure));
     let instants = trace.instants;
