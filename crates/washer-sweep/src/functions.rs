@@ -9,9 +9,9 @@ use sweep::{Effort, ProgressMode};
 
 use crate::ended;
 use crate::errors;
+use crate::mappings::assignments;
 use crate::plan::PyPlan;
 use crate::result::PyResultTable;
-use crate::toml::assignments;
 use crate::work::{abandonable, attended};
 
 /// Natural frequencies over spin speed.

@@ -9,9 +9,9 @@ mod columns;
 mod ended;
 mod errors;
 mod functions;
+mod mappings;
 mod plan;
 mod result;
-mod toml;
 mod work;
 
 use pyo3::pymodule;

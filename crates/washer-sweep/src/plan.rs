@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
 use sweep::{BoundaryOptions, Effort, Evaluator, GridInput, TraceOptions};
 
+use crate::mappings::{self, assignments};
 use crate::result::PyResultTable;
-use crate::toml::{assignments, toml};
 use crate::work::{abandonable, attended};
 use crate::{columns, ended, errors};
 
@@ -36,7 +36,7 @@ impl PyPlan {
     #[pyo3(signature = (grid, *, set=None))]
     fn new(grid: &Bound<'_, PyMapping>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
         let py = grid.py();
-        let text = toml(grid)?;
+        let text = mappings::text(grid)?;
         Self::load(py, GridInput::text(UNNAMED, text, assignments(set)?))
     }
 

@@ -1,0 +1,65 @@
+//! Mappings of Python's as the words that the engine reads: the text of a grid file, and
+//! `NAME=VALUE`.
+
+use std::path::PathBuf;
+
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyMapping, PyString};
+use toml::{Table, Value};
+
+/// `NAME=VALUE` of each entry; numbers in the shortest form that reads back to the same bits.
+pub(crate) fn assignments(values: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<String>> {
+    let one = |entry: Bound<'_, PyAny>| {
+        let (name, value): (String, Bound<'_, PyAny>) = entry.extract()?;
+        let value: f64 = value.extract().map_err(|_| {
+            let found = value.get_type().name().map(|name| name.to_string()).unwrap_or_default();
+            PyTypeError::new_err(format!("`{name}`: expected a number, got `{found}`"))
+        })?;
+        Ok(format!("{name}={value:?}"))
+    };
+    values.map_or_else(|| Ok(Vec::new()), |values| values.items()?.iter().map(one).collect())
+}
+
+/// A dictionary as the text of a grid file.
+pub(crate) fn text(grid: &Bound<'_, PyMapping>) -> PyResult<String> {
+    Ok(table(grid)?.to_string())
+}
+
+fn table(entries: &Bound<'_, PyMapping>) -> PyResult<Table> {
+    let one = |entry: Bound<'_, PyAny>| {
+        let (key, value): (String, Bound<'_, PyAny>) = entry.extract()?;
+        let value = toml(&key, &value)?;
+        Ok((key, value))
+    };
+    entries.items()?.iter().map(one).collect()
+}
+
+fn toml(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    if let Ok(text) = value.cast::<PyString>() {
+        return Ok(Value::String(text.to_string()));
+    }
+    if let Ok(flag) = value.extract::<bool>() {
+        return Ok(Value::Boolean(flag));
+    }
+    if let Ok(entries) = value.cast::<PyMapping>() {
+        return Ok(Value::Table(table(entries)?));
+    }
+    // Before numbers: an array of NumPy's with one value passes for a number.
+    if let Ok(entries) = value.try_iter() {
+        let entries = entries.map(|entry| toml(key, &entry?));
+        return Ok(Value::Array(entries.collect::<PyResult<_>>()?));
+    }
+    if let Ok(number) = value.extract::<i64>() {
+        return Ok(Value::Integer(number));
+    }
+    // `nan` and `inf` too, which are then refused at their place.
+    if let Ok(number) = value.extract::<f64>() {
+        return Ok(Value::Float(number));
+    }
+    if let Ok(path) = value.extract::<PathBuf>() {
+        return Ok(Value::String(path.display().to_string()));
+    }
+    let found = value.get_type().name().map(|name| name.to_string()).unwrap_or_default();
+    Err(PyTypeError::new_err(format!("`{key}`: a grid holds no `{found}`")))
+}
