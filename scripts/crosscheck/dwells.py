@@ -21,7 +21,8 @@ import tomllib
 import exudyn
 import numpy as np
 import pyarrow.parquet as pq
-from against_exudyn import ROOT, RPM, Washer, grid, ours
+from against_exudyn import ROOT, grid, ours
+from exudyn_washer import RPM, Washer
 
 # Speed (rpm) and length of the dwell (s).
 DWELLS = [(250.0, 9.6), (305.0, 12.0)]
