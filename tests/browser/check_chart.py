@@ -10,10 +10,9 @@ wrong.
 import argparse
 import bisect
 import itertools
-import sys
 
 import pyarrow.parquet as pq
-from check_page import CTRL, Page, Wrong, check, number_in, same, stands_alone
+from check_page import CTRL, Page, check, number_in, same, stands_alone
 from selenium.webdriver.common.by import By
 
 # Channels, their names on the page, and the unit in which it shows them, as parts of the file's.
@@ -203,26 +202,16 @@ def main():
     arguments = parser.parse_args()
     rows = pq.read_table(arguments.trace).to_pydict()
     page = Chart(arguments.page, arguments.screenshots)
-    try:
-        for name, run in [
-            ("alone", lambda: stands_alone(page)),
-            ("hover", lambda: hovering_shows_the_file(page, rows)),
-            ("in sight", lambda: values_are_in_sight(page)),
-            ("legend", lambda: marks_are_explained(page)),
-            ("names", lambda: boxes_are_named_as_axes(page)),
-            ("wheel", lambda: the_wheel_scrolls(page)),
-            ("switch", lambda: switches_and_zoom_redraw(page)),
-            ("widths", lambda: narrow_and_dark(page)),
-        ]:
-            result = run()
-            page.quiet(name)
-            page.shot(f"chart-{name}")
-            print(f"{name:10} {result}")
-    except Wrong as wrong:
-        page.shot("wrong")
-        sys.exit(f"{arguments.page}: {wrong}")
-    finally:
-        page.close()
+    page.run([
+        ("alone", lambda: stands_alone(page)),
+        ("hover", lambda: hovering_shows_the_file(page, rows)),
+        ("in sight", lambda: values_are_in_sight(page)),
+        ("legend", lambda: marks_are_explained(page)),
+        ("names", lambda: boxes_are_named_as_axes(page)),
+        ("wheel", lambda: the_wheel_scrolls(page)),
+        ("switch", lambda: switches_and_zoom_redraw(page)),
+        ("widths", lambda: narrow_and_dark(page)),
+    ])
 
 
 if __name__ == "__main__":

@@ -8,10 +8,9 @@ that is wrong.
 """
 
 import argparse
-import sys
 
 import pyarrow.parquet as pq
-from check_page import Page, Wrong, check, number_in, same, stands_alone
+from check_page import Page, check, number_in, same, stands_alone
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
@@ -110,22 +109,12 @@ def main():
     arguments = parser.parse_args()
     rows = pq.read_table(arguments.design).to_pydict()
     page = Design(arguments.page, arguments.screenshots)
-    try:
-        for name, run in [
-            ("alone", lambda: stands_alone(page)),
-            ("hover", lambda: hovering_shows_the_file(page, rows)),
-            ("keys", lambda: keys_go_from_point_to_point(page, rows)),
-            ("counts", lambda: counts_are_the_files(page, rows)),
-        ]:
-            result = run()
-            page.quiet(name)
-            page.shot(f"design-{name}")
-            print(f"{name:10} {result}")
-    except Wrong as wrong:
-        page.shot("wrong")
-        sys.exit(f"{arguments.page}: {wrong}")
-    finally:
-        page.close()
+    page.run([
+        ("alone", lambda: stands_alone(page)),
+        ("hover", lambda: hovering_shows_the_file(page, rows)),
+        ("keys", lambda: keys_go_from_point_to_point(page, rows)),
+        ("counts", lambda: counts_are_the_files(page, rows)),
+    ])
 
 
 if __name__ == "__main__":

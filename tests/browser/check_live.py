@@ -10,11 +10,10 @@ import argparse
 import base64
 import json
 import math
-import sys
 import time
 
 import pyarrow.parquet as pq
-from check_page import Map, Page, Wrong, check, number_in, stands_alone
+from check_page import Map, Page, check, number_in, stands_alone
 from selenium.webdriver.common.by import By
 
 # Of a peak, at reliable points: WebAssembly has no fused multiply-add.
@@ -232,6 +231,18 @@ def further_parameters(page):
     return f"{', '.join(names)}: checked at {names[0]} {slider['to']}"
 
 
+def narrow_and_dark(page):
+    """Nothing is wider than the window."""
+    for width, scheme in ((400, "light"), (400, "dark"), (1400, "dark"), (1400, "light")):
+        page.window(width, scheme)
+        wide = page.driver.execute_script("return document.documentElement.scrollWidth")
+        check(wide <= width, f"at {width} px the page is {wide} px wide")
+        page.driver.execute_script("document.getElementById('live').scrollIntoView()")
+        page.frame()
+        page.shot(f"live-{width}-{scheme}")
+    return "400 and 1400 px, light and dark"
+
+
 def main():
     """Run every check on one page."""
     parser = argparse.ArgumentParser(
@@ -247,33 +258,18 @@ def main():
     at = json.loads(metadata[b"sweep.trace"])["at"]
     page = Live(arguments.page, arguments.screenshots)
     page.driver.set_script_timeout(LONGEST_CHECK_S)
-    try:
-        for name, run in [
-            ("opens", lambda: opens(page)),
-            ("rows", lambda: checked_points_are_rows(page, data)),
-            ("preview", lambda: previews_say_so(page, data)),
-            ("curves", lambda: curves_are_the_traces(page, arguments.trace, at)),
-            ("drag", lambda: stays_responsive(page, data)),
-            ("keys", lambda: keys_alone(page)),
-            ("further", lambda: further_parameters(page)),
-            ("refine", lambda: map_is_refined(page)),
-            ("alone", lambda: stands_alone(page)),
-        ]:
-            result = run()
-            page.quiet(name)
-            print(f"{name:10} {result}")
-        for width, scheme in ((400, "light"), (400, "dark"), (1400, "dark"), (1400, "light")):
-            page.window(width, scheme)
-            wide = page.driver.execute_script("return document.documentElement.scrollWidth")
-            check(wide <= width, f"at {width} px the page is {wide} px wide")
-            page.driver.execute_script("document.getElementById('live').scrollIntoView()")
-            page.frame()
-            page.shot(f"live-{width}-{scheme}")
-    except Wrong as wrong:
-        page.shot("wrong")
-        sys.exit(f"{arguments.page}: {wrong}")
-    finally:
-        page.close()
+    page.run([
+        ("opens", lambda: opens(page)),
+        ("rows", lambda: checked_points_are_rows(page, data)),
+        ("preview", lambda: previews_say_so(page, data)),
+        ("curves", lambda: curves_are_the_traces(page, arguments.trace, at)),
+        ("drag", lambda: stays_responsive(page, data)),
+        ("keys", lambda: keys_alone(page)),
+        ("further", lambda: further_parameters(page)),
+        ("refine", lambda: map_is_refined(page)),
+        ("alone", lambda: stands_alone(page)),
+        ("widths", lambda: narrow_and_dark(page)),
+    ])
 
 
 if __name__ == "__main__":

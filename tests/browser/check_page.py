@@ -100,9 +100,24 @@ class Page:
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         service = Service(shutil.which("chromedriver"))
         self.driver = webdriver.Chrome(options=options, service=service)
-        self.screenshots = screenshots
+        self.path, self.screenshots = path, screenshots
         self.driver.get(pathlib.Path(path).resolve().as_uri())
         self.wait(self.drawn, "the figure was never drawn")
+
+    def run(self, checks):
+        """Run checks, each a name and a function, and print what it returns; end with exit code 1
+        at the first that is wrong. Then end the browser."""
+        try:
+            for name, holds in checks:
+                result = holds()
+                self.quiet(name)
+                self.shot(f"{type(self).__name__.lower()}-{name}")
+                print(f"{name:10} {result}")
+        except Wrong as wrong:
+            self.shot("wrong")
+            sys.exit(f"{self.path}: {wrong}")
+        finally:
+            self.close()
 
     def close(self):
         """End the browser."""
@@ -469,28 +484,18 @@ def main():
     data = Map(arguments.map)
     started = time.monotonic()
     page = Page(arguments.page, arguments.screenshots)
-    try:
-        carried = page.data()
-        log = [axis["log"] for axis in carried["axes"]]
-        for name, run in [
-            ("alone", lambda: stands_alone(page)),
-            ("hover", lambda: hovering_shows_the_file(page, data, log, "as opened")),
-            ("switch", lambda: switches_redraw(page, data, log)),
-            ("zoom", lambda: zoom_moves_and_returns(page, data, log)),
-            ("keys", lambda: keys_do_all_of_it(page, data)),
-            ("histories", lambda: clicking_shows_histories(page, data, log)),
-            ("report", lambda: report_and_downloads(page, data)),
-            ("widths", lambda: widths_and_schemes(page)),
-            ("speed", lambda: redraw_time(page)),
-        ]:
-            result = run()
-            page.quiet(name)
-            print(f"{name:10} {result}")
-    except Wrong as wrong:
-        page.shot("wrong")
-        sys.exit(f"{arguments.page}: {wrong}")
-    finally:
-        page.close()
+    log = [axis["log"] for axis in page.data()["axes"]]
+    page.run([
+        ("alone", lambda: stands_alone(page)),
+        ("hover", lambda: hovering_shows_the_file(page, data, log, "as opened")),
+        ("switch", lambda: switches_redraw(page, data, log)),
+        ("zoom", lambda: zoom_moves_and_returns(page, data, log)),
+        ("keys", lambda: keys_do_all_of_it(page, data)),
+        ("histories", lambda: clicking_shows_histories(page, data, log)),
+        ("report", lambda: report_and_downloads(page, data)),
+        ("widths", lambda: widths_and_schemes(page)),
+        ("speed", lambda: redraw_time(page)),
+    ])
     print(f"{len(data.rows)} points checked in {time.monotonic() - started:.0f} s")
 
 

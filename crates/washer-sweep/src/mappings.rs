@@ -13,8 +13,7 @@ pub(crate) fn assignments(values: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec
     let one = |entry: Bound<'_, PyAny>| {
         let (name, value): (String, Bound<'_, PyAny>) = entry.extract()?;
         let value: f64 = value.extract().map_err(|_| {
-            let found = value.get_type().name().map(|name| name.to_string()).unwrap_or_default();
-            PyTypeError::new_err(format!("`{name}`: expected a number, got `{found}`"))
+            PyTypeError::new_err(format!("`{name}`: expected a number, got `{}`", type_of(&value)))
         })?;
         Ok(format!("{name}={value:?}"))
     };
@@ -28,7 +27,10 @@ pub(crate) fn text(grid: &Bound<'_, PyMapping>) -> PyResult<String> {
 
 fn table(entries: &Bound<'_, PyMapping>) -> PyResult<Table> {
     let one = |entry: Bound<'_, PyAny>| {
-        let (key, value): (String, Bound<'_, PyAny>) = entry.extract()?;
+        let (key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>) = entry.extract()?;
+        let key: String = key.extract().map_err(|_| {
+            PyTypeError::new_err(format!("a grid's keys are text, not `{}`", type_of(&key)))
+        })?;
         let value = toml(&key, &value)?;
         Ok((key, value))
     };
@@ -60,6 +62,9 @@ fn toml(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Ok(path) = value.extract::<PathBuf>() {
         return Ok(Value::String(path.display().to_string()));
     }
-    let found = value.get_type().name().map(|name| name.to_string()).unwrap_or_default();
-    Err(PyTypeError::new_err(format!("`{key}`: a grid holds no `{found}`")))
+    Err(PyTypeError::new_err(format!("`{key}`: a grid holds no `{}`", type_of(value))))
+}
+
+fn type_of(value: &Bound<'_, PyAny>) -> String {
+    value.get_type().name().map(|name| name.to_string()).unwrap_or_default()
 }
