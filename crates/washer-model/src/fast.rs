@@ -118,8 +118,8 @@ struct Case<'a> {
     fastest_at_rest_rad_per_s: f64,
     /// Fastest of all modes, at rest and turning.
     fastest_rad_per_s: f64,
-    /// The hinge is stiff enough.
-    may_be_capped: bool,
+    /// Frequency of the hinge at rest over the greatest speed of the drum.
+    hinge_to_drum: f64,
     /// The drum at the greatest speed of each gear.
     turning: [State; GEARS],
     rest: State,
@@ -173,7 +173,7 @@ impl<'a> Case<'a> {
                 followed
             },
             fastest_at_rest_rad_per_s: at_rest,
-            may_be_capped: hinge >= HINGE_TO_DRUM * top,
+            hinge_to_drum: hinge / top,
             fastest_rad_per_s: highest_with_caps(point, 0.0, None)?
                 .max(highest_with_caps(point, top, None)?),
             turning: [first?, second?, third?],
@@ -323,6 +323,16 @@ impl<'a> Cases<'a> {
         self.cases.iter().flatten().any(|case| case.point.machine.elements.are_nonsmooth())
     }
 
+    /// The least frequency of a hinge over the greatest speed of its drum; infinite if there is no
+    /// machine with modes.
+    ///
+    /// Where a multiple of the drum's speed passes a whirl of the hinge, the hinge is left
+    /// ringing, hardly damped. Runs with caps have the ringing, but soon not its phase.
+    #[must_use]
+    pub fn hinge_to_drum(&self) -> f64 {
+        self.cases.iter().flatten().map(|case| case.hinge_to_drum).fold(f64::INFINITY, f64::min)
+    }
+
     /// Whether closed stops or stiffened springs make the tub swing faster (rad/s, given back) than
     /// anything else that the method has to follow.
     #[must_use]
@@ -387,7 +397,7 @@ impl<'a> Cases<'a> {
     ) -> Result<Option<(Search<'_, 'a>, Trial)>, NoModes> {
         let cases = self.with_modes()?;
         let Some(plain_step_s) = self.plain_step_s() else { return Ok(None) };
-        if !cases.iter().all(|case| case.may_be_capped) {
+        if self.hinge_to_drum() < HINGE_TO_DRUM {
             return Ok(None);
         }
         let most_evaluations_per_s = Formula::Rk4.evaluations_per_s(plain_step_s);

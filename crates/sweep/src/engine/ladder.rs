@@ -80,6 +80,18 @@ const OWN_ERROR_OF_RK4: f64 = 3e-4;
 /// believed below this.
 const LEAST_EXPECTED_SHARE: f64 = 5e-3;
 
+/// Harmonics of the drum's speed up to this one are kept below the hinge's whirl at any accuracy
+/// down to [`HARMONIC_OF_ACCURACY`]: of the third, whirls can grow.
+const LEAST_HARMONIC: f64 = 3.0;
+
+/// Each further harmonic leaves the hinge ringing less, by a factor of some ten. With heavy
+/// unbalances the fourth was seen to ring by 2.4e-3 of the drum's motion, the fifth by 3.3e-4, and
+/// the sixth by less than 3e-5. The accuracy down to which the fourth does not matter.
+const HARMONIC_OF_ACCURACY: f64 = 1e-2;
+
+/// How far the whirl is kept above the last harmonic that matters.
+const CLEAR_OF_HARMONIC: f64 = 16.0 / 15.0;
+
 /// Steps of RK4 where forces have corners, as shares of the reference's. With friction of 90 N that
 /// turns within 3 mm/s, amplitudes err by up to 7e-3 at the first, 5e-4 and 1e-4 at the others.
 const STEPS_AT_CORNERS: [f64; 3] = [1.0, 0.5, SHORTEST_AT_CORNERS];
@@ -164,7 +176,7 @@ impl Ladder {
             return Self { rungs, is_checked: true, held_back: Some(AT_CORNERS.to_owned()) };
         }
         let mut rungs = capped(cases, model, accuracy);
-        let held_back = if rungs.is_empty() { too_fast(cases) } else { None };
+        let held_back = if rungs.is_empty() { too_fast(cases, model, accuracy) } else { None };
         let mut longer = plain(LONGER_STEP * reference_step_s, 1.0, FIRST_ORDER_OF_RK4);
         if !rungs.is_empty() {
             longer.convergence.contraction = CONTRACTION_TO_RK4;
@@ -191,8 +203,15 @@ impl Ladder {
 const AT_CORNERS: &str =
     "rk4 alone, because friction and stops give forces corners, which longer steps miss";
 
-/// Why elements keep a machine from the quick rungs, if they do.
-fn too_fast(cases: &Cases<'_>) -> Option<String> {
+/// Why elements or the drum's speed keep a machine from the quick rungs, if they do.
+fn too_fast(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Option<String> {
+    let (has, needs) = (cases.hinge_to_drum(), least_hinge_to_drum(accuracy));
+    if model == ModelKind::Nonlinear && has < needs {
+        return Some(format!(
+            "rk4 alone, because the hinge is only {has:.2} times as fast as the drum; this accuracy \
+             needs {needs:.2}"
+        ));
+    }
     let fastest = cases.stiffened_rad_per_s()?;
     Some(format!(
         "rk4 alone, because stiffened springs and bushings can swing the tub at {fastest:.0} \
@@ -207,6 +226,10 @@ fn too_fast(cases: &Cases<'_>) -> Option<String> {
 /// alone, it is what the rule expects. Corners without an equilibrium or without modes are rows
 /// that say so; the rest climbs by plain RK4.
 fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
+    // The linear model has no harmonics beyond the second.
+    if model == ModelKind::Nonlinear && cases.hinge_to_drum() < least_hinge_to_drum(accuracy) {
+        return Vec::new();
+    }
     let mut chosen: Vec<(Level, Geared)> = Vec::new();
     for (level, aim) in [Level::Fast, Level::Fast, Level::Fine].into_iter().zip(aims(model)) {
         // The nonlinear model has one gear after the first: what instability amplifies later is
@@ -264,6 +287,15 @@ fn expected_share(cases: &Cases<'_>, model: ModelKind, coarser: &Geared, finer: 
 /// low as the first rung's, a mode's shift is less than proportional to it.
 const fn reserve(rung: usize) -> f64 {
     if rung == 1 { 2.0 } else { 1.5 }
+}
+
+/// By how much the hinge must be faster than the drum for nonlinear runs with capped modes. Of its
+/// ringing after a harmonic of the drum's speed has passed its whirl, two of these may differ much
+/// or little, so what rings must be less than the accuracy.
+fn least_hinge_to_drum(accuracy: f64) -> f64 {
+    // The quotient of two powers of ten may come out a hair above one.
+    let further = ((HARMONIC_OF_ACCURACY / accuracy).log10() - 1e-9).ceil().max(0.0);
+    CLEAR_OF_HARMONIC * (LEAST_HARMONIC + further)
 }
 
 /// With shorter steps, and caps as high as these bear.

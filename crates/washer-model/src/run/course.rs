@@ -6,7 +6,7 @@ use crate::kind::ModelKind;
 use crate::point::Point;
 
 /// Coordinates that follow the motion of interest. The hinge's two are left out: they also ring,
-/// hardly damped, without effect on any output.
+/// hardly damped, and mostly without effect on any output.
 const FOLLOWED: usize = COORDINATES - 2;
 
 impl Point {
