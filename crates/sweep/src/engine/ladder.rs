@@ -208,8 +208,8 @@ fn too_fast(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Option<String
     let (has, needs) = (cases.hinge_to_drum(), least_hinge_to_drum(accuracy));
     if model == ModelKind::Nonlinear && has < needs {
         return Some(format!(
-            "rk4 alone, because the hinge is only {has:.2} times as fast as the drum; this accuracy \
-             needs {needs:.2}"
+            "rk4 alone, because the hinge is only {has:.2} times as fast as the drum, and this \
+             accuracy needs {needs:.2}"
         ));
     }
     let fastest = cases.stiffened_rad_per_s()?;
