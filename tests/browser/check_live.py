@@ -202,6 +202,26 @@ def keys_alone(page):
     return "arrow keys move a slider"
 
 
+def log_axes_have_log_sliders(page):
+    """Half way along a slider lies the middle of its axis: of a logarithmic one, the geometric."""
+    found = []
+    for slider in (slider for slider in page.live["sliders"] if slider["axis"]):
+        low, high = slider["from"], slider["to"]
+        middle = math.sqrt(low * high) if slider["log"] else (low + high) / 2
+        script = """const range = document.querySelector(`[data-slider="${arguments[0]}"]`);
+            range.value = (Number(range.min) + Number(range.max)) / 2;
+            range.dispatchEvent(new Event("input"));
+            const number = document.querySelector(`[data-number="${arguments[0]}"]`);
+            return [Number(number.value), range.getAttribute("aria-valuetext")];"""
+        value, said = page.driver.execute_script(script, slider["name"])
+        check(abs(value / middle - 1) < 1e-3, f"{slider['name']} half way is {value}")
+        # A linear slider says its own value.
+        check(float(said) == value if slider["log"] else said is None,
+              f"{slider['name']} says {said}")
+        found.append("logarithmic" if slider["log"] else "linear")
+    return ", ".join(found)
+
+
 def map_is_refined(page):
     """Finer cells appear on the map, and the legend says what they are."""
     page.driver.execute_script("scrollTo(0, 0)")
@@ -265,6 +285,7 @@ def main():
         ("curves", lambda: curves_are_the_traces(page, arguments.trace, at)),
         ("drag", lambda: stays_responsive(page, data)),
         ("keys", lambda: keys_alone(page)),
+        ("scales", lambda: log_axes_have_log_sliders(page)),
         ("further", lambda: further_parameters(page)),
         ("refine", lambda: map_is_refined(page)),
         ("alone", lambda: stands_alone(page)),

@@ -39,6 +39,9 @@ fi
 "$venv/bin/python" "$here/check_live.py" "$map" "$work/between.parquet" "$work/live.html" \
     ${SHOTS:+--screenshots "$SHOTS"}
 
+# The same of random machines, along an axis that is logarithmic.
+"$venv/bin/python" "$here/random_points.py" "$sweep" --maps 2
+
 # The page of a design: points by pairs of parameters, the histogram, the influences.
 cat > "$work/design.toml" << 'END'
 name = "design"

@@ -54,31 +54,37 @@ function createLive(host, data) {
 
   function createSlider(slider, k) {
     const { from, to } = slider;
+    // Along a logarithmic axis the slider goes by the logarithm, and says the value.
+    const [scaled, back] = slider.log ? [Math.log10, (x) => 10 ** x] : [(x) => x, (x) => x];
+    const bounded = (value) => Math.min(Math.max(value, from), to);
     const number = element("input", {
       type: "number", step: "any", min: from, max: to, value: slider.value,
       "aria-label": withUnit(slider.words, slider.unit), "data-number": slider.name,
       onchange: () => {
         const typed = Number(number.value);
-        set(k, Number.isFinite(typed) ? Math.min(Math.max(typed, from), to) : values[k]);
+        set(k, Number.isFinite(typed) ? bounded(typed) : values[k]);
         changed();
       },
     });
     const range = element("input", {
-      type: "range", step: "any", min: from, max: to, value: slider.value,
+      type: "range", step: "any", min: scaled(from), max: scaled(to), value: scaled(slider.value),
       "aria-label": slider.words, "data-slider": slider.name, title: slider.description,
       oninput: () => {
-        set(k, Number(Number(range.value).toPrecision(4)));
+        set(k, bounded(Number(back(Number(range.value)).toPrecision(4))));
         changed();
       },
     });
-    return { number, range, row: element("label", { title: slider.description },
+    if (slider.log) range.setAttribute("aria-valuetext", slider.value);
+    return { number, range, scaled, row: element("label", { title: slider.description },
       element("span", {}, slider.words), range, number, element("span", {}, slider.unit)) };
   }
 
   function set(k, value) {
     values[k] = value;
-    inputs[k].number.value = value;
-    inputs[k].range.value = value;
+    const { number, range, scaled } = inputs[k];
+    number.value = value;
+    range.value = scaled(value);
+    if (live.sliders[k].log) range.setAttribute("aria-valuetext", value);
   }
 
   function changed() {

@@ -36,6 +36,7 @@ pub(crate) fn json(live: &Live, axes: &[GridAxis]) -> Value {
 }
 
 fn slider(slider: &Slider, axes: &[GridAxis]) -> Value {
+    let axis = axes.iter().find(|axis| axis.name == slider.name);
     json!({
         "name": slider.name,
         "words": label::words(&slider.name),
@@ -44,6 +45,7 @@ fn slider(slider: &Slider, axes: &[GridAxis]) -> Value {
         "from": slider.from,
         "to": slider.to,
         "value": slider.value.unwrap_or(slider.from),
-        "axis": axes.iter().any(|axis| axis.name == slider.name),
+        "axis": axis.is_some(),
+        "log": axis.is_some_and(|axis| axis.log),
     })
 }
