@@ -36,6 +36,7 @@ def grid(chance):
 
     chosen = chance.sample(sorted(PARAMETERS), 3)
     constants = [f"{name} = {about(*PARAMETERS[name])!r}" for name in chosen]
+    profile = chance.choice(["ramp", "triangular", "cycloidal"])
     end_s = chance.uniform(5.0, 20.0)
     from_s = chance.uniform(0.0, 0.7) * end_s
     masses = [about(mass_kg, 1.4) for mass_kg in (0.05, 0.3, 0.8)]
@@ -43,11 +44,12 @@ def grid(chance):
     return "\n".join([
         'name = "random"',
         "[set]", *constants,
-        "[spin]", f'profile = "{chance.choice(["ramp", "triangular", "cycloidal"])}"',
+        "[spin]", f'profile = "{profile}"',
         f"peak_rpm = {about(320.0, 1.6)!r}", f"ramp_s = {chance.uniform(0.4, 1.1) * end_s!r}",
         "[time]", f"end_s = {end_s!r}", f"window_s = [{from_s!r}, {end_s!r}]",
         "[[axis]]", 'parameter = "unbalance_mass_kg"', f"values = {sorted(masses)!r}",
-        "[[axis]]", 'parameter = "damping_n_s_per_m"', f'range = {{ {dampings}, spacing = "log" }}', "",
+        "[[axis]]", 'parameter = "damping_n_s_per_m"',
+        f'range = {{ {dampings}, spacing = "log" }}', "",
     ])
 
 
