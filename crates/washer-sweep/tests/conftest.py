@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import signal
 
 import pyarrow as pa
 import pytest
@@ -10,6 +11,9 @@ from conftest_grid import SHORT
 import washer_sweep
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
+
+# Shells let a script's background jobs ignore it, and Python leaves that so.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def rows(result):
