@@ -1,32 +1,26 @@
 //! The engine: points through both models, in lanes, as far up the ladder of methods as each needs.
 
-mod climb;
 mod growth;
 mod ladder;
 mod pool;
 mod watch;
 
-pub(crate) use climb::Demand;
 pub(crate) use growth::responses;
-pub(crate) use ladder::{Ladder, Rung, reference_step_s};
+pub(crate) use ladder::reference_step_s;
 pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
 pub(crate) use watch::{Engine, Watch};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use climb::{MODELS, RungRun};
-use lane_ode::{Failure, Simd};
+use ladder::ladder;
+use lane_ode::Simd;
 use pool::{Feed, Keep, Pool, Shared};
-use washer_model::{
-    Cases, Extra, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted, prepare,
-    simulate_until,
-};
+use washer_model::{Cases, Machine, Method, Point, Spin, Timing, prepare};
+use washer_row::{Demand, Ladder, Level, MODELS, Outcome, Rule, RungRun, Status, runs};
 
 use crate::interrupt::Interrupt;
-use crate::measures::Criterion;
-use crate::method::{Level, Steps};
-use crate::outcome::{Outcome, Status, Trajectory};
+use crate::method::Steps;
 use crate::plan::{Plan, Scenario};
 
 /// Parts of a run at whose ends two runs of a trajectory are compared.
@@ -55,7 +49,7 @@ pub struct ModelEngine<'a> {
     plan: &'a Plan,
     simd: Simd,
     timing: Timing,
-    wanted: Wanted,
+    rule: Rule,
     /// Of both models; found when first asked for.
     ladders: OnceLock<[Ladder; 2]>,
     /// Held by the thread that finds them.
@@ -84,9 +78,8 @@ impl<'a> ModelEngine<'a> {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
-        let wanted = Wanted { course: is_checked, ..plan.measures.wanted() };
         let (simd, ladders) = (simd_from_environment()?, OnceLock::new());
-        Ok(Self { plan, simd, timing, wanted, ladders, finding: Mutex::new(()) })
+        Ok(Self { plan, simd, timing, rule: rule(plan), ladders, finding: Mutex::new(()) })
     }
 
     /// As [`Self::new`], with the rungs of another engine.
@@ -140,12 +133,12 @@ impl<'a> ModelEngine<'a> {
     fn find_ladders(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
         match self.plan.integrator.direct() {
             Some((level, method)) => MODELS.map(|_| Ladder::direct(level, method)),
-            None => self.checked(self.accuracy(), is_stopped),
+            None => self.checked(is_stopped),
         }
     }
 
     /// The fast method's ladders, by the corners of the grid.
-    fn checked(&self, accuracy: f64, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
+    fn checked(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
         let scenarios: Vec<_> =
             self.plan.some_corners().iter().map(|at| self.plan.scenario_at(at)).collect();
         let prepared = self.prepare(&scenarios);
@@ -153,15 +146,7 @@ impl<'a> ModelEngine<'a> {
         let ready =
             ready.filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.spin)));
         let cases = Cases::until(ready, self.plan.end_s, is_stopped);
-        MODELS.map(|model| Ladder::new(&cases, model, accuracy))
-    }
-
-    /// What amplitudes must be good for; of one method alone nothing is asked.
-    fn accuracy(&self) -> f64 {
-        match self.plan.integrator.steps() {
-            Steps::Checked(accuracy) => accuracy,
-            Steps::Fixed(_) | Steps::Explicit | Steps::Implicit => f64::INFINITY,
-        }
+        MODELS.map(|model| ladder(&cases, model, self.rule.accuracy))
     }
 
     /// One row per point given by the values of its axes, on the grid or between its points;
@@ -258,69 +243,29 @@ impl<'a> ModelEngine<'a> {
         points: &[&Point],
         watch: &Watch<'_>,
     ) -> Vec<RungRun> {
-        let together = |points: &[&Point]| self.trajectories(points, MODELS[model], method, watch);
-        let panicked = || RungRun {
-            trajectory: Trajectory::failed(Status::Panicked),
-            course: Vec::new(),
-            clash_doubt_s: None,
+        let stop = || watch.stopped();
+        let together = |points: &[&Point]| {
+            runs(self.simd, MODELS[model], method, points, &self.rule, &stop).unwrap_or_default()
         };
+        let panicked = || RungRun::failed(Status::Panicked);
         together_or_alone(points, together, panicked)
     }
+}
 
-    fn trajectories(
-        &self,
-        points: &[&Point],
-        model: ModelKind,
-        method: &Method,
-        watch: &Watch<'_>,
-    ) -> Vec<RungRun> {
-        let stop = || watch.stopped();
-        let found = simulate_until(self.simd, model, method, points, self.wanted, &stop);
-        let (records, extras) = found.unwrap_or_default();
-        // None at all if nothing was wanted.
-        let mut extras = extras.into_iter();
-        records
-            .iter()
-            .map(|record| {
-                let mut extra = extras.next().unwrap_or_default();
-                let course = std::mem::take(&mut extra.course);
-                let clash_doubt_s = extra.clash_doubt_s;
-                RungRun { trajectory: self.trajectory(record, extra), course, clash_doubt_s }
-            })
-            .collect()
-    }
-
-    fn trajectory(&self, record: &Record, extra: Extra) -> Trajectory {
-        let Record { failure, steps, rejected, .. } = *record;
-        if let Some((reason, time_s)) = failure {
-            let status = match reason {
-                Failure::Diverged => Status::Diverged,
-                Failure::StepTooSmall => Status::StepTooSmall,
-                Failure::StepLimit => Status::StepLimit,
-            };
-            return Trajectory {
-                fail_time_s: Some(time_s),
-                steps,
-                rejected,
-                ..Trajectory::failed(status)
-            };
-        }
-        let channels = &self.plan.reliability.channels;
-        let amplitudes = match self.plan.measures.criterion {
-            Criterion::Peak | Criterion::Envelope => record.amplitudes,
-            Criterion::Rms => extra.root_mean_squares.unwrap_or(record.amplitudes),
-        };
-        let metrics = self.plan.measures.of_model().filter_map(|number| number.of(&extra));
-        Trajectory {
-            status: Status::Ok,
-            fail_time_s: None,
-            amplitudes: channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
-            min_gap_m: Some(record.min_gap_m),
-            steps,
-            rejected,
-            metrics: metrics.collect(),
-            turns: extra.turns,
-        }
+/// What the rows of a plan take from trajectories, and what they must be good for.
+pub(crate) fn rule(plan: &Plan) -> Rule {
+    let accuracy = match plan.integrator.steps() {
+        Steps::Checked(accuracy) => accuracy,
+        // Of one method alone nothing is asked.
+        Steps::Fixed(_) | Steps::Explicit | Steps::Implicit => f64::INFINITY,
+    };
+    Rule {
+        end_s: plan.end_s,
+        window_s: plan.window_s,
+        accuracy,
+        ratio_limit: plan.reliability.ratio_limit,
+        channels: plan.reliability.channels.clone(),
+        measures: plan.measures.clone(),
     }
 }
 

@@ -4,10 +4,10 @@
 use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
+use washer_row::{Deviations, Ladder, Outcome};
 
-use crate::engine::{Engine, EngineError, Ladder, MOST_WAITING, ModelEngine, ROWS_A_THREAD};
+use crate::engine::{Engine, EngineError, MOST_WAITING, ModelEngine, ROWS_A_THREAD};
 use crate::method::Steps;
-use crate::outcome::{Deviations, Outcome};
 use crate::plan::{Plan, shortest_step_s};
 use crate::store::{Job, Shape, chunk_points};
 

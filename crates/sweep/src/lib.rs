@@ -49,11 +49,9 @@ mod identity;
 mod interrupt;
 mod library;
 mod live;
-mod measures;
 mod memory;
 mod method;
 mod nearest;
-mod outcome;
 mod plan;
 mod progress;
 mod random_keys;
@@ -64,7 +62,6 @@ mod store;
 mod table;
 mod threads;
 mod trace;
-mod verdict;
 
 pub use commands::Cli;
 pub use config::{Diagnostics, GridInput, Mistake, load};
@@ -77,14 +74,12 @@ pub use library::{
     ResultTable, TraceOptions, explain_point, find_boundary, find_modes, find_stability,
     list_parameters, run_to_file, stability_to_file, trace_point,
 };
-pub use measures::Metric;
 pub use memory::ensure_memory;
 pub use method::Integrator;
-pub use outcome::{Outcome, Status, Trajectory};
 pub use plan::Plan;
 pub use progress::ProgressMode;
 pub use run::{Ended, RunOptions, run};
 pub use store::{
     Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, State, StoreError, status,
 };
-pub use verdict::Verdict;
+pub use washer_row::{Metric, Outcome, Status, Trajectory, Verdict};

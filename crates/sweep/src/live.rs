@@ -9,12 +9,12 @@ use sweep_files::{ParquetFile, key};
 use sweep_plot::{Live, Slider};
 use washer_live::{Setup, Sliders};
 use washer_model::{Channel, ModeOverSpeed, ModelKind, Parameter, Timing, campbell, prepare};
+use washer_row::{Level, Metric};
 
 use crate::config::GridInput;
-use crate::engine::{CHECKPOINTS, Ladder, ModelEngine};
+use crate::engine::{CHECKPOINTS, ModelEngine, rule};
 use crate::exit::Error;
-use crate::measures::{Criterion, Measures};
-use crate::method::{ACCURACY, Integrator, Level, Steps};
+use crate::method::{ACCURACY, Integrator, Steps};
 use crate::plan::{Axis, AxisValues, Plan};
 
 /// Parameters that a page offers beside the axes, where the machine has them.
@@ -95,8 +95,8 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
         compared: plan.reliability.channels.iter().map(|channel| channel.index()).collect(),
         levels: Level::ALL.map(|level| level.name().to_owned()).to_vec(),
-        accuracy: setup.accuracy,
-        ratio_limit: setup.ratio_limit,
+        accuracy: setup.rule.accuracy,
+        ratio_limit: setup.rule.ratio_limit,
         rungs: words,
         version: crate::VERSION.to_owned(),
         resonances: resonances(&plan),
@@ -143,16 +143,18 @@ fn plan_of(file: &Path) -> Result<Plan, Error> {
     if json.get("design").is_some() {
         return Err(refused("the map of a grid; this one's points are a design's"));
     }
-    let criterion = json.pointer("/reliability/criterion").and_then(Value::as_str);
-    if criterion.is_some_and(|criterion| criterion != Criterion::Peak.name()) {
-        return Err(refused("a map by the criterion `peak`: a page knows no other"));
-    }
-    let mut plan = GridInput::of_plan(&file.display().to_string(), &json).load()?;
+    let plan = GridInput::of_plan(&file.display().to_string(), &json).load()?;
     if plan.axes.len() < 2 {
         return Err(refused("a map of two axes or more"));
     }
-    plan.measures = Measures::default();
-    Ok(plan)
+    Ok(without_growth(plan))
+}
+
+/// A page does not have the metric: it takes a response at each of the plan's speeds.
+fn without_growth(mut plan: Plan) -> Plan {
+    plan.measures.metrics.retain(|metric| *metric != Metric::Growth);
+    plan.growth_speeds = None;
+    plan
 }
 
 /// What checked amplitudes are good for: the map's own accuracy, or the usual one.
@@ -254,27 +256,13 @@ fn setup(plan: &Plan, sliders: &[Range]) -> Result<(Setup, [Vec<String>; 2]), Er
     let setup = Setup {
         machine: plan.machine.clone(),
         spin: plan.spin.clone(),
-        end_s: plan.end_s,
-        window_s: plan.window_s,
         checkpoints: CHECKPOINTS,
-        accuracy,
-        ratio_limit: plan.reliability.ratio_limit,
-        channels: plan.reliability.channels.clone(),
+        rule: rule(plan),
         sliders: Sliders { parameters, axes: plan.axes.len() },
-        ladders: ladders.map(|ladder| rungs(&ladder)),
-        wide_ladders: wide_ladders.map(|ladder| rungs(&ladder)),
+        ladders,
+        wide_ladders,
     };
     Ok((setup, words))
-}
-
-fn rungs(ladder: &Ladder) -> Vec<washer_live::Rung> {
-    let rung = |rung: &crate::engine::Rung| washer_live::Rung {
-        level: rung.level as u8,
-        is_capped: rung.level.is_capped(),
-        method: rung.method,
-        convergence: rung.convergence,
-    };
-    ladder.rungs.iter().map(rung).collect()
 }
 
 #[cfg(test)]

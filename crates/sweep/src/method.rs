@@ -7,6 +7,7 @@ use std::fmt;
 use lane_ode::Tolerance;
 use serde_json::{Value, json};
 use washer_model::{Method, Range};
+use washer_row::Level;
 
 /// Steps that one leg of an adaptive trajectory may take.
 const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
@@ -202,50 +203,6 @@ impl fmt::Display for Integrator {
     }
 }
 
-/// Which method a row's numbers come from, and which rung if it has several.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Level {
-    /// The lowest rung that a row may hold: bearings and hinge with capped modes.
-    Fast,
-    /// The same with less error.
-    Fine,
-    /// The same with shorter steps and higher caps.
-    Finest,
-    /// Plain RK4.
-    Rk4,
-    /// Dormand-Prince 5(4).
-    Dopri5,
-    /// Rodas5P.
-    Rodas5p,
-}
-
-impl Level {
-    /// Every level; the position is its code in chunk files, so new ones go to the end.
-    pub const ALL: [Self; 6] =
-        [Self::Fast, Self::Fine, Self::Finest, Self::Rk4, Self::Dopri5, Self::Rodas5p];
-
-    /// Whether it is a rung on which modes of bearings and hinge are capped.
-    pub(crate) const fn is_capped(self) -> bool {
-        match self {
-            Self::Fast | Self::Fine | Self::Finest => true,
-            Self::Rk4 | Self::Dopri5 | Self::Rodas5p => false,
-        }
-    }
-
-    /// As in the file.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Fast => "fast",
-            Self::Fine => "fine",
-            Self::Finest => "finest",
-            Self::Rk4 => "rk4",
-            Self::Dopri5 => "dopri5",
-            Self::Rodas5p => "rodas5p",
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -274,13 +231,6 @@ mod tests {
         for (one, other) in all().flat_map(|one| all().map(move |other| (one, other))) {
             let same = (one.range, one.default) == (other.range, other.default);
             assert!(one.key != other.key || same, "{}", one.key);
-        }
-    }
-
-    #[test]
-    fn levels_are_coded_by_their_place() {
-        for (code, level) in Level::ALL.into_iter().enumerate() {
-            assert_eq!(level as usize, code);
         }
     }
 

@@ -3,10 +3,11 @@
 
 use serde_json::Value;
 use washer_model::{Channel, Machine, Parameter, Spin, Target};
+use washer_row::Measures;
 
 use crate::design::{Design, Distribution};
-use crate::measures::Measures;
 use crate::method::Integrator;
+use crate::speeds::Speeds;
 
 /// Most steps that a trajectory may need by a method whose steps are bounded by its stability; at
 /// this many, one point takes an hour or more.
@@ -44,6 +45,8 @@ pub struct Plan {
     pub reliability: Reliability,
     /// What is measured of the motions.
     pub measures: Measures,
+    /// The constant speeds that the metric `growth` is about; `None` if it is not asked for.
+    pub growth_speeds: Option<Speeds>,
     /// What `--set` has changed, by name.
     pub set: Vec<(String, Value)>,
 }
@@ -351,6 +354,7 @@ mod tests {
             integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 },
             reliability: Reliability { ratio_limit: 2.0, channels: Channel::ALL.to_vec() },
             measures: Measures::default(),
+            growth_speeds: None,
             set: Vec::new(),
         }
     }

@@ -15,13 +15,13 @@ use std::time::{Duration, Instant};
 
 use crate::engine::{Engine, Watch};
 use crate::interrupt::Interrupt;
-use crate::outcome::Outcome;
 use crate::progress::{Progress, ProgressMode};
 use crate::store::provenance::{self, Session};
 use crate::store::read::{ResultFile, Tally};
 use crate::store::{Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, StoreError};
 use crate::threads::{self, Environment, ThreadsError};
 use sweep_files::panics;
+use washer_row::Outcome;
 
 /// How to run.
 #[derive(Clone, Copy)]

@@ -1,18 +1,23 @@
 //! The module's exports. A caller writes numbers where [`input`] says and calls a function with how
 //! many they are; what it returns is how many numbers stand at [`output`], 0 if there is no answer.
 //!
-//! Numbers are 64 bit floats. A record is `failure` (0 none, 1 diverged, 2 step too small, 3 step
-//! limit), its time (s), `steps`, the least gap (m), and the amplitude of each channel.
+//! Numbers are 64 bit floats. An answer is 1, or 0 if the point is impossible or -1 if it has no
+//! equilibrium; whether it is sensitive; a record of each model, the nonlinear one first; the ratio
+//! of each channel; the static sag (m). What is not there is NaN.
+//!
+//! A record is the rung and its level, the error left, `failure` (0 none, 1 diverged, 2 step too
+//! small, 3 step limit), its time (s), `steps`, the least gap (m), the amplitude of each channel and
+//! the map's metrics of the model.
 #![allow(unsafe_code)]
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use lane_ode::{Failure, Simd};
-use washer_model::{Channel, ModelKind, Record};
+use washer_model::{Channel, ModelKind};
+use washer_row::{Status, Trajectory};
 
-use crate::point::{NoPoint, Scenario, motion, peaks};
+use crate::point::{Answer, NoPoint, Scenario, check, motion};
 use crate::setup::Setup;
-use crate::{Climbed, check};
 
 #[derive(Default)]
 struct State {
@@ -58,42 +63,26 @@ pub extern "C" fn setup() -> usize {
     usize::from(state.setup.is_some())
 }
 
-/// Both models by the quick rung at points of so many values each. For each point: 1, 0 if it is
-/// impossible or -1 if it has no equilibrium; the two records.
+/// Both models by the quick rung at points of so many values each: an answer for each point.
 #[unsafe(no_mangle)]
 pub extern "C" fn quick(values: usize) -> usize {
     let state = &mut *state();
     let Some(setup) = &state.setup else { return 0 };
     let points: Vec<&[f64]> = state.input.chunks_exact(values.max(1)).collect();
     state.output.clear();
-    for found in peaks(setup, &points) {
-        state.output.push(code(found.as_ref().err()));
-        let empty = [None; 2];
-        for record in found.map_or(empty, |records| records.map(Some)) {
-            write_record(&mut state.output, record.as_ref());
-        }
+    for found in crate::quick(setup, &points) {
+        write_answer(&mut state.output, &found, setup);
     }
     state.output.len()
 }
 
-/// One checked point: 1, 0 or -1 as above, whether it is sensitive; for each model the rung, its
-/// level, the error left (NaN if unknown), the record.
+/// One checked point: its answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn checked() -> usize {
     let state = &mut *state();
     let Some(setup) = &state.setup else { return 0 };
     state.output.clear();
-    match check(setup, &state.input) {
-        Err(why) => state.output.push(code(Some(&why))),
-        Ok(found) => {
-            state.output.extend([1.0, f64::from(u8::from(found.is_sensitive))]);
-            for Climbed { record, rung, level, error } in found.models {
-                let error = error.unwrap_or(f64::NAN);
-                state.output.extend([rung as f64, f64::from(level), error]);
-                write_record(&mut state.output, Some(&record));
-            }
-        }
-    }
+    write_answer(&mut state.output, &check(setup, &state.input), setup);
     state.output.len()
 }
 
@@ -151,13 +140,33 @@ fn failure(failure: Option<(Failure, f64)>) -> (f64, f64) {
     }
 }
 
-fn write_record(output: &mut Vec<f64>, record: Option<&Record>) {
-    match record {
-        None => output.extend([f64::NAN; 4 + Channel::ALL.len()]),
-        Some(record) => {
-            let (failure, time_s) = failure(record.failure);
-            output.extend([failure, time_s, record.steps as f64, record.min_gap_m]);
-            output.extend(record.amplitudes);
-        }
+fn write_answer(output: &mut Vec<f64>, found: &Result<Answer, NoPoint>, setup: &Setup) {
+    let metrics = setup.rule.measures.of_model().count();
+    output.push(code(found.as_ref().err()));
+    let Ok(answer) = found else {
+        let channels = Channel::ALL.len();
+        let width = 2 + 2 * (7 + channels + metrics) + channels;
+        output.resize(output.len() + width, f64::NAN);
+        return;
+    };
+    let Answer { outcome, amplitudes, ratios, rungs, levels, errors } = answer;
+    output.push(f64::from(u8::from(outcome.sensitive == Some(true))));
+    for (model, run) in [&outcome.nonlinear, &outcome.linear].into_iter().enumerate() {
+        let error = errors[model].unwrap_or(f64::NAN);
+        output.extend([rungs[model] as f64, f64::from(levels[model] as u8), error]);
+        let Trajectory { status, fail_time_s, steps, min_gap_m, metrics: found, .. } = run;
+        let failure = match status {
+            Status::Ok => 0.0,
+            Status::Diverged => 1.0,
+            Status::StepTooSmall => 2.0,
+            _ => 3.0,
+        };
+        let or_none = |value: &Option<f64>| value.unwrap_or(f64::NAN);
+        output.extend([failure, or_none(fail_time_s), *steps as f64, or_none(min_gap_m)]);
+        output.extend(amplitudes[model]);
+        let found = found.iter().copied().chain(std::iter::repeat(f64::NAN));
+        output.extend(found.take(metrics));
     }
+    output.extend(ratios.iter().map(|ratio| ratio.unwrap_or(f64::NAN)));
+    output.push(outcome.static_sag_m.unwrap_or(f64::NAN));
 }

@@ -4,21 +4,20 @@
 //! fast method, as the program chose them for the map and for the sliders. The page's workers load
 //! this crate as a WebAssembly module, and ask for
 //!
-//! * [`peaks`]: both models at some points by one rung, which is quick and not checked;
+//! * [`quick`]: both models at some points by one rung, which is quick and not checked;
 //! * [`check`]: a point as a row of the map has it, by runs that agree;
 //! * [`motion`]: the time history of one model at a point.
 //!
 //! Numbers go in and come out as arrays of 64 bit floats; `exports.rs` says in which order. Where
-//! this crate runs natively, [`check`] gives the bits of the program's rows (tests of `sweep`); as
+//! this crate runs natively, [`check`] gives the bits of the program's rows, because both climb by
+//! the rule of `washer-row` (tests of `sweep`); as
 //! a module it rounds without fused operations (`tests/browser/check_live.py`).
 
-mod climb;
 #[cfg(target_arch = "wasm32")]
 mod exports;
 mod numbers;
 mod point;
 mod setup;
 
-pub use climb::{Checked, Climbed, check};
-pub use point::{Motion, NoPoint, Peaks, motion, peaks};
-pub use setup::{Rung, Setup, Sliders};
+pub use point::{Answer, Motion, NoPoint, check, motion, quick};
+pub use setup::{Setup, Sliders};

@@ -2,11 +2,14 @@
 
 use lane_ode::{Failure, Simd};
 use washer_model::{
-    Channel, Machine, ModelKind, Point, Record, Spin, Start, Target, Timing, Wanted, history,
-    prepare, simulate_with,
+    Channel, Machine, ModelKind, Point, Spin, Start, Target, Timing, history, prepare,
+};
+use washer_row::{
+    Climbs, Demand, Deviations, Ladder, Level, MODELS, Next, Outcome, Rule, Rung, RungRun, Status,
+    Trajectory, Verdict, runs,
 };
 
-use crate::setup::{Rung, Setup};
+use crate::setup::Setup;
 
 /// Why a point has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,8 +20,46 @@ pub enum NoPoint {
     NoEquilibrium,
 }
 
-/// What both models do at a point, the nonlinear one first.
-pub type Peaks = [Record; 2];
+/// What both models do at a point; of pairs, the nonlinear one first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answer {
+    /// The row that a map has of it; of a quick answer without what comparing runs says.
+    pub outcome: Outcome,
+    /// Amplitudes of every channel by the criterion, compared or not (m, rad).
+    pub amplitudes: [Deviations; 2],
+    /// Their ratios, as if every channel was compared.
+    pub ratios: Vec<Option<f64>>,
+    /// The rungs that the models' numbers come from, by their places on the ladders.
+    pub rungs: [usize; 2],
+    /// What the program calls these rungs.
+    pub levels: [Level; 2],
+    /// The errors left, relative; absent where nothing says so.
+    pub errors: [Option<f64>; 2],
+}
+
+impl Answer {
+    fn new(
+        outcome: Outcome,
+        amplitudes: [Deviations; 2],
+        rungs: [usize; 2],
+        ladders: &[Ladder; 2],
+        ratio_limit: f64,
+    ) -> Self {
+        let every = |of: &Trajectory, amplitudes: &Deviations| match of.status {
+            Status::Ok => Trajectory { amplitudes: amplitudes.to_vec(), ..of.clone() },
+            failed => Trajectory::failed(failed),
+        };
+        let mut compared = Outcome::new(
+            outcome.point,
+            every(&outcome.nonlinear, &amplitudes[0]),
+            every(&outcome.linear, &amplitudes[1]),
+        );
+        compared.compare_turns(&Channel::ALL);
+        let Verdict { ratios, .. } = Verdict::new(&compared, Channel::ALL.len(), ratio_limit);
+        let levels = [0, 1].map(|model| ladders[model].rungs[rungs[model]].level);
+        Self { outcome, amplitudes, ratios, rungs, levels, errors: [None; 2] }
+    }
+}
 
 /// One model's motion at even instants.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +83,9 @@ pub(crate) struct Scenario {
 impl Scenario {
     /// Missing values are the setup's.
     pub(crate) fn new(setup: &Setup, values: &[f64]) -> Result<Self, NoPoint> {
-        let Setup { machine, spin, window_s, .. } = setup.clone();
-        let mut scenario = Self { machine, spin, window_s };
+        let Setup { machine, spin, rule, .. } = setup;
+        let (machine, spin) = (machine.clone(), spin.clone());
+        let mut scenario = Self { machine, spin, window_s: rule.window_s };
         for (parameter, &value) in setup.sliders.parameters.iter().zip(values) {
             if !parameter.range().contains(value) {
                 return Err(NoPoint::Impossible);
@@ -54,7 +96,7 @@ impl Scenario {
             }
         }
         let [from_s, to_s] = scenario.window_s;
-        let window_is_sound = from_s < to_s && to_s <= setup.end_s;
+        let window_is_sound = from_s < to_s && to_s <= setup.rule.end_s;
         let violations = [scenario.machine.violations(), scenario.spin.violations()].concat();
         if !window_is_sound || !violations.is_empty() {
             return Err(NoPoint::Impossible);
@@ -63,13 +105,13 @@ impl Scenario {
     }
 
     fn timing(&self, setup: &Setup) -> Timing {
-        let Setup { end_s, checkpoints, .. } = *setup;
-        Timing { end_s, window_s: self.window_s, checkpoints }
+        let Setup { checkpoints, ref rule, .. } = *setup;
+        Timing { end_s: rule.end_s, window_s: self.window_s, checkpoints }
     }
 }
 
 /// The rungs of both models that hold at these values.
-pub(crate) fn ladders<'a>(setup: &'a Setup, values: &[f64]) -> &'a [Vec<Rung>; 2] {
+fn ladders<'a>(setup: &'a Setup, values: &[f64]) -> &'a [Ladder; 2] {
     let further = setup.sliders.parameters.iter().zip(values).skip(setup.sliders.axes);
     let has_moved = |(parameter, value): (&washer_model::Parameter, &f64)| {
         parameter.get(&setup.machine, &setup.spin) != Some(*value)
@@ -81,7 +123,7 @@ pub(crate) fn ladders<'a>(setup: &'a Setup, values: &[f64]) -> &'a [Vec<Rung>; 2
 ///
 /// # Errors
 /// [`NoPoint`].
-pub(crate) fn ready(setup: &Setup, values: &[f64]) -> Result<(Scenario, Point), NoPoint> {
+fn ready(setup: &Setup, values: &[f64]) -> Result<(Scenario, Point), NoPoint> {
     let scenario = Scenario::new(setup, values)?;
     let machines = [(scenario.machine.clone(), scenario.spin.clone())];
     let mut points = prepare(Simd::Scalar, &machines, &scenario.timing(setup));
@@ -93,9 +135,10 @@ pub(crate) fn ready(setup: &Setup, values: &[f64]) -> Result<(Scenario, Point), 
 
 /// Both models at points by the quick rung, in lanes. Nothing is compared with these runs.
 #[must_use]
-pub fn peaks(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Peaks, NoPoint>> {
+pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
     let ready: Vec<_> = points.iter().map(|values| self::ready(setup, values)).collect();
-    let mut found: Vec<Result<Peaks, NoPoint>> = Vec::with_capacity(points.len());
+    let rule = Rule { accuracy: f64::INFINITY, ..setup.rule.clone() };
+    let mut found: Vec<Result<Answer, NoPoint>> = Vec::with_capacity(points.len());
     // Runs of the same rungs go through the lanes together.
     let is_alike = |a: &usize, b: &usize| {
         core::ptr::eq(ladders(setup, points[*a]), ladders(setup, points[*b]))
@@ -103,16 +146,21 @@ pub fn peaks(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Peaks, NoPoint>> {
     let places: Vec<usize> = (0..points.len()).collect();
     for alike in places.chunk_by(is_alike) {
         let ladders = ladders(setup, points[alike[0]]);
-        let runs: Vec<&Point> =
+        let ready_ones: Vec<&Point> =
             alike.iter().filter_map(|&k| ready[k].as_ref().ok()).map(|(_, point)| point).collect();
-        let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
-            let method = quick(&ladders[model as usize]).method;
-            simulate_with(Simd::best(), model, &method, &runs, Wanted::default()).0
-        });
+        let rungs = [0, 1].map(|model| quick_rung(&ladders[model]));
+        let [nonlinear, linear] = [0, 1]
+            .map(|model| by_rung(model, &ladders[model].rungs[rungs[model]], &ready_ones, &rule));
         let mut pairs = nonlinear.into_iter().zip(linear);
         for &k in alike {
+            let answer = |(nonlinear, linear): (RungRun, RungRun)| {
+                let amplitudes = [nonlinear.amplitudes, linear.amplitudes];
+                let mut outcome = Outcome::new(0, nonlinear.trajectory, linear.trajectory);
+                outcome.compare_turns(&rule.channels);
+                Answer::new(outcome, amplitudes, rungs, ladders, rule.ratio_limit)
+            };
             found.push(match &ready[k] {
-                Ok(_) => pairs.next().map(|(a, b)| [a, b]).ok_or(NoPoint::NoEquilibrium),
+                Ok(_) => pairs.next().map(answer).ok_or(NoPoint::NoEquilibrium),
                 Err(why) => Err(*why),
             });
         }
@@ -120,13 +168,44 @@ pub fn peaks(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Peaks, NoPoint>> {
     found
 }
 
+/// A point as a row of the map has it: each model by finer and finer rungs, until two runs agree.
+///
+/// # Errors
+/// [`NoPoint`].
+pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
+    let (_, point) = ready(setup, values)?;
+    let (ladders, rule) = (ladders(setup, values), &setup.rule);
+    let mut climbs = Climbs::default();
+    let outcome = loop {
+        match climbs.next(0, &point, ladders, Demand::Row, rule) {
+            Next::Done(outcome) => break *outcome,
+            Next::Runs(wanted) => {
+                for (model, rung) in wanted {
+                    let ladder = &ladders[model];
+                    for run in by_rung(model, &ladder.rungs[rung], &[&point], rule) {
+                        climbs.take((model, rung), run, ladder, &point, rule);
+                    }
+                }
+            }
+        }
+    };
+    let last = [0, 1].map(|model| climbs.last(model));
+    let [Some(nonlinear), Some(linear)] = last else { return Err(NoPoint::NoEquilibrium) };
+    let last = [nonlinear, linear];
+    let (amplitudes, rungs) = (last.map(|(run, ..)| run.amplitudes), last.map(|(_, at, _)| at));
+    let answer = Answer::new(outcome, amplitudes, rungs, ladders, rule.ratio_limit);
+    Ok(Answer { errors: last.map(|(.., error)| error), ..answer })
+}
+
+fn by_rung(model: usize, rung: &Rung, points: &[&Point], rule: &Rule) -> Vec<RungRun> {
+    let found = runs(Simd::best(), MODELS[model], &rung.method, points, rule, &|| false);
+    found.unwrap_or_default()
+}
+
 /// The rung of quick answers: the lowest that a row may hold, because the one below only shows its
 /// error. Where there is nothing but plain RK4, its longest step.
-fn quick(rungs: &[Rung]) -> &Rung {
-    match rungs.get(1) {
-        Some(second) if second.is_capped => second,
-        _ => &rungs[0],
-    }
+fn quick_rung(ladder: &Ladder) -> usize {
+    usize::from(ladder.rungs.get(1).is_some_and(|second| second.level.is_capped()))
 }
 
 /// The motion of one model at a point by a rung of its ladder, or by the quick one, every `every_s`
@@ -142,8 +221,9 @@ pub fn motion(
     every_s: f64,
 ) -> Result<Motion, NoPoint> {
     let (_, point) = ready(setup, values)?;
-    let rungs = &ladders(setup, values)[model as usize];
-    let rung = rung.and_then(|rung| rungs.get(rung)).unwrap_or(quick(rungs));
+    let ladder = &ladders(setup, values)[model as usize];
+    let rung = rung.and_then(|rung| ladder.rungs.get(rung));
+    let rung = rung.unwrap_or(&ladder.rungs[quick_rung(ladder)]);
     let history = history(model, &rung.method, &point, &Start::default(), every_s);
     let instants = (0..history.len()).filter_map(|k| history.instant(k));
     let (channels, gaps_m) = instants.map(|instant| (instant.channels, instant.gap_m)).unzip();

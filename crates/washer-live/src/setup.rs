@@ -4,6 +4,7 @@ use washer_model::{
     BumpStop, Bushing, Cabinet, Caps, Channel, Convergence, Foot, Gear, Geared, Machine, Method,
     Parameter, Spin, Unbalance,
 };
+use washer_row::{Criterion, Ladder, Level, Measures, Metric, Rule, Rung};
 
 use crate::numbers::{Reader, Writer};
 
@@ -17,24 +18,17 @@ pub struct Setup {
     pub machine: Machine,
     /// The spin, but for what a point changes.
     pub spin: Spin,
-    /// The run is from 0 to here.
-    pub end_s: f64,
-    /// Amplitudes are taken over this closed interval, unless a point changes it.
-    pub window_s: [f64; 2],
     /// Into how many parts a run is cut, at whose ends two runs of it are compared.
     pub checkpoints: u32,
-    /// Largest error of a checked amplitude, relative.
-    pub accuracy: f64,
-    /// Ratios below it are reliable.
-    pub ratio_limit: f64,
-    /// What the verdict compares.
-    pub channels: Vec<Channel>,
+    /// What is measured, and what checked numbers must be good for.
+    pub rule: Rule,
     /// What a point gives values.
     pub sliders: Sliders,
-    /// Rungs of the nonlinear and of the linear model while only axes move; at least one of each.
-    pub ladders: [Vec<Rung>; 2],
+    /// Rungs of the nonlinear and of the linear model while only axes move. What holds the quick
+    /// ones back, in words, does not go with the numbers.
+    pub ladders: [Ladder; 2],
     /// The same while any slider may be anywhere in its range.
-    pub wide_ladders: [Vec<Rung>; 2],
+    pub wide_ladders: [Ladder; 2],
 }
 
 /// The parameters that a point gives values.
@@ -44,19 +38,6 @@ pub struct Sliders {
     pub parameters: Vec<Parameter>,
     /// How many are axes.
     pub axes: usize,
-}
-
-/// One way to integrate a model.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rung {
-    /// What the program calls it, by its place among its levels.
-    pub level: u8,
-    /// Whether modes of bearings and hinge are capped.
-    pub is_capped: bool,
-    /// RK4 or a geared formula; a page has no other.
-    pub method: Method,
-    /// What its difference from the rung before says.
-    pub convergence: Convergence,
 }
 
 impl Setup {
@@ -87,13 +68,8 @@ impl Setup {
         }
         // A spring's length without force may follow from where its ends are.
         machine.springs.iter().for_each(|spring| out.optional(spring.free_length_m));
-        out.number(self.end_s);
-        self.window_s.into_iter().for_each(|edge_s| out.number(edge_s));
         out.number(f64::from(self.checkpoints));
-        out.number(self.accuracy);
-        out.number(self.ratio_limit);
-        let channels: Vec<f64> = self.channels.iter().map(|of| of.index() as f64).collect();
-        out.counted(&channels);
+        write_rule(&mut out, &self.rule);
         let place = |slider: &Parameter| {
             let at = parameters.iter().position(|parameter| parameter == slider);
             at.map_or(f64::NAN, |at| at as f64)
@@ -101,9 +77,9 @@ impl Setup {
         let sliders: Vec<f64> = self.sliders.parameters.iter().map(place).collect();
         out.counted(&sliders);
         out.count(self.sliders.axes);
-        for rungs in self.ladders.iter().chain(&self.wide_ladders) {
-            out.count(rungs.len());
-            rungs.iter().for_each(|rung| write_rung(&mut out, rung));
+        for ladder in self.ladders.iter().chain(&self.wide_ladders) {
+            out.count(ladder.rungs.len());
+            ladder.rungs.iter().for_each(|rung| write_rung(&mut out, rung));
         }
         out.0
     }
@@ -139,40 +115,50 @@ impl Setup {
         for spring in &mut machine.springs {
             spring.free_length_m = from.optional()?;
         }
-        let end_s = from.number()?;
-        let window_s = [from.number()?, from.number()?];
         let checkpoints = u32::try_from(from.count(MOST)?).ok()?;
-        let (accuracy, ratio_limit) = (from.number()?, from.number()?);
-        let channel = |of: &f64| Channel::ALL.get(*of as usize).copied();
-        let channels = from.counted()?.iter().map(channel).collect::<Option<_>>()?;
+        let rule = read_rule(&mut from, &machine)?;
         let slider = |of: &f64| parameters.get(*of as usize).cloned();
         let sliders = from.counted()?.iter().map(slider).collect::<Option<_>>()?;
         let sliders = Sliders { parameters: sliders, axes: from.count(MOST)? };
-        let mut ladder = || -> Option<Vec<Rung>> {
-            let count = from.count(MOST).filter(|count| *count > 0)?;
-            (0..count).map(|_| read_rung(&mut from)).collect()
+        let mut ladder = || -> Option<Ladder> {
+            let count = from.count(MOST).filter(|count| *count > 1)?;
+            let rungs = (0..count).map(|_| read_rung(&mut from)).collect::<Option<_>>()?;
+            Some(Ladder::checked(rungs, None))
         };
         let ladders = [ladder()?, ladder()?];
         let wide_ladders = [ladder()?, ladder()?];
-        Some(Self {
-            machine,
-            spin,
-            end_s,
-            window_s,
-            checkpoints,
-            accuracy,
-            ratio_limit,
-            channels,
-            sliders,
-            ladders,
-            wide_ladders,
-        })
+        Some(Self { machine, spin, checkpoints, rule, sliders, ladders, wide_ladders })
     }
 }
 
+/// Stops and feet are counted with the machine.
+fn write_rule(out: &mut Writer, rule: &Rule) {
+    let Rule { end_s, window_s: [from_s, to_s], accuracy, ratio_limit, channels, measures } = rule;
+    for number in [end_s, from_s, to_s, accuracy, ratio_limit] {
+        out.number(*number);
+    }
+    let channels: Vec<f64> = channels.iter().map(|of| of.index() as f64).collect();
+    out.counted(&channels);
+    out.count(measures.criterion as usize);
+    let metrics: Vec<f64> = measures.metrics.iter().map(|of| f64::from(*of as u8)).collect();
+    out.counted(&metrics);
+}
+
+fn read_rule(from: &mut Reader<'_>, machine: &Machine) -> Option<Rule> {
+    let (end_s, window_s) = (from.number()?, [from.number()?, from.number()?]);
+    let (accuracy, ratio_limit) = (from.number()?, from.number()?);
+    let channel = |of: &f64| Channel::ALL.get(*of as usize).copied();
+    let channels = from.counted()?.iter().map(channel).collect::<Option<_>>()?;
+    let criterion = *Criterion::ALL.get(from.count(MOST)?)?;
+    let metric = |of: &f64| Metric::ALL.get(*of as usize).copied();
+    let metrics = from.counted()?.iter().map(metric).collect::<Option<_>>()?;
+    let (stops, feet) = (machine.stops.len(), machine.feet.len());
+    let measures = Measures { criterion, metrics, stops, feet };
+    Some(Rule { end_s, window_s, accuracy, ratio_limit, channels, measures })
+}
+
 fn write_rung(out: &mut Writer, rung: &Rung) {
-    out.number(f64::from(rung.level));
-    out.count(usize::from(rung.is_capped));
+    out.number(f64::from(rung.level as u8));
     let Convergence { contraction, believed_to, own_error, expected } = rung.convergence;
     for number in [contraction, believed_to, own_error, expected] {
         out.number(number);
@@ -197,8 +183,7 @@ fn write_rung(out: &mut Writer, rung: &Rung) {
 }
 
 fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
-    let level = u8::try_from(from.count(MOST)?).ok()?;
-    let is_capped = from.count(2)? == 1;
+    let level = *Level::ALL.get(from.count(MOST)?)?;
     let convergence = Convergence {
         contraction: from.number()?,
         believed_to: from.number()?,
@@ -218,5 +203,5 @@ fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
             Method::Geared(Geared { gears: [gear()?, gear()?, gear()?] })
         }
     };
-    Some(Rung { level, is_capped, method, convergence })
+    Some(Rung { level, method, convergence })
 }

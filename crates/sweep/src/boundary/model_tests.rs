@@ -7,12 +7,10 @@ use super::{Edge, EdgeKind, Traced, trace};
 use crate::config;
 use crate::engine::ModelEngine;
 use crate::interrupt::Interrupt;
-use crate::measures::Criterion;
-use crate::outcome::Outcome;
 use crate::plan::Plan;
 use crate::store::{OpenedTrials, Trials};
-use crate::verdict::Verdict;
 use sweep_plot::contour::zero_lines;
+use washer_row::{Criterion, Outcome, Verdict};
 
 const HEAD: &str = r#"
 name = "short"

@@ -4,11 +4,12 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use washer_row::{Demand, Outcome};
+
 use super::quantity::TracedQuantity;
 use super::{Evaluate, Search, Trial};
-use crate::engine::{Demand, ModelEngine, Watch};
+use crate::engine::{ModelEngine, Watch};
 use crate::interrupt::Interrupt;
-use crate::outcome::Outcome;
 use crate::plan::{Axis, AxisValues, Plan};
 use crate::store::{Key, StoreError, Trials};
 use crate::threads::{self, ThreadsError};

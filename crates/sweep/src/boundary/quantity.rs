@@ -1,11 +1,10 @@
 //! What a boundary is drawn through: a ratio at its limit, or a gap at zero.
 
 use washer_model::Channel;
+use washer_row::{Outcome, Verdict};
 
 use super::product::BoundaryError;
-use crate::outcome::Outcome;
 use crate::plan::Plan;
-use crate::verdict::Verdict;
 
 /// Gaps are compared with this, so that their distances are of order one, as those of ratios.
 const GAP_SCALE_M: f64 = 0.010;
@@ -77,7 +76,7 @@ impl TracedQuantity {
         let mut plan = plan.clone();
         match self {
             Self::Ratio(channel) => plan.reliability.channels = vec![channel],
-            Self::Growth if plan.measures.growth_speeds.is_none() => {
+            Self::Growth if plan.growth_speeds.is_none() => {
                 return Err(BoundaryError::Speeds);
             }
             Self::RatioMax | Self::GapNonlinear | Self::GapLinear | Self::Growth => {}

@@ -6,15 +6,14 @@ use super::cells::short;
 use super::examples::Examples;
 use super::grid::GridArgs;
 use crate::design::{Design, Distribution};
-use crate::engine::Ladder;
 use crate::estimate::{Estimate, size};
 use crate::exit::{Error, Exit, show, tell};
-use crate::measures::Criterion;
 use crate::method::Steps;
 use crate::plan::{Axis, AxisValues, Plan};
 use crate::progress::duration;
 use crate::threads;
 use washer_model::ModelKind;
+use washer_row::{Criterion, Ladder};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[

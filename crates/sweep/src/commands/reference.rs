@@ -5,13 +5,12 @@ use std::fmt::Write as _;
 use std::iter;
 
 use washer_model::{Channel, Machine, Parameter, Range, Spin, Target};
+use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 
 use crate::config;
 use crate::exit::{Error, Exit, print};
-use crate::measures::{Criterion, Measures, Metric};
 use crate::method::{Entry, METHODS};
 use crate::store::schema::{AxisColumn, Layout, RowKind};
-use crate::verdict::ROW_STATUSES;
 
 /// Arguments of `sweep reference`.
 #[derive(Debug, clap::Args)]

@@ -11,16 +11,15 @@ use crate::config;
 use crate::engine::ModelEngine;
 use crate::exit::{Error, Exit, tell};
 use crate::memory::{ensure_heaps, ensure_memory_of};
-use crate::outcome::Trajectory;
 use crate::plan::Plan;
 use crate::store::Job;
 use crate::threads;
 use crate::trace::{
     Extras, StartValue, View, bytes, every, instants, start_of, start_value, trace,
 };
-use crate::verdict::Verdict;
 use sweep_files::{FileKind, Output, key};
 use sweep_results::{Cell, Order, ResultTable, top};
+use washer_row::{Trajectory, Verdict};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[

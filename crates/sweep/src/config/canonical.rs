@@ -3,10 +3,10 @@
 
 use serde_json::{Value, json};
 use washer_model::Spin;
+use washer_row::{Criterion, Measures};
 
 use super::machine;
 use crate::design::{Design, Distribution};
-use crate::measures::{Criterion, Measures};
 use crate::plan::{Axis, AxisValues, Plan};
 
 impl Plan {
@@ -38,14 +38,14 @@ impl Plan {
         // What is left out stands for the default, so that plans which do not ask for more read as
         // ever.
         // The machine says how many stops and feet it has.
-        let Measures { criterion, metrics, growth_speeds, stops: _, feet: _ } = &self.measures;
+        let Measures { criterion, metrics, stops: _, feet: _ } = &self.measures;
         if *criterion != Criterion::default() {
             plan["reliability"]["criterion"] = criterion.name().into();
         }
         if !metrics.is_empty() {
             plan["metrics"] = metrics.iter().map(|metric| metric.name()).collect();
         }
-        if let Some(speeds) = growth_speeds {
+        if let Some(speeds) = &self.growth_speeds {
             plan["stability"] = json!({ "speed_rpm": speeds.to_string() });
         }
         if !self.set.is_empty() {

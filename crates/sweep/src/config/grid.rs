@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use washer_model::{Channel, Machine, Range, decimal};
+use washer_row::{Criterion, Measures, Metric};
 
 use super::origins::Origins;
 use super::parameters::WrittenConstant;
@@ -12,7 +13,6 @@ use super::section::{Field, Section, cut, unknown_word};
 use super::source::{Located, Location, ReadError, read};
 use super::syntax::parse;
 use super::{GridInput, axes, design, machine, parameters, scalars, spin};
-use crate::measures::{Criterion, Measures, Metric};
 use crate::method::{Entry, Integrator, METHODS, settings};
 use crate::plan::{Plan, Reliability};
 use crate::speeds::{Speeds, turning};
@@ -101,7 +101,8 @@ pub(super) fn draft(input: &GridInput, report: &mut Report) -> Option<Draft> {
         axes: Vec::new(),
         design: None,
         reliability,
-        measures: Measures { criterion, metrics, growth_speeds, stops, feet },
+        measures: Measures { criterion, metrics, stops, feet },
+        growth_speeds,
         set: Vec::new(),
     };
     let mut draft = Draft { plan, origins, constants: Vec::new() };

@@ -3,6 +3,7 @@
 
 use serde_json::{Value, json};
 use washer_model::{Channel, Range, decimal};
+use washer_row::{Criterion, Metric};
 
 use super::axes::MOST_POINTS;
 use super::design::{MOST_SEED, MOST_SOBOL};
@@ -12,7 +13,6 @@ use super::section::{check_number, quoted, short, unknown_word};
 use super::source::{Located, Location};
 use super::spin;
 use crate::design::Design;
-use crate::measures::{Criterion, Metric};
 use crate::method::{METHODS, settings};
 
 /// Those that stand outside of `[integrator]`.
@@ -182,7 +182,7 @@ fn put(written: &Written<'_>, draft: &mut Draft, report: &mut Report) -> Option<
         }
         "metrics" => {
             let metrics = written.list("metric", &Metric::ALL, Metric::name, report)?;
-            let speeds = &mut plan.measures.growth_speeds;
+            let speeds = &mut plan.growth_speeds;
             if !metrics.contains(&Metric::Growth) {
                 *speeds = None;
             } else if speeds.is_none() {

@@ -4,13 +4,13 @@
 
 use serde_json::{Map, Value, json};
 use washer_model::{Channel, Parameter, Range, Spin};
+use washer_row::{Criterion, Metric};
 
 use super::axes::MOST_POINTS;
 use super::design::{DEFAULT_SEED, MOST_SEED, MOST_SOBOL};
 use super::grid::{DEFAULT_CHANNELS, DEFAULT_MACHINE, DEFAULT_RATIO_LIMIT, LONGEST_S};
 use super::machine::{BLOCKS, Block, CABINET, LISTS, no_spin, with_one_of_each};
 use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
-use crate::measures::{Criterion, Metric};
 use crate::method::{Entry, METHODS};
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";

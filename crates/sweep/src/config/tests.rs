@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
 use washer_model::{Machine, Spin};
+use washer_row::{Measures, Metric};
 
 use super::*;
 use crate::design::Design;
-use crate::measures::{Measures, Metric};
 use crate::method::Integrator;
 use crate::plan::AxisValues;
 

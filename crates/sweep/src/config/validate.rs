@@ -7,13 +7,17 @@ use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use washer_model::{
     Parameter, Spin, Target, Timing, Violation, decimal, highest_frequency_rad_per_s, prepare,
 };
+use washer_row::Criterion;
 
 use super::grid::Draft;
 use super::report::{Diagnostic, Report};
 use super::source::{Location, Sources};
-use crate::measures::{Criterion, MOST_TURNS};
 use crate::method::{REFERENCE_SHARE, SHORTEST_AT_CORNERS, Steps};
 use crate::plan::{MOST_STEPS, Plan, Scenario, shortest_step_s};
+
+/// Most turns of the drum in a window that are compared one by one: 20 minutes at 1000 rpm. They
+/// stay in memory for a group of points.
+const MOST_TURNS: f64 = 20_000.0;
 
 /// Elements and rows of a spin's table that are looked at before a run, over all points of a list:
 /// some seconds' worth.
@@ -272,7 +276,7 @@ pub(super) fn steps(draft: &Draft, report: &mut Report) {
 
 /// Growth is asked of machines whose forces are smooth.
 pub(super) fn growth(draft: &Draft, report: &mut Report) {
-    let is_asked = draft.plan.measures.growth_speeds.is_some();
+    let is_asked = draft.plan.growth_speeds.is_some();
     let Some(what) = draft.plan.corners_of_forces().filter(|_| is_asked) else { return };
     let title = format!("the metric `growth` is for smooth forces, and the machine has {what}");
     report.push(

@@ -3,10 +3,10 @@
 //! at random.
 
 use rayon::prelude::*;
+use washer_row::{Level, Verdict};
 
 use super::*;
-use crate::method::{Integrator, Level};
-use crate::verdict::Verdict;
+use crate::method::Integrator;
 
 fn load(text: &str) -> Plan {
     let folder = tempfile::tempdir().unwrap();

@@ -1,9 +1,9 @@
 //! Disturbances of periodic responses at constant speeds.
 
 use washer_model::{Dwell, NoAnswer, Point, Response, respond};
+use washer_row::{Growth, Status};
 
 use super::together_or_alone;
-use crate::outcome::{Growth, Status};
 
 /// The periodic responses of points at constant speeds, or why there is none.
 pub(crate) fn responses(dwells: &[Dwell<'_>]) -> Vec<Result<Response, Status>> {

@@ -18,8 +18,9 @@
 
 use lane_ode::dop853::DOP853_STABILITY_LIMIT;
 use washer_model::{Caps, Cases, Convergence, Formula, Gear, Geared, Method, ModelKind};
+use washer_row::{Ladder, Level, Rung};
 
-use crate::method::{Level, REFERENCE_SHARE, SHORTEST_AT_CORNERS};
+use crate::method::{REFERENCE_SHARE, SHORTEST_AT_CORNERS};
 
 /// Step of the reference method, where the machine allows it (s): amplitudes are converged to about
 /// 1e-9.
@@ -103,100 +104,30 @@ const CONTRACTION_AT_CORNERS: f64 = 2.0;
 /// A contraction better than this is not believed.
 const BEST_CONTRACTION: f64 = 1e-3;
 
-/// One way to integrate a trajectory.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rung {
-    /// What the row says of it.
-    pub(crate) level: Level,
-    /// The method.
-    pub(crate) method: Method,
-    /// What its difference from the rung before says.
-    pub(crate) convergence: Convergence,
-}
-
-impl Rung {
-    /// The rung in words, as one of this model's.
-    pub(crate) fn describe(&self, model: ModelKind) -> String {
-        let name = self.level.name();
-        match &self.method {
-            Method::Geared(geared) => {
-                let Gear { step_s, caps, .. } = geared.top();
-                let order = match Formula::of(model) {
-                    Formula::Rk4 => 4,
-                    Formula::Dop853 => 8,
-                };
-                let bearings = caps.bearings_rad_per_s;
-                let hinge = match caps.hinge_rad_per_s {
-                    Some(hinge) => format!(" and hinge at {hinge:.0}"),
-                    None => String::new(),
-                };
-                format!(
-                    "{name} (order {order}, step {:.3} ms, bearings capped at {bearings:.0}{hinge} \
-                     rad/s)",
-                    1e3 * step_s
-                )
-            }
-            Method::Rk4 { step_s } => format!("{name} (step {:.3} ms)", 1e3 * step_s),
-            // Not on the fast method's ladder.
-            Method::Dopri5(_) | Method::Rodas5p(_) => name.to_owned(),
-        }
+/// The rungs of the fast method for these cases.
+pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladder {
+    let has_corners = model == ModelKind::Nonlinear && cases.are_nonsmooth();
+    let plain = |step_s: f64, contraction: f64, believed_to: f64| Rung {
+        level: Level::Rk4,
+        method: Method::Rk4 { step_s },
+        convergence: Convergence { contraction, believed_to, ..Convergence::NONE },
+    };
+    let reference_step_s = reference_step_s(cases);
+    if has_corners {
+        let rungs = STEPS_AT_CORNERS
+            .map(|share| plain(share * reference_step_s, CONTRACTION_AT_CORNERS, f64::INFINITY))
+            .to_vec();
+        return Ladder::checked(rungs, Some(AT_CORNERS.to_owned()));
     }
-}
-
-/// The rungs of one model, from the quickest.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Ladder {
-    pub(crate) rungs: Vec<Rung>,
-    /// Whether there is more than one, and the last ones are plain RK4.
-    is_checked: bool,
-    /// What elements of the machines hold the quick rungs back, if any do.
-    pub(crate) held_back: Option<String>,
-}
-
-impl Ladder {
-    /// One method, which nothing is compared with.
-    pub(crate) fn direct(level: Level, method: Method) -> Self {
-        let rungs = vec![Rung { level, method, convergence: Convergence::NONE }];
-        Self { rungs, is_checked: false, held_back: None }
+    let mut rungs = capped(cases, model, accuracy);
+    let held_back = if rungs.is_empty() { too_fast(cases, model, accuracy) } else { None };
+    let mut longer = plain(LONGER_STEP * reference_step_s, 1.0, FIRST_ORDER_OF_RK4);
+    if !rungs.is_empty() {
+        longer.convergence.contraction = CONTRACTION_TO_RK4;
+        longer.convergence.own_error = OWN_ERROR_OF_RK4;
     }
-
-    /// The fast method's for these cases.
-    pub(crate) fn new(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Self {
-        let has_corners = model == ModelKind::Nonlinear && cases.are_nonsmooth();
-        let plain = |step_s: f64, contraction: f64, believed_to: f64| Rung {
-            level: Level::Rk4,
-            method: Method::Rk4 { step_s },
-            convergence: Convergence { contraction, believed_to, ..Convergence::NONE },
-        };
-        let reference_step_s = reference_step_s(cases);
-        if has_corners {
-            let rungs = STEPS_AT_CORNERS
-                .map(|share| plain(share * reference_step_s, CONTRACTION_AT_CORNERS, f64::INFINITY))
-                .to_vec();
-            return Self { rungs, is_checked: true, held_back: Some(AT_CORNERS.to_owned()) };
-        }
-        let mut rungs = capped(cases, model, accuracy);
-        let held_back = if rungs.is_empty() { too_fast(cases, model, accuracy) } else { None };
-        let mut longer = plain(LONGER_STEP * reference_step_s, 1.0, FIRST_ORDER_OF_RK4);
-        if !rungs.is_empty() {
-            longer.convergence.contraction = CONTRACTION_TO_RK4;
-            longer.convergence.own_error = OWN_ERROR_OF_RK4;
-        }
-        rungs.extend([longer, plain(reference_step_s, REFERENCE_CONTRACTION, f64::INFINITY)]);
-        Self { rungs, is_checked: true, held_back }
-    }
-
-    /// The last rung, if there are others below it.
-    pub(crate) fn top(&self) -> Option<usize> {
-        self.is_checked.then(|| self.rungs.len() - 1)
-    }
-
-    /// The method of the rows that capped modes of this level hold; of a ladder without such a
-    /// rung, the finest capped one's below it.
-    pub(crate) fn capped(&self, level: Level) -> Option<Method> {
-        let is_capped = |rung: &&Rung| rung.level.is_capped() && rung.level <= level;
-        self.rungs.iter().rfind(is_capped).map(|rung| rung.method)
-    }
+    rungs.extend([longer, plain(reference_step_s, REFERENCE_CONTRACTION, f64::INFINITY)]);
+    Ladder::checked(rungs, held_back)
 }
 
 /// Why a machine with friction or stops has no quick rungs.

@@ -14,11 +14,10 @@ use std::time::Duration;
 
 use lane_ode::MAX_LANES;
 use washer_model::Point;
+use washer_row::{Climbs, Demand, Ladder, Next, Outcome, Rule, Status, Trajectory};
 
-use super::climb::{Climber, Demand, Next};
 use super::growth::fastest_growth;
 use super::{ModelEngine, Watch};
-use crate::outcome::Outcome;
 use crate::plan::Scenario;
 
 /// Points that are made ready together.
@@ -45,7 +44,38 @@ pub(super) type Keep<'a> = dyn Fn(Outcome) + Sync + 'a;
 const LOOK_UP: Duration = Duration::from_millis(50);
 
 /// Runs of one rung of one model: positions in `MODELS` and on its ladder.
-pub(super) type ModelRung = (usize, usize);
+type ModelRung = (usize, usize);
+
+/// A point's row on its way.
+struct Climber {
+    /// What the caller knows it by.
+    id: u64,
+    /// Or why there is none.
+    point: Result<Arc<Point>, Status>,
+    climbs: Climbs,
+    /// Runs that have been asked for and are not there yet.
+    pending: usize,
+    /// How many rows came before it.
+    came_as: u64,
+}
+
+impl Climber {
+    fn new(id: u64, point: Result<Arc<Point>, Status>) -> Self {
+        Self { id, point, climbs: Climbs::default(), pending: 0, came_as: 0 }
+    }
+
+    /// What is to be done once nothing is pending.
+    fn next(&self, ladders: &[Ladder; 2], demand: Demand, rule: &Rule) -> Next {
+        match &self.point {
+            Ok(point) => self.climbs.next(self.id, point, ladders, demand, rule),
+            Err(status) => {
+                let none = || Trajectory::failed(*status);
+                let method = ladders[0].rungs[0].level;
+                Next::Done(Box::new(Outcome { method, ..Outcome::new(self.id, none(), none()) }))
+            }
+        }
+    }
+}
 
 /// Where a rung is among what threads work at; below all of them is the feed.
 const fn above(rung: usize) -> usize {
@@ -131,7 +161,10 @@ impl Pool<'_> {
                     let mut rows = Vec::with_capacity(taken.len());
                     for ((position, _), run) in taken.iter().zip(runs) {
                         let Some(mut row) = state.rows.remove(position) else { continue };
-                        row.take(model, rung, run, ladder, self.engine.plan);
+                        row.pending -= 1;
+                        if let Ok(point) = &row.point {
+                            row.climbs.take((model, rung), run, ladder, point, &self.engine.rule);
+                        }
                         rows.push(row);
                     }
                     self.advance(state, rows, above(rung));
@@ -164,7 +197,7 @@ impl Pool<'_> {
             } else {
                 // Nothing is kept of what is put down.
                 let Some(ladders) = self.engine.ladders_under(self.watch) else { break };
-                row.next(ladders, self.demand, self.engine.accuracy(), self.engine.plan)
+                row.next(ladders, self.demand, &self.engine.rule)
             };
             match next {
                 Next::Runs(kinds) => {
@@ -185,7 +218,7 @@ impl Pool<'_> {
         self.shared.changed.notify_all();
         for (mut outcome, point) in done {
             outcome.forget_turns();
-            if let (Some(speeds), Ok(point)) = (&self.engine.plan.measures.growth_speeds, point) {
+            if let (Some(speeds), Ok(point)) = (&self.engine.plan.growth_speeds, point) {
                 outcome.growth = fastest_growth(&point, &speeds.values());
             }
             (self.keep)(outcome);

@@ -2,8 +2,9 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use washer_row::Outcome;
+
 use crate::interrupt::Interrupt;
-use crate::outcome::Outcome;
 
 /// What computes points.
 pub trait Engine: Sync {

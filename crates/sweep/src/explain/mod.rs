@@ -13,17 +13,16 @@ use washer_model::{
 };
 
 use crate::config::NamedValues;
-use crate::engine::{Demand, ModelEngine, Watch, reference_step_s};
+use crate::engine::{ModelEngine, Watch, reference_step_s};
 use crate::exit::Error;
 use crate::interrupt::Interrupt;
-use crate::outcome::{Outcome, Status, Trajectory};
 use crate::plan::{Plan, Scenario};
 use crate::speeds::Speeds;
 use crate::stability::smooth;
-use crate::verdict::{ROW_STATUSES, Verdict, row_status};
 
 use tongue::{Asker, tongues};
 pub(crate) use tongue::{Closing, End, Resonance, Tongue};
+use washer_row::{Demand, Outcome, ROW_STATUSES, Status, Trajectory, Verdict, row_status};
 
 /// Distance between the speeds that are looked at (rpm), unless `--speed` says another.
 const STEP_RPM: f64 = 1.0;

@@ -12,15 +12,15 @@ use serde_json::json;
 use super::Effort;
 use super::points::PointTable;
 use super::result::{MapPlan, ResultTable};
-use crate::engine::{Ladder, ModelEngine, Watch};
+use crate::engine::{ModelEngine, Watch};
 use crate::exit::Error;
-use crate::outcome::Outcome;
 use crate::plan::Plan;
 use crate::progress::Progress;
 use crate::random_keys::draw_random_keys;
 use crate::store::{BATCH_ROWS, Job, Layout, ResultRows, StoreError};
 use crate::threads::{self, ThreadsError};
 use sweep_files::panics;
+use washer_row::{Ladder, Outcome};
 
 /// How often progress is shown while rows are computed.
 const SHOWN_EVERY: Duration = Duration::from_millis(100);

@@ -1,7 +1,8 @@
 //! A page's checked points against the program's rows: the same rungs, errors and bits.
 
+use washer_row::{Criterion, Outcome, Status, Verdict};
+
 use super::*;
-use crate::outcome::{Outcome, Status};
 
 const GRID: &str = r#"
 name = "live"
@@ -21,21 +22,17 @@ fn plan(text: &str) -> Plan {
 
 fn is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
     let checked = washer_live::check(setup, values).unwrap();
-    assert_eq!(Some(checked.is_sensitive), outcome.sensitive, "{values:?}");
-    assert_eq!(checked.models[0].level, outcome.method as u8, "{values:?}");
-    let errors = checked.models.map(|model| model.error);
-    let greatest = errors[0].zip(errors[1]).map(|(a, b)| a.max(b));
-    assert_eq!(greatest, outcome.error, "{values:?}");
-    for (model, row) in checked.models.iter().zip([&outcome.nonlinear, &outcome.linear]) {
-        let has_failed = row.status != Status::Ok;
-        assert_eq!(model.record.failure.is_some(), has_failed, "{values:?}");
-        assert_eq!(model.record.steps, row.steps, "{values:?}");
-        if has_failed {
-            continue;
+    let errors = checked.errors[0].zip(checked.errors[1]).map(|(a, b)| a.max(b));
+    assert_eq!(errors, outcome.error, "{values:?}");
+    assert_eq!(checked.levels[0], outcome.method, "{values:?}");
+    let mut row = checked.outcome;
+    row.forget_turns();
+    assert_eq!((row, values), (Outcome { point: 0, ..outcome.clone() }, values));
+    for (amplitudes, run) in checked.amplitudes.iter().zip([&outcome.nonlinear, &outcome.linear]) {
+        let of_channels = setup.rule.channels.iter().map(|of| amplitudes[of.index()]);
+        if run.status == Status::Ok {
+            assert_eq!(of_channels.collect::<Vec<_>>(), run.amplitudes, "{values:?}");
         }
-        assert_eq!(Some(model.record.min_gap_m), row.min_gap_m, "{values:?}");
-        let of_channels = setup.channels.iter().map(|of| model.record.amplitudes[of.index()]);
-        assert_eq!(of_channels.collect::<Vec<_>>(), row.amplitudes, "{values:?}");
     }
 }
 
@@ -50,6 +47,35 @@ fn a_checked_point_is_the_row_of_the_map() {
     for values in [[0.1, 300.0], [0.4, 180.0], [0.95, 180.0]] {
         let outcomes = engine.evaluate_at(&[values.to_vec()]);
         is_row(&outcomes[0], &setup, &values);
+    }
+}
+
+#[test]
+fn every_criterion_and_metric_is_the_rows() {
+    let further = r#"
+metrics = ["static_sag", "cabinet_force", "clash_time", "growth"]
+reliability = { criterion = "CRITERION" }
+stability = { speed_rpm = "200:240:20" }
+"#;
+    for criterion in ["rms", "envelope"] {
+        let further = further.replace("CRITERION", criterion);
+        let plan = without_growth(plan(&(further + GRID)));
+        let (setup, _) = setup(&plan, &[]).unwrap();
+        let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
+        let engine = ModelEngine::new(&plan).unwrap();
+        let values = [0.95, 300.0];
+        let outcome = &engine.evaluate_at(&[values.to_vec()])[0];
+        assert_eq!(outcome.linear.metrics.len(), 2);
+        assert!(outcome.static_sag_m > Some(0.0));
+        is_row(outcome, &setup, &values);
+        let answer = washer_live::check(&setup, &values).unwrap();
+        let limit = plan.reliability.ratio_limit;
+        let verdict = Verdict::new(outcome, setup.rule.channels.len(), limit);
+        // The page has them of every channel.
+        let of_turns = answer.outcome.turn_ratios;
+        assert!(criterion == "rms" || of_turns == verdict.ratios);
+        let ratios = setup.rule.channels.iter().map(|of| answer.ratios[of.index()]);
+        assert_eq!(ratios.collect::<Vec<_>>(), verdict.ratios, "{criterion}");
     }
 }
 
@@ -71,11 +97,18 @@ fn a_setup_comes_back_from_its_numbers() {
         "\"table\", time_s = [0, 20, 50], speed_rpm = [0, 350, 100]",
     ));
     plan.machine = crate::config::with_one_of_each();
+    (plan.measures.stops, plan.measures.feet) = (plan.machine.stops.len(), plan.machine.feet.len());
+    plan.measures.metrics = vec![Metric::SlipMargin, Metric::CabinetForce];
+    plan.measures.criterion = Criterion::Envelope;
     plan.machine.springs[1].free_length_m = Some(0.2);
     plan.machine.dampers[0].friction_n = 20.0;
     plan.machine.dampers[0].friction_linear_speed_m_per_s = Some(0.1);
-    let (setup, _) = setup(&plan, &[]).unwrap();
+    let (mut setup, _) = setup(&plan, &[]).unwrap();
     let numbers = setup.to_numbers();
+    // Words do not go with them.
+    for ladder in setup.ladders.iter_mut().chain(&mut setup.wide_ladders) {
+        assert!(ladder.held_back.take().is_some() || ladder.rungs.len() > 3);
+    }
     assert_eq!(Setup::from_numbers(&numbers), Some(setup));
     assert_eq!(Setup::from_numbers(&numbers[..numbers.len() - 1]), None);
     assert_eq!(Setup::from_numbers(&[f64::NAN; 400]), None);

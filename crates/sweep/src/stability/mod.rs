@@ -7,12 +7,12 @@ use std::collections::BTreeMap;
 
 use lane_ode::Simd;
 use washer_model::{Dwell, Machine, Point, Response, Spin, Target, Timing, prepare};
+use washer_row::{Growth, Outcome, Status, Trajectory};
 
 use crate::engine::{
     Engine, EngineError, Watch, responses, simd_from_environment, together_or_alone,
 };
 use crate::exit::Error;
-use crate::outcome::{Growth, Outcome, Status, Trajectory};
 use crate::plan::Plan;
 
 /// Rows that a thread takes at once: enough to fill lanes, few enough that a signal is soon heard.

@@ -27,10 +27,8 @@
 
 use super::error::StoreError;
 use super::schema::Layout;
-use crate::measures::{Criterion, Metric};
-use crate::method::Level;
-use crate::outcome::{GrowingMode, Growth, Outcome, Status, Trajectory};
 use washer_model::{Disturbance, Motion};
+use washer_row::{Criterion, GrowingMode, Growth, Level, Metric, Outcome, Status, Trajectory};
 
 const MAGIC: [u8; 8] = *b"SWEEPCHK";
 const PART_MAGIC: [u8; 8] = *b"SWEEPPRT";

@@ -50,9 +50,9 @@ pub use status::{State, status};
 pub(crate) use trials::{Key, OpenedTrials, Trials};
 
 use crate::identity;
-use crate::measures::Measures;
 use crate::plan::{Axis, Plan};
 use sweep_files::{self as files, FileKind};
+use washer_row::Measures;
 
 /// The values of the axes at a point of the grid, first axis first.
 pub(crate) type AxisValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;

@@ -16,9 +16,9 @@ use super::plan_file::{Found, PlanDifference, PlanFile, set_aside};
 use super::read::{self, ResultFile, Tally};
 use super::shard::{self, Dealing, Shard, ShardRequest};
 use super::{Folder, Job, Named, chunk_points, provenance, trials};
-use crate::outcome::Outcome;
 use crate::threads::Environment;
 use sweep_files::{FileError, atomic, regular};
+use washer_row::Outcome;
 
 /// How a run is opened.
 #[derive(Clone, Copy)]

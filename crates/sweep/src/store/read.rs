@@ -17,10 +17,9 @@ use serde::ser::{SerializeMap, Serializer};
 use serde_json::Value;
 
 use super::error::StoreError;
-use crate::method::Level;
-use crate::verdict::ROW_STATUSES;
 use sweep_files::cells;
 use sweep_files::{FileKind, ParquetFile, key};
+use washer_row::{Level, ROW_STATUSES};
 
 /// What a finished result says of itself.
 #[derive(Clone, Debug, PartialEq)]

@@ -18,12 +18,9 @@ use serde_json::{Map, Value, json};
 use washer_model::{Channel, Disturbance, Kind, Motion};
 
 use super::Job;
-use crate::measures::{Measures, Metric};
-use crate::method::Level;
-use crate::outcome::{Outcome, Trajectory};
 use crate::table::{dictionary_entry, field_metadata};
-use crate::verdict::{ROW_STATUSES, Verdict, row_status};
 use sweep_files::{FileKind, key};
+use washer_row::{Level, Measures, Metric, Outcome, ROW_STATUSES, Trajectory, Verdict, row_status};
 
 /// Rows in a row group: fixed, so that chunking leaves no trace in the file. A group of 25 columns
 /// takes about 30 MB in memory while it is written.

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use washer_row::{Outcome, row_status};
 
 use super::chunk::{Place, Shape};
 use super::error::{Holder, StoreError};
@@ -12,8 +13,6 @@ use super::plan_file::{Found, PlanFile};
 use super::read::StatusCounts;
 use super::shard::{self, Dealing};
 use super::{Folder, Job, Named, chunk_points, lock};
-use crate::outcome::Outcome;
-use crate::verdict::row_status;
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -2,11 +2,9 @@
 
 use serde_json::json;
 use washer_model::Channel;
+use washer_row::{Level, Measures, Outcome, Status, Trajectory};
 
 use super::{AxisColumn, Job, Layout, RowKind};
-use crate::measures::Measures;
-use crate::method::Level;
-use crate::outcome::{Outcome, Status, Trajectory};
 
 /// Two axes, two channels.
 pub(crate) fn layout() -> Layout {

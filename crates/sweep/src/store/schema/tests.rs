@@ -1,7 +1,8 @@
 //! Which columns there are, in which order, and what they say.
 
+use washer_row::{Criterion, Metric};
+
 use super::*;
-use crate::measures::{Criterion, Metric};
 use crate::store::synthetic;
 
 #[test]

@@ -13,10 +13,9 @@ use tempfile::TempDir;
 
 use super::merge::Joined;
 use super::*;
-use crate::outcome::Outcome;
-use crate::verdict::{ROW_STATUSES, Verdict, row_status};
 use sweep_files::FileError;
 use sweep_files::cells;
+use washer_row::{Outcome, ROW_STATUSES, Verdict, row_status};
 
 mod chunks;
 mod plans;

@@ -1,7 +1,8 @@
 //! The result file and its sidecar: what they say, and what is taken for them.
 
+use washer_row::{Measures, Metric};
+
 use super::*;
-use crate::measures::{Measures, Metric};
 
 #[test]
 fn every_cell_is_what_the_outcome_says() {

@@ -2,7 +2,7 @@
 
 use washer_model::{Channel, Disturbance, Response};
 
-use crate::method::Level;
+use crate::level::Level;
 
 /// Why a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -63,7 +63,7 @@ pub struct Trajectory {
 }
 
 /// Of every channel, in the order of `Channel::ALL` (m, rad).
-pub(crate) type Deviations = [f64; Channel::ALL.len()];
+pub type Deviations = [f64; Channel::ALL.len()];
 
 impl Trajectory {
     /// Nothing but a status.

@@ -7,7 +7,7 @@ use crate::outcome::{Outcome, Status};
 ///
 /// A row whose nonlinear model failed carries that model's reason, whatever became of the linear
 /// one; a row whose linear model alone failed carries that reason behind `linear_`.
-pub(crate) const ROW_STATUSES: [&str; 13] = [
+pub const ROW_STATUSES: [&str; 13] = [
     "ok",
     "diverged",
     "step_too_small",
@@ -28,7 +28,7 @@ const OF_EITHER: usize = Status::Panicked as usize + 1;
 
 /// The row's entry in [`ROW_STATUSES`], and the failing model's time of failure.
 #[must_use]
-pub(crate) fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
+pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
     // Those of both models together stand behind those of either.
     let code = |status: Status, of_linear: usize| match status as usize {
         code if code < OF_EITHER => code + of_linear,

@@ -1,15 +1,12 @@
 //! A row on its way: both models' trajectories, each as far up its ladder as it has come.
 
-use std::sync::Arc;
+use washer_model::{ModelKind, Point};
 
-use washer_model::{Course, ModelKind, Point};
-
-use super::ladder::{Ladder, Rung};
-use super::pool::ModelRung;
+use crate::ladder::{Ladder, Rung};
+use crate::level::Level;
 use crate::measures::{Metric, TURN_FLOOR};
-use crate::method::Level;
 use crate::outcome::{Outcome, Status, Trajectory};
-use crate::plan::Plan;
+use crate::run::{Rule, RungRun};
 use crate::verdict::Verdict;
 
 /// What an outcome must be good for.
@@ -45,17 +42,8 @@ const METRIC_FLOOR: f64 = 1e-3;
 /// with the phase of the motion, and shrinks less from rung to rung than the motion's error does.
 const TURN_WEIGHT: f64 = 3.0;
 
-/// Both models in the order in which this module holds them.
-pub(super) const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
-
-/// A trajectory as a rung gave it.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct RungRun {
-    pub(super) trajectory: Trajectory,
-    pub(super) course: Course,
-    /// By how much the time of clash may be off for what capped rungs leave out (s).
-    pub(super) clash_doubt_s: Option<f64>,
-}
+/// Both models in the order of [`Climbs`].
+pub const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
 
 /// One model's trajectory on its ladder.
 #[derive(Clone, Debug, Default)]
@@ -78,15 +66,15 @@ impl Climb {
         ladder: &Ladder,
         point: &Point,
         model: ModelKind,
-        plan: &Plan,
+        rule: &Rule,
     ) {
         let Some(before) = self.run.take() else {
             (self.rung, self.run) = (rung, Some(now));
             return;
         };
-        let found = difference(&before, &now, point, model, plan);
+        let found = difference(&before, &now, point, model, rule);
         let Rung { level, convergence, .. } = &ladder.rungs[rung];
-        let unseen = unseen(&now, *level, point, plan);
+        let unseen = unseen(&now, *level, point, rule);
         self.error = found.map(|found| convergence.error_left(found.greatest(), unseen));
         self.spread = found.map(|found| found.of_numbers);
         (self.rung, self.run) = (rung, Some(now));
@@ -102,69 +90,57 @@ impl Climb {
     }
 }
 
-/// A point's row in the making.
-pub(super) struct Climber {
-    /// What the caller knows it by.
-    pub(super) id: u64,
-    /// Or why there is none.
-    pub(super) point: Result<Arc<Point>, Status>,
-    climbs: [Climb; 2],
-    /// Runs that have been asked for and are not there yet.
-    pub(super) pending: usize,
-    /// How many rows came before it.
-    pub(super) came_as: u64,
-}
+/// A point's row in the making: each model as far up its ladder as it has come.
+#[derive(Clone, Debug, Default)]
+pub struct Climbs([Climb; 2]);
 
 /// What a row needs next.
-pub(super) enum Next {
-    /// These runs.
-    Runs(Vec<ModelRung>),
+#[derive(Clone, Debug)]
+pub enum Next {
+    /// These runs: positions in [`MODELS`] and on that model's ladder.
+    Runs(Vec<(usize, usize)>),
     /// Nothing.
     Done(Box<Outcome>),
 }
 
-impl Climber {
-    pub(super) fn new(id: u64, point: Result<Arc<Point>, Status>) -> Self {
-        Self { id, point, climbs: Default::default(), pending: 0, came_as: 0 }
-    }
-
+impl Climbs {
     /// A run of a model that was asked for.
-    pub(super) fn take(
+    pub fn take(
         &mut self,
-        model: usize,
-        rung: usize,
+        (model, rung): (usize, usize),
         run: RungRun,
         ladder: &Ladder,
-        plan: &Plan,
+        point: &Point,
+        rule: &Rule,
     ) {
-        self.pending -= 1;
-        if let Ok(point) = &self.point {
-            self.climbs[model].take(rung, run, ladder, point, MODELS[model], plan);
-        }
+        self.0[model].take(rung, run, ladder, point, MODELS[model], rule);
     }
 
-    /// What is to be done once nothing is pending.
-    pub(super) fn next(
-        &mut self,
+    /// The last run of a model with its rung and the error left in it, once there is one. The error
+    /// is absent where nothing says so.
+    #[must_use]
+    pub fn last(&self, model: usize) -> Option<(&RungRun, usize, Option<f64>)> {
+        let Climb { run, rung, error, .. } = &self.0[model];
+        run.as_ref().map(|run| (run, *rung, *error))
+    }
+
+    /// What is to be done once every run that was asked for is there. `id` is what the outcome
+    /// calls the point.
+    #[must_use]
+    pub fn next(
+        &self,
+        id: u64,
+        point: &Point,
         ladders: &[Ladder; 2],
         demand: Demand,
-        accuracy: f64,
-        plan: &Plan,
+        rule: &Rule,
     ) -> Next {
-        if let Err(status) = self.point {
-            let none = || Trajectory::failed(status);
-            let outcome = Outcome {
-                method: ladders[0].rungs[0].level,
-                ..Outcome::new(self.id, none(), none())
-            };
-            return Next::Done(Box::new(outcome));
-        }
         if demand == Demand::Growth {
             let none = || Trajectory::failed(Status::Ok);
-            return Next::Done(Box::new(Outcome::new(self.id, none(), none())));
+            return Next::Done(Box::new(Outcome::new(id, none(), none())));
         }
-        let outcome = self.outcome(ladders, accuracy, plan);
-        let margin = outcome.as_ref().and_then(|outcome| margin(outcome, plan));
+        let outcome = self.outcome(id, point, ladders, rule);
+        let margin = outcome.as_ref().and_then(|outcome| margin(outcome, rule));
         let is_sure = |climb: &Climb| match (demand, margin) {
             (Demand::Side, Some(margin)) => {
                 climb.roughly().is_some_and(|error| SURE * error <= margin)
@@ -172,15 +148,15 @@ impl Climber {
             _ => false,
         };
         let higher = |(model, climb): (usize, &Climb)| {
-            let rung = climb.higher(&ladders[model], accuracy)?;
+            let rung = climb.higher(&ladders[model], rule.accuracy)?;
             (!is_sure(climb)).then_some((model, rung))
         };
-        let mut runs: Vec<_> = self.climbs.iter().enumerate().filter_map(higher).collect();
+        let mut runs: Vec<_> = self.0.iter().enumerate().filter_map(higher).collect();
         let Some(outcome) = outcome.filter(|_| runs.is_empty()) else { return Next::Runs(runs) };
         // The verdict is plain RK4's: where the error left could turn it, RK4 has the word.
-        let errors: f64 = self.climbs.iter().filter_map(|climb| climb.error).sum();
+        let errors: f64 = self.0.iter().filter_map(|climb| climb.error).sum();
         if let Some(margin) = margin.filter(|margin| *margin <= errors) {
-            for (model, climb) in self.climbs.iter().enumerate() {
+            for (model, climb) in self.0.iter().enumerate() {
                 let Some(top) = ladders[model].top().filter(|top| climb.rung < *top) else {
                     continue;
                 };
@@ -201,18 +177,24 @@ impl Climber {
     }
 
     /// The row as it is now, once both models have run.
-    fn outcome(&self, ladders: &[Ladder; 2], accuracy: f64, plan: &Plan) -> Option<Outcome> {
-        let [nonlinear, linear] = &self.climbs;
+    fn outcome(
+        &self,
+        id: u64,
+        point: &Point,
+        ladders: &[Ladder; 2],
+        rule: &Rule,
+    ) -> Option<Outcome> {
+        let [nonlinear, linear] = &self.0;
         let trajectory = |climb: &Climb| climb.run.as_ref().map(|run| run.trajectory.clone());
-        let mut outcome = Outcome::new(self.id, trajectory(nonlinear)?, trajectory(linear)?);
-        outcome.compare_turns(&plan.reliability.channels);
+        let mut outcome = Outcome::new(id, trajectory(nonlinear)?, trajectory(linear)?);
+        outcome.compare_turns(&rule.channels);
         outcome.method = ladders[0].rungs[nonlinear.rung].level;
-        if plan.measures.metrics.contains(&Metric::StaticSag) {
-            outcome.static_sag_m = self.point.as_ref().ok().map(|point| point.static_sag_m());
+        if rule.measures.metrics.contains(&Metric::StaticSag) {
+            outcome.static_sag_m = Some(point.static_sag_m());
         }
         if let [Some(nonlinear_top), Some(linear_top)] = [ladders[0].top(), ladders[1].top()] {
             let is_chaotic = |climb: &Climb, top: usize| {
-                climb.rung == top && climb.error.is_none_or(|error| error > accuracy)
+                climb.rung == top && climb.error.is_none_or(|error| error > rule.accuracy)
             };
             outcome.sensitive =
                 Some(is_chaotic(nonlinear, nonlinear_top) || is_chaotic(linear, linear_top));
@@ -224,8 +206,7 @@ impl Climber {
 }
 
 /// How far the greatest ratio is from the limit, as a share of the limit.
-fn margin(outcome: &Outcome, plan: &Plan) -> Option<f64> {
-    let rule = &plan.reliability;
+fn margin(outcome: &Outcome, rule: &Rule) -> Option<f64> {
     let verdict = Verdict::new(outcome, rule.channels.len(), rule.ratio_limit);
     verdict.greatest.map(|(_, ratio)| (ratio / rule.ratio_limit - 1.0).abs())
 }
@@ -269,7 +250,7 @@ fn difference(
     b: &RungRun,
     point: &Point,
     model: ModelKind,
-    plan: &Plan,
+    rule: &Rule,
 ) -> Option<Difference> {
     let (of_a, of_b) = (&a.trajectory, &b.trajectory);
     if of_a.status != of_b.status {
@@ -277,22 +258,22 @@ fn difference(
     }
     if of_b.status != Status::Ok {
         let (a_s, b_s) = of_a.fail_time_s.zip(of_b.fail_time_s)?;
-        return ((a_s - b_s).abs() <= SAME_TIME * plan.end_s).then_some(Difference::NONE);
+        return ((a_s - b_s).abs() <= SAME_TIME * rule.end_s).then_some(Difference::NONE);
     }
     let of_course = point.course_difference(model, &a.course, &b.course);
-    Some(Difference { of_course, of_numbers: of_numbers(of_a, of_b, point, plan) })
+    Some(Difference { of_course, of_numbers: of_numbers(of_a, of_b, point, rule) })
 }
 
 /// The error that rungs of this level have in common, so that no comparison shows it: bearings and
 /// hinge that are left swinging.
-fn unseen(run: &RungRun, level: Level, point: &Point, plan: &Plan) -> f64 {
+fn unseen(run: &RungRun, level: Level, point: &Point, rule: &Rule) -> f64 {
     if !level.is_capped() {
         return 0.0;
     }
     let numbers = &run.trajectory;
     let swings = point.ringing();
     let share = |swing: f64, of: f64| if swing == 0.0 { 0.0 } else { swing / of };
-    let channels = &plan.reliability.channels;
+    let channels = &rule.channels;
     let of_amplitudes = channels.iter().zip(&numbers.amplitudes);
     let of_amplitudes = of_amplitudes.map(|(channel, of)| share(swings[channel.index()], *of));
     let of_turns = numbers.turns.iter().flat_map(|turn| {
@@ -300,23 +281,23 @@ fn unseen(run: &RungRun, level: Level, point: &Point, plan: &Plan) -> f64 {
             .iter()
             .map(|channel| share(swings[channel.index()], turn[channel.index()].max(TURN_FLOOR)))
     });
-    let metrics = plan.measures.of_model().zip(&numbers.metrics);
+    let metrics = rule.measures.of_model().zip(&numbers.metrics);
     let of_clash = metrics.filter(|(number, _)| number.metric == Metric::ClashTime);
     let clash_s = of_clash.map(|(_, time)| *time);
     let of_clash = clash_s
         .zip(run.clash_doubt_s)
-        .map(|(time_s, doubt_s)| doubt_s / time_s.max(clash_floor_s(plan)));
+        .map(|(time_s, doubt_s)| doubt_s / time_s.max(clash_floor_s(rule)));
     of_amplitudes.chain(of_turns).chain(of_clash).fold(0.0, f64::max)
 }
 
 /// A clash that just happens is a time that just is not zero: shorter ones are compared with this.
-fn clash_floor_s(plan: &Plan) -> f64 {
-    let [from_s, to_s] = plan.window_s;
+fn clash_floor_s(rule: &Rule) -> f64 {
+    let [from_s, to_s] = rule.window_s;
     METRIC_FLOOR * (to_s - from_s)
 }
 
 /// The greatest relative difference of what a row takes from two trajectories.
-fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, plan: &Plan) -> f64 {
+fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, rule: &Rule) -> f64 {
     let mut greatest = 0.0_f64;
     let mut compare = |a: f64, b: f64, least: f64| {
         if a != b {
@@ -331,9 +312,9 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, plan: &Plan) -> f64
     if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
         compare(a, b, point.clearance_m());
     }
-    for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(plan.measures.of_model()) {
+    for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(rule.measures.of_model()) {
         let least = match number.metric {
-            Metric::ClashTime | Metric::StopContact => clash_floor_s(plan),
+            Metric::ClashTime | Metric::StopContact => clash_floor_s(rule),
             // These may pass through zero.
             Metric::FootLoad | Metric::SlipMargin => point.weight_n(),
             // Of open stops no more is left than rounding.
@@ -343,7 +324,7 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, plan: &Plan) -> f64
         compare(*a, *b, least);
     }
     for (a, b) in a.turns.iter().zip(&b.turns) {
-        for channel in &plan.reliability.channels {
+        for channel in &rule.channels {
             let i = channel.index();
             let (a, b) = (a[i].max(TURN_FLOOR), b[i].max(TURN_FLOOR));
             // Exaggerated, as a number that errs more than its difference shows.

@@ -4,15 +4,10 @@
 use washer_model::{Channel, Extra, Wanted};
 
 use crate::outcome::{Deviations, Outcome};
-use crate::speeds::Speeds;
 
 /// Deviations below this count as this (m, rad) where turns are compared: neither 0 over 0 nor what
 /// no machine feels decides.
 pub(crate) const TURN_FLOOR: f64 = 1e-5;
-
-/// Most turns of the drum in a window that are compared one by one: 20 minutes at 1000 rpm. They
-/// stay in memory for a group of points.
-pub(crate) const MOST_TURNS: f64 = 20_000.0;
 
 /// What counts as the amplitude of a motion, and so as a ratio of two.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -267,7 +262,7 @@ impl Measured {
     }
 
     /// Its value in a trajectory's records, if it was recorded.
-    pub(crate) fn of(self, extra: &Extra) -> Option<f64> {
+    pub fn of(self, extra: &Extra) -> Option<f64> {
         let stops = extra.stops.iter();
         match self.metric {
             Metric::CabinetForce => extra.cabinet_force_n,
@@ -300,8 +295,6 @@ pub struct Measures {
     pub criterion: Criterion,
     /// Metrics asked for, in column order.
     pub metrics: Vec<Metric>,
-    /// The constant speeds that [`Metric::Growth`] is about; `None` if it is not asked for.
-    pub growth_speeds: Option<Speeds>,
     /// How many stops the machine has.
     pub stops: usize,
     /// How many feet the machine has.
@@ -319,7 +312,7 @@ impl Measures {
 
     /// The numbers of a metric that each model has its own of: of all parts, then of each if there
     /// are several.
-    pub(crate) fn numbers_of(&self, metric: Metric) -> impl Iterator<Item = Measured> + use<> {
+    pub fn numbers_of(&self, metric: Metric) -> impl Iterator<Item = Measured> + use<> {
         let parts = match metric.of_each().map(|of_each| of_each.part) {
             Some(Part::Stop) => self.stops,
             Some(Part::Foot) => self.feet,
@@ -348,7 +341,7 @@ impl Measures {
 
 impl Outcome {
     /// Compares the two models turn by turn, if both have turns.
-    pub(crate) fn compare_turns(&mut self, channels: &[Channel]) {
+    pub fn compare_turns(&mut self, channels: &[Channel]) {
         let (nonlinear, linear) = (&self.nonlinear.turns, &self.linear.turns);
         self.turn_ratios.clear();
         if nonlinear.is_empty() || linear.is_empty() {
@@ -365,7 +358,7 @@ impl Outcome {
     }
 
     /// Lets go of what only the comparison needs.
-    pub(crate) fn forget_turns(&mut self) {
+    pub fn forget_turns(&mut self) {
         self.nonlinear.turns = Vec::new();
         self.linear.turns = Vec::new();
     }

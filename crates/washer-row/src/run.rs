@@ -1,0 +1,116 @@
+//! One model's trajectories by one rung, and what a row takes from each.
+
+use lane_ode::{Failure, Simd};
+use washer_model::{
+    Channel, Course, Extra, Method, ModelKind, Point, Record, Wanted, simulate_until,
+};
+
+use crate::measures::{Criterion, Measures};
+use crate::outcome::{Deviations, Status, Trajectory};
+
+/// What rows take from trajectories, and what they must be good for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rule {
+    /// The run is from 0 to here.
+    pub end_s: f64,
+    /// What is measured is measured in this closed interval, unless a point has its own.
+    pub window_s: [f64; 2],
+    /// Largest error of a row's numbers, relative; infinite where nothing is compared.
+    pub accuracy: f64,
+    /// Ratios below it are reliable.
+    pub ratio_limit: f64,
+    /// What the verdict compares.
+    pub channels: Vec<Channel>,
+    /// What is measured of the motions.
+    pub measures: Measures,
+}
+
+impl Rule {
+    /// What trajectories must record.
+    #[must_use]
+    pub fn wanted(&self) -> Wanted {
+        Wanted { course: self.accuracy.is_finite(), ..self.measures.wanted() }
+    }
+}
+
+/// A trajectory as a rung gave it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RungRun {
+    /// What a row takes from it.
+    pub trajectory: Trajectory,
+    /// Amplitudes by the rule's criterion, of channels that it does not compare too.
+    pub amplitudes: Deviations,
+    /// The motion at the ends of the run's parts, if anything is compared.
+    pub course: Course,
+    /// By how much the time of clash may be off for what capped rungs leave out (s).
+    pub clash_doubt_s: Option<f64>,
+}
+
+impl RungRun {
+    /// Nothing but a status.
+    #[must_use]
+    pub const fn failed(status: Status) -> Self {
+        Self {
+            trajectory: Trajectory::failed(status),
+            amplitudes: [0.0; Channel::ALL.len()],
+            course: Course::new(),
+            clash_doubt_s: None,
+        }
+    }
+
+    fn new(record: &Record, mut extra: Extra, rule: &Rule) -> Self {
+        let course = std::mem::take(&mut extra.course);
+        let clash_doubt_s = extra.clash_doubt_s;
+        let amplitudes = match rule.measures.criterion {
+            Criterion::Peak | Criterion::Envelope => record.amplitudes,
+            Criterion::Rms => extra.root_mean_squares.unwrap_or(record.amplitudes),
+        };
+        let trajectory = trajectory(record, extra, &amplitudes, rule);
+        Self { trajectory, amplitudes, course, clash_doubt_s }
+    }
+}
+
+/// One model at every point, by one method; `None` once `is_stopped` says so.
+#[must_use]
+pub fn runs(
+    simd: Simd,
+    model: ModelKind,
+    method: &Method,
+    points: &[&Point],
+    rule: &Rule,
+    is_stopped: &dyn Fn() -> bool,
+) -> Option<Vec<RungRun>> {
+    let (records, extras) = simulate_until(simd, model, method, points, rule.wanted(), is_stopped)?;
+    // None at all if nothing was wanted.
+    let mut extras = extras.into_iter();
+    let run = |record: &Record| RungRun::new(record, extras.next().unwrap_or_default(), rule);
+    Some(records.iter().map(run).collect())
+}
+
+fn trajectory(record: &Record, extra: Extra, amplitudes: &Deviations, rule: &Rule) -> Trajectory {
+    let Record { failure, steps, rejected, .. } = *record;
+    if let Some((reason, time_s)) = failure {
+        let status = match reason {
+            Failure::Diverged => Status::Diverged,
+            Failure::StepTooSmall => Status::StepTooSmall,
+            Failure::StepLimit => Status::StepLimit,
+        };
+        return Trajectory {
+            fail_time_s: Some(time_s),
+            steps,
+            rejected,
+            ..Trajectory::failed(status)
+        };
+    }
+    let metrics = rule.measures.of_model().filter_map(|number| number.of(&extra));
+    Trajectory {
+        status: Status::Ok,
+        fail_time_s: None,
+        amplitudes: rule.channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
+        min_gap_m: Some(record.min_gap_m),
+        steps,
+        rejected,
+        metrics: metrics.collect(),
+        turns: extra.turns,
+    }
+}
