@@ -8,6 +8,7 @@ and its curves with the trace. Exits with 1 at the first thing that is wrong.
 
 import argparse
 import base64
+import gzip
 import json
 import math
 import time
@@ -65,17 +66,23 @@ class Live(Page):
         width = len(numbers) // 2
         names = [channel["name"] for channel in self.live["channels"]]
         keys = ["failure", "fail_time_s", "steps", "gap_m", *names]
-        return [dict(zip(keys, numbers[k * width:(k + 1) * width])) for k in range(2)]
+        models = [dict(zip(keys, numbers[k * width:(k + 1) * width])) for k in range(2)]
+        for k, model in enumerate(models):
+            metrics = numbers[k * width + len(keys):(k + 1) * width]
+            model["metrics"] = {
+                metric["columns"][k]: value for metric, value in zip(self.live["metrics"], metrics)
+            }
+        return models
 
 
 def opens(page):
     """The module is there, has vectors and needs nothing; workers come up from a file."""
     page.live = page.data()["live"]
-    module = base64.b64decode(page.live["module"])
+    module = gzip.decompress(base64.b64decode(page.live["module"]))
     counts = [module.count(opcode) for opcode in OPCODES]
     check(min(counts) > 1000, f"the module has few vector instructions: {counts}")
     script = """const done = arguments[arguments.length - 1];
-        WebAssembly.compile(decode(DATA.live.module))
+        unpacked(DATA.live.module).then((bytes) => WebAssembly.compile(bytes))
           .then((module) => done(WebAssembly.Module.imports(module).length));"""
     imports = page.driver.execute_async_script(script)
     check(imports == 0, f"the module wants {imports} things from outside")

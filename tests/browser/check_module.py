@@ -1,11 +1,11 @@
 """Two builds of the module of live pages, in headless Chromium: they compute the same bits.
 
-    python check_module.py PAGE.html MODULE.wasm
+    python check_module.py PAGE.html MODULE.wasm.gz
 
-PAGE.html carries one module and the setup, MODULE.wasm is the other. Both take the setup and
-compute the same points, checked, by the quick rung and as time histories. Every number must be the
-same bits: each operation of WebAssembly is rounded correctly, so only another source computes
-anything else, whatever the compiler. Exits with 1 at the first difference.
+PAGE.html carries one module and the setup, MODULE.wasm.gz is the other. Both take the setup and
+compute the same points, checked, by the quick rung, as time histories and at constant speeds. Every
+number must be the same bits: each operation of WebAssembly is rounded correctly, so only another
+source computes anything else, whatever the compiler. Exits with 1 at the first difference.
 """
 
 import argparse
@@ -40,10 +40,11 @@ const run = async (bytes) => {
       write(values); found.push(...read(api.history(model, 255, live.everyS)));
     }
     write(values); found.push(...read(api.speeds(live.everyS)));
+    write([...values, 200, 240]); found.push(...read(api.growth(values.length)));
   }
   return found;
 };
-Promise.all([run(decode(live.module)), run(decode(other))]).then(([a, b]) => {
+Promise.all([live.module, other].map((packed) => unpacked(packed).then(run))).then(([a, b]) => {
   const apart = a.findIndex((bits, k) => bits !== b[k]);
   done([a.length, b.length, apart]);
 }, (error) => done(String(error)));

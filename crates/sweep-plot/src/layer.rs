@@ -3,7 +3,7 @@
 use super::colour::ColourScale;
 use super::error::PlotError;
 use super::gather::{Divide, Map};
-use super::label;
+use super::label::{self, capitalised};
 use super::read::{ColumnFacts, Source};
 use super::{PlotOptions, Quantity};
 
@@ -232,13 +232,28 @@ impl Whole {
 /// The columns of single stops or feet beside the one of all, as channels: beside
 /// `stop_force_linear_n` stands `stop_2_force_linear_n`, of `stop_2`.
 pub(crate) fn parts<'a>(source: &'a Source, column: &str) -> Vec<(&'a str, &'a ColumnFacts)> {
-    let Some((kind, what)) = column.split_once('_') else { return Vec::new() };
-    let of_part = |facts: &'a ColumnFacts| {
-        let part = facts.name.strip_suffix(what)?.strip_suffix('_')?;
-        let number = part.strip_prefix(kind)?.strip_prefix('_')?;
-        number.parse::<u32>().is_ok().then_some((part, facts))
-    };
+    let of_part = |facts: &'a ColumnFacts| Some((part_of(&facts.name, column)?, facts));
     source.columns.iter().filter_map(of_part).collect()
+}
+
+/// The part that a column is of, if it stands beside this one of all.
+fn part_of<'a>(name: &'a str, column: &str) -> Option<&'a str> {
+    let (kind, what) = column.split_once('_')?;
+    let part = name.strip_suffix(what)?.strip_suffix('_')?;
+    let number = part.strip_prefix(kind)?.strip_prefix('_')?;
+    number.parse::<u32>().is_ok().then_some(part)
+}
+
+/// A column in words, if it is of a [`Whole`] or of one of its parts.
+pub(crate) fn words_of_whole(name: &str) -> Option<String> {
+    WHOLE.iter().find_map(|whole| {
+        let mut columns = whole.columns.iter().map(|(.., column)| *column);
+        if columns.clone().any(|column| column == name) {
+            return Some(capitalised(whole.words));
+        }
+        let part = columns.find_map(|column| part_of(name, column))?;
+        Some(format!("{}: {}", capitalised(whole.words), label::channel(part)))
+    })
 }
 
 /// What the options ask for; none if that is the status, which has no values.

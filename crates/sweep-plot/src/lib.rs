@@ -199,6 +199,15 @@ pub struct Live {
     pub channels: Vec<String>,
     /// Those that the verdict compares, by their places.
     pub compared: Vec<usize>,
+    /// What an amplitude is, and a ratio.
+    pub criterion: [String; 2],
+    /// The columns of each model's metrics in the module's records, in their order.
+    pub metrics: Vec<[String; 2]>,
+    /// Whether the map has the static sag.
+    pub has_static_sag: bool,
+    /// Ways in which a response at a constant speed can lose its stability, in the module's order;
+    /// none where that cannot be asked of the machine.
+    pub kinds: Vec<String>,
     /// Names of the levels that the module counts.
     pub levels: Vec<String>,
     /// Largest error of a checked amplitude, relative.

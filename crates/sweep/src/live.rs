@@ -8,8 +8,8 @@ use serde_json::Value;
 use sweep_files::{ParquetFile, key};
 use sweep_plot::{Live, Slider};
 use washer_live::{Setup, Sliders};
-use washer_model::{Channel, ModeOverSpeed, ModelKind, Parameter, Timing, campbell, prepare};
-use washer_row::{Level, Metric};
+use washer_model::{Channel, Kind, ModeOverSpeed, ModelKind, Parameter, Timing, campbell, prepare};
+use washer_row::{Level, Measured, Metric};
 
 use crate::config::GridInput;
 use crate::engine::{CHECKPOINTS, ModelEngine, rule};
@@ -83,6 +83,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         let [least, greatest] = axis.values.extremes().map(|at| axis.values.value(at));
         slider(&axis.parameter, least, greatest, None)
     };
+    let columns = |number: Measured| ["nonlinear", "linear"].map(|model| number.column(model));
     let further = sliders.iter().map(|(parameter, from, to)| {
         slider(parameter, *from, *to, parameter.get(&plan.machine, &plan.spin))
     });
@@ -93,6 +94,16 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         end_s: plan.end_s,
         window_s: plan.window_s,
         channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
+        criterion: {
+            let criterion = plan.measures.criterion;
+            [criterion.amplitude(), criterion.ratio()].map(str::to_owned)
+        },
+        metrics: plan.measures.of_model().map(columns).collect(),
+        has_static_sag: plan.measures.metrics.contains(&Metric::StaticSag),
+        kinds: match widened(&plan, &sliders).corners_of_forces() {
+            None => Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
+            Some(_) => Vec::new(),
+        },
         compared: plan.reliability.channels.iter().map(|channel| channel.index()).collect(),
         levels: Level::ALL.map(|level| level.name().to_owned()).to_vec(),
         accuracy: setup.rule.accuracy,

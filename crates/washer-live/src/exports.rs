@@ -109,6 +109,26 @@ pub extern "C" fn history(model: usize, rung: usize, every_s: f64) -> usize {
     state.output.len()
 }
 
+/// How disturbances grow at a point of so many values while the drum turns at the constant speeds
+/// (rpm) behind them: 1, 0 or -1 as above; for each speed how fast the fastest one grows (1/s; NaN
+/// where there is no periodic response), its frequency (cycles per minute), and what it is, by its
+/// place among [`washer_model::Kind::ALL`].
+#[unsafe(no_mangle)]
+pub extern "C" fn growth(values: usize) -> usize {
+    let state = &mut *state();
+    let Some(setup) = &state.setup else { return 0 };
+    let Some((values, speeds_rpm)) = state.input.split_at_checked(values) else { return 0 };
+    state.output.clear();
+    let found = crate::growth(setup, values, speeds_rpm);
+    state.output.push(code(found.as_ref().err()));
+    for disturbance in found.unwrap_or_default() {
+        state.output.extend(disturbance.map_or([f64::NAN; 3], |of| {
+            [of.growth_per_s(), of.frequency_cpm(), f64::from(of.kind() as u8)]
+        }));
+    }
+    state.output.len()
+}
+
 /// Speeds (rpm) at a point, every `every_s` from 0 to the end.
 #[unsafe(no_mangle)]
 pub extern "C" fn speeds(every_s: f64) -> usize {
@@ -116,7 +136,7 @@ pub extern "C" fn speeds(every_s: f64) -> usize {
     let Some(setup) = &state.setup else { return 0 };
     state.output.clear();
     if let Ok(scenario) = Scenario::new(setup, &state.input) {
-        let instants = 1 + (setup.end_s / every_s * (1.0 + 1e-12)) as usize;
+        let instants = 1 + (setup.rule.end_s / every_s * (1.0 + 1e-12)) as usize;
         let times_s = (0..instants).map(|k| k as f64 * every_s);
         state.output.extend(scenario.spin.speeds_rpm(times_s));
     }

@@ -6,12 +6,13 @@
 //!
 //! * [`quick`]: both models at some points by one rung, which is quick and not checked;
 //! * [`check`]: a point as a row of the map has it, by runs that agree;
-//! * [`motion`]: the time history of one model at a point.
+//! * [`motion`]: the time history of one model at a point;
+//! * [`growth`]: how fast disturbances grow there while the drum turns at constant speeds.
 //!
 //! Numbers go in and come out as arrays of 64 bit floats; `exports.rs` says in which order. Where
 //! this crate runs natively, [`check`] gives the bits of the program's rows, because both climb by
-//! the rule of `washer-row` (tests of `sweep`); as
-//! a module it rounds without fused operations (`tests/browser/check_live.py`).
+//! the rule of `washer-row` (tests of `sweep`). As a module it rounds without fused operations
+//! (`tests/browser/check_live.py`).
 
 #[cfg(target_arch = "wasm32")]
 mod exports;
@@ -19,5 +20,5 @@ mod numbers;
 mod point;
 mod setup;
 
-pub use point::{Answer, Motion, NoPoint, check, motion, quick};
+pub use point::{Answer, Motion, NoPoint, check, growth, motion, quick};
 pub use setup::{Setup, Sliders};

@@ -2,7 +2,8 @@
 
 use lane_ode::{Failure, Simd};
 use washer_model::{
-    Channel, Machine, ModelKind, Point, Spin, Start, Target, Timing, history, prepare,
+    Channel, Disturbance, Dwell, Machine, ModelKind, Point, Spin, Start, Target, Timing, history,
+    prepare, respond,
 };
 use washer_row::{
     Climbs, Demand, Deviations, Ladder, Level, MODELS, Next, Outcome, Rule, Rung, RungRun, Status,
@@ -228,4 +229,23 @@ pub fn motion(
     let instants = (0..history.len()).filter_map(|k| history.instant(k));
     let (channels, gaps_m) = instants.map(|instant| (instant.channels, instant.gap_m)).unzip();
     Ok(Motion { failure: history.failure, channels, gaps_m })
+}
+
+/// The fastest growing disturbance of a point's periodic response at each of some constant speeds
+/// (rpm); none where there is no response.
+///
+/// # Errors
+/// [`NoPoint`].
+pub fn growth(
+    setup: &Setup,
+    values: &[f64],
+    speeds_rpm: &[f64],
+) -> Result<Vec<Option<Disturbance>>, NoPoint> {
+    let (_, point) = ready(setup, values)?;
+    let dwells: Vec<Dwell<'_>> =
+        speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+    Ok(respond(&dwells)
+        .into_iter()
+        .map(|answer| answer.ok().map(|found| found.disturbance()))
+        .collect())
 }

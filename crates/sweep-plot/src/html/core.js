@@ -8,6 +8,12 @@ function decode(text) {
   return bytes;
 }
 
+// What gzip has packed, as a promise of its bytes.
+function unpacked(text) {
+  const stream = new Blob([decode(text)]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).arrayBuffer();
+}
+
 function floats(text) {
   const view = new DataView(decode(text).buffer);
   return Float32Array.from({ length: view.byteLength / 4 }, (_, k) => view.getFloat32(4 * k, true));

@@ -4,17 +4,12 @@
 const QUICK_RUNG = 255;
 // A point is checked once its sliders have rested so long, ms.
 const REST = 150;
-// Numbers of a record before its amplitudes, and in all beside them.
-const RECORD = 4;
 const FAILURES = ["", "diverged", "needs steps too small", "used up its steps"];
 // Points of a finer map along each axis, how many cells it spans without a zoom, points a call.
 const FINE = { points: 20, cells: 7, together: 10 };
-// The highest frequency of a spectrum, Hz.
-const HIGHEST = 25;
 
 function createLive(host, data) {
   const { live } = data;
-  const width = RECORD + live.channels.length;
   const values = live.sliders.map((slider) => slider.value);
   let map = null;
   let latest = 0;
@@ -44,13 +39,14 @@ function createLive(host, data) {
       told),
     charts, computedWith()));
 
-  const pool = createPool(decode(live.module), doubles(live.setup), (state) => {
+  const pool = createPool(unpacked(live.module), doubles(live.setup), (state) => {
     if (state.error) status.textContent = `This browser cannot compute here: ${state.error}.`;
     host.querySelector("#live").dataset.ready = `${state.ready} of ${state.workers}`;
     host.querySelector("#live-workers").textContent = `${state.ready} workers, each with a module `
       + `of its own: WebAssembly with simd128, ${state.lanes} trajectories side by side.`;
   });
-  const curves = createCurves(charts, live, data);
+  const curves = createCurves(charts, live);
+  const growth = live.kinds.length > 0 ? createGrowth(charts, live, pool) : null;
 
   function createSlider(slider, k) {
     const { from, to } = slider;
@@ -91,6 +87,7 @@ function createLive(host, data) {
     latest += 1;
     clearTimeout(resting);
     pool.drop("check");
+    growth?.moved();
     map?.mark();
     if (isBusy) isMoved = true;
     else preview();
@@ -112,10 +109,8 @@ function createLive(host, data) {
         const speeds = ask("preview", 3, "speeds", [live.everyS]);
         const [peaks, ...found] = await Promise.all(calls);
         const took = performance.now() - started;
-        const [is, ...numbers] = peaks.numbers;
-        const records = [numbers.slice(0, width), numbers.slice(width)];
         const ms = [peaks, ...found].map((one) => one.ms);
-        show({ is, records, isChecked: false, took, ms });
+        show({ ...parsedAnswer(peaks.numbers, live), isChecked: false, took, ms });
         curves.show(found.map((one) => one.numbers), (await speeds).numbers);
       } catch (error) {
         tellError(error);
@@ -130,20 +125,16 @@ function createLive(host, data) {
       const started = performance.now();
       const { numbers, ms } = await ask("check", 2, "checked");
       if (of !== latest) return;
-      const [is, sensitive, ...rest] = numbers;
-      if (is !== 1) return;
-      const size = 3 + width;
-      const models = [rest.slice(0, size), rest.slice(size)];
-      const took = performance.now() - started;
-      show({
-        is, records: models.map((model) => model.slice(3)), isChecked: true, took, ms: [ms],
-        sensitive: sensitive === 1, levels: models.map((model) => live.levels[model[1]]),
-        error: Math.max(...models.map((model) => model[2])),
-      });
-      const speeds = ask("check", 2, "speeds", [live.everyS]);
-      const found = await Promise.all(motions("check", models.map((model) => model[0])));
+      const answer = parsedAnswer(numbers, live);
+      if (answer.is !== 1) return;
+      show({ ...answer, isChecked: true, took: performance.now() - started, ms: [ms] });
+      const asked = ask("check", 2, "speeds", [live.everyS]);
+      const rungs = answer.records.map((record) => record.rung);
+      const found = await Promise.all(motions("check", rungs));
+      const speeds = (await asked).numbers;
       if (of === latest) {
-        curves.show(found.map((one) => one.numbers), (await speeds).numbers);
+        curves.show(found.map((one) => one.numbers), speeds);
+        growth?.rested([...values], speeds.reduce((most, speed) => Math.max(most, speed)));
       }
     } catch (error) {
       tellError(error);
@@ -156,16 +147,10 @@ function createLive(host, data) {
     status.textContent = `This point could not be computed: ${error.message}. It is a defect.`;
   }
 
-  // Both models' ratio of a channel.
-  const ratioOf = ([nonlinear, linear], channel) => {
-    const of = linear[RECORD + channel];
-    return of === 0 ? NaN : nonlinear[RECORD + channel] / of;
-  };
-
-  function greatestOf(records) {
+  function greatestOf(ratios) {
     let greatest = null;
     for (const channel of live.compared) {
-      const ratio = ratioOf(records, channel);
+      const ratio = ratios[channel];
       if (ratio > (greatest?.ratio ?? -Infinity)) greatest = { ratio, channel };
     }
     return greatest;
@@ -183,24 +168,29 @@ function createLive(host, data) {
       status.textContent = "Nothing to compute.";
       return;
     }
-    const { records } = answer;
-    panel.dataset.records = records.flat().join(" ");
-    const greatest = greatestOf(records);
-    const failed = records.findIndex((record) => record[0] !== 0);
+    const { records, ratios } = answer;
+    panel.dataset.records = records.map(({ failure, failTime, steps, gap, amplitudes, metrics }) =>
+      [failure, failTime, steps, gap, ...amplitudes, ...metrics].join(" ")).join(" ");
+    panel.dataset.ratios = ratios.join(" ");
+    const greatest = greatestOf(ratios);
+    const failed = records.findIndex((record) => record.failure !== 0);
     const verdict = failed >= 0
-      ? `The ${["nonlinear", "linear"][failed]} model ${FAILURES[records[failed][0]]} at `
-        + `${significant(records[failed][1])} s`
+      ? `The ${["nonlinear", "linear"][failed]} model ${FAILURES[records[failed].failure]} at `
+        + `${significant(records[failed].failTime)} s`
       : !greatest ? "Undefined: no excitation"
         : `Linear model ${greatest.ratio < live.ratioLimit ? "" : "un"}reliable here`;
     const kind = answer.isChecked ? "Checked" : "Preview, not checked";
-    const rows = live.channels.map((channel, k) => element("tr", { "data-live": channel.name },
-      element("th", { scope: "row" }, withUnit(channel.words, channel.unit)),
-      ...records.map((record) => element("td", {}, significant(record[RECORD + k]
-        * channel.factor))),
-      element("td", {}, significant(ratioOf(records, k)))));
-    const gaps = element("tr", {}, element("th", { scope: "row" }, "Least gap, whole run (mm)"),
-      ...records.map((record) => element("td", {}, significant(record[3] * 1e3))),
-      element("td", {}));
+    const row = (words, unit, of, beside = "") => element("tr", {},
+      element("th", { scope: "row" }, withUnit(words, unit)),
+      ...records.map((record) => element("td", {}, significant(of(record)))),
+      element("td", {}, beside));
+    const rows = live.channels.map((channel, k) => row(channel.words, channel.unit,
+      (record) => record.amplitudes[k] * channel.factor, significant(ratios[k])));
+    rows.push(row("Least gap, whole run", "mm", (record) => record.gap * 1e3));
+    live.metrics.forEach((metric, k) => rows.push(row(metric.words, metric.unit,
+      (record) => record.metrics[k] * metric.factor)));
+    const sag = live.staticSag
+      ? [element("p", {}, `Static sag of the tub ${significant(answer.sag * 1e3)} mm`)] : [];
     const heads = ["", "nonlinear", "linear", "ratio"]
       .map((text) => element("th", { scope: "col" }, text));
     const largest = greatest && `Largest ratio ${significant(greatest.ratio)} `
@@ -211,12 +201,16 @@ function createLive(host, data) {
       ...(largest ? [element("p", {}, largest)] : []),
       ...(answer.sensitive ? [element("p", {}, "The motion is chaotic: plain rk4 does not agree "
         + "with itself at two steps. The digits are those of one trajectory.")] : []),
-      element("table", {}, element("thead", {}, element("tr", {}, ...heads)),
-        element("tbody", {}, ...rows, gaps)));
+      element("table", {},
+        element("caption", { title: `Ratio: ${live.criterion[1]}` },
+          capitalised(live.criterion[0])),
+        element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)),
+      ...sag);
     const took = `${answer.took.toFixed(answer.took < 10 ? 1 : 0)} ms`;
     status.textContent = answer.isChecked
-      ? `Checked in ${took}: amplitudes within ${significant(answer.error, 2)} of themselves; `
-        + `nonlinear model by ${answer.levels[0]}, linear model by ${answer.levels[1]}.`
+      ? `Checked in ${took}: numbers within `
+        + `${significant(Math.max(...records.map((record) => record.error)), 2)} of themselves; `
+        + `nonlinear model by ${records[0].level}, linear model by ${records[1].level}.`
       : `Preview in ${took}: peaks of both models ${answer.ms[0].toFixed(1)} ms, curves `
         + `${answer.ms.slice(1).map((ms) => ms.toFixed(1)).join(" and ")} ms, side by side.`;
   }
@@ -251,8 +245,9 @@ function createLive(host, data) {
       });
       pool.ask("fine", 1, "quick", points, [values.length]).then(({ numbers }) => {
         part.forEach((cell, at) => {
-          const [is, ...rest] = numbers.slice(at * (1 + 2 * width), (at + 1) * (1 + 2 * width));
-          if (is === 1) fine.push({ ...cell, records: [rest.slice(0, width), rest.slice(width)] });
+          const width = numbers.length / part.length;
+          const answer = parsedAnswer(numbers.slice(at * width, (at + 1) * width), live);
+          if (answer.is === 1) fine.push({ ...cell, answer });
         });
         fineLeft -= part.length;
         host.querySelector("#live").dataset.fine = `${fine.length} ${fineLeft}`;
@@ -262,17 +257,23 @@ function createLive(host, data) {
   }
 
   // What a layer of the map shows of a finer cell; NaN where it shows something else.
-  function layerValue(layer, records) {
-    if (layer.group === "ratio" && !layer.channel) return greatestOf(records)?.ratio ?? NaN;
+  function layerValue(layer, { records, ratios, sag }) {
+    if (layer.group === "ratio" && !layer.channel) return greatestOf(ratios)?.ratio ?? NaN;
     const model = { nonlinear: 0, linear: 1 };
     if (layer.group in model || layer.group === "ratio") {
       const channel = live.channels.findIndex((one) => one.name === layer.channel);
       if (channel < 0) return NaN;
-      if (layer.group === "ratio") return ratioOf(records, channel);
-      return records[model[layer.group]][RECORD + channel] * live.channels[channel].factor;
+      if (layer.group === "ratio") return ratios[channel];
+      return records[model[layer.group]].amplitudes[channel] * live.channels[channel].factor;
     }
     const gap = { "gap-nonlinear": 0, "gap-linear": 1 }[layer.group];
-    return gap === undefined ? NaN : records[gap][3] * 1e3;
+    if (gap !== undefined) return records[gap].gap * 1e3;
+    if (layer.column === "static_sag_m") return sag * 1e3;
+    for (const [k, { columns, factor }] of live.metrics.entries()) {
+      const of = columns.indexOf(layer.column);
+      if (of >= 0) return records[of].metrics[k] * factor;
+    }
+    return NaN;
   }
 
   function computedWith() {
@@ -309,8 +310,8 @@ function createLive(host, data) {
     hasFine: () => fine.length > 0,
     cells(context, layer, at, colour) {
       if (!layer) return;
-      for (const { from, to, records } of fine) {
-        const value = layerValue(layer, records);
+      for (const { from, to, answer } of fine) {
+        const value = layerValue(layer, answer);
         if (!Number.isFinite(value)) continue;
         const [left, low] = at(...from).map(Math.round);
         const [right, high] = at(...to).map(Math.round);
@@ -345,75 +346,18 @@ function createLive(host, data) {
   };
 }
 
-// Time histories and spectra of both models, redrawn in place.
-function createCurves(host, live, data) {
-  const instants = 1 + Math.floor((live.endS / live.everyS) * (1 + 1e-12));
-  const times = Float32Array.from({ length: instants }, (_, k) => k * live.everyS);
-  const [from, to] = live.windowS.map((at) => Math.round(at / live.everyS));
-  const size = spectrumSize(to - from + 1);
-  const perBin = 1 / (size * live.everyS);
-  const bins = Math.min(Math.floor(HIGHEST / perBin), size / 2);
-  const frequencies = Float32Array.from({ length: bins }, (_, k) => k * perBin);
-  // Of the motions that are there.
-  let version = 0;
-  const line = (name, colour, count, alpha = 1) => ({
-    name, colour, alpha, grid: 0, width: 1.3, dashed: false, y: new Float32Array(count).fill(NaN),
+// What the module answers of a point, by name (`exports.rs` of washer-live).
+function parsedAnswer(numbers, live) {
+  const rest = [...numbers];
+  const take = (count) => rest.splice(0, count);
+  const [is, sensitive] = take(2);
+  const records = [0, 1].map(() => {
+    const [rung, level, error, failure, failTime, steps, gap] = take(7);
+    const [amplitudes, metrics] = [take(live.channels.length), take(live.metrics.length)];
+    return {
+      rung, level: live.levels[level], error, failure, failTime, steps, gap, amplitudes, metrics,
+    };
   });
-  const both = (count) => [line("nonlinear model", "#0072b2", count),
-    line("linear model", "#d55e00", count, 0.65)];
-  const panel = (name, words, unit, shown, series, height = 150) => ({
-    name, words, unit, shown, log: false, ticks: null, range: null, height, series, levels: [],
-    stars: [], mixed: [],
-  });
-  const first = live.compared[Math.max(live.compared.length - 2, 0)];
-  const motion = live.channels.map((channel, k) => panel(channel.name, capitalised(channel.words),
-    channel.unit, k === first, both(instants)));
-  const gap = panel("gap", "Gap, drum to tub", "mm", false, both(instants));
-  const speed = panel("speed", "Spin", "rpm", true, [line("", "ink", instants)], 80);
-  // Spectra are found when they are drawn.
-  const ofWindow = (one, source) => {
-    const [y, found] = [new Float32Array(bins).fill(NaN), { version: -1 }];
-    return Object.defineProperty({ ...one }, "y", { get() {
-      if (found.version === version) return y;
-      found.version = version;
-      y.set(spectrum(Array.from(source.y.subarray(from, to + 1)), live.everyS, bins));
-      return y;
-    } });
-  };
-  const spectra = live.channels.map((channel, k) => panel(channel.name,
-    capitalised(channel.words), channel.unit, k === first,
-    both(bins).map((one, model) => ofWindow(one, motion[k].series[model]))));
-  const spec = (xWords, xUnit, grid, panels) => ({
-    xWords, xUnit, xLog: false, xTicks: null, grids: [grid], panels, marks: [], markMeaning: "",
-    shades: [], shadeMeaning: "",
-  });
-  const histories = element("div", { id: "live-histories" });
-  const spectrumHost = element("div", { id: "live-spectrum" });
-  host.append(element("h2", {}, "Time histories"), histories,
-    element("h2", {}, `Spectrum from ${live.windowS[0]} to ${live.windowS[1]} s`), spectrumHost);
-  const charts = [
-    createChart(histories, spec("Time", "s", times, [...motion, gap, speed]), "Time histories"),
-    createChart(spectrumHost, spec("Frequency", "Hz", frequencies, spectra), "Spectrum"),
-  ];
-  const columns = live.channels.length + 1;
-
-  return {
-    show(models, speeds) {
-      models.forEach((numbers, model) => {
-        const count = numbers[0] === 1 ? numbers[3] : 0;
-        const column = (k, factor, into) => {
-          for (let i = 0; i < into.length; i++) {
-            into[i] = i < count ? numbers[4 + i * columns + k] * factor : NaN;
-          }
-        };
-        live.channels.forEach((channel, k) => {
-          column(k, channel.factor, motion[k].series[model].y);
-        });
-        column(columns - 1, 1e3, gap.series[model].y);
-      });
-      version += 1;
-      speed.series[0].y.set(speeds.subarray(0, instants));
-      charts.forEach((chart) => chart.changed());
-    },
-  };
+  const ratios = take(live.channels.length);
+  return { is, sensitive: sensitive === 1, records, ratios, sag: rest[0] };
 }

@@ -4,10 +4,10 @@ use serde_json::{Value, json};
 
 use super::embed;
 use crate::grid::GridAxis;
-use crate::{Live, Slider, label};
+use crate::{Live, Slider, label, layer};
 
-/// The module of `crates/washer-live`; `scripts/release/build_live.sh` makes it.
-const MODULE: &[u8] = include_bytes!("../../assets/live.wasm");
+/// The module of `crates/washer-live`, packed by gzip; `scripts/release/build_live.sh` makes it.
+const MODULE: &[u8] = include_bytes!("../../assets/live.wasm.gz");
 
 /// What the page's workers run.
 pub(crate) const WORKER: &str =
@@ -27,12 +27,23 @@ pub(crate) fn json(live: &Live, axes: &[GridAxis]) -> Value {
         "windowS": live.window_s,
         "channels": live.channels.iter().map(channel).collect::<Vec<_>>(),
         "compared": live.compared,
+        "criterion": live.criterion,
+        "metrics": live.metrics.iter().map(metric).collect::<Vec<_>>(),
+        "staticSag": live.has_static_sag,
+        "kinds": live.kinds.iter().map(|kind| kind.replace('_', " ")).collect::<Vec<_>>(),
         "levels": live.levels,
         "accuracy": live.accuracy,
         "ratioLimit": live.ratio_limit,
         "rungs": live.rungs,
         "version": live.version,
     })
+}
+
+fn metric(columns: &[String; 2]) -> Value {
+    let unit = label::unit_of_name(&columns[0]);
+    let (unit, factor) = label::shown(&unit);
+    let words = layer::words_of_whole(&columns[0]).unwrap_or_else(|| label::words(&columns[0]));
+    json!({ "columns": columns, "words": words, "unit": unit, "factor": factor })
 }
 
 fn slider(slider: &Slider, axes: &[GridAxis]) -> Value {

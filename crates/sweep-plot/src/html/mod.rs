@@ -41,6 +41,8 @@ const MAP: &str = include_str!("map.js");
 const DESIGN: &str = include_str!("design.js");
 const SPECTRUM: &str = include_str!("spectrum.js");
 const POOL: &str = include_str!("pool.js");
+const CURVES: &str = include_str!("curves.js");
+const GROWTH: &str = include_str!("growth.js");
 const LIVE: &str = include_str!("live.js");
 const REPORT: &str = include_str!("report.js");
 const START: &str = include_str!("start.js");
@@ -116,7 +118,10 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
     };
     data["live"] = live::json(live, &map.grid.axes);
     data["resonances"] = json!(live.resonances);
-    let scripts = [CORE, CHART, BAR, HISTORIES, SPECTRUM, POOL, LIVE, CELLS, MAP, REPORT, START];
+    let scripts = [
+        CORE, CHART, BAR, HISTORIES, SPECTRUM, POOL, CURVES, GROWTH, LIVE, CELLS, MAP, REPORT,
+        START,
+    ];
     Ok(page(title, data, &scripts))
 }
 

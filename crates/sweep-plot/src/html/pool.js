@@ -5,8 +5,9 @@ const MOST_WORKERS = 8;
 // Work on something that is not wanted any more is cut off after this time, ms.
 const PATIENCE = 60;
 
-// `tell` hears { workers, ready, lanes, error } as workers come up.
-function createPool(moduleBytes, setup, tell) {
+// `module` is a promise of its bytes. `tell` hears { workers, ready, lanes, error } as workers come
+// up.
+function createPool(module, setup, tell) {
   const source = document.getElementById("worker").textContent;
   const url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
   const count = Math.min(Math.max(navigator.hardwareConcurrency || 2, 2), MOST_WORKERS);
@@ -82,8 +83,8 @@ function createPool(moduleBytes, setup, tell) {
     }
   }
 
-  WebAssembly.compile(moduleBytes).then((module) => {
-    compiled = module;
+  module.then((bytes) => WebAssembly.compile(bytes)).then((ready) => {
+    compiled = ready;
     for (let k = 0; k < count; k++) {
       members.push({});
       hire(members[k]);

@@ -1,0 +1,77 @@
+// Time histories and spectra of the panel that computes.
+
+// The highest frequency of a spectrum, Hz.
+const HIGHEST = 25;
+
+// Time histories and spectra of both models, redrawn in place.
+function createCurves(host, live) {
+  const instants = 1 + Math.floor((live.endS / live.everyS) * (1 + 1e-12));
+  const times = Float32Array.from({ length: instants }, (_, k) => k * live.everyS);
+  const [from, to] = live.windowS.map((at) => Math.round(at / live.everyS));
+  const size = spectrumSize(to - from + 1);
+  const perBin = 1 / (size * live.everyS);
+  const bins = Math.min(Math.floor(HIGHEST / perBin), size / 2);
+  const frequencies = Float32Array.from({ length: bins }, (_, k) => k * perBin);
+  // Of the motions that are there.
+  let version = 0;
+  const line = (name, colour, count, alpha = 1) => ({
+    name, colour, alpha, grid: 0, width: 1.3, dashed: false, y: new Float32Array(count).fill(NaN),
+  });
+  const both = (count) => [line("nonlinear model", "#0072b2", count),
+    line("linear model", "#d55e00", count, 0.65)];
+  const panel = (name, words, unit, shown, series, height = 150) => ({
+    name, words, unit, shown, log: false, ticks: null, range: null, height, series, levels: [],
+    stars: [], mixed: [],
+  });
+  const first = live.compared[Math.max(live.compared.length - 2, 0)];
+  const motion = live.channels.map((channel, k) => panel(channel.name, capitalised(channel.words),
+    channel.unit, k === first, both(instants)));
+  const gap = panel("gap", "Gap, drum to tub", "mm", false, both(instants));
+  const speed = panel("speed", "Spin", "rpm", true, [line("", "ink", instants)], 80);
+  // Spectra are found when they are drawn.
+  const ofWindow = (one, source) => {
+    const [y, found] = [new Float32Array(bins).fill(NaN), { version: -1 }];
+    return Object.defineProperty({ ...one }, "y", { get() {
+      if (found.version === version) return y;
+      found.version = version;
+      y.set(spectrum(Array.from(source.y.subarray(from, to + 1)), live.everyS, bins));
+      return y;
+    } });
+  };
+  const spectra = live.channels.map((channel, k) => panel(channel.name,
+    capitalised(channel.words), channel.unit, k === first,
+    both(bins).map((one, model) => ofWindow(one, motion[k].series[model]))));
+  const spec = (xWords, xUnit, grid, panels) => ({
+    xWords, xUnit, xLog: false, xTicks: null, grids: [grid], panels, marks: [], markMeaning: "",
+    shades: [], shadeMeaning: "",
+  });
+  const histories = element("div", { id: "live-histories" });
+  const spectrumHost = element("div", { id: "live-spectrum" });
+  host.append(element("h2", {}, "Time histories"), histories,
+    element("h2", {}, `Spectrum from ${live.windowS[0]} to ${live.windowS[1]} s`), spectrumHost);
+  const charts = [
+    createChart(histories, spec("Time", "s", times, [...motion, gap, speed]), "Time histories"),
+    createChart(spectrumHost, spec("Frequency", "Hz", frequencies, spectra), "Spectrum"),
+  ];
+  const columns = live.channels.length + 1;
+
+  return {
+    show(models, speeds) {
+      models.forEach((numbers, model) => {
+        const count = numbers[0] === 1 ? numbers[3] : 0;
+        const column = (k, factor, into) => {
+          for (let i = 0; i < into.length; i++) {
+            into[i] = i < count ? numbers[4 + i * columns + k] * factor : NaN;
+          }
+        };
+        live.channels.forEach((channel, k) => {
+          column(k, channel.factor, motion[k].series[model].y);
+        });
+        column(columns - 1, 1e3, gap.series[model].y);
+      });
+      version += 1;
+      speed.series[0].y.set(speeds.subarray(0, instants));
+      charts.forEach((chart) => chart.changed());
+    },
+  };
+}
