@@ -1,9 +1,10 @@
 """A page that computes, in headless Chromium, held against the map and a trace of the program.
 
-    python check_live.py MAP.parquet TRACE.parquet PAGE.html [--screenshots FOLDER]
+    python check_live.py MAP.parquet TRACE.parquet STABILITY.parquet PAGE.html
+        [--screenshots FOLDER]
 
 Points of the map are typed into the page; what it then computes is compared with the file's rows,
-and its curves with the trace. Exits with 1 at the first thing that is wrong.
+its curves with the trace, and the growth of disturbances with the file of `sweep stability`. Exits with 1 at the first thing that is wrong.
 """
 
 import argparse
@@ -34,6 +35,11 @@ class Live(Page):
         """What the panel says of itself."""
         script = "return document.getElementById('live').dataset[arguments[0]]"
         return self.driver.execute_script(script, name)
+
+    def growth(self, name):
+        """What is known of the growth of disturbances."""
+        script = "return document.getElementById('live-growth').dataset[arguments[0]] ?? ''"
+        return [float(text) for text in self.driver.execute_script(script, name).split()]
 
     def until(self, condition, what, seconds=LONGEST_CHECK_S):
         """Until the condition holds."""
@@ -172,6 +178,37 @@ def curves_are_the_traces(page, trace, where):
     return f"{seen} values of curves, as in the trace of plain rk4"
 
 
+def growth_is_the_programs(page, path):
+    """Growth over speed at points of the file, at the speeds that both have."""
+    rows = pq.read_table(path).to_pylist()
+    sliders = [slider["name"] for slider in page.live["sliders"]]
+    axes = [name for name in sliders if name in rows[0]]
+    points = sorted({tuple(row[axis] for axis in axes) for row in rows})
+    page.driver.execute_script("document.getElementById('live-growth').open = true")
+    worst, seen, grows = 0.0, 0, 0
+    for point in (points[0], points[len(points) // 2], points[-1]):
+        where = dict(zip(axes, point))
+        page.computed(where)
+
+        def is_there(where=where):
+            here = dict(zip(sliders, page.growth("point")))
+            return all(here.get(name) == value for name, value in where.items())
+        page.until(is_there, f"no growth at {where}")
+        found = dict(zip(page.growth("speeds"), page.growth("growth")))
+        for row in rows:
+            if all(row[axis] == value for axis, value in where.items()) \
+                    and row["speed_rpm"] in found:
+                # The page draws it in single precision.
+                worst = max(worst, abs(found[row["speed_rpm"]] - row["growth_per_s"]))
+                seen += 1
+                grows += row["growth_per_s"] > 0
+        page.shot(f"live-growth-{'-'.join(map(str, point))}")
+    check(seen >= 9 and grows > 0, f"{seen} speeds in common, growth at {grows}")
+    check(worst < 1e-6, f"growth is off by {worst:.1e}/s")
+    page.driver.execute_script("document.getElementById('live-growth').open = false")
+    return f"{seen} speeds, growth at {grows} of them: within {worst:.1e}/s"
+
+
 def stays_responsive(page, data):
     """While a slider is dragged, frames keep coming and so do answers."""
     script = """const done = arguments[arguments.length - 1];
@@ -202,6 +239,8 @@ def stays_responsive(page, data):
 def keys_alone(page):
     """A slider under the keyboard."""
     slider = page.driver.find_element(By.CSS_SELECTOR, "#live input[type=range]")
+    first = page.live["sliders"][0]
+    page.computed({first["name"]: (first["from"] + first["to"]) / 2})
     page.driver.execute_script("arguments[0].focus()", slider)
     before = page.panel("point")
     page.press("ArrowRight")
@@ -277,6 +316,7 @@ def main():
     )
     parser.add_argument("map")
     parser.add_argument("trace", help="of the first point of the map that is reliable")
+    parser.add_argument("stability", help="of the map's grid at some speeds")
     parser.add_argument("page")
     parser.add_argument("--screenshots", help="folder for pictures of what was seen")
     arguments = parser.parse_args()
@@ -290,6 +330,7 @@ def main():
         ("rows", lambda: checked_points_are_rows(page, data)),
         ("preview", lambda: previews_say_so(page, data)),
         ("curves", lambda: curves_are_the_traces(page, arguments.trace, at)),
+        ("growth", lambda: growth_is_the_programs(page, arguments.stability)),
         ("drag", lambda: stays_responsive(page, data)),
         ("keys", lambda: keys_alone(page)),
         ("scales", lambda: log_axes_have_log_sliders(page)),

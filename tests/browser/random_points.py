@@ -2,12 +2,13 @@
 
     python random_points.py SWEEP_BINARY [--maps N] [--seed N]
 
-Each map has nine points of a random machine, spin profile and window; each point is typed into the
-map's live page. Says how far the page's amplitudes are from the file's, as a share of each, and
-exits with 1 if a reliable point is further off than a page promises.
+Each map has nine points of a random machine, spin profile, window and criterion; each point is typed
+into the map's live page. Says how far the page's amplitudes, ratios and metrics are from the
+file's, as a share of each, and exits with 1 if a reliable point is further off than a page promises.
 """
 
 import argparse
+import math
 import pathlib
 import random
 import subprocess
@@ -43,6 +44,8 @@ def grid(chance):
     dampings = f"from = {about(70.0, 1.4)!r}, to = {about(280.0, 1.4)!r}, count = 3"
     return "\n".join([
         'name = "random"',
+        'metrics = ["static_sag", "cabinet_force", "clash_time"]',
+        "[reliability]", f'criterion = "{chance.choice(["peak", "rms", "envelope"])}"',
         "[set]", *constants,
         "[spin]", f'profile = "{profile}"',
         f"peak_rpm = {about(320.0, 1.6)!r}", f"ramp_s = {chance.uniform(0.4, 1.1) * end_s!r}",
@@ -59,10 +62,22 @@ def distances(page, data):
         if row["status"] != "ok" or row["sensitive"]:
             continue
         where = {axis: row[axis] for axis in data.axes}
-        models = dict(zip(("nonlinear", "linear"), page.computed(where)))
+        found = {"static_sag_m": None}
+        for model, record in zip(("nonlinear", "linear"), page.computed(where)):
+            found |= {f"{model}_{channel}": record[channel] for channel in data.channels}
+            found |= record["metrics"]
+        names = [channel["name"] for channel in page.live["channels"]]
+        ratios = dict(zip(names, map(float, page.panel("ratios").split())))
+        found |= {f"ratio_{channel}": ratios[channel] for channel in data.channels}
+        found["static_sag_m"] = float(page.panel("sag"))
         yield bool(row["reliable"]), max(
-            (abs(models[model][channel] / row[f"{model}_{channel}"] - 1), model, channel, where)
-            for model in models for channel in data.channels)
+            (apart(column, value, row[column]), column, where) for column, value in found.items())
+
+
+def apart(column, value, true):
+    """The relative difference; of times, which may be zero, in seconds."""
+    difference = abs(value - true) if column.endswith("_s") else abs(value / true - 1)
+    return math.inf if math.isnan(difference) else difference
 
 
 def main():

@@ -36,8 +36,10 @@ fi
 "$sweep" plot "$map" --live -o "$work/live.html"
 "$sweep" trace "$root/sweeps/quick.toml" --at unbalance_mass_kg=0.12 --at damping_n_s_per_m=222 \
     --out "$work/between.parquet"
-"$venv/bin/python" "$here/check_live.py" "$map" "$work/between.parquet" "$work/live.html" \
-    ${SHOTS:+--screenshots "$SHOTS"}
+"$sweep" stability "$root/sweeps/quick.toml" --speed 210:250:20 --out "$work/stability.parquet" \
+    --progress none
+"$venv/bin/python" "$here/check_live.py" "$map" "$work/between.parquet" \
+    "$work/stability.parquet" "$work/live.html" ${SHOTS:+--screenshots "$SHOTS"}
 
 # The same of random machines, along an axis that is logarithmic.
 "$venv/bin/python" "$here/random_points.py" "$sweep" --maps 2

@@ -1,16 +1,16 @@
 // How fast small disturbances grow while the drum turns at constant speeds, of the panel's point.
 
 // The least speed that is asked for, rpm; about how many are; how many a call takes.
-const GROWTH = { from: 50, speeds: 150, together: 5 };
+const GROWTH = { from: 50, speeds: 300, together: 10 };
 
 function createGrowth(host, live, pool) {
   const about = element("p", { id: "growth-status", role: "status" });
   const chartHost = element("div", { id: "live-growth-chart" });
   const box = element("details", { id: "live-growth", ontoggle: () => compute() },
     element("summary", {}, "Growth of disturbances at constant speeds"),
-    element("p", {}, "While the drum turns at one speed, the nonlinear model has a motion that "
-      + "repeats with each turn. Small disturbances of it grow at some speeds, and there the "
-      + "linear model fails. Above zero they grow."),
+    element("p", {}, "At a constant speed the nonlinear model has a motion that repeats with each "
+      + "turn of the drum. Where small disturbances of this motion grow (above zero), it does not "
+      + "last, and the linear model fails."),
     about, chartHost);
   host.append(box);
   let point = null;
@@ -22,8 +22,8 @@ function createGrowth(host, live, pool) {
   // Speeds up to the fastest of the spin, in whole steps.
   function speedsUpTo(peak) {
     const from = Math.min(GROWTH.from, peak / 4);
-    const step = Math.max(1, Math.ceil((peak - from) / GROWTH.speeds));
-    const count = Math.max(2, 1 + Math.floor((peak - from) / step));
+    const step = Math.max(1, Math.round((peak - from) / GROWTH.speeds));
+    const count = Math.max(2, 1 + Math.floor((peak - from) / step + 1e-6));
     return Float32Array.from({ length: count }, (_, k) => from + step * k);
   }
 
@@ -40,7 +40,7 @@ function createGrowth(host, live, pool) {
       xWords: "Spin speed", xUnit: "rpm", xLog: false, xTicks: null, grids: [speeds],
       panels: [
         panel("growth", "Growth", "1/s", [[0, "neither growth nor decay"]], 200),
-        panel("frequency", "Frequency of the disturbance", "cycles/min", [], 110),
+        panel("frequency", "Frequency", "cycles/min", [], 110),
       ],
       marks: [], markMeaning: "", shades: [], shadeMeaning: "disturbances grow",
     };

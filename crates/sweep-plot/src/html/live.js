@@ -172,6 +172,7 @@ function createLive(host, data) {
     panel.dataset.records = records.map(({ failure, failTime, steps, gap, amplitudes, metrics }) =>
       [failure, failTime, steps, gap, ...amplitudes, ...metrics].join(" ")).join(" ");
     panel.dataset.ratios = ratios.join(" ");
+    panel.dataset.sag = answer.sag;
     const greatest = greatestOf(ratios);
     const failed = records.findIndex((record) => record.failure !== 0);
     const verdict = failed >= 0

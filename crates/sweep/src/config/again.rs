@@ -30,6 +30,8 @@ fn toml(value: &serde_json::Value) -> Option<Value> {
 
 #[cfg(test)]
 mod tests {
+    use washer_row::Metric;
+
     use crate::config::{GridInput, with_one_of_each};
 
     const GRID: &str = r#"
@@ -38,7 +40,9 @@ set = { tub_mass_kg = 24.5 }
 spin = { profile = "table", time_s = [0, 10, 50], speed_rpm = [0, 300, 1e2] }
 time = { end_s = 50, window_s = [30, 50] }
 integrator = { accuracy = 1e-5 }
-reliability = { ratio_limit = 1.5, channels = ["tub_yaw", "tub_pitch"] }
+reliability = { ratio_limit = 1.5, channels = ["tub_yaw", "tub_pitch"], criterion = "rms" }
+metrics = ["static_sag", "growth"]
+stability = { speed_rpm = "200:240:20" }
 [[axis]]
 parameter = "unbalance_mass_kg"
 values = [0.1, 0.30000000000000004]
@@ -55,6 +59,8 @@ range = { from = 1e7, to = 2e8, count = 4, spacing = "log" }
             input.load().unwrap_or_else(|mistakes| panic!("{mistakes}"))
         };
         assert_eq!(again(&plan), plan);
+        // Its stops have no growth.
+        (plan.measures.metrics, plan.growth_speeds) = (vec![Metric::StopForce], None);
         plan.machine = with_one_of_each();
         plan.machine.feet = [[0.5, -0.4, 0.3], [0.5, -0.4, -0.3], [-0.2, -0.4, 0.0]]
             .map(|foot_m| washer_model::Foot { foot_m })

@@ -84,10 +84,11 @@ impl GridInput {
         Self { path: name.into(), text: Some(text), machine: None, sets }
     }
 
-    /// The grid that a result was made of, by its plan in the result (`Plan::to_json`). What
-    /// measures more than amplitudes is left out, and the points of a design.
+    /// The grid that a result was made of, by its plan in the result (`Plan::to_json`). The points
+    /// of a design are left out.
     pub(crate) fn of_plan(name: &str, plan: &Value) -> Self {
-        let parts = ["name", "spin", "time", "integrator", "axis", "reliability"];
+        let parts =
+            ["name", "spin", "time", "integrator", "axis", "reliability", "metrics", "stability"];
         let text = again::file(parts.map(|key| (key, plan.get(key))));
         let machine = plan.get("machine").and_then(Value::as_object);
         let machine = machine.map(|machine| {
