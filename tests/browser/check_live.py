@@ -4,7 +4,8 @@
         [--screenshots FOLDER]
 
 Points of the map are typed into the page; what it then computes is compared with the file's rows,
-its curves with the trace, and the growth of disturbances with the file of `sweep stability`. Exits with 1 at the first thing that is wrong.
+its curves with the trace, and the growth of disturbances with the file of `sweep stability`. Exits
+with 1 at the first thing that is wrong.
 """
 
 import argparse
@@ -106,6 +107,7 @@ def checked_points_are_rows(page, data):
     """Amplitudes, levels and verdicts of the file, at points all over the map."""
     ok = [row for row in data.shown if row["status"] == "ok"]
     chosen = ok[:: max(1, len(ok) // 24)]
+    chosen += [row for row in ok if row["sensitive"] and row not in chosen][:2]
     worst = {True: (0.0, None), False: (0.0, None)}
     for row in chosen:
         where = {axis: row[axis] for axis in data.axes}
@@ -124,9 +126,12 @@ def checked_points_are_rows(page, data):
         check(f"nonlinear model by {row['method']}," in page.text("live-status"),
               f"{where}: the row is by {row['method']}: {page.text('live-status')}")
         check(said.startswith("Checked"), f"{where}: a checked point says {said[:40]}")
+        check(("chaotic" in said) == row["sensitive"],
+              f"{where}: sensitive is {row['sensitive']}, the page says: {said}")
     check(worst[True][0] <= BOUND, f"reliable: {worst[True]}")
+    chaotic = sum(row["sensitive"] for row in chosen)
     return f"{len(chosen)} points: within {worst[True][0]:.1e} of a peak where the model is " \
-        f"reliable, {worst[False][0]:.1e} elsewhere"
+        f"reliable, {worst[False][0]:.1e} elsewhere; {chaotic} called chaotic, as in the file"
 
 
 def previews_say_so(page, data):

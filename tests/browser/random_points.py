@@ -2,9 +2,10 @@
 
     python random_points.py SWEEP_BINARY [--maps N] [--seed N]
 
-Each map has nine points of a random machine, spin profile, window and criterion; each point is typed
-into the map's live page. Says how far the page's amplitudes, ratios and metrics are from the
-file's, as a share of each, and exits with 1 if a reliable point is further off than a page promises.
+Each map has nine points of a random machine, spin profile, window and criterion; each point is
+typed into the map's live page. Says how far the page's amplitudes, ratios and metrics are from the
+file's, as a share of each, and exits with 1 if a reliable point is further off than a page
+promises.
 """
 
 import argparse

@@ -6,9 +6,11 @@
 //! of each channel; the static sag (m). What is not there is NaN.
 //!
 //! A record is the rung and its level, the error left, `failure` (0 none, 1 diverged, 2 step too
-//! small, 3 step limit), its time (s), `steps`, the least gap (m), the amplitude of each channel and
-//! the map's metrics of the model.
+//! small, 3 step limit), its time (s), `steps`, the least gap (m), the amplitude of each channel
+//! and the map's metrics of the model.
 #![allow(unsafe_code)]
+// A module's exports are not this crate's.
+#![allow(unreachable_pub)]
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

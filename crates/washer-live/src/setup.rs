@@ -1,10 +1,10 @@
 //! What a page computes with.
 
 use washer_model::{
-    BumpStop, Bushing, Cabinet, Caps, Channel, Convergence, Foot, Gear, Geared, Machine, Method,
-    Parameter, Spin, Unbalance,
+    BumpStop, Bushing, Cabinet, Caps, Channel, Foot, Gear, Geared, Machine, Method, Parameter,
+    Spin, Unbalance,
 };
-use washer_row::{Criterion, Ladder, Level, Measures, Metric, Rule, Rung};
+use washer_row::{Convergence, Criterion, Ladder, Level, Measures, Metric, Rule, Rung};
 
 use crate::numbers::{Reader, Writer};
 

@@ -35,7 +35,6 @@
 //! ([`Cases::are_nonsmooth`]), one step serves all speeds of the drum, because a stop rings as fast
 //! at any.
 
-pub(crate) mod convergence;
 pub(crate) mod geared;
 
 use crate::coordinates::COORDINATES;

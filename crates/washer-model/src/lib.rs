@@ -76,7 +76,6 @@ mod stability;
 pub use channel::Channel;
 pub use coordinates::COORDINATES;
 pub use fast::Cases;
-pub use fast::convergence::Convergence;
 pub use fast::geared::{Formula, Gear, Geared};
 pub use kind::ModelKind;
 pub use linear::Matrices;

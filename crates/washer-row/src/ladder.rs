@@ -1,7 +1,8 @@
 //! Ways to integrate a trajectory, from the quickest: what a point climbs until two of them agree.
 
-use washer_model::{Convergence, Formula, Gear, Method, ModelKind};
+use washer_model::{Formula, Gear, Method, ModelKind};
 
+use crate::convergence::Convergence;
 use crate::level::Level;
 
 /// One way to integrate a trajectory.

@@ -11,6 +11,7 @@
 //!   compares them.
 
 mod climb;
+mod convergence;
 mod ladder;
 mod level;
 mod measures;
@@ -19,6 +20,7 @@ mod run;
 mod verdict;
 
 pub use climb::{Climbs, Demand, MODELS, Next};
+pub use convergence::Convergence;
 pub use ladder::{Ladder, Rung};
 pub use level::Level;
 pub use measures::{Criterion, Measured, Measures, Metric};

@@ -17,8 +17,8 @@
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
 use lane_ode::dop853::DOP853_STABILITY_LIMIT;
-use washer_model::{Caps, Cases, Convergence, Formula, Gear, Geared, Method, ModelKind};
-use washer_row::{Ladder, Level, Rung};
+use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind};
+use washer_row::{Convergence, Ladder, Level, Rung};
 
 use crate::method::{REFERENCE_SHARE, SHORTEST_AT_CORNERS};
 
