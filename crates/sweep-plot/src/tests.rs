@@ -1,5 +1,6 @@
 //! Files in, figures out.
 
+use std::io::Read as _;
 use std::path::Path;
 
 use base64::Engine as _;
@@ -411,12 +412,16 @@ fn a_live_page_carries_the_module_and_its_setup() {
         setup: vec![0.1, f64::INFINITY],
         sliders: vec![slider("unbalance_mass_kg", None), slider("tub_mass_kg", Some(1.5))],
         channels: vec!["tub_yaw".to_owned()],
+        metrics: vec![["stop_2_force_nonlinear_n", "stop_2_force_linear_n"].map(str::to_owned)],
+        kinds: vec!["period_doubling".to_owned()],
         ..Live::default()
     };
     let options = PlotOptions { live: Some(live), ..PlotOptions::default() };
     let page = draw(map(), &options, "a.html").unwrap();
     let live = &carried(&page)["live"];
-    let module = STANDARD.decode(live["module"].as_str().unwrap()).unwrap();
+    let packed = STANDARD.decode(live["module"].as_str().unwrap()).unwrap();
+    let mut module = Vec::new();
+    flate2::read::GzDecoder::new(&packed[..]).read_to_end(&mut module).unwrap();
     assert_eq!(module[..8], *b"\0asm\x01\0\0\0");
     let setup = STANDARD.decode(live["setup"].as_str().unwrap()).unwrap();
     assert_eq!(setup, [0.1, f64::INFINITY].map(f64::to_le_bytes).concat());
@@ -424,6 +429,9 @@ fn a_live_page_carries_the_module_and_its_setup() {
     assert_eq!(live["sliders"][1]["axis"], false);
     assert_eq!(live["sliders"][1]["words"], "Tub mass");
     assert_eq!(live["channels"][0]["unit"], "mrad");
+    assert_eq!(live["metrics"][0]["words"], "Greatest push of a stop: stop 2");
+    assert_eq!(live["metrics"][0]["unit"], "N");
+    assert_eq!(live["kinds"][0], "period doubling");
     assert!(String::from_utf8(page).unwrap().contains("id=\"worker\""));
     assert!(
         message(draw(map(), &options, "a.svg")).contains("`--live` is for maps drawn as .html")
