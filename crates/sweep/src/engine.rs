@@ -47,7 +47,8 @@ pub(crate) struct Quick {
 /// Both models over a plan's points.
 pub struct ModelEngine<'a> {
     plan: &'a Plan,
-    simd: Simd,
+    /// What groups run on; else as few lanes as a group needs.
+    forced: Option<Simd>,
     timing: Timing,
     rule: Rule,
     /// Of both models; found when first asked for.
@@ -61,12 +62,26 @@ pub struct ModelEngine<'a> {
 /// # Errors
 /// A name that is not one of this machine's.
 pub(crate) fn simd_from_environment() -> Result<Simd, EngineError> {
-    let Ok(name) = std::env::var("SWEEP_SIMD") else { return Ok(Simd::best()) };
+    Ok(forced_simd()?.unwrap_or_else(Simd::best))
+}
+
+/// The instruction set that `SWEEP_SIMD` asks for, if it does.
+fn forced_simd() -> Result<Option<Simd>, EngineError> {
+    let Ok(name) = std::env::var("SWEEP_SIMD") else { return Ok(None) };
     let available = || Simd::ALL.into_iter().filter(|simd| simd.is_available());
-    available().find(|simd| simd.name() == name).ok_or_else(|| {
+    let named = available().find(|simd| simd.name() == name);
+    named.map(Some).ok_or_else(|| {
         let names: Vec<_> = available().map(Simd::name).collect();
         EngineError::Simd(name, names.join(", "))
     })
+}
+
+/// The instruction set with the fewest lanes that take so many trajectories at once: half the lanes
+/// cost little more than half the time where a processor splits its widest instructions. Results
+/// are the same bits on all of them.
+fn narrowest(trajectories: usize) -> Simd {
+    let fits = |simd: &Simd| simd.is_available() && simd.lanes() >= trajectories;
+    Simd::ALL.into_iter().rev().find(fits).unwrap_or_else(Simd::best)
 }
 
 impl<'a> ModelEngine<'a> {
@@ -78,8 +93,8 @@ impl<'a> ModelEngine<'a> {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
-        let (simd, ladders) = (simd_from_environment()?, OnceLock::new());
-        Ok(Self { plan, simd, timing, rule: rule(plan), ladders, finding: Mutex::new(()) })
+        let (forced, ladders) = (forced_simd()?, OnceLock::new());
+        Ok(Self { plan, forced, timing, rule: rule(plan), ladders, finding: Mutex::new(()) })
     }
 
     /// As [`Self::new`], with the rungs of another engine.
@@ -216,6 +231,10 @@ impl<'a> ModelEngine<'a> {
         }
     }
 
+    fn simd_for(&self, trajectories: usize) -> Simd {
+        self.forced.unwrap_or_else(|| narrowest(trajectories))
+    }
+
     /// Points made ready, those of one window together; or why there is none.
     fn prepare(&self, scenarios: &[Scenario]) -> Vec<Result<Point, Status>> {
         let mut prepared = Vec::with_capacity(scenarios.len());
@@ -226,7 +245,7 @@ impl<'a> ModelEngine<'a> {
                 .collect();
             let timing = Timing { window_s: alike[0].window_s, ..self.timing };
             let together = |machines: &[(Machine, Spin)]| {
-                let points = prepare(self.simd, machines, &timing);
+                let points = prepare(self.simd_for(machines.len()), machines, &timing);
                 points.into_iter().map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
             };
             prepared.extend(together_or_alone(&machines, together, || Err(Status::Panicked)));
@@ -245,7 +264,8 @@ impl<'a> ModelEngine<'a> {
     ) -> Vec<RungRun> {
         let stop = || watch.stopped();
         let together = |points: &[&Point]| {
-            runs(self.simd, MODELS[model], method, points, &self.rule, &stop).unwrap_or_default()
+            let simd = self.simd_for(points.len());
+            runs(simd, MODELS[model], method, points, &self.rule, &stop).unwrap_or_default()
         };
         let panicked = || RungRun::failed(Status::Panicked);
         together_or_alone(points, together, panicked)
@@ -296,7 +316,7 @@ impl Engine for ModelEngine<'_> {
     }
 
     fn simd(&self) -> &str {
-        self.simd.name()
+        self.forced.unwrap_or_else(Simd::best).name()
     }
 }
 

@@ -78,3 +78,22 @@ fn a_panic_over_one_item_is_that_items_defect() {
     let results = together_or_alone(&[5, 6, 7, 8], twice, || None);
     assert_eq!(results, [Some(10), Some(12), None, Some(16)]);
 }
+
+#[test]
+fn groups_of_any_size_give_the_same_bits_in_as_few_lanes_as_they_need() {
+    for trajectories in 1..=9 {
+        let simd = narrowest(trajectories);
+        let narrower = |other: &Simd| other.is_available() && other.lanes() < simd.lanes();
+        let fits = |lanes: usize| lanes >= trajectories;
+        assert!(fits(simd.lanes()) || simd == Simd::best(), "{trajectories} in {simd:?}");
+        assert!(!Simd::ALL.iter().filter(|other| narrower(other)).any(|other| fits(other.lanes())));
+    }
+    let plan = plan(GRID);
+    let engine = ModelEngine::new(&plan).unwrap();
+    let together = evaluate(&engine, 0..9);
+    for size in [1, 2, 3, 4, 8] {
+        let parts = (0..9).step_by(size).map(|from| from..(from + size as u64).min(9));
+        let parts: Vec<_> = parts.flat_map(|part| evaluate(&engine, part)).collect();
+        assert_eq!(parts, together, "by {size}");
+    }
+}
