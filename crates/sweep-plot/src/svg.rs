@@ -95,6 +95,9 @@ fn write_text(out: &mut String, text: &Text) {
     );
 }
 
+/// Positions farther out than this are drawn here, px: out of sight either way.
+const FARTHEST: f64 = 1e7;
+
 /// Width of the outline behind letters of this height, px.
 pub(crate) fn halo_width(size: f64) -> f64 {
     0.3 * size
@@ -161,7 +164,8 @@ fn path(outline: &Outline) -> String {
 }
 
 fn hundredths(point: [f64; 2]) -> [i64; 2] {
-    point.map(|value| (value * 100.0).round() as i64)
+    // Values of a file may lie anywhere; a step between two of them has to fit a number.
+    point.map(|value| (value.clamp(-FARTHEST, FARTHEST) * 100.0).round() as i64)
 }
 
 /// Hundredths as a decimal number without needless characters.
@@ -225,6 +229,12 @@ mod tests {
         let sum: f64 =
             d[d.find('h').unwrap() + 1..].split('h').map(|step| step.parse::<f64>().unwrap()).sum();
         assert!((sum - 999.0 * 0.333_33).abs() < 0.011, "{sum}");
+    }
+
+    #[test]
+    fn steps_between_positions_far_outside_are_numbers() {
+        let line = Outline::line(&[[f64::MIN, 0.5], [f64::MAX, 1.0], [f64::MIN, f64::MAX]]);
+        assert_eq!(path(&line), "M-10000000 .5l20000000 .5l-20000000 9999999");
     }
 
     #[test]
