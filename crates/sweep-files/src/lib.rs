@@ -13,14 +13,16 @@
 //!   whoever writes to the folder next.
 //!
 //! Reading: `regular` opens regular files only, so that a FIFO cannot hold a command up;
-//! `ParquetFile` checks the digest that our files carry (`seal`) and turns every failure of the
-//! Parquet library, panics included, into an error with the file's name.
+//! `ParquetFile` checks the digest that our files carry (`seal`) and what their pages declare to
+//! unpack into (`pages`), and turns every failure of the Parquet library, panics included, into an
+//! error with the file's name.
 
 pub mod atomic;
 pub mod cells;
 mod error;
 mod kind;
 mod output;
+pub mod pages;
 pub mod panics;
 mod parquet;
 pub mod regular;

@@ -13,9 +13,13 @@ use parquet::arrow::arrow_reader::{
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{FileMetaData, KeyValue};
 
+use crate::pages::{self, Refused, Unpacked};
 use crate::panics;
 use crate::seal::{self, Seal};
 use crate::{FileError, key, regular};
+
+/// Most bytes that the pages of a file may unpack into at once. Ours have pages of 1 MiB.
+const MOST_AT_ONCE: u64 = 1 << 30;
 
 /// An open Parquet file, ours or another program's.
 #[derive(Debug)]
@@ -51,7 +55,37 @@ impl ParquetFile {
         if seal == Seal::Absent && file.value(key::DIGEST).is_some() {
             return Err(FileError::Damaged { path: path.to_path_buf() });
         }
+        file.check_pages()?;
         Ok(file)
+    }
+
+    /// Refuses pages that do not fit in memory, before any is unpacked.
+    fn check_pages(&self) -> Result<(), FileError> {
+        let refused = |reason: &str| FileError::NotParquet {
+            path: self.path.clone(),
+            reason: reason.to_owned(),
+        };
+        for group in self.metadata.metadata().row_groups() {
+            let mut at_once = 0_u64;
+            for column in group.columns() {
+                // It panics where the file places a column before its beginning.
+                let range = panics::caught(|| column.byte_range());
+                let (start, length) = range.map_err(|_| refused("a column lies outside of it"))?;
+                let most = Unpacked { total: u64::MAX, at_once: MOST_AT_ONCE - at_once };
+                let codec = column.compression();
+                let sizes = pages::unpacked(&mut &self.file, start, length, codec, most);
+                at_once += sizes
+                    .map_err(|error| match error {
+                        Refused::Io(source) => FileError::io("read", &self.path)(source),
+                        Refused::TooLong => {
+                            refused("its pages unpack into more than 1 GiB at once")
+                        }
+                        Refused::Senseless => refused(&error.to_string()),
+                    })?
+                    .at_once;
+            }
+        }
+        Ok(())
     }
 
     /// Opens a file to see whose it is, without reading it through unless it makes no sense.
@@ -168,5 +202,39 @@ fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
             let reason = text.strip_prefix("Parquet error: ").unwrap_or(&text).trim().to_owned();
             FileError::NotParquet { path, reason }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow_array::Float64Array;
+    use parquet::arrow::ArrowWriter;
+    use parquet::file::properties::WriterProperties;
+
+    use super::*;
+
+    #[test]
+    fn a_dictionary_that_cannot_be_is_refused_before_there_is_room_for_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.parquet");
+        let values: Float64Array = (0..3000).map(|k| f64::from(k % 1500)).collect();
+        let batch = RecordBatch::try_from_iter([("x", Arc::new(values) as _)]).unwrap();
+        let properties = WriterProperties::builder().build();
+        let mut writer =
+            ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties)).unwrap();
+        writer.write(&batch).unwrap();
+        let sound = writer.into_inner().unwrap();
+        std::fs::write(&path, &sound).unwrap();
+        assert_eq!(ParquetFile::open(&path).unwrap().rows(), 3000);
+        // Its header's number of entries, 1500, becomes 8191; the library believes any.
+        let declared = [0x4c, 0x15, 0xb8, 0x17];
+        let at = sound.windows(4).position(|bytes| bytes == declared).unwrap();
+        let mut other = sound;
+        other[at + 2..at + 4].copy_from_slice(&[0xfe, 0x7f]);
+        std::fs::write(&path, &other).unwrap();
+        let told = ParquetFile::open(&path).unwrap_err().to_string();
+        assert!(told.contains("the header of a page makes no sense"), "{told}");
     }
 }

@@ -96,7 +96,9 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
         criterion: {
             let criterion = plan.measures.criterion;
-            [criterion.amplitude(), criterion.ratio()].map(str::to_owned)
+            // What a column has where there is no ratio is not a page's.
+            let ratio = criterion.ratio().split(';').next().unwrap_or_default();
+            [criterion.amplitude(), ratio].map(str::to_owned)
         },
         metrics: plan.measures.of_model().map(columns).collect(),
         has_static_sag: plan.measures.metrics.contains(&Metric::StaticSag),

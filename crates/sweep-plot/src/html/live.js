@@ -203,8 +203,7 @@ function createLive(host, data) {
       ...(answer.sensitive ? [element("p", {}, "The motion is chaotic: plain rk4 does not agree "
         + "with itself at two steps. The digits are those of one trajectory.")] : []),
       element("table", {},
-        element("caption", { title: `Ratio: ${live.criterion[1]}` },
-          capitalised(live.criterion[0])),
+        element("caption", {}, `${capitalised(live.criterion[0])}. Ratio: ${live.criterion[1]}.`),
         element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)),
       ...sag);
     const took = `${answer.took.toFixed(answer.took < 10 ? 1 : 0)} ms`;

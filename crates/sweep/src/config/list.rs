@@ -4,7 +4,6 @@
 //! numbers in it are bounded; each bound is checked before the memory is taken.
 
 mod csv;
-mod pages;
 mod parquet;
 
 use std::io::Read as _;

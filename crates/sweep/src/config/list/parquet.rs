@@ -1,14 +1,18 @@
 //! Parquet files of numbers. The library trusts a file's own account of its sizes, so that is
 //! checked first.
 
+use std::io::Cursor;
+
 use bytes::Bytes;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
-use super::{LONGEST_BYTES, MOST_COLUMNS, Unreadable, fits, pages};
+use sweep_files::pages::{self, Refused, Unpacked};
 use sweep_files::{cells, panics};
+
+use super::{LONGEST_BYTES, MOST_COLUMNS, Unreadable, fits};
 
 /// How a list may be compressed, for a message.
 pub(super) const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
@@ -67,16 +71,19 @@ fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Resu
                 return Err(Unreadable::Codec { column: name, codec });
             }
             let (start, length) = column.byte_range();
-            let within = |end: u64| {
-                let (start, end) = (usize::try_from(start).ok()?, usize::try_from(end).ok()?);
-                bytes.get(start..end)
-            };
-            let outside = || Unreadable::Damaged("a column lies outside of it".to_owned());
-            let chunk = start.checked_add(length).and_then(within).ok_or_else(outside)?;
-            unpacked = unpacked.saturating_add(pages::unpacked_bytes(chunk, codec)?);
-            if unpacked > LONGEST_BYTES {
-                return Err(Unreadable::TooLongUnpacked);
+            if start.checked_add(length).is_none_or(|end| end > bytes.len() as u64) {
+                return Err(Unreadable::Damaged("a column lies outside of it".to_owned()));
             }
+            let left = LONGEST_BYTES - unpacked;
+            let most = Unpacked { total: left, at_once: left };
+            let sizes = pages::unpacked(&mut Cursor::new(bytes), start, length, codec, most);
+            unpacked += sizes
+                .map_err(|error| match error {
+                    Refused::Io(source) => Unreadable::Io(source),
+                    Refused::TooLong => Unreadable::TooLongUnpacked,
+                    Refused::Senseless => Unreadable::Damaged(error.to_string()),
+                })?
+                .total;
         }
     }
     Ok(())

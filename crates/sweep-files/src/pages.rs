@@ -4,12 +4,14 @@
 //! header declares. So the headers are walked beforehand. They are structs in Thrift's compact
 //! protocol.
 
-use std::io::Read as _;
+use std::io::{self, Read, Seek, SeekFrom};
 
 use flate2::read::MultiGzDecoder;
 use parquet::basic::Compression;
 
-use super::{LONGEST_BYTES, Unreadable};
+/// How many bytes are read for a header: the first number is enough for nearly every one, and no
+/// header has more than the last.
+const HEADER_BYTES: [u64; 3] = [256, 4 << 10, 64 << 10];
 
 /// Structs within structs of a page header: the page's own, and its statistics.
 const DEEPEST: usize = 3;
@@ -41,47 +43,92 @@ struct Header {
     is_plain: bool,
 }
 
-/// Bytes of all pages of a column chunk, unpacked. What its headers declare is true, or at most
-/// what the library would unpack.
-pub(super) fn unpacked_bytes(chunk: &[u8], codec: Compression) -> Result<u64, Unreadable> {
-    let mut rest = chunk;
-    let mut total = 0_u64;
-    while !rest.is_empty() {
-        let (header, page);
-        (header, rest) = Header::read(rest).ok_or_else(senseless)?;
-        let size = |declared: i32| u64::try_from(declared).map_err(|_| senseless());
+/// Sizes of a column chunk, unpacked (bytes).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Unpacked {
+    /// Of all its pages.
+    pub total: u64,
+    /// Of its dictionary and the largest page: what a reader holds at once.
+    pub at_once: u64,
+}
+
+/// Why a column chunk is not read.
+#[derive(Debug, thiserror::Error)]
+pub enum Refused {
+    /// A header that is none, or declares what cannot be.
+    #[error("the header of a page makes no sense")]
+    Senseless,
+    /// More than what was said to be the most.
+    #[error("its pages unpack into too many bytes")]
+    TooLong,
+    /// The source cannot be read.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+/// Sizes of the column chunk in these bytes of a file, which are at most these. What its headers
+/// declare is true, or at most what the library would unpack.
+///
+/// # Errors
+/// [`Refused`].
+pub fn unpacked(
+    file: &mut (impl Read + Seek),
+    start: u64,
+    length: u64,
+    codec: Compression,
+    most: Unpacked,
+) -> Result<Unpacked, Refused> {
+    let end = start.checked_add(length).ok_or(Refused::Senseless)?;
+    let (mut at, mut dictionary, mut largest) = (start, 0, 0);
+    let mut sizes = Unpacked::default();
+    while at < end {
+        let (header, header_bytes) = header(file, at, end)?;
+        at += header_bytes;
+        let size = |declared: i32| u64::try_from(declared).map_err(|_| Refused::Senseless);
         let (unpacked, packed) = (size(header.unpacked)?, size(header.packed)?);
-        if SMALLEST_NUMBER_BYTES * size(header.dictionary)? > unpacked {
-            return Err(senseless());
+        if SMALLEST_NUMBER_BYTES * size(header.dictionary)? > unpacked || packed > end - at {
+            return Err(Refused::Senseless);
         }
-        (page, rest) = rest.split_at_checked(packed as usize).ok_or_else(senseless)?;
-        total = total.saturating_add(unpacked);
-        if total > LONGEST_BYTES {
-            return Err(Unreadable::TooLongUnpacked);
+        sizes.total = sizes.total.saturating_add(unpacked);
+        let kind = if header.dictionary > 0 { &mut dictionary } else { &mut largest };
+        *kind = unpacked.max(*kind);
+        sizes.at_once = dictionary.saturating_add(largest);
+        if sizes.total > most.total || sizes.at_once > most.at_once {
+            return Err(Refused::TooLong);
         }
         if matches!(codec, Compression::GZIP(_)) && !header.is_plain {
             let levels = size(header.levels[0])? + size(header.levels[1])?;
-            check_gzip(page, levels, unpacked)?;
+            file.seek(SeekFrom::Start(at.saturating_add(levels)))?;
+            let page = packed.checked_sub(levels).ok_or(Refused::Senseless)?;
+            check_gzip(file.take(page), unpacked.saturating_sub(levels))?;
+        }
+        at += packed;
+    }
+    Ok(sizes)
+}
+
+/// The header of the page that begins here, and how many bytes it takes.
+fn header(file: &mut (impl Read + Seek), at: u64, end: u64) -> Result<(Header, u64), Refused> {
+    let mut bytes = Vec::new();
+    for most in HEADER_BYTES {
+        file.seek(SeekFrom::Start(at + bytes.len() as u64))?;
+        let more = most.min(end - at) - bytes.len() as u64;
+        file.take(more).read_to_end(&mut bytes)?;
+        if let Some((header, rest)) = Header::read(&bytes) {
+            return Ok((header, (bytes.len() - rest.len()) as u64));
         }
     }
-    Ok(total)
+    Err(Refused::Senseless)
 }
 
 /// Of the codecs, gzip alone is unpacked to its end whatever the header declares.
-fn check_gzip(page: &[u8], levels: u64, unpacked: u64) -> Result<(), Unreadable> {
-    let packed = usize::try_from(levels).ok().and_then(|levels| page.get(levels..));
-    let packed = packed.ok_or_else(senseless)?;
-    let most = unpacked.saturating_sub(levels);
+fn check_gzip(packed: impl Read, most: u64) -> Result<(), Refused> {
     let mut decoder = MultiGzDecoder::new(packed).take(most + 1);
     // The library reports bytes that are not gzip.
-    match std::io::copy(&mut decoder, &mut std::io::sink()) {
-        Ok(found) if found > most => Err(senseless()),
+    match io::copy(&mut decoder, &mut io::sink()) {
+        Ok(found) if found > most => Err(Refused::Senseless),
         _ => Ok(()),
     }
-}
-
-fn senseless() -> Unreadable {
-    Unreadable::Damaged("the header of a page makes no sense".to_owned())
 }
 
 impl Header {
@@ -186,7 +233,7 @@ impl Thrift<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::io::Write as _;
+    use std::io::{Cursor, Write as _};
 
     use flate2::write::GzEncoder;
 
@@ -224,21 +271,32 @@ mod tests {
         bytes
     }
 
+    fn sizes(chunk: &[u8], codec: Compression) -> Result<Unpacked, Refused> {
+        // Something stands before and behind it.
+        let file = [&[9; 5], chunk, &[9; 500]].concat();
+        let most = Unpacked { total: 10 << 30, at_once: 0x7fff_ffff };
+        unpacked(&mut Cursor::new(file), 5, chunk.len() as u64, codec, most)
+    }
+
     fn told(chunk: &[u8], codec: Compression) -> String {
-        match unpacked_bytes(chunk, codec) {
-            Ok(bytes) => bytes.to_string(),
+        match sizes(chunk, codec) {
+            Ok(sizes) => sizes.total.to_string(),
             Err(error) => error.to_string(),
         }
     }
 
     #[test]
-    fn pages_add_up_and_declarations_have_a_bound() {
-        let two = [page(100, &[1; 10]), page(50, &[2; 60])].concat();
-        assert_eq!(told(&two, Compression::SNAPPY), "150");
-        let large = page(i32::MAX, &[0; 40]);
-        assert!(told(&large, Compression::SNAPPY).contains("longer than 256 MiB"));
-        let many = page(200 << 20, &[0; 40]).repeat(2);
-        assert!(told(&many, Compression::ZSTD(Default::default())).contains("longer than 256 MiB"));
+    fn pages_add_up_and_one_is_held_at_once_beside_its_dictionary() {
+        let chunk = [dictionary(80, 10), page(100, &[1; 10]), page(50, &[2; 60])].concat();
+        let found = sizes(&chunk, Compression::SNAPPY).unwrap();
+        assert_eq!(found, Unpacked { total: 230, at_once: 180 });
+        let many = page(i32::MAX, &[0; 40]).repeat(3);
+        let found = sizes(&many, Compression::ZSTD(Default::default())).unwrap();
+        assert_eq!(found, Unpacked { total: 3 * 0x7fff_ffff, at_once: 0x7fff_ffff });
+        let many = page(i32::MAX, &[0; 40]).repeat(6);
+        assert!(told(&many, Compression::SNAPPY).contains("too many bytes"));
+        let both = [dictionary(80, 10), page(i32::MAX, &[0; 40])].concat();
+        assert!(told(&both, Compression::SNAPPY).contains("too many bytes"));
     }
 
     #[test]
@@ -256,6 +314,25 @@ mod tests {
         let gzip = Compression::GZIP(Default::default());
         assert_eq!(told(&page(50_000_000, &packed), gzip), "50000000");
         assert!(told(&page(49_999_999, &packed), gzip).contains("no sense"));
+    }
+
+    #[test]
+    fn headers_with_long_statistics_are_read() {
+        for length in [10_usize, 300, 5000, 60_000, 70_000] {
+            let mut bytes = [&[0x15, 0, 0x15], number(100).as_slice(), &[0x15, 0]].concat();
+            // Statistics, whose first field is a text.
+            bytes.extend([0x2c, 0x15, 2, 0x15, 0, 0x15, 6, 0x15, 6, 0x1c, 0x18]);
+            let mut rest = length;
+            while rest >= 0x80 {
+                bytes.push(rest as u8 | 0x80);
+                rest >>= 7;
+            }
+            bytes.push(rest as u8);
+            bytes.extend(vec![7; length]);
+            bytes.extend([0, 0, 0]);
+            let expected = if length < 65_000 { "100" } else { "no sense" };
+            assert!(told(&bytes, Compression::SNAPPY).contains(expected), "{length}");
+        }
     }
 
     #[test]
