@@ -7,6 +7,7 @@
 #![allow(missing_docs, reason = "a test is documented by its name")]
 
 mod boundary;
+mod corpora;
 mod decisions;
 mod determinism;
 mod elements;

@@ -96,3 +96,29 @@ fn advice(source: &io::Error) -> &'static str {
         }
     }
 }
+
+/// Why a Parquet file is not read, found before the library would fail at it.
+#[derive(Debug, thiserror::Error)]
+pub enum Refused {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// A footer that is none, or declares what cannot be.
+    #[error("its footer makes no sense")]
+    Footer,
+    /// A footer of more bytes than any file needs.
+    #[error("its footer is longer than {} MiB", crate::footer::LONGEST_BYTES >> 20)]
+    LongFooter,
+    /// Columns and groups of them, more than any file needs.
+    #[error("it has more than {} columns", crate::footer::MOST_COLUMNS)]
+    TooManyColumns,
+    /// Groups of columns within each other, more than any file needs.
+    #[error("its columns are nested more than {} deep", crate::footer::DEEPEST)]
+    TooDeep,
+    /// A page's header that is none, or declares what cannot be.
+    #[error("the header of a page makes no sense")]
+    PageHeader,
+    /// Pages that unpack into more bytes than was said to be the most.
+    #[error("its pages unpack into too many bytes")]
+    TooLong,
+}

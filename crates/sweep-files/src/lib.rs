@@ -13,13 +13,14 @@
 //!   whoever writes to the folder next.
 //!
 //! Reading: `regular` opens regular files only, so that a FIFO cannot hold a command up;
-//! `ParquetFile` checks the digest that our files carry (`seal`) and what their pages declare to
-//! unpack into (`pages`), and turns every failure of the Parquet library, panics included, into an
-//! error with the file's name.
+//! `ParquetFile` checks the digest that our files carry (`seal`), that the library can read the
+//! footer (`footer`), and what pages declare to unpack into (`pages`), and turns every failure of
+//! the library, panics included, into an error with the file's name.
 
 pub mod atomic;
 pub mod cells;
 mod error;
+pub mod footer;
 mod kind;
 mod output;
 pub mod pages;
@@ -27,8 +28,9 @@ pub mod panics;
 mod parquet;
 pub mod regular;
 pub mod seal;
+mod thrift;
 
-pub use error::FileError;
+pub use error::{FileError, Refused};
 pub use kind::{EXPORTED_CSV, FileKind, key};
 pub use output::{Output, beside, judge, ready, write};
 pub use parquet::{Batches, ParquetFile};

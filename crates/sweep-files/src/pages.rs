@@ -1,34 +1,33 @@
 //! The unpacked size of a column's pages, from their own headers.
 //!
 //! A page of a few kilobytes may unpack into gigabytes, and the library makes room for whatever a
-//! header declares. So the headers are walked beforehand. They are structs in Thrift's compact
-//! protocol.
+//! header declares. So the headers are walked beforehand.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
 use flate2::read::MultiGzDecoder;
 use parquet::basic::Compression;
 
+use crate::Refused;
+use crate::footer::STATISTICS;
+use crate::thrift::{self, Found, Kind, Shape};
+use Kind::{Bool, Number, Struct};
+
 /// How many bytes are read for a header: the first number is enough for nearly every one, and no
 /// header has more than the last.
 const HEADER_BYTES: [u64; 3] = [256, 4 << 10, 64 << 10];
 
-/// Structs within structs of a page header: the page's own, and its statistics.
-const DEEPEST: usize = 3;
-
 /// Bytes of the smallest number that a dictionary holds.
 const SMALLEST_NUMBER_BYTES: u64 = 4;
 
-/// Kinds of a field.
-const TRUE: u8 = 1;
-const FALSE: u8 = 2;
-const I8: u8 = 3;
-const I16: u8 = 4;
-const I32: u8 = 5;
-const I64: u8 = 6;
-const DOUBLE: u8 = 7;
-const BINARY: u8 = 8;
-const STRUCT: u8 = 12;
+/// What the library takes the fields of a page header for.
+const PAGE_HEADER: Shape = &[
+    (1..=4, Number),
+    (5..=5, Struct(&[(1..=4, Number), (5..=5, Struct(STATISTICS))])),
+    (6..=6, Struct(&[])),
+    (7..=7, Struct(&[(1..=2, Number), (3..=3, Bool)])),
+    (8..=8, Struct(&[(1..=6, Number), (7..=7, Bool), (8..=8, Struct(STATISTICS))])),
+];
 
 /// Numbers of a page header that matter here.
 #[derive(Default)]
@@ -52,20 +51,6 @@ pub struct Unpacked {
     pub at_once: u64,
 }
 
-/// Why a column chunk is not read.
-#[derive(Debug, thiserror::Error)]
-pub enum Refused {
-    /// A header that is none, or declares what cannot be.
-    #[error("the header of a page makes no sense")]
-    Senseless,
-    /// More than what was said to be the most.
-    #[error("its pages unpack into too many bytes")]
-    TooLong,
-    /// The source cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-}
-
 /// Sizes of the column chunk in these bytes of a file, which are at most these. What its headers
 /// declare is true, or at most what the library would unpack.
 ///
@@ -78,16 +63,16 @@ pub fn unpacked(
     codec: Compression,
     most: Unpacked,
 ) -> Result<Unpacked, Refused> {
-    let end = start.checked_add(length).ok_or(Refused::Senseless)?;
+    let end = start.checked_add(length).ok_or(Refused::PageHeader)?;
     let (mut at, mut dictionary, mut largest) = (start, 0, 0);
     let mut sizes = Unpacked::default();
     while at < end {
         let (header, header_bytes) = header(file, at, end)?;
         at += header_bytes;
-        let size = |declared: i32| u64::try_from(declared).map_err(|_| Refused::Senseless);
+        let size = |declared: i32| u64::try_from(declared).map_err(|_| Refused::PageHeader);
         let (unpacked, packed) = (size(header.unpacked)?, size(header.packed)?);
         if SMALLEST_NUMBER_BYTES * size(header.dictionary)? > unpacked || packed > end - at {
-            return Err(Refused::Senseless);
+            return Err(Refused::PageHeader);
         }
         sizes.total = sizes.total.saturating_add(unpacked);
         let kind = if header.dictionary > 0 { &mut dictionary } else { &mut largest };
@@ -99,7 +84,7 @@ pub fn unpacked(
         if matches!(codec, Compression::GZIP(_)) && !header.is_plain {
             let levels = size(header.levels[0])? + size(header.levels[1])?;
             file.seek(SeekFrom::Start(at.saturating_add(levels)))?;
-            let page = packed.checked_sub(levels).ok_or(Refused::Senseless)?;
+            let page = packed.checked_sub(levels).ok_or(Refused::PageHeader)?;
             check_gzip(file.take(page), unpacked.saturating_sub(levels))?;
         }
         at += packed;
@@ -118,7 +103,7 @@ fn header(file: &mut (impl Read + Seek), at: u64, end: u64) -> Result<(Header, u
             return Ok((header, (bytes.len() - rest.len()) as u64));
         }
     }
-    Err(Refused::Senseless)
+    Err(Refused::PageHeader)
 }
 
 /// Of the codecs, gzip alone is unpacked to its end whatever the header declares.
@@ -126,7 +111,7 @@ fn check_gzip(packed: impl Read, most: u64) -> Result<(), Refused> {
     let mut decoder = MultiGzDecoder::new(packed).take(most + 1);
     // The library reports bytes that are not gzip.
     match io::copy(&mut decoder, &mut io::sink()) {
-        Ok(found) if found > most => Err(Refused::Senseless),
+        Ok(found) if found > most => Err(Refused::PageHeader),
         _ => Ok(()),
     }
 }
@@ -135,99 +120,21 @@ impl Header {
     /// The header at the beginning of some bytes, and what follows it.
     fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let mut header = Self::default();
-        let mut thrift = Thrift(bytes);
-        thrift.fields(&mut Vec::new(), &mut |path, number| match path {
-            [2] => header.unpacked = number,
-            [3] => header.packed = number,
-            [7, 1] => header.dictionary = number,
-            [8, 5] => header.levels[0] = number,
-            [8, 6] => header.levels[1] = number,
-            [8, 7] => header.is_plain = number == 0,
-            _ => {}
+        let rest = thrift::walk(bytes, PAGE_HEADER, &mut |path, found| {
+            let Found::Number(number) = found else { return };
+            // As the library does, which drops what is beyond the type.
+            let number = number as i32;
+            match path {
+                [2] => header.unpacked = number,
+                [3] => header.packed = number,
+                [7, 1] => header.dictionary = number,
+                [8, 5] => header.levels[0] = number,
+                [8, 6] => header.levels[1] = number,
+                [8, 7] => header.is_plain = number == 0,
+                _ => {}
+            }
         })?;
-        Some((header, thrift.0))
-    }
-}
-
-/// Whether a field of a page header may be of this kind. The library reads each as what it should
-/// be, whatever kind the file declares, so another one would part its reading from this one.
-fn is_kind(path: &[i16], kind: u8) -> bool {
-    match path {
-        [1..=4] | [5, 1..=4] | [7, 1..=2] | [8, 1..=6] => kind == I32,
-        [5..=8] | [5, 5] | [8, 8] => kind == STRUCT,
-        [7, 3] | [8, 7] => matches!(kind, TRUE | FALSE),
-        _ => true,
-    }
-}
-
-/// Bytes in the compact protocol that are yet to be read.
-struct Thrift<'a>(&'a [u8]);
-
-impl Thrift<'_> {
-    /// Reads a struct to its end, and hands over each number by the fields that lead to it; true is
-    /// 1.
-    fn fields(&mut self, path: &mut Vec<i16>, found: &mut dyn FnMut(&[i16], i32)) -> Option<()> {
-        let mut field = 0_i16;
-        loop {
-            let head = self.byte()?;
-            let (step, kind) = (head >> 4, head & 0xf);
-            if kind == 0 {
-                return Some(());
-            }
-            if step == 0 {
-                // A field far from the one before it: a page header has none.
-                return None;
-            }
-            field = field.checked_add(i16::from(step))?;
-            path.push(field);
-            if !is_kind(path, kind) {
-                return None;
-            }
-            match kind {
-                TRUE | FALSE => found(path, i32::from(kind == TRUE)),
-                I8 => self.skip(1)?,
-                // As the library does, which drops what is beyond the type.
-                I16 | I32 | I64 => found(path, self.number()? as i32),
-                DOUBLE => self.skip(8)?,
-                BINARY => {
-                    let length = self.varint()?;
-                    self.skip(length)?;
-                }
-                STRUCT if path.len() < DEEPEST => self.fields(path, found)?,
-                _ => return None,
-            }
-            path.pop();
-        }
-    }
-
-    fn byte(&mut self) -> Option<u8> {
-        let (first, rest) = self.0.split_first()?;
-        self.0 = rest;
-        Some(*first)
-    }
-
-    fn skip(&mut self, length: u64) -> Option<()> {
-        self.0 = self.0.get(usize::try_from(length).ok()?..)?;
-        Some(())
-    }
-
-    /// A number in groups of seven bits, the lowest first.
-    fn varint(&mut self) -> Option<u64> {
-        let mut number = 0;
-        for shift in (0..64).step_by(7) {
-            let byte = self.byte()?;
-            number |= u64::from(byte & 0x7f) << shift;
-            if byte & 0x80 == 0 {
-                return Some(number);
-            }
-        }
-        None
-    }
-
-    /// One whose lowest bit is its sign.
-    fn number(&mut self) -> Option<i64> {
-        let number = self.varint()?;
-        Some((number >> 1) as i64 ^ -((number & 1) as i64))
+        Some((header, rest))
     }
 }
 
@@ -341,13 +248,10 @@ mod tests {
         for length in 1..sound.len() {
             assert!(told(&sound[..length], Compression::SNAPPY).contains("no sense"), "{length}");
         }
-        // A size as a text, which a reader that trusts the schema would take for a number; and a
-        // field number in full.
-        for (at, kind) in [(2, 0x18), (2, 0x05)] {
-            let mut other = sound.clone();
-            other[at] = kind;
-            assert!(told(&other, Compression::SNAPPY).contains("no sense"), "{at}: {kind:#x}");
-        }
+        // A size as a text, which a reader that trusts the schema would take for a number.
+        let mut other = sound;
+        other[2] = 0x18;
+        assert!(told(&other, Compression::SNAPPY).contains("no sense"));
         assert!(told(&page(-1, &[1; 10]), Compression::SNAPPY).contains("no sense"));
     }
 }

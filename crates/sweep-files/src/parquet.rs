@@ -13,10 +13,9 @@ use parquet::arrow::arrow_reader::{
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{FileMetaData, KeyValue};
 
-use crate::pages::{self, Refused, Unpacked};
-use crate::panics;
+use crate::pages::{self, Unpacked};
 use crate::seal::{self, Seal};
-use crate::{FileError, key, regular};
+use crate::{FileError, Refused, footer, key, panics, regular};
 
 /// Most bytes that the pages of a file may unpack into at once. Ours have pages of 1 MiB.
 const MOST_AT_ONCE: u64 = 1 << 30;
@@ -61,28 +60,19 @@ impl ParquetFile {
 
     /// Refuses pages that do not fit in memory, before any is unpacked.
     fn check_pages(&self) -> Result<(), FileError> {
-        let refused = |reason: &str| FileError::NotParquet {
-            path: self.path.clone(),
-            reason: reason.to_owned(),
-        };
         for group in self.metadata.metadata().row_groups() {
             let mut at_once = 0_u64;
             for column in group.columns() {
                 // It panics where the file places a column before its beginning.
                 let range = panics::caught(|| column.byte_range());
-                let (start, length) = range.map_err(|_| refused("a column lies outside of it"))?;
+                let (start, length) = range.map_err(|_| FileError::NotParquet {
+                    path: self.path.clone(),
+                    reason: "a column lies outside of it".to_owned(),
+                })?;
                 let most = Unpacked { total: u64::MAX, at_once: MOST_AT_ONCE - at_once };
                 let codec = column.compression();
                 let sizes = pages::unpacked(&mut &self.file, start, length, codec, most);
-                at_once += sizes
-                    .map_err(|error| match error {
-                        Refused::Io(source) => FileError::io("read", &self.path)(source),
-                        Refused::TooLong => {
-                            refused("its pages unpack into more than 1 GiB at once")
-                        }
-                        Refused::Senseless => refused(&error.to_string()),
-                    })?
-                    .at_once;
+                at_once += sizes.map_err(refused(&self.path))?.at_once;
             }
         }
         Ok(())
@@ -98,6 +88,7 @@ impl ParquetFile {
     }
 
     fn parse(path: &Path, file: File, seal: Seal) -> Result<Self, FileError> {
+        footer::check(&mut &file).map_err(refused(path))?;
         let load = || ArrowReaderMetadata::load(&file, ArrowReaderOptions::new());
         let metadata = guarded(load).map_err(not_parquet(path))?;
         Ok(Self { path: path.to_path_buf(), file, metadata, seal })
@@ -187,6 +178,19 @@ impl Iterator for Batches {
 /// Has the library read.
 fn guarded<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
     panics::in_parquet("it makes no sense inside", work)
+}
+
+/// What was found before the library was asked.
+fn refused(path: &Path) -> impl FnOnce(Refused) -> FileError {
+    move |refused| match refused {
+        Refused::Io(source) => FileError::io("read", path)(source),
+        Refused::TooLong => {
+            let reason =
+                format!("its pages unpack into more than {} GiB at once", MOST_AT_ONCE >> 30);
+            FileError::NotParquet { path: path.to_path_buf(), reason }
+        }
+        refused => FileError::NotParquet { path: path.to_path_buf(), reason: refused.to_string() },
+    }
 }
 
 /// What the library reported, as a plain I/O failure where it was one.

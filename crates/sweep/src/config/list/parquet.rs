@@ -9,8 +9,8 @@ use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
-use sweep_files::pages::{self, Refused, Unpacked};
-use sweep_files::{cells, panics};
+use sweep_files::pages::{self, Unpacked};
+use sweep_files::{Refused, cells, footer, panics};
 
 use super::{LONGEST_BYTES, MOST_COLUMNS, Unreadable, fits};
 
@@ -27,6 +27,7 @@ pub(super) fn columns(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, Unreada
 }
 
 fn read(bytes: Bytes) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
+    footer::check(&mut Cursor::new(&bytes)).map_err(refused)?;
     let builder = ParquetRecordBatchReaderBuilder::try_new(bytes.clone()).map_err(damaged)?;
     let fields = builder.schema().fields().clone();
     if fields.len() > MOST_COLUMNS {
@@ -77,13 +78,7 @@ fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Resu
             let left = LONGEST_BYTES - unpacked;
             let most = Unpacked { total: left, at_once: left };
             let sizes = pages::unpacked(&mut Cursor::new(bytes), start, length, codec, most);
-            unpacked += sizes
-                .map_err(|error| match error {
-                    Refused::Io(source) => Unreadable::Io(source),
-                    Refused::TooLong => Unreadable::TooLongUnpacked,
-                    Refused::Senseless => Unreadable::Damaged(error.to_string()),
-                })?
-                .total;
+            unpacked += sizes.map_err(refused)?.total;
         }
     }
     Ok(())
@@ -98,6 +93,14 @@ const fn is_readable(codec: Compression) -> bool {
         | Compression::GZIP(_)
         | Compression::LZ4_RAW => true,
         Compression::BROTLI(_) | Compression::LZ4 | Compression::LZO => false,
+    }
+}
+
+fn refused(refused: Refused) -> Unreadable {
+    match refused {
+        Refused::Io(source) => Unreadable::Io(source),
+        Refused::TooLong => Unreadable::TooLongUnpacked,
+        refused => Unreadable::Damaged(refused.to_string()),
     }
 }
 

@@ -1,0 +1,291 @@
+//! What a Parquet file's footer says, made sure of before the library reads it.
+//!
+//! A footer of a few bytes can have the library count for minutes, recurse until the stack is full,
+//! or make room for what is not there.
+
+use std::io::{Read, Seek, SeekFrom};
+
+use crate::Refused;
+use crate::thrift::{self, Found, Kind, Shape};
+use Kind::{Binary, Bool, Byte, Double, List, Number, Struct};
+
+/// The end of a file: the footer's length (bytes) and a mark.
+const TAIL_BYTES: u64 = 8;
+const MARK: &[u8] = b"PAR1";
+
+/// Most bytes of a footer. The library makes up to 25 bytes of one, beside columns.
+pub(crate) const LONGEST_BYTES: u64 = 16 << 20;
+
+/// Columns and groups of columns. The library makes up to 2 kB of one, whose name may be empty.
+pub(crate) const MOST_COLUMNS: u64 = 100_000;
+
+/// Groups of columns within each other. The library recurses through them.
+pub(crate) const DEEPEST: usize = 100;
+
+// What version 60 of the library takes the fields for, by the names of Parquet's own format.
+const FILE: Shape = &[
+    (1..=1, Number),
+    (2..=2, List(&Struct(SCHEMA_ELEMENT))),
+    (3..=3, Number),
+    (4..=4, List(&Struct(ROW_GROUP))),
+    (5..=5, List(&Struct(&[(1..=2, Binary)]))),
+    (6..=6, Binary),
+    (7..=7, List(&Struct(&[(1..=3, EMPTY)]))),
+];
+const SCHEMA_ELEMENT: Shape =
+    &[(1..=3, Number), (4..=4, Binary), (5..=9, Number), (10..=10, Struct(LOGICAL_TYPE))];
+const LOGICAL_TYPE: Shape = &[
+    (5..=5, Struct(&[(1..=2, Number)])),
+    (7..=8, Struct(&[(1..=1, Bool), (2..=2, Struct(&[(1..=3, EMPTY)]))])),
+    (10..=10, Struct(&[(1..=1, Byte), (2..=2, Bool)])),
+    (16..=16, Struct(&[(1..=1, Byte)])),
+    (17..=18, Struct(&[(1..=1, Binary), (2..=2, Number)])),
+    (1..=19, EMPTY),
+];
+const ROW_GROUP: Shape = &[
+    (1..=1, List(&Struct(COLUMN_CHUNK))),
+    (2..=3, Number),
+    (4..=4, List(&Struct(&[(1..=1, Number), (2..=3, Bool)]))),
+    (5..=5, Number),
+    (7..=7, Number),
+];
+const COLUMN_CHUNK: Shape =
+    &[(1..=1, Binary), (2..=2, Number), (3..=3, Struct(COLUMN_META_DATA)), (4..=7, Number)];
+const COLUMN_META_DATA: Shape = &[
+    (1..=1, Number),
+    (2..=2, List(&Number)),
+    (4..=7, Number),
+    (9..=11, Number),
+    (12..=12, Struct(STATISTICS)),
+    (13..=13, List(&Struct(&[(1..=3, Number)]))),
+    (14..=15, Number),
+    (16..=16, Struct(&[(1..=1, Number), (2..=3, List(&Number))])),
+    (17..=17, Struct(&[(1..=1, Struct(&[(1..=8, Double)])), (2..=2, List(&Number))])),
+];
+pub(crate) const STATISTICS: Shape =
+    &[(1..=2, Binary), (3..=4, Number), (5..=6, Binary), (7..=8, Bool), (9..=9, Number)];
+const EMPTY: Kind = Struct(&[]);
+
+/// The path to a group's number of columns.
+const CHILDREN: &[i16] = &[2, 5];
+
+/// Whether the library can read a file's footer. What has no footer at all it reports itself.
+///
+/// # Errors
+/// [`Refused::Io`], [`Refused::Footer`], [`Refused::LongFooter`], [`Refused::TooManyColumns`],
+/// [`Refused::TooDeep`].
+pub fn check(file: &mut (impl Read + Seek)) -> Result<(), Refused> {
+    let length = file.seek(SeekFrom::End(0))?;
+    let Some(end) = length.checked_sub(TAIL_BYTES) else { return Ok(()) };
+    file.seek(SeekFrom::Start(end))?;
+    let mut tail = [0; TAIL_BYTES as usize];
+    file.read_exact(&mut tail)?;
+    let [a, b, c, d, mark @ ..] = tail;
+    let length = u64::from(u32::from_le_bytes([a, b, c, d]));
+    let Some(start) = end.checked_sub(length) else { return Ok(()) };
+    if mark != MARK {
+        return Ok(());
+    }
+    if length > LONGEST_BYTES {
+        return Err(Refused::LongFooter);
+    }
+    file.seek(SeekFrom::Start(start))?;
+    let mut footer = Vec::new();
+    file.take(length).read_to_end(&mut footer)?;
+    check_footer(&footer)
+}
+
+fn check_footer(footer: &[u8]) -> Result<(), Refused> {
+    let (mut elements, mut declared, mut children) = (0_u64, 0_u64, 0);
+    let mut tree = Tree::default();
+    let rest = thrift::walk(footer, FILE, &mut |path, found| match (path, found) {
+        (CHILDREN, Found::Number(number)) => children = u64::try_from(number).unwrap_or(0),
+        ([2], Found::End) => {
+            elements += 1;
+            declared = declared.saturating_add(children);
+            tree.add(children);
+            children = 0;
+        }
+        _ => {}
+    });
+    // Room is made for as many columns as a group declares.
+    if rest.is_none() || declared >= elements.max(1) {
+        return Err(Refused::Footer);
+    }
+    if elements > MOST_COLUMNS {
+        return Err(Refused::TooManyColumns);
+    }
+    if tree.depth > DEEPEST { Err(Refused::TooDeep) } else { Ok(()) }
+}
+
+/// Columns and groups of them, each group before its own.
+#[derive(Default)]
+struct Tree {
+    /// How many are yet to come, of each group that is not whole.
+    open: Vec<u64>,
+    /// Most groups within each other so far.
+    depth: usize,
+}
+
+impl Tree {
+    fn add(&mut self, children: u64) {
+        while self.open.pop_if(|left| *left == 0).is_some() {}
+        if let Some(left) = self.open.last_mut() {
+            *left -= 1;
+        }
+        if children > 0 {
+            self.open.push(children);
+            self.depth = self.depth.max(self.open.len());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+    use std::sync::Arc;
+
+    use arrow_array::builder::{Int64Builder, ListBuilder, MapBuilder, StringBuilder};
+    use arrow_array::{
+        ArrayRef, BooleanArray, Date32Array, Decimal128Array, Float64Array, Int8Array, RecordBatch,
+        StringArray, StructArray, Time64MicrosecondArray, TimestampMillisecondArray,
+    };
+    use parquet::arrow::ArrowWriter;
+    use parquet::file::metadata::{KeyValue, SortingColumn};
+    use parquet::file::properties::{EnabledStatistics, WriterProperties};
+
+    use super::*;
+
+    /// A number in groups of seven bits.
+    fn varint(mut rest: u64) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        while rest >= 0x80 {
+            bytes.push(rest as u8 | 0x80);
+            rest >>= 7;
+        }
+        bytes.push(rest as u8);
+        bytes
+    }
+
+    /// A column, or with children a group of them.
+    fn element(children: u64) -> Vec<u8> {
+        match children {
+            0 => vec![0x15, 10, 0x25, 0, 0x18, 1, b'x', 0],
+            _ => [&[0x35, 0, 0x18, 1, b'g', 0x15], varint(2 * children).as_slice(), &[0]].concat(),
+        }
+    }
+
+    /// A file without rows that has these groups and columns, and more fields at its footer's end.
+    fn file(children: impl IntoIterator<Item = u64>, more: &[u8]) -> Vec<u8> {
+        let elements: Vec<_> = children.into_iter().map(element).collect();
+        let footer = [
+            &[0x15, 2, 0x19, 0xfc],
+            varint(elements.len() as u64).as_slice(),
+            &elements.concat(),
+            &[0x16, 0, 0x19, 0x0c],
+            more,
+            &[0],
+        ]
+        .concat();
+        [MARK, &footer, &(footer.len() as u32).to_le_bytes(), MARK].concat()
+    }
+
+    fn told(file: &[u8]) -> String {
+        check(&mut Cursor::new(file)).map_or_else(|error| error.to_string(), |()| "fine".to_owned())
+    }
+
+    #[test]
+    fn footers_of_every_type_and_setting_are_fine() {
+        let mut lists = ListBuilder::new(Int64Builder::new());
+        lists.values().append_value(7);
+        lists.append(true);
+        let mut maps = MapBuilder::new(None, StringBuilder::new(), Int64Builder::new());
+        maps.keys().append_value("k");
+        maps.values().append_value(1);
+        maps.append(true).unwrap();
+        let numbers: ArrayRef = Arc::new(Float64Array::from(vec![1.5]));
+        let decimals = Decimal128Array::from(vec![5]).with_precision_and_scale(9, 2).unwrap();
+        let columns: Vec<(&str, ArrayRef)> = vec![
+            ("double", numbers.clone()),
+            ("truth", Arc::new(BooleanArray::from(vec![true]))),
+            ("byte", Arc::new(Int8Array::from(vec![1]))),
+            ("text", Arc::new(StringArray::from(vec!["long".repeat(90)]))),
+            ("date", Arc::new(Date32Array::from(vec![1]))),
+            ("time", Arc::new(Time64MicrosecondArray::from(vec![1]))),
+            ("stamp", Arc::new(TimestampMillisecondArray::from(vec![1]).with_timezone("UTC"))),
+            ("decimal", Arc::new(decimals)),
+            ("list", Arc::new(lists.finish())),
+            ("map", Arc::new(maps.finish())),
+            ("group", Arc::new(StructArray::try_from(vec![("inner", numbers)]).unwrap())),
+        ];
+        let batch = RecordBatch::try_from_iter(columns).unwrap();
+        for statistics in
+            [EnabledStatistics::None, EnabledStatistics::Chunk, EnabledStatistics::Page]
+        {
+            let sorting = SortingColumn { column_idx: 0, descending: true, nulls_first: false };
+            let properties = WriterProperties::builder()
+                .set_statistics_enabled(statistics)
+                .set_bloom_filter_enabled(true)
+                .set_sorting_columns(Some(vec![sorting]))
+                .set_key_value_metadata(Some(vec![KeyValue::new("k".to_owned(), None)]))
+                .build();
+            let mut writer =
+                ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties)).unwrap();
+            writer.write(&batch).unwrap();
+            assert_eq!(told(&writer.into_inner().unwrap()), "fine");
+        }
+    }
+
+    #[test]
+    fn what_has_no_footer_is_left_to_the_library() {
+        for bytes in [&b""[..], b"PAR1", b"time_s,x\n1,2\n", b"PAR1\xff\0\0\0PAR1", &[0; 100]] {
+            assert_eq!(told(bytes), "fine");
+        }
+    }
+
+    #[test]
+    fn lists_that_take_no_bytes_are_refused() {
+        // Field 9 and those after it: each declares 2^31 - 1 booleans.
+        let lists = [0x59, 0xf1, 0xff, 0xff, 0xff, 0xff, 7].repeat(3);
+        assert_eq!(told(&file([1, 0], &[])), "fine");
+        assert_eq!(told(&file([1, 0], &lists)), "its footer makes no sense");
+    }
+
+    #[test]
+    fn groups_within_groups_have_an_end() {
+        // The root is a group too.
+        let chain = |groups| std::iter::repeat_n(1, groups).chain([0]);
+        assert_eq!(told(&file(chain(DEEPEST), &[])), "fine");
+        let told_of = told(&file(chain(DEEPEST + 1), &[]));
+        assert_eq!(told_of, "its columns are nested more than 100 deep");
+        // Groups beside each other are none within each other.
+        let beside = [150].into_iter().chain([1, 0].repeat(150));
+        assert_eq!(told(&file(beside, &[])), "fine");
+        // The last of a group may be one, too.
+        let comb = [2].into_iter().chain([0, 2].repeat(DEEPEST)).chain([0, 0]);
+        assert_eq!(told(&file(comb, &[])), "its columns are nested more than 100 deep");
+    }
+
+    #[test]
+    fn columns_have_an_end() {
+        let flat = |columns: u64| std::iter::once(columns).chain((0..columns).map(|_| 0));
+        assert_eq!(told(&file(flat(MOST_COLUMNS - 1), &[])), "fine");
+        assert_eq!(told(&file(flat(MOST_COLUMNS), &[])), "it has more than 100000 columns");
+    }
+
+    #[test]
+    fn a_group_has_no_more_columns_than_there_are() {
+        assert_eq!(told(&file([2, 0, 0], &[])), "fine");
+        assert_eq!(told(&file([3, 0, 0], &[])), "its footer makes no sense");
+        assert_eq!(told(&file([0x3fff_ffff, 0], &[])), "its footer makes no sense");
+    }
+
+    #[test]
+    fn a_footer_has_a_length_that_fits_in_memory() {
+        let mut bytes = file([1, 0], &[]);
+        let length = (LONGEST_BYTES as usize) + 1;
+        let footer = [vec![0; length], (length as u32).to_le_bytes().to_vec(), MARK.to_vec()];
+        bytes.extend(footer.concat());
+        assert_eq!(told(&bytes), "its footer is longer than 16 MiB");
+    }
+}

@@ -1,0 +1,279 @@
+//! Structs in Thrift's compact protocol: what the Parquet library reads, walked before it does.
+//!
+//! The library takes every field that it knows for what it should be, whatever kind the file
+//! declares, and it counts through a list of booleans that it does not know without reading a byte.
+//! So a file is walked by both at once: by its own kinds, which must be those that the library
+//! takes them for. A file for which that holds is read by the library as it was walked here.
+
+use std::ops::RangeInclusive;
+
+/// Structs and lists within each other. Parquet's own have seven.
+const DEEPEST: usize = 16;
+
+/// Kinds of a field, as a file declares them.
+const TRUE: u8 = 1;
+const FALSE: u8 = 2;
+const BYTE: u8 = 3;
+const I16: u8 = 4;
+const I32: u8 = 5;
+const I64: u8 = 6;
+const DOUBLE: u8 = 7;
+const BINARY: u8 = 8;
+const LIST: u8 = 9;
+const SET: u8 = 10;
+const MAP: u8 = 11;
+const STRUCT: u8 = 12;
+const UUID: u8 = 13;
+
+/// What the library takes a field for.
+#[derive(Clone, Copy)]
+pub(crate) enum Kind {
+    Bool,
+    Byte,
+    /// Of any width: all are read alike.
+    Number,
+    Double,
+    Binary,
+    List(&'static Self),
+    Struct(Shape),
+}
+
+/// The fields of a struct that the library knows, by their numbers. It skips any other.
+pub(crate) type Shape = &'static [(RangeInclusive<i16>, Kind)];
+
+/// What a walk comes past.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Found {
+    /// A number or a truth, which is 1 or 0.
+    Number(i64),
+    /// The end of a struct.
+    End,
+}
+
+/// Walks the struct at the beginning of some bytes, and returns the bytes behind it. `found` gets
+/// each number by the fields that lead to it; elements of a list have the list's.
+///
+/// None where the bytes end too early, a kind is not the one that the library takes the field for,
+/// or a collection holds booleans.
+pub(crate) fn walk<'a>(
+    bytes: &'a [u8],
+    shape: Shape,
+    found: &mut dyn FnMut(&[i16], Found),
+) -> Option<&'a [u8]> {
+    let mut walk = Walk { rest: bytes, path: Vec::new(), depth: 0, found };
+    walk.fields(Some(shape))?;
+    Some(walk.rest)
+}
+
+impl Kind {
+    const fn is(self, declared: u8) -> bool {
+        match self {
+            Self::Bool => matches!(declared, TRUE | FALSE),
+            Self::Byte => declared == BYTE,
+            Self::Number => matches!(declared, I16 | I32 | I64),
+            Self::Double => declared == DOUBLE,
+            Self::Binary => declared == BINARY,
+            Self::List(_) => declared == LIST,
+            Self::Struct(_) => declared == STRUCT,
+        }
+    }
+}
+
+struct Walk<'a, 'f> {
+    rest: &'a [u8],
+    path: Vec<i16>,
+    depth: usize,
+    found: &'f mut dyn FnMut(&[i16], Found),
+}
+
+impl Walk<'_, '_> {
+    fn fields(&mut self, shape: Option<Shape>) -> Option<()> {
+        let mut field = 0_i16;
+        loop {
+            let head = self.byte()?;
+            let (step, declared) = (head >> 4, head & 0xf);
+            if declared == 0 {
+                (self.found)(&self.path, Found::End);
+                return Some(());
+            }
+            field = match step {
+                // As the library does, which drops what is beyond the type.
+                0 => self.number()? as i16,
+                step => field.checked_add(i16::from(step))?,
+            };
+            let known = shape.and_then(|shape| shape.iter().find(|(at, _)| at.contains(&field)));
+            let known = known.map(|(_, kind)| *kind);
+            self.path.push(field);
+            if matches!(declared, TRUE | FALSE) {
+                // The one kind whose value stands in the head.
+                if !known.is_none_or(|kind| kind.is(declared)) {
+                    return None;
+                }
+                (self.found)(&self.path, Found::Number(i64::from(declared == TRUE)));
+            } else {
+                self.value(declared, known)?;
+            }
+            self.path.pop();
+        }
+    }
+
+    fn value(&mut self, declared: u8, known: Option<Kind>) -> Option<()> {
+        if !known.is_none_or(|kind| kind.is(declared)) || self.depth == DEEPEST {
+            return None;
+        }
+        self.depth += 1;
+        match declared {
+            BYTE => self.skip(1)?,
+            I16 | I32 | I64 => {
+                let number = self.number()?;
+                (self.found)(&self.path, Found::Number(number));
+            }
+            DOUBLE => self.skip(8)?,
+            BINARY => {
+                let length = self.varint()?;
+                self.skip(length)?;
+            }
+            LIST | SET => {
+                let head = self.byte()?;
+                let length = if head >> 4 == 0xf { self.varint()? } else { u64::from(head >> 4) };
+                let element = if let Some(Kind::List(kind)) = known { Some(*kind) } else { None };
+                for _ in 0..length {
+                    self.value(head & 0xf, element)?;
+                }
+            }
+            MAP => {
+                let length = self.varint()?;
+                let kinds = if length > 0 { self.byte()? } else { 0 };
+                for _ in 0..length {
+                    self.value(kinds >> 4, None)?;
+                    self.value(kinds & 0xf, None)?;
+                }
+            }
+            STRUCT => {
+                self.fields(if let Some(Kind::Struct(shape)) = known {
+                    Some(shape)
+                } else {
+                    None
+                })?;
+            }
+            UUID => self.skip(16)?,
+            // Booleans of a collection, to which the library gives no bytes, are among them.
+            _ => return None,
+        }
+        self.depth -= 1;
+        Some(())
+    }
+
+    fn byte(&mut self) -> Option<u8> {
+        let (first, rest) = self.rest.split_first()?;
+        self.rest = rest;
+        Some(*first)
+    }
+
+    fn skip(&mut self, length: u64) -> Option<()> {
+        self.rest = self.rest.get(usize::try_from(length).ok()?..)?;
+        Some(())
+    }
+
+    /// A number in groups of seven bits, the lowest first.
+    fn varint(&mut self) -> Option<u64> {
+        let mut number = 0;
+        for shift in (0..64).step_by(7) {
+            let byte = self.byte()?;
+            number |= u64::from(byte & 0x7f) << shift;
+            if byte & 0x80 == 0 {
+                return Some(number);
+            }
+        }
+        None
+    }
+
+    /// One whose lowest bit is its sign.
+    fn number(&mut self) -> Option<i64> {
+        let number = self.varint()?;
+        Some((number >> 1) as i64 ^ -((number & 1) as i64))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHAPE: Shape = &[
+        (1..=2, Kind::Number),
+        (3..=3, Kind::List(&Kind::Struct(&[(1..=1, Kind::Bool), (2..=2, Kind::Binary)]))),
+        (4..=4, Kind::List(&Kind::Number)),
+    ];
+
+    /// What a walk finds in some bytes, and how many stand behind it.
+    fn walked(bytes: &[u8]) -> Option<(Vec<(Vec<i16>, Found)>, usize)> {
+        let mut all = Vec::new();
+        let rest = walk(bytes, SHAPE, &mut |path, found| all.push((path.to_vec(), found)))?;
+        Some((all, rest.len()))
+    }
+
+    #[test]
+    fn numbers_come_with_the_fields_that_lead_to_them() {
+        use Found::{End, Number};
+        let bytes = [
+            // Field 1 is -3, in groups of seven bits; field 2, its number in full, 300.
+            &[0x15, 0x05, 0x06, 0x04, 0xd8, 0x04][..],
+            // A list of two structs: true and a text; nothing.
+            &[0x19, 0x2c, 0x11, 0x18, 0x02, 7, 7, 0, 0],
+            // Three numbers, and what nobody knows: a double, a map, a set, a uuid and a struct.
+            &[0x19, 0x36, 2, 4, 6, 0x17, 1, 2, 3, 4, 5, 6, 7, 8],
+            &[0x1b, 1, 0x85, 1, 9, 2, 0x1a, 0x23, 1, 2, 0x1d],
+            &[0; 16],
+            &[0x1c, 0x15, 8, 0, 0, 99],
+        ]
+        .concat();
+        let expected = vec![
+            (vec![1], Number(-3)),
+            (vec![2], Number(300)),
+            (vec![3, 1], Number(1)),
+            (vec![3], End),
+            (vec![3], End),
+            (vec![4], Number(1)),
+            (vec![4], Number(2)),
+            (vec![4], Number(3)),
+            (vec![6], Number(1)),
+            (vec![9, 1], Number(4)),
+            (vec![9], End),
+            (vec![], End),
+        ];
+        assert_eq!(walked(&bytes), Some((expected, 1)));
+        for length in 0..bytes.len() - 1 {
+            assert_eq!(walked(&bytes[..length]), None, "{length}");
+        }
+    }
+
+    #[test]
+    fn a_field_of_another_kind_than_the_library_takes_it_for_ends_the_walk() {
+        assert!(walked(&[0x15, 2, 0]).is_some());
+        for other in [0x11, 0x13, 0x17, 0x18, 0x19, 0x1c] {
+            assert_eq!(walked(&[other, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]), None, "{other:#x}");
+        }
+        assert!(walked(&[0x39, 0x1c, 0, 0]).is_some());
+        assert_eq!(walked(&[0x39, 0x15, 0, 0]), None, "elements too");
+        assert_eq!(walked(&[0x39, 0x1c, 0x15, 0, 0, 0]), None, "fields of elements too");
+    }
+
+    #[test]
+    fn collections_of_booleans_end_the_walk_however_long_they_say_they_are() {
+        assert!(walked(&[0x59, 0x02, 0]).is_some(), "there is none in it");
+        for kind in [1, 2] {
+            assert_eq!(walked(&[0x59, 0x10 | kind, 1, 0]), None);
+            assert_eq!(walked(&[0x59, 0xf0 | kind, 0xff, 0xff, 0xff, 0xff, 7, 0]), None);
+            assert_eq!(walked(&[0x5b, 0xff, 0xff, 0xff, 0xff, 7, 0x10 | kind, 0]), None);
+            assert_eq!(walked(&[0x59, 0x19, 0x10 | kind, 1, 0]), None, "in a list");
+        }
+    }
+
+    #[test]
+    fn what_is_nested_without_end_ends_the_walk() {
+        let nested = |depth: usize| [vec![0x5c; depth], vec![0; depth + 1]].concat();
+        assert!(walked(&nested(DEEPEST)).is_some());
+        assert_eq!(walked(&nested(DEEPEST + 1)), None);
+        assert_eq!(walked(&[vec![0x59], vec![0x19; 100_000]].concat()), None);
+    }
+}
