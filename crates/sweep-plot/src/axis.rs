@@ -163,6 +163,8 @@ pub(crate) fn log_sets(low: f64, high: f64) -> [Vec<Tick>; 5] {
 
 fn log_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     let [mut best, denser @ ..] = log_sets(low, high);
+    let apart = best.len().div_ceil(count.max(2) + 1);
+    best = best.into_iter().step_by(apart.max(1)).collect();
     for set in denser {
         if best.len() >= 2 && set.len() > count.max(2) + 1 {
             break;
@@ -206,6 +208,12 @@ mod tests {
         assert_eq!(labels(Scale::log(1.0, 1000.0), 4), ["1", "10", "100", "1000"]);
         assert_eq!(labels(Scale::log(1.0, 9.0), 4), ["1", "2", "5"]);
         assert!(labels(Scale::linear(1.0, 1.0), 5).is_empty());
+    }
+
+    #[test]
+    fn a_scale_of_many_powers_of_ten_has_no_more_ticks_than_fit() {
+        assert_eq!(labels(Scale::log(1e-3, 1e12), 5).len(), 6);
+        assert!(labels(Scale::log(1e-100, 1e100), 5).len() <= 6);
     }
 
     #[test]

@@ -213,7 +213,11 @@ impl Source {
 
     /// The ratio from which on a point is unreliable: the run's limit, or else the paper's, 2.
     pub(crate) fn ratio_limit(&self) -> f64 {
-        self.find("ratio_limit").and_then(Value::as_f64).filter(|limit| *limit > 0.0).unwrap_or(2.0)
+        self.find("ratio_limit")
+            .and_then(Value::as_f64)
+            .map(drawable)
+            .filter(|limit| *limit > 0.0)
+            .unwrap_or(2.0)
     }
 }
 
@@ -257,14 +261,15 @@ impl Batch<'_> {
         self.columns.iter().find(|(column, _)| column.name == name).map(|(_, array)| array)
     }
 
-    /// The numbers of a column, null as NaN; none for a column that was not asked for.
+    /// The numbers of a column as they are drawn, null as NaN; none for a column that was not asked
+    /// for.
     ///
     /// # Errors
     /// [`PlotError::File`] if the cells are not what the schema says.
     pub(crate) fn numbers(&self, name: &str) -> Result<Vec<f64>, PlotError> {
         let Some(array) = self.array(name) else { return Ok(Vec::new()) };
         let numbers = cells::numbers(array).map_err(|error| damaged(self.path, &error))?;
-        Ok(numbers.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
+        Ok(numbers.into_iter().map(|value| drawable(value.unwrap_or(f64::NAN))).collect())
     }
 
     /// The words of a column; none for a column that was not asked for.
@@ -280,6 +285,21 @@ impl Batch<'_> {
             cells::texts(array)
         };
         words.map_err(|error| damaged(self.path, &error))
+    }
+}
+
+/// Numbers beyond these are drawn as these, and smaller ones as 0: what a figure makes of them,
+/// such as borders halfway on a logarithmic axis, shall neither overflow nor vanish.
+const GREATEST: f64 = 1e100;
+const LEAST: f64 = 1e-100;
+
+fn drawable(value: f64) -> f64 {
+    if value.is_infinite() {
+        value
+    } else if value.abs() < LEAST {
+        0.0
+    } else {
+        value.clamp(-GREATEST, GREATEST)
     }
 }
 
@@ -360,4 +380,20 @@ fn column(field: &Field, place: usize) -> Option<ColumnFacts> {
         cells,
         field: place,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_drawn_as_far_as_figures_can_take_them() {
+        for value in [0.0, -350.0, 1e-99, 9e99] {
+            assert_eq!(drawable(value).to_bits(), value.to_bits());
+        }
+        assert_eq!(drawable(5e-324), 0.0);
+        assert_eq!(drawable(-1e300), -GREATEST);
+        assert_eq!(drawable(f64::INFINITY), f64::INFINITY, "it is left out, as it was");
+        assert!(drawable(f64::NAN).is_nan());
+    }
 }
