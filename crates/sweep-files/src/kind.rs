@@ -72,10 +72,6 @@ pub enum FileKind<'a> {
 /// The first line of an exported CSV file.
 pub const EXPORTED_CSV: &str = "# exported by sweep ";
 
-/// The longest account that is read: a session takes some hundred bytes, and a run has thousands
-/// of sessions at most.
-const LONGEST_ACCOUNT_BYTES: u64 = 64 << 20;
-
 impl FileKind<'_> {
     /// The kind in words: "the file there is no <name>".
     pub(crate) const fn name(self) -> &'static str {
@@ -163,8 +159,7 @@ impl FileKind<'_> {
 }
 
 fn is_account(path: &Path, of: &OsStr) -> std::io::Result<bool> {
-    let mut text = Vec::new();
-    regular::open(path)?.take(LONGEST_ACCOUNT_BYTES).read_to_end(&mut text)?;
+    let text = regular::read_json(path)?;
     let account: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
     Ok(account["plan_hash"].is_string() && account["file"].as_str() == Some(&of.to_string_lossy()))
 }

@@ -17,13 +17,17 @@ pub fn open(path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// The bytes of a regular file.
+/// Most bytes of a plan or an account, of which ours have kilobytes: read as JSON, 16 MiB may take
+/// half a GB.
+pub const LONGEST_JSON_BYTES: u64 = 16 << 20;
+
+/// The text of a JSON file. What is too long to be one of ours comes cut off, so that it is none.
 ///
 /// # Errors
 /// What the system answers, or that the path leads to something else, in words.
-pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+pub fn read_json(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    open(path)?.read_to_end(&mut bytes)?;
+    open(path)?.take(LONGEST_JSON_BYTES).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
@@ -172,10 +176,18 @@ mod tests {
         let (target, link) = (folder.path().join("target"), folder.path().join("link"));
         fs::write(&target, "mine").unwrap();
         std::os::unix::fs::symlink(&target, &link).unwrap();
-        assert_eq!(read(&link).unwrap(), b"mine");
+        assert_eq!(read_json(&link).unwrap(), b"mine");
         let error = open_or_create(&link).unwrap_err();
         assert_eq!(error.to_string(), "it is a symbolic link, not a regular file");
         open_or_create(&target).unwrap();
-        assert_eq!(read(&target).unwrap(), b"mine");
+        assert_eq!(read_json(&target).unwrap(), b"mine");
+    }
+
+    #[test]
+    fn no_more_is_read_than_json_of_ours_may_have() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("plan.json");
+        File::create(&path).unwrap().set_len(1 << 40).unwrap();
+        assert_eq!(read_json(&path).unwrap().len() as u64, LONGEST_JSON_BYTES);
     }
 }

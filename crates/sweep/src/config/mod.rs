@@ -13,7 +13,7 @@
 //! spreads `points` points; or there is no axis, and `list` takes points from a CSV or Parquet file
 //! whose columns are parameters.
 //!
-//! Bounds: files to 4 MiB; lists of points to 256 MiB, packed or not, and 2e7 numbers; a Sobol
+//! Bounds: files to 896 KiB; lists of points to 256 MiB, packed or not, and 2e7 numbers; a Sobol
 //! design to 2^32 points over 32 axes; 1e12 grid points; 1e6 s; 1e10 steps that stability asks for;
 //! spin tables of 20,000 rows; numbers to 1e12 in magnitude; 1000 of each kind
 //! of element.

@@ -5,9 +5,9 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
-/// Longest file that is read. A list of two hundred thousand numbers fits; a result file given by
-/// mistake does not.
-pub(super) const LONGEST_BYTES: u64 = 4 << 20;
+/// Longest file that is read. The longest spin table fits; a result file given by mistake does not.
+/// Two bytes may be a table of 1 kB while a file is read: a grid and its machine take up to 1 GB.
+pub(super) const LONGEST_BYTES: u64 = 896 << 10;
 
 /// A text among [`Sources`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -49,7 +49,7 @@ impl fmt::Display for ReadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Io(error) => write!(f, "{error}"),
-            Self::TooLong => write!(f, "it is longer than {} MiB", LONGEST_BYTES >> 20),
+            Self::TooLong => write!(f, "it is longer than {} KiB", LONGEST_BYTES >> 10),
             Self::NotUtf8 { utf16: true, .. } => {
                 f.write_str("it is UTF-16, not UTF-8: save it as UTF-8")
             }

@@ -38,6 +38,17 @@ pub enum StoreError {
         /// Where the plans part.
         differences: Vec<PlanDifference>,
     },
+    /// The plan has more numbers than a run folder keeps.
+    #[error(
+        "the plan is too long for {}: written out, it has more than {} MiB\n  = help: write values \
+         as a range, or points as a list in a file of their own",
+        folder.display(),
+        sweep_files::regular::LONGEST_JSON_BYTES >> 20
+    )]
+    LongPlan {
+        /// The run folder.
+        folder: PathBuf,
+    },
     /// The finished output belongs to another plan, or is of a build that computes other numbers.
     #[error(
         "{} already holds the result of another plan or build:\n{}  = help: give another --out, or \
@@ -145,7 +156,10 @@ impl StoreError {
     #[must_use]
     pub fn is_refusal(&self) -> bool {
         match self {
-            Self::PlanDiffers { .. } | Self::OutputDiffers { .. } | Self::Shard(_) => true,
+            Self::PlanDiffers { .. }
+            | Self::OutputDiffers { .. }
+            | Self::LongPlan { .. }
+            | Self::Shard(_) => true,
             Self::Threads(error) => error.is_refusal(),
             Self::File(error) => error.is_refusal(),
             Self::Busy { .. }

@@ -15,6 +15,9 @@ use super::Folder;
 use super::error::{Holder, StoreError};
 use sweep_files::{FileError, atomic, regular};
 
+/// Most bytes of a holder's name.
+const LONGEST_NAME: u64 = 300;
+
 /// How long a lock is asked for before it counts as held: `sweep status` holds it for an instant
 /// when it looks.
 const ATTEMPTS: u32 = 5;
@@ -108,7 +111,6 @@ pub(crate) fn holders(folder: &Folder) -> Vec<Holder> {
 
 /// A lock holds nothing, or the name that [`sign`] writes. Anything else is somebody's file.
 fn refuse_strangers(file: &mut File, path: &Path) -> Result<(), StoreError> {
-    const LONGEST_NAME: u64 = 300;
     let mut name = Vec::new();
     file.take(LONGEST_NAME + 1).read_to_end(&mut name).map_err(StoreError::io("read", path))?;
     let process = name.split(|byte| *byte == b' ').next().unwrap_or_default();
@@ -169,12 +171,12 @@ pub(super) fn shard_of_name(name: &str) -> Option<u64> {
 
 /// The holder named in a lock file, if someone holds it.
 fn held_by(path: &Path, shard: Option<u64>) -> Option<Holder> {
-    let mut file = regular::open(path).ok()?;
+    let file = regular::open(path).ok()?;
     if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
         return None;
     }
     let mut text = String::new();
-    file.read_to_string(&mut text).ok()?;
+    file.take(LONGEST_NAME).read_to_string(&mut text).ok()?;
     let (pid, host) = text.trim_end().split_once(' ')?;
     Some(Holder { pid: pid.parse().ok()?, host: host.to_owned(), shard })
 }

@@ -62,7 +62,7 @@ impl PlanFile {
     /// Reads the plan of a run folder.
     pub(crate) fn read(folder: &Folder) -> Result<Found, StoreError> {
         let path = folder.plan();
-        let text = match regular::read(&path) {
+        let text = match regular::read_json(&path) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
             Err(error) => return Err(StoreError::io("read", &path)(error)),
@@ -89,7 +89,11 @@ impl PlanFile {
             "chunk_points": self.chunk_points,
             "plan": self.plan,
         });
-        atomic::create(&folder.path, &folder.plan(), &pretty(&value))?;
+        let text = pretty(&value);
+        if text.len() as u64 >= regular::LONGEST_JSON_BYTES {
+            return Err(StoreError::LongPlan { folder: folder.path.clone() });
+        }
+        atomic::create(&folder.path, &folder.plan(), &text)?;
         Ok(())
     }
 

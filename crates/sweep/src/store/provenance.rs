@@ -123,7 +123,7 @@ fn recorded(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     let mut sessions = Vec::new();
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         if name.to_str().is_some_and(is_session) {
-            let text = regular::read(&folder.path.join(name)).unwrap_or_default();
+            let text = regular::read_json(&folder.path.join(name)).unwrap_or_default();
             sessions.extend(serde_json::from_slice::<Session>(&text).ok());
         }
     }

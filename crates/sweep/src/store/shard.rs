@@ -91,7 +91,7 @@ impl Dealing {
     /// none: the dealing only says who computes a chunk, never what is in it.
     pub(crate) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
         let path = folder.shards();
-        match regular::read(&path) {
+        match regular::read_json(&path) {
             Ok(text) => Ok(serde_json::from_slice(&text)
                 .ok()
                 .filter(|dealing: &Self| (1..=MAX_SHARDS).contains(&dealing.shards))),

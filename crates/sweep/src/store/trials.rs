@@ -18,7 +18,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::error::StoreError;
@@ -39,6 +39,9 @@ const RECORD_BYTES: usize = 40;
 /// What a trial is known by.
 pub(crate) type Key = [u64; 3];
 
+/// Trials and their answers.
+type Known = BTreeMap<Key, Option<f64>>;
+
 /// What opening a search's output came to.
 #[derive(Debug)]
 pub(crate) enum OpenedTrials {
@@ -56,7 +59,7 @@ pub(crate) struct Trials {
     file: File,
     path: PathBuf,
     plan: [u8; blake3::OUT_LEN],
-    known: BTreeMap<Key, Option<f64>>,
+    known: Known,
     notes: Vec<String>,
 }
 
@@ -91,10 +94,7 @@ impl Trials {
         }
         let path = folder.path.join(NAME);
         let plan = *job.hash().as_bytes();
-        let (mut file, bytes) = contents(&path)?;
-        let found = bytes.len() / RECORD_BYTES;
-        let records = bytes.chunks_exact(RECORD_BYTES);
-        let known: BTreeMap<_, _> = records.filter_map(|record| decode(&plan, record)).collect();
+        let (mut file, found, known) = contents(&path, &plan)?;
         if known.is_empty() && found > 0 {
             let aside = set_aside(&path)?;
             notes.push(format!(
@@ -102,7 +102,7 @@ impl Trials {
                 path.display(),
                 aside.display()
             ));
-            (file, _) = contents(&path)?;
+            (file, ..) = contents(&path, &plan)?;
         } else {
             if found > known.len() {
                 notes.push(format!(
@@ -112,7 +112,7 @@ impl Trials {
                 ));
             }
             // A torn record goes, so that the next one begins where a record should.
-            let whole = (found * RECORD_BYTES) as u64;
+            let whole = found as u64 * RECORD_BYTES as u64;
             let cut = file.set_len(whole).and_then(|()| file.seek(SeekFrom::End(0)));
             cut.map_err(StoreError::io("write", &path))?;
         }
@@ -162,12 +162,21 @@ impl Trials {
     }
 }
 
-/// The file of trials, made if need be, and what it holds.
-fn contents(path: &Path) -> Result<(File, Vec<u8>), StoreError> {
-    let mut file = regular::open_or_create(path).map_err(StoreError::io("open", path))?;
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(StoreError::io("read", path))?;
-    Ok((file, bytes))
+/// The file of trials, made if need be; how many records it holds; and the trials in them.
+fn contents(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> Result<(File, usize, Known), StoreError> {
+    let file = regular::open_or_create(path).map_err(StoreError::io("open", path))?;
+    let (mut found, mut known) = (0, Known::new());
+    let mut records = BufReader::new(&file);
+    loop {
+        let mut record = [0; RECORD_BYTES];
+        match records.read_exact(&mut record) {
+            Ok(()) => found += 1,
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => break,
+            Err(error) => return Err(StoreError::io("read", path)(error)),
+        }
+        known.extend(decode(plan, &record));
+    }
+    Ok((file, found, known))
 }
 
 /// Whether the output is the finished file of this search and build.

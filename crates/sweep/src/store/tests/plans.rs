@@ -98,3 +98,20 @@ fn a_damaged_plan_is_set_aside_and_its_chunks_are_used() {
         assert_eq!(fs::read_to_string(&plan).unwrap(), text);
     }
 }
+
+#[test]
+fn a_plan_of_any_length_does_not_fill_the_memory() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    drop(open(&home.output(), &job));
+    for name in ["plan.json", "shards.json", "session-x-1-1.json"] {
+        fs::File::create(home.partial().join(name)).unwrap().set_len(1 << 40).unwrap();
+        assert!(status(&home.output(), &job).is_ok(), "{name}");
+        drop(open(&home.output(), &job));
+    }
+    // One that could not be read again is not written.
+    let numbers = vec![0.1; 2_000_000];
+    let long = Job { plan: json!({ "values": numbers }), ..synthetic::job(POINTS) };
+    let error = OpenRun::open(&home.output().with_file_name("y.parquet"), &long, options());
+    let text = error.unwrap_err().to_string();
+    assert!(text.contains("more than 16 MiB") && text.contains("as a list"), "{text}");
+}
