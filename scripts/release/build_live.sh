@@ -14,7 +14,7 @@ target=wasm32-unknown-unknown
 [ -d "$(rustc --print target-libdir --target $target)" ] || rustup target add $target
 
 cargo rustc --locked --package washer-live --profile live --target $target --crate-type cdylib
-module=target/$target/live/washer_live.wasm
+module=${CARGO_TARGET_DIR:-target}/$target/live/washer_live.wasm
 # Without a name and a time: the same module gives the same bytes.
 gzip -9 -n -c "$module" > "$output"
 echo "wrote $output: $(wc -c < "$output") bytes, unpacked $(wc -c < "$module"), $(rustc --version)"
