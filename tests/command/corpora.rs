@@ -1,4 +1,4 @@
-//! The fuzzer's files, findings among them, through the commands that read them.
+//! The fuzzer's files, findings among them, through what reads them.
 
 #![cfg(target_os = "linux")]
 
@@ -6,6 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::home::{Home, said};
+
+#[path = "../../fuzz/src/targets/folder.rs"]
+mod folder;
 
 /// Files whose footers the Parquet library must not see, and what is said of each.
 const HOSTILE: [(&str, &str); 2] = [
@@ -18,6 +21,12 @@ fn corpus(name: &str) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).expect("there is a corpus");
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
     paths.sort();
+    paths
+}
+
+/// The files of a corpus that stands for readers of Parquet.
+fn parquet_corpus(name: &str) -> Vec<PathBuf> {
+    let paths = corpus(name);
     for (file, _) in HOSTILE {
         assert!(paths.iter().any(|path| path.ends_with(file)), "{name} has no {file}");
     }
@@ -39,7 +48,7 @@ fn assert_ends(home: &Home, words: &[&str], path: &Path) {
 #[test]
 fn results_of_the_fuzzers_corpus_are_shown_or_explained() {
     let home = Home::new("");
-    for path in corpus("corpus-result") {
+    for path in parquet_corpus("corpus-result") {
         fs::copy(&path, home.path("x.parquet")).expect("the file is there");
         assert_ends(&home, &["show", "x.parquet"], &path);
         assert_ends(&home, &["plot", "x.parquet", "-o", "x.svg"], &path);
@@ -53,8 +62,16 @@ fn lists_of_the_fuzzers_corpus_load_or_are_explained() {
          time = { end_s = 1 }\n\
          design = { method = \"list\", file = \"list\" }\n",
     );
-    for path in corpus("corpus-list") {
+    for path in parquet_corpus("corpus-list") {
         fs::copy(&path, home.path("list")).expect("the file is there");
         assert_ends(&home, &["check", "g.toml"], &path);
+    }
+}
+
+#[test]
+fn run_folders_of_the_fuzzers_corpus_change_no_result() {
+    for path in corpus("corpus-folder") {
+        println!("{}", path.display());
+        folder::run(&fs::read(&path).expect("the file is there"));
     }
 }
