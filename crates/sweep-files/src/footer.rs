@@ -155,17 +155,7 @@ mod tests {
     use parquet::file::properties::{EnabledStatistics, WriterProperties};
 
     use super::*;
-
-    /// A number in groups of seven bits.
-    fn varint(mut rest: u64) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        while rest >= 0x80 {
-            bytes.push(rest as u8 | 0x80);
-            rest >>= 7;
-        }
-        bytes.push(rest as u8);
-        bytes
-    }
+    use crate::thrift::encode::varint;
 
     /// A column, or with children a group of them.
     fn element(children: u64) -> Vec<u8> {

@@ -145,18 +145,7 @@ mod tests {
     use flate2::write::GzEncoder;
 
     use super::*;
-
-    /// A number whose lowest bit is its sign, in groups of seven bits.
-    fn number(value: i32) -> Vec<u8> {
-        let mut rest = ((i64::from(value) << 1) ^ (i64::from(value) >> 63)) as u64;
-        let mut bytes = Vec::new();
-        while rest >= 0x80 {
-            bytes.push(rest as u8 | 0x80);
-            rest >>= 7;
-        }
-        bytes.push(rest as u8);
-        bytes
-    }
+    use crate::thrift::encode::{number, varint};
 
     /// A page of the first version with a header that declares these sizes.
     fn page(unpacked: i32, packed: &[u8]) -> Vec<u8> {
@@ -229,12 +218,7 @@ mod tests {
             let mut bytes = [&[0x15, 0, 0x15], number(100).as_slice(), &[0x15, 0]].concat();
             // Statistics, whose first field is a text.
             bytes.extend([0x2c, 0x15, 2, 0x15, 0, 0x15, 6, 0x15, 6, 0x1c, 0x18]);
-            let mut rest = length;
-            while rest >= 0x80 {
-                bytes.push(rest as u8 | 0x80);
-                rest >>= 7;
-            }
-            bytes.push(rest as u8);
+            bytes.extend(varint(length as u64));
             bytes.extend(vec![7; length]);
             bytes.extend([0, 0, 0]);
             let expected = if length < 65_000 { "100" } else { "no sense" };

@@ -150,11 +150,8 @@ impl Walk<'_, '_> {
                 }
             }
             STRUCT => {
-                self.fields(if let Some(Kind::Struct(shape)) = known {
-                    Some(shape)
-                } else {
-                    None
-                })?;
+                let shape = if let Some(Kind::Struct(shape)) = known { Some(shape) } else { None };
+                self.fields(shape)?;
             }
             UUID => self.skip(16)?,
             // Booleans of a collection, to which the library gives no bytes, are among them.
@@ -192,6 +189,26 @@ impl Walk<'_, '_> {
     fn number(&mut self) -> Option<i64> {
         let number = self.varint()?;
         Some((number >> 1) as i64 ^ -((number & 1) as i64))
+    }
+}
+
+/// Numbers as a file has them.
+#[cfg(test)]
+pub(crate) mod encode {
+    /// In groups of seven bits, the lowest first.
+    pub(crate) fn varint(mut rest: u64) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        while rest >= 0x80 {
+            bytes.push(rest as u8 | 0x80);
+            rest >>= 7;
+        }
+        bytes.push(rest as u8);
+        bytes
+    }
+
+    /// One whose lowest bit is its sign.
+    pub(crate) fn number(value: i32) -> Vec<u8> {
+        varint(((i64::from(value) << 1) ^ (i64::from(value) >> 63)) as u64)
     }
 }
 

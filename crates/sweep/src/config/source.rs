@@ -49,7 +49,12 @@ impl fmt::Display for ReadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Io(error) => write!(f, "{error}"),
-            Self::TooLong => write!(f, "it is longer than {} KiB", LONGEST_BYTES >> 10),
+            Self::TooLong => write!(
+                f,
+                "it is longer than {} KiB: give values as a range, or points as a list in a file \
+                 of their own",
+                LONGEST_BYTES >> 10
+            ),
             Self::NotUtf8 { utf16: true, .. } => {
                 f.write_str("it is UTF-16, not UTF-8: save it as UTF-8")
             }
