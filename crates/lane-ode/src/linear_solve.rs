@@ -3,6 +3,7 @@
 use crate::num::N;
 
 /// Row-pivoted triangular factors of a square matrix.
+#[derive(Clone)]
 pub struct Lu<const C: usize> {
     /// L below the diagonal (its unit diagonal not stored), U above it, the reciprocals of U's
     /// diagonal on it.

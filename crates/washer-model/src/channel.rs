@@ -119,6 +119,24 @@ macro_rules! declare {
 }
 channels!(declare);
 
+impl sweep_parameter::Channel for Channel {
+    fn every() -> &'static [Self] {
+        &Self::ALL
+    }
+
+    fn name(self) -> &'static str {
+        self.name()
+    }
+
+    fn unit(self) -> &'static str {
+        self.unit()
+    }
+
+    fn description(self) -> &'static str {
+        self.description()
+    }
+}
+
 /// A name that ends with its only zero byte.
 const fn terminated(name: &'static str) -> &'static CStr {
     match CStr::from_bytes_with_nul(name.as_bytes()) {

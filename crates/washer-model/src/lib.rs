@@ -100,8 +100,8 @@ pub use run::{
     Course, Extra, Method, Record, Stop, StopLoad, Wanted, simulate, simulate_until, simulate_with,
 };
 pub use stability::{
-    Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant, Response,
-    cross, exact_motions, peaks_without_departures, respond,
+    Beyond, Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant,
+    Response, Responses, cross, exact_motions, peaks_without_departures, respond,
 };
 
 #[cfg(test)]

@@ -7,6 +7,8 @@ mod table;
 use std::borrow::Cow;
 use std::fmt;
 
+pub use sweep_parameter::{Range, decimal, unit_suffix};
+
 use crate::{BumpStop, Damper, Machine, Spin, Spring};
 use table::{BLOCKS, TABLE};
 
@@ -57,22 +59,6 @@ pub enum Target {
     /// An edge of the window (0: the beginning, 1: the end), which neither machine nor spin holds:
     /// [`Parameter::get`] finds nothing and [`Parameter::set`] writes nothing.
     Window(usize),
-}
-
-/// Values that a parameter may take. No number above [`Range::LARGEST`] in magnitude is accepted,
-/// so that products of a few parameters stay finite.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Range {
-    /// Any finite number.
-    Any,
-    /// Greater than 0.
-    Positive,
-    /// 0 or greater.
-    NonNegative,
-    /// Less than 0.
-    Negative,
-    /// Within these bounds, both included.
-    Within(f64, f64),
 }
 
 /// Why a name is not a parameter of this machine and spin.
@@ -143,58 +129,6 @@ impl Target {
     }
 }
 
-impl Range {
-    /// Greatest magnitude accepted of any number.
-    pub const LARGEST: f64 = 1e12;
-
-    /// Whether `value` is allowed; never for NaN or infinity.
-    #[must_use]
-    pub fn contains(self, value: f64) -> bool {
-        value.abs() <= Self::LARGEST
-            && match self {
-                Self::Any => true,
-                Self::Positive => value > 0.0,
-                Self::NonNegative => value >= 0.0,
-                Self::Negative => value < 0.0,
-                Self::Within(least, greatest) => (least..=greatest).contains(&value),
-            }
-    }
-}
-
-impl Range {
-    /// The values that would be accepted in place of a refused one.
-    #[must_use]
-    pub fn instead_of(self, value: f64) -> String {
-        if value.is_finite() && value.abs() > Self::LARGEST && !matches!(self, Self::Within(..)) {
-            format!("{self}, at most {:e} in magnitude", Self::LARGEST)
-        } else {
-            self.to_string()
-        }
-    }
-}
-
-/// A number as a message shows it: the shortest decimal that reads back the same, in powers of ten
-/// where it would be long.
-#[must_use]
-pub fn decimal(value: f64) -> String {
-    let text = format!("{value:?}");
-    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
-}
-
-impl fmt::Display for Range {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Any => f.write_str("a finite number"),
-            Self::Positive => f.write_str("a number greater than 0"),
-            Self::NonNegative => f.write_str("a number, 0 or greater"),
-            Self::Negative => f.write_str("a number less than 0"),
-            Self::Within(least, greatest) => {
-                write!(f, "a number from {} to {}", decimal(*least), decimal(*greatest))
-            }
-        }
-    }
-}
-
 impl fmt::Display for Source {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -204,6 +138,31 @@ impl fmt::Display for Source {
             Self::Convention => f.write_str("convention"),
             Self::Grid => f.write_str("the grid file's [spin]"),
             Self::Time => f.write_str("the grid file's [time]"),
+        }
+    }
+}
+
+impl sweep_parameter::Parameter for Parameter {
+    fn name(&self) -> &str {
+        self.name()
+    }
+
+    fn unit(&self) -> &'static str {
+        self.unit()
+    }
+
+    fn description(&self) -> &'static str {
+        self.description()
+    }
+
+    fn range(&self) -> Range {
+        self.range()
+    }
+
+    fn window_edge(&self) -> Option<usize> {
+        match self.target() {
+            Target::Window(edge) => Some(edge),
+            _ => None,
         }
     }
 }
@@ -220,27 +179,6 @@ impl fmt::Debug for Parameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("Parameter").field(&self.name).finish()
     }
-}
-
-/// How a name ends whose number is in this unit; `None` where names say nothing of it.
-#[must_use]
-pub fn unit_suffix(unit: &str) -> Option<&'static str> {
-    Some(match unit {
-        "m" => "_m",
-        "kg" => "_kg",
-        "s" => "_s",
-        "rpm" => "_rpm",
-        "" => "",
-        "N" => "_n",
-        "N/m" => "_n_per_m",
-        "N/m^3" => "_n_per_m3",
-        "N s/m" => "_n_s_per_m",
-        "N m/rad" => "_n_m_per_rad",
-        "kg m^2" => "_kg_m2",
-        "m/s" => "_m_per_s",
-        "m/s^2" => "_m_per_s2",
-        _ => return None,
-    })
 }
 
 impl Parameter {

@@ -64,6 +64,13 @@ pub enum Violation {
         /// Whether there is a cabinet on them.
         has_cabinet: bool,
     },
+    /// A foot that does not stand as high as the first: a floor is even.
+    FootOffTheFloor {
+        /// Which, from 1.
+        number: usize,
+        /// How much higher it stands (m).
+        higher_m: f64,
+    },
     /// A foot that carries nothing even at rest: the machine's mass centre is beyond the others.
     FootInTheAir {
         /// Which, from 1.
@@ -137,6 +144,7 @@ impl Violation {
             Self::OnAxis { number } => vec![format!("unbalance_{number}_radius_m")],
             Self::Feet { count, .. } => (1..=*count).flat_map(places_of_foot).collect(),
             Self::FootInTheAir { number, .. } => places_of_foot(*number).into(),
+            Self::FootOffTheFloor { number, .. } => vec![format!("foot_{number}_y_m")],
             Self::BearingsTogether { .. } => {
                 vec!["bearing_rear_x_m".to_owned(), "bearing_front_x_m".to_owned()]
             }
@@ -174,6 +182,9 @@ impl Violation {
             }
             Self::Feet { .. } => {
                 "three or four [[feet]] with foot_m = [x, y, z], not all in a line".to_owned()
+            }
+            Self::FootOffTheFloor { .. } => {
+                "one height for all feet: the second number of foot_m".to_owned()
             }
             Self::FootInTheAir { .. } => {
                 "feet around the mass centre of cabinet and machine together".to_owned()
@@ -230,6 +241,10 @@ impl fmt::Display for Violation {
             }
             Self::Feet { count, .. } => {
                 write!(f, "the cabinet stands on {count} feet, and loads are reckoned for 3 or 4")
+            }
+            Self::FootOffTheFloor { number, higher_m } => {
+                let way = if *higher_m > 0.0 { "higher" } else { "lower" };
+                write!(f, "foot {number} stands {} m {way} than foot 1", rounded(higher_m.abs()))
             }
             Self::FootInTheAir { number, load_n } => {
                 write!(f, "foot {number} lifts at rest: it would carry {load_n:.1} N")
@@ -326,6 +341,13 @@ impl Machine {
         let has_cabinet = self.cabinet.is_some();
         match Feet::new(self) {
             Some(feet) => {
+                let first_y_m = self.feet[0].foot_m[1];
+                for (k, foot) in self.feet.iter().enumerate() {
+                    let higher_m = foot.foot_m[1] - first_y_m;
+                    if higher_m.abs() > SHORTEST_M {
+                        joint.push(Violation::FootOffTheFloor { number: k + 1, higher_m });
+                    }
+                }
                 let loads_n = feet.at_rest_n(self).into_iter().enumerate();
                 let lifted = loads_n.filter(|(_, load_n)| *load_n <= 0.0);
                 joint.extend(

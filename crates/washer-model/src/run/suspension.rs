@@ -101,6 +101,23 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     forces
 }
 
+/// From the cabinet end of each spring and damper to its tub end (m), in cabinet axes.
+pub(crate) struct Attachments {
+    pub(crate) springs: Vec<[f64; 3]>,
+    pub(crate) dampers: Vec<[f64; 3]>,
+}
+
+/// Those at some coordinates.
+pub(crate) fn attachments(point: &Point, q: &[f64; COORDINATES]) -> Attachments {
+    let q = along(q, &[0.0; COORDINATES]);
+    let span = |ends: &Ends<Dual<f64>>| tub_from_cabinet(&q, ends).map(|x| x.0.value);
+    let elements = &point.machine.elements;
+    Attachments {
+        springs: elements.springs.iter().map(|spring| span(&spring.constant().ends)).collect(),
+        dampers: elements.dampers.iter().map(|damper| span(&damper.constant().ends)).collect(),
+    }
+}
+
 /// The tub at a state.
 struct Tub {
     model: ModelKind,

@@ -5,17 +5,20 @@
 //! few even instants, and the trigonometric polynomial through those at all others. Classical
 //! Runge-Kutta takes all disturbances through the turn together.
 
-use super::turn::{AT, Clock, REACH, WEIGHT};
+use super::turn::{Clock, REACH, WEIGHT, WHEN};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::run::model::Nonlinear;
 use core::array::from_fn;
-use lane_ode::{Dual, Lane, N, System as _, trig};
+use lane_ode::{Dual, Lane, N, System, trig};
 
 /// Instants a turn at which the derivatives are taken: harmonics of the turn up to the seventh.
 pub(super) const INSTANTS: usize = 16;
 
 /// Disturbances taken through a step at once, so that they stay in the nearest cache.
-const BLOCK: usize = 4;
+const BLOCK: usize = 5;
+
+/// Steps whose derivatives are kept at once, where they are taken in every step.
+const STEPS_AT_ONCE: usize = 32;
 
 /// Derivatives interpolated at once, whose sums then stay in registers.
 const TOGETHER: usize = 10;
@@ -32,21 +35,12 @@ pub(super) fn slopes_along<T: Lane>(
     states: &[[N<T>; STATES]],
 ) -> Vec<Slopes<T>> {
     let every = clock.steps / INSTANTS;
-    let mut along = vec![[[zero; STATES]; COORDINATES]; INSTANTS];
-    for (k, slopes) in along.iter_mut().enumerate() {
+    let mut along = Vec::with_capacity(INSTANTS);
+    for k in 0..INSTANTS {
         let forcing = model.forcing(clock.time_s((k * every) as f64).constant());
-        let mut state = [zero.constant(); STATES];
-        for i in 0..STATES {
-            state[i] = states[k][i].constant();
-        }
-        for j in 0..STATES {
-            state[j].0.slope = zero.lit(1.0).0;
-            let derivative = model.derivative(&forcing, &state);
-            state[j].0.slope = zero.0;
-            for i in 0..COORDINATES {
-                slopes[i][j] = N(derivative[COORDINATES + i].0.slope);
-            }
-        }
+        let mut found = [[zero; STATES]; COORDINATES];
+        slopes(zero, model, &forcing, &states[k], &mut found);
+        along.push(found);
     }
     along
 }
@@ -71,12 +65,130 @@ pub(super) fn monodromy<T: Lane>(
         (start, end) = (end, start);
         between(zero, along, weights, 2 * k + 1, &mut at[1]);
         between(zero, along, weights, 2 * k + 2, &mut at[end]);
-        let slopes = [&at[start], &at[1], &at[end]];
+        let slopes = [&at[start], &at[1], &at[1], &at[end]];
         for block in columns.chunks_exact_mut(BLOCK) {
             step(zero, clock.step_s, slopes, block);
         }
     }
     columns
+}
+
+/// As [`monodromy`] of some rows in lanes, each by itself, where forces have corners: the
+/// derivatives are those at every stage of every step, so that it is the derivative of what the
+/// steps do. `path` has the states at the steps' starts. `model` and `clock` have the rows one
+/// after another, again and again: lanes share a row's steps, then its disturbances.
+#[inline(always)]
+pub(super) fn along_every_step<T: Lane>(
+    zero: N<T>,
+    model: &Nonlinear<Dual<T>>,
+    clock: &Clock<T>,
+    path: &[[N<T>; STATES]],
+    rows: usize,
+) -> Vec<Vec<[N<T>; STATES]>> {
+    let shares = T::LANES / rows;
+    let mut columns = vec![vec![[zero; STATES]; STATES.div_ceil(BLOCK * T::LANES) * BLOCK]; rows];
+    for columns in &mut columns {
+        for j in 0..STATES {
+            columns[j / T::LANES][j].0.set(j % T::LANES, 1.0);
+        }
+    }
+    let mut slopes = vec![[[[[0.0; STATES]; COORDINATES]; 4]; STEPS_AT_ONCE]; rows];
+    let mut steps = vec![0; T::LANES];
+    for first in (0..clock.steps).step_by(STEPS_AT_ONCE) {
+        let last = (first + STEPS_AT_ONCE).min(clock.steps) - 1;
+        for step in (first..=last).step_by(shares) {
+            for lane in 0..T::LANES {
+                steps[lane] = (step + (lane / rows).min(shares - 1)).min(last);
+            }
+            let found = slopes_of_stages(zero, model, clock, path, rows, &steps);
+            for lane in 0..T::LANES {
+                let of_step = &mut slopes[lane % rows][steps[lane] - first];
+                for stage in 0..4 {
+                    for i in 0..COORDINATES {
+                        for j in 0..STATES {
+                            of_step[stage][i][j] = found[stage][i][j].0.get(lane);
+                        }
+                    }
+                }
+            }
+        }
+        for row in 0..rows {
+            let step_s = zero.lit(clock.step_s.0.get(row));
+            for k in 0..=last - first {
+                let mut at = [[[zero; STATES]; COORDINATES]; 4];
+                for stage in 0..4 {
+                    for i in 0..COORDINATES {
+                        for j in 0..STATES {
+                            at[stage][i][j] = zero.lit(slopes[row][k][stage][i][j]);
+                        }
+                    }
+                }
+                let stages = [&at[0], &at[1], &at[2], &at[3]];
+                for block in columns[row].chunks_exact_mut(BLOCK) {
+                    step(zero, step_s, stages, block);
+                }
+            }
+        }
+    }
+    columns
+}
+
+/// The derivatives at the stages of each lane's step of the path.
+#[inline(always)]
+fn slopes_of_stages<T: Lane>(
+    zero: N<T>,
+    model: &Nonlinear<Dual<T>>,
+    clock: &Clock<T>,
+    path: &[[N<T>; STATES]],
+    rows: usize,
+    steps: &[usize],
+) -> [Slopes<T>; 4] {
+    let (mut step, mut start) = (zero, [zero; STATES]);
+    for lane in 0..T::LANES {
+        step.0.set(lane, steps[lane] as f64);
+        for i in 0..STATES {
+            start[i].0.set(lane, path[steps[lane]][i].0.get(lane % rows));
+        }
+    }
+    let mut found = [[[zero; STATES]; COORDINATES]; 4];
+    let mut along = start;
+    for stage in 0..4 {
+        let time_s = (clock.step_s * (step + WHEN[stage])).v();
+        let forcing = model.forcing(time_s.constant());
+        let rate = slopes(zero, model, &forcing, &along, &mut found[stage]);
+        let reach = (clock.step_s * REACH[stage]).v();
+        for i in 0..STATES {
+            along[i] = start[i] + reach * rate[i];
+        }
+    }
+    found
+}
+
+/// The derivatives at a state; gives the state's derivative by time.
+#[inline(always)]
+fn slopes<T: Lane>(
+    zero: N<T>,
+    model: &Nonlinear<Dual<T>>,
+    forcing: &<Nonlinear<Dual<T>> as System<Dual<T>, STATES>>::Forcing,
+    at: &[N<T>; STATES],
+    slopes: &mut Slopes<T>,
+) -> [N<T>; STATES] {
+    let (mut state, mut rate) = ([zero.constant(); STATES], [zero; STATES]);
+    for i in 0..STATES {
+        state[i] = at[i].constant();
+    }
+    for j in 0..STATES {
+        state[j].0.slope = zero.lit(1.0).0;
+        let derivative = model.derivative(forcing, &state);
+        state[j].0.slope = zero.0;
+        for i in 0..COORDINATES {
+            slopes[i][j] = N(derivative[COORDINATES + i].0.slope);
+        }
+        for i in 0..STATES {
+            rate[i] = N(derivative[i].0.value);
+        }
+    }
+    rate
 }
 
 /// Weights of the values at [`INSTANTS`] even instants in the trigonometric polynomial through
@@ -124,14 +236,14 @@ fn between<T: Lane>(
     }
 }
 
-/// One step of some disturbances; the derivatives are those at its start, middle and end.
+/// One step of some disturbances; the derivatives are those at its stages.
 #[inline(always)]
-fn step<T: Lane>(zero: N<T>, h: N<T>, at: [&Slopes<T>; 3], block: &mut [[N<T>; STATES]]) {
+fn step<T: Lane>(zero: N<T>, h: N<T>, at: [&Slopes<T>; 4], block: &mut [[N<T>; STATES]]) {
     let mut along = [[zero; STATES]; BLOCK];
     along.copy_from_slice(block);
     let start = along;
     for stage in 0..4 {
-        let slopes = at[AT[stage]];
+        let slopes = at[stage];
         let mut accelerations = [[zero; COORDINATES]; BLOCK];
         // Rows by two, so that what is loaded of a disturbance serves both.
         for i in (0..COORDINATES).step_by(2) {

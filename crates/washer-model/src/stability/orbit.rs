@@ -1,21 +1,21 @@
-//! Periodic responses: points at constant speeds, in lanes.
+//! The period map: what one turn at a constant speed makes of a state, points in lanes.
 //!
-//! The period map is a turn of the machine with capped modes, which leave exact what turns with the
-//! drum (`coupling.rs`), by classical Runge-Kutta in few steps. The linear model's is affine, so
-//! that one linear solve finds what it returns to. From there the nonlinear model's fixed point is
-//! found by Newton's method: with the linear model's matrix as long as that brings it closer fast
-//! enough, else with the response's own (`monodromy.rs`).
+//! It is a turn of the machine with capped modes, which leave exact what turns with the drum
+//! (`coupling.rs`), by classical Runge-Kutta in few steps. What returns to itself is looked for by
+//! `search.rs` at one speed, and followed over speed by `branch.rs`.
 
-use super::monodromy::{INSTANTS, monodromy, slopes_along, weights};
+use super::monodromy::{INSTANTS, along_every_step, monodromy, slopes_along, weights};
+use super::settings::caps;
 use super::turn::{Clock, Watch, turn};
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, STATES};
+use crate::coordinates::STATES;
 use crate::machine::spin::SpinStretch;
 use crate::nonlinear::coupling::{Caps, Coupling};
+use crate::nonlinear::outputs::squared;
 use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
-use core::f64::consts::TAU;
-use lane_ode::{Dual, Kernel, Lane, Lu, N, Peaks};
+use core::array::from_fn;
+use lane_ode::{Dual, Kernel, Lane, Lu, N, Peaks, Simd};
 
 /// Rows and columns of a state's disturbance.
 pub(super) type Square = [[N<f64>; STATES]; STATES];
@@ -29,11 +29,15 @@ pub(super) struct Row<'a> {
     pub(super) steps: usize,
     /// On the modes of bearings and hinge; none if the steps follow these.
     pub(super) caps: Option<Caps>,
-    /// A response nearby, from which the search starts; else it starts from the linear model's.
-    pub(super) from: Option<[f64; STATES]>,
 }
 
 impl Row<'_> {
+    /// The same at another speed close by, with the steps and caps of this one as shares of a turn.
+    pub(super) fn beside(self, speed_rpm: f64) -> Self {
+        let caps = self.caps.map(|_| caps(self.steps, 60.0 / speed_rpm));
+        Self { speed_rpm, caps, ..self }
+    }
+
     pub(super) fn turn_s(&self) -> f64 {
         60.0 / self.speed_rpm
     }
@@ -47,51 +51,83 @@ impl Row<'_> {
     pub(super) fn unit_per_s(&self) -> f64 {
         1.0 / self.step_s()
     }
+
+    /// Whether forces have corners, between which derivatives at a few instants say nothing.
+    fn has_corners(&self) -> bool {
+        self.point.machine.elements.are_nonsmooth()
+    }
+
+    /// What must be equal of rows that turn side by side.
+    fn kind(&self) -> (usize, bool, bool) {
+        (self.steps, self.caps.is_some(), self.has_corners())
+    }
 }
 
-/// Turns that the search for a response may take.
-const MOST_TURNS: usize = 30;
-
-/// A response is found once another turn moves it by less than this share of its greatest
-/// coordinate.
-const CLOSE: f64 = 1e-10;
-
-/// Smaller deviations (m, rad) count as this: without unbalance there is none but rounding.
-const LEAST_SIZE: f64 = 1e-4;
-
-/// The matrix is taken anew where a correction leaves more than this share of what was missing.
-const FAST_ENOUGH: f64 = 0.2;
-
-/// What is found of a row.
-pub(super) struct Found {
-    /// Amplitudes of the linear model's response (m, rad).
-    pub(super) linear: [f64; CHANNELS],
-    /// Of the nonlinear model's.
-    pub(super) nonlinear: [f64; CHANNELS],
-    /// The nonlinear response at theta = 0.
+/// A turn that is asked for.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'a> {
+    pub(super) row: Row<'a>,
+    /// Where the unbalance is up: coordinates (m, rad), then their speeds (per s).
     pub(super) start: [f64; STATES],
-    /// What a turn does to disturbances of it; speeds per [`Row::unit_per_s`].
+    /// Whether to see all of it, not its end alone.
+    pub(super) is_seen: bool,
+}
+
+/// A turn.
+pub(super) struct Turned {
+    /// The state at its end.
+    pub(super) end: [f64; STATES],
+    /// What was asked to be seen.
+    pub(super) seen: Option<Box<Seen>>,
+}
+
+/// What is seen of a turn.
+pub(super) struct Seen {
+    /// What it makes of disturbances of its start.
     pub(super) monodromy: Square,
+    /// Largest deviations from equilibrium (m, rad).
+    pub(super) peaks: [f64; CHANNELS],
+    /// Least gap between drum and tub at the ends of its steps (m).
+    pub(super) gap_m: f64,
+    /// States at even instants.
+    pub(super) states: Vec<[f64; STATES]>,
 }
 
-/// Finds the responses of rows whose turns have equally many steps, and all of which are capped or
-/// none; `None` where there is no response.
-pub(super) struct Respond<'a> {
-    pub(super) rows: &'a [Row<'a>],
+/// Takes turns, in lanes, those of a kind together. What is found of one does not depend on the
+/// others.
+pub(super) fn turns(asked: &[Asked<'_>]) -> Vec<Turned> {
+    let kind = |k: usize| (asked[k].row.kind(), asked[k].is_seen);
+    let mut order: Vec<usize> = (0..asked.len()).collect();
+    order.sort_by_key(|&k| kind(k));
+    let mut turned: Vec<Option<Turned>> = asked.iter().map(|_| None).collect();
+    for places in order.chunk_by(|&a, &b| kind(a) == kind(b)) {
+        let together: Vec<Asked<'_>> = places.iter().map(|&k| asked[k]).collect();
+        let found = Simd::dispatch_narrow(Turns { asked: &together });
+        for (&k, found) in places.iter().zip(found) {
+            turned[k] = Some(found);
+        }
+    }
+    turned.into_iter().flatten().collect()
 }
 
-impl Kernel for Respond<'_> {
-    type Output = Vec<Option<Box<Found>>>;
+/// Turns of one kind.
+struct Turns<'a> {
+    asked: &'a [Asked<'a>],
+}
+
+impl Kernel for Turns<'_> {
+    type Output = Vec<Turned>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut found = Vec::with_capacity(self.rows.len());
-        let Some(first) = self.rows.first() else { return found };
-        let weights = weights(first.steps);
-        for rows in self.rows.chunks(T::LANES) {
-            respond(N(zero), rows, &weights, &mut found);
+        let mut turned = Vec::with_capacity(self.asked.len());
+        let Some(first) = self.asked.first() else { return turned };
+        let with_weights = first.is_seen && !first.row.has_corners();
+        let weights = if with_weights { weights(first.row.steps) } else { Vec::new() };
+        for asked in self.asked.chunks(T::LANES) {
+            see(N(zero), asked, &weights, &mut turned);
         }
-        found
+        turned
     }
 }
 
@@ -111,100 +147,142 @@ pub(super) fn model<T: Lane, M: Model<T>>(zero: N<T>, rows: &[Row<'_>]) -> M {
     model
 }
 
+/// The clock of rows in lanes, the last in those that are left over.
 #[inline(always)]
-fn respond<T: Lane>(
-    zero: N<T>,
-    rows: &[Row<'_>],
-    weights: &[[f64; INSTANTS]],
-    found: &mut Vec<Option<Box<Found>>>,
-) {
+fn clock<T: Lane>(zero: N<T>, rows: &[Row<'_>]) -> Clock<T> {
     let mut clock = Clock { step_s: zero, steps: rows[0].steps };
     for lane in 0..T::LANES {
         clock.step_s.0.set(lane, rows[lane.min(rows.len() - 1)].step_s());
     }
-    let linear: Linear<T> = model(zero, rows);
-    let answer = linear_response(zero, &linear, &clock, rows.len());
-    let mut states = answer.start;
-    for lane in 0..rows.len() {
-        let rest = <Nonlinear<T> as Model<T>>::at_rest(rows[lane].point);
-        for i in 0..STATES {
-            let deviation = states[i].0.get(lane);
-            // Where even the linear model has none, the search starts at rest.
-            let deviation = if deviation.is_finite() { deviation } else { 0.0 };
-            let start = match &rows[lane].from {
-                Some(from) => from[i],
-                None => rest[i] + deviation,
-            };
-            states[i].0.set(lane, start);
-        }
-    }
-    let nonlinear: Nonlinear<T> = model(zero, rows);
-    let tangent: Nonlinear<Dual<T>> = model(zero.constant(), rows);
-    let is_found = [false; lane_ode::MAX_LANES];
-    let mut search = Search { rows, weights, states, jacobians: answer.jacobians, is_found };
-    let (peaks, columns) = search.run(&nonlinear, &tangent, &clock);
-    for lane in 0..rows.len() {
-        if !search.is_found[lane] {
-            found.push(None);
-            continue;
-        }
-        let unit_per_s = rows[lane].unit_per_s();
-        let unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
-        let mut monodromy = [[N(0.0); STATES]; STATES];
-        for i in 0..STATES {
-            for j in 0..STATES {
-                monodromy[i][j] = N(columns[j][i].0.get(lane) * unit(j) / unit(i));
-            }
-        }
-        found.push(Some(Box::new(Found {
-            linear: answer.peaks.lane(lane),
-            nonlinear: peaks.lane(lane),
-            start: core::array::from_fn(|i| search.states[i].0.get(lane)),
-            monodromy,
-        })));
-    }
-}
-
-/// What the linear model answers.
-struct LinearAnswer<T> {
-    /// Its response at theta = 0.
-    start: [N<T>; STATES],
-    peaks: Peaks<T, CHANNELS>,
-    /// Of each lane the factors of 1 - Phi.
-    jacobians: Vec<Option<Lu<STATES>>>,
+    clock
 }
 
 #[inline(always)]
-fn linear_response<T: Lane>(
+fn see<T: Lane>(
     zero: N<T>,
-    model: &Linear<T>,
-    clock: &Clock<T>,
-    lanes: usize,
-) -> LinearAnswer<T> {
+    asked: &[Asked<'_>],
+    weights: &[[f64; INSTANTS]],
+    turned: &mut Vec<Turned>,
+) {
+    let rows: Vec<Row<'_>> = asked.iter().map(|asked| asked.row).collect();
+    let clock = clock(zero, &rows);
+    let model: Nonlinear<T> = model(zero, &rows);
+    let mut ends = [[zero; STATES]];
+    for lane in 0..T::LANES {
+        for i in 0..STATES {
+            ends[0][i].0.set(lane, asked[lane.min(asked.len() - 1)].start[i]);
+        }
+    }
+    let mut watched = Watched::new(zero, &model, &clock);
+    watched.with_outputs = asked[0].is_seen;
+    watched.with_path = asked[0].is_seen && rows[0].has_corners();
+    turn(&model, &clock, &mut ends, Some(&mut watched));
+    // Of each row what its turn makes of disturbances.
+    let mut monodromies: Vec<Square> = Vec::new();
+    if asked[0].is_seen && rows[0].has_corners() {
+        let spread: Vec<Row<'_>> = rows.iter().copied().cycle().take(T::LANES).collect();
+        let tangent: Nonlinear<Dual<T>> = self::model(zero.constant(), &spread);
+        let clock = self::clock(zero, &spread);
+        let columns = along_every_step(zero, &tangent, &clock, &watched.path, rows.len());
+        let entry = |of_row: &[[N<T>; STATES]], i: usize, j: usize| {
+            N(of_row[j / T::LANES][i].0.get(j % T::LANES))
+        };
+        let square = |of_row: &Vec<[N<T>; STATES]>| -> Square {
+            from_fn(|i| from_fn(|j| entry(of_row, i, j)))
+        };
+        monodromies.extend(columns.iter().map(square));
+    } else if asked[0].is_seen {
+        let tangent: Nonlinear<Dual<T>> = self::model(zero.constant(), &rows);
+        let slopes = slopes_along(zero, &tangent, &clock, &watched.states);
+        let columns = monodromy(zero, &slopes, weights, &clock);
+        let in_lane = |lane| -> Square { from_fn(|i| from_fn(|j| N(columns[j][i].0.get(lane)))) };
+        monodromies.extend((0..rows.len()).map(in_lane));
+    }
+    let in_lane = |state: &[N<T>; STATES], lane: usize| -> [f64; STATES] {
+        from_fn(|i| state[i].0.get(lane))
+    };
+    for (lane, asked) in asked.iter().enumerate() {
+        let seen = asked.is_seen.then(|| {
+            let clearance_m = asked.row.point.clearance_m();
+            Box::new(Seen {
+                monodromy: monodromies[lane],
+                peaks: watched.peaks.lane(lane),
+                gap_m: clearance_m - watched.radial_squared.0.get(lane).sqrt(),
+                states: watched.states.iter().map(|state| in_lane(state, lane)).collect(),
+            })
+        });
+        turned.push(Turned { end: in_lane(&ends[0], lane), seen });
+    }
+}
+
+/// The linear model's response to a constant speed.
+pub(super) struct LinearResponse {
+    /// Deviations and their speeds where the unbalance is up; not finite where there is none.
+    pub(super) start: [f64; STATES],
+    /// Largest deviations from equilibrium (m, rad).
+    pub(super) peaks: [f64; CHANNELS],
+}
+
+/// The linear model's responses, in lanes, those of a kind together.
+pub(super) fn linear_responses(rows: &[Row<'_>]) -> Vec<LinearResponse> {
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    order.sort_by_key(|&k| rows[k].kind());
+    let mut found: Vec<Option<LinearResponse>> = rows.iter().map(|_| None).collect();
+    for places in order.chunk_by(|&a, &b| rows[a].kind() == rows[b].kind()) {
+        let together: Vec<Row<'_>> = places.iter().map(|&k| rows[k]).collect();
+        let of_kind = Simd::dispatch_narrow(OfLinear { rows: &together });
+        for (&k, response) in places.iter().zip(of_kind) {
+            found[k] = Some(response);
+        }
+    }
+    found.into_iter().flatten().collect()
+}
+
+/// Those of one kind. The map is affine, so that one linear solve finds what it returns to.
+struct OfLinear<'a> {
+    rows: &'a [Row<'a>],
+}
+
+impl Kernel for OfLinear<'_> {
+    type Output = Vec<LinearResponse>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
+        let mut found = Vec::with_capacity(self.rows.len());
+        for rows in self.rows.chunks(T::LANES) {
+            linear(N(zero), rows, &mut found);
+        }
+        found
+    }
+}
+
+#[inline(always)]
+fn linear<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<LinearResponse>) {
+    let clock = clock(zero, rows);
+    let model: Linear<T> = model(zero, rows);
     // From rest, then from a unit of each coordinate and speed.
     let mut ends = vec![[zero; STATES]; 1 + STATES];
     for j in 0..STATES {
         ends[1 + j][j] = zero.lit(1.0);
     }
-    let mut answer = LinearAnswer {
-        start: [zero; STATES],
-        peaks: Peaks::new(zero),
-        jacobians: Vec::with_capacity(lanes),
-    };
+    let mut start = [zero; STATES];
     // The second time around it is watched. A loop, for one copy of the model's code.
     for is_known in [false, true] {
         if is_known {
             ends.truncate(1);
-            ends[0] = answer.start;
+            ends[0] = start;
         }
-        let mut watched = Watched::new(zero, model, clock);
-        watched.with_peaks = is_known;
-        turn(model, clock, &mut ends, if is_known { Some(&mut watched) } else { None });
-        if is_known {
-            answer.peaks = watched.peaks;
-            break;
-        }
-        for lane in 0..T::LANES {
+        let mut watched = Watched::new(zero, &model, &clock);
+        watched.with_outputs = is_known;
+        turn(&model, &clock, &mut ends, if is_known { Some(&mut watched) } else { None });
+        for lane in 0..rows.len() {
+            if is_known {
+                found.push(LinearResponse {
+                    start: from_fn(|i| start[i].0.get(lane)),
+                    peaks: watched.peaks.lane(lane),
+                });
+                continue;
+            }
             let mut apart = [[N(0.0); STATES]; STATES];
             let mut reached = [N(0.0); STATES];
             for i in 0..STATES {
@@ -214,146 +292,11 @@ fn linear_response<T: Lane>(
                 }
                 apart[i][i] = apart[i][i] + 1.0;
             }
-            let factors = Lu::new(apart);
-            if let Some(factors) = &factors {
-                let returns = factors.solve(&reached);
-                for i in 0..STATES {
-                    answer.start[i].0.set(lane, returns[i].0);
-                }
-            }
-            if lane < lanes {
-                answer.jacobians.push(factors);
-            }
-        }
-    }
-    answer
-}
-
-/// The search for the nonlinear responses.
-struct Search<'a, T> {
-    rows: &'a [Row<'a>],
-    /// [`weights`] of the rows' turns.
-    weights: &'a [[f64; INSTANTS]],
-    states: [N<T>; STATES],
-    /// Factors of 1 - Phi of each lane.
-    jacobians: Vec<Option<Lu<STATES>>>,
-    is_found: [bool; lane_ode::MAX_LANES],
-}
-
-impl<T: Lane> Search<'_, T> {
-    /// Searches, and watches a last turn from what was found: its peaks, and what becomes of unit
-    /// disturbances of its start.
-    #[inline(always)]
-    fn run(
-        &mut self,
-        model: &Nonlinear<T>,
-        tangent: &Nonlinear<Dual<T>>,
-        clock: &Clock<T>,
-    ) -> (Peaks<T, CHANNELS>, Vec<[N<T>; STATES]>) {
-        let lanes = self.rows.len();
-        let zero = self.states[0].lit(0.0);
-        let mut is_over = [false; lane_ode::MAX_LANES];
-        let mut last = [f64::INFINITY; lane_ode::MAX_LANES];
-        let mut watched = Watched::new(zero, model, clock);
-        let mut are_all_over = false;
-        let mut turns = 0;
-        loop {
-            let mut ends = [self.states];
-            let is_last = are_all_over || turns == MOST_TURNS;
-            watched.states.clear();
-            watched.with_peaks = is_last;
-            turn(model, clock, &mut ends, Some(&mut watched));
-            turns += 1;
-            let mut is_slow = [false; lane_ode::MAX_LANES];
-            let mut are_any_slow = false;
-            if !is_last {
-                for lane in 0..lanes {
-                    let missing = self.missing(&ends[0], lane);
-                    if !is_over[lane] && missing > FAST_ENOUGH * last[lane] {
-                        is_slow[lane] = true;
-                        are_any_slow = true;
-                    }
-                    last[lane] = missing;
-                }
-            }
-            // One call, for one copy of the model's code.
-            if is_last || are_any_slow {
-                let slopes = slopes_along(zero, tangent, clock, &watched.states);
-                let columns = monodromy(zero, &slopes, self.weights, clock);
-                if is_last {
-                    return (watched.peaks, columns);
-                }
-                self.renew(&columns, &is_slow);
-            }
-            are_all_over = true;
-            for lane in 0..lanes {
-                if is_over[lane] {
-                    continue;
-                }
-                let is_corrected = self.correct(&ends[0], lane);
-                self.is_found[lane] = is_corrected && last[lane] < CLOSE;
-                is_over[lane] = !is_corrected || self.is_found[lane];
-                are_all_over &= is_over[lane];
-            }
-        }
-    }
-
-    /// How far a lane's turn is from closing, as a share of its deviation; not finite if it left
-    /// the model's range.
-    #[inline(always)]
-    fn missing(&self, end: &[N<T>; STATES], lane: usize) -> f64 {
-        let rest = self.rows[lane].point.equilibrium();
-        let speed = TAU / self.rows[lane].turn_s();
-        let (mut missing, mut size) = (0.0_f64, LEAST_SIZE);
-        for i in 0..COORDINATES {
-            let x = self.states[i].0.get(lane);
-            size = size.max((x - rest[i]).abs());
-            let by_speed = (end[COORDINATES + i] - self.states[COORDINATES + i]).0.get(lane);
-            let gap = (end[i].0.get(lane) - x).abs() + by_speed.abs() / speed;
-            // NaN stays.
-            missing = if gap > missing || gap.is_nan() { gap } else { missing };
-        }
-        missing / size
-    }
-
-    /// Takes the matrices of these lanes from the turn itself.
-    #[inline(always)]
-    fn renew(&mut self, columns: &[[N<T>; STATES]], lanes: &[bool]) {
-        for lane in 0..self.rows.len() {
-            if !lanes[lane] {
-                continue;
-            }
-            let mut apart = [[N(0.0); STATES]; STATES];
+            let returns = Lu::new(apart).map(|factors| factors.solve(&reached));
             for i in 0..STATES {
-                for j in 0..STATES {
-                    apart[i][j] = N(-columns[j][i].0.get(lane));
-                }
-                apart[i][i] = apart[i][i] + 1.0;
-            }
-            self.jacobians[lane] = Lu::new(apart);
-        }
-    }
-
-    /// Moves a lane's state by Newton's correction; false if there is none.
-    #[inline(always)]
-    fn correct(&mut self, end: &[N<T>; STATES], lane: usize) -> bool {
-        let Some(factors) = &self.jacobians[lane] else { return false };
-        let mut missing = [N(0.0); STATES];
-        for i in 0..STATES {
-            missing[i] = N((end[i] - self.states[i]).0.get(lane));
-        }
-        let correction = factors.solve(&missing);
-        let mut is_finite = true;
-        for i in 0..STATES {
-            is_finite &= correction[i].0.is_finite();
-        }
-        if is_finite {
-            for i in 0..STATES {
-                let x = self.states[i].0.get(lane) + correction[i].0;
-                self.states[i].0.set(lane, x);
+                start[i].0.set(lane, returns.as_ref().map_or(f64::NAN, |state| state[i].0));
             }
         }
-        is_finite
     }
 }
 
@@ -361,39 +304,58 @@ impl<T: Lane> Search<'_, T> {
 struct Watched<'m, T, M> {
     model: &'m M,
     clock: &'m Clock<T>,
-    with_peaks: bool,
+    with_outputs: bool,
     /// Above 0 in every lane.
     windows: N<T>,
     peaks: Peaks<T, CHANNELS>,
+    /// The greatest distance of the drum from the tub's axis, squared (m^2).
+    radial_squared: N<T>,
     /// At even instants, the first at the turn's start.
     states: Vec<[N<T>; STATES]>,
+    /// At the ends of all steps, if that is wanted.
+    path: Vec<[N<T>; STATES]>,
+    with_path: bool,
 }
 
 impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
     #[inline(always)]
     fn new(zero: N<T>, model: &'m M, clock: &'m Clock<T>) -> Self {
         let (windows, peaks) = (zero.lit(1.0), Peaks::new(zero));
-        let states = Vec::with_capacity(INSTANTS + 1);
-        Self { model, clock, with_peaks: false, windows, peaks, states }
+        Self {
+            model,
+            clock,
+            with_outputs: false,
+            windows,
+            peaks,
+            radial_squared: zero,
+            states: Vec::with_capacity(INSTANTS + 1),
+            path: Vec::new(),
+            with_path: false,
+        }
     }
 }
 
-impl<T: Lane, M: Model<T>> Watch<T, M> for Watched<'_, T, M> {
+impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
     #[inline(always)]
     fn see(&mut self, k: usize, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
+        if !self.with_outputs {
+            return;
+        }
         if k.is_multiple_of(self.clock.steps / INSTANTS) {
             self.states.push(*x);
         }
-        if !self.with_peaks {
-            return;
+        if self.with_path {
+            self.path.push(*x);
         }
         let everywhere = self.windows.lit(0.0).0.less(self.windows.0);
-        if let (_, Some(channels)) = self.model.observe(forcing, x, dx, true) {
+        if let (radial, Some(channels)) = self.model.observe(forcing, x, dx, true) {
             if k == 0 {
                 self.peaks.begin(&channels, everywhere);
             } else {
                 self.peaks.advance(self.clock.step_s, &channels, everywhere);
             }
+            let (most, here) = (self.radial_squared.0, squared(&radial).value.0);
+            self.radial_squared = N(T::select(most.less(here), here, most));
         }
     }
 }

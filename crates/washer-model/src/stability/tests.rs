@@ -1,12 +1,17 @@
 //! Against numbers from a program independent of this one, against the machine as it is, and
 //! against its simulation.
 
+use super::orbit::Row;
 use super::plain::{Plain, Trace};
+use super::search::{Solve, finish};
+use super::settings::Settings;
 use super::*;
 use crate::coordinates::COORDINATES;
+use crate::fast::SUSPENSION_MODES;
 use crate::tests::reference::reference;
-use crate::{Machine, Method, ModelKind, Spin, Start, Timing, history, prepare};
-use faer::c64;
+use crate::{Channel, Machine, Method, ModelKind, Spin, Start, Timing, history, prepare};
+use faer::{Mat, c64};
+use lane_ode::Simd;
 use serde_json::Value;
 use std::f64::consts::PI;
 
@@ -38,10 +43,17 @@ fn list(name: &str) -> Vec<Value> {
 
 /// The responses of one machine at these speeds.
 fn over(machine: Machine, speeds_rpm: &[f64]) -> Vec<Response> {
-    let point = prepared(machine, 100.0);
-    let dwells: Vec<_> =
-        speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-    respond(&dwells).into_iter().map(Result::unwrap).collect()
+    over_point(&prepared(machine, 100.0), speeds_rpm)
+}
+
+fn over_point(point: &Point, speeds_rpm: &[f64]) -> Vec<Response> {
+    let dwells: Vec<_> = speeds_rpm.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
+    all(&dwells).into_iter().map(|responses| responses.unwrap().remove(0)).collect()
+}
+
+/// All responses of some dwells.
+fn all(dwells: &[Dwell<'_>]) -> Vec<Result<Vec<Response>, NoAnswer>> {
+    respond(dwells, &|| false)
 }
 
 fn at(machine: Machine, speed_rpm: f64) -> Response {
@@ -59,12 +71,15 @@ fn plain(machine: Machine, speed_rpm: f64, start: [f64; STATES]) -> Vec<c64> {
     multipliers
 }
 
-/// Of one row what is found, and every multiplier.
-fn found(row: &Row<'_>) -> (Box<Found>, Vec<c64>) {
-    let found = Simd::dispatch_narrow(Respond { rows: &[*row] }).remove(0).unwrap();
-    let matrix = Mat::from_fn(STATES, STATES, |i, j| found.monodromy[i][j].0);
-    let multipliers = matrix.eigenvalues().unwrap();
-    (found, multipliers)
+/// Of one row the response near a state, and every multiplier.
+fn found(row: &Row<'_>, start: [f64; STATES]) -> ([f64; STATES], Vec<c64>) {
+    let mut solves = [Solve::new(*row, start, None)];
+    assert!(finish(&mut solves, &|| false));
+    let [solve] = solves;
+    let (start, seen) = solve.found().unwrap();
+    let unit = |i: usize| if i < COORDINATES { 1.0 } else { row.unit_per_s() };
+    let matrix = Mat::from_fn(STATES, STATES, |i, j| seen.monodromy[i][j].0 * unit(j) / unit(i));
+    (start, matrix.eigenvalues().unwrap())
 }
 
 #[test]
@@ -245,7 +260,9 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
             of_model + turning
         });
         let row = Settings::new(&point).case(speed_rpm).unwrap().row;
-        let ours = found(&row).1;
+        let rest =
+            core::array::from_fn(|i| if i < COORDINATES { point.equilibrium()[i] } else { 0.0 });
+        let ours = found(&row, rest).1;
         // The suspension's.
         let slow = system.eigenvalues().unwrap().into_iter().filter(|s| s.norm() < 100.0);
         let slow: Vec<c64> = slow.collect();
@@ -265,9 +282,10 @@ fn the_product_of_all_multipliers_is_the_exponential_of_the_trace() {
     let capped = Settings::new(&point).case(250.0).unwrap().row;
     // With steps so short that the formula takes nothing from the capped modes.
     let row = Row { steps: 32 * capped.steps, ..capped };
-    let (found, multipliers) = found(&row);
+    let near = at(with(0.4, 140.0), 250.0).start;
+    let (start, multipliers) = found(&row, near);
     let product = multipliers.into_iter().product::<c64>();
-    let trace = Simd::one_lane(Trace { row, start: found.start });
+    let trace = Simd::one_lane(Trace { row, start });
     let error = product.re.ln() / trace - 1.0;
     println!("{product} {trace} {error:e}");
     assert!(error.abs() < 1e-5 && product.im.abs() < 1e-9, "{product} {trace} {error:e}");
@@ -279,10 +297,188 @@ fn responses_do_not_depend_on_company() {
     let dwells: Vec<_> = (0..30)
         .map(|k| Dwell { point: &points[k % 3], speed_rpm: 20.0 + 40.0 * k as f64 })
         .collect();
-    let together = respond(&dwells);
+    let together = all(&dwells);
     for (dwell, answer) in dwells.iter().zip(&together).step_by(7) {
-        assert_eq!(&respond(&[*dwell])[0], answer);
+        assert_eq!(&all(&[*dwell])[0], answer);
     }
+}
+
+/// Followed both ways every 0.25 rpm by an independent program, and lost where it folds.
+#[test]
+fn val_branches_match_an_independent_program() {
+    for case in reference("branches.json").as_array().unwrap() {
+        let machine = with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"));
+        let point = prepared(machine, 100.0);
+        let mut folds_rpm = Vec::new();
+        for (way, lost) in [("up", "up_lost_after_rpm"), ("down", "down_lost_below_rpm")] {
+            let rows = case[way].as_array().unwrap();
+            let dwells: Vec<Dwell<'_>> = rows
+                .iter()
+                .map(|row| Dwell { point: &point, speed_rpm: number(row, "speed_rpm") })
+                .collect();
+            for (row, responses) in rows.iter().zip(all(&dwells)) {
+                let responses = responses.unwrap();
+                let ours = if way == "up" { responses.first() } else { responses.last() }.unwrap();
+                for (channel, name) in [(6, "tub_yaw_rad"), (7, "tub_pitch_rad")] {
+                    let error = ours.nonlinear[channel] / number(row, name) - 1.0;
+                    assert!(error.abs() < 1e-4, "{row}: {name} {error:e}");
+                }
+                let growth = number(row, "growth_per_s");
+                if growth > 0.0 {
+                    let apart = ours.growth_per_s() - growth;
+                    assert!(apart.abs() < 5e-3, "{row}: {apart:e}");
+                }
+                folds_rpm.extend(ours.between_rpm);
+            }
+            if let Some(lost_rpm) = case[lost].as_f64() {
+                let nearest = folds_rpm.iter().flatten().map(|rpm: &f64| (rpm - lost_rpm).abs());
+                let nearest = nearest.fold(f64::INFINITY, f64::min);
+                println!("{lost_rpm} rpm: a fold {nearest} rpm from it");
+                assert!(nearest < 0.1, "{lost}: {folds_rpm:?}");
+            }
+        }
+    }
+}
+
+/// A machine of its own: masses, inertias, stiffnesses, damping and unbalance of the paper's,
+/// each times a factor.
+fn random(random: &mut fastrand::Rng) -> Machine {
+    let mut factor = |least: f64, most: f64| least * (most / least).powf(random.f64());
+    let mut machine = with(factor(0.05, 1.5), factor(30.0, 250.0));
+    machine.tub.mass_kg *= factor(0.5, 2.0);
+    machine.drum.mass_kg *= factor(0.5, 2.0);
+    for i in 0..3 {
+        machine.tub.inertia_kg_m2[i] *= factor(0.6, 1.6);
+    }
+    machine.springs.iter_mut().for_each(|s| s.stiffness_n_per_m *= factor(0.5, 2.0));
+    machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m *= factor(0.7, 1.4));
+    machine.flexure.stiffness_n_m_per_rad *= factor(0.5, 2.0);
+    machine
+}
+
+/// Responses of random machines are those that steps of 0.05 rpm lead to, until these are lost; and
+/// there the curve has a fold.
+#[test]
+#[ignore = "minutes of work"]
+fn followed_responses_are_those_of_short_steps() {
+    let count = 30;
+    let mut numbers = fastrand::Rng::with_seed(32);
+    let points: Vec<Point> = (0..count).map(|_| prepared(random(&mut numbers), 100.0)).collect();
+    let speed = |step: u32| 60.0 + 0.05 * f64::from(step);
+    let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
+    let mut states: Vec<Option<[f64; STATES]>> =
+        points.iter().map(|point| Some(over_point(point, &[speed(0)])[0].start)).collect();
+    let (mut compared, mut worst, mut jumps) = (0, 0.0_f64, Vec::new());
+    for step in 1..=6000 {
+        let followed = settings.iter_mut().zip(&states);
+        let mut solves: Vec<Solve<'_>> = followed
+            .filter_map(|(settings, state)| {
+                Some(Solve::new(settings.case(speed(step)).unwrap().row, (*state)?, None))
+            })
+            .collect();
+        assert!(finish(&mut solves, &|| false));
+        let mut solves = solves.into_iter();
+        for (k, state) in states.iter_mut().enumerate() {
+            let Some(from) = *state else { continue };
+            let found = solves.next().unwrap().found().map(|(found, _)| found);
+            let far = |to: &[f64; STATES]| (0..COORDINATES).any(|i| (to[i] - from[i]).abs() > 1e-3);
+            *state = found.filter(|found| !far(found));
+            if state.is_none() {
+                jumps.push((k, speed(step)));
+            }
+        }
+        if step % 100 != 0 {
+            continue;
+        }
+        let dwells: Vec<Dwell<'_>> =
+            points.iter().map(|point| Dwell { point, speed_rpm: speed(step) }).collect();
+        for (k, (responses, state)) in all(&dwells).into_iter().zip(&states).enumerate() {
+            let Some(state) = state else { continue };
+            let apart = |response: &Response| {
+                let apart = (0..COORDINATES).map(|i| (response.start[i] - state[i]).abs());
+                apart.fold(0.0, f64::max)
+            };
+            let apart = responses.as_ref().map_or(f64::NAN, |responses| apart(&responses[0]));
+            compared += 1;
+            worst = worst.max(apart);
+            if apart.is_nan() || apart >= 1e-6 {
+                println!("machine {k} at {} rpm: {apart:e}", speed(step));
+            }
+        }
+    }
+    println!("{compared} compared, at most {worst:e} apart; jumps: {jumps:?}");
+    for (k, lost_rpm) in jumps {
+        let ends = over_point(&points[k], &[lost_rpm - 0.3])[0].between_rpm;
+        println!("machine {k}, lost by {lost_rpm} rpm: branch {ends:?}");
+        assert!(ends[1].is_some_and(|fold| (fold - lost_rpm).abs() < 0.3), "{k}: {ends:?}");
+    }
+    assert!(worst < 1e-6);
+}
+
+/// A drum with two different inertias across its axis drives the hinge by harmonics of its turn.
+#[test]
+fn near_resonances_of_the_hinge_responses_are_those_of_the_machine_as_it_is() {
+    let mut machine = with(0.8, 140.0);
+    machine.drum.inertia_kg_m2[2] *= 1.3;
+    machine.springs[0].stiffness_n_per_m *= 1.2;
+    let point = prepared(machine, 100.0);
+    let mut settings = Settings::new(&point);
+    let speeds: Vec<f64> = (0..=20)
+        .flat_map(|k| [630.0, 760.0, 830.0, 960.0].map(|from| from + 3.0 * f64::from(k)))
+        .collect();
+    let ours = over_point(&point, &speeds);
+    let mut plain: Vec<Solve<'_>> = speeds
+        .iter()
+        .zip(&ours)
+        .map(|(&rpm, ours)| {
+            Solve::new(settings.case(rpm).unwrap().without_caps().unwrap().row, ours.start, None)
+        })
+        .collect();
+    assert!(finish(&mut plain, &|| false));
+    let mut worst = 0.0_f64;
+    for (ours, plain) in ours.iter().zip(plain) {
+        let plain = plain.found().unwrap().1.peaks;
+        for k in 0..CHANNELS {
+            let apart = (ours.nonlinear[k] / plain[k] - 1.0).abs();
+            worst = worst.max(apart);
+            assert!(apart < 6e-5, "{} rpm, channel {k}: {apart:e}", ours.speed_rpm);
+        }
+    }
+    println!("{worst:e}");
+}
+
+/// Friction, stops, a gasket, stiffening springs, a second unbalance.
+#[test]
+fn val_machines_with_elements_match_an_independent_program() {
+    let mut compared = 0;
+    for case in reference("stability_elements.json").as_array().unwrap() {
+        let point = prepared(crate::tests::elements::machine(case), 100.0);
+        let rows = case["points"].as_array().unwrap();
+        let dwells: Vec<Dwell<'_>> = rows
+            .iter()
+            .map(|row| Dwell { point: &point, speed_rpm: number(row, "speed_rpm") })
+            .collect();
+        for (row, responses) in rows.iter().zip(all(&dwells)) {
+            assert_eq!(row["converged"], true);
+            let place = format!("{} at {} rpm", case["name"], row["speed_rpm"]);
+            let ours = responses.unwrap_or_else(|none| panic!("{place}: {none}")).remove(0);
+            for channel in [0, 1, 6, 7] {
+                let name = Channel::ALL[channel].name();
+                let unit = Channel::ALL[channel].unit();
+                let theirs = number(row, &format!("amplitude_{name}_{unit}"));
+                let error = ours.nonlinear[channel] / theirs - 1.0;
+                assert!(error.abs() < 1.2e-5, "{place}: {name} {error:e}");
+            }
+            // Where all decays, what decays slowest is the hinge, which is left out here.
+            let growth = number(row, "growth_per_s");
+            if growth > 0.0 {
+                let apart = ours.growth_per_s() - growth;
+                assert!(apart.abs() < 5e-4, "{place}: {apart:e}");
+            }
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 39);
 }
 
 #[test]
@@ -306,6 +502,6 @@ fn cost() {
     let dwells: Vec<_> =
         (0..560).map(|k| Dwell { point: &point, speed_rpm: 210.0 + 0.25 * f64::from(k) }).collect();
     let began = std::time::Instant::now();
-    let count = respond(&dwells).iter().filter(|a| a.is_ok()).count();
+    let count = all(&dwells).iter().filter(|a| a.is_ok()).count();
     println!("{:.3} ms each, {count} found", 1e3 * began.elapsed().as_secs_f64() / 560.0);
 }

@@ -25,7 +25,7 @@ fn rows(case: &Value, key: &str) -> Vec<Vec<f64>> {
 }
 
 /// The machine of a file of `tests/reference`, by the keys that its README explains.
-fn machine(case: &Value) -> Machine {
+pub(crate) fn machine(case: &Value) -> Machine {
     let number = |key: &str| case[key].as_f64();
     let mut machine =
         paper(number("unbalance_mass_kg").unwrap(), number("damping_n_s_per_m").unwrap());

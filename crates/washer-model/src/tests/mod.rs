@@ -3,7 +3,7 @@
 mod allocation;
 mod bits;
 mod cost;
-mod elements;
+pub(crate) mod elements;
 mod energy;
 mod expansion;
 mod extras;

@@ -58,8 +58,8 @@ fn a_crossing_of_no_length_amplifies_nothing() {
 #[test]
 fn a_run_on_its_response_departs_by_nothing() {
     let point = point(Spin::Table { time_s: vec![0.0], speed_rpm: vec![225.0] });
-    let response = respond(&[Dwell { point: &point, speed_rpm: 225.0 }]);
-    let response = response.into_iter().next().unwrap().unwrap();
+    let response = respond(&[Dwell { point: &point, speed_rpm: 225.0 }], &|| false);
+    let response = response.into_iter().next().unwrap().unwrap().remove(0);
     for at_s in [0.0_f64, 0.1, 0.2, 1.0] {
         let followed = run(&point, STEP_S, [0.0, at_s.max(1e-12)], &response.start).end;
         let expected = response_at(&point, STEP_S, &response, at_s);
@@ -87,8 +87,8 @@ fn peaks_are_of_the_window_and_of_the_run_that_was_put_on_its_response() {
         assert!((part[i] / late[i] - 1.0).abs() < 1e-6);
     }
     // The ramp of two seconds leaves much that the response has not.
-    let response = respond(&[Dwell { point: &point, speed_rpm: 225.0 }]);
-    let response = response.into_iter().next().unwrap().unwrap();
+    let response = respond(&[Dwell { point: &point, speed_rpm: 225.0 }], &|| false);
+    let response = response.into_iter().next().unwrap().unwrap().remove(0);
     let crossing = Crossing { from_to_s: [1.8, 2.2], responses: [Some(&response), None] };
     let quiet = peaks_without_departures(&point, STEP_S, &[crossing], [1.9, 3.0]).unwrap();
     assert!(quiet.iter().zip(&plain).all(|(quiet, plain)| quiet < plain), "{quiet:?} {plain:?}");

@@ -1,0 +1,475 @@
+//! The periodic response followed over speed, from a low one up and round its folds.
+//!
+//! A curve of states and speeds, both in units of their own, is followed by pseudo-arclength
+//! (Keller 1977): along the tangent and its turning, then back onto the curve in the plane across
+//! the tangent, by the derivatives where the step has led. Steps grow where few corrections are
+//! needed and shrink where many are. The curve depends on the machine alone. So does what is found
+//! of it at a speed: the part of the curve counts up to where it first is [`BEYOND`] times as fast.
+
+use super::orbit::{Asked, Square, Turned};
+use super::search::{Search, apart, missing};
+use super::settings::Settings;
+use crate::coordinates::{COORDINATES, STATES};
+use lane_ode::{Lu, N};
+
+/// A place on the curve: coordinates, their speeds, and the drum's speed.
+const PLACE: usize = STATES + 1;
+
+/// Position of the drum's speed in a place.
+const SPEED: usize = STATES;
+
+/// Units of a place: of coordinates (m, rad),
+const UNIT: f64 = 0.01;
+
+/// of their speeds, UNIT times this (1/s),
+const UNIT_PER_S: f64 = 10.0;
+
+/// and of the logarithm of the drum's speed.
+const UNIT_OF_SPEED: f64 = 0.02;
+
+/// A response may lie on the curve after this many times its speed, but no later.
+pub(super) const BEYOND: f64 = 1.25;
+
+/// Length of the first step, of the longest, which no correction exceeds, and of the shortest,
+/// after which the curve is lost.
+const FIRST_STEP: f64 = 1.0;
+const LONGEST_STEP: f64 = 4.0;
+const SHORTEST_STEP: f64 = 1e-3;
+
+/// A step is longer than the last by as much where it took at most so many corrections,
+const LONGER: f64 = 1.6;
+const FEW: usize = 4;
+
+/// shorter where it took as many as this,
+const SHORTER: f64 = 0.7;
+const MANY: usize = 6;
+
+/// and done again, half as long, after this many.
+const MOST: usize = 9;
+
+/// A correction is to leave less than this share of what was missing.
+const FAST_ENOUGH: f64 = 0.5;
+
+/// A place is on the curve once a turn misses less than this (`missing`).
+const CLOSE: f64 = 1e-7;
+
+/// Cosine of the most that the tangent may turn in a step.
+const MOST_TURNED: f64 = 0.8;
+
+/// A place is no neighbour if it was corrected by more than this share of the step.
+const MOST_CORRECTED: f64 = 0.5;
+
+/// Relative difference of speeds by which the curve's slope along the speed is taken.
+const BESIDE: f64 = 1e-5;
+
+/// A fold is found this closely (relative, of its speed), in so many rounds.
+const FOLD: f64 = 1e-6;
+const FOLD_ROUNDS: usize = 5;
+
+/// Nodes on either side of a fold are no farther from it than this.
+const BY_FOLD: f64 = 0.3;
+
+/// Places of a curve, at most.
+const MOST_PLACES: usize = 4000;
+
+/// Coordinates (m, rad) beyond which no machine goes.
+const FARTHEST: f64 = 1.0;
+
+type Place = [f64; PLACE];
+
+fn dot(a: &Place, b: &Place) -> f64 {
+    (0..PLACE).fold(0.0, |sum, i| sum + a[i] * b[i])
+}
+
+fn unit(direction: &Place) -> Place {
+    let size = dot(direction, direction).sqrt();
+    direction.map(|entry| entry / size)
+}
+
+fn along(from: &Place, by: f64, direction: &Place) -> Place {
+    core::array::from_fn(|i| from[i] + by * direction[i])
+}
+
+fn unit_of(i: usize) -> f64 {
+    if i < COORDINATES { UNIT } else { UNIT * UNIT_PER_S }
+}
+
+fn place_of(state: &[f64; STATES], speed_rpm: f64) -> Place {
+    core::array::from_fn(|i| {
+        if i == SPEED { libm::log(speed_rpm) / UNIT_OF_SPEED } else { state[i] / unit_of(i) }
+    })
+}
+
+fn state_of(place: &Place) -> [f64; STATES] {
+    core::array::from_fn(|i| place[i] * unit_of(i))
+}
+
+fn speed_of(place: &Place) -> f64 {
+    libm::exp(place[SPEED] * UNIT_OF_SPEED)
+}
+
+/// A response on the curve.
+#[derive(Clone)]
+struct Node {
+    at: Place,
+    /// Of length 1, onwards.
+    tangent: Place,
+    /// Length of the curve up to here.
+    length: f64,
+    /// What a turn makes of disturbances, here or close by.
+    monodromy: Square,
+}
+
+/// Between two nodes, at a share of the length: the cubic through both along both tangents, and
+/// its slope by the length.
+fn between(a: &Node, b: &Node, share: f64) -> (Place, Place) {
+    let length = b.length - a.length;
+    let (t, u) = (share, 1.0 - share);
+    let at = core::array::from_fn(|i| {
+        u * u * ((1.0 + 2.0 * t) * a.at[i] + t * length * a.tangent[i])
+            + t * t * ((1.0 + 2.0 * u) * b.at[i] - u * length * b.tangent[i])
+    });
+    let slope = core::array::from_fn(|i| {
+        let chord = 6.0 * t * u * (b.at[i] - a.at[i]) / length;
+        chord + u * (1.0 - 3.0 * t) * a.tangent[i] + t * (1.0 - 3.0 * u) * b.tangent[i]
+    });
+    (at, slope)
+}
+
+/// The share up to which something is so.
+fn bisected(is_before: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if is_before(middle) { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// A step: from where it is corrected, and in which plane.
+#[derive(Clone)]
+struct Step {
+    onto: Place,
+    across: Place,
+    corrections: usize,
+    missing: f64,
+    /// What is known of the curve at `onto`, once that is seen.
+    seen: Option<Box<Jacobian>>,
+}
+
+/// The curve's equations about a place.
+#[derive(Clone)]
+struct Jacobian {
+    monodromy: Square,
+    /// Of the equations with the step's plane below.
+    factors: Lu<PLACE>,
+}
+
+/// A stretch by a fold that gets one more node: after which node it begins, and how often more the
+/// fold is looked for in it, if it is.
+#[derive(Clone, Copy)]
+struct Turning {
+    after: usize,
+    rounds: usize,
+}
+
+/// A response at a speed that was asked for, as the curve has it: where to look for it.
+pub(super) struct Guess {
+    /// How many folds are before it on the curve.
+    pub(super) branch: u32,
+    /// Speeds (rpm) of the folds between which the branch is, lower and upper; none where it has no
+    /// end that counts.
+    pub(super) between_rpm: [Option<f64>; 2],
+    /// Where the unbalance is up.
+    pub(super) state: [f64; STATES],
+    /// Factors of 1 - Phi nearby.
+    pub(super) factors: Option<Lu<STATES>>,
+    /// Whether the curve says so.
+    pub(super) is_on_curve: bool,
+}
+
+/// The curve of a point's responses.
+#[derive(Clone)]
+pub(super) struct Curve<'a> {
+    pub(super) settings: Settings<'a>,
+    /// It is followed until it is as fast as this (rpm).
+    until_rpm: f64,
+    nodes: Vec<Node>,
+    /// Positions of nodes where it turns back in speed.
+    folds: Vec<usize>,
+    at: Place,
+    /// Length of the next step.
+    length: f64,
+    /// The step that is being taken; none once it is over.
+    step: Option<Step>,
+    /// The stretch in which a fold is being looked for.
+    turning: Option<Turning>,
+}
+
+impl<'a> Curve<'a> {
+    /// One of which nothing is known.
+    pub(super) fn new(settings: Settings<'a>) -> Self {
+        Self {
+            settings,
+            until_rpm: 0.0,
+            nodes: Vec::new(),
+            folds: Vec::new(),
+            at: [0.0; PLACE],
+            length: FIRST_STEP,
+            step: None,
+            turning: None,
+        }
+    }
+
+    /// Is to follow it from a response at a speed (rpm) up to another speed.
+    pub(super) fn begin(&mut self, speed_rpm: f64, start: &[f64; STATES], until_rpm: f64) {
+        self.until_rpm = until_rpm;
+        // At first, up in speed.
+        let mut across = [0.0; PLACE];
+        across[SPEED] = 1.0;
+        self.correct(place_of(start, speed_rpm), across);
+    }
+
+    /// Takes the next step, or ends.
+    fn advance(&mut self) {
+        self.step = None;
+        let Some(last) = self.nodes.last() else { return };
+        let (at_rpm, count) = (speed_of(&last.at), self.nodes.len());
+        let is_far = (0..COORDINATES).any(|i| (last.at[i] * UNIT).abs() > FARTHEST);
+        let is_back = at_rpm < speed_of(&self.nodes[0].at);
+        let is_over = at_rpm >= self.until_rpm || is_far || is_back || count >= MOST_PLACES;
+        if is_over || self.length < SHORTEST_STEP {
+            return;
+        }
+        // Along the tangent, and as it turned in the last step.
+        let mut onto = along(&last.at, self.length, &last.tangent);
+        if count > 1 {
+            let before = &self.nodes[count - 2];
+            let by = 0.5 * self.length * self.length / (last.length - before.length);
+            let turned = core::array::from_fn(|i| last.tangent[i] - before.tangent[i]);
+            onto = along(&onto, by, &turned);
+        }
+        self.correct(onto, last.tangent);
+    }
+
+    fn correct(&mut self, onto: Place, across: Place) {
+        self.at = onto;
+        let missing = f64::INFINITY;
+        self.step = Some(Step { onto, across, corrections: 0, missing, seen: None });
+    }
+
+    /// The step led nowhere.
+    fn shorten(&mut self) {
+        match self.turning.take() {
+            // A fold that cannot be found more closely is where it is.
+            Some(Turning { after, rounds }) if rounds > 0 => self.folds.push(after + 1),
+            Some(_) => {}
+            None => self.length *= 0.5,
+        }
+        self.advance();
+    }
+
+    /// What a turn from where the step begins makes of the state, of disturbances and, beside it,
+    /// of the speed.
+    fn saw(&mut self, step: Step, seen: &Turned, beside: &Turned) {
+        let Some(monodromy) = seen.seen.as_ref().map(|seen| seen.monodromy) else {
+            return self.shorten();
+        };
+        let mut matrix = [[N(0.0); PLACE]; PLACE];
+        for i in 0..STATES {
+            for j in 0..STATES {
+                let own = f64::from(u8::from(i == j));
+                matrix[i][j] = N(monodromy[i][j].0 * (unit_of(j) / unit_of(i)) - own);
+            }
+            let by_speed = (beside.end[i] - seen.end[i]) / libm::log1p(BESIDE);
+            matrix[i][SPEED] = N(by_speed * UNIT_OF_SPEED / unit_of(i));
+        }
+        matrix[SPEED] = step.across.map(N);
+        let Some(factors) = Lu::new(matrix) else { return self.shorten() };
+        let jacobian = Box::new(Jacobian { monodromy, factors });
+        self.corrected(Step { seen: Some(jacobian), ..step }, &seen.end);
+    }
+
+    /// What a turn from where the step has come makes of the state.
+    fn corrected(&mut self, mut step: Step, end: &[f64; STATES]) {
+        let Some(jacobian) = &step.seen else { return self.shorten() };
+        let speed_rpm = speed_of(&self.at);
+        let missing = missing(self.settings.point, speed_rpm, &state_of(&self.at), end);
+        let is_slow = step.corrections > 1 && missing > FAST_ENOUGH * step.missing;
+        if !missing.is_finite() || step.corrections == MOST || is_slow {
+            return self.shorten();
+        }
+        let end = place_of(end, speed_rpm);
+        let mut gap = [N(0.0); PLACE];
+        for i in 0..STATES {
+            gap[i] = N(self.at[i] - end[i]);
+        }
+        let off: Place = core::array::from_fn(|i| step.onto[i] - self.at[i]);
+        gap[SPEED] = N(dot(&step.across, &off));
+        let correction = jacobian.factors.solve(&gap);
+        self.at = core::array::from_fn(|i| self.at[i] + correction[i].0);
+        let off: Place = core::array::from_fn(|i| self.at[i] - step.onto[i]);
+        let off = dot(&off, &off);
+        if off.is_nan() || off > LONGEST_STEP * LONGEST_STEP {
+            return self.shorten();
+        }
+        (step.corrections, step.missing) = (step.corrections + 1, missing);
+        if missing < CLOSE { self.arrived(step) } else { self.step = Some(step) }
+    }
+
+    fn arrived(&mut self, step: Step) {
+        let Some(jacobian) = step.seen else { return self.shorten() };
+        let mut one = [N(0.0); PLACE];
+        one[SPEED] = N(1.0);
+        let tangent = jacobian.factors.solve(&one).map(|entry| entry.0);
+        let tangent = unit(&tangent);
+        let before = match self.turning {
+            Some(turning) => self.nodes.get(turning.after),
+            None => self.nodes.last(),
+        };
+        let (mut length, mut turns_back) = (0.0, false);
+        if let Some(before) = before {
+            let apart = |from: &Place| {
+                let apart: Place = core::array::from_fn(|i| self.at[i] - from[i]);
+                dot(&apart, &apart).sqrt()
+            };
+            let (gone, off) = (apart(&before.at), apart(&step.onto));
+            let cosine = dot(&before.tangent, &tangent);
+            if !(cosine >= MOST_TURNED && off <= MOST_CORRECTED * gone) {
+                return self.shorten();
+            }
+            length = before.length + gone;
+            turns_back = before.tangent[SPEED] * tangent[SPEED] < 0.0;
+        }
+        let node = Node { at: self.at, tangent, length, monodromy: jacobian.monodromy };
+        if let Some(turning) = self.turning {
+            return self.closer(node, turning);
+        }
+        self.nodes.push(node);
+        if step.corrections <= FEW {
+            self.length = (LONGER * self.length).min(LONGEST_STEP);
+        } else if step.corrections >= MANY {
+            self.length *= SHORTER;
+        }
+        if turns_back {
+            let after = self.nodes.len() - 2;
+            self.look_for_fold(Turning { after, rounds: FOLD_ROUNDS });
+        } else {
+            self.advance();
+        }
+    }
+
+    /// Takes in a node of a stretch in which the speed turns back.
+    fn closer(&mut self, node: Node, turning: Turning) {
+        let Turning { after, rounds } = turning;
+        let [a, b] = [&self.nodes[after], &self.nodes[after + 1]];
+        let bend = (b.tangent[SPEED] - a.tangent[SPEED]) / (b.length - a.length);
+        let slope = node.tangent[SPEED];
+        let error = 0.5 * slope * slope / bend.abs() * UNIT_OF_SPEED;
+        let is_before = a.tangent[SPEED] * slope > 0.0;
+        self.nodes.insert(after + 1, node);
+        if rounds == 0 {
+            if let Some(fold) = self.folds.last_mut().filter(|fold| **fold > after) {
+                *fold += 1;
+            }
+            return self.surround();
+        }
+        if error < FOLD || rounds == 1 {
+            self.folds.push(after + 1);
+            return self.surround();
+        }
+        let after = if is_before { after + 1 } else { after };
+        self.look_for_fold(Turning { after, rounds: rounds - 1 });
+    }
+
+    /// Puts nodes close by on either side of the last fold: there two branches are so near each
+    /// other that they are told apart by little.
+    fn surround(&mut self) {
+        self.turning = None;
+        let Some(&fold) = self.folds.last() else { return self.advance() };
+        let is_long = |after: usize| {
+            let pair = self.nodes.get(after).zip(self.nodes.get(after + 1));
+            pair.is_some_and(|(a, b)| b.length - a.length > BY_FOLD)
+        };
+        let Some(after) = [fold - 1, fold].into_iter().find(|&after| is_long(after)) else {
+            return self.advance();
+        };
+        let (onto, slope) = between(&self.nodes[after], &self.nodes[after + 1], 0.5);
+        self.correct(onto, unit(&slope));
+        self.turning = Some(Turning { after, rounds: 0 });
+    }
+
+    fn look_for_fold(&mut self, turning: Turning) {
+        let [a, b] = [&self.nodes[turning.after], &self.nodes[turning.after + 1]];
+        let rises = a.tangent[SPEED] > 0.0;
+        let share = bisected(|share| (between(a, b, share).1[SPEED] > 0.0) == rises);
+        let (onto, slope) = between(a, b, share);
+        self.correct(onto, unit(&slope));
+        self.turning = Some(turning);
+    }
+
+    /// Where responses at a speed (rpm) are to be looked for, in the order of the curve; none where
+    /// the curve does not get there.
+    pub(super) fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
+        let end = self.nodes.iter().position(|node| speed_of(&node.at) >= BEYOND * speed_rpm);
+        let nodes = &self.nodes[..end.map_or(self.nodes.len(), |end| end + 1)];
+        let target = libm::log(speed_rpm) / UNIT_OF_SPEED;
+        let mut guesses = Vec::new();
+        for (k, pair) in nodes.windows(2).enumerate() {
+            let [a, b] = pair else { continue };
+            let [from, to] = [a.at[SPEED], b.at[SPEED]];
+            let rises = to > from;
+            // A speed that is a node's own counts once.
+            let is_within = if rises {
+                (from < target || k == 0 && from == target) && target <= to
+            } else {
+                to <= target && target < from
+            };
+            if !is_within {
+                continue;
+            }
+            let share = bisected(|share| (between(a, b, share).0[SPEED] < target) == rises);
+            let nearest = if share < 0.5 { a } else { b };
+            let branch = self.folds.iter().filter(|&&fold| fold <= k).count();
+            let fold = |number: usize| {
+                let place = *self.folds.get(number)?;
+                nodes.get(place).map(|node| speed_of(&node.at))
+            };
+            let ends = [branch.checked_sub(1).and_then(fold), fold(branch)];
+            guesses.push(Guess {
+                branch: branch as u32,
+                between_rpm: if branch % 2 == 0 { ends } else { [ends[1], ends[0]] },
+                state: state_of(&between(a, b, share).0),
+                factors: apart(&nearest.monodromy),
+                is_on_curve: true,
+            });
+        }
+        guesses
+    }
+}
+
+impl<'a> Search<'a> for Curve<'a> {
+    fn wants(&mut self) -> Vec<Asked<'a>> {
+        let Some(step) = &self.step else { return Vec::new() };
+        let is_seen = step.seen.is_none();
+        let Ok(row) = self.settings.followed(speed_of(&self.at)) else {
+            self.step = None;
+            return Vec::new();
+        };
+        let start = state_of(&self.at);
+        let mut asked = vec![Asked { row, start, is_seen }];
+        if is_seen {
+            let row = row.beside(row.speed_rpm * (1.0 + BESIDE));
+            asked.push(Asked { row, start, is_seen: false });
+        }
+        asked
+    }
+
+    fn take(&mut self, turned: Vec<Turned>) {
+        match (self.step.take(), turned.as_slice()) {
+            (Some(step), [seen, beside]) => self.saw(step, seen, beside),
+            (Some(step), [turned]) => self.corrected(step, &turned.end),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! Periodic responses at speeds that are asked for: where the curve of a point's responses has
+//! them, and what becomes of disturbances there.
+
+use super::branch::{BEYOND, Curve, Guess};
+use super::orbit::{Asked, LinearResponse, Row, Seen, linear_responses, turns};
+use super::participants::{named, shares, vector_of};
+use super::search::{Solve, finish, missing};
+use super::settings::{Case, Settings};
+use super::{Beyond, Dwell, Kind, NoAnswer, Response, rounded};
+use crate::coordinates::{COORDINATES, STATES};
+use crate::fast::SUSPENSION_MODES;
+use crate::modes::modes;
+use crate::point::Point;
+use crate::run::model::{Model, Nonlinear};
+use crate::run::suspension::{Attachments, attachments};
+use core::f64::consts::TAU;
+use faer::Mat;
+
+/// A motion is judged if the modes that are right have this share of its energy.
+const JUDGED_SHARE: f64 = 0.5;
+
+/// Growth closer to 0 than this (1/s) is asked of the machine as it is: it is more than caps may
+/// move it.
+const CLOSE_TO_EDGE_PER_S: f64 = 2e-3;
+
+/// Where so many times the drum's speed exceed the hinge's frequency, a harmonic may ring it. A
+/// response that a turn of the machine as it is then misses by more than this share is asked of
+/// that machine: less is what caps leave out of the bearings' own deflection.
+const HARMONICS_OF_HINGE: f64 = 7.0;
+const RETURNS: f64 = 2e-4;
+
+/// A response that is farther than this (m, rad) from where the curve has it is another.
+const FARTHEST_FROM_GUESS: f64 = 5e-3;
+
+/// The periodic responses at constant speeds, on lanes; a run of dwells of one point shares its
+/// curve of responses. Per dwell as [`Responses::at`].
+pub fn respond(
+    dwells: &[Dwell<'_>],
+    is_stopped: &dyn Fn() -> bool,
+) -> Vec<Result<Vec<Response>, NoAnswer>> {
+    let same = |a: &Dwell<'_>, b: &Dwell<'_>| core::ptr::eq(a.point, b.point);
+    let (mut points, mut asked) = (Vec::new(), Vec::new());
+    for group in dwells.chunk_by(same) {
+        let fastest_rpm = group.iter().map(|dwell| dwell.speed_rpm).fold(0.0, f64::max);
+        asked.extend(group.iter().map(|dwell| (points.len(), dwell.speed_rpm)));
+        points.push((group[0].point, fastest_rpm));
+    }
+    let mut followed = Responses::follow(&points, is_stopped);
+    Responses::at(&mut followed, &asked, is_stopped)
+}
+
+/// A point's periodic responses over speed.
+#[derive(Clone)]
+pub struct Responses<'a>(Curve<'a>);
+
+impl<'a> Responses<'a> {
+    /// Follows the responses of some points from a low speed up, each to the fastest speed (rpm)
+    /// that will be asked for; on lanes. What there is when `is_stopped` says so means nothing.
+    #[must_use]
+    pub fn follow(points: &[(&'a Point, f64)], is_stopped: &dyn Fn() -> bool) -> Vec<Self> {
+        let mut curves: Vec<Curve<'a>> =
+            points.iter().map(|(point, _)| Curve::new(Settings::new(point))).collect();
+        let mut starts = Vec::new();
+        for (curve, (_, fastest_rpm)) in curves.iter_mut().zip(points) {
+            let lowest = curve.settings.lowest_rpm().ok().filter(|lowest| lowest < fastest_rpm);
+            starts.push(lowest.and_then(|lowest| curve.settings.case(lowest).ok()));
+        }
+        let rows: Vec<Row<'_>> = starts.iter().flatten().map(|case| case.row).collect();
+        let linear = linear_responses(&rows);
+        let begun = starts.iter().flatten().zip(&linear);
+        let mut solves: Vec<Solve<'_>> = begun
+            .map(|(case, linear)| Solve::new(case.row, from_linear(case, linear).state, None))
+            .collect();
+        let mut is_whole = finish(&mut solves, is_stopped);
+        let mut solves = solves.into_iter();
+        for ((curve, (_, fastest_rpm)), start) in curves.iter_mut().zip(points).zip(&starts) {
+            if let Some(case) = start
+                && let Some((state, _)) = solves.next().and_then(Solve::found)
+            {
+                curve.begin(case.row.speed_rpm, &state, BEYOND * fastest_rpm);
+            }
+        }
+        is_whole = is_whole && finish(&mut curves, is_stopped);
+        if is_whole { curves.into_iter().map(Self).collect() } else { Vec::new() }
+    }
+
+    /// Of each place in `followed` and speed (rpm) the responses that the point's curve passes
+    /// there, in its order, on lanes. The first is that of a machine that runs up, until its
+    /// branch ends. What is found does not depend on what else is asked for, nor on how much
+    /// farther the curve was followed.
+    ///
+    /// Where growth is close to 0, a response is that of the machine as it is, by classical
+    /// Runge-Kutta in steps that follow its bearings.
+    ///
+    /// # Errors
+    /// Per place and speed, [`NoAnswer`]. Once `is_stopped` says so, [`NoAnswer::Stopped`].
+    pub fn at(
+        followed: &mut [Self],
+        asked: &[(usize, f64)],
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Vec<Result<Vec<Response>, NoAnswer>> {
+        let stopped = || asked.iter().map(|_| Err(NoAnswer::Stopped)).collect();
+        if is_stopped() {
+            return stopped();
+        }
+        let mut cases = Vec::with_capacity(asked.len());
+        for &(place, speed_rpm) in asked {
+            let Some(Self(curve)) = followed.get_mut(place) else { return stopped() };
+            cases.push(curve.settings.case(speed_rpm));
+        }
+        let rows: Vec<Row<'_>> = cases.iter().flatten().map(|case| case.row).collect();
+        let mut linear = linear_responses(&rows).into_iter();
+        let (mut looked, mut solves): (Vec<Look<'_>>, Vec<Solve<'_>>) = Default::default();
+        for (number, (case, (place, speed_rpm))) in cases.iter().zip(asked).enumerate() {
+            let Ok(case) = case else { continue };
+            let Some(linear) = linear.next() else { continue };
+            let mut guesses = followed[*place].0.guesses(*speed_rpm);
+            if guesses.is_empty() {
+                guesses.push(from_linear(case, &linear));
+            }
+            for guess in guesses {
+                solves.push(Solve::new(case.row, guess.state, guess.factors.clone()));
+                looked.push(Look { number, case: case.clone(), guess, linear: linear.peaks });
+            }
+        }
+        if !finish(&mut solves, is_stopped) {
+            return stopped();
+        }
+        let mut found: Vec<Result<Response, NoAnswer>> =
+            looked.iter().zip(solves).map(|(look, solve)| look.answer(solve)).collect();
+        if is_stopped() {
+            return stopped();
+        }
+        // What is close to an edge, or moved by the caps, is asked of the machine as it is.
+        let are_moved = are_moved(&looked, &found);
+        let mut close = Vec::new();
+        for (place, response) in found.iter().enumerate() {
+            let Ok(response) = response else { continue };
+            let is_close = response.growth_per_s().abs() < CLOSE_TO_EDGE_PER_S;
+            if (is_close || are_moved[place]) && looked[place].case.row.caps.is_some() {
+                close.push((place, looked[place].case.without_caps(), response.start));
+            }
+        }
+        let mut plain: Vec<Solve<'_>> = close
+            .iter()
+            .filter_map(|(_, case, start)| Some(Solve::new(case.as_ref().ok()?.row, *start, None)))
+            .collect();
+        if !finish(&mut plain, is_stopped) {
+            return stopped();
+        }
+        let mut plain = plain.into_iter();
+        for (place, case, _) in close {
+            found[place] = case.and_then(|case| {
+                looked[place].case = case;
+                let solve = plain.next().ok_or(NoAnswer::NoResponse)?;
+                looked[place].answer(solve)
+            });
+        }
+        let none = |case: Result<Case<'_>, NoAnswer>| case.err().unwrap_or(NoAnswer::NoResponse);
+        let mut answers: Vec<Result<Vec<Response>, NoAnswer>> =
+            cases.into_iter().map(|case| Err(none(case))).collect();
+        for (look, response) in looked.iter().zip(found) {
+            let answer = &mut answers[look.number];
+            match (response, answer.as_mut()) {
+                (Ok(response), Ok(responses)) => responses.push(response),
+                (Ok(response), Err(_)) => *answer = Ok(vec![response]),
+                (Err(none), Err(first)) => *first = none,
+                (Err(_), Ok(_)) => {}
+            }
+        }
+        answers
+    }
+}
+
+/// Whether a turn of the machine as it is leaves these responses, where a harmonic of the drum's
+/// speed may be near the hinge's frequency.
+fn are_moved(looked: &[Look<'_>], found: &[Result<Response, NoAnswer>]) -> Vec<bool> {
+    let mut are_moved = vec![false; looked.len()];
+    let (mut places, mut asked) = (Vec::new(), Vec::new());
+    for (place, (look, response)) in looked.iter().zip(found).enumerate() {
+        let hinge = look.case.frozen.modes[SUSPENSION_MODES].frequency_rpm();
+        let is_near = hinge < HARMONICS_OF_HINGE * look.case.row.speed_rpm;
+        if let (true, Ok(response), Some(_)) = (is_near, response, look.case.row.caps)
+            && let Ok(plain) = look.case.without_caps()
+        {
+            places.push(place);
+            asked.push(Asked { row: plain.row, start: response.start, is_seen: false });
+        }
+    }
+    for ((place, asked), turned) in places.into_iter().zip(&asked).zip(turns(&asked)) {
+        let Row { point, speed_rpm, .. } = asked.row;
+        let missing = missing(point, speed_rpm, &asked.start, &turned.end);
+        are_moved[place] = missing.is_nan() || missing > RETURNS;
+    }
+    are_moved
+}
+
+/// The linear model's response, where there is one; else the machine at rest.
+fn from_linear(case: &Case<'_>, linear: &LinearResponse) -> Guess {
+    let rest = <Nonlinear<f64> as Model<f64>>::at_rest(case.row.point);
+    let is_known = linear.start.iter().all(|x| x.is_finite());
+    let deviation = |i: usize| if is_known { linear.start[i] } else { 0.0 };
+    let state = core::array::from_fn(|i| rest[i] + deviation(i));
+    Guess { branch: 0, between_rpm: [None; 2], state, factors: None, is_on_curve: false }
+}
+
+/// A response that is looked for.
+struct Look<'a> {
+    /// Position of what was asked.
+    number: usize,
+    case: Case<'a>,
+    guess: Guess,
+    /// Largest deviations by the linear model.
+    linear: [f64; crate::channel::CHANNELS],
+}
+
+impl Look<'_> {
+    fn answer(&self, solve: Solve<'_>) -> Result<Response, NoAnswer> {
+        let (start, seen) = solve.found().ok_or(NoAnswer::NoResponse)?;
+        let is_far = |i: usize| (start[i] - self.guess.state[i]).abs() > FARTHEST_FROM_GUESS;
+        if self.guess.is_on_curve && (0..COORDINATES).any(is_far) {
+            return Err(NoAnswer::NoResponse);
+        }
+        let row = &self.case.row;
+        let unit_per_s = row.unit_per_s();
+        let unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
+        let matrix =
+            Mat::from_fn(STATES, STATES, |i, j| seen.monodromy[i][j].0 * unit(j) / unit(i));
+        let mut multipliers = matrix.eigenvalues().map_err(|_| NoAnswer::Eigenvalues)?;
+        if multipliers.iter().any(|mu| !mu.re.is_finite() || !mu.im.is_finite()) {
+            return Err(NoAnswer::Eigenvalues);
+        }
+        multipliers.retain(|mu| mu.im >= 0.0);
+        multipliers.sort_by(|a, b| {
+            b.norm_sqr().total_cmp(&a.norm_sqr()).then_with(|| b.im.total_cmp(&a.im))
+        });
+        for mu in multipliers {
+            let vector = vector_of(&matrix, mu);
+            let shares = shares(&self.case.frozen, &vector, unit_per_s);
+            let judged = shares.iter().filter(|(mode, _)| *mode < self.case.judged);
+            let share: f64 = judged.map(|(_, energy)| energy).sum();
+            // Not finite where there is no such disturbance.
+            if share.is_nan() || share < JUDGED_SHARE {
+                continue;
+            }
+            let mut response = Response {
+                speed_rpm: row.speed_rpm,
+                branch: self.guess.branch,
+                between_rpm: self.guess.between_rpm,
+                beyond: beyond(row.point, &seen),
+                nonlinear: seen.peaks,
+                linear: self.linear,
+                start,
+                multiplier: [mu.re, mu.im].map(rounded),
+                participants: Vec::new(),
+            };
+            if response.kind() != Kind::Stable {
+                let speed = row.speed_rpm * TAU / 60.0;
+                let frozen = modes(row.point, 0.0, speed).map_err(|_| NoAnswer::Eigenvalues)?;
+                response.participants = named(row.point, &frozen, &vector, unit_per_s);
+            }
+            return Ok(response);
+        }
+        Err(NoAnswer::Eigenvalues)
+    }
+}
+
+/// What of the machine's geometry a motion passes.
+fn beyond(point: &Point, seen: &Seen) -> Option<Beyond> {
+    let rest = attachments(point, point.equilibrium());
+    let is_past = |of: fn(&Attachments) -> &Vec<[f64; 3]>| {
+        seen.states.iter().any(|state| {
+            let q = core::array::from_fn(|i| state[i]);
+            let now = attachments(point, &q);
+            of(&now).iter().zip(of(&rest)).any(|(now, rest)| {
+                let along: f64 = now.iter().zip(rest).map(|(a, b)| a * b).sum();
+                along.is_nan() || along <= 0.0
+            })
+        })
+    };
+    if is_past(|ends| &ends.springs) {
+        Some(Beyond::SpringHooks)
+    } else if is_past(|ends| &ends.dampers) {
+        Some(Beyond::DamperEnds)
+    } else if seen.gap_m.is_nan() || seen.gap_m <= 0.0 {
+        Some(Beyond::Clearance)
+    } else {
+        None
+    }
+}

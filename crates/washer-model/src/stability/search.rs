@@ -1,0 +1,157 @@
+//! Searches that live on turns: many of them side by side, and the one for a periodic response at
+//! one speed.
+
+use super::orbit::{Asked, Row, Seen, Square, Turned, turns};
+use crate::coordinates::{COORDINATES, STATES};
+use crate::point::Point;
+use core::f64::consts::TAU;
+use lane_ode::{Lu, N};
+
+/// A search that asks for turns until it is over.
+pub(super) trait Search<'a> {
+    /// The turns that it needs next; none once it is over.
+    fn wants(&mut self) -> Vec<Asked<'a>>;
+
+    /// What it asked for, in that order.
+    fn take(&mut self, turned: Vec<Turned>);
+}
+
+/// Takes searches to their ends, the turns of all of them in lanes together. False if `is_stopped`
+/// said so before that.
+pub(super) fn finish<'a, S: Search<'a>>(searches: &mut [S], is_stopped: &dyn Fn() -> bool) -> bool {
+    loop {
+        let wanted: Vec<Vec<Asked<'a>>> = searches.iter_mut().map(Search::wants).collect();
+        let asked: Vec<Asked<'a>> = wanted.concat();
+        if asked.is_empty() {
+            return true;
+        }
+        if is_stopped() {
+            return false;
+        }
+        let mut turned = turns(&asked).into_iter();
+        for (search, wanted) in searches.iter_mut().zip(wanted) {
+            if !wanted.is_empty() {
+                search.take(turned.by_ref().take(wanted.len()).collect());
+            }
+        }
+    }
+}
+
+/// Turns that the search for a response may take.
+const MOST_TURNS: usize = 30;
+
+/// A response is found once another turn moves it by less than this share of its greatest
+/// coordinate.
+const CLOSE: f64 = 1e-10;
+
+/// Smaller deviations (m, rad) count as this: without unbalance there is none but rounding.
+const LEAST_SIZE: f64 = 1e-4;
+
+/// The matrix is taken anew where a correction leaves more than this share of what was missing.
+const FAST_ENOUGH: f64 = 0.2;
+
+/// How far a turn is from closing, as a share of its deviation; not finite if it left the model's
+/// range.
+pub(super) fn missing(
+    point: &Point,
+    speed_rpm: f64,
+    start: &[f64; STATES],
+    end: &[f64; STATES],
+) -> f64 {
+    let rest = point.equilibrium();
+    let speed = speed_rpm * TAU / 60.0;
+    let (mut missing, mut size) = (0.0_f64, LEAST_SIZE);
+    for i in 0..COORDINATES {
+        size = size.max((start[i] - rest[i]).abs());
+        let by_speed = end[COORDINATES + i] - start[COORDINATES + i];
+        let gap = (end[i] - start[i]).abs() + by_speed.abs() / speed;
+        // NaN stays.
+        missing = if gap > missing || gap.is_nan() { gap } else { missing };
+    }
+    missing / size
+}
+
+/// Factors of 1 - Phi.
+pub(super) fn apart(monodromy: &Square) -> Option<Lu<STATES>> {
+    let mut apart = monodromy.map(|row| row.map(|entry| -entry));
+    for i in 0..STATES {
+        apart[i][i] = apart[i][i] + 1.0;
+    }
+    Lu::new(apart)
+}
+
+/// The search for a periodic response at one speed, by Newton's method: with the matrix that it
+/// has as long as that brings it closer fast enough, else with the response's own.
+pub(super) struct Solve<'a> {
+    row: Row<'a>,
+    state: [f64; STATES],
+    /// Of 1 - Phi; none where the next turn is to give it.
+    factors: Option<Lu<STATES>>,
+    turns: usize,
+    missing: f64,
+    is_last: bool,
+    is_over: bool,
+    found: Option<Box<Seen>>,
+}
+
+impl<'a> Solve<'a> {
+    /// From a state nearby, with factors of 1 - Phi of a response nearby if there are any.
+    pub(super) fn new(row: Row<'a>, state: [f64; STATES], factors: Option<Lu<STATES>>) -> Self {
+        Self {
+            row,
+            state,
+            factors,
+            turns: 0,
+            missing: f64::INFINITY,
+            is_last: false,
+            is_over: false,
+            found: None,
+        }
+    }
+
+    /// The state where the unbalance is up, and what is seen of the turn from there; none where
+    /// there is no response.
+    pub(super) fn found(self) -> Option<([f64; STATES], Box<Seen>)> {
+        Some((self.state, self.found?))
+    }
+}
+
+impl<'a> Search<'a> for Solve<'a> {
+    fn wants(&mut self) -> Vec<Asked<'a>> {
+        if self.is_over {
+            return Vec::new();
+        }
+        let is_seen = self.is_last || self.factors.is_none();
+        vec![Asked { row: self.row, start: self.state, is_seen }]
+    }
+
+    fn take(&mut self, turned: Vec<Turned>) {
+        let Some(Turned { end, seen }) = turned.into_iter().next() else { return };
+        self.turns += 1;
+        let missing = missing(self.row.point, self.row.speed_rpm, &self.state, &end);
+        if self.is_last || (missing < CLOSE && seen.is_some()) {
+            (self.is_over, self.found) = (true, seen);
+            return;
+        }
+        match seen {
+            Some(seen) => {
+                self.factors = apart(&seen.monodromy);
+                self.is_over = self.factors.is_none();
+            }
+            None if missing > FAST_ENOUGH * self.missing => self.factors = None,
+            None => {}
+        }
+        self.is_over |= !missing.is_finite() || self.turns == MOST_TURNS;
+        if let (false, Some(factors)) = (self.is_over, &self.factors) {
+            let gap = core::array::from_fn(|i| N(end[i] - self.state[i]));
+            let correction = factors.solve(&gap);
+            for i in 0..STATES {
+                self.state[i] += correction[i].0;
+            }
+            self.is_last = missing < CLOSE;
+            // Slow progress is judged over corrections, not over looks.
+            self.missing = missing;
+        }
+        self.is_over |= self.state.iter().any(|x| !x.is_finite());
+    }
+}

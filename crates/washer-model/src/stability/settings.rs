@@ -1,0 +1,209 @@
+//! Steps and caps at constant speeds, and what of a machine's motion they leave right.
+
+use super::NoAnswer;
+use super::orbit::Row;
+use crate::coordinates::COORDINATES;
+use crate::fast::{HINGE_TO_DRUM, SUSPENSION_MODES, hinge_shift};
+use crate::modes::{Modes, highest_frequency_rad_per_s, modes, motions_with_caps};
+use crate::nonlinear::coupling::Caps;
+use crate::point::Point;
+use core::f64::consts::TAU;
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Steps a turn, at least, and what their number is a multiple of.
+const STEPS: usize = 96;
+
+/// Longest step times the fastest of the suspension's modes, all of which the steps must follow.
+const LONGEST_PHASE: f64 = 0.25;
+
+/// Step times cap, as a share of the formula's limit. Gyroscopic effects may make whirls of the
+/// capped hinge faster than its cap.
+const CAP_SHARE: f64 = 0.7;
+
+/// Step times the fastest mode, where none is capped.
+const PLAIN_PHASE: f64 = 1.0;
+
+/// How much caps may move modes of the suspension (1/s, rad/s), and the longest steps (s) where
+/// friction and stops give forces corners: of rows,
+const OF_ROWS: [f64; 2] = [3e-4, 1e-4];
+
+/// and where responses are only followed: what lies on the curve is looked for anew.
+const OF_FOLLOWED: [f64; 2] = [3e-3, 5e-4];
+
+/// Responses are followed from this share of the slowest mode's frequency, a multiple of so many
+/// parts of a turn per minute.
+const LOWEST_SHARE: f64 = 0.45;
+const LOWEST_DIGITS: f64 = 64.0;
+
+/// Steps of a turn, at most: a drum so slow that it asks for more leaves its machine at rest, but
+/// for its own unbalance going round.
+const MOST_STEPS: usize = 1 << 15;
+
+/// Ranges of speed in a doubling of it, in each of which steps and caps are chosen once.
+const RANGES: f64 = 4.0;
+
+/// A row, and what is known of its machine with theta frozen.
+#[derive(Clone)]
+pub(super) struct Case<'a> {
+    pub(super) row: Row<'a>,
+    /// At the low end of the range that the speed is in.
+    pub(super) frozen: Arc<Modes>,
+    /// Modes that are judged, the slowest.
+    pub(super) judged: usize,
+}
+
+impl<'a> Case<'a> {
+    /// The same for the machine as it is.
+    pub(super) fn without_caps(&self) -> Result<Self, NoAnswer> {
+        let steps = plain_steps(self.row.point, self.row.speed_rpm, self.row.turn_s())?;
+        let row = Row { steps, caps: None, ..self.row };
+        Ok(Self { row, frozen: Arc::clone(&self.frozen), judged: self.judged })
+    }
+}
+
+/// Steps of a turn that follow all modes.
+fn plain_steps(point: &Point, speed_rpm: f64, turn_s: f64) -> Result<usize, NoAnswer> {
+    let highest = highest_frequency_rad_per_s(point, speed_rpm * TAU / 60.0)
+        .map_err(|_| NoAnswer::Eigenvalues)?;
+    whole(highest * turn_s / PLAIN_PHASE)
+}
+
+/// At least so many steps, a multiple of [`STEPS`].
+fn whole(steps: f64) -> Result<usize, NoAnswer> {
+    let steps = STEPS as f64 * (steps / STEPS as f64).ceil().max(1.0);
+    if steps > MOST_STEPS as f64 { Err(NoAnswer::TooSlow) } else { Ok(steps as usize) }
+}
+
+/// Steps and caps at a point's speeds.
+#[derive(Clone)]
+pub(super) struct Settings<'a> {
+    pub(super) point: &'a Point,
+    rest: Option<Modes>,
+    /// By range, and whether responses are only followed.
+    ranges: BTreeMap<(i64, bool), Result<Setting, NoAnswer>>,
+}
+
+/// Those of a range of speeds.
+#[derive(Clone)]
+struct Setting {
+    frozen: Arc<Modes>,
+    steps: usize,
+    is_capped: bool,
+}
+
+impl<'a> Settings<'a> {
+    pub(super) fn new(point: &'a Point) -> Self {
+        Self { point, rest: modes(point, 0.0, 0.0).ok(), ranges: BTreeMap::new() }
+    }
+
+    /// From where responses are followed (rpm): below all that the suspension answers to.
+    pub(super) fn lowest_rpm(&self) -> Result<f64, NoAnswer> {
+        let slowest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?.modes[0].frequency_rpm();
+        // The last digits of an eigenvalue are the processor's own.
+        Ok((LOWEST_SHARE * slowest * LOWEST_DIGITS).ceil() / LOWEST_DIGITS)
+    }
+
+    /// That of a speed.
+    ///
+    /// # Errors
+    /// [`NoAnswer::Eigenvalues`]; [`NoAnswer::TooSlow`].
+    pub(super) fn case(&mut self, speed_rpm: f64) -> Result<Case<'a>, NoAnswer> {
+        self.chosen(speed_rpm, false)
+    }
+
+    /// As [`Self::case`], where responses are only followed.
+    ///
+    /// # Errors
+    /// As [`Self::case`].
+    pub(super) fn followed(&mut self, speed_rpm: f64) -> Result<Row<'a>, NoAnswer> {
+        Ok(self.chosen(speed_rpm, true)?.row)
+    }
+
+    fn chosen(&mut self, speed_rpm: f64, is_followed: bool) -> Result<Case<'a>, NoAnswer> {
+        let range = (RANGES * libm::log2(speed_rpm)).floor();
+        let point = self.point;
+        let rest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?;
+        let setting = self.ranges.entry((range as i64, is_followed)).or_insert_with(|| {
+            let end_rpm = |range: f64| libm::exp2(range / RANGES);
+            let most = if is_followed { OF_FOLLOWED } else { OF_ROWS };
+            setting(point, rest, [end_rpm(range), end_rpm(range + 1.0)], most)
+        });
+        let Setting { frozen, steps, is_capped } = setting.clone()?;
+        let caps = is_capped.then(|| caps(steps, 60.0 / speed_rpm));
+        let row = Row { point, speed_rpm, steps, caps };
+        let judged = if is_capped { SUSPENSION_MODES } else { SUSPENSION_MODES + 2 };
+        Ok(Case { row, frozen, judged })
+    }
+}
+
+/// As many steps a turn as the suspension's modes ask for in a range of speeds, and caps as high as
+/// these steps allow. Where these would move the suspension's modes, there are more steps; where
+/// the drum is not slow beside the hinge, there are no caps (`fast.rs`).
+fn setting(
+    point: &Point,
+    rest: &Modes,
+    ends_rpm: [f64; 2],
+    [most_shift_per_s, longest_at_corners_s]: [f64; 2],
+) -> Result<Setting, NoAnswer> {
+    let of_modes = |speed_rpm: f64| {
+        modes(point, 0.0, speed_rpm * TAU / 60.0).map_err(|_| NoAnswer::Eigenvalues)
+    };
+    let turn_s = 60.0 / ends_rpm[0];
+    let fastest = rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
+    let mut steps = whole(fastest * turn_s / LONGEST_PHASE)?;
+    if point.machine.elements.are_nonsmooth() {
+        steps = steps.max(whole(turn_s / longest_at_corners_s)?);
+    }
+    let frozen = [of_modes(ends_rpm[0])?, of_modes(ends_rpm[1])?];
+    let mut is_capped = false;
+    let top_rad_per_s = ends_rpm[1] * TAU / 60.0;
+    if rest.modes[SUSPENSION_MODES].magnitude_rad_per_s >= HINGE_TO_DRUM * top_rad_per_s {
+        let highest = rest.modes[COORDINATES - 1].magnitude_rad_per_s;
+        // More steps than that cap nothing.
+        while !is_capped && (steps as f64) < highest * turn_s {
+            let shift = |end: usize| {
+                let caps = caps(steps, 60.0 / ends_rpm[end]);
+                shift_per_s(point, ends_rpm[end] * TAU / 60.0, &frozen[end], &caps)
+            };
+            is_capped = shift(0)?.max(shift(1)?) <= most_shift_per_s;
+            if !is_capped {
+                steps *= 2;
+            }
+        }
+    }
+    if !is_capped {
+        steps =
+            plain_steps(point, ends_rpm[0], turn_s)?.max(plain_steps(point, ends_rpm[1], turn_s)?);
+    }
+    if steps > MOST_STEPS {
+        return Err(NoAnswer::TooSlow);
+    }
+    let [frozen, _] = frozen;
+    Ok(Setting { frozen: Arc::new(frozen), steps, is_capped })
+}
+
+/// As high as so many steps a turn allow.
+pub(super) fn caps(steps: usize, turn_s: f64) -> Caps {
+    let cap = CAP_SHARE * RK4_STABILITY_LIMIT * steps as f64 / turn_s;
+    Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) }
+}
+
+/// How far caps move the suspension's modes.
+fn shift_per_s(
+    point: &Point,
+    speed_rad_per_s: f64,
+    frozen: &Modes,
+    caps: &Caps,
+) -> Result<f64, NoAnswer> {
+    let of_bearings = Caps { hinge_rad_per_s: None, ..*caps };
+    let capped = motions_with_caps(point, speed_rad_per_s, &of_bearings)
+        .map_err(|_| NoAnswer::Eigenvalues)?;
+    let shifts = frozen.modes.iter().zip(&capped).take(SUSPENSION_MODES).map(|(mode, capped)| {
+        let (slower, detuned) = (capped.s.re - mode.re_per_s, capped.s.im - mode.im_rad_per_s);
+        let of_hinge = hinge_shift(point, mode, speed_rad_per_s, caps.hinge_rad_per_s);
+        (slower * slower + detuned * detuned).sqrt() + of_hinge
+    });
+    Ok(shifts.fold(0.0, f64::max))
+}
