@@ -33,4 +33,4 @@ mod thrift;
 pub use error::{FileError, Refused};
 pub use kind::{EXPORTED_CSV, FileKind, key};
 pub use output::{Output, beside, judge, ready, write};
-pub use parquet::{Batches, ParquetFile};
+pub use parquet::{Batches, CREATED_BY, ParquetFile};

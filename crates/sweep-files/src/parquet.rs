@@ -1,7 +1,7 @@
 //! The gate through which every Parquet file is read.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use arrow_array::RecordBatch;
@@ -19,6 +19,9 @@ use crate::{FileError, Refused, footer, key, panics, regular};
 
 /// Most bytes that the pages of a file may unpack into at once. Ours have pages of 1 MiB.
 const MOST_AT_ONCE: u64 = 1 << 30;
+
+/// How the name begins by which this program signs its files; a version follows.
+pub const CREATED_BY: &str = "sweep version ";
 
 /// An open Parquet file, ours or another program's.
 #[derive(Debug)]
@@ -50,8 +53,11 @@ impl ParquetFile {
             return Err(FileError::Damaged { path: path.to_path_buf() });
         }
         let file = Self::parse(path, file, seal)?;
-        // A digest that the library finds and `seal` does not stands where none of ours would.
-        if seal == Seal::Absent && file.value(key::DIGEST).is_some() {
+        // A digest that the library finds and `seal` does not stands where none of ours would, and
+        // whatever this program has written has one: it is the name before it that has changed.
+        let is_ours = file.created_by().is_some_and(|by| by.starts_with(CREATED_BY));
+        let has_digest = file.pairs().any(|pair| pair.key == key::DIGEST);
+        if seal == Seal::Absent && (is_ours || has_digest) {
             return Err(FileError::Damaged { path: path.to_path_buf() });
         }
         file.check_pages()?;
@@ -102,6 +108,22 @@ impl ParquetFile {
     /// Whether it carries a digest, which then fits.
     pub fn is_sealed(&self) -> bool {
         self.seal == Seal::Whole
+    }
+
+    /// The file's bytes, which are still those that were checked if it is one of ours.
+    ///
+    /// # Errors
+    /// [`FileError::Io`]; [`FileError::Damaged`] if it has been written over.
+    pub fn bytes(&self) -> Result<Vec<u8>, FileError> {
+        let mut bytes = Vec::new();
+        let mut file = &self.file;
+        let read = file.seek(SeekFrom::Start(0)).and_then(|_| file.read_to_end(&mut bytes));
+        read.map_err(FileError::io("read", &self.path))?;
+        let seal = seal::check(&mut io::Cursor::new(&bytes));
+        if seal.map_err(FileError::io("read", &self.path))? != self.seal {
+            return Err(FileError::Damaged { path: self.path.clone() });
+        }
+        Ok(bytes)
     }
 
     fn about(&self) -> &FileMetaData {
@@ -218,6 +240,56 @@ mod tests {
     use parquet::file::properties::WriterProperties;
 
     use super::*;
+
+    /// The bytes of a file that this program has written, with its digest.
+    fn ours() -> Vec<u8> {
+        let values: Float64Array = (0..300).map(f64::from).collect();
+        let batch = RecordBatch::try_from_iter([("x", Arc::new(values) as _)]).unwrap();
+        let properties =
+            WriterProperties::builder().set_created_by(format!("{CREATED_BY}0.0.0")).build();
+        let mut writer =
+            ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties)).unwrap();
+        writer.write(&batch).unwrap();
+        writer.append_key_value_metadata(seal::blank());
+        let mut bytes = io::Cursor::new(writer.into_inner().unwrap());
+        seal::seal(&mut bytes).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn no_flipped_bit_makes_a_file_of_ours_one_without_a_digest() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.parquet");
+        let sound = ours();
+        std::fs::write(&path, &sound).unwrap();
+        assert!(ParquetFile::open(&path).unwrap().is_sealed());
+        for bit in 0..8 * sound.len() {
+            let mut bytes = sound.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            std::fs::write(&path, &bytes).unwrap();
+            assert!(ParquetFile::open(&path).is_err(), "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn the_bytes_of_an_open_file_are_those_that_were_checked() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.parquet");
+        let sound = ours();
+        std::fs::write(&path, &sound).unwrap();
+        let file = ParquetFile::open(&path).unwrap();
+        assert_eq!(file.bytes().unwrap(), sound);
+        let other = folder.path().join("y.parquet");
+        std::fs::write(&other, b"another file").unwrap();
+        std::fs::rename(&other, &path).unwrap();
+        assert_eq!(file.bytes().unwrap(), sound, "a file that took its place is another one");
+        std::fs::write(&path, &sound).unwrap();
+        let file = ParquetFile::open(&path).unwrap();
+        let mut changed = sound;
+        changed[20] ^= 1;
+        std::fs::write(&path, &changed).unwrap();
+        assert!(matches!(file.bytes(), Err(FileError::Damaged { .. })));
+    }
 
     #[test]
     fn a_dictionary_that_cannot_be_is_refused_before_there_is_room_for_it() {

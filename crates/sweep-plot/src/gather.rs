@@ -87,7 +87,8 @@ pub(crate) struct Map {
     pub(crate) counts: Vec<Counts>,
     /// Of each column of numbers.
     pub(crate) extents: BTreeMap<String, Extent>,
-    /// Of each column with a level, where cells hold more than one point.
+    /// On which sides of its limit the points of a cell lie, by column. Columns without a limit are
+    /// left out, and so are all where each cell is one point.
     pub(crate) sides: BTreeMap<String, Sides>,
     /// Rows of the whole file by their status.
     pub(crate) statuses: BTreeMap<String, usize>,

@@ -43,6 +43,7 @@ mod tests_metrics;
 #[cfg(test)]
 mod tests_stability;
 mod thin;
+mod together;
 
 use std::path::{Path, PathBuf};
 
@@ -60,6 +61,7 @@ use scatter::Scatter;
 use scene::Scene;
 use swept::SweptAxis;
 use table::Table;
+use together::At;
 
 use sweep_files::{self as files, Output};
 
@@ -350,7 +352,7 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
         let map = Map::read(source, grid, &columns, divide)?;
         let typeface = Typeface::load()?;
         let overlay = match &options.boundary {
-            Some(path) => Some(overlay(path, &axes)?),
+            Some(path) => Some(overlay(path, &axes, &map.table.source)?),
             None => None,
         };
         let scene = figures::map::draw(&map, &cuts, shown.as_ref(), overlay.as_ref(), &typeface)?;
@@ -376,7 +378,7 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
 }
 
 /// The boundary file beside a map of these axes.
-fn overlay(path: &Path, axes: &[SweptAxis]) -> Result<Overlay, PlotError> {
+fn overlay(path: &Path, axes: &[SweptAxis], map: &Source) -> Result<Overlay, PlotError> {
     let source = Source::open(path)?;
     if source.kind != Kind::Boundary {
         return Err(PlotError::Unfit(format!(
@@ -385,7 +387,12 @@ fn overlay(path: &Path, axes: &[SweptAxis]) -> Result<Overlay, PlotError> {
             source.kind.name()
         )));
     }
-    figures::boundary::overlay(&Table::read(source)?, [&axes[0].name, &axes[1].name])
+    let table = Table::read(source)?;
+    let line = figures::boundary::overlay(&table, [&axes[0].name, &axes[1].name])?;
+    let moved: At = axes.iter().map(|axis| (axis.name.clone(), 0.0)).collect();
+    let files = [(map, &moved), (&table.source, &moved)];
+    together::agree("--boundary", path, files, figures::boundary::follows_from(&table))?;
+    Ok(line)
 }
 
 /// A picture of what differs between two maps: of ratios, unless the options say gaps.

@@ -68,6 +68,11 @@ impl Sample {
         self
     }
 
+    pub(crate) fn without(mut self, key: &str) -> Self {
+        self.metadata.retain(|pair| pair.key != key);
+        self
+    }
+
     pub(crate) fn write(self, folder: &Path, name: &str) -> PathBuf {
         write_all(folder, name, [self])
     }

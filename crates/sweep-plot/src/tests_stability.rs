@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::sample::{Sample, boundary, map, modes, trace};
-use super::tests::{carried, draw, message, svg};
+use super::tests::{carried, data, draw, message, svg};
 use super::*;
 
 /// Points of these unbalances over 200 to 300 rpm. Growth is above 0 from 230 to 250 rpm, by as
@@ -151,6 +151,81 @@ fn a_map_takes_the_line_of_a_boundary_over_its_axes() {
     }
     let own = svg(over(["unbalance_mass_kg", "damping_n_s_per_m"]), &PlotOptions::default());
     assert!(own.contains(">Where the machine may dwell at any speed<"), "the title");
+}
+
+/// A plan of the samples' machine, or of one with another tub.
+fn plan(tub_mass_kg: f64, further: &str) -> String {
+    format!(
+        r#"{{"name": "one", {further} "spin": {{"peak_rpm": 300.0}}, "time": {{"end_s": 12.0}},
+            "machine": {{"tub": {{"mass_kg": {tub_mass_kg:?}}}, "unbalance": {{"mass_kg": 0.4}},
+                "dampers": [{{"damping_n_s_per_m": 120.0}}]}}}}"#
+    )
+}
+
+#[test]
+fn what_is_drawn_together_is_of_one_plan() {
+    let folder = tempfile::tempdir().unwrap();
+    let axes =
+        r#""axis": [{"parameter": "unbalance_mass_kg"}, {"parameter": "damping_n_s_per_m"}],"#;
+    let named = |file: Sample, tub: f64, name: &str| {
+        let plan = plan(tub, axes);
+        file.without("sweep.plan").metadata("sweep.plan", &plan).write(folder.path(), name)
+    };
+    let (own, other) = (24.0, 20.0);
+    let map_of = || map().without("sweep.plan").metadata("sweep.plan", &plan(own, axes));
+    let trace_of = || trace().metadata("sweep.plan", &plan(own, ""));
+    let boundary = |tub, name| PlotOptions {
+        boundary: Some(named(boundary(), tub, name)),
+        ..Default::default()
+    };
+    svg(map_of(), &boundary(own, "b.parquet"));
+    let said = message(draw(map_of(), &boundary(other, "c.parquet"), "a.svg"));
+    assert!(said.contains("machine.tub.mass_kg 24.0 and 20.0"), "{said}");
+
+    let stability_of = |tub, name| PlotOptions {
+        stability: Some(named(stability(&[0.4]), tub, name)),
+        ..Default::default()
+    };
+    svg(trace_of(), &stability_of(own, "s.parquet"));
+    for file in [trace_of(), modes().metadata("sweep.plan", &plan(own, ""))] {
+        let said = message(draw(file, &stability_of(other, "t.parquet"), "a.svg"));
+        assert!(said.contains("`--stability`") && said.contains("24.0 and 20.0"), "{said}");
+    }
+
+    let modes_of = |tub, name, view| PlotOptions {
+        modes: Some(named(modes(), tub, name)),
+        view,
+        ..Default::default()
+    };
+    for view in [None, Some(View::Passages)] {
+        let same = svg(trace_of(), &modes_of(own, "m.parquet", view));
+        assert!(!same.contains("another machine"));
+        let warned = svg(trace_of(), &modes_of(other, "n.parquet", view));
+        let said = "resonances of another machine: machine.tub.mass_kg 24.0 and 20.0";
+        assert!(warned.contains(said), "the figure says so");
+    }
+
+    let traces = folder.path().join("traces");
+    std::fs::create_dir(&traces).unwrap();
+    let with = PlotOptions { traces: Some(traces.clone()), ..Default::default() };
+    trace_of().write(&traces, "point-3.parquet");
+    let carried = data(map_of(), &with);
+    assert_eq!(carried["traces"].as_object().unwrap().keys().collect::<Vec<_>>(), ["29"]);
+    let of_other = trace().metadata("sweep.plan", &plan(other, axes));
+    of_other.write(&traces, "point-29.parquet");
+    let said = message(draw(map_of(), &with, "a.html"));
+    assert!(said.contains("point-29.parquet is of another plan than"), "{said}");
+    // What says its point is of no other, whatever its number.
+    let astray = trace().without("at").metadata("at", r#"{"unbalance_mass_kg": 7.0}"#);
+    astray.write(&traces, "point-29.parquet");
+    let said = message(draw(map_of(), &with, "a.html"));
+    assert!(said.contains("belongs to no point of this map"), "{said}");
+    // Its number alone: the plan's own unbalance and damping are those of the point.
+    trace_of().without("at").write(&traces, "point-29.parquet");
+    data(map_of(), &with);
+    trace_of().without("at").write(&traces, "point-30.parquet");
+    let said = message(draw(map_of(), &with, "a.html"));
+    assert!(said.contains("damping_n_s_per_m 150.0 and 120.0"), "{said}");
 }
 
 #[test]

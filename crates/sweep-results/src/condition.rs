@@ -186,10 +186,22 @@ impl Comparison {
     }
 }
 
+/// What rows are folded into.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Folded {
+    /// Of the rows that have a value.
+    pub(crate) value: Cell,
+    /// How many those are.
+    pub(crate) over: u64,
+    /// Whether those are all rows.
+    pub(crate) whole: bool,
+}
+
 /// The number that rows are folded into, on its way.
 #[derive(Clone, Copy, Debug, Default)]
 struct Folding {
     rows: u64,
+    over: u64,
     counted: u64,
     sum: f64,
     least: Option<f64>,
@@ -205,7 +217,7 @@ impl Condition {
         &self,
         table: &ResultTable,
         keep: Option<&Condition>,
-    ) -> Result<Vec<Cell>, ResultsError> {
+    ) -> Result<Vec<Folded>, ResultsError> {
         if self.folds.is_empty() {
             return Ok(Vec::new());
         }
@@ -215,11 +227,13 @@ impl Condition {
                 folding.rows += 1;
                 match fold {
                     Fold::Count | Fold::Share => {
-                        folding.counted += u64::from(node.truth(at) == Some(true));
+                        let Some(truth) = node.truth(at) else { continue };
+                        folding.over += 1;
+                        folding.counted += u64::from(truth);
                     }
                     Fold::Least | Fold::Greatest | Fold::Mean => {
                         let Some(number) = node.number(at) else { continue };
-                        folding.counted += 1;
+                        folding.over += 1;
                         folding.sum += number;
                         folding.least = Some(folding.least.map_or(number, |l| l.min(number)));
                         folding.greatest = Some(folding.greatest.map_or(number, |g| g.max(number)));
@@ -234,15 +248,15 @@ impl Condition {
 }
 
 impl Folding {
-    fn finish(self, fold: Fold) -> Cell {
-        let some = |count: u64, value: f64| number((count > 0).then_some(value));
-        match fold {
-            Fold::Count => Cell::Number(self.counted as f64),
-            Fold::Share => some(self.rows, self.counted as f64 / self.rows as f64),
-            Fold::Least => number(self.least),
-            Fold::Greatest => number(self.greatest),
-            Fold::Mean => some(self.counted, self.sum / self.counted as f64),
-        }
+    fn finish(self, fold: Fold) -> Folded {
+        let value = match fold {
+            Fold::Count => Some(self.counted as f64),
+            Fold::Share => Some(self.counted as f64 / self.rows as f64),
+            Fold::Least => self.least,
+            Fold::Greatest => self.greatest,
+            Fold::Mean => Some(self.sum / self.over as f64),
+        };
+        Folded { value: number(value), over: self.over, whole: self.over == self.rows }
     }
 }
 

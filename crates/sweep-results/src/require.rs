@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::condition::{Condition, Context, each_row};
+use crate::condition::{Condition, Context, Folded, each_row};
 use crate::error::ResultsError;
 use crate::rows::{Cell, ResultTable};
 
@@ -32,8 +32,11 @@ pub struct Checked {
     pub failing: u64,
     /// Rows for which it is neither true nor false.
     pub undefined: u64,
-    /// Values of its functions over all rows, in the order of their closing parentheses.
+    /// Values of its functions over all rows, in the order of their closing parentheses; of the
+    /// rows that have a value.
     pub folded: Vec<Cell>,
+    /// How many rows those are.
+    pub folded_rows: Vec<u64>,
     /// The first of the rows that do not keep it.
     pub offenders: Vec<Offender>,
 }
@@ -41,7 +44,8 @@ pub struct Checked {
 /// Checks a condition on the rows for which `keep` is true.
 ///
 /// A row where a value is missing does not keep a condition unless that is true or false whatever
-/// the value is; with `allow_null` such rows pass. No rows at all keep no condition.
+/// the value is, and a function over all rows has no value if it lacks one of any row. With
+/// `allow_null` such rows pass, and functions leave them out. No rows at all keep no condition.
 ///
 /// # Errors
 /// [`ResultsError::File`].
@@ -52,7 +56,11 @@ pub fn check(
     allow_null: bool,
     most_offenders: usize,
 ) -> Result<Checked, ResultsError> {
-    let folded = condition.fold(table, keep)?;
+    let folds = condition.fold(table, keep)?;
+    let known = |fold: &Folded| {
+        if fold.whole || allow_null { fold.value.clone() } else { Cell::Null }
+    };
+    let folded: Vec<Cell> = folds.iter().map(known).collect();
     let mut checked = Checked {
         expression: condition.text.clone(),
         holds: false,
@@ -60,7 +68,8 @@ pub fn check(
         rows: 0,
         failing: 0,
         undefined: 0,
-        folded: folded.clone(),
+        folded_rows: folds.iter().map(|fold| fold.over).collect(),
+        folded: folds.into_iter().map(|fold| fold.value).collect(),
         offenders: Vec::new(),
     };
     let mut whole = None;
@@ -169,14 +178,40 @@ mod tests {
             ("max(-ratio_max) < -1", false),
             ("count(status != \"ok\") < 1", false),
         ] {
-            let found = checked(text, None, false);
+            let found = checked(text, None, true);
             assert!(!found.by_row);
             assert_eq!(found.holds, holds, "{text}: {found:?}");
         }
         let mixed = checked("ratio_max <= max(ratio_max)", None, true);
         assert!(mixed.holds && mixed.by_row);
         assert_eq!(mixed.folded, [Cell::Number(4.0)]);
-        let kept = checked("max(ratio_max) == 2.5", Some("not sensitive"), false);
+        let kept = checked("max(ratio_max) == 2.5", Some("not sensitive"), true);
         assert!(kept.holds, "{kept:?}");
+    }
+
+    // One of six rows diverged: nothing that looks at its ratio can be said of all rows.
+    #[test]
+    fn a_function_that_lacks_a_row_keeps_nothing_unless_that_is_said() {
+        for text in [
+            "max(ratio_max) < 9",
+            "min(ratio_max) > 0",
+            "mean(ratio_max) < 9",
+            "count(ratio_max > 9) == 0",
+            "count(not (ratio_max > 9)) > 0",
+            "share(reliable) >= 0",
+            "not (max(ratio_max) > 9)",
+            "ratio_max is null or ratio_max <= max(ratio_max)",
+        ] {
+            let found = checked(text, None, false);
+            assert!(!found.holds, "{text}: {found:?}");
+            assert_eq!((found.rows, &found.folded_rows[..]), (6, &[5][..]), "{text}");
+            assert!(checked(text, None, true).holds, "{text}");
+            assert!(checked(text, Some("ratio_max is not null"), false).holds, "{text}");
+        }
+        assert!(checked("max(ratio_max) < 9 or count(true) == 6", None, false).holds);
+        assert!(checked("share(status == \"ok\") > 0.8", None, false).holds);
+        // Not even --allow-null makes a number of nothing.
+        let nothing = checked("max(ratio_max) < 9", Some("ratio_max is null"), true);
+        assert!(!nothing.holds && nothing.folded_rows == [0], "{nothing:?}");
     }
 }

@@ -9,6 +9,7 @@ use crate::error::PlotError;
 use crate::label::{self, Label};
 use crate::read::bracket;
 use crate::table::{Column, Table};
+use crate::together;
 
 /// One place of the file: where it is, and the bracket it lies in. The place is NaN where there is
 /// no such number.
@@ -146,6 +147,15 @@ fn quantity(table: &Table) -> &str {
 /// Whether that is the growth of disturbances.
 fn is_growth(quantity: &str) -> bool {
     quantity.starts_with("growth")
+}
+
+/// What of its plan the boundary follows from, beside its limit, which is named.
+pub(crate) fn follows_from(table: &Table) -> &'static [&'static str] {
+    match quantity(table) {
+        growth if is_growth(growth) => together::MACHINE,
+        "ratio_max" => together::RATIOS,
+        _ => together::RUN,
+    }
 }
 
 /// A boundary over a map's two axes.

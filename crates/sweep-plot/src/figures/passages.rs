@@ -47,10 +47,10 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         panel.height = 190.0;
     }
     chart.title = "Greatest deviation in each turn of the drum, over its speed".to_owned();
-    chart.subtitle = trace::subtitle(table, &[], None);
+    let (resonances, note) = trace::resonances(table, options)?;
+    chart.subtitle = trace::subtitle(table, &[], None) + &note;
     chart.x_label = Label::new("Spin speed", "rpm");
-    chart.marks =
-        trace::resonances(options)?.into_iter().map(|speed| Mark::of_speed(speed, speed)).collect();
+    chart.marks = resonances.into_iter().map(|speed| Mark::of_speed(speed, speed)).collect();
     chart.mark_meaning = "resonance speed".to_owned();
     chart.shades = trace::unstable_speeds(table, options)?;
     Ok(chart)

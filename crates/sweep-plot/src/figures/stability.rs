@@ -3,8 +3,6 @@
 
 use std::path::Path;
 
-use serde_json::Value;
-
 use crate::PlotOptions;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
 use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
@@ -14,6 +12,7 @@ use crate::label::{self, Label};
 use crate::read::{Batch, Cells, ColumnFacts, Kind, Source};
 use crate::swept::SweptAxis;
 use crate::table::Table;
+use crate::together;
 
 /// Most points whose growth is drawn: each needs a colour.
 const MOST_CURVES: usize = DISTINCT.len();
@@ -226,28 +225,16 @@ pub(super) struct Unstable {
 pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
     let source = open(path)?;
     let axes = axes(&source);
-    let machine = |source: &Source| source.find("machine").cloned();
-    if axes.is_empty()
-        && let (Some(ours), Some(theirs)) = (machine(&table.source), machine(&source))
-        && ours != theirs
-    {
-        return Err(PlotError::Unfit(format!(
-            "`--stability {}`: this file is of another machine than {}",
-            path.display(),
-            table.source.path.display()
-        )));
-    }
     let mut at: Vec<(String, f64)> =
         trace::machine(table).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-    let named = table.source.find("at").and_then(Value::as_object).into_iter().flatten();
-    for (name, value) in named {
-        if let Some(value) = value.as_f64() {
-            at.retain(|(known, _)| known != name);
-            at.push((name.clone(), value));
-        }
-    }
+    let named = together::at(&table.source);
+    at.retain(|(known, _)| !named.iter().any(|(name, _)| name == known));
+    at.extend(named.iter().cloned());
     at.retain(|(name, _)| axes.iter().any(|axis| axis.name == *name));
     let point = one_point(&source, &axes, &at, "--stability")?;
+    let own = axes.iter().map(|axis| axis.name.clone()).zip(point.iter().copied()).collect();
+    let files = [(&table.source, &named), (&source, &own)];
+    together::agree("--stability", path, files, together::MACHINE)?;
     let columns = ["mode_1_cpm", "mode_2_cpm"].map(str::to_owned);
     let swept = read(&source, &axes, &[point], &columns)?;
     let one = &swept[0];
@@ -401,6 +388,10 @@ fn read(
             let Some(point) = swept.iter_mut().find(|point| point.values == values) else {
                 continue;
             };
+            // Further rows of a speed are other responses; a machine that runs up is on the first.
+            if point.speed.last() == Some(&speed[row]) {
+                continue;
+            }
             point.speed.push(speed[row]);
             point.growth.push(growth[row]);
             for (kept, column) in point.columns.iter_mut().zip(&further) {

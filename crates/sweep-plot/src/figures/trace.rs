@@ -14,6 +14,7 @@ use crate::label::{self, Label};
 use crate::read::Kind;
 use crate::scene::INK;
 use crate::table::Table;
+use crate::together::{self, At};
 
 /// Channels that a picture shows by default: one for each way in which the tub can move.
 const USUAL: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
@@ -116,8 +117,9 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let mut marks = Vec::new();
     let mut shades = Vec::new();
     let unstable = unstable_speeds(table, options)?;
+    let (resonances, note) = resonances(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
-        for (x, resonance) in passages(&time, speed, &resonances(options)?) {
+        for (x, resonance) in passages(&time, speed, &resonances) {
             marks.push(Mark::of_speed(x, resonance));
         }
         shades = stability::stretches_within(&time, speed, &unstable);
@@ -139,7 +141,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             // What one of them is would be wrong of the other.
             Some(_) => of_both(&least, apart),
             None => subtitle(table, &least, apart),
-        },
+        } + &note,
         x_label: Label::new("Time", "s"),
         x_log: false,
         grids: match &other {
@@ -332,13 +334,25 @@ pub(super) fn unstable_speeds(
     Ok(options.stability.as_ref().map(unstable).transpose()?.map_or_else(Vec::new, |it| it.speeds))
 }
 
-/// The resonance speeds that the options name, rpm.
-pub(super) fn resonances(options: &PlotOptions) -> Result<Vec<f64>, PlotError> {
+/// The resonance speeds that the options name, rpm, and for the subtitle where the machine whose
+/// modes they are is another one. Resonances hardly move with unbalance and damping, so the modes
+/// of a machine serve all its points.
+pub(super) fn resonances(
+    table: &Table,
+    options: &PlotOptions,
+) -> Result<(Vec<f64>, String), PlotError> {
     let mut speeds = options.resonances_rpm.clone();
+    let mut note = String::new();
     if let Some(path) = &options.modes {
-        speeds.extend(campbell::resonances(&Table::open(path)?)?);
+        let modes = Table::open(path)?;
+        speeds.extend(campbell::resonances(&modes)?);
+        let files = [(&table.source, &together::at(&table.source)), (&modes.source, &At::new())];
+        let parted = together::parted(files, together::MACHINE);
+        if !parted.is_empty() {
+            note = format!(" · resonances of another machine: {}", together::some(&parted, 1));
+        }
     }
-    Ok(speeds)
+    Ok((speeds, note))
 }
 
 /// Instants at which the speed passes each resonance, upwards or downwards, in order of time.

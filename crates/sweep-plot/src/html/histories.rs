@@ -11,6 +11,7 @@ use crate::gather::Map;
 use crate::label;
 use crate::read::{Kind, Source};
 use crate::table::Table;
+use crate::together::{self, At};
 use sweep_files::{FileError, regular};
 
 /// Stretches of time that a history is cut into; of each, the least and the greatest value are
@@ -55,34 +56,50 @@ pub(crate) fn read(folder: &Path, map: &Map) -> Result<Value, PlotError> {
         if source.kind != Kind::Trace {
             return Err(unfit("not a trace file"));
         }
-        let cell = cell(&source, map).ok_or_else(|| {
+        let at = together::at(&source);
+        let cell = cell(&source, &at, map).ok_or_else(|| {
             unfit(
                 "it belongs to no point of this map: neither its metadata (`at`) nor its name \
                    (point-<index>) says one",
             )
         })?;
+        let point = point(&at, cell, map);
+        // Where a cell holds several points, which of them a number means is not known.
+        let own = if at.is_empty() && map.grid.merged() { &point } else { &at };
+        let files = [(&map.table.source, &point), (&source, own)];
+        together::agree("--traces", &file, files, together::RUN)?;
         histories.insert(cell.to_string(), history(&Table::read_thinned(source, STRETCHES)?)?);
     }
     Ok(Value::Object(histories))
 }
 
 /// The cell of a trace's point in the map's grid.
-fn cell(trace: &Source, map: &Map) -> Option<usize> {
-    if let Some(at) = trace.find("at").and_then(Value::as_object) {
-        let places: Option<Vec<usize>> = map
-            .grid
-            .axes
-            .iter()
-            .map(|axis| axis.place_near(at.get(&axis.name)?.as_f64()?))
-            .collect();
-        if let Some(places) = places {
-            return Some(map.grid.index(&places)).filter(|&cell| map.filled(cell));
-        }
+fn cell(trace: &Source, at: &At, map: &Map) -> Option<usize> {
+    // What says its point is of no other, whatever it is called.
+    if !at.is_empty() {
+        let value =
+            |name: &str| at.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
+        let places = map.grid.axes.iter().map(|axis| axis.place_near(value(&axis.name)?));
+        let places: Vec<usize> = places.collect::<Option<_>>()?;
+        return Some(map.grid.index(&places)).filter(|&cell| map.filled(cell));
     }
     let stem = trace.path.file_stem()?.to_str()?;
     let digits = stem.rsplit(|letter: char| !letter.is_ascii_digit()).next()?;
     let wanted: u32 = digits.parse().ok()?;
     map.table.numbers("point").ok()?.iter().position(|point| *point == f64::from(wanted))
+}
+
+/// The values of the map's axes at a trace's point.
+fn point(at: &At, cell: usize, map: &Map) -> At {
+    let mut rest = cell;
+    let mut point = At::new();
+    for axis in map.grid.axes.iter().rev() {
+        let named = at.iter().find(|(name, _)| *name == axis.name);
+        let value = named.map_or(axis.values[rest % axis.values.len()], |(_, value)| *value);
+        point.push((axis.name.clone(), value));
+        rest /= axis.values.len();
+    }
+    point
 }
 
 fn history(table: &Table) -> Result<Value, PlotError> {

@@ -77,16 +77,26 @@ impl SharedRow {
         Some(self.gap_m[1]? - self.gap_m[0]?)
     }
 
-    /// By how much the ratio changed either way, as a factor less 1; 0 where there is none.
+    /// By how much the ratio changed either way, as a factor less 1; infinite where one file alone
+    /// has a ratio.
     #[must_use]
     pub fn ratio_by(&self) -> f64 {
-        self.ratio_change().map_or(0.0, |change| change.max(1.0 / change) - 1.0)
+        by(self.ratio, |first, second| (second / first).max(first / second) - 1.0)
     }
 
-    /// By how much the gap changed either way, m; 0 where there is none.
+    /// By how much the gap changed either way, m; infinite where one file alone has a gap.
     #[must_use]
     pub fn gap_by_m(&self) -> f64 {
-        self.gap_change_m().map_or(0.0, f64::abs)
+        by(self.gap_m, |first, second| (second - first).abs())
+    }
+}
+
+/// How far two values are apart. A value that came or went is farther than any measure.
+fn by([first, second]: [Option<f64>; 2], apart: fn(f64, f64) -> f64) -> f64 {
+    match (first, second) {
+        _ if first == second => 0.0,
+        (Some(first), Some(second)) => apart(first, second),
+        _ => f64::INFINITY,
     }
 }
 
@@ -126,6 +136,10 @@ pub struct Comparison {
     pub columns: Vec<ColumnChange>,
     /// Whether the files have verdicts.
     pub has_verdicts: bool,
+    /// Whether the files have ratios.
+    pub has_ratios: bool,
+    /// Whether the files have least gaps of the nonlinear model.
+    pub has_gaps: bool,
     /// How the boundary moved, if there is one.
     pub boundary: Option<Moved>,
 }
@@ -244,10 +258,13 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     } else {
         boundary::of_maps(first, &keys, &shared)
     };
+    let both_have = |name: &str| tables.iter().all(|table| table.column(name).is_some());
     Ok(Comparison {
         plan: plans::changes(first.file(), second.file()),
         alone: [0, 1].map(|place| (sides[place].rows - pairs.len()) as u64),
-        has_verdicts: tables.iter().all(|table| table.column("reliable").is_some()),
+        has_verdicts: both_have("reliable"),
+        has_ratios: both_have("ratio_max"),
+        has_gaps: both_have("min_gap_nonlinear_m"),
         keys,
         key_units,
         fixed,

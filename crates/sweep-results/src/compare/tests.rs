@@ -42,14 +42,30 @@ fn planted_flips_are_found_and_sensitive_rows_stand_apart() {
         |sensitive| found.flips(sensitive).map(|row| (row.rows[0], row.flip)).collect::<Vec<_>>();
     assert_eq!(flips(false), [(1, Flip::Lost), (2, Flip::Gained), (3, Flip::Defined)]);
     assert_eq!(flips(true), [(4, Flip::Gained)]);
-    let greatest = found.greatest(2, false, SharedRow::ratio_by);
-    assert_eq!(greatest.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [2, 1]);
-    assert!((greatest[0].ratio_by() - 1.0).abs() < 1e-12, "2.5 to 1.25 is a factor of two");
-    let gap = found.greatest(1, false, SharedRow::gap_by_m)[0];
+    let greatest = found.greatest(3, false, SharedRow::ratio_by);
+    assert_eq!(greatest.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [3, 2, 1]);
+    assert!((greatest[1].ratio_by() - 1.0).abs() < 1e-12, "2.5 to 1.25 is a factor of two");
+    let gap = found.greatest(2, false, SharedRow::gap_by_m)[1];
     assert!((gap.gap_by_m() - 1.25e-3).abs() < 1e-12, "{gap:?}");
     assert!(found.shared.iter().filter(|row| row.differs).count() == 4);
     assert!(found.columns.iter().any(|column| column.name == "ratio_max" && column.rows == 4));
     assert!(!found.is_empty());
+}
+
+#[test]
+fn numbers_that_came_or_went_changed_by_more_than_any_measure() {
+    let mut ratios = RATIOS;
+    ratios[0] = None;
+    ratios[3] = Some(1.0); // failed before
+    let found = compare(&map(&RATIOS), &map(&ratios)).unwrap();
+    for by in [SharedRow::ratio_by, SharedRow::gap_by_m] {
+        let rows = found.greatest(5, false, by);
+        assert_eq!(rows.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [0, 3]);
+        assert!(rows.iter().all(|row| by(row) == f64::INFINITY));
+    }
+    assert!(found.has_ratios && found.has_gaps);
+    let boundaries = compare(&boundary(&[Some(1.0)]), &boundary(&[Some(1.0)])).unwrap();
+    assert!(!boundaries.has_ratios && !boundaries.has_gaps);
 }
 
 #[test]

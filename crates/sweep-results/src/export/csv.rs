@@ -10,15 +10,15 @@ use crate::rows::{Cell, ResultTable};
 
 pub(super) fn bytes(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
     let version = table.file().value(key::VERSION).unwrap_or("of another version");
-    let mut text = format!("{EXPORTED_CSV}{}\n", one_line(version));
+    let mut text = format!("{EXPORTED_CSV}{}\n", no_cells(version));
     // Writing to a String cannot fail.
     for column in &table.columns {
         let unit = if column.unit.is_empty() { "-" } else { &column.unit };
-        let (unit, description) = (one_line(unit), one_line(&column.description));
-        let _ = writeln!(text, "# {} [{unit}]: {description}", one_line(&column.name));
+        let (unit, description) = (no_cells(unit), no_cells(&column.description));
+        let _ = writeln!(text, "# {} [{unit}]: {description}", no_cells(&column.name));
     }
     if let Some(plan) = table.file().value(key::PLAN) {
-        let _ = writeln!(text, "# plan: {}", one_line(plan));
+        let _ = writeln!(text, "# plan: {}", no_cells(plan));
     }
     let names = names(table);
     let headings: Vec<String> = names.iter().map(|name| quoted(name)).collect();
@@ -54,15 +54,30 @@ fn shortest(number: f64) -> String {
     if plain.len() <= exponent.len() { plain } else { exponent }
 }
 
-fn one_line(text: &str) -> String {
-    text.replace(['\n', '\r'], " ")
+/// A text on one line, of which a sheet makes no formula: it takes commas, semicolons and tabs of a
+/// comment for the borders of cells, and a cell that begins with a sign for a formula. Such a sign
+/// moves behind an apostrophe. A JSON number keeps its sign: it is in no text.
+fn no_cells(text: &str) -> String {
+    let mut line = String::with_capacity(text.len());
+    let mut begins = false;
+    let mut chars = text.chars().peekable();
+    while let Some(c) = chars.next() {
+        let c = if c.is_control() && c != '\t' { ' ' } else { c };
+        let is_number = c == '-' && chars.peek().is_some_and(char::is_ascii_digit);
+        if begins && "=+-@".contains(c) && !is_number {
+            line.push('\'');
+        }
+        line.push(c);
+        begins = ",;\t\"".contains(c) || (begins && c == ' ');
+    }
+    line
 }
 
 /// A text as a cell: in quotes where it would be taken for more than one.
 fn quoted(text: &str) -> String {
     // A sheet takes what begins like this for a formula.
-    let formula = text.starts_with(['=', '+', '-', '@']);
-    if formula || text.contains(['"', ',', '\n', '\r', '#']) {
+    let formula = text.trim_start().starts_with(['=', '+', '-', '@']);
+    if formula || text.contains(['"', ',', ';', '\t', '\n', '\r', '#']) {
         let mark = if formula { "'" } else { "" };
         format!("\"{mark}{}\"", text.replace('"', "\"\""))
     } else {
@@ -86,6 +101,24 @@ mod tests {
         assert_eq!(lines[head + 1], "0,0.1,60,1,1,1,1,true,false,0.009000000000000001,ok");
         assert_eq!(lines[head + 4], "3,0.2,60,,1,,,,false,,diverged");
         assert_eq!(lines.len(), head + 7);
+    }
+
+    #[test]
+    fn no_cell_of_a_comment_begins_as_a_formula() {
+        assert_eq!(
+            no_cells(r#"{"name":"x","values":[1.0,-2.0]}"#),
+            r#"{"name":"x","values":[1.0,-2.0]}"#
+        );
+        for (text, mended) in [
+            (r#"{"name":"=1+1"}"#, r#"{"name":"'=1+1"}"#),
+            ("a,=1+1", "a,'=1+1"),
+            ("a; \t@SUM(A1)", "a; \t'@SUM(A1)"),
+            ("a,+1", "a,'+1"),
+            ("a,-x()", "a,'-x()"),
+            ("a\n=1\r,=2", "a =1 ,'=2"),
+        ] {
+            assert_eq!(no_cells(text), mended);
+        }
     }
 
     #[test]

@@ -1,0 +1,209 @@
+//! What is drawn together: files whose plans agree in what the picture speaks of.
+//!
+//! A picture of two plans would be read as one of a single machine. Where plans part in something
+//! else, such as a name or the rungs of an integrator, that is no matter. A file without a plan (of
+//! another program, or through one) is taken as it is.
+
+use std::path::Path;
+
+use serde_json::Value;
+use sweep_files::key;
+
+use crate::error::PlotError;
+use crate::read::Source;
+
+/// What histories, and gaps over them, follow from.
+pub(crate) const RUN: &[&str] = &["machine", "spin", "time.end_s"];
+/// What ratios follow from.
+pub(crate) const RATIOS: &[&str] =
+    &["machine", "spin", "time", "reliability.channels", "reliability.criterion"];
+/// What modes, and responses at constant speeds, follow from.
+pub(crate) const MACHINE: &[&str] = &["machine"];
+
+/// Parameters with their values.
+pub(crate) type At = Vec<(String, f64)>;
+
+/// The point that a trace says it is of.
+pub(crate) fn at(source: &Source) -> At {
+    let at = source.find("at").and_then(Value::as_object).into_iter().flatten();
+    at.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
+}
+
+/// Where the plans of two files part, each at a point, in words.
+pub(crate) fn parted(files: [(&Source, &At); 2], parts: &[&str]) -> Vec<String> {
+    let plans = files.map(|(source, _)| {
+        source.provenance.iter().find(|(name, _)| name == key::PLAN).map(|(_, plan)| plan)
+    });
+    let [Some(first), Some(second)] = plans else { return Vec::new() };
+    let mut found = Vec::new();
+    for part in parts {
+        let mut path: Vec<String> = part.split('.').map(str::to_owned).collect();
+        let within = |plan: &'_ Value| -> Option<Value> {
+            let section = plan.get(&path[0])?;
+            Some(
+                path.get(1).map_or(section, |key| section.get(key).unwrap_or(&Value::Null)).clone(),
+            )
+        };
+        if let (Some(first), Some(second)) = (within(first), within(second)) {
+            descend([(&first, files[0].1), (&second, files[1].1)], &mut path, &mut found);
+        }
+    }
+    found
+}
+
+/// Refuses two files whose plans part.
+///
+/// # Errors
+/// [`PlotError::Unfit`], which names the places.
+pub(crate) fn agree(
+    option: &str,
+    path: &Path,
+    files: [(&Source, &At); 2],
+    parts: &[&str],
+) -> Result<(), PlotError> {
+    let found = parted(files, parts);
+    if found.is_empty() {
+        return Ok(());
+    }
+    Err(PlotError::Unfit(format!(
+        "`{option}`: {} is of another plan than {}: {}",
+        path.display(),
+        files[0].0.path.display(),
+        some(&found, 3)
+    )))
+}
+
+/// The first of some places, and how many more there are.
+pub(crate) fn some(places: &[String], most: usize) -> String {
+    let more = places.len().saturating_sub(most);
+    let first = places[..places.len() - more].join(", ");
+    if more > 0 { format!("{first} and {more} more") } else { first }
+}
+
+fn descend(sides: [(&Value, &At); 2], path: &mut Vec<String>, found: &mut Vec<String>) {
+    let [(first, _), (second, _)] = sides;
+    let mut step = |name: String, first: &Value, second: &Value| {
+        path.push(name);
+        descend([(first, sides[0].1), (second, sides[1].1)], path, found);
+        path.pop();
+    };
+    match (first, second) {
+        (Value::Object(first), Value::Object(second)) => {
+            let further = second.keys().filter(|name| !first.contains_key(*name));
+            for name in first.keys().chain(further) {
+                let [first, second] = [first, second].map(|side| side.get(name));
+                step(name.clone(), first.unwrap_or(&Value::Null), second.unwrap_or(&Value::Null));
+            }
+        }
+        (Value::Array(first), Value::Array(second)) if first.len() == second.len() => {
+            for (k, (first, second)) in first.iter().zip(second).enumerate() {
+                step((k + 1).to_string(), first, second);
+            }
+        }
+        _ => {
+            let values = sides.map(|(value, at)| moved(value, at, path));
+            if values[0] != values[1] && !is_of_point(&values, sides, path) {
+                let [first, second] = values.map(|value| match value {
+                    Value::Null => "none".to_owned(),
+                    value => value.to_string(),
+                });
+                // Springs, dampers and the like part one as another.
+                let place: Vec<&str> =
+                    path.iter().map(String::as_str).filter(|it| !is_number(it)).collect();
+                let said = format!("{} {first} and {second}", place.join("."));
+                if !found.contains(&said) {
+                    found.push(said);
+                }
+            }
+        }
+    }
+}
+
+fn is_number(name: &str) -> bool {
+    name.parse::<usize>().is_ok()
+}
+
+/// A value of the plan, or what its point says in its place.
+fn moved(value: &Value, at: &At, path: &[String]) -> Value {
+    let named = at.iter().find(|(name, _)| names(name, path));
+    named.map_or_else(|| value.clone(), |(_, value)| (*value).into())
+}
+
+/// Whether a parameter is the value at this place: `tub_mass_kg` is `machine.tub.mass_kg`,
+/// `damping_n_s_per_m` that of every damper, `damper_2_damping_n_s_per_m` that of one.
+fn names(parameter: &str, path: &[String]) -> bool {
+    let own = if path[0] == "machine" { &path[1..] } else { path };
+    let (Some(last), Some(list)) = (own.last(), own.first()) else { return false };
+    let one = list.strip_suffix('s').unwrap_or(list);
+    let place = own.get(1).filter(|place| is_number(place));
+    parameter == last
+        || parameter == format!("{one}_{last}")
+        || place.is_some_and(|place| parameter == format!("{one}_{place}_{last}"))
+}
+
+/// Whether a value is that of a parameter of the point whose place in the plan has another name.
+fn is_of_point(values: &[Value; 2], sides: [(&Value, &At); 2], path: &[String]) -> bool {
+    sides.iter().flat_map(|(_, at)| at.iter()).any(|(name, value)| {
+        let mut tokens = name.split('_').filter(|token| token.len() > 1);
+        let words = path.join("_");
+        !names(name, path)
+            && values.iter().any(|known| known.as_f64() == Some(*value))
+            && tokens.next().is_some_and(|first| words.contains(first))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn parts_of(first: (&Value, &At), second: (&Value, &At)) -> Vec<String> {
+        let mut found = Vec::new();
+        descend([first, second], &mut vec!["machine".to_owned()], &mut found);
+        found
+    }
+
+    fn machine(damping: f64, mass: f64, inertia: f64) -> Value {
+        json!({
+            "tub": { "mass_kg": mass, "inertia_kg_m2": [1.0, inertia, 1.5] },
+            "dampers": [{ "damping_n_s_per_m": damping }, { "damping_n_s_per_m": damping }],
+        })
+    }
+
+    #[test]
+    fn plans_are_compared_at_their_points() {
+        let at = |list: &[(&str, f64)]| -> At {
+            list.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect()
+        };
+        let (base, none) = (machine(140.0, 24.0, 1.6), at(&[]));
+        assert!(parts_of((&base, &none), (&base, &none)).is_empty());
+        let light = machine(140.0, 20.0, 1.6);
+        let said = parts_of((&base, &none), (&light, &none));
+        assert_eq!(said, ["machine.tub.mass_kg 24.0 and 20.0"]);
+        // A point of a map, and its trace with the numbers in place.
+        let point = at(&[("damping_n_s_per_m", 100.0), ("tub_mass_kg", 20.0)]);
+        let run = machine(100.0, 20.0, 1.6);
+        assert!(parts_of((&base, &point), (&run, &none)).is_empty());
+        assert!(parts_of((&base, &point), (&base, &point)).is_empty());
+        assert_eq!(
+            parts_of((&base, &point), (&base, &none)),
+            [
+                "machine.dampers.damping_n_s_per_m 100.0 and 140.0",
+                "machine.tub.mass_kg 20.0 and 24.0"
+            ]
+        );
+        let one = at(&[("damper_2_damping_n_s_per_m", 100.0)]);
+        assert_eq!(parts_of((&base, &one), (&base, &none)).len(), 1);
+        // Its place has another name than the parameter.
+        let inertia = at(&[("tub_inertia_22_kg_m2", 1.7)]);
+        let other = machine(140.0, 24.0, 1.7);
+        assert!(parts_of((&base, &inertia), (&other, &none)).is_empty());
+        assert_eq!(parts_of((&base, &inertia), (&machine(140.0, 24.0, 1.8), &none)).len(), 1);
+        // What one plan has and the other has not.
+        let bare = json!({ "tub": {} });
+        let said = parts_of((&base, &none), (&bare, &none));
+        assert_eq!(said.len(), 3, "{said:?}");
+        assert!(said[1].starts_with("machine.tub.inertia_kg_m2 [1.0") && said[1].ends_with("none"));
+    }
+}
