@@ -45,9 +45,9 @@ fn try_out(plan: &Plan) {
     let scenarios: Vec<_> = (0..plan.corners().min(4))
         .map(|corner| {
             let scenario = plan.scenario_at(&plan.corner(corner));
-            assert_eq!(scenario.machine.violations(), []);
-            assert_eq!(scenario.spin.violations(), []);
-            (scenario.machine, scenario.spin)
+            assert_eq!(scenario.model.machine.violations(), []);
+            assert_eq!(scenario.model.spin.violations(), []);
+            (scenario.model.machine, scenario.model.spin)
         })
         .collect();
     let end_s = END_S.min(plan.end_s);

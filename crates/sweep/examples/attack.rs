@@ -243,19 +243,21 @@ fn difference(plan: &Plan, a: &Outcome, b: &Outcome) -> f64 {
 fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
     let models = [("nonlinear", &a.nonlinear, &b.nonlinear), ("linear", &a.linear, &b.linear)];
     let [from_s, to_s] = plan.window_s;
-    let machine = &plan.machine;
+    let machine = &plan.model.machine;
     let moving_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;
     let weight_n = moving_kg * machine.gravity_m_per_s2;
     let metrics = models.iter().flat_map(|(model, a, b)| {
-        plan.measures.of_model().zip(a.metrics.iter().zip(&b.metrics)).map(|(number, (a, b))| {
-            let least = match number.metric {
-                Metric::ClashTime | Metric::StopContact => CLASH_FLOOR * (to_s - from_s),
-                Metric::StopForce => PUSH_FLOOR * weight_n,
-                Metric::FootLoad | Metric::SlipMargin => weight_n,
-                Metric::CabinetForce | Metric::StaticSag | Metric::Growth => 0.0,
-            };
-            (number.column(model), relative_from(least, *a, *b))
-        })
+        plan.model.measures.of_model().zip(a.metrics.iter().zip(&b.metrics)).map(
+            |(number, (a, b))| {
+                let least = match number.metric {
+                    Metric::ClashTime | Metric::StopContact => CLASH_FLOOR * (to_s - from_s),
+                    Metric::StopForce => PUSH_FLOOR * weight_n,
+                    Metric::FootLoad | Metric::SlipMargin => weight_n,
+                    Metric::CabinetForce | Metric::StaticSag | Metric::Growth => 0.0,
+                };
+                (number.column(model), relative_from(least, *a, *b))
+            },
+        )
     });
     metrics.collect()
 }
@@ -281,7 +283,7 @@ fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
     let mut rng = Rng(!seed);
     let rows = evaluated(plan, Integrator::Rk4MassScaled { accuracy: 1e-3 });
     let gap_m = rng.one(&rows).nonlinear.min_gap_m?;
-    let reach_m = plan.machine.radial_clearance_m - gap_m;
+    let reach_m = plan.model.machine.radial_clearance_m - gap_m;
     let overlap = 10f64.powf(rng.between(-6.0, -1.5));
     Some(format!("radial_clearance_m={}", reach_m * (1.0 - overlap)))
 }

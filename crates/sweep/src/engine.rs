@@ -3,12 +3,11 @@
 mod growth;
 mod ladder;
 mod pool;
-mod watch;
 
 pub(crate) use growth::responses;
 pub(crate) use ladder::reference_step_s;
 pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
-pub(crate) use watch::{Engine, Watch};
+pub(crate) use sweep_engine::{Engine, Watch};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -19,9 +18,11 @@ use pool::{Feed, Keep, Pool, Shared};
 use washer_model::{Cases, Machine, Method, Point, Spin, Timing, prepare};
 use washer_row::{Demand, Ladder, Level, MODELS, Outcome, Rule, RungRun, Status, runs};
 
-use crate::interrupt::Interrupt;
-use crate::method::Steps;
+use crate::columns::Columns;
 use crate::plan::{Plan, Scenario};
+use sweep_engine::interrupt::Interrupt;
+use sweep_engine::method::{Integrator as _, Steps};
+use sweep_engine::store::Done;
 
 /// Parts of a run at whose ends two runs of a trajectory are compared.
 pub(crate) const CHECKPOINTS: u32 = 128;
@@ -32,6 +33,12 @@ pub enum EngineError {
     /// `SWEEP_SIMD` names nothing this machine has.
     #[error("SWEEP_SIMD={0}: expected one that this machine has: {1}")]
     Simd(String, String),
+}
+
+impl From<EngineError> for sweep_engine::Error {
+    fn from(error: EngineError) -> Self {
+        Self::model(error)
+    }
 }
 
 /// What a row by capped modes came from.
@@ -158,8 +165,8 @@ impl<'a> ModelEngine<'a> {
             self.plan.some_corners().iter().map(|at| self.plan.scenario_at(at)).collect();
         let prepared = self.prepare(&scenarios);
         let ready = prepared.iter().zip(&scenarios);
-        let ready =
-            ready.filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.spin)));
+        let ready = ready
+            .filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.model.spin)));
         let cases = Cases::until(ready, self.plan.end_s, is_stopped);
         MODELS.map(|model| ladder(&cases, model, self.rule.accuracy))
     }
@@ -211,14 +218,16 @@ impl<'a> ModelEngine<'a> {
     pub(crate) fn evaluate_rows(
         &self,
         next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
-        keep: &(dyn Fn(Outcome) + Sync),
+        keep: &(dyn Fn(Done) + Sync),
         watch: &Watch<'_>,
     ) {
+        let columns = Columns::of_run(self.plan);
+        let keep = |outcome: Outcome| keep(columns.done(outcome));
         let feed = |most: usize| {
             let rows = std::iter::from_fn(next).take(most);
             rows.map(|(row, values)| (row, self.plan.scenario_at(&values))).collect()
         };
-        self.through_lanes(Demand::Row, &feed, keep, watch);
+        self.through_lanes(Demand::Row, &feed, &keep, watch);
     }
 
     /// Rows from a feed to a keeper, on all threads of the rayon pool this is called in.
@@ -241,7 +250,7 @@ impl<'a> ModelEngine<'a> {
         for alike in scenarios.chunk_by(|a, b| a.window_s == b.window_s) {
             let machines: Vec<_> = alike
                 .iter()
-                .map(|scenario| (scenario.machine.clone(), scenario.spin.clone()))
+                .map(|Scenario { model, .. }| (model.machine.clone(), model.spin.clone()))
                 .collect();
             let timing = Timing { window_s: alike[0].window_s, ..self.timing };
             let together = |machines: &[(Machine, Spin)]| {
@@ -285,7 +294,7 @@ pub(crate) fn rule(plan: &Plan) -> Rule {
         accuracy,
         ratio_limit: plan.reliability.ratio_limit,
         channels: plan.reliability.channels.clone(),
-        measures: plan.measures.clone(),
+        measures: plan.model.measures.clone(),
     }
 }
 
@@ -308,7 +317,7 @@ impl Engine for ModelEngine<'_> {
     fn evaluate(
         &self,
         feed: &(dyn Fn() -> Option<u64> + Sync),
-        keep: &Keep<'_>,
+        keep: &(dyn Fn(Done) + Sync),
         watch: &Watch<'_>,
     ) {
         let next = || feed().map(|point| (point, self.plan.axis_values(point)));

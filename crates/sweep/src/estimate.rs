@@ -4,12 +4,15 @@
 use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
+use washer_model::ModelKind;
 use washer_row::{Deviations, Ladder, Outcome};
 
 use crate::engine::{Engine, EngineError, MOST_WAITING, ModelEngine, ROWS_A_THREAD};
-use crate::method::Steps;
-use crate::plan::{Plan, shortest_step_s};
-use crate::store::{Job, Shape, chunk_points};
+use crate::plan::Plan;
+use sweep_engine::estimate::Estimate;
+use sweep_engine::method::{Integrator as _, Steps};
+use sweep_engine::plan::shortest_step_s;
+use sweep_engine::store::{Job, Shape, chunk_points};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long.
 const LONG_ENOUGH: Duration = Duration::from_millis(60);
@@ -41,73 +44,46 @@ const CELL_BYTES: f64 = 5.0;
 /// in results of one point with 35 and 40 columns.
 const RESULT_COLUMN_BYTES: f64 = 800.0;
 
-/// What a run will take. Every number is an estimate.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Estimate {
-    /// Instruction set.
-    pub simd: String,
-    /// Worker threads.
-    pub threads: usize,
-    /// Time from start to end, if the threads have a core each to themselves.
-    pub wall_s: f64,
-    /// Time of one core for one point.
-    pub core_s_per_point: f64,
-    /// Points that were integrated for it.
-    pub sampled_points: u64,
-    /// How far, of the plan's `end_s`.
-    pub sampled_s: f64,
-    /// Memory at its peak.
-    pub memory_bytes: f64,
-    /// Disk for the run's folder.
-    pub disk_bytes: f64,
-    /// Disk for the result, at most.
-    pub result_bytes: f64,
-    /// The nonlinear model's rungs.
-    pub(crate) ladder: Ladder,
-}
-
-impl Estimate {
-    /// Integrates some points of the plan, for about half a second, and reckons from there for so
-    /// many threads.
-    ///
-    /// # Errors
-    /// What keeps a run from having an engine.
-    pub(crate) fn of(plan: &Plan, threads: usize) -> Result<Self, EngineError> {
-        let engine = ModelEngine::new(plan)?;
-        let ladders = engine.ladders();
-        let began = Instant::now();
-        let first = Measured::take(plan, ladders, PLACES[0])?;
-        let mut samples = match Measured::spread(plan, ladders, &first)? {
-            Some(spread) => vec![spread],
-            None => vec![first],
-        };
-        for place in &PLACES[1..] {
-            if samples[0].integrated_s < plan.end_s && began.elapsed() < BUDGET {
-                samples.push(Measured::take(plan, ladders, *place)?);
-            }
+/// Integrates some points of the plan, for about half a second, and reckons from there for so
+/// many threads.
+///
+/// # Errors
+/// What keeps a run from having an engine.
+pub(crate) fn of(plan: &Plan, threads: usize) -> Result<Estimate, EngineError> {
+    let engine = ModelEngine::new(plan)?;
+    let ladders = engine.ladders();
+    let began = Instant::now();
+    let first = Measured::take(plan, ladders, PLACES[0])?;
+    let mut samples = match Measured::spread(plan, ladders, &first)? {
+        Some(spread) => vec![spread],
+        None => vec![first],
+    };
+    for place in &PLACES[1..] {
+        if samples[0].integrated_s < plan.end_s && began.elapsed() < BUDGET {
+            samples.push(Measured::take(plan, ladders, *place)?);
         }
-        let core_s_per_point = samples.iter().map(|sample| sample.core_s_per_point).sum::<f64>()
-            / samples.len() as f64;
-        let chunk = chunk_points(plan.points());
-        let layout = &Job::of(plan).layout;
-        let disk_bytes = plan.points() as f64 * Shape::of(layout).bytes_a_point() as f64;
-        let columns = layout.schema().fields().len() as f64;
-        // A chunk is one thread's work, so the last round of chunks may leave threads without any.
-        let rounds = plan.points().div_ceil(chunk).div_ceil(threads as u64);
-        let points_a_thread = (rounds * chunk).min(plan.points());
-        Ok(Self {
-            simd: engine.simd().to_owned(),
-            threads,
-            wall_s: points_a_thread as f64 * core_s_per_point,
-            core_s_per_point,
-            sampled_points: samples.iter().map(|sample| sample.points).sum(),
-            sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
-            memory_bytes: memory_bytes(plan, threads),
-            disk_bytes,
-            result_bytes: disk_bytes + columns * RESULT_COLUMN_BYTES,
-            ladder: ladders[0].clone(),
-        })
     }
+    let core_s_per_point =
+        samples.iter().map(|sample| sample.core_s_per_point).sum::<f64>() / samples.len() as f64;
+    let chunk = chunk_points(plan.points());
+    let layout = &Job::of(plan).layout;
+    let disk_bytes = plan.points() as f64 * Shape::of(layout).bytes_a_row() as f64;
+    let columns = layout.schema().fields().len() as f64;
+    // A chunk is one thread's work, so the last round of chunks may leave threads without any.
+    let rounds = plan.points().div_ceil(chunk).div_ceil(threads as u64);
+    let points_a_thread = (rounds * chunk).min(plan.points());
+    Ok(Estimate {
+        simd: engine.simd().to_owned(),
+        threads,
+        wall_s: points_a_thread as f64 * core_s_per_point,
+        core_s_per_point,
+        sampled_points: samples.iter().map(|sample| sample.points).sum(),
+        sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
+        memory_bytes: memory_bytes(plan, threads),
+        disk_bytes,
+        result_bytes: disk_bytes + columns * RESULT_COLUMN_BYTES,
+        method: method(plan, &ladders[0]),
+    })
 }
 
 /// The cost measured at one place of the grid.
@@ -215,7 +191,7 @@ fn memory_bytes(plan: &Plan, threads: usize) -> f64 {
     let outcome = size_of::<Outcome>() as f64 + 2.0 * 8.0 * channels;
     let in_hand = (2 * threads + 1) as f64 * chunk_points(plan.points()) as f64 * outcome;
     let columns = Job::of(plan).layout.schema().fields().len() as f64;
-    let row_group = crate::store::schema::ROW_GROUP_ROWS as f64;
+    let row_group = sweep_engine::store::schema::ROW_GROUP_ROWS as f64;
     let joining = row_group.min(plan.points() as f64) * columns * (8.0 + CELL_BYTES);
     BASE_BYTES + in_hand.max(joining) + turn_bytes(plan, threads)
 }
@@ -223,39 +199,43 @@ fn memory_bytes(plan: &Plan, threads: usize) -> f64 {
 /// Peaks by turn of the drum, both models', of the points that go through each thread's lanes
 /// together.
 fn turn_bytes(plan: &Plan, threads: usize) -> f64 {
-    if !plan.measures.wanted().turns {
+    if !plan.model.measures.wanted().turns {
         return 0.0;
     }
-    let turns = plan.spin.turns_within(plan.window_s);
+    let turns = plan.model.spin.turns_within(plan.window_s);
     (MOST_WAITING + threads * ROWS_A_THREAD) as f64 * 2.0 * turns * size_of::<Deviations>() as f64
 }
 
-/// A size with three digits.
-#[must_use]
-pub(crate) fn size(bytes: f64) -> String {
-    const UNITS: [&str; 5] = ["bytes", "kB", "MB", "GB", "TB"];
-    let mut scaled = bytes;
-    let mut unit = 0;
-    while scaled >= 999.5 && unit + 1 < UNITS.len() {
-        scaled /= 1e3;
-        unit += 1;
-    }
-    let digits = if unit == 0 || scaled >= 99.95 { 0 } else { 1 };
-    format!("{scaled:.digits$} {}", UNITS[unit])
+/// How the method goes about it, in words.
+fn method(plan: &Plan, ladder: &Ladder) -> String {
+    let steps = match plan.integrator.steps() {
+        Steps::Fixed(step_s) => {
+            // Both window edges and the end are hit exactly, so each stretch rounds up.
+            let edges = [0.0, plan.window_s[0], plan.window_s[1], plan.end_s];
+            let steps: f64 =
+                edges.windows(2).map(|edge| ((edge[1] - edge[0]) / step_s).ceil()).sum();
+            format!(": about {steps} steps per trajectory, two trajectories per point")
+        }
+        Steps::Explicit => ": steps as it needs".to_owned(),
+        Steps::Implicit => ": steps as it needs, one trajectory at a time".to_owned(),
+        Steps::Checked(_) => {
+            let rungs: Vec<String> = ladder
+                .rungs
+                .iter()
+                .skip(1)
+                .map(|rung| rung.describe(ModelKind::Nonlinear))
+                .collect();
+            let why = ladder.held_back.as_ref().map(|why| format!("\n            {why}"));
+            let rungs = rungs.join("\n            then ");
+            format!(", until two rungs agree: {rungs}{}", why.unwrap_or_default())
+        }
+    };
+    format!("{}{steps}", plan.integrator)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn sizes_read_as_people_say_them() {
-        let said = [0.0, 999.0, 1234.0, 56.7e6, 999.96e6, 2e9, 3e15].map(size);
-        assert_eq!(
-            said,
-            ["0 bytes", "999 bytes", "1.2 kB", "56.7 MB", "1.0 GB", "2.0 GB", "3000 TB"]
-        );
-    }
 
     /// A grid of `count` points over `end_s`.
     fn plan(count: u64, end_s: f64) -> Plan {
@@ -277,7 +257,7 @@ mod tests {
         // Whole trajectories, and beginnings of longer ones.
         for (end_s, sampled_whole) in [(0.01, true), (1e5, false)] {
             let plan = plan(16, end_s);
-            let estimate = Estimate::of(&plan, 1).unwrap();
+            let estimate = of(&plan, 1).unwrap();
             assert!(estimate.wall_s.is_finite() && estimate.wall_s > 0.0, "{estimate:?}");
             assert_eq!(estimate.sampled_s >= end_s, sampled_whole, "{estimate:?}");
             assert_eq!(estimate.threads, 1);
@@ -291,13 +271,13 @@ mod tests {
             let plan = plan(16, end_s);
             // The least of some, because others are at work in any case.
             let least = || {
-                let reckoned = (0..3).map(|_| Estimate::of(&plan, 1).unwrap().core_s_per_point);
+                let reckoned = (0..3).map(|_| of(&plan, 1).unwrap().core_s_per_point);
                 reckoned.fold(f64::INFINITY, f64::min)
             };
             let alone_s = least();
             let is_over = std::sync::atomic::AtomicBool::new(false);
             let beside_s = std::thread::scope(|scope| {
-                for _ in 0..8 * crate::threads::cores() {
+                for _ in 0..8 * sweep_engine::threads::cores() {
                     scope.spawn(|| {
                         while !is_over.load(std::sync::atomic::Ordering::Relaxed) {
                             std::hint::spin_loop();
@@ -316,7 +296,7 @@ mod tests {
     #[test]
     fn time_grows_with_points_and_memory_does_not() {
         let (small, large) = (plan(1_000_000, 0.01), plan(1_000_000_000, 0.01));
-        let [small, large] = [&small, &large].map(|plan| Estimate::of(plan, 1).unwrap());
+        let [small, large] = [&small, &large].map(|plan| of(plan, 1).unwrap());
         assert!(large.wall_s > small.wall_s, "{small:?} {large:?}");
         assert!(large.memory_bytes < 1.2 * small.memory_bytes, "{small:?} {large:?}");
         assert!(large.memory_bytes < 200e6, "{large:?}");

@@ -1,5 +1,7 @@
 //! Which build of the program made a file: what decides its bytes besides the plan.
 
+use sweep_engine::Build;
+
 /// Version of the program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -10,9 +12,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// chunks of others are never mixed with theirs. `tests/command/goldens.rs` fails when bytes change
 /// and this number does not; `scripts/release/raise_numerics.sh` raises it and writes the new
 /// hashes.
-pub const NUMERICS_VERSION: u32 = 11;
+pub const NUMERICS_VERSION: u32 = 12;
 
-/// Both, as `sweep show` prints them.
-pub(crate) fn words(version: &str, numerics: u32) -> String {
-    format!("sweep {version}, numerics {numerics}")
-}
+/// Both.
+pub(crate) const BUILD: Build = Build { version: VERSION, numerics: NUMERICS_VERSION };

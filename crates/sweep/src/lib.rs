@@ -37,49 +37,41 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod boundary;
+#[cfg(test)]
+mod boundary_tests;
+mod columns;
 mod commands;
 mod config;
-mod design;
 mod engine;
 mod estimate;
-mod exit;
 mod explain;
 mod identity;
-mod interrupt;
 mod library;
 mod live;
-mod memory;
 mod method;
-mod nearest;
+mod model;
 mod plan;
-mod progress;
-mod random_keys;
-mod run;
 mod speeds;
 mod stability;
-mod store;
-mod table;
-mod threads;
+mod swept;
 mod trace;
 
 pub use commands::Cli;
 pub use config::{Diagnostics, GridInput, Mistake, load};
 pub use engine::ModelEngine;
-pub use exit::{Error, Exit, tell};
 pub use identity::{NUMERICS_VERSION, VERSION};
-pub use interrupt::{Interrupt, survive_file_size_limits};
 pub use library::{
     BoundaryOptions, Effort, Evaluated, Evaluator, Explained, PointTable, RanToFile, ResultKind,
     ResultTable, TraceOptions, explain_point, find_boundary, find_modes, find_stability,
     list_parameters, run_to_file, stability_to_file, trace_point,
 };
-pub use memory::ensure_memory;
 pub use method::Integrator;
+pub use model::Washer;
 pub use plan::Plan;
-pub use progress::ProgressMode;
-pub use run::{Ended, RunOptions, run};
-pub use store::{
+pub use sweep_engine::progress::ProgressMode;
+pub use sweep_engine::run::{Ended, RunOptions, run};
+pub use sweep_engine::store::{
     Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, State, StoreError, status,
 };
+pub use sweep_engine::{Error, Exit, Interrupt, ensure_memory, survive_file_size_limits, tell};
 pub use washer_row::{Metric, Outcome, Status, Trajectory, Verdict};

@@ -13,9 +13,10 @@ use washer_row::{Level, Measured, Metric};
 
 use crate::config::GridInput;
 use crate::engine::{CHECKPOINTS, ModelEngine, rule};
-use crate::exit::Error;
-use crate::method::{ACCURACY, Integrator, Steps};
+use crate::method::Integrator;
 use crate::plan::{Axis, AxisValues, Plan};
+use sweep_engine::exit::Error;
+use sweep_engine::method::{ACCURACY, Integrator as _, Steps};
 
 /// Parameters that a page offers beside the axes, where the machine has them.
 const OFFERED: [&str; 6] = [
@@ -85,7 +86,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     };
     let columns = |number: Measured| ["nonlinear", "linear"].map(|model| number.column(model));
     let further = sliders.iter().map(|(parameter, from, to)| {
-        slider(parameter, *from, *to, parameter.get(&plan.machine, &plan.spin))
+        slider(parameter, *from, *to, parameter.get(&plan.model.machine, &plan.model.spin))
     });
     Ok(Live {
         setup: setup.to_numbers(),
@@ -95,17 +96,14 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         window_s: plan.window_s,
         channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
         criterion: {
-            let criterion = plan.measures.criterion;
+            let criterion = plan.model.measures.criterion;
             // What a column has where there is no ratio is not a page's.
             let ratio = criterion.ratio().split(';').next().unwrap_or_default();
             [criterion.amplitude(), ratio].map(str::to_owned)
         },
-        metrics: plan.measures.of_model().map(columns).collect(),
-        has_static_sag: plan.measures.metrics.contains(&Metric::StaticSag),
-        kinds: match widened(&plan, &sliders).corners_of_forces() {
-            None => Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
-            Some(_) => Vec::new(),
-        },
+        metrics: plan.model.measures.of_model().map(columns).collect(),
+        has_static_sag: plan.model.measures.metrics.contains(&Metric::StaticSag),
+        kinds: Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
         compared: plan.reliability.channels.iter().map(|channel| channel.index()).collect(),
         levels: Level::ALL.map(|level| level.name().to_owned()).to_vec(),
         accuracy: setup.rule.accuracy,
@@ -120,8 +118,8 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
 /// has no modes.
 fn resonances(plan: &Plan) -> Vec<[String; 3]> {
     let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
-    let machines = [(plan.machine.clone(), plan.spin.clone())];
-    let greatest_rpm = plan.spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
+    let machines = [(plan.model.machine.clone(), plan.model.spin.clone())];
+    let greatest_rpm = plan.model.spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
     let count = (greatest_rpm / MODES_EVERY_RPM).ceil() as u32;
     let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODES_EVERY_RPM * f64::from(k)).collect();
     let points = prepare(Simd::Scalar, &machines, &timing);
@@ -165,8 +163,8 @@ fn plan_of(file: &Path) -> Result<Plan, Error> {
 
 /// A page does not have the metric: it takes a response at each of the plan's speeds.
 fn without_growth(mut plan: Plan) -> Plan {
-    plan.measures.metrics.retain(|metric| *metric != Metric::Growth);
-    plan.growth_speeds = None;
+    plan.model.measures.metrics.retain(|metric| *metric != Metric::Growth);
+    plan.model.growth_speeds = None;
     plan
 }
 
@@ -185,8 +183,9 @@ fn usual(plan: &Plan) -> Vec<Range> {
     let is_axis = |name: &str| plan.axes.iter().any(|axis| axis.parameter.name() == name);
     let offered = OFFERED.into_iter().filter(|name| !is_axis(name));
     let range = |name| {
-        let parameter = Parameter::find(name, &plan.machine, &plan.spin).ok()?;
-        let value = parameter.get(&plan.machine, &plan.spin).filter(|value| *value != 0.0)?;
+        let parameter = Parameter::find(name, &plan.model.machine, &plan.model.spin).ok()?;
+        let value =
+            parameter.get(&plan.model.machine, &plan.model.spin).filter(|value| *value != 0.0)?;
         let ends = [(1.0 - SPREAD) * value, (1.0 + SPREAD) * value];
         let [from, to] = if value > 0.0 { ends } else { [ends[1], ends[0]] };
         let range = (parameter, from, to);
@@ -205,14 +204,14 @@ fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Range>, Error> {
     let mut found: Vec<Range> = Vec::new();
     for range in ranges {
         let SliderRange { name, from, to } = range;
-        let parameter = Parameter::find(name, &plan.machine, &plan.spin)
+        let parameter = Parameter::find(name, &plan.model.machine, &plan.model.spin)
             .map_err(|why| refused(range, format!("a name of `sweep parameters`: {why}")))?;
         if plan.axes.iter().any(|axis| axis.parameter == parameter)
             || found.iter().any(|(other, ..)| *other == parameter)
         {
             return Err(refused(range, "a parameter that has no slider yet".to_owned()));
         }
-        let is_spread = parameter.get(&plan.machine, &plan.spin).is_none();
+        let is_spread = parameter.get(&plan.model.machine, &plan.model.spin).is_none();
         if is_spread {
             let expected = "a parameter that has one value in this map".to_owned();
             return Err(refused(range, expected));
@@ -239,7 +238,8 @@ fn is_sound(plan: &Plan, sliders: &[Range]) -> bool {
     let wide = widened(plan, sliders);
     wide.some_corners().iter().all(|corner| {
         let scenario = wide.scenario_at(corner);
-        scenario.machine.violations().is_empty() && scenario.spin.violations().is_empty()
+        scenario.model.machine.violations().is_empty()
+            && scenario.model.spin.violations().is_empty()
     })
 }
 
@@ -267,8 +267,8 @@ fn setup(plan: &Plan, sliders: &[Range]) -> Result<(Setup, [Vec<String>; 2]), Er
     });
     let parameters = wide.axes.iter().map(|axis| axis.parameter.clone()).collect();
     let setup = Setup {
-        machine: plan.machine.clone(),
-        spin: plan.spin.clone(),
+        machine: plan.model.machine.clone(),
+        spin: plan.model.spin.clone(),
         checkpoints: CHECKPOINTS,
         rule: rule(plan),
         sliders: Sliders { parameters, axes: plan.axes.len() },

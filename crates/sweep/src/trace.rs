@@ -11,15 +11,18 @@ use washer_model::{
     Spin, Start, Timing, history_until, prepare,
 };
 
-use crate::config::NamedValues;
 use crate::engine::{ModelEngine, Quick, reference_step_s};
-use crate::exit::Error;
 use crate::method::Integrator;
+use crate::model::Washer;
 use crate::plan::{Plan, Scenario};
-use crate::store::{StoreError, read};
-use crate::table::Table;
-use crate::threads;
-use sweep_files::{self as files, FileKind, ParquetFile, key};
+use sweep_engine::config::NamedValues;
+use sweep_engine::exit::Error;
+use sweep_engine::method::Integrator as _;
+use sweep_engine::store::{StoreError, read};
+use sweep_engine::table::Table;
+use sweep_engine::threads;
+use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
+use washer_row::Level;
 
 /// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as
 /// many.
@@ -154,7 +157,7 @@ pub(crate) fn trace(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Trace, NoEquilibrium> {
     let View { every_s, ref start, extras, quick } = *view;
-    let Scenario { machine, spin, window_s } = scenario;
+    let Scenario { model: Washer { machine, spin, .. }, window_s } = scenario;
     let checkpoints = quick.map_or(0, |quick| quick.checkpoints);
     let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
     let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
@@ -170,7 +173,7 @@ pub(crate) fn trace(
 
     let instants = instants(plan, every_s);
     let time = |k: usize| k as f64 * every_s;
-    let mut table = Table::default();
+    let mut table = Table::new(crate::identity::BUILD);
     table.numbers("time_s", "s", "time since the start", (0..instants).map(|k| Some(time(k))));
     let speeds = spin.speeds_rpm((0..instants).map(time)).map(Some);
     table.numbers("speed_rpm", "rpm", "spin of the shaft", speeds);
@@ -225,6 +228,7 @@ pub(crate) fn keep(
 ) -> Result<(), StoreError> {
     let plan = engine.plan();
     files::ready(folder)?;
+    remove_former(folder)?;
     let levels = read::levels(result)?;
     threads::pool(threads)?.install(|| {
         levels.into_par_iter().enumerate().try_for_each(|(point, level)| {
@@ -238,7 +242,10 @@ pub(crate) fn keep(
                 every_s: plan.end_s / KEPT_INSTANTS,
                 start: Start::default(),
                 extras: Extras::default(),
-                quick: level.and_then(|level| engine.quick(level)),
+                quick: level.and_then(|level| {
+                    let named = |known: &Level| known.name() == level;
+                    engine.quick(Level::ALL.into_iter().find(named)?)
+                }),
             };
             let found = trace(plan, plan.scenario(point), at, &view, stop);
             if stop() {
@@ -253,6 +260,21 @@ pub(crate) fn keep(
             Ok(())
         })
     })
+}
+
+/// Removes the traces that a former run kept in the folder: its points were others.
+fn remove_former(folder: &Path) -> Result<(), StoreError> {
+    for name in regular::names(folder).map_err(StoreError::io("list", folder))? {
+        let is_kept = name.to_str().is_some_and(|name| {
+            let number = name.strip_prefix("point-").and_then(|it| it.strip_suffix(".parquet"));
+            number.is_some_and(|number| number.parse::<u64>().is_ok())
+        });
+        let path = folder.join(&name);
+        if is_kept && ParquetFile::open(&path).is_ok_and(|file| file.value(key::TRACE).is_some()) {
+            std::fs::remove_file(&path).map_err(StoreError::io("remove", &path))?;
+        }
+    }
+    Ok(())
 }
 
 impl Trace {

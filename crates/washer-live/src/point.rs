@@ -2,8 +2,8 @@
 
 use lane_ode::{Failure, Simd};
 use washer_model::{
-    Channel, Disturbance, Dwell, Machine, ModelKind, Point, Spin, Start, Target, Timing, history,
-    prepare, respond,
+    Channel, Disturbance, Dwell, Machine, ModelKind, Point, Response, Spin, Start, Target, Timing,
+    history, prepare, respond,
 };
 use washer_row::{
     Climbs, Demand, Deviations, Ladder, Level, MODELS, Next, Outcome, Rule, Rung, RungRun, Status,
@@ -244,8 +244,8 @@ pub fn growth(
     let (_, point) = ready(setup, values)?;
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-    Ok(respond(&dwells)
+    Ok(respond(&dwells, &|| false)
         .into_iter()
-        .map(|answer| answer.ok().map(|found| found.disturbance()))
+        .map(|answer| answer.ok()?.first().map(Response::disturbance))
         .collect())
 }

@@ -1,6 +1,6 @@
 //! The outcome of a grid point: one row of the result file.
 
-use washer_model::{Channel, Disturbance, Response};
+use washer_model::{Beyond, Channel, Disturbance, Response};
 
 use crate::level::Level;
 
@@ -23,11 +23,13 @@ pub enum Status {
     NoResponse,
     /// Its multipliers could not be computed.
     NoMultipliers,
+    /// The drum is so slow that a turn takes too many steps.
+    TooSlow,
 }
 
 impl Status {
     /// Every status; the position is its code in chunk files, so new ones go to the end.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Ok,
         Self::Diverged,
         Self::StepTooSmall,
@@ -36,6 +38,7 @@ impl Status {
         Self::Panicked,
         Self::NoResponse,
         Self::NoMultipliers,
+        Self::TooSlow,
     ];
 }
 
@@ -82,9 +85,15 @@ impl Trajectory {
     }
 }
 
-/// What becomes of small disturbances of a response at a constant speed.
+/// A response at a constant speed, and what becomes of small disturbances of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
+    /// How many folds the curve of responses has before it, followed from a low speed up.
+    pub branch: u32,
+    /// Speeds (rpm) of the folds between which that branch lies, lower and upper.
+    pub between_rpm: [Option<f64>; 2],
+    /// What of the machine's geometry it passes.
+    pub beyond: Option<Beyond>,
     /// The fastest growing one.
     pub fastest: Disturbance,
     /// Modes of the linear model that take part in what grows, most first.
@@ -112,7 +121,13 @@ impl From<&Response> for Growth {
                 frequency_cpm: participant.frequency_cpm,
             })
         };
-        Self { fastest: response.disturbance(), modes: [mode(0), mode(1)] }
+        Self {
+            branch: response.branch,
+            between_rpm: response.between_rpm,
+            beyond: response.beyond,
+            fastest: response.disturbance(),
+            modes: [mode(0), mode(1)],
+        }
     }
 }
 
@@ -141,6 +156,8 @@ pub struct Outcome {
     /// What becomes of disturbances at a constant speed: the row's own, or the one of the plan's
     /// speeds at which they grow fastest. `None` where it is not asked for or not known.
     pub growth: Option<Growth>,
+    /// Other responses at the same point and constant speed: rows of their own, behind this one.
+    pub coexisting: Vec<Outcome>,
 }
 
 impl Outcome {
@@ -157,6 +174,18 @@ impl Outcome {
             turn_ratios: Vec::new(),
             static_sag_m: None,
             growth: None,
+            coexisting: Vec::new(),
         }
+    }
+
+    /// It, then the others at the same point and speed.
+    pub fn rows(&self) -> impl Iterator<Item = &Self> {
+        core::iter::once(self).chain(&self.coexisting)
+    }
+
+    /// As [`Self::rows`], apart.
+    pub fn into_rows(mut self) -> impl Iterator<Item = Self> {
+        let coexisting = core::mem::take(&mut self.coexisting);
+        core::iter::once(self).chain(coexisting)
     }
 }

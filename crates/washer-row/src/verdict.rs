@@ -7,7 +7,7 @@ use crate::outcome::{Outcome, Status};
 ///
 /// A row whose nonlinear model failed carries that model's reason, whatever became of the linear
 /// one; a row whose linear model alone failed carries that reason behind `linear_`.
-pub const ROW_STATUSES: [&str; 13] = [
+pub const ROW_STATUSES: [&str; 14] = [
     "ok",
     "diverged",
     "step_too_small",
@@ -21,6 +21,7 @@ pub const ROW_STATUSES: [&str; 13] = [
     "linear_panicked",
     "no_response",
     "no_multipliers",
+    "too_slow",
 ];
 
 /// Statuses that either model can have, each of which has a name behind `linear_` too.

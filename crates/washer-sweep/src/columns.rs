@@ -1,9 +1,11 @@
 //! Tables as users hold them: anything that speaks Arrow's C stream, or a dictionary of columns.
 
+use std::ffi::CStr;
+
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyMapping;
+use pyo3::types::{PyBool, PyMapping};
 use sweep::PointTable;
 
 use crate::arrow;
@@ -36,7 +38,8 @@ pub(crate) fn points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
 }
 
 /// Numbers of an array of NumPy's, or of anything else in one dimension.
-fn numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+pub(crate) fn numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    is_of_numbers(values)?;
     let dimensions = values.getattr_opt("ndim")?.map(|count| count.extract::<usize>());
     let dimensions = dimensions.transpose()?.unwrap_or(1);
     if dimensions != 1 {
@@ -44,7 +47,36 @@ fn numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
         return Err(PyTypeError::new_err(text));
     }
     match PyBuffer::<f64>::get(values) {
-        Ok(buffer) => buffer.to_vec(values.py()),
-        Err(_) => values.try_iter()?.map(|value| value?.extract()).collect(),
+        // PyO3 takes either order of bytes for this machine's.
+        Ok(buffer) if [c"d", NATIVE].contains(&buffer.format()) => buffer.to_vec(values.py()),
+        _ => values.try_iter()?.map(|value| number(&value?)).collect(),
+    }
+}
+
+/// An eight-byte float in this machine's order of bytes, where an array names that.
+const NATIVE: &CStr = if cfg!(target_endian = "little") { c"<d" } else { c">d" };
+
+/// A number, and nothing that Python would make one of.
+pub(crate) fn number(value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    is_of_numbers(value)?;
+    if value.is_instance_of::<PyBool>() {
+        return Err(PyTypeError::new_err("expected a number, got a truth value"));
+    }
+    value.extract()
+}
+
+/// Refuses what NumPy would turn into numbers with a loss: masked and complex values, truth values,
+/// times.
+fn is_of_numbers(values: &Bound<'_, PyAny>) -> PyResult<()> {
+    if values.getattr_opt("mask")?.is_some_and(|mask| !mask.is_callable()) {
+        let text = "expected numbers, got masked ones: fill or drop what is masked";
+        return Err(PyTypeError::new_err(text));
+    }
+    let Some(dtype) = values.getattr_opt("dtype")? else { return Ok(()) };
+    let Some(kind) = dtype.getattr_opt("kind")? else { return Ok(()) };
+    // Objects are judged one by one.
+    match kind.extract::<char>() {
+        Ok('f' | 'i' | 'u' | 'O') => Ok(()),
+        _ => Err(PyTypeError::new_err(format!("expected real numbers, got `{dtype}`"))),
     }
 }

@@ -71,3 +71,8 @@ fn worded(error: &Error) -> String {
 pub(crate) fn interrupted(py: Python<'_>, text: String, result: Py<PyAny>) -> PyErr {
     raised(py, "Interrupted", text, result)
 }
+
+/// An interruption of what has no result before its end.
+pub(crate) fn early(py: Python<'_>) -> PyErr {
+    interrupted(py, "interrupted".to_owned(), py.None())
+}

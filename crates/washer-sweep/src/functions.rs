@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use pyo3::exceptions::{PyKeyboardInterrupt, PyTypeError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 use sweep::{Effort, ProgressMode};
 
+use crate::columns::numbers;
 use crate::ended;
 use crate::errors;
 use crate::mappings::assignments;
@@ -20,10 +21,11 @@ use crate::work::{abandonable, attended};
 pub(crate) fn modes(
     py: Python<'_>,
     plan: Option<&Bound<'_, PyPlan>>,
-    speeds_rpm: Option<Vec<f64>>,
+    speeds_rpm: Option<&Bound<'_, PyAny>>,
     at: Option<&Bound<'_, PyMapping>>,
 ) -> PyResult<PyResultTable> {
     let at = assignments(at)?;
+    let speeds_rpm = speeds_rpm.map(numbers).transpose()?;
     if plan.is_none() && !at.is_empty() {
         return Err(PyTypeError::new_err("`at` needs a plan"));
     }
@@ -32,7 +34,7 @@ pub(crate) fn modes(
     let work = move |interrupt: &_| sweep::find_modes(input.as_ref(), &at, &speeds, interrupt);
     let found = abandonable(py, work)?;
     let found = found.map_err(|error| errors::error(py, &error))?;
-    found.map(PyResultTable::new).ok_or_else(|| PyKeyboardInterrupt::new_err("interrupted"))
+    found.map(PyResultTable::new).ok_or_else(|| errors::early(py))
 }
 
 /// Periodic responses at constant speeds, and whether they are stable.
@@ -40,13 +42,14 @@ pub(crate) fn modes(
 #[pyo3(signature = (plan, speeds_rpm, out=None, *, threads=None, progress=true, fresh=false))]
 pub(crate) fn stability(
     plan: &Bound<'_, PyPlan>,
-    speeds_rpm: Vec<f64>,
+    speeds_rpm: &Bound<'_, PyAny>,
     out: Option<PathBuf>,
     threads: Option<usize>,
     progress: bool,
     fresh: bool,
 ) -> PyResult<PyResultTable> {
     let py = plan.py();
+    let speeds_rpm = numbers(speeds_rpm)?;
     let plan = plan.get().evaluator.plan();
     let mode = ended::mode(progress);
     let Some(out) = out else {
@@ -70,17 +73,18 @@ pub(crate) fn stability(
 pub(crate) fn explain<'py>(
     plan: &Bound<'py, PyPlan>,
     at: Option<&Bound<'py, PyMapping>>,
-    speeds_rpm: Option<Vec<f64>>,
+    speeds_rpm: Option<&Bound<'py, PyAny>>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = plan.py();
+    let speeds_rpm = speeds_rpm.map(numbers).transpose()?;
     let (at, input) = (assignments(at)?, plan.get().input.clone());
     let explained = abandonable(py, move |interrupt| {
         let effort = Effort { threads, progress: ProgressMode::None, interrupt };
         sweep::explain_point(&input, &at, speeds_rpm.as_deref(), effort)
     })?;
     let explained = explained.map_err(|error| errors::error(py, &error))?;
-    let explained = explained.ok_or_else(|| PyKeyboardInterrupt::new_err("interrupted"))?;
+    let explained = explained.ok_or_else(|| errors::early(py))?;
     let found = py.import("json")?.call_method1("loads", (explained.found.to_string(),))?;
     py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((found, explained.text))
 }

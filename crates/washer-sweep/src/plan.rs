@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
 use sweep::{BoundaryOptions, Effort, Evaluator, GridInput, TraceOptions};
@@ -113,8 +112,7 @@ impl PyPlan {
         let input = self.input.clone();
         let work = move |interrupt: &_| sweep::trace_point(&input, &at, &options, interrupt);
         let traced = abandonable(py, work)?.map_err(|error| errors::error(py, &error))?;
-        let (table, failures) =
-            traced.ok_or_else(|| PyKeyboardInterrupt::new_err("interrupted"))?;
+        let (table, failures) = traced.ok_or_else(|| errors::early(py))?;
         for failure in failures {
             py.import("warnings")?.call_method1("warn", (failure,))?;
         }

@@ -7,6 +7,8 @@ use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 use sweep::Interrupt;
 
+use crate::errors;
+
 /// How often signals are looked for.
 const LOOK_UP: Duration = Duration::from_millis(50);
 
@@ -40,7 +42,7 @@ pub(crate) fn abandonable<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Interrupt) -> T + Send + 'static,
 ) -> PyResult<T> {
-    py.detach(|| {
+    let left = py.detach(|| {
         let (done, ended) = channel();
         let interrupt = Interrupt::new();
         let of_work = interrupt.clone();
@@ -63,6 +65,10 @@ pub(crate) fn abandonable<T: Send + 'static>(
                 Err(RecvTimeoutError::Disconnected) => return Err(panicked()),
             }
         }
+    });
+    left.map_err(|raised| match raised.is_instance_of::<PyKeyboardInterrupt>(py) {
+        true => errors::early(py),
+        false => raised,
     })
 }
 

@@ -42,6 +42,32 @@ def test_fig12_has_the_bits_of_the_commands_rows(sweep, tmp_path):
         assert found == table.take(some).drop_columns("point").combine_chunks()
 
 
+def test_numbers_are_read_whatever_their_bytes_and_nothing_else_is(short):
+    table = columns(short)
+    expected = rows(short.evaluate(table))
+    for kind in (">f8", "<f8", ">f4", "O", "longdouble"):
+        found = {name: values.astype(kind) for name, values in table.items()}
+        if kind == ">f4":
+            table = {name: values.astype("f4").astype("f8") for name, values in table.items()}
+        assert rows(short.evaluate(found)) == rows(short.evaluate(table)), kind
+        table = columns(short)
+    counts = {name: np.round(values + 0.5).astype(">i4") for name, values in table.items()}
+    counts["unbalance_mass_kg"] = table["unbalance_mass_kg"]
+    assert rows(short.evaluate(counts))["damping_n_s_per_m"].to_pylist() == list(
+        np.round(table["damping_n_s_per_m"] + 0.5))
+    assert expected == rows(short.evaluate({name: list(values) for name, values in table.items()}))
+    mass = table["unbalance_mass_kg"]
+    for wrong in (np.ma.masked_less(mass, 0.3), mass + 0j, mass.astype("c8"), mass > 0.5,
+                  list(mass > 0.5), [True] * len(mass), mass.astype("M8[s]"), mass.astype("U")):
+        with pytest.raises(TypeError, match="column `unbalance_mass_kg`: expected numbers"):
+            short.evaluate({**table, "unbalance_mass_kg": wrong})
+    for wrong in (np.ma.masked_less(np.arange(60.0, 63.0), 61), np.arange(60, 62) + 0j, [True]):
+        with pytest.raises(TypeError, match="expected"):
+            washer_sweep.modes(speeds_rpm=wrong)
+    assert rows(washer_sweep.modes(speeds_rpm=np.array([60.0, 70.0]).astype(">f8"))) == rows(
+        washer_sweep.modes(speeds_rpm=[60, 70]))
+
+
 def test_every_source_of_columns_is_the_same(short):
     table = columns(short)
     expected = pa.table(short.evaluate(table))

@@ -72,8 +72,9 @@ def test_ctrl_c_is_answered_in_half_a_second(long, work):
         "explain": lambda: washer_sweep.explain(long, AT),
     }[work], 0.3)
     assert answered_s < ANSWERED_S
+    assert isinstance(stopped, washer_sweep.Interrupted)
     # Traces and explanations have nothing before their end.
-    assert isinstance(stopped, washer_sweep.Interrupted) or work in ("trace", "explain")
+    assert stopped.result is None or work not in ("trace", "explain")
 
 
 def test_ctrl_c_ends_the_threads_of_an_explanation(long):

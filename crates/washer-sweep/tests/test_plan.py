@@ -48,6 +48,26 @@ def test_constants_override():
         Plan(SHORT, set={"tub_mass_kg": "20"})
 
 
+def test_a_dictionary_without_an_end_is_refused():
+    endless = dict(SHORT)
+    endless["spin"] = endless
+    deep, flat = {}, []
+    for _ in range(20_000):
+        deep, flat = {"spin": deep}, [flat]
+    lists = []
+    lists.append(lists)
+    for grid in (endless, deep, {"axis": flat}, {"axis": lists}):
+        with pytest.raises(ValueError, match="nested deeper than 24"):
+            Plan(grid)
+
+
+@pytest.mark.parametrize("value", [True, np.True_, 2j, np.complex128(2 + 1j), np.ma.masked,
+                                   np.datetime64("2020-01-01")])
+def test_a_constant_is_a_number(value):
+    with pytest.raises(TypeError, match="`tub_mass_kg`: expected a number, got"):
+        Plan(SHORT, set={"tub_mass_kg": value})
+
+
 def test_a_mistake_is_data_and_the_commands_text(sweep, tmp_path):
     import subprocess
 

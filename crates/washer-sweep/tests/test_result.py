@@ -32,6 +32,24 @@ def test_rows_are_not_copied(short):
     assert frame["steps_nonlinear"].to_numpy().ctypes.data == steps.buffers()[1].address
 
 
+def test_what_was_read_is_what_is_saved(short, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    here = tmp_path / "map.parquet"
+    short.run("map.parquet", progress=False)
+    whole = here.read_bytes()
+    result = washer_sweep.read("map.parquet")
+    # Its bytes change, it goes, and the folder is another one.
+    here.write_bytes(whole[:-1])
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    result.save("copy.parquet")
+    assert (tmp_path / "elsewhere/copy.parquet").read_bytes() == whole
+    result.save("map.svg")
+    here.unlink()
+    result.save("again.parquet")
+    assert (tmp_path / "elsewhere/again.parquet").read_bytes() == whole
+
+
 def test_rows_outlive_their_result(short):
     table = pa.table(short.run(progress=False))
     copy = table.to_pydict()

@@ -19,8 +19,8 @@ pub(crate) fn run(bytes: &[u8]) {
             assert!(plan.points() >= 1);
             for corner in [0, plan.corners() - 1] {
                 let scenario = plan.scenario_at(&plan.corner(corner));
-                assert_eq!(scenario.machine.violations(), []);
-                assert_eq!(scenario.spin.violations(), []);
+                assert_eq!(scenario.model.machine.violations(), []);
+                assert_eq!(scenario.model.spin.violations(), []);
             }
         }
         Err(mistakes) => {

@@ -2,8 +2,8 @@
 
 use clap_complete::Shell;
 
-use super::examples::Examples;
-use crate::exit::{Error, Exit, print};
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::exit::{Error, Exit, print};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples =

@@ -1,14 +1,14 @@
 //! `sweep explain GRID.toml --at NAME=VALUE`: why the linear model fails at a point.
 
-use super::examples::Examples;
-use super::grid::GridArgs;
 use crate::config;
 use crate::engine::simd_from_environment;
-use crate::exit::{Error, Exit, show};
 use crate::explain::{explain, json, words};
-use crate::interrupt::Interrupt;
 use crate::speeds::{Speeds, turning};
-use crate::threads;
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::commands::grid::GridArgs;
+use sweep_engine::exit::{Error, Exit, show};
+use sweep_engine::interrupt::Interrupt;
+use sweep_engine::threads;
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[

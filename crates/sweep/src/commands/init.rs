@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use washer_model::Machine;
 
-use super::examples::Examples;
 use crate::config;
-use crate::exit::{Error, Exit, print, tell};
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::exit::{Error, Exit, print, tell};
 use sweep_files::atomic;
 
 /// The commented grid file.
@@ -59,11 +59,12 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::method::METHODS;
+    use crate::method::Integrator;
+    use sweep_engine::method::Integrator as _;
 
     #[test]
     fn the_starter_shows_every_method_and_setting() {
-        for entry in &METHODS {
+        for entry in Integrator::methods() {
             assert!(GRID.contains(&format!("\"{}\"", entry.name)), "no {}", entry.name);
             for setting in entry.settings {
                 let line = format!("{} = {:e}", setting.key, setting.default);

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use clap_mangen::Man;
 use clap_mangen::roff::{Roff, bold, roman};
 
-use super::examples::Examples;
-use crate::exit::{Error, Exit};
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::exit::{Error, Exit};
 use sweep_files::{self as files, FileKind};
 
 /// Shown by `--help`.

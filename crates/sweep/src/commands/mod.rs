@@ -1,23 +1,14 @@
 //! The command line: one module a subcommand, each with its arguments and `run`.
 
-mod boundary;
-mod cells;
-mod check;
-mod compare;
 mod completions;
-mod conditions;
-mod examples;
 mod explain;
-mod export;
-mod grid;
 mod init;
+mod lines;
 mod man;
 mod merge;
 mod modes;
-mod parameters;
 mod plot;
 mod reference;
-mod require;
 mod run;
 mod schema;
 mod show;
@@ -29,11 +20,14 @@ mod trace;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use examples::Examples;
+use sweep_engine::commands::examples::{self, Examples};
+use sweep_engine::commands::{
+    boundary, check, compare, export, parameters, require, show as show_engine,
+};
 
-use crate::exit::{Error, Exit};
-use crate::nearest::nearest;
-use crate::random_keys::draw_random_keys;
+use sweep_engine::exit::{Error, Exit};
+use sweep_engine::nearest::nearest;
+use sweep_engine::random_keys::draw_random_keys;
 
 /// Shown by `--help`.
 const EXAMPLES: Examples = &[
@@ -43,6 +37,15 @@ const EXAMPLES: Examples = &[
     ["sweep show results/first.parquet", "what came of it"],
     ["sweep plot results/first.parquet", "the map as a picture"],
     ["sweep parameters", "every number that can be set or swept"],
+];
+
+/// Subcommands by what they are for, as help lists them.
+const GROUPS: [(&str, &[&str]); 5] = [
+    ("Run", &["run", "check"]),
+    ("Ask", &["boundary", "trace", "modes", "stability", "explain"]),
+    ("Look", &["show", "plot", "require", "compare", "export"]),
+    ("Cluster", &["status", "merge", "slurm"]),
+    ("Set up", &["init", "parameters", "schema", "man", "completions"]),
 ];
 
 /// Maps where a washing machine's linear suspension model can be trusted.
@@ -64,47 +67,46 @@ pub struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Integrate every grid point with both models, into one Parquet file; resumes what was
-    /// interrupted
+    /// Integrate every grid point, or go on after an interruption
     Run(run::Args),
     /// Check a grid file and show what it would do, without doing it
     Check(check::Args),
-    /// Join the finished shards of a run into its one result file
-    Merge(merge::Args),
-    /// Show how far a run is: done, missing, failed, running
-    Status(status::Args),
-    /// Print the script that submits a run to a Slurm cluster: an array of shards, then their merge
-    Slurm(slurm::Args),
-    /// Show what a result file holds: counts, verdicts, extremes, provenance
-    Show(show::Args),
-    /// Check that expressions hold of a result, and show the rows where they do not
+    /// Trace the curve where the ratio is at its limit
+    Boundary(boundary::Args),
+    /// Write time histories of both models at one point
+    Trace(trace::Args),
+    /// Find resonance speeds, mode shapes and frequencies over speed
+    Modes(modes::Args),
+    /// Find periodic responses at constant speeds, and unstable ones
+    Stability(stability::Args),
+    /// Explain why the linear model fails at one point
+    Explain(explain::Args),
+    /// Show what a result file holds: verdicts, extremes, metrics
+    Show(show_engine::Args),
+    /// Draw a file: map, boundary, time histories, Campbell diagram
+    Plot(plot::Args),
+    /// Check expressions on a result, and show the rows that break them
     Require(require::Args),
     /// Say what differs between two results
     Compare(compare::Args),
-    /// Write a result as CSV, as an Excel workbook or as NetCDF, with units
+    /// Write a result as CSV, Excel workbook or NetCDF, with units
     Export(export::Args),
-    /// Write time histories of both models at one point
-    Trace(trace::Args),
-    /// Find the natural frequencies over spin speed, the resonance speeds and the mode shapes
-    Modes(modes::Args),
-    /// Find the periodic response at constant speeds, and where it is unstable
-    Stability(stability::Args),
-    /// Explain why the linear model fails at one point: the unstable speeds that the run crosses
-    Explain(explain::Args),
-    /// Trace the curve where the ratio is at its limit, without filling the grid
-    Boundary(boundary::Args),
-    /// Draw the figure that fits a file: map, boundary, time histories or Campbell diagram
-    Plot(plot::Args),
-    /// List every parameter that can be set or swept
-    Parameters(parameters::Args),
+    /// Show how far a run is: done, missing, failed, running
+    Status(status::Args),
+    /// Join the finished shards of a run into its one result file
+    Merge(merge::Args),
+    /// Print the script that submits a run to a Slurm cluster
+    Slurm(slurm::Args),
     /// Write a commented grid file, or a machine file, to start from
     Init(init::Args),
+    /// List every parameter that can be set or swept
+    Parameters(parameters::Args),
     /// Print the JSON Schema of grid or machine files, for editors
     Schema(schema::Args),
-    /// Print shell completions
-    Completions(completions::Args),
     /// Write manual pages
     Man(man::Args),
+    /// Print shell completions
+    Completions(completions::Args),
     /// Print a page of the guide that is made from this program's tables
     #[command(hide = true)]
     Reference(reference::Args),
@@ -114,22 +116,22 @@ pub enum Command {
 fn examples_of(name: &str) -> Examples {
     match name {
         "" => EXAMPLES,
-        "run" => run::EXAMPLES,
-        "check" => check::EXAMPLES,
-        "merge" => merge::EXAMPLES,
-        "status" => status::EXAMPLES,
+        "run" => lines::RUN,
+        "check" => lines::CHECK,
+        "merge" => lines::MERGE,
+        "status" => lines::STATUS,
         "slurm" => slurm::EXAMPLES,
-        "show" => show::EXAMPLES,
-        "require" => require::EXAMPLES,
-        "compare" => compare::EXAMPLES,
-        "export" => export::EXAMPLES,
+        "show" => lines::SHOW,
+        "require" => lines::REQUIRE,
+        "compare" => lines::COMPARE,
+        "export" => lines::EXPORT,
         "trace" => trace::EXAMPLES,
         "modes" => modes::EXAMPLES,
         "stability" => stability::EXAMPLES,
         "explain" => explain::EXAMPLES,
-        "boundary" => boundary::EXAMPLES,
+        "boundary" => lines::BOUNDARY,
         "plot" => plot::EXAMPLES,
-        "parameters" => parameters::EXAMPLES,
+        "parameters" => lines::PARAMETERS,
         "init" => init::EXAMPLES,
         "schema" => schema::EXAMPLES,
         "completions" => completions::EXAMPLES,
@@ -148,9 +150,29 @@ pub(crate) fn command() -> clap::Command {
     let program = with(Cli::command(), EXAMPLES);
     let names: Vec<String> =
         program.get_subcommands().map(|command| command.get_name().to_owned()).collect();
-    names.into_iter().fold(program, |program, name| {
+    let program = names.into_iter().fold(program, |program, name| {
         program.mut_subcommand(&name, |command| with(command, examples_of(&name)))
-    })
+    });
+    let template = grouped_help(&program);
+    program.help_template(template)
+}
+
+/// The template of the program's help. clap has headings for arguments only, so the subcommands
+/// stand in the template.
+fn grouped_help(program: &clap::Command) -> String {
+    let header = program.get_styles().get_header();
+    let name_style = program.get_styles().get_literal();
+    let mut text = String::from("{before-help}{about-with-newline}\n{usage-heading} {usage}\n\n");
+    for (heading, names) in GROUPS {
+        text += &format!("{header}{heading}:{header:#}\n");
+        for name in names {
+            let command = program.find_subcommand(name);
+            let about = command.and_then(clap::Command::get_about).cloned().unwrap_or_default();
+            text += &format!("  {name_style}{name:11}{name_style:#}  {about}\n");
+        }
+        text.push('\n');
+    }
+    text + &format!("{header}Options:{header:#}\n{{options}}{{after-help}}")
 }
 
 /// The command line without what help hides, for what lists every subcommand.
@@ -203,21 +225,21 @@ impl Command {
         draw_random_keys()?;
         match self {
             Self::Run(args) => run::run(args),
-            Self::Check(args) => check::run(args),
+            Self::Check(args) => check::run::<crate::Washer>(args),
             Self::Merge(args) => merge::run(args),
             Self::Status(args) => status::run(args),
             Self::Slurm(args) => slurm::run(args),
             Self::Show(args) => show::run(args),
             Self::Require(args) => require::run(args),
-            Self::Compare(args) => compare::run(args),
+            Self::Compare(args) => compare::run(args, crate::identity::BUILD),
             Self::Export(args) => export::run(args),
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Stability(args) => stability::run(args),
             Self::Explain(args) => explain::run(args),
-            Self::Boundary(args) => boundary::run(args),
+            Self::Boundary(args) => boundary::run::<crate::Washer>(args),
             Self::Plot(args) => plot::run(args),
-            Self::Parameters(args) => parameters::run(args),
+            Self::Parameters(args) => parameters::run::<crate::Washer>(args),
             Self::Init(args) => init::run(args),
             Self::Schema(args) => schema::run(args),
             Self::Completions(args) => completions::run(args, shown_command()),
@@ -301,6 +323,21 @@ mod tests {
             let words = shown.replace("\\\n", "").split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(lines.iter().all(|[line, _]| words.contains(line)), "{shown}");
         }
+    }
+
+    #[test]
+    fn help_lists_every_visible_command_once_under_a_heading() {
+        let whole = command();
+        let shown = whole.get_subcommands().filter(|command| !command.is_hide_set());
+        let shown: Vec<&str> = shown.map(clap::Command::get_name).collect();
+        let grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
+        assert_eq!(shown, grouped);
+        let help = command().render_help().to_string();
+        let list = help.split("Run:\n").nth(1).and_then(|rest| rest.split("Options:").next());
+        for line in list.expect("the list of commands").lines() {
+            assert!(line.len() <= examples::WIDEST, "{line}");
+        }
+        assert!(help.contains("\nSet up:\n  init "), "{help}");
     }
 
     #[test]

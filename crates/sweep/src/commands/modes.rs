@@ -5,12 +5,12 @@ use std::path::PathBuf;
 
 use washer_model::{Exact, ModeAtSpeed, ModeOverSpeed, decimal};
 
-use super::examples::Examples;
 use crate::config;
-use crate::exit::{Error, Exit, show, tell};
 use crate::library::modes::{Analysis, built_in};
 use crate::speeds::Speeds;
-use crate::store::StoreError;
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::exit::{Error, Exit, show, tell};
+use sweep_engine::store::StoreError;
 use sweep_files::{FileKind, Output};
 
 /// Modes of the suspension, which differ from exact motions most.
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
             } else {
                 config::load_point(grid, &args.sets, &args.at)?.0
             };
-            (plan.name, plan.machine, plan.spin)
+            (plan.name, plan.model.machine, plan.model.spin)
         }
     };
     let output =

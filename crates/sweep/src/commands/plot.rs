@@ -1,12 +1,12 @@
 //! `sweep plot`: the figure that fits a file.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use super::examples::Examples;
-use crate::exit::{Error, Exit, tell};
 use crate::live::{SliderRange, live, slider_range};
-use sweep_files::beside;
-use sweep_plot::{PlotOptions, Quantity, View, render};
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::commands::plot::{self, finite};
+use sweep_engine::exit::{Error, Exit};
+use sweep_plot::PlotOptions;
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[
@@ -23,32 +23,8 @@ pub(super) const EXAMPLES: Examples = &[
 /// Arguments of `sweep plot`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Result of `sweep run`, `trace`, `modes`, `boundary` or `stability`
-    #[arg(value_name = "FILE")]
-    pub file: PathBuf,
-
-    /// Where to write; the ending .svg, .png or .html says how [default: FILE with .svg]
-    #[arg(short, long, visible_alias = "out", value_name = "IMAGE")]
-    pub output: Option<PathBuf>,
-
-    /// Modes, trace, design, stability: which of its figures [default: frequencies, time, scatter,
-    /// growth]; a page of a design has all three
-    #[arg(long, value_enum)]
-    pub view: Option<View>,
-
-    /// Map: what the colours show. Design: what is shown over the parameters
-    #[arg(long, value_enum, default_value_t)]
-    pub quantity: Quantity,
-
-    /// Channel to show, as in the column names (tub_yaw, drum_front_y, ...); of a load, which stop
-    /// or foot (stop_2, foot_1); again for more of them in a trace
-    #[arg(long = "channel", value_name = "NAME")]
-    pub channels: Vec<String>,
-
-    /// Map of three or more axes: cut an axis beyond the second at this value. Stability: show the
-    /// points at this value
-    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
-    pub at: Vec<(String, f64)>,
+    #[command(flatten)]
+    plot: plot::Args,
 
     /// Trace: mark where these speeds are passed, in rpm, separated by commas
     #[arg(
@@ -67,10 +43,6 @@ pub struct Args {
     /// Trace, modes: shade the unstable speeds of this stability file
     #[arg(long, value_name = "FILE")]
     pub stability: Option<PathBuf>,
-
-    /// Map as .svg or .png: draw the line of this boundary file too
-    #[arg(long, value_name = "FILE")]
-    pub boundary: Option<PathBuf>,
 
     /// Trace: compare with this trace: both nonlinear models, the linear one left out
     #[arg(long, value_name = "FILE")]
@@ -98,52 +70,27 @@ pub struct Args {
 /// Draws the figure and says where it is.
 ///
 /// # Errors
-/// As [`render`].
+/// As the engine's command, and a map that no page can compute.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let output = args.output.clone().unwrap_or_else(|| default_output(&args.file));
-    let mut options = PlotOptions {
-        view: args.view,
-        quantity: args.quantity,
-        channels: args.channels.clone(),
-        at: args.at.clone(),
+    let live = match args.live {
+        true => Some(live(&args.plot.file, &args.sliders)?),
+        false => None,
+    };
+    let further = PlotOptions {
         resonances_rpm: args.resonances.clone(),
         modes: args.modes.clone(),
         stability: args.stability.clone(),
-        boundary: args.boundary.clone(),
         against: args.against.clone(),
         traces: args.traces.clone(),
-        live: None,
+        live,
+        ..PlotOptions::default()
     };
-    if args.live {
-        options.live = Some(live(&args.file, &args.sliders)?);
-    }
-    render(&args.file, &options, &output)?;
-    tell(&format!("wrote {}", output.display()));
-    Ok(Exit::Done)
-}
-
-/// Beside the input, under its name.
-fn default_output(file: &Path) -> PathBuf {
-    beside(file, "svg")
-}
-
-fn assignment(text: &str) -> Result<(String, f64), String> {
-    let (name, value) =
-        text.split_once('=').ok_or("expected NAME=VALUE, as in spin_peak_rpm=350")?;
-    Ok((name.trim().to_owned(), finite(value)?))
+    plot::draw(&args.plot, further)
 }
 
 fn speed(text: &str) -> Result<f64, String> {
     let speed = finite(text)?;
     if speed > 0.0 { Ok(speed) } else { Err("expected a speed above 0 rpm".to_owned()) }
-}
-
-fn finite(text: &str) -> Result<f64, String> {
-    text.trim()
-        .parse::<f64>()
-        .ok()
-        .filter(|value| value.is_finite())
-        .ok_or_else(|| format!("`{}` is not a finite number", text.trim()))
 }
 
 #[cfg(test)]
@@ -169,11 +116,10 @@ mod tests {
              --channel a --channel b",
         );
         let args = args.unwrap();
-        assert_eq!(args.quantity, Quantity::GapLinear);
-        assert_eq!(args.at, [("spin_peak_rpm".to_owned(), 350.0)]);
+        assert_eq!(args.plot.quantity, sweep_plot::Quantity::GapLinear);
+        assert_eq!(args.plot.at, [("spin_peak_rpm".to_owned(), 350.0)]);
         assert_eq!(args.resonances, [99.9, 147.6]);
-        assert_eq!(args.channels, ["a", "b"]);
-        assert_eq!(default_output(&args.file), Path::new("m.svg"));
+        assert_eq!(args.plot.channels, ["a", "b"]);
     }
 
     #[test]

@@ -7,10 +7,11 @@ use std::iter;
 use washer_model::{Channel, Machine, Parameter, Range, Spin, Target};
 use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 
-use crate::config;
-use crate::exit::{Error, Exit, print};
-use crate::method::{Entry, METHODS};
-use crate::store::schema::{AxisColumn, Layout, RowKind};
+use crate::method::Integrator;
+use crate::{columns, config};
+use sweep_engine::exit::{Error, Exit, print};
+use sweep_engine::method::{Integrator as _, default_method};
+use sweep_engine::store::{Column, Kind};
 
 /// Arguments of `sweep reference`.
 #[derive(Debug, clap::Args)]
@@ -131,8 +132,8 @@ fn methods() -> String {
     );
     row(&mut text, &["`method`", "what it does", "key", "meaning", "default", "values"]);
     row(&mut text, &["---"; 6]);
-    for entry in &METHODS {
-        let is_default = entry.name == Entry::default_method().name;
+    for entry in Integrator::methods() {
+        let is_default = entry.name == default_method::<Integrator>().name;
         let name = format!("`{}`{}", entry.name, if is_default { ", the default" } else { "" });
         // Only the first key's row has the name and the description.
         let heads = [[name.as_str(), entry.description]].into_iter().chain(iter::repeat([""; 2]));
@@ -166,21 +167,13 @@ fn columns() -> String {
     let axes = Parameter::all(&machine, &spin)
         .into_iter()
         .filter(|parameter| ["unbalance_mass_kg", "damping_n_s_per_m"].contains(&parameter.name()))
-        .map(|parameter| AxisColumn {
-            name: parameter.name().to_owned(),
-            unit: parameter.unit().to_owned(),
-            description: parameter.description().to_owned(),
+        .map(|parameter| {
+            Column::new(parameter.name(), parameter.unit(), parameter.description(), Kind::Axis)
         })
         .collect();
     let metrics = Metric::ALL.to_vec();
     let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
-    let layout = Layout {
-        axes,
-        channels: Channel::ALL.to_vec(),
-        ratio_limit: 2.0,
-        measures,
-        rows: RowKind::Run,
-    };
+    let layout = columns::of_measures(axes, &Channel::ALL, 2.0, measures);
     row(&mut text, &["column", "type", "unit", "null", "meaning"]);
     row(&mut text, &["---"; 5]);
     for field in layout.schema().fields().iter().filter(|field| !is_a_further_one(field.name())) {
@@ -262,7 +255,7 @@ mod tests {
         for name in ["tub_mass_kg", "spring_1_free_length_m", "spin_peak_rpm"] {
             assert!(page.contains(&format!("| `{name}` |")), "{name}");
         }
-        for entry in &METHODS {
+        for entry in Integrator::methods() {
             assert!(methods().contains(&format!("| `{}`", entry.name)), "{}", entry.name);
         }
         assert!(columns().contains("| `ratio_max_channel` | text |"));

@@ -1,8 +1,8 @@
 //! `sweep schema`: JSON Schema of the files a user writes.
 
-use super::examples::Examples;
 use crate::config::schema;
-use crate::exit::{Error, Exit, print};
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::exit::{Error, Exit, print};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples =
@@ -21,6 +21,10 @@ pub struct Args {
 /// # Errors
 /// When standard output cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let schema = if args.machine { schema::machine() } else { schema::grid() };
+    let schema = if args.machine {
+        schema::machine()
+    } else {
+        sweep_engine::config::schema::grid::<crate::Washer>()
+    };
     print(&format!("{schema:#}\n"))
 }

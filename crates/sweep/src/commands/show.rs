@@ -1,325 +1,32 @@
 //! `sweep show FILE`: what a Parquet file of this program holds.
 
-use std::fmt::Write as _;
-use std::path::PathBuf;
-
-use serde_json::{Map, Value, json};
-
-use super::cells::{short, table, word};
-use super::conditions;
-use super::examples::Examples;
-use super::run::{counts, line};
-use crate::exit::{Error, Exit, show};
-use crate::identity;
-use crate::nearest::nearest;
 use crate::stability::tongues;
-use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, Tally, overview, row, tally};
-use sweep_files::{FileKind, ParquetFile, key};
-use sweep_results::{Cell, Condition, Order, ResultTable, ResultsError, top};
+use sweep_engine::commands::show::{self, Args, Further};
+use sweep_engine::exit::{Error, Exit};
+use sweep_files::{FileKind, ParquetFile};
+use washer_row::Metric;
 
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    ["sweep show map.parquet", "verdicts, extremes, columns with units and ranges"],
-    ["sweep show map.parquet --top 10 --by ratio_tub_yaw", "the ten worst points"],
-    ["sweep show map.parquet --where 'not reliable' --top 5", "the first unreliable ones"],
-    ["sweep show map.parquet --json", "the same for a program"],
-];
-
-/// Rows shown where none are asked for by number.
-const ROWS_SHOWN: u16 = 10;
-
-/// Arguments of `sweep show`.
-#[derive(Debug, clap::Args)]
-pub struct Args {
-    /// A result, trace, modes, stability or boundary file
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
-    /// Show this many rows, and no summary [default: 10 with --by or --where]
-    #[arg(long, value_name = "N")]
-    top: Option<u16>,
-    /// Order the rows by this column, the greatest first [default: file order]
-    #[arg(long, value_name = "COLUMN")]
-    by: Option<String>,
-    /// Order them from the least
-    #[arg(long, requires = "by")]
-    ascending: bool,
-    /// Show only rows for which this expression is true, as `sweep require` takes them
-    #[arg(long = "where", value_name = "EXPRESSION")]
-    keep: Option<String>,
-    /// Columns of the rows, separated by commas [default: the axes, the verdict, and what is asked
-    /// for]
-    #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
-    columns: Vec<String>,
-    /// Print it as JSON
-    #[arg(long)]
-    json: bool,
-}
-
-/// Shows a file's content in short: for a result its verdicts and extremes, for any file its
-/// columns and their ranges, or some of its rows.
+/// Shows a file's content in short, or some of its rows.
 ///
 /// # Errors
-/// A file that cannot be read, or is not Parquet; a column that it does not have.
+/// As the engine's command.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let asks_for_rows = args.top.is_some() || args.by.is_some() || args.keep.is_some();
-    if asks_for_rows || !args.columns.is_empty() {
-        return rows(args);
-    }
-    let opened = ParquetFile::open(&args.file)?;
-    let file = overview(&opened)?;
-    if args.json {
-        return show(&format!("{:#}\n", in_json(args, &opened, &file)?));
-    }
-    let mut text = String::new();
-    line(&mut text, "file", &args.file.display().to_string());
-    match &file.result {
-        Some(result) => {
-            provenance(&mut text, result);
-            if !opened.is_sealed() {
-                line(
-                    &mut text,
-                    "checked",
-                    "no: it carries no digest, as files of older builds do not",
-                );
-            }
-            let tally = tally(&opened)?;
-            let limit = result.plan["reliability"]["ratio_limit"].as_f64().unwrap_or(f64::NAN);
-            let places = extremes_at(&opened, result, &tally)?;
-            let at = |point| {
-                let place = places.iter().find(|(known, _)| *known == point);
-                place.map_or(String::new(), |(_, values)| {
-                    let said =
-                        values.iter().map(|(axis, value)| format!("{axis} {}", short(*value)));
-                    said.collect::<Vec<_>>().join(", ")
-                })
-            };
-            text.push_str(&counts(&tally, limit, &at));
-        }
-        None => {
-            line(&mut text, "made by", opened.created_by().unwrap_or("unknown"));
-            if FileKind::Stability.has_keys(&|key| opened.value(key).is_some()) {
-                for (name, words) in tongues::summary(&opened)?.lines() {
-                    line(&mut text, name, &words);
-                }
-            }
-            if let Some(traced) = own_json(&opened, key::BOUNDARY) {
-                let quantity = traced["quantity"].as_str().unwrap_or("unknown");
-                let limit = traced["limit"].as_f64().map_or("unknown".to_owned(), short);
-                line(&mut text, "boundary", &format!("where {quantity} = {limit}"));
-            }
-        }
-    }
-    columns(&mut text, &file);
-    show(&text)
+    show::run(args, &Further { lines: &lines, is_of_a_metric })
 }
 
-/// One JSON value of the file's metadata.
-fn own_json(file: &ParquetFile, key: &str) -> Option<Value> {
-    serde_json::from_str(file.value(key)?).ok()
+fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
+    if FileKind::Stability.has_keys(&|key| file.value(key).is_some()) {
+        return Ok(tongues::summary(file)?.lines());
+    }
+    Ok(Vec::new())
 }
 
-/// Some rows of the file.
-fn rows(args: &Args) -> Result<Exit, Error> {
-    let file = ResultTable::open(&args.file)?;
-    let keep: Vec<String> = args.keep.iter().cloned().collect();
-    let keep = conditions::parse("--where", &keep, &file)?;
-    let keep = conditions::rows_only("--where", keep)?.pop();
-    let columns = shown_columns(args, &file, keep.as_ref());
-    let order = if args.ascending { Order::Ascending } else { Order::Descending };
-    let by = args.by.as_deref().map(|by| (by, order));
-    let count = usize::from(args.top.unwrap_or(ROWS_SHOWN));
-    let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-    let rows = top(&file, &names, keep.as_ref(), by, count);
-    let rows = rows.map_err(|error| with_nearest(error, &file))?;
-    if args.json {
-        let object = |row: &Vec<Cell>| {
-            let cells = columns.iter().zip(row).map(|(name, cell)| (name.clone(), json!(cell)));
-            Value::Object(cells.collect::<Map<_, _>>())
-        };
-        let rows: Vec<Value> = rows.iter().map(object).collect();
-        return show(&format!("{:#}\n", json!(rows)));
-    }
-    let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(word).collect()).collect();
-    if rows.is_empty() {
-        return show("no rows\n");
-    }
-    show(&table(&columns, &rows, ""))
-}
-
-/// An error about a column with the name that was meant.
-pub(super) fn with_nearest(error: ResultsError, file: &ResultTable) -> ResultsError {
-    match error {
-        ResultsError::Column { path, name, .. } => {
-            let names = file.columns.iter().map(|column| column.name.as_str());
-            let nearest = nearest(&name, names).map(str::to_owned);
-            ResultsError::Column { path, name, nearest }
-        }
-        other => other,
-    }
-}
-
-/// The columns to show of rows: those asked for, or where a row is, how its verdict came about, and
-/// what the order and the filter go by.
-fn shown_columns(args: &Args, file: &ResultTable, keep: Option<&Condition>) -> Vec<String> {
-    if !args.columns.is_empty() {
-        return args.columns.clone();
-    }
-    let places = file.places();
-    let verdict = ["ratio_max", "ratio_max_channel", "reliable", "min_gap_nonlinear_m", "status"];
-    let asked = args.by.iter().map(String::as_str);
-    let filtered = keep.into_iter().flat_map(|keep| keep.columns.iter().map(String::as_str));
-    let own = verdict.into_iter().filter(|name| file.column(name).is_some());
-    let mut columns: Vec<String> = Vec::new();
-    for name in places.into_iter().chain(own).chain(asked).chain(filtered) {
-        if !columns.iter().any(|known| known == name) {
-            columns.push(name.to_owned());
-        }
-    }
-    // Files without places or verdict show what they have.
-    if columns.is_empty() {
-        columns = file.columns.iter().map(|column| column.name.clone()).collect();
-    }
-    columns
-}
-
-/// Everything that the text says, and the whole plan.
-fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, Error> {
-    let column = |column: &ColumnRange| {
-        let names: Map<String, Value> =
-            column.names.iter().map(|(name, count)| (name.clone(), json!(count))).collect();
-        json!({
-            "name": column.name,
-            "unit": column.unit,
-            "nulls": column.nulls,
-            "least": column.range.map(|(least, _)| least),
-            "greatest": column.range.map(|(_, greatest)| greatest),
-            "counts": if names.is_empty() { Value::Null } else { Value::Object(names) },
-        })
-    };
-    let mut said = json!({
-        "file": args.file.display().to_string(),
-        "rows": file.rows,
-        "made_by": opened.created_by(),
-        "is_sealed": opened.is_sealed(),
-        "columns": file.columns.iter().map(column).collect::<Value>(),
-        "boundary": own_json(opened, key::BOUNDARY),
-        "plan": own_json(opened, key::PLAN),
-    });
-    if let Some(result) = &file.result {
-        let tally = tally(opened)?;
-        let places = extremes_at(opened, result, &tally)?;
-        let places = places.into_iter().map(|(point, values)| {
-            let values: Map<String, Value> =
-                values.into_iter().map(|(axis, value)| (axis, json!(value))).collect();
-            (point.to_string(), Value::Object(values))
-        });
-        said["version"] = json!(result.version);
-        said["numerics"] = json!(result.numerics);
-        said["plan_hash"] = json!(result.plan_hash);
-        said["summary"] = json!(tally);
-        said["points"] = Value::Object(places.collect());
-    }
-    Ok(said)
-}
-
-/// The points of the extremes that a summary names, in axis values.
-fn extremes_at(
-    file: &ParquetFile,
-    result: &ResultFile,
-    tally: &Tally,
-) -> Result<Vec<(u64, Vec<(String, f64)>)>, Error> {
-    let axes: Vec<&str> =
-        axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
-    let extremes = [&tally.greatest_ratio, &tally.least_gap_nonlinear_m];
-    let place = |extreme: &Extreme| {
-        let values = row(file, extreme.point, &axes)?;
-        let named = axes.iter().map(|axis| (*axis).to_owned()).zip(values);
-        Ok::<_, Error>((extreme.point, named.collect()))
-    };
-    extremes.into_iter().flatten().map(place).collect()
-}
-
-fn provenance(text: &mut String, result: &ResultFile) {
-    let plan = &result.plan;
-    line(text, "name", plan["name"].as_str().unwrap_or_default());
-    let build = identity::words(&result.version, result.numerics);
-    line(text, "made by", &format!("{build}, plan {}", &result.plan_hash));
-    for (name, key) in [("spin", "spin"), ("time", "time"), ("method", "integrator")] {
-        line(text, name, &brief(&plan[key]));
-    }
-    if let Some(criterion) = plan["reliability"]["criterion"].as_str() {
-        line(text, "criterion", criterion);
-    }
-    if let Some(design) = plan.get("design") {
-        line(text, "design", &brief(design));
-    }
-    for axis in axes(plan) {
-        let name = axis["parameter"].as_str().unwrap_or_default();
-        // The axes of a list are its columns, whose ranges stand below.
-        let values = ["range", "values", "distribution"].iter().find_map(|key| axis.get(key));
-        let values = values.map(brief);
-        let values = values.map_or(String::new(), |values| format!(": {values}"));
-        line(text, "axis", &format!("{name}{values}"));
-    }
-    if let Some(set) = plan["set"].as_object() {
-        let told = set.iter().map(|(name, value)| format!("{name} = {}", brief(value)));
-        line(text, "--set", &told.collect::<Vec<_>>().join(", "));
-    }
-}
-
-/// A small JSON value on one line, as a person would write it.
-fn brief(value: &Value) -> String {
-    let list = |parts: Vec<String>| parts.join(", ");
-    match value {
-        Value::Object(map) => {
-            list(map.iter().map(|(key, value)| format!("{key} {}", brief(value))).collect())
-        }
-        Value::Array(values) => match values.get(..12) {
-            Some(first) if values.len() > 12 => {
-                format!(
-                    "{}, ... ({} values)",
-                    list(first.iter().map(brief).collect()),
-                    values.len()
-                )
-            }
-            _ => list(values.iter().map(brief).collect()),
-        },
-        Value::String(text) => text.clone(),
-        Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), short),
-        other => other.to_string(),
-    }
-}
-
-fn axes(plan: &Value) -> &[Value] {
-    plan["axis"].as_array().map_or(&[], Vec::as_slice)
-}
-
-/// The columns with their units and ranges.
-fn columns(text: &mut String, file: &Overview) {
-    line(text, "rows", &file.rows.to_string());
-    let width = file.columns.iter().map(|column| column.name.len()).max().unwrap_or(0);
-    for column in &file.columns {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "    {:width$}  {}", column.name, range(column));
-    }
-}
-
-fn range(column: &ColumnRange) -> String {
-    let mut parts = Vec::new();
-    if let Some((least, greatest)) = column.range {
-        let unit = column
-            .unit
-            .as_deref()
-            .filter(|unit| *unit != "1")
-            .map(|unit| format!(" {unit}"))
-            .unwrap_or_default();
-        parts.push(format!("{} to {}{unit}", short(least), short(greatest)));
-    }
-    parts.extend(column.names.iter().map(|(name, count)| format!("{count} {name}")));
-    if column.nulls > 0 {
-        parts.push(format!("{} null", column.nulls));
-    }
-    parts.join(", ")
+/// Whether a result has this column because a metric asked for it.
+fn is_of_a_metric(column: &str) -> bool {
+    // A column of one stop or foot has its number behind the first word.
+    let words = column.split('_').filter(|word| word.parse::<u32>().is_err());
+    let name = words.collect::<Vec<_>>().join("_");
+    Metric::ALL.iter().any(|metric| name.starts_with(metric.name()))
 }
 
 #[cfg(test)]
@@ -327,11 +34,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_read_as_a_person_would_write_them() {
-        let spin = serde_json::json!({ "profile": "ramp", "peak_rpm": 350.0 });
-        assert_eq!(brief(&spin), "peak_rpm 350, profile ramp");
-        assert_eq!(brief(&serde_json::json!([1, 2.5])), "1, 2.5");
-        let long: Vec<u32> = (0..40).collect();
-        assert!(brief(&serde_json::json!(long)).ends_with("10, 11, ... (40 values)"));
+    fn columns_of_metrics_are_told_from_others() {
+        let metrics = ["cabinet_force_linear_n", "static_sag_m", "stop_2_force_nonlinear_n"];
+        for name in [metrics.as_slice(), &["foot_load_linear_n", "growth_mode_1_name"]].concat() {
+            assert!(is_of_a_metric(name), "{name}");
+        }
+        for name in ["ratio_max", "stop_2_clearance_m", "min_gap_linear_m", "status"] {
+            assert!(!is_of_a_metric(name), "{name}");
+        }
     }
 }

@@ -1,13 +1,14 @@
 //! `sweep slurm GRID.toml --shards N`: the script that submits a sweep to a Slurm cluster.
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::examples::Examples;
-use super::grid::{ResultArgs, quoted};
-use crate::exit::{Error, Exit, print, tell};
 use crate::plan::Plan;
-use crate::store::{ShardRequest, chunk_points};
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::commands::grid::{ResultArgs, quoted};
+use sweep_engine::exit::{Error, Exit, print, tell};
+use sweep_engine::store::{ShardRequest, chunk_points};
 
 /// Tasks that a Slurm array may have unless its administrator allowed more (`MaxArraySize` 1001
 /// counts from 0).
@@ -71,7 +72,7 @@ fn word(text: &str) -> Result<String, String> {
 /// Mistakes in the grid file, a working folder or program without a path, standard output that
 /// cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let plan = args.target.grid.load()?;
+    let plan: Plan = args.target.grid.load()?;
     let path_of = |what: &str, found: std::io::Result<PathBuf>| {
         found.map_err(|source| Error::File {
             action: "find the path of",
@@ -81,6 +82,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     };
     let folder = path_of("the working folder", std::env::current_dir())?;
     let program = path_of("this program", std::env::current_exe())?;
+    names_fit(args, &folder, &program)?;
     let chunks = plan.points().div_ceil(chunk_points(plan.points()));
     if args.shards > chunks {
         tell(&format!(
@@ -96,6 +98,30 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         );
     }
     print(&script(args, &plan, &folder, &program))
+}
+
+/// Refuses names that a script cannot hold. A line break in one would end a here-document early,
+/// and the shell would run the rest of the name.
+fn names_fit(args: &Args, folder: &Path, program: &Path) -> Result<(), Error> {
+    let ResultArgs { grid, out } = &args.target;
+    let paths = [
+        ("GRID.toml", Some(grid.grid.as_path())),
+        ("--out", out.as_deref()),
+        ("the working folder", Some(folder)),
+        ("the path of this program", Some(program)),
+    ];
+    let paths = paths.into_iter().filter_map(|(what, path)| Some((what, path?.as_os_str())));
+    let sets = grid.sets.iter().map(|set| ("--set", OsStr::new(set)));
+    for (option, name) in paths.chain(sets) {
+        if name.to_str().is_none_or(|name| word(name).is_err()) {
+            return Err(Error::Option {
+                option,
+                given: format!("{name:?}"),
+                expected: "a name in UTF-8 without control characters, as a script needs".into(),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// The script: the array, and the merge that waits for it.
@@ -280,6 +306,24 @@ mod tests {
         ));
         place(&format!("exec '/opt/my sweep' merge '{grid}' --set tub_mass_kg=20"));
         assert!(home.path().join("results").is_dir(), "Slurm makes no folder for its logs");
+    }
+
+    #[test]
+    fn no_name_gets_out_of_its_line() {
+        use std::os::unix::ffi::OsStrExt;
+        let fits = |words: &[&str], folder: &[u8], program: &str| {
+            let args = parse(&[words, &["--shards", "2"]].concat()).unwrap();
+            names_fit(&args, Path::new(OsStr::from_bytes(folder)), Path::new(program)).is_ok()
+        };
+        assert!(fits(&["it's $(a) `grid`.toml", "--out", "ü x.parquet"], b"/a b", "/sweep"));
+        let out = "x\nEND\ntouch /tmp/out\n.toml";
+        assert!(!fits(&[out], b"/", "/sweep"));
+        assert!(!fits(&["g.toml", "--out", out], b"/", "/sweep"));
+        assert!(!fits(&["g.toml", "--set", out], b"/", "/sweep"));
+        assert!(!fits(&["g.toml"], out.as_bytes(), "/sweep"));
+        assert!(!fits(&["g.toml"], b"/", out));
+        assert!(!fits(&["g.toml"], b"/\xff", "/sweep"), "a lossy name is another one");
+        assert!(!fits(&["g.toml", "--out", "a\r.parquet"], b"/", "/sweep"));
     }
 
     #[test]

@@ -4,16 +4,18 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::examples::Examples;
-use super::grid::{ResultArgs, quoted};
-use super::run::{WorkArgs, line, work};
-use crate::exit::{Error, Exit, tell};
-use crate::interrupt::Interrupt;
-use crate::progress::duration;
-use crate::run::{self as runner, Ended, RunReport};
+use crate::plan::Plan;
 use crate::speeds::{Speeds, turning};
+use crate::stability::dwells;
 use crate::stability::{DwellEngine, check, tongues};
-use crate::threads::Environment;
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::commands::grid::{ResultArgs, quoted};
+use sweep_engine::commands::run::{WorkArgs, line, work};
+use sweep_engine::exit::{Error, Exit, tell};
+use sweep_engine::interrupt::Interrupt;
+use sweep_engine::progress::duration;
+use sweep_engine::run::{self as runner, Ended, RunReport};
+use sweep_engine::threads::Environment;
 use sweep_files::ParquetFile;
 
 /// Shown by `--help`.
@@ -60,11 +62,11 @@ command goes on from there.";
 /// Mistakes in the grid file or the options, and whatever keeps the file from being written;
 /// finished chunks are kept.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let plan = args.target.grid.load()?;
+    let plan: Plan = args.target.grid.load()?;
     check(&plan, "--speed", &args.speed.to_string())?;
     let speeds_rpm = args.speed.values();
     let engine = DwellEngine::new(&plan, &speeds_rpm)?;
-    let (job, output) = args.target.job(&plan, Some(args.speed));
+    let (job, output) = dwells(&plan, args.speed, args.target.out.as_deref());
     let interrupt = Interrupt::install().map_err(|source| Error::File {
         action: "install signal handlers for",
         path: PathBuf::from("this process"),

@@ -3,20 +3,20 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use super::cells::{short, table};
-use super::examples::Examples;
-use super::grid::quoted;
-use super::run::line;
 use crate::config;
 use crate::engine::ModelEngine;
-use crate::exit::{Error, Exit, tell};
-use crate::memory::{ensure_heaps, ensure_memory_of};
 use crate::plan::Plan;
-use crate::store::Job;
-use crate::threads;
 use crate::trace::{
     Extras, StartValue, View, bytes, every, instants, start_of, start_value, trace,
 };
+use sweep_engine::commands::cells::{short, table};
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::commands::grid::quoted;
+use sweep_engine::commands::run::line;
+use sweep_engine::exit::{Error, Exit, tell};
+use sweep_engine::memory::{ensure_heaps, ensure_memory_of};
+use sweep_engine::store::Job;
+use sweep_engine::threads;
 use sweep_files::{FileKind, Output, key};
 use sweep_results::{Cell, Order, ResultTable, top};
 use washer_row::{Trajectory, Verdict};
@@ -36,7 +36,7 @@ pub(super) const EXAMPLES: Examples = &[
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    grid: super::grid::GridArgs,
+    grid: sweep_engine::commands::grid::GridArgs,
     /// The point: a value for each axis, on the grid or between its points, and for any other
     /// parameter; may be repeated
     #[arg(long, value_name = "NAME=VALUE", conflicts_with_all = ["point", "worst"])]
@@ -98,9 +98,10 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     // A thread for each model, where there may be two; they write the same bytes as one.
     let pool = ensure_heaps(2, bytes).ok().and_then(|()| threads::pool(2).ok());
     let trace = match pool {
-        Some(pool) => pool.install(work)?,
-        None => work()?,
-    };
+        Some(pool) => pool.install(work),
+        None => work(),
+    }
+    .map_err(Error::model)?;
     trace.failures.iter().for_each(|failure| tell(failure));
     let instants = trace.instants;
     output.finish(&trace.into_bytes(&args.out)?)?;
@@ -117,7 +118,7 @@ fn chosen(args: &Args) -> Result<Vec<String>, Error> {
     if args.point.is_none() && args.worst.is_none() {
         return Ok(args.at.clone());
     }
-    let plan = args.grid.load()?;
+    let plan: Plan = args.grid.load()?;
     let point = match (&args.worst, args.point) {
         (Some(column), _) => {
             let point = worst(args, &plan, column)?;
@@ -166,7 +167,7 @@ fn worst(args: &Args, plan: &Plan, column: &str) -> Result<u64, Error> {
     }
     let order = if is_worst_where_least(column) { Order::Ascending } else { Order::Descending };
     let rows = top(&file, &["point", column], None, Some((column, order)), 1);
-    let rows = rows.map_err(|error| super::show::with_nearest(error, &file))?;
+    let rows = rows.map_err(|error| sweep_engine::commands::show::with_nearest(error, &file))?;
     match rows.first().map(Vec::as_slice) {
         Some([Cell::Number(point), Cell::Number(_) | Cell::Flag(_)]) => Ok(*point as u64),
         _ => Err(refused(format!("a column that has values in {}", path.display()))),
@@ -198,7 +199,7 @@ fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
             .collect();
         let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
         let [from, to] = plan.window_s;
-        let what = plan.measures.criterion.amplitude();
+        let what = plan.model.measures.criterion.amplitude();
         let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{what}, {} to {} s{place}:", short(from), short(to));

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::tests::{SMALLEST, load_text};
 use super::*;
-use crate::estimate::Estimate;
+use crate::estimate;
 
 /// A grid whose spin is a table of so many rows.
 fn with_a_table(rows: usize, more: &str) -> String {
@@ -96,7 +96,7 @@ fn a_machine_too_stiff_for_any_number_of_steps_is_refused_by_every_explicit_meth
 fn a_stiff_machine_that_is_accepted_is_estimated_from_a_beginning() {
     for method in ["rk4-mass-scaled", "dopri5"] {
         let plan = light(1e-6, 10.0, &format!("method = \"{method}\"")).unwrap();
-        let estimate = Estimate::of(&plan, 1).unwrap();
+        let estimate = estimate::of(&plan, 1).unwrap();
         assert!(estimate.sampled_s < 1.0, "{estimate:?}");
     }
 }

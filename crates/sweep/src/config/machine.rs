@@ -1,18 +1,16 @@
 //! Machine files: every section and key is a group of parameters, so one small table of their names
 //! reads a file, writes one, and describes it.
 
-use std::path::Path;
-
 use serde_json::{Map, Value};
 use washer_model::{
     BumpStop, Bushing, Cabinet, Damper, Foot, Machine, Parameter, Spin, Spring, Unbalance,
 };
 
-use super::grid::is_blank;
-use super::origins::Origins;
-use super::report::{Diagnostic, Report};
-use super::section::{Field, Section};
-use super::source::Location;
+use sweep_engine::config::origins::Origins;
+use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_engine::config::section::{Field, Section};
+use sweep_engine::config::source::Location;
+use sweep_engine::config::source::is_blank;
 
 /// A section of the machine file. Parameters are named `<prefix>_<number>` and, for vectors, with
 /// the component before the unit: `inertia_kg_m2` holds `inertia_11_kg_m2` and two more.
@@ -392,11 +390,6 @@ impl MachineReader<'_> {
             self.origins.doubt(format!("{prefix}{name}"));
         }
     }
-}
-
-/// Path of a machine file as the grid file means it.
-pub(super) fn beside(grid: &Path, machine: &str) -> std::path::PathBuf {
-    grid.parent().unwrap_or(Path::new("")).join(machine)
 }
 
 /// The machine as a machine file's tables hold it; every number as its shortest decimal that reads

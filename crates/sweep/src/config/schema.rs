@@ -1,91 +1,40 @@
-//! JSON Schema (draft 2020-12) of grid and machine files, made from the tables that read them. It
-//! covers what a schema can say about one file; what needs the machine or two values together is
-//! left to [`super::load`].
+//! What JSON Schemas say of machines: machine files, and what of grid files is the machine's.
 
 use serde_json::{Map, Value, json};
-use washer_model::{Channel, Parameter, Range, Spin};
+use sweep_engine::Schema;
+use sweep_engine::config::schema::{document, number, of, set as set_schema, table};
+use washer_model::{Parameter, Range, Spin};
 use washer_row::{Criterion, Metric};
 
-use super::axes::MOST_POINTS;
-use super::design::{DEFAULT_SEED, MOST_SEED, MOST_SOBOL};
-use super::grid::{DEFAULT_CHANNELS, DEFAULT_MACHINE, DEFAULT_RATIO_LIMIT, LONGEST_S};
+use super::grid::DEFAULT_MACHINE;
 use super::machine::{BLOCKS, Block, CABINET, LISTS, no_spin, with_one_of_each};
 use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
-use crate::method::{Entry, METHODS};
 
-const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
-
-/// The schema of grid files.
+/// What grid files have beside what the engine reads.
 #[must_use]
-pub(crate) fn grid() -> Value {
-    let name = json!({
-        "type": "string",
-        "pattern": "^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
-        "description": "name of the run and of its result file; the grid file's own name if left \
-                        out",
-    });
+pub(crate) fn grid() -> Schema {
     let machine = json!({
         "type": "string",
         "default": DEFAULT_MACHINE,
         "description": "\"paper\", or a machine file relative to this file",
     });
-    let axes = json!({
-        "type": "array",
-        "items": axis(),
-        "description": "swept parameters; the first varies slowest. With [design] each has a \
-                        range without a count",
+    let criterion = json!({
+        "enum": Criterion::ALL.map(Criterion::name),
+        "default": Criterion::default().name(),
+        "description": "what the models are compared by: largest deviations, the same turn by \
+                        turn of the drum, or root mean squares",
     });
-    let sections = [
-        ("name", name),
-        ("machine", machine),
-        ("metrics", metrics()),
-        ("set", set()),
-        ("spin", spin()),
-        ("time", time()),
-        ("integrator", integrator()),
-        ("axis", axes),
-        ("design", design()),
-        ("reliability", reliability()),
-        ("stability", stability()),
-    ];
-    let mut schema = table(sections, &["spin", "time"]);
-    // Whether a range has a count depends on whether there is a design.
-    schema["if"] = json!({ "required": ["design"] });
-    let counted = json!({ "properties": { "range": { "required": ["count"] } } });
-    let every_axis = |items: Value| json!({ "properties": { "axis": { "items": items } } });
-    schema["then"] = every_axis(json!({ "not": counted }));
-    schema["else"] = every_axis(counted);
-    document("Grid file of sweep", schema)
-}
-
-fn design() -> Value {
-    let one = |method: &'static str, description: &str, most: u64| {
-        let method = json!({ "const": method, "description": description });
-        let points =
-            json!({ "type": "integer", "minimum": 1, "maximum": most, "description": "how many" });
-        let seed = json!({
-            "type": "integer",
-            "minimum": 0,
-            "maximum": MOST_SEED,
-            "default": DEFAULT_SEED,
-            "description": "another seed, another draw",
-        });
-        table([("method", method), ("points", points), ("seed", seed)], &["method", "points"])
-    };
-    let list = json!({ "const": "list", "description": "points as listed" });
-    let file = json!({ "type": "string", "description": "CSV or Parquet, relative to this file: \
-                                                         one column a parameter, one row a \
-                                                         point" });
-    json!({
-        "oneOf": [
-            one("latin_hypercube", "every axis cut into as many strata as there are points, one \
-                                    point in each", MOST_POINTS),
-            one("monte_carlo", "every point at random, independent of all others", MOST_POINTS),
-            one("sobol", "a scrambled Sobol sequence; a power of two points is the most \
-                          even", MOST_SOBOL),
-            table([("method", list), ("file", file)], &["method", "file"]),
+    Schema {
+        top: vec![
+            ("machine", machine),
+            ("metrics", metrics()),
+            ("spin", spin()),
+            ("stability", stability()),
         ],
-    })
+        required: vec!["spin"],
+        reliability: vec![("criterion", criterion)],
+        set: set(),
+    }
 }
 
 /// The schema of machine files.
@@ -128,53 +77,11 @@ pub(crate) fn machine() -> Value {
     document("Machine file of sweep", table(properties, &required))
 }
 
-fn document(title: &str, mut schema: Value) -> Value {
-    schema["$schema"] = DRAFT.into();
-    schema["title"] = title.into();
-    schema
-}
-
-fn table<'k>(properties: impl IntoIterator<Item = (&'k str, Value)>, required: &[&str]) -> Value {
-    let properties: Map<String, Value> =
-        properties.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
-    json!({
-        "type": "object",
-        "properties": properties,
-        "required": required,
-        "additionalProperties": false,
-    })
-}
-
-fn number(range: Range) -> Value {
-    let largest = Range::LARGEST;
-    match range {
-        Range::Any => json!({ "type": "number", "minimum": -largest, "maximum": largest }),
-        Range::Positive => json!({ "type": "number", "exclusiveMinimum": 0, "maximum": largest }),
-        Range::NonNegative => json!({ "type": "number", "minimum": 0, "maximum": largest }),
-        Range::Negative => json!({ "type": "number", "minimum": -largest, "exclusiveMaximum": 0 }),
-        Range::Within(least, greatest) => {
-            json!({ "type": "number", "minimum": least, "maximum": greatest })
-        }
-    }
-}
-
-fn described(mut schema: Value, default: f64, description: &str) -> Value {
-    schema["default"] = default.into();
-    schema["description"] = description.into();
-    schema
-}
-
 /// A parameter's number, by name.
 fn parameter(name: &str) -> Value {
     let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
     Parameter::find(name, &with_one_of_each(), &spin)
         .map_or(json!({ "type": "number" }), |parameter| of(&parameter))
-}
-
-fn of(parameter: &Parameter) -> Value {
-    let mut schema = number(parameter.range());
-    schema["description"] = format!("{}, {}", parameter.description(), parameter.unit()).into();
-    schema
 }
 
 fn block_properties(block: &Block, prefix: &str) -> Vec<(&'static str, Value)> {
@@ -206,7 +113,7 @@ fn set() -> Value {
     let mut all = Parameter::all(&machine, &spin);
     let table = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     all.extend(Parameter::all(&machine, &table));
-    let (mut properties, mut patterns) = (Map::new(), Map::new());
+    let (mut single, mut patterns) = (Vec::new(), Map::new());
     for parameter in &all {
         let name = parameter.name();
         let lists = LISTS.iter().map(|list| (list.block.prefix, list.first));
@@ -219,18 +126,10 @@ fn set() -> Value {
                 let number = if first == 1 { "[1-9][0-9]*" } else { "([2-9]|[1-9][0-9]+)" };
                 patterns.insert(format!("^{prefix}{number}{suffix}$"), of(parameter));
             }
-            _ => {
-                properties.insert(name.to_owned(), of(parameter));
-            }
+            _ => single.push(parameter.clone()),
         }
     }
-    json!({
-        "type": "object",
-        "properties": properties,
-        "patternProperties": patterns,
-        "additionalProperties": false,
-        "description": "constants, by the names of `sweep parameters`",
-    })
+    set_schema(&single, patterns)
 }
 
 fn spin() -> Value {
@@ -268,37 +167,6 @@ fn spin() -> Value {
     json!({ "oneOf": RAMPED.iter().map(ramped).chain([tabled]).collect::<Value>() })
 }
 
-fn time() -> Value {
-    let end_s = json!({
-        "type": "number",
-        "exclusiveMinimum": 0,
-        "maximum": LONGEST_S,
-        "description": "end of the integration, s",
-    });
-    let window_s = json!({
-        "type": "array",
-        "items": number(Range::NonNegative),
-        "minItems": 2,
-        "maxItems": 2,
-        "description": "amplitudes are taken from the first to the second time, s; the whole run \
-                        if left out",
-    });
-    table([("end_s", end_s), ("window_s", window_s)], &["end_s"])
-}
-
-fn integrator() -> Value {
-    let one = |entry: &Entry| {
-        let method = json!({ "const": entry.name, "description": entry.description });
-        let settings = entry.settings.iter().map(|setting| {
-            (setting.key, described(number(setting.range), setting.default, setting.description))
-        });
-        let is_default = entry.name == Entry::default_method().name;
-        let required: &[&str] = if is_default { &[] } else { &["method"] };
-        table([("method", method)].into_iter().chain(settings), required)
-    };
-    json!({ "oneOf": METHODS.iter().map(one).collect::<Value>() })
-}
-
 fn metrics() -> Value {
     json!({
         "type": "array",
@@ -316,80 +184,4 @@ fn stability() -> Value {
                         what `growth` among the metrics is about",
     });
     table([("speed_rpm", speeds)], &["speed_rpm"])
-}
-
-fn reliability() -> Value {
-    let criterion = json!({
-        "enum": Criterion::ALL.map(Criterion::name),
-        "default": Criterion::default().name(),
-        "description": "what the models are compared by: largest deviations, the same turn by \
-                        turn of the drum, or root mean squares",
-    });
-    let limit = "a point is reliable where every ratio is below this";
-    let channels = json!({
-        "type": "array",
-        "items": { "enum": Channel::ALL.map(Channel::name) },
-        "minItems": 1,
-        "uniqueItems": true,
-        "default": DEFAULT_CHANNELS.map(Channel::name),
-        "description": "motions that are compared",
-    });
-    let ratio_limit = described(number(Range::Positive), DEFAULT_RATIO_LIMIT, limit);
-    table([("ratio_limit", ratio_limit), ("channels", channels), ("criterion", criterion)], &[])
-}
-
-fn distribution() -> Value {
-    let one = |kind: &'static str, numbers: &[(&'static str, Range)], required: &[&str]| {
-        let mut properties = vec![("kind", json!({ "const": kind }))];
-        properties.extend(numbers.iter().map(|(key, range)| (*key, number(*range))));
-        properties.extend(["from", "to"].map(|key| (key, number(Range::Any))));
-        table(properties, required)
-    };
-    let (any, positive) = (Range::Any, Range::Positive);
-    json!({
-        "description": "of a design, cut at `from` and `to`; left out, they lie six standard \
-                        deviations from the middle",
-        "oneOf": [
-            one("normal", &[("mean", any), ("sd", positive)], &["kind", "mean", "sd"]),
-            one(
-                "lognormal",
-                &[("median", positive), ("sigma", positive)],
-                &["kind", "median", "sigma"],
-            ),
-            one("uniform", &[], &["kind", "from", "to"]),
-        ],
-    })
-}
-
-fn axis() -> Value {
-    let parameter = json!({ "type": "string", "description": "a name of `sweep parameters`" });
-    let range = table(
-        [
-            ("from", number(Range::Any)),
-            ("to", number(Range::Any)),
-            (
-                "count",
-                json!({
-                    "type": "integer",
-                    "minimum": 1,
-                    "maximum": MOST_POINTS,
-                    "description": "how many, both ends included",
-                }),
-            ),
-            ("spacing", json!({ "enum": ["linear", "log"], "default": "linear" })),
-        ],
-        &["from", "to"],
-    );
-    let values =
-        json!({ "type": "array", "items": number(Range::Any), "minItems": 1, "uniqueItems": true });
-    json!({
-        "oneOf": [
-            table([("parameter", parameter.clone()), ("values", values)], &["parameter", "values"]),
-            table([("parameter", parameter.clone()), ("range", range)], &["parameter", "range"]),
-            table(
-                [("parameter", parameter), ("distribution", distribution())],
-                &["parameter", "distribution"],
-            ),
-        ],
-    })
 }

@@ -1,15 +1,22 @@
 //! `[spin]`: the profiles by name, and how each is read and described.
 
-use washer_model::{Range, Spin, decimal};
+use serde_json::{Value, json};
+use washer_model::{Machine, Parameter, Range, Spin, decimal};
 
-use super::origins::Origins;
-use super::report::{Diagnostic, Report};
-use super::section::{Section, listed};
-use super::{machine, parameters};
+use super::machine;
+use sweep_engine::config::origins::Origins;
+use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_engine::config::section::{Section, listed};
 
 /// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are
 /// made ready together.
 pub(super) const MOST_ROWS: usize = 20_000;
+
+/// The range of a parameter of the spin.
+fn range(parameter: &str, spin: &Spin) -> Range {
+    Parameter::find(parameter, &Machine::paper(), spin)
+        .map_or(Range::Any, |parameter| parameter.range())
+}
 
 /// A profile that a peak and a ramp give.
 pub(super) struct Ramped {
@@ -50,6 +57,21 @@ pub(super) const fn name(spin: &Spin) -> &'static str {
     }
 }
 
+/// A spin as a grid file has it.
+pub(crate) fn to_json(spin: &Spin) -> Value {
+    let profile = name(spin);
+    match spin {
+        Spin::Cycloidal { peak_rpm, ramp_s }
+        | Spin::Triangular { peak_rpm, ramp_s }
+        | Spin::Ramp { peak_rpm, ramp_s } => {
+            json!({ "profile": profile, "peak_rpm": peak_rpm, "ramp_s": ramp_s })
+        }
+        Spin::Table { time_s, speed_rpm } => {
+            json!({ "profile": profile, "time_s": time_s, "speed_rpm": speed_rpm })
+        }
+    }
+}
+
 /// The same spin by another profile that a peak and a ramp give; none of a table.
 pub(super) fn by_profile(spin: &Spin, profile: &Ramped) -> Option<Spin> {
     match *spin {
@@ -78,7 +100,7 @@ impl Profile {
     }
 }
 
-pub(super) fn read(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> Spin {
+pub(crate) fn read(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> Spin {
     // Stands in for a wrong spin, so that axes over its numbers are still known.
     let stand_in = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
     let field = root.table("spin", "[spin]", report);
@@ -155,7 +177,7 @@ impl<'r, 'a> SpinReader<'r, 'a> {
     }
 
     fn number(&mut self, key: &'static str, parameter: &str, expected: &str) -> Option<f64> {
-        let range = parameters::range(parameter, self.stand_in);
+        let range = range(parameter, self.stand_in);
         let field = self.section.number(key, range, self.report);
         let found = if self.must_be_there() {
             self.section.require(field, key, expected, self.report)?

@@ -12,9 +12,9 @@ use washer_model::{Machine, Spin};
 use washer_row::{Measures, Metric};
 
 use super::*;
-use crate::design::Design;
 use crate::method::Integrator;
 use crate::plan::AxisValues;
+use sweep_engine::design::Design;
 
 /// What the fuzzer's inputs are read as.
 #[path = "../../../../fuzz/src/input.rs"]
@@ -107,8 +107,8 @@ fn every_sweep_of_the_repository_loads() {
 fn what_is_left_out_has_its_default() {
     let plan = load_text(SMALLEST, &[]).unwrap();
     assert_eq!(plan.name, "grid");
-    assert_eq!(plan.machine, Machine::paper());
-    assert_eq!(plan.spin, Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 });
+    assert_eq!(plan.model.machine, Machine::paper());
+    assert_eq!(plan.model.spin, Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 });
     assert_eq!((plan.end_s, plan.window_s), (50.0, [0.0, 50.0]));
     assert_eq!(plan.integrator, Integrator::Rk4MassScaled { accuracy: 1e-3 });
     assert_eq!(plan.points(), 1);
@@ -135,13 +135,13 @@ fn a_starter_grid_is_the_documented_one() {
     assert_eq!(starter.points(), 16);
     let bare = load_text(SMALLEST, &[]).unwrap();
     assert_eq!((starter.integrator, starter.reliability), (bare.integrator, bare.reliability));
-    assert_eq!((starter.machine, starter.measures), (bare.machine, bare.measures));
+    assert_eq!(starter.model, bare.model);
 }
 
 #[test]
 fn what_is_measured_is_part_of_the_plan_only_where_it_is_not_the_default() {
     let plain = load_text(SMALLEST, &[]).unwrap();
-    assert_eq!(plain.measures, Measures::default());
+    assert_eq!(plain.model.measures, Measures::default());
     let told = load_text(format!("{SMALLEST}[reliability]\ncriterion = \"peak\"\n"), &[]).unwrap();
     assert_eq!(told.to_json(), plain.to_json());
     let more = format!(
@@ -149,7 +149,7 @@ fn what_is_measured_is_part_of_the_plan_only_where_it_is_not_the_default() {
          = \"rms\"\n"
     );
     let more = load_text(more, &[]).unwrap();
-    assert_eq!(more.measures.metrics, [Metric::StaticSag, Metric::CabinetForce]);
+    assert_eq!(more.model.measures.metrics, [Metric::StaticSag, Metric::CabinetForce]);
     let json = more.to_json();
     assert_eq!(json["reliability"]["criterion"], "rms");
     assert_eq!(json["metrics"], serde_json::json!(["static_sag", "cabinet_force"]));
@@ -162,15 +162,21 @@ fn later_layers_override_earlier_ones() {
     );
     let plan =
         load_text(&grid, &["unbalance_mass_kg=0.3", "damper_2_damping_n_s_per_m=90"]).unwrap();
-    assert_eq!(plan.machine.unbalance.mass_kg, 0.3);
-    let dampings = plan.machine.dampers.iter().map(|damper| damper.damping_n_s_per_m);
+    assert_eq!(plan.model.machine.unbalance.mass_kg, 0.3);
+    let dampings = plan.model.machine.dampers.iter().map(|damper| damper.damping_n_s_per_m);
     assert_eq!(dampings.collect::<Vec<_>>(), [100.0, 90.0]);
-    assert_eq!(plan.spin, Spin::Triangular { peak_rpm: 600.0, ramp_s: 50.0 });
+    assert_eq!(plan.model.spin, Spin::Triangular { peak_rpm: 600.0, ramp_s: 50.0 });
     // An axis of one damper beside a constant for all of them.
     let axis = "[[axis]]\nparameter = \"damper_1_damping_n_s_per_m\"\nvalues = [50, 60]\n";
     let plan = load_text(format!("{grid}{axis}"), &[]).unwrap();
-    let dampings =
-        plan.scenario(1).machine.dampers.iter().map(|d| d.damping_n_s_per_m).collect::<Vec<_>>();
+    let dampings = plan
+        .scenario(1)
+        .model
+        .machine
+        .dampers
+        .iter()
+        .map(|d| d.damping_n_s_per_m)
+        .collect::<Vec<_>>();
     assert_eq!(dampings, [60.0, 100.0]);
 }
 
@@ -182,8 +188,8 @@ fn a_point_may_lie_between_the_grids() {
             .map(|(plan, _)| plan)
     };
     let plan = at(&["damping_n_s_per_m=99.5", "unbalance_mass_kg=0.4", "tub_mass_kg=25"]).unwrap();
-    assert_eq!((plan.points(), plan.machine.tub.mass_kg), (1, 25.0));
-    assert!(plan.machine.dampers.iter().all(|damper| damper.damping_n_s_per_m == 99.5));
+    assert_eq!((plan.points(), plan.model.machine.tub.mass_kg), (1, 25.0));
+    assert!(plan.model.machine.dampers.iter().all(|damper| damper.damping_n_s_per_m == 99.5));
     assert_eq!(at(&["unbalance_mass_kg=0.4"]).unwrap_err().count(), 1);
     assert_eq!(at(&[]).unwrap_err().count(), 2);
 }
@@ -213,7 +219,7 @@ fn a_written_machine_reads_back_the_same_bits() {
         std::fs::write(folder.path().join("machine.toml"), machine_file(&machine)).unwrap();
         let grid = folder.path().join("grid.toml");
         std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
-        assert_eq!(load(&grid, &[]).unwrap().machine, machine);
+        assert_eq!(load(&grid, &[]).unwrap().model.machine, machine);
     }
 }
 
@@ -288,7 +294,7 @@ fn a_machine_of_a_thousand_springs_is_enough() {
         std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
         load(&grid, &[]).map_err(|mistakes| mistakes.to_string())
     };
-    assert_eq!(load_with(1000).unwrap().machine.springs.len(), 1000);
+    assert_eq!(load_with(1000).unwrap().model.machine.springs.len(), 1000);
     assert!(load_with(1001).unwrap_err().contains("the machine has 1001 springs"));
 }
 
@@ -420,8 +426,8 @@ fn loads_or_explains(text: &[u8]) {
         Ok(plan) => {
             for corner in 0..plan.corners() {
                 let scenario = plan.scenario_at(&plan.corner(corner));
-                assert_eq!(scenario.machine.violations(), []);
-                assert_eq!(scenario.spin.violations(), []);
+                assert_eq!(scenario.model.machine.violations(), []);
+                assert_eq!(scenario.model.spin.violations(), []);
             }
             assert!(plan.window_s[0] < plan.window_s[1] && plan.window_s[1] <= plan.end_s);
         }
@@ -440,7 +446,7 @@ fn the_fuzzers_corpus_loads_or_is_explained() {
         match load(&input.write(folder.path()).unwrap(), &input.sets) {
             Ok(plan) => {
                 loaded += 1;
-                assert_eq!(plan.scenario(plan.points() - 1).machine.violations(), []);
+                assert_eq!(plan.scenario(plan.points() - 1).model.machine.violations(), []);
             }
             Err(mistakes) => assert!(mistakes.to_string().contains("nothing was done")),
         }
@@ -518,7 +524,7 @@ proptest! {
         let grid = folder.path().join("grid.toml");
         std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
         match load(&grid, &[]) {
-            Ok(plan) => assert_eq!(plan.machine.violations(), []),
+            Ok(plan) => assert_eq!(plan.model.machine.violations(), []),
             Err(mistakes) => assert!(mistakes.count() >= 1),
         }
     }
@@ -561,7 +567,7 @@ fn a_list_is_a_file_of_points_whose_content_counts() {
         [plan.axis_values(0), plan.axis_values(1)],
         [[0.25, 50.0], [0.5, 40.0]].map(Vec::from)
     );
-    assert_eq!(plan.scenario(1).spin, Spin::Triangular { peak_rpm: 350.0, ramp_s: 40.0 });
+    assert_eq!(plan.scenario(1).model.spin, Spin::Triangular { peak_rpm: 350.0, ramp_s: 40.0 });
     let other = load_list(&text.replace("40", "41"));
     assert_ne!(plan.to_json()["design"]["hash"], other.to_json()["design"]["hash"]);
     assert_eq!(plan.to_json()["axis"], other.to_json()["axis"]);

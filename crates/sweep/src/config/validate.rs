@@ -5,15 +5,19 @@ use std::collections::BTreeSet;
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use washer_model::{
-    Parameter, Spin, Target, Timing, Violation, decimal, highest_frequency_rad_per_s, prepare,
+    Spin, Target, Timing, Violation, decimal, highest_frequency_rad_per_s, prepare,
 };
 use washer_row::Criterion;
 
-use super::grid::Draft;
-use super::report::{Diagnostic, Report};
-use super::source::{Location, Sources};
-use crate::method::{REFERENCE_SHARE, SHORTEST_AT_CORNERS, Steps};
-use crate::plan::{MOST_STEPS, Plan, Scenario, shortest_step_s};
+use crate::method::{REFERENCE_SHARE, SHORTEST_AT_CORNERS};
+use crate::model::Washer;
+use crate::plan::{Plan, Scenario};
+use sweep_engine::config::Draft;
+use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_engine::config::source::Location;
+use sweep_engine::config::whole::{places, refuse_step, window};
+use sweep_engine::method::{Integrator as _, Steps};
+use sweep_engine::plan::{MOST_STEPS, shortest_step_s};
 
 /// Most turns of the drum in a window that are compared one by one: 20 minutes at 1000 rpm. They
 /// stay in memory for a group of points.
@@ -29,7 +33,7 @@ const TURNS_PER_ROW: u64 = 50;
 /// A machine or spin that cannot be, at any corner of the grid. Inertia and bearings are linear
 /// conditions, so a machine that meets them at the corners meets them between; a spring that
 /// shrinks to nothing only in between is left to the run, as a failed row.
-pub(super) fn scenarios(draft: &Draft, report: &mut Report) {
+pub(crate) fn scenarios(draft: &Draft<Washer>, report: &mut Report) {
     let plan = &draft.plan;
     let mut scenario = plan.scenario_at(&plan.corner(0));
     let swept = Swept::of(plan);
@@ -70,8 +74,8 @@ impl Swept {
 
     /// Refuses a list so long, of a machine or a spin so large, that judging its points would take
     /// minutes.
-    fn is_too_much(self, draft: &Draft, scenario: &Scenario, report: &mut Report) -> bool {
-        let Scenario { machine, spin, .. } = scenario;
+    fn is_too_much(self, draft: &Draft<Washer>, scenario: &Scenario, report: &mut Report) -> bool {
+        let Washer { machine, spin, .. } = &scenario.model;
         let lists = [machine.springs.len(), machine.dampers.len(), machine.stops.len()];
         let further = machine.bushings.len() + machine.further_unbalances.len();
         let elements = (lists.iter().sum::<usize>() + further) as u64;
@@ -79,8 +83,8 @@ impl Swept {
             Spin::Table { time_s, .. } => time_s.len() as u64,
             Spin::Cycloidal { .. } | Spin::Triangular { .. } | Spin::Ramp { .. } => 1,
         };
-        let counts_turns =
-            draft.plan.measures.criterion == Criterion::Envelope && (self.spin || self.window);
+        let counts_turns = draft.plan.model.measures.criterion == Criterion::Envelope
+            && (self.spin || self.window);
         let a_point = u64::from(self.machine) * elements
             + u64::from(self.spin) * rows
             + u64::from(counts_turns) * rows * TURNS_PER_ROW;
@@ -102,7 +106,7 @@ impl Swept {
 
 /// Judges corner after corner, and reports each mistake once.
 struct Judge<'a> {
-    draft: &'a Draft,
+    draft: &'a Draft<Washer>,
     reported: BTreeSet<Vec<String>>,
     spin_is_sound: bool,
 }
@@ -112,10 +116,10 @@ impl Judge<'_> {
     /// they go together.
     fn corner(&mut self, scenario: &Scenario, new: Swept, report: &mut Report) {
         if new.machine {
-            self.violations(scenario.machine.joint_violations(), false, report);
+            self.violations(scenario.model.machine.joint_violations(), false, report);
         }
         if new.spin {
-            let violations = scenario.spin.joint_violations();
+            let violations = scenario.model.spin.joint_violations();
             self.spin_is_sound = violations.is_empty();
             self.violations(violations, true, report);
         }
@@ -140,51 +144,18 @@ impl Judge<'_> {
     }
 }
 
-/// A window that constants or axes have turned round, or moved past the end.
-fn window(
-    draft: &Draft,
-    scenario: &Scenario,
-    reported: &mut BTreeSet<Vec<String>>,
-    report: &mut Report,
-) {
-    let [from_s, to_s] = scenario.window_s;
-    let end_s = draft.plan.end_s;
-    if from_s < to_s && to_s <= end_s {
-        return;
-    }
-    let concerns = ["window_from_s", "window_to_s", "time.end_s"].map(str::to_owned).to_vec();
-    if !reported.insert(concerns.clone()) {
-        return;
-    }
-    let title = format!(
-        "the window from {} s to {} s does not fit into a run to {} s",
-        decimal(from_s),
-        decimal(to_s),
-        decimal(end_s)
-    );
-    report.push_with(|sources| {
-        let mut diagnostic = Diagnostic::new(title);
-        for (k, place) in places(draft, &concerns, sources).iter().enumerate() {
-            let label =
-                if k == 0 { "expected window_from_s < window_to_s <= end_s" } else { "and this" };
-            diagnostic = diagnostic.at(place, label);
-        }
-        diagnostic
-    });
-}
-
 /// More turns of the drum in the window than are compared one by one.
 fn turns(
-    draft: &Draft,
+    draft: &Draft<Washer>,
     scenario: &Scenario,
     reported: &mut BTreeSet<Vec<String>>,
     report: &mut Report,
 ) {
     let Some(criterion) = draft.origins.get("reliability.criterion") else { return };
-    if draft.plan.measures.criterion != Criterion::Envelope {
+    if draft.plan.model.measures.criterion != Criterion::Envelope {
         return;
     }
-    let turns = scenario.spin.turns_within(scenario.window_s);
+    let turns = scenario.model.spin.turns_within(scenario.window_s);
     if turns <= MOST_TURNS || !reported.insert(vec!["reliability.criterion".to_owned()]) {
         return;
     }
@@ -204,35 +175,6 @@ fn keys(violation: &Violation, of_spin: bool) -> Vec<String> {
     violation.concerns().into_iter().map(key).collect()
 }
 
-/// Where the concerned numbers were written: the axes that sweep them first, then files and
-/// arguments.
-fn places(draft: &Draft, concerns: &[String], sources: &Sources) -> Vec<Location> {
-    let sweeps = |parameter: &Parameter| {
-        parameter
-            .parts(&draft.plan.machine)
-            .iter()
-            .any(|part| concerns.iter().any(|key| key == part))
-    };
-    let axes = draft.plan.axes.iter().enumerate().filter(|(_, axis)| sweeps(&axis.parameter));
-    let axes = axes.filter_map(|(k, _)| draft.origins.get(&format!("axis[{k}]")));
-    let mut places: Vec<Location> = Vec::new();
-    for place in axes.chain(concerns.iter().filter_map(|key| draft.origins.get(key))) {
-        // Numbers of one line, as of one vector, are one place.
-        let line = sources.line(place).number;
-        let same = places
-            .iter_mut()
-            .find(|other| other.source == place.source && sources.line(other).number == line);
-        match same {
-            Some(other) => {
-                other.span =
-                    other.span.start.min(place.span.start)..other.span.end.max(place.span.end);
-            }
-            None => places.push(place.clone()),
-        }
-    }
-    places
-}
-
 fn describe(violation: &Violation, places: &[Location]) -> Diagnostic {
     let mut diagnostic = Diagnostic::new(violation.to_string());
     for (k, place) in places.iter().enumerate() {
@@ -246,54 +188,15 @@ fn describe(violation: &Violation, places: &[Location]) -> Diagnostic {
     diagnostic
 }
 
-/// A fixed step that is longer than the run, or so short that a trajectory would never end.
-pub(super) fn steps(draft: &Draft, report: &mut Report) {
-    let Steps::Fixed(step_s) = draft.plan.integrator.steps() else { return };
-    let end_s = draft.plan.end_s;
-    let steps = end_s / step_s;
-    let title = if step_s > end_s {
-        format!(
-            "a step of {} s is longer than the whole run, {} s",
-            decimal(step_s),
-            decimal(end_s)
-        )
-    } else if steps > MOST_STEPS {
-        format!("a step of {} s makes {steps:.1e} steps to {} s", decimal(step_s), decimal(end_s))
-    } else {
-        return;
-    };
-    let expected =
-        format!("expected a step from {:e} s to {} s", shortest_step_s(end_s), decimal(end_s));
-    let refusal = refuse_step(draft, title, &expected);
-    report.push(
-        draft
-            .origins
-            .get("time.end_s")
-            .into_iter()
-            .fold(refusal, |all, end| all.at(end, "and this")),
-    );
-}
-
-/// Growth is asked of machines whose forces are smooth.
-pub(super) fn growth(draft: &Draft, report: &mut Report) {
-    let is_asked = draft.plan.growth_speeds.is_some();
-    let Some(what) = draft.plan.corners_of_forces().filter(|_| is_asked) else { return };
-    let title = format!("the metric `growth` is for smooth forces, and the machine has {what}");
-    report.push(
-        Diagnostic::new(title)
-            .help("let the drum dwell by a spin table instead (docs/friction.md)"),
-    );
-}
-
 /// A machine whose fastest motion is too fast for an explicit method: for any number of steps that
 /// is accepted, or for the plan's own step. Only a sound plan can be judged.
-pub(super) fn stability(draft: &Draft, report: &mut Report) {
+pub(crate) fn stability(draft: &Draft<Washer>, report: &mut Report) {
     // As a share of the longest stable step: that which the method takes at its slowest.
     let (step_s, share) = match draft.plan.integrator.steps() {
         Steps::Fixed(step_s) => (Some(step_s), 1.0),
         Steps::Explicit => (None, 1.0),
         // No rung costs more than the last.
-        Steps::Checked(_) if draft.plan.corners_of_forces().is_some() => {
+        Steps::Checked(_) if crate::plan::corners_of_forces(&draft.plan).is_some() => {
             (None, REFERENCE_SHARE * SHORTEST_AT_CORNERS)
         }
         Steps::Checked(_) => (None, REFERENCE_SHARE),
@@ -339,12 +242,12 @@ pub(super) fn stability(draft: &Draft, report: &mut Report) {
 /// The highest natural frequency of any corner's machine, at rest and turning at its greatest
 /// speed. As a rule it is that of undamped bearings against their mass. A machine without
 /// equilibrium has none, and its rows will say so.
-fn highest_frequency_of_corners_rad_per_s(draft: &Draft) -> f64 {
+fn highest_frequency_of_corners_rad_per_s(draft: &Draft<Washer>) -> f64 {
     let plan = &draft.plan;
     let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
     let mut highest = 0.0_f64;
     for values in plan.some_corners() {
-        let Scenario { machine, spin, .. } = plan.scenario_at(&values);
+        let Washer { machine, spin, .. } = plan.scenario_at(&values).model;
         let speed = spin.greatest_speed_rad_per_s(plan.end_s);
         for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
             // Matrices without eigenvalues leave it to the run to tell whether the machine can
@@ -353,10 +256,4 @@ fn highest_frequency_of_corners_rad_per_s(draft: &Draft) -> f64 {
         }
     }
     highest
-}
-
-/// A refusal of the step, pointing at it, or at the section that leaves it out.
-fn refuse_step(draft: &Draft, title: String, expected: &str) -> Diagnostic {
-    let step = draft.origins.get("integrator.step_s").or_else(|| draft.origins.get("integrator"));
-    step.into_iter().fold(Diagnostic::new(title), |diagnostic, at| diagnostic.at(at, expected))
 }

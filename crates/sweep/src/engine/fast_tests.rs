@@ -243,7 +243,8 @@ fn rows_by_other_criteria_are_rk4s() {
              [reliability]\ncriterion = \"{criterion}\"\n"
         ));
         let rows = hold_against_rk4(&plan, 1e-3);
-        let by_peaks = Plan { measures: Default::default(), ..plan.clone() };
+        let mut by_peaks = plan.clone();
+        by_peaks.model.measures = Default::default();
         let peaks = hold_against_rk4(&by_peaks, 1e-3);
         let clashing = rows.iter().filter(|row| row.nonlinear.metrics[1] > 0.0).count();
         assert!((1..rows.len()).contains(&clashing), "{clashing} of {} rows", rows.len());
@@ -284,7 +285,7 @@ fn where_the_verdict_is_in_doubt_rk4_is_held_against_rk4() {
     let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
     assert_eq!(row.method, Level::Fast);
     let ratio = Verdict::new(row, plan.reliability.channels.len(), 2.0).greatest.unwrap().1;
-    let reliability = crate::plan::Reliability { ratio_limit: ratio, ..plan.reliability.clone() };
+    let reliability = sweep_engine::Reliability { ratio_limit: ratio, ..plan.reliability.clone() };
     let plan = Plan { reliability, ..plan };
     let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
     assert_eq!((row.method, row.sensitive), (Level::Rk4, Some(false)));

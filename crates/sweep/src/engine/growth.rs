@@ -5,28 +5,37 @@ use washer_row::{Growth, Status};
 
 use super::together_or_alone;
 
-/// The periodic responses of points at constant speeds, or why there is none.
-pub(crate) fn responses(dwells: &[Dwell<'_>]) -> Vec<Result<Response, Status>> {
+/// The periodic responses of points at constant speeds, that of a machine that runs up first, or
+/// why there is none. Once `is_stopped` says so, what comes means nothing.
+pub(crate) fn responses(
+    dwells: &[Dwell<'_>],
+    is_stopped: &dyn Fn() -> bool,
+) -> Vec<Result<Vec<Response>, Status>> {
     let together = |dwells: &[Dwell<'_>]| {
-        let answers = respond(dwells).into_iter();
+        let answers = respond(dwells, is_stopped).into_iter();
         let status = |none| match none {
-            NoAnswer::NoResponse => Status::NoResponse,
+            NoAnswer::NoResponse | NoAnswer::Stopped => Status::NoResponse,
             NoAnswer::Eigenvalues => Status::NoMultipliers,
+            NoAnswer::TooSlow => Status::TooSlow,
         };
         answers.map(|answer| answer.map_err(status)).collect()
     };
     together_or_alone(dwells, together, || Err(Status::Panicked))
 }
 
-/// The fastest growing disturbance at any of these speeds; the first speed wins a tie. Speeds
-/// without a response are left out.
-pub(super) fn fastest_growth(point: &Point, speeds_rpm: &[f64]) -> Option<Growth> {
+/// The fastest growing disturbance at any of these speeds, of the response that a machine is in
+/// that runs up; the first speed wins a tie. Speeds without a response are left out.
+pub(super) fn fastest_growth(
+    point: &Point,
+    speeds_rpm: &[f64],
+    is_stopped: &dyn Fn() -> bool,
+) -> Option<Growth> {
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
-    let found = responses(&dwells);
-    let fastest = found
-        .iter()
-        .flatten()
-        .reduce(|most, next| if next.growth_per_s() > most.growth_per_s() { next } else { most })?;
+    let found = responses(&dwells, is_stopped);
+    let fastest =
+        found.iter().flatten().filter_map(|responses| responses.first()).reduce(|most, next| {
+            if next.growth_per_s() > most.growth_per_s() { next } else { most }
+        })?;
     Some(Growth::from(fastest))
 }

@@ -218,8 +218,12 @@ impl Pool<'_> {
         self.shared.changed.notify_all();
         for (mut outcome, point) in done {
             outcome.forget_turns();
-            if let (Some(speeds), Ok(point)) = (&self.engine.plan.growth_speeds, point) {
-                outcome.growth = fastest_growth(&point, &speeds.values());
+            if let (Some(speeds), Ok(point)) = (&self.engine.plan.model.growth_speeds, point) {
+                let is_stopped = || self.watch.stopped();
+                outcome.growth = fastest_growth(&point, &speeds.values(), &is_stopped);
+                if is_stopped() {
+                    return;
+                }
             }
             (self.keep)(outcome);
         }

@@ -9,7 +9,7 @@ use super::{Closing, End, Explanation, Passage, Resonance, Swept, Tongue};
 
 /// Everything that was found; units stand in the names.
 pub(crate) fn of(found: &Explanation) -> Value {
-    let tongues = found.tongues.iter().map(|(tongue, passages)| of_tongue(found, tongue, passages));
+    let tongues = found.tongues.iter().map(|(tongue, passages)| of_tongue(tongue, passages));
     let without = found.without_departures.as_ref().map(|entered| match entered {
         Ok(amplitudes) => {
             let greatest = found.swept.greatest_of(amplitudes);
@@ -30,6 +30,10 @@ pub(crate) fn of(found: &Explanation) -> Value {
             "to_rpm": found.looked.to,
             "step_rpm": found.looked.step,
             "without_response": found.without_response,
+            "jumps_rpm": found.jumps_rpm,
+            "beyond": found.beyond.iter().map(|(rpm, what)| {
+                json!({ "speed_rpm": rpm, "passes": what.name() })
+            }).collect::<Value>(),
         },
         "profile_rpm": found.profile_rpm,
         "tongues": tongues.collect::<Value>(),
@@ -65,7 +69,7 @@ fn of_swept(swept: &Swept) -> Value {
     })
 }
 
-fn of_tongue(found: &Explanation, tongue: &Tongue, passages: &[Passage]) -> Value {
+fn of_tongue(tongue: &Tongue, passages: &[Passage]) -> Value {
     let at = &tongue.at;
     json!({
         "from_rpm": tongue.from_to_rpm[0],
@@ -80,9 +84,6 @@ fn of_tongue(found: &Explanation, tongue: &Tongue, passages: &[Passage]) -> Valu
         "resonance": tongue.resonance.as_ref().map(resonance),
         "crossed": passages.iter().map(passage).collect::<Value>(),
         "closed_by": tongue.closing.map(closing),
-        "out_of_profile_by_cpm": tongue.resonance.map(|resonance| {
-            resonance.rise_cpm(found.profile_rpm[1] - tongue.from_to_rpm[0])
-        }),
     })
 }
 
@@ -111,7 +112,6 @@ fn resonance(resonance: &Resonance) -> Value {
         "sign": resonance.sign,
         "sum_cpm": resonance.sum_cpm(),
         "order": resonance.order,
-        "sum_per_speed": resonance.slope,
     })
 }
 
@@ -130,9 +130,11 @@ fn passage(passage: &Passage) -> Value {
 
 fn closing(closing: Closing) -> Value {
     match closing {
-        Closing::Factor(factor, damping) => {
-            json!({ "damping_factor": factor, "damping_n_s_per_m": damping })
-        }
+        Closing::Factor { factor, damping_n_s_per_m, looked_rpm } => json!({
+            "damping_factor": factor,
+            "damping_n_s_per_m": damping_n_s_per_m,
+            "nothing_grows_from_to_rpm": looked_rpm,
+        }),
         Closing::NotUpTo(factor) => json!({ "damping_factor_above": factor }),
         Closing::NoDampers => Value::Null,
     }

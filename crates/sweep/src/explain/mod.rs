@@ -7,20 +7,20 @@ mod tongue;
 pub(crate) mod words;
 
 use lane_ode::Simd;
+use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use washer_model::{
-    Cases, Channel, Crossed, Crossing, LeftRange, NoEquilibrium, Point, Response, Timing, cross,
-    modes, peaks_without_departures, prepare,
+    Beyond, Cases, Channel, Crossed, Crossing, LeftRange, NoEquilibrium, Point, Response, Timing,
+    cross, modes, peaks_without_departures, prepare,
 };
 
-use crate::config::NamedValues;
 use crate::engine::{ModelEngine, Watch, reference_step_s};
-use crate::exit::Error;
-use crate::interrupt::Interrupt;
 use crate::plan::{Plan, Scenario};
 use crate::speeds::Speeds;
-use crate::stability::smooth;
+use sweep_engine::config::NamedValues;
+use sweep_engine::exit::Error;
+use sweep_engine::interrupt::Interrupt;
 
-use tongue::{Asker, tongues};
+use tongue::{Asker, Seen, tongues};
 pub(crate) use tongue::{Closing, End, Resonance, Tongue};
 use washer_row::{Demand, Outcome, ROW_STATUSES, Status, Trajectory, Verdict, row_status};
 
@@ -43,6 +43,10 @@ pub(crate) struct Explanation {
     pub(crate) looked: Speeds,
     /// How many of them have no response.
     pub(crate) without_response: usize,
+    /// Speeds (rpm) at which a machine that runs up leaves its branch of responses.
+    pub(crate) jumps_rpm: Vec<f64>,
+    /// Speeds (rpm) at which the response passes what of the machine's geometry.
+    pub(crate) beyond: Vec<(f64, Beyond)>,
     /// From lowest to fastest speed of the profile within the run (rpm).
     pub(crate) profile_rpm: [f64; 2],
     /// Each, with the times at which the run crosses it.
@@ -101,20 +105,21 @@ pub(crate) fn explain(
     simd: Simd,
     interrupt: &Interrupt,
 ) -> Result<Explanation, Error> {
-    smooth(plan)?;
     let scenario = plan.scenario(0);
-    let profile_rpm = profile::range(&scenario.spin, plan.end_s)?;
-    let point = ready(simd, plan, &scenario)?;
+    let profile_rpm = profile::range(&scenario.model.spin, plan.end_s)?;
+    let point = ready(simd, plan, &scenario).map_err(Error::model)?;
     let looked = match speeds {
         Some(speeds) => speeds,
         None => looked(&point, profile_rpm[1])?,
     };
-    let asker = Asker { simd, plan, scenario: &scenario, point: &point, interrupt };
-    let (found, swept) = rayon::join(|| tongues(&asker, looked), || swept(plan, interrupt));
-    let ((found, without_response), swept) = (found, swept?);
+    let mut asker =
+        Asker { simd, plan, scenario: &scenario, point: &point, interrupt, followed: Vec::new() };
+    asker.follow(looked.to.max(profile_rpm[1]));
+    let (seen, swept) = rayon::join(|| tongues(&asker, looked), || swept(plan, interrupt));
+    let (Seen { tongues: found, without_response, jumps_rpm, beyond }, swept) = (seen, swept?);
     let (crossings, closings) = rayon::join(
         || crossings(&asker, &found, &swept),
-        || found.iter().map(|tongue| tongue.closing(&asker)).collect::<Vec<_>>(),
+        || found.par_iter().map(|tongue| tongue.closing(&asker)).collect::<Vec<_>>(),
     );
     let (passages, without_departures) = crossings;
     let tongues = found.into_iter().zip(closings).zip(passages);
@@ -126,6 +131,8 @@ pub(crate) fn explain(
         at,
         looked,
         without_response,
+        jumps_rpm,
+        beyond,
         profile_rpm,
         tongues: tongues.collect(),
         without_departures,
@@ -136,12 +143,13 @@ pub(crate) fn explain(
 /// A machine with its spin, ready to be integrated.
 fn ready(simd: Simd, plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilibrium> {
     let timing = Timing { end_s: plan.end_s, window_s: scenario.window_s, checkpoints: 0 };
-    prepare(simd, &[(scenario.machine.clone(), scenario.spin.clone())], &timing).remove(0)
+    prepare(simd, &[(scenario.model.machine.clone(), scenario.model.spin.clone())], &timing)
+        .remove(0)
 }
 
 /// The profile's speeds from half of the slowest mode's frequency up.
 fn looked(point: &Point, fastest_rpm: f64) -> Result<Speeds, Error> {
-    let slowest_rpm = modes(point, 0.0, 0.0)?.modes[0].frequency_rpm();
+    let slowest_rpm = modes(point, 0.0, 0.0).map_err(Error::model)?.modes[0].frequency_rpm();
     let from_rpm = (LOWEST_SHARE * slowest_rpm).floor().max(1.0);
     if fastest_rpm > from_rpm {
         return Ok(Speeds::new(from_rpm, fastest_rpm, STEP_RPM));
@@ -187,7 +195,7 @@ fn crossings(
     tongues: &[Tongue],
     swept: &Swept,
 ) -> (Vec<Vec<Passage>>, WithoutDepartures) {
-    let spin = &asker.scenario.spin;
+    let spin = &asker.scenario.model.spin;
     let end_s = asker.plan.end_s;
     // In order of time, with the tongue of each.
     let mut times: Vec<(usize, [f64; 2])> = tongues

@@ -2,7 +2,7 @@
 
 use washer_model::{Spin, decimal};
 
-use crate::exit::Error;
+use sweep_engine::exit::Error;
 
 /// Even instants at which a profile is looked at; it is smooth between kinks.
 const INSTANTS: usize = 4000;

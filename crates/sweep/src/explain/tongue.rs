@@ -4,15 +4,15 @@
 use lane_ode::Simd;
 use rayon::iter::ParallelIterator as _;
 use rayon::slice::ParallelSlice as _;
-use washer_model::{Dwell, Kind, Point, Response, modes, respond};
+use washer_model::{Beyond, Kind, Point, Response, Responses, modes};
 
 use super::ready;
-use crate::interrupt::Interrupt;
 use crate::plan::{Plan, Scenario};
 use crate::speeds::Speeds;
+use sweep_engine::interrupt::Interrupt;
 
 /// Speeds that are asked at once: enough to fill lanes.
-const AT_ONCE: usize = 16;
+const AT_ONCE: usize = 32;
 
 /// An edge is looked for until it is between two speeds this close (rpm).
 const EDGE_RPM: f64 = 0.01;
@@ -28,11 +28,21 @@ const PEAK_ROUNDS: usize = 2;
 const TRIAL_SPEEDS: usize = 24;
 const TRIAL_MARGIN: f64 = 0.25;
 
+/// A machine whose disturbances die at this rate (1/s) everywhere it was looked at is closed: a
+/// smaller one may grow between two speeds.
+const CLOSED_BY_PER_S: f64 = 5e-4;
+
 /// Dampers are not made stronger than this.
 const MOST_DAMPING_FACTOR: f64 = 32.0;
 
-/// The factor that closes a tongue is found this closely, relative.
-const FACTOR_TOLERANCE: f64 = 1e-3;
+/// Such factors that are tried at once, in lanes; the one that closes a tongue is found this
+/// closely, relative.
+const FACTORS: usize = 8;
+const FACTOR_TOLERANCE: f64 = 5e-4;
+
+/// Where such factors are tried once two are known between which one closes it: by how many
+/// tolerances about where growth ends if it falls evenly.
+const ABOUT_ROOT: [f64; 4] = [-8.0, -0.4, 0.4, 8.0];
 
 /// Modes that may take part.
 const SUSPENSION_MODES: usize = 4;
@@ -43,9 +53,6 @@ const MOST_ORDER: u32 = 3;
 /// Frequencies farther than this from a multiple of the speed, relative, explain nothing.
 const FARTHEST_MISS: f64 = 0.05;
 
-/// Half of the distance in speed over which frequencies' slopes are taken, as a share of it.
-const SLOPE_SHARE: f64 = 0.01;
-
 /// What is asked about, and by which instruction set.
 pub(crate) struct Asker<'a> {
     pub(crate) simd: Simd,
@@ -54,22 +61,28 @@ pub(crate) struct Asker<'a> {
     pub(crate) point: &'a Point,
     /// Once it is raised, no response is found, and what is made of that means nothing.
     pub(crate) interrupt: &'a Interrupt,
+    /// The point's responses over speed.
+    pub(crate) followed: Vec<Responses<'a>>,
 }
 
 impl Asker<'_> {
-    /// The responses at some speeds, on all threads; none where there is none.
-    pub(crate) fn responses(&self, speeds_rpm: &[f64]) -> Vec<Option<Response>> {
-        self.responses_of(self.point, speeds_rpm)
+    /// Follows the point's responses up to a speed (rpm).
+    pub(crate) fn follow(&mut self, fastest_rpm: f64) {
+        let is_stopped = || self.interrupt.stopped();
+        self.followed = Responses::follow(&[(self.point, fastest_rpm)], &is_stopped);
     }
 
-    fn responses_of(&self, point: &Point, speeds_rpm: &[f64]) -> Vec<Option<Response>> {
+    /// The responses at some speeds of a machine that runs up, on all threads; none where there is
+    /// none.
+    pub(crate) fn responses(&self, speeds_rpm: &[f64]) -> Vec<Option<Response>> {
         let of_part = |speeds: &[f64]| {
-            if self.interrupt.stopped() {
+            let asked: Vec<(usize, f64)> = speeds.iter().map(|&speed_rpm| (0, speed_rpm)).collect();
+            let is_stopped = || self.interrupt.stopped();
+            if is_stopped() {
                 return vec![None; speeds.len()];
             }
-            let dwells: Vec<Dwell<'_>> =
-                speeds.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
-            respond(&dwells).into_iter().map(Result::ok).collect::<Vec<_>>()
+            let found = Responses::at(&mut self.followed.clone(), &asked, &is_stopped).into_iter();
+            found.map(|answer| answer.ok()?.into_iter().next()).collect::<Vec<_>>()
         };
         let parts: Vec<_> = speeds_rpm.par_chunks(AT_ONCE).map(of_part).collect();
         parts.into_iter().flatten().collect()
@@ -116,8 +129,6 @@ pub(crate) struct Resonance {
     pub(crate) sign: f64,
     /// Turns of the drum to which the sum belongs.
     pub(crate) order: u32,
-    /// How much the sum rises with the speed (cycles per turn).
-    pub(crate) slope: f64,
 }
 
 impl Resonance {
@@ -125,30 +136,46 @@ impl Resonance {
     pub(crate) fn sum_cpm(&self) -> f64 {
         self.frequencies_cpm[0] + self.sign * self.frequencies_cpm[1]
     }
-
-    /// By how much the sum would have to rise (cycles per minute) for the tongue to move by a
-    /// distance in speed (rpm), to first order.
-    pub(crate) fn rise_cpm(&self, distance_rpm: f64) -> f64 {
-        distance_rpm * (f64::from(self.order) - self.slope)
-    }
 }
 
-/// How much more damping closes a tongue.
+/// How much more damping closes a tongue: nothing grows then, in any way, about where it was.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Closing {
-    /// Every damper this many times as strong; the damping (N s/m) if all have the same.
-    Factor(f64, Option<f64>),
+    /// Every damper this many times as strong, tried; the damping (N s/m) if all have the same.
+    Factor {
+        /// How many times.
+        factor: f64,
+        /// What each damper then has, if all have the same.
+        damping_n_s_per_m: Option<f64>,
+        /// From and to which speed (rpm) nothing grew.
+        looked_rpm: [f64; 2],
+    },
     /// Not up to this many times.
     NotUpTo(f64),
     /// There is no damping to raise.
     NoDampers,
 }
 
-/// The tongues within a range of speeds, and how many speeds have no response.
-pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> (Vec<Tongue>, usize) {
+/// What is seen over a range of speeds.
+#[derive(Default)]
+pub(crate) struct Seen {
+    pub(crate) tongues: Vec<Tongue>,
+    /// How many speeds have no response.
+    pub(crate) without_response: usize,
+    /// Speeds (rpm) at which a machine that runs up leaves its branch of responses.
+    pub(crate) jumps_rpm: Vec<f64>,
+    /// Speeds (rpm) at which the response passes what of the machine's geometry.
+    pub(crate) beyond: Vec<(f64, Beyond)>,
+}
+
+/// The tongues within a range of speeds, and what else is seen there.
+pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> Seen {
     let speeds = looked.values();
     let responses = asker.responses(&speeds);
-    let without = responses.iter().filter(|response| response.is_none()).count();
+    let there = || responses.iter().flatten();
+    let ends = there().filter_map(|response| response.between_rpm[1]);
+    let mut jumps_rpm: Vec<f64> = ends.filter(|&rpm| rpm <= looked.to).collect();
+    jumps_rpm.dedup();
     let kind = |k: usize| responses[k].as_ref().map(Response::kind);
     let mut tongues = Vec::new();
     let mut first = 0;
@@ -175,7 +202,12 @@ pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> (Vec<Tongue>, usize)
         tongues.push(tongue(asker, of_run, &run, [from, to]));
         first = last + 1;
     }
-    (tongues, without)
+    Seen {
+        tongues,
+        without_response: responses.iter().filter(|response| response.is_none()).count(),
+        jumps_rpm,
+        beyond: there().filter_map(|it| Some((it.speed_rpm, it.beyond?))).collect(),
+    }
 }
 
 fn tongue(asker: &Asker<'_>, kind: Kind, run: &[&Response], [from, to]: [(f64, End); 2]) -> Tongue {
@@ -258,8 +290,6 @@ fn resonance(point: &Point, at: &Response) -> Option<Resonance> {
         Some(found.modes.iter().map(washer_model::Mode::frequency_rpm).collect())
     };
     let here = frequencies(at.speed_rpm)?;
-    let apart = SLOPE_SHARE * at.speed_rpm;
-    let beside = [frequencies(at.speed_rpm - apart)?, frequencies(at.speed_rpm + apart)?];
     let named: Vec<usize> = at.participants.iter().map(|mode| mode.mode - 1).collect();
     let (&a, partners) = match named.as_slice() {
         [] => return None,
@@ -305,7 +335,6 @@ fn resonance(point: &Point, at: &Response) -> Option<Resonance> {
                             frequencies_cpm: ordered.map(|mode| here[mode]),
                             sign,
                             order,
-                            slope: (sum(&beside[1]) - sum(&beside[0])) / (2.0 * apart),
                         },
                     ));
                 }
@@ -315,56 +344,114 @@ fn resonance(point: &Point, at: &Response) -> Option<Resonance> {
     best.filter(|(miss, _)| *miss < FARTHEST_MISS).map(|(_, resonance)| resonance)
 }
 
+/// Factors to try next, between one that leaves growth and one that does not if that is known, each
+/// given with the growth that it leaves.
+fn trials(open: [f64; 2], closed: Option<[f64; 2]>) -> Vec<f64> {
+    let Some(closed) = closed else {
+        let step = MOST_DAMPING_FACTOR.powf(1.0 / FACTORS as f64);
+        return (1..=FACTORS).map(|k| step.powi(k as i32)).collect();
+    };
+    // Growth falls evenly over short ways.
+    let fall = ((open[1] + CLOSED_BY_PER_S) / (open[1] - closed[1])).clamp(0.0, 1.0);
+    let share = if fall.is_nan() { 0.5 } else { fall };
+    let root = open[0] + share * (closed[0] - open[0]);
+    let about = ABOUT_ROOT.map(|by| root * (1.0 + by * FACTOR_TOLERANCE));
+    let mut factors: Vec<f64> =
+        about.into_iter().filter(|&factor| open[0] < factor && factor < closed[0]).collect();
+    if factors.len() < ABOUT_ROOT.len() {
+        factors.push(0.5 * (open[0] + closed[0]));
+        factors.sort_by(f64::total_cmp);
+    }
+    factors
+}
+
 impl Tongue {
-    /// How much more damping in every damper closes it, by bisection.
+    /// The least damping found that closes it: factors are tried side by side, then more closely
+    /// about the first that does.
     pub(crate) fn closing(&self, asker: &Asker<'_>) -> Closing {
-        let dampers = &asker.scenario.machine.dampers;
+        let dampers = &asker.scenario.model.machine.dampers;
         if dampers.iter().all(|damper| damper.damping_n_s_per_m == 0.0) {
             return Closing::NoDampers;
         }
-        let (mut open, mut closed) = (1.0, 2.0);
-        while self.is_open(asker, closed) {
-            if closed >= MOST_DAMPING_FACTOR {
-                return Closing::NotUpTo(closed);
+        // Factors and the growth that they leave.
+        let mut open = [1.0, self.at.growth_per_s()];
+        let mut closed: Option<[f64; 2]> = None;
+        while closed.is_none_or(|closed| closed[0] - open[0] > FACTOR_TOLERANCE * open[0]) {
+            let factors = trials(open, closed);
+            let growths = self.growths_left(asker, &factors);
+            let tried = factors.iter().zip(growths).map(|(&factor, growth)| [factor, growth]);
+            for tried in tried {
+                if tried[1] <= -CLOSED_BY_PER_S {
+                    closed = Some(tried);
+                    break;
+                }
+                open = tried;
             }
-            (open, closed) = (closed, 2.0 * closed);
+            if closed.is_none() {
+                return Closing::NotUpTo(MOST_DAMPING_FACTOR);
+            }
         }
-        while closed - open > FACTOR_TOLERANCE * open {
-            let middle = 0.5 * (open + closed);
-            if self.is_open(asker, middle) { open = middle } else { closed = middle }
-        }
-        let factor = 0.5 * (open + closed);
+        let closed = closed.map_or(MOST_DAMPING_FACTOR, |[factor, _]| factor);
         let first = dampers[0].damping_n_s_per_m;
         let is_common = dampers.iter().all(|damper| damper.damping_n_s_per_m == first);
-        Closing::Factor(factor, is_common.then_some(factor * first))
+        let damping_n_s_per_m = is_common.then_some(closed * first);
+        Closing::Factor { factor: closed, damping_n_s_per_m, looked_rpm: self.about_rpm() }
     }
 
-    /// Whether something grows in its way, about where it is, with dampers so many times as strong.
-    fn is_open(&self, asker: &Asker<'_>, factor: f64) -> bool {
-        let mut scenario = asker.scenario.clone();
-        for damper in &mut scenario.machine.dampers {
-            damper.damping_n_s_per_m *= factor;
-        }
-        let Ok(point) = ready(asker.simd, asker.plan, &scenario) else { return false };
-        let kind = self.at.kind();
+    /// The speeds (rpm) at which it is looked for in other machines.
+    fn about_rpm(&self) -> [f64; 2] {
         let [from, to] = self.from_to_rpm;
         let margin = TRIAL_MARGIN * (to - from) + 1.0;
-        let mut around = [(from - margin).max(0.5 * from), to + margin];
+        [(from - margin).max(0.5 * from), to + margin]
+    }
+
+    /// The most that anything grows about where it is (1/s), for each number of times that dampers
+    /// are as strong; infinite where a response is missing. On lanes.
+    fn growths_left(&self, asker: &Asker<'_>, factors: &[f64]) -> Vec<f64> {
+        let machine = |factor: f64| {
+            let mut scenario = asker.scenario.clone();
+            for damper in &mut scenario.model.machine.dampers {
+                damper.damping_n_s_per_m *= factor;
+            }
+            ready(asker.simd, asker.plan, &scenario).ok()
+        };
+        let points: Vec<Option<Point>> = factors.iter().map(|&factor| machine(factor)).collect();
+        let about = self.about_rpm();
+        let is_stopped = || asker.interrupt.stopped();
+        let wanted: Vec<(&Point, f64)> =
+            points.iter().flatten().map(|point| (point, about[1])).collect();
+        let mut followed = Responses::follow(&wanted, &is_stopped);
+        let mut growths = vec![f64::NEG_INFINITY; wanted.len()];
+        let mut around = vec![about; wanted.len()];
         let mut count = TRIAL_SPEEDS;
         for _ in 0..=PEAK_ROUNDS {
-            let trials = between(around[0], around[1], count);
-            let found = asker.responses_of(&point, &trials);
-            let found = || found.iter().flatten();
-            if found().any(|response| response.kind() == kind) {
-                return true;
+            // What is open stays so.
+            let places = (0..wanted.len()).filter(|&place| growths[place] <= -CLOSED_BY_PER_S);
+            let asked: Vec<(usize, f64)> = places
+                .flat_map(|place| {
+                    let [low, high] = around[place];
+                    let ends = if count == TRIAL_SPEEDS { vec![low, high] } else { vec![] };
+                    let speeds = ends.into_iter().chain(between(low, high, count));
+                    speeds.map(move |rpm| (place, rpm))
+                })
+                .collect();
+            let found = Responses::at(&mut followed, &asked, &is_stopped);
+            let mut most_rpm = vec![0.0; wanted.len()];
+            for ((place, rpm), responses) in asked.into_iter().zip(found) {
+                let first = responses.ok().and_then(|responses| responses.into_iter().next());
+                let growth = first.map_or(f64::INFINITY, |response| response.growth_per_s());
+                if growth > growths[place] {
+                    (growths[place], most_rpm[place]) = (growth, rpm);
+                }
             }
-            let of_stable = found().filter(|response| response.kind() == Kind::Stable);
-            let most = of_stable.max_by(|a, b| a.growth_per_s().total_cmp(&b.growth_per_s()));
-            let Some(most) = most else { return false };
-            let reach = (around[1] - around[0]) / (count + 1) as f64;
-            around = [most.speed_rpm - reach, most.speed_rpm + reach];
+            for (around, rpm) in around.iter_mut().zip(most_rpm) {
+                let reach = (around[1] - around[0]) / (count + 1) as f64;
+                *around = if rpm > 0.0 { [rpm - reach, rpm + reach] } else { *around };
+            }
             count = BETWEEN;
         }
-        false
+        let mut growths = growths.into_iter();
+        let of = |point: &Option<Point>| point.as_ref().and_then(|_| growths.next());
+        points.iter().map(of).map(|growth| growth.unwrap_or(f64::INFINITY)).collect()
     }
 }

@@ -67,6 +67,23 @@ pub(crate) fn of(found: &Explanation) -> String {
             ),
         );
     }
+    for rpm in &found.jumps_rpm {
+        let words = format!(
+            "at {rpm:.2} rpm the response folds back: a machine that runs up jumps to another there"
+        );
+        text.line("jump", &words);
+    }
+    if let (Some((from, what)), Some((to, _))) = (found.beyond.first(), found.beyond.last()) {
+        let words = format!(
+            "at {} of the speeds, from {} to {} rpm, the response passes what no machine can ({}): \
+             there growth says nothing of a machine",
+            found.beyond.len(),
+            decimal(*from),
+            decimal(*to),
+            what.name().replace('_', " ")
+        );
+        text.line("beyond", &words);
+    }
     for (tongue, passages) in &found.tongues {
         text.end("");
         of_tongue(&mut text, found, tongue, passages);
@@ -190,7 +207,7 @@ fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[
     for passage in passages {
         crossed(text, passage);
     }
-    closes(text, found, tongue);
+    closes(text, tongue);
 }
 
 fn ends(tongue: &Tongue) -> String {
@@ -265,40 +282,21 @@ fn crossed(text: &mut Text, passage: &Passage) {
     text.line("crossed", &words);
 }
 
-fn closes(text: &mut Text, found: &Explanation, tongue: &Tongue) {
-    let damping = match tongue.closing {
-        Some(Closing::Factor(factor, Some(damping))) => {
-            format!("{damping:.1} N s/m in every damper ({factor:.2} times) closes it")
-        }
-        Some(Closing::Factor(factor, None)) => {
-            format!("every damper {factor:.2} times as strong closes it")
+fn closes(text: &mut Text, tongue: &Tongue) {
+    let words = match tongue.closing {
+        Some(Closing::Factor { factor, damping_n_s_per_m, looked_rpm: [from, to] }) => {
+            let dampers = match damping_n_s_per_m {
+                Some(damping) => format!("{damping:.1} N s/m in every damper ({factor:.2} times)"),
+                None => format!("every damper {factor:.2} times as strong"),
+            };
+            format!("with {dampers} nothing grows from {from:.1} to {to:.1} rpm")
         }
         Some(Closing::NotUpTo(factor)) => {
             format!("dampers up to {factor} times as strong do not close it")
         }
         Some(Closing::NoDampers) | None => "the machine has no damping to raise".to_owned(),
     };
-    let shift = tongue.resonance.map(|resonance| {
-        let fastest = found.profile_rpm[1];
-        let [from, to] = tongue.from_to_rpm;
-        let name = sum_words(&resonance);
-        if fastest <= from {
-            return format!("; the profile's {fastest:.0} rpm stay below it");
-        }
-        let above = format!(
-            "; {name} higher by {:.1} per minute moves it above the profile's {} rpm",
-            resonance.rise_cpm(fastest - from),
-            decimal(fastest)
-        );
-        if fastest < to {
-            let lower = -resonance.rise_cpm(fastest - to);
-            return format!(
-                "{above}; lower by {lower:.1} moves it below these, where it is only crossed"
-            );
-        }
-        above
-    });
-    text.line("remedy", &format!("{damping}{}", shift.unwrap_or_default()));
+    text.line("remedy", &words);
 }
 
 /// What the tongues have to do with the swept verdict.
@@ -392,13 +390,8 @@ mod tests {
 
     #[test]
     fn a_resonance_is_named_by_its_modes() {
-        let of = |modes, sign, order| Resonance {
-            modes,
-            frequencies_cpm: [150.0, 100.0],
-            sign,
-            order,
-            slope: 0.1,
-        };
+        let of =
+            |modes, sign, order| Resonance { modes, frequencies_cpm: [150.0, 100.0], sign, order };
         assert_eq!(sum_words(&of([2, 2], 1.0, 1)), "2 f2");
         assert_eq!(sum_words(&of([1, 2], 1.0, 1)), "f1 + f2");
         assert_eq!(sum_words(&of([2, 1], -1.0, 1)), "f2 - f1");
@@ -407,6 +400,5 @@ mod tests {
             words,
             "f1 + f2 = 250.00 per minute, against 2 times the speed, 250.00 (+0.00 %)"
         );
-        assert_eq!(of([1, 2], 1.0, 1).rise_cpm(10.0), 9.0);
     }
 }

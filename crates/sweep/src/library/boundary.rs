@@ -1,21 +1,18 @@
 //! The search for a boundary, with or without a file that keeps what it finds out.
 
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 use super::Effort;
 use super::result::{ResultKind, ResultTable};
-use crate::boundary::file::{job, table};
-use crate::boundary::product::{BoundaryTask, Models, Stopped};
-use crate::boundary::quantity::TracedQuantity;
-use crate::boundary::{Standing, Traced, trace};
-use crate::engine::ModelEngine;
-use crate::exit::Error;
+use crate::model::Washer;
 use crate::plan::Plan;
-use crate::progress::Progress;
-use crate::random_keys::draw_random_keys;
-use crate::store::{OpenedTrials, Trials};
+use sweep_engine::Swept as _;
+use sweep_engine::boundary::file::{job, table};
+use sweep_engine::boundary::search::{BoundaryTask, Stopped};
+use sweep_engine::commands::boundary::search;
+use sweep_engine::exit::Error;
+use sweep_engine::random_keys::draw_random_keys;
+use sweep_engine::store::{OpenedTrials, Trials};
 use sweep_files::{FileKind, Output};
 
 /// What is asked of a boundary.
@@ -46,16 +43,17 @@ pub fn find_boundary(
     effort: Effort<'_>,
 ) -> Result<Option<ResultTable>, Error> {
     draw_random_keys()?;
-    let quantity: TracedQuantity = options.quantity.parse().map_err(|expected| Error::Option {
-        option: "quantity",
-        given: options.quantity.to_owned(),
-        expected,
-    })?;
+    let names = Washer::quantities();
+    if !names.iter().any(|name| name == options.quantity) {
+        let (given, expected) =
+            (options.quantity.to_owned(), format!("one of {}", names.join(", ")));
+        return Err(Error::Option { option: "quantity", given, expected });
+    }
     if !(1..=1000).contains(&options.lattice) {
         let given = options.lattice.to_string();
         return Err(Error::Option { option: "lattice", given, expected: "from 1 to 1000".into() });
     }
-    let plan = &quantity.plan(plan)?;
+    let (quantity, plan) = &Washer::traced(plan, options.quantity)?;
     let task = BoundaryTask::new(plan, options.tolerance, usize::from(options.lattice))?;
     let job = job(plan, quantity, &task);
     let begin = |path| Output::begin(path, FileKind::Boundary);
@@ -83,39 +81,4 @@ pub fn find_boundary(
     // What it says matters where a user watches the folder.
     let _ = trials.and_then(Trials::complete);
     Ok(Some(found))
-}
-
-/// Searches, with a memory of trials if there is one, and gives it back.
-///
-/// # Errors
-/// No threads; `SWEEP_SIMD` naming nothing this machine has.
-pub(crate) fn search(
-    plan: &Plan,
-    quantity: TracedQuantity,
-    task: &BoundaryTask,
-    trials: Option<Trials>,
-    effort: Effort<'_>,
-) -> Result<(Result<Traced, Stopped>, Option<Trials>), Error> {
-    let engine = ModelEngine::new(plan)?;
-    let there = trials.as_ref().map_or(0, |trials| trials.count() as u64);
-    let rows = (task.firsts.len() * task.curves) as u64;
-    let rows_done = AtomicU64::new(0);
-    let progress = Mutex::new(Progress::of_search(effort.progress, rows, there));
-    let shown = |points: u64| {
-        // A thread that finds another showing it goes on.
-        if let Ok(mut progress) = progress.try_lock() {
-            progress.show_search(rows_done.load(Ordering::Relaxed), points);
-        }
-    };
-    let threads = effort.threads()?;
-    let models = Models::new(plan, engine, quantity, threads, effort.interrupt, &shown)?;
-    let models = match trials {
-        Some(trials) => models.keeping(trials),
-        None => models,
-    };
-    let mut standing =
-        |standing: &Standing| rows_done.store(standing.rows as u64, Ordering::Relaxed);
-    let traced = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
-    progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
-    Ok((traced, models.into_kept()))
 }

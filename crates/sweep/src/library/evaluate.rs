@@ -13,14 +13,15 @@ use super::Effort;
 use super::points::PointTable;
 use super::result::{MapPlan, ResultTable};
 use crate::engine::{ModelEngine, Watch};
-use crate::exit::Error;
 use crate::plan::Plan;
-use crate::progress::Progress;
-use crate::random_keys::draw_random_keys;
-use crate::store::{BATCH_ROWS, Job, Layout, ResultRows, StoreError};
-use crate::threads::{self, ThreadsError};
+use sweep_engine::exit::Error;
+use sweep_engine::progress::Progress;
+use sweep_engine::random_keys::draw_random_keys;
+use sweep_engine::store::Done;
+use sweep_engine::store::{BATCH_ROWS, Job, Layout, ResultRows, StoreError};
+use sweep_engine::threads::{self, ThreadsError};
 use sweep_files::panics;
-use washer_row::{Ladder, Outcome};
+use washer_row::Ladder;
 
 /// How often progress is shown while rows are computed.
 const SHOWN_EVERY: Duration = Duration::from_millis(100);
@@ -101,7 +102,7 @@ impl Evaluator {
 /// Computes rows: takes their numbers from the first until there are no more, and hands on the
 /// outcome of each.
 type Compute<'a> =
-    dyn Fn(&(dyn Fn() -> Option<u64> + Sync), &(dyn Fn(Outcome) + Sync), &Watch<'_>) + Sync + 'a;
+    dyn Fn(&(dyn Fn() -> Option<u64> + Sync), &(dyn Fn(Done) + Sync), &Watch<'_>) + Sync + 'a;
 
 /// Every row of a job, in memory.
 ///
@@ -158,7 +159,7 @@ struct Gathered<'a> {
     job: &'a Job<'a>,
     /// Of every batch.
     schema: SchemaRef,
-    parts: Mutex<BTreeMap<u64, Vec<Outcome>>>,
+    parts: Mutex<BTreeMap<u64, Vec<Done>>>,
     batches: Mutex<BTreeMap<u64, Result<RecordBatch, ArrowError>>>,
 }
 
@@ -168,7 +169,7 @@ impl<'a> Gathered<'a> {
         Self { job, schema, parts: Mutex::default(), batches: Mutex::default() }
     }
 
-    fn keep(&self, outcome: Outcome, watch: &Watch<'_>) {
+    fn keep(&self, outcome: Done, watch: &Watch<'_>) {
         const ROWS: u64 = BATCH_ROWS as u64;
         let place = outcome.point / ROWS;
         let wanted = ROWS.min(self.job.points - place * ROWS);
@@ -184,12 +185,14 @@ impl<'a> Gathered<'a> {
         watch.done(1);
     }
 
-    fn batch(&self, mut outcomes: Vec<Outcome>) -> Result<RecordBatch, ArrowError> {
+    fn batch(&self, mut outcomes: Vec<Done>) -> Result<RecordBatch, ArrowError> {
         outcomes.sort_by_key(|outcome| outcome.point);
         let layout: &Layout = &self.job.layout;
         let mut rows = ResultRows::sharing(layout, SchemaRef::clone(&self.schema));
-        for outcome in outcomes {
-            rows.push((self.job.axis_values)(outcome.point), outcome);
+        for done in outcomes {
+            for row in done.rows {
+                rows.push(done.point, (self.job.axis_values)(done.point), row);
+            }
         }
         rows.take()
     }
@@ -215,8 +218,8 @@ mod tests {
 
     use super::*;
     use crate::config::GridInput;
-    use crate::interrupt::Interrupt;
-    use crate::progress::ProgressMode;
+    use sweep_engine::interrupt::Interrupt;
+    use sweep_engine::progress::ProgressMode;
 
     #[test]
     fn batches_share_their_schema() {

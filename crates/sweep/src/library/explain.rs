@@ -5,11 +5,11 @@ use serde_json::Value;
 use super::{Effort, refused_speeds};
 use crate::config::GridInput;
 use crate::engine::simd_from_environment;
-use crate::exit::Error;
 use crate::explain::{explain, json, words};
-use crate::random_keys::draw_random_keys;
 use crate::speeds::Speeds;
-use crate::threads;
+use sweep_engine::exit::Error;
+use sweep_engine::random_keys::draw_random_keys;
+use sweep_engine::threads;
 
 /// What is found at a point.
 #[derive(Debug)]
@@ -57,8 +57,8 @@ mod tests {
     use std::time::{Duration, Instant};
 
     use super::*;
-    use crate::interrupt::Interrupt;
-    use crate::progress::ProgressMode;
+    use sweep_engine::interrupt::Interrupt;
+    use sweep_engine::progress::ProgressMode;
 
     #[test]
     fn an_interrupt_ends_it() {

@@ -26,30 +26,10 @@ pub use run::{RanToFile, run_to_file};
 pub use stability::{find_stability, stability_to_file};
 pub use trace::{TraceOptions, trace_point};
 
-/// What a search or an evaluation needs beside its question.
-#[derive(Clone, Copy, Debug)]
-pub struct Effort<'a> {
-    /// Worker threads; if `None`, what Slurm gave this task, else the cores of this machine.
-    pub threads: Option<usize>,
-    /// How progress is shown, on standard error.
-    pub progress: crate::progress::ProgressMode,
-    /// Ends the work early.
-    pub interrupt: &'a crate::interrupt::Interrupt,
-}
-
-impl Effort<'_> {
-    /// The threads to work with.
-    fn threads(&self) -> Result<usize, crate::threads::ThreadsError> {
-        let environment = |name: &str| std::env::var(name).ok();
-        match self.threads {
-            Some(threads) => crate::threads::checked(threads),
-            None => crate::threads::count(None, &environment),
-        }
-    }
-}
+pub use sweep_engine::effort::Effort;
 
 /// Speeds that make no sense.
-fn refused_speeds(count: usize, expected: String) -> crate::exit::Error {
+fn refused_speeds(count: usize, expected: String) -> sweep_engine::exit::Error {
     let given = format!("with {count} values");
-    crate::exit::Error::Option { option: "speeds", given, expected }
+    sweep_engine::exit::Error::Option { option: "speeds", given, expected }
 }

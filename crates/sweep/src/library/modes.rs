@@ -10,10 +10,10 @@ use washer_model::{
 use super::refused_speeds;
 use super::result::{ResultKind, ResultTable};
 use crate::config::{self, GridInput};
-use crate::exit::Error;
-use crate::interrupt::Interrupt;
 use crate::speeds::MOST_SPEEDS;
-use crate::table::Table;
+use sweep_engine::exit::Error;
+use sweep_engine::interrupt::Interrupt;
+use sweep_engine::table::Table;
 use sweep_files::key;
 
 /// The modes of a grid's machine at spin speeds (rpm, rising); `at` gives axes a value, which have
@@ -43,7 +43,7 @@ pub fn find_modes(
         None => built_in(speeds_rpm[count - 1]),
         Some(grid) => {
             let plan = if at.is_empty() { grid.load()? } else { grid.load_point(at)?.0 };
-            (plan.name, plan.machine, plan.spin)
+            (plan.name, plan.model.machine, plan.model.spin)
         }
     };
     let stop = || interrupt.stopped();
@@ -80,8 +80,10 @@ impl Analysis {
         stop: Stop<'_>,
     ) -> Result<Option<Self>, Error> {
         let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-        let point = prepare(Simd::Scalar, &[(machine.clone(), spin.clone())], &timing).remove(0)?;
-        let Some(modes) = campbell_until(&point, speeds_rpm, stop)? else { return Ok(None) };
+        let point = prepare(Simd::Scalar, &[(machine.clone(), spin.clone())], &timing).remove(0);
+        let point = point.map_err(Error::model)?;
+        let modes = campbell_until(&point, speeds_rpm, stop).map_err(Error::model)?;
+        let Some(modes) = modes else { return Ok(None) };
         let exact = if is_exact { Some(exact_over(&point, speeds_rpm, &modes)?) } else { None };
         Ok(Some(Self { speeds_rpm: speeds_rpm.to_vec(), modes, exact }))
     }
@@ -108,7 +110,7 @@ impl Analysis {
     pub(crate) fn table(&self, name: &str, machine: &Machine) -> Table {
         let (speeds, modes) = (&self.speeds_rpm, &self.modes);
         let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
-        let mut table = Table::default();
+        let mut table = Table::new(crate::identity::BUILD);
         table.numbers(
             "speed_rpm",
             "rpm",
@@ -194,7 +196,7 @@ fn exact_over(
         if speed == 0.0 {
             return Ok(vec![None; modes.len()]);
         }
-        let motions = exact_motions(point, speed)?;
+        let motions = exact_motions(point, speed).map_err(Error::model)?;
         let of = |mode: &ModeOverSpeed| {
             motions.iter().find(|motion| motion.frozen.shape == mode.at_speed[k].shape).copied()
         };

@@ -1,15 +1,15 @@
 //! Results in memory: rows as columns, and the file that they are or would be.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use arrow_array::RecordBatch;
 use arrow_schema::{Schema, SchemaRef};
 use serde_json::Value;
 
-use crate::exit::Error;
 use crate::identity;
-use crate::store::{Job, Layout, RowKind, StoreError, write_map};
-use crate::table::Table;
+use sweep_engine::exit::Error;
+use sweep_engine::store::{Job, Layout, StoreError, write_map};
+use sweep_engine::table::Table;
 use sweep_files::{FileError, FileKind, Output, ParquetFile, key};
 use sweep_plot::{PlotOptions, render};
 
@@ -66,12 +66,10 @@ pub struct ResultTable {
     file: FileContent,
 }
 
-/// Where a result's file is, or what it is made of.
+/// What a result's file is made of.
 #[derive(Debug)]
 enum FileContent {
-    /// On disk.
-    At(PathBuf),
-    /// These bytes.
+    /// These bytes. Of a file that was read, those of then: another may lie there by now.
     Bytes(Vec<u8>),
     /// The rows, by the rules of a run's file.
     Rows(Box<MapPlan>),
@@ -96,9 +94,9 @@ impl MapPlan {
 impl ResultTable {
     /// The rows of a run, or of one at constant speeds.
     pub(super) fn of_rows(map: MapPlan, batches: Vec<RecordBatch>) -> Self {
-        let kind = match map.layout.rows {
-            RowKind::Run => ResultKind::Map,
-            RowKind::Dwell(_) => ResultKind::Stability,
+        let kind = match map.layout.kind {
+            FileKind::Stability => ResultKind::Stability,
+            _ => ResultKind::Map,
         };
         Self {
             kind,
@@ -149,7 +147,8 @@ impl ResultTable {
             path: path.to_path_buf(),
             reason: error.to_string(),
         })?;
-        Ok(Self { kind, plan, schema, batches, file: FileContent::At(path.to_path_buf()) })
+        let file = FileContent::Bytes(file.bytes()?);
+        Ok(Self { kind, plan, schema, batches, file })
     }
 
     /// What it is.
@@ -190,20 +189,14 @@ impl ResultTable {
     pub fn save(&self, path: &Path) -> Result<(), Error> {
         match &self.file {
             FileContent::Rows(map) => Ok(map.write(&self.batches, path)?),
-            FileContent::Bytes(_) | FileContent::At(_) => {
-                self.finish(Output::begin(path, self.kind.file())?)
-            }
+            FileContent::Bytes(_) => self.finish(Output::begin(path, self.kind.file())?),
         }
     }
 
-    /// Writes a small result, or a copy of the file that this one is, to an output already begun.
+    /// Writes a small result, or a copy of the file that this one was, to an output already begun.
     pub(super) fn finish(&self, output: Output<'_>) -> Result<(), Error> {
         match &self.file {
             FileContent::Bytes(bytes) => Ok(output.finish(bytes)?),
-            FileContent::At(source) => {
-                let bytes = std::fs::read(source).map_err(FileError::io("read", source))?;
-                Ok(output.finish(&bytes)?)
-            }
             FileContent::Rows(_) => Ok(()),
         }
     }
@@ -213,9 +206,6 @@ impl ResultTable {
     /// # Errors
     /// As [`sweep_plot::render`] and [`Self::save`].
     pub fn draw(&self, options: &PlotOptions, output: &Path) -> Result<(), Error> {
-        if let FileContent::At(path) = &self.file {
-            return Ok(render(path, options, output)?);
-        }
         let here = Path::new("a temporary folder");
         let folder = tempfile::tempdir().map_err(FileError::io("make", here))?;
         let path = folder.path().join("result.parquet");
@@ -240,6 +230,8 @@ impl MapPlan {
             numerics: identity::NUMERICS_VERSION,
             points: self.points,
             layout: self.layout.clone(),
+            // Of tables and progress alone.
+            ratio_limit: f64::NAN,
             axis_values: Box::new(|_| Vec::new()),
         };
         Ok(write_map(&job, batches, path)?)

@@ -5,11 +5,11 @@ use std::path::Path;
 use super::Effort;
 use super::result::ResultTable;
 use crate::engine::{Engine, ModelEngine};
-use crate::exit::Error;
 use crate::plan::Plan;
-use crate::random_keys::draw_random_keys;
-use crate::run::{self as runner, Ended, RunOptions};
-use crate::store::Job;
+use sweep_engine::exit::Error;
+use sweep_engine::random_keys::draw_random_keys;
+use sweep_engine::run::{self as runner, Ended, RunOptions};
+use sweep_engine::store::Job;
 
 /// How a run into a file ended.
 #[derive(Debug)]

@@ -6,12 +6,11 @@ use super::evaluate::{Evaluated, in_memory};
 use super::run::{RanToFile, into_file};
 use super::{Effort, refused_speeds};
 use crate::engine::Engine as _;
-use crate::exit::Error;
 use crate::plan::Plan;
-use crate::random_keys::draw_random_keys;
 use crate::speeds::MOST_SPEEDS;
 use crate::stability::{DwellEngine, check};
-use crate::store::Job;
+use sweep_engine::exit::Error;
+use sweep_engine::random_keys::draw_random_keys;
 
 /// The periodic response of both models at each point of a plan's grid and each constant speed
 /// (rpm, rising), and how fast disturbances of it grow; speeds vary fastest.
@@ -26,7 +25,7 @@ pub fn find_stability(
     draw_random_keys()?;
     check_speeds(plan, speeds_rpm)?;
     let engine = DwellEngine::new(plan, speeds_rpm)?;
-    let job = Job::of_dwells(plan, speeds_rpm);
+    let job = crate::stability::job(plan, speeds_rpm);
     in_memory(&job, effort, &|next, keep, watch| engine.evaluate(next, keep, watch))
 }
 
@@ -45,7 +44,7 @@ pub fn stability_to_file(
 ) -> Result<RanToFile, Error> {
     check_speeds(plan, speeds_rpm)?;
     let engine = DwellEngine::new(plan, speeds_rpm)?;
-    into_file(&engine, &Job::of_dwells(plan, speeds_rpm), output, fresh, tell, effort)
+    into_file(&engine, &crate::stability::job(plan, speeds_rpm), output, fresh, tell, effort)
 }
 
 fn check_speeds(plan: &Plan, speeds_rpm: &[f64]) -> Result<(), Error> {

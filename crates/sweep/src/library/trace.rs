@@ -2,11 +2,11 @@
 
 use super::result::{ResultKind, ResultTable};
 use crate::config::GridInput;
-use crate::exit::Error;
-use crate::interrupt::Interrupt;
-use crate::random_keys::draw_random_keys;
-use crate::threads;
 use crate::trace::{self, Extras, View, every, start_of, start_value};
+use sweep_engine::exit::Error;
+use sweep_engine::interrupt::Interrupt;
+use sweep_engine::random_keys::draw_random_keys;
+use sweep_engine::threads;
 
 /// What a trace holds.
 #[derive(Clone, Debug)]
@@ -50,9 +50,10 @@ pub fn trace_point(
     let work = || trace::trace(&plan, plan.scenario(0), at, &view, &stop);
     // A thread for each model, where there may be two; they give the same bits as one.
     let trace = match threads::pool(2) {
-        Ok(pool) => pool.install(work)?,
-        Err(_) => work()?,
-    };
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }
+    .map_err(Error::model)?;
     if interrupt.stopped() {
         return Ok(None);
     }

@@ -96,13 +96,14 @@ fn a_setup_comes_back_from_its_numbers() {
         "\"triangular\", peak_rpm = 350, ramp_s = 50",
         "\"table\", time_s = [0, 20, 50], speed_rpm = [0, 350, 100]",
     ));
-    plan.machine = crate::config::with_one_of_each();
-    (plan.measures.stops, plan.measures.feet) = (plan.machine.stops.len(), plan.machine.feet.len());
-    plan.measures.metrics = vec![Metric::SlipMargin, Metric::CabinetForce];
-    plan.measures.criterion = Criterion::Envelope;
-    plan.machine.springs[1].free_length_m = Some(0.2);
-    plan.machine.dampers[0].friction_n = 20.0;
-    plan.machine.dampers[0].friction_linear_speed_m_per_s = Some(0.1);
+    plan.model.machine = crate::config::with_one_of_each();
+    (plan.model.measures.stops, plan.model.measures.feet) =
+        (plan.model.machine.stops.len(), plan.model.machine.feet.len());
+    plan.model.measures.metrics = vec![Metric::SlipMargin, Metric::CabinetForce];
+    plan.model.measures.criterion = Criterion::Envelope;
+    plan.model.machine.springs[1].free_length_m = Some(0.2);
+    plan.model.machine.dampers[0].friction_n = 20.0;
+    plan.model.machine.dampers[0].friction_linear_speed_m_per_s = Some(0.1);
     let (mut setup, _) = setup(&plan, &[]).unwrap();
     let numbers = setup.to_numbers();
     // Words do not go with them.

@@ -4,27 +4,33 @@
 pub(crate) mod tongues;
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use lane_ode::Simd;
 use washer_model::{Dwell, Machine, Point, Response, Spin, Target, Timing, prepare};
 use washer_row::{Growth, Outcome, Status, Trajectory};
 
+use crate::columns::{self, Columns};
 use crate::engine::{
     Engine, EngineError, Watch, responses, simd_from_environment, together_or_alone,
 };
-use crate::exit::Error;
 use crate::plan::Plan;
+use crate::speeds::Speeds;
+use serde_json::json;
+use sweep_engine::exit::Error;
+use sweep_engine::store::{Done, Job};
 
-/// Rows that a thread takes at once: enough to fill lanes, few enough that a signal is soon heard.
-const AT_ONCE: usize = 32;
+/// Rows that a thread takes at once: those of enough points to fill lanes, because a point's rows
+/// share its curve of responses; but no fewer and no more than these.
+const POINTS_AT_ONCE: u64 = 8;
+const AT_ONCE: [u64; 2] = [32, 2048];
 
 /// Refuses a grid whose axes contradict the speeds, or mean nothing at a constant speed. `option`
 /// is what gave the speeds.
 ///
 /// # Errors
-/// [`Error::Option`]; [`Error::Corners`].
+/// [`Error::Option`].
 pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<(), Error> {
-    smooth(plan)?;
     let refuse =
         |expected: String| Err(Error::Option { option, given: given.to_owned(), expected });
     for axis in &plan.axes {
@@ -53,13 +59,33 @@ pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<()
     Ok(())
 }
 
-/// Refuses machines whose forces have corners: the derivatives along a response are taken at a few
-/// instants of a turn, between which they are to be smooth.
-///
-/// # Errors
-/// [`Error::Corners`].
-pub(crate) fn smooth(plan: &Plan) -> Result<(), Error> {
-    plan.corners_of_forces().map_or(Ok(()), |what| Err(Error::Corners { what }))
+/// The dwells of a plan's points at these speeds (rpm), for `sweep stability`: a row for each point
+/// and speed, speeds varying fastest.
+#[must_use]
+pub(crate) fn job<'a>(plan: &'a Plan, speeds_rpm: &[f64]) -> Job<'a> {
+    let of_run = Job::of(plan);
+    let mut json = of_run.plan;
+    json["stability"] = json!({ "speed_rpm": speeds_rpm });
+    let layout = columns::of_dwells(plan, speeds_rpm);
+    let speeds_rpm = speeds_rpm.to_vec();
+    let speeds = speeds_rpm.len() as u64;
+    Job {
+        plan: json,
+        points: plan.points() * speeds,
+        layout,
+        axis_values: Box::new(move |row| {
+            let mut values = plan.axis_values(row / speeds);
+            values.push(speeds_rpm[(row % speeds) as usize]);
+            values
+        }),
+        ..of_run
+    }
+}
+
+/// The dwells of a plan at these speeds, and where their result goes unless it is said.
+pub(crate) fn dwells<'a>(plan: &'a Plan, speeds: Speeds, out: Option<&Path>) -> (Job<'a>, PathBuf) {
+    let default = || PathBuf::from(format!("results/{}-stability.parquet", plan.name));
+    (job(plan, &speeds.values()), out.map_or_else(default, Path::to_owned))
 }
 
 /// Both models' periodic responses at a plan's points and speeds. Row r is the point r / speeds at
@@ -79,8 +105,9 @@ impl<'a> DwellEngine<'a> {
         Ok(Self { plan, speeds_rpm, simd: simd_from_environment()? })
     }
 
-    /// These rows, those of neighbouring points and speeds in lanes together.
-    fn rows(&self, rows: &[u64]) -> Vec<Outcome> {
+    /// These rows, those of neighbouring points and speeds in lanes together. Once `is_stopped`
+    /// says so, what comes means nothing.
+    fn rows(&self, rows: &[u64], is_stopped: &dyn Fn() -> bool) -> Vec<Outcome> {
         let speeds = self.speeds_rpm.len() as u64;
         let mut wanted: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
         wanted.dedup();
@@ -98,9 +125,9 @@ impl<'a> DwellEngine<'a> {
                 Err(status) => outcomes.push(failed(row, *status)),
             }
         }
-        for (row, found) in asked.into_iter().zip(responses(&dwells)) {
+        for (row, found) in asked.into_iter().zip(responses(&dwells, is_stopped)) {
             outcomes.push(match found {
-                Ok(response) => self.outcome(row, &response),
+                Ok(responses) => self.outcome(row, &responses),
                 Err(status) => failed(row, status),
             });
         }
@@ -112,7 +139,7 @@ impl<'a> DwellEngine<'a> {
         let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
         let scenarios = points.iter().map(|&point| self.plan.scenario(point));
         let machines: Vec<(Machine, Spin)> =
-            scenarios.map(|scenario| (scenario.machine, scenario.spin)).collect();
+            scenarios.map(|scenario| (scenario.model.machine, scenario.model.spin)).collect();
         let together = |machines: &[(Machine, Spin)]| {
             let ready = prepare(self.simd, machines, &timing).into_iter();
             ready.map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
@@ -120,7 +147,13 @@ impl<'a> DwellEngine<'a> {
         together_or_alone(&machines, together, || Err(Status::Panicked))
     }
 
-    fn outcome(&self, row: u64, response: &Response) -> Outcome {
+    fn outcome(&self, row: u64, responses: &[Response]) -> Outcome {
+        let mut outcomes = responses.iter().map(|response| self.outcome_of(row, response));
+        let first = outcomes.next().unwrap_or_else(|| failed(row, Status::NoResponse));
+        Outcome { coexisting: outcomes.collect(), ..first }
+    }
+
+    fn outcome_of(&self, row: u64, response: &Response) -> Outcome {
         let channels = &self.plan.reliability.channels;
         let of_model = |amplitudes: &[f64]| Trajectory {
             amplitudes: channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
@@ -139,16 +172,25 @@ impl Engine for DwellEngine<'_> {
     fn evaluate(
         &self,
         next: &(dyn Fn() -> Option<u64> + Sync),
-        keep: &(dyn Fn(Outcome) + Sync),
+        keep: &(dyn Fn(Done) + Sync),
         watch: &Watch<'_>,
     ) {
+        let speeds = self.speeds_rpm.len() as u64;
+        // All threads have some of few rows.
+        let share = self.plan.points().saturating_mul(speeds) / rayon::current_num_threads() as u64;
+        let at_once = share.min(POINTS_AT_ONCE * speeds).clamp(AT_ONCE[0], AT_ONCE[1]);
+        let is_stopped = || watch.stopped();
+        let columns = Columns::of_dwells(self.plan, self.speeds_rpm);
         rayon::broadcast(|_| {
             while !watch.stopped() {
-                let rows: Vec<u64> = std::iter::from_fn(next).take(AT_ONCE).collect();
+                let rows: Vec<u64> = std::iter::from_fn(next).take(at_once as usize).collect();
                 if rows.is_empty() {
                     break;
                 }
-                self.rows(&rows).into_iter().for_each(keep);
+                let outcomes = self.rows(&rows, &is_stopped);
+                if !watch.stopped() {
+                    outcomes.into_iter().for_each(|outcome| keep(columns.done(outcome)));
+                }
             }
         });
     }

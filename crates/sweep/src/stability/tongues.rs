@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use arrow_schema::ArrowError;
 use washer_model::decimal;
 
-use crate::store::StoreError;
+use sweep_engine::store::StoreError;
 use sweep_files::{ParquetFile, cells};
 
 /// Tongues that a summary lists.
@@ -20,6 +20,10 @@ pub(crate) struct Row {
     pub(crate) growth_per_s: f64,
     pub(crate) frequency_cpm: f64,
     pub(crate) kind: String,
+    /// The speed (rpm) above which its branch is not.
+    pub(crate) branch_to_rpm: Option<f64>,
+    /// What of the machine's geometry it passes.
+    pub(crate) beyond: Option<String>,
     /// What moves in the modes that take part, and their numbers.
     pub(crate) modes: Vec<(f64, String)>,
     pub(crate) status: String,
@@ -41,18 +45,36 @@ pub(crate) struct Summary {
     points: u64,
     without: u64,
     unstable: u64,
+    /// Rows that are stable by their multipliers, and pass what no machine can.
+    beyond: u64,
+    /// Rows behind another of the same point and speed, which all else leaves out.
+    coexisting: u64,
     tongues: Vec<Tongue>,
+    /// Points and speeds (rpm) at which a branch ends that a machine runs up on.
+    jumps: Vec<(f64, f64)>,
     last: Option<Row>,
 }
 
 impl Summary {
     /// Takes in the next row.
     pub(crate) fn add(&mut self, row: Row) {
-        self.rows += 1;
         let same_point = self.last.as_ref().is_some_and(|last| last.point == row.point);
+        let is_other = |last: &Row| same_point && last.speed_rpm == row.speed_rpm;
+        // A machine that runs up is on the first branch that there is at a speed.
+        if self.last.as_ref().is_some_and(is_other) {
+            self.coexisting += 1;
+            return;
+        }
+        self.rows += 1;
+        if let Some(to_rpm) = row.branch_to_rpm
+            && self.jumps.last() != Some(&(row.point, to_rpm))
+        {
+            self.jumps.push((row.point, to_rpm));
+        }
         let follows = same_point && self.last.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
         self.points += u64::from(!same_point);
         self.without += u64::from(row.status != "ok");
+        self.beyond += u64::from(row.growth_per_s <= 0.0 && row.beyond.is_some());
         if row.growth_per_s > 0.0 {
             self.unstable += 1;
             match self.tongues.last_mut() {
@@ -77,13 +99,29 @@ impl Summary {
             "stable",
             format!(
                 "{} of {} rows, {} not, {} without a response; {} points",
-                self.rows - self.unstable - self.without,
+                self.rows - self.unstable - self.without - self.beyond,
                 self.rows,
                 self.unstable,
                 self.without,
                 self.points
             ),
         )];
+        if self.beyond > 0 {
+            let words = "rows pass what no machine can (column beyond), and count for neither";
+            lines.push(("beyond", format!("{} {words}", self.beyond)));
+        }
+        if self.coexisting > 0 {
+            let words = "further rows: other responses at the same speeds (column branch)";
+            lines.push(("others", format!("{} {words}", self.coexisting)));
+        }
+        for (point, rpm) in self.jumps.iter().take(MOST_LISTED) {
+            let of_point = if self.points > 1 { format!("point {point}: ") } else { String::new() };
+            let words = "running up, the response folds back and the motion jumps";
+            lines.push(("jump", format!("{of_point}at {rpm:.2} rpm, {words}")));
+        }
+        if self.jumps.len() > MOST_LISTED {
+            lines.push(("", format!("and {} more jumps", self.jumps.len() - MOST_LISTED)));
+        }
         // All of one point; else the worst, each point by its number.
         let mut listed: Vec<&Tongue> = self.tongues.iter().collect();
         if self.points > 1 {
@@ -141,6 +179,7 @@ pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, StoreError> {
             let [point, speed, growth, frequency, mode_1, mode_2] =
                 ["point", "speed_rpm", "growth_per_s", "frequency_cpm", "mode_1", "mode_2"]
                     .map(numbers);
+            let (branch_to, beyond) = (numbers("branch_to_rpm")?, words("beyond")?);
             let [kind, name_1, name_2, status] =
                 ["kind", "mode_1_name", "mode_2_name", "status"].map(words);
             let (point, speed, growth, frequency) = (point?, speed?, growth?, frequency?);
@@ -158,6 +197,8 @@ pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, StoreError> {
                     growth_per_s: number(&growth),
                     frequency_cpm: number(&frequency),
                     kind: word(&kind),
+                    branch_to_rpm: branch_to[i],
+                    beyond: beyond[i].map(str::to_owned),
                     modes: named.collect(),
                     status: word(&status),
                 });
@@ -181,10 +222,12 @@ mod tests {
             (0.0, 2.0, 0.1, "quasi_periodic"),
             (0.0, 3.0, 0.3, "quasi_periodic"),
             (0.0, 4.0, 0.2, "period_doubling"),
+            (0.0, 4.0, 0.9, "fold"),
             (1.0, 1.0, 0.2, "period_doubling"),
             (1.0, 2.0, f64::NAN, ""),
             (1.0, 3.0, 0.1, "fold"),
         ];
+        // A second row of a speed is another response, and no speed.
         for (point, speed_rpm, growth_per_s, kind) in rows {
             let status = if growth_per_s.is_nan() { "no_response" } else { "ok" };
             summary.add(Row {
@@ -204,8 +247,9 @@ mod tests {
         );
         let lines = summary.lines();
         assert_eq!(lines[0].1, "1 of 7 rows, 5 not, 1 without a response; 2 points");
+        assert!(lines[1].1.starts_with("1 further rows"));
         assert!(
-            lines[1].1.starts_with("point 0: 2 to 3 rpm, quasi periodic, up to 0.3000 /s at 3")
+            lines[2].1.starts_with("point 0: 2 to 3 rpm, quasi periodic, up to 0.3000 /s at 3")
         );
     }
 }

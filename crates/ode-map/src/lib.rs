@@ -1,0 +1,73 @@
+//! Any oscillator as a model of the engine: its equations once over [`lane_ode::Real`], and every
+//! command of `sweep_engine::commands`.
+//!
+//! An [`Oscillator`] says what its parameters, coordinates and accelerations are. From these come
+//! the linear model, by dual numbers at the equilibrium; runs of both through lanes, by fixed steps
+//! that are halved until two runs agree or by one of three methods; peaks, ratios and verdicts.
+
+mod equations;
+mod map;
+mod run;
+
+pub use map::{Integrator, Map};
+pub use sweep_parameter::Range;
+
+use std::process::ExitCode;
+
+use lane_ode::{N, Real};
+
+/// A parameter of an oscillator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Name in grid files and of the result's column; it ends with the unit.
+    pub name: &'static str,
+    /// Unit; "1" for none.
+    pub unit: &'static str,
+    /// What it is, in a phrase.
+    pub description: &'static str,
+    /// Values it may take.
+    pub range: Range,
+    /// Its value where nothing else is said.
+    pub default: f64,
+    /// Where that comes from.
+    pub source: &'static str,
+}
+
+/// A coordinate of an oscillator, which is compared between the models.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coordinate {
+    /// Name in grid files; columns are called `nonlinear_NAME` and the like.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// What it is, in a phrase.
+    pub description: &'static str,
+}
+
+/// Coordinates q with q'' = accelerations(q, q') + forcing(t): `C` coordinates, `P` parameters. `D`
+/// is twice `C`.
+pub trait Oscillator<const C: usize, const D: usize, const P: usize>:
+    Clone + std::fmt::Debug + PartialEq + Send + Sync + 'static
+{
+    /// The parameters.
+    const PARAMETERS: [Parameter; P];
+    /// The coordinates.
+    const COORDINATES: [Coordinate; C];
+    /// Version of the equations: results of others are never mixed with theirs.
+    const VERSION: &'static str;
+
+    /// The free motion: q'' at coordinates `q` with speeds `u`.
+    fn accelerations<T: Real>(p: &[N<T>; P], q: &[N<T>; C], u: &[N<T>; C]) -> [N<T>; C];
+
+    /// What drives it at time `t`, added to the accelerations of both models.
+    fn forcing<T: Real>(p: &[N<T>; P], t: N<T>) -> [N<T>; C];
+}
+
+/// The program of an oscillator: does what this process's arguments say. `name` is how it is
+/// called.
+#[must_use]
+pub fn main<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
+    name: &'static str,
+) -> ExitCode {
+    sweep_engine::commands::main::<Map<O, C, D, P>>(name)
+}

@@ -1,0 +1,589 @@
+//! An oscillator as a model of the engine.
+
+use std::marker::PhantomData;
+use std::sync::Mutex;
+use std::time::Instant;
+
+use lane_ode::{Failure, MAX_LANES, Simd};
+use serde_json::{Map as JsonMap, Value};
+use sweep_engine::boundary::quantity::TracedQuantity;
+use sweep_engine::boundary::search::Distances;
+use sweep_engine::columns::{
+    Compared, ResultColumn, amplitude_columns, row, run_columns, verdict_columns,
+};
+use sweep_engine::config::report::Report;
+use sweep_engine::config::schema::set;
+use sweep_engine::config::section::Section;
+use sweep_engine::config::{Origins, Read};
+use sweep_engine::estimate::Estimate;
+use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Steps};
+use sweep_engine::store::{Done, Job, Layout, Rows, Shape, axis_columns};
+use sweep_engine::{
+    Build, Engine, Error, GridInput, Listed, Model as EngineModel, Plan, Scenario, Schema, Swept,
+    UnknownParameter, Watch, methods,
+};
+use sweep_files::FileKind;
+use sweep_parameter::{Channel, Range};
+
+use crate::equations::Case;
+use crate::run::{Method, Model, Run, runs};
+use crate::{Coordinate, Oscillator, Parameter};
+
+methods! {
+    Rk4 = "rk4", "classical Runge-Kutta of order 4, in fixed steps" { step_s: STEP_S }
+        Steps::Fixed(step_s);
+    Dopri5 = "dopri5", "Dormand-Prince 5(4), adaptive" { rtol: RTOL, atol: ATOL } Steps::Explicit;
+    Rodas5p = "rodas5p", "Rodas5P, adaptive and linearly implicit: for stiff oscillators" {
+        rtol: RTOL, atol: ATOL
+    } Steps::Implicit;
+    Rk4Halved = "rk4-halved", "rk4 in steps that are halved until two runs agree" {
+        accuracy: ACCURACY
+    } Steps::Checked(accuracy);
+}
+
+/// Steps of the first rung over a radian of the linear model's fastest motion.
+const FIRST_STEP_RAD: f64 = 0.5;
+/// Rungs at most, each of half the step of the one before.
+const MOST_RUNGS: u32 = 12;
+/// The error left in a run of order 4, as a share of its difference from one of twice the step.
+const CONTRACTION: f64 = 1.0 / 15.0;
+/// An amplitude below this share of the row's greatest is compared with that share.
+const FLOOR: f64 = 1e-9;
+
+/// Names of methods in results.
+const METHODS: [&str; 3] = ["rk4", "dopri5", "rodas5p"];
+/// Values of `status`: those of the nonlinear model, then those of the linear one alone.
+const STATUSES: [&str; 8] = [
+    "ok",
+    "diverged",
+    "step_too_small",
+    "step_limit",
+    "no_equilibrium",
+    "linear_diverged",
+    "linear_step_too_small",
+    "linear_step_limit",
+];
+const NO_EQUILIBRIUM: usize = 4;
+
+/// What a grid file sets of an oscillator: a value for every parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Map<O, const C: usize, const D: usize, const P: usize> {
+    values: [f64; P],
+    of: PhantomData<O>,
+}
+
+/// A parameter of an oscillator, or an edge of the window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Named {
+    of: Parameter,
+    place: Result<usize, usize>,
+}
+
+/// Edges of the window, which are parameters like others.
+const EDGES: [Parameter; 2] = [
+    Parameter {
+        name: "window_from_s",
+        unit: "s",
+        description: "where the window begins",
+        range: Range::NonNegative,
+        default: 0.0,
+        source: "the grid file's [time]",
+    },
+    Parameter {
+        name: "window_to_s",
+        unit: "s",
+        description: "where the window ends",
+        range: Range::NonNegative,
+        default: 0.0,
+        source: "the grid file's [time]",
+    },
+];
+
+impl sweep_parameter::Parameter for Named {
+    fn name(&self) -> &str {
+        self.of.name
+    }
+
+    fn unit(&self) -> &'static str {
+        self.of.unit
+    }
+
+    fn description(&self) -> &'static str {
+        self.of.description
+    }
+
+    fn range(&self) -> Range {
+        self.of.range
+    }
+
+    fn window_edge(&self) -> Option<usize> {
+        self.place.err()
+    }
+}
+
+/// A coordinate as a channel, by its number.
+#[derive(Debug)]
+pub struct CoordinateOf<O, const C: usize, const D: usize, const P: usize> {
+    place: usize,
+    of: PhantomData<O>,
+}
+
+impl<O, const C: usize, const D: usize, const P: usize> Clone for CoordinateOf<O, C, D, P> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<O, const C: usize, const D: usize, const P: usize> Copy for CoordinateOf<O, C, D, P> {}
+
+impl<O, const C: usize, const D: usize, const P: usize> PartialEq for CoordinateOf<O, C, D, P> {
+    fn eq(&self, other: &Self) -> bool {
+        self.place == other.place
+    }
+}
+
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
+    CoordinateOf<O, C, D, P>
+{
+    const EVERY: [Self; C] = {
+        let mut every = [Self { place: 0, of: PhantomData }; C];
+        let mut k = 0;
+        while k < C {
+            every[k].place = k;
+            k += 1;
+        }
+        every
+    };
+
+    const fn of(self) -> Coordinate {
+        O::COORDINATES[self.place]
+    }
+}
+
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Channel
+    for CoordinateOf<O, C, D, P>
+{
+    fn every() -> &'static [Self] {
+        &Self::EVERY
+    }
+
+    fn name(self) -> &'static str {
+        self.of().name
+    }
+
+    fn unit(self) -> &'static str {
+        self.of().unit
+    }
+
+    fn description(self) -> &'static str {
+        self.of().description
+    }
+}
+
+fn parameters<O, const C: usize, const D: usize, const P: usize>() -> Vec<Named>
+where
+    O: Oscillator<C, D, P>,
+{
+    let own = O::PARAMETERS.into_iter().enumerate().map(|(k, of)| Named { of, place: Ok(k) });
+    let edges = EDGES.into_iter().enumerate().map(|(k, of)| Named { of, place: Err(k) });
+    own.chain(edges).collect()
+}
+
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> EngineModel
+    for Map<O, C, D, P>
+{
+    type Parameter = Named;
+    type Channel = CoordinateOf<O, C, D, P>;
+    type Integrator = Integrator;
+
+    const BUILD: Build = Build { version: O::VERSION, numerics: 1 };
+
+    fn parameters(&self) -> Vec<Named> {
+        parameters::<O, C, D, P>()
+    }
+
+    fn find(&self, name: &str) -> Result<Named, UnknownParameter> {
+        let found = parameters::<O, C, D, P>().into_iter().find(|one| one.of.name == name);
+        found.ok_or_else(|| UnknownParameter {
+            reason: "no parameter has this name".to_owned(),
+            is_strange: true,
+        })
+    }
+
+    fn write(&mut self, parameter: &Named, value: f64) {
+        if let Ok(place) = parameter.place {
+            self.values[place] = value;
+        }
+    }
+}
+
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Read
+    for Map<O, C, D, P>
+{
+    fn read(_: &GridInput<Self>, _: &mut Section<'_>, _: &mut Origins, _: &mut Report) -> Self {
+        Self { values: O::PARAMETERS.map(|one| one.default), of: PhantomData }
+    }
+
+    fn describe(&self, plan: &mut JsonMap<String, Value>) {
+        let named = O::PARAMETERS.iter().zip(self.values);
+        let pair = |(one, value): (&Parameter, f64)| (one.name.to_owned(), Value::from(value));
+        let values: Value = named.map(pair).collect();
+        plan.insert("parameters".to_owned(), values);
+    }
+
+    fn schema() -> Schema {
+        Schema {
+            top: Vec::new(),
+            required: Vec::new(),
+            reliability: Vec::new(),
+            set: set(&parameters::<O, C, D, P>(), JsonMap::new()),
+        }
+    }
+}
+
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Rows
+    for Map<O, C, D, P>
+{
+    fn layout(plan: &Plan<Self>) -> Layout {
+        Layout {
+            axes: axis_columns(plan),
+            columns: columns(plan).into_iter().map(|column| column.declared).collect(),
+            kind: FileKind::Map,
+            rows_a_point: 1,
+            has_several: false,
+            metadata: Vec::new(),
+        }
+    }
+}
+
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swept
+    for Map<O, C, D, P>
+{
+    fn engine(plan: &Plan<Self>) -> Result<Box<dyn Engine + '_>, Error> {
+        Ok(Box::new(Evaluator { plan }))
+    }
+
+    fn estimate(plan: &Plan<Self>, threads: usize) -> Result<Estimate, Error> {
+        let points = plan.points().min(MAX_LANES as u64);
+        let some: Vec<Vec<f64>> = (0..points).map(|k| plan.axis_values(k)).collect();
+        let began = Instant::now();
+        let rows = Evaluator { plan }.rows(&some, &|| false);
+        let core_s_per_point = began.elapsed().as_secs_f64() / points as f64;
+        drop(rows);
+        let layout = &Job::of(plan).layout;
+        let result_bytes = plan.points() as f64 * Shape::of(layout).bytes_a_row() as f64;
+        let steps = match plan.integrator.steps() {
+            Steps::Checked(_) => ", until two runs agree",
+            Steps::Fixed(_) => ", two trajectories per point",
+            Steps::Explicit | Steps::Implicit => ": steps as it needs",
+        };
+        Ok(Estimate {
+            simd: Simd::best().name().to_owned(),
+            threads,
+            wall_s: plan.points() as f64 * core_s_per_point / threads as f64,
+            core_s_per_point,
+            sampled_points: points,
+            sampled_s: plan.end_s,
+            // Chunks in hand, or a row group.
+            memory_bytes: 14e6 + result_bytes.min(40e6),
+            disk_bytes: result_bytes,
+            result_bytes,
+            method: format!("{}{steps}", plan.integrator),
+        })
+    }
+
+    fn search<'a>(
+        plan: &'a Plan<Self>,
+        quantity: &TracedQuantity,
+    ) -> Result<Box<dyn Distances + 'a>, Error> {
+        Ok(Box::new(Searched { rows: Evaluator { plan }, quantity: quantity.clone() }))
+    }
+
+    fn listed(plan: Option<&Plan<Self>>) -> Vec<Listed<Self>> {
+        let defaults = O::PARAMETERS.map(|one| one.default);
+        let line = |parameter: Named| {
+            let value = match parameter.place {
+                Ok(place) => Some(plan.map_or(defaults[place], |plan| plan.model.values[place])),
+                Err(edge) => plan.map(|plan| plan.window_s[edge]),
+            };
+            let is_given = parameter.place.is_ok_and(|place| value != Some(defaults[place]));
+            let source = if is_given { "given" } else { parameter.of.source };
+            Listed { value, source: source.to_owned(), parameter }
+        };
+        parameters::<O, C, D, P>().into_iter().map(line).collect()
+    }
+}
+
+/// A row as it is computed.
+struct Row<const C: usize> {
+    /// None without an equilibrium.
+    runs: Option<[Run<C>; 2]>,
+    /// Coordinates that the plan compares.
+    channels: Vec<usize>,
+    ratio_limit: f64,
+    method: usize,
+    error: Option<f64>,
+    sensitive: Option<bool>,
+}
+
+impl<const C: usize> Row<C> {
+    fn run(&self, model: usize) -> Option<&Run<C>> {
+        self.runs.as_ref().map(|runs| &runs[model])
+    }
+}
+
+impl<const C: usize> Compared for Row<C> {
+    fn amplitude(&self, model: usize, channel: usize) -> Option<f64> {
+        let run = self.run(model).filter(|run| run.failure.is_none())?;
+        Some(run.peaks[self.channels[channel]])
+    }
+
+    fn ratio(&self, channel: usize) -> Option<f64> {
+        let linear = self.amplitude(1, channel).filter(|linear| *linear != 0.0)?;
+        Some(self.amplitude(0, channel)? / linear)
+    }
+
+    fn greatest(&self) -> Option<(usize, f64)> {
+        let ratios = (0..self.channels.len()).filter_map(|k| Some((k, self.ratio(k)?)));
+        ratios.reduce(|most, next| if next.1 > most.1 { next } else { most })
+    }
+
+    fn reliable(&self) -> Option<bool> {
+        self.greatest().map(|(_, ratio)| ratio < self.ratio_limit)
+    }
+
+    fn sensitive(&self) -> Option<bool> {
+        self.sensitive
+    }
+
+    fn method(&self) -> usize {
+        self.method
+    }
+
+    fn error(&self) -> Option<f64> {
+        self.error
+    }
+
+    fn status(&self) -> usize {
+        let Some(runs) = &self.runs else { return NO_EQUILIBRIUM };
+        let code = |run: &Run<C>| match run.failure.map(|(reason, _)| reason) {
+            None => 0,
+            Some(Failure::Diverged) => 1,
+            Some(Failure::StepTooSmall) => 2,
+            Some(Failure::StepLimit) => 3,
+        };
+        match (code(&runs[0]), code(&runs[1])) {
+            (0, 0) => 0,
+            (0, linear) => NO_EQUILIBRIUM + linear,
+            (nonlinear, _) => nonlinear,
+        }
+    }
+
+    fn fail_time_s(&self) -> Option<f64> {
+        self.runs.as_ref()?.iter().find_map(|run| run.failure).map(|(_, time_s)| time_s)
+    }
+
+    fn steps(&self, model: usize) -> u64 {
+        self.run(model).map_or(0, |run| run.steps)
+    }
+
+    fn rejected(&self, model: usize) -> u64 {
+        self.run(model).map_or(0, |run| run.rejected)
+    }
+}
+
+fn columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
+    plan: &Plan<Map<O, C, D, P>>,
+) -> Vec<ResultColumn<Row<C>>> {
+    let reliability = &plan.reliability;
+    let amplitude = "largest deviation from equilibrium in the window";
+    let ratio = "nonlinear over linear amplitude; null where the linear one is zero or a model \
+                 failed";
+    let mut columns = amplitude_columns(&reliability.channels, amplitude, ratio);
+    let (limit, methods) = (reliability.ratio_limit, METHODS.to_vec());
+    let told = "the method that the row's numbers come from";
+    columns.extend(verdict_columns(&reliability.channels, limit, methods, told));
+    columns.extend(run_columns(STATUSES.to_vec()));
+    columns
+}
+
+/// What computes rows.
+struct Evaluator<'a, O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> {
+    plan: &'a Plan<Map<O, C, D, P>>,
+}
+
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
+    Evaluator<'_, O, C, D, P>
+{
+    /// Rows of points given by the values of the axes, a lane each.
+    fn rows(&self, axis_values: &[Vec<f64>], is_stopped: &dyn Fn() -> bool) -> Vec<Row<C>> {
+        let ready = |values: &Vec<f64>| {
+            let Scenario { model, window_s } = self.plan.scenario_at(values);
+            Case::new::<O, D>(model.values, window_s)
+        };
+        let cases: Vec<Option<Case<C, P>>> = axis_values.iter().map(ready).collect();
+        let places: Vec<usize> = (0..cases.len()).filter(|k| cases[*k].is_some()).collect();
+        let there: Vec<&Case<C, P>> = cases.iter().flatten().collect();
+        let mut rows: Vec<Row<C>> = cases.iter().map(|_| self.row()).collect();
+        let both = |method: Method, cases: &[&Case<C, P>]| {
+            [Model::Nonlinear, Model::Linear]
+                .map(|model| runs::<O, C, D, P>(model, method, cases, self.plan.end_s, is_stopped))
+        };
+        let (direct, name) = match self.plan.integrator {
+            Integrator::Rk4 { step_s } => (Some(Method::Rk4(step_s)), 0),
+            Integrator::Dopri5 { rtol, atol } => (Some(Method::Dopri5(rtol, atol)), 1),
+            Integrator::Rodas5p { rtol, atol } => (Some(Method::Rodas5p(rtol, atol)), 2),
+            Integrator::Rk4Halved { .. } => (None, 0),
+        };
+        rows.iter_mut().for_each(|row| row.method = name);
+        if let Some(method) = direct {
+            let [nonlinear, linear] = both(method, &there);
+            for (k, place) in places.into_iter().enumerate() {
+                rows[place].runs = Some([nonlinear[k], linear[k]]);
+            }
+            return rows;
+        }
+        // Each point has steps of its own, so that a row does not depend on its company.
+        for (place, case) in places.into_iter().zip(there) {
+            self.climb(&mut rows[place], case, &both);
+            if is_stopped() {
+                break;
+            }
+        }
+        rows
+    }
+
+    /// Halves the step until two runs agree.
+    fn climb(
+        &self,
+        row: &mut Row<C>,
+        case: &Case<C, P>,
+        both: &dyn Fn(Method, &[&Case<C, P>]) -> [Vec<Run<C>>; 2],
+    ) {
+        let Steps::Checked(accuracy) = self.plan.integrator.steps() else { return };
+        let mut step_s = (FIRST_STEP_RAD / case.fastest_rad_per_s()).min(self.plan.end_s / 8.0);
+        let mut before: Option<[Run<C>; 2]> = None;
+        for _ in 0..MOST_RUNGS {
+            let [nonlinear, linear] = both(Method::Rk4(step_s), &[case]);
+            let now = [nonlinear[0], linear[0]];
+            let error = before.and_then(|before| error_left(&before, &now, &row.channels));
+            (row.runs, row.error) = (Some(now), error);
+            row.sensitive = Some(error.is_none_or(|error| error > accuracy));
+            if row.sensitive == Some(false) {
+                return;
+            }
+            before = Some(now);
+            step_s *= 0.5;
+        }
+    }
+
+    fn row(&self) -> Row<C> {
+        let reliability = &self.plan.reliability;
+        Row {
+            runs: None,
+            channels: reliability.channels.iter().map(|channel| channel.place).collect(),
+            ratio_limit: reliability.ratio_limit,
+            method: 0,
+            error: None,
+            sensitive: None,
+        }
+    }
+}
+
+/// The relative error left in the finer runs; none where one of them failed.
+fn error_left<const C: usize>(
+    coarse: &[Run<C>; 2],
+    fine: &[Run<C>; 2],
+    channels: &[usize],
+) -> Option<f64> {
+    let mut greatest = 0.0_f64;
+    for (coarse, fine) in coarse.iter().zip(fine) {
+        if coarse.failure.or(fine.failure).is_some() {
+            return None;
+        }
+        let largest = fine.peaks.iter().copied().fold(0.0, f64::max);
+        for &channel in channels {
+            let (a, b) = (coarse.peaks[channel], fine.peaks[channel]);
+            if a != b {
+                greatest = greatest.max((a - b).abs() / b.max(FLOOR * largest));
+            }
+        }
+    }
+    Some(CONTRACTION * greatest)
+}
+
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Engine
+    for Evaluator<'_, O, C, D, P>
+{
+    fn evaluate(
+        &self,
+        next: &(dyn Fn() -> Option<u64> + Sync),
+        keep: &(dyn Fn(Done) + Sync),
+        watch: &Watch<'_>,
+    ) {
+        let columns = columns(self.plan);
+        rayon::broadcast(|_| {
+            while !watch.stopped() {
+                let points: Vec<u64> = std::iter::from_fn(next).take(MAX_LANES).collect();
+                if points.is_empty() {
+                    break;
+                }
+                let at: Vec<Vec<f64>> =
+                    points.iter().map(|point| self.plan.axis_values(*point)).collect();
+                let rows = self.rows(&at, &|| watch.stopped());
+                // They may have been cut short.
+                if watch.stopped() {
+                    break;
+                }
+                for (&point, of) in points.iter().zip(&rows) {
+                    keep(Done { point, rows: vec![row(&columns, of)] });
+                }
+            }
+        });
+    }
+
+    fn simd(&self) -> &str {
+        Simd::best().name()
+    }
+}
+
+/// Distances of a ratio from its limit.
+struct Searched<'a, O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> {
+    rows: Evaluator<'a, O, C, D, P>,
+    quantity: TracedQuantity,
+}
+
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Distances
+    for Searched<'_, O, C, D, P>
+{
+    fn distances(
+        &self,
+        axis_values: &[Vec<f64>],
+        seen: &(dyn Fn(usize, Option<f64>) + Sync),
+        watch: &Watch<'_>,
+    ) -> Option<Vec<Option<f64>>> {
+        let next = Mutex::new((0..axis_values.len()).step_by(MAX_LANES));
+        let found = Mutex::new(vec![None; axis_values.len()]);
+        rayon::broadcast(|_| {
+            while !watch.stopped() {
+                let Some(first) = lock(&next).next() else { break };
+                let last = (first + MAX_LANES).min(axis_values.len());
+                let rows = self.rows.rows(&axis_values[first..last], &|| watch.stopped());
+                if watch.stopped() {
+                    break;
+                }
+                for (place, row) in (first..last).zip(&rows) {
+                    let distance = row.greatest().map(|(_, ratio)| self.quantity.distance(ratio));
+                    seen(place, distance);
+                    lock(&found)[place] = distance;
+                }
+            }
+        });
+        let found = found.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        (!watch.stopped()).then_some(found)
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}

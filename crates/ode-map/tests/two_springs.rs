@@ -1,0 +1,168 @@
+//! The example against an independent program, and every command that it has.
+
+#![allow(clippy::unwrap_used, reason = "a test fails where it must")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::Float64Type;
+use arrow_array::{Array, RecordBatch};
+
+/// The example, which cargo builds beside this test.
+fn program() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    let folder = test.parent().and_then(Path::parent).unwrap();
+    folder.join("examples").join(format!("two_springs{}", std::env::consts::EXE_SUFFIX))
+}
+
+fn grid(integrator: &str, axes: &str) -> String {
+    format!(
+        "name = \"springs\"\ntime = {{ end_s = 400, window_s = [300, 400] }}\n\
+         integrator = {integrator}\n{axes}"
+    )
+}
+
+const AXES: &str = "[[axis]]\nparameter = \"forcing\"\nvalues = [0.002, 0.005, 0.01, 0.02, 0.03]\n\
+    [[axis]]\nparameter = \"forcing_rad_per_s\"\n\
+    values = [0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5]\n";
+
+struct Home(tempfile::TempDir);
+
+impl Home {
+    fn new(grid: &str) -> Self {
+        let home = tempfile::tempdir().unwrap();
+        std::fs::write(home.path().join("grid.toml"), grid).unwrap();
+        Self(home)
+    }
+
+    fn output(&self, words: &str) -> Output {
+        let mut command = Command::new(program());
+        command.current_dir(self.0.path()).args(words.split(' ')).output().unwrap()
+    }
+
+    /// Standard output and error of a command that ends well.
+    fn does(&self, words: &str) -> String {
+        let output = self.output(words);
+        let text = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+        assert!(output.status.success(), "{words}: {}", text.concat());
+        text.concat()
+    }
+
+    fn bytes(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.0.path().join(name)).unwrap()
+    }
+
+    fn rows(&self, name: &str) -> RecordBatch {
+        let file = sweep_files::ParquetFile::open(&self.0.path().join(name)).unwrap();
+        file.batches(|builder| builder).unwrap().next().unwrap().unwrap()
+    }
+}
+
+fn number(rows: &RecordBatch, name: &str, row: usize) -> Option<f64> {
+    let column = rows.column_by_name(name).unwrap().as_primitive::<Float64Type>();
+    column.is_valid(row).then(|| column.value(row))
+}
+
+/// The greatest difference from the reference, as a share of the peak.
+fn off(integrator: &str) -> f64 {
+    let home = Home::new(&grid(integrator, AXES));
+    home.does("run grid.toml --out x.parquet --progress none");
+    let rows = home.rows("x.parquet");
+    let text = include_str!("../testdata/two_springs.json");
+    let reference: serde_json::Value = serde_json::from_str(text).unwrap();
+    let expected = reference["rows"].as_array().unwrap();
+    assert_eq!(rows.num_rows(), expected.len());
+    let mut off = 0.0_f64;
+    for (row, expected) in expected.iter().enumerate() {
+        for key in ["forcing", "forcing_rad_per_s"] {
+            assert_eq!(number(&rows, key, row), expected[key].as_f64());
+        }
+        for (k, name) in ["x1", "x2"].into_iter().enumerate() {
+            let of = |model: &str| number(&rows, &format!("{model}_{name}"), row).unwrap();
+            let peak = expected["nonlinear"][k].as_f64().unwrap();
+            off = off.max((of("nonlinear") / peak - 1.0).abs());
+            let linear = expected["linear"][k].as_f64().unwrap();
+            off = off.max((of("linear") - linear).abs() / linear.max(1e-9));
+        }
+        assert_eq!(number(&rows, "ratio_x2", row), None, "its linear motion is zero");
+        let ratio = expected["ratio"].as_f64().unwrap();
+        off = off.max((number(&rows, "ratio_x1", row).unwrap() / ratio - 1.0).abs());
+    }
+    off
+}
+
+#[test]
+fn every_method_meets_the_independent_program() {
+    for integrator in [
+        "{ method = \"rk4\", step_s = 5e-3 }",
+        "{ method = \"dopri5\", rtol = 1e-11, atol = 1e-15 }",
+        "{ method = \"rodas5p\", rtol = 1e-10, atol = 1e-15 }",
+        "{ method = \"rk4-halved\", accuracy = 1e-8 }",
+    ] {
+        let off = off(integrator);
+        assert!(off < 1e-6, "{integrator}: {off:e}");
+    }
+}
+
+const FAST: &str = "{ method = \"rk4\", step_s = 0.05 }";
+
+#[test]
+fn every_mistake_is_told_at_once_with_its_place_and_the_nearest_name() {
+    let wrong = grid("{ method = \"rk5\" }", "[[axis]]\nparameter = \"forcin\"\nvalues = [1, 1]\n");
+    let output = Home::new(&wrong).output("check grid.toml");
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    for said in ["did you mean `rk4`", "did you mean `forcing`", "grid.toml:6", "is twice"] {
+        assert!(text.contains(said), "no {said} in {text}");
+    }
+}
+
+#[test]
+fn shards_join_to_the_bytes_of_one_run() {
+    let home = Home::new(&grid(FAST, AXES));
+    home.does("run grid.toml --out whole.parquet --threads 1 --progress none");
+    for shard in ["1/2", "2/2"] {
+        home.does(&format!("run grid.toml --out x.parquet --shard {shard} --progress none"));
+    }
+    assert!(home.does("status grid.toml --out x.parquet").contains("complete, to be merged"));
+    home.does("merge grid.toml --out x.parquet");
+    assert!(home.bytes("whole.parquet") == home.bytes("x.parquet"));
+}
+
+#[test]
+fn every_command_has_something_to_say() {
+    let axes = "[[axis]]\nparameter = \"forcing_rad_per_s\"\nvalues = [1.05, 1.1]\n\
+                [[axis]]\nparameter = \"forcing\"\n\
+                range = { from = 0.001, to = 0.05, count = 9 }\n";
+    let home = Home::new(&format!("{}[reliability]\nratio_limit = 1.02\n", grid(FAST, axes)));
+    assert!(home.does("check grid.toml").contains("18"));
+    home.does("run grid.toml --out x.parquet --progress none");
+    assert!(home.does("show x.parquet").contains("below ratio 1.02"));
+    assert!(home.does("show x.parquet --top 1 --by ratio_x1").contains("forcing_rad_per_s"));
+    home.does("plot x.parquet -o x.svg");
+    assert!(String::from_utf8(home.bytes("x.svg")).unwrap().starts_with("<svg"));
+    home.does("export x.parquet x.csv");
+    assert!(String::from_utf8(home.bytes("x.csv")).unwrap().contains("nonlinear_x1"));
+    home.does("require x.parquet count(status=='ok')==18");
+    let broken = home.output("require x.parquet ratio_x1<1");
+    assert_eq!(broken.status.code(), Some(4), "{broken:?}");
+    home.does("run grid.toml --set zeta_1=0.02 --out y.parquet --progress none");
+    assert!(home.does("compare x.parquet y.parquet").contains("zeta_1"));
+    let found = home.does("boundary grid.toml --out b.parquet --progress none");
+    assert!(found.contains("crossing"), "{found}");
+    home.does("plot x.parquet --boundary b.parquet -o y.svg");
+    let listed = home.does("parameters grid.toml");
+    assert!(listed.contains("omega_1_rad_per_s") && listed.contains("window_to_s"), "{listed}");
+    let schema: serde_json::Value = serde_json::from_str(&home.does("schema")).unwrap();
+    assert!(schema["properties"]["set"]["properties"]["zeta_2"].is_object());
+}
+
+#[test]
+fn designs_spread_points() {
+    let design = "[design]\nmethod = \"sobol\"\npoints = 16\n\
+                  [[axis]]\nparameter = \"zeta_1\"\nrange = { from = 0.005, to = 0.05 }\n";
+    let home = Home::new(&grid(FAST, design));
+    home.does("run grid.toml --out x.parquet --progress none");
+    assert_eq!(home.rows("x.parquet").num_rows(), 16);
+}

@@ -1,0 +1,181 @@
+//! The boundary file: one row per place where the side changes, or per row of the first axis that
+//! has none.
+
+use serde_json::{Value, json};
+use sweep_parameter::{Parameter as _, unit_suffix};
+
+use super::quantity::TracedQuantity;
+use super::search::{BoundaryTask, further_values};
+use super::{Edge, Traced, TracedRow};
+use crate::plan::Plan;
+use crate::store::{Job, Rows};
+use crate::table::Table;
+use sweep_files::key;
+
+/// One line of the file.
+struct Line<'a> {
+    curve: usize,
+    row: &'a TracedRow,
+    /// From 1; 0 where there is none in range.
+    number: usize,
+    edge: &'a Edge,
+}
+
+/// A name with something before its unit's suffix: `damping_n_s_per_m` and `low` give
+/// `damping_low_n_s_per_m`.
+fn within(name: &str, unit: &str, word: &str) -> String {
+    let suffix = unit_suffix(unit).unwrap_or_default();
+    let stem = name.strip_suffix(suffix).unwrap_or(name);
+    format!("{stem}_{word}{}", &name[stem.len()..])
+}
+
+/// What the store must know of a search: its plan, with what is asked of it beside the grid.
+#[must_use]
+pub fn job<'a, M: Rows>(
+    plan: &'a Plan<M>,
+    quantity: &TracedQuantity,
+    task: &BoundaryTask,
+) -> Job<'a> {
+    let mut job = Job::of(plan);
+    job.plan["boundary"] = asked(quantity, task);
+    job
+}
+
+fn asked(quantity: &TracedQuantity, task: &BoundaryTask) -> Value {
+    json!({
+        "quantity": &quantity.name,
+        "tolerance": task.search.tolerance,
+        "lattice": task.search.lattice,
+    })
+}
+
+/// The file of a [`job`].
+pub fn table<M: Rows>(
+    job: &Job<'_>,
+    plan: &Plan<M>,
+    quantity: &TracedQuantity,
+    task: &BoundaryTask,
+    traced: &Traced,
+) -> Table {
+    let mut about = asked(quantity, task);
+    about["limit"] = quantity.limit.into();
+    about["points"] = traced.trials.into();
+    about["rounds"] = traced.rounds.into();
+    let mut table = Table::new(M::BUILD);
+    add_columns(&mut table, plan, quantity, traced);
+    table.metadata(key::PLAN, &job.plan);
+    table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
+    table.metadata(key::BOUNDARY, &about);
+    table
+}
+
+fn add_columns<M: Rows>(
+    table: &mut Table,
+    plan: &Plan<M>,
+    quantity: &TracedQuantity,
+    traced: &Traced,
+) {
+    let lines: Vec<Line<'_>> = traced
+        .curves
+        .iter()
+        .enumerate()
+        .flat_map(|(curve, rows)| rows.iter().map(move |row| (curve, row)))
+        .flat_map(|(curve, row)| {
+            row.edges.iter().enumerate().map(move |(k, edge)| {
+                let number = if edge.bracket.is_some() { k + 1 } else { 0 };
+                Line { curve, row, number, edge }
+            })
+        })
+        .collect();
+    add_axes(table, plan, quantity, &lines);
+    table.words(
+        "kind",
+        "crossing, jump (the quantity leaps over its limit), undefined (it is not defined on one \
+         side), or why there is none in \
+         range: reliable, unreliable or undefined wherever it was evaluated",
+        lines.iter().map(|line| line.edge.kind.name()),
+    );
+    table.counts(
+        "crossing",
+        "number of this change of side at this value of the first axis, from 1 upwards along the \
+         second; 0 where none is \
+         in range",
+        lines.iter().map(|line| line.number as u64),
+    );
+    table.counts(
+        "crossings",
+        "how many changes of side there are",
+        lines
+            .iter()
+            .map(|line| line.row.edges.iter().filter(|edge| edge.bracket.is_some()).count() as u64),
+    );
+    for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
+        table.numbers(
+            &format!("quantity_{word}"),
+            quantity.unit,
+            &format!("{} at the bracket's {side} end; null where not defined", quantity.name),
+            lines
+                .iter()
+                .map(|line| line.edge.distances[end].map(|distance| quantity.value(distance))),
+        );
+    }
+    table.counts(
+        "points",
+        "points evaluated at this value of the first axis",
+        lines.iter().map(|line| line.row.trials as u64),
+    );
+}
+
+/// Where the boundary is: both axes, the bracket, and the axes beyond the second.
+fn add_axes<M: Rows>(
+    table: &mut Table,
+    plan: &Plan<M>,
+    quantity: &TracedQuantity,
+    lines: &[Line<'_>],
+) {
+    let [first, second, further @ ..] = plan.axes.as_slice() else { return };
+    let (name, unit) = (second.parameter.name(), second.parameter.unit());
+    table.numbers(
+        first.parameter.name(),
+        first.parameter.unit(),
+        first.parameter.description(),
+        lines.iter().map(|line| Some(line.row.first)),
+    );
+    let said = format!(
+        "{}, where {} = {}; null unless it is a crossing",
+        second.parameter.description(),
+        quantity.name,
+        quantity.limit
+    );
+    table.numbers(name, unit, &said, lines.iter().map(|line| line.edge.at));
+    for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
+        table.numbers(
+            &within(name, unit, word),
+            unit,
+            &format!(
+                "{side} end of the bracket in which the side changes; null where none is in range"
+            ),
+            lines.iter().map(|line| line.edge.bracket.map(|bracket| bracket[end])),
+        );
+    }
+    for (k, axis) in further.iter().enumerate() {
+        table.numbers(
+            axis.parameter.name(),
+            axis.parameter.unit(),
+            axis.parameter.description(),
+            lines.iter().map(|line| further_values(plan, line.curve).get(k).copied()),
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_word_stands_before_the_unit() {
+        assert_eq!(within("damping_n_s_per_m", "N s/m", "low"), "damping_low_n_s_per_m");
+        assert_eq!(within("front_x_m", "m", "high"), "front_x_high_m");
+        assert_eq!(within("plain", "1", "low"), "plain_low");
+    }
+}

@@ -1,0 +1,373 @@
+//! The search against functions whose edges are known.
+
+use std::cell::{Cell, RefCell};
+use std::convert::Infallible;
+
+use super::*;
+
+/// A function of first and second value, and what was asked of it.
+pub(crate) struct Function<F> {
+    of: F,
+    asked: RefCell<Vec<Trial>>,
+    batches: RefCell<Vec<usize>>,
+}
+
+impl<F: Fn(f64, f64) -> Option<f64>> Function<F> {
+    pub(crate) fn new(of: F) -> Self {
+        Self { of, asked: RefCell::default(), batches: RefCell::default() }
+    }
+}
+
+impl<F: Fn(f64, f64) -> Option<f64>> Evaluate for Function<F> {
+    type Stop = Infallible;
+
+    fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Infallible> {
+        self.asked.borrow_mut().extend_from_slice(trials);
+        self.batches.borrow_mut().push(trials.len());
+        Ok(trials.iter().map(|trial| (self.of)(trial.first, trial.second)).collect())
+    }
+}
+
+pub(crate) const SEARCH: Search = Search {
+    least: 60.0,
+    greatest: 300.0,
+    first_log: false,
+    second_log: false,
+    tolerance: 0.5,
+    lattice: 6,
+};
+
+fn masses(count: u32) -> Vec<f64> {
+    (0..count).map(|k| 0.05 + 0.95 * f64::from(k) / f64::from(count - 1)).collect()
+}
+
+pub(crate) fn traced(
+    of: impl Fn(f64, f64) -> Option<f64>,
+    firsts: &[f64],
+    search: &Search,
+) -> Traced {
+    let function = Function::new(of);
+    let told = Cell::new(0);
+    let mut tell = |standing: &Standing| {
+        assert_eq!(standing.trials, told.get());
+        assert!(standing.rows < firsts.len() && standing.batch > 0, "{standing:?}");
+        told.set(standing.trials + standing.batch);
+    };
+    let Ok(traced) = trace(&function, firsts, 1, search, &mut tell);
+    let (asked, batches) = (function.asked.borrow(), function.batches.borrow());
+    assert_eq!(
+        (traced.trials, traced.rounds, told.get()),
+        (asked.len(), batches.len(), asked.len())
+    );
+    assert_eq!(traced.lane_groups, batches.iter().map(|trials| trials.div_ceil(8)).sum::<usize>());
+    let mut keys: Vec<[u64; 2]> =
+        asked.iter().map(|t| [t.first.to_bits(), t.second.to_bits()]).collect();
+    keys.sort_unstable();
+    keys.dedup();
+    assert_eq!(keys.len(), asked.len(), "nothing is evaluated twice");
+    assert!(asked.iter().all(|trial| (search.least..=search.greatest).contains(&trial.second)));
+    traced
+}
+
+/// Shaped like the paper's Fig. 12: saturated far on both sides of a line that bends a little.
+fn like_fig12(mass: f64, damping: f64) -> Option<f64> {
+    let x = (line(mass) - damping) / 40.0;
+    let distance =
+        if x > 0.0 { 2.5 * (1.0 - (-1.4 * x).exp()) } else { 0.65 * ((1.6 * x).exp() - 1.0) };
+    Some(distance)
+}
+
+fn line(mass: f64) -> f64 {
+    30.0 + 230.0 * mass + 15.0 * (5.0 * mass).sin()
+}
+
+/// Every edge has the right sides at its ends and is no wider than asked.
+pub(crate) fn check_edges(traced: &Traced, of: impl Fn(f64, f64) -> Option<f64>, tolerance: f64) {
+    for row in &traced.curves[0] {
+        for edge in &row.edges {
+            let Some([low, high]) = edge.bracket else { continue };
+            assert!(high - low <= tolerance, "{row:?}");
+            let [a, b] = [of(row.first, low), of(row.first, high)];
+            assert_eq!(edge.distances, [a, b], "{row:?}");
+            assert_ne!(a.map(|a| a < 0.0), b.map(|b| b < 0.0), "{row:?}");
+            assert!(edge.at.is_none_or(|at| (low..=high).contains(&at)), "{row:?}");
+        }
+    }
+}
+
+#[test]
+fn a_smooth_boundary_costs_a_seventh_of_the_grids_lane_groups() {
+    let firsts = masses(39);
+    let traced = traced(like_fig12, &firsts, &SEARCH);
+    check_edges(&traced, like_fig12, 0.5);
+    assert!(traced.lane_groups <= 39 * 33 / 8 / 7, "{}", traced.lane_groups);
+    assert!(traced.trials <= 39 * 33 / 7, "{}", traced.trials);
+    for (row, &mass) in traced.curves[0].iter().zip(&firsts) {
+        assert_eq!((row.first, row.edges.len()), (mass, 1));
+        let edge = row.edges[0];
+        if line(mass) <= 60.0 {
+            assert_eq!(edge.kind, EdgeKind::NoneReliable, "{mass}");
+        } else {
+            assert_eq!(edge.kind, EdgeKind::Crossing, "{mass}");
+            // The function has a kink there, so the straight line within the bracket is not exact.
+            assert!((edge.at.unwrap() - line(mass)).abs() < 0.2, "{mass}: {edge:?}");
+        }
+    }
+}
+
+#[test]
+fn what_a_trace_costs_is_pinned() {
+    let fold = |mass, damping| folded(mass, damping);
+    let wave = |mass: f64, damping: f64| Some(0.8 * ((damping - 20.0 * mass) / 25.0).sin());
+    let cost = |of: &dyn Fn(f64, f64) -> Option<f64>, rows| {
+        let traced = traced(of, &masses(rows), &SEARCH);
+        (traced.trials, traced.lane_groups)
+    };
+    let costs = [
+        cost(&like_fig12, 5),
+        cost(&like_fig12, 39),
+        cost(&like_fig12, 400),
+        cost(&fold, 39),
+        cost(&wave, 39),
+    ];
+    assert_eq!(costs, [(83, 11), (173, 22), (905, 114), (268, 37), (550, 69)]);
+}
+
+#[test]
+fn a_jump_is_told_from_a_crossing_however_steep() {
+    let leap = |_: f64, damping: f64| Some(if damping < 137.3 { 1.0 } else { -0.6 });
+    for row in &traced(leap, &masses(12), &SEARCH).curves[0] {
+        let edge = row.edges[0];
+        assert_eq!((edge.kind, edge.at), (EdgeKind::Jump, None));
+        let [low, high] = edge.bracket.unwrap();
+        assert!(low < 137.3 && 137.3 <= high && high - low <= 0.5 / 16.0);
+    }
+    let steep = |_: f64, damping: f64| Some(((137.3 - damping) * 5.0).clamp(-0.6, 1.0));
+    for row in &traced(steep, &masses(12), &SEARCH).curves[0] {
+        assert_eq!(row.edges[0].kind, EdgeKind::Crossing);
+        assert!((row.edges[0].at.unwrap() - 137.3).abs() < 0.03, "{row:?}");
+    }
+}
+
+#[test]
+fn several_crossings_are_several_edges() {
+    let wave = |mass: f64, damping: f64| Some(0.8 * ((damping - 20.0 * mass) / 25.0).sin());
+    let traced = traced(wave, &masses(20), &SEARCH);
+    check_edges(&traced, wave, 0.5);
+    for row in &traced.curves[0] {
+        let roots: Vec<f64> = (0..12)
+            .map(|k| 20.0 * row.first + 25.0 * std::f64::consts::PI * f64::from(k))
+            .filter(|root| (60.0..300.0).contains(root))
+            .collect();
+        let found: Vec<f64> = row.edges.iter().map(|edge| edge.at.unwrap()).collect();
+        assert_eq!(found.len(), roots.len(), "{}", row.first);
+        assert!(
+            found.iter().zip(&roots).all(|(found, root)| (found - root).abs() < 0.1),
+            "{found:?} {roots:?}"
+        );
+    }
+}
+
+#[test]
+fn an_island_as_wide_as_two_cells_is_found_in_every_row_it_spans() {
+    // A reliable disc in an unreliable plane, and the other way round.
+    for sign in [1.0, -1.0] {
+        let disc = |mass: f64, damping: f64| {
+            let (x, y) = ((mass - 0.5) / 0.3, (damping - 170.0) / 55.0);
+            Some(sign * (x * x + y * y - 1.0).clamp(-0.6, 2.0))
+        };
+        let traced = traced(disc, &masses(39), &SEARCH);
+        check_edges(&traced, disc, 0.5);
+        for row in &traced.curves[0] {
+            let x = (row.first - 0.5) / 0.3;
+            if x.abs() < 0.97 {
+                assert_eq!(row.edges.len(), 2, "{row:?}");
+            } else if x.abs() > 1.0 {
+                let none =
+                    if sign > 0.0 { EdgeKind::NoneUnreliable } else { EdgeKind::NoneReliable };
+                assert_eq!(row.edges[0].kind, none, "{row:?}");
+            }
+        }
+    }
+}
+
+/// As beyond 0.94 kg in Fig. 12: a cliff ends in a dip of one to three N s/m below the limit before
+/// the ratio rises once more; at smaller masses the dip stays above it.
+fn folded(mass: f64, damping: f64) -> Option<f64> {
+    let x = damping - 230.0 * (mass - 1.0);
+    let cliff = 0.25 * (246.5 - x);
+    let tail = 0.036 * (248.1 - x);
+    let rise = 0.12 * (x - 251.6 + 50.0 * (1.0 - mass));
+    let hump = 0.36 - ((x - 255.0) / 30.0).powi(2);
+    Some(cliff.max(tail.max(rise.min(hump))).clamp(-0.65, 2.4))
+}
+
+#[test]
+fn a_narrow_dip_beside_the_crossing_is_found_and_followed() {
+    let traced = traced(folded, &masses(39), &SEARCH);
+    check_edges(&traced, folded, 0.5);
+    let edges: Vec<usize> =
+        traced.curves[0].iter().rev().take(5).map(|row| row.edges.len()).collect();
+    assert_eq!(edges, [3, 3, 3, 1, 1]);
+}
+
+#[test]
+fn a_pocket_that_ends_between_two_rows_is_found_in_the_last_that_has_it() {
+    // As damper 1's height on the cabinet against damping: reliable from a line that bends up
+    // towards the lowest heights, to one that leaves the range at 0.125 m, is at 180 N s/m at
+    // 0.1125 m, and has met the other at 0.1 m.
+    let heights: Vec<f64> = (0..17).map(|k| 0.1 + 0.0125 * f64::from(k)).collect();
+    let bottom = |height: f64| 97.0 + 0.3 / (height - 0.09);
+    let pocket = |height: f64, damping: f64| {
+        let top = 180.0 + (height - 0.1125) * (130.0 / 0.0125);
+        Some(((bottom(height) - damping).max(damping - top) / 40.0).clamp(-0.65, 2.4))
+    };
+    let traced = traced(pocket, &heights, &SEARCH);
+    check_edges(&traced, pocket, 0.5);
+    let rows = &traced.curves[0];
+    assert_eq!(rows[0].edges[0].kind, EdgeKind::NoneUnreliable);
+    for (row, height) in rows.iter().zip(&heights).skip(1) {
+        let mut expected = vec![bottom(*height)];
+        expected.extend((*height < 0.12).then_some(180.0));
+        let found: Vec<f64> = row.edges.iter().filter_map(|edge| edge.at).collect();
+        let is_near = |(a, b): (&f64, &f64)| (a - b).abs() < 0.1;
+        assert!(
+            found.len() == expected.len() && found.iter().zip(&expected).all(is_near),
+            "{row:?}"
+        );
+    }
+}
+
+#[test]
+fn a_pocket_found_late_is_followed_through_every_row() {
+    // Slanted, narrower than the lattice's cells, between its rows and columns but for one corner.
+    let tongue = |mass: f64, damping: f64| {
+        let middle = 120.0 + 180.0 * (mass - 0.3);
+        let half = 4.0 * (1.0 - ((mass - 0.55) / 0.3).powi(2));
+        Some((((damping - middle).abs() - half) / 10.0).clamp(-0.6, 0.6))
+    };
+    let traced = traced(tongue, &masses(39), &SEARCH);
+    check_edges(&traced, tongue, 0.5);
+    for row in &traced.curves[0] {
+        let has_it = ((row.first - 0.55) / 0.3).abs() < 0.9;
+        assert!(row.edges.len() == 2 || !has_it, "{row:?}");
+    }
+}
+
+#[test]
+fn where_the_quantity_is_not_defined_is_said() {
+    let broken =
+        |mass: f64, damping: f64| if damping < 100.0 { None } else { like_fig12(mass, damping) };
+    let of = |of: &dyn Fn(f64, f64) -> Option<f64>, firsts: &[f64]| {
+        traced(of, firsts, &SEARCH).curves.remove(0)
+    };
+    let rows = of(&broken, &[0.2, 0.6]);
+    let kinds: Vec<Vec<EdgeKind>> =
+        rows.iter().map(|row| row.edges.iter().map(|edge| edge.kind).collect()).collect();
+    assert_eq!(kinds, [vec![EdgeKind::Undefined], vec![EdgeKind::Undefined, EdgeKind::Crossing]]);
+    assert_eq!(rows[0].edges[0].at, None);
+    let nothing = of(&|_, _| None, &masses(5));
+    assert!(nothing.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
+    let nan = of(&|_, _| Some(f64::NAN), &masses(5));
+    assert!(nan.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
+}
+
+#[test]
+fn nothing_in_range_is_no_number() {
+    for (distance, kind) in [(-1.0, EdgeKind::NoneReliable), (1.0, EdgeKind::NoneUnreliable)] {
+        let traced = traced(|_, _| Some(distance), &masses(39), &SEARCH);
+        for row in &traced.curves[0] {
+            let edge = Edge { kind, at: None, bracket: None, distances: [None; 2] };
+            assert_eq!(row.edges, [edge]);
+        }
+    }
+}
+
+#[test]
+fn whatever_the_function_it_ends() {
+    // Noise of every kind, infinities included, decided by the digits of the values.
+    for seed in 0..8_u64 {
+        let noise = |mass: f64, damping: f64| {
+            let bits = (mass.to_bits() ^ damping.to_bits().rotate_left(17))
+                .wrapping_mul(0x9E37_79B9_7F4A_7C15 ^ seed);
+            match bits >> 60 {
+                0 => None,
+                1 => Some(f64::INFINITY),
+                2 => Some(f64::NEG_INFINITY),
+                _ => Some((bits >> 12) as f64 / 2.0_f64.powi(51) - 1.0),
+            }
+        };
+        let traced = traced(noise, &masses(17), &SEARCH);
+        check_edges(&traced, noise, 0.5);
+        // No more than twice what trying every tolerance would take.
+        assert!(traced.trials <= 2 * 17 * 480, "{}", traced.trials);
+    }
+}
+
+#[test]
+fn logarithmic_axes_are_searched_by_their_logarithms() {
+    let line = |first: f64| 1e5 * first.powf(1.5);
+    let of = |first: f64, second: f64| Some((line(first) / second).ln().clamp(-1.0, 1.0));
+    let firsts: Vec<f64> = (0..20).map(|k| 10.0_f64.powf(f64::from(k) / 10.0)).collect();
+    let (least, greatest) = (1e4, 1e9);
+    let search =
+        Search { least, greatest, first_log: true, second_log: true, tolerance: 0.01, ..SEARCH };
+    for row in &traced(of, &firsts, &search).curves[0] {
+        let edge = row.edges[0];
+        let [low, high] = edge.bracket.unwrap();
+        assert!((high / low).ln() <= 0.0101, "{edge:?}");
+        assert!((edge.at.unwrap() / line(row.first)).ln().abs() < 0.005);
+    }
+}
+
+#[test]
+fn curves_share_batches() {
+    struct Shifted;
+    impl Evaluate for Shifted {
+        type Stop = Infallible;
+        fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Infallible> {
+            Ok(trials
+                .iter()
+                .map(|t| like_fig12(t.first, t.second - 9.0 * t.curve as f64))
+                .collect())
+        }
+    }
+    let firsts = masses(39);
+    let [Ok(one), Ok(three)] = [1, 3].map(|n| trace(&Shifted, &firsts, n, &SEARCH, &mut |_| {}));
+    assert!(three.rounds <= one.rounds + 4, "{} for {}", three.rounds, one.rounds);
+    for (k, rows) in three.curves.iter().enumerate() {
+        for row in rows {
+            let line = line(row.first) + 9.0 * k as f64;
+            let found = row.edges[0].at;
+            assert!(found.map_or(line <= 60.0, |at| (at - line).abs() < 0.2), "{k}: {row:?}");
+        }
+    }
+}
+
+#[test]
+fn rows_in_any_order_give_the_same_edges() {
+    let firsts = masses(13);
+    let mut shuffled = firsts.clone();
+    shuffled.swap(0, 7);
+    shuffled.reverse();
+    let mut rows = traced(like_fig12, &shuffled, &SEARCH).curves.remove(0);
+    rows.sort_by(|a, b| a.first.total_cmp(&b.first));
+    assert_eq!(rows, traced(like_fig12, &firsts, &SEARCH).curves[0]);
+}
+
+#[test]
+fn an_evaluator_that_stops_ends_the_search() {
+    struct Third(Cell<usize>);
+    impl Evaluate for Third {
+        type Stop = &'static str;
+        fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, &'static str> {
+            self.0.set(self.0.get() + 1);
+            if self.0.get() == 3 {
+                return Err("enough");
+            }
+            Ok(trials.iter().map(|t| like_fig12(t.first, t.second)).collect())
+        }
+    }
+    let ended = trace(&Third(Cell::new(0)), &masses(9), 1, &SEARCH, &mut |_| {});
+    assert_eq!(ended, Err("enough"));
+}

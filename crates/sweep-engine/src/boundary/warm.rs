@@ -1,0 +1,245 @@
+//! Warm starts: where the side should change in a row, by the rows around it that are done.
+
+use super::pockets::missing;
+use super::row::{Hint, Question, RowSearch, Side, SideRange, Span};
+
+/// Most rows on each side that a prediction is made from.
+pub(super) const HEARD: usize = 2;
+/// Roots are not expected closer than this to where they are predicted, in tolerances.
+const LEAST_SPREAD: f64 = 0.1;
+/// The part of a prediction's last correction by which it may still be off.
+const CORRECTION: f64 = 0.25;
+
+/// A row as others see it: its place along the first axis, and what was found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Neighbour<'a> {
+    pub at: f64,
+    pub runs: &'a [SideRange],
+}
+
+impl Neighbour<'_> {
+    fn sides(&self) -> impl Iterator<Item = Side> + '_ {
+        self.runs.iter().map(|run| run.side)
+    }
+
+    /// Whether the sides change as in another row.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        self.sides().eq(other.sides())
+    }
+
+    /// Changes of side.
+    fn roots(&self) -> impl Iterator<Item = f64> + '_ {
+        self.runs.iter().skip(1).map(|run| run.from)
+    }
+
+    /// How far every change of side should move on the way to another place: as far, in proportion,
+    /// as from the row before. Nothing where that one's sides change otherwise.
+    pub(super) fn drift(&self, before: Option<&Self>, to: f64) -> Vec<f64> {
+        let Some(before) = before.filter(|before| before.is_like(self)) else { return Vec::new() };
+        let part = (to - self.at) / (self.at - before.at);
+        self.roots().zip(before.roots()).map(|(now, then)| part * (now - then)).collect()
+    }
+}
+
+/// A new row at `at` among rows that are done: those to its left and those to its right, the
+/// nearest first.
+pub(super) fn start(
+    at: f64,
+    left: &[Neighbour<'_>],
+    right: &[Neighbour<'_>],
+    span: &Span,
+) -> RowSearch {
+    let both_ends = || Question::places(vec![span.least, span.greatest]);
+    let (Some(a), Some(b)) = (left.first(), right.first()) else {
+        return RowSearch::new(both_ends(), [None; 2]);
+    };
+    if !a.is_like(b) {
+        return between_unlike(at, left, right, span);
+    }
+    if a.runs.len() < 2 {
+        return RowSearch::new(both_ends(), [None; 2]);
+    }
+    let like: Vec<Neighbour<'_>> = [left, right]
+        .into_iter()
+        .flat_map(|side| side.iter().take(HEARD))
+        .filter(|row| row.is_like(a))
+        .copied()
+        .collect();
+    let roots: Vec<Hint> = (1..a.runs.len()).map(|k| predicted(at, k, &like, span)).collect();
+    // What lies between two roots is seen, not taken from the neighbours.
+    let places = roots.windows(2).map(|two| 0.5 * (two[0].root + two[1].root)).collect();
+    let assumed = [a.runs.first(), a.runs.last()].map(|run| run.map(|run| run.side));
+    RowSearch::new(Question { places, roots, perhaps: Vec::new() }, assumed)
+}
+
+/// Where the k-th change of side of rows that are alike should be.
+fn predicted(at: f64, k: usize, like: &[Neighbour<'_>], span: &Span) -> Hint {
+    let mut known: Vec<(f64, f64)> = like.iter().map(|row| (row.at, row.runs[k].from)).collect();
+    known.sort_by(|x, y| (x.0 - at).abs().total_cmp(&(y.0 - at).abs()));
+    let root = polynomial(&known, at);
+    let fewer = polynomial(&known[..known.len() - 1], at);
+    hint(root.clamp(span.least, span.greatest), CORRECTION * (root - fewer), span)
+}
+
+/// A row between two whose sides change differently.
+fn between_unlike(
+    at: f64,
+    left: &[Neighbour<'_>],
+    right: &[Neighbour<'_>],
+    span: &Span,
+) -> RowSearch {
+    let (few, many) =
+        if left[0].runs.len() < right[0].runs.len() { (left, right) } else { (right, left) };
+    let (poor, rich) = (few[0], many[0]);
+    // An end on whose side both agree is taken from them, the other is tried.
+    let agreed = |run: fn(&[SideRange]) -> Option<&SideRange>| {
+        let [a, b] = [poor, rich].map(|row| run(row.runs).map(|run| run.side));
+        if a == b { a } else { None }
+    };
+    let assumed = [agreed(<[SideRange]>::first), agreed(<[SideRange]>::last)];
+    let ends = [span.least, span.greatest].into_iter().zip(assumed);
+    let mut places: Vec<f64> =
+        ends.filter(|(_, side)| side.is_none()).map(|(end, _)| end).collect();
+    let part = (at - rich.at) / (poor.at - rich.at);
+    let shared = shared(rich, poor, few.get(1));
+    let moved = |[k, m]: [usize; 2]| poor.runs[m].from - rich.runs[k].from;
+    let mut roots: Vec<Hint> = shared
+        .iter()
+        .map(|pair| {
+            let moved = moved(*pair);
+            hint(rich.runs[pair[0]].from + part * moved, CORRECTION * moved, span)
+        })
+        .collect();
+    if rich.runs.len() == 2 && shared.is_empty() {
+        // It leaves the range between the two, towards where it comes from.
+        let from: Vec<(f64, f64)> = many
+            .iter()
+            .filter(|row| row.is_like(&rich))
+            .map(|row| (row.at, row.runs[1].from))
+            .collect();
+        let root = polynomial(&from, at);
+        if span.contains(root) {
+            roots.push(hint(root, CORRECTION * (root - rich.runs[1].from), span));
+        }
+    }
+    // What one has inside the range and the other lacks, moved along with the change beside it.
+    for run in missing(rich.runs, poor.runs, span) {
+        let near = nearest(run, shared.iter().map(|pair| (rich.runs[pair[0]].from, moved(*pair))));
+        places.push(run.middle() + part * near);
+    }
+    for run in missing(poor.runs, rich.runs, span) {
+        let near = nearest(run, shared.iter().map(|pair| (poor.runs[pair[1]].from, -moved(*pair))));
+        places.push(run.middle() + (1.0 - part) * near);
+    }
+    places.retain(|place| span.contains(*place));
+    RowSearch::new(Question { places, roots, perhaps: Vec::new() }, assumed)
+}
+
+/// A root with how far it may be off: by as much as this, and never by nothing.
+pub(super) fn hint(root: f64, off: f64, span: &Span) -> Hint {
+    Hint { root, spread: off.abs().max(LEAST_SPREAD * span.tolerance) }
+}
+
+/// How far the change of side next to a run has moved, of these with their moves.
+pub(super) fn nearest(run: &SideRange, moves: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let away = |at: f64| (at - run.middle()).abs();
+    let nearest = moves.min_by(|a, b| away(a.0).total_cmp(&away(b.0)));
+    nearest.map_or(0.0, |(_, moved)| moved)
+}
+
+/// Changes of side that two rows have in common, as pairs of their numbers (of the run that begins
+/// there): every change of the row with fewer goes with the nearest of its kind in the other, in
+/// order. `before` is the row before `b`, seen from `a`: it shows how far those of `b` have moved
+/// on their way.
+pub(super) fn shared(
+    a: Neighbour<'_>,
+    b: Neighbour<'_>,
+    before: Option<&Neighbour<'_>>,
+) -> Vec<[usize; 2]> {
+    let drift = b.drift(before, a.at);
+    let expected = |m: usize| b.runs[m].from + drift.get(m - 1).copied().unwrap_or(0.0);
+    let is_alike = |k: usize, m: usize| {
+        let sides = |runs: &[SideRange], k: usize| [runs[k - 1].side, runs[k].side];
+        sides(a.runs, k) == sides(b.runs, m)
+    };
+    let distance = |k: usize, m: usize| (a.runs[k].from - expected(m)).abs();
+    let has_more = a.runs.len() >= b.runs.len();
+    let (few, many) = if has_more { (b, a) } else { (a, b) };
+    let mut pairs = Vec::new();
+    let mut next = 1;
+    for one in 1..few.runs.len() {
+        let pair = |other: usize| if has_more { [other, one] } else { [one, other] };
+        // Those after it need theirs too.
+        let end = many.runs.len() - (few.runs.len() - 1 - one);
+        let found = (next..end.max(next))
+            .filter(|other| is_alike(pair(*other)[0], pair(*other)[1]))
+            .min_by(|x, y| {
+                let [x, y] = [pair(*x), pair(*y)];
+                distance(x[0], x[1]).total_cmp(&distance(y[0], y[1]))
+            });
+        if let Some(other) = found {
+            pairs.push(pair(other));
+            next = other + 1;
+        }
+    }
+    pairs
+}
+
+/// The value at `at` of the polynomial through these points, at distinct places (Lagrange's form).
+fn polynomial(points: &[(f64, f64)], at: f64) -> f64 {
+    let mut sum = 0.0;
+    for (i, (x, y)) in points.iter().enumerate() {
+        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
+        sum += y * others.map(|(_, (other, _))| (at - other) / (x - other)).product::<f64>();
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPAN: Span = Span { least: 0.0, greatest: 100.0, tolerance: 1.0 };
+
+    /// Runs that change sides here, the first unreliable.
+    pub(in super::super) fn runs(roots: &[f64]) -> Vec<SideRange> {
+        let marks: Vec<f64> =
+            [0.0].into_iter().chain(roots.iter().copied()).chain([100.0]).collect();
+        let side = |k: usize| if k.is_multiple_of(2) { Side::Unreliable } else { Side::Reliable };
+        let pairs = marks.windows(2).enumerate();
+        pairs.map(|(k, pair)| SideRange { from: pair[0], to: pair[1], side: side(k) }).collect()
+    }
+
+    #[test]
+    fn the_polynomial_goes_through_its_points_and_beyond() {
+        let cube = |x: f64| x * x * x - 2.0 * x;
+        let points: Vec<(f64, f64)> = [0.0, 1.0, 3.0, 4.0].map(|x| (x, cube(x))).to_vec();
+        assert!((polynomial(&points, 2.0) - cube(2.0)).abs() < 1e-12);
+        assert_eq!(polynomial(&points[1..2], 9.0), points[1].1);
+    }
+
+    #[test]
+    fn a_change_is_recognised_by_where_it_should_have_moved() {
+        let [before, poor, rich] = [runs(&[35.0]), runs(&[50.0]), runs(&[55.0, 58.0, 65.0])];
+        let [before, poor, rich] = [(0.0, &before), (1.0, &poor), (2.0, &rich)]
+            .map(|(at, runs)| Neighbour { at, runs: runs.as_slice() });
+        assert_eq!(shared(rich, poor, None), [[1, 1]]);
+        assert_eq!(shared(rich, poor, Some(&before)), [[3, 1]]);
+        assert_eq!(shared(poor, rich, None), [[1, 1]]);
+        let other = [
+            SideRange { from: 0.0, to: 40.0, side: Side::Reliable },
+            SideRange { from: 40.0, to: 100.0, side: Side::Unreliable },
+        ];
+        let other = Neighbour { at: 3.0, runs: &other };
+        assert_eq!(shared(poor, other, None), [[0; 2]; 0], "the other way round is no match");
+    }
+
+    #[test]
+    fn between_rows_alike_two_trials_a_root_and_one_a_pocket() {
+        let [a, b] = [runs(&[20.0, 30.0, 60.0]), runs(&[22.0, 34.0, 62.0])];
+        let [a, b] =
+            [(0.0, &a), (1.0, &b)].map(|(at, runs)| Neighbour { at, runs: runs.as_slice() });
+        let wants = start(0.5, &[a], &[b], &SPAN).wants(&SPAN);
+        assert_eq!(wants.iter().map(|want| want.needed()).sum::<usize>(), 3 * 2 + 2, "{wants:?}");
+    }
+}

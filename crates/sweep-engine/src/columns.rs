@@ -1,0 +1,206 @@
+//! Columns as functions of a row: what every model has that compares a nonlinear motion with a
+//! linear one, and what a model's own are made of.
+
+use sweep_parameter::Channel;
+
+use crate::store::{Column, Kind, Row};
+
+/// The two models by name.
+pub const MODELS: [&str; 2] = ["nonlinear", "linear"];
+
+/// A point at which both models have run.
+pub trait Compared: 'static {
+    /// The amplitude of a channel of the plan by a model; none if it failed.
+    fn amplitude(&self, model: usize, channel: usize) -> Option<f64>;
+    /// The ratio of a channel of the plan, where there is one.
+    fn ratio(&self, channel: usize) -> Option<f64>;
+    /// The greatest ratio with its channel; the first wins a tie.
+    fn greatest(&self) -> Option<(usize, f64)>;
+    /// Whether the greatest ratio is below the limit.
+    fn reliable(&self) -> Option<bool>;
+    /// Whether the method does not agree with itself.
+    fn sensitive(&self) -> Option<bool>;
+    /// The position of the method's name.
+    fn method(&self) -> usize;
+    /// The relative error left.
+    fn error(&self) -> Option<f64>;
+    /// The position of the status.
+    fn status(&self) -> usize;
+    /// When a model failed.
+    fn fail_time_s(&self) -> Option<f64>;
+    /// Accepted steps of a model.
+    fn steps(&self, model: usize) -> u64;
+    /// Rejected steps of a model.
+    fn rejected(&self, model: usize) -> u64;
+}
+
+type Get<R, T> = Box<dyn Fn(&R) -> T + Send + Sync>;
+
+/// How a column takes its cell from a row, which settles its type too.
+pub enum Cell<R> {
+    /// Never null.
+    Count(Get<R, u64>),
+    /// Null where not known.
+    KnownCount(Get<R, Option<u64>>),
+    /// A number that hardly ever repeats.
+    Measured(Get<R, Option<f64>>),
+    /// A number that may repeat.
+    Time(Get<R, Option<f64>>),
+    /// True or false.
+    Flag(Get<R, Option<bool>>),
+    /// A position in a list of names that is the same for every row, batch and run of the plan.
+    Name(Vec<&'static str>, Get<R, Option<usize>>),
+}
+
+/// A column of the file.
+pub struct ResultColumn<R> {
+    /// What the file says of it.
+    pub declared: Column,
+    cell: Cell<R>,
+}
+
+impl<R> ResultColumn<R> {
+    /// A column.
+    #[must_use]
+    pub fn new(
+        name: impl Into<String>,
+        unit: &str,
+        description: impl Into<String>,
+        cell: Cell<R>,
+    ) -> Self {
+        let kind = match &cell {
+            Cell::Count(_) => Kind::Count,
+            Cell::KnownCount(_) => Kind::KnownCount,
+            Cell::Measured(_) => Kind::Measured,
+            Cell::Time(_) => Kind::Time,
+            Cell::Flag(_) => Kind::Flag,
+            Cell::Name(names, _) => Kind::Name(names.clone()),
+        };
+        Self { declared: Column::new(name, unit, description, kind), cell }
+    }
+
+    /// Its cell of a row.
+    #[must_use]
+    pub fn cell(&self, row: &R) -> Option<u64> {
+        match &self.cell {
+            Cell::Count(get) => Some(get(row)),
+            Cell::KnownCount(get) => get(row),
+            Cell::Measured(get) | Cell::Time(get) => get(row).map(f64::to_bits),
+            Cell::Flag(get) => get(row).map(u64::from),
+            Cell::Name(_, get) => get(row).map(|name| name as u64),
+        }
+    }
+}
+
+/// The cells of a row.
+#[must_use]
+pub fn row<R>(columns: &[ResultColumn<R>], of: &R) -> Row {
+    columns.iter().map(|column| column.cell(of)).collect()
+}
+
+/// Amplitudes of both models and ratios. `amplitude` and `ratio` are what these are of.
+#[must_use]
+pub fn amplitude_columns<R: Compared, C: Channel>(
+    channels: &[C],
+    amplitude: &str,
+    ratio: &str,
+) -> Vec<ResultColumn<R>> {
+    let mut columns = Vec::new();
+    for (k, model) in MODELS.into_iter().enumerate() {
+        for (i, channel) in channels.iter().enumerate() {
+            let what = channel.description();
+            let text = format!("{what}: {amplitude}, {model} model; null if it failed");
+            let cell = Cell::Measured(Box::new(move |row: &R| row.amplitude(k, i)));
+            let name = format!("{model}_{}", channel.name());
+            columns.push(ResultColumn::new(name, channel.unit(), text, cell));
+        }
+    }
+    for (i, channel) in channels.iter().enumerate() {
+        let text = format!("{}: {ratio}", channel.description());
+        let cell = Cell::Measured(Box::new(move |row: &R| row.ratio(i)));
+        columns.push(ResultColumn::new(format!("ratio_{}", channel.name()), "1", text, cell));
+    }
+    columns
+}
+
+/// The verdict, and how far it can be trusted. `methods` are the names of methods, `told` what they
+/// are.
+#[must_use]
+pub fn verdict_columns<R: Compared, C: Channel>(
+    channels: &[C],
+    ratio_limit: f64,
+    methods: Vec<&'static str>,
+    told: &str,
+) -> [ResultColumn<R>; 6] {
+    let channels = channels.iter().map(|channel| channel.name()).collect();
+    [
+        ResultColumn::new(
+            "ratio_max",
+            "1",
+            "greatest of the defined ratios; null if none is",
+            Cell::Measured(Box::new(|row: &R| row.greatest().map(|(_, ratio)| ratio))),
+        ),
+        ResultColumn::new(
+            "ratio_max_channel",
+            "",
+            "channel of ratio_max; the first of the plan's channels wins a tie",
+            Cell::Name(channels, Box::new(|row: &R| row.greatest().map(|(channel, _)| channel))),
+        ),
+        ResultColumn::new(
+            "reliable",
+            "",
+            format!("ratio_max below {}; null where ratio_max is", ratio_limit),
+            Cell::Flag(Box::new(|row: &R| row.reliable())),
+        ),
+        ResultColumn::new(
+            "sensitive",
+            "",
+            "true where plain rk4 does not agree with itself at two steps: the motion is \
+                 chaotic, and the row's \
+                 digits are those of one trajectory; null where nothing was compared",
+            Cell::Flag(Box::new(|row: &R| row.sensitive())),
+        ),
+        ResultColumn::new(
+            "method",
+            "",
+            told,
+            Cell::Name(methods, Box::new(|row: &R| Some(row.method()))),
+        ),
+        ResultColumn::new(
+            "error",
+            "1",
+            "greatest relative error left in the row's numbers, from comparing two rungs of \
+                 its method; null where \
+                 nothing was compared",
+            Cell::Measured(Box::new(|row: &R| row.error())),
+        ),
+    ]
+}
+
+/// Columns about the two integrations, the same for every plan.
+#[must_use]
+pub fn run_columns<R: Compared>(statuses: Vec<&'static str>) -> Vec<ResultColumn<R>> {
+    let mut columns = Vec::new();
+    columns.push(ResultColumn::new(
+        "status",
+        "",
+        "ok, or why the nonlinear model failed, or behind linear_ why the linear model alone did",
+        Cell::Name(statuses, Box::new(|row: &R| Some(row.status()))),
+    ));
+    columns.push(ResultColumn::new(
+        "fail_time_s",
+        "s",
+        "when the model named by status failed; null if none did or it never started",
+        Cell::Time(Box::new(|row: &R| row.fail_time_s())),
+    ));
+    let counts: [(&str, &str, fn(&R, usize) -> u64); 2] =
+        [("steps", "accepted", R::steps), ("rejected", "rejected", R::rejected)];
+    for (name, kind, count) in counts {
+        for (k, model) in MODELS.into_iter().enumerate() {
+            let text = format!("{kind} integration steps, {model} model");
+            let cell = Cell::Count(Box::new(move |row: &R| count(row, k)));
+            columns.push(ResultColumn::new(format!("{name}_{model}"), "1", text, cell));
+        }
+    }
+    columns
+}

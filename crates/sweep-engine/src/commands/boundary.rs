@@ -1,0 +1,260 @@
+//! `sweep boundary GRID.toml`: the curve itself.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use super::grid::{GridArgs, quoted};
+use super::run::line;
+use crate::boundary::file::{job, table};
+use crate::boundary::quantity::TracedQuantity;
+use crate::boundary::search::{BoundaryTask, Models, Stopped};
+use crate::boundary::{EdgeKind, Standing, Traced, trace};
+use crate::effort::Effort;
+use crate::exit::{Error, Exit, tell};
+use crate::interrupt::Interrupt;
+use crate::plan::Plan;
+use crate::program::program;
+use crate::progress::{Progress, ProgressMode, duration};
+use crate::store::{OpenedTrials, StoreError, Trials};
+use crate::swept::Swept;
+use crate::threads;
+use sweep_files::{FileKind, Output};
+use sweep_parameter::Parameter as _;
+
+/// Arguments of `sweep boundary`.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = LONG)]
+pub struct Args {
+    /// The grid: its first axis gives the rows, its second the range that is searched
+    #[command(flatten)]
+    pub grid: GridArgs,
+    /// Boundary file [default: results/NAME-boundary.parquet]
+    #[arg(short, long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// What is at its limit: ratio_max, ratio_CHANNEL, min_gap_nonlinear_m or min_gap_linear_m (at
+    /// no gap)
+    #[arg(long, value_name = "NAME", default_value = "ratio_max")]
+    pub quantity: String,
+    /// Width of the final brackets, in the second axis's unit; if that axis is logarithmic, as a
+    /// fraction of its value [default: 1/480 of the range]
+    #[arg(long, value_name = "WIDTH")]
+    pub tolerance: Option<f64>,
+    /// Cells along each axis of the lattice that guards against islands: the finer, the smaller the
+    /// island it cannot miss, and the more points it takes
+    #[arg(
+        long,
+        value_name = "CELLS",
+        default_value_t = 6,
+        value_parser = clap::value_parser!(u16).range(1..=1000)
+    )]
+    pub lattice: u16,
+    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    pub threads: Option<usize>,
+    /// Start over, even if the boundary is there or another plan was begun
+    #[arg(long)]
+    pub fresh: bool,
+    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
+    /// 5 s) or none
+    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
+    pub progress: ProgressMode,
+}
+
+/// What `--help` adds.
+const LONG: &str = "\
+For each value of the first axis, the places along the second where the quantity passes its \
+limit, each with the bracket \
+it is known to lie in. Where there is no such place, or the quantity leaps over its limit, the \
+file says so and gives \
+no number. The least and greatest value of the second axis are the range, however it is written. \
+Axes beyond the second \
+give one curve for every combination of their values.
+
+The file is a pure function of its input, whatever the number of threads and interruptions. What \
+    an interrupted \
+search has found out stays in FILE.partial, and the same command goes on from there.";
+
+/// Traces the boundary of a grid.
+///
+/// # Errors
+/// Mistakes in the grid file, a plan without a range to search, and whatever keeps the file from
+/// being written.
+pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+    let plan: Plan<M> = args.grid.load()?;
+    let names = M::quantities();
+    if !names.contains(&args.quantity) {
+        let (given, expected) = (args.quantity.clone(), format!("one of {}", names.join(", ")));
+        return Err(Error::Option { option: "--quantity", given, expected });
+    }
+    let (quantity, plan) = M::traced(&plan, &args.quantity)?;
+    let task = BoundaryTask::new(&plan, args.tolerance, usize::from(args.lattice))?;
+    let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
+    let output = args.out.clone().unwrap_or_else(default);
+    let file = Output::begin(&output, FileKind::Boundary)?;
+    let interrupt = Interrupt::install().map_err(|source| Error::File {
+        action: "install signal handlers for",
+        path: PathBuf::from("this process"),
+        source,
+    })?;
+    let job = job(&plan, &quantity, &task);
+    let mut trials = match Trials::open(&output, &job, args.fresh)? {
+        OpenedTrials::Open(trials) => *trials,
+        OpenedTrials::Finished => {
+            tell(&already(&plan, &output));
+            return Ok(Exit::Done);
+        }
+    };
+    trials.take_notes().iter().for_each(|note| tell(note));
+    let there = trials.count() as u64;
+    if there > 0 {
+        tell(&format!("going on: {there} points are there"));
+    }
+    let began = Instant::now();
+    let effort = Effort { threads: args.threads, progress: args.progress, interrupt: &interrupt };
+    let (traced, trials) = search(&plan, &quantity, &task, Some(trials), effort)?;
+    let traced = match traced {
+        Ok(traced) => traced,
+        Err(Stopped::Failed(error)) => return Err(error.into()),
+        Err(Stopped::Interrupted) => {
+            let kept = trials.map_or(0, |trials| trials.count());
+            let wall = duration(began.elapsed().as_secs_f64());
+            let mut text =
+                format!("{}: interrupted with {kept} points kept, after {wall}\n", plan.name);
+            line(&mut text, "go on", "the same command");
+            tell(text.trim_end());
+            return Ok(match interrupt.signal() {
+                Some(15) => Exit::Terminated,
+                _ => Exit::Interrupted,
+            });
+        }
+    };
+    let bytes = table(&job, &plan, &quantity, &task, &traced).into_bytes();
+    file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;
+    if let Some(note) = trials.and_then(Trials::complete) {
+        tell(&note);
+    }
+    let mut text = summary(&plan, &quantity, &task, &traced, began.elapsed().as_secs_f64());
+    next(&mut text, &output);
+    tell(text.trim_end());
+    Ok(Exit::Done)
+}
+
+/// What there is to say if the boundary is there.
+fn already<M: Swept>(plan: &Plan<M>, output: &Path) -> String {
+    let mut text =
+        format!("{}: the boundary is there already (--fresh traces it again)\n", plan.name);
+    next(&mut text, output);
+    text.trim_end().to_owned()
+}
+
+/// The file, and what to do with it.
+fn next(text: &mut String, output: &Path) {
+    let shown = output.display().to_string();
+    line(text, "file", &shown);
+    line(text, "next", &format!("{} plot {}", program(), quoted(&shown)));
+}
+
+fn summary<M: Swept>(
+    plan: &Plan<M>,
+    quantity: &TracedQuantity,
+    task: &BoundaryTask,
+    traced: &Traced,
+    wall_s: f64,
+) -> String {
+    let mut text = String::new();
+    let grid: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "{}: {} = {} traced with {} points (the grid has {grid}) in {} rounds, {}",
+        plan.name,
+        quantity.name,
+        quantity.limit,
+        traced.trials,
+        traced.rounds,
+        duration(wall_s)
+    );
+    let rows = || traced.curves.iter().flatten();
+    let counts: Vec<String> = EdgeKind::ALL
+        .into_iter()
+        .map(|kind| {
+            (kind, rows().flat_map(|row| &row.edges).filter(|edge| edge.kind == kind).count())
+        })
+        .filter(|(_, count)| *count > 0)
+        .map(|(kind, count)| format!("{count} {}", kind.name()))
+        .collect();
+    line(&mut text, "found", &counts.join(", "));
+    let several = rows().filter(|row| row.edges.len() > 1).count();
+    if several > 0 {
+        line(
+            &mut text,
+            "folds",
+            &format!("{several} values of the first axis have several crossings"),
+        );
+    }
+    let widest = rows()
+        .flat_map(|row| &row.edges)
+        .filter_map(|edge| edge.bracket.map(|[low, high]| high - low))
+        .fold(0.0, f64::max);
+    let unit = plan.axes.get(1).map_or("", |axis| axis.parameter.unit());
+    line(
+        &mut text,
+        "brackets",
+        &format!("at most {widest:.3} {unit} wide (asked: {})", task.search.tolerance),
+    );
+    // By the logarithm cells grow: the largest counts.
+    let cells: Vec<String> = plan
+        .axes
+        .iter()
+        .map(|axis| {
+            let edge = |k: usize| axis.values.between(k as f64 / task.search.lattice as f64);
+            let cells = (0..task.search.lattice).map(|k| (edge(k + 1) - edge(k)).abs());
+            let cell = cells.fold(0.0, f64::max);
+            format!("{cell:.3} {}", axis.parameter.unit())
+        })
+        .collect();
+    let cell = cells.join(" by ");
+    line(
+        &mut text,
+        "promises",
+        &format!("every island that a cell of the lattice fits into, {cell} (--lattice)"),
+    );
+    text
+}
+
+/// Searches, with a memory of trials if there is one, and gives it back.
+///
+/// # Errors
+/// No threads; `SWEEP_SIMD` naming nothing this machine has.
+pub fn search<M: Swept>(
+    plan: &Plan<M>,
+    quantity: &TracedQuantity,
+    task: &BoundaryTask,
+    trials: Option<Trials>,
+    effort: Effort<'_>,
+) -> Result<(Result<Traced, Stopped>, Option<Trials>), Error> {
+    let there = trials.as_ref().map_or(0, |trials| trials.count() as u64);
+    let rows = (task.firsts.len() * task.curves) as u64;
+    let rows_done = AtomicU64::new(0);
+    let progress = Mutex::new(Progress::of_search(effort.progress, rows, there));
+    let shown = |points: u64| {
+        // A thread that finds another showing it goes on.
+        if let Ok(mut progress) = progress.try_lock() {
+            progress.show_search(rows_done.load(Ordering::Relaxed), points);
+        }
+    };
+    let threads = effort.threads()?;
+    let models = Models::new(plan, M::search(plan, quantity)?, threads, effort.interrupt, &shown)?;
+    let models = match trials {
+        Some(trials) => models.keeping(trials),
+        None => models,
+    };
+    let mut standing =
+        |standing: &Standing| rows_done.store(standing.rows as u64, Ordering::Relaxed);
+    let traced = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
+    progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+    Ok((traced, models.into_kept()))
+}

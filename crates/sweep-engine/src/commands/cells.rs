@@ -1,0 +1,65 @@
+//! Cells of results as people read them.
+
+use sweep_results::Cell;
+
+/// Six digits, without an exponent where that reads well.
+pub fn short(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e9).contains(&value.abs()) {
+        // Small numbers keep their digits behind the zeros.
+        let decimals = 5 - value.abs().max(1e-300).log10().floor().min(0.0) as i32;
+        let text = format!("{value:.*}", decimals.clamp(6, 9) as usize);
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        format!("{value:.5e}")
+    }
+}
+
+/// A cell in a word.
+pub fn word(cell: &Cell) -> String {
+    match cell {
+        Cell::Null => "null".to_owned(),
+        Cell::Number(number) => short(*number),
+        Cell::Text(text) => text.clone(),
+        Cell::Flag(flag) => flag.to_string(),
+    }
+}
+
+/// Rows under their headings, in columns that are as wide as they need to be; each line begins with
+/// `indent`.
+pub fn table(headings: &[String], rows: &[Vec<String>], indent: &str) -> String {
+    let width = |column: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(column)).chain(headings.get(column));
+        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..headings.len()).map(width).collect();
+    let line = |cells: &[String]| {
+        let padded: Vec<String> =
+            cells.iter().zip(&widths).map(|(cell, &width)| format!("{cell:>width$}")).collect();
+        format!("{indent}{}\n", padded.join("  ").trim_end())
+    };
+    std::iter::once(line(headings)).chain(rows.iter().map(|row| line(row))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        let shown: Vec<String> =
+            [0.0, 0.05, 300.0, -1.5e-7, 2e12, 1.0 / 3.0, 0.549_999_999_999_999_9, 0.001_234_567_8]
+                .into_iter()
+                .map(short)
+                .collect();
+        let expected =
+            ["0", "0.05", "300", "-1.50000e-7", "2.00000e12", "0.333333", "0.55", "0.00123457"];
+        assert_eq!(shown, expected);
+    }
+
+    #[test]
+    fn columns_are_as_wide_as_their_widest_cell() {
+        let words = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect::<Vec<_>>();
+        let text = table(&words(&["a", "long"]), &[words(&["10", "1"]), words(&["2", "3"])], " ");
+        assert_eq!(text, "  a  long\n 10     1\n  2     3\n");
+    }
+}

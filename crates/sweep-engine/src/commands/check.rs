@@ -1,0 +1,141 @@
+//! `sweep check GRID.toml`: every mistake, or what a run would do and about how long it would take.
+
+use std::fmt::Write as _;
+
+use super::cells::short;
+use super::grid::GridArgs;
+use crate::design::{Design, Distribution};
+use crate::estimate::{Estimate, size};
+use crate::exit::{Error, Exit, show, tell};
+use crate::plan::{Axis, AxisValues, Plan};
+use crate::progress::duration;
+use crate::swept::Swept;
+use crate::threads;
+use sweep_parameter::{Channel as _, Parameter as _};
+
+/// Arguments of `sweep check`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    grid: GridArgs,
+    /// Print the plan as JSON, with every default and constant in place
+    #[arg(long)]
+    json: bool,
+}
+
+/// Checks a grid and shows its plan.
+///
+/// # Errors
+/// Mistakes in the grid file, no engine for it, or standard output that cannot be written.
+pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+    let plan: Plan<M> = args.grid.load()?;
+    if args.json {
+        return show(&format!("{:#}\n", plan.to_json()));
+    }
+    let estimate = M::estimate(&plan, threads::count(None, &|name| std::env::var(name).ok())?)?;
+    tell(summary(&plan, &estimate).trim_end());
+    Ok(Exit::Done)
+}
+
+/// The plan in a few lines.
+fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{name:<12}{value}");
+    };
+    line("name", plan.name.clone());
+    for (k, axis) in plan.axes.iter().enumerate() {
+        line(if k == 0 { "axes" } else { "" }, describe(axis, plan.design.as_ref()));
+    }
+    let points = plan.points();
+    let laid_out = match &plan.design {
+        Some(Design::List { file, .. }) => format!("{points}, as listed in {file}"),
+        Some(design) => format!("{points} by {}", design.method()),
+        None if plan.axes.is_empty() => "1 (no axes)".to_owned(),
+        None => points.to_string(),
+    };
+    line("points", laid_out);
+    line(
+        "time",
+        format!("0 to {} s, window {} to {} s", plan.end_s, plan.window_s[0], plan.window_s[1]),
+    );
+    line("method", estimate.method.clone());
+    for (name, words) in M::words(plan) {
+        line(name, words);
+    }
+    let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name()).collect();
+    line("channels", channels.join(", "));
+    line(
+        "verdict",
+        format!(
+            "reliable where every ratio is below {}{}",
+            plan.reliability.ratio_limit,
+            plan.model.criterion()
+        ),
+    );
+    line("output", format!("results/{}.parquet", plan.name));
+    line(
+        "runs on",
+        format!(
+            "{} thread{}, instruction set {}",
+            estimate.threads,
+            plural(estimate.threads as u64),
+            estimate.simd
+        ),
+    );
+    line("takes", took(plan, estimate));
+    let [memory, disk, result] =
+        [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(size);
+    line(
+        "",
+        format!(
+            "{memory} of memory; on disk {disk} while it runs, and at most {result} for the result"
+        ),
+    );
+    text
+}
+
+/// The time, and what it was reckoned from.
+fn took<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
+    let (points, whole) = (estimate.sampled_points, estimate.sampled_s >= plan.end_s);
+    let part =
+        if whole { String::new() } else { format!(", the first {} s each", estimate.sampled_s) };
+    let about = duration(estimate.wall_s);
+    format!(
+        "about {about}: an estimate, from {points} point{} integrated just now{part}",
+        plural(points)
+    )
+}
+
+fn plural(count: u64) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+fn describe<M: Swept>(axis: &Axis<M>, design: Option<&Design>) -> String {
+    let (name, count) = (axis.parameter.name(), axis.values.len());
+    match &axis.values {
+        AxisValues::Linear { from, to, .. } if design.is_some() => {
+            format!("{name}: from {from} to {to}")
+        }
+        AxisValues::Log { from, to, .. } if design.is_some() => {
+            format!("{name}: from {from} to {to}, logarithmic")
+        }
+        AxisValues::Distributed(Distribution { shape, from, to }) => {
+            let numbers = shape.numbers().map(|(key, number)| format!("{key} {number}"));
+            let [from, to] = [*from, *to].map(short);
+            format!("{name}: {}, {}, from {from} to {to}", shape.name(), numbers.join(", "))
+        }
+        AxisValues::List(values) => {
+            let shown: Vec<_> = values.iter().take(8).map(f64::to_string).collect();
+            let more = if values.len() > shown.len() { ", ..." } else { "" };
+            format!("{name}: {count} values, {}{more}", shown.join(", "))
+        }
+        AxisValues::Linear { from, to, .. } => {
+            format!("{name}: {count} values from {from} to {to}")
+        }
+        AxisValues::Log { from, to, .. } => {
+            format!("{name}: {count} values from {from} to {to}, logarithmic")
+        }
+    }
+}

@@ -1,0 +1,456 @@
+//! `sweep compare A B`: what differs between two results.
+
+mod differences;
+mod fail_on;
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use super::cells::{short, table};
+use super::grid::quoted;
+use super::run::line;
+use crate::build::Build;
+use crate::exit::{Error, Exit, show, tell};
+use crate::store::StoreError;
+use fail_on::FailOn;
+use sweep_files::{FileKind, Output};
+use sweep_results::{Comparison, Flip, Moved, PlanChange, ResultTable, SharedRow, compare};
+
+/// Arguments of `sweep compare`.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = LONG)]
+pub struct Args {
+    /// The result to compare with: a map, a boundary, or any other Parquet file of this program
+    #[arg(value_name = "A")]
+    first: PathBuf,
+    /// The result that is compared
+    #[arg(value_name = "B")]
+    second: PathBuf,
+    /// Print what differs as JSON
+    #[arg(long, conflicts_with = "markdown")]
+    json: bool,
+    /// Print it as Markdown, for the summary of a CI job
+    #[arg(long)]
+    markdown: bool,
+    /// Write the differences of maps, row by row, to a Parquet file that `sweep plot` draws
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Exit with 4 if this differs: any, plan, flips, sensitive, rows, ratio=PART, gap=M or
+    /// boundary=WIDTH; may be repeated
+    #[arg(long, value_name = "WHAT", value_parser = str::parse::<FailOn>)]
+    fail_on: Vec<FailOn>,
+    /// Show at most this many rows of each kind
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    rows: u16,
+}
+
+/// What `--help` adds.
+const LONG: &str = "\
+Rows are the same where the axes have the same values, to nine digits; rows of only one file are \
+counted. An axis that only one file has is left out if it has a single value. Files of different \
+kinds, or that share no row, are refused.
+
+A sensitive row is chaotic: its digits, and perhaps its verdict, are those of one trajectory. Such \
+rows are shown apart, and only `any` and `sensitive` look at them.
+
+What --fail-on takes:
+  any             anything at all differs
+  plan            parameters, spin, method or version
+  rows            a row is in one file only
+  flips           a verdict differs, in a row that is not sensitive
+  sensitive       a verdict differs, in a sensitive row
+  ratio=0.05      a ratio changed by more than 5 % either way, or is in one file only
+  gap=0.001       a least gap changed by more than 1 mm, or is in one file only
+  boundary=2      the boundary moved by more than 2 in the second axis's unit, whatever the brackets
+                  leave open, or has other numbers of crossings";
+
+/// Compares the files.
+///
+/// # Errors
+/// Files that cannot be read or compared, and an output that cannot be written.
+pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
+    let files = [&args.first, &args.second];
+    let output =
+        args.out.as_deref().map(|path| Output::begin(path, FileKind::Differences)).transpose()?;
+    let tables = [ResultTable::open(files[0])?, ResultTable::open(files[1])?];
+    let found = compare(&tables[0], &tables[1])?;
+    if let Some([given, of]) = args.fail_on.iter().find_map(|fail_on| fail_on.lacks(&found)) {
+        let (given, expected) = (given.to_owned(), of.to_owned());
+        return Err(Error::Option { option: "--fail-on", given, expected });
+    }
+    if let (Some(output), Some(path)) = (output, &args.out) {
+        if !found.has_verdicts {
+            return Err(Error::Option {
+                option: "--out",
+                given: path.display().to_string(),
+                expected: "two maps: other files have no differences row by row".to_owned(),
+            });
+        }
+        let bytes = differences::bytes(args, &found, &tables, build)
+            .map_err(StoreError::parquet("write", path))?;
+        output.finish(&bytes)?;
+    }
+    let broken: Vec<String> =
+        args.fail_on.iter().filter_map(|fail_on| fail_on.found(&found)).collect();
+    if args.json {
+        show(&format!("{:#}\n", in_json(args, &found, &broken)))?;
+    } else if args.markdown {
+        show(&markdown(args, &found, &broken))?;
+    } else {
+        show(&text(args, &found))?;
+        if let Some(out) = &args.out {
+            tell(&format!(
+                "wrote {0}: sweep plot {1}",
+                out.display(),
+                quoted(&out.display().to_string())
+            ));
+        }
+        broken.iter().for_each(|broken| tell(&format!("--fail-on: {broken}")));
+    }
+    Ok(if broken.is_empty() { Exit::Done } else { Exit::NotHeld })
+}
+
+/// A value of a plan in a word or two.
+fn brief(value: &Value) -> String {
+    match value {
+        Value::Null => "absent".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), short),
+        other => {
+            let text = other.to_string();
+            match text.char_indices().nth(48) {
+                Some((cut, _)) => format!("{}...", &text[..cut]),
+                None => text,
+            }
+        }
+    }
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or_else(|| "null".to_owned(), short)
+}
+
+fn verdict(row: &SharedRow, limit_side: usize) -> &'static str {
+    // The verdicts follow from the flip: what one side was, the other was not.
+    match (row.flip, limit_side) {
+        (Flip::Lost, 0) | (Flip::Gained, 1) => "reliable",
+        (Flip::Lost, _) | (Flip::Gained, _) => "not",
+        _ => "undefined",
+    }
+}
+
+/// A heading with rows beneath: what every kind of output shows.
+struct Listed {
+    title: String,
+    headings: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+/// The lists of rows, those that are empty left out.
+fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
+    let most = usize::from(args.rows);
+    let mut lists = Vec::new();
+    let place = |row: &SharedRow| row.place.iter().map(|value| short(*value)).collect::<Vec<_>>();
+    for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
+        let count = found.flips(sensitive).count();
+        if count > 0 {
+            let rows = found.flips(sensitive).take(most).map(|row| {
+                let mut cells = place(row);
+                cells.extend([0, 1].map(|side| match row.flip {
+                    Flip::Defined => number(row.ratio[side]),
+                    _ => format!("{} {}", number(row.ratio[side]), verdict(row, side)),
+                }));
+                cells
+            });
+            lists.push(Listed {
+                title: format!("verdicts that flipped{which}: {count}"),
+                headings: headings(found, &["A", "B"]),
+                rows: rows.collect(),
+            });
+        }
+    }
+    for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
+        let ratios = found.greatest(most, sensitive, SharedRow::ratio_by);
+        if !ratios.is_empty() {
+            let rows = ratios.into_iter().map(|row| {
+                let mut cells = place(row);
+                cells.extend(row.ratio.map(number));
+                let change = row.ratio_change().map(|change| 100.0 * (change - 1.0));
+                cells.push(change.map_or_else(|| number(None), |change| format!("{change:+.3} %")));
+                cells
+            });
+            lists.push(Listed {
+                title: format!("greatest changes of the ratio{which}"),
+                headings: headings(found, &["A", "B", "change"]),
+                rows: rows.collect(),
+            });
+        }
+        let gaps = found.greatest(most, sensitive, SharedRow::gap_by_m);
+        if !gaps.is_empty() {
+            let rows = gaps.into_iter().map(|row| {
+                let mut cells = place(row);
+                cells.extend(row.gap_m.map(number));
+                let sign = if row.gap_change_m() > Some(0.0) { "+" } else { "" };
+                cells.push(format!("{sign}{}", number(row.gap_change_m())));
+                cells
+            });
+            lists.push(Listed {
+                title: format!("greatest changes of the least gap{which}, m"),
+                headings: headings(found, &["A", "B", "change"]),
+                rows: rows.collect(),
+            });
+        }
+    }
+    lists
+}
+
+fn headings(found: &Comparison, further: &[&str]) -> Vec<String> {
+    found.keys.iter().cloned().chain(further.iter().map(|name| (*name).to_owned())).collect()
+}
+
+/// How many rows and verdicts are shared.
+fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
+    let mut facts = Vec::new();
+    let [first, second] = found.alone;
+    let alone = match (first, second) {
+        (0, 0) => String::new(),
+        _ => format!(", {first} only in A, {second} only in B"),
+    };
+    facts.push(("rows", format!("{} in both{alone}", found.shared.len())));
+    for (place, name, value) in &found.fixed {
+        let which = ["A", "B"][*place];
+        facts.push(("axis", format!("{name} = {} in {which} alone, left out", short(*value))));
+    }
+    for (names, which) in found.columns_alone.iter().zip(["A", "B"]) {
+        if !names.is_empty() {
+            facts.push(("columns", format!("only in {which}: {}", names.join(", "))));
+        }
+    }
+    if found.has_verdicts {
+        let count = |flip: Flip| found.flips(false).filter(|row| row.flip == flip).count();
+        let told = format!(
+            "{} lost, {} gained, {} defined in one file alone; of sensitive rows {}",
+            count(Flip::Lost),
+            count(Flip::Gained),
+            count(Flip::Defined),
+            found.flips(true).count()
+        );
+        facts.push(("verdicts", told));
+    }
+    if let Some(moved) = &found.boundary {
+        facts.push(("boundary", boundary(moved)));
+    }
+    let differing = found.shared.iter().filter(|row| row.differs).count();
+    let told = match differing {
+        0 => "every shared cell is the same, bit for bit".to_owned(),
+        count => {
+            let names: Vec<String> = found
+                .columns
+                .iter()
+                .take(6)
+                .map(|column| format!("{} ({})", column.name, column.rows))
+                .collect();
+            let more = if found.columns.len() > 6 { ", ..." } else { "" };
+            format!("{count} rows, in {}{more}", names.join(", "))
+        }
+    };
+    facts.push(("differ", told));
+    facts
+}
+
+/// How far the boundary moved.
+fn boundary(moved: &Moved) -> String {
+    let unit = &moved.unit;
+    let mut told = match moved.farthest() {
+        None => "no crossing in both".to_owned(),
+        Some(farthest) if farthest.by() == 0.0 => {
+            format!("{} crossings, none moved", moved.crossings.len())
+        }
+        Some(farthest) => {
+            let place: Vec<String> = moved
+                .keys
+                .iter()
+                .zip(&farthest.place)
+                .map(|(name, value)| format!("{name} {}", short(*value)))
+                .collect();
+            let bracket = |side: usize| {
+                let [low, high] = farthest.bracket[side];
+                format!("{} to {}", short(low), short(high))
+            };
+            format!(
+                "{} crossings along {}, moved by {:+.3} {unit} in the mean and {:+.3} at most, at \
+                 {}: from within {} to within {}; {} moved farther than their brackets explain",
+                moved.crossings.len(),
+                moved.axis,
+                moved.mean(),
+                farthest.by(),
+                place.join(", "),
+                bracket(0),
+                bracket(1),
+                moved.certain(),
+            )
+        }
+    };
+    if !moved.unlike.is_empty() {
+        let _ = write!(told, "; {} lines have other numbers of crossings", moved.unlike.len());
+    }
+    told
+}
+
+/// What differs, for people.
+fn text(args: &Args, found: &Comparison) -> String {
+    let mut text = String::new();
+    line(&mut text, "A", &args.first.display().to_string());
+    line(&mut text, "B", &args.second.display().to_string());
+    if found.is_empty() {
+        line(&mut text, "differ", "not at all");
+        return text;
+    }
+    for PlanChange { path, first, second } in found.plan.iter().take(PLAN_SHOWN) {
+        line(&mut text, "plan", &format!("{path}: {} -> {}", brief(first), brief(second)));
+    }
+    if found.plan.len() > PLAN_SHOWN {
+        line(&mut text, "", &format!("and {} more (--json)", found.plan.len() - PLAN_SHOWN));
+    }
+    for (name, told) in facts(found) {
+        line(&mut text, name, &told);
+    }
+    for Listed { title, headings, rows } in lists(args, found) {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{title}");
+        text.push_str(&table(&headings, &rows, "  "));
+    }
+    text
+}
+
+/// Places of the plan that people are shown.
+const PLAN_SHOWN: usize = 12;
+
+/// What differs, for a page.
+fn markdown(args: &Args, found: &Comparison, broken: &[String]) -> String {
+    let names = [&args.first, &args.second].map(|path| code(&path.display().to_string()));
+    let mut text = format!("### {} compared with {}\n\n", names[1], names[0]);
+    if found.is_empty() {
+        text.push_str("They do not differ.\n");
+        return text;
+    }
+    for broken in broken {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "- **`--fail-on`: {broken}**");
+    }
+    for PlanChange { path, first, second } in found.plan.iter().take(PLAN_SHOWN) {
+        let (first, second) = (code(&brief(first)), code(&brief(second)));
+        let _ = writeln!(text, "- plan: {} from {first} to {second}", code(path));
+    }
+    if found.plan.len() > PLAN_SHOWN {
+        let _ = writeln!(text, "- plan: {} more", found.plan.len() - PLAN_SHOWN);
+    }
+    for (name, told) in facts(found) {
+        let _ = writeln!(text, "- {name}: {}", escaped(&told));
+    }
+    for Listed { title, headings, rows } in lists(args, found) {
+        let row = |cells: &[String]| {
+            let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        let _ = writeln!(text, "\n#### {}\n", capital(&escaped(&title)));
+        text.push_str(&row(&headings));
+        let _ = writeln!(text, "|{}", "---:|".repeat(headings.len()));
+        rows.iter().for_each(|cells| text.push_str(&row(cells)));
+    }
+    text
+}
+
+/// A text between backticks.
+fn code(text: &str) -> String {
+    format!("`{}`", text.replace('`', "'"))
+}
+
+/// A text whose signs mean nothing in Markdown.
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        if "\\`*_|<>[]#".contains(c) {
+            escaped.push('\\');
+        }
+        escaped.push(c);
+    }
+    escaped
+}
+
+fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or(String::new(), |first| first.to_uppercase().chain(chars).collect())
+}
+
+/// What differs, for programs.
+fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
+    let row = |row: &SharedRow| {
+        let place: serde_json::Map<String, Value> =
+            found.keys.iter().cloned().zip(row.place.iter().map(|value| json!(value))).collect();
+        json!({
+            "rows": row.rows, "place": place, "ratio": row.ratio, "gap_m": row.gap_m,
+            "flip": row.flip, "sensitive": row.sensitive,
+        })
+    };
+    let most = usize::from(args.rows);
+    let greatest = |sensitive| {
+        json!({
+            "ratio": found.greatest(most, sensitive, SharedRow::ratio_by).into_iter().map(row)
+                .collect::<Value>(),
+            "gap": found.greatest(most, sensitive, SharedRow::gap_by_m).into_iter().map(row)
+                .collect::<Value>(),
+        })
+    };
+    json!({
+        "first": args.first.display().to_string(),
+        "second": args.second.display().to_string(),
+        "differ": !found.is_empty(),
+        "fail_on": broken,
+        "plan": found.plan,
+        "rows": {
+            "in_both": found.shared.len(),
+            "only_in_first": found.alone[0],
+            "only_in_second": found.alone[1],
+            "differing": found.shared.iter().filter(|row| row.differs).count(),
+        },
+        "axes_left_out": found.fixed.iter().map(|(place, name, value)| json!({
+            "file": (["first", "second"][*place]), "parameter": name, "value": value,
+        })).collect::<Value>(),
+        "columns": found.columns.iter().map(|column| json!({
+            "name": column.name, "unit": column.unit, "rows": column.rows,
+            "greatest": column.greatest,
+        })).collect::<Value>(),
+        "columns_only_in": { "first": found.columns_alone[0], "second": found.columns_alone[1] },
+        "flips": found.flips(false).map(row).collect::<Value>(),
+        "greatest": greatest(false),
+        "sensitive": {
+            "flips": found.flips(true).map(row).collect::<Value>(),
+            "greatest": greatest(true),
+        },
+        "boundary": found.boundary.as_ref().map(|moved| json!({
+            "axis": moved.axis,
+            "unit": moved.unit,
+            "mean": moved.mean(),
+            "certain": moved.certain(),
+            "crossings": moved.crossings.iter().map(|crossing| json!({
+                "place": crossing.place, "number": crossing.number, "at": crossing.at,
+                "bracket": crossing.bracket, "by": crossing.by(), "at_least": crossing.at_least(),
+            })).collect::<Value>(),
+            "other_numbers_of_crossings": moved.unlike.len(),
+        })),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn markdown_shows_texts_as_they_are() {
+        assert_eq!(escaped("ratio_max | <b>"), "ratio\\_max \\| \\<b\\>");
+        assert_eq!(code("a`b"), "`a'b`");
+    }
+}

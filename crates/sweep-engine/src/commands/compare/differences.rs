@@ -1,0 +1,83 @@
+//! The file of differences, which `sweep plot` draws.
+
+use std::path::PathBuf;
+
+use parquet::errors::ParquetError;
+use serde_json::json;
+
+use super::Args;
+use crate::build::Build;
+use crate::table::Table;
+use sweep_files::key;
+use sweep_results::{Comparison, ResultTable, SharedRow};
+
+/// The file of differences: one row per row that both have.
+pub(super) fn bytes(
+    args: &Args,
+    found: &Comparison,
+    tables: &[ResultTable; 2],
+    build: Build,
+) -> Result<Vec<u8>, ParquetError> {
+    let mut table = Table::new(build);
+    let rows = || found.shared.iter();
+    table.counts("point", "row of A, from 0", rows().map(|row| row.rows[0]));
+    for (k, (name, unit)) in found.keys.iter().zip(&found.key_units).enumerate() {
+        let description =
+            tables[0].column(name).map_or("", |column| column.description.as_str()).to_owned();
+        let unit = if unit.is_empty() { "1" } else { unit };
+        table.numbers(name, unit, &description, rows().map(|row| Some(row.place[k])));
+    }
+    table.numbers(
+        "ratio_change",
+        "1",
+        "ratio_max of B over that of A; null where either has none",
+        rows().map(SharedRow::ratio_change),
+    );
+    table.numbers(
+        "gap_change_m",
+        "m",
+        "least gap of the nonlinear model in B less that in A; null where either has none",
+        rows().map(SharedRow::gap_change_m),
+    );
+    for (side, which) in ["A", "B"].into_iter().enumerate() {
+        let suffix = ["a", "b"][side];
+        let values = rows().map(|row| row.ratio[side]);
+        table.numbers(
+            &format!("ratio_max_{suffix}"),
+            "1",
+            &format!("ratio_max of {which}"),
+            values,
+        );
+    }
+    table.words(
+        "flip",
+        "none, lost (reliable in A alone), gained (reliable in B alone), defined (a verdict in one \
+         file alone)",
+        rows().map(|row| row.flip.name()),
+    );
+    table.words(
+        "sensitive",
+        "true where either file calls the row chaotic",
+        rows().map(|row| if row.sensitive { "true" } else { "false" }),
+    );
+    table.words(
+        "status",
+        "ok, or no_ratio where either file has none",
+        rows().map(|row| if row.ratio_change().is_some() { "ok" } else { "no_ratio" }),
+    );
+    let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let hashes =
+        tables.each_ref().map(|table| table.file().value(key::PLAN_HASH).map(str::to_owned));
+    table.metadata(
+        key::DIFFERENCES,
+        &json!({
+            // Figures say it under their title.
+            "name": format!("{} compared with {}", name(&args.second), name(&args.first)),
+            "first": name(&args.first),
+            "second": name(&args.second),
+            "plan_hash": hashes,
+            "plan": found.plan,
+        }),
+    );
+    table.into_bytes()
+}

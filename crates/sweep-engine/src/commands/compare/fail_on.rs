@@ -1,0 +1,124 @@
+//! `--fail-on`: which differences a comparison may not have.
+
+use std::str::FromStr;
+
+use super::short;
+use sweep_results::Comparison;
+
+/// What makes the comparison fail.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum FailOn {
+    Any,
+    Plan,
+    Rows,
+    Flips,
+    Sensitive,
+    Ratio(f64),
+    Gap(f64),
+    Boundary(f64),
+}
+
+impl FromStr for FailOn {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || {
+            "expected any, plan, rows, flips, sensitive, ratio=PART, gap=M or boundary=WIDTH"
+                .to_owned()
+        };
+        let (name, value) = match text.split_once('=') {
+            Some((name, value)) => (name, Some(value)),
+            None => (text, None),
+        };
+        let number = || {
+            let number = value.and_then(|value| value.trim().parse::<f64>().ok());
+            number
+                .filter(|number| number.is_finite() && *number >= 0.0)
+                .ok_or_else(|| format!("expected a number of at least 0, as in {name}=0.05"))
+        };
+        match (name.trim(), value) {
+            ("any", None) => Ok(Self::Any),
+            ("plan", None) => Ok(Self::Plan),
+            ("rows", None) => Ok(Self::Rows),
+            ("flips", None) => Ok(Self::Flips),
+            ("sensitive", None) => Ok(Self::Sensitive),
+            ("ratio", _) => Ok(Self::Ratio(number()?)),
+            ("gap", _) => Ok(Self::Gap(number()?)),
+            ("boundary", _) => Ok(Self::Boundary(number()?)),
+            _ => Err(expected()),
+        }
+    }
+}
+
+impl FailOn {
+    /// Its name and the files that it speaks of, where these are others: it would stand open.
+    pub(super) fn lacks(self, found: &Comparison) -> Option<[&'static str; 2]> {
+        let (has, lacks) = match self {
+            Self::Any | Self::Plan | Self::Rows => return None,
+            Self::Flips => (found.has_verdicts, ["flips", "two files with verdicts"]),
+            Self::Sensitive => (found.has_verdicts, ["sensitive", "two files with verdicts"]),
+            Self::Ratio(_) => (found.has_ratios, ["ratio", "two files with `ratio_max`"]),
+            Self::Gap(_) => (found.has_gaps, ["gap", "two files with `min_gap_nonlinear_m`"]),
+            Self::Boundary(_) => {
+                (found.boundary.is_some(), ["boundary", "two boundaries, or maps of two axes"])
+            }
+        };
+        (!has).then_some(lacks)
+    }
+
+    /// What of it is there, in words; `None` if nothing is.
+    pub(super) fn found(self, found: &Comparison) -> Option<String> {
+        let steady = || found.shared.iter().filter(|row| !row.sensitive);
+        let counted = |what: &str, count: usize| (count > 0).then(|| format!("{what}: {count}"));
+        match self {
+            Self::Any => (!found.is_empty()).then(|| "the files differ".to_owned()),
+            Self::Plan => counted("differences of the plans", found.plan.len()),
+            Self::Rows => {
+                counted("rows of one file alone", found.alone.iter().sum::<u64>() as usize)
+            }
+            Self::Flips => counted("verdicts that flipped", found.flips(false).count()),
+            Self::Sensitive => {
+                counted("sensitive verdicts that flipped", found.flips(true).count())
+            }
+            Self::Ratio(most) => {
+                let percent = short(100.0 * most);
+                let what = format!("ratios that changed by more than {percent} %, came or went");
+                counted(&what, steady().filter(|row| row.ratio_by() > most).count())
+            }
+            Self::Gap(most) => {
+                let most_m = short(most);
+                let what = format!("gaps that changed by more than {most_m} m, came or went");
+                counted(&what, steady().filter(|row| row.gap_by_m() > most).count())
+            }
+            Self::Boundary(most) => {
+                let moved = found.boundary.as_ref()?;
+                let far = moved.crossings.iter().filter(|crossing| crossing.at_least() > most);
+                let what =
+                    format!("crossings that moved by more than {} {}", short(most), moved.unit);
+                counted(what.trim_end(), far.count() + moved.unlike.len())
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_makes_it_fail_is_read_as_documented() {
+        assert_eq!("flips".parse(), Ok(FailOn::Flips));
+        assert_eq!("ratio=0.05".parse(), Ok(FailOn::Ratio(0.05)));
+        assert_eq!("boundary=2".parse(), Ok(FailOn::Boundary(2.0)));
+        for (text, said) in [
+            ("flip", "expected any, plan"),
+            ("flips=3", "expected any, plan"),
+            ("ratio", "as in ratio=0.05"),
+            ("gap=-1", "at least 0"),
+            ("ratio=nan", "at least 0"),
+        ] {
+            let refused = text.parse::<FailOn>().unwrap_err();
+            assert!(refused.contains(said), "{text}: {refused}");
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! `sweep export FILE OUT`: a result in another format.
+
+use std::path::PathBuf;
+
+use crate::exit::{Error, Exit, tell};
+use sweep_files::Output;
+use sweep_results::{Format, ResultTable, export};
+
+/// Arguments of `sweep export`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A result, trace, modes or boundary file, or any other Parquet file of this program
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Where to write; the ending .csv, .xlsx or .nc says how
+    #[arg(value_name = "OUT")]
+    out: PathBuf,
+}
+
+/// Writes the result in the format of the output's ending.
+///
+/// # Errors
+/// An ending of no format, a file that cannot be read or is too large for the format, an output
+/// that cannot be written.
+pub fn run(args: &Args) -> Result<Exit, Error> {
+    let Some(format) = Format::of(&args.out) else {
+        return Err(Error::Option {
+            option: "OUT",
+            given: args.out.display().to_string(),
+            expected: "a name that ends in .csv, .xlsx or .nc".to_owned(),
+        });
+    };
+    let output = Output::begin(&args.out, format.kind())?;
+    let file = ResultTable::open(&args.file)?;
+    output.finish(&export(&file, format)?)?;
+    tell(&format!("wrote {}: {} rows", args.out.display(), file.rows()));
+    Ok(Exit::Done)
+}

@@ -1,0 +1,112 @@
+//! Arguments that several subcommands take.
+
+use std::path::PathBuf;
+
+use crate::config::Read;
+use crate::config::{self, Diagnostics, GridInput};
+use crate::plan::Plan;
+use crate::program::program;
+
+/// A grid file and changes to its constants, as most commands take them.
+#[derive(Debug, clap::Args)]
+pub struct GridArgs {
+    /// Grid file
+    #[arg(value_name = "GRID.toml")]
+    pub grid: PathBuf,
+    /// Set a constant, over those of the grid file; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub sets: Vec<String>,
+    /// Call a ratio below this reliable, over the grid file's limit
+    #[arg(long, value_name = "RATIO")]
+    pub ratio_limit: Option<f64>,
+    /// Name of the run, over the grid file's: a result's default file, and what figures say
+    #[arg(long, value_name = "NAME", value_parser = config::plain_name)]
+    pub name: Option<String>,
+}
+
+impl GridArgs {
+    /// What is set, in one list.
+    pub fn sets(&self) -> Vec<String> {
+        let limit = self.ratio_limit.map(|limit| format!("ratio_limit={limit}"));
+        self.sets.iter().cloned().chain(limit).collect()
+    }
+
+    /// The plan.
+    ///
+    /// # Errors
+    /// Every mistake in the grid file and the constants.
+    pub fn load<M: Read>(&self) -> Result<Plan<M>, Diagnostics> {
+        let mut plan = GridInput::<M>::file(self.grid.clone(), self.sets()).load()?;
+        if let Some(name) = &self.name {
+            plan.name.clone_from(name);
+        }
+        Ok(plan)
+    }
+}
+
+/// A grid and where its result goes, as the commands about runs take them.
+#[derive(Debug, clap::Args)]
+pub struct ResultArgs {
+    /// The grid.
+    #[command(flatten)]
+    pub grid: GridArgs,
+    /// Result file [default: results/NAME.parquet]
+    #[arg(short, long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+impl ResultArgs {
+    /// The result file.
+    #[must_use]
+    pub fn output<M: Read>(&self, plan: &Plan<M>) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{}.parquet", plan.name)))
+    }
+
+    /// A command line about the same run, for a user to copy.
+    #[must_use]
+    pub fn command(&self, verb: &str) -> String {
+        let mut line =
+            format!("{} {verb} {}", program(), quoted(&self.grid.grid.display().to_string()));
+        for set in self.grid.sets() {
+            line.push_str(&format!(" --set {}", quoted(&set)));
+        }
+        if let Some(name) = &self.grid.name {
+            line.push_str(&format!(" --name {}", quoted(name)));
+        }
+        if let Some(out) = &self.out {
+            line.push_str(&format!(" --out {}", quoted(&out.display().to_string())));
+        }
+        line
+    }
+}
+
+/// A word as a shell takes it.
+pub fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/._-=:,+".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_to_copy_survives_the_shell() {
+        let grid = GridArgs {
+            grid: "my grids/it's.toml".into(),
+            sets: vec!["mass_kg=20".into()],
+            ratio_limit: Some(1.5),
+            name: Some("light".into()),
+        };
+        let target = ResultArgs { grid, out: Some("x.parquet".into()) };
+        assert_eq!(
+            target.command("merge"),
+            "sweep merge 'my grids/it'\\''s.toml' --set mass_kg=20 --set ratio_limit=1.5 \
+             --name light --out x.parquet"
+        );
+    }
+}

@@ -1,0 +1,66 @@
+//! `sweep merge GRID.toml`: finished shards into the one file.
+
+use super::grid::ResultArgs;
+use std::path::Path;
+
+use super::run::{installed, line, rows};
+use crate::exit::{Error, Exit, tell};
+use crate::plan::Plan;
+use crate::store::Job;
+use crate::store::{OpenRun, Opened};
+use crate::swept::Swept;
+
+/// Arguments of `sweep merge`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    /// The run.
+    pub target: ResultArgs,
+}
+
+/// Joins what the shards have left.
+///
+/// # Errors
+/// [`crate::store::StoreError::Incomplete`] with what is missing, and whatever else keeps it from
+/// its end.
+pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+    let plan: Plan<M> = args.target.grid.load()?;
+    of_job(&plan.name, &Job::of(&plan), &args.target.output(&plan))
+}
+
+/// Joins what the shards of a job have left.
+///
+/// # Errors
+/// As [`run`].
+pub fn of_job(name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
+    let interrupt = installed()?;
+    let mut run = match OpenRun::open_for_merge(output, job)? {
+        Opened::Run(run) => run,
+        Opened::Finished(file, tally) => {
+            let mut text = format!("{}: all {} points are there already\n", name, file.points);
+            text.push_str(&rows(&tally, job));
+            tell(text.trim_end());
+            return Ok(Exit::Done);
+        }
+    };
+    for note in run.take_notes() {
+        tell(&note);
+    }
+    let Some(tally) = run.join(job, &|| interrupt.stopped())? else {
+        tell("interrupted; the chunks are kept");
+        return Ok(if interrupt.signal() == Some(15) {
+            Exit::Terminated
+        } else {
+            Exit::Interrupted
+        });
+    };
+    let joined = run.complete(job, tally, None)?;
+    for note in &joined.notes {
+        tell(note);
+    }
+    let mut text = format!("{}: joined {} points\n", name, joined.tally.points);
+    text.push_str(&rows(&joined.tally, job));
+    line(&mut text, "file", &output.display().to_string());
+    tell(text.trim_end());
+    Ok(Exit::Done)
+}

@@ -1,0 +1,83 @@
+//! `sweep parameters`: the parameter table, for reading or for programs.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+use sweep_parameter::{Parameter as _, Range};
+
+use crate::config::GridInput;
+use crate::exit::{Error, Exit, show};
+use crate::swept::{Listed, Swept};
+
+/// Arguments of `sweep parameters`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Grid file that gives the values; without it those that need none
+    #[arg(value_name = "GRID.toml")]
+    grid: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints every parameter with value, unit, meaning and source.
+///
+/// # Errors
+/// Mistakes in the grid file, or standard output that cannot be written.
+pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+    let plan =
+        args.grid.clone().map(|grid| GridInput::<M>::file(grid, Vec::new()).load()).transpose()?;
+    let rows = M::listed(plan.as_ref());
+    show(&if args.json { as_json(&rows) } else { as_text(&rows) })
+}
+
+fn as_text<M: Swept>(rows: &[Listed<M>]) -> String {
+    let value =
+        |row: &Listed<M>| row.value.map_or_else(|| "-".to_owned(), |value| value.to_string());
+    let width = |length: &dyn Fn(&Listed<M>) -> usize| rows.iter().map(length).max().unwrap_or(0);
+    let name_width = width(&|row| row.parameter.name().len());
+    let value_width = width(&|row| value(row).len());
+    let unit_width = width(&|row| row.parameter.unit().len());
+    let mut text = String::new();
+    for row in rows {
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{:name_width$}  {:>value_width$} {:unit_width$}  {} [{}]",
+            row.parameter.name(),
+            value(row),
+            row.parameter.unit(),
+            row.parameter.description(),
+            row.source,
+        );
+    }
+    text
+}
+
+/// The listing as JSON.
+pub fn as_json<M: Swept>(rows: &[Listed<M>]) -> String {
+    let row = |row: &Listed<M>| {
+        json!({
+            "name": row.parameter.name(),
+            "value": row.value,
+            "unit": row.parameter.unit(),
+            "description": row.parameter.description(),
+            "range": range(row.parameter.range()),
+            "source": row.source,
+        })
+    };
+    format!("{:#}\n", rows.iter().map(row).collect::<Value>())
+}
+
+/// Bounds of a range, `null` where there is none but the common greatest magnitude.
+fn range(range: Range) -> Value {
+    let (least, greatest) = match range {
+        Range::Any => (None, None),
+        Range::Positive | Range::NonNegative => (Some(0.0), None),
+        Range::Negative => (None, Some(0.0)),
+        Range::Within(least, greatest) => (Some(least), Some(greatest)),
+    };
+    let excluded = matches!(range, Range::Positive | Range::Negative);
+    json!({ "least": least, "greatest": greatest, "zero_excluded": excluded })
+}

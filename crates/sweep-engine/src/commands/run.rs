@@ -1,0 +1,338 @@
+//! `sweep run GRID.toml`: the sweep.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::cells::short;
+use super::grid::{ResultArgs, quoted};
+use crate::exit::{Error, Exit, tell};
+use crate::interrupt::Interrupt;
+use crate::plan::Plan;
+use crate::program::program;
+use crate::progress::{ProgressMode, duration, per_second};
+use crate::run::{self as runner, Ended, RunOptions, RunReport};
+use crate::store::provenance::Session;
+use crate::store::read::Tally;
+use crate::store::{Job, ShardRequest};
+use crate::swept::Swept;
+use crate::threads::{self, Environment};
+use crate::watch::Engine;
+use sweep_plot::Share;
+
+/// Arguments of `sweep run`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The run.
+    #[command(flatten)]
+    pub target: ResultArgs,
+    /// How it is done.
+    #[command(flatten)]
+    pub work: WorkArgs,
+    /// Exit with 3 if any row of the finished result failed
+    #[arg(long)]
+    pub fail_on_error: bool,
+}
+
+/// How a run is done, by whichever engine.
+#[derive(Debug, clap::Args)]
+pub struct WorkArgs {
+    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    pub threads: Option<usize>,
+    /// Compute one of N equal shards only, to be joined by `sweep merge`; `auto/N` takes the place
+    /// from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX. In a Slurm array the default is that
+    /// array's task and count (--shard 1/1 is the whole)
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<ShardRequest>,
+    /// Start over, even if the result is there or another plan was begun
+    #[arg(long)]
+    pub fresh: bool,
+    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
+    /// 5 s) or none
+    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
+    pub progress: ProgressMode,
+}
+
+impl WorkArgs {
+    /// As the runner takes them.
+    ///
+    /// # Errors
+    /// A scheduler's number of threads that is none.
+    pub fn options<'a>(&self, environment: Environment<'a>) -> Result<RunOptions<'a>, Error> {
+        Ok(RunOptions {
+            threads: threads::count(self.threads, environment)?,
+            fresh: self.fresh,
+            shard: self.shard,
+            progress: self.progress,
+            environment,
+            tell: &tell,
+        })
+    }
+}
+
+/// Runs a grid.
+///
+/// # Errors
+/// Mistakes in the grid file, and whatever kept the run from its end.
+pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+    let plan: Plan<M> = args.target.grid.load()?;
+    let engine = M::engine(&plan)?;
+    let interrupt = installed()?;
+    let report = execute(args, &plan, engine.as_ref(), &interrupt, "")?;
+    Ok(exit(args.fail_on_error, &report))
+}
+
+/// Signals, heeded from now on.
+///
+/// # Errors
+/// What the system refuses.
+pub fn installed() -> Result<Interrupt, Error> {
+    Interrupt::install().map_err(|source| Error::File {
+        action: "install signal handlers for",
+        path: PathBuf::from("this process"),
+        source,
+    })
+}
+
+/// Runs a plan, with an engine made for it, and prints a summary. `options` are what the command
+/// line has beside these arguments.
+///
+/// # Errors
+/// Whatever of [`crate::store::StoreError`] kept it from its end; finished chunks are kept.
+pub fn execute<M: Swept>(
+    args: &Args,
+    plan: &Plan<M>,
+    engine: &dyn Engine,
+    interrupt: &Interrupt,
+    options: &str,
+) -> Result<RunReport, Error> {
+    let (job, output) = (Job::of(plan), args.target.output(plan));
+    let environment: Environment<'_> = &|name| std::env::var(name).ok();
+    let report = runner::run(engine, &job, &output, args.work.options(environment)?, interrupt)?;
+    for note in &report.notes {
+        tell(note);
+    }
+    tell(summary(args, plan, &job, &output, &report, options).trim_end());
+    Ok(report)
+}
+
+/// How a run ends the program.
+#[must_use]
+pub fn exit(fail_on_error: bool, report: &RunReport) -> Exit {
+    match &report.ended {
+        Ended::Interrupted { signal: 15, .. } => Exit::Terminated,
+        Ended::Interrupted { .. } => Exit::Interrupted,
+        Ended::Already(_, tally) | Ended::Finished(tally)
+            if fail_on_error && tally.by_status.failed() > 0 =>
+        {
+            Exit::PointsFailed
+        }
+        _ => Exit::Done,
+    }
+}
+
+/// What came of the run, in at most twelve lines.
+fn summary<M: Swept>(
+    args: &Args,
+    plan: &Plan<M>,
+    job: &Job<'_>,
+    output: &Path,
+    report: &RunReport,
+    options: &str,
+) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = match (&report.ended, &report.session) {
+        (Ended::Already(file, _), _) => {
+            writeln!(
+                text,
+                "{}: all {} points are there already (--fresh computes them again)",
+                plan.name, file.points
+            )
+        }
+        (Ended::Interrupted { kept, points, .. }, session) => writeln!(
+            text,
+            "{}: interrupted with {kept} of {points} points kept{}",
+            plan.name,
+            session
+                .as_ref()
+                .map(|session| format!(", after {}", duration(session.wall_s)))
+                .unwrap_or_default()
+        ),
+        (Ended::Shard(shard), Some(session)) => {
+            writeln!(
+                text,
+                "{}, shard {} of {}: {}",
+                plan.name,
+                shard.index,
+                shard.of,
+                work(session)
+            )
+        }
+        (_, Some(session)) => writeln!(text, "{}: {}", plan.name, work(session)),
+        (_, None) => Ok(()),
+    };
+    match &report.ended {
+        Ended::Already(_, tally) | Ended::Finished(tally) => text.push_str(&rows(tally, job)),
+        Ended::Interrupted { .. } | Ended::Shard(_) => {}
+    }
+    let out = quoted(&output.display().to_string());
+    match &report.ended {
+        Ended::Already(..) | Ended::Finished(_) => {
+            line(&mut text, "file", &output.display().to_string());
+            if let (true, Ended::Already(_, tally) | Ended::Finished(tally)) =
+                (plan.design.is_some(), &report.ended)
+            {
+                line(&mut text, "share", &share(tally));
+            }
+            line(&mut text, "next", &format!("{} plot {out}", program()));
+        }
+        Ended::Shard(_) => {
+            line(
+                &mut text,
+                "next",
+                &format!("{}, when all shards are done", args.target.command("merge")),
+            );
+        }
+        Ended::Interrupted { .. } => {
+            line(&mut text, "go on", &go_on(args, report.session.as_ref(), options))
+        }
+    }
+    text
+}
+
+/// The command that goes on with an interrupted run, or with this shard of it.
+fn go_on(args: &Args, session: Option<&Session>, options: &str) -> String {
+    let mut line = args.target.command("run");
+    if let Some(shard) = session.and_then(|session| session.shard.as_deref()) {
+        // Writing to a String cannot fail.
+        let _ = write!(line, " --shard {shard}");
+    }
+    line + options
+}
+
+/// What this process did.
+pub fn work(session: &Session) -> String {
+    format!(
+        "{} points in {}, {} on {} thread{} ({})",
+        session.points,
+        duration(session.wall_s),
+        per_second(session.points_per_s),
+        session.threads,
+        if session.threads == 1 { "" } else { "s" },
+        session.simd
+    )
+}
+
+/// A result's rows: verdicts, failures, extremes. At most six lines.
+pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
+    if let Some(dwells) = &tally.dwells {
+        let mut text = String::new();
+        let mut told = format!(
+            "{} of {} rows, {} not, {} without a response",
+            dwells.stable - dwells.beyond,
+            tally.points,
+            dwells.unstable,
+            dwells.unknown
+        );
+        if dwells.beyond > 0 {
+            let _ = write!(told, ", {} beyond what a machine can do", dwells.beyond);
+        }
+        line(&mut text, "stable", &told);
+        return text;
+    }
+    let at = |point: u64| {
+        let values = (job.axis_values)(point);
+        let place = job
+            .layout
+            .axes
+            .iter()
+            .zip(values)
+            .map(|(axis, value)| format!("{} {}", axis.name, short(value)));
+        place.collect::<Vec<_>>().join(", ")
+    };
+    counts(tally, job.ratio_limit, &at)
+}
+
+/// The share of reliable points among those with a verdict, with the interval in which the true
+/// share lies with 95 % confidence if points are independent and at random.
+fn share(tally: &Tally) -> String {
+    match Share::of(tally.reliable, tally.reliable + tally.unreliable) {
+        None => "no point has a verdict".to_owned(),
+        Some(Share { part, low, high }) => format!(
+            "{:.1} % reliable, with 95 % confidence {:.1} to {:.1} % for points at random",
+            100.0 * part,
+            100.0 * low,
+            100.0 * high
+        ),
+    }
+}
+
+/// As [`rows`], where `at` says where a point lies.
+pub fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String) -> String {
+    let mut text = String::new();
+    let percent = |count: u64| 100.0 * count as f64 / tally.points.max(1) as f64;
+    let verdicts = format!(
+        "{} ({:.1} %) below ratio {ratio_limit}, {} not, {} undefined",
+        tally.reliable,
+        percent(tally.reliable),
+        tally.unreliable,
+        tally.undefined
+    );
+    line(&mut text, "reliable", &verdicts);
+    if tally.by_status.failed() > 0 {
+        let by_status = tally.by_status.iter().filter(|(status, _)| *status != "ok");
+        let list: Vec<String> =
+            by_status.map(|(status, count)| format!("{count} {status}")).collect();
+        line(&mut text, "failed", &list.join(", "));
+    }
+    if tally.sensitive > 0 {
+        let told =
+            format!("{}: chaotic, rk4 does not agree with itself at two steps", tally.sensitive);
+        line(&mut text, "sensitive", &told);
+    }
+    if let Some(greatest) = &tally.greatest_error {
+        let methods: Vec<String> =
+            tally.by_method.iter().map(|(method, count)| format!("{count} {method}")).collect();
+        let told = format!(
+            "at most {:.1e} left in a row; rows by method: {}",
+            greatest.value,
+            methods.join(", ")
+        );
+        line(&mut text, "error", &told);
+    }
+    let place = |point: u64| match at(point) {
+        place if place.is_empty() => place,
+        place => format!(" at {place}"),
+    };
+    if let Some(greatest) = &tally.greatest_ratio {
+        line(
+            &mut text,
+            "greatest",
+            &format!("ratio {:.3}{}", greatest.value, place(greatest.point)),
+        );
+    }
+    if let Some(least) = &tally.least_gap_nonlinear_m {
+        line(&mut text, "least gap", &format!("{:.5} m{}", least.value, place(least.point)));
+    }
+    text
+}
+
+/// A named line of a summary.
+pub fn line(text: &mut String, name: &str, value: &str) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "{name:>10}  {value}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_share_is_of_points_with_a_verdict() {
+        let tally = |reliable, unreliable| Tally { reliable, unreliable, ..Tally::default() };
+        let said = share(&tally(8, 2));
+        assert!(said.starts_with("80.0 % reliable, with 95 % confidence 49.0 to 94.3 %"), "{said}");
+        assert_eq!(share(&tally(0, 0)), "no point has a verdict");
+    }
+}

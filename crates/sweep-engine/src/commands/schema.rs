@@ -1,0 +1,17 @@
+//! `schema`: the JSON Schema of grid files.
+
+use crate::config::schema::grid;
+use crate::exit::{Error, Exit, print};
+use crate::swept::Swept;
+
+/// Arguments of `schema`.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+/// Prints the schema of a model's grid files.
+///
+/// # Errors
+/// When standard output cannot be written.
+pub fn run<M: Swept>(_: &Args) -> Result<Exit, Error> {
+    print(&format!("{:#}\n", grid::<M>()))
+}

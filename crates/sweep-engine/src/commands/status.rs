@@ -1,0 +1,97 @@
+//! `sweep status GRID.toml`: progress of a run.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::grid::ResultArgs;
+use super::run::line;
+use crate::exit::{Error, Exit, show, tell};
+use crate::plan::Plan;
+use crate::store::Job;
+use crate::store::{FolderStatus, State, shard_list, status};
+use crate::swept::Swept;
+
+/// Arguments of `sweep status`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    /// The run.
+    pub target: ResultArgs,
+    /// Print it as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Shows the progress of a run, without disturbing it.
+///
+/// # Errors
+/// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
+pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+    let plan: Plan<M> = args.target.grid.load()?;
+    of_job(args, &Job::of(&plan), &args.target.output(&plan), ["run", ""])
+}
+
+/// Shows the progress of a job on its output. `again` is the command that goes on with it, and
+/// what stands behind its arguments.
+///
+/// # Errors
+/// As [`run`].
+pub fn of_job(args: &Args, job: &Job<'_>, output: &Path, again: [&str; 2]) -> Result<Exit, Error> {
+    let found = status(output, job)?;
+    if args.json {
+        return show(&format!("{:#}\n", json!(found)));
+    }
+    tell(summary(args, &found, again).trim_end());
+    Ok(Exit::Done)
+}
+
+fn summary(args: &Args, found: &FolderStatus, [verb, options]: [&str; 2]) -> String {
+    let mut text = String::new();
+    let state = match found.state {
+        State::NotStarted => "not started",
+        State::Unfinished => "unfinished",
+        State::Complete => "complete, to be merged",
+        State::Finished => "finished",
+    };
+    line(&mut text, "state", state);
+    line(&mut text, "file", &found.output.display().to_string());
+    line(
+        &mut text,
+        "points",
+        &format!("{} of {} done, {} failed", found.points_done, found.points, found.points_failed),
+    );
+    if found.state == State::Finished || found.state == State::NotStarted {
+        return text;
+    }
+    let damaged = match found.chunks_damaged.len() {
+        0 => String::new(),
+        count => format!(" ({count} of them damaged)"),
+    };
+    let chunks = format!(
+        "{} of {} done, {} missing{damaged}",
+        found.chunks_done, found.chunks, found.chunks_missing
+    );
+    line(&mut text, "chunks", &chunks);
+    for holder in &found.running {
+        let shard = holder.shard.map(|shard| format!(", shard {shard}")).unwrap_or_default();
+        line(&mut text, "running", &format!("process {} on {}{shard}", holder.pid, holder.host));
+    }
+    if let Some(shards) = found.shards {
+        line(&mut text, "shards", &shards.to_string());
+        let missing = shard_list(found.missing_shard_numbers.iter().copied());
+        if !missing.is_empty() {
+            let run = format!("{} --shard I/{shards}", args.target.command("run"));
+            line(&mut text, "again", &format!("{run}, for I = {missing}"));
+            line(&mut text, "on Slurm", &format!("sbatch --array={} ...", found.missing_shards));
+        }
+    }
+    let next = match found.state {
+        State::Complete => args.target.command("merge"),
+        _ => args.target.command(verb),
+    } + options;
+    if found.running.is_empty() && (found.shards.is_none() || found.state == State::Complete) {
+        line(&mut text, "next", &next);
+    }
+    text
+}

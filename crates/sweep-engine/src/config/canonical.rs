@@ -1,0 +1,86 @@
+//! A plan as JSON: what a result file carries as its input, and what tells one run's plan from
+//! another's.
+
+use serde_json::{Value, json};
+use sweep_parameter::{Channel as _, Parameter as _};
+
+use super::Read;
+use crate::design::{Design, Distribution};
+use crate::method::Integrator as _;
+use crate::plan::{Axis, AxisValues, Plan};
+
+impl<M: Read> Plan<M> {
+    /// The whole plan with every default and constant in place, in the grid file's own terms:
+    /// `name`, `time`, `integrator`, `axis`, `reliability`, what the model says of itself, and
+    /// under `set` what `--set` has changed, if it has.
+    ///
+    /// Canonical: keys are sorted, and numbers are written as the shortest decimal that reads back
+    /// to the same bits, so two plans are the same if and only if their texts are.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let axes = self.axes.iter().map(|axis| self::axis(axis, self.design.as_ref()));
+        let channels = self.reliability.channels.iter().map(|channel| channel.name());
+        let mut plan = json!({
+            "name": self.name,
+            "time": { "end_s": self.end_s, "window_s": self.window_s },
+            "integrator": self.integrator.to_json(),
+            "axis": axes.collect::<Value>(),
+            "reliability": {
+                "ratio_limit": self.reliability.ratio_limit,
+                "channels": channels.collect::<Value>(),
+            },
+        });
+        if let Some(design) = &self.design {
+            plan["design"] = self::design(design);
+        }
+        if let Value::Object(plan) = &mut plan {
+            self.model.describe(plan);
+        }
+        if !self.set.is_empty() {
+            plan["set"] = self.set.iter().cloned().collect();
+        }
+        plan
+    }
+}
+
+fn design(design: &Design) -> Value {
+    let method = design.method();
+    match design {
+        Design::LatinHypercube { points, seed }
+        | Design::Sobol { points, seed }
+        | Design::MonteCarlo { points, seed } => {
+            json!({ "method": method, "points": points, "seed": seed })
+        }
+        Design::List { file, points, hash } => {
+            json!({ "method": method, "file": file, "points": points, "hash": hash })
+        }
+    }
+}
+
+fn axis<M: Read>(axis: &Axis<M>, design: Option<&Design>) -> Value {
+    let parameter = axis.parameter.name();
+    if let Some(Design::List { .. }) = design {
+        // The values are the result's own columns, and the design's hash is over them all.
+        return json!({ "parameter": parameter });
+    }
+    let range = |from: f64, to: f64, count: u64, spacing: &str| {
+        let mut range = json!({ "from": from, "to": to, "spacing": spacing });
+        if design.is_none() {
+            range["count"] = count.into();
+        }
+        json!({ "parameter": parameter, "range": range })
+    };
+    match axis.values {
+        AxisValues::List(ref values) => json!({ "parameter": parameter, "values": values }),
+        AxisValues::Distributed(ref distribution) => {
+            let Distribution { shape, from, to } = *distribution;
+            let mut json = json!({ "kind": shape.name(), "from": from, "to": to });
+            for (key, number) in shape.numbers() {
+                json[key] = number.into();
+            }
+            json!({ "parameter": parameter, "distribution": json })
+        }
+        AxisValues::Linear { from, to, count } => range(from, to, count, "linear"),
+        AxisValues::Log { from, to, count } => range(from, to, count, "log"),
+    }
+}

@@ -1,0 +1,78 @@
+//! `[design]`: points by a rule over the axes' ranges, or listed in a file of their own.
+
+use std::path::Path;
+
+use super::axes::MOST_POINTS;
+use super::list::{self, List};
+use super::report::Report;
+use super::section::{Field, Section};
+use super::source::Located;
+use crate::design::Design;
+
+/// The methods by name.
+pub const METHODS: [&str; 4] = ["latin_hypercube", "sobol", "monte_carlo", "list"];
+/// `seed` when the grid names none.
+pub const DEFAULT_SEED: u64 = 0;
+/// Greatest seed: what JSON and TOML carry exactly everywhere.
+pub const MOST_SEED: u64 = (1 << 53) - 1;
+/// Points of Sobol's sequence with 32 bits.
+pub const MOST_SOBOL: u64 = 1 << 32;
+
+/// What `[design]` says.
+pub enum WrittenDesign {
+    /// Nothing: a grid.
+    None,
+    /// Something wrong, already reported.
+    Bad,
+    /// Points over ranges.
+    Box(Located<Design>),
+    /// Points as listed.
+    List(List),
+}
+
+/// Reads the section, and the file it names.
+pub fn read(root: &mut Section<'_>, grid: &Path, report: &mut Report) -> WrittenDesign {
+    let mut section = match root.table("design", "[design]", report) {
+        Field::Absent => return WrittenDesign::None,
+        Field::Bad => return WrittenDesign::Bad,
+        Field::Given(section) => section.value,
+    };
+    let at = section.at().clone();
+    let field = section.choice("method", &METHODS, report);
+    let expected = "`latin_hypercube`, `sobol`, `monte_carlo` or `list`";
+    let Some(method) = section.require(field, "method", expected, report) else {
+        // Which keys belong to a method that is none cannot be said, but what is wrong with any
+        // can.
+        let _ = section.count("points", MOST_POINTS, report);
+        let _ = section.whole("seed", 0..=MOST_SEED, report);
+        let _ = section.text("file", report);
+        section.finish(report);
+        return WrittenDesign::Bad;
+    };
+    let written = if METHODS[method.value] == "list" {
+        section.misplace(&["points", "seed"], "a list has the points that it lists");
+        let field = section.text("file", report);
+        let file =
+            section.require(field, "file", "a CSV or Parquet file, relative to this file", report);
+        file.and_then(|file| list::read(&file, grid, report))
+            .map_or(WrittenDesign::Bad, WrittenDesign::List)
+    } else {
+        section.misplace(&["file"], "only the method \"list\" has it");
+        let chosen = METHODS[method.value];
+        let sobol = chosen == "sobol";
+        let field = section.count("points", if sobol { MOST_SOBOL } else { MOST_POINTS }, report);
+        let points = section.require(field, "points", "the number of points", report);
+        let seed = section.whole("seed", 0..=MOST_SEED, report).or(DEFAULT_SEED);
+        // Stand-ins for what was refused, so that the axes are read all the same.
+        let (points, seed) =
+            (points.map_or(1, |points| points.value), seed.unwrap_or(DEFAULT_SEED));
+        let design = match chosen {
+            "sobol" => Design::Sobol { points, seed },
+            "monte_carlo" => Design::MonteCarlo { points, seed },
+            _ => Design::LatinHypercube { points, seed },
+        };
+        WrittenDesign::Box(Located { value: design, at })
+    };
+    section.finish(report);
+    written
+}

@@ -1,0 +1,159 @@
+//! Lists of points: files whose columns are parameters and whose rows are points.
+//!
+//! A list is read into memory as a whole. The bytes of its file, packed and unpacked, and the
+//! numbers in it are bounded; each bound is checked before the memory is taken.
+
+mod csv;
+mod parquet;
+
+use std::io::Read as _;
+use std::path::Path;
+
+use super::report::{Diagnostic, Report};
+use super::section::{cut, short};
+use super::source::{Located, Location, SourceId, Sources, beside};
+use crate::design::Design;
+use sweep_files::regular;
+
+/// Longest list that is read, in bytes; and so of a Parquet file's pages unpacked.
+const LONGEST_BYTES: u64 = 256 << 20;
+/// Most numbers of a list.
+const MOST_NUMBERS: u64 = 20_000_000;
+/// Most columns of a list.
+const MOST_COLUMNS: usize = 1000;
+/// Most characters of a path in a message.
+const LONGEST_PATH: usize = 1000;
+
+/// Name of a column that is no parameter: it tells people which row is which.
+pub(super) const ID: &str = "id";
+
+/// A list of points.
+pub struct List {
+    pub design: Design,
+    pub columns: Vec<ListColumn>,
+    rows: Rows,
+}
+
+/// One parameter's values.
+pub struct ListColumn {
+    pub name: Located<String>,
+    pub values: Vec<f64>,
+}
+
+/// The places of rows.
+enum Rows {
+    /// In lines of a text that begin at these bytes.
+    Lines { source: SourceId, starts: Vec<u32> },
+    /// In no text; the file is named here.
+    Binary(Location),
+}
+
+/// Why a file is no list.
+#[derive(Debug, thiserror::Error)]
+enum Unreadable {
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    #[error("it is longer than {} MiB", LONGEST_BYTES >> 20)]
+    TooLong,
+    #[error("unpacked, it is longer than {} MiB", LONGEST_BYTES >> 20)]
+    TooLongUnpacked,
+    #[error("it holds more than {MOST_NUMBERS} numbers")]
+    TooManyNumbers,
+    #[error("it has {0} columns, more than {MOST_COLUMNS}")]
+    TooManyColumns(usize),
+    #[error("it is neither Parquet nor UTF-8 text: byte {0} is wrong")]
+    NotText(usize),
+    #[error("its column `{}` holds no numbers but {found}", short(column))]
+    NotNumbers { column: String, found: String },
+    #[error("its column `{}` has no value in row {row}", short(column))]
+    NoValue { column: String, row: usize },
+    #[error(
+        "its column `{}` is compressed by {codec}, which this program does not read: \
+         write it with {}",
+        short(column),
+        parquet::READABLE_CODECS
+    )]
+    Codec { column: String, codec: String },
+    #[error("it is damaged: {0}")]
+    Damaged(String),
+}
+
+impl List {
+    /// The place of a value, both counted from 0.
+    pub fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
+        match &self.rows {
+            Rows::Binary(at) => at.clone(),
+            Rows::Lines { source, starts } => {
+                let start = starts.get(row).map_or(0, |&start| start as usize);
+                let span = csv::cell_span(sources.text(*source), start, column);
+                Location::new(*source, span)
+            }
+        }
+    }
+}
+
+/// Reads the listed points.
+pub(super) fn read(file: &Located<&str>, grid: &Path, report: &mut Report) -> Option<List> {
+    let path = beside(grid, file.value);
+    let shown = cut(&path.display().to_string(), LONGEST_PATH);
+    let read = bytes(&path).and_then(|bytes| {
+        let hash = blake3::hash(&bytes).to_hex().to_string();
+        if bytes.starts_with(b"PAR1") {
+            let columns = parquet::columns(bytes)?;
+            let located = |value| Located { value, at: file.at.clone() };
+            let column = |(name, values)| ListColumn { name: located(name), values };
+            let columns = columns.into_iter().map(column).collect();
+            return Ok(Some((columns, Rows::Binary(file.at.clone()), hash)));
+        }
+        let text = String::from_utf8(bytes)
+            .map_err(|error| Unreadable::NotText(error.utf8_error().valid_up_to() + 1))?;
+        // Messages quote the text when all is read; until then it is held here.
+        let source = report.sources.add(shown.as_str(), String::new());
+        let read = csv::read(&text, source, report);
+        report.sources.fill(source, text);
+        let (columns, starts) = match read? {
+            Some(read) => read,
+            None => return Ok(None),
+        };
+        Ok(Some((columns, Rows::Lines { source, starts }, hash)))
+    });
+    let (columns, rows, hash) = match read {
+        Ok(read) => read?,
+        Err(reason) => {
+            let title = format!("cannot read the list of points {shown}: {reason}");
+            let expected = "expected a CSV or Parquet file of numbers, one column a parameter, \
+                relative to this file";
+            report.push(Diagnostic::new(title).at(&file.at, expected));
+            return None;
+        }
+    };
+    let points = columns.first().map_or(0, |column: &ListColumn| column.values.len());
+    if points == 0 {
+        let title = format!("the list of points {shown} is empty");
+        let expected = "expected a line of parameter names, and under it a row of numbers a point";
+        report.push(Diagnostic::new(title).at(&file.at, expected));
+        return None;
+    }
+    if columns.iter().all(|column: &ListColumn| column.name.value == ID) {
+        let title = format!("the list of points {shown} has no column but `{ID}`");
+        report.push(Diagnostic::new(title).at(&file.at, "expected a column of a parameter"));
+        return None;
+    }
+    let design = Design::List { file: file.value.to_owned(), points: points as u64, hash };
+    Some(List { design, columns, rows })
+}
+
+fn bytes(path: &Path) -> Result<Vec<u8>, Unreadable> {
+    let mut bytes = Vec::new();
+    regular::open(path)?.take(LONGEST_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LONGEST_BYTES { Err(Unreadable::TooLong) } else { Ok(bytes) }
+}
+
+/// Whether so many rows of so many columns are accepted.
+fn fits(rows: u64, columns: usize) -> Result<(), Unreadable> {
+    let fits = rows.checked_mul(columns as u64).is_some_and(|numbers| numbers <= MOST_NUMBERS);
+    if fits { Ok(()) } else { Err(Unreadable::TooManyNumbers) }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,155 @@
+//! Every compression, every bound, and files that are damaged.
+
+use std::sync::Arc;
+
+use ::parquet::arrow::ArrowWriter;
+use ::parquet::basic::{Compression, GzipLevel, ZstdLevel};
+use ::parquet::file::properties::{WriterProperties, WriterVersion};
+use arrow_array::{ArrayRef, Float64Array, Int32Array, RecordBatch, StringArray};
+
+use super::*;
+
+const NAME: &str = "unbalance_mass_kg";
+
+fn readable() -> [Compression; 5] {
+    [
+        Compression::UNCOMPRESSED,
+        Compression::SNAPPY,
+        Compression::ZSTD(ZstdLevel::default()),
+        Compression::GZIP(GzipLevel::default()),
+        Compression::LZ4_RAW,
+    ]
+}
+
+/// A file with these columns, batch after batch.
+fn file(columns: &[(&str, ArrayRef)], batches: usize, properties: WriterProperties) -> Vec<u8> {
+    let batch = RecordBatch::try_from_iter(columns.iter().cloned()).unwrap();
+    let mut bytes = Vec::new();
+    let mut writer = ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties)).unwrap();
+    for _ in 0..batches {
+        writer.write(&batch).unwrap();
+    }
+    writer.close().unwrap();
+    bytes
+}
+
+fn compressed(codec: Compression, version: WriterVersion) -> WriterProperties {
+    WriterProperties::builder().set_compression(codec).set_writer_version(version).build()
+}
+
+/// A mass and a whole number of kilograms.
+fn small(codec: Compression, version: WriterVersion) -> Vec<u8> {
+    let masses = (0..300).map(|k| 0.1 + 0.001 * f64::from(k % 50)).collect::<Vec<_>>();
+    let frames = (0..300).map(|k| 20 + k % 7).collect::<Vec<_>>();
+    let masses: ArrayRef = Arc::new(Float64Array::from(masses));
+    let frames: ArrayRef = Arc::new(Int32Array::from(frames));
+    file(&[(NAME, masses), ("frame_mass_kg", frames)], 1, compressed(codec, version))
+}
+
+fn refusal(bytes: Vec<u8>) -> String {
+    parquet::columns(bytes).expect_err("not a list").to_string()
+}
+
+#[test]
+fn every_usual_compression_reads_alike() {
+    let plain = small(Compression::UNCOMPRESSED, WriterVersion::PARQUET_1_0);
+    let plain = parquet::columns(plain).unwrap();
+    assert_eq!((plain[0].1[49], plain[1].1[6]), (0.1 + 0.001 * 49.0, 26.0));
+    for codec in readable() {
+        for version in [WriterVersion::PARQUET_1_0, WriterVersion::PARQUET_2_0] {
+            let read = parquet::columns(small(codec, version));
+            assert_eq!(read.unwrap(), plain, "{codec}, {version:?}");
+        }
+    }
+}
+
+#[test]
+fn a_compression_that_is_not_read_is_named_with_those_that_are() {
+    let snappy = small(Compression::SNAPPY, WriterVersion::PARQUET_1_0);
+    // A column's codec follows its name: an i32, one field on.
+    let place = [NAME.as_bytes(), &[0x15, 0x02]].concat();
+    let found = snappy.windows(place.len()).position(|window| window == place);
+    let place = found.unwrap() + place.len() - 1;
+    for (code, name) in [(3, "lzo"), (4, "brotli"), (5, "lz4")] {
+        let mut other = snappy.clone();
+        other[place] = 2 * code;
+        let told = refusal(other);
+        let expected = format!("`{NAME}` is compressed by {name}, which this program does not");
+        assert!(told.contains(&expected) && told.contains("snappy, zstd, gzip"), "{told}");
+    }
+}
+
+#[test]
+fn what_is_no_number_is_told_by_column() {
+    let texts: ArrayRef = Arc::new(StringArray::from(vec!["a"]));
+    let none: ArrayRef = Arc::new(Float64Array::from(vec![Some(1.0), None]));
+    let of = |column: ArrayRef| refusal(file(&[("x", column)], 1, WriterProperties::default()));
+    assert!(of(texts).contains("`x` holds no numbers but Utf8"));
+    assert!(of(none).contains("`x` has no value in row 2"));
+}
+
+#[test]
+fn a_small_file_of_too_many_rows_is_refused_unread() {
+    let column: ArrayRef = Arc::new(Float64Array::from(vec![1.0; 1_000_000]));
+    let properties = compressed(Compression::SNAPPY, WriterVersion::PARQUET_1_0);
+    let bytes = file(&[("x", column)], 1 + (MOST_NUMBERS / 1_000_000) as usize, properties);
+    assert!(bytes.len() < 1_000_000, "{}", bytes.len());
+    assert!(refusal(bytes).contains("more than 20000000 numbers"));
+}
+
+#[test]
+fn damage_is_an_error_or_another_list_and_nothing_else() {
+    for codec in readable() {
+        let whole = small(codec, WriterVersion::PARQUET_2_0);
+        for length in (0..whole.len()).step_by(7) {
+            assert!(parquet::columns(whole[..length].to_vec()).is_err(), "{codec}: {length} bytes");
+        }
+        for at in 0..whole.len() {
+            for bit in [0, 3, 7] {
+                let mut flipped = whole.clone();
+                flipped[at] ^= 1 << bit;
+                if let Ok(columns) = parquet::columns(flipped) {
+                    assert!(columns.iter().all(|(_, values)| values.len() as u64 <= MOST_NUMBERS));
+                }
+            }
+        }
+    }
+}
+
+fn csv_of(text: &str) -> Result<Option<(Vec<ListColumn>, Vec<u32>)>, Unreadable> {
+    let mut report = Report::default();
+    let source = report.sources.add("list.csv", String::new());
+    csv::read(text, source, &mut report)
+}
+
+#[test]
+fn a_text_of_too_many_numbers_or_columns_is_refused() {
+    let rows = "1,2\n".repeat((MOST_NUMBERS / 2) as usize);
+    let (columns, starts) = csv_of(&format!("a,b\n{rows}")).unwrap().unwrap();
+    assert_eq!((columns[1].values.len(), starts.len()), (10_000_000, 10_000_000));
+    let refused = |text: &str| csv_of(text).map(|_| ()).unwrap_err().to_string();
+    assert!(refused(&format!("a,b\n{rows}1,2\n")).contains("more than 20000000 numbers"));
+    assert!(refused(&",".repeat(100_000_000)).contains("it has 100000001 columns"));
+}
+
+#[test]
+fn a_row_of_too_many_numbers_is_one_mistake() {
+    let mut report = Report::default();
+    let source = report.sources.add("list.csv", String::new());
+    let text = format!("a,b\n{}\n1,2\n", ",".repeat(100_000_000));
+    assert!(csv::read(&text, source, &mut report).unwrap().is_none());
+    assert_eq!(report.into_diagnostics().count(), 1);
+}
+
+#[test]
+fn a_value_is_found_where_it_stands() {
+    let text = "\u{feff}# by hand\r\n a , \"b\"\r\n\r\n 1,2 \r\n3 , \"4\"\r\n";
+    let (columns, starts) = csv_of(text).unwrap().unwrap();
+    assert_eq!([&columns[0].values, &columns[1].values], [&[1.0, 3.0], &[2.0, 4.0]]);
+    let found = |row: usize, column| &text[csv::cell_span(text, starts[row] as usize, column)];
+    assert_eq!([found(0, 0), found(0, 1), found(1, 0), found(1, 1)], ["1", "2", "3", "\"4\""]);
+    assert_eq!(
+        [&text[columns[0].name.at.span.clone()], &text[columns[1].name.at.span.clone()]],
+        ["a", "\"b\""]
+    );
+}

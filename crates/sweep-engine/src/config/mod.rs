@@ -1,0 +1,166 @@
+//! From what a user typed to a [`Plan`], or to every mistake in it.
+//!
+//! A grid file, the file that it names for its model and the constants of the command line are
+//! walked once, each value with its place. Wrong values are reported and replaced by stand-ins, so
+//! that the walk goes on and one pass finds every mistake. There is a plan only if there are no
+//! mistakes.
+//!
+//! Defaults: `name` is the file's own name, `window_s` the whole run, `[integrator]` the defaults
+//! of [`crate::method`]'s table, `[reliability]` the ratio 2 over the model's usual channels;
+//! without axes the grid is a single point. `end_s` must be given.
+//!
+//! With `[design]` the axes are ranges without a count, over which `latin_hypercube` or `sobol`
+//! spreads `points` points; or there is no axis, and `list` takes points from a CSV or Parquet file
+//! whose columns are parameters.
+//!
+//! Bounds: files to 896 KiB; lists of points to 256 MiB, packed or not, and 2e7 numbers; a Sobol
+//! design to 2^32 points over 32 axes; 1e12 grid points; 1e6 s; 1e10 steps that stability asks for;
+//! numbers to 1e12 in magnitude.
+//!
+//! Precedence, later over earlier: the model's own file, `[set]`, `--set`, axes. Within each of
+//! them no number may be written twice, not even under two names, because nothing would say which
+//! comes last.
+
+mod again;
+pub mod axes;
+mod canonical;
+pub mod design;
+pub mod grid;
+mod list;
+pub mod origins;
+pub mod parameters;
+mod points;
+pub mod read;
+mod render;
+pub mod report;
+pub mod scalars;
+pub mod schema;
+pub mod section;
+pub mod source;
+pub mod syntax;
+pub mod whole;
+
+use std::marker::PhantomData;
+use std::path::PathBuf;
+
+pub use grid::Draft;
+pub use origins::Origins;
+pub use points::{check_columns, not_numbers, other_length};
+pub use read::{Read, Schema};
+pub use report::{Diagnostics, Mistake};
+
+use report::{Diagnostic, Report};
+use serde_json::Value;
+use source::Location;
+
+use crate::plan::Plan;
+
+/// A grid as a user gives it: a file or a text, with the constants `NAME=VALUE` over those it sets.
+#[derive(Clone, Debug)]
+pub struct GridInput<M> {
+    /// The file, to which the paths in it are relative.
+    pub path: PathBuf,
+    /// If it is not the file's.
+    text: Option<String>,
+    /// The text of a file of the model's own, in place of the one that the grid names.
+    pub own_file: Option<String>,
+    sets: Vec<String>,
+    model: PhantomData<M>,
+}
+
+impl<M: Read> GridInput<M> {
+    /// A grid file. The paths in it are relative to its folder.
+    #[must_use]
+    pub fn file(path: PathBuf, sets: Vec<String>) -> Self {
+        Self { path, text: None, own_file: None, sets, model: PhantomData }
+    }
+
+    /// The text of a grid file. Messages call it by this name, which is also that of the run if the
+    /// text gives none. The paths in it are relative to the working directory.
+    #[must_use]
+    pub fn text(name: &str, text: String, sets: Vec<String>) -> Self {
+        Self { path: name.into(), text: Some(text), own_file: None, sets, model: PhantomData }
+    }
+
+    /// The grid that a result was made of, by its plan in the result (`Plan::to_json`). The points
+    /// of a design are left out.
+    pub fn of_plan(name: &str, plan: &Value) -> Self {
+        let is_read =
+            |key: &str| !["design", "set", "boundary"].contains(&key) && Some(key) != M::OWN_FILE;
+        let entries = |value: Option<&'_ Value>| -> Vec<(String, Value)> {
+            let object = value.and_then(Value::as_object).into_iter().flatten();
+            object.map(|(key, value)| (key.clone(), value.clone())).collect()
+        };
+        let top = entries(Some(plan)).into_iter().filter(|(key, _)| is_read(key));
+        let own = M::OWN_FILE.and_then(|key| plan.get(key)).filter(|own| own.is_object());
+        Self {
+            path: name.into(),
+            text: Some(again::file(top)),
+            own_file: own.map(|own| again::file(entries(Some(own)))),
+            sets: Vec::new(),
+            model: PhantomData,
+        }
+    }
+
+    /// Reads the grid, puts the constants in place, and checks the whole.
+    ///
+    /// # Errors
+    /// Every mistake found, in one pass.
+    pub fn load(&self) -> Result<Plan<M>, Diagnostics> {
+        resolve(self, |_, _| ()).map(|(plan, ())| plan)
+    }
+
+    /// As [`Self::load`], for one point: `at` gives each axis of several values one (on the grid or
+    /// between its points), and any other parameter too. The plan has no axes; its model
+    /// is the point's. Beside it, what `at` says, by name.
+    ///
+    /// # Errors
+    /// Every mistake found, in one pass.
+    pub fn load_point(&self, at: &[String]) -> Result<(Plan<M>, NamedValues), Diagnostics> {
+        resolve(self, |draft, report| parameters::point(at, draft, report))
+    }
+}
+
+/// The name of a run as the command line gives it, or what it should have been.
+///
+/// # Errors
+/// In words.
+pub fn plain_name(text: &str) -> Result<String, String> {
+    grid::plain_name(text)
+}
+
+/// Parameters by name, with a value each.
+pub type NamedValues = Vec<(String, f64)>;
+
+fn resolve<M: Read, T>(
+    input: &GridInput<M>,
+    finish: impl FnOnce(&mut Draft<M>, &mut Report) -> T,
+) -> Result<(Plan<M>, T), Diagnostics> {
+    let mut report = Report::default();
+    let Some(mut draft) = grid::draft(input, &mut report) else {
+        return Err(report.into_diagnostics());
+    };
+    let finished = finish(&mut draft, &mut report);
+    whole::steps(&draft, &mut report);
+    M::judge(&draft, &mut report);
+    report.finish((draft.plan, finished))
+}
+
+/// Mistakes in expressions that an option or argument takes, each with its text.
+#[must_use]
+pub fn mistakes_in_expressions<'a>(
+    option: &str,
+    mistakes: impl IntoIterator<Item = (&'a str, sweep_results::Mistake)>,
+) -> Diagnostics {
+    let mut report = Report::default();
+    for (text, mistake) in mistakes {
+        let source = report.sources.add(option, text);
+        let at = Location::new(source, mistake.span);
+        let mut diagnostic = Diagnostic::new(mistake.title).at(&at, mistake.expected);
+        if let Some((typed, names)) = &mistake.candidates {
+            diagnostic = diagnostic.nearest(typed, names.iter().map(String::as_str));
+        }
+        report.push(diagnostic);
+    }
+    report.into_diagnostics()
+}

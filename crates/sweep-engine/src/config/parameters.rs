@@ -1,0 +1,229 @@
+//! Constants (`[set]`, `--set`, `--at`): names from the parameter table with a value each.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use sweep_parameter::{Parameter as _, Range};
+
+use super::NamedValues;
+use super::Read;
+use super::grid::Draft;
+use super::report::{Diagnostic, Report};
+use super::scalars;
+use super::section::{Section, check_number, quoted, short};
+use super::source::{Located, Location};
+use crate::model::UnknownParameter;
+use crate::plan::Plan;
+use crate::program::program;
+
+/// Names offered as the nearest one; a machine of thousands of springs has more than a reader wants
+/// compared.
+const COMPARED: usize = 400;
+
+/// A name with its value, and the numbers it writes.
+struct Constant<'a, M: Read> {
+    name: Located<&'a str>,
+    parameter: M::Parameter,
+    value: Located<f64>,
+}
+
+/// A constant that was put in place.
+pub struct WrittenConstant {
+    /// Of the parameter.
+    pub name: Located<String>,
+    /// The numbers that it writes.
+    pub parts: Vec<Cow<'static, str>>,
+}
+
+/// Reads `[set]`, then `--set`, which overrides it, and writes both into the plan.
+pub fn constants<M: Read>(
+    root: &mut Section<'_>,
+    sets: &[String],
+    draft: &mut Draft<M>,
+    report: &mut Report,
+) {
+    let mut constants = Vec::new();
+    if let Some(section) = root.table("set", "[set]", report).given() {
+        let section = section.value;
+        for name in section.names() {
+            let number =
+                |range: Range, report: &mut Report| section.number_named(name.value, range, report);
+            constants.extend(constant(name.clone(), number, draft, report));
+        }
+        apply(&constants, draft, report);
+    }
+    let sets: Vec<String> =
+        sets.iter().filter(|argument| !scalars::is_one::<M>(argument)).cloned().collect();
+    let constants = arguments("--set", &sets, draft, report);
+    let before = draft.plan.clone();
+    apply(&constants, draft, report);
+    // What is set to what it was leaves the plan as it was.
+    let changes = |constant: &&Constant<'_, M>| {
+        let mut after = before.clone();
+        write(&constant.parameter, &mut after, constant.value.value);
+        after != before
+    };
+    draft.plan.set = constants
+        .iter()
+        .filter(changes)
+        .map(|constant| (constant.name.value.to_owned(), constant.value.value.into()))
+        .collect();
+}
+
+/// Puts one point in place of the axes: `--at` gives every axis of several values, and may give
+/// more.
+pub fn point<M: Read>(at: &[String], draft: &mut Draft<M>, report: &mut Report) -> NamedValues {
+    let constants = arguments("--at", at, draft, report);
+    let named = |name: &str| {
+        at.iter().any(|argument| argument.split('=').next().is_some_and(|n| n.trim() == name))
+    };
+    for (k, axis) in std::mem::take(&mut draft.plan.axes).into_iter().enumerate() {
+        if named(axis.parameter.name()) {
+            continue;
+        }
+        if axis.values.len() == 1 {
+            write(&axis.parameter, &mut draft.plan, axis.values.value(0));
+        } else if let Some(place) = draft.origins.get(&format!("axis[{k}]")) {
+            let name = axis.parameter.name();
+            let title = format!("a point of the grid needs a value of `{name}`");
+            report.push(
+                Diagnostic::new(title)
+                    .at(place, format!("expected --at {name}=VALUE for this axis")),
+            );
+        }
+    }
+    draft.plan.design = None;
+    apply(&constants, draft, report);
+    constants
+        .iter()
+        .map(|constant| (constant.name.value.to_owned(), constant.value.value))
+        .collect()
+}
+
+/// Reads NAME=VALUE arguments.
+fn arguments<'a, M: Read>(
+    option: &str,
+    arguments: &'a [String],
+    draft: &Draft<M>,
+    report: &mut Report,
+) -> Vec<Constant<'a, M>> {
+    let mut constants = Vec::new();
+    for argument in arguments {
+        let source = report.sources.add(option, argument.as_str());
+        let whole = Location::new(source, 0..argument.len());
+        let Some((name, value)) = argument.split_once('=') else {
+            let title = format!("`{}` is not a constant", short(argument));
+            report.push(Diagnostic::new(title).at(&whole, "expected NAME=VALUE"));
+            continue;
+        };
+        let value_at = Location::new(source, name.len() + 1..argument.len());
+        let name = Located { value: name.trim(), at: Location::new(source, 0..name.len()) };
+        let number = |range: Range, report: &mut Report| match value.trim().parse() {
+            Ok(number) => check_number(&quoted(name.value), number, value_at, range, report),
+            Err(_) => {
+                let title = format!("`{}` is not a number", short(value));
+                report.push(Diagnostic::new(title).at(&value_at, format!("expected {range}")));
+                None
+            }
+        };
+        constants.extend(constant(name.clone(), number, draft, report));
+    }
+    constants
+}
+
+/// A constant if its name is right and `number` has one in the parameter's range.
+fn constant<'a, M: Read>(
+    name: Located<&'a str>,
+    number: impl FnOnce(Range, &mut Report) -> Option<Located<f64>>,
+    draft: &Draft<M>,
+    report: &mut Report,
+) -> Option<Constant<'a, M>> {
+    let parameter = find(&name, draft, report)?;
+    let value = number(parameter.range(), report)?;
+    Some(Constant { name, parameter, value })
+}
+
+/// The parameter of this name.
+pub fn find<M: Read>(
+    name: &Located<&str>,
+    draft: &Draft<M>,
+    report: &mut Report,
+) -> Option<M::Parameter> {
+    let error = match draft.plan.model.find(name.value) {
+        Ok(parameter) => return Some(parameter),
+        Err(error) => error,
+    };
+    report.push_with(|_| unknown(name, &error, &draft.plan.model));
+    None
+}
+
+/// The mistake of a name that is no parameter.
+pub fn unknown<M: Read>(
+    name: &Located<&str>,
+    UnknownParameter { reason, is_strange }: &UnknownParameter,
+    model: &M,
+) -> Diagnostic {
+    let title = format!("unknown parameter {}", quoted(name.value));
+    let diagnostic = Diagnostic::new(title).at(&name.at, reason.as_str());
+    let section = match name.value {
+        "window_s" => Some("[time], or as `window_from_s` and `window_to_s` here"),
+        "end_s" => Some("[time]"),
+        "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator]"),
+        "ratio_limit" | "criterion" | "channels" => Some("[reliability]"),
+        _ => None,
+    };
+    match (is_strange, section) {
+        (true, Some(section)) => diagnostic.help(format!(
+            "`{}` is set in {section} of the grid file and is the same at every point",
+            name.value
+        )),
+        (true, None) => {
+            let all = model.parameters();
+            let near =
+                diagnostic.nearest(name.value, all.iter().take(COMPARED).map(|one| one.name()));
+            near.help(format!("`{} parameters` lists every name", program()))
+        }
+        (false, _) => diagnostic,
+    }
+}
+
+/// Writes constants of equal rank; no number may be written twice, as nothing says which comes
+/// last.
+fn apply<M: Read>(constants: &[Constant<'_, M>], draft: &mut Draft<M>, report: &mut Report) {
+    let mut written: BTreeMap<Cow<'static, str>, &Constant<'_, M>> = BTreeMap::new();
+    for constant in constants {
+        let parts = draft.plan.model.parts(&constant.parameter);
+        match parts.iter().find_map(|part| written.get(part)) {
+            Some(first) => report.push(twice(&constant.name, &first.name)),
+            None => {
+                write(&constant.parameter, &mut draft.plan, constant.value.value);
+                for part in &parts {
+                    draft.origins.put(part.clone().into_owned(), constant.value.at.clone());
+                    written.insert(part.clone(), constant);
+                }
+                let name =
+                    Located { value: constant.name.value.to_owned(), at: constant.name.at.clone() };
+                draft.constants.push(WrittenConstant { name, parts });
+            }
+        }
+    }
+}
+
+fn write<M: Read>(parameter: &M::Parameter, plan: &mut Plan<M>, value: f64) {
+    match parameter.window_edge() {
+        Some(edge) => plan.window_s[edge] = value,
+        None => plan.model.write(parameter, value),
+    }
+}
+
+/// The mistake of a number that is written twice.
+pub fn twice(second: &Located<&str>, first: &Located<&str>) -> Diagnostic {
+    let title = if second.value == first.value {
+        format!("`{}` is given twice", second.value)
+    } else {
+        format!("`{}` and `{}` write the same number", first.value, second.value)
+    };
+    Diagnostic::new(title)
+        .at(&second.at, "expected each number once")
+        .at(&first.at, "first written here")
+}

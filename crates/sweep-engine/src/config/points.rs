@@ -1,0 +1,139 @@
+//! Columns of a table as the axes of a plan: what a program gives in place of a grid.
+
+use sweep_parameter::Parameter as _;
+
+use super::Read;
+use super::parameters::unknown;
+use super::report::{Diagnostic, Diagnostics, Report};
+use super::section::{quoted, refused_number};
+use super::source::{Located, Location};
+use crate::plan::{Axis, Plan};
+
+/// Finds the column of each axis of a plan: its position among `names`, or none for an axis of one
+/// value that the table leaves out. Every value must lie on its axis, from the least to the
+/// greatest: the method's steps are chosen for that range, so that a row depends on the plan and
+/// its own values alone. `values` gives those of a column in order, `None` where there is none.
+///
+/// # Errors
+/// Every mistake found: columns that are unknown, no axis, or given twice, missing ones, values out
+/// of range.
+pub fn check_columns<M: Read, V>(
+    plan: &Plan<M>,
+    names: &[&str],
+    values: impl Fn(usize) -> V,
+) -> Result<Vec<Option<usize>>, Diagnostics>
+where
+    V: Iterator<Item = Option<f64>>,
+{
+    let mut report = Report::default();
+    let header = names.join(",");
+    let source = report.sources.add("table", header.as_str());
+    let mut start = 0;
+    let located = |name: &&'_ str| {
+        let at = Location::new(source, start..start + name.len());
+        start = at.span.end + 1;
+        Located { value: (*name).to_owned(), at }
+    };
+    let columns: Vec<Located<String>> = names.iter().map(located).collect();
+    let mut of_axes: Vec<Option<usize>> = vec![None; plan.axes.len()];
+    for (k, column) in columns.iter().enumerate() {
+        let name = Located { value: column.value.as_str(), at: column.at.clone() };
+        let place = plan.axes.iter().position(|axis| axis.parameter.name() == name.value);
+        let Some(place) = place else {
+            report.push_with(|_| no_axis(&name, plan));
+            continue;
+        };
+        if let Some(first) = of_axes[place] {
+            let title = format!("the column {} is given twice", quoted(name.value));
+            let diagnostic = Diagnostic::new(title).at(&name.at, "expected each axis once");
+            report.push(diagnostic.at(&columns[first].at, "first given here"));
+            continue;
+        }
+        of_axes[place] = Some(k);
+        let axis = &plan.axes[place];
+        let ends = axis.values.extremes().map(|k| axis.values.value(k));
+        for (row, value) in values(k).enumerate() {
+            if let Err(wrong) = judge(value, row, axis, ends, &name) {
+                report.push_with(|_| wrong());
+            }
+        }
+    }
+    for (axis, column) in plan.axes.iter().zip(&of_axes) {
+        if column.is_none() && axis.values.len() > 1 {
+            let name = axis.parameter.name();
+            let title = format!("the table has no column {}", quoted(name));
+            let whole = Location::new(source, 0..header.len());
+            let expected = "expected a column for every axis of the plan";
+            report.push(Diagnostic::new(title).at(&whole, expected));
+        }
+    }
+    report.finish(of_axes)
+}
+
+/// The mistake of a column that holds no numbers.
+pub fn not_numbers(names: &[String], column: usize, found: &str) -> Diagnostics {
+    let what = format!("the column {} holds no numbers", quoted(&names[column]));
+    of_column(names, column, what, format!("expected numbers, found {found}"))
+}
+
+/// The mistake of a column that is longer or shorter than the first.
+pub fn other_length(names: &[String], column: usize, length: usize, first: usize) -> Diagnostics {
+    let what = format!("the column {} has {length} values", quoted(&names[column]));
+    of_column(names, column, what, format!("expected {first}, as the first column has"))
+}
+
+fn of_column(names: &[String], column: usize, title: String, expected: String) -> Diagnostics {
+    let mut report = Report::default();
+    let source = report.sources.add("table", names.join(","));
+    let start = names[..column].iter().map(|name| name.len() + 1).sum();
+    let at = Location::new(source, start..start + names[column].len());
+    report.push(Diagnostic::new(title).at(&at, expected));
+    report.into_diagnostics()
+}
+
+/// Judges one value; what is wrong is put in words only where it is shown.
+fn judge<'a, M: Read>(
+    value: Option<f64>,
+    row: usize,
+    axis: &'a Axis<M>,
+    [least, greatest]: [f64; 2],
+    name: &'a Located<&str>,
+) -> Result<(), impl FnOnce() -> Diagnostic + 'a> {
+    if value.is_some_and(|value| (least..=greatest).contains(&value)) {
+        return Ok(());
+    }
+    Err(move || {
+        let what = format!("row {} of {}", row + 1, quoted(name.value));
+        let range = axis.parameter.range();
+        match value {
+            None => Diagnostic::new(format!("{what} has no value"))
+                .at(&name.at, format!("expected {range}")),
+            Some(value) if !range.contains(value) => refused_number(&what, value, &name.at, range),
+            Some(value) => {
+                let title = format!("{what} = {value} is off the plan's axis");
+                let expected = format!("expected a number from {least} to {greatest}");
+                Diagnostic::new(title).at(&name.at, expected).help(format!(
+                    "give `{}` a wider range in the plan's [[axis]]",
+                    axis.parameter.name()
+                ))
+            }
+        }
+    })
+}
+
+/// A column that is no axis: of a parameter that the plan holds, or of nothing.
+fn no_axis<M: Read>(name: &Located<&str>, plan: &Plan<M>) -> Diagnostic {
+    if let Err(error) = plan.model.find(name.value) {
+        return unknown(name, &error, &plan.model);
+    }
+    let axes: Vec<String> = plan.axes.iter().map(|axis| quoted(axis.parameter.name())).collect();
+    let expected = match axes.as_slice() {
+        [] => "this plan has no [[axis]]".to_owned(),
+        axes => format!("expected the plan's axes: {}", axes.join(", ")),
+    };
+    let title = format!("{} is no axis of this plan", quoted(name.value));
+    Diagnostic::new(title).at(&name.at, expected).help(format!(
+        "add [[axis]] with parameter = \"{}\" and the range that the table may cover",
+        name.value
+    ))
+}

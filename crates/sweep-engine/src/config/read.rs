@@ -1,0 +1,69 @@
+//! What a grid file holds of a model.
+
+use serde_json::{Map, Value};
+
+use super::report::Report;
+use super::scalars::Written;
+use super::section::Section;
+use super::{Draft, GridInput, Origins};
+use crate::model::Model;
+
+/// A model in grid files. The engine reads `name`, `[set]`, `[time]`, `[integrator]`,
+/// `[reliability]`, `[design]` and `[[axis]]`; what else there is, the model reads.
+pub trait Read: Model {
+    /// The key under which a grid names a file of the model's own, if it may.
+    const OWN_FILE: Option<&'static str> = None;
+
+    /// What to do where there is no grid file yet.
+    const TO_START: Option<&'static str> = None;
+
+    /// Reads what the model is of the top of a grid file.
+    fn read(
+        input: &GridInput<Self>,
+        root: &mut Section<'_>,
+        origins: &mut Origins,
+        report: &mut Report,
+    ) -> Self;
+
+    /// Reads what stands before `[reliability]`.
+    fn read_before_reliability(&mut self, _: &mut Section<'_>, _: &mut Origins, _: &mut Report) {}
+
+    /// Reads what is the model's of `[reliability]`.
+    fn read_reliability(&mut self, _: &mut Section<'_>, _: &mut Origins, _: &mut Report) {}
+
+    /// Reads what stands behind `[reliability]`.
+    fn read_after_reliability(&mut self, _: &mut Section<'_>, _: &mut Origins, _: &mut Report) {}
+
+    /// What `--set` takes that is no parameter, beside what the engine knows.
+    fn scalars() -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Puts one of them in place; its value as it stands in the plan.
+    fn put(_: &Written<'_>, _: &mut Draft<Self>, _: &mut Report) -> Option<Value> {
+        None
+    }
+
+    /// Judges the whole, once every value is in place.
+    fn judge(draft: &Draft<Self>, report: &mut Report) {
+        super::whole::windows(draft, report);
+    }
+
+    /// What the model is, into a plan as JSON; a default may be left out.
+    fn describe(&self, plan: &mut Map<String, Value>);
+
+    /// What a grid file holds beside what the engine reads, for its schema.
+    fn schema() -> Schema;
+}
+
+/// What a model adds to the schema of grid files.
+pub struct Schema {
+    /// Keys at the top.
+    pub top: Vec<(&'static str, Value)>,
+    /// Those that must be there.
+    pub required: Vec<&'static str>,
+    /// Keys of `[reliability]`.
+    pub reliability: Vec<(&'static str, Value)>,
+    /// `[set]`, by [`crate::config::schema::set`].
+    pub set: Value,
+}

@@ -1,0 +1,456 @@
+//! Walks one TOML table key by key. Every value is taken by name and kind; a wrong one is reported
+//! and the walk goes on, so that one pass finds every mistake. Keys nobody asked for are reported
+//! at the end.
+
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+
+use sweep_parameter::{Range, decimal};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::report::{Diagnostic, Report};
+use super::source::{Located, Location, SourceId};
+
+/// A key's value: not written, written wrong (already reported), or as written.
+pub enum Field<T> {
+    /// Not written.
+    Absent,
+    /// Written wrong, and reported.
+    Bad,
+    /// As written.
+    Given(Located<T>),
+}
+
+impl<T> Field<T> {
+    /// The value, or the default when it is not written; `None` when it is wrong.
+    pub fn or(self, default: T) -> Option<T> {
+        match self {
+            Self::Absent => Some(default),
+            Self::Bad => None,
+            Self::Given(found) => Some(found.value),
+        }
+    }
+
+    /// The value with its place, if it is written and right.
+    pub fn given(self) -> Option<Located<T>> {
+        match self {
+            Self::Given(found) => Some(found),
+            Self::Absent | Self::Bad => None,
+        }
+    }
+
+    fn then<U>(self, next: impl FnOnce(Located<T>) -> Option<Located<U>>) -> Field<U> {
+        match self {
+            Self::Absent => Field::Absent,
+            Self::Bad => Field::Bad,
+            Self::Given(found) => next(found).map_or(Field::Bad, Field::Given),
+        }
+    }
+}
+
+type Value<'a> = Spanned<DeValue<'a>>;
+
+/// One table of a file.
+pub struct Section<'a> {
+    /// As messages call it: `[spin]`, `the grid file`.
+    title: String,
+    at: Location,
+    table: &'a DeTable<'a>,
+    known: Vec<&'static str>,
+    /// Keys that are valid elsewhere, with the reason why not here.
+    misplaced: BTreeMap<&'static str, String>,
+}
+
+impl<'a> Section<'a> {
+    /// A table of a text.
+    pub fn new(title: impl Into<String>, at: Location, table: &'a DeTable<'a>) -> Self {
+        Self { title: title.into(), at, table, known: Vec::new(), misplaced: BTreeMap::new() }
+    }
+
+    /// Where the table begins.
+    pub fn at(&self) -> &Location {
+        &self.at
+    }
+
+    fn place(&self, span: std::ops::Range<usize>) -> Location {
+        Location::new(self.at.source, span)
+    }
+
+    fn get(&mut self, key: &'static str) -> Option<&'a Value<'a>> {
+        self.known.push(key);
+        self.table.get(key)
+    }
+
+    /// The place of a key, if it is written.
+    pub fn key_at(&self, key: &str) -> Option<Location> {
+        self.table.get_key_value(key).map(|(key, _)| self.place(key.span()))
+    }
+
+    /// Refuses these keys with a reason of their own instead of "unknown key".
+    pub fn misplace(&mut self, keys: &[&'static str], reason: &str) {
+        self.misplaced.extend(keys.iter().map(|&key| (key, reason.to_owned())));
+    }
+
+    /// Reports a key that must be there.
+    pub fn require<T>(
+        &self,
+        field: Field<T>,
+        key: &str,
+        expected: &str,
+        report: &mut Report,
+    ) -> Option<Located<T>> {
+        if matches!(field, Field::Absent) {
+            self.missing(key, expected, report);
+        }
+        field.given()
+    }
+
+    /// Reports a key that must be there and is not.
+    pub fn missing(&self, key: &str, expected: &str, report: &mut Report) {
+        let title = format!("`{key}` is missing in {}", self.title);
+        report.push_missing(Diagnostic::new(title).at(&self.at, format!("expected {expected}")));
+    }
+
+    /// A finite number in a range.
+    pub fn number(&mut self, key: &'static str, range: Range, report: &mut Report) -> Field<f64> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        number(&quoted(key), self.at.source, value, range, report).map_or(Field::Bad, Field::Given)
+    }
+
+    /// A whole number from 1 to `most`.
+    pub fn count(&mut self, key: &'static str, most: u64, report: &mut Report) -> Field<u64> {
+        self.whole(key, 1..=most, report)
+    }
+
+    /// A whole number within bounds.
+    pub fn whole(
+        &mut self,
+        key: &'static str,
+        bounds: RangeInclusive<u64>,
+        report: &mut Report,
+    ) -> Field<u64> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        let at = self.place(value.span());
+        let expected =
+            format!("expected a whole number from {} to {}", bounds.start(), bounds.end());
+        match value.get_ref() {
+            DeValue::Integer(integer) => {
+                match u64::from_str_radix(integer.as_str(), integer.radix()) {
+                    Ok(count) if bounds.contains(&count) => {
+                        Field::Given(Located { value: count, at })
+                    }
+                    _ => {
+                        let title = format!("`{key}` = {integer} is out of range");
+                        report.push(Diagnostic::new(title).at(&at, expected));
+                        Field::Bad
+                    }
+                }
+            }
+            other => {
+                report.push(wrong_kind(&quoted(key), &at, "a whole number", other));
+                Field::Bad
+            }
+        }
+    }
+
+    /// A string.
+    pub fn text(&mut self, key: &'static str, report: &mut Report) -> Field<&'a str> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        text(&quoted(key), self.at.source, value, report).map_or(Field::Bad, Field::Given)
+    }
+
+    /// One of a few words. Given back as the word's position in `choices`.
+    pub fn choice(
+        &mut self,
+        key: &'static str,
+        choices: &[&str],
+        report: &mut Report,
+    ) -> Field<usize> {
+        self.text(key, report).then(|found| {
+            let position = choices.iter().position(|&choice| choice == found.value);
+            if position.is_none() {
+                report.push_with(|_| unknown_word(key, &found, choices));
+            }
+            position.map(|value| Located { value, at: found.at })
+        })
+    }
+
+    /// An array of finite numbers in a range; a single wrong one makes it wrong.
+    pub fn numbers(
+        &mut self,
+        key: &'static str,
+        range: Range,
+        report: &mut Report,
+    ) -> Field<Vec<Located<f64>>> {
+        self.right_numbers(key, range, report).then(|found| {
+            let (numbers, all) = found.value;
+            all.then_some(Located { value: numbers, at: found.at })
+        })
+    }
+
+    /// The right ones among an array of numbers, and whether those are all.
+    pub fn right_numbers(
+        &mut self,
+        key: &'static str,
+        range: Range,
+        report: &mut Report,
+    ) -> Field<(Vec<Located<f64>>, bool)> {
+        let source = self.at.source;
+        self.items(key, "an array of numbers", report).then(|items| {
+            let numbers: Vec<_> = items
+                .value
+                .iter()
+                .filter_map(|item| number(&entry(key), source, item, range, report))
+                .collect();
+            let all = numbers.len() == items.value.len();
+            Some(Located { value: (numbers, all), at: items.at })
+        })
+    }
+
+    /// An array of strings, wrong ones left out and reported.
+    pub fn texts(
+        &mut self,
+        key: &'static str,
+        report: &mut Report,
+    ) -> Field<Vec<Located<&'a str>>> {
+        let source = self.at.source;
+        self.items(key, "an array of strings", report).then(|items| {
+            let texts = items
+                .value
+                .iter()
+                .filter_map(|item| text(&entry(key), source, item, report))
+                .collect();
+            Some(Located { value: texts, at: items.at })
+        })
+    }
+
+    fn items(
+        &mut self,
+        key: &'static str,
+        kind: &str,
+        report: &mut Report,
+    ) -> Field<&'a [Value<'a>]> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        let at = self.place(value.span());
+        match value.get_ref() {
+            DeValue::Array(items) => Field::Given(Located { value: items, at }),
+            other => {
+                report.push(wrong_kind(&quoted(key), &at, kind, other));
+                Field::Bad
+            }
+        }
+    }
+
+    /// A table under this key.
+    pub fn table(
+        &mut self,
+        key: &'static str,
+        title: &str,
+        report: &mut Report,
+    ) -> Field<Section<'a>> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        let at = self.place(value.span());
+        match value.get_ref() {
+            DeValue::Table(table) => {
+                Field::Given(Located { value: Section::new(title, at.clone(), table), at })
+            }
+            other => {
+                report.push(wrong_kind(&quoted(key), &at, &format!("a table, {title}"), other));
+                Field::Bad
+            }
+        }
+    }
+
+    /// An array of tables, `[[key]]`; empty if it is not written.
+    pub fn tables(&mut self, key: &'static str, report: &mut Report) -> Vec<Section<'a>> {
+        let kind = format!("tables, each under [[{key}]]");
+        let items = match self.get(key).map(|value| (value, value.get_ref())) {
+            None => return Vec::new(),
+            Some((_, DeValue::Array(items))) => items,
+            Some((value, other)) => {
+                report.push(wrong_kind(&quoted(key), &self.place(value.span()), &kind, other));
+                return Vec::new();
+            }
+        };
+        let mut sections = Vec::new();
+        for (k, item) in items.iter().enumerate() {
+            let at = self.place(item.span());
+            match item.get_ref() {
+                DeValue::Table(table) => {
+                    sections.push(Section::new(format!("[[{key}]] number {}", k + 1), at, table))
+                }
+                other => report.push(wrong_kind(&entry(key), &at, &kind, other)),
+            }
+        }
+        sections
+    }
+
+    /// Every key as written, for tables whose keys are names of parameters.
+    pub fn names(&self) -> Vec<Located<&'a str>> {
+        let mut names = Vec::new();
+        for key in self.table.keys() {
+            names.push(Located { value: key.get_ref() as &'a str, at: self.place(key.span()) });
+        }
+        names
+    }
+
+    /// The number under a name from [`Section::names`].
+    pub fn number_named(
+        &self,
+        name: &str,
+        range: Range,
+        report: &mut Report,
+    ) -> Option<Located<f64>> {
+        number(&quoted(name), self.at.source, self.table.get(name)?, range, report)
+    }
+
+    /// Reports every key that was not asked for.
+    pub fn finish(self, report: &mut Report) {
+        for key in self.table.keys() {
+            let name: &str = key.get_ref();
+            if self.known.contains(&name) {
+                continue;
+            }
+            report.push_with(|_| {
+                let at = self.place(key.span());
+                match self.misplaced.get(name) {
+                    Some(reason) => {
+                        Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
+                            .at(&at, reason.as_str())
+                    }
+                    None => {
+                        Diagnostic::new(format!("unknown key `{}` in {}", short(name), self.title))
+                            .at(&at, format!("expected {}", listed(&self.known)))
+                            .nearest(name, self.known.iter().copied())
+                    }
+                }
+            });
+        }
+    }
+}
+
+/// Refuses a word that is not among the choices.
+pub fn unknown_word(what: &str, found: &Located<&str>, choices: &[&str]) -> Diagnostic {
+    Diagnostic::new(format!("unknown {what} \"{}\"", short(found.value)))
+        .at(&found.at, format!("expected {}", listed(choices)))
+        .nearest(found.value, choices.iter().copied())
+}
+
+/// `a`, `a or b`, `one of a, b, c`.
+pub fn listed(choices: &[&str]) -> String {
+    match choices {
+        [] => "nothing".to_owned(),
+        [only] => format!("`{only}`"),
+        [first, second] => format!("`{first}` or `{second}`"),
+        many => format!("one of `{}`", many.join("`, `")),
+    }
+}
+
+/// A key as messages call it.
+pub fn quoted(key: &str) -> String {
+    format!("`{}`", short(key))
+}
+
+/// An entry of an array as messages call it.
+fn entry(key: &str) -> String {
+    format!("an entry of `{key}`")
+}
+
+/// What a user typed, cut to what fits a title.
+pub fn short(typed: &str) -> String {
+    cut(typed, 60)
+}
+
+/// At most `most` characters of a text.
+pub fn cut(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+fn text<'a>(
+    what: &str,
+    source: SourceId,
+    value: &'a Value<'a>,
+    report: &mut Report,
+) -> Option<Located<&'a str>> {
+    let at = Location::new(source, value.span());
+    match value.get_ref() {
+        DeValue::String(text) => Some(Located { value: text, at }),
+        other => {
+            report.push(wrong_kind(what, &at, "a string", other));
+            None
+        }
+    }
+}
+
+fn number(
+    what: &str,
+    source: SourceId,
+    value: &Value<'_>,
+    range: Range,
+    report: &mut Report,
+) -> Option<Located<f64>> {
+    let at = Location::new(source, value.span());
+    let number = match value.get_ref() {
+        DeValue::Float(float) => float.as_str().parse().ok(),
+        DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
+        DeValue::Integer(integer) => {
+            u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|value| value as f64)
+        }
+        other => {
+            report.push(wrong_kind(what, &at, "a number", other));
+            return None;
+        }
+    };
+    check_number(what, number.unwrap_or(f64::INFINITY), at, range, report)
+}
+
+/// The number if it is finite and in range.
+pub fn check_number(
+    what: &str,
+    value: f64,
+    at: Location,
+    range: Range,
+    report: &mut Report,
+) -> Option<Located<f64>> {
+    if range.contains(value) {
+        return Some(Located { value, at });
+    }
+    report.push(refused_number(what, value, &at, range));
+    None
+}
+
+/// What is wrong with a number that is not finite or not in range.
+pub fn refused_number(what: &str, value: f64, at: &Location, range: Range) -> Diagnostic {
+    let title = if value.is_nan() {
+        format!("{what} is not a number")
+    } else if value.is_infinite() {
+        format!("{what} is not finite")
+    } else {
+        format!("{what} = {} is out of range", decimal(value))
+    };
+    Diagnostic::new(title).at(at, format!("expected {}", range.instead_of(value)))
+}
+
+fn wrong_kind(what: &str, at: &Location, expected: &str, found: &DeValue<'_>) -> Diagnostic {
+    let kind = match found {
+        DeValue::String(_) => "a string",
+        DeValue::Integer(_) => "a whole number",
+        DeValue::Float(_) => "a decimal number",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date or time",
+        DeValue::Array(_) => "an array",
+        DeValue::Table(_) => "a table",
+    };
+    let diagnostic = Diagnostic::new(format!("{what} has the wrong type"))
+        .at(at, format!("expected {expected}, found {kind}"));
+    match found {
+        DeValue::String(text) if expected.contains("number") && text.parse::<f64>().is_ok() => {
+            diagnostic.help("write the number without quotes")
+        }
+        _ => diagnostic,
+    }
+}

@@ -1,0 +1,57 @@
+//! From text to a TOML table, with every mistake of syntax the parser can recover from.
+
+use toml::Spanned;
+use toml::de::{DeTable, Error};
+
+use super::report::{Diagnostic, Report};
+use super::section::quoted;
+use super::source::{Location, SourceId};
+
+/// The table a text holds; what is not TOML is reported, what can be made out of the rest is
+/// returned.
+pub fn parse<'a>(text: &'a str, source: SourceId, report: &mut Report) -> Spanned<DeTable<'a>> {
+    let (table, mut errors) = DeTable::parse_recoverable(text);
+    errors.sort_by_key(start);
+    // An array that is never closed swallows what follows; all that says of it is the first
+    // complaint.
+    let unclosed = errors.iter().any(|error| error.message().starts_with("unclosed array"));
+    let swallowed =
+        errors.iter().position(|error| error.message().contains("array")).filter(|_| unclosed);
+    if let Some(first) = swallowed {
+        let at = Location::new(source, errors[first].span().unwrap_or(0..0));
+        report.push_syntax(
+            Diagnostic::new("an array is not closed").at(&at, "expected `,` or `]` before this"),
+        );
+        report.swallow(&at);
+        errors.truncate(first);
+    }
+    for error in errors {
+        report.push_syntax(describe(&error, text, source));
+    }
+    table
+}
+
+fn start(error: &Error) -> usize {
+    error.span().map_or(0, |span| span.start)
+}
+
+fn describe(error: &Error, text: &str, source: SourceId) -> Diagnostic {
+    let span = error.span().unwrap_or(0..0);
+    let typed = text.get(span.clone()).unwrap_or_default();
+    let at = Location::new(source, span);
+    // The message says what was expected after its first comma, if anything.
+    let (what, expected) = error.message().split_once(", ").unwrap_or((error.message(), ""));
+    match what {
+        "duplicate key" => Diagnostic::new(format!("the key {} is given twice", quoted(typed)))
+            .at(&at, "expected each key once"),
+        "string values must be quoted" => {
+            let title = if typed.is_empty() {
+                "a value is missing".to_owned()
+            } else {
+                format!("{} is no value", quoted(typed))
+            };
+            Diagnostic::new(title).at(&at, "expected a number, a string in quotes, or an array")
+        }
+        what => Diagnostic::new(what).at(&at, expected),
+    }
+}

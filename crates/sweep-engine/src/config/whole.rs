@@ -1,0 +1,118 @@
+//! Checks of the resolved plan as a whole, each pointing back at the numbers it concerns.
+
+use std::collections::BTreeSet;
+
+use sweep_parameter::decimal;
+
+use super::Read;
+use super::grid::Draft;
+use super::report::{Diagnostic, Report};
+use super::source::{Location, Sources};
+use crate::method::{Integrator as _, Steps};
+use crate::plan::{MOST_STEPS, Scenario, shortest_step_s};
+
+/// A window that is none, at any corner of the grid.
+pub fn windows<M: Read>(draft: &Draft<M>, report: &mut Report) {
+    let mut reported = BTreeSet::new();
+    for corner in 0..draft.plan.corners() {
+        if report.is_full() || !reported.is_empty() {
+            break;
+        }
+        let scenario = draft.plan.scenario_at(&draft.plan.corner(corner));
+        window(draft, &scenario, &mut reported, report);
+    }
+}
+
+/// A window that constants or axes have turned round, or moved past the end.
+pub fn window<M: Read>(
+    draft: &Draft<M>,
+    scenario: &Scenario<M>,
+    reported: &mut BTreeSet<Vec<String>>,
+    report: &mut Report,
+) {
+    let [from_s, to_s] = scenario.window_s;
+    let end_s = draft.plan.end_s;
+    if from_s < to_s && to_s <= end_s {
+        return;
+    }
+    let concerns = ["window_from_s", "window_to_s", "time.end_s"].map(str::to_owned).to_vec();
+    if !reported.insert(concerns.clone()) {
+        return;
+    }
+    let title = format!(
+        "the window from {} s to {} s does not fit into a run to {} s",
+        decimal(from_s),
+        decimal(to_s),
+        decimal(end_s)
+    );
+    report.push_with(|sources| {
+        let mut diagnostic = Diagnostic::new(title);
+        for (k, place) in places(draft, &concerns, sources).iter().enumerate() {
+            let label =
+                if k == 0 { "expected window_from_s < window_to_s <= end_s" } else { "and this" };
+            diagnostic = diagnostic.at(place, label);
+        }
+        diagnostic
+    });
+}
+
+/// Where the concerned numbers were written: the axes that sweep them first, then files and
+/// arguments.
+pub fn places<M: Read>(draft: &Draft<M>, concerns: &[String], sources: &Sources) -> Vec<Location> {
+    let sweeps = |parameter: &M::Parameter| {
+        let parts = draft.plan.model.parts(parameter);
+        parts.iter().any(|part| concerns.iter().any(|key| key == part))
+    };
+    let axes = draft.plan.axes.iter().enumerate().filter(|(_, axis)| sweeps(&axis.parameter));
+    let axes = axes.filter_map(|(k, _)| draft.origins.get(&format!("axis[{k}]")));
+    let mut places: Vec<Location> = Vec::new();
+    for place in axes.chain(concerns.iter().filter_map(|key| draft.origins.get(key))) {
+        // Numbers of one line, as of one vector, are one place.
+        let line = sources.line(place).number;
+        let same = places
+            .iter_mut()
+            .find(|other| other.source == place.source && sources.line(other).number == line);
+        match same {
+            Some(other) => {
+                other.span =
+                    other.span.start.min(place.span.start)..other.span.end.max(place.span.end);
+            }
+            None => places.push(place.clone()),
+        }
+    }
+    places
+}
+
+/// A fixed step that is longer than the run, or so short that a trajectory would never end.
+pub fn steps<M: Read>(draft: &Draft<M>, report: &mut Report) {
+    let Steps::Fixed(step_s) = draft.plan.integrator.steps() else { return };
+    let end_s = draft.plan.end_s;
+    let steps = end_s / step_s;
+    let title = if step_s > end_s {
+        format!(
+            "a step of {} s is longer than the whole run, {} s",
+            decimal(step_s),
+            decimal(end_s)
+        )
+    } else if steps > MOST_STEPS {
+        format!("a step of {} s makes {steps:.1e} steps to {} s", decimal(step_s), decimal(end_s))
+    } else {
+        return;
+    };
+    let expected =
+        format!("expected a step from {:e} s to {} s", shortest_step_s(end_s), decimal(end_s));
+    let refusal = refuse_step(draft, title, &expected);
+    report.push(
+        draft
+            .origins
+            .get("time.end_s")
+            .into_iter()
+            .fold(refusal, |all, end| all.at(end, "and this")),
+    );
+}
+
+/// A refusal of the step, pointing at it, or at the section that leaves it out.
+pub fn refuse_step<M: Read>(draft: &Draft<M>, title: String, expected: &str) -> Diagnostic {
+    let step = draft.origins.get("integrator.step_s").or_else(|| draft.origins.get("integrator"));
+    step.into_iter().fold(Diagnostic::new(title), |diagnostic, at| diagnostic.at(at, expected))
+}

@@ -1,0 +1,133 @@
+//! Designs: points that fill a box of parameters more evenly than chance, or as listed, in place of
+//! a grid.
+//!
+//! A point's place is a pure function of design and index: any shard, any resumed run, any machine
+//! finds the same.
+
+mod distribution;
+mod latin;
+mod sobol;
+
+pub use distribution::{Distribution, REACH, Shape};
+pub use sobol::MOST_AXES;
+
+/// How the points of a plan are laid out, if not as a grid.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Design {
+    /// Every axis cut into as many strata as there are points, one point in each, at random within
+    /// it.
+    ///
+    /// M. D. McKay, R. J. Beckman, W. J. Conover, A comparison of three methods for selecting
+    /// values of input variables in the analysis of output from a computer code, Technometrics 21
+    /// (1979), 239-245.
+    LatinHypercube {
+        /// How many points.
+        points: u64,
+        /// Another seed, another draw.
+        seed: u64,
+    },
+    /// Sobol's sequence with direction numbers of Joe and Kuo, in Owen's nested scrambling.
+    Sobol {
+        /// How many points; a power of two is the most even.
+        points: u64,
+        /// Another seed, another scrambling.
+        seed: u64,
+    },
+    /// Every point at random, independent of all others: what averages, shares and their confidence
+    /// intervals by the binomial formulas assume.
+    MonteCarlo {
+        /// How many points.
+        points: u64,
+        /// Another seed, another draw.
+        seed: u64,
+    },
+    /// As listed in a file.
+    List {
+        /// The file as the grid file names it.
+        file: String,
+        /// How many points.
+        points: u64,
+        /// BLAKE3 hash of the file's bytes, hexadecimal: another content is another plan.
+        hash: String,
+    },
+}
+
+impl Design {
+    /// Number of points.
+    #[must_use]
+    pub const fn points(&self) -> u64 {
+        match self {
+            Self::LatinHypercube { points, .. }
+            | Self::Sobol { points, .. }
+            | Self::MonteCarlo { points, .. }
+            | Self::List { points, .. } => *points,
+        }
+    }
+
+    /// Its name in grid files.
+    #[must_use]
+    pub const fn method(&self) -> &'static str {
+        match self {
+            Self::LatinHypercube { .. } => "latin_hypercube",
+            Self::Sobol { .. } => "sobol",
+            Self::MonteCarlo { .. } => "monte_carlo",
+            Self::List { .. } => "list",
+        }
+    }
+
+    /// Where point `point` lies along axis `axis`, strictly between 0 and 1; `None` for a list,
+    /// whose axes hold the values themselves.
+    #[must_use]
+    pub fn place(&self, point: u64, axis: usize) -> Option<f64> {
+        match *self {
+            Self::LatinHypercube { points, seed } => Some(latin::place(point, points, axis, seed)),
+            Self::Sobol { seed, .. } => Some(sobol::place(point, axis, seed)),
+            Self::MonteCarlo { seed, .. } => Some(at_random(point, axis, seed)),
+            Self::List { .. } => None,
+        }
+    }
+}
+
+/// A number strictly between 0 and 1 that belongs to a point and an axis.
+fn at_random(point: u64, axis: usize, seed: u64) -> f64 {
+    // Of 52 bits the middle of each step, so that neither 0 nor 1 comes up.
+    let bits = mixed(mixed(point) ^ axis_key(seed, axis)) >> 12;
+    (bits as f64 + 0.5) / (1_u64 << 52) as f64
+}
+
+/// A well-mixed 64-bit function of its argument: the finaliser of SplitMix64 (G. L. Steele, D. Lea,
+/// C. H. Flood, Fast splittable pseudorandom number generators, OOPSLA 2014).
+const fn mixed(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ (x >> 31)
+}
+
+/// A key of its own for every axis.
+const fn axis_key(seed: u64, axis: usize) -> u64 {
+    // Axes are few; the cast keeps them apart.
+    mixed(mixed(seed) ^ (axis as u64).wrapping_mul(0xD6E8_FEB8_6659_FD93))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_at_random_are_even_and_independent() {
+        let design = Design::MonteCarlo { points: 20_000, seed: 3 };
+        let draw = |axis| (0..20_000).map(move |point| at_random(point, axis, 3));
+        assert_eq!(design.place(7, 1), Some(at_random(7, 1, 3)));
+        assert_eq!((design.points(), design.method()), (20_000, "monte_carlo"));
+        let mean = draw(0).sum::<f64>() / 20_000.0;
+        // Three standard errors of the mean of an even spread, 1 / sqrt(12 n), are 0.006.
+        assert!((mean - 0.5).abs() < 0.006, "{mean}");
+        let spread = draw(0).map(|x| (x - 0.5).powi(2)).sum::<f64>() / 20_000.0;
+        assert!((spread - 1.0 / 12.0).abs() < 0.002, "{spread}");
+        let product = draw(0).zip(draw(1)).map(|(x, y)| (x - 0.5) * (y - 0.5)).sum::<f64>();
+        assert!((product / 20_000.0).abs() < 0.002, "{product}");
+        assert!(draw(0).all(|x| 0.0 < x && x < 1.0));
+        assert_ne!(at_random(0, 0, 1), at_random(0, 0, 2));
+    }
+}

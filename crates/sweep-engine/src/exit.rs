@@ -1,0 +1,293 @@
+//! How the program ends, and why it could not go on.
+
+use std::borrow::Cow;
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use crate::boundary::search::BoundaryError;
+use crate::config::Diagnostics;
+use crate::memory::NoMemory;
+use crate::random_keys::NoRandomNumbers;
+use crate::store::StoreError;
+use crate::threads::ThreadsError;
+use sweep_files::FileError;
+use sweep_plot::PlotError;
+use sweep_results::ResultsError;
+
+/// Exit codes, a contract with scripts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// Done.
+    Done = 0,
+    /// Something failed that the input is not to blame for.
+    Failed = 1,
+    /// Bad input; nothing was done.
+    BadInput = 2,
+    /// Done, but some points failed and `--fail-on-error` was given.
+    PointsFailed = 3,
+    /// What `require`, or `compare --fail-on`, was asked for does not hold.
+    NotHeld = 4,
+    /// Another run holds this output.
+    Busy = 75,
+    /// Interrupted (SIGINT).
+    Interrupted = 130,
+    /// Asked to stop (SIGTERM).
+    Terminated = 143,
+}
+
+impl Exit {
+    /// Every exit code.
+    pub const ALL: [Self; 8] = [
+        Self::Done,
+        Self::Failed,
+        Self::BadInput,
+        Self::PointsFailed,
+        Self::NotHeld,
+        Self::Busy,
+        Self::Interrupted,
+        Self::Terminated,
+    ];
+
+    /// What it means to a script.
+    #[must_use]
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Failed => "an I/O or internal failure",
+            Self::BadInput => "bad input, refused before any work",
+            Self::PointsFailed => "with --fail-on-error: done, but some points failed",
+            Self::NotHeld => "done: a `require`, or a `compare --fail-on`, does not hold",
+            Self::Busy => "another run holds this output",
+            Self::Interrupted => "interrupted; finished work is kept",
+            Self::Terminated => "terminated; finished work is kept",
+        }
+    }
+
+    /// All codes with their meanings, for `--help`.
+    #[must_use]
+    pub fn table() -> String {
+        let mut table = "Exit codes:".to_owned();
+        for exit in Self::ALL {
+            // Writing to a String cannot fail.
+            let _ = write!(table, "\n  {:>3}  {}", exit as u8, exit.meaning());
+        }
+        table
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// Why a command ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Mistakes in what the user wrote.
+    #[error(transparent)]
+    Input(#[from] Diagnostics),
+    /// A boundary that cannot be traced.
+    #[error(transparent)]
+    Boundary(#[from] BoundaryError),
+    /// A run's files.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A figure.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// A result that does not answer.
+    #[error(transparent)]
+    Results(#[from] ResultsError),
+    /// A model that cannot do what was asked.
+    #[error(transparent)]
+    Model(Box<dyn std::error::Error + Send + Sync>),
+    /// An option whose value makes no sense here.
+    #[error("`{option} {given}`: expected {expected}")]
+    Option {
+        /// `"--every"`.
+        option: &'static str,
+        /// As typed.
+        given: String,
+        /// What it should have been.
+        expected: String,
+    },
+    /// A file of this program's.
+    #[error(transparent)]
+    Files(#[from] FileError),
+    /// No threads.
+    #[error(transparent)]
+    Threads(#[from] ThreadsError),
+    /// No memory.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
+    /// No random numbers.
+    #[error(transparent)]
+    Random(#[from] NoRandomNumbers),
+    /// A file that could not be read or written.
+    #[error("cannot {action} {}: {source}", path.display())]
+    File {
+        /// What was attempted: `"write"`.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Standard output could not be written.
+    #[error("cannot write to standard output: {0}")]
+    Stdout(io::Error),
+}
+
+impl Error {
+    /// What a model says that it cannot do.
+    pub fn model(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self::Model(Box::new(error))
+    }
+
+    /// The exit code it ends with.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Input(_) => Exit::BadInput,
+            Self::Model(_) | Self::Option { .. } => Exit::BadInput,
+            Self::Boundary(_) => Exit::BadInput,
+            Self::Files(error) if error.is_refusal() => Exit::BadInput,
+            Self::Threads(error) if error.is_refusal() => Exit::BadInput,
+            Self::Store(StoreError::Busy { .. }) => Exit::Busy,
+            Self::Store(error) if error.is_refusal() => Exit::BadInput,
+            Self::Plot(error) if error.is_usage() => Exit::BadInput,
+            Self::Results(error) if error.is_refusal() => Exit::BadInput,
+            Self::Plot(_) | Self::Results(_) => Exit::Failed,
+            Self::Store(_) | Self::Files(_) | Self::Threads(_) | Self::Random(_) => Exit::Failed,
+            Self::Memory(_) | Self::File { .. } | Self::Stdout(_) => Exit::Failed,
+        }
+    }
+
+    /// What to do about it, where something can be said.
+    #[must_use]
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::File { source, .. } if source.kind() == io::ErrorKind::AlreadyExists => {
+                Some("give another name, or remove the file first")
+            }
+            _ => None,
+        }
+    }
+
+    /// Tells the user, on standard error, in colour on a terminal unless `NO_COLOR` is set.
+    pub fn report(&self) {
+        match self {
+            Self::Input(diagnostics) => {
+                let text = diagnostics.styled();
+                // Its own escapes are colours, and its renderer replaces those of what it quotes.
+                let text = escaped(&text, |c| c != '\x1b' && is_unsafe(c));
+                // With standard error gone there is nobody left to tell; the exit code still does.
+                let _ = writeln!(anstream::stderr(), "{text}");
+            }
+            other => match other.hint() {
+                Some(hint) => tell(&format!("error: {other}\n  = help: {hint}")),
+                None => tell(&format!("error: {other}")),
+            },
+        }
+    }
+}
+
+/// Whether a character can do something to a terminal, or to the order of the text in it.
+fn is_unsafe(c: char) -> bool {
+    let is_control = c.is_control() && !matches!(c, '\n' | '\t');
+    is_control || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// A text with some characters written as `\u001b`, which is their form in JSON too.
+fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> Cow<'_, str> {
+    if !text.contains(&is_bad) {
+        return Cow::Borrowed(text);
+    }
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_bad(c) {
+            // Writing to a String cannot fail.
+            let _ = write!(safe, "\\u{:04x}", u32::from(c));
+        } else {
+            safe.push(c);
+        }
+    }
+    Cow::Owned(safe)
+}
+
+/// Writes what people read, or JSON, to standard output. What a file has put into it that is no
+/// text cannot reach the terminal.
+///
+/// # Errors
+/// As [`print()`].
+pub fn show(text: &str) -> Result<Exit, Error> {
+    print(&escaped(text, is_unsafe))
+}
+
+/// Writes a command's product to standard output, as it is: a script, a file. A reader that has
+/// seen enough (`| head`) is no failure.
+///
+/// # Errors
+/// When standard output cannot be written for any other reason.
+pub fn print(text: &str) -> Result<Exit, Error> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Error::Stdout(error)),
+        _ => Ok(Exit::Done),
+    }
+}
+
+/// Writes a message for people to standard error; as in `show`, text only.
+pub fn tell(text: &str) {
+    // As in `Error::report`: nobody is left to tell.
+    let _ = writeln!(anstream::stderr(), "{}", escaped(text, is_unsafe));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_codes_are_the_contract() {
+        assert_eq!(Exit::ALL.map(|exit| exit as u8), [0, 1, 2, 3, 4, 75, 130, 143]);
+        for exit in Exit::ALL {
+            assert!(Exit::table().contains(exit.meaning()));
+        }
+    }
+
+    #[test]
+    fn what_moves_a_cursor_is_written_out_and_text_stays() {
+        let told = escaped("a\x1b[2J\u{9b}3m\r\u{202e}é\tb\n", is_unsafe);
+        assert_eq!(told, "a\\u001b[2J\\u009b3m\\u000d\\u202eé\tb\n");
+        let json = serde_json::json!({ "host": "a\u{9b}\x07b" }).to_string();
+        let back: serde_json::Value = serde_json::from_str(&escaped(&json, is_unsafe)).unwrap();
+        assert_eq!(back["host"], "a\u{9b}\x07b");
+        assert!(matches!(escaped("plain", is_unsafe), Cow::Borrowed("plain")));
+    }
+
+    #[test]
+    fn a_store_that_is_busy_refuses_or_fails_has_a_code_each() {
+        let (output, folder) = (PathBuf::from("x.parquet"), PathBuf::from("x.parquet.partial"));
+        let differs = StoreError::PlanDiffers { folder: folder.clone(), differences: Vec::new() };
+        for (error, exit) in [
+            (StoreError::Busy { output: output.clone(), holders: Vec::new() }, Exit::Busy),
+            (differs, Exit::BadInput),
+            (ThreadsError::Scheduler { given: "0".to_owned() }.into(), Exit::BadInput),
+            (StoreError::NoRun { output, folder }, Exit::Failed),
+        ] {
+            assert_eq!(Error::Store(error).exit(), exit);
+        }
+    }
+
+    #[test]
+    fn a_file_that_exists_comes_with_advice() {
+        let exists = io::Error::from(io::ErrorKind::AlreadyExists);
+        let error = Error::File { action: "write", path: "grid.toml".into(), source: exists };
+        assert_eq!(error.exit(), Exit::Failed);
+        assert!(error.to_string().starts_with("cannot write grid.toml: "));
+        assert_eq!(error.hint(), Some("give another name, or remove the file first"));
+    }
+}

@@ -1,0 +1,45 @@
+//! Sweeps of a model over grids: from a grid file to a result file. What is swept is a [`Model`];
+//! nothing here knows which.
+//!
+//! * `config` reads a grid file into a [`Plan`], or says every mistake in it. `method` declares a
+//!   model's methods of integration. `design` places points off the grid.
+//! * `run` has an [`Engine`] do a plan's points on all cores and keeps them as they come; `store`
+//!   is the folder on disk meanwhile, and the result file, written and read by the rules of
+//!   [`sweep_files`].
+//! * `boundary` traces the curve where a quantity is at its limit.
+//! * `commands` is the command line, with `progress`, `interrupt` and `exit` for its manners.
+
+pub mod boundary;
+pub mod build;
+pub mod columns;
+pub mod commands;
+pub mod config;
+pub mod design;
+pub mod effort;
+pub mod estimate;
+pub mod exit;
+pub mod interrupt;
+pub mod memory;
+pub mod method;
+pub mod model;
+pub mod nearest;
+pub mod plan;
+pub mod program;
+pub mod progress;
+pub mod random_keys;
+pub mod run;
+pub mod store;
+pub mod swept;
+pub mod table;
+pub mod threads;
+pub mod watch;
+
+pub use build::Build;
+pub use config::{Diagnostics, GridInput, Mistake, Schema};
+pub use exit::{Error, Exit, tell};
+pub use interrupt::{Interrupt, survive_file_size_limits};
+pub use memory::ensure_memory;
+pub use model::{Model, UnknownParameter};
+pub use plan::{Axis, AxisValues, Plan, Reliability, Scenario};
+pub use swept::{Listed, Swept};
+pub use watch::{Engine, Watch};

@@ -1,0 +1,245 @@
+//! Progress of a run: a bar on a terminal, a line now and then elsewhere, or nothing.
+
+use std::io::{IsTerminal, Write};
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// What `--progress` said.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ProgressMode {
+    /// A bar on a terminal; elsewhere a line a minute, which suits the log of a batch job.
+    #[default]
+    Auto,
+    /// A line every five seconds.
+    Plain,
+    /// Nothing.
+    None,
+}
+
+impl FromStr for ProgressMode {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "plain" => Ok(Self::Plain),
+            "none" => Ok(Self::None),
+            _ => Err(format!("expected auto, plain or none; got `{text}`")),
+        }
+    }
+}
+
+/// Something that shows how far the run is, on stderr.
+pub struct Progress {
+    shown: Shown,
+    total: u64,
+    /// Points that were there at the start: they count as done, but not towards the rate.
+    start: u64,
+    began: Instant,
+}
+
+enum Shown {
+    Bar(ProgressBar),
+    Lines { every: Duration, next: Instant },
+    Nothing,
+}
+
+impl Progress {
+    /// Of a run.
+    pub fn new(mode: ProgressMode, total: u64, start: u64) -> Self {
+        Self::shown(mode, BAR, total, start, start)
+    }
+
+    /// Of a search, whose points nobody can count beforehand: rows of this total are done. `start`
+    /// points were there at the start.
+    pub fn of_search(mode: ProgressMode, rows: u64, start: u64) -> Self {
+        Self::shown(mode, ROWS, rows, 0, start)
+    }
+
+    fn shown(mode: ProgressMode, template: &str, total: u64, position: u64, start: u64) -> Self {
+        let lines = |seconds| {
+            let every = Duration::from_secs(seconds);
+            Shown::Lines { every, next: Instant::now() + every }
+        };
+        let shown = match mode {
+            ProgressMode::None => Shown::Nothing,
+            ProgressMode::Plain => lines(5),
+            ProgressMode::Auto if std::io::stderr().is_terminal() => {
+                Shown::Bar(bar(template, total, position))
+            }
+            ProgressMode::Auto => lines(60),
+        };
+        let mut progress = Self { shown, total, start, began: Instant::now() };
+        if template == BAR {
+            progress.show(start);
+        }
+        progress
+    }
+
+    /// Shows that `done` points of the total are there.
+    pub fn show(&mut self, done: u64) {
+        match &self.shown {
+            Shown::Bar(bar) => {
+                bar.set_position(done);
+                bar.set_message(self.line(done));
+            }
+            Shown::Lines { next, .. } if Instant::now() >= *next => self.say(&self.line(done)),
+            _ => {}
+        }
+    }
+
+    /// Shows that so many rows of a search are done, with so many points.
+    pub fn show_search(&mut self, rows: u64, points: u64) {
+        match &self.shown {
+            Shown::Bar(bar) => {
+                bar.set_position(rows);
+                bar.set_message(self.points(points));
+            }
+            Shown::Lines { next, .. } if Instant::now() >= *next => {
+                self.say(&format!("{rows} of {} rows, {}", self.total, self.points(points)));
+            }
+            _ => {}
+        }
+    }
+
+    /// The points of a search and their rate.
+    fn points(&self, points: u64) -> String {
+        format!("{points} points, {}", per_second(self.rate(points)))
+    }
+
+    /// Writes a line, and none for a while.
+    fn say(&mut self, text: &str) {
+        if let Shown::Lines { every, next } = &mut self.shown {
+            *next = Instant::now() + *every;
+            // A log that cannot be written to must not end the run.
+            let _ = writeln!(std::io::stderr(), "{text}");
+        }
+    }
+
+    /// Points a second of this process.
+    fn rate(&self, done: u64) -> f64 {
+        done.saturating_sub(self.start) as f64 / self.began.elapsed().as_secs_f64().max(1e-9)
+    }
+
+    /// Says that the chunks are being joined.
+    pub fn joining(&self) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.set_style(style("{spinner} joining {human_len} points"));
+            bar.tick();
+        }
+    }
+
+    /// Clears the bar away.
+    pub fn finish(&self) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn line(&self, done: u64) -> String {
+        let rate = self.rate(done);
+        let percent = 100.0 * done as f64 / self.total.max(1) as f64;
+        let so_far = format!("{done} of {} points ({percent:.1} %)", self.total);
+        // Before the first points are there, a rate of 0 and a time left would be no estimates.
+        if rate == 0.0 {
+            return so_far;
+        }
+        let left = duration(self.total.saturating_sub(done) as f64 / rate);
+        format!("{so_far}, {}, {left} left", per_second(rate))
+    }
+}
+
+/// The bar with its numbers.
+const BAR: &str = "{wide_bar} {msg}";
+
+/// The bar of a search.
+const ROWS: &str = "{wide_bar} {human_pos}/{human_len} rows  {msg}";
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+fn bar(template: &str, total: u64, start: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(8));
+    bar.set_style(style(template));
+    bar.set_position(start);
+    bar.reset_eta();
+    bar
+}
+
+/// A duration as people say it: `0.42 s`, `12 s`, `3 min 20 s`, `5 h 02 min`.
+#[must_use]
+pub fn duration(seconds: f64) -> String {
+    if seconds < 10.0 {
+        return format!("{seconds:.2} s");
+    }
+    // Saturates; nobody waits for 1e19 s.
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{whole} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        3600..172_800 => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
+        _ => format!("{} days", whole / 86_400),
+    }
+}
+
+/// A rate with three digits.
+#[must_use]
+pub fn per_second(rate: f64) -> String {
+    if rate >= 100.0 { format!("{rate:.0} points/s") } else { format!("{rate:.3} points/s") }
+}
+
+impl clap::builder::ValueParserFactory for ProgressMode {
+    type Parser = clap::builder::ValueParser;
+
+    fn value_parser() -> Self::Parser {
+        clap::builder::ValueParser::new(|text: &str| text.parse::<ProgressMode>())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_read_as_people_say_them() {
+        let said: Vec<String> =
+            [0.416, 12.2, 200.0, 18_120.0, 1e6, f64::INFINITY].into_iter().map(duration).collect();
+        assert_eq!(said[..5], ["0.42 s", "12 s", "3 min 20 s", "5 h 02 min", "11 days"]);
+        assert!(said[5].ends_with("days"));
+    }
+
+    #[test]
+    fn a_resumed_run_counts_what_is_there_but_not_towards_the_rate() {
+        let mut progress = Progress::new(ProgressMode::Plain, 1000, 900);
+        progress.began = Instant::now() - Duration::from_secs(10);
+        let line = progress.line(950);
+        assert!(line.starts_with("950 of 1000 points (95.0 %), 5.0"), "{line}");
+        assert!(
+            line.ends_with("10 s left")
+                || line.ends_with("9.99 s left")
+                || line.ends_with("10.00 s left"),
+            "{line}"
+        );
+        assert_eq!(progress.line(900), "900 of 1000 points (90.0 %)");
+    }
+
+    #[test]
+    fn a_search_counts_its_rows_and_the_rate_of_its_new_points() {
+        let mut progress = Progress::of_search(ProgressMode::Plain, 39, 100);
+        progress.began = Instant::now() - Duration::from_secs(10);
+        let points = progress.points(200);
+        assert!(points.starts_with("200 points, ") && points.ends_with(" points/s"), "{points}");
+        assert!((9.0..=10.0).contains(&progress.rate(200)), "{points}");
+    }
+
+    #[test]
+    fn modes_read_as_written() {
+        assert_eq!("plain".parse(), Ok(ProgressMode::Plain));
+        assert!(
+            "loud".parse::<ProgressMode>().unwrap_err().contains("expected auto, plain or none")
+        );
+    }
+}

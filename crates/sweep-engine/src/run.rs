@@ -1,0 +1,317 @@
+//! The runner: takes missing chunks in order, has the engine compute them on all cores, keeps each
+//! as it comes, and joins the whole. Of chunks that a signal or an error cuts short it keeps the
+//! rows that are there.
+//!
+//! Memory: a chunk (at most 4096 points, about 2 MB) in hand for each thread and as many again on
+//! their way to the disk, then about 40 MB for the join; nothing grows with the number of points
+//! but one set entry a chunk.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use crate::interrupt::Interrupt;
+use crate::progress::{Progress, ProgressMode};
+use crate::store::provenance::{self, Session};
+use crate::store::read::{ResultFile, Tally};
+use crate::store::{Done, Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, StoreError};
+use crate::threads::{self, Environment, ThreadsError};
+use crate::watch::{Engine, Watch};
+use sweep_files::panics;
+
+/// How to run.
+#[derive(Clone, Copy)]
+pub struct RunOptions<'a> {
+    /// Worker threads (`threads::count`).
+    pub threads: usize,
+    /// Start over.
+    pub fresh: bool,
+    /// Which part.
+    pub shard: Option<ShardRequest>,
+    /// How progress is shown.
+    pub progress: ProgressMode,
+    /// Looks up the scheduler's variables.
+    pub environment: Environment<'a>,
+    /// Shows a user what matters before the work starts.
+    pub tell: &'a dyn Fn(&str),
+}
+
+/// How a run ended, other than by an error.
+#[derive(Debug)]
+pub enum Ended {
+    /// The output was there already.
+    Already(Box<ResultFile>, Box<Tally>),
+    /// The output is in place.
+    Finished(Box<Tally>),
+    /// This shard's part is there; the merge comes when all are.
+    Shard(Shard),
+    /// A signal stopped it; what is done is kept.
+    Interrupted {
+        /// The signal.
+        signal: u8,
+        /// Points that are there.
+        kept: u64,
+        /// Of how many.
+        points: u64,
+    },
+}
+
+/// The outcome of a run, for a user.
+#[derive(Debug)]
+pub struct RunReport {
+    /// How it ended.
+    pub ended: Ended,
+    /// This process's work; absent if there was none to do.
+    pub session: Option<Session>,
+    /// Notes for the user.
+    pub notes: Vec<String>,
+}
+
+/// Runs a job on an output, resuming what is there.
+///
+/// # Errors
+/// Everything of [`StoreError`]; finished chunks are kept whatever it is.
+pub fn run(
+    engine: &dyn Engine,
+    job: &Job<'_>,
+    output: &Path,
+    options: RunOptions<'_>,
+    interrupt: &Interrupt,
+) -> Result<RunReport, StoreError> {
+    let RunOptions { threads, fresh, shard, environment, .. } = options;
+    let mut run = match OpenRun::open(output, job, OpenOptions { fresh, shard, environment })? {
+        Opened::Finished(file, tally) => {
+            let ended = Ended::Already(file, tally);
+            return Ok(RunReport { ended, session: None, notes: Vec::new() });
+        }
+        Opened::Run(run) => *run,
+    };
+    let (points, there) = run.own_points();
+    if let Some(shard) = run.shard() {
+        (options.tell)(&format!("shard {} of {}", shard.index, shard.of));
+    }
+    for note in run.take_notes() {
+        (options.tell)(&note);
+    }
+    if there > 0 {
+        (options.tell)(&format!("going on: {there} of {points} points are there"));
+    }
+    let clock =
+        Clock { began: Instant::now(), started_unix_s: provenance::now_unix_s(), threads, there };
+    let mut progress = Progress::new(options.progress, points, there);
+    let result = compute_and_join(engine, job, &mut run, threads, &mut progress, interrupt);
+    progress.finish();
+    let session = clock.session(engine, job, &run);
+    match result {
+        Ok(Some(tally)) => {
+            let joined = run.complete(job, tally, Some(session.clone()))?;
+            let ended = Ended::Finished(Box::new(joined.tally));
+            Ok(RunReport { ended, session: Some(session), notes: joined.notes })
+        }
+        Ok(None) => {
+            let mut notes = run.take_notes();
+            // Only the sidecar's account of the work would miss this; the work itself is kept.
+            notes.extend(run.record(&session).err().map(|error| error.to_string()));
+            let (points, kept) = run.own_points();
+            let ended = match (interrupt.signal(), run.shard()) {
+                (None, Some(shard)) => Ended::Shard(shard),
+                (signal, _) => {
+                    Ended::Interrupted { signal: signal.unwrap_or_default(), kept, points }
+                }
+            };
+            Ok(RunReport { ended, session: Some(session), notes })
+        }
+        Err(error) => {
+            // The error counts; whether its session can be recorded on the same disk does not.
+            let _ = run.record(&session);
+            Err(error)
+        }
+    }
+}
+
+/// Computes what is missing and joins the whole; `None` for a shard, or when a signal stopped it.
+fn compute_and_join(
+    engine: &dyn Engine,
+    job: &Job<'_>,
+    run: &mut OpenRun,
+    threads: usize,
+    progress: &mut Progress,
+    interrupt: &Interrupt,
+) -> Result<Option<Tally>, StoreError> {
+    let mut attempts_left = 2;
+    loop {
+        compute(engine, run, threads, progress, interrupt)?;
+        if interrupt.stopped() || run.shard().is_some() {
+            return Ok(None);
+        }
+        progress.joining();
+        match run.join(job, &|| interrupt.stopped()) {
+            // A chunk that was whole a moment ago is not any more: compute it again, but not for
+            // ever.
+            Err(StoreError::Incomplete { .. }) if attempts_left > 0 => attempts_left -= 1,
+            result => return result,
+        }
+    }
+}
+
+/// Computes and keeps every missing chunk of this process's part, or as many as a signal or an
+/// error lets.
+fn compute(
+    engine: &dyn Engine,
+    run: &OpenRun,
+    threads: usize,
+    progress: &mut Progress,
+    interrupt: &Interrupt,
+) -> Result<(), StoreError> {
+    let pool = threads::pool(threads)?;
+    let watch = Watch::new(interrupt);
+    let (_, start) = run.own_points();
+    // Bounded, so that a disk slower than the engine holds the engine up instead of filling memory.
+    let (sender, receiver) = sync_channel(threads);
+    let hand = Hand::new(run, sender);
+    let mut result = Ok(());
+    std::thread::scope(|scope| {
+        let (watch, pool) = (&watch, &pool);
+        let work = move || pool.install(|| hand.fill(engine, watch));
+        // Where it cannot be started, the sender goes with it, and the loop below ends.
+        let work = match std::thread::Builder::new().spawn_scoped(scope, work) {
+            Ok(work) => Some(work),
+            Err(error) => {
+                result = Err(ThreadsError::start(threads + 1)(&error).into());
+                None
+            }
+        };
+        loop {
+            match receiver.recv_timeout(Duration::from_millis(100)) {
+                Ok((chunk, outcomes)) => {
+                    if let Err(error) = run.write_chunk(chunk, &outcomes) {
+                        // A chunk that makes no sense costs itself; a disk that fails would cost
+                        // them all.
+                        if !matches!(error, StoreError::Engine { .. }) {
+                            watch.abort();
+                        }
+                        result = std::mem::replace(&mut result, Ok(())).and(Err(error));
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            progress.show(start + watch.points_done());
+        }
+        if let Some(Ok(Err(error))) = work.map(std::thread::ScopedJoinHandle::join) {
+            result = std::mem::replace(&mut result, Ok(())).and(Err(error));
+        }
+    });
+    result
+}
+
+/// Chunks in hand: points go out one by one, outcomes come back in any order, whole chunks go on.
+struct Hand<'a> {
+    run: &'a OpenRun,
+    /// Points of missing chunks that have not gone out.
+    left: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
+    /// Outcomes of chunks that are not whole, those of an interrupted process among them.
+    parts: Mutex<BTreeMap<u64, Vec<Done>>>,
+    whole: SyncSender<(u64, Vec<Done>)>,
+}
+
+impl<'a> Hand<'a> {
+    fn new(run: &'a OpenRun, whole: SyncSender<(u64, Vec<Done>)>) -> Self {
+        let parts = run.take_parts();
+        let there: BTreeSet<u64> = parts.values().flatten().map(|outcome| outcome.point).collect();
+        let missing = (0..run.chunks()).filter(|&chunk| run.is_missing(chunk));
+        let left = missing.flat_map(|chunk| run.chunk_range(chunk));
+        let left = left.filter(move |point| !there.contains(point));
+        Self { run, left: Mutex::new(Box::new(left)), parts: Mutex::new(parts), whole }
+    }
+
+    /// Has the engine evaluate everything that is missing, and keeps what there is of chunks that
+    /// did not become whole.
+    fn fill(self, engine: &dyn Engine, watch: &Watch<'_>) -> Result<(), StoreError> {
+        let evaluated = self.evaluate(engine, watch);
+        let parts = std::mem::take(&mut *lock(&self.parts));
+        // A part that makes no sense costs itself.
+        let kept = parts.into_iter().map(|(chunk, part)| self.run.write_part(chunk, part));
+        kept.fold(evaluated, Result::and)
+    }
+
+    fn evaluate(&self, engine: &dyn Engine, watch: &Watch<'_>) -> Result<(), StoreError> {
+        let next = || if watch.stopped() { None } else { lock(&self.left).next() };
+        let keep = |outcome| self.keep(outcome, watch);
+        let panic = catch_unwind(AssertUnwindSafe(|| engine.evaluate(&next, &keep, watch))).err();
+        let reason = match panic {
+            Some(panic) => format!("the engine panicked: {}", panics::text(panic.as_ref())),
+            None if watch.stopped() => return Ok(()),
+            None => "the engine put its work down unasked".to_owned(),
+        };
+        let parts = lock(&self.parts);
+        let unfinished = parts.keys().next().map(|&chunk| self.run.chunk_range(chunk));
+        let untouched = lock(&self.left).next();
+        match (unfinished, untouched) {
+            (None, None) => Ok(()),
+            (Some(points), _) => Err(StoreError::Engine {
+                first: points.start,
+                last: points.end.saturating_sub(1),
+                reason,
+            }),
+            (None, Some(point)) => Err(StoreError::Engine { first: point, last: point, reason }),
+        }
+    }
+
+    fn keep(&self, outcome: Done, watch: &Watch<'_>) {
+        watch.done(1);
+        let chunk = self.run.chunk_of(outcome.point);
+        let points = self.run.chunk_range(chunk);
+        let mut parts = lock(&self.parts);
+        let part = parts.entry(chunk).or_default();
+        part.push(outcome);
+        if (part.len() as u64) < points.end - points.start {
+            return;
+        }
+        let mut outcomes = parts.remove(&chunk).unwrap_or_default();
+        drop(parts);
+        outcomes.sort_by_key(|outcome| outcome.point);
+        // The receiver outlives the engine's work.
+        let _ = self.whole.send((chunk, outcomes));
+    }
+}
+
+fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What a session is made of, besides what the engine knows.
+struct Clock {
+    began: Instant,
+    started_unix_s: u64,
+    threads: usize,
+    /// Points that were there at the start.
+    there: u64,
+}
+
+impl Clock {
+    fn session(&self, engine: &dyn Engine, job: &Job<'_>, run: &OpenRun) -> Session {
+        let points = run.own_points().1.saturating_sub(self.there);
+        let wall_s = self.began.elapsed().as_secs_f64();
+        Session {
+            started_unix_s: self.started_unix_s,
+            wall_s,
+            host: provenance::host(),
+            pid: std::process::id(),
+            cpus: threads::cores(),
+            cpu_model: provenance::cpu_model(),
+            simd: engine.simd().to_owned(),
+            threads: self.threads,
+            shard: run.shard().map(|shard| format!("{}/{}", shard.index, shard.of)),
+            points,
+            points_per_s: if wall_s > 0.0 { points as f64 / wall_s } else { 0.0 },
+            version: job.version.to_owned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,380 @@
+//! A chunk: the rows of a run of neighbouring points, in one file with its own hash.
+//!
+//! All numbers are little-endian.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 8 | `SWEEPCHK` |
+//! | 4 | format, u32 |
+//! | 4 | columns C of the model, u32 |
+//! | 32 | hash of the plan |
+//! | 8, 8, 8 | chunk index, first point, number of points, u64 |
+//! | rows x (8 + B + 8 C) | records: one a point, or several |
+//! | 32 | blake3 of everything before |
+//!
+//! A record is the point (u64), a bit for each column that says whether there is a cell, in B bytes
+//! as many as it takes, and the cells (u64): the bits of numbers, positions of names, 0 or 1. What
+//! is not there is zero.
+//!
+//! A part is what an interrupted process has of a chunk: the same with `SWEEPPRT`, and records of
+//! some of the points, in order.
+
+use std::sync::Arc;
+
+use super::error::StoreError;
+use super::schema::{Column, Done, Layout, Row};
+
+const MAGIC: [u8; 8] = *b"SWEEPCHK";
+const PART_MAGIC: [u8; 8] = *b"SWEEPPRT";
+const FORMAT: u32 = 5;
+const HEADER: usize = 8 + 4 + 4 + 32 + 3 * 8;
+const HASH: usize = blake3::OUT_LEN;
+
+/// Rows of a point, at most.
+const MOST_ROWS: u64 = 32;
+
+/// What a record holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shape {
+    columns: Arc<[Column]>,
+    /// Whether there may be several rows of a point.
+    has_several: bool,
+}
+
+impl Shape {
+    /// That of a result file's rows.
+    #[must_use]
+    pub fn of(layout: &Layout) -> Self {
+        Self { columns: layout.columns.as_slice().into(), has_several: layout.has_several }
+    }
+
+    /// Bytes of a record.
+    #[must_use]
+    pub fn bytes_a_row(&self) -> usize {
+        8 + self.columns.len().div_ceil(8) + 8 * self.columns.len()
+    }
+}
+
+/// What a chunk's header must say to be the chunk that is looked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Hash of the plan.
+    pub plan: blake3::Hash,
+    /// What a record holds; the hash tells shapes with as many columns apart.
+    pub shape: Shape,
+    /// Index of the chunk.
+    pub chunk: u64,
+    /// Its first point.
+    pub first: u64,
+    /// Its number of points.
+    pub count: u64,
+}
+
+impl Place {
+    /// Bytes of the whole file, at most.
+    pub fn most_bytes(&self) -> u64 {
+        let rows = if self.shape.has_several { MOST_ROWS } else { 1 };
+        self.count
+            .saturating_mul(rows * self.shape.bytes_a_row() as u64)
+            .saturating_add((HEADER + HASH) as u64)
+    }
+}
+
+/// Why bytes are not the chunk that is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(super) enum Damage {
+    #[error("it is cut short or too long")]
+    Length,
+    #[error("its hash is wrong")]
+    Hash,
+    #[error("it belongs to another plan, place or version")]
+    Foreign,
+    #[error("a record makes no sense")]
+    Record,
+}
+
+/// Why outcomes are not a chunk: a defect of whoever computed them.
+fn reject(place: &Place, reason: String) -> StoreError {
+    let last = (place.first + place.count).saturating_sub(1);
+    StoreError::Engine { first: place.first, last, reason }
+}
+
+/// The chunk's file.
+pub(super) fn encode(place: &Place, outcomes: &[Done]) -> Result<Vec<u8>, StoreError> {
+    if outcomes.len() as u64 != place.count {
+        return Err(reject(
+            place,
+            format!("{} outcomes for {} points", outcomes.len(), place.count),
+        ));
+    }
+    for (outcome, point) in outcomes.iter().zip(place.first..) {
+        if outcome.point != point {
+            return Err(reject(
+                place,
+                format!("an outcome of point {} in the place of {point}", outcome.point),
+            ));
+        }
+    }
+    write(MAGIC, place, outcomes)
+}
+
+/// The file of a part of a chunk: outcomes of some of its points, in order.
+pub(super) fn encode_part(place: &Place, outcomes: &[Done]) -> Result<Vec<u8>, StoreError> {
+    if !is_part(place, outcomes) {
+        let reason = format!("{} outcomes that are no part of the chunk", outcomes.len());
+        return Err(reject(place, reason));
+    }
+    write(PART_MAGIC, place, outcomes)
+}
+
+/// Whether these are some of a chunk's points, in order, and not all.
+fn is_part(place: &Place, outcomes: &[Done]) -> bool {
+    let points = place.first..place.first.saturating_add(place.count);
+    (outcomes.len() as u64) < place.count
+        && outcomes.iter().all(|outcome| points.contains(&outcome.point))
+        && outcomes.is_sorted_by(|a, b| a.point < b.point)
+}
+
+fn write(magic: [u8; 8], place: &Place, outcomes: &[Done]) -> Result<Vec<u8>, StoreError> {
+    let shape = &place.shape;
+    let mut bytes = Vec::with_capacity(HEADER + outcomes.len() * shape.bytes_a_row() + HASH);
+    bytes.extend_from_slice(&header(magic, place));
+    for (point, row) in outcomes
+        .iter()
+        .flat_map(|done| done.rows.iter().take(MOST_ROWS as usize).map(|row| (done.point, row)))
+    {
+        let fits = row.len() == shape.columns.len()
+            && shape.columns.iter().zip(row).all(|(column, cell)| column.takes(*cell));
+        if !fits {
+            let reason = format!("point {point}: a row that does not fit its columns");
+            return Err(reject(place, reason));
+        }
+        record(point, row, &mut bytes);
+    }
+    let hash = blake3::hash(&bytes);
+    bytes.extend_from_slice(hash.as_bytes());
+    Ok(bytes)
+}
+
+/// The outcomes in a chunk's file, if every byte is as it was written and it is the chunk looked
+/// for.
+pub(super) fn decode(place: &Place, bytes: &[u8]) -> Result<Vec<Done>, Damage> {
+    let outcomes = read(MAGIC, place, bytes)?;
+    if outcomes.len() as u64 != place.count {
+        return Err(Damage::Length);
+    }
+    let is_whole =
+        outcomes.iter().zip(place.first..).all(|(outcome, point)| outcome.point == point);
+    if is_whole { Ok(outcomes) } else { Err(Damage::Record) }
+}
+
+/// As [`decode`], of a part of the chunk.
+pub(super) fn decode_part(place: &Place, bytes: &[u8]) -> Result<Vec<Done>, Damage> {
+    let outcomes = read(PART_MAGIC, place, bytes)?;
+    if is_part(place, &outcomes) { Ok(outcomes) } else { Err(Damage::Record) }
+}
+
+fn read(magic: [u8; 8], place: &Place, bytes: &[u8]) -> Result<Vec<Done>, Damage> {
+    let (body, hash) = bytes.split_last_chunk::<HASH>().ok_or(Damage::Length)?;
+    if blake3::hash(body) != *hash {
+        return Err(Damage::Hash);
+    }
+    let (found, records) = body.split_at_checked(HEADER).ok_or(Damage::Length)?;
+    if found != header(magic, place) {
+        return Err(Damage::Foreign);
+    }
+    let shape = &place.shape;
+    let records = records.chunks_exact(shape.bytes_a_row());
+    if !records.remainder().is_empty() {
+        return Err(Damage::Length);
+    }
+    let mut outcomes: Vec<Done> = Vec::with_capacity(records.len());
+    for record in records {
+        let (point, row) = read_record(record, shape).ok_or(Damage::Record)?;
+        match outcomes.last_mut() {
+            Some(last) if last.point == point => last.rows.push(row),
+            _ => outcomes.push(Done { point, rows: vec![row] }),
+        }
+    }
+    Ok(outcomes)
+}
+
+fn header(magic: [u8; 8], place: &Place) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(HEADER);
+    bytes.extend_from_slice(&magic);
+    bytes.extend_from_slice(&FORMAT.to_le_bytes());
+    bytes.extend_from_slice(&(place.shape.columns.len() as u32).to_le_bytes());
+    bytes.extend_from_slice(place.plan.as_bytes());
+    for number in [place.chunk, place.first, place.count] {
+        bytes.extend_from_slice(&number.to_le_bytes());
+    }
+    bytes
+}
+
+fn record(point: u64, row: &Row, bytes: &mut Vec<u8>) {
+    bytes.extend_from_slice(&point.to_le_bytes());
+    for eight in row.chunks(8) {
+        let bits = eight.iter().enumerate().map(|(k, cell)| u8::from(cell.is_some()) << k);
+        bytes.push(bits.sum());
+    }
+    for cell in row {
+        bytes.extend_from_slice(&cell.unwrap_or_default().to_le_bytes());
+    }
+}
+
+/// Takes a fixed-length record apart; `None` where it makes no sense.
+fn read_record(bytes: &[u8], shape: &Shape) -> Option<(u64, Row)> {
+    let columns = &shape.columns;
+    let mut rest = bytes;
+    let point = u64::from_le_bytes(take(&mut rest)?);
+    let (bits, mut rest) = rest.split_at_checked(columns.len().div_ceil(8))?;
+    let mut row = Row::with_capacity(columns.len());
+    for (k, column) in columns.iter().enumerate() {
+        let number = u64::from_le_bytes(take(&mut rest)?);
+        let is_there = bits[k / 8] >> (k % 8) & 1 == 1;
+        let cell = is_there.then_some(number);
+        if !column.takes(cell) || (!is_there && number != 0) {
+            return None;
+        }
+        row.push(cell);
+    }
+    Some((point, row))
+}
+
+fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+    let (head, tail) = rest.split_first_chunk::<N>()?;
+    *rest = tail;
+    Some(*head)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::synthetic;
+    use proptest::prelude::*;
+
+    fn place(count: u64) -> Place {
+        let shape = Shape::of(&synthetic::layout());
+        Place { plan: blake3::hash(b"plan"), shape, chunk: 3, first: 48, count }
+    }
+
+    fn outcomes(place: &Place) -> Vec<Done> {
+        (place.first..place.first + place.count).map(synthetic::done).collect()
+    }
+
+    #[test]
+    fn a_flipped_bit_anywhere_is_found() {
+        let place = place(3);
+        let bytes = encode(&place, &outcomes(&place)).unwrap();
+        for at in 0..bytes.len() {
+            for bit in 0..8 {
+                let mut broken = bytes.clone();
+                broken[at] ^= 1 << bit;
+                assert_eq!(decode(&place, &broken), Err(Damage::Hash), "byte {at}, bit {bit}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_truncation_anywhere_is_found() {
+        let place = place(3);
+        let bytes = encode(&place, &outcomes(&place)).unwrap();
+        for length in 0..bytes.len() {
+            assert!(decode(&place, &bytes[..length]).is_err(), "cut to {length}");
+        }
+        let longer = [bytes.as_slice(), &[0]].concat();
+        assert!(decode(&place, &longer).is_err());
+    }
+
+    #[test]
+    fn a_whole_chunk_of_another_plan_place_or_shape_is_foreign() {
+        let ours = place(2);
+        let bytes = encode(&ours, &outcomes(&ours)).unwrap();
+        let mut layout = synthetic::layout();
+        layout.columns.pop();
+        let others = [
+            Place { plan: blake3::hash(b"other"), ..ours.clone() },
+            Place { chunk: 4, ..ours.clone() },
+            Place { first: 49, ..ours.clone() },
+            Place { count: 3, ..ours.clone() },
+            Place { shape: Shape::of(&layout), ..ours },
+        ];
+        for other in others {
+            assert_eq!(decode(&other, &bytes), Err(Damage::Foreign));
+        }
+    }
+
+    #[test]
+    fn rows_that_do_not_fit_the_chunk_are_refused() {
+        let place = place(2);
+        let good = outcomes(&place);
+        let reason = |outcomes: &[Done]| encode(&place, outcomes).unwrap_err().to_string();
+        assert!(reason(&good[..1]).contains("1 outcomes for 2 points"));
+        let swapped: Vec<Done> = good.iter().rev().cloned().collect();
+        assert!(reason(&swapped).contains("an outcome of point 49 in the place of 48"));
+        let mut short = good.clone();
+        short[0].rows[0].pop();
+        assert!(reason(&short).contains("does not fit"), "{}", reason(&short));
+        let mut null = good;
+        let steps = synthetic::layout().position("steps").unwrap();
+        null[0].rows[0][steps] = None;
+        assert!(reason(&null).contains("does not fit"), "{}", reason(&null));
+    }
+
+    #[test]
+    fn a_part_is_some_points_in_order_and_no_chunk() {
+        let place = place(4);
+        let all = outcomes(&place);
+        for some in [&all[..0], &all[1..2], &all[..3]] {
+            let bytes = encode_part(&place, some).unwrap();
+            assert_eq!(decode_part(&place, &bytes).as_deref(), Ok(some));
+            assert_eq!(decode(&place, &bytes), Err(Damage::Foreign));
+            for at in 0..bytes.len() {
+                let mut broken = bytes.clone();
+                broken[at] ^= 1;
+                assert_eq!(decode_part(&place, &broken), Err(Damage::Hash), "byte {at}");
+                assert!(decode_part(&place, &bytes[..at]).is_err(), "cut to {at}");
+            }
+        }
+        let elsewhere = [synthetic::done(place.first + 4)];
+        let backwards = [all[1].clone(), all[0].clone()];
+        for wrong in [all.as_slice(), &elsewhere, &backwards] {
+            assert!(encode_part(&place, wrong).is_err(), "{wrong:?}");
+            let bytes = write(PART_MAGIC, &place, wrong).unwrap();
+            assert_eq!(decode_part(&place, &bytes), Err(Damage::Record));
+        }
+        let whole = encode(&place, &all).unwrap();
+        assert_eq!(decode_part(&place, &whole), Err(Damage::Foreign));
+    }
+
+    fn row() -> impl Strategy<Value = Row> {
+        let cell = |column: &Column| match &column.kind {
+            crate::store::Kind::Count | crate::store::Kind::Axis => {
+                any::<u64>().prop_map(Some).boxed()
+            }
+            crate::store::Kind::Flag => prop::option::of(0..2_u64).boxed(),
+            crate::store::Kind::Name(names) => prop::option::of(0..names.len() as u64).boxed(),
+            _ => any::<Option<u64>>().boxed(),
+        };
+        synthetic::layout().columns.iter().map(cell).collect::<Vec<_>>()
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_goes_in_comes_out(
+            points in prop::collection::vec(prop::collection::vec(row(), 1..4), 0..20),
+        ) {
+            let mut place = place(points.len() as u64);
+            place.shape.has_several = true;
+            let done = |(rows, point)| Done { point, rows };
+            let outcomes: Vec<Done> = points.into_iter().zip(place.first..).map(done).collect();
+            let bytes = encode(&place, &outcomes).unwrap();
+            prop_assert_eq!(decode(&place, &bytes), Ok(outcomes));
+        }
+
+        #[test]
+        fn any_bytes_at_all_are_answered(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+            prop_assert!(decode(&place(1), &bytes).is_err());
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! What can go wrong with a run's files, each with the path and what to do about it.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::plan_file::PlanDifference;
+use crate::threads::ThreadsError;
+use sweep_files::FileError;
+
+/// A failure of the store.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// A file that cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// Another process runs on this output.
+    #[error("{} is in use by {}\n  = help: wait for it to end, or give another \
+             --out", output.display(), Holders(holders))]
+    Busy {
+        /// The output both want.
+        output: PathBuf,
+        /// Who holds it, as far as they could be read.
+        holders: Vec<Holder>,
+    },
+    /// The run folder belongs to another plan, or was begun by a build that computes other numbers.
+    #[error(
+        "{} was begun with another plan or by another build:\n{}  = help: end it with that plan \
+         and \
+         build, give another --out, or start over with --fresh (which deletes that folder's \
+         finished chunks)",
+        folder.display(),
+        Differences(differences)
+    )]
+    PlanDiffers {
+        /// The run folder.
+        folder: PathBuf,
+        /// Where the plans part.
+        differences: Vec<PlanDifference>,
+    },
+    /// The plan has more numbers than a run folder keeps.
+    #[error(
+        "the plan is too long for {}: written out, it has more than {} MiB\n  = help: write values \
+         as a range, or points as a list in a file of their own",
+        folder.display(),
+        sweep_files::regular::LONGEST_JSON_BYTES >> 20
+    )]
+    LongPlan {
+        /// The run folder.
+        folder: PathBuf,
+    },
+    /// The finished output belongs to another plan, or is of a build that computes other numbers.
+    #[error(
+        "{} already holds the result of another plan or build:\n{}  = help: give another --out, or \
+         replace it with --fresh",
+        output.display(),
+        Differences(differences)
+    )]
+    OutputDiffers {
+        /// The finished file.
+        output: PathBuf,
+        /// Where the plans part.
+        differences: Vec<PlanDifference>,
+    },
+    /// A shard that does not fit.
+    #[error("{0}")]
+    Shard(String),
+    /// Chunks are missing, so there is no whole result to write.
+    #[error("{} is incomplete: {missing} of {chunks} chunks are missing{}\n  = help: \
+         {}", folder.display(), ShardsMissing(missing_shards), how_to_complete(missing_shards))]
+    Incomplete {
+        /// The run folder.
+        folder: PathBuf,
+        /// How many chunks are missing.
+        missing: u64,
+        /// Of how many.
+        chunks: u64,
+        /// The shards they belong to, as a list such as `2,5-7`, if the run was sharded.
+        missing_shards: Option<String>,
+    },
+    /// There is no run to speak of.
+    #[error("there is no run at {}: neither {} nor that file exists\n  = help: start it with \
+             `sweep run`",
+        output.display(), folder.display())]
+    NoRun {
+        /// The output asked about.
+        output: PathBuf,
+        /// Its run folder.
+        folder: PathBuf,
+    },
+    /// The engine handed over something that cannot be a chunk; a defect of this program.
+    #[error(
+        "internal error in points {first} to {last}: {reason}\n  = help: \
+         the other chunks are kept; please report this with the grid file"
+    )]
+    Engine {
+        /// First point of the chunk.
+        first: u64,
+        /// Last point of the chunk.
+        last: u64,
+        /// What was wrong.
+        reason: String,
+    },
+    /// Arrow or Parquet refused; a defect of this program or a file that lacks what is looked for.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Parquet {
+        /// What was being done, in the infinitive.
+        action: &'static str,
+        /// To which file.
+        path: PathBuf,
+        /// What the library answered.
+        source: parquet::errors::ParquetError,
+    },
+    /// There are no threads to work with.
+    #[error(transparent)]
+    Threads(#[from] ThreadsError),
+}
+
+/// A process that holds an output.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Holder {
+    /// Process id.
+    pub pid: u32,
+    /// Its machine.
+    pub host: String,
+    /// Its shard, 1-based, if it runs one.
+    pub shard: Option<u64>,
+}
+
+impl StoreError {
+    /// A failure of the Parquet library at a file.
+    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let failed = FileError::io(action, path);
+        move |source| Self::File(failed(source))
+    }
+
+    /// Wraps what the Parquet library reported, as a plain I/O failure where it was one.
+    pub fn parquet(
+        action: &'static str,
+        path: &Path,
+    ) -> impl Fn(parquet::errors::ParquetError) -> Self {
+        let path = path.to_path_buf();
+        move |error| match error {
+            parquet::errors::ParquetError::External(inner) => match inner.downcast::<io::Error>() {
+                Ok(source) => FileError::Io { action, path: path.clone(), source: *source }.into(),
+                Err(inner) => Self::Parquet {
+                    action,
+                    path: path.clone(),
+                    source: parquet::errors::ParquetError::External(inner),
+                },
+            },
+            source => Self::Parquet { action, path: path.clone(), source },
+        }
+    }
+
+    /// Whether nothing was begun, because the request does not fit what is there.
+    #[must_use]
+    pub fn is_refusal(&self) -> bool {
+        match self {
+            Self::PlanDiffers { .. }
+            | Self::OutputDiffers { .. }
+            | Self::LongPlan { .. }
+            | Self::Shard(_) => true,
+            Self::Threads(error) => error.is_refusal(),
+            Self::File(error) => error.is_refusal(),
+            Self::Busy { .. }
+            | Self::Incomplete { .. }
+            | Self::NoRun { .. }
+            | Self::Engine { .. }
+            | Self::Parquet { .. } => false,
+        }
+    }
+}
+
+fn how_to_complete(missing_shards: &Option<String>) -> &'static str {
+    match missing_shards {
+        Some(_) => "run those shards again, or run the same command as `sweep run` without --shard",
+        None => "run `sweep run` with the same grid: it computes what is missing",
+    }
+}
+
+struct ShardsMissing<'a>(&'a Option<String>);
+
+impl fmt::Display for ShardsMissing<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(list) => write!(f, ", of shards {list}"),
+            None => Ok(()),
+        }
+    }
+}
+
+struct Holders<'a>(&'a [Holder]);
+
+impl fmt::Display for Holders<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() {
+            return f.write_str("another run");
+        }
+        for (i, holder) in self.0.iter().take(4).enumerate() {
+            let comma = if i > 0 { ", " } else { "" };
+            write!(f, "{comma}process {} on {}", holder.pid, holder.host)?;
+            if let Some(shard) = holder.shard {
+                write!(f, " (shard {shard})")?;
+            }
+        }
+        if self.0.len() > 4 { write!(f, " and {} more", self.0.len() - 4) } else { Ok(()) }
+    }
+}
+
+struct Differences<'a>(&'a [PlanDifference]);
+
+impl fmt::Display for Differences<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const SHOWN: usize = 12;
+        for difference in self.0.iter().take(SHOWN) {
+            writeln!(f, "  {difference}")?;
+        }
+        if self.0.len() > SHOWN {
+            writeln!(f, "  and {} more differences", self.0.len() - SHOWN)?;
+        }
+        Ok(())
+    }
+}

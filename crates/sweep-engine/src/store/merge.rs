@@ -1,0 +1,149 @@
+//! Joining the chunks into the one Parquet file, a row group at a time.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use arrow_array::RecordBatch;
+use parquet::arrow::ArrowWriter;
+use parquet::errors::ParquetError;
+use tempfile::NamedTempFile;
+
+use super::Job;
+use super::error::StoreError;
+use super::open::{OpenRun, remove};
+use super::provenance::{self, Session};
+use super::read::{self, Tally};
+use super::schema::{self, BATCH_ROWS, ResultRows};
+use sweep_files::panics;
+use sweep_files::{self as files, ParquetFile, atomic, seal};
+
+/// A finished result.
+#[derive(Debug)]
+pub struct Joined {
+    /// What it holds.
+    pub tally: Tally,
+    /// Things a user should hear of.
+    pub notes: Vec<String>,
+}
+
+/// A result file in the making: batches of [`BATCH_ROWS`] rows, the last perhaps of fewer.
+struct MapWriter<'a> {
+    output: &'a Path,
+    file: NamedTempFile,
+    writer: ArrowWriter<BufWriter<File>>,
+}
+
+impl<'a> MapWriter<'a> {
+    /// Begins the file of a job, which is to be at `output`.
+    fn begin(job: &Job<'_>, file: NamedTempFile, output: &'a Path) -> Result<Self, StoreError> {
+        let (schema, properties) = (job.layout.schema(), schema::properties(job));
+        let handle = file.as_file().try_clone().map_err(StoreError::io("write", output))?;
+        let begin = || ArrowWriter::try_new(BufWriter::new(handle), schema, Some(properties));
+        let writer = panics::in_parquet("the library gave up writing", begin)
+            .map_err(StoreError::parquet("write", output))?;
+        Ok(Self { output, file, writer })
+    }
+
+    fn write(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
+        panics::in_parquet("the library gave up writing", || self.writer.write(batch))
+            .map_err(StoreError::parquet("write", self.output))
+    }
+
+    /// The whole file, with its digest.
+    fn finish(self) -> Result<NamedTempFile, StoreError> {
+        let Self { output, mut file, mut writer } = self;
+        // Closing flushes to the file. (Taking the file back out of the writer would tell a full
+        // disk as text only.)
+        writer.append_key_value_metadata(seal::blank());
+        panics::in_parquet("the library gave up writing", || writer.close())
+            .map_err(StoreError::parquet("write", output))?;
+        seal::seal(file.as_file_mut()).map_err(StoreError::io("write", output))?;
+        Ok(file)
+    }
+}
+
+/// Writes the result file of a job whose rows are in memory, in batches of [`BATCH_ROWS`]: the same
+/// bytes as a run's.
+///
+/// # Errors
+/// [`StoreError::File`].
+pub fn write_map(job: &Job<'_>, batches: &[RecordBatch], output: &Path) -> Result<(), StoreError> {
+    files::judge(output, job.layout.file_kind())?;
+    let folder = atomic::parent(output);
+    files::ready(folder)?;
+    let mut writer = MapWriter::begin(job, atomic::begin(folder)?, output)?;
+    batches.iter().try_for_each(|batch| writer.write(batch))?;
+    let file = writer.finish()?;
+    files::judge(output, job.layout.file_kind())?;
+    Ok(atomic::publish(file, output)?)
+}
+
+impl OpenRun {
+    /// Joins the chunks into the output and syncs it into place; `None` when `stop` said so. The
+    /// folder stays until [`OpenRun::complete`].
+    ///
+    /// Memory: one row group while it is encoded and one chunk, about 40 MB whatever the number of
+    /// points, and 150 bytes a column for each row group behind (10 MB for a billion points).
+    ///
+    /// # Errors
+    /// [`StoreError::Incomplete`] when a chunk is missing or was found damaged (it is then set
+    /// aside, and [`OpenRun::is_missing`]); [`StoreError::File`].
+    pub fn join(
+        &mut self,
+        job: &Job<'_>,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Tally>, StoreError> {
+        let output = self.output().to_path_buf();
+        let file = atomic::begin(self.folder())?;
+        let from_arrow = |error| StoreError::parquet("write", &output)(ParquetError::from(error));
+        let mut rows = ResultRows::new(&job.layout);
+        let mut writer = MapWriter::begin(job, file, &output)?;
+        for chunk in 0..self.chunks() {
+            if stop() {
+                return Ok(None);
+            }
+            let Some(outcomes) = self.read_chunk(chunk)? else {
+                self.rescan()?;
+                return Err(self.incomplete()?);
+            };
+            let of_points = outcomes
+                .into_iter()
+                .flat_map(|done| done.rows.into_iter().map(move |row| (done.point, row)));
+            for (point, row) in of_points {
+                rows.push(point, (job.axis_values)(point), row);
+                if rows.len() == BATCH_ROWS {
+                    writer.write(&rows.take().map_err(from_arrow)?)?;
+                }
+            }
+        }
+        if rows.len() > 0 {
+            writer.write(&rows.take().map_err(from_arrow)?)?;
+        }
+        let file = writer.finish()?;
+        // Read back before it takes its place: what cannot be read must not replace anything.
+        let tally = read::tally(&ParquetFile::open(file.path())?)?;
+        files::judge(&output, job.layout.file_kind())?;
+        atomic::publish(file, &output)?;
+        Ok(Some(tally))
+    }
+
+    /// Ends a run whose output is in place: writes the sidecar and removes the folder.
+    ///
+    /// # Errors
+    /// [`StoreError::File`] when the sidecar cannot be written.
+    pub fn complete(
+        mut self,
+        job: &Job<'_>,
+        tally: Tally,
+        session: Option<Session>,
+    ) -> Result<Joined, StoreError> {
+        let sidecar = provenance::sidecar(&self.folder, job, &tally, session)?;
+        let path = self.folder.sidecar();
+        files::judge(&path, self.folder.account())?;
+        atomic::write(self.folder(), &path, &sidecar)?;
+        let mut notes = self.take_notes();
+        notes.extend(remove(&self.folder, self.lock));
+        Ok(Joined { tally, notes })
+    }
+}

@@ -1,0 +1,230 @@
+//! A run's files: nothing computed is lost, and nothing but the plan decides a byte of the result.
+//!
+//! A run on `x.parquet` works in the folder `x.parquet.partial`:
+//!
+//! | file | what |
+//! |---|---|
+//! | `plan.json` | the frozen plan, written first (`plan_file`) |
+//! | `shards.json` | into how many shards the run was dealt, if it was (`shard`) |
+//! | `chunk-<index>.bin` | outcomes of neighbouring points, each file whole or absent (`chunk`) |
+//! | `part-<index>.bin` | what an interrupted process had of a chunk (`chunk`) |
+//! | `trials.bin` | the trials of a search, in place of chunks (`trials`) |
+//! | `*.damaged` | what was not as it had been written; computed again |
+//! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
+//! | `lock`, `shard-<i>.lock` | who is at work (`lock`) |
+//!
+//! When every chunk is there they are joined into the one Parquet file (`merge`), and the folder
+//! goes. The store knows points, axis names and outcomes; it does not know the engine that makes
+//! them.
+
+mod chunk;
+mod error;
+mod lock;
+mod merge;
+mod open;
+mod plan_file;
+pub mod provenance;
+pub mod read;
+pub mod schema;
+mod shard;
+mod status;
+#[cfg(test)]
+pub mod synthetic;
+#[cfg(test)]
+mod tests;
+mod trials;
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+pub use chunk::Shape;
+pub use error::StoreError;
+pub use merge::write_map;
+pub use open::{OpenOptions, OpenRun, Opened};
+pub use schema::{BATCH_ROWS, Column, Done, Kind, Layout, ResultRows, Row};
+pub use shard::list as shard_list;
+pub use shard::{Shard, ShardRequest};
+pub use status::FolderStatus;
+pub use status::{State, status};
+pub use trials::{Key, OpenedTrials, Trials};
+
+use sweep_parameter::Parameter as _;
+
+use crate::config::Read;
+use crate::model::Model;
+use crate::plan::{Axis, Plan};
+use sweep_files::{self as files, FileKind};
+
+/// The values of the axes at a point of the grid, first axis first.
+pub type AxisValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
+
+/// What the store must know of a plan.
+pub struct Job<'a> {
+    /// Grid as run, full machine and method. Two runs are the same when this, `version` and
+    /// `numerics` are.
+    pub plan: Value,
+    /// Version of the program; other versions may round differently, so their chunks do not mix.
+    pub version: &'a str,
+    /// Version of its numerics: so may other builds of one version.
+    pub numerics: u32,
+    /// Rows of the result.
+    pub points: u64,
+    /// What the columns depend on.
+    pub layout: Layout,
+    /// A row is reliable when its greatest ratio is below this.
+    pub ratio_limit: f64,
+    /// Axis values by point.
+    pub axis_values: AxisValues<'a>,
+}
+
+impl<'a> Job<'a> {
+    /// What the store must know of this plan, as run by this build of its program.
+    #[must_use]
+    pub fn of<M: Rows>(plan: &'a Plan<M>) -> Self {
+        Self {
+            plan: plan.to_json(),
+            version: M::BUILD.version,
+            numerics: M::BUILD.numerics,
+            points: plan.points(),
+            layout: M::layout(plan),
+            ratio_limit: plan.reliability.ratio_limit,
+            axis_values: Box::new(|point| plan.axis_values(point)),
+        }
+    }
+
+    /// Hash of version, numerics and plan.
+    #[must_use]
+    pub fn hash(&self) -> blake3::Hash {
+        plan_file::plan_hash(self.version, self.numerics, &self.plan)
+    }
+}
+
+/// A model whose rows can be kept.
+pub trait Rows: Read {
+    /// What the rows of a result are.
+    fn layout(plan: &Plan<Self>) -> Layout;
+}
+
+/// The axes of a plan as columns.
+#[must_use]
+pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<Column> {
+    let column = |axis: &Axis<M>| {
+        let parameter = &axis.parameter;
+        Column::new(parameter.name(), parameter.unit(), parameter.description(), Kind::Axis)
+    };
+    plan.axes.iter().map(column).collect()
+}
+
+/// Points a chunk holds (the last may hold fewer), from the number of points alone.
+///
+/// A power of two, so that chunks fill whole SIMD lane groups: 8 for the smallest grids, so that
+/// every core gets some; then 32 to 4096, for about a thousand chunks; then 4096 each, for chunks
+/// of a megabyte.
+#[must_use]
+pub const fn chunk_points(points: u64) -> u64 {
+    const SMALL_GRID: u64 = 128;
+    const CHUNKS: u64 = 1024;
+    if points <= SMALL_GRID {
+        return 8;
+    }
+    let wanted = points.div_ceil(CHUNKS);
+    if wanted <= 32 {
+        32
+    } else if wanted >= 4096 {
+        4096
+    } else {
+        wanted.next_power_of_two()
+    }
+}
+
+/// The paths of one run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Folder {
+    /// The finished file.
+    pub output: PathBuf,
+    /// The folder of the unfinished run, beside it.
+    pub path: PathBuf,
+}
+
+impl Folder {
+    /// Those of the run with this output. Neither it nor its sidecar is anything but absent or
+    /// ours.
+    pub fn of(output: &Path, layout: &Layout) -> Result<Self, StoreError> {
+        let folder = Self::beside(output, layout.file_kind())?;
+        files::judge(&folder.sidecar(), folder.account())?;
+        Ok(folder)
+    }
+
+    /// Those of the search with this output.
+    fn of_search(output: &Path) -> Result<Self, StoreError> {
+        Self::beside(output, FileKind::Boundary)
+    }
+
+    fn beside(output: &Path, kind: FileKind<'_>) -> Result<Self, StoreError> {
+        files::judge(output, kind)?;
+        let mut name = output.file_name().unwrap_or_default().to_owned();
+        name.push(".partial");
+        Ok(Self { output: output.to_path_buf(), path: output.with_file_name(name) })
+    }
+
+    fn plan(&self) -> PathBuf {
+        self.path.join("plan.json")
+    }
+
+    fn shards(&self) -> PathBuf {
+        self.path.join("shards.json")
+    }
+
+    fn lock(&self) -> PathBuf {
+        self.path.join("lock")
+    }
+
+    fn shard_lock(&self, shard: u64) -> PathBuf {
+        self.path.join(format!("shard-{shard}.lock"))
+    }
+
+    fn chunk(&self, chunk: u64) -> PathBuf {
+        self.path.join(Named::Chunk.name(chunk))
+    }
+
+    fn part(&self, chunk: u64) -> PathBuf {
+        self.path.join(Named::Part.name(chunk))
+    }
+
+    /// The sidecar that says how the run went.
+    fn sidecar(&self) -> PathBuf {
+        files::beside(&self.output, "run.json")
+    }
+
+    /// What kind of file that is.
+    fn account(&self) -> FileKind<'_> {
+        FileKind::Account { of: self.output.file_name().unwrap_or_default() }
+    }
+}
+
+/// Files of a run's folder that are named after a chunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Named {
+    Chunk,
+    Part,
+}
+
+impl Named {
+    const fn stem(self) -> &'static str {
+        match self {
+            Self::Chunk => "chunk-",
+            Self::Part => "part-",
+        }
+    }
+
+    fn name(self, chunk: u64) -> String {
+        format!("{}{chunk:08}.bin", self.stem())
+    }
+
+    /// The chunk that such a file is named after, if any.
+    fn chunk_of(self, name: &str) -> Option<u64> {
+        let chunk = name.strip_prefix(self.stem())?.strip_suffix(".bin")?.parse().ok()?;
+        (self.name(chunk) == name).then_some(chunk)
+    }
+}

@@ -1,0 +1,501 @@
+//! Opening a run on an output: whose it is, what is there, what is missing.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io::{self, ErrorKind, Read as _};
+use std::ops::Range;
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use arrow_schema::SchemaRef;
+
+use super::chunk::{self, Damage, Place, Shape};
+use super::error::StoreError;
+use super::lock::{self, Lock};
+use super::plan_file::{Found, PlanDifference, PlanFile, set_aside};
+use super::read::{self, ResultFile, Tally};
+use super::schema::Done;
+use super::shard::{self, Dealing, Shard, ShardRequest};
+use super::{Folder, Job, Named, chunk_points, provenance, trials};
+use crate::threads::Environment;
+use sweep_files::{FileError, atomic, regular};
+
+/// How a run is opened.
+#[derive(Clone, Copy)]
+pub struct OpenOptions<'a> {
+    /// Start over: finished chunks go now, a finished file stays until the new one takes its place.
+    pub fresh: bool,
+    /// Which part to compute; if `None`, the scheduler's variables say.
+    pub shard: Option<ShardRequest>,
+    /// Looks up the scheduler's variables.
+    pub environment: Environment<'a>,
+}
+
+/// What opening an output came to.
+#[derive(Debug)]
+pub enum Opened {
+    /// The output is there, whole, and of this very plan.
+    Finished(Box<ResultFile>, Box<Tally>),
+    /// There is something to do; the run holds its lock.
+    Run(Box<OpenRun>),
+}
+
+/// A run folder this process has a right to.
+#[derive(Debug)]
+pub struct OpenRun {
+    /// Its paths.
+    pub folder: Folder,
+    /// What it holds.
+    pub lock: Lock,
+    place: Place,
+    points: u64,
+    chunk_points: u64,
+    dealt: Option<(Shard, Dealing)>,
+    /// This process's chunks that are there; behind a lock because workers look while the writer
+    /// adds.
+    present: Mutex<BTreeSet<u64>>,
+    /// What there is of this process's other chunks, until it is taken.
+    parts: Mutex<BTreeMap<u64, Vec<Done>>>,
+    notes: Vec<String>,
+}
+
+impl OpenRun {
+    /// Takes the output for this job, freezes its plan or finds it frozen, and looks through its
+    /// chunks.
+    ///
+    /// # Errors
+    /// [`StoreError::Busy`] when another run holds the output, [`StoreError::PlanDiffers`],
+    /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::Shard`]
+    /// for a part that does not fit, [`StoreError::File`] for anything else at the output that is
+    /// not ours, and for the file system.
+    pub fn open(
+        output: &Path,
+        job: &Job<'_>,
+        options: OpenOptions<'_>,
+    ) -> Result<Opened, StoreError> {
+        let folder = Folder::of(output, &job.layout)?;
+        if !options.fresh
+            && !folder.path.exists()
+            && let Some((file, tally)) = finished(&folder, job)?
+        {
+            return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
+        }
+        let mut dealt =
+            shard::resolve(options.shard, options.environment, Dealing::read(&folder)?)?;
+        if options.fresh && dealt.is_some() {
+            return Err(StoreError::Shard(format!(
+                "--fresh would delete what the other shards have done\n  = help: delete {} first, \
+                 then start the shards",
+                folder.path.display()
+            )));
+        }
+        let lock = Lock::acquire(&folder, dealt.map(|(shard, _)| shard.index))?;
+        let mut notes: Vec<String> = lock.note(&folder).into_iter().collect();
+        if options.fresh {
+            clear(&folder)?;
+        }
+        atomic::clear_leftovers(&folder.path);
+        let finished = || if options.fresh { Ok(None) } else { finished(&folder, job) };
+        if let Some((file, tally)) = agree_on_plan(&folder, job, &mut notes, finished)? {
+            // What a run leaves that dies between publishing its file and removing its folder.
+            remove(&folder, lock);
+            return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
+        }
+        if let Some((_, dealing)) = dealt {
+            let frozen = dealing.freeze(&folder)?;
+            dealt = shard::resolve(options.shard, options.environment, Some(frozen))?;
+        }
+        let place =
+            Place { plan: job.hash(), shape: Shape::of(&job.layout), chunk: 0, first: 0, count: 0 };
+        let mut run = Self {
+            folder,
+            lock,
+            place,
+            points: job.points,
+            chunk_points: chunk_points(job.points),
+            dealt,
+            present: Mutex::default(),
+            parts: Mutex::default(),
+            notes,
+        };
+        run.rescan()?;
+        Ok(Opened::Run(Box::new(run)))
+    }
+
+    /// Opens what shards have left, in order to join it; never begins a run.
+    ///
+    /// # Errors
+    /// [`StoreError::NoRun`] when nothing is there; else as [`OpenRun::open`].
+    pub fn open_for_merge(output: &Path, job: &Job<'_>) -> Result<Opened, StoreError> {
+        let folder = Folder::of(output, &job.layout)?;
+        if !folder.path.exists() && !output.exists() {
+            return Err(StoreError::NoRun { output: output.to_path_buf(), folder: folder.path });
+        }
+        Self::open(output, job, OpenOptions { fresh: false, shard: None, environment: &|_| None })
+    }
+
+    /// Looks through the chunks again, setting aside what is not whole.
+    ///
+    /// # Errors
+    /// [`StoreError::File`].
+    pub fn rescan(&mut self) -> Result<(), StoreError> {
+        let mut present = BTreeSet::new();
+        for chunk in chunks_named(&self.folder, Named::Chunk)? {
+            if chunk >= self.chunks() || !self.owns(chunk) {
+                continue;
+            }
+            if self.read_chunk(chunk)?.is_some() {
+                present.insert(chunk);
+            }
+        }
+        *self.present() = present;
+        let mut parts = BTreeMap::new();
+        for chunk in chunks_named(&self.folder, Named::Part)? {
+            if chunk < self.chunks() && self.is_missing(chunk) {
+                let path = self.folder.part(chunk);
+                let found = read_part(&self.folder, &self.place(chunk))?;
+                let outcomes = self.undamaged(found, &path)?;
+                parts.extend(outcomes.map(|outcomes| (chunk, outcomes)));
+            }
+        }
+        *lock_of(&self.parts) = parts;
+        Ok(())
+    }
+
+    /// A chunk's outcomes; `None`, with the file set aside and noted, if it is damaged, or if it is
+    /// not there.
+    pub fn read_chunk(&mut self, chunk: u64) -> Result<Option<Vec<Done>>, StoreError> {
+        let found = read_chunk(&self.folder, &self.place(chunk))?;
+        let outcomes = self.undamaged(found, &self.folder.chunk(chunk))?;
+        if outcomes.is_none() {
+            self.present().remove(&chunk);
+        }
+        Ok(outcomes)
+    }
+
+    /// What a file holds; a damaged one is set aside and noted.
+    fn undamaged(
+        &mut self,
+        found: ChunkFile,
+        path: &Path,
+    ) -> Result<Option<Vec<Done>>, StoreError> {
+        match found {
+            ChunkFile::Whole(outcomes) => Ok(Some(outcomes)),
+            ChunkFile::Absent => Ok(None),
+            ChunkFile::Damaged(damage) => {
+                let aside = set_aside(path)?;
+                self.notes.push(format!(
+                    "{}: {damage}; kept as {} and computed again",
+                    path.display(),
+                    aside.file_name().unwrap_or_default().to_string_lossy()
+                ));
+                Ok(None)
+            }
+        }
+    }
+
+    /// Keeps a chunk for good: when this returns, it outlives a power cut.
+    ///
+    /// # Errors
+    /// [`StoreError::Engine`] when the outcomes are not this chunk's points in order,
+    /// [`StoreError::File`].
+    pub fn write_chunk(&self, chunk: u64, outcomes: &[Done]) -> Result<(), StoreError> {
+        let bytes = chunk::encode(&self.place(chunk), outcomes)?;
+        atomic::write(&self.folder.path, &self.folder.chunk(chunk), &bytes)?;
+        self.present().insert(chunk);
+        Ok(())
+    }
+
+    /// The outcomes there are of chunks that are not whole, to go on from.
+    pub fn take_parts(&self) -> BTreeMap<u64, Vec<Done>> {
+        std::mem::take(&mut *lock_of(&self.parts))
+    }
+
+    /// Keeps what there is of a chunk, in any order, for the next process to go on from. Once the
+    /// chunk is there, nobody reads the part.
+    ///
+    /// # Errors
+    /// As [`OpenRun::write_chunk`].
+    pub fn write_part(&self, chunk: u64, mut outcomes: Vec<Done>) -> Result<(), StoreError> {
+        outcomes.sort_by_key(|outcome| outcome.point);
+        let bytes = chunk::encode_part(&self.place(chunk), &outcomes)?;
+        atomic::write(&self.folder.path, &self.folder.part(chunk), &bytes)?;
+        lock_of(&self.parts).insert(chunk, outcomes);
+        Ok(())
+    }
+
+    /// How many chunks make up the whole result.
+    #[must_use]
+    pub fn chunks(&self) -> u64 {
+        self.points.div_ceil(self.chunk_points)
+    }
+
+    /// The points of a chunk.
+    #[must_use]
+    pub fn chunk_range(&self, chunk: u64) -> Range<u64> {
+        let first = chunk.saturating_mul(self.chunk_points).min(self.points);
+        first..first.saturating_add(self.chunk_points).min(self.points)
+    }
+
+    /// The chunk that a point is in.
+    #[must_use]
+    pub const fn chunk_of(&self, point: u64) -> u64 {
+        point / self.chunk_points
+    }
+
+    /// The part this process computes, if not the whole.
+    #[must_use]
+    pub fn shard(&self) -> Option<Shard> {
+        self.dealt.map(|(shard, _)| shard)
+    }
+
+    fn owns(&self, chunk: u64) -> bool {
+        self.shard().is_none_or(|shard| shard.owns(chunk))
+    }
+
+    /// Whether a chunk is this process's to compute and not there yet.
+    #[must_use]
+    pub fn is_missing(&self, chunk: u64) -> bool {
+        self.owns(chunk) && !self.present().contains(&chunk)
+    }
+
+    fn present(&self) -> MutexGuard<'_, BTreeSet<u64>> {
+        lock_of(&self.present)
+    }
+
+    /// Points this process answers for, and how many of them are there.
+    #[must_use]
+    pub fn own_points(&self) -> (u64, u64) {
+        let length = |chunk| {
+            let range = self.chunk_range(chunk);
+            range.end - range.start
+        };
+        let chunks = self.chunks();
+        let own = self.shard().map_or(chunks, |shard| shard.chunks(chunks));
+        // All chunks are full but the last of the run.
+        let short = match chunks.checked_sub(1) {
+            Some(last) if self.owns(last) => self.chunk_points - length(last),
+            _ => 0,
+        };
+        let whole: u64 = self.present().iter().map(|&chunk| length(chunk)).sum();
+        let there =
+            whole + lock_of(&self.parts).values().map(|part| part.len() as u64).sum::<u64>();
+        (own.saturating_mul(self.chunk_points).saturating_sub(short), there)
+    }
+
+    /// The unfinished run's folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder.path
+    }
+
+    /// Where the finished file goes.
+    #[must_use]
+    pub fn output(&self) -> &Path {
+        &self.folder.output
+    }
+
+    /// Things a user should hear of once: damaged chunks, a file system without locks.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+
+    /// The place of a chunk.
+    pub fn place(&self, chunk: u64) -> Place {
+        let range = self.chunk_range(chunk);
+        Place { chunk, first: range.start, count: range.end - range.start, ..self.place.clone() }
+    }
+
+    /// The error that says which chunks, and of which shards, are missing from the whole.
+    pub fn incomplete(&self) -> Result<StoreError, StoreError> {
+        let chunks = self.chunks();
+        let present = self.present();
+        let dealing = Dealing::read(&self.folder)?;
+        Ok(StoreError::Incomplete {
+            folder: self.folder.path.clone(),
+            missing: chunks - present.len() as u64,
+            chunks,
+            missing_shards: dealing
+                .map(|dealing| shard::list(dealing.incomplete(chunks, &present))),
+        })
+    }
+}
+
+/// What is in a chunk's place.
+pub(super) enum ChunkFile {
+    Whole(Vec<Done>),
+    Absent,
+    Damaged(Damage),
+}
+
+fn lock_of<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Reads and verifies a chunk, leaving the file alone.
+pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
+    read_file(&folder.chunk(place.chunk), place, chunk::decode)
+}
+
+/// As [`read_chunk`], of what there is of a chunk.
+pub(super) fn read_part(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
+    read_file(&folder.part(place.chunk), place, chunk::decode_part)
+}
+
+fn read_file(
+    path: &Path,
+    place: &Place,
+    decode: fn(&Place, &[u8]) -> Result<Vec<Done>, Damage>,
+) -> Result<ChunkFile, StoreError> {
+    let mut bytes = Vec::new();
+    // A byte too many is enough to know that it is too long.
+    let read = regular::open(path)
+        .and_then(|file| file.take(place.most_bytes() + 1).read_to_end(&mut bytes));
+    match read {
+        Ok(_) => {}
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(ChunkFile::Absent),
+        Err(error) => return Err(StoreError::io("read", path)(error)),
+    }
+    Ok(match decode(place, &bytes) {
+        Ok(outcomes) => ChunkFile::Whole(outcomes),
+        Err(damage) => ChunkFile::Damaged(damage),
+    })
+}
+
+/// Chunks that a folder has such files of by name, unread.
+pub(super) fn chunks_named(folder: &Folder, named: Named) -> Result<BTreeSet<u64>, StoreError> {
+    let mut chunks = BTreeSet::new();
+    for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
+        chunks.extend(name.to_str().and_then(|name| named.chunk_of(name)));
+    }
+    Ok(chunks)
+}
+
+/// The finished file, whole, if it is of this plan and build.
+pub(super) fn finished(
+    folder: &Folder,
+    job: &Job<'_>,
+) -> Result<Option<(ResultFile, Tally)>, StoreError> {
+    let Some(file) = read::finished(&folder.output)? else { return Ok(None) };
+    let result = ResultFile::of(&file, job.layout.file_kind())?;
+    let same_plan = result.plan_hash == job.hash().to_hex().as_str();
+    let schema = job.layout.schema();
+    let [was, is] = [file.schema(), &schema].map(column_names);
+    if same_plan && was != is {
+        let differences = vec![columns_apart(&was, &is)];
+        return Err(StoreError::OutputDiffers { output: folder.output.clone(), differences });
+    }
+    if same_plan {
+        // Files of this build carry a digest.
+        if !file.is_sealed() {
+            return Err(FileError::Damaged { path: folder.output.clone() }.into());
+        }
+        let tally = read::tally(&file)?;
+        return Ok(Some((result, tally)));
+    }
+    let was = PlanFile {
+        plan: result.plan,
+        version: result.version,
+        numerics: result.numerics,
+        ..PlanFile::of(job)
+    };
+    let differences = was.differences(&PlanFile::of(job));
+    Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
+}
+
+fn column_names(schema: &SchemaRef) -> Vec<&str> {
+    schema.fields().iter().map(|field| field.name().as_str()).collect()
+}
+
+/// The columns that only one of two builds has for the same plan.
+fn columns_apart(was: &[&str], is: &[&str]) -> PlanDifference {
+    let only = |some: &[&str], others: &[&str]| {
+        let of_some: Vec<_> = some.iter().filter(|name| !others.contains(name)).copied().collect();
+        (!of_some.is_empty()).then(|| of_some.join(", "))
+    };
+    PlanDifference { pointer: "/columns".to_owned(), was: only(was, is), is: only(is, was) }
+}
+
+/// Finds this plan frozen in the folder, or freezes it. Where there was none, `finished` has the
+/// first word: what it finds is returned, and nothing is frozen.
+pub(super) fn agree_on_plan<T>(
+    folder: &Folder,
+    job: &Job<'_>,
+    notes: &mut Vec<String>,
+    finished: impl FnOnce() -> Result<Option<T>, StoreError>,
+) -> Result<Option<T>, StoreError> {
+    let ours = PlanFile::of(job);
+    match PlanFile::read(folder)? {
+        Found::Plan(found) => refuse_other_plan(folder, &found, &ours)?,
+        Found::Damaged => {
+            let aside = set_aside(&folder.plan())?;
+            notes.push(format!("the frozen plan was damaged; kept as {}", aside.display()));
+            ours.freeze(folder)?;
+        }
+        Found::Nothing => {
+            if let Some(finished) = finished()? {
+                return Ok(Some(finished));
+            }
+            ours.freeze(folder)?;
+            // Another process, a shard, may have been first, with another plan.
+            if let Found::Plan(found) = PlanFile::read(folder)? {
+                refuse_other_plan(folder, &found, &ours)?;
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Refuses a folder that another plan was begun in.
+fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Result<(), StoreError> {
+    if found == ours {
+        return Ok(());
+    }
+    Err(StoreError::PlanDiffers {
+        folder: folder.path.clone(),
+        differences: found.differences(ours),
+    })
+}
+
+/// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers'
+/// files stay.
+pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
+    atomic::remove(&folder.plan())?;
+    for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
+        if name.to_str().is_some_and(is_ours) {
+            atomic::remove(&folder.path.join(name))?;
+        }
+    }
+    Ok(atomic::sync_folder(&folder.path)?)
+}
+
+/// Whether a run writes files of this name into its folder, the lock aside.
+fn is_ours(name: &str) -> bool {
+    let whole = name.strip_suffix(".damaged").unwrap_or(name);
+    ["plan.json", "shards.json", trials::NAME].contains(&whole)
+        || [Named::Chunk, Named::Part].iter().any(|named| named.chunk_of(whole).is_some())
+        || lock::shard_of_name(name).is_some()
+        || provenance::is_session(name)
+        || atomic::is_temporary(name)
+}
+
+/// Removes a folder that has served; the result does not depend on it, so a failure is only worth a
+/// note.
+pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
+    let removed = clear(folder).and_then(|()| lock.retire()).and_then(|()| {
+        match fs::remove_dir(&folder.path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(StoreError::io("remove the folder", &folder.path)(error))
+            }
+            _ => Ok(()),
+        }
+    });
+    match removed {
+        Ok(()) => None,
+        Err(error) => Some(format!(
+            "the result is whole, but {} could not be removed; delete it by hand ({})",
+            folder.path.display(),
+            error.to_string().lines().next().unwrap_or_default()
+        )),
+    }
+}

@@ -1,0 +1,260 @@
+//! The frozen plan: what a run folder was begun with, and where another plan differs from it.
+
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::error::StoreError;
+use super::{Folder, Job};
+use sweep_files::{atomic, regular};
+
+/// Format of `plan.json`; a folder of another format is another plan.
+const FORMAT: u32 = 2;
+
+/// What `plan.json` says.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PlanFile {
+    /// Layout of this file and of the chunks beside it.
+    pub format: u32,
+    /// Version of the program that began the run; another one might round differently.
+    pub version: String,
+    /// Version of its numerics; files of format 1 had none.
+    #[serde(default)]
+    pub numerics: u32,
+    /// Hash of version, numerics and plan, hexadecimal, as in every chunk's header.
+    pub plan_hash: String,
+    /// Rows of the result.
+    pub points: u64,
+    /// Points a chunk; the last one may hold fewer.
+    pub chunk_points: u64,
+    /// Grid as run, full machine, method.
+    pub plan: Value,
+}
+
+/// What is in the plan's place in a run folder.
+pub(super) enum Found {
+    /// No plan was frozen here.
+    Nothing,
+    /// A plan, whole.
+    Plan(Box<PlanFile>),
+    /// A file that is not a whole plan.
+    Damaged,
+}
+
+impl PlanFile {
+    pub(super) fn of(job: &Job<'_>) -> Self {
+        Self {
+            format: FORMAT,
+            version: job.version.to_owned(),
+            numerics: job.numerics,
+            plan_hash: job.hash().to_hex().to_string(),
+            points: job.points,
+            chunk_points: super::chunk_points(job.points),
+            plan: job.plan.clone(),
+        }
+    }
+
+    /// Reads the plan of a run folder.
+    pub(super) fn read(folder: &Folder) -> Result<Found, StoreError> {
+        let path = folder.plan();
+        let text = match regular::read_json(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
+            Err(error) => return Err(StoreError::io("read", &path)(error)),
+        };
+        // Of another format it is enough that it is one: the run is refused with what differs.
+        let whole = |found: &Self| {
+            let hash = plan_hash(&found.version, found.numerics, &found.plan);
+            found.format != FORMAT || hash.to_hex().as_str() == found.plan_hash
+        };
+        Ok(match serde_json::from_slice::<Self>(&text) {
+            Ok(found) if whole(&found) => Found::Plan(Box::new(found)),
+            _ => Found::Damaged,
+        })
+    }
+
+    /// Writes the plan unless another process was first.
+    pub(super) fn freeze(&self, folder: &Folder) -> Result<(), StoreError> {
+        let value = json!({
+            "format": self.format,
+            "version": self.version,
+            "numerics": self.numerics,
+            "plan_hash": self.plan_hash,
+            "points": self.points,
+            "chunk_points": self.chunk_points,
+            "plan": self.plan,
+        });
+        let text = pretty(&value);
+        if text.len() as u64 >= regular::LONGEST_JSON_BYTES {
+            return Err(StoreError::LongPlan { folder: folder.path.clone() });
+        }
+        atomic::create(&folder.path, &folder.plan(), &text)?;
+        Ok(())
+    }
+
+    /// Where the plans part; empty if they are the same.
+    pub(super) fn differences(&self, is: &Self) -> Vec<PlanDifference> {
+        if self == is {
+            return Vec::new();
+        }
+        differences(&comparable(self), &comparable(is))
+    }
+}
+
+/// Pretty JSON with a final newline, for files that people may look into.
+pub(super) fn pretty(value: &Value) -> Vec<u8> {
+    format!("{value:#}\n").into_bytes()
+}
+
+/// Hash of the build that runs and the plan it runs.
+pub(super) fn plan_hash(version: &str, numerics: u32, plan: &Value) -> blake3::Hash {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(version.as_bytes());
+    hasher.update(b"\n");
+    hasher.update(numerics.to_string().as_bytes());
+    hasher.update(b"\n");
+    hasher.update(plan.to_string().as_bytes());
+    hasher.finalize()
+}
+
+/// The plan with the facts beside it, for showing differences of either by path.
+fn comparable(file: &PlanFile) -> Value {
+    let mut value = file.plan.clone();
+    if let Value::Object(map) = &mut value {
+        map.insert("sweep_version".into(), file.version.clone().into());
+        map.insert("numerics".into(), file.numerics.into());
+        map.insert("store_format".into(), file.format.into());
+        map.insert("chunk_points".into(), file.chunk_points.into());
+    }
+    value
+}
+
+/// One place where two plans part.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlanDifference {
+    /// JSON pointer into the plan.
+    pub pointer: String,
+    /// Value in the older plan; `None` if it had none there.
+    pub was: Option<String>,
+    /// Value in the plan of now.
+    pub is: Option<String>,
+}
+
+impl fmt::Display for PlanDifference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let side = |value: &Option<String>| value.clone().unwrap_or_else(|| "absent".into());
+        write!(f, "{}: was {}, is {}", self.pointer, side(&self.was), side(&self.is))
+    }
+}
+
+/// Every leaf at which two JSON values part.
+pub(super) fn differences(was: &Value, is: &Value) -> Vec<PlanDifference> {
+    let mut found = Vec::new();
+    descend(Some(was), Some(is), &mut String::new(), &mut found);
+    found
+}
+
+fn descend(
+    was: Option<&Value>,
+    is: Option<&Value>,
+    pointer: &mut String,
+    found: &mut Vec<PlanDifference>,
+) {
+    if was == is {
+        return;
+    }
+    let length = pointer.len();
+    let mut step = |key: &str, was: Option<&Value>, is: Option<&Value>| {
+        pointer.push('/');
+        pointer.push_str(&key.replace('~', "~0").replace('/', "~1"));
+        descend(was, is, pointer, found);
+        pointer.truncate(length);
+    };
+    match (was, is) {
+        (Some(Value::Object(was)), Some(Value::Object(is))) => {
+            for (key, value) in was {
+                step(key, Some(value), is.get(key));
+            }
+            for (key, value) in is.iter().filter(|(key, _)| !was.contains_key(*key)) {
+                step(key, None, Some(value));
+            }
+        }
+        (Some(Value::Array(was)), Some(Value::Array(is))) => {
+            for i in 0..was.len().max(is.len()) {
+                step(&i.to_string(), was.get(i), is.get(i));
+            }
+        }
+        _ => found.push(PlanDifference {
+            pointer: pointer.clone(),
+            was: was.map(brief),
+            is: is.map(brief),
+        }),
+    }
+}
+
+/// A value on one line; long ones (a whole machine part) are cut.
+fn brief(value: &Value) -> String {
+    const SHOWN: usize = 60;
+    let text = value.to_string();
+    match text.char_indices().nth(SHOWN) {
+        Some((cut, _)) => format!("{}...", &text[..cut]),
+        None => text,
+    }
+}
+
+/// Moves something unreadable out of the way, keeping it for whoever wants to look.
+pub(super) fn set_aside(path: &Path) -> Result<std::path::PathBuf, StoreError> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".damaged");
+    let aside = std::path::PathBuf::from(name);
+    match fs::rename(path, &aside) {
+        Ok(()) => Ok(aside),
+        // Another shard of the same run set it aside first.
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(aside),
+        Err(error) => Err(StoreError::io("set aside", path)(error)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_name_every_leaf_by_pointer() {
+        let was = json!({ "axes": [{ "count": 39 }, { "count": 33 }], "gone": 1, "a/b": [1, 2] });
+        let is = json!({ "axes": [{ "count": 40 }, { "count": 33 }], "new": true, "a/b": [1] });
+        let lines: Vec<String> = differences(&was, &is).iter().map(ToString::to_string).collect();
+        assert_eq!(
+            lines,
+            [
+                "/a~1b/1: was 2, is absent",
+                "/axes/0/count: was 39, is 40",
+                "/gone: was 1, is absent",
+                "/new: was absent, is true",
+            ]
+        );
+        assert!(differences(&was, &was).is_empty());
+    }
+
+    #[test]
+    fn long_values_are_cut_on_a_character() {
+        let was = json!({ "name": "ä".repeat(100) });
+        let shown = differences(&was, &json!({}))[0].was.clone().unwrap();
+        assert!(shown.ends_with("...") && shown.chars().count() == 63, "{shown}");
+    }
+
+    #[test]
+    fn floats_survive_the_file_so_the_hash_does() {
+        let plan = json!({ "x": 0.1 + 0.2, "y": 1e-300 / 3.0, "z": 2.0e-4, "n": 5e-324 });
+        let back: Value =
+            serde_json::from_slice(&serde_json::to_vec_pretty(&plan).unwrap()).unwrap();
+        assert_eq!(plan_hash("1", 1, &plan), plan_hash("1", 1, &back));
+        assert_ne!(plan_hash("1", 1, &plan), plan_hash("2", 1, &plan));
+        assert_ne!(plan_hash("1", 1, &plan), plan_hash("1", 2, &plan));
+    }
+}

@@ -1,0 +1,366 @@
+//! Reading Parquet files back: whose plan a result is of, what it holds, what any file's columns
+//! range over.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::UInt64Type;
+use arrow_array::{Array, RecordBatch};
+use arrow_schema::{ArrowError, DataType};
+use parquet::arrow::ProjectionMask;
+use parquet::errors::ParquetError;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::error::StoreError;
+use sweep_files::cells;
+use sweep_files::{FileKind, ParquetFile, key};
+
+/// What a finished result says of itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResultFile {
+    /// Grid as run, full machine, method.
+    pub plan: Value,
+    /// Hash over version, numerics and plan, hexadecimal.
+    pub plan_hash: String,
+    /// Version of the program that made it.
+    pub version: String,
+    /// Version of its numerics; 0 in files older than that.
+    pub numerics: u32,
+    /// Rows.
+    pub points: u64,
+}
+
+impl ResultFile {
+    /// What the metadata says.
+    ///
+    /// # Errors
+    /// [`StoreError::Parquet`] for a file that is not the result of a run.
+    pub fn of(file: &ParquetFile, kind: FileKind<'_>) -> Result<Self, StoreError> {
+        own_word(file, kind).ok_or_else(|| {
+            let reason = "its metadata is not that of a result of this command";
+            StoreError::parquet("read", file.path())(ParquetError::General(reason.into()))
+        })
+    }
+}
+
+fn own_word(file: &ParquetFile, kind: FileKind<'_>) -> Option<ResultFile> {
+    // Other files of this program carry the plan too: a boundary's rows are not points.
+    if !kind.has_keys(&|key| file.value(key).is_some()) {
+        return None;
+    }
+    Some(ResultFile {
+        plan: serde_json::from_str(file.value(key::PLAN)?).ok()?,
+        plan_hash: file.value(key::PLAN_HASH)?.to_owned(),
+        version: file.value(key::VERSION)?.to_owned(),
+        numerics: file.value(key::NUMERICS).and_then(|numerics| numerics.parse().ok()).unwrap_or(0),
+        points: file.rows(),
+    })
+}
+
+/// The finished file at an output, checked; `None` if nothing is there yet.
+pub fn finished(path: &Path) -> Result<Option<ParquetFile>, StoreError> {
+    match fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        // What some programs make of a file before its content.
+        Ok(found) if found.len() == 0 => Ok(None),
+        _ => Ok(Some(ParquetFile::open(path)?)),
+    }
+}
+
+/// An extreme value, and its place.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Extreme {
+    /// The value.
+    pub value: f64,
+    /// Point index.
+    pub point: u64,
+}
+
+/// What a result holds, counted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Tally {
+    /// Rows.
+    pub points: u64,
+    /// Rows by status.
+    pub by_status: StatusCounts,
+    /// Rows whose ratio is below the limit.
+    pub reliable: u64,
+    /// Rows whose ratio is at or above the limit.
+    pub unreliable: u64,
+    /// Rows without a verdict: a model failed, or nothing moves.
+    pub undefined: u64,
+    /// Rows known to be chaotic: plain RK4 does not agree with itself.
+    pub sensitive: u64,
+    /// Rows by the method that their numbers come from, where the file says so.
+    pub by_method: BTreeMap<String, u64>,
+    /// The greatest error left in a row that is not sensitive.
+    pub greatest_error: Option<Extreme>,
+    /// The greatest ratio.
+    pub greatest_ratio: Option<Extreme>,
+    /// The least gap of the nonlinear model, m.
+    pub least_gap_nonlinear_m: Option<Extreme>,
+    /// Of a result of `sweep stability`, which has none of the verdicts above.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dwells: Option<DwellCounts>,
+}
+
+/// Rows of a result of `sweep stability`, counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct DwellCounts {
+    /// Rows whose disturbances all decay.
+    pub stable: u64,
+    /// Rows with one that grows.
+    pub unstable: u64,
+    /// Of the stable ones those that pass what no machine can.
+    pub beyond: u64,
+    /// Rows without a response.
+    pub unknown: u64,
+}
+
+/// Rows by status.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct StatusCounts(BTreeMap<String, u64>);
+
+impl StatusCounts {
+    /// The statuses that occur, and how often.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, u64)> + '_ {
+        self.0.iter().map(|(name, count)| (name.as_str(), *count))
+    }
+
+    /// Rows whose status is not `ok`.
+    #[must_use]
+    pub fn failed(&self) -> u64 {
+        self.iter().filter(|(name, _)| *name != "ok").map(|(_, count)| count).sum()
+    }
+
+    pub(crate) fn add(&mut self, status: &str) {
+        *self.0.entry(status.to_owned()).or_default() += 1;
+    }
+}
+
+/// Counts a result file's rows, in bounded memory.
+///
+/// # Errors
+/// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
+pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
+    const COLUMNS: [&str; 10] = [
+        "point",
+        "status",
+        "stable",
+        "beyond",
+        "reliable",
+        "sensitive",
+        "method",
+        "error",
+        "ratio_max",
+        "min_gap_nonlinear_m",
+    ];
+    let failed = StoreError::parquet("read", file.path());
+    let mut tally = Tally::default();
+    let batches = file.batches(|builder| {
+        let mask = ProjectionMask::columns(builder.parquet_schema(), COLUMNS);
+        builder.with_projection(mask)
+    })?;
+    for batch in batches {
+        count(&batch?, &mut tally).map_err(&failed)?;
+    }
+    Ok(tally)
+}
+
+fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
+    let column = |name: &str| {
+        batch
+            .column_by_name(name)
+            .ok_or_else(|| ParquetError::General(format!("there is no column `{name}`")))
+    };
+    let points = column("point")?;
+    let points = points.as_primitive_opt::<UInt64Type>().ok_or_else(|| {
+        ParquetError::General(format!("column `point` is of type {}", points.data_type()))
+    })?;
+    for name in cells::texts(column("status")?)?.into_iter().flatten() {
+        tally.by_status.add(name);
+    }
+    tally.points += batch.num_rows() as u64;
+    if let Some(stable) = batch.column_by_name("stable") {
+        let dwells = tally.dwells.get_or_insert_default();
+        let beyond = cells::texts(column("beyond")?)?;
+        for (stable, beyond) in cells::flags(stable)?.iter().zip(beyond) {
+            match stable {
+                Some(true) => {
+                    dwells.stable += 1;
+                    dwells.beyond += u64::from(beyond.is_some());
+                }
+                Some(false) => dwells.unstable += 1,
+                None => dwells.unknown += 1,
+            }
+        }
+        return Ok(());
+    }
+    for reliable in cells::flags(column("reliable")?)? {
+        match reliable {
+            Some(true) => tally.reliable += 1,
+            Some(false) => tally.unreliable += 1,
+            None => tally.undefined += 1,
+        }
+    }
+    let sensitive = cells::flags(column("sensitive")?)?;
+    tally.sensitive += sensitive.true_count() as u64;
+    for name in cells::texts(column("method")?)?.into_iter().flatten() {
+        *tally.by_method.entry(name.to_owned()).or_default() += 1;
+    }
+    let errors = cells::numbers(column("error")?)?.into_iter().zip(sensitive.iter()).zip(points);
+    for ((error, sensitive), point) in errors {
+        if let (Some(value), Some(point)) = (error, point)
+            && sensitive != Some(true)
+            && tally.greatest_error.as_ref().is_none_or(|greatest| value > greatest.value)
+        {
+            tally.greatest_error = Some(Extreme { value, point });
+        }
+    }
+    let extreme = |name: &str, best: &mut Option<Extreme>, better: fn(f64, f64) -> bool| {
+        let Some(column) = batch.column_by_name(name) else { return Ok(()) };
+        for (value, point) in cells::numbers(column)?.into_iter().zip(points) {
+            if let (Some(value), Some(point)) = (value, point)
+                && best.as_ref().is_none_or(|best| better(value, best.value))
+            {
+                *best = Some(Extreme { value, point });
+            }
+        }
+        Ok::<(), ParquetError>(())
+    };
+    extreme("ratio_max", &mut tally.greatest_ratio, |a, b| a > b)?;
+    extreme("min_gap_nonlinear_m", &mut tally.least_gap_nonlinear_m, |a, b| a < b)?;
+    Ok(())
+}
+
+/// Which method each row's numbers come from; nothing where the file does not say.
+///
+/// # Errors
+/// [`StoreError::File`], and [`StoreError::Parquet`] for a file without such a column.
+pub fn levels(file: &ParquetFile) -> Result<Vec<Option<String>>, StoreError> {
+    let failed = StoreError::parquet("read", file.path());
+    let absent = || ParquetError::General("there is no column `method`".to_owned());
+    let mut levels = Vec::new();
+    let batches = file.batches(|builder| {
+        let mask = ProjectionMask::columns(builder.parquet_schema(), ["method"]);
+        builder.with_projection(mask)
+    })?;
+    for batch in batches {
+        let batch = batch?;
+        let names = batch.column_by_name("method").ok_or_else(absent).map_err(&failed)?;
+        let names = cells::texts(names).map_err(|error| failed(error.into()))?;
+        levels.extend(names.into_iter().map(|name| name.map(str::to_owned)));
+    }
+    Ok(levels)
+}
+
+/// What one column of any file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColumnRange {
+    /// Name.
+    pub name: String,
+    /// Unit from the field's metadata, if it carries one.
+    pub unit: Option<String>,
+    /// Rows without a value.
+    pub nulls: u64,
+    /// Least and greatest value of a numeric column that has any.
+    pub range: Option<(f64, f64)>,
+    /// How often each value of a text or bool column occurs; the first `NAMES_SHOWN` to appear.
+    pub names: Vec<(String, u64)>,
+}
+
+/// A text column of more different values is not a list of names.
+const NAMES_SHOWN: usize = 16;
+
+/// What any Parquet file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Overview {
+    /// Its own word, if it is a result of a sweep.
+    pub result: Option<ResultFile>,
+    /// Rows.
+    pub rows: u64,
+    /// Columns in order.
+    pub columns: Vec<ColumnRange>,
+}
+
+/// Reads through a file, in bounded memory.
+///
+/// # Errors
+/// [`StoreError::File`] and [`StoreError::Parquet`].
+pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
+    let failed = StoreError::parquet("read", file.path());
+    let new = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
+        name: field.name().clone(),
+        unit: field.metadata().get("unit").cloned().filter(|unit| !unit.is_empty()),
+        nulls: 0,
+        range: None,
+        names: Vec::new(),
+    };
+    let mut columns: Vec<ColumnRange> = file.schema().fields().iter().map(new).collect();
+    for batch in file.batches(|builder| builder)? {
+        for (column, array) in columns.iter_mut().zip(batch?.columns()) {
+            column.widen(array).map_err(|error| failed(error.into()))?;
+        }
+    }
+    Ok(Overview { result: own_word(file, FileKind::Map), rows: file.rows(), columns })
+}
+
+impl ColumnRange {
+    /// Takes in more rows. Of types that none of our files has, only the nulls are counted.
+    fn widen(&mut self, array: &dyn Array) -> Result<(), ArrowError> {
+        self.nulls += array.null_count() as u64;
+        match array.data_type() {
+            DataType::Boolean => {
+                for flag in cells::flags(array)?.iter().flatten() {
+                    self.count(if flag { "true" } else { "false" });
+                }
+            }
+            text if cells::is_text(text) => {
+                cells::texts(array)?.into_iter().flatten().for_each(|name| self.count(name));
+            }
+            number if cells::is_number(number) => {
+                for value in cells::numbers(array)?.into_iter().flatten() {
+                    let (least, greatest) = self.range.unwrap_or((value, value));
+                    self.range = Some((least.min(value), greatest.max(value)));
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn count(&mut self, name: &str) {
+        if let Some((_, count)) = self.names.iter_mut().find(|(known, _)| known == name) {
+            *count += 1;
+        } else if self.names.len() < NAMES_SHOWN {
+            self.names.push((name.to_owned(), 1));
+        }
+    }
+}
+
+/// Numeric columns of one row, counted from 0.
+///
+/// # Errors
+/// [`StoreError::File`], and [`StoreError::Parquet`] for a row or column that is not there.
+pub fn row(file: &ParquetFile, row: u64, columns: &[&str]) -> Result<Vec<f64>, StoreError> {
+    let failed = StoreError::parquet("read", file.path());
+    let absent = || ParquetError::General(format!("there is no row {row} with all of {columns:?}"));
+    let mut batches = file.batches(|builder| {
+        let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().copied());
+        builder
+            .with_projection(mask)
+            .with_offset(usize::try_from(row).unwrap_or(usize::MAX))
+            .with_limit(1)
+    })?;
+    let batch = batches.next().ok_or_else(absent).map_err(&failed)??;
+    let value = |name: &&str| {
+        let column = batch.column_by_name(name).ok_or_else(absent)?;
+        cells::numbers(column)?.first().copied().flatten().ok_or_else(absent)
+    };
+    columns.iter().map(value).collect::<Result<_, _>>().map_err(&failed)
+}

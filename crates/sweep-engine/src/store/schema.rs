@@ -1,0 +1,295 @@
+//! The result file's columns: a function of the plan, with units and descriptions that travel in
+//! the file. A row is kept by its cells, so that neither unfinished work nor joining knows what a
+//! model computes.
+
+use std::sync::Arc;
+
+use arrow_array::types::Int32Type;
+use arrow_array::{
+    ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray,
+    UInt64Array,
+};
+use arrow_schema::ArrowError;
+use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
+use parquet::schema::types::ColumnPath;
+use serde_json::{Map, Value};
+
+use super::Job;
+use crate::table::{dictionary_entry, field_metadata};
+use sweep_files::{CREATED_BY, FileKind, key};
+
+/// Rows in a row group: fixed, so that chunking leaves no trace in the file. A group of 25 columns
+/// takes about 30 MB in memory while it is written.
+pub const ROW_GROUP_ROWS: usize = 1 << 17;
+
+/// Rows handed to the Parquet writer at once: fixed for the same reason, and a whole number of them
+/// makes a group.
+pub const BATCH_ROWS: usize = 1 << 12;
+
+/// What a column's cells are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A whole number, never null.
+    Count,
+    /// A whole number, if it is known.
+    KnownCount,
+    /// A number that hardly ever repeats.
+    Measured,
+    /// A swept value, never null.
+    Axis,
+    /// A number that may repeat.
+    Time,
+    /// True or false.
+    Flag,
+    /// A position in a list of names that is the same for every row, batch and run of the plan.
+    Name(Vec<&'static str>),
+}
+
+/// A column of the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// One line.
+    pub description: String,
+    /// What its cells are.
+    pub kind: Kind,
+}
+
+/// What the columns depend on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// The axes, first to last.
+    pub axes: Vec<Column>,
+    /// The model's columns, in order.
+    pub columns: Vec<Column>,
+    /// The kind of the result file.
+    pub kind: FileKind<'static>,
+    /// Numbers that the engine knows rows by, of each point of the grid: 1 but where a point is
+    /// looked at several times.
+    pub rows_a_point: u64,
+    /// Whether there may be several rows of one number.
+    pub has_several: bool,
+    /// Further entries of the file's metadata.
+    pub metadata: Vec<(&'static str, Value)>,
+}
+
+/// The cells of a row, without its place: bits of numbers, positions of names, 0 or 1; none where
+/// null.
+pub type Row = Vec<Option<u64>>;
+
+/// What came of a point: its rows, one but where a model finds several.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Done {
+    /// What the engine was asked for.
+    pub point: u64,
+    /// At least one.
+    pub rows: Vec<Row>,
+}
+
+impl Column {
+    /// A column.
+    #[must_use]
+    pub fn new(
+        name: impl Into<String>,
+        unit: &str,
+        description: impl Into<String>,
+        kind: Kind,
+    ) -> Self {
+        Self { name: name.into(), unit: unit.into(), description: description.into(), kind }
+    }
+
+    fn field(&self) -> Field {
+        let names = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let (data_type, nullable) = match self.kind {
+            Kind::Count => (DataType::UInt64, false),
+            Kind::KnownCount => (DataType::UInt64, true),
+            Kind::Axis => (DataType::Float64, false),
+            Kind::Measured | Kind::Time => (DataType::Float64, true),
+            Kind::Flag => (DataType::Boolean, true),
+            Kind::Name(_) => (names(), true),
+        };
+        let metadata = field_metadata(&self.unit, &self.description);
+        Field::new(&self.name, data_type, nullable).with_metadata(metadata)
+    }
+
+    /// The column's array; cells that must be there and are not become zeros.
+    fn array(&self, cells: impl Iterator<Item = Option<u64>>) -> Result<ArrayRef, ArrowError> {
+        Ok(match &self.kind {
+            Kind::Count => {
+                Arc::new(UInt64Array::from_iter_values(cells.map(Option::unwrap_or_default)))
+            }
+            Kind::KnownCount => Arc::new(cells.collect::<UInt64Array>()),
+            Kind::Axis => Arc::new(Float64Array::from_iter_values(
+                cells.map(|cell| cell.map_or(f64::NAN, f64::from_bits)),
+            )),
+            Kind::Measured | Kind::Time => {
+                Arc::new(cells.map(|cell| cell.map(f64::from_bits)).collect::<Float64Array>())
+            }
+            Kind::Flag => {
+                Arc::new(cells.map(|cell| cell.map(|flag| flag != 0)).collect::<BooleanArray>())
+            }
+            Kind::Name(names) => {
+                let keys: Int32Array = cells.map(|name| i32::try_from(name?).ok()).collect();
+                let names = StringArray::from_iter_values(names);
+                Arc::new(DictionaryArray::<Int32Type>::try_new(keys, Arc::new(names))?)
+            }
+        })
+    }
+
+    /// Whether a cell is one of this column.
+    pub(super) fn takes(&self, cell: Option<u64>) -> bool {
+        match (&self.kind, cell) {
+            (Kind::Count | Kind::Axis, cell) => cell.is_some(),
+            (_, None) | (Kind::KnownCount | Kind::Measured | Kind::Time, _) => true,
+            (Kind::Flag, Some(flag)) => flag <= 1,
+            (Kind::Name(names), Some(name)) => name < names.len() as u64,
+        }
+    }
+
+    /// Name of the type in the column dictionary.
+    const fn type_name(&self) -> &'static str {
+        match self.kind {
+            Kind::Count | Kind::KnownCount => "uint64",
+            Kind::Axis | Kind::Measured | Kind::Time => "float64",
+            Kind::Flag => "bool",
+            Kind::Name(_) => "string",
+        }
+    }
+}
+
+impl Layout {
+    /// The kind of the result file.
+    pub(crate) const fn file_kind(&self) -> FileKind<'static> {
+        self.kind
+    }
+
+    /// Every column, in order.
+    fn all(&self) -> impl Iterator<Item = &Column> + Clone {
+        static POINT: std::sync::LazyLock<Column> = std::sync::LazyLock::new(|| {
+            Column::new("point", "1", "index in grid order", Kind::Count)
+        });
+        std::iter::once(&*POINT).chain(&self.axes).chain(&self.columns)
+    }
+
+    /// The Arrow schema.
+    #[must_use]
+    pub fn schema(&self) -> SchemaRef {
+        Arc::new(Schema::new(self.all().map(Column::field).collect::<Vec<_>>()))
+    }
+
+    /// The position of one of the model's columns.
+    #[must_use]
+    pub fn position(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|column| column.name == name)
+    }
+
+    /// The column dictionary: name to type, unit and description.
+    fn dictionary(&self) -> Value {
+        let entry = |column: &Column| {
+            let entry = dictionary_entry(column.type_name(), &column.unit, &column.description);
+            (column.name.clone(), entry)
+        };
+        Value::Object(self.all().map(entry).collect::<Map<_, _>>())
+    }
+}
+
+/// Writer settings and metadata of a result file. Nothing in them depends on when, where or how the
+/// run went.
+pub fn properties(job: &Job<'_>) -> WriterProperties {
+    let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
+    let mut metadata = vec![
+        pair(key::PLAN, job.plan.to_string()),
+        pair(key::PLAN_HASH, job.hash().to_hex().to_string()),
+        pair(key::VERSION, job.version.to_owned()),
+        pair(key::NUMERICS, job.numerics.to_string()),
+        pair(key::COLUMNS, job.layout.dictionary().to_string()),
+    ];
+    metadata.extend(job.layout.metadata.iter().map(|(key, value)| pair(key, value.to_string())));
+    let builder = WriterProperties::builder()
+        // The library's own default names its version, and an upgrade would change the bytes.
+        .set_created_by(format!("{CREATED_BY}{}", job.version))
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
+        .set_max_row_group_bytes(None)
+        .set_key_value_metadata(Some(metadata));
+    job.layout.all().fold(builder, encoding).build()
+}
+
+fn encoding(builder: WriterPropertiesBuilder, column: &Column) -> WriterPropertiesBuilder {
+    let path = ColumnPath::from(column.name.as_str());
+    match column.kind {
+        // A dictionary of them would be written and thrown away.
+        Kind::Measured => builder.set_column_dictionary_enabled(path, false),
+        _ => builder,
+    }
+}
+
+/// Rows on their way into a batch.
+pub struct ResultRows<'a> {
+    layout: &'a Layout,
+    schema: SchemaRef,
+    /// Each with the number that it is known by, and its place.
+    rows: Vec<(u64, Vec<f64>, Row)>,
+}
+
+impl<'a> ResultRows<'a> {
+    /// Of a layout.
+    #[must_use]
+    pub fn new(layout: &'a Layout) -> Self {
+        Self::sharing(layout, layout.schema())
+    }
+
+    /// With the schema of other batches of this layout: every field carries its description, so
+    /// that one of their own would take 4 % of a batch's memory.
+    #[must_use]
+    pub fn sharing(layout: &'a Layout, schema: SchemaRef) -> Self {
+        Self { layout, schema, rows: Vec::with_capacity(BATCH_ROWS) }
+    }
+
+    /// The schema of its batches.
+    #[must_use]
+    pub fn schema(&self) -> SchemaRef {
+        Arc::clone(&self.schema)
+    }
+
+    /// Rows so far.
+    pub(crate) fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Adds a row of a point, with the values of the axes there.
+    pub fn push(&mut self, point: u64, axis_values: Vec<f64>, row: Row) {
+        self.rows.push((point, axis_values, row));
+    }
+
+    /// The rows so far as a batch; leaves none.
+    ///
+    /// # Errors
+    /// Rows of another layout.
+    pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
+        let rows = &self.rows;
+        let a_point = self.layout.rows_a_point;
+        let axes = self.layout.axes.len();
+        let array = |(k, column): (usize, &Column)| match k.checked_sub(1) {
+            None => column.array(rows.iter().map(|(point, ..)| Some(point / a_point))),
+            Some(axis) if axis < axes => column
+                .array(rows.iter().map(|(_, at, _)| at.get(axis).map(|value| value.to_bits()))),
+            Some(k) => {
+                let k = k - axes;
+                column.array(rows.iter().map(|(.., row)| row.get(k).copied().flatten()))
+            }
+        };
+        let arrays = self.layout.all().enumerate().map(array).collect::<Result<Vec<_>, _>>()?;
+        self.rows.clear();
+        RecordBatch::try_new(self.schema(), arrays)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,31 @@
+//! What columns say, and what rows become.
+
+use super::*;
+use crate::store::synthetic;
+
+#[test]
+fn every_field_carries_unit_and_description() {
+    let layout = synthetic::layout();
+    let dictionary = layout.dictionary();
+    for field in layout.schema().fields() {
+        let unit = &field.metadata()["unit"];
+        assert_eq!(dictionary[field.name()]["unit"], unit.as_str());
+        assert!(!field.metadata()["description"].is_empty(), "{}", field.name());
+    }
+    assert_eq!(dictionary["nonlinear_a"]["unit"], "m");
+}
+
+#[test]
+fn name_dictionaries_do_not_depend_on_which_names_appear() {
+    let layout = synthetic::layout();
+    let mut rows = ResultRows::new(&layout);
+    rows.push(0, vec![0.1, 60.0], synthetic::row(0));
+    let batch = rows.take().unwrap();
+    let names = |column: &str| {
+        let array = batch.column_by_name(column).unwrap();
+        let array = array.as_any().downcast_ref::<DictionaryArray<Int32Type>>().unwrap();
+        let values = array.values().as_any().downcast_ref::<StringArray>().unwrap();
+        values.iter().flatten().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(names("status"), synthetic::STATUSES);
+}

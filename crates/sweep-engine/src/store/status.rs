@@ -1,0 +1,167 @@
+//! Progress of a run, without disturbing it.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::chunk::{Place, Shape};
+use super::error::{Holder, StoreError};
+use super::open::{self, ChunkFile, chunks_named, read_chunk, read_part};
+use super::plan_file::{Found, PlanFile};
+use super::read::StatusCounts;
+use super::schema::{Done, Kind};
+use super::shard::{self, Dealing};
+use super::{Folder, Job, Named, chunk_points, lock};
+
+/// How far a run is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// Nothing is there.
+    NotStarted,
+    /// Chunks are missing.
+    Unfinished,
+    /// Every chunk is there and waits for the merge.
+    Complete,
+    /// The one file is there.
+    Finished,
+}
+
+/// Progress of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FolderStatus {
+    /// The finished file, or where it will be.
+    pub output: PathBuf,
+    /// How far.
+    pub state: State,
+    /// Rows of the whole result.
+    pub points: u64,
+    /// Rows that are there.
+    pub points_done: u64,
+    /// Of those, rows whose status is not `ok`.
+    pub points_failed: u64,
+    /// Rows that are there, by status.
+    pub by_status: StatusCounts,
+    /// Chunks of the whole.
+    pub chunks: u64,
+    /// Chunks that are there and whole.
+    pub chunks_done: u64,
+    /// Chunks that are not there, or damaged.
+    pub chunks_missing: u64,
+    /// Chunks that are there but not as they were written; the next run computes them again.
+    pub chunks_damaged: Vec<u64>,
+    /// Who is at work.
+    pub running: Vec<Holder>,
+    /// Into how many shards the run was dealt, if it was.
+    pub shards: Option<u64>,
+    /// Shards with something missing that nobody is working on, as the scheduler numbers them:
+    /// `2,5-7`, for `sbatch --array=`; empty if none is.
+    pub missing_shards: String,
+    /// The same shards by their numbers from 1, for `--shard I/N`.
+    pub missing_shard_numbers: Vec<u64>,
+}
+
+/// Looks at an output and its folder. What would stop a run is an error here too: another plan in
+/// the folder, another result or another file at the output, a damaged result.
+///
+/// # Errors
+/// As [`super::OpenRun::open`], but never [`StoreError::Busy`].
+pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> {
+    let folder = Folder::of(output, &job.layout)?;
+    let points_a_chunk = chunk_points(job.points);
+    let chunks = job.points.div_ceil(points_a_chunk);
+    let mut status = FolderStatus {
+        output: output.to_path_buf(),
+        state: State::NotStarted,
+        points: job.points,
+        points_done: 0,
+        points_failed: 0,
+        by_status: StatusCounts::default(),
+        chunks,
+        chunks_done: 0,
+        chunks_missing: chunks,
+        chunks_damaged: Vec::new(),
+        running: Vec::new(),
+        shards: None,
+        missing_shards: String::new(),
+        missing_shard_numbers: Vec::new(),
+    };
+    let (ours, hash) = (PlanFile::of(job), job.hash());
+    match PlanFile::read(&folder)? {
+        Found::Plan(found) if *found != ours => {
+            return Err(StoreError::PlanDiffers {
+                folder: folder.path,
+                differences: found.differences(&ours),
+            });
+        }
+        Found::Nothing => return finished(&folder, job, status),
+        Found::Plan(_) | Found::Damaged => {}
+    }
+    let place = |chunk: u64| {
+        let first = chunk * points_a_chunk;
+        let shape = Shape::of(&job.layout);
+        Place { plan: hash, shape, chunk, first, count: points_a_chunk.min(job.points - first) }
+    };
+    let mut present = BTreeSet::new();
+    let of_status = job.layout.position("status");
+    let name = |done: &Done| {
+        let column = of_status?;
+        let Kind::Name(names) = &job.layout.columns[column].kind else { return None };
+        names.get((*done.rows.first()?.get(column)?)? as usize).copied()
+    };
+    let count = |points: &[Done], status: &mut FolderStatus| {
+        status.points_done += points.len() as u64;
+        points.iter().filter_map(name).for_each(|name| status.by_status.add(name));
+    };
+    let named = |named| Ok::<_, StoreError>(chunks_named(&folder, named)?.into_iter());
+    for chunk in named(Named::Chunk)?.filter(|chunk| *chunk < chunks) {
+        match read_chunk(&folder, &place(chunk))? {
+            ChunkFile::Whole(outcomes) => {
+                present.insert(chunk);
+                count(&outcomes, &mut status);
+            }
+            ChunkFile::Damaged(_) => status.chunks_damaged.push(chunk),
+            // The run was finished, or the chunk set aside, a moment ago.
+            ChunkFile::Absent => {}
+        }
+    }
+    for chunk in named(Named::Part)?.filter(|chunk| *chunk < chunks && !present.contains(chunk)) {
+        if let ChunkFile::Whole(outcomes) = read_part(&folder, &place(chunk))? {
+            count(&outcomes, &mut status);
+        }
+    }
+    status.chunks_done = present.len() as u64;
+    status.points_failed = status.by_status.failed();
+    status.chunks_missing = chunks - status.chunks_done;
+    status.state = if status.chunks_missing == 0 { State::Complete } else { State::Unfinished };
+    status.running = lock::holders(&folder);
+    if let Some(dealing) = Dealing::read(&folder)? {
+        let running =
+            |shard: &u64| status.running.iter().any(|holder| holder.shard == Some(*shard));
+        let missing =
+            dealing.incomplete(chunks, &present).into_iter().filter(|shard| !running(shard));
+        status.missing_shard_numbers = missing.collect();
+        let array_ids =
+            status.missing_shard_numbers.iter().map(|shard| shard - 1 + dealing.first_array_id);
+        status.missing_shards = shard::list(array_ids);
+        status.shards = Some(dealing.shards);
+    }
+    Ok(status)
+}
+
+fn finished(
+    folder: &Folder,
+    job: &Job<'_>,
+    mut status: FolderStatus,
+) -> Result<FolderStatus, StoreError> {
+    if let Some((_, tally)) = open::finished(folder, job)? {
+        status.state = State::Finished;
+        status.points_done = tally.points;
+        status.points_failed = tally.by_status.failed();
+        status.by_status = tally.by_status;
+        status.chunks_done = status.chunks;
+        status.chunks_missing = 0;
+    }
+    Ok(status)
+}

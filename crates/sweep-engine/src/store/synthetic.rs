@@ -1,0 +1,78 @@
+//! Rows from a formula, for tests of the store and the runner without a model.
+
+use serde_json::json;
+use sweep_files::FileKind;
+
+use super::{Column, Done, Job, Kind, Layout, Row};
+
+/// Statuses of rows.
+pub const STATUSES: [&str; 4] = ["ok", "diverged", "step_limit", "linear_diverged"];
+
+/// Two axes, two channels.
+pub fn layout() -> Layout {
+    let column =
+        |name: &str, unit: &str, kind| Column::new(name, unit, format!("the {name}"), kind);
+    let measured = |name: &str| column(name, "m", Kind::Measured);
+    Layout {
+        axes: vec![column("mass_kg", "kg", Kind::Axis), column("damping", "N s/m", Kind::Axis)],
+        columns: vec![
+            measured("nonlinear_a"),
+            measured("linear_a"),
+            column("ratio_max", "1", Kind::Measured),
+            column("reliable", "", Kind::Flag),
+            column("sensitive", "", Kind::Flag),
+            column("method", "", Kind::Name(vec!["rk4", "dopri5"])),
+            column("error", "1", Kind::Measured),
+            column("status", "", Kind::Name(STATUSES.to_vec())),
+            column("fail_time_s", "s", Kind::Time),
+            column("steps", "1", Kind::Count),
+        ],
+        kind: FileKind::Map,
+        rows_a_point: 1,
+        has_several: false,
+        metadata: Vec::new(),
+    }
+}
+
+/// A job of so many points.
+pub fn job(points: u64) -> Job<'static> {
+    Job {
+        plan: json!({ "name": "synthetic", "points": points, "step_s": 2.0e-4 }),
+        version: "0.0.0-test",
+        numerics: 1,
+        points,
+        layout: layout(),
+        ratio_limit: 2.0,
+        axis_values: Box::new(|point| {
+            vec![0.05 * (point / 9 + 1) as f64, 60.0 + 10.0 * (point % 9) as f64]
+        }),
+    }
+}
+
+/// Every kind of row comes by within 60 points: reliable, not, undefined, failed in each way.
+pub fn row(point: u64) -> Row {
+    let x = point as f64;
+    let status = if [4, 7].contains(&(point % 20)) { 1 + point / 20 % 3 } else { 0 };
+    let linear = if point % 30 == 11 { 0.0 } else { 1.0 + (0.37 * x).sin().abs() };
+    let nonlinear = linear * (0.5 + x % 5.0);
+    let is_ok = status == 0;
+    let number = |value: f64| Some(value.to_bits()).filter(|_| is_ok);
+    let ratio = (is_ok && linear != 0.0).then_some(nonlinear / linear);
+    vec![
+        number(nonlinear),
+        number(linear),
+        ratio.map(f64::to_bits),
+        ratio.map(|ratio| u64::from(ratio < 2.0)),
+        [None, Some(0), Some(1)][(point % 3) as usize],
+        Some(point % 2),
+        (!point.is_multiple_of(5)).then_some((1e-5 * (1.0 + x)).to_bits()),
+        Some(status),
+        (!is_ok).then_some((x / 7.0).to_bits()),
+        Some(1000 + point),
+    ]
+}
+
+/// What came of a point.
+pub fn done(point: u64) -> Done {
+    Done { point, rows: vec![row(point)] }
+}

@@ -1,0 +1,90 @@
+//! The store as a whole: the same bytes whatever happens on the way.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float64Type, UInt64Type};
+use arrow_array::{Array, RecordBatch};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use proptest::prelude::*;
+use serde_json::json;
+use tempfile::TempDir;
+
+use super::merge::Joined;
+use super::*;
+use sweep_files::FileError;
+use sweep_files::cells;
+
+mod chunks;
+mod plans;
+mod result;
+mod strangers;
+
+const POINTS: u64 = 81;
+
+struct Home(TempDir);
+
+impl Home {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn output(&self) -> PathBuf {
+        self.0.path().join("x.parquet")
+    }
+
+    fn partial(&self) -> PathBuf {
+        self.0.path().join("x.parquet.partial")
+    }
+}
+
+fn options() -> OpenOptions<'static> {
+    OpenOptions { fresh: false, shard: None, environment: &|_| None }
+}
+
+fn open(output: &Path, job: &Job<'_>) -> OpenRun {
+    match OpenRun::open(output, job, options()).unwrap() {
+        Opened::Run(run) => *run,
+        Opened::Finished(file, _) => panic!("finished: {file:?}"),
+    }
+}
+
+fn write(run: &OpenRun, chunk: u64) {
+    let outcomes: Vec<_> = run.chunk_range(chunk).map(synthetic::done).collect();
+    run.write_chunk(chunk, &outcomes).unwrap();
+}
+
+fn write_bytes(job: &Job<'_>, chunk: u64) -> Vec<u8> {
+    let home = Home::new();
+    let run = open(&home.output(), job);
+    write(&run, chunk);
+    fs::read(home.partial().join(Named::Chunk.name(chunk))).unwrap()
+}
+
+fn write_missing(run: &OpenRun) -> u64 {
+    (0..run.chunks())
+        .filter(|&chunk| run.is_missing(chunk))
+        .inspect(|&chunk| write(run, chunk))
+        .count() as u64
+}
+
+fn finish(mut run: OpenRun, job: &Job<'_>) -> Joined {
+    let tally = run.join(job, &|| false).unwrap().unwrap();
+    run.complete(job, tally, None).unwrap()
+}
+
+/// The bytes of an undisturbed run.
+fn undisturbed(points: u64) -> Vec<u8> {
+    let (home, job) = (Home::new(), synthetic::job(points));
+    let run = open(&home.output(), &job);
+    write_missing(&run);
+    finish(run, &job);
+    assert!(!home.partial().exists());
+    fs::read(home.output()).unwrap()
+}
+
+fn batches(path: &Path) -> Vec<RecordBatch> {
+    let reader = ParquetRecordBatchReaderBuilder::try_new(fs::File::open(path).unwrap()).unwrap();
+    reader.with_batch_size(1 << 20).build().unwrap().map(Result::unwrap).collect()
+}

@@ -1,0 +1,362 @@
+//! The trials of a search, kept as they come: a search whose next trials follow from the answers so
+//! far finds all of them again after an interruption, and ends in the same bytes.
+//!
+//! A search on `x.parquet` works in the folder `x.parquet.partial`, under the same lock and with
+//! the same frozen plan as a run. Chunks do not fit it: which points it needs is not known
+//! beforehand. Its trials are in `trials.bin` instead, in the order in which they came, 40 bytes
+//! each:
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 24 | the point: three numbers |
+//! | 8 | the answer, an `f64`; NaN where there is none |
+//! | 8 | of the BLAKE3 hash of the 32 bytes before, keyed by the plan's hash |
+//!
+//! A record whose hash does not match, because a crash tore it or because it belongs to another
+//! plan, is ignored, and its trial is made again. What was written survives the process at once,
+//! and a power cut once [`Trials::settle`] has returned.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+
+use super::error::StoreError;
+use super::lock::Lock;
+use super::open;
+use super::plan_file::{PlanFile, set_aside};
+use super::read;
+use super::{Folder, Job};
+use sweep_files::{FileError, FileKind, ParquetFile, atomic, key, regular};
+
+/// The file of a search's folder that holds its trials.
+pub(super) const NAME: &str = "trials.bin";
+/// Bytes of a point and its answer.
+const CONTENT_BYTES: usize = 32;
+/// Bytes of a record.
+const RECORD_BYTES: usize = 40;
+
+/// What a trial is known by.
+pub type Key = [u64; 3];
+
+/// Trials and their answers.
+type Known = BTreeMap<Key, Option<f64>>;
+
+/// What opening a search's output came to.
+#[derive(Debug)]
+pub enum OpenedTrials {
+    /// The output is there, whole, and of this very plan.
+    Finished,
+    /// There is something to do; the search holds its lock.
+    Open(Box<Trials>),
+}
+
+/// The trials of a search that this process has a right to.
+#[derive(Debug)]
+pub struct Trials {
+    folder: Folder,
+    lock: Lock,
+    file: File,
+    path: PathBuf,
+    plan: [u8; blake3::OUT_LEN],
+    known: Known,
+    notes: Vec<String>,
+}
+
+impl Trials {
+    /// Takes the output for this search, freezes its plan or finds it frozen, and reads its trials.
+    /// `fresh` starts over: trials go now, a finished file stays until the new one takes its place.
+    ///
+    /// # Errors
+    /// [`StoreError::Busy`] when another process holds the output, [`StoreError::PlanDiffers`],
+    /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::File`] for
+    /// anything else at the output that is not ours, and for the file system.
+    pub fn open(output: &Path, job: &Job<'_>, fresh: bool) -> Result<OpenedTrials, StoreError> {
+        let folder = Folder::of_search(output)?;
+        if !fresh && !folder.path.exists() && is_finished(&folder, job)? {
+            return Ok(OpenedTrials::Finished);
+        }
+        let lock = Lock::acquire(&folder, None)?;
+        let mut notes: Vec<String> = lock.note(&folder).into_iter().collect();
+        if fresh {
+            open::clear(&folder)?;
+        }
+        atomic::clear_leftovers(&folder.path);
+        let finished = || Ok((!fresh && is_finished(&folder, job)?).then_some(()));
+        if open::agree_on_plan(&folder, job, &mut notes, finished)?.is_some() {
+            // What a search leaves that dies between publishing its file and removing its folder.
+            open::remove(&folder, lock);
+            return Ok(OpenedTrials::Finished);
+        }
+        let path = folder.path.join(NAME);
+        let plan = *job.hash().as_bytes();
+        let (mut file, found, known) = contents(&path, &plan)?;
+        if known.is_empty() && found > 0 {
+            let aside = set_aside(&path)?;
+            notes.push(format!(
+                "{}: no trial is as it was written; kept as {}, and they are made again",
+                path.display(),
+                aside.display()
+            ));
+            (file, ..) = contents(&path, &plan)?;
+        } else {
+            if found > known.len() {
+                notes.push(format!(
+                    "{}: {} of {found} trials are not as they were written; they are made again",
+                    path.display(),
+                    found - known.len()
+                ));
+            }
+            // A torn record goes, so that the next one begins where a record should.
+            let whole = found as u64 * RECORD_BYTES as u64;
+            let cut = file.set_len(whole).and_then(|()| file.seek(SeekFrom::End(0)));
+            cut.map_err(StoreError::io("write", &path))?;
+        }
+        Ok(OpenedTrials::Open(Box::new(Self { folder, lock, file, path, plan, known, notes })))
+    }
+
+    /// How many trials are there.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.known.len()
+    }
+
+    /// The answer to a trial that was made before.
+    #[must_use]
+    pub fn recall(&self, key: &Key) -> Option<Option<f64>> {
+        self.known.get(key).copied()
+    }
+
+    /// Keeps an answer.
+    ///
+    /// # Errors
+    /// [`StoreError::File`].
+    pub fn keep(&mut self, key: Key, answer: Option<f64>) -> Result<(), StoreError> {
+        let record = encode(&self.plan, key, answer);
+        self.file.write_all(&record).map_err(StoreError::io("write", &self.path))?;
+        self.known.insert(key, answer);
+        Ok(())
+    }
+
+    /// Makes what was kept outlive a power cut.
+    ///
+    /// # Errors
+    /// [`StoreError::File`].
+    pub fn settle(&self) -> Result<(), StoreError> {
+        self.file.sync_data().map_err(StoreError::io("sync", &self.path))
+    }
+
+    /// Things a user should hear of once.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+
+    /// Removes the folder of a search whose file is in place; a failure is only worth a note.
+    #[must_use]
+    pub fn complete(self) -> Option<String> {
+        open::remove(&self.folder, self.lock)
+    }
+}
+
+/// The file of trials, made if need be; how many records it holds; and the trials in them.
+fn contents(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> Result<(File, usize, Known), StoreError> {
+    let file = regular::open_or_create(path).map_err(StoreError::io("open", path))?;
+    let (mut found, mut known) = (0, Known::new());
+    let mut records = BufReader::new(&file);
+    loop {
+        let mut record = [0; RECORD_BYTES];
+        match records.read_exact(&mut record) {
+            Ok(()) => found += 1,
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => break,
+            Err(error) => return Err(StoreError::io("read", path)(error)),
+        }
+        known.extend(decode(plan, &record));
+    }
+    Ok((file, found, known))
+}
+
+/// Whether the output is the finished file of this search and build.
+fn is_finished(folder: &Folder, job: &Job<'_>) -> Result<bool, StoreError> {
+    let Some(file) = read::finished(&folder.output)? else { return Ok(false) };
+    let ours = PlanFile::of(job);
+    let was = frozen(&file, &ours).ok_or_else(|| {
+        let reason = "its metadata is not that of a result of `sweep boundary`";
+        let error = parquet::errors::ParquetError::General(reason.into());
+        StoreError::parquet("read", file.path())(error)
+    })?;
+    if was.plan_hash != ours.plan_hash {
+        let differences = was.differences(&ours);
+        return Err(StoreError::OutputDiffers { output: folder.output.clone(), differences });
+    }
+    // Files of this build carry a digest.
+    if !file.is_sealed() {
+        return Err(FileError::Damaged { path: folder.output.clone() }.into());
+    }
+    Ok(true)
+}
+
+/// The plan that a finished file was made with.
+fn frozen(file: &ParquetFile, ours: &PlanFile) -> Option<PlanFile> {
+    if !FileKind::Boundary.has_keys(&|key| file.value(key).is_some()) {
+        return None;
+    }
+    Some(PlanFile {
+        plan: serde_json::from_str(file.value(key::PLAN)?).ok()?,
+        plan_hash: file.value(key::PLAN_HASH)?.to_owned(),
+        version: file.value(key::VERSION)?.to_owned(),
+        numerics: file.value(key::NUMERICS).and_then(|numerics| numerics.parse().ok()).unwrap_or(0),
+        ..ours.clone()
+    })
+}
+
+fn encode(plan: &[u8; blake3::OUT_LEN], key: Key, answer: Option<f64>) -> [u8; RECORD_BYTES] {
+    let mut record = [0; RECORD_BYTES];
+    let answer = answer.unwrap_or(f64::NAN).to_bits();
+    for (place, word) in record.chunks_exact_mut(8).zip(key.into_iter().chain([answer])) {
+        place.copy_from_slice(&word.to_le_bytes());
+    }
+    let check = check(plan, &record[..CONTENT_BYTES]);
+    record[CONTENT_BYTES..].copy_from_slice(&check);
+    record
+}
+
+fn decode(plan: &[u8; blake3::OUT_LEN], record: &[u8]) -> Option<(Key, Option<f64>)> {
+    let (content, found) = record.split_at_checked(CONTENT_BYTES)?;
+    if check(plan, content) != found {
+        return None;
+    }
+    let mut words = content.chunks_exact(8).map(|word| word.try_into().map(u64::from_le_bytes));
+    let mut word = || words.next()?.ok();
+    let key = [word()?, word()?, word()?];
+    let answer = f64::from_bits(word()?);
+    Some((key, if answer.is_nan() { None } else { Some(answer) }))
+}
+
+fn check(plan: &[u8; blake3::OUT_LEN], content: &[u8]) -> [u8; RECORD_BYTES - CONTENT_BYTES] {
+    let hash = blake3::keyed_hash(plan, content);
+    let mut check = [0; RECORD_BYTES - CONTENT_BYTES];
+    for (to, from) in check.iter_mut().zip(hash.as_bytes()) {
+        *to = *from;
+    }
+    check
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use serde_json::json;
+
+    use super::super::synthetic::job;
+    use super::*;
+    use crate::build::Build;
+    use crate::table::Table;
+
+    const BUILD: Build = Build { version: "0.0.0-test", numerics: 1 };
+
+    fn open(output: &Path, job: &Job<'_>) -> Trials {
+        match Trials::open(output, job, false) {
+            Ok(OpenedTrials::Open(trials)) => *trials,
+            other => panic!("expected trials, got {other:?}"),
+        }
+    }
+
+    #[test]
+    fn trials_outlive_their_process_whatever_tears_the_last() {
+        let home = tempfile::tempdir().unwrap();
+        let (output, job) = (home.path().join("x.parquet"), job(8));
+        let mut trials = open(&output, &job);
+        for k in 0..5 {
+            trials.keep([k, 7, 9], (k != 3).then_some(0.5 * k as f64)).unwrap();
+        }
+        trials.settle().unwrap();
+        let path = trials.path.clone();
+        drop(trials);
+        let whole = fs::read(&path).unwrap();
+        for length in 0..=whole.len() {
+            fs::write(&path, &whole[..length]).unwrap();
+            let mut trials = open(&output, &job);
+            assert_eq!(trials.count(), length / RECORD_BYTES);
+            assert_eq!(trials.take_notes(), [""; 0]);
+            // The next one is found again behind what was torn.
+            trials.keep([9, 9, 9], Some(1.0)).unwrap();
+            drop(trials);
+            assert_eq!(open(&output, &job).recall(&[9, 9, 9]), Some(Some(1.0)));
+        }
+        fs::write(&path, &whole).unwrap();
+        let trials = open(&output, &job);
+        assert_eq!(trials.recall(&[2, 7, 9]), Some(Some(1.0)));
+        assert_eq!(trials.recall(&[3, 7, 9]), Some(None));
+        assert_eq!(trials.recall(&[3, 7, 8]), None);
+        assert_eq!(trials.complete(), None);
+        assert!(!path.parent().unwrap().exists());
+    }
+
+    #[test]
+    fn a_record_that_is_not_as_it_was_written_is_none() {
+        let home = tempfile::tempdir().unwrap();
+        let (output, job) = (home.path().join("x.parquet"), job(8));
+        let mut trials = open(&output, &job);
+        for k in 0..3 {
+            trials.keep([k, 0, 0], Some(1.0)).unwrap();
+        }
+        let path = trials.path.clone();
+        drop(trials);
+        let whole = fs::read(&path).unwrap();
+        for bit in (8 * RECORD_BYTES..16 * RECORD_BYTES).step_by(7) {
+            let mut bytes = whole.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            fs::write(&path, bytes).unwrap();
+            let mut trials = open(&output, &job);
+            assert_eq!((trials.count(), trials.recall(&[1, 0, 0])), (2, None), "bit {bit}");
+            assert!(trials.take_notes()[0].contains("1 of 3 trials"), "bit {bit}");
+        }
+        // Somebody's file of the same name.
+        fs::write(&path, [b'x'; 100]).unwrap();
+        let mut trials = open(&output, &job);
+        assert!(trials.take_notes()[0].contains("no trial is as it was written"));
+        assert_eq!(fs::read(path.with_extension("bin.damaged")).unwrap(), [b'x'; 100]);
+    }
+
+    #[test]
+    fn another_plan_is_refused_and_starting_over_forgets() {
+        let home = tempfile::tempdir().unwrap();
+        let output = home.path().join("x.parquet");
+        let (ours, other) = (job(8), job(9));
+        open(&output, &ours).keep([0; 3], None).unwrap();
+        let refused = Trials::open(&output, &other, false);
+        assert!(matches!(refused, Err(StoreError::PlanDiffers { .. })), "{refused:?}");
+        let Ok(OpenedTrials::Open(trials)) = Trials::open(&output, &other, true) else { panic!() };
+        assert_eq!(trials.count(), 0);
+        let busy = Trials::open(&output, &other, false);
+        assert!(matches!(busy, Err(StoreError::Busy { .. })), "{busy:?}");
+    }
+
+    #[test]
+    fn a_finished_file_is_known_by_its_plan() {
+        let home = tempfile::tempdir().unwrap();
+        let output = home.path().join("x.parquet");
+        let [ours, other] = [8, 9].map(|points| Job {
+            version: BUILD.version,
+            numerics: BUILD.numerics,
+            ..job(points)
+        });
+        let mut table = Table::new(BUILD);
+        table.metadata(key::PLAN, &ours.plan);
+        table.text(key::PLAN_HASH, ours.hash().to_hex().to_string());
+        table.metadata(key::BOUNDARY, &json!({}));
+        table.counts("points", "", [1]);
+        fs::write(&output, table.into_bytes().unwrap()).unwrap();
+        let opened = Trials::open(&output, &ours, false);
+        assert!(matches!(opened, Ok(OpenedTrials::Finished)), "{opened:?}");
+        let refused = Trials::open(&output, &other, false);
+        assert!(matches!(refused, Err(StoreError::OutputDiffers { .. })), "{refused:?}");
+        assert!(!home.path().join("x.parquet.partial").exists());
+        // A search that died with its file in place has left its folder.
+        let Ok(OpenedTrials::Open(_)) = Trials::open(&output, &ours, true) else { panic!() };
+        fs::remove_file(home.path().join("x.parquet.partial/plan.json")).unwrap();
+        let opened = Trials::open(&output, &ours, false);
+        assert!(matches!(opened, Ok(OpenedTrials::Finished)), "{opened:?}");
+        assert!(!home.path().join("x.parquet.partial").exists());
+    }
+}

@@ -1,0 +1,62 @@
+//! What the engine and its caller ask of each other: whether to stop, and how many points are done.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use crate::interrupt::Interrupt;
+use crate::store::Done;
+
+/// What computes points.
+pub trait Engine: Sync {
+    /// Evaluates points until `next` gives none, and hands each outcome to `keep`, in any order;
+    /// fewer if it stopped because [`Watch::stopped`] said so. Works on all threads of the rayon
+    /// pool that it is called in, and calls both from any of them.
+    ///
+    /// A point that fails, even by a panic, is an outcome; a panic that leaves this function costs
+    /// all that is in hand.
+    fn evaluate(
+        &self,
+        next: &(dyn Fn() -> Option<u64> + Sync),
+        keep: &(dyn Fn(Done) + Sync),
+        watch: &Watch<'_>,
+    );
+
+    /// The instruction set in use.
+    fn simd(&self) -> &str;
+}
+
+/// The engine's view of the run it serves.
+pub struct Watch<'a> {
+    interrupt: &'a Interrupt,
+    /// Set when a chunk could not be kept: what is in hand would be lost too.
+    abort: AtomicBool,
+    done: AtomicU64,
+}
+
+impl<'a> Watch<'a> {
+    /// A watch over nothing but the stop flag.
+    #[must_use]
+    pub const fn new(interrupt: &'a Interrupt) -> Self {
+        Self { interrupt, abort: AtomicBool::new(false), done: AtomicU64::new(0) }
+    }
+
+    /// Counts points done, for the bar.
+    pub fn done(&self, points: u64) {
+        self.done.fetch_add(points, Ordering::Relaxed);
+    }
+
+    /// Points done so far.
+    pub fn points_done(&self) -> u64 {
+        self.done.load(Ordering::Relaxed)
+    }
+
+    /// Stops the engine.
+    pub fn abort(&self) {
+        self.abort.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the engine is to stop.
+    #[must_use]
+    pub fn stopped(&self) -> bool {
+        self.interrupt.stopped() || self.abort.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,119 @@
+//! What a number that can be set and swept may be: its range, how it is written in messages, how
+//! its unit stands in its name. Models and the engine that sweeps them share it.
+
+use std::fmt;
+
+/// A number that can be set and swept.
+pub trait Parameter: Clone + PartialEq + fmt::Debug + Send + Sync {
+    /// Name in grid files, on the command line and of the result's column.
+    fn name(&self) -> &str;
+    /// Unit, as in the name's suffix but readable.
+    fn unit(&self) -> &'static str;
+    /// What it is, in a phrase.
+    fn description(&self) -> &'static str;
+    /// Values it may take.
+    fn range(&self) -> Range;
+    /// Which edge of the window it is (0: the beginning, 1: the end), if it is one: the window is
+    /// no model's.
+    fn window_edge(&self) -> Option<usize>;
+}
+
+/// A motion that is compared between two models.
+pub trait Channel: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
+    /// Every channel.
+    fn every() -> &'static [Self];
+    /// Name in grid files and column names.
+    fn name(self) -> &'static str;
+    /// Unit.
+    fn unit(self) -> &'static str;
+    /// One line for column dictionaries and pages.
+    fn description(self) -> &'static str;
+}
+
+/// Values that a parameter may take. No number above [`Range::LARGEST`] in magnitude is accepted,
+/// so that products of a few parameters stay finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Range {
+    /// Any finite number.
+    Any,
+    /// Greater than 0.
+    Positive,
+    /// 0 or greater.
+    NonNegative,
+    /// Less than 0.
+    Negative,
+    /// Within these bounds, both included.
+    Within(f64, f64),
+}
+
+impl Range {
+    /// Greatest magnitude accepted of any number.
+    pub const LARGEST: f64 = 1e12;
+
+    /// Whether `value` is allowed; never for NaN or infinity.
+    #[must_use]
+    pub fn contains(self, value: f64) -> bool {
+        value.abs() <= Self::LARGEST
+            && match self {
+                Self::Any => true,
+                Self::Positive => value > 0.0,
+                Self::NonNegative => value >= 0.0,
+                Self::Negative => value < 0.0,
+                Self::Within(least, greatest) => (least..=greatest).contains(&value),
+            }
+    }
+
+    /// The values that would be accepted in place of a refused one.
+    #[must_use]
+    pub fn instead_of(self, value: f64) -> String {
+        if value.is_finite() && value.abs() > Self::LARGEST && !matches!(self, Self::Within(..)) {
+            format!("{self}, at most {:e} in magnitude", Self::LARGEST)
+        } else {
+            self.to_string()
+        }
+    }
+}
+
+/// A number as a message shows it: the shortest decimal that reads back the same, in powers of ten
+/// where it would be long.
+#[must_use]
+pub fn decimal(value: f64) -> String {
+    let text = format!("{value:?}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Any => f.write_str("a finite number"),
+            Self::Positive => f.write_str("a number greater than 0"),
+            Self::NonNegative => f.write_str("a number, 0 or greater"),
+            Self::Negative => f.write_str("a number less than 0"),
+            Self::Within(least, greatest) => {
+                write!(f, "a number from {} to {}", decimal(*least), decimal(*greatest))
+            }
+        }
+    }
+}
+
+/// How a name ends whose number is in this unit; `None` where names say nothing of it.
+#[must_use]
+pub fn unit_suffix(unit: &str) -> Option<&'static str> {
+    Some(match unit {
+        "m" => "_m",
+        "kg" => "_kg",
+        "s" => "_s",
+        "rpm" => "_rpm",
+        "" | "1" => "",
+        "rad/s" => "_rad_per_s",
+        "N" => "_n",
+        "N/m" => "_n_per_m",
+        "N/m^3" => "_n_per_m3",
+        "N s/m" => "_n_s_per_m",
+        "N m/rad" => "_n_m_per_rad",
+        "kg m^2" => "_kg_m2",
+        "m/s" => "_m_per_s",
+        "m/s^2" => "_m_per_s2",
+        _ => return None,
+    })
+}

@@ -1,0 +1,296 @@
+//! The search over the real models, against the grid it stands for.
+
+use crate::config;
+use crate::engine::ModelEngine;
+use crate::model::Washer;
+use crate::plan::Plan;
+use sweep_engine::Swept as _;
+use sweep_engine::boundary::file::{job, table};
+use sweep_engine::boundary::search::{BoundaryError, BoundaryTask, Models, Stopped};
+use sweep_engine::boundary::{Edge, EdgeKind, Traced, trace};
+use sweep_engine::interrupt::Interrupt;
+use sweep_engine::store::{OpenedTrials, Trials};
+use sweep_plot::contour::zero_lines;
+use washer_row::{Criterion, Outcome, Verdict};
+
+const HEAD: &str = r#"
+name = "short"
+[spin]
+profile = "triangular"
+peak_rpm = 350.0
+ramp_s = 50.0
+[time]
+end_s = 50.0
+window_s = [30.0, 50.0]
+[integrator]
+method = "rk4"
+step_s = 2.5e-4
+"#;
+
+/// Fig. 12 at three masses, every 12 N s/m.
+const GRID: &str = r#"
+[[axis]]
+parameter = "unbalance_mass_kg"
+values = [0.1, 0.35, 0.6]
+[[axis]]
+parameter = "damping_n_s_per_m"
+range = { from = 60.0, to = 300.0, count = 21 }
+"#;
+
+fn plan(text: &str) -> Plan {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grid.toml");
+    std::fs::write(&path, text).unwrap();
+    config::load(&path, &[]).unwrap_or_else(|mistakes| panic!("{mistakes}"))
+}
+
+fn traced(
+    plan: &Plan,
+    task: &BoundaryTask,
+    threads: usize,
+    interrupt: &Interrupt,
+) -> Result<Traced, Stopped> {
+    let (quantity, _) = Washer::traced(plan, "ratio_max").unwrap();
+    let distances = Washer::search(plan, &quantity).unwrap();
+    let models = Models::new(plan, distances, threads, interrupt, &|_| {}).unwrap();
+    trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {})
+}
+
+/// Axis values of every point of the grid.
+fn all_points(plan: &Plan) -> Vec<Vec<f64>> {
+    (0..plan.points()).map(|point| plan.axis_values(point)).collect()
+}
+
+#[test]
+fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads() {
+    let plan = plan(&format!("{HEAD}{GRID}"));
+    let task = BoundaryTask::new(&plan, Some(0.5), 3).unwrap();
+    let interrupt = Interrupt::new();
+    let traced = [1, 3].map(|threads| traced(&plan, &task, threads, &interrupt).unwrap());
+    let (quantity, _) = Washer::traced(&plan, "ratio_max").unwrap();
+    let job = job(&plan, &quantity, &task);
+    let [one, three] =
+        [0, 1].map(|k| table(&job, &plan, &quantity, &task, &traced[k]).into_bytes().unwrap());
+    assert!(one == three, "other bytes on three threads");
+
+    let engine = ModelEngine::new(&plan).unwrap();
+    let outcomes = engine.evaluate_at(&all_points(&plan));
+    let channels = plan.reliability.channels.len();
+    for (row, outcomes) in traced[0].curves[0].iter().zip(outcomes.chunks(21)) {
+        assert!(row.trials < 21, "{row:?}");
+        let edge = row.edges[0];
+        let logs: Vec<(f64, f64)> = outcomes
+            .iter()
+            .map(|outcome| {
+                let verdict = Verdict::new(outcome, channels, 2.0);
+                let [_, damping] = plan.axis_values(outcome.point)[..] else { panic!("two axes") };
+                (damping, (verdict.greatest.unwrap().1 / 2.0).ln())
+            })
+            .collect();
+        let Some([low, high]) = edge.bracket else {
+            assert_eq!((row.first, edge.kind), (0.1, EdgeKind::NoneReliable));
+            assert!(logs.iter().all(|(_, log)| *log < 0.0));
+            continue;
+        };
+        assert_eq!((row.edges.len(), edge.kind), (1, EdgeKind::Crossing));
+        assert!(high - low <= 0.5);
+        for (damping, log) in &logs {
+            let reliable = *log < 0.0;
+            assert!(
+                if reliable { *damping > low } else { *damping < high },
+                "{damping} {log} {edge:?}"
+            );
+        }
+        let contour = logs.windows(2).find_map(|pair| {
+            let [(a, from), (b, to)] = [pair[0], pair[1]];
+            (from >= 0.0 && to < 0.0).then(|| a + (b - a) * from / (from - to))
+        });
+        assert!((contour.unwrap() - edge.at.unwrap()).abs() < 1.0, "{contour:?} {edge:?}");
+    }
+}
+
+/// The distance of an outcome's greatest ratio from the limit.
+fn distance(outcome: &Outcome, plan: &Plan) -> f64 {
+    let (quantity, _) = Washer::traced(plan, "ratio_max").unwrap();
+    let verdict = Verdict::new(outcome, plan.reliability.channels.len(), quantity.limit);
+    quantity.distance(verdict.greatest.unwrap().1)
+}
+
+/// The logarithm of a grid's greatest ratios over the limit, its columns by the first axis.
+fn grid_logs(plan: &Plan) -> Vec<Vec<f64>> {
+    let engine = ModelEngine::new(plan).unwrap();
+    let outcomes = engine.evaluate_at(&all_points(plan));
+    let log = |outcome: &Outcome| distance(outcome, plan);
+    outcomes
+        .chunks(plan.axes[1].values.len() as usize)
+        .map(|row| row.iter().map(log).collect())
+        .collect()
+}
+
+#[test]
+fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
+    // Around 0.4 kg, and one mass between the grid's columns.
+    let head = HEAD.split("[integrator]").next().unwrap();
+    let masses = [0.39, 0.40, 0.41];
+    let axes = |masses: &[f64], from: f64, to: f64, count: u32| {
+        format!(
+            "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = {masses:?}\n\
+             [[axis]]\nparameter = \"damping_n_s_per_m\"\n\
+             range = {{ from = {from:?}, to = {to:?}, count = {count} }}\n"
+        )
+    };
+    for criterion in Criterion::ALL {
+        let told = format!("{head}[reliability]\ncriterion = \"{}\"\n", criterion.name());
+        let wide = plan(&format!("{told}{}", axes(&[0.39, 0.395, 0.41], 60.0, 300.0, 33)));
+        let task = BoundaryTask::new(&wide, Some(0.5), 4).unwrap();
+        let rows = traced(&wide, &task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+        let edges: Vec<_> = rows.iter().map(|row| row.edges.last().copied().unwrap()).collect();
+        assert!(
+            edges.iter().all(|edge| edge.kind == EdgeKind::Crossing),
+            "{criterion:?}: {edges:?}"
+        );
+        // Dampings 0.5 N s/m apart around the last crossing.
+        let middle = edges[0].at.unwrap().round();
+        let (from, count) = (middle - 4.0, 29);
+        let fine = plan(&format!("{told}{}", axes(&masses, from, from + 14.0, count)));
+        let dampings: Vec<f64> = (0..count).map(|k| from + 0.5 * f64::from(k)).collect();
+        let logs = grid_logs(&fine);
+        let contour = zero_lines(&masses, &dampings, |i, j| logs[i][j]).concat();
+        for (row, edge) in rows.iter().zip(&edges) {
+            let nearest = contour.windows(2).find_map(|pair| {
+                let [[x0, y0], [x1, y1]] = [pair[0], pair[1]];
+                let inside = (x0.min(x1)..=x0.max(x1)).contains(&row.first) && x0 != x1;
+                inside.then(|| y0 + (y1 - y0) * (row.first - x0) / (x1 - x0))
+            });
+            let (contour, at) = (nearest.unwrap(), edge.at.unwrap());
+            assert!(
+                (contour - at).abs() < 0.25,
+                "{criterion:?} at {} kg: {contour} and {at}",
+                row.first
+            );
+        }
+    }
+}
+
+#[test]
+fn a_stop_is_heeded_before_the_next_group() {
+    let plan = plan(&format!("{HEAD}{GRID}"));
+    let task = BoundaryTask::new(&plan, None, 6).unwrap();
+    assert_eq!(task.search.tolerance, 0.5, "1/480 of 240 N s/m");
+    let interrupt = Interrupt::new();
+    interrupt.raise(2);
+    assert!(matches!(traced(&plan, &task, 2, &interrupt), Err(Stopped::Interrupted)));
+}
+
+#[test]
+fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
+    let plan = plan(&format!("{HEAD}{GRID}"));
+    let task = BoundaryTask::new(&plan, Some(2.0), 2).unwrap();
+    let whole = traced(&plan, &task, 1, &Interrupt::new()).unwrap();
+    let home = tempfile::tempdir().unwrap();
+    let output = home.path().join("x.parquet");
+    let (quantity, _) = Washer::traced(&plan, "ratio_max").unwrap();
+    let job = job(&plan, &quantity, &task);
+    let mut stops = 0;
+    let (found, trials) = loop {
+        let Ok(OpenedTrials::Open(trials)) = Trials::open(&output, &job, false) else { panic!() };
+        let interrupt = Interrupt::new();
+        let there = trials.count();
+        // The first to be told so much stops it, wherever it is in its batch.
+        let tell = |done: u64| {
+            if done >= there as u64 + 5 {
+                interrupt.raise(2);
+            }
+        };
+        let distances = Washer::search(&plan, &quantity).unwrap();
+        let models = Models::new(&plan, distances, 2, &interrupt, &tell).unwrap();
+        let models = models.keeping(*trials);
+        let found = trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {});
+        let trials = models.into_kept().unwrap();
+        match found {
+            Ok(found) => break (found, trials),
+            Err(Stopped::Interrupted) => assert!(trials.count() > there),
+            Err(Stopped::Failed(error)) => panic!("{error}"),
+        }
+        stops += 1;
+    };
+    assert!(stops > 1);
+    assert_eq!((found, trials.count()), (whole.clone(), whole.trials));
+}
+
+#[test]
+fn a_pocket_is_followed_along_a_damper_that_is_moved() {
+    // Where one damper is hung up decides for which dampings there is a reliable stretch at all.
+    let head = HEAD.split("[integrator]").next().unwrap();
+    let axes = "[[axis]]\nparameter = \"damper_1_cabinet_z_m\"\n\
+                range = { from = 0.1, to = 0.3, count = 17 }\n\
+                [[axis]]\nparameter = \"damping_n_s_per_m\"\n\
+                range = { from = 60.0, to = 300.0, count = 33 }\n";
+    let plan = plan(&format!("{head}{axes}"));
+    let task = BoundaryTask::new(&plan, None, 6).unwrap();
+    let rows = traced(&plan, &task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+    // At 0.1 m nothing is reliable, from 0.125 m on all is from a crossing upwards; the row between
+    // has a part of that, which no point of the lattice meets.
+    let kinds: Vec<EdgeKind> = rows.iter().map(|row| row.edges[0].kind).collect();
+    assert_eq!(
+        kinds[..3],
+        [EdgeKind::NoneUnreliable, EdgeKind::Crossing, EdgeKind::Crossing],
+        "{rows:?}"
+    );
+    let engine = ModelEngine::new(&plan).unwrap();
+    for row in &rows[..3] {
+        let dampings: Vec<f64> = (0..=24).map(|k| 60.0 + 10.0 * f64::from(k)).collect();
+        let points: Vec<Vec<f64>> =
+            dampings.iter().map(|damping| vec![row.first, *damping]).collect();
+        for (damping, outcome) in dampings.iter().zip(engine.evaluate_at(&points)) {
+            let is_reliable = distance(&outcome, &plan) < 0.0;
+            let below =
+                row.edges.iter().rev().find(|edge| edge.bracket.is_some_and(|b| b[1] <= *damping));
+            let found = match (below, row.edges[0].distances[0]) {
+                (Some(edge), _) => edge.distances[1].unwrap() < 0.0,
+                (None, Some(distance)) => distance < 0.0,
+                (None, None) => row.edges[0].kind == EdgeKind::NoneReliable,
+            };
+            let is_bracketed =
+                |edge: &Edge| edge.bracket.is_some_and(|b| b[0] < *damping && *damping < b[1]);
+            let said = (row.first, damping, &row.edges);
+            assert!(found == is_reliable || row.edges.iter().any(is_bracketed), "{said:?}");
+        }
+    }
+}
+
+#[test]
+fn plans_without_a_boundary_say_why() {
+    let mass = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.2]\n";
+    let refused = |text: &str, tolerance: Option<f64>| {
+        BoundaryTask::new(&plan(&format!("{HEAD}{text}")), tolerance, 6).unwrap_err()
+    };
+    assert_eq!(refused(mass, None), BoundaryError::Axes(1));
+    let one = format!("{mass}[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100.0]\n");
+    assert_eq!(refused(&one, None), BoundaryError::NoRange("damping_n_s_per_m".into()));
+    for tolerance in [0.0, -1.0, f64::NAN, 1e9] {
+        let error = refused(GRID, Some(tolerance)).to_string();
+        assert!(error.contains("--tolerance") && error.contains("240"), "{error}");
+    }
+    let design = "[design]\nmethod = \"sobol\"\npoints = 8\n\
+                  [[axis]]\nparameter = \"unbalance_mass_kg\"\n\
+                  range = { from = 0.1, to = 0.2 }\n";
+    assert_eq!(refused(design, None), BoundaryError::Design);
+}
+
+#[test]
+fn every_quantity_is_found_by_its_name_and_back_from_its_distance() {
+    let plan = plan(&format!("{HEAD}{GRID}"));
+    for name in Washer::quantities().iter().filter(|name| *name != "growth") {
+        let (quantity, _) = Washer::traced(&plan, name).unwrap();
+        assert_eq!(&quantity.name, name);
+        assert_eq!(quantity.value(0.0), quantity.limit);
+        for value in [0.5, 1.5, 3.0] {
+            let back = quantity.value(quantity.distance(value));
+            assert!((back - value).abs() < 1e-15 * 4.0, "{name}: {back}");
+        }
+    }
+    let (_, of_one) = Washer::traced(&plan, "ratio_tub_yaw").unwrap();
+    assert_eq!(of_one.reliability.channels, [washer_model::Channel::TubYaw]);
+    assert!(Washer::traced(&plan, "growth").unwrap_err().to_string().contains("[stability]"));
+}

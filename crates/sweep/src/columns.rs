@@ -1,0 +1,434 @@
+//! The columns of results, and rows of outcomes: the one place that says what a file holds.
+
+use serde_json::json;
+use sweep_engine::columns::{
+    Cell, Compared, ResultColumn, amplitude_columns, row, run_columns, verdict_columns,
+};
+use sweep_engine::store::{Column, Done, Kind as Cells, Layout, Row, Rows, axis_columns};
+use sweep_files::{FileKind, key};
+use washer_model::{Beyond, Channel, Disturbance, Kind, Motion};
+use washer_row::{Level, Measures, Metric, Outcome, ROW_STATUSES, Trajectory, Verdict, row_status};
+
+use crate::model::Washer;
+use crate::plan::Plan;
+
+impl Rows for Washer {
+    fn layout(plan: &Plan) -> Layout {
+        of_run(plan)
+    }
+}
+
+/// What a row is about.
+#[derive(Clone, Debug, PartialEq)]
+enum RowKind {
+    /// A point over the run's time: `sweep run`.
+    Run,
+    /// A point at one of these speeds (rpm), speeds varying fastest: `sweep stability`.
+    Dwell(Vec<f64>),
+}
+
+/// What a row's cells are taken from.
+struct ResultRow {
+    outcome: Outcome,
+    verdict: Verdict,
+    /// Position in [`ROW_STATUSES`].
+    status: usize,
+    fail_time_s: Option<f64>,
+}
+
+/// The columns of a plan's rows.
+pub(crate) struct Columns {
+    columns: Vec<WasherColumn>,
+    channels: usize,
+    ratio_limit: f64,
+}
+
+impl Columns {
+    /// Those of a run.
+    pub(crate) fn of_run(plan: &Plan) -> Self {
+        Self::of(&Asked::of(plan, RowKind::Run))
+    }
+
+    /// Those of dwells at constant speeds.
+    pub(crate) fn of_dwells(plan: &Plan, speeds_rpm: &[f64]) -> Self {
+        Self::of(&Asked::of(plan, RowKind::Dwell(speeds_rpm.to_vec())))
+    }
+
+    fn of(asked: &Asked) -> Self {
+        let (channels, ratio_limit) = (asked.channels.len(), asked.ratio_limit);
+        Self { columns: asked.columns(), channels, ratio_limit }
+    }
+
+    /// The rows of what came of a point.
+    pub(crate) fn done(&self, outcome: Outcome) -> Done {
+        let point = outcome.point;
+        Done { point, rows: outcome.into_rows().map(|outcome| self.row(outcome)).collect() }
+    }
+
+    fn row(&self, outcome: Outcome) -> Row {
+        let verdict = Verdict::new(&outcome, self.channels, self.ratio_limit);
+        let (status, fail_time_s) = row_status(&outcome);
+        row(&self.columns, &ResultRow { outcome, verdict, status, fail_time_s })
+    }
+}
+
+type WasherColumn = ResultColumn<ResultRow>;
+
+impl ResultRow {
+    fn model(&self, model: usize) -> &Trajectory {
+        if model == 0 { &self.outcome.nonlinear } else { &self.outcome.linear }
+    }
+}
+
+impl Compared for ResultRow {
+    fn amplitude(&self, model: usize, channel: usize) -> Option<f64> {
+        self.model(model).amplitudes.get(channel).copied()
+    }
+
+    fn ratio(&self, channel: usize) -> Option<f64> {
+        self.verdict.ratios.get(channel).copied().flatten()
+    }
+
+    fn greatest(&self) -> Option<(usize, f64)> {
+        self.verdict.greatest
+    }
+
+    fn reliable(&self) -> Option<bool> {
+        self.verdict.reliable
+    }
+
+    fn sensitive(&self) -> Option<bool> {
+        self.outcome.sensitive
+    }
+
+    fn method(&self) -> usize {
+        self.outcome.method as usize
+    }
+
+    fn error(&self) -> Option<f64> {
+        self.outcome.error
+    }
+
+    fn status(&self) -> usize {
+        self.status
+    }
+
+    fn fail_time_s(&self) -> Option<f64> {
+        self.fail_time_s
+    }
+
+    fn steps(&self, model: usize) -> u64 {
+        self.model(model).steps
+    }
+
+    fn rejected(&self, model: usize) -> u64 {
+        self.model(model).rejected
+    }
+}
+
+/// The layout of a run's result.
+pub(crate) fn of_run(plan: &Plan) -> Layout {
+    let reliability = &plan.reliability;
+    let measures = plan.model.measures.clone();
+    of_measures(axis_columns(plan), &reliability.channels, reliability.ratio_limit, measures)
+}
+
+/// The same, by what it depends on.
+pub(crate) fn of_measures(
+    axes: Vec<Column>,
+    channels: &[Channel],
+    ratio_limit: f64,
+    measures: Measures,
+) -> Layout {
+    let asked = Asked { channels: channels.to_vec(), ratio_limit, measures, rows: RowKind::Run };
+    let columns = Columns::of(&asked).columns;
+    Layout {
+        axes,
+        columns: columns.into_iter().map(|column| column.declared).collect(),
+        kind: FileKind::Map,
+        rows_a_point: 1,
+        has_several: false,
+        metadata: Vec::new(),
+    }
+}
+
+/// The layout of the dwells of a plan's points at these speeds (rpm), speeds varying fastest.
+pub(crate) fn of_dwells(plan: &Plan, speeds_rpm: &[f64]) -> Layout {
+    let columns = Columns::of_dwells(plan, speeds_rpm).columns;
+    let mut axes = axis_columns(plan);
+    axes.push(Column::new("speed_rpm", "rpm", "constant spin of the shaft", Cells::Axis));
+    Layout {
+        axes,
+        columns: columns.into_iter().map(|column| column.declared).collect(),
+        kind: FileKind::Stability,
+        rows_a_point: speeds_rpm.len() as u64,
+        has_several: true,
+        metadata: vec![(key::STABILITY, json!({ "speeds_rpm": speeds_rpm }))],
+    }
+}
+
+/// What the columns depend on.
+struct Asked {
+    channels: Vec<Channel>,
+    ratio_limit: f64,
+    measures: Measures,
+    rows: RowKind,
+}
+
+/// The two models by name.
+const MODELS: [(&str, fn(&Outcome) -> &Trajectory); 2] =
+    [("nonlinear", |outcome| &outcome.nonlinear), ("linear", |outcome| &outcome.linear)];
+
+impl Asked {
+    fn of(plan: &Plan, rows: RowKind) -> Self {
+        let measures = match rows {
+            RowKind::Run => plan.model.measures.clone(),
+            // What is measured of a run is not of a dwell.
+            RowKind::Dwell(_) => Measures::default(),
+        };
+        let channels = plan.reliability.channels.clone();
+        Self { channels, ratio_limit: plan.reliability.ratio_limit, measures, rows }
+    }
+
+    /// Every column, in order: the one place that says what the file holds.
+    fn columns(&self) -> Vec<WasherColumn> {
+        let mut columns = Vec::new();
+        if let RowKind::Dwell(_) = self.rows {
+            columns.extend(growth_columns(""));
+            let amplitude = "largest deviation from equilibrium over a turn";
+            let ratio = "nonlinear over linear amplitude; null where that is zero";
+            columns.extend(amplitude_columns(&self.channels, amplitude, ratio));
+            let [greatest, channel, ..] = self.verdict_columns();
+            columns.extend([greatest, channel, dwell_status_column()]);
+            return columns;
+        }
+        let criterion = self.measures.criterion;
+        let (amplitude, ratio) = (criterion.amplitude(), criterion.ratio());
+        columns.extend(amplitude_columns(&self.channels, amplitude, ratio));
+        columns.extend(self.verdict_columns());
+        columns.extend(gap_columns());
+        columns.extend(self.metric_columns());
+        columns.extend(run_columns(ROW_STATUSES.to_vec()));
+        columns
+    }
+
+    fn verdict_columns(&self) -> [WasherColumn; 6] {
+        let told = "what the row's numbers come from: fast, fine and finest are rungs of the fast \
+                    method, the others methods of that name";
+        verdict_columns(
+            &self.channels,
+            self.ratio_limit,
+            Level::ALL.map(Level::name).to_vec(),
+            told,
+        )
+    }
+
+    /// Columns of the metrics that are asked for, and no others.
+    fn metric_columns(&self) -> Vec<WasherColumn> {
+        let mut columns = Vec::new();
+        let mut position = 0;
+        for metric in &self.measures.metrics {
+            if let Metric::Growth = metric {
+                columns.extend(growth_columns("growth_"));
+                continue;
+            }
+            if !metric.is_of_model() {
+                let cell = Cell::Measured(Box::new(|row: &ResultRow| row.outcome.static_sag_m));
+                columns.push(ResultColumn::new(
+                    metric.column(""),
+                    metric.unit(),
+                    metric.description(),
+                    cell,
+                ));
+                continue;
+            }
+            for number in self.measures.numbers_of(*metric) {
+                for (model, of) in MODELS {
+                    let text =
+                        format!("{}, {model} model; null if it failed", number.description());
+                    let cell = Cell::Measured(Box::new(move |row: &ResultRow| {
+                        of(&row.outcome).metrics.get(position).copied()
+                    }));
+                    let name = number.column(model);
+                    columns.push(ResultColumn::new(name, metric.unit(), text, cell));
+                }
+                position += 1;
+            }
+        }
+        columns
+    }
+}
+
+/// Columns of the fastest growing disturbance at a constant speed. In maps they stand behind a
+/// prefix, and the speed is one of them.
+fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
+    let in_map = !prefix.is_empty();
+    let mut columns = Vec::new();
+    let numbers: [(&str, &str, &str, fn(&Disturbance) -> f64); 6] = [
+        ("speed_rpm", "rpm", "the plan's speed at which a disturbance grows fastest", |fastest| {
+            fastest.speed_rpm
+        }),
+        (
+            "growth_per_s",
+            "1/s",
+            "how fast the fastest growing disturbance of the nonlinear response grows; negative \
+             where all decay",
+            Disturbance::growth_per_s,
+        ),
+        (
+            "frequency_cpm",
+            "1/min",
+            "its frequency in cycles per minute, known up to whole multiples of the speed and \
+             sign: the one from 0 to half the speed",
+            Disturbance::frequency_cpm,
+        ),
+        (
+            "other_frequency_cpm",
+            "1/min",
+            "the speed less frequency_cpm",
+            Disturbance::other_frequency_cpm,
+        ),
+        (
+            "multiplier_re",
+            "1",
+            "the suspension's largest Floquet multiplier, real part",
+            |fastest| fastest.multiplier[0],
+        ),
+        ("multiplier_im", "1", "its imaginary part, not negative", |fastest| fastest.multiplier[1]),
+    ];
+    let of_dwell = usize::from(!in_map);
+    for (name, unit, text, of) in numbers.into_iter().skip(of_dwell) {
+        let cell = Cell::Measured(Box::new(move |row: &ResultRow| {
+            Some(of(&row.outcome.growth.as_ref()?.fastest))
+        }));
+        let name =
+            if name.starts_with(prefix) { name.to_owned() } else { format!("{prefix}{name}") };
+        columns.push(ResultColumn::new(name, unit, text, cell));
+    }
+    let kind = |row: &ResultRow| {
+        let kind = row.outcome.growth.as_ref()?.fastest.kind();
+        Kind::ALL.iter().position(|known| *known == kind)
+    };
+    columns.push(ResultColumn::new(
+        format!("{prefix}kind"),
+        "",
+        "what a disturbance turns the response into: stable, period_doubling, quasi_periodic, fold",
+        Cell::Name(Kind::ALL.map(Kind::name).to_vec(), Box::new(kind)),
+    ));
+    if !in_map {
+        let stable =
+            |row: &ResultRow| Some(row.outcome.growth.as_ref()?.fastest.kind() == Kind::Stable);
+        let text = "true where every disturbance decays";
+        columns.push(ResultColumn::new("stable", "", text, Cell::Flag(Box::new(stable))));
+    }
+    for place in 0..2 {
+        columns.extend(growing_mode_columns(prefix, place));
+    }
+    columns.extend(branch_columns(prefix));
+    columns
+}
+
+/// Columns of the branch that a response is on.
+fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
+    let end = |place: usize| move |row: &ResultRow| row.outcome.growth.as_ref()?.between_rpm[place];
+    let number = |row: &ResultRow| Some(u64::from(row.outcome.growth.as_ref()?.branch));
+    // It says which of a speed's rows a row is, and so is never null there.
+    let branch = if prefix.is_empty() {
+        Cell::Count(Box::new(move |row: &ResultRow| number(row).unwrap_or(0)))
+    } else {
+        Cell::KnownCount(Box::new(number))
+    };
+    let beyond = |row: &ResultRow| {
+        let beyond = row.outcome.growth.as_ref()?.beyond?;
+        Beyond::ALL.iter().position(|known| *known == beyond)
+    };
+    [
+        ResultColumn::new(
+            format!("{prefix}branch"),
+            "1",
+            "how many folds the point's curve of responses has before this one, followed from a \
+             low speed up; a machine that runs up is on the least branch that there is at a speed",
+            branch,
+        ),
+        ResultColumn::new(
+            format!("{prefix}branch_from_rpm"),
+            "rpm",
+            "speed of the fold below which the branch is not; null where it has none",
+            Cell::Measured(Box::new(end(0))),
+        ),
+        ResultColumn::new(
+            format!("{prefix}branch_to_rpm"),
+            "rpm",
+            "speed of the fold above which the branch is not; null where it has none",
+            Cell::Measured(Box::new(end(1))),
+        ),
+        ResultColumn::new(
+            format!("{prefix}beyond"),
+            "",
+            "what of the machine's geometry the response passes, and so is no motion of the \
+             machine: spring_hooks, damper_ends, clearance; null where nothing",
+            Cell::Name(Beyond::ALL.map(Beyond::name).to_vec(), Box::new(beyond)),
+        ),
+    ]
+}
+
+/// Columns of one of the modes that take part in what grows.
+fn growing_mode_columns(prefix: &str, place: usize) -> [WasherColumn; 3] {
+    let mode = move |row: &ResultRow| row.outcome.growth.as_ref()?.modes[place];
+    let which = if place == 0 { "that takes most part in" } else { "next to that in" };
+    let name = format!("{prefix}mode_{}", place + 1);
+    [
+        ResultColumn::new(
+            name.clone(),
+            "1",
+            format!(
+                "number, by frequency at this speed, of the linear model's mode {which} what \
+                 grows; null where nothing grows, or no such mode is needed"
+            ),
+            Cell::KnownCount(Box::new(move |row: &ResultRow| Some(u64::from(mode(row)?.number)))),
+        ),
+        ResultColumn::new(
+            format!("{name}_name"),
+            "",
+            "what moves in it",
+            Cell::Name(
+                Motion::NAMES.to_vec(),
+                Box::new(move |row: &ResultRow| Some(mode(row)?.name as usize)),
+            ),
+        ),
+        ResultColumn::new(
+            format!("{name}_cpm"),
+            "1/min",
+            "its damped natural frequency at this speed in cycles per minute",
+            Cell::Measured(Box::new(move |row: &ResultRow| Some(mode(row)?.frequency_cpm))),
+        ),
+    ]
+}
+
+/// The status of a dwell.
+fn dwell_status_column() -> WasherColumn {
+    ResultColumn::new(
+        "status",
+        "",
+        "ok, or why there is no response",
+        Cell::Name(ROW_STATUSES.to_vec(), Box::new(|row: &ResultRow| Some(row.status))),
+    )
+}
+
+/// Columns of the least gaps, the same for every plan.
+fn gap_columns() -> Vec<WasherColumn> {
+    let mut columns = Vec::new();
+    for (model, of) in MODELS {
+        let text = format!(
+            "least gap between drum and tub over the whole run, {model} model; negative where \
+             they clash; null if \
+             it failed"
+        );
+        let cell = Cell::Measured(Box::new(move |row: &ResultRow| of(&row.outcome).min_gap_m));
+        columns.push(ResultColumn::new(format!("min_gap_{model}_m"), "m", text, cell));
+    }
+    columns
+}
+
+#[cfg(test)]
+mod tests;

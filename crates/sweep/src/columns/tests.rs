@@ -1,0 +1,88 @@
+//! Which columns there are, in which order, and what they say.
+
+use arrow_array::Float64Array;
+use sweep_engine::store::ResultRows;
+use washer_row::{Criterion, Status};
+
+use super::*;
+
+const CHANNELS: [Channel; 2] = [Channel::TubFrontY, Channel::TubYaw];
+
+fn layout(measures: Measures) -> Layout {
+    let axis =
+        |name: &str, unit: &str| Column::new(name, unit, format!("swept {name}"), Cells::Axis);
+    let axes = vec![axis("unbalance_mass_kg", "kg"), axis("damping_n_s_per_m", "N s/m")];
+    of_measures(axes, &CHANNELS, 2.0, measures)
+}
+
+#[test]
+fn columns_stand_as_the_contract_says() {
+    let names: Vec<String> =
+        layout(Measures::default()).schema().fields().iter().map(|f| f.name().clone()).collect();
+    assert_eq!(
+        names,
+        [
+            "point",
+            "unbalance_mass_kg",
+            "damping_n_s_per_m",
+            "nonlinear_tub_front_y",
+            "nonlinear_tub_yaw",
+            "linear_tub_front_y",
+            "linear_tub_yaw",
+            "ratio_tub_front_y",
+            "ratio_tub_yaw",
+            "ratio_max",
+            "ratio_max_channel",
+            "reliable",
+            "sensitive",
+            "method",
+            "error",
+            "min_gap_nonlinear_m",
+            "min_gap_linear_m",
+            "status",
+            "fail_time_s",
+            "steps_nonlinear",
+            "steps_linear",
+            "rejected_nonlinear",
+            "rejected_linear",
+        ]
+    );
+}
+
+#[test]
+fn metrics_have_columns_in_the_order_asked_for_and_criteria_say_what_they_are() {
+    let plain = layout(Measures::default()).schema().fields().len();
+    let metrics = vec![Metric::StaticSag, Metric::ClashTime, Metric::CabinetForce];
+    let measures = Measures { criterion: Criterion::Rms, metrics, ..Measures::default() };
+    let layout = layout(measures.clone());
+    let asked =
+        Asked { channels: CHANNELS.to_vec(), ratio_limit: 2.0, measures, rows: RowKind::Run };
+    let model = |metrics: &[f64]| Trajectory {
+        amplitudes: vec![0.1, 0.2],
+        metrics: metrics.to_vec(),
+        ..Trajectory::failed(Status::Ok)
+    };
+    let mut outcome = Outcome::new(0, model(&[1.5, 400.0]), model(&[0.5, 300.0]));
+    outcome.static_sag_m = Some(0.013);
+    let mut rows = ResultRows::new(&layout);
+    rows.push(0, vec![0.1, 60.0], Columns::of(&asked).row(outcome));
+    let batch = rows.take().unwrap();
+    assert_eq!(batch.num_columns(), plain + 5);
+    let expected = [
+        ("static_sag_m", 0.013),
+        ("clash_time_nonlinear_s", 1.5),
+        ("clash_time_linear_s", 0.5),
+        ("cabinet_force_nonlinear_n", 400.0),
+        ("cabinet_force_linear_n", 300.0),
+    ];
+    let first = batch.schema().index_of("static_sag_m").unwrap();
+    for (k, (name, value)) in expected.into_iter().enumerate() {
+        assert_eq!(batch.schema().field(first + k).name(), name);
+        let column = batch.column(first + k).as_any().downcast_ref::<Float64Array>().unwrap();
+        assert_eq!(column.value(0), value, "{name}");
+    }
+    let schema = layout.schema();
+    let description =
+        &schema.field_with_name("nonlinear_tub_yaw").unwrap().metadata()["description"];
+    assert!(description.contains("root mean square"), "{description}");
+}

@@ -1,0 +1,41 @@
+//! A plan in a result is read as grid files are.
+
+use washer_row::Metric;
+
+use super::{GridInput, with_one_of_each};
+
+const GRID: &str = r#"
+name = "again"
+set = { tub_mass_kg = 24.5 }
+spin = { profile = "table", time_s = [0, 10, 50], speed_rpm = [0, 300, 1e2] }
+time = { end_s = 50, window_s = [30, 50] }
+integrator = { accuracy = 1e-5 }
+reliability = { ratio_limit = 1.5, channels = ["tub_yaw", "tub_pitch"], criterion = "rms" }
+metrics = ["static_sag", "growth"]
+stability = { speed_rpm = "200:240:20" }
+[[axis]]
+parameter = "unbalance_mass_kg"
+values = [0.1, 0.30000000000000004]
+[[axis]]
+parameter = "bearing_stiffness_n_per_m"
+range = { from = 1e7, to = 2e8, count = 4, spacing = "log" }
+"#;
+
+#[test]
+fn a_plan_is_read_again_from_its_own_json() {
+    let mut plan = GridInput::text("again", GRID.to_owned(), Vec::new()).load().unwrap();
+    let again = |plan: &crate::Plan| {
+        let input = GridInput::of_plan("again", &plan.to_json());
+        input.load().unwrap_or_else(|mistakes| panic!("{mistakes}"))
+    };
+    assert_eq!(again(&plan), plan);
+    // Its stops have no growth.
+    (plan.model.measures.metrics, plan.model.growth_speeds) = (vec![Metric::StopForce], None);
+    plan.model.machine = with_one_of_each();
+    plan.model.machine.feet = [[0.5, -0.4, 0.3], [0.5, -0.4, -0.3], [-0.2, -0.4, 0.0]]
+        .map(|foot_m| washer_model::Foot { foot_m })
+        .to_vec();
+    plan.model.measures.stops = plan.model.machine.stops.len();
+    plan.model.measures.feet = plan.model.machine.feet.len();
+    assert_eq!(again(&plan), plan);
+}

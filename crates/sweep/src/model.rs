@@ -1,0 +1,65 @@
+//! The washing machine as a model of the engine: its parameters.
+
+use std::borrow::Cow;
+
+use sweep_engine::{Build, Model, UnknownParameter};
+use washer_model::{Channel, Machine, Parameter, Spin};
+use washer_row::Measures;
+
+use crate::identity::BUILD;
+use crate::method::Integrator;
+use crate::speeds::Speeds;
+
+/// Channels that are compared if the grid file names none.
+const DEFAULT_CHANNELS: [Channel; 6] = [
+    Channel::TubFrontY,
+    Channel::TubFrontZ,
+    Channel::DrumFrontY,
+    Channel::DrumFrontZ,
+    Channel::TubYaw,
+    Channel::TubPitch,
+];
+
+/// What a grid file sets of the washing machine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Washer {
+    /// The machine after `[set]` and `--set`, before the axes.
+    pub machine: Machine,
+    /// The spin after `[set]` and `--set`, before the axes.
+    pub spin: Spin,
+    /// What is measured of the motions.
+    pub measures: Measures,
+    /// The constant speeds that the metric `growth` is about; `None` if it is not asked for.
+    pub growth_speeds: Option<Speeds>,
+}
+
+impl Model for Washer {
+    type Parameter = Parameter;
+    type Channel = Channel;
+    type Integrator = Integrator;
+
+    const BUILD: Build = BUILD;
+
+    fn default_channels() -> Vec<Channel> {
+        DEFAULT_CHANNELS.to_vec()
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        Parameter::all(&self.machine, &self.spin)
+    }
+
+    fn find(&self, name: &str) -> Result<Parameter, UnknownParameter> {
+        Parameter::find(name, &self.machine, &self.spin).map_err(|error| UnknownParameter {
+            reason: error.to_string(),
+            is_strange: error == washer_model::UnknownParameter::Name,
+        })
+    }
+
+    fn parts(&self, parameter: &Parameter) -> Vec<Cow<'static, str>> {
+        parameter.parts(&self.machine)
+    }
+
+    fn write(&mut self, parameter: &Parameter, value: f64) {
+        parameter.set(&mut self.machine, &mut self.spin, value);
+    }
+}
