@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Everything that is measured of this project alone, in one command: ratios, kernels by instruction
-# set, instruction counts. Writes results/benchmarks/NAME.md with machine, versions and commands.
+# What is measured of this project alone, in one command: ratios, instruction counts, what a step
+# executes. Writes results/benchmarks/NAME.md with machine, versions and commands.
+# `cargo bench --bench kernels` times every kernel by itself.
 #
 #     scripts/benchmarks/benchmark.sh [NAME] [ROUNDS]
 set -euo pipefail
@@ -38,14 +39,6 @@ fact() { lscpu | sed -n "s/^$1: *//p"; }
   echo "\`scripts/benchmarks/kernel_profile.py\`"
   echo
   python3 scripts/benchmarks/kernel_profile.py
-  echo
-  echo "## Kernels"
-  echo
-  echo "\`cargo bench --bench kernels\`; items are evaluations or trajectories of single lanes"
-  echo
-  echo '```text'
-  cargo bench --quiet --bench kernels -- --color never
-  echo '```'
 } > "$out.partial"
 mv "$out.partial" "$out"
 echo "$out"

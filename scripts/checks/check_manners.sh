@@ -12,7 +12,7 @@ trap 'rm -rf "$work"' EXIT
 shells="bash zsh fish elvish powershell"
 for shell in $shells; do "$sweep" completions "$shell" > "$work/completions.$shell"; done
 bash -n "$work/completions.bash"
-commands=$("$sweep" --help | sed -n '/^Commands:/,/^$/p' | awk '/^  [a-z]/ { print $1 }')
+commands=$("$sweep" --help | sed -n '/^Usage:/,/^Options:/p' | awk '/^  [a-z]/ { print $1 }')
 test "$(wc -w <<< "$commands")" -ge 11
 for command in $commands; do
     grep -q "^\.SH SYNOPSIS" "$work/man/sweep-$command.1"

@@ -6,11 +6,12 @@
 The tour starts in a fresh copy of the repository's files and takes the README, then the pages of
 docs/SUMMARY.md, in order:
 
-- Each line of an `sh` block is run as it stands, and must succeed. Commands that cannot run
-  everywhere are in `console` blocks. SWEEP_BINARY answers for `cargo run --release --`; other
-  cargo commands are left to .ci/run.
+- Each line of an `sh` or `console` block is run as it stands, and must succeed. A block that
+  cannot run here has the line `<!-- not run: REASON -->` above it. SWEEP_BINARY answers for
+  `cargo run --release --`; other cargo commands are left to .ci/run.
 - A `text` block below an `sh` block holds what the last command above it prints. --write renews
   the blocks that differ.
+- A placeholder such as @@NAME@@ is a mistake.
 
 What depends on the machine is not compared: on a line with a rate, threads, memory or the time of a
 search, numbers with their units and the names of instruction sets.
@@ -34,6 +35,8 @@ NUMBERS = re.compile(
     r"\b[0-9]+ (h [0-9]+ min|min [0-9]+ s)\b"
     r"|\b[0-9][0-9.e+-]*( (ms|s|days?|kB|MB|GB)\b)?|\b(avx512|avx2|neon|scalar)\b"
 )
+NOT_RUN = re.compile(r"<!-- not run: .+ -->$")
+PLACEHOLDER = re.compile(r"@@\w+@@")
 # A slow machine estimates from the beginnings of trajectories, and says so.
 BEGINNINGS = re.compile(r", the first ~ each$")
 
@@ -58,8 +61,14 @@ def blocks(lines):
             start = None
 
 
+def is_marked(lines, start):
+    """Whether the block that starts here says that it is not run."""
+    above = [line for line in lines[max(0, start - 3):start - 1] if line]
+    return bool(above) and NOT_RUN.match(above[-1]) is not None
+
+
 def commands(lines):
-    """Commands of an `sh` block, continued lines joined."""
+    """Commands of a block, continued lines joined."""
     for command in re.sub(r"\\\n\s*", "", "\n".join(lines)).split("\n"):
         if command.strip() and not command.startswith("#"):
             yield command
@@ -84,7 +93,9 @@ def tour(page, run, write):
     lines = page.read_text().splitlines()
     ran, samples, stale, printed = 0, 0, [], None
     for language, start, end in blocks(lines):
-        if language == "sh":
+        if language in ("sh", "console") and is_marked(lines, start):
+            printed = None
+        elif language in ("sh", "console"):
             for command in commands(lines[start:end]):
                 if command.startswith(LEFT_TO_CI):
                     continue
@@ -93,8 +104,6 @@ def tour(page, run, write):
                 if status != 0:
                     sys.exit("\n".join([*printed, f"{name}: this command failed: {command}"]))
                 ran += 1
-        elif language == "console":
-            printed = None
         elif language == "text" and printed is not None:
             samples += 1
             right = renewed(lines[start:end], printed)
@@ -108,6 +117,8 @@ def tour(page, run, write):
         stale = []
     wrong = [f"{name}:{start}: the program prints:\n" + "\n".join(right)
              for start, _, right in stale]
+    wrong += [f"{name}:{number}: a placeholder remains: {line}"
+              for number, line in enumerate(lines, 1) if PLACEHOLDER.search(line)]
     return ran, samples, wrong
 
 

@@ -173,21 +173,6 @@ def machine():
     return f"{model} ({family}), {platform.system()} {platform.release()}"
 
 
-def table(medians, fastest):
-    lines = [
-        "| program | method | settings | error | ms a trajectory | against row 1 |",
-        "|---|---|---|---|---|---|",
-    ]
-    for entry in medians:
-        error = "the reference" if entry["settings"] == REFERENCE else f"{entry['error']:.0e}"
-        times = entry["seconds"] / fastest
-        lines.append(
-            f"| {entry['program']} | {entry['method']} | {entry['settings']} | {error} "
-            f"| {entry['seconds'] * 1e3:.1f} | {times:.3g} |"
-        )
-    return lines
-
-
 def best_at(medians, accuracy):
     """The quickest setting of each method that is at least so accurate."""
     lines = [
@@ -276,8 +261,6 @@ def main():
         "Times in lanes are a trajectory's share of a full lane group.",
         "",
         "![work-precision diagram](peers.svg)",
-        "",
-        *table(medians, medians[0]["seconds"]),
     ]
     for accuracy in [1e-3, 1e-6]:
         text += [

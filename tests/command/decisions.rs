@@ -1,9 +1,12 @@
 //! From one map to a decision: `require`, `compare`, `export`, rows of `show`, `trace --point`,
 //! `--set` of the grid file's scalars.
 
-use std::fs;
+use std::fs::{self, File};
 use std::process::Output;
+use std::sync::Arc;
 
+use arrow_array::{ArrayRef, Float64Array, RecordBatch};
+use parquet::arrow::ArrowWriter;
 use serde_json::{Value, json};
 
 use crate::home::{Home, grid, said};
@@ -53,6 +56,55 @@ fn a_gate_opens_or_names_the_rows_and_exits_with_4() {
     let none = home.sweep(&["require", MAP, "reliable", "--where", "false"]);
     assert_eq!(code(&none), Some(4));
     assert!(said(&none).contains("no row"), "{}", said(&none));
+}
+
+/// Writes a file of these ratios and gaps over as many masses.
+fn write_ratios(home: &Home, name: &str, ratio: impl Fn(u32) -> Option<f64>) {
+    let numbers = |of: &dyn Fn(u32) -> Option<f64>| -> ArrayRef {
+        Arc::new((0..400).map(of).collect::<Float64Array>())
+    };
+    let columns = [
+        ("unbalance_mass_kg", numbers(&|row| Some(0.01 * f64::from(row)))),
+        ("nonlinear_tub_yaw", numbers(&ratio)),
+        ("ratio_max", numbers(&ratio)),
+        ("min_gap_nonlinear_m", numbers(&|row| Some(0.01 * ratio(row)?))),
+        ("status", numbers(&|_| None)),
+    ];
+    let rows = RecordBatch::try_from_iter(columns).expect("columns of one length");
+    let file = File::create(home.path(name)).expect("the file can be made");
+    let mut writer = ArrowWriter::try_new(file, rows.schema(), None).expect("a writer");
+    writer.write(&rows).expect("rows are written");
+    writer.close().expect("the file is written");
+}
+
+#[test]
+fn no_gate_stands_open_where_points_failed() {
+    let home = Home::new(&grid(1, 1));
+    write_ratios(&home, "whole.parquet", |_| Some(1.5));
+    write_ratios(&home, "half.parquet", |row| (row % 2 == 0).then_some(1.5));
+    write_ratios(&home, "nan.parquet", |_| Some(f64::NAN));
+    for (file, over) in [("half.parquet", 200), ("nan.parquet", 0)] {
+        for gate in
+            ["max(ratio_max)<2", "mean(ratio_max)<2", "min(ratio_max)>1", "count(ratio_max>=2)==0"]
+        {
+            let shut = home.sweep(&["require", file, gate]);
+            assert_eq!(code(&shut), Some(4), "{file}: {gate}");
+            let told = format!("over {over} of 400 rows");
+            assert!(said(&shut).contains(&told), "{}", said(&shut));
+        }
+        for gate in ["ratio=0.05", "gap=0.001"] {
+            let shut = home.sweep(&["compare", "whole.parquet", file, "--fail-on", gate]);
+            assert_eq!(code(&shut), Some(4), "{file}: {gate}\n{}", printed(&shut));
+            let same = home.sweep(&["compare", file, file, "--fail-on", gate]);
+            assert_eq!(code(&same), Some(0), "{file}: {gate}\n{}", printed(&same));
+        }
+    }
+    let known = home.sweep(&["require", "half.parquet", "max(ratio_max)<2", "--allow-null"]);
+    assert_eq!(code(&known), Some(0), "{}", said(&known));
+    let lacks = ["compare", "half.parquet", "half.parquet", "--fail-on", "flips"];
+    let lacks = home.sweep(&lacks);
+    assert_eq!(code(&lacks), Some(2), "{}", said(&lacks));
+    assert!(said(&lacks).contains("two files with verdicts"), "{}", said(&lacks));
 }
 
 #[test]

@@ -79,6 +79,34 @@ fn the_papers_machine_has_two_tongues_with_the_references_edges_and_dampings() {
     assert!(found["entered_on_responses"]["ratio_max"].as_f64().expect("a number") < 2.0);
 }
 
+/// A corner of Fig. 12 whose response folds back: one wide band, and no damping that was not tried.
+#[test]
+fn a_folded_response_is_one_band_and_its_jump_is_named() {
+    let axes = AXES.replace("[0.4]", "[1.0]").replace("100.0, 140.0", "60.0, 140.0");
+    let at = ["--at", "damping_n_s_per_m=60", "--speed", "200:350:1", "--json"];
+    let done = explain(&grid(PAPER, &axes), &at);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
+    within(&found["speeds"]["jumps_rpm"][0], 243.06, 0.1);
+    let tongues = found["tongues"].as_array().expect("a list");
+    assert_eq!(tongues.len(), 2, "{tongues:?}");
+    within(&tongues[0]["to_rpm"], 243.06, 0.1);
+    within(&tongues[1]["from_rpm"], 243.06, 0.1);
+    for tongue in tongues {
+        let closed = &tongue["closed_by"];
+        // What is said to close it leaves no growth anywhere about it.
+        if let Some(damping) = closed["damping_n_s_per_m"].as_f64() {
+            let axes = axes.replace("60.0, 140.0", &format!("{damping}"));
+            let [from, to] = [0, 1].map(|end| closed["nothing_grows_from_to_rpm"][end].to_string());
+            let speed = format!("{from}:{to}:1");
+            let at = format!("damping_n_s_per_m={damping}");
+            let done = explain(&grid(PAPER, &axes), &["--at", &at, "--speed", &speed, "--json"]);
+            let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
+            assert_eq!(found["tongues"], serde_json::json!([]), "{damping}");
+        }
+    }
+}
+
 #[test]
 fn a_stable_machine_is_told_so() {
     let done =

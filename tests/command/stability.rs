@@ -193,3 +193,70 @@ fn growth_is_a_metric_of_maps_and_a_quantity_of_boundaries() {
     assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
     assert!(said(&refused).contains("[stability]"), "{}", said(&refused));
 }
+
+/// Between its folds the machine has three responses; one of them, found by a search of its own,
+/// used to be called stable where a dwell shakes violently.
+#[test]
+fn coexisting_responses_are_rows_of_their_own() {
+    let folder = folder_with("");
+    let grid = GRID.replace("values = [0.4]", "values = [0.3, 0.4]");
+    let grid = grid.replace("values = [140.0, 300.0]", "values = [30.0, 140.0]");
+    fs::write(folder.path().join("grid.toml"), grid).expect("it is written");
+    let speed = "254:259:0.5";
+    let done = stability(&folder, speed, &[]);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    let file = "results/grid-stability.parquet";
+    let shown = said(&sweep(&folder, &["show", file]).output().expect("it starts"));
+    for line in ["6 of 44 rows", "4 further rows", "point 0: at 255.36 rpm, running up"] {
+        assert!(shown.contains(line) || said(&done).contains(line), "{line}\n{shown}");
+    }
+    let csv = sweep(&folder, &["export", file, "rows.csv"]).output().expect("it starts");
+    assert_eq!(csv.status.code(), Some(0), "{}", said(&csv));
+    let text = fs::read_to_string(folder.path().join("rows.csv")).expect("it is there");
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let place = |name: &str| names.iter().position(|known| known.starts_with(name)).expect(name);
+    let [point, rpm, growth, branch] = ["point", "speed_rpm", "growth_per_s", "branch"].map(place);
+    // No name of a mode ends a field by its comma.
+    let unquoted = |line: &str| -> String {
+        let pieces = line.split('"').enumerate();
+        pieces
+            .map(|(k, piece)| if k % 2 == 1 { piece.replace(',', ";") } else { piece.into() })
+            .collect()
+    };
+    let lines: Vec<String> = lines.map(unquoted).collect();
+    let rows: Vec<Vec<&str>> = lines.iter().map(|line| line.split(',').collect()).collect();
+    let at = |speed: &str| -> Vec<&Vec<&str>> {
+        rows.iter().filter(|row| row[point] == "0" && row[rpm] == speed).collect()
+    };
+    let branches: Vec<&str> = at("255").iter().map(|row| row[branch]).collect();
+    assert_eq!(branches, ["0", "1", "2"]);
+    for speed in ["256.5", "257", "257.5"] {
+        let [row] = at(speed)[..] else { panic!("one response at {speed} rpm: {text}") };
+        assert!(row[growth].parse::<f64>().expect("a number") > 2.9, "{row:?}");
+    }
+    // Shards and a file compared with itself meet the further rows too.
+    for shard in ["2/2", "1/2"] {
+        let done = stability(&folder, speed, &["--out", "joined.parquet", "--shard", shard]);
+        assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    }
+    let merge = ["merge", "grid.toml", "--speed", speed, "--out", "joined.parquet"];
+    let merged = sweep(&folder, &merge).output().expect("it starts");
+    assert_eq!(merged.status.code(), Some(0), "{}", said(&merged));
+    let bytes = |name: &str| fs::read(folder.path().join(name)).expect("it is there");
+    assert!(bytes("joined.parquet") == bytes(file));
+    let compared = sweep(&folder, &["compare", file, "joined.parquet"]).output();
+    let compared = compared.expect("it starts");
+    assert!(said(&compared).contains("differ  not at all"), "{}", said(&compared));
+}
+
+/// A turn of so slow a drum would take hours.
+#[test]
+fn a_drum_too_slow_to_follow_says_so_at_once() {
+    let folder = folder_with("");
+    let done = stability(&folder, "0.01:0.02:0.01", &[]);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    let shown = sweep(&folder, &["show", "--all", "results/grid-stability.parquet"]).output();
+    let shown = said(&shown.expect("it starts"));
+    assert!(shown.contains("too_slow"), "{shown}");
+}
