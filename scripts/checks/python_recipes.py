@@ -1,5 +1,5 @@
-"""Runs the `python` blocks of the README and docs/python.md, then the recipes of docs/python, and
-holds what these print against their pages.
+"""Runs the `python` blocks of the package's README and docs/python.md, then the recipes of
+docs/python, and holds what these print against their pages.
 
     python scripts/checks/python_recipes.py [--write]
 
@@ -16,7 +16,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 PAGES = sorted((ROOT / "docs/python").glob("*.md"))
-DOCUMENTS = [ROOT / "README.md", ROOT / "docs/python.md"]
+DOCUMENTS = [ROOT / "crates/washer-sweep/README.md", ROOT / "docs/python.md"]
 BLOCK = re.compile(r"(?<=\n```python\n).*?(?=```\n)", re.DOTALL)
 OUTPUT = re.compile(r"(?<=\n```text\n).*?(?=```\n)", re.DOTALL)
 

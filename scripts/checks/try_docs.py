@@ -11,7 +11,8 @@ docs/SUMMARY.md, in order:
   `cargo run --release --`; other cargo commands are left to .ci/run.
 - A `text` block below an `sh` block holds what the last command above it prints. --write renews
   the blocks that differ.
-- A placeholder such as @@NAME@@ is a mistake.
+- A placeholder such as @@NAME@@ is a mistake. So is a block of commands or of Python in any other
+  Markdown file that does not say why it is not run.
 
 What depends on the machine is not compared: on a line with a rate, threads, memory or the time of a
 search, numbers with their units and the names of instruction sets.
@@ -37,6 +38,8 @@ NUMBERS = re.compile(
 )
 NOT_RUN = re.compile(r"<!-- not run: .+ -->$")
 PLACEHOLDER = re.compile(r"@@\w+@@")
+# Pages whose `python` blocks scripts/checks/python_recipes.py runs.
+RUN_AS_PYTHON = {"docs/python.md", "crates/washer-sweep/README.md"}
 # A slow machine estimates from the beginnings of trajectories, and says so.
 BEGINNINGS = re.compile(r", the first ~ each$")
 
@@ -122,6 +125,19 @@ def tour(page, run, write):
     return ran, samples, wrong
 
 
+def untried(names):
+    """Blocks that nothing runs and that do not say why."""
+    toured = {str(page.relative_to(ROOT)) for page in pages()}
+    for name in names:
+        lines = (ROOT / name).read_text().splitlines()
+        for language, start, _ in blocks(lines):
+            is_run = (language in ("sh", "console") and name in toured
+                      or language == "python" and name in RUN_AS_PYTHON)
+            if language in ("sh", "console", "bash", "python") and not is_run:
+                if not is_marked(lines, start):
+                    yield f"{name}:{start}: nothing runs this block, and it does not say why"
+
+
 def main():
     """Run the tour; exit with 1 if anything is wrong."""
     sweep, write = pathlib.Path(sys.argv[1]).resolve(), "--write" in sys.argv[2:]
@@ -145,7 +161,9 @@ def main():
             return done.returncode, [line.rstrip() for line in done.stdout.splitlines()]
 
         taken = [tour(page, run, write) for page in pages()]
+    names = filter(None, os.fsdecode(listed.stdout).split("\0"))
     wrong = [line for _, _, found in taken for line in found]
+    wrong += untried(name for name in names if name.endswith(".md") and (ROOT / name).is_file())
     for line in wrong:
         print(line, file=sys.stderr)
     ran, samples = (sum(page[i] for page in taken) for i in (0, 1))
