@@ -1,9 +1,9 @@
 //! Any oscillator as a model of the engine: its equations once over [`lane_ode::Real`], and every
 //! command of `sweep_engine::commands`.
 //!
-//! An [`Oscillator`] says what its parameters, coordinates and accelerations are. From these come
-//! the linear model, by dual numbers at the equilibrium; runs of both through lanes, by fixed steps
-//! that are halved until two runs agree or by one of three methods; peaks, ratios and verdicts.
+//! An [`Oscillator`] declares its parameters, coordinates and accelerations. The linear model comes
+//! from dual numbers at the equilibrium. Both models run through lanes, by fixed steps that are
+//! halved until two runs agree, or by one of three methods.
 
 mod equations;
 mod map;
@@ -27,7 +27,7 @@ pub struct Parameter {
     pub description: &'static str,
     /// Values it may take.
     pub range: Range,
-    /// Its value where nothing else is said.
+    /// Its default.
     pub default: f64,
     /// Where that comes from.
     pub source: &'static str,
@@ -53,18 +53,17 @@ pub trait Oscillator<const C: usize, const D: usize, const P: usize>:
     const PARAMETERS: [Parameter; P];
     /// The coordinates.
     const COORDINATES: [Coordinate; C];
-    /// Version of the equations: results of others are never mixed with theirs.
+    /// Version of the equations: results of different versions are never mixed.
     const VERSION: &'static str;
 
     /// The free motion: q'' at coordinates `q` with speeds `u`.
     fn accelerations<T: Real>(p: &[N<T>; P], q: &[N<T>; C], u: &[N<T>; C]) -> [N<T>; C];
 
-    /// What drives it at time `t`, added to the accelerations of both models.
+    /// The drive at time `t`, added to the accelerations of both models.
     fn forcing<T: Real>(p: &[N<T>; P], t: N<T>) -> [N<T>; C];
 }
 
-/// The program of an oscillator: does what this process's arguments say. `name` is how it is
-/// called.
+/// The program of an oscillator: does what this process's arguments say. `name` is its name.
 #[must_use]
 pub fn main<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
     name: &'static str,

@@ -1,4 +1,4 @@
-//! Which build of a program made a file: what decides its bytes besides the plan.
+//! The build of the program that made a file. With the plan it decides the file's bytes.
 
 /// A build. Builds alike in both write the same bytes for the same input; unfinished work of others
 /// is never mixed with theirs.

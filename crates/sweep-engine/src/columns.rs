@@ -1,5 +1,5 @@
-//! Columns as functions of a row: what every model has that compares a nonlinear motion with a
-//! linear one, and what a model's own are made of.
+//! Columns as functions of a row: those of every comparison of a nonlinear with a linear motion,
+//! and the parts of a model's own columns.
 
 use sweep_parameter::Channel;
 

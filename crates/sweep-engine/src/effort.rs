@@ -1,6 +1,6 @@
-//! What work needs beside its question.
+//! The effort of a search or an evaluation: its threads and its interruption.
 
-/// What a search or an evaluation needs beside its question.
+/// How a search or an evaluation is to be done.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort<'a> {
     /// Worker threads; if `None`, what Slurm gave this task, else the cores of this machine.

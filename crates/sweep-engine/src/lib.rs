@@ -1,5 +1,5 @@
-//! Sweeps of a model over grids: from a grid file to a result file. What is swept is a [`Model`];
-//! nothing here knows which.
+//! Sweeps a [`Model`] over a grid: from a grid file to a result file. Nothing here knows which
+//! model it is.
 //!
 //! * `config` reads a grid file into a [`Plan`], or says every mistake in it. `method` declares a
 //!   model's methods of integration. `design` places points off the grid.
@@ -7,7 +7,7 @@
 //!   is the folder on disk meanwhile, and the result file, written and read by the rules of
 //!   [`sweep_files`].
 //! * `boundary` traces the curve where a quantity is at its limit.
-//! * `commands` is the command line, with `progress`, `interrupt` and `exit` for its manners.
+//! * `commands` is the command line; `progress`, `interrupt` and `exit` serve it.
 
 pub mod boundary;
 pub mod build;

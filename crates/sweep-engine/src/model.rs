@@ -11,9 +11,9 @@ use crate::method::Integrator;
 /// What can be swept. A value of this type is what a grid file sets of the model, the same at every
 /// point but for the axes.
 ///
-/// What the engine asks of it beside its parameters is in traits of their own: what a grid file
-/// holds of it in [`crate::config::Read`], the columns of its rows in [`crate::store::Rows`], and
-/// what computes them in [`crate::swept::Swept`].
+/// Further traits ask for the rest: [`crate::config::Read`] for its part of a grid file,
+/// [`crate::store::Rows`] for the columns of its rows, [`crate::swept::Swept`] for the engine that
+/// computes them.
 pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static {
     /// A number that can be set and swept.
     type Parameter: Parameter;
@@ -39,7 +39,7 @@ pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static 
     /// Why there is none.
     fn find(&self, name: &str) -> Result<Self::Parameter, UnknownParameter>;
 
-    /// Names of the single numbers that a parameter writes: its own, unless it writes several.
+    /// Names of the single numbers that a parameter writes; one, its own, unless it writes several.
     fn parts(&self, parameter: &Self::Parameter) -> Vec<Cow<'static, str>> {
         vec![parameter.name().to_owned().into()]
     }

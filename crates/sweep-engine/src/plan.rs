@@ -1,5 +1,5 @@
-//! What a run is about to do, with every value resolved and checked: the one thing that flows from
-//! the configuration into the engine, the store and the reports.
+//! A run with every value resolved and checked. The configuration makes it; engine, store and
+//! reports read it.
 
 use serde_json::Value;
 use sweep_parameter::Parameter as _;
@@ -35,7 +35,7 @@ pub struct Plan<M: Model> {
     pub integrator: M::Integrator,
     /// The grid's axes; the first varies slowest. Of a design, what its points are spread over.
     pub axes: Vec<Axis<M>>,
-    /// How points are laid out if not as the grid of the axes.
+    /// The design of the points, if they are not the grid of the axes.
     pub design: Option<Design>,
     /// What counts as reliable.
     pub reliability: Reliability<M>,
@@ -66,7 +66,7 @@ pub enum AxisValues {
         /// How many, at least 1.
         count: u64,
     },
-    /// Of a design: as often as a distribution says, between its bounds.
+    /// In a design: by a distribution, between its bounds.
     Distributed(Distribution),
     /// Evenly spaced in the logarithm, both ends included.
     Log {
@@ -263,8 +263,8 @@ impl<M: Model> Plan<M> {
         self.axes.iter().enumerate().map(end).collect()
     }
 
-    /// Of the corners not more than 256, spread evenly: a list has no corners but its points, and
-    /// looking at a machine's modes is expensive.
+    /// At most 256 of the corners, spread evenly. The corners of a list are all of its points, and
+    /// a machine's modes are expensive.
     #[must_use]
     pub fn some_corners(&self) -> Vec<Vec<f64>> {
         let every = self.corners().div_ceil(Self::MOST_PREPARED);

@@ -1,4 +1,4 @@
-//! The keys of hash maps, drawn before any work.
+//! Draws the keys of hash maps before any work.
 
 use std::hash::RandomState;
 

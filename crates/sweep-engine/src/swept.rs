@@ -30,7 +30,7 @@ pub trait Swept: Rows {
         Vec::new()
     }
 
-    /// What ratios are of, where that is not the largest deviations: words behind "below 2".
+    /// Words behind "below 2" in summaries, where ratios are not of the largest deviations.
     fn criterion(&self) -> &'static str {
         ""
     }

@@ -1,4 +1,4 @@
-//! What the engine and its caller ask of each other: whether to stop, and how many points are done.
+//! What passes between the engine and its caller: whether to stop, and how many points are done.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 

@@ -1,5 +1,5 @@
-//! A column's cells, whatever type of numbers or text a file keeps them in: ours may have been
-//! through other programs.
+//! A column's cells, whatever type of numbers or text holds them: other programs may have rewritten
+//! our files.
 
 use arrow_array::cast::{AsArray, as_dictionary_array};
 use arrow_array::types::{

@@ -1,7 +1,7 @@
-//! What a Parquet file's footer says, made sure of before the library reads it.
+//! A check of a Parquet file's footer, before the library reads it.
 //!
-//! A footer of a few bytes can have the library count for minutes, recurse until the stack is full,
-//! or make room for what is not there.
+//! A footer of a few bytes can make the library count for minutes, recurse until the stack is full,
+//! or allocate for columns that are not there.
 
 use std::io::{Read, Seek, SeekFrom};
 
@@ -69,7 +69,7 @@ const EMPTY: Kind = Struct(&[]);
 /// The path to a group's number of columns.
 const CHILDREN: &[i16] = &[2, 5];
 
-/// Whether the library can read a file's footer. What has no footer at all it reports itself.
+/// Whether the library can read a file's footer. The library itself reports a file without one.
 ///
 /// # Errors
 /// [`Refused::Io`], [`Refused::Footer`], [`Refused::LongFooter`], [`Refused::TooManyColumns`],

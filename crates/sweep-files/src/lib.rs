@@ -1,5 +1,4 @@
-//! Files on disk: one rule for every command that writes one, and one gate for every file that is
-//! read.
+//! Files on disk: one rule for writing, one gate for reading.
 //!
 //! Writing ([`Output`]):
 //!

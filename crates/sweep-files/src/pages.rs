@@ -47,7 +47,7 @@ struct Header {
 pub struct Unpacked {
     /// Of all its pages.
     pub total: u64,
-    /// Of its dictionary and the largest page: what a reader holds at once.
+    /// The dictionary and the largest page together: what a reader holds at once.
     pub at_once: u64,
 }
 
@@ -106,7 +106,7 @@ fn header(file: &mut (impl Read + Seek), at: u64, end: u64) -> Result<(Header, u
     Err(Refused::PageHeader)
 }
 
-/// Of the codecs, gzip alone is unpacked to its end whatever the header declares.
+/// Gzip is the only codec that is unpacked to its end whatever the header declares.
 fn check_gzip(packed: impl Read, most: u64) -> Result<(), Refused> {
     let mut decoder = MultiGzDecoder::new(packed).take(most + 1);
     // The library reports bytes that are not gzip.

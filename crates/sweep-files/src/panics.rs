@@ -1,4 +1,4 @@
-//! Panics of code that is called with what is not under our control.
+//! Panics of libraries, on data that is not under our control.
 
 use std::any::Any;
 use std::cell::Cell;

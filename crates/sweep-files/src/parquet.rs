@@ -20,7 +20,7 @@ use crate::{FileError, Refused, footer, key, panics, regular};
 /// Most bytes that the pages of a file may unpack into at once. Ours have pages of 1 MiB.
 const MOST_AT_ONCE: u64 = 1 << 30;
 
-/// How the name begins by which this program signs its files; a version follows.
+/// The beginning of the name by which this program signs its files; a version follows.
 pub const CREATED_BY: &str = "sweep version ";
 
 /// An open Parquet file, ours or another program's.
@@ -53,8 +53,8 @@ impl ParquetFile {
             return Err(FileError::Damaged { path: path.to_path_buf() });
         }
         let file = Self::parse(path, file, seal)?;
-        // A digest that the library finds and `seal` does not stands where none of ours would, and
-        // whatever this program has written has one: it is the name before it that has changed.
+        // The library finds a digest where `seal` does not. Every file of this program has one in
+        // `seal`'s place, so the name before it has changed.
         let is_ours = file.created_by().is_some_and(|by| by.starts_with(CREATED_BY));
         let has_digest = file.pairs().any(|pair| pair.key == key::DIGEST);
         if seal == Seal::Absent && (is_ours || has_digest) {

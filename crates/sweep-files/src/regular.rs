@@ -17,11 +17,10 @@ pub fn open(path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// Most bytes of a plan or an account, of which ours have kilobytes: read as JSON, 16 MiB may take
-/// half a GB.
+/// Most bytes of a plan or of a sidecar. Ours have kilobytes; 16 MiB of JSON may take half a GB.
 pub const LONGEST_JSON_BYTES: u64 = 16 << 20;
 
-/// The text of a JSON file. What is too long to be one of ours comes cut off, so that it is none.
+/// The text of a JSON file. A file that is too long to be ours is cut off, so it no longer parses.
 ///
 /// # Errors
 /// What the system answers, or that the path leads to something else, in words.

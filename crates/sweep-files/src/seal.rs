@@ -1,9 +1,9 @@
-//! The digest by which a Parquet file of ours shows that its bytes are those that were written.
+//! The digest in our Parquet files, which shows that their bytes are unchanged.
 //!
 //! It is the last entry of the file's key-value metadata ([`key::DIGEST`]): the BLAKE3 hash of the
-//! whole file with zeros in the digest's own place. So it covers the columns, the metadata and the
-//! file's structure, and it is found and checked without trusting any of them. It depends on the
-//! other bytes alone: the file stays a pure function of its input.
+//! whole file with zeros in the digest's own place. It covers the columns, the metadata and the
+//! file's structure, and is checked without trusting any of them. It depends on the other bytes
+//! alone, so the file stays a pure function of its input.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 

@@ -1,9 +1,9 @@
 //! Structs in Thrift's compact protocol: what the Parquet library reads, walked before it does.
 //!
-//! The library takes every field that it knows for what it should be, whatever kind the file
-//! declares, and it counts through a list of booleans that it does not know without reading a byte.
-//! So a file is walked by both at once: by its own kinds, which must be those that the library
-//! takes them for. A file for which that holds is read by the library as it was walked here.
+//! The library assumes the kind of every field that it knows, whatever kind the file declares. It
+//! also counts through an unknown list of booleans without reading a byte. So the walk follows the
+//! file's kinds, and refuses a file whose kinds are not the library's. The library then reads the
+//! file as it was walked here.
 
 use std::ops::RangeInclusive;
 

@@ -1,5 +1,5 @@
-//! What a number that can be set and swept may be: its range, how it is written in messages, how
-//! its unit stands in its name. Models and the engine that sweeps them share it.
+//! Numbers that can be set and swept: their ranges, their form in messages, the unit at the end of
+//! their names. Models and the engine share them.
 
 use std::fmt;
 
@@ -13,8 +13,8 @@ pub trait Parameter: Clone + PartialEq + fmt::Debug + Send + Sync {
     fn description(&self) -> &'static str;
     /// Values it may take.
     fn range(&self) -> Range;
-    /// Which edge of the window it is (0: the beginning, 1: the end), if it is one: the window is
-    /// no model's.
+    /// The edge of the window that it is (0: the beginning, 1: the end), if any. The window belongs
+    /// to no model.
     fn window_edge(&self) -> Option<usize>;
 }
 
@@ -63,7 +63,7 @@ impl Range {
             }
     }
 
-    /// The values that would be accepted in place of a refused one.
+    /// The accepted values, for the message about a refused one.
     #[must_use]
     pub fn instead_of(self, value: f64) -> String {
         if value.is_finite() && value.abs() > Self::LARGEST && !matches!(self, Self::Within(..)) {
@@ -96,7 +96,7 @@ impl fmt::Display for Range {
     }
 }
 
-/// How a name ends whose number is in this unit; `None` where names say nothing of it.
+/// The ending of names of numbers in this unit; `None` where names do not show it.
 #[must_use]
 pub fn unit_suffix(unit: &str) -> Option<&'static str> {
     Some(match unit {

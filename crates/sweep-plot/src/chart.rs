@@ -1,4 +1,4 @@
-//! Curves over a common x axis, in panels one above the other: what all figures but the map are.
+//! Curves over a common x axis, in panels one above the other. All figures but the map are charts.
 
 use super::axis::{Scale, extremes};
 use super::colour::{BOTH as BOTH_SIDES, ColourScale, SHADE};

@@ -1,9 +1,9 @@
-//! A map file's rows gathered into the cells of its grid, batch by batch: memory goes by the cells,
-//! not the rows.
+//! A map file's rows gathered into the cells of its grid, batch by batch. Memory depends on the
+//! number of cells, not of rows.
 //!
 //! A cell of one point has that point's values. A cell of several has the worst of them, column by
-//! column: the greatest amplitude and ratio, the least gap. How many of its points are reliable,
-//! unreliable or failed is counted, so that a cell which holds both says so.
+//! column: the greatest amplitude and ratio, the least gap. It counts its reliable, unreliable and
+//! failed points.
 
 use std::collections::BTreeMap;
 

@@ -12,7 +12,7 @@ use super::{PlotOptions, Quantity};
 pub(crate) struct Shown {
     /// What it is.
     pub(crate) quantity: Quantity,
-    /// The channel it is of, if it is of one; of a stop's or a foot's load which one.
+    /// Its channel, if it has one; for a load, the stop or the foot.
     pub(crate) channel: Option<String>,
     /// Name of its column.
     pub(crate) column: String,
@@ -33,7 +33,7 @@ pub(crate) struct Layer {
     pub(crate) nonlinear: bool,
     /// The level whose line is drawn, if one has a meaning.
     pub(crate) level: Option<Level>,
-    /// Of cells of several points, what the line goes by.
+    /// The value that the line follows, in cells of several points.
     divided: Option<Divided>,
 }
 
@@ -87,7 +87,7 @@ impl Layer {
         self.divided.as_ref().map(|divided| [&divided.both[..], &divided.undefined[..]])
     }
 
-    /// The value by which the level's line finds its way: the mean of the cell's points.
+    /// The value that the level's line follows: the mean of the cell's points.
     pub(crate) fn typical(&self, cell: usize) -> f64 {
         self.divided.as_ref().map_or(self.values[cell], |divided| divided.mean[cell])
     }
@@ -211,7 +211,7 @@ pub(crate) struct OfPart<'a> {
 }
 
 impl Whole {
-    /// What each stop or foot has of it in a file, if there are several.
+    /// The columns of single stops or feet in a file, if there are several.
     pub(crate) fn parts<'a>(&self, source: &'a Source) -> Vec<OfPart<'a>> {
         let [(_, first, of_first), (_, second, of_second)] = self.columns else {
             return Vec::new();
@@ -367,7 +367,7 @@ impl Quantity {
         }
     }
 
-    /// What no channel has: the quantity, its model (empty at rest), its column.
+    /// A quantity without a channel: the quantity, its model (empty at rest), its column.
     pub(crate) fn whole(self) -> Option<(&'static Whole, &'static str, &'static str)> {
         WHOLE.iter().find_map(|whole| {
             let (_, model, column) = whole.columns.iter().find(|(known, ..)| *known == self)?;

@@ -1,4 +1,4 @@
-//! Where within a panel the name of a region has room.
+//! A place within a panel with room for the name of a region.
 
 /// Samples across and down: enough to find room for a line of text.
 const SAMPLES: [usize; 2] = [44, 33];

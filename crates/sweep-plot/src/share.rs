@@ -1,4 +1,4 @@
-//! The part of points that is on one side, and how well a sample tells it.
+//! The share of points on one side, and its confidence interval.
 
 /// A share with the interval in which the true one lies with 95 % confidence, if the points are
 /// independent and at random.

@@ -1,5 +1,5 @@
-//! Long columns cut into stretches while their rows come by: what a curve needs of each is its
-//! least and its greatest value.
+//! Long columns cut into stretches as their rows are read. A curve needs the least and the greatest
+//! value of each stretch.
 
 /// Some rows cut into stretches that differ by one row at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,8 +1,7 @@
-//! What is drawn together: files whose plans agree in what the picture speaks of.
+//! Whether files can be drawn together: their plans must agree in what the picture shows.
 //!
-//! A picture of two plans would be read as one of a single machine. Where plans part in something
-//! else, such as a name or the rungs of an integrator, that is no matter. A file without a plan (of
-//! another program, or through one) is taken as it is.
+//! A reader would take a picture of two plans for one of a single machine. Other differences, such
+//! as a name or the rungs of an integrator, do not matter. A file without a plan is taken as it is.
 
 use std::path::Path;
 

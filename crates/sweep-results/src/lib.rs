@@ -1,5 +1,5 @@
-//! What is asked of finished results, from the files alone: whether conditions hold, which rows are
-//! extreme, what differs between two files, and the same rows in other formats.
+//! Questions to finished results, from the files alone: whether conditions hold, which rows are
+//! extreme, what differs between two files. It also writes the rows in other formats.
 //!
 //! * [`ResultTable`] is an open file: its columns with units, its rows batch by batch.
 //! * [`Condition`] is an expression over its columns; [`check`] says which rows keep it, [`top`]

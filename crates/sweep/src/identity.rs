@@ -1,4 +1,4 @@
-//! Which build of the program made a file: what decides its bytes besides the plan.
+//! The build of the program that made a file. With the plan it decides the file's bytes.
 
 use sweep_engine::Build;
 

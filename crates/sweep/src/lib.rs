@@ -1,5 +1,5 @@
-//! The sweep: from a grid file to a result file. The command `sweep` is all of this with arguments;
-//! here it is for programs.
+//! The sweep, for programs: from a grid file to a result file. The command `sweep` is this library
+//! with arguments.
 //!
 //! * `config` reads a grid file into a [`Plan`], or says every mistake in it. `method` is the table
 //!   of the methods of integration. `design` places points off the grid.
@@ -13,9 +13,9 @@
 //!   histories. [`sweep_plot`] draws any of these files.
 //! * `library` is the commands' work as functions with results in memory: an [`Evaluator`] takes
 //!   tables of points, a [`ResultTable`] is what came of anything.
-//! * `commands` is the command line, with `progress`, `interrupt` and `exit` for its manners.
+//! * `commands` is the command line; `progress`, `interrupt` and `exit` serve it.
 //!
-//! Exported is what the program, the fuzzer and the examples use; the rest is this crate's own.
+//! This crate exports what the program, the fuzzer and the examples use.
 //!
 //! # Example
 //!

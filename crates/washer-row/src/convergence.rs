@@ -1,4 +1,4 @@
-//! What the difference of two runs says of the error that is left in the finer one.
+//! The error left in the finer of two runs, estimated from their difference.
 
 /// Errors of a run by a method's own may be at most this share of its difference from a coarser
 /// one.

@@ -1,4 +1,5 @@
-//! Ways to integrate a trajectory, from the quickest: what a point climbs until two of them agree.
+//! Ladders: ways to integrate a trajectory, from the quickest. A point climbs until two rungs
+//! agree.
 
 use washer_model::{Formula, Gear, Method, ModelKind};
 

@@ -1,4 +1,4 @@
-//! What a row says of where its numbers come from.
+//! The rung or method that a row's numbers come from.
 
 /// Which method a row's numbers come from, and which rung if it has several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -1,8 +1,8 @@
-//! One row of a map: both models at a point, by finer and finer runs until two agree, and what is
-//! taken from them.
+//! One row of a map: both models at a point, in finer and finer runs until two agree, and the
+//! numbers that the row takes from them.
 //!
-//! Nothing here knows of grids, files or threads. `sweep` takes rows through lanes many at a time,
-//! a live page (`washer-live`) one by one, and both by this rule, so that they get the same bits.
+//! Nothing here knows of grids, files or threads. `sweep` takes many rows through lanes at a time,
+//! a live page (`washer-live`) one. Both use this rule, so they get the same bits.
 //!
 //! * A [`Ladder`] holds one model's rungs, [`runs`] integrates trajectories by one of them.
 //! * [`Climbs`] is a row in the making. It says which runs it needs next, takes them, and reckons

@@ -1,5 +1,4 @@
-//! What a run measures of its motions: which amplitude the two models are compared by, and metrics
-//! beside it.
+//! What a run measures: the amplitude by which the two models are compared, and metrics.
 
 use washer_model::{Channel, Extra, Wanted};
 

@@ -1,8 +1,8 @@
-//! The Python package `washer_sweep`, as far as it is not Python: `python/washer_sweep` says what
-//! is public, and its stubs say what each thing takes.
+//! The Rust part of the Python package `washer_sweep`. `python/washer_sweep` defines the public
+//! names, and its stubs their types.
 //!
-//! The engine is called without the interpreter's lock, on threads that end with the call, so that
-//! other threads of Python go on and a fork afterwards finds nothing half done.
+//! The engine runs without the interpreter's lock, on threads that end with the call. So other
+//! Python threads run meanwhile, and a later fork is safe.
 
 mod arrow;
 mod columns;

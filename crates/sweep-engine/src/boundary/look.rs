@@ -1,5 +1,4 @@
-//! Looks between samples of one side, where the distances hint at a change of side that none of
-//! them met.
+//! Looks between samples of one side, where their distances hint at a change of side between them.
 
 use super::net::Net;
 use super::row::{Span, Tried, Want};

@@ -1,5 +1,5 @@
-//! The boundary itself: for each value of the first axis, where along the second a quantity passes
-//! its limit, without filling the grid between.
+//! The boundary: for each value of the first axis, the places along the second where a quantity
+//! passes its limit, without filling the grid.
 //!
 //! The quantity enters as a signed distance from its limit, negative on the reliable side
 //! ([`Evaluate`]); nothing here knows a machine. Trials go to the evaluator in batches, and what a
@@ -15,8 +15,8 @@
 //! 4. Where neighbouring rows disagree, both are looked at until the pocket that one has is found
 //!    in the other, or closes between them (`pockets`).
 //!
-//! All rows that are at work share a batch, rows begin in whole lane groups, and the trials that
-//! fill up the last group make the widest nets closer (`batch`).
+//! All rows at work share a batch, and rows begin in whole lane groups. The trials that fill up the
+//! last group make the widest nets closer (`batch`).
 //!
 //! Which trials are made depends on values alone, never on threads or lanes, so the result is a
 //! pure function of the input.

@@ -1,5 +1,5 @@
-//! Nets: trial places on both sides of where the side should change, so close together that what
-//! they catch is a bracket within tolerance, or so far apart that they catch it for certain.
+//! Nets: trial places on both sides of an expected change of side. They are so close together that
+//! they catch a bracket within tolerance, or so far apart that they catch one for certain.
 
 use super::row::Span;
 
@@ -38,7 +38,7 @@ pub(super) struct Net {
 }
 
 impl Net {
-    /// A net that knows nothing of where in the stretch.
+    /// A net without an expected place in the stretch.
     pub(super) fn even(from: f64, to: f64) -> Self {
         Self { from, to, root: 0.5 * (from + to), spread: 0.5 * (to - from), least: 1 }
     }
@@ -161,7 +161,7 @@ mod tests {
         assert_eq!(net(30.0, 3.0).places(4, &SPAN), [27.0, 29.0, 31.0, 33.0]);
         assert_eq!(net(29.0, 3.0).places(5, &SPAN), [26.0, 28.0, 30.0, 32.0, 34.0]);
         assert_eq!(net(31.0, 3.0).places(5, &SPAN), [26.0, 28.0, 30.0, 32.0, 34.0]);
-        // Of a vague root nothing is believed, and a narrow bracket is cut up at once.
+        // A vague root is not believed, and a narrow bracket is cut up at once.
         assert_eq!(net(30.0, 20.0).places(3, &SPAN), [20.0, 30.0, 40.0]);
         let narrow = Net { from: 10.0, to: 14.0, root: 13.0, spread: 0.5, least: 1 };
         assert_eq!(narrow.places(3, &SPAN), [11.0, 12.0, 13.0]);

@@ -1,5 +1,5 @@
-//! Pockets that a neighbour announces: where a row has to be looked at because the row beside it is
-//! on another side there.
+//! Pockets that a neighbour announces: places to look at in a row because the row beside it is on
+//! another side there.
 
 use super::row::{Question, RowSearch, SideRange, Span};
 use super::warm::{Neighbour, hint, nearest, shared};

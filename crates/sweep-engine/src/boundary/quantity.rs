@@ -1,4 +1,4 @@
-//! What a boundary is drawn through: a quantity at its limit.
+//! The quantity of a boundary, and its limit.
 
 use sweep_parameter::Channel as _;
 

@@ -1,4 +1,4 @@
-//! One row: what was tried along it, what that says of its sides, and what it wants tried next.
+//! One row: the trials along it, the sides that they show, and the trials that it wants next.
 //!
 //! Positions are coordinates of the second axis: its values, or their logarithms. Distances are
 //! signed distances from the limit, of order one (a logarithm of a ratio).
@@ -289,7 +289,7 @@ impl RowSearch {
         let mut wants: Vec<Want> = open.iter().map(|[a, b]| self.narrow(a, b, span)).collect();
         let first = self.samples.first().map(Tried::side);
         if wants.is_empty() && self.samples.iter().all(|sample| Some(sample.side()) == first) {
-            // That there is no change of side at all is not taken from other rows.
+            // A row never takes from other rows that it has no change of side.
             let ends = [span.least, span.greatest].into_iter();
             wants.extend(ends.filter(|end| !self.knows(*end)).map(Want::At));
         }

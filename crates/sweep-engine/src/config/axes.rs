@@ -179,8 +179,7 @@ fn distribution(
         }
         Some(_) => None,
         None => {
-            // Which keys belong to a kind that is none cannot be said, but what is wrong with any
-            // can.
+            // An unknown kind has no list of keys, but each key has its range.
             for (key, range) in [
                 ("mean", Range::Any),
                 ("sd", Range::Positive),

@@ -1,5 +1,4 @@
-//! A plan as JSON: what a result file carries as its input, and what tells one run's plan from
-//! another's.
+//! A plan as JSON: a result file carries it as its input, and it tells the plans of two runs apart.
 
 use serde_json::{Value, json};
 use sweep_parameter::{Channel as _, Parameter as _};

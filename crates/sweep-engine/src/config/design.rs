@@ -41,8 +41,7 @@ pub fn read(root: &mut Section<'_>, grid: &Path, report: &mut Report) -> Written
     let field = section.choice("method", &METHODS, report);
     let expected = "`latin_hypercube`, `sobol`, `monte_carlo` or `list`";
     let Some(method) = section.require(field, "method", expected, report) else {
-        // Which keys belong to a method that is none cannot be said, but what is wrong with any
-        // can.
+        // An unknown method has no list of keys, but each key has its range.
         let _ = section.count("points", MOST_POINTS, report);
         let _ = section.whole("seed", 0..=MOST_SEED, report);
         let _ = section.text("file", report);

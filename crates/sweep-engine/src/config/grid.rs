@@ -88,7 +88,7 @@ pub fn draft<M: Read>(input: &GridInput<M>, report: &mut Report) -> Option<Draft
         }
         design::WrittenDesign::List(list) => axes::listed_axes(&mut root, list, &mut draft, report),
         design::WrittenDesign::Bad => {
-            // Which axes are right depends on what cannot be known.
+            // The right axes depend on a method that is unknown.
             let _ = root.tables("axis", report);
         }
     }
@@ -216,7 +216,7 @@ fn integrator<I: Integrator>(
         Field::Given(place) => &I::methods()[place.value],
         Field::Absent => default_method::<I>(),
         Field::Bad => {
-            // Nobody knows which keys belong to an unknown method, but each has its range.
+            // An unknown method has no list of keys, but each key has its range.
             for (setting, _) in settings::<I>() {
                 let _ = section.number(setting.key, setting.range, report);
             }

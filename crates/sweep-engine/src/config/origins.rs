@@ -1,4 +1,4 @@
-//! Where each resolved number was written, so that a check made later can still point at it.
+//! The place where each resolved number was written, so that a later check can point at it.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! What a grid file holds of a model.
+//! The model's part of a grid file.
 
 use serde_json::{Map, Value};
 
@@ -17,7 +17,7 @@ pub trait Read: Model {
     /// What to do where there is no grid file yet.
     const TO_START: Option<&'static str> = None;
 
-    /// Reads what the model is of the top of a grid file.
+    /// Reads the model's keys at the top of a grid file.
     fn read(
         input: &GridInput<Self>,
         root: &mut Section<'_>,
@@ -34,7 +34,7 @@ pub trait Read: Model {
     /// Reads what stands behind `[reliability]`.
     fn read_after_reliability(&mut self, _: &mut Section<'_>, _: &mut Origins, _: &mut Report) {}
 
-    /// What `--set` takes that is no parameter, beside what the engine knows.
+    /// What `--set` takes beside parameters and the engine's own settings.
     fn scalars() -> &'static [&'static str] {
         &[]
     }
@@ -49,10 +49,10 @@ pub trait Read: Model {
         super::whole::windows(draft, report);
     }
 
-    /// What the model is, into a plan as JSON; a default may be left out.
+    /// Writes the model into a plan as JSON; a default may be left out.
     fn describe(&self, plan: &mut Map<String, Value>);
 
-    /// What a grid file holds beside what the engine reads, for its schema.
+    /// The model's part of the schema of grid files.
     fn schema() -> Schema;
 }
 

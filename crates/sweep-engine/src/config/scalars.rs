@@ -1,4 +1,4 @@
-//! `--set` of the grid file's own scalars, which are no parameters: they are the same at every
+//! `--set` of the grid file's own scalars. They are not parameters: they are the same at every
 //! point, and no axis sweeps them.
 
 use serde_json::{Value, json};

@@ -12,8 +12,8 @@ use super::source::{Location, SourceId};
 pub fn parse<'a>(text: &'a str, source: SourceId, report: &mut Report) -> Spanned<DeTable<'a>> {
     let (table, mut errors) = DeTable::parse_recoverable(text);
     errors.sort_by_key(start);
-    // An array that is never closed swallows what follows; all that says of it is the first
-    // complaint.
+    // An array that is never closed swallows what follows. Only its first mistake says something of
+    // it.
     let unclosed = errors.iter().any(|error| error.message().starts_with("unclosed array"));
     let swallowed =
         errors.iter().position(|error| error.message().contains("array")).filter(|_| unclosed);

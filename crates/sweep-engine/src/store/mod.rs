@@ -1,4 +1,4 @@
-//! A run's files: nothing computed is lost, and nothing but the plan decides a byte of the result.
+//! A run's files. Nothing computed is lost, and only the plan decides the bytes of the result.
 //!
 //! A run on `x.parquet` works in the folder `x.parquet.partial`:
 //!

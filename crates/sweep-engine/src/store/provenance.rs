@@ -1,5 +1,5 @@
-//! What varies between runs of one plan, kept out of the result and beside it: when, where, how
-//! fast.
+//! What varies between runs of one plan: when, where, how fast. It is kept beside the result, not
+//! in it.
 
 use std::fs;
 use std::io;

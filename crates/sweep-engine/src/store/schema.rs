@@ -83,7 +83,7 @@ pub struct Layout {
 /// null.
 pub type Row = Vec<Option<u64>>;
 
-/// What came of a point: its rows, one but where a model finds several.
+/// The outcome of a point: one row, or several where a model finds several.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Done {
     /// What the engine was asked for.

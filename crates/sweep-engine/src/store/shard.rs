@@ -1,4 +1,4 @@
-//! Which part of a run this process computes, and how a scheduler's array numbers it.
+//! The part of a run that this process computes, and its number in a scheduler's array.
 //!
 //! Chunk `c` belongs to shard `c mod N`, so every shard gets its share of every region of the grid.
 //! `N`, and the array number of the first shard, are frozen in `shards.json` by the first shard to
@@ -87,8 +87,8 @@ pub(super) struct Dealing {
 }
 
 impl Dealing {
-    /// What a run folder was dealt into, if any shard has started. An unreadable file counts as
-    /// none: the dealing only says who computes a chunk, never what is in it.
+    /// The number of shards of a run folder, if any shard has started. An unreadable file counts as
+    /// none: it only says who computes a chunk, never what is in it.
     pub(super) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
         let path = folder.shards();
         match regular::read_json(&path) {

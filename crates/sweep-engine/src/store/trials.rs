@@ -1,5 +1,5 @@
-//! The trials of a search, kept as they come: a search whose next trials follow from the answers so
-//! far finds all of them again after an interruption, and ends in the same bytes.
+//! The trials of a search, kept as they come. A search's next trials follow from the answers so
+//! far, so after an interruption it repeats them from here and ends in the same bytes.
 //!
 //! A search on `x.parquet` works in the folder `x.parquet.partial`, under the same lock and with
 //! the same frozen plan as a run. Chunks do not fit it: which points it needs is not known

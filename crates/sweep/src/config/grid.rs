@@ -1,5 +1,5 @@
-//! What a grid file holds of the washing machine beside what the engine reads: `machine`, `[spin]`,
-//! `metrics`, the criterion of `[reliability]`, `[stability]`.
+//! The washing machine's part of a grid file: `machine`, `[spin]`, `metrics`, the criterion of
+//! `[reliability]`, `[stability]`.
 
 use sweep_engine::config::Origins;
 use sweep_engine::config::grid::names;

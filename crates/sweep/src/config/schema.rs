@@ -1,4 +1,4 @@
-//! What JSON Schemas say of machines: machine files, and what of grid files is the machine's.
+//! JSON Schemas of machine files, and of the machine's part of grid files.
 
 use serde_json::{Map, Value, json};
 use sweep_engine::Schema;

@@ -1,5 +1,5 @@
-//! Tongues of a point: runs of speeds at which its periodic response is unstable, their edges, the
-//! frequencies behind them, and the damping that closes them.
+//! Tongues of a point: bands of speed in which its periodic response is unstable, with their edges,
+//! their frequencies, and the damping that closes them.
 
 use lane_ode::Simd;
 use rayon::iter::ParallelIterator as _;

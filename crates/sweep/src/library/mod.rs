@@ -1,8 +1,7 @@
-//! The commands' work as functions: what programs call, with results in memory. The commands call
-//! what they share with it here.
+//! The commands' work as functions with results in memory, for programs.
 //!
-//! What may take long takes an [`Interrupt`](crate::Interrupt): raised from another thread, it ends
-//! the work in a fraction of a second.
+//! Functions that may take long take an [`Interrupt`](crate::Interrupt). Raised from another
+//! thread, it ends the work in a fraction of a second.
 
 pub(crate) mod boundary;
 mod evaluate;

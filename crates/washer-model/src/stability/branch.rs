@@ -59,6 +59,9 @@ const MOST_TURNED: f64 = 0.8;
 /// A place is no neighbour if it was corrected by more than this share of the step.
 const MOST_CORRECTED: f64 = 0.5;
 
+/// A place's tangent is its own if the derivatives were taken no farther from it than this.
+const OWN: f64 = 1e-3;
+
 /// Relative difference of speeds by which the curve's slope along the speed is taken.
 const BESIDE: f64 = 1e-5;
 
@@ -114,6 +117,8 @@ struct Node {
     at: Place,
     /// Of length 1, onwards.
     tangent: Place,
+    /// Whether that is the place's own, not one close by.
+    is_own: bool,
     /// Length of the curve up to here.
     length: f64,
     /// What a turn makes of disturbances, here or close by.
@@ -317,6 +322,15 @@ impl<'a> Curve<'a> {
         if missing < CLOSE { self.arrived(step) } else { self.step = Some(step) }
     }
 
+    /// Arrives at the last node once more, with derivatives of that very place. From a tangent that
+    /// is not quite its own, no step would be short enough.
+    fn look_again(&mut self) {
+        self.length *= 0.5;
+        if let Some(last) = self.nodes.pop() {
+            self.correct(last.at, last.tangent);
+        }
+    }
+
     fn arrived(&mut self, step: Step) {
         let Some(jacobian) = step.seen else { return self.shorten() };
         let mut one = [N(0.0); PLACE];
@@ -327,21 +341,27 @@ impl<'a> Curve<'a> {
             Some(turning) => self.nodes.get(turning.after),
             None => self.nodes.last(),
         };
+        let apart = |from: &Place| {
+            let apart: Place = core::array::from_fn(|i| self.at[i] - from[i]);
+            dot(&apart, &apart).sqrt()
+        };
+        let off = apart(&step.onto);
         let (mut length, mut turns_back) = (0.0, false);
         if let Some(before) = before {
-            let apart = |from: &Place| {
-                let apart: Place = core::array::from_fn(|i| self.at[i] - from[i]);
-                dot(&apart, &apart).sqrt()
-            };
-            let (gone, off) = (apart(&before.at), apart(&step.onto));
+            let gone = apart(&before.at);
             let cosine = dot(&before.tangent, &tangent);
-            if !(cosine >= MOST_TURNED && off <= MOST_CORRECTED * gone) {
+            let is_turned = cosine.is_nan() || cosine < MOST_TURNED;
+            if is_turned && !before.is_own && self.turning.is_none() {
+                return self.look_again();
+            }
+            if is_turned || off > MOST_CORRECTED * gone {
                 return self.shorten();
             }
             length = before.length + gone;
             turns_back = before.tangent[SPEED] * tangent[SPEED] < 0.0;
         }
-        let node = Node { at: self.at, tangent, length, monodromy: jacobian.monodromy };
+        let (is_own, monodromy) = (off < OWN, jacobian.monodromy);
+        let node = Node { at: self.at, tangent, is_own, length, monodromy };
         if let Some(turning) = self.turning {
             return self.closer(node, turning);
         }

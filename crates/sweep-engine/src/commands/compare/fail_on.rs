@@ -51,7 +51,8 @@ impl FromStr for FailOn {
 }
 
 impl FailOn {
-    /// Its name and the files that it speaks of, where these are others: it would stand open.
+    /// Its name and the kind of files that it needs, where these are of another kind: the gate
+    /// would never close.
     pub(super) fn lacks(self, found: &Comparison) -> Option<[&'static str; 2]> {
         let (has, lacks) = match self {
             Self::Any | Self::Plan | Self::Rows => return None,
@@ -66,7 +67,7 @@ impl FailOn {
         (!has).then_some(lacks)
     }
 
-    /// What of it is there, in words; `None` if nothing is.
+    /// The differences that it forbids, in words; `None` without any.
     pub(super) fn found(self, found: &Comparison) -> Option<String> {
         let steady = || found.shared.iter().filter(|row| !row.sensitive);
         let counted = |what: &str, count: usize| (count > 0).then(|| format!("{what}: {count}"));
