@@ -3,9 +3,9 @@
 //!
 //! * `config` reads a grid file into a [`Plan`], or says every mistake in it. `method` declares a
 //!   model's methods of integration. `design` places points off the grid.
-//! * `run` has an [`Engine`] do a plan's points on all cores and keeps them as they come; `store`
-//!   is the folder on disk meanwhile, and the result file, written and read by the rules of
-//!   [`sweep_files`].
+//! * `run` has an [`Engine`] compute a plan's points on all cores and keeps them as they come.
+//!   `store` is the folder on disk meanwhile, and the result file; [`sweep_files`] has the rules of
+//!   writing and reading.
 //! * `boundary` traces the curve where a quantity is at its limit.
 //! * `commands` is the command line; `progress`, `interrupt` and `exit` serve it.
 

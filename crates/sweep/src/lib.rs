@@ -6,13 +6,13 @@
 //! * `engine` takes points of a plan through both models of `washer_model`, and returns an
 //!   [`Outcome`] each; `verdict` makes ratios and a verdict of it. `estimate` says beforehand what
 //!   a run will take.
-//! * `run` does a plan's points on all cores and keeps them as they come; `store` is the folder on
-//!   disk meanwhile, and the result file, written and read by the rules of [`sweep_files`].
+//! * `run` computes a plan's points on all cores and keeps them as they come. `store` is the folder
+//!   on disk meanwhile, and the result file; [`sweep_files`] has the rules of writing and reading.
 //!   `identity` says which builds write the same bytes.
 //! * `boundary` traces the curve where the ratio is at its limit, `trace` writes one point's time
 //!   histories. [`sweep_plot`] draws any of these files.
-//! * `library` is the commands' work as functions with results in memory: an [`Evaluator`] takes
-//!   tables of points, a [`ResultTable`] is what came of anything.
+//! * `library` is the commands' work as functions: an [`Evaluator`] takes tables of points, a
+//!   [`ResultTable`] holds a result in memory.
 //! * `commands` is the command line; `progress`, `interrupt` and `exit` serve it.
 //!
 //! This crate exports what the program, the fuzzer and the examples use.

@@ -5,10 +5,10 @@
 //! a live page (`washer-live`) one. Both use this rule, so they get the same bits.
 //!
 //! * A [`Ladder`] holds one model's rungs, [`runs`] integrates trajectories by one of them.
-//! * [`Climbs`] is a row in the making. It says which runs it needs next, takes them, and reckons
-//!   what error is left.
-//! * An [`Outcome`] is what came of it: both models' amplitudes and [`Metric`]s. A [`Verdict`]
-//!   compares them.
+//! * [`Climbs`] is a row in the making. It says which runs it needs next, takes them, and estimates
+//!   the error left.
+//! * An [`Outcome`] is the result: both models' amplitudes and [`Metric`]s. A [`Verdict`] compares
+//!   them.
 
 mod climb;
 mod convergence;

@@ -164,9 +164,7 @@ impl Metric {
                 "greatest push of any stop in the window; the linear model has the tangents of the \
                  stops at equilibrium, next to nothing while they are open"
             }
-            Self::StopContact => {
-                "time in the window that the stop is closed that is closed longest"
-            }
+            Self::StopContact => "longest time in the window for which any one stop is closed",
             Self::FootLoad => {
                 "least vertical load of any foot of the cabinet in the window, by statics; below \
                  zero it would lift"
@@ -192,7 +190,7 @@ impl Metric {
                  equilibrium, next to nothing while it is open",
             ),
             Self::StopContact => {
-                (Part::Stop, "contact", "time in the window that the stop is closed")
+                (Part::Stop, "contact", "time in the window for which the stop is closed")
             }
             Self::FootLoad => (
                 Part::Foot,

@@ -6,12 +6,12 @@
 //! batch costs is counted in lane groups (`batch.rs`): nine trials cost as much as
 //! sixteen.
 //!
-//! 1. A lattice: every value of the second axis's lattice at evenly spread rows. It finds what lies
-//!    in range, and guards against islands wider than its cells.
+//! 1. A lattice: evenly spread values of the second axis, in evenly spread rows. It finds every
+//!    island wider than its cells.
 //! 2. In those rows, nets around where the side should change (`net`), until they catch a bracket
 //!    within tolerance (`row`). Distances that hint at more are followed (`look`).
-//! 3. The rows between, from the middle of each gap outwards, start from where their neighbours'
-//!    roots point (`warm`): where the curve is smooth, two trials a row are enough.
+//! 3. The rows between start from the places that their neighbours' roots predict (`warm`), from
+//!    the middle of each gap outwards. Where the curve is smooth, two trials a row are enough.
 //! 4. Where neighbouring rows disagree, both are looked at until the pocket that one has is found
 //!    in the other, or closes between them (`pockets`).
 //!

@@ -1,6 +1,7 @@
 //! `sweep reference PAGE`: pages of the guide that are made from the program's own tables, as
 //! Markdown.
 
+use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::iter;
 
@@ -64,42 +65,60 @@ fn row(text: &mut String, cells: &[&str]) {
 fn parameters() -> String {
     let mut text = head("Parameters", "parameters");
     text.push_str(
-        "Every number of the machine and of the spin has one name, the same in `[set]`, in `--set \
-         NAME=VALUE` and as the\n\
-         `parameter` of an `[[axis]]`. Values are those of the built-in machine. *Paper* means \
-         printed there, *derived*\n\
-         follows from what is printed, *assumed* is this project's own choice where the paper is \
-         silent.\n\
-         Springs, dampers, stops, bushings and unbalances are numbered in the order of the machine \
-         file; the table shows the first\n\
-         of each, and no value where the built-in machine has none. The end of the run\n\
-         (`end_s`) and the integrator's settings are no parameters: `[time]` and `[integrator]` \
-         set them once, because rows whose\n\
-         runs differ in length or method would not compare. The window's edges are.\n\n",
+        "Every number of the machine and of the spin has one name, in `[set]`, in `--set \
+         NAME=VALUE` and as\n\
+         the `parameter` of an `[[axis]]`. Values are the built-in machine's. *Paper* means \
+         printed there,\n\
+         *derived* follows from what is printed, *assumed* is this project's choice.\n\n\
+         Springs, dampers, stops, bushings, unbalances and feet are numbered in the order of the \
+         machine file.\n\
+         The table shows the first of each, without a source where the built-in machine has none, \
+         and one\n\
+         row for x (towards the door), y (upwards) and z (sideways). `end_s` and the integrator's \
+         settings are\n\
+         not parameters, because rows of different length or method would not compare.\n\n",
     );
     row(&mut text, &["name", "built in", "unit", "meaning", "values", "source"]);
     row(&mut text, &["---"; 6]);
     let machine = Machine::paper();
     let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
-    for parameter in Parameter::all(&config::with_one_of_each(), &spin) {
-        let name = parameter.name();
-        if is_a_further_one(name) {
+    let all = Parameter::all(&config::with_one_of_each(), &spin);
+    let value_of = |name: &str| {
+        let parameter = all.iter().find(|parameter| parameter.name() == name)?;
+        let value = parameter.get(&machine, &spin).filter(|_| !name.starts_with("spin_"))?;
+        Some(value.to_string())
+    };
+    for parameter in &all {
+        let (name, description) = (parameter.name(), parameter.description());
+        if is_a_further_one(name)
+            || description.ends_with("upwards")
+            || description.ends_with("sideways")
+        {
             continue;
         }
-        let of_spin = name.starts_with("spin_");
-        let value = parameter.get(&machine, &spin).filter(|_| !of_spin);
         let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
         let none = if of_grid { "as the grid file says" } else { "none" };
-        let value = value.map_or_else(|| none.to_owned(), |value| value.to_string());
+        let has_source = value_of(name).is_some() || of_grid;
+        let source = if has_source { parameter.source().to_string() } else { String::new() };
+        // The first of three coordinates tells of all.
+        let of_three = description.strip_suffix("towards the door");
+        let axes: &[&str] = if of_three.is_some() { &["_x", "_y", "_z"] } else { &["_x"] };
+        let mut values: Vec<String> = Vec::new();
+        for axis in axes {
+            values.push(value_of(&name.replacen("_x", axis, 1)).unwrap_or_else(|| none.into()));
+        }
+        if values.iter().all(|value| *value == values[0]) {
+            values.truncate(1);
+        }
         row(
             &mut text,
             &[
-                &format!("`{name}`"),
-                &value,
+                &format!("`{name}`{}", if of_three.is_some() { ", y, z" } else { "" }),
+                &values.join(", "),
                 parameter.unit(),
-                parameter.description(),
+                of_three.unwrap_or(description).trim_end_matches([',', ' ']),
                 &allowed(parameter.range()),
-                &parameter.source().to_string(),
+                &source,
             ],
         );
     }
@@ -149,19 +168,18 @@ fn methods() -> String {
 fn columns() -> String {
     let mut text = head("Columns of a result file", "columns");
     text.push_str(
-        "One row per grid point, in grid order. Behind `point` stands one column per axis, named \
-         as its\n\
-         parameter (here the two axes of `sweeps/fig12.toml`); the channels are those of \
-         `[reliability]`,\n\
-         here all that exist. Each column's unit and description also stand in the file: in the \
-         Arrow field\n\
-         metadata (`unit`, `description`), and as JSON under the key `sweep.columns` of the \
-         file's key-value\n\
-         metadata. There stand too `sweep.plan` (the grid as run with the full machine), \
-         `sweep.plan_hash`,\n\
-         `sweep.version` and `sweep.numerics` (together they say which build made it), and last\n\
-         `sweep.digest`, by which every command that reads the file knows that no bit of it has \
-         changed.\n\n",
+        "A result has one row per grid point, in grid order. One column per axis follows `point`, \
+         named as its\n\
+         parameter: here the two axes of `sweeps/fig12.toml`. MODEL is `nonlinear` or `linear`, \
+         CHANNEL a\n\
+         channel of `[reliability]`.\n\n\
+         The file holds each column's unit and description, in the Arrow metadata of its field \
+         (`unit`,\n\
+         `description`) and as JSON under the key `sweep.columns`. Other keys are `sweep.plan` \
+         (the grid as run,\n\
+         with the full machine), `sweep.plan_hash`, `sweep.version`, `sweep.numerics` (which \
+         builds write the\n\
+         same bytes) and `sweep.digest`, by which every command notices a changed bit.\n\n",
     );
     let (machine, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
     let axes = Parameter::all(&machine, &spin)
@@ -174,19 +192,37 @@ fn columns() -> String {
     let metrics = Metric::ALL.to_vec();
     let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
     let layout = columns::of_measures(axes, &Channel::ALL, 2.0, measures);
-    row(&mut text, &["column", "type", "unit", "null", "meaning"]);
-    row(&mut text, &["---"; 5]);
+    row(&mut text, &["column", "type", "unit", "meaning"]);
+    row(&mut text, &["---"; 4]);
+    let mut names = HashSet::new();
     for field in layout.schema().fields().iter().filter(|field| !is_a_further_one(field.name())) {
+        let name = of_any(field.name());
+        if !names.insert(name.clone()) {
+            continue;
+        }
         let told = |key: &str| field.metadata().get(key).map_or("", String::as_str);
-        let data_type = match field.data_type() {
+        let mut data_type = match field.data_type() {
             arrow_schema::DataType::Dictionary(..) => "text".to_owned(),
             plain => plain.to_string().to_lowercase(),
         };
-        let null = if field.is_nullable() { "may be" } else { "never" };
+        if !field.is_nullable() {
+            data_type.push_str(", never null");
+        }
         row(
             &mut text,
-            &[&format!("`{}`", field.name()), &data_type, told("unit"), null, told("description")],
+            &[
+                &format!("`{name}`"),
+                &data_type,
+                if name == "MODEL_CHANNEL" { "the channel's" } else { told("unit") },
+                &of_any_model(told("description")),
+            ],
         );
+    }
+    text.push_str("\nChannels:\n\n");
+    row(&mut text, &["channel", "unit", "what moves"]);
+    row(&mut text, &["---"; 3]);
+    for channel in Channel::ALL {
+        row(&mut text, &[&format!("`{}`", channel.name()), channel.unit(), channel.description()]);
     }
     text.push_str("\nWhat `criterion` in `[reliability]` makes of a channel's columns:\n\n");
     row(&mut text, &["criterion", "`nonlinear_` and `linear_`", "`ratio_`"]);
@@ -213,23 +249,83 @@ fn columns() -> String {
     text
 }
 
+/// A column's name, with CHANNEL and MODEL in place of one channel's and one model's.
+fn of_any(name: &str) -> String {
+    let of_channel = Channel::ALL.iter().find_map(|channel| {
+        ["nonlinear_", "linear_", "ratio_"].into_iter().find_map(|before| {
+            (name.strip_prefix(before)? == channel.name()).then(|| format!("{before}CHANNEL"))
+        })
+    });
+    of_channel
+        .unwrap_or_else(|| name.into())
+        .replace("nonlinear", "MODEL")
+        .replace("linear", "MODEL")
+}
+
+/// A column's description, with that of any channel and model.
+fn of_any_model(description: &str) -> String {
+    let first = Channel::ALL
+        .iter()
+        .find_map(|channel| description.strip_prefix(channel.description())?.strip_prefix(": "));
+    first.unwrap_or(description).replace(", nonlinear model", ", MODEL model")
+}
+
 fn commands(program: clap::Command) -> String {
     let mut text = head("Commands", "commands");
     // The width of a terminal must not show in a file.
     let mut program = program.term_width(100);
     program.build();
-    let mut part = |title: &str, help: String| {
+    let mut part = |title: &str, help: String, more: &str| {
         let help: Vec<&str> = help.lines().map(str::trim_end).collect();
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "## {title}\n\n```text\n{}\n```\n", help.join("\n").trim());
+        let _ =
+            writeln!(text, "## {title}\n\n```text\n{}\n```\n{more}", help.join("\n").trim_end());
     };
-    part("sweep", program.clone().render_help().to_string());
-    for command in program.get_subcommands_mut().filter(|command| !command.is_hide_set()) {
-        part(&format!("sweep {}", command.get_name()), command.render_help().to_string());
+    let help_of_program = program.clone().render_help().to_string();
+    part("sweep", help_of_program.trim_start().into(), "");
+    let shared = shared_options(&program);
+    let mut options = clap::Command::new("options").disable_help_flag(true).term_width(100);
+    options = options.help_template("{options}").args(shared.clone());
+    part("Options of several commands", options.render_help().to_string(), "");
+    for command in program.get_subcommands().filter(|command| !command.is_hide_set()) {
+        let is_shared = |arg: &clap::Arg| shared.iter().any(|of_many| is_same(of_many, arg));
+        let longs = command
+            .get_arguments()
+            .filter(|arg| is_shared(arg))
+            .filter_map(|arg| arg.get_long().map(|long| format!("`--{long}`")));
+        let longs: Vec<String> = longs.collect();
+        let more = if longs.is_empty() {
+            String::new()
+        } else {
+            format!("\nAlso {}: [above](#options-of-several-commands).\n", longs.join(", "))
+        };
+        let mut alone =
+            command.clone().mut_args(|arg| if is_shared(&arg) { arg.hide(true) } else { arg });
+        part(&format!("sweep {}", command.get_name()), alone.render_help().to_string(), &more);
     }
     text.truncate(text.trim_end().len());
     text.push('\n');
     text
+}
+
+/// Whether two commands' arguments are one option, told alike.
+fn is_same(a: &clap::Arg, b: &clap::Arg) -> bool {
+    let told = |arg: &clap::Arg| arg.get_help().map(ToString::to_string);
+    a.get_long().is_some() && a.get_long() == b.get_long() && told(a) == told(b)
+}
+
+/// Options that at least three commands have, each once; the help flag stays with its command.
+fn shared_options(program: &clap::Command) -> Vec<clap::Arg> {
+    let visible = || program.get_subcommands().filter(|command| !command.is_hide_set());
+    let mut shared: Vec<clap::Arg> = Vec::new();
+    for arg in visible().flat_map(clap::Command::get_arguments) {
+        let times = visible().flat_map(clap::Command::get_arguments).filter(|a| is_same(a, arg));
+        let is_known = shared.iter().any(|known| is_same(known, arg));
+        if arg.get_long() != Some("help") && !is_known && times.count() > 2 {
+            shared.push(arg.clone());
+        }
+    }
+    shared
 }
 
 #[cfg(test)]

@@ -355,7 +355,8 @@ fn judgement(text: &mut Text, found: &Explanation) {
 fn limits(text: &mut Text, found: &Explanation) {
     let mut words = format!(
         "a tongue narrower than {} rpm may be missed. E-folds hold the speed still at each \
-         instant; equal e-folds do not mean equal ratios, and a map's boundary is no tongue's edge",
+         instant; equal e-folds do not mean equal ratios, and a map's boundary is not the edge of \
+         a tongue",
         decimal(found.looked.step)
     );
     if found.without_response > 0 {
