@@ -126,6 +126,8 @@ const LEFT: f64 = 92.0;
 const RIGHT: f64 = 26.0;
 const BELOW: f64 = 64.0;
 const GAP: f64 = 14.0;
+/// Radius of the dot of a place that no line runs to, px.
+const ALONE: f64 = 3.0;
 /// What a star means, in the legend.
 const STARS: &str = "resonance speed";
 
@@ -152,11 +154,19 @@ pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
     for (index, &content) in panels.iter().enumerate() {
         let panel = Panel { x: LEFT, y, width, height: content.height, xs, ys: y_scale(content) };
         panel.rules(&mut scene);
-        scene.clipped(panel.outline(), |scene| draw_panel(scene, chart, content, &panel));
+        let mut alone = Vec::new();
+        scene.clipped(panel.outline(), |scene| {
+            alone = draw_panel(scene, chart, content, &panel);
+        });
         draw_marks(&mut scene, chart, &panel, index == 0);
-        draw_stars(&mut scene, typeface, content, &panel);
+        draw_stars(&mut scene, typeface, (chart, content), &panel);
         let last = index + 1 == panels.len();
         panel.frame(&mut scene, last, true);
+        // Whole at the panel's edge too.
+        let within = |y: f64| (panel.y..=panel.y + panel.height).contains(&y);
+        for (place, colour) in alone.into_iter().filter(|([_, y], _)| within(*y)) {
+            scene.fill(Outline::disc(place, ALONE), colour);
+        }
         panel.y_label(&mut scene, typeface, &content.label.to_string(), 62.0);
         if last {
             panel.x_label(&mut scene, &chart.x_label.to_string());
@@ -192,7 +202,14 @@ pub(crate) fn y_scale(panel: &ChartPanel) -> Scale {
     }
 }
 
-fn draw_panel(scene: &mut Scene, chart: &Chart, content: &ChartPanel, panel: &Panel) {
+/// Draws shades, curves and levels; gives the places that stand alone, which no line shows.
+fn draw_panel(
+    scene: &mut Scene,
+    chart: &Chart,
+    content: &ChartPanel,
+    panel: &Panel,
+) -> Vec<([f64; 2], Colour)> {
+    let mut all_alone = Vec::new();
     for (ranges, colour) in [(&chart.shades, SHADE), (&content.mixed, BOTH_SIDES)] {
         if ranges.is_empty() {
             continue;
@@ -211,28 +228,34 @@ fn draw_panel(scene: &mut Scene, chart: &Chart, content: &ChartPanel, panel: &Pa
             (xs[k].is_finite() && ys[k].is_finite()).then(|| panel.at(xs[k], ys[k]))
         };
         if let Style::Band(low, high) = &series.style {
-            let mut area: Vec<[f64; 2]> = (0..xs.len()).filter_map(|k| at(low, k)).collect();
-            area.extend((0..xs.len()).rev().filter_map(|k| at(high, k)));
+            let both: Vec<_> = (0..xs.len()).map(|k| at(low, k).zip(at(high, k))).collect();
             let mut outline = Outline::default();
-            outline.add_polygon(&area);
+            for run in both.split(Option::is_none).filter(|run| !run.is_empty()) {
+                let (mut area, mut back): (Vec<[f64; 2]>, Vec<[f64; 2]>) =
+                    run.iter().flatten().copied().unzip();
+                // The bracket of a place that stands alone is as wide as its dot.
+                for side in [&mut area, &mut back] {
+                    if let [[x, y]] = side[..] {
+                        *side = vec![[x - ALONE, y], [x + ALONE, y]];
+                    }
+                }
+                area.extend(back.into_iter().rev());
+                outline.add_polygon(&area);
+            }
             scene.fill(outline, series.colour.with_alpha(90));
         }
         let kept = envelope(xs, &series.y, panel.xs.from, panel.xs.to, panel.width as usize);
+        let places: Vec<_> = kept.into_iter().map(|k| at(&series.y, k)).collect();
         let mut outline = Outline::default();
-        let mut line = Vec::new();
-        for k in kept {
-            match at(&series.y, k) {
-                Some(point) => line.push(point),
-                None => outline.add_line(&std::mem::take(&mut line)),
-            }
-        }
-        outline.add_line(&line);
+        let alone = outline.add_runs(&places);
         scene.line(outline, stroke(series));
+        all_alone.extend(alone.into_iter().map(|place| (place, series.colour)));
     }
     for (value, _) in &content.levels {
         let y = panel.at_y(*value);
         scene.line(Outline::line(&[[panel.x, y], [panel.x + panel.width, y]]), level_stroke());
     }
+    all_alone
 }
 
 fn stroke(series: &Series) -> Stroke {
@@ -254,11 +277,18 @@ fn mark_stroke() -> Stroke {
 /// Radius of a star, px.
 const STAR: f64 = 10.0;
 
+/// A rectangle: left, top, right, bottom, px.
+type Extent = [f64; 4];
+
 /// Stars first, then their labels, each where it covers neither a star nor a label before it, if
-/// there is such a place.
-fn draw_stars(scene: &mut Scene, typeface: &Typeface, content: &ChartPanel, panel: &Panel) {
-    // Left, top, right, bottom, px.
-    let mut taken: Vec<[f64; 4]> = Vec::new();
+/// there is such a place; of several, the one that the fewest lines run through.
+fn draw_stars(
+    scene: &mut Scene,
+    typeface: &Typeface,
+    (chart, content): (&Chart, &ChartPanel),
+    panel: &Panel,
+) {
+    let mut taken: Vec<Extent> = Vec::new();
     for (x, y, _) in &content.stars {
         let [x, y] = panel.at(*x, *y);
         scene.fill(Outline::star([x, y], STAR), INK);
@@ -267,24 +297,58 @@ fn draw_stars(scene: &mut Scene, typeface: &Typeface, content: &ChartPanel, pane
     for (x, y, label) in &content.stars {
         let [x, y] = panel.at(*x, *y);
         let width = typeface.width(label, TICK_SIZE, true);
-        let places = [
-            [x - STAR - 2.0 - width, y - 6.0],
-            [x + STAR + 2.0, y + 18.0],
-            [x - STAR - 2.0 - width, y - 24.0],
-            [x + STAR + 2.0, y + 36.0],
-        ];
+        // On either side of the star, and from close to it to farther above and below.
+        let sides = [x - STAR - 2.0 - width, x + STAR + 2.0];
+        let heights = [-6.0, 18.0, -24.0, 36.0, -42.0, 54.0];
+        let places = heights.iter().flat_map(|dy| sides.map(|left| [left, y + dy]));
         let extent = |[left, base]: [f64; 2]| [left, base - TICK_SIZE, left + width, base + 4.0];
-        let free = |place: &&[f64; 2]| {
-            let [left, top, right, bottom] = extent(**place);
+        let free = |place: &[f64; 2]| {
+            let [left, top, right, bottom] = extent(*place);
             left > panel.x
+                && right < panel.x + panel.width
+                && top > panel.y
+                && bottom < panel.y + panel.height
                 && taken.iter().all(|other| {
                     right < other[0] || left > other[2] || bottom < other[1] || top > other[3]
                 })
         };
-        let place = *places.iter().find(free).unwrap_or(&places[1]);
+        let place = places
+            .filter(free)
+            .min_by_key(|place| lines_through(chart, content, panel, extent(*place)));
+        let place = place.unwrap_or([sides[1], y + 18.0]);
         taken.push(extent(place));
         scene.text(Text::new(label.clone(), place, TICK_SIZE).bold().halo(PAPER));
     }
+}
+
+/// How many curves of a panel run through a rectangle.
+fn lines_through(chart: &Chart, content: &ChartPanel, panel: &Panel, extent: Extent) -> usize {
+    let runs_through = |series: &&Series| {
+        let xs = &chart.grids[series.grid];
+        let places = xs.iter().zip(&series.y).map(|(&x, &y)| panel.at(x, y));
+        let places: Vec<[f64; 2]> = places.collect();
+        places.windows(2).any(|pair| crosses([pair[0], pair[1]], extent))
+    };
+    content.series.iter().filter(runs_through).count()
+}
+
+/// Whether a straight line between two places has a part within a rectangle.
+fn crosses([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: Extent) -> bool {
+    let (mut first, mut last) = (0.0_f64, 1.0_f64);
+    for (k, (low, high)) in [(left, right), (top, bottom)].into_iter().enumerate() {
+        let step = to[k] - from[k];
+        if step == 0.0 {
+            if !(low..=high).contains(&from[k]) {
+                return false;
+            }
+            continue;
+        }
+        let [one, other] = [(low - from[k]) / step, (high - from[k]) / step];
+        first = first.max(one.min(other));
+        last = last.min(one.max(other));
+    }
+    // A gap has no place.
+    from.iter().chain(&to).all(|part| part.is_finite()) && first <= last
 }
 
 /// Marks through a panel; above the first one their labels, moved aside where they would cover each
@@ -350,4 +414,61 @@ pub(crate) const MIXED: &str = "both: reliable and unreliable points";
 /// Whether positive values span so much that only a logarithm shows them all.
 pub(crate) fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
     matches!(ColourScale::amplitude(values), ColourScale::Sequential(Scale { log: true, .. }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_of_stars_stand_off_the_curves() {
+        let speeds: Vec<f64> = (0..=30).map(|k| 10.0 * f64::from(k)).collect();
+        let flat = |y: f64| Series {
+            name: String::new(),
+            colour: INK,
+            grid: 0,
+            y: vec![y; 31],
+            style: Style::Solid(2.0),
+        };
+        // The second curve is where the first one's label would stand.
+        let mut series = vec![flat(147.8), flat(154.0), flat(162.1)];
+        series.push(Series { y: speeds.clone(), ..flat(0.0) });
+        let stars = [147.8, 162.1].map(|at| (at, at, format!("{at} rpm"))).to_vec();
+        let panel = ChartPanel {
+            stars,
+            range: Some((0.0, 300.0)),
+            ..ChartPanel::new("frequency", Label::new("Frequency", ""), series)
+        };
+        let chart = Chart {
+            title: String::new(),
+            subtitle: String::new(),
+            x_label: Label::new("Speed", "rpm"),
+            x_log: false,
+            grids: vec![speeds],
+            panels: vec![panel],
+            marks: Vec::new(),
+            mark_meaning: String::new(),
+            shades: Vec::new(),
+            shade_meaning: String::new(),
+        };
+        let typeface = Typeface::load().unwrap();
+        let drawn = draw(&chart, &typeface);
+        let labels = drawn.items.iter().filter_map(|item| match item {
+            crate::scene::Item::Text(text) if text.halo.is_some() => Some(text),
+            _ => None,
+        });
+        let content = &chart.panels[0];
+        let (x, y) = (LEFT, HEADING_HEIGHT);
+        let (xs, ys) = (x_scale(&chart), y_scale(content));
+        let panel = Panel { x, y, width: WIDTH - LEFT - RIGHT, height: content.height, xs, ys };
+        let mut count = 0;
+        for text in labels {
+            let [left, base] = text.at;
+            let width = typeface.width(&text.text, TICK_SIZE, true);
+            let extent = [left, base - TICK_SIZE, left + width, base + 4.0];
+            assert_eq!(lines_through(&chart, content, &panel, extent), 0, "{}", text.text);
+            count += 1;
+        }
+        assert_eq!(count, 2);
+    }
 }

@@ -13,6 +13,14 @@ const BELOW: [u32; 5] = [0xe1_ed_f8, 0xcf_e1_f2, 0xb5_d4_e9, 0x93_c3_df, 0x6b_ae
 /// without colour show which side a cell is on; blue against red is safe for the colour-blind.
 const ABOVE: [u32; 5] = [0xe8_86_66, 0xd6_60_4d, 0xc4_3c_3c, 0xb2_18_2b, 0x67_00_1f];
 
+/// From the middle of a scale without a limit to either end: nothing is light grey, and both sides
+/// get darker alike (the blues and reds of ColorBrewer's RdBu).
+const LESS: [u32; 5] = [0x05_30_61, 0x21_66_ac, 0x43_93_c3, 0x92_c5_de, 0xf2_f2_f2];
+const MORE: [u32; 5] = [0xf2_f2_f2, 0xf4_a5_82, 0xd6_60_4d, 0xb2_18_2b, 0x67_00_1f];
+
+/// Changes by less than this factor have next to no colour, even where all are smaller.
+const LEAST_CHANGE: f64 = 1.02;
+
 /// Every ninth or so colour of viridis (matplotlib, CC0).
 const SEQUENTIAL: [u32; 10] = [
     0x44_01_54, 0x48_28_78, 0x3e_49_89, 0x31_68_8e, 0x26_82_8e, 0x1f_9e_89, 0x35_b7_79, 0x6e_ce_58,
@@ -63,6 +71,8 @@ pub(crate) enum ColourScale {
         high: f64,
         /// The red side is the low one.
         reversed: bool,
+        /// The middle is no limit: values near it have no colour.
+        neutral: bool,
     },
     /// One run of colours, dark to light.
     Sequential(Scale),
@@ -78,23 +88,45 @@ impl ColourScale {
             centre: limit,
             high: high.max(limit * 2.0),
             reversed: false,
+            neutral: false,
         }
     }
 
     /// For factors: the scale reaches as far below 1 as above it.
-    pub(crate) fn change(values: impl Iterator<Item = f64>) -> Self {
+    pub(crate) fn factor(values: impl Iterator<Item = f64>) -> Self {
         let farthest = |so_far: f64, value: f64| so_far.max(value).max(1.0 / value);
-        let most = values.filter(|value| *value > 0.0).fold(1.001, farthest);
-        Self::Diverging { log: true, low: 1.0 / most, centre: 1.0, high: most, reversed: false }
+        let most = values.filter(|value| *value > 0.0).fold(LEAST_CHANGE, farthest);
+        Self::Diverging {
+            log: true,
+            low: 1.0 / most,
+            centre: 1.0,
+            high: most,
+            reversed: false,
+            neutral: true,
+        }
+    }
+
+    /// For differences: the scale reaches as far below 0 as above it. `reversed` where less is
+    /// worse.
+    pub(crate) fn difference(values: impl Iterator<Item = f64>, reversed: bool) -> Self {
+        let farthest = |so_far: f64, value: f64| so_far.max(value.abs());
+        let most = values.filter(|value| value.is_finite()).fold(0.0, farthest);
+        let most = if most > 0.0 { most } else { 1.0 };
+        Self::Diverging { log: false, low: -most, centre: 0.0, high: most, reversed, neutral: true }
     }
 
     /// For gaps: below zero there is contact. Gaps that are all open, or all closed, have all the
     /// colours for themselves.
     pub(crate) fn gap(values: impl Iterator<Item = f64>) -> Self {
         match extremes(values) {
-            Some((low, high)) if low < 0.0 && high > 0.0 => {
-                Self::Diverging { log: false, low, centre: 0.0, high, reversed: true }
-            }
+            Some((low, high)) if low < 0.0 && high > 0.0 => Self::Diverging {
+                log: false,
+                low,
+                centre: 0.0,
+                high,
+                reversed: true,
+                neutral: false,
+            },
             found => Self::even(found.map(<[f64; 2]>::from).into_iter().flatten()),
         }
     }
@@ -141,12 +173,13 @@ impl ColourScale {
     pub(crate) fn colour(&self, level: usize) -> Colour {
         let place = (level as f64 + 0.5) / LEVELS as f64;
         match self {
-            Self::Diverging { reversed, .. } => {
+            Self::Diverging { reversed, neutral, .. } => {
                 let place = if *reversed { 1.0 - place } else { place };
+                let [below, above] = if *neutral { [&LESS, &MORE] } else { [&BELOW, &ABOVE] };
                 if place < 0.5 {
-                    blend(&BELOW, 2.0 * place)
+                    blend(below, 2.0 * place)
                 } else {
-                    blend(&ABOVE, 2.0 * place - 1.0)
+                    blend(above, 2.0 * place - 1.0)
                 }
             }
             Self::Sequential(_) => blend(&SEQUENTIAL, place),
@@ -220,6 +253,26 @@ mod tests {
         let mixed = ColourScale::gap([-0.001, 0.012].into_iter());
         assert_eq!([-0.001, 0.0, 0.012].map(|gap| mixed.position(gap)), [0.0, 0.5, 1.0]);
         assert!(ColourScale::even([3.0, 3.0].into_iter()).position(3.0).is_finite());
+    }
+
+    #[test]
+    fn a_change_of_next_to_nothing_has_no_colour() {
+        let spread = |scale: &ColourScale, value: f64| {
+            let rgb = scale.colour(scale.level(value)).rgb;
+            rgb.iter().max().unwrap() - rgb.iter().min().unwrap()
+        };
+        let factors = ColourScale::factor([0.9995, 1.0005].into_iter());
+        assert!([0.9995, 1.0, 1.0005].iter().all(|factor| spread(&factors, *factor) < 24));
+        let factors = ColourScale::factor([0.5, 1.1].into_iter());
+        assert!(spread(&factors, 1.0) < 24 && spread(&factors, 0.5) > 70);
+        assert_eq!(factors.position(2.0), 1.0, "as far above 1 as below it");
+        let gaps = ColourScale::difference([-0.001, 0.004].into_iter(), true);
+        assert!(spread(&gaps, 0.0) < 24);
+        assert_eq!([-0.004, 0.0, 0.004].map(|gap| gaps.position(gap)), [0.0, 0.5, 1.0]);
+        let [red, _, blue] = gaps.colour(gaps.level(-0.003)).rgb;
+        assert!(red > blue, "a gap that got smaller is worse");
+        let same = ColourScale::difference([0.0, 0.0].into_iter(), true);
+        assert!(same.position(0.0).is_finite());
     }
 
     #[test]

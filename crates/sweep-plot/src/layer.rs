@@ -468,10 +468,10 @@ impl Shown {
         };
         let scale = match self.quantity {
             Quantity::Ratio => ColourScale::ratio(extent, limit),
-            Quantity::RatioChange => ColourScale::change(extent),
+            Quantity::GapChange => ColourScale::difference(extent, true),
+            Quantity::RatioChange => ColourScale::factor(extent),
             Quantity::GapNonlinear
             | Quantity::GapLinear
-            | Quantity::GapChange
             | Quantity::FootLoadNonlinear
             | Quantity::FootLoadLinear
             | Quantity::SlipMarginNonlinear

@@ -37,6 +37,8 @@ mod tests;
 #[cfg(test)]
 mod tests_designs;
 #[cfg(test)]
+mod tests_drawing;
+#[cfg(test)]
 mod tests_long;
 #[cfg(test)]
 mod tests_metrics;

@@ -137,7 +137,10 @@ fn a_map_takes_the_line_of_a_boundary_over_its_axes() {
     let with = |path: &Path| PlotOptions { boundary: Some(path.to_owned()), ..Default::default() };
     let plain = svg(map(), &PlotOptions::default());
     let figure = svg(map(), &with(&same));
-    assert!(figure.contains(">boundary: no growth at any speed<"), "the legend names the line");
+    assert!(
+        figure.contains(">traced boundary: no growth at any speed<"),
+        "the legend names the line"
+    );
     let dashed = |figure: &str| figure.matches("stroke-dasharray").count();
     // The line and its sign in the legend.
     assert_eq!(dashed(&figure), dashed(&plain) + 2);

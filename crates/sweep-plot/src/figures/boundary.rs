@@ -135,7 +135,7 @@ fn far_side(curves: &[(String, Vec<Place>)], quantity: &str) -> String {
         .iter()
         .map(|(_, places)| places.iter().filter(|place| place.y.is_finite()).count())
         .sum();
-    let line = if places > uppermost.len() { "highest line" } else { "line" };
+    let line = if places > uppermost.len() { "highest crossing" } else { "line" };
     format!(" · {side} above the {line}")
 }
 
@@ -183,7 +183,7 @@ pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay, PlotErr
         )));
     }
     let chart = chart(table)?;
-    let name = format!("boundary: {}", limit(table));
+    let name = format!("traced boundary: {}", limit(table));
     let xs = chart.grids.into_iter().next().unwrap_or_default();
     let series = chart.panels.into_iter().flat_map(|panel| panel.series);
     let lines = series.map(|series| xs.iter().zip(series.y).map(|(&x, y)| [x, y]).collect());

@@ -94,7 +94,9 @@ pub(crate) fn draw(
         }
         // Above the lines, which they interrupt.
         if let Some(divided) = divided {
-            cells.name_regions(&mut scene, typeface, &panel, divided, &cut.rest);
+            let overlaid = overlay.iter().flat_map(|overlay| &overlay.lines);
+            let overlaid: Vec<_> = overlaid.map(|line| places(&panel, line)).collect();
+            cells.name_regions(&mut scene, typeface, &panel, divided, (&cut.rest, &overlaid));
         }
         let lowest = index + columns >= cuts.cuts.len();
         panel.frame(&mut scene, lowest, column == 0);
@@ -126,18 +128,24 @@ fn overlay_stroke() -> Stroke {
 /// Draws the line of another file, as far as it is within the panel.
 fn draw_overlay(scene: &mut Scene, panel: &Panel, overlay: &Overlay) {
     let mut outline = Outline::default();
+    let mut alone = Vec::new();
     for line in &overlay.lines {
-        let places = line.iter().map(|[x, y]| [panel.xs.position(*x), panel.ys.position(*y)]);
-        let places: Vec<[f64; 2]> = places.collect();
-        let inside = |place: &[f64; 2]| place.iter().all(|part| (0.0..=1.0).contains(part));
-        for part in places.split(|place| !inside(place)).filter(|part| part.len() > 1) {
-            let at =
-                |[x, y]: &[f64; 2]| [panel.x + x * panel.width, panel.y + (1.0 - y) * panel.height];
-            outline.add_line(&part.iter().map(at).collect::<Vec<_>>());
-        }
+        alone.extend(outline.add_runs(&places(panel, line)));
     }
     scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
     scene.line(outline, overlay_stroke());
+    for place in alone {
+        scene.fill(Outline::disc(place, 4.5), PAPER);
+        scene.fill(Outline::disc(place, 3.5), OVERLAY);
+    }
+}
+
+/// Where a line's places are in a panel, px; none of those outside, and where it has a gap.
+fn places(panel: &Panel, line: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
+    let inside = |x: f64, y: f64| {
+        [panel.xs.position(x), panel.ys.position(y)].iter().all(|part| (0.0..=1.0).contains(part))
+    };
+    line.iter().map(|&[x, y]| inside(x, y).then(|| panel.at(x, y))).collect()
 }
 
 /// Name of the run, how many points it has and how many failed, and what is fixed, left out or
@@ -346,7 +354,7 @@ impl<'a> Cells<'a> {
         typeface: &Typeface,
         panel: &Panel,
         (layer, level): (&Layer, &Level),
-        rest: &[usize],
+        (rest, overlaid): (&[usize], &[Vec<Option<[f64; 2]>>]),
     ) {
         let place = |axis: &GridAxis, scale: Scale, part: f64| {
             let found = axis.borders.partition_point(|&border| scale.position(border) <= part);
@@ -366,7 +374,11 @@ impl<'a> Cells<'a> {
                 offset.is_finite() && (offset >= 0.0) == wanted_above
             };
             let size = [typeface.width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
-            if let Some([x, y]) = roomiest([panel.width, panel.height], size, inside) {
+            let area = [panel.width, panel.height];
+            // Off the other file's line, unless that leaves no room.
+            let clear = |point: [f64; 2]| inside(point) && !is_near(panel, overlaid, point);
+            let found = roomiest(area, size, clear).or_else(|| roomiest(area, size, inside));
+            if let Some([x, y]) = found {
                 let at = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];
                 scene.text(
                     Text::new(name, at, LABEL_SIZE).bold().anchor(Anchor::Middle).halo(PAPER),
@@ -432,6 +444,22 @@ impl<'a> Cells<'a> {
         }
         entries
     }
+}
+
+/// Whether a point of a panel, px from its corner, is as near to one of these lines as samples for
+/// a name are to each other.
+fn is_near(panel: &Panel, lines: &[Vec<Option<[f64; 2]>>], [x, y]: [f64; 2]) -> bool {
+    let point = [panel.x + x, panel.y + y];
+    let reach = (panel.width / 44.0).max(panel.height / 33.0);
+    let near = |from: [f64; 2], to: [f64; 2]| {
+        let [[dx, px], [dy, py]] = [0, 1].map(|k| [to[k] - from[k], point[k] - from[k]]);
+        let square = (dx * dx + dy * dy).max(f64::MIN_POSITIVE);
+        let part = ((px * dx + py * dy) / square).clamp(0.0, 1.0);
+        (px - part * dx).hypot(py - part * dy) < reach
+    };
+    let pairs = lines.iter().flat_map(|line| line.windows(2));
+    let mut known = pairs.filter_map(|pair| pair[0].zip(pair[1]));
+    known.any(|(from, to)| near(from, to))
 }
 
 /// Neighbouring places with the same content as `(first, one past the last, content)`, those alone

@@ -75,7 +75,7 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
     });
     let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
     let common = axes.iter().zip(&shown[0]).enumerate().filter(|(k, _)| !differs(*k));
-    notes.extend(common.map(|(_, (axis, value))| said(axis, *value).to_lowercase()));
+    notes.extend(common.map(|(_, (axis, value))| said_within(axis, *value)));
     if shown.len() < all.len() {
         notes.push(format!("{} of {} points", shown.len(), all.len()));
     }
@@ -176,7 +176,7 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
     let panels = panels.collect();
     let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
     let named = axes.iter().zip(&one.values);
-    notes.extend(named.map(|(axis, value)| said(axis, *value).to_lowercase()));
+    notes.extend(named.map(|(axis, value)| said_within(axis, *value)));
     notes.push("largest deviation from equilibrium over a turn".to_owned());
     Ok(Chart {
         title: "Periodic responses at constant speed".to_owned(),
@@ -251,6 +251,12 @@ pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotEr
 fn said(axis: &ColumnFacts, value: f64) -> String {
     let unit = if axis.unit.is_empty() { String::new() } else { format!(" {}", axis.unit) };
     format!("{} {}{unit}", label::words(&axis.name), label::significant(value, 4))
+}
+
+/// As [`said`], within a sentence: the words are small, the unit keeps its letters.
+fn said_within(axis: &ColumnFacts, value: f64) -> String {
+    let words = label::words(&axis.name);
+    said(axis, value).replacen(&words, &words.to_lowercase(), 1)
 }
 
 /// The values of a row's axes, and whether it is at the values asked for.

@@ -204,6 +204,7 @@ function createChart(host, spec, name) {
     context.beginPath();
     const crowded = to - from > 4 * box.width;
     let open = false;
+    const dots = [];
     for (let k = from; k <= to;) {
       if (!Number.isFinite(series.y[k])) {
         open = false;
@@ -224,8 +225,11 @@ function createChart(host, spec, name) {
           high = Math.max(high, final);
         }
       }
+      const alone = !open && !(end <= to && Number.isFinite(series.y[end]));
       if (open) context.lineTo(x, atY(series.y[k]));
       else context.moveTo(x, atY(series.y[k]));
+      // No line runs to it.
+      if (alone) dots.push([x, atY(series.y[k])]);
       open = true;
       if (end > k + 1) {
         for (const value of [low, high, final]) context.lineTo(x, atY(value));
@@ -234,6 +238,11 @@ function createChart(host, spec, name) {
     }
     context.stroke();
     context.setLineDash([]);
+    for (const [x, y] of dots) {
+      context.beginPath();
+      context.arc(x, y, 3, 0, 2 * Math.PI);
+      context.fill();
+    }
     context.globalAlpha = 1;
   }
 

@@ -293,7 +293,7 @@ fn counts_json(map: &Map) -> Value {
 
 fn layer_json(map: &Map, shown: &Shown, layer: &Layer, room: usize) -> Value {
     let scale = match layer.scale {
-        ColourScale::Diverging { log, low, centre, high, reversed } => {
+        ColourScale::Diverging { log, low, centre, high, reversed, .. } => {
             json!({ "log": log, "low": low, "centre": centre, "high": high, "reversed": reversed })
         }
         ColourScale::Sequential(scale) => {

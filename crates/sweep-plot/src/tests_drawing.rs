@@ -1,0 +1,93 @@
+//! What is drawn where: places that stand alone, names off lines, legends that tell lines apart.
+
+use super::sample::{Sample, boundary, map};
+use super::scene::{Item, Outline};
+use super::tests::svg;
+use super::*;
+
+/// One crossing at each of three masses, and two more at the last.
+fn folded(axes: &str) -> Sample {
+    let at = [(0.8, 200.0), (0.9, 230.0), (1.0, 248.1), (1.0, 251.2), (1.0, 271.4)];
+    let damping = |by: f64| at.map(|(_, damping)| damping + by);
+    Sample::default()
+        .numbers("unbalance_mass_kg", "kg", at.map(|(mass, _)| mass))
+        .numbers("damping_n_s_per_m", "N s/m", damping(0.0))
+        .numbers("damping_low_n_s_per_m", "N s/m", damping(-0.1))
+        .numbers("damping_high_n_s_per_m", "N s/m", damping(0.1))
+        .metadata("sweep.plan", &format!(r#"{{"axis": [{axes}]}}"#))
+}
+
+/// The map's figure with the line of this boundary file.
+fn over_the_map(file: Sample) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let boundary = Some(file.write(folder.path(), "boundary.parquet"));
+    svg(map(), &PlotOptions { boundary, ..PlotOptions::default() })
+}
+
+const AXES: &str = r#"{"parameter": "unbalance_mass_kg"}, {"parameter": "damping_n_s_per_m"}"#;
+
+#[test]
+fn a_crossing_that_no_line_runs_to_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = Table::open(&folded("").write(folder.path(), "boundary.parquet")).unwrap();
+    let chart = figures::boundary::chart(&table).unwrap();
+    let scene = chart::draw(&chart, &Typeface::load().unwrap());
+    let [segments, _] = [Outline::disc([0.0, 0.0], 3.0), Outline::default()].map(|one| one.0.len());
+    let is_disc =
+        |item: &&Item| matches!(item, Item::Fill { outline, .. } if outline.0.len() == segments);
+    assert_eq!(scene.items.iter().filter(is_disc).count(), 2);
+    // Over a map each has a light rim.
+    let [alone, none] =
+        [folded(AXES), boundary().metadata("sweep.plan", &format!(r#"{{"axis": [{AXES}]}}"#))];
+    let discs = |file| over_the_map(file).matches(r##"fill="#0b6b3a""##).count();
+    assert_eq!((discs(none), discs(alone)), (0, 2));
+}
+
+#[test]
+fn a_legend_names_each_line_once() {
+    let limit = r#"], "reliability": {"ratio_limit": 3.0}, "other": ["#;
+    let figure = over_the_map(folded(&format!("{AXES}{limit}")));
+    for name in [">boundary: ratio 3<", ">traced boundary: ratio 3<"] {
+        assert_eq!(figure.matches(name).count(), 1, "{name}");
+    }
+}
+
+/// Where a text of a figure stands.
+fn place_of(figure: &str, text: &str) -> [f64; 2] {
+    let end = figure.find(&format!(">{text}<")).unwrap();
+    let element = &figure[figure[..end].rfind("<text").unwrap()..end];
+    ["x", "y"].map(|name| {
+        let start = element.find(&format!(r#" {name}=""#)).unwrap() + name.len() + 3;
+        element[start..].split('"').next().unwrap().parse().unwrap()
+    })
+}
+
+#[test]
+fn names_of_regions_keep_off_the_line_of_another_file() {
+    const NAME: &str = "linear model reliable";
+    let [_, y] = place_of(&svg(map(), &PlotOptions::default()), NAME);
+    // The panel's 440 px stand for 45 to 315 N s/m; the name's middle is above its base.
+    let through = 315.0 - (y - 5.6 - frame::HEADING_HEIGHT) / 440.0 * 270.0;
+    let masses = (1..=10).map(|k| 0.1 * f64::from(k));
+    let flat = |by: f64| (0..10).map(move |_| through + by);
+    let line = Sample::default()
+        .numbers("unbalance_mass_kg", "kg", masses)
+        .numbers("damping_n_s_per_m", "N s/m", flat(0.0))
+        .numbers("damping_low_n_s_per_m", "N s/m", flat(-0.1))
+        .numbers("damping_high_n_s_per_m", "N s/m", flat(0.1))
+        .metadata("sweep.plan", &format!(r#"{{"axis": [{AXES}]}}"#));
+    let [_, moved] = place_of(&over_the_map(line), NAME);
+    assert!((moved - y).abs() > 16.0, "{moved} {y}");
+}
+
+#[test]
+fn subtitles_leave_units_their_letters() {
+    let dwells = Sample::default()
+        .counts("point", [0, 0, 0])
+        .numbers("damping_n_s_per_m", "N s/m", [140.0; 3])
+        .numbers("speed_rpm", "rpm", [200.0, 210.0, 220.0])
+        .numbers("growth_per_s", "1/s", [-0.1, 0.1, 0.2])
+        .words("status", [Some("ok"); 3]);
+    let figure = svg(dwells, &PlotOptions::default());
+    assert!(figure.contains(">damping 140 N s/m<"), "{figure}");
+}
