@@ -187,5 +187,6 @@ function showProvenance(entries) {
     list.append(element("dt", {}, key), element("dd", {}, body));
   }
   const host = document.getElementById("provenance");
-  host.append(entries.length ? list : "The file says nothing about its origin.");
+  const fold = element("details", {}, element("summary", {}, "digests, versions, the plan"), list);
+  host.append(entries.length ? fold : "The file says nothing about its origin.");
 }
