@@ -11,10 +11,9 @@ use sweep_engine::boundary::search::Distances;
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, row, run_columns, verdict_columns,
 };
-use sweep_engine::config::report::Report;
+use sweep_engine::config::Read;
 use sweep_engine::config::schema::set;
 use sweep_engine::config::section::Section;
-use sweep_engine::config::{Origins, Read};
 use sweep_engine::estimate::Estimate;
 use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Steps};
 use sweep_engine::store::{Done, Job, Layout, Rows, Shape, axis_columns};
@@ -220,7 +219,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Read
     for Map<O, C, D, P>
 {
-    fn read(_: &GridInput<Self>, _: &mut Section<'_>, _: &mut Origins, _: &mut Report) -> Self {
+    fn read(_: &GridInput<Self>, _: &Section<'_>) -> Self {
         Self { values: O::PARAMETERS.map(|one| one.default), of: PhantomData }
     }
 

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use super::axes::MOST_POINTS;
 use super::list::{self, List};
-use super::report::Report;
 use super::section::{Field, Section};
 use super::source::Located;
 use crate::design::Design;
@@ -31,37 +30,36 @@ pub enum WrittenDesign {
 }
 
 /// Reads the section, and the file it names.
-pub fn read(root: &mut Section<'_>, grid: &Path, report: &mut Report) -> WrittenDesign {
-    let mut section = match root.table("design", "[design]", report) {
+pub fn read(root: &Section<'_>, grid: &Path) -> WrittenDesign {
+    let section = match root.table("design", "[design]") {
         Field::Absent => return WrittenDesign::None,
         Field::Bad => return WrittenDesign::Bad,
         Field::Given(section) => section.value,
     };
     let at = section.at().clone();
-    let field = section.choice("method", &METHODS, report);
+    let field = section.choice("method", &METHODS);
     let expected = "`latin_hypercube`, `sobol`, `monte_carlo` or `list`";
-    let Some(method) = section.require(field, "method", expected, report) else {
+    let Some(method) = section.require(field, "method", expected) else {
         // An unknown method has no list of keys, but each key has its range.
-        let _ = section.count("points", MOST_POINTS, report);
-        let _ = section.whole("seed", 0..=MOST_SEED, report);
-        let _ = section.text("file", report);
-        section.finish(report);
+        let _ = section.count("points", MOST_POINTS);
+        let _ = section.whole("seed", 0..=MOST_SEED);
+        let _ = section.text("file");
+        section.finish();
         return WrittenDesign::Bad;
     };
     let written = if METHODS[method.value] == "list" {
         section.misplace(&["points", "seed"], "a list has the points that it lists");
-        let field = section.text("file", report);
-        let file =
-            section.require(field, "file", "a CSV or Parquet file, relative to this file", report);
-        file.and_then(|file| list::read(&file, grid, report))
+        let field = section.text("file");
+        let file = section.require(field, "file", "a CSV or Parquet file, relative to this file");
+        file.and_then(|file| list::read(&file, grid, root.report))
             .map_or(WrittenDesign::Bad, WrittenDesign::List)
     } else {
         section.misplace(&["file"], "only the method \"list\" has it");
         let chosen = METHODS[method.value];
         let sobol = chosen == "sobol";
-        let field = section.count("points", if sobol { MOST_SOBOL } else { MOST_POINTS }, report);
-        let points = section.require(field, "points", "the number of points", report);
-        let seed = section.whole("seed", 0..=MOST_SEED, report).or(DEFAULT_SEED);
+        let field = section.count("points", if sobol { MOST_SOBOL } else { MOST_POINTS });
+        let points = section.require(field, "points", "the number of points");
+        let seed = section.whole("seed", 0..=MOST_SEED).or(DEFAULT_SEED);
         // Stand-ins for what was refused, so that the axes are read all the same.
         let (points, seed) =
             (points.map_or(1, |points| points.value), seed.unwrap_or(DEFAULT_SEED));
@@ -72,6 +70,6 @@ pub fn read(root: &mut Section<'_>, grid: &Path, report: &mut Report) -> Written
         };
         WrittenDesign::Box(Located { value: design, at })
     };
-    section.finish(report);
+    section.finish();
     written
 }

@@ -6,7 +6,6 @@ use std::path::Path;
 use sweep_parameter::{Channel, Range, decimal};
 
 use super::Read;
-use super::origins::Origins;
 use super::parameters::WrittenConstant;
 use super::report::{Diagnostic, Report};
 use super::section::{Field, Section, unknown_word};
@@ -22,17 +21,17 @@ pub const DEFAULT_RATIO_LIMIT: f64 = 2.0;
 pub const LONGEST_S: f64 = 1e6;
 
 /// A plan in the making: whole, but sound only if nothing was reported.
-pub struct Draft<M: Read> {
+pub struct Draft<'a, M: Read> {
     /// The plan.
     pub plan: Plan<M>,
-    /// Where its numbers were written.
-    pub origins: Origins,
+    /// Where its numbers were written, and what is wrong.
+    pub report: &'a Report,
     /// What `[set]`, `--set` and `--at` have written.
     pub constants: Vec<WrittenConstant>,
 }
 
 /// Reads the grid file and puts the constants in place. `None` if the grid file has no text.
-pub fn draft<M: Read>(input: &GridInput<M>, report: &mut Report) -> Option<Draft<M>> {
+pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
     let GridInput { path, text, sets, .. } = input;
     let to_start = |diagnostic: Diagnostic| match M::TO_START {
         Some(help) => diagnostic.help(help),
@@ -49,7 +48,7 @@ pub fn draft<M: Read>(input: &GridInput<M>, report: &mut Report) -> Option<Draft
             return None;
         }
     };
-    let source = report.sources.add(shown.to_string(), text.as_str());
+    let source = report.add(shown.to_string(), text.as_str());
     if is_blank(&text) {
         let at = Location::new(source, 0..0);
         let diagnostic =
@@ -58,16 +57,13 @@ pub fn draft<M: Read>(input: &GridInput<M>, report: &mut Report) -> Option<Draft
         return None;
     }
     let table = parse(&text, source, report);
-    let mut root = Section::new("the grid file", Location::new(source, 0..0), table.get_ref());
+    let root = Section::new("the grid file", Location::new(source, 0..0), table.get_ref(), report);
 
-    let name = name(&mut root, path, report);
-    let mut origins = Origins::default();
-    let mut model = M::read(input, &mut root, &mut origins, report);
-    let [end_s, from_s, to_s] = time(&mut root, &mut origins, report);
-    let integrator = integrator(&mut root, &mut origins, report);
-    model.read_before_reliability(&mut root, &mut origins, report);
-    let reliability = reliability(&mut root, &mut model, &mut origins, report);
-    model.read_after_reliability(&mut root, &mut origins, report);
+    let name = name(&root, path);
+    let mut model = M::read(input, &root);
+    let [end_s, from_s, to_s] = time(&root);
+    let integrator = integrator(&root);
+    let reliability = reliability(&root, &mut model);
     let plan = Plan {
         name,
         model,
@@ -79,21 +75,19 @@ pub fn draft<M: Read>(input: &GridInput<M>, report: &mut Report) -> Option<Draft
         reliability,
         set: Vec::new(),
     };
-    let mut draft = Draft { plan, origins, constants: Vec::new() };
-    parameters::constants(&mut root, sets, &mut draft, report);
-    match design::read(&mut root, path, report) {
-        design::WrittenDesign::None => axes::axes(&mut root, &mut draft, report),
-        design::WrittenDesign::Box(design) => {
-            axes::box_of_axes(&mut root, design, &mut draft, report)
-        }
-        design::WrittenDesign::List(list) => axes::listed_axes(&mut root, list, &mut draft, report),
+    let mut draft = Draft { plan, report, constants: Vec::new() };
+    parameters::constants(&root, sets, &mut draft);
+    match design::read(&root, path) {
+        design::WrittenDesign::None => axes::axes(&root, None, &mut draft),
+        design::WrittenDesign::Box(design) => axes::axes(&root, Some(design), &mut draft),
+        design::WrittenDesign::List(list) => axes::listed_axes(&root, list, &mut draft),
         design::WrittenDesign::Bad => {
             // The right axes depend on a method that is unknown.
-            let _ = root.tables("axis", report);
+            let _ = root.tables("axis");
         }
     }
-    scalars::apply(sets, &mut draft, report);
-    root.finish(report);
+    scalars::apply(sets, &mut draft);
+    root.finish();
     Some(draft)
 }
 
@@ -113,12 +107,13 @@ pub fn plain_name(text: &str) -> Result<String, String> {
     if is_plain(text) { Ok(text.to_owned()) } else { Err(format!("expected {PLAIN_NAME}")) }
 }
 
-fn name(root: &mut Section<'_>, path: &Path, report: &mut Report) -> String {
-    match root.text("name", report) {
+fn name(root: &Section<'_>, path: &Path) -> String {
+    match root.text("name") {
         Field::Given(found) if is_plain(found.value) => return found.value.to_owned(),
         Field::Given(found) => {
             let title = "`name` is not a plain file name";
-            report.push(Diagnostic::new(title).at(&found.at, format!("expected {PLAIN_NAME}")));
+            let refusal = Diagnostic::new(title).at(&found.at, format!("expected {PLAIN_NAME}"));
+            root.report.push(refusal);
         }
         Field::Bad => {}
         Field::Absent => {
@@ -127,100 +122,89 @@ fn name(root: &mut Section<'_>, path: &Path, report: &mut Report) -> String {
                 return stem.to_owned();
             }
             let title = "`name` is missing, and the file's own name cannot stand in for it";
-            report.push_missing(
-                Diagnostic::new(title).at(root.at(), format!("expected {PLAIN_NAME}")),
-            );
+            let refusal = Diagnostic::new(title).at(root.at(), format!("expected {PLAIN_NAME}"));
+            root.report.push_missing(refusal);
         }
     }
     String::new()
 }
 
 /// End and both edges of the window, in s.
-fn time(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> [f64; 3] {
+fn time(root: &Section<'_>) -> [f64; 3] {
     const STAND_IN: [f64; 3] = [50.0, 0.0, 50.0];
-    let field = root.table("time", "[time]", report);
-    let Some(section) = root.require(field, "time", "a section [time]", report) else {
+    let report = root.report;
+    let Some(section) = root.require(root.table("time", "[time]"), "time", "a section [time]")
+    else {
         return STAND_IN;
     };
-    let mut section = section.value;
-    let field = section.number("end_s", Range::Any, report);
-    let end = section.require(field, "end_s", "the end of the integration in s", report);
-    let end = end.filter(|end| {
-        let sound = 0.0 < end.value && end.value <= LONGEST_S;
-        if !sound {
+    let section = section.value;
+    let field = section.number("end_s", Range::Any);
+    let end = section.require(field, "end_s", "the end of the integration in s");
+    let end = end.and_then(|end| match 0.0 < end.value && end.value <= LONGEST_S {
+        true => Some(end),
+        false => {
             let title = format!("`end_s` = {} is out of range", decimal(end.value));
             let expected = format!("expected a time greater than 0, at most {LONGEST_S:e} s");
-            report.push(Diagnostic::new(title).at(&end.at, expected));
+            report.refuse(&end.at, title, expected)
         }
-        sound
     });
-    let window = section.numbers("window_s", Range::NonNegative, report).given();
+    let window = section.numbers("window_s", Range::NonNegative).given();
     if let Some(Located { value, .. }) = &window
         && let [from, to] = value.as_slice()
     {
-        origins.put("window_from_s".to_owned(), from.at.clone());
-        origins.put("window_to_s".to_owned(), to.at.clone());
+        report.put("window_from_s", from.at.clone());
+        report.put("window_to_s", to.at.clone());
     }
-    let window = window.and_then(|window| self::window(window, end.as_ref(), report));
-    section.finish(report);
+    let window = window.and_then(|window| self::window(&window, end.as_ref(), report));
+    section.finish();
     let Some(end) = end else { return STAND_IN };
     let [from_s, to_s] = window.unwrap_or([0.0, end.value]);
-    origins.put("time.end_s".to_owned(), end.at);
+    report.put("time.end_s", end.at);
     [end.value, from_s, to_s]
 }
 
 fn window(
-    window: Located<Vec<Located<f64>>>,
+    window: &Located<Vec<Located<f64>>>,
     end: Option<&Located<f64>>,
-    report: &mut Report,
+    report: &Report,
 ) -> Option<[f64; 2]> {
     let [from, to] = window.value.as_slice() else {
         let title = format!("`window_s` has {} numbers", window.value.len());
-        report.push(Diagnostic::new(title).at(&window.at, "expected two, [from, to], in s"));
-        return None;
+        return report.refuse(&window.at, title, "expected two, [from, to], in s");
     };
+    let [from_said, to_said] = [from, to].map(|edge| decimal(edge.value));
     if from.value >= to.value {
         let what = if from.value > to.value { "reversed" } else { "empty" };
-        let title = format!(
-            "the window is {what}: it goes from {} s to {} s",
-            decimal(from.value),
-            decimal(to.value)
-        );
-        report.push(Diagnostic::new(title).at(&window.at, "expected [from, to] with from < to"));
-        return None;
+        let title = format!("the window is {what}: it goes from {from_said} s to {to_said} s");
+        return report.refuse(&window.at, title, "expected [from, to] with from < to");
     }
     if let Some(end) = end.filter(|end| to.value > end.value) {
-        let title = format!("the window ends at {} s, after the integration", decimal(to.value));
-        let expected = format!("expected at most {}", decimal(end.value));
-        report.push(
-            Diagnostic::new(title).at(&to.at, expected).at(&end.at, "the integration ends here"),
-        );
+        let title = format!("the window ends at {to_said} s, after the integration");
+        let refusal =
+            Diagnostic::new(title).at(&to.at, format!("expected at most {}", decimal(end.value)));
+        report.push(refusal.at(&end.at, "the integration ends here"));
         return None;
     }
     Some([from.value, to.value])
 }
 
-fn integrator<I: Integrator>(
-    root: &mut Section<'_>,
-    origins: &mut Origins,
-    report: &mut Report,
-) -> I {
+fn integrator<I: Integrator>(root: &Section<'_>) -> I {
     let stand_in = || default_method::<I>().with_defaults();
-    let Some(section) = root.table("integrator", "[integrator]", report).given() else {
+    let Some(section) = root.table("integrator", "[integrator]").given() else {
         return stand_in();
     };
-    let mut section = section.value;
-    origins.put("integrator".to_owned(), section.at().clone());
+    let section = section.value;
+    root.report.put("integrator", section.at().clone());
     let names: Vec<_> = I::methods().iter().map(|entry| entry.name).collect();
-    let method = match section.choice("method", &names, report) {
+    let method = match section.choice("method", &names) {
         Field::Given(place) => &I::methods()[place.value],
         Field::Absent => default_method::<I>(),
         Field::Bad => {
             // An unknown method has no list of keys, but each key has its range.
             for (setting, _) in settings::<I>() {
-                let _ = section.number(setting.key, setting.range, report);
+                let _ = section.number(setting.key, setting.range);
             }
-            section.finish(report);
+            section.finish();
             return stand_in();
         }
     };
@@ -235,33 +219,25 @@ fn integrator<I: Integrator>(
     }
     let integrator = (method.with)(&mut |setting| {
         if let Some(at) = section.key_at(setting.key) {
-            origins.put(format!("integrator.{}", setting.key), at);
+            root.report.put(format!("integrator.{}", setting.key), at);
         }
-        let number = section.number(setting.key, setting.range, report);
-        number.or(setting.default).unwrap_or(setting.default)
+        section.number(setting.key, setting.range).or(setting.default).unwrap_or(setting.default)
     });
-    section.finish(report);
+    section.finish();
     integrator
 }
 
-fn reliability<M: Read>(
-    root: &mut Section<'_>,
-    model: &mut M,
-    origins: &mut Origins,
-    report: &mut Report,
-) -> Reliability<M> {
+fn reliability<M: Read>(root: &Section<'_>, model: &mut M) -> Reliability<M> {
     let stand_in =
         Reliability { ratio_limit: DEFAULT_RATIO_LIMIT, channels: M::default_channels() };
-    let Some(section) = root.table("reliability", "[reliability]", report).given() else {
+    let Some(section) = root.table("reliability", "[reliability]").given() else {
         return stand_in;
     };
-    let mut section = section.value;
-    model.read_reliability(&mut section, origins, report);
-    let ratio_limit =
-        section.number("ratio_limit", Range::Positive, report).or(DEFAULT_RATIO_LIMIT);
-    let every = M::Channel::every();
-    let channels = names(&mut section, "channels", "channel", every, M::Channel::name, report);
-    section.finish(report);
+    let section = section.value;
+    model.read_reliability(&section);
+    let ratio_limit = section.number("ratio_limit", Range::Positive).or(DEFAULT_RATIO_LIMIT);
+    let channels = names(&section, "channels", "channel", M::Channel::every(), M::Channel::name);
+    section.finish();
     Reliability {
         ratio_limit: ratio_limit.unwrap_or(DEFAULT_RATIO_LIMIT),
         channels: channels.unwrap_or(stand_in.channels),
@@ -270,33 +246,49 @@ fn reliability<M: Read>(
 
 /// A list of some of `all`, each once, by their names; an empty one is a mistake.
 pub fn names<T: Copy + PartialEq>(
-    section: &mut Section<'_>,
+    section: &Section<'_>,
     key: &'static str,
     what: &str,
     all: &[T],
     name: fn(T) -> &'static str,
-    report: &mut Report,
 ) -> Option<Vec<T>> {
-    let known: Vec<&str> = all.iter().copied().map(name).collect();
-    let list = section.texts(key, report).given()?;
+    let list = section.texts(key).given()?;
     if list.value.is_empty() {
+        let known: Vec<&str> = all.iter().copied().map(name).collect();
         let expected = format!("expected at least one of `{}`", known.join("`, `"));
-        report.push(Diagnostic::new(format!("`{key}` is empty")).at(&list.at, expected));
+        section.report.push(Diagnostic::new(format!("`{key}` is empty")).at(&list.at, expected));
     }
-    let mut chosen: Vec<Located<T>> = Vec::new();
-    for found in list.value {
-        let Some(&one) = all.iter().find(|one| name(**one) == found.value) else {
-            report.push_with(|_| unknown_word(what, &found, &known));
-            continue;
-        };
-        match chosen.iter().find(|other| other.value == one) {
-            Some(first) => report.push(
-                Diagnostic::new(format!("the {what} \"{}\" is given twice", found.value))
-                    .at(&found.at, format!("expected each {what} once"))
-                    .at(&first.at, "first given here"),
-            ),
-            None => chosen.push(Located { value: one, at: found.at }),
+    Some(some_of(list.value, what, all, name, section.report).0)
+}
+
+/// Those of `all` that are named, each once, and whether that is what every name says.
+pub fn some_of<'t, T: Copy + PartialEq>(
+    found: impl IntoIterator<Item = Located<&'t str>>,
+    what: &str,
+    all: &[T],
+    name: fn(T) -> &'static str,
+    report: &Report,
+) -> (Vec<T>, bool) {
+    let known: Vec<&str> = all.iter().copied().map(name).collect();
+    let (mut chosen, mut is_sound): (Vec<Located<T>>, _) = (Vec::new(), true);
+    for found in found {
+        let one = all.iter().find(|one| name(**one) == found.value);
+        let first = chosen.iter().find(|other| Some(&other.value) == one);
+        is_sound &= one.is_some() && first.is_none();
+        match (one, first) {
+            (None, _) => report.push_with(|_| unknown_word(what, &found, &known)),
+            (Some(_), Some(first)) => {
+                let title = format!("the {what} \"{}\" is given twice", found.value);
+                let refusal =
+                    Diagnostic::new(title).at(&found.at, format!("expected each {what} once"));
+                // Names of one argument have one place.
+                report.push(match first.at == found.at {
+                    true => refusal,
+                    false => refusal.at(&first.at, "first given here"),
+                });
+            }
+            (Some(&value), None) => chosen.push(Located { value, at: found.at }),
         }
     }
-    Some(chosen.into_iter().map(|one| one.value).collect())
+    (chosen.into_iter().map(|one| one.value).collect(), is_sound)
 }

@@ -93,7 +93,7 @@ impl List {
 }
 
 /// Reads the listed points.
-pub(super) fn read(file: &Located<&str>, grid: &Path, report: &mut Report) -> Option<List> {
+pub(super) fn read(file: &Located<&str>, grid: &Path, report: &Report) -> Option<List> {
     let path = beside(grid, file.value);
     let shown = cut(&path.display().to_string(), LONGEST_PATH);
     let read = bytes(&path).and_then(|bytes| {
@@ -108,9 +108,9 @@ pub(super) fn read(file: &Located<&str>, grid: &Path, report: &mut Report) -> Op
         let text = String::from_utf8(bytes)
             .map_err(|error| Unreadable::NotText(error.utf8_error().valid_up_to() + 1))?;
         // Messages quote the text when all is read; until then it is held here.
-        let source = report.sources.add(shown.as_str(), String::new());
+        let source = report.add(shown.as_str(), String::new());
         let read = csv::read(&text, source, report);
-        report.sources.fill(source, text);
+        report.fill(source, text);
         let (columns, starts) = match read? {
             Some(read) => read,
             None => return Ok(None),

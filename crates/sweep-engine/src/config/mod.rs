@@ -27,7 +27,6 @@ mod canonical;
 pub mod design;
 pub mod grid;
 mod list;
-pub mod origins;
 pub mod parameters;
 mod points;
 pub mod read;
@@ -44,7 +43,6 @@ use std::marker::PhantomData;
 use std::path::PathBuf;
 
 pub use grid::Draft;
-pub use origins::Origins;
 pub use points::{check_columns, not_numbers, other_length};
 pub use read::{Read, Schema};
 pub use report::{Diagnostics, Mistake};
@@ -107,7 +105,7 @@ impl<M: Read> GridInput<M> {
     /// # Errors
     /// Every mistake found, in one pass.
     pub fn load(&self) -> Result<Plan<M>, Diagnostics> {
-        resolve(self, |_, _| ()).map(|(plan, ())| plan)
+        resolve(self, |_| ()).map(|(plan, ())| plan)
     }
 
     /// As [`Self::load`], for one point: `at` gives each axis of several values one (on the grid or
@@ -117,7 +115,7 @@ impl<M: Read> GridInput<M> {
     /// # Errors
     /// Every mistake found, in one pass.
     pub fn load_point(&self, at: &[String]) -> Result<(Plan<M>, NamedValues), Diagnostics> {
-        resolve(self, |draft, report| parameters::point(at, draft, report))
+        resolve(self, |draft| parameters::point(at, draft))
     }
 }
 
@@ -134,16 +132,17 @@ pub type NamedValues = Vec<(String, f64)>;
 
 fn resolve<M: Read, T>(
     input: &GridInput<M>,
-    finish: impl FnOnce(&mut Draft<M>, &mut Report) -> T,
+    finish: impl FnOnce(&mut Draft<'_, M>) -> T,
 ) -> Result<(Plan<M>, T), Diagnostics> {
-    let mut report = Report::default();
-    let Some(mut draft) = grid::draft(input, &mut report) else {
+    let report = Report::default();
+    let Some(mut draft) = grid::draft(input, &report) else {
         return Err(report.into_diagnostics());
     };
-    let finished = finish(&mut draft, &mut report);
-    whole::steps(&draft, &mut report);
-    M::judge(&draft, &mut report);
-    report.finish((draft.plan, finished))
+    let finished = finish(&mut draft);
+    whole::steps(&draft);
+    M::judge(&draft);
+    let plan = draft.plan;
+    report.finish((plan, finished))
 }
 
 /// Mistakes in expressions that an option or argument takes, each with its text.
@@ -152,9 +151,9 @@ pub fn mistakes_in_expressions<'a>(
     option: &str,
     mistakes: impl IntoIterator<Item = (&'a str, sweep_results::Mistake)>,
 ) -> Diagnostics {
-    let mut report = Report::default();
+    let report = Report::default();
     for (text, mistake) in mistakes {
-        let source = report.sources.add(option, text);
+        let source = report.add(option, text);
         let at = Location::new(source, mistake.span);
         let mut diagnostic = Diagnostic::new(mistake.title).at(&at, mistake.expected);
         if let Some((typed, names)) = &mistake.candidates {

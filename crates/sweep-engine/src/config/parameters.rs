@@ -8,10 +8,10 @@ use sweep_parameter::{Parameter as _, Range};
 use super::NamedValues;
 use super::Read;
 use super::grid::Draft;
-use super::report::{Diagnostic, Report};
-use super::scalars;
-use super::section::{Section, check_number, quoted, short};
-use super::source::{Located, Location};
+use super::report::Diagnostic;
+use super::scalars::{self, Written};
+use super::section::{Section, quoted};
+use super::source::Located;
 use crate::model::UnknownParameter;
 use crate::plan::Plan;
 use crate::program::program;
@@ -36,27 +36,21 @@ pub struct WrittenConstant {
 }
 
 /// Reads `[set]`, then `--set`, which overrides it, and writes both into the plan.
-pub fn constants<M: Read>(
-    root: &mut Section<'_>,
-    sets: &[String],
-    draft: &mut Draft<M>,
-    report: &mut Report,
-) {
+pub fn constants<M: Read>(root: &Section<'_>, sets: &[String], draft: &mut Draft<'_, M>) {
     let mut constants = Vec::new();
-    if let Some(section) = root.table("set", "[set]", report).given() {
+    if let Some(section) = root.table("set", "[set]").given() {
         let section = section.value;
         for name in section.names() {
-            let number =
-                |range: Range, report: &mut Report| section.number_named(name.value, range, report);
-            constants.extend(constant(name.clone(), number, draft, report));
+            let number = |range: Range| section.number_named(name.value, range);
+            constants.extend(constant(name.clone(), number, draft));
         }
-        apply(&constants, draft, report);
+        apply(&constants, draft);
     }
     let sets: Vec<String> =
         sets.iter().filter(|argument| !scalars::is_one::<M>(argument)).cloned().collect();
-    let constants = arguments("--set", &sets, draft, report);
+    let constants = arguments("--set", &sets, draft);
     let before = draft.plan.clone();
-    apply(&constants, draft, report);
+    apply(&constants, draft);
     // What is set to what it was leaves the plan as it was.
     let changes = |constant: &&Constant<'_, M>| {
         let mut after = before.clone();
@@ -72,8 +66,8 @@ pub fn constants<M: Read>(
 
 /// Puts one point in place of the axes: `--at` gives every axis of several values, and may give
 /// more.
-pub fn point<M: Read>(at: &[String], draft: &mut Draft<M>, report: &mut Report) -> NamedValues {
-    let constants = arguments("--at", at, draft, report);
+pub fn point<M: Read>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
+    let constants = arguments("--at", at, draft);
     let named = |name: &str| {
         at.iter().any(|argument| argument.split('=').next().is_some_and(|n| n.trim() == name))
     };
@@ -83,17 +77,17 @@ pub fn point<M: Read>(at: &[String], draft: &mut Draft<M>, report: &mut Report) 
         }
         if axis.values.len() == 1 {
             write(&axis.parameter, &mut draft.plan, axis.values.value(0));
-        } else if let Some(place) = draft.origins.get(&format!("axis[{k}]")) {
+        } else if let Some(place) = draft.report.place(&format!("axis[{k}]")) {
             let name = axis.parameter.name();
             let title = format!("a point of the grid needs a value of `{name}`");
-            report.push(
+            draft.report.push(
                 Diagnostic::new(title)
-                    .at(place, format!("expected --at {name}=VALUE for this axis")),
+                    .at(&place, format!("expected --at {name}=VALUE for this axis")),
             );
         }
     }
     draft.plan.design = None;
-    apply(&constants, draft, report);
+    apply(&constants, draft);
     constants
         .iter()
         .map(|constant| (constant.name.value.to_owned(), constant.value.value))
@@ -104,56 +98,31 @@ pub fn point<M: Read>(at: &[String], draft: &mut Draft<M>, report: &mut Report) 
 fn arguments<'a, M: Read>(
     option: &str,
     arguments: &'a [String],
-    draft: &Draft<M>,
-    report: &mut Report,
+    draft: &Draft<'a, M>,
 ) -> Vec<Constant<'a, M>> {
-    let mut constants = Vec::new();
-    for argument in arguments {
-        let source = report.sources.add(option, argument.as_str());
-        let whole = Location::new(source, 0..argument.len());
-        let Some((name, value)) = argument.split_once('=') else {
-            let title = format!("`{}` is not a constant", short(argument));
-            report.push(Diagnostic::new(title).at(&whole, "expected NAME=VALUE"));
-            continue;
-        };
-        let value_at = Location::new(source, name.len() + 1..argument.len());
-        let name = Located { value: name.trim(), at: Location::new(source, 0..name.len()) };
-        let number = |range: Range, report: &mut Report| match value.trim().parse() {
-            Ok(number) => check_number(&quoted(name.value), number, value_at, range, report),
-            Err(_) => {
-                let title = format!("`{}` is not a number", short(value));
-                report.push(Diagnostic::new(title).at(&value_at, format!("expected {range}")));
-                None
-            }
-        };
-        constants.extend(constant(name.clone(), number, draft, report));
-    }
-    constants
+    let written = arguments.iter().filter_map(|one| Written::read(option, one, draft.report));
+    let constant = |one: Written<'a>| constant(one.name.clone(), |range| one.number(range), draft);
+    written.filter_map(constant).collect()
 }
 
 /// A constant if its name is right and `number` has one in the parameter's range.
 fn constant<'a, M: Read>(
     name: Located<&'a str>,
-    number: impl FnOnce(Range, &mut Report) -> Option<Located<f64>>,
-    draft: &Draft<M>,
-    report: &mut Report,
+    number: impl FnOnce(Range) -> Option<Located<f64>>,
+    draft: &Draft<'_, M>,
 ) -> Option<Constant<'a, M>> {
-    let parameter = find(&name, draft, report)?;
-    let value = number(parameter.range(), report)?;
+    let parameter = find(&name, draft)?;
+    let value = number(parameter.range())?;
     Some(Constant { name, parameter, value })
 }
 
 /// The parameter of this name.
-pub fn find<M: Read>(
-    name: &Located<&str>,
-    draft: &Draft<M>,
-    report: &mut Report,
-) -> Option<M::Parameter> {
+pub fn find<M: Read>(name: &Located<&str>, draft: &Draft<'_, M>) -> Option<M::Parameter> {
     let error = match draft.plan.model.find(name.value) {
         Ok(parameter) => return Some(parameter),
         Err(error) => error,
     };
-    report.push_with(|_| unknown(name, &error, &draft.plan.model));
+    draft.report.push_with(|_| unknown(name, &error, &draft.plan.model));
     None
 }
 
@@ -189,16 +158,16 @@ pub fn unknown<M: Read>(
 
 /// Writes constants of equal rank; no number may be written twice, as nothing says which comes
 /// last.
-fn apply<M: Read>(constants: &[Constant<'_, M>], draft: &mut Draft<M>, report: &mut Report) {
+fn apply<M: Read>(constants: &[Constant<'_, M>], draft: &mut Draft<'_, M>) {
     let mut written: BTreeMap<Cow<'static, str>, &Constant<'_, M>> = BTreeMap::new();
     for constant in constants {
         let parts = draft.plan.model.parts(&constant.parameter);
         match parts.iter().find_map(|part| written.get(part)) {
-            Some(first) => report.push(twice(&constant.name, &first.name)),
+            Some(first) => draft.report.push(twice(&constant.name, &first.name)),
             None => {
                 write(&constant.parameter, &mut draft.plan, constant.value.value);
                 for part in &parts {
-                    draft.origins.put(part.clone().into_owned(), constant.value.at.clone());
+                    draft.report.put(part.clone().into_owned(), constant.value.at.clone());
                     written.insert(part.clone(), constant);
                 }
                 let name =

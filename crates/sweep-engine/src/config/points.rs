@@ -25,9 +25,9 @@ pub fn check_columns<M: Read, V>(
 where
     V: Iterator<Item = Option<f64>>,
 {
-    let mut report = Report::default();
+    let report = Report::default();
     let header = names.join(",");
-    let source = report.sources.add("table", header.as_str());
+    let source = report.add("table", header.as_str());
     let mut start = 0;
     let located = |name: &&'_ str| {
         let at = Location::new(source, start..start + name.len());
@@ -83,8 +83,8 @@ pub fn other_length(names: &[String], column: usize, length: usize, first: usize
 }
 
 fn of_column(names: &[String], column: usize, title: String, expected: String) -> Diagnostics {
-    let mut report = Report::default();
-    let source = report.sources.add("table", names.join(","));
+    let report = Report::default();
+    let source = report.add("table", names.join(","));
     let start = names[..column].iter().map(|name| name.len() + 1).sum();
     let at = Location::new(source, start..start + names[column].len());
     report.push(Diagnostic::new(title).at(&at, expected));

@@ -2,10 +2,9 @@
 
 use serde_json::{Map, Value};
 
-use super::report::Report;
 use super::scalars::Written;
 use super::section::Section;
-use super::{Draft, GridInput, Origins};
+use super::{Draft, GridInput};
 use crate::model::Model;
 
 /// A model in grid files. The engine reads `name`, `[set]`, `[time]`, `[integrator]`,
@@ -17,22 +16,11 @@ pub trait Read: Model {
     /// What to do where there is no grid file yet.
     const TO_START: Option<&'static str> = None;
 
-    /// Reads the model's keys at the top of a grid file.
-    fn read(
-        input: &GridInput<Self>,
-        root: &mut Section<'_>,
-        origins: &mut Origins,
-        report: &mut Report,
-    ) -> Self;
-
-    /// Reads what stands before `[reliability]`.
-    fn read_before_reliability(&mut self, _: &mut Section<'_>, _: &mut Origins, _: &mut Report) {}
+    /// Reads the model's keys of a grid file.
+    fn read(input: &GridInput<Self>, root: &Section<'_>) -> Self;
 
     /// Reads what is the model's of `[reliability]`.
-    fn read_reliability(&mut self, _: &mut Section<'_>, _: &mut Origins, _: &mut Report) {}
-
-    /// Reads what stands behind `[reliability]`.
-    fn read_after_reliability(&mut self, _: &mut Section<'_>, _: &mut Origins, _: &mut Report) {}
+    fn read_reliability(&mut self, _: &Section<'_>) {}
 
     /// What `--set` takes beside parameters and the engine's own settings.
     fn scalars() -> &'static [&'static str] {
@@ -40,13 +28,13 @@ pub trait Read: Model {
     }
 
     /// Puts one of them in place; its value as it stands in the plan.
-    fn put(_: &Written<'_>, _: &mut Draft<Self>, _: &mut Report) -> Option<Value> {
+    fn put(_: &Written<'_>, _: &mut Draft<'_, Self>) -> Option<Value> {
         None
     }
 
     /// Judges the whole, once every value is in place.
-    fn judge(draft: &Draft<Self>, report: &mut Report) {
-        super::whole::windows(draft, report);
+    fn judge(draft: &Draft<'_, Self>) {
+        super::whole::windows(draft);
     }
 
     /// Writes the model into a plan as JSON; a default may be left out.

@@ -1,5 +1,6 @@
 //! Mistakes as they are found: collected, not thrown, so that one pass shows them all.
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
@@ -49,11 +50,19 @@ impl Diagnostic {
     }
 }
 
-/// Texts read and mistakes found so far.
+/// Texts read, where their numbers stand, and mistakes found so far. All who read share it.
 #[derive(Debug, Default)]
 pub struct Report {
-    /// Texts read so far.
-    pub sources: Sources,
+    sources: RefCell<Sources>,
+    found: RefCell<Found>,
+    /// Places of resolved numbers, so that a check made later can still point at them.
+    places: RefCell<BTreeMap<String, Location>>,
+    /// Numbers that were refused or missing: a stand-in holds their place.
+    doubtful: RefCell<BTreeSet<String>>,
+}
+
+#[derive(Debug, Default)]
+struct Found {
     found: Vec<Diagnostic>,
     beyond: usize,
     /// Lines that are not TOML: what recovery makes of them is not the user's mistake.
@@ -62,75 +71,118 @@ pub struct Report {
     swallowed: BTreeMap<SourceId, usize>,
 }
 
-impl Report {
-    /// Keeps a mistake, unless it is on a line whose syntax is already refused.
-    pub fn push(&mut self, diagnostic: Diagnostic) {
-        self.push_with(|_| diagnostic);
-    }
-
-    /// As [`Report::push`], but a mistake beyond those kept is only counted: finding its line, or
-    /// the nearest name, a million times over would take minutes.
-    pub fn push_with(&mut self, diagnose: impl FnOnce(&Sources) -> Diagnostic) {
-        if self.is_full() {
-            self.beyond += 1;
-            return;
-        }
-        let diagnostic = diagnose(&self.sources);
-        let broken = diagnostic.places.first().is_some_and(|(at, _)| {
-            let swallowed =
-                self.swallowed.get(&at.source).is_some_and(|&from| at.span.start >= from);
-            let broken = self.broken.get(&at.source);
-            swallowed || broken.is_some_and(|lines| lines.contains(&self.sources.line(at).number))
-        });
-        if broken {
-            return;
-        }
-        self.keep(diagnostic);
-    }
-
-    /// Keeps a mistake of syntax, the first of each line.
-    pub fn push_syntax(&mut self, diagnostic: Diagnostic) {
-        if self.is_full() {
-            self.beyond += 1;
-            return;
-        }
-        let first = diagnostic.places.first().is_none_or(|(at, _)| {
-            let number = self.sources.line(at).number;
-            self.broken.entry(at.source).or_default().insert(number)
-        });
-        if first {
-            self.keep(diagnostic);
-        }
-    }
-
-    /// Takes what follows a place for the inside of an array that is never closed.
-    pub fn swallow(&mut self, from: &Location) {
-        self.swallowed.insert(from.source, from.span.start);
-    }
-
-    /// Keeps the report of a missing key, unless broken syntax may have swallowed it.
-    pub fn push_missing(&mut self, diagnostic: Diagnostic) {
-        if !diagnostic.places.iter().any(|(at, _)| self.broken.contains_key(&at.source)) {
-            self.keep(diagnostic);
-        }
-    }
-
+impl Found {
     fn keep(&mut self, diagnostic: Diagnostic) {
-        if self.is_full() {
+        if self.found.len() >= KEPT {
             self.beyond += 1;
         } else {
             self.found.push(diagnostic);
         }
     }
+}
+
+impl Report {
+    /// Keeps a text under the name that messages show.
+    pub fn add(&self, name: impl Into<String>, text: impl Into<String>) -> SourceId {
+        self.sources.borrow_mut().add(name, text)
+    }
+
+    /// Puts in the text of a source that was kept under its name alone.
+    pub fn fill(&self, id: SourceId, text: String) {
+        self.sources.borrow_mut().fill(id, text);
+    }
+
+    /// Keeps the place of a number by its key: a parameter's name, `time.end_s` and the like for
+    /// the rest of the grid file, `spin.time_s[3]` for an entry of an array, `axis[0]` for an axis.
+    pub fn put(&self, key: impl Into<String>, at: Location) {
+        self.places.borrow_mut().insert(key.into(), at);
+    }
+
+    /// Marks a number that was refused or missing: what depends on it is not judged.
+    pub fn doubt(&self, key: impl Into<String>) {
+        self.doubtful.borrow_mut().insert(key.into());
+    }
+
+    /// The place of a number, if it was written.
+    pub fn place(&self, key: &str) -> Option<Location> {
+        self.places.borrow().get(key).cloned()
+    }
+
+    /// Whether it was refused or missing.
+    pub fn is_doubtful(&self, key: &str) -> bool {
+        self.doubtful.borrow().contains(key)
+    }
+
+    /// Keeps a mistake, unless it is on a line whose syntax is already refused.
+    pub fn push(&self, diagnostic: Diagnostic) {
+        self.push_with(|_| diagnostic);
+    }
+
+    /// Keeps a mistake at one place: what is wrong, and what was expected there. There is no value.
+    pub fn refuse<T>(
+        &self,
+        at: &Location,
+        title: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Option<T> {
+        self.push(Diagnostic::new(title).at(at, expected));
+        None
+    }
+
+    /// As [`Report::push`], but a mistake beyond those kept is only counted: finding its line, or
+    /// the nearest name, a million times over would take minutes.
+    pub fn push_with(&self, diagnose: impl FnOnce(&Sources) -> Diagnostic) {
+        if self.is_full() {
+            self.found.borrow_mut().beyond += 1;
+            return;
+        }
+        let sources = self.sources.borrow();
+        let diagnostic = diagnose(&sources);
+        let mut found = self.found.borrow_mut();
+        let broken = diagnostic.places.first().is_some_and(|(at, _)| {
+            let swallowed = found.swallowed.get(&at.source).is_some_and(|&f| at.span.start >= f);
+            let broken = found.broken.get(&at.source);
+            swallowed || broken.is_some_and(|lines| lines.contains(&sources.line(at).number))
+        });
+        if !broken {
+            found.keep(diagnostic);
+        }
+    }
+
+    /// Keeps a mistake of syntax, the first of each line.
+    pub fn push_syntax(&self, diagnostic: Diagnostic) {
+        let mut found = self.found.borrow_mut();
+        let first = found.found.len() >= KEPT
+            || diagnostic.places.first().is_none_or(|(at, _)| {
+                let number = self.sources.borrow().line(at).number;
+                found.broken.entry(at.source).or_default().insert(number)
+            });
+        if first {
+            found.keep(diagnostic);
+        }
+    }
+
+    /// Takes what follows a place for the inside of an array that is never closed.
+    pub fn swallow(&self, from: &Location) {
+        self.found.borrow_mut().swallowed.insert(from.source, from.span.start);
+    }
+
+    /// Keeps the report of a missing key, unless broken syntax may have swallowed it.
+    pub fn push_missing(&self, diagnostic: Diagnostic) {
+        let mut found = self.found.borrow_mut();
+        if !diagnostic.places.iter().any(|(at, _)| found.broken.contains_key(&at.source)) {
+            found.keep(diagnostic);
+        }
+    }
 
     /// Whether further mistakes would only be counted.
     pub fn is_full(&self) -> bool {
-        self.found.len() >= KEPT
+        self.found.borrow().found.len() >= KEPT
     }
 
     /// Whether nothing is wrong so far.
     pub fn is_clean(&self) -> bool {
-        self.found.is_empty()
+        self.found.borrow().found.is_empty()
     }
 
     /// The value if nothing is wrong.
@@ -139,9 +191,10 @@ impl Report {
     }
 
     /// Everything that was found.
-    pub fn into_diagnostics(mut self) -> Diagnostics {
-        self.found.sort_by_key(|d| d.places.first().map(|(at, _)| (at.source, at.span.start)));
-        Diagnostics { sources: self.sources, found: self.found, beyond: self.beyond }
+    pub fn into_diagnostics(self) -> Diagnostics {
+        let Found { mut found, beyond, .. } = self.found.into_inner();
+        found.sort_by_key(|d| d.places.first().map(|(at, _)| (at.source, at.span.start)));
+        Diagnostics { sources: self.sources.into_inner(), found, beyond }
     }
 }
 
@@ -232,7 +285,7 @@ mod tests {
 
     #[test]
     fn mistakes_beyond_what_is_kept_are_counted() {
-        let mut report = Report::default();
+        let report = Report::default();
         for _ in 0..1000 {
             report.push(Diagnostic::new("wrong"));
         }

@@ -2,6 +2,7 @@
 //! and the walk goes on, so that one pass finds every mistake. Keys nobody asked for are reported
 //! at the end.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
@@ -40,6 +41,14 @@ impl<T> Field<T> {
         }
     }
 
+    /// Another value at the same place.
+    pub fn map<U>(self, next: impl FnOnce(Located<T>) -> U) -> Field<U> {
+        self.then(|found| {
+            let at = found.at.clone();
+            Some(Located { value: next(found), at })
+        })
+    }
+
     fn then<U>(self, next: impl FnOnce(Located<T>) -> Option<Located<U>>) -> Field<U> {
         match self {
             Self::Absent => Field::Absent,
@@ -57,15 +66,23 @@ pub struct Section<'a> {
     title: String,
     at: Location,
     table: &'a DeTable<'a>,
-    known: Vec<&'static str>,
+    /// Takes what is wrong.
+    pub report: &'a Report,
+    known: RefCell<Vec<&'static str>>,
     /// Keys that are valid elsewhere, with the reason why not here.
-    misplaced: BTreeMap<&'static str, String>,
+    misplaced: RefCell<BTreeMap<&'static str, String>>,
 }
 
 impl<'a> Section<'a> {
     /// A table of a text.
-    pub fn new(title: impl Into<String>, at: Location, table: &'a DeTable<'a>) -> Self {
-        Self { title: title.into(), at, table, known: Vec::new(), misplaced: BTreeMap::new() }
+    pub fn new(
+        title: impl Into<String>,
+        at: Location,
+        table: &'a DeTable<'a>,
+        report: &'a Report,
+    ) -> Self {
+        let (known, misplaced) = Default::default();
+        Self { title: title.into(), at, table, report, known, misplaced }
     }
 
     /// Where the table begins.
@@ -77,8 +94,8 @@ impl<'a> Section<'a> {
         Location::new(self.at.source, span)
     }
 
-    fn get(&mut self, key: &'static str) -> Option<&'a Value<'a>> {
-        self.known.push(key);
+    fn get(&self, key: &'static str) -> Option<&'a Value<'a>> {
+        self.known.borrow_mut().push(key);
         self.table.get(key)
     }
 
@@ -88,48 +105,50 @@ impl<'a> Section<'a> {
     }
 
     /// Refuses these keys with a reason of their own instead of "unknown key".
-    pub fn misplace(&mut self, keys: &[&'static str], reason: &str) {
-        self.misplaced.extend(keys.iter().map(|&key| (key, reason.to_owned())));
+    pub fn misplace(&self, keys: &[&'static str], reason: &str) {
+        self.misplaced.borrow_mut().extend(keys.iter().map(|&key| (key, reason.to_owned())));
     }
 
     /// Reports a key that must be there.
-    pub fn require<T>(
-        &self,
-        field: Field<T>,
-        key: &str,
-        expected: &str,
-        report: &mut Report,
-    ) -> Option<Located<T>> {
+    pub fn require<T>(&self, field: Field<T>, key: &str, expected: &str) -> Option<Located<T>> {
         if matches!(field, Field::Absent) {
-            self.missing(key, expected, report);
+            self.missing(key, expected);
         }
         field.given()
     }
 
+    /// As [`Self::require`] where the key is needed, else the value if it is there.
+    pub fn require_if<T>(
+        &self,
+        needed: bool,
+        field: Field<T>,
+        key: &str,
+        expected: &str,
+    ) -> Option<Located<T>> {
+        if needed { self.require(field, key, expected) } else { field.given() }
+    }
+
     /// Reports a key that must be there and is not.
-    pub fn missing(&self, key: &str, expected: &str, report: &mut Report) {
+    pub fn missing(&self, key: &str, expected: &str) {
         let title = format!("`{key}` is missing in {}", self.title);
-        report.push_missing(Diagnostic::new(title).at(&self.at, format!("expected {expected}")));
+        self.report
+            .push_missing(Diagnostic::new(title).at(&self.at, format!("expected {expected}")));
     }
 
     /// A finite number in a range.
-    pub fn number(&mut self, key: &'static str, range: Range, report: &mut Report) -> Field<f64> {
+    pub fn number(&self, key: &'static str, range: Range) -> Field<f64> {
         let Some(value) = self.get(key) else { return Field::Absent };
-        number(&quoted(key), self.at.source, value, range, report).map_or(Field::Bad, Field::Given)
+        number(&quoted(key), self.at.source, value, range, self.report)
+            .map_or(Field::Bad, Field::Given)
     }
 
     /// A whole number from 1 to `most`.
-    pub fn count(&mut self, key: &'static str, most: u64, report: &mut Report) -> Field<u64> {
-        self.whole(key, 1..=most, report)
+    pub fn count(&self, key: &'static str, most: u64) -> Field<u64> {
+        self.whole(key, 1..=most)
     }
 
     /// A whole number within bounds.
-    pub fn whole(
-        &mut self,
-        key: &'static str,
-        bounds: RangeInclusive<u64>,
-        report: &mut Report,
-    ) -> Field<u64> {
+    pub fn whole(&self, key: &'static str, bounds: RangeInclusive<u64>) -> Field<u64> {
         let Some(value) = self.get(key) else { return Field::Absent };
         let at = self.place(value.span());
         let expected =
@@ -142,48 +161,37 @@ impl<'a> Section<'a> {
                     }
                     _ => {
                         let title = format!("`{key}` = {integer} is out of range");
-                        report.push(Diagnostic::new(title).at(&at, expected));
-                        Field::Bad
+                        self.report.refuse(&at, title, expected).map_or(Field::Bad, Field::Given)
                     }
                 }
             }
             other => {
-                report.push(wrong_kind(&quoted(key), &at, "a whole number", other));
+                self.report.push(wrong_kind(&quoted(key), &at, "a whole number", other));
                 Field::Bad
             }
         }
     }
 
     /// A string.
-    pub fn text(&mut self, key: &'static str, report: &mut Report) -> Field<&'a str> {
+    pub fn text(&self, key: &'static str) -> Field<&'a str> {
         let Some(value) = self.get(key) else { return Field::Absent };
-        text(&quoted(key), self.at.source, value, report).map_or(Field::Bad, Field::Given)
+        text(&quoted(key), self.at.source, value, self.report).map_or(Field::Bad, Field::Given)
     }
 
     /// One of a few words. Given back as the word's position in `choices`.
-    pub fn choice(
-        &mut self,
-        key: &'static str,
-        choices: &[&str],
-        report: &mut Report,
-    ) -> Field<usize> {
-        self.text(key, report).then(|found| {
+    pub fn choice(&self, key: &'static str, choices: &[&str]) -> Field<usize> {
+        self.text(key).then(|found| {
             let position = choices.iter().position(|&choice| choice == found.value);
             if position.is_none() {
-                report.push_with(|_| unknown_word(key, &found, choices));
+                self.report.push_with(|_| unknown_word(key, &found, choices));
             }
             position.map(|value| Located { value, at: found.at })
         })
     }
 
     /// An array of finite numbers in a range; a single wrong one makes it wrong.
-    pub fn numbers(
-        &mut self,
-        key: &'static str,
-        range: Range,
-        report: &mut Report,
-    ) -> Field<Vec<Located<f64>>> {
-        self.right_numbers(key, range, report).then(|found| {
+    pub fn numbers(&self, key: &'static str, range: Range) -> Field<Vec<Located<f64>>> {
+        self.right_numbers(key, range).then(|found| {
             let (numbers, all) = found.value;
             all.then_some(Located { value: numbers, at: found.at })
         })
@@ -191,17 +199,16 @@ impl<'a> Section<'a> {
 
     /// The right ones among an array of numbers, and whether those are all.
     pub fn right_numbers(
-        &mut self,
+        &self,
         key: &'static str,
         range: Range,
-        report: &mut Report,
     ) -> Field<(Vec<Located<f64>>, bool)> {
         let source = self.at.source;
-        self.items(key, "an array of numbers", report).then(|items| {
+        self.items(key, "an array of numbers").then(|items| {
             let numbers: Vec<_> = items
                 .value
                 .iter()
-                .filter_map(|item| number(&entry(key), source, item, range, report))
+                .filter_map(|item| number(&entry(key), source, item, range, self.report))
                 .collect();
             let all = numbers.len() == items.value.len();
             Some(Located { value: (numbers, all), at: items.at })
@@ -209,67 +216,59 @@ impl<'a> Section<'a> {
     }
 
     /// An array of strings, wrong ones left out and reported.
-    pub fn texts(
-        &mut self,
-        key: &'static str,
-        report: &mut Report,
-    ) -> Field<Vec<Located<&'a str>>> {
+    pub fn texts(&self, key: &'static str) -> Field<Vec<Located<&'a str>>> {
         let source = self.at.source;
-        self.items(key, "an array of strings", report).then(|items| {
+        self.items(key, "an array of strings").then(|items| {
             let texts = items
                 .value
                 .iter()
-                .filter_map(|item| text(&entry(key), source, item, report))
+                .filter_map(|item| text(&entry(key), source, item, self.report))
                 .collect();
             Some(Located { value: texts, at: items.at })
         })
     }
 
-    fn items(
-        &mut self,
-        key: &'static str,
-        kind: &str,
-        report: &mut Report,
-    ) -> Field<&'a [Value<'a>]> {
+    fn items(&self, key: &'static str, kind: &str) -> Field<&'a [Value<'a>]> {
         let Some(value) = self.get(key) else { return Field::Absent };
         let at = self.place(value.span());
         match value.get_ref() {
             DeValue::Array(items) => Field::Given(Located { value: items, at }),
             other => {
-                report.push(wrong_kind(&quoted(key), &at, kind, other));
+                self.report.push(wrong_kind(&quoted(key), &at, kind, other));
                 Field::Bad
             }
         }
     }
 
     /// A table under this key.
-    pub fn table(
-        &mut self,
-        key: &'static str,
-        title: &str,
-        report: &mut Report,
-    ) -> Field<Section<'a>> {
+    pub fn table(&self, key: &'static str, title: &str) -> Field<Section<'a>> {
         let Some(value) = self.get(key) else { return Field::Absent };
         let at = self.place(value.span());
         match value.get_ref() {
-            DeValue::Table(table) => {
-                Field::Given(Located { value: Section::new(title, at.clone(), table), at })
-            }
+            DeValue::Table(table) => Field::Given(Located {
+                value: Section::new(title, at.clone(), table, self.report),
+                at,
+            }),
             other => {
-                report.push(wrong_kind(&quoted(key), &at, &format!("a table, {title}"), other));
+                self.report.push(wrong_kind(
+                    &quoted(key),
+                    &at,
+                    &format!("a table, {title}"),
+                    other,
+                ));
                 Field::Bad
             }
         }
     }
 
     /// An array of tables, `[[key]]`; empty if it is not written.
-    pub fn tables(&mut self, key: &'static str, report: &mut Report) -> Vec<Section<'a>> {
+    pub fn tables(&self, key: &'static str) -> Vec<Section<'a>> {
         let kind = format!("tables, each under [[{key}]]");
         let items = match self.get(key).map(|value| (value, value.get_ref())) {
             None => return Vec::new(),
             Some((_, DeValue::Array(items))) => items,
             Some((value, other)) => {
-                report.push(wrong_kind(&quoted(key), &self.place(value.span()), &kind, other));
+                self.report.push(wrong_kind(&quoted(key), &self.place(value.span()), &kind, other));
                 return Vec::new();
             }
         };
@@ -277,10 +276,13 @@ impl<'a> Section<'a> {
         for (k, item) in items.iter().enumerate() {
             let at = self.place(item.span());
             match item.get_ref() {
-                DeValue::Table(table) => {
-                    sections.push(Section::new(format!("[[{key}]] number {}", k + 1), at, table))
-                }
-                other => report.push(wrong_kind(&entry(key), &at, &kind, other)),
+                DeValue::Table(table) => sections.push(Section::new(
+                    format!("[[{key}]] number {}", k + 1),
+                    at,
+                    table,
+                    self.report,
+                )),
+                other => self.report.push(wrong_kind(&entry(key), &at, &kind, other)),
             }
         }
         sections
@@ -296,33 +298,29 @@ impl<'a> Section<'a> {
     }
 
     /// The number under a name from [`Section::names`].
-    pub fn number_named(
-        &self,
-        name: &str,
-        range: Range,
-        report: &mut Report,
-    ) -> Option<Located<f64>> {
-        number(&quoted(name), self.at.source, self.table.get(name)?, range, report)
+    pub fn number_named(&self, name: &str, range: Range) -> Option<Located<f64>> {
+        number(&quoted(name), self.at.source, self.table.get(name)?, range, self.report)
     }
 
     /// Reports every key that was not asked for.
-    pub fn finish(self, report: &mut Report) {
+    pub fn finish(self) {
+        let (known, misplaced) = (self.known.into_inner(), self.misplaced.into_inner());
         for key in self.table.keys() {
             let name: &str = key.get_ref();
-            if self.known.contains(&name) {
+            if known.contains(&name) {
                 continue;
             }
-            report.push_with(|_| {
-                let at = self.place(key.span());
-                match self.misplaced.get(name) {
+            self.report.push_with(|_| {
+                let at = Location::new(self.at.source, key.span());
+                match misplaced.get(name) {
                     Some(reason) => {
                         Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
                             .at(&at, reason.as_str())
                     }
                     None => {
                         Diagnostic::new(format!("unknown key `{}` in {}", short(name), self.title))
-                            .at(&at, format!("expected {}", listed(&self.known)))
-                            .nearest(name, self.known.iter().copied())
+                            .at(&at, format!("expected {}", listed(&known)))
+                            .nearest(name, known.iter().copied())
                     }
                 }
             });
@@ -374,7 +372,7 @@ fn text<'a>(
     what: &str,
     source: SourceId,
     value: &'a Value<'a>,
-    report: &mut Report,
+    report: &Report,
 ) -> Option<Located<&'a str>> {
     let at = Location::new(source, value.span());
     match value.get_ref() {
@@ -391,7 +389,7 @@ fn number(
     source: SourceId,
     value: &Value<'_>,
     range: Range,
-    report: &mut Report,
+    report: &Report,
 ) -> Option<Located<f64>> {
     let at = Location::new(source, value.span());
     let number = match value.get_ref() {
@@ -414,7 +412,7 @@ pub fn check_number(
     value: f64,
     at: Location,
     range: Range,
-    report: &mut Report,
+    report: &Report,
 ) -> Option<Located<f64>> {
     if range.contains(value) {
         return Some(Located { value, at });

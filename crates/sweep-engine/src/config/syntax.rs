@@ -9,7 +9,7 @@ use super::source::{Location, SourceId};
 
 /// The table a text holds; what is not TOML is reported, what can be made out of the rest is
 /// returned.
-pub fn parse<'a>(text: &'a str, source: SourceId, report: &mut Report) -> Spanned<DeTable<'a>> {
+pub fn parse<'a>(text: &'a str, source: SourceId, report: &Report) -> Spanned<DeTable<'a>> {
     let (table, mut errors) = DeTable::parse_recoverable(text);
     errors.sort_by_key(start);
     // An array that is never closed swallows what follows. Only its first mistake says something of

@@ -6,29 +6,28 @@ use sweep_parameter::decimal;
 
 use super::Read;
 use super::grid::Draft;
-use super::report::{Diagnostic, Report};
+use super::report::Diagnostic;
 use super::source::{Location, Sources};
 use crate::method::{Integrator as _, Steps};
 use crate::plan::{MOST_STEPS, Scenario, shortest_step_s};
 
 /// A window that is none, at any corner of the grid.
-pub fn windows<M: Read>(draft: &Draft<M>, report: &mut Report) {
+pub fn windows<M: Read>(draft: &Draft<'_, M>) {
     let mut reported = BTreeSet::new();
     for corner in 0..draft.plan.corners() {
-        if report.is_full() || !reported.is_empty() {
+        if draft.report.is_full() || !reported.is_empty() {
             break;
         }
         let scenario = draft.plan.scenario_at(&draft.plan.corner(corner));
-        window(draft, &scenario, &mut reported, report);
+        window(draft, &scenario, &mut reported);
     }
 }
 
 /// A window that constants or axes have turned round, or moved past the end.
 pub fn window<M: Read>(
-    draft: &Draft<M>,
+    draft: &Draft<'_, M>,
     scenario: &Scenario<M>,
     reported: &mut BTreeSet<Vec<String>>,
-    report: &mut Report,
 ) {
     let [from_s, to_s] = scenario.window_s;
     let end_s = draft.plan.end_s;
@@ -45,7 +44,7 @@ pub fn window<M: Read>(
         decimal(to_s),
         decimal(end_s)
     );
-    report.push_with(|sources| {
+    draft.report.push_with(|sources| {
         let mut diagnostic = Diagnostic::new(title);
         for (k, place) in places(draft, &concerns, sources).iter().enumerate() {
             let label =
@@ -58,17 +57,21 @@ pub fn window<M: Read>(
 
 /// Where the concerned numbers were written: the axes that sweep them first, then files and
 /// arguments.
-pub fn places<M: Read>(draft: &Draft<M>, concerns: &[String], sources: &Sources) -> Vec<Location> {
+pub fn places<M: Read>(
+    draft: &Draft<'_, M>,
+    concerns: &[String],
+    sources: &Sources,
+) -> Vec<Location> {
     let sweeps = |parameter: &M::Parameter| {
         let parts = draft.plan.model.parts(parameter);
         parts.iter().any(|part| concerns.iter().any(|key| key == part))
     };
     let axes = draft.plan.axes.iter().enumerate().filter(|(_, axis)| sweeps(&axis.parameter));
-    let axes = axes.filter_map(|(k, _)| draft.origins.get(&format!("axis[{k}]")));
+    let axes = axes.filter_map(|(k, _)| draft.report.place(&format!("axis[{k}]")));
     let mut places: Vec<Location> = Vec::new();
-    for place in axes.chain(concerns.iter().filter_map(|key| draft.origins.get(key))) {
+    for place in axes.chain(concerns.iter().filter_map(|key| draft.report.place(key))) {
         // Numbers of one line, as of one vector, are one place.
-        let line = sources.line(place).number;
+        let line = sources.line(&place).number;
         let same = places
             .iter_mut()
             .find(|other| other.source == place.source && sources.line(other).number == line);
@@ -84,7 +87,7 @@ pub fn places<M: Read>(draft: &Draft<M>, concerns: &[String], sources: &Sources)
 }
 
 /// A fixed step that is longer than the run, or so short that a trajectory would never end.
-pub fn steps<M: Read>(draft: &Draft<M>, report: &mut Report) {
+pub fn steps<M: Read>(draft: &Draft<'_, M>) {
     let Steps::Fixed(step_s) = draft.plan.integrator.steps() else { return };
     let end_s = draft.plan.end_s;
     let steps = end_s / step_s;
@@ -102,17 +105,17 @@ pub fn steps<M: Read>(draft: &Draft<M>, report: &mut Report) {
     let expected =
         format!("expected a step from {:e} s to {} s", shortest_step_s(end_s), decimal(end_s));
     let refusal = refuse_step(draft, title, &expected);
-    report.push(
+    draft.report.push(
         draft
-            .origins
-            .get("time.end_s")
+            .report
+            .place("time.end_s")
             .into_iter()
-            .fold(refusal, |all, end| all.at(end, "and this")),
+            .fold(refusal, |all, end| all.at(&end, "and this")),
     );
 }
 
 /// A refusal of the step, pointing at it, or at the section that leaves it out.
-pub fn refuse_step<M: Read>(draft: &Draft<M>, title: String, expected: &str) -> Diagnostic {
-    let step = draft.origins.get("integrator.step_s").or_else(|| draft.origins.get("integrator"));
-    step.into_iter().fold(Diagnostic::new(title), |diagnostic, at| diagnostic.at(at, expected))
+pub fn refuse_step<M: Read>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
+    let step = draft.report.place("integrator.step_s").or_else(|| draft.report.place("integrator"));
+    step.into_iter().fold(Diagnostic::new(title), |diagnostic, at| diagnostic.at(&at, expected))
 }

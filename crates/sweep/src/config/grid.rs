@@ -1,8 +1,6 @@
 //! The washing machine's part of a grid file: `machine`, `[spin]`, `metrics`, the criterion of
 //! `[reliability]`, `[stability]`.
 
-use sweep_engine::config::Origins;
-use sweep_engine::config::grid::names;
 use sweep_engine::config::report::{Diagnostic, Report};
 use sweep_engine::config::section::{Field, Section, cut};
 use sweep_engine::config::source::{Location, beside, read};
@@ -22,74 +20,51 @@ const LONGEST_PATH: usize = 1000;
 const MACHINES: [&str; 1] = [DEFAULT_MACHINE];
 
 /// The machine that a grid names, or the one given in its place.
-pub(crate) fn machine(
-    input: &GridInput,
-    root: &mut Section<'_>,
-    origins: &mut Origins,
-    report: &mut Report,
-) -> Machine {
+pub(crate) fn machine(input: &GridInput, root: &Section<'_>) -> Machine {
+    let report = root.report;
     if let Some(text) = &input.own_file {
-        return machine_of(text, "its machine", origins, report);
+        return machine_of(text, "its machine", report);
     }
-    let Some(named) = root.text("machine", report).given() else { return Machine::paper() };
+    let Some(named) = root.text("machine").given() else { return Machine::paper() };
     if named.value == DEFAULT_MACHINE {
         return Machine::paper();
     }
     let path = beside(&input.path, named.value);
-    let text = match read(&path) {
-        Ok(text) => text,
+    match read(&path) {
+        Ok(text) => machine_of(&text, &path.display().to_string(), report),
         Err(error) => {
-            let title = format!(
-                "cannot read the machine file {}: {error}",
-                cut(&path.display().to_string(), LONGEST_PATH)
-            );
+            let shown = cut(&path.display().to_string(), LONGEST_PATH);
+            let title = format!("cannot read the machine file {shown}: {error}");
             let expected =
                 format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
-            report.push(
-                Diagnostic::new(title).at(&named.at, expected).nearest(named.value, MACHINES),
-            );
-            return Machine::paper();
+            let refusal = Diagnostic::new(title).at(&named.at, expected);
+            report.push(refusal.nearest(named.value, MACHINES));
+            Machine::paper()
         }
-    };
-    machine_of(&text, &path.display().to_string(), origins, report)
+    }
 }
 
 /// The machine of a machine file's text.
-fn machine_of(text: &str, name: &str, origins: &mut Origins, report: &mut Report) -> Machine {
-    let source = report.sources.add(name.to_owned(), text);
+fn machine_of(text: &str, name: &str, report: &Report) -> Machine {
+    let source = report.add(name, text);
     let table = parse(text, source, report);
-    let root = Section::new("the machine file", Location::new(source, 0..0), table.get_ref());
-    machine::read(text, root, origins, report)
-}
-
-/// Metrics by their names.
-pub(crate) fn metrics(root: &mut Section<'_>, report: &mut Report) -> Vec<Metric> {
-    let metrics = names(root, "metrics", "metric", &Metric::ALL, Metric::name, report);
-    metrics.unwrap_or_default()
+    let at = Location::new(source, 0..0);
+    machine::read(text, Section::new("the machine file", at, table.get_ref(), report))
 }
 
 /// The criterion of `[reliability]`.
-pub(crate) fn criterion(
-    section: &mut Section<'_>,
-    origins: &mut Origins,
-    report: &mut Report,
-) -> Criterion {
+pub(crate) fn criterion(section: &Section<'_>) -> Criterion {
     section.misplace(&["metrics"], "it belongs at the top of the file, before the first [section]");
-    let criterion =
-        section.choice("criterion", &Criterion::ALL.map(Criterion::name), report).given();
-    if let Some(criterion) = &criterion {
-        origins.put("reliability.criterion".to_owned(), criterion.at.clone());
-    }
-    criterion.map(|found| Criterion::ALL[found.value]).unwrap_or_default()
+    let criterion = section.choice("criterion", &Criterion::ALL.map(Criterion::name)).given();
+    criterion.map_or_else(Criterion::default, |found| {
+        section.report.put("reliability.criterion", found.at);
+        Criterion::ALL[found.value]
+    })
 }
 
 /// The speeds that the metric `growth` is about. The section and the metric need each other.
-pub(crate) fn stability(
-    root: &mut Section<'_>,
-    metrics: &[Metric],
-    report: &mut Report,
-) -> Option<Speeds> {
-    let field = root.table("stability", "[stability]", report);
+pub(crate) fn stability(root: &Section<'_>, metrics: &[Metric]) -> Option<Speeds> {
+    let (field, report) = (root.table("stability", "[stability]"), root.report);
     if let (Field::Given(section), false) = (&field, metrics.contains(&Metric::Growth)) {
         let title = "[stability] is for the metric `growth`, which is not asked for";
         let expected = "expected metrics = [\"growth\"] at the top of the file, or no [stability]; \
@@ -101,29 +76,22 @@ pub(crate) fn stability(
         let expected = "expected a section [stability] with speed_rpm = \"FROM:TO:STEP\"";
         report.push_missing(Diagnostic::new(title).at(root.at(), expected));
     }
-    let mut section = field.given()?.value;
-    let field = section.text("speed_rpm", report);
-    let found =
-        section.require(field, "speed_rpm", "constant speeds as \"FROM:TO:STEP\" in rpm", report);
-    section.finish(report);
+    let section = field.given()?.value;
+    let expected = "constant speeds as \"FROM:TO:STEP\" in rpm";
+    let found = section.require(section.text("speed_rpm"), "speed_rpm", expected);
+    section.finish();
     let found = found?;
-    match turning(found.value) {
-        Ok(speeds) => Some(speeds),
-        Err(expected) => {
+    turning(found.value).map_or_else(
+        |expected| {
             let title = format!("`speed_rpm` = \"{}\" is no range of speeds", found.value);
-            report.push(Diagnostic::new(title).at(&found.at, expected));
-            None
-        }
-    }
+            report.refuse(&found.at, title, expected)
+        },
+        Some,
+    )
 }
 
 /// Metrics of what the machine has not got.
-pub(crate) fn judge_metrics(
-    metrics: &[Metric],
-    machine: &Machine,
-    root: &Section<'_>,
-    report: &mut Report,
-) {
+pub(crate) fn judge_metrics(metrics: &[Metric], machine: &Machine, root: &Section<'_>) {
     for metric in metrics {
         let (is_there, what) = match metric {
             Metric::StopForce | Metric::StopContact => {
@@ -139,7 +107,9 @@ pub(crate) fn judge_metrics(
         };
         if !is_there {
             let title = format!("the metric `{}` needs a machine with more parts", metric.name());
-            report.push(Diagnostic::new(title).at(root.at(), format!("the machine has no {what}")));
+            let refusal =
+                Diagnostic::new(title).at(root.at(), format!("the machine has no {what}"));
+            root.report.push(refusal);
         }
     }
 }

@@ -2,11 +2,11 @@
 
 use serde_json::{Map, Value, json};
 use sweep_engine::Schema;
-use sweep_engine::config::report::Report;
+use sweep_engine::config::grid::names;
 use sweep_engine::config::scalars::Written;
 use sweep_engine::config::section::Section;
-use sweep_engine::config::{Draft, Origins, Read};
-use washer_row::{Criterion, Measures};
+use sweep_engine::config::{Draft, Read};
+use washer_row::{Criterion, Measures, Metric};
 
 use super::{GridInput, grid, machine_json, scalars, schema, spin, validate};
 use crate::model::Washer;
@@ -17,58 +17,33 @@ impl Read for Washer {
     const TO_START: Option<&'static str> =
         Some("`sweep init FILE` writes a grid file to start from");
 
-    fn read(
-        input: &GridInput,
-        root: &mut Section<'_>,
-        origins: &mut Origins,
-        report: &mut Report,
-    ) -> Self {
-        let machine = grid::machine(input, root, origins, report);
-        let spin = spin::read(root, origins, report);
+    fn read(input: &GridInput, root: &Section<'_>) -> Self {
+        let machine = grid::machine(input, root);
+        let spin = spin::read(root);
+        let metrics = names(root, "metrics", "metric", &Metric::ALL, Metric::name);
+        let metrics = metrics.unwrap_or_default();
+        grid::judge_metrics(&metrics, &machine, root);
+        let growth_speeds = grid::stability(root, &metrics);
         let (stops, feet) = (machine.stops.len(), machine.feet.len());
-        let measures = Measures { stops, feet, ..Measures::default() };
-        Self { machine, spin, measures, growth_speeds: None }
+        let measures = Measures { metrics, stops, feet, ..Measures::default() };
+        Self { machine, spin, measures, growth_speeds }
     }
 
-    fn read_before_reliability(
-        &mut self,
-        root: &mut Section<'_>,
-        _: &mut Origins,
-        report: &mut Report,
-    ) {
-        self.measures.metrics = grid::metrics(root, report);
-    }
-
-    fn read_reliability(
-        &mut self,
-        section: &mut Section<'_>,
-        origins: &mut Origins,
-        report: &mut Report,
-    ) {
-        self.measures.criterion = grid::criterion(section, origins, report);
-    }
-
-    fn read_after_reliability(
-        &mut self,
-        root: &mut Section<'_>,
-        _: &mut Origins,
-        report: &mut Report,
-    ) {
-        grid::judge_metrics(&self.measures.metrics, &self.machine, root, report);
-        self.growth_speeds = grid::stability(root, &self.measures.metrics, report);
+    fn read_reliability(&mut self, section: &Section<'_>) {
+        self.measures.criterion = grid::criterion(section);
     }
 
     fn scalars() -> &'static [&'static str] {
         scalars::NAMES
     }
 
-    fn put(written: &Written<'_>, draft: &mut Draft<Self>, report: &mut Report) -> Option<Value> {
-        scalars::put(written, draft, report)
+    fn put(written: &Written<'_>, draft: &mut Draft<'_, Self>) -> Option<Value> {
+        scalars::put(written, draft)
     }
 
-    fn judge(draft: &Draft<Self>, report: &mut Report) {
-        validate::scenarios(draft, report);
-        validate::stability(draft, report);
+    fn judge(draft: &Draft<'_, Self>) {
+        validate::scenarios(draft);
+        validate::stability(draft);
     }
 
     fn describe(&self, plan: &mut Map<String, Value>) {

@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 use sweep_engine::config::Draft;
-use sweep_engine::config::report::{Diagnostic, Report};
 use sweep_engine::config::scalars::Written;
 use washer_row::{Criterion, Metric};
 
@@ -13,44 +12,38 @@ use crate::model::Washer;
 pub(crate) const NAMES: &[&str] = &["profile", "criterion", "metrics"];
 
 /// Puts one in place; its value as it stands in the plan.
-pub(crate) fn put(
-    written: &Written<'_>,
-    draft: &mut Draft<Washer>,
-    report: &mut Report,
-) -> Option<Value> {
+pub(crate) fn put(written: &Written<'_>, draft: &mut Draft<'_, Washer>) -> Option<Value> {
+    let report = draft.report;
     let plan = &mut draft.plan;
     Some(match written.name.value {
         "profile" => {
             let names = spin::RAMPED.map(|profile| profile.name);
-            let profile = &spin::RAMPED[written.choice(&names, report)?];
+            let profile = &spin::RAMPED[written.choice(&names)?];
             let Some(spun) = spin::by_profile(&plan.model.spin, profile) else {
                 let title = "the grid's spin is a table, which has no peak and no ramp";
                 let expected = "expected a grid file with `peak_rpm` and `ramp_s`";
-                report.push(Diagnostic::new(title).at(&written.name.at, expected));
-                return None;
+                return report.refuse(&written.name.at, title, expected);
             };
             plan.model.spin = spun;
             json!(profile.name)
         }
         "metrics" => {
-            let metrics = written.list("metric", &Metric::ALL, Metric::name, report)?;
+            let metrics = written.list("metric", &Metric::ALL, Metric::name)?;
             let speeds = &mut plan.model.growth_speeds;
             if !metrics.contains(&Metric::Growth) {
                 *speeds = None;
             } else if speeds.is_none() {
                 let title = "the metric `growth` needs speeds";
                 let expected = "expected a grid file with this metric and a section [stability]";
-                report.push(Diagnostic::new(title).at(&written.value.at, expected));
-                return None;
+                return report.refuse(&written.value.at, title, expected);
             }
             plan.model.measures.metrics = metrics;
             json!(written.value.value)
         }
         "criterion" => {
             let names = Criterion::ALL.map(Criterion::name);
-            plan.model.measures.criterion = Criterion::ALL[written.choice(&names, report)?];
-            let at = written.value.at.clone();
-            draft.origins.put("reliability.criterion".to_owned(), at);
+            plan.model.measures.criterion = Criterion::ALL[written.choice(&names)?];
+            report.put("reliability.criterion", written.value.at.clone());
             json!(plan.model.measures.criterion.name())
         }
         _ => return None,

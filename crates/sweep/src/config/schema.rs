@@ -7,7 +7,7 @@ use washer_model::{Parameter, Range, Spin};
 use washer_row::{Criterion, Metric};
 
 use super::grid::DEFAULT_MACHINE;
-use super::machine::{BLOCKS, Block, CABINET, LISTS, no_spin, with_one_of_each};
+use super::machine::{Key, LeftOut, PARTS, Part, Times, no_spin, with_one_of_each};
 use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
 
 /// What grid files have beside what the engine reads.
@@ -40,41 +40,41 @@ pub(crate) fn grid() -> Schema {
 /// The schema of machine files.
 #[must_use]
 pub(crate) fn machine() -> Value {
-    let mut properties: Vec<(&str, Value)> = Vec::new();
-    let mut required = Vec::new();
-    for block in &BLOCKS {
-        if block.section.is_empty() {
-            properties.extend(block_properties(block, block.prefix));
-            required.extend(block.numbers);
-        } else {
-            properties.push((block.section, block_schema(block, block.prefix, &[])));
-            required.push(block.section);
+    let (mut properties, mut required) = (Vec::new(), Vec::new());
+    for part in &PARTS {
+        let (own, needed) = keys(part);
+        if part.section.is_empty() {
+            properties.extend(own);
+            required.extend(needed);
+            continue;
         }
-    }
-    properties.push((CABINET.section, block_schema(&CABINET, CABINET.prefix, &[])));
-    for list in &LISTS {
-        let prefix = format!("{}{}_", list.block.prefix, list.first);
-        let numbers = list.optional.iter().map(|&(key, default)| {
-            let mut schema = parameter(&format!("{prefix}{key}"));
-            if let Some(default) = default {
-                schema["default"] = default.into();
+        let mut schema = table(own, &needed);
+        if let Times::Many(_, needed) = part.times {
+            schema = json!({ "type": "array", "items": schema });
+            if needed.is_some() {
+                schema["minItems"] = 1.into();
             }
-            (key, schema)
-        });
-        let vectors = list
-            .optional_vectors
-            .iter()
-            .map(|(key, components)| (*key, vector(&format!("{prefix}{}", components[0]))));
-        let optional: Vec<_> = numbers.chain(vectors).collect();
-        let items = block_schema(&list.block, &prefix, &optional);
-        let mut schema = json!({ "type": "array", "items": items });
-        if list.needed.is_some() {
-            schema["minItems"] = 1.into();
-            required.push(list.block.section);
         }
-        properties.push((list.block.section, schema));
+        if matches!(part.times, Times::Once | Times::Many(_, Some(_))) {
+            required.push(part.section);
+        }
+        properties.push((part.section, schema));
     }
     document("Machine file of sweep", table(properties, &required))
+}
+
+/// The keys of a section, and those that must be there.
+fn keys(part: &Part) -> (Vec<(&'static str, Value)>, Vec<&'static str>) {
+    let one = |key: &Key| {
+        let first = &key.names(&part.prefix(0))[0];
+        let mut schema = if key.is_vector() { vector(first) } else { parameter(first) };
+        if let (LeftOut::Is(default), false) = (key.left_out, key.is_vector()) {
+            schema["default"] = default.into();
+        }
+        (key.name, schema)
+    };
+    let needed = part.keys.iter().filter(|key| key.left_out == LeftOut::Refused);
+    (part.keys.iter().map(one).collect(), needed.map(|key| key.name).collect())
 }
 
 /// A parameter's number, by name.
@@ -84,26 +84,11 @@ fn parameter(name: &str) -> Value {
         .map_or(json!({ "type": "number" }), |parameter| of(&parameter))
 }
 
-fn block_properties(block: &Block, prefix: &str) -> Vec<(&'static str, Value)> {
-    let numbers = block.numbers.iter().map(|&key| (key, parameter(&format!("{prefix}{key}"))));
-    let vectors = block
-        .vectors
-        .iter()
-        .map(|(key, components)| (*key, vector(&format!("{prefix}{}", components[0]))));
-    numbers.chain(vectors).collect()
-}
-
 /// Three numbers, of which `first` is a parameter's name.
 fn vector(first: &str) -> Value {
     let range = Parameter::find(first, &with_one_of_each(), &no_spin())
         .map_or(Range::Any, |found| found.range());
     json!({ "type": "array", "items": number(range), "minItems": 3, "maxItems": 3 })
-}
-
-fn block_schema(block: &Block, prefix: &str, optional: &[(&'static str, Value)]) -> Value {
-    let properties = block_properties(block, prefix);
-    let required: Vec<&str> = properties.iter().map(|(key, _)| *key).collect();
-    table(properties.into_iter().chain(optional.iter().cloned()), &required)
 }
 
 /// Names of the table as properties; those of numbered elements as patterns.
@@ -116,7 +101,10 @@ fn set() -> Value {
     let (mut single, mut patterns) = (Vec::new(), Map::new());
     for parameter in &all {
         let name = parameter.name();
-        let lists = LISTS.iter().map(|list| (list.block.prefix, list.first));
+        let lists = PARTS.iter().filter_map(|part| match part.times {
+            Times::Many(first, _) => Some((part.prefix, first)),
+            Times::Once | Times::AtMostOnce => None,
+        });
         match lists
             .chain([("spin_table_", 1)])
             .find_map(|(prefix, first)| Some((prefix, first, name.strip_prefix(prefix)?)))

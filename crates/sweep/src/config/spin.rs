@@ -4,8 +4,7 @@ use serde_json::{Value, json};
 use washer_model::{Machine, Parameter, Range, Spin, decimal};
 
 use super::machine;
-use sweep_engine::config::origins::Origins;
-use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_engine::config::report::Diagnostic;
 use sweep_engine::config::section::{Section, listed};
 
 /// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are
@@ -100,122 +99,81 @@ impl Profile {
     }
 }
 
-pub(crate) fn read(root: &mut Section<'_>, origins: &mut Origins, report: &mut Report) -> Spin {
+pub(crate) fn read(root: &Section<'_>) -> Spin {
     // Stands in for a wrong spin, so that axes over its numbers are still known.
     let stand_in = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
-    let field = root.table("spin", "[spin]", report);
-    let section = root.require(field, "spin", "a section [spin]", report);
-    let Some(section) = section else { return stand_in };
-    let mut section = section.value;
+    let field = root.table("spin", "[spin]");
+    let Some(section) = root.require(field, "spin", "a section [spin]") else { return stand_in };
+    let section = section.value;
     let [cycloidal, triangular, ramp] = RAMPED.map(|profile| profile.name);
     let profiles = [cycloidal, triangular, ramp, TABLE];
-    let field = section.choice("profile", &profiles, report);
-    let profile = section.require(field, "profile", &listed(&profiles), report);
+    let field = section.choice("profile", &profiles);
+    let profile = section.require(field, "profile", &listed(&profiles));
     let profile = Profile::of(profile.map(|profile| profile.value));
-    match profile {
-        Profile::Ramped(Ramped { name, .. }) => {
+    let spin = match profile {
+        Profile::Ramped(Ramped { name, make, .. }) => {
             let reason = format!("only the profile \"{TABLE}\" has it, not \"{name}\"");
             section.misplace(&["time_s", "speed_rpm"], &reason);
+            ramped(&section, true, &stand_in).map(|[peak_rpm, ramp_s]| make(peak_rpm, ramp_s))
         }
         Profile::Table => {
             let reason = "a table gives `time_s` and `speed_rpm` instead";
             section.misplace(&["peak_rpm", "ramp_s"], reason);
+            table(&section, true)
         }
-        Profile::Unknown => {}
-    }
-    let mut reader = SpinReader::new(&mut section, profile, &stand_in, origins, report);
-    let spin = match profile {
-        Profile::Ramped(Ramped { make, .. }) => {
-            reader.ramped().map(|[peak_rpm, ramp_s]| make(peak_rpm, ramp_s))
-        }
-        Profile::Table => reader.table(),
         Profile::Unknown => {
-            reader.ramped();
-            reader.table();
+            ramped(&section, false, &stand_in);
+            table(&section, false);
             None
         }
     };
-    section.finish(report);
+    section.finish();
     spin.unwrap_or_else(|| match profile {
         Profile::Table => {
             // The table's mistakes are reported; that the stand-in has no rows is not one of them.
-            origins.doubt("spin.time_s".to_owned());
+            root.report.doubt("spin.time_s");
             machine::no_spin()
         }
         Profile::Ramped(_) | Profile::Unknown => stand_in,
     })
 }
 
-struct SpinReader<'r, 'a> {
-    section: &'r mut Section<'a>,
-    profile: Profile,
-    stand_in: &'r Spin,
-    origins: &'r mut Origins,
-    report: &'r mut Report,
+/// Peak and ramp.
+fn ramped(section: &Section<'_>, needed: bool, stand_in: &Spin) -> Option<[f64; 2]> {
+    let number = |key, parameter: &str, expected| {
+        let field = section.number(key, range(parameter, stand_in));
+        let found = section.require_if(needed, field, key, expected)?;
+        section.report.put(parameter, found.at);
+        Some(found.value)
+    };
+    let peak_rpm = number("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm");
+    let ramp_s = number("ramp_s", "spin_ramp_s", "the duration of the run-up in s");
+    Some([peak_rpm?, ramp_s?])
 }
 
-impl<'r, 'a> SpinReader<'r, 'a> {
-    fn new(
-        section: &'r mut Section<'a>,
-        profile: Profile,
-        stand_in: &'r Spin,
-        origins: &'r mut Origins,
-        report: &'r mut Report,
-    ) -> Self {
-        Self { section, profile, stand_in, origins, report }
-    }
-
-    fn must_be_there(&self) -> bool {
-        !matches!(self.profile, Profile::Unknown)
-    }
-
-    /// Peak and ramp.
-    fn ramped(&mut self) -> Option<[f64; 2]> {
-        let peak_rpm = self.number("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm");
-        let ramp_s = self.number("ramp_s", "spin_ramp_s", "the duration of the run-up in s");
-        Some([peak_rpm?, ramp_s?])
-    }
-
-    fn number(&mut self, key: &'static str, parameter: &str, expected: &str) -> Option<f64> {
-        let range = range(parameter, self.stand_in);
-        let field = self.section.number(key, range, self.report);
-        let found = if self.must_be_there() {
-            self.section.require(field, key, expected, self.report)?
-        } else {
-            field.given()?
-        };
-        self.origins.put(parameter.to_owned(), found.at);
-        Some(found.value)
-    }
-
-    fn table(&mut self) -> Option<Spin> {
-        let time_s = self.column("time_s", Range::NonNegative);
-        let speed_rpm = self.column("speed_rpm", Range::Any);
-        Some(Spin::Table { time_s: time_s?, speed_rpm: speed_rpm? })
-    }
-
-    fn column(&mut self, key: &'static str, range: Range) -> Option<Vec<f64>> {
-        let field = self.section.numbers(key, range, self.report);
-        let found = if self.must_be_there() {
-            self.section.require(field, key, "an array of numbers", self.report)?
-        } else {
-            field.given()?
-        };
+fn table(section: &Section<'_>, needed: bool) -> Option<Spin> {
+    let column = |key, range| {
+        let field = section.numbers(key, range);
+        let found = section.require_if(needed, field, key, "an array of numbers")?;
+        let report = section.report;
         if found.value.len() > MOST_ROWS {
             let title = format!("`{key}` has {} numbers", decimal(found.value.len() as f64));
             let expected = format!("expected at most {MOST_ROWS}");
             let refusal = Diagnostic::new(title).at(&found.at, expected);
-            self.report.push(refusal.help("leave out rows between which the speed is linear"));
+            report.push(refusal.help("leave out rows between which the speed is linear"));
             return None;
         }
-        self.origins.put(format!("spin.{key}"), found.at);
+        report.put(format!("spin.{key}"), found.at);
         let mut values = Vec::with_capacity(found.value.len());
         for (k, entry) in found.value.into_iter().enumerate() {
-            self.origins.put(format!("spin.{key}[{k}]"), entry.at);
+            report.put(format!("spin.{key}[{k}]"), entry.at);
             values.push(entry.value);
         }
         Some(values)
-    }
+    };
+    let (time_s, speed_rpm) =
+        (column("time_s", Range::NonNegative), column("speed_rpm", Range::Any));
+    Some(Spin::Table { time_s: time_s?, speed_rpm: speed_rpm? })
 }
 
 #[cfg(test)]

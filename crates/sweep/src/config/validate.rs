@@ -13,7 +13,7 @@ use crate::method::{REFERENCE_SHARE, SHORTEST_AT_CORNERS};
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario};
 use sweep_engine::config::Draft;
-use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_engine::config::report::Diagnostic;
 use sweep_engine::config::source::Location;
 use sweep_engine::config::whole::{places, refuse_step, window};
 use sweep_engine::method::{Integrator as _, Steps};
@@ -33,22 +33,22 @@ const TURNS_PER_ROW: u64 = 50;
 /// A machine or spin that cannot be, at any corner of the grid. Inertia and bearings are linear
 /// conditions, so a machine that meets them at the corners meets them between; a spring that
 /// shrinks to nothing only in between is left to the run, as a failed row.
-pub(crate) fn scenarios(draft: &Draft<Washer>, report: &mut Report) {
+pub(crate) fn scenarios(draft: &Draft<'_, Washer>) {
     let plan = &draft.plan;
     let mut scenario = plan.scenario_at(&plan.corner(0));
     let swept = Swept::of(plan);
-    if swept.is_too_much(draft, &scenario, report) {
+    if swept.is_too_much(draft, &scenario) {
         return;
     }
     let mut judge = Judge { draft, reported: BTreeSet::new(), spin_is_sound: true };
-    judge.corner(&scenario, Swept::EVERYTHING, report);
+    judge.corner(&scenario, Swept::EVERYTHING);
     for corner in 1..plan.corners() {
-        if report.is_full() {
+        if draft.report.is_full() {
             // A corner's mistakes are mostly another's, and none would be shown.
             break;
         }
         plan.place(&mut scenario, &plan.corner(corner));
-        judge.corner(&scenario, swept, report);
+        judge.corner(&scenario, swept);
     }
 }
 
@@ -74,7 +74,7 @@ impl Swept {
 
     /// Refuses a list so long, of a machine or a spin so large, that judging its points would take
     /// minutes.
-    fn is_too_much(self, draft: &Draft<Washer>, scenario: &Scenario, report: &mut Report) -> bool {
+    fn is_too_much(self, draft: &Draft<'_, Washer>, scenario: &Scenario) -> bool {
         let Washer { machine, spin, .. } = &scenario.model;
         let lists = [machine.springs.len(), machine.dampers.len(), machine.stops.len()];
         let further = machine.bushings.len() + machine.further_unbalances.len();
@@ -96,9 +96,9 @@ impl Swept {
             "too many points to check: {points}, each with {elements} springs, dampers \
              and the like and a spin of {rows} rows"
         );
-        let at = draft.origins.get("axis[0]");
-        report.push(at.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
-            diagnostic.at(at, format!("expected at most {most} points of this machine and spin"))
+        let at = draft.report.place("axis[0]");
+        draft.report.push(at.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
+            diagnostic.at(&at, format!("expected at most {most} points of this machine and spin"))
         }));
         true
     }
@@ -106,7 +106,7 @@ impl Swept {
 
 /// Judges corner after corner, and reports each mistake once.
 struct Judge<'a> {
-    draft: &'a Draft<Washer>,
+    draft: &'a Draft<'a, Washer>,
     reported: BTreeSet<Vec<String>>,
     spin_is_sound: bool,
 }
@@ -114,29 +114,29 @@ struct Judge<'a> {
 impl Judge<'_> {
     /// Judges what is new at a corner. Single numbers were judged where they were read; left is how
     /// they go together.
-    fn corner(&mut self, scenario: &Scenario, new: Swept, report: &mut Report) {
+    fn corner(&mut self, scenario: &Scenario, new: Swept) {
         if new.machine {
-            self.violations(scenario.model.machine.joint_violations(), false, report);
+            self.violations(scenario.model.machine.joint_violations(), false);
         }
         if new.spin {
             let violations = scenario.model.spin.joint_violations();
             self.spin_is_sound = violations.is_empty();
-            self.violations(violations, true, report);
+            self.violations(violations, true);
         }
         if new.window {
-            window(self.draft, scenario, &mut self.reported, report);
+            window(self.draft, scenario, &mut self.reported);
         }
         if (new.spin || new.window) && self.spin_is_sound {
-            turns(self.draft, scenario, &mut self.reported, report);
+            turns(self.draft, scenario, &mut self.reported);
         }
     }
 
-    fn violations(&mut self, found: Vec<Violation>, of_spin: bool, report: &mut Report) {
+    fn violations(&mut self, found: Vec<Violation>, of_spin: bool) {
         for violation in found {
             let concerns = keys(&violation, of_spin);
-            let judged = !concerns.iter().any(|key| self.draft.origins.is_doubtful(key));
+            let judged = !concerns.iter().any(|key| self.draft.report.is_doubtful(key));
             if judged && self.reported.insert(concerns.clone()) {
-                report.push_with(|sources| {
+                self.draft.report.push_with(|sources| {
                     describe(&violation, &places(self.draft, &concerns, sources))
                 });
             }
@@ -145,13 +145,8 @@ impl Judge<'_> {
 }
 
 /// More turns of the drum in the window than are compared one by one.
-fn turns(
-    draft: &Draft<Washer>,
-    scenario: &Scenario,
-    reported: &mut BTreeSet<Vec<String>>,
-    report: &mut Report,
-) {
-    let Some(criterion) = draft.origins.get("reliability.criterion") else { return };
+fn turns(draft: &Draft<'_, Washer>, scenario: &Scenario, reported: &mut BTreeSet<Vec<String>>) {
+    let Some(criterion) = draft.report.place("reliability.criterion") else { return };
     if draft.plan.model.measures.criterion != Criterion::Envelope {
         return;
     }
@@ -165,7 +160,7 @@ fn turns(
         "expected at most {MOST_TURNS} turns for \"{}\": shorten the window",
         Criterion::Envelope.name()
     );
-    report.push(Diagnostic::new(title).at(criterion, expected));
+    draft.report.push(Diagnostic::new(title).at(&criterion, expected));
 }
 
 /// The keys under which the numbers' places are kept.
@@ -190,7 +185,7 @@ fn describe(violation: &Violation, places: &[Location]) -> Diagnostic {
 
 /// A machine whose fastest motion is too fast for an explicit method: for any number of steps that
 /// is accepted, or for the plan's own step. Only a sound plan can be judged.
-pub(crate) fn stability(draft: &Draft<Washer>, report: &mut Report) {
+pub(crate) fn stability(draft: &Draft<'_, Washer>) {
     // As a share of the longest stable step: that which the method takes at its slowest.
     let (step_s, share) = match draft.plan.integrator.steps() {
         Steps::Fixed(step_s) => (Some(step_s), 1.0),
@@ -203,7 +198,7 @@ pub(crate) fn stability(draft: &Draft<Washer>, report: &mut Report) {
         // Stable at any step.
         Steps::Implicit => return,
     };
-    if !report.is_clean() {
+    if !draft.report.is_clean() {
         return;
     }
     let frequency = highest_frequency_of_corners_rad_per_s(draft);
@@ -217,11 +212,12 @@ pub(crate) fn stability(draft: &Draft<Washer>, report: &mut Report) {
             end_s / (share * limit_s),
             decimal(end_s)
         );
-        let place = ["integrator", "time.end_s"].into_iter().find_map(|key| draft.origins.get(key));
+        let place =
+            ["integrator", "time.end_s"].into_iter().find_map(|key| draft.report.place(key));
         let refusal = place.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
-            diagnostic.at(at, format!("expected at most {MOST_STEPS:e} steps"))
+            diagnostic.at(&at, format!("expected at most {MOST_STEPS:e} steps"))
         });
-        report.push(refusal.help(format!(
+        draft.report.push(refusal.help(format!(
             "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mass, a \
              moment of inertia or a \
              stiffness that is not meant so, or use method = \"rodas5p\""
@@ -232,7 +228,7 @@ pub(crate) fn stability(draft: &Draft<Washer>, report: &mut Report) {
             decimal(step_s)
         );
         let expected = format!("expected a step of at most {limit_s:.2e} s");
-        report.push(refuse_step(draft, title, &expected).help(format!(
+        draft.report.push(refuse_step(draft, title, &expected).help(format!(
             "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural \
              frequency{at}"
         )));
@@ -242,7 +238,7 @@ pub(crate) fn stability(draft: &Draft<Washer>, report: &mut Report) {
 /// The highest natural frequency of any corner's machine, at rest and turning at its greatest
 /// speed. As a rule it is that of undamped bearings against their mass. A machine without
 /// equilibrium has none, and its rows will say so.
-fn highest_frequency_of_corners_rad_per_s(draft: &Draft<Washer>) -> f64 {
+fn highest_frequency_of_corners_rad_per_s(draft: &Draft<'_, Washer>) -> f64 {
     let plan = &draft.plan;
     let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
     let mut highest = 0.0_f64;

@@ -13,7 +13,7 @@ use super::{ID, ListColumn, MOST_COLUMNS, Unreadable, fits};
 pub(super) fn read(
     text: &str,
     source: SourceId,
-    report: &mut Report,
+    report: &Report,
 ) -> Result<Option<(Vec<ListColumn>, Vec<u32>)>, Unreadable> {
     let mut columns: Vec<ListColumn> = Vec::new();
     let mut starts: Vec<u32> = Vec::new();

@@ -117,9 +117,9 @@ fn damage_is_an_error_or_another_list_and_nothing_else() {
 }
 
 fn csv_of(text: &str) -> Result<Option<(Vec<ListColumn>, Vec<u32>)>, Unreadable> {
-    let mut report = Report::default();
-    let source = report.sources.add("list.csv", String::new());
-    csv::read(text, source, &mut report)
+    let report = Report::default();
+    let source = report.add("list.csv", String::new());
+    csv::read(text, source, &report)
 }
 
 #[test]
@@ -134,10 +134,10 @@ fn a_text_of_too_many_numbers_or_columns_is_refused() {
 
 #[test]
 fn a_row_of_too_many_numbers_is_one_mistake() {
-    let mut report = Report::default();
-    let source = report.sources.add("list.csv", String::new());
+    let report = Report::default();
+    let source = report.add("list.csv", String::new());
     let text = format!("a,b\n{}\n1,2\n", ",".repeat(100_000_000));
-    assert!(csv::read(&text, source, &mut report).unwrap().is_none());
+    assert!(csv::read(&text, source, &report).unwrap().is_none());
     assert_eq!(report.into_diagnostics().count(), 1);
 }
 
