@@ -1,10 +1,11 @@
 """The map as an xarray dataset: one dimension per axis of the grid, units and descriptions as
 attributes.
 
-    python docs/recipes/with_xarray.py results/quick.parquet [MASS_KG [PICTURE.png]]
+    python docs/recipes/with_xarray.py results/quick.parquet [MASS_KG [PICTURE.png | MAP.nc]]
 
 Answers: which least damping keeps this unbalance reliable? Works for any number of axes; with two
-it draws the map.
+it draws the map. A name that ends in .nc is written as NetCDF (with `pip install netCDF4`), for
+MATLAB, Octave and ncview.
 """
 
 import json
@@ -58,12 +59,20 @@ def least_damping(path, mass_kg):
     return float(column.unbalance_mass_kg), float(kept.min()) if kept.size else None
 
 
+def write_netcdf(data, path):
+    """The dataset as a file; truth values with gaps become words, which NetCDF has."""
+    mixed = [name for name, variable in data.variables.items() if variable.dtype == object]
+    data.assign({name: data[name].astype(str) for name in mixed}).to_netcdf(path)
+
+
 def main():
     """Read the command line, tell, draw."""
     path, mass_kg = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else 0.6
     data = load(path)
     print(data["ratio_max"])
-    if len(sys.argv) > 3 and data["ratio_max"].ndim == 2:
+    if len(sys.argv) > 3 and sys.argv[3].endswith(".nc"):
+        write_netcdf(data, sys.argv[3])
+    elif len(sys.argv) > 3 and data["ratio_max"].ndim == 2:
         limit = json.loads(data.attrs["plan"])["reliability"]["ratio_limit"]
         data["ratio_max"].plot.contourf(
             x="unbalance_mass_kg", levels=[0, 1, limit, 5, 10, 50], figsize=(8, 6)

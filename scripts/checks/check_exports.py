@@ -3,7 +3,7 @@
 
     scripts/checks/check_exports.sh MAP.parquet
 
-Workbooks by openpyxl, NetCDF by netCDF4 and by xarray, CSV by pandas; the result by pyarrow.
+Workbooks by openpyxl, CSV by pandas, NetCDF of the recipe by netCDF4; the result by pyarrow.
 """
 
 import json
@@ -17,7 +17,6 @@ import netCDF4
 import openpyxl
 import pandas
 import pyarrow.parquet
-import xarray
 
 sweep, source = sys.argv[1:]
 result = pyarrow.parquet.read_table(source)
@@ -51,17 +50,8 @@ def compare(what, found):
     print(f"{what}: {len(rows)} rows of {len(names)} columns are the result's")
 
 
-def flags(variable):
-    """What codes of words mean, by the CF conventions; nothing for numbers."""
-    if "flag_values" not in variable.ncattrs():
-        return None
-    words = variable.flag_meanings.split(" ")
-    values = [variable.flag_values] if len(words) == 1 else list(variable.flag_values)
-    return dict(zip([int(value) for value in values], words, strict=True))
-
-
 with tempfile.TemporaryDirectory() as folder:
-    files = {ending: pathlib.Path(folder) / f"map.{ending}" for ending in ("csv", "xlsx", "nc")}
+    files = {ending: pathlib.Path(folder) / f"map.{ending}" for ending in ("csv", "xlsx")}
     for path in files.values():
         subprocess.run([sweep, "export", source, str(path)], check=True)
 
@@ -71,6 +61,10 @@ with tempfile.TemporaryDirectory() as folder:
     assert list(header) == names, header
     assert [unit or "" for unit in told] == [shown(name) for name in names], told
     compare("openpyxl", cells)
+    assert first.freeze_panes == "A3", first.freeze_panes
+    last = openpyxl.utils.get_column_letter(len(names))
+    assert first.auto_filter.ref == f"A2:{last}{len(rows) + 2}", first.auto_filter.ref
+    assert first.column_dimensions["A"].width > 10
     said = {cell for sheet in others for row in sheet.iter_rows(values_only=True) for cell in row}
     assert set(names) <= said and plan["name"] in said
 
@@ -80,30 +74,21 @@ with tempfile.TemporaryDirectory() as folder:
     compare("pandas", cleaned.itertuples(index=False, name=None))
 
     axes = [axis["parameter"] for axis in plan["axis"]]
-    with netCDF4.Dataset(files["nc"]) as data:
-        data.set_auto_mask(False)
-        shape = [len(data.dimensions[axis]) for axis in axes]
-        assert math.prod(shape) == len(rows), shape
-        for name in names:
-            variable = data.variables.get(name)
-            if name in axes:
-                values = data.variables[name][:].tolist()
-                assert sorted(values) == sorted({row[names.index(name)] for row in rows})
-                continue
-            assert variable is not None, f"netCDF4: no variable {name}"
-            if units[name] not in ("", "1"):
-                assert variable.units == units[name], f"{name}: {variable.units}"
-            meanings = flags(variable)
-            flat = variable[:].reshape(-1).tolist()
-            assert len(flat) == len(rows), f"netCDF4: {name} has {len(flat)} values"
-            for number, found in enumerate(flat):
-                found = meanings.get(int(found)) if meanings else found
-                ours = rows[number][names.index(name)]
-                assert same(ours, found), f"netCDF4: row {number}, {name}: {found!r}, not {ours!r}"
-    print(f"netCDF4: {len(names)} columns over {' by '.join(map(str, shape))} are the result's")
+    sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "docs" / "recipes"))
+    import with_xarray
 
-    with xarray.open_dataset(files["nc"]) as data:
-        place = {axis: rows[-1][names.index(axis)] for axis in axes}
-        found = float(data["ratio_max"].sel(place))
-        assert found == rows[-1][names.index("ratio_max")], found
-    print("xarray: finds a point by the values of its axes")
+    path = pathlib.Path(folder) / "map.nc"
+    with_xarray.write_netcdf(with_xarray.load(source), path)
+    with netCDF4.Dataset(path) as data:
+        data.set_auto_mask(False)
+        places = [[data.variables[axis][:].tolist() for axis in axes], axes]
+        for number, row in enumerate(rows):
+            at = tuple(own.index(row[names.index(axis)]) for own, axis in zip(*places))
+            for name in set(names) - set(axes):
+                found, ours = data.variables[name][at], row[names.index(name)]
+                words = isinstance(found, str)
+                fits = found == str(ours) or ours is None if words else same(ours, float(found))
+                assert fits, f"netCDF4: row {number}, {name}: {found!r}, not {ours!r}"
+                if units[name] not in ("", "1"):
+                    assert data.variables[name].units == units[name], name
+    print(f"netCDF4: {len(names)} columns of the recipe's file are the result's")

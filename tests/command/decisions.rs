@@ -178,9 +178,7 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
 #[test]
 fn exports_open_with_their_kind_and_nothing_else_is_overwritten() {
     let home = mapped();
-    for (name, begins) in
-        [("m.csv", &b"# exported by sweep "[..]), ("m.xlsx", b"PK\x03\x04"), ("m.nc", b"CDF\x02")]
-    {
+    for (name, begins) in [("m.csv", &b"# exported by sweep "[..]), ("m.xlsx", b"PK\x03\x04")] {
         for _ in 0..2 {
             let done = home.sweep(&["export", MAP, name]);
             assert_eq!(code(&done), Some(0), "{}", said(&done));

@@ -8,8 +8,6 @@ use std::process::ExitCode;
 
 use crate::boundary::search::BoundaryError;
 use crate::config::Diagnostics;
-use crate::memory::NoMemory;
-use crate::random_keys::NoRandomNumbers;
 use crate::store::StoreError;
 use crate::threads::ThreadsError;
 use sweep_files::FileError;
@@ -120,12 +118,6 @@ pub enum Error {
     /// No threads.
     #[error(transparent)]
     Threads(#[from] ThreadsError),
-    /// No memory.
-    #[error(transparent)]
-    Memory(#[from] NoMemory),
-    /// No random numbers.
-    #[error(transparent)]
-    Random(#[from] NoRandomNumbers),
     /// A file that could not be read or written.
     #[error("cannot {action} {}: {source}", path.display())]
     File {
@@ -161,8 +153,8 @@ impl Error {
             Self::Plot(error) if error.is_usage() => Exit::BadInput,
             Self::Results(error) if error.is_refusal() => Exit::BadInput,
             Self::Plot(_) | Self::Results(_) => Exit::Failed,
-            Self::Store(_) | Self::Files(_) | Self::Threads(_) | Self::Random(_) => Exit::Failed,
-            Self::Memory(_) | Self::File { .. } | Self::Stdout(_) => Exit::Failed,
+            Self::Store(_) | Self::Files(_) | Self::Threads(_) => Exit::Failed,
+            Self::File { .. } | Self::Stdout(_) => Exit::Failed,
         }
     }
 

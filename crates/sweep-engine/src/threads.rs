@@ -2,9 +2,6 @@
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::memory::{NoMemory, ensure_memory_for};
-use crate::random_keys::{NoRandomNumbers, draw_random_keys};
-
 /// Looks up a variable of a scheduler; the process environment outside tests.
 pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
 
@@ -34,18 +31,12 @@ pub enum ThreadsError {
         /// The variable's value.
         given: String,
     },
-    /// No memory for them.
-    #[error(transparent)]
-    Memory(#[from] NoMemory),
     /// A program asks for none, or beyond reason.
     #[error("{threads} threads: expected a number from 1 to {MOST}")]
     Asked {
         /// How many.
         threads: usize,
     },
-    /// No random numbers.
-    #[error(transparent)]
-    Random(#[from] NoRandomNumbers),
 }
 
 impl ThreadsError {
@@ -101,17 +92,13 @@ pub fn cores() -> usize {
 /// A pool of so many threads.
 ///
 /// # Errors
-/// [`ThreadsError::Start`], [`ThreadsError::Memory`], [`ThreadsError::Random`].
+/// [`ThreadsError::Start`].
 pub fn pool(threads: usize) -> Result<ThreadPool, ThreadsError> {
-    ensure_memory_for(threads)?;
-    let pool = ThreadPoolBuilder::new()
+    ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|i| format!("sweep-{i}"))
         .build()
-        .map_err(|error| ThreadsError::start(threads)(&error))?;
-    // Maps of the libraries are made in any of them.
-    pool.broadcast(|_| draw_random_keys()).into_iter().collect::<Result<(), _>>()?;
-    Ok(pool)
+        .map_err(|error| ThreadsError::start(threads)(&error))
 }
 
 #[cfg(test)]

@@ -121,7 +121,6 @@ impl FileKind<'_> {
                 Err(error) => return Err(error),
             },
             Self::Exported { ending: "csv" } => begins(EXPORTED_CSV.as_bytes())?,
-            Self::Exported { ending: "nc" } => begins(b"CDF\x02")?,
             Self::Exported { .. } => begins(b"PK\x03\x04")?,
             Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,
             Self::Svg => begins(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,

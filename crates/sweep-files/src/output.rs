@@ -150,7 +150,6 @@ mod tests {
             FileKind::Exported { ending: "csv" } => {
                 return format!("{}x\n", crate::EXPORTED_CSV).into_bytes();
             }
-            FileKind::Exported { ending: "nc" } => return b"CDF\x02...".to_vec(),
             FileKind::Exported { .. } => return b"PK\x03\x04...".to_vec(),
             FileKind::Account { of } => {
                 return json!({ "file": of.to_str(), "plan_hash": "00" }).to_string().into_bytes();
@@ -190,7 +189,6 @@ mod tests {
             FileKind::Html,
             FileKind::ManPage,
             FileKind::Exported { ending: "csv" },
-            FileKind::Exported { ending: "nc" },
             FileKind::Exported { ending: "xlsx" },
         ])
     }

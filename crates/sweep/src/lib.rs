@@ -73,5 +73,5 @@ pub use sweep_engine::run::{Ended, RunOptions, run};
 pub use sweep_engine::store::{
     Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, State, StoreError, status,
 };
-pub use sweep_engine::{Error, Exit, Interrupt, ensure_memory, survive_file_size_limits, tell};
+pub use sweep_engine::{Error, Exit, Interrupt, survive_file_size_limits, tell};
 pub use washer_row::{Metric, Outcome, Status, Trajectory, Verdict};

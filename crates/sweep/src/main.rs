@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use sweep::{Cli, Error, Exit, ensure_memory, survive_file_size_limits};
+use sweep::{Cli, Error, Exit, survive_file_size_limits};
 
 fn main() -> ExitCode {
     let exit = run().unwrap_or_else(|error| {
@@ -19,6 +19,5 @@ fn run() -> Result<Exit, Error> {
         path: "this process".into(),
         source,
     })?;
-    ensure_memory()?;
     cli.command.run()
 }

@@ -107,18 +107,9 @@ pub(crate) fn every(every_s: f64, plan: &Plan) -> Result<f64, Error> {
 }
 
 /// How many instants from 0 to the end there are.
-pub(crate) fn instants(plan: &Plan, every_s: f64) -> usize {
+fn instants(plan: &Plan, every_s: f64) -> usize {
     // The quotient may come out a hair below the whole number that was meant.
     1 + (plan.end_s / every_s * (1.0 + 1e-12)).floor() as usize
-}
-
-/// A bound on the memory that a trace of so many instants takes while it is made, in bytes.
-///
-/// Measured at 10,001 to 100,001 instants of Fig. 12's machine: 0.94 kB an instant, and 2.4 kB with
-/// states and forces.
-pub(crate) fn bytes(instants: usize, extras: Extras) -> usize {
-    let each = 1200 + 1000 * (usize::from(extras.states) + usize::from(extras.forces));
-    instants.saturating_mul(each)
 }
 
 /// What of a point's histories is looked at.

@@ -12,7 +12,7 @@ pub struct Args {
     /// A result, trace, modes or boundary file, or any other Parquet file of this program
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Where to write; the ending .csv, .xlsx or .nc says how
+    /// Where to write; the ending .csv or .xlsx says how
     #[arg(value_name = "OUT")]
     out: PathBuf,
 }
@@ -27,7 +27,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         return Err(Error::Option {
             option: "OUT",
             given: args.out.display().to_string(),
-            expected: "a name that ends in .csv, .xlsx or .nc".to_owned(),
+            expected: "a name that ends in .csv or .xlsx".to_owned(),
         });
     };
     let output = Output::begin(&args.out, format.kind())?;

@@ -23,9 +23,7 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::exit::{Error, Exit};
 use crate::interrupt::survive_file_size_limits;
-use crate::memory::ensure_memory;
 use crate::program::call_program;
-use crate::random_keys::draw_random_keys;
 use crate::swept::Swept;
 
 #[derive(Debug, Parser)]
@@ -51,7 +49,7 @@ enum Command {
     Require(require::Args),
     /// Say what differs between two results
     Compare(compare::Args),
-    /// Write a result as CSV, Excel workbook or NetCDF, with units
+    /// Write a result as CSV or as an Excel workbook, with units
     Export(export::Args),
     /// Show how far a run is: done, missing, failed, running
     Status(status::Args),
@@ -82,8 +80,6 @@ fn run<M: Swept>(command: &Command) -> Result<Exit, Error> {
         path: "this process".into(),
         source,
     })?;
-    ensure_memory()?;
-    draw_random_keys()?;
     match command {
         Command::Run(args) => run::run::<M>(args),
         Command::Check(args) => check::run::<M>(args),

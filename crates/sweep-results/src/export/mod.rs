@@ -1,9 +1,7 @@
 //! Results in the formats of other programs, with units.
 
 mod csv;
-mod netcdf;
 mod xlsx;
-mod zip;
 
 use std::path::Path;
 
@@ -19,13 +17,11 @@ pub enum Format {
     Csv,
     /// A workbook: the rows, the columns with units and descriptions, the plan.
     Xlsx,
-    /// NetCDF classic, with 64-bit offsets: variables over the axes if the rows are a whole grid.
-    NetCdf,
 }
 
 impl Format {
     /// Every format.
-    pub const ALL: [Self; 3] = [Self::Csv, Self::Xlsx, Self::NetCdf];
+    pub const ALL: [Self; 2] = [Self::Csv, Self::Xlsx];
 
     /// The ending of its files, without a point.
     #[must_use]
@@ -33,7 +29,6 @@ impl Format {
         match self {
             Self::Csv => "csv",
             Self::Xlsx => "xlsx",
-            Self::NetCdf => "nc",
         }
     }
 
@@ -68,7 +63,6 @@ pub fn export(table: &ResultTable, format: Format) -> Result<Vec<u8>, ResultsErr
     match format {
         Format::Csv => csv::bytes(table),
         Format::Xlsx => xlsx::bytes(table),
-        Format::NetCdf => netcdf::bytes(table),
     }
 }
 

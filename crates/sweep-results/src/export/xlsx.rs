@@ -1,16 +1,14 @@
-//! A workbook of three sheets: the rows, the columns with units and descriptions, the plan. Office
-//! Open XML (ECMA-376), with texts in their cells and two styles.
+//! A workbook of three sheets: the rows, the columns with units and descriptions, the plan.
 
-use std::fmt::Write as _;
-use std::io;
-
+use rust_xlsxwriter::{
+    DocProperties, ExcelDateTime, Format as Style, Workbook, Worksheet, XlsxError,
+};
 use serde_json::Value;
 use sweep_files::key;
 
-use super::zip::Archive;
 use super::{Format, names, no_room};
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable};
+use crate::rows::{Cell, Column, ResultTable};
 
 /// Rows of a sheet, less the two of headings.
 const MOST_ROWS: u64 = (1 << 20) - 2;
@@ -18,226 +16,129 @@ const MOST_ROWS: u64 = (1 << 20) - 2;
 const MOST_COLUMNS: usize = 1 << 14;
 /// Characters of a sheet's cell.
 const LONGEST: usize = 32_767;
-
-const HEAD: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"yes\"?>\n";
-const MAIN: &str = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
-const OFFICE: &str = "http://schemas.openxmlformats.org/officeDocument/2006/relationships";
-const PACKAGE: &str = "http://schemas.openxmlformats.org/package/2006";
-const PART: &str = "application/vnd.openxmlformats-officedocument.spreadsheetml";
-
-const SHEETS: [&str; 3] = ["rows", "columns", "plan"];
+/// Widths of columns (characters): of a number, and of the longest words that are not cut off.
+const WIDTHS: [usize; 2] = [12, 60];
+/// What a filter's button takes of a heading (characters).
+const BUTTON: usize = 3;
 
 pub(super) fn bytes(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
+    let no_room = |reason: String| no_room(table, Format::Xlsx, reason);
     if table.rows() > MOST_ROWS {
         let reason = format!("{} rows, and a sheet has room for {MOST_ROWS}", table.rows());
-        return Err(no_room(table, Format::Xlsx, reason));
+        return Err(no_room(reason));
     }
     if table.columns.len() > MOST_COLUMNS {
-        let reason = format!("more than {MOST_COLUMNS} columns");
-        return Err(no_room(table, Format::Xlsx, reason));
+        return Err(no_room(format!("more than {MOST_COLUMNS} columns")));
     }
-    let sheets = [rows(table)?, columns(table), plan(table)];
-    archive(&sheets).map_err(|error| no_room(table, Format::Xlsx, error.to_string()))
-}
-
-/// The parts of a workbook with these sheets.
-fn archive(sheets: &[String; 3]) -> io::Result<Vec<u8>> {
-    let mut archive = Archive::default();
-    let numbered = || (1..).zip(SHEETS);
-    let overrides: String = numbered()
-        .map(|(k, _): (usize, _)| {
-            let name = format!("/xl/worksheets/sheet{k}.xml");
-            format!("<Override PartName=\"{name}\" ContentType=\"{PART}.worksheet+xml\"/>")
+    let mut book = Workbook::new();
+    let refused = |error: XlsxError| no_room(error.to_string());
+    let mut rows = Sheet::new(&mut book, "rows", 2).map_err(refused)?;
+    fill(&mut rows, table, refused)?;
+    about_columns(&mut book, table)
+        .and_then(|()| about_plan(&mut book, table))
+        .and_then(|()| {
+            // The same rows give the same bytes, whenever it is.
+            let made = ExcelDateTime::from_ymd(2000, 1, 1)?;
+            book.set_properties(&DocProperties::new().set_creation_datetime(&made));
+            book.save_to_buffer()
         })
-        .collect();
-    let content = format!(
-        "{HEAD}<Types xmlns=\"{PACKAGE}/content-types\">\
-         <Default Extension=\"rels\" \
-         ContentType=\"application/vnd.openxmlformats-package.relationships+xml\"/>\
-         <Default Extension=\"xml\" ContentType=\"application/xml\"/>\
-         <Override PartName=\"/xl/workbook.xml\" ContentType=\"{PART}.sheet.main+xml\"/>\
-         <Override PartName=\"/xl/styles.xml\" ContentType=\"{PART}.styles+xml\"/>\
-         {overrides}</Types>"
-    );
-    archive.add("[Content_Types].xml", content.as_bytes())?;
-    let related = |links: &[(String, &str, String)]| {
-        let links: String = links
-            .iter()
-            .map(|(id, kind, target)| {
-                format!("<Relationship Id=\"{id}\" Type=\"{OFFICE}/{kind}\" Target=\"{target}\"/>")
-            })
-            .collect();
-        format!("{HEAD}<Relationships xmlns=\"{PACKAGE}/relationships\">{links}</Relationships>")
-    };
-    let link = |id: usize, kind, target: &str| (format!("r{id}"), kind, target.to_owned());
-    let root = related(&[link(1, "officeDocument", "xl/workbook.xml")]);
-    archive.add("_rels/.rels", root.as_bytes())?;
-    let listed: String = numbered()
-        .map(|(k, name): (usize, _)| {
-            format!("<sheet name=\"{name}\" sheetId=\"{k}\" r:id=\"r{k}\"/>")
-        })
-        .collect();
-    let workbook = format!(
-        "{HEAD}<workbook xmlns=\"{MAIN}\" xmlns:r=\"{OFFICE}\"><sheets>{listed}</sheets></workbook>"
-    );
-    archive.add("xl/workbook.xml", workbook.as_bytes())?;
-    let mut links: Vec<_> = numbered()
-        .map(|(k, _)| link(k, "worksheet", &format!("worksheets/sheet{k}.xml")))
-        .collect();
-    links.push(link(SHEETS.len() + 1, "styles", "styles.xml"));
-    archive.add("xl/_rels/workbook.xml.rels", related(&links).as_bytes())?;
-    archive.add("xl/styles.xml", styles().as_bytes())?;
-    for (k, sheet) in (1..).zip(sheets) {
-        let k: usize = k;
-        archive.add(&format!("xl/worksheets/sheet{k}.xml"), sheet.as_bytes())?;
-    }
-    archive.finish()
+        .map_err(refused)
 }
 
-/// Style 0 is plain, 1 bold.
-fn styles() -> String {
-    let font = |bold: &str| format!("<font>{bold}<sz val=\"11\"/><name val=\"Calibri\"/></font>");
-    let style = |font: u8| {
-        format!("<xf numFmtId=\"0\" fontId=\"{font}\" fillId=\"0\" borderId=\"0\" xfId=\"0\"/>")
-    };
-    format!(
-        "{HEAD}<styleSheet xmlns=\"{MAIN}\"><fonts count=\"2\">{}{}</fonts>\
-         <fills count=\"2\"><fill><patternFill patternType=\"none\"/></fill>\
-         <fill><patternFill patternType=\"gray125\"/></fill></fills>\
-         <borders count=\"1\"><border/></borders>\
-         <cellStyleXfs count=\"1\"><xf/></cellStyleXfs>\
-         <cellXfs count=\"2\">{}{}</cellXfs>\
-         <cellStyles count=\"1\">\
-         <cellStyle name=\"Normal\" xfId=\"0\" builtinId=\"0\"/></cellStyles>\
-         </styleSheet>",
-        font(""),
-        font("<b/>"),
-        style(0),
-        style(1)
-    )
+/// A sheet in the making, row by row: what is written is in a temporary file.
+struct Sheet<'a> {
+    sheet: &'a mut Worksheet,
+    row: u32,
 }
 
-/// A sheet in the making.
-struct Sheet {
-    text: String,
-    row: usize,
-}
-
-impl Sheet {
+impl<'a> Sheet<'a> {
     /// With so many rows of headings, which stay in sight.
-    fn new(headings: usize) -> Self {
-        let text = format!(
-            "{HEAD}<worksheet xmlns=\"{MAIN}\"><sheetViews><sheetView workbookViewId=\"0\">\
-             <pane ySplit=\"{headings}\" topLeftCell=\"A{}\" activePane=\"bottomLeft\" \
-             state=\"frozen\"/></sheetView></sheetViews><sheetData>",
-            headings + 1
-        );
-        Self { text, row: 0 }
+    fn new(book: &'a mut Workbook, name: &str, headings: u32) -> Result<Self, XlsxError> {
+        let sheet = book.add_worksheet_with_constant_memory()?;
+        sheet.set_name(name)?.set_freeze_panes(headings, 0)?;
+        sheet.set_row_format(0, &Style::new().set_bold())?;
+        Ok(Self { sheet, row: 0 })
     }
 
-    fn row(&mut self, cells: impl IntoIterator<Item = Cell>, bold: bool) {
-        self.row += 1;
-        // Writing to a String cannot fail.
-        let _ = write!(self.text, "<row r=\"{}\">", self.row);
-        for (column, cell) in cells.into_iter().enumerate() {
-            let style = if bold { " s=\"1\"" } else { "" };
-            let place = format!("{}{}", letters(column), self.row);
-            let _ = match cell {
+    fn row(&mut self, cells: impl IntoIterator<Item = Cell>) -> Result<(), XlsxError> {
+        for (column, cell) in (0..).zip(cells) {
+            match cell {
                 // What is missing has no cell.
-                Cell::Null => Ok(()),
-                // A sheet has no infinity.
+                Cell::Null => continue,
                 Cell::Number(number) if number.is_finite() => {
-                    write!(self.text, "<c r=\"{place}\"{style}><v>{number:e}</v></c>")
+                    self.sheet.write_number(self.row, column, number)?
                 }
-                Cell::Flag(flag) => {
-                    let flag = u8::from(flag);
-                    write!(self.text, "<c r=\"{place}\"{style} t=\"b\"><v>{flag}</v></c>")
+                // A sheet has no infinity.
+                Cell::Number(number) => {
+                    self.sheet.write_string(self.row, column, number.to_string())?
                 }
-                Cell::Number(number) => self.words(&place, style, &number.to_string()),
-                Cell::Text(text) => self.words(&place, style, &text),
+                Cell::Flag(flag) => self.sheet.write_boolean(self.row, column, flag)?,
+                Cell::Text(text) => {
+                    let fits: String = text.chars().take(LONGEST).collect();
+                    self.sheet.write_string(self.row, column, fits)?
+                }
             };
         }
-        self.text.push_str("</row>");
+        self.row += 1;
+        Ok(())
     }
 
-    fn words(&mut self, place: &str, style: &str, text: &str) -> std::fmt::Result {
-        let text = escaped(text);
-        write!(
-            self.text,
-            "<c r=\"{place}\"{style} t=\"inlineStr\">\
-             <is><t xml:space=\"preserve\">{text}</t></is></c>"
-        )
-    }
-
-    fn finish(mut self) -> String {
-        self.text.push_str("</sheetData></worksheet>");
-        self.text
-    }
-}
-
-/// A column as sheets count: A to Z, AA, AB, ...
-fn letters(column: usize) -> String {
-    let mut letters = Vec::new();
-    let mut rest = column + 1;
-    while rest > 0 {
-        rest -= 1;
-        // Below 26.
-        letters.push(b'A' + (rest % 26) as u8);
-        rest /= 26;
-    }
-    letters.reverse();
-    String::from_utf8(letters).unwrap_or_default()
-}
-
-/// A text in XML, as long as a cell takes it, without characters that XML has no place for.
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars().take(LONGEST) {
-        match c {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '\t' | '\n' => escaped.push(c),
-            c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => {
-                escaped.push('\u{fffd}');
-            }
-            c => escaped.push(c),
+    /// The columns are as wide as these words of theirs.
+    fn widths<'b>(&mut self, words: impl Iterator<Item = &'b str>) -> Result<(), XlsxError> {
+        for (column, word) in (0..).zip(words) {
+            let width = (word.chars().count() + BUTTON).clamp(WIDTHS[0], WIDTHS[1]);
+            self.sheet.set_column_width(column, u32::try_from(width).unwrap_or(u32::MAX))?;
         }
+        Ok(())
     }
-    escaped
 }
 
 fn text(text: &str) -> Cell {
     Cell::Text(text.to_owned())
 }
 
-fn rows(table: &ResultTable) -> Result<String, ResultsError> {
-    let mut sheet = Sheet::new(2);
+/// The rows, under their names and units, with a filter.
+fn fill(
+    sheet: &mut Sheet<'_>,
+    table: &ResultTable,
+    refused: impl Fn(XlsxError) -> ResultsError + Copy,
+) -> Result<(), ResultsError> {
     let names = names(table);
-    sheet.row(names.iter().map(|name| text(name)), true);
-    sheet.row(table.columns.iter().map(|column| text(&column.unit)), false);
+    sheet.widths(names.iter().copied()).map_err(refused)?;
+    sheet.row(names.iter().map(|name| text(name))).map_err(refused)?;
+    sheet.row(table.columns.iter().map(|column| text(&column.unit))).map_err(refused)?;
+    let heading = sheet.row - 1;
     for rows in table.read(&names)? {
         let rows = rows?;
         for row in 0..rows.count {
-            sheet.row((0..names.len()).map(|column| rows.cell(column, row)), false);
+            let cells = (0..names.len()).map(|column| rows.cell(column, row));
+            sheet.row(cells).map_err(refused)?;
         }
     }
-    Ok(sheet.finish())
+    let last = u16::try_from(names.len().saturating_sub(1)).unwrap_or(u16::MAX);
+    // Its buttons stand beside the units, so that sorting moves neither units nor names.
+    sheet.sheet.autofilter(heading, 0, sheet.row - 1, last).map_err(refused)?;
+    Ok(())
 }
 
-fn columns(table: &ResultTable) -> String {
-    let mut sheet = Sheet::new(1);
-    sheet.row(["column", "unit", "description"].map(text), true);
+fn about_columns(book: &mut Workbook, table: &ResultTable) -> Result<(), XlsxError> {
+    let mut sheet = Sheet::new(book, "columns", 1)?;
+    let longest = |word: fn(&Column) -> &str| {
+        let words = table.columns.iter().map(word);
+        words.max_by_key(|word| word.chars().count()).unwrap_or_default()
+    };
+    let widest = [longest(|c| &c.name), longest(|c| &c.unit), longest(|c| &c.description)];
+    sheet.widths(widest.into_iter())?;
+    sheet.row(["column", "unit", "description"].map(text))?;
     for column in &table.columns {
-        sheet.row([&column.name, &column.unit, &column.description].map(|word| text(word)), false);
+        sheet.row([&column.name, &column.unit, &column.description].map(|word| text(word)))?;
     }
-    sheet.finish()
+    Ok(())
 }
 
 /// Every number and word of the plan under its path.
-fn plan(table: &ResultTable) -> String {
-    let mut sheet = Sheet::new(1);
-    sheet.row(["setting", "value"].map(text), true);
+fn about_plan(book: &mut Workbook, table: &ResultTable) -> Result<(), XlsxError> {
+    let mut sheet = Sheet::new(book, "plan", 1)?;
     let mut leaves = Vec::new();
     for (name, key) in [("version", key::VERSION), ("numerics", key::NUMERICS)] {
         leaves.extend(table.file().value(key).map(|value| (name.to_owned(), value.into())));
@@ -245,15 +146,18 @@ fn plan(table: &ResultTable) -> String {
     if let Some(plan) = &table.plan {
         collect(plan, &mut String::new(), &mut leaves);
     }
+    let longest = leaves.iter().map(|(path, _)| path.as_str()).max_by_key(|path| path.len());
+    sheet.widths(longest.into_iter())?;
+    sheet.row(["setting", "value"].map(text))?;
     for (path, value) in leaves {
         let value = match &value {
             Value::Number(number) => number.as_f64().map_or(Cell::Null, Cell::Number),
             Value::String(word) => text(word),
             other => text(&other.to_string()),
         };
-        sheet.row([Cell::Text(path), value], false);
+        sheet.row([Cell::Text(path), value])?;
     }
-    sheet.finish()
+    Ok(())
 }
 
 fn collect(value: &Value, path: &mut String, leaves: &mut Vec<(String, Value)>) {
@@ -284,18 +188,8 @@ mod tests {
     fn the_same_rows_give_the_same_workbook() {
         let first = bytes(&sample::table()).unwrap();
         assert!(first.starts_with(b"PK\x03\x04"));
+        std::thread::sleep(std::time::Duration::from_millis(1100));
         assert_eq!(first, bytes(&sample::table()).unwrap());
-    }
-
-    #[test]
-    fn cells_stand_where_they_belong() {
-        let sheet = rows(&sample::table()).unwrap();
-        assert!(sheet.contains("<row r=\"3\"><c r=\"A3\"><v>0e0</v></c><c r=\"B3\"><v>1e-1</v>"));
-        assert!(sheet.contains("<c r=\"H3\" t=\"b\"><v>1</v></c>"), "{sheet}");
-        assert!(!sheet.contains("r=\"G6\""), "what is missing has no cell");
-        let named = [0, 25, 26, 701, 702].map(letters);
-        assert_eq!(named, ["A", "Z", "AA", "ZZ", "AAA"]);
-        assert_eq!(escaped("a<b>&\u{1}"), "a&lt;b&gt;&amp;\u{fffd}");
     }
 
     #[test]

@@ -53,7 +53,6 @@ pub(super) const COMPARE: Examples = &[
 pub(super) const EXPORT: Examples = &[
     ["sweep export map.parquet map.csv", "text; units in comments (pandas: comment=\"#\")"],
     ["sweep export map.parquet map.xlsx", "a workbook: rows, columns with units, plan"],
-    ["sweep export map.parquet map.nc", "NetCDF over the axes, for xarray and MATLAB"],
 ];
 
 /// Of `sweep boundary`.

@@ -27,7 +27,6 @@ use sweep_engine::commands::{
 
 use sweep_engine::exit::{Error, Exit};
 use sweep_engine::nearest::nearest;
-use sweep_engine::random_keys::draw_random_keys;
 
 /// Shown by `--help`.
 const EXAMPLES: Examples = &[
@@ -89,7 +88,7 @@ pub enum Command {
     Require(require::Args),
     /// Say what differs between two results
     Compare(compare::Args),
-    /// Write a result as CSV, Excel workbook or NetCDF, with units
+    /// Write a result as CSV or as an Excel workbook, with units
     Export(export::Args),
     /// Show how far a run is: done, missing, failed, running
     Status(status::Args),
@@ -222,7 +221,6 @@ impl Command {
     /// # Errors
     /// Whatever kept the command from its end.
     pub fn run(&self) -> Result<Exit, Error> {
-        draw_random_keys()?;
         match self {
             Self::Run(args) => run::run(args),
             Self::Check(args) => check::run::<crate::Washer>(args),

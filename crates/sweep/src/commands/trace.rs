@@ -6,15 +6,12 @@ use std::path::PathBuf;
 use crate::config;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
-use crate::trace::{
-    Extras, StartValue, View, bytes, every, instants, start_of, start_value, trace,
-};
+use crate::trace::{Extras, StartValue, View, every, start_of, start_value, trace};
 use sweep_engine::commands::cells::{short, table};
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::quoted;
 use sweep_engine::commands::run::line;
 use sweep_engine::exit::{Error, Exit, tell};
-use sweep_engine::memory::{ensure_heaps, ensure_memory_of};
 use sweep_engine::store::Job;
 use sweep_engine::threads;
 use sweep_files::{FileKind, Output, key};
@@ -93,11 +90,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let view = View { every_s, start, extras, quick: None };
     // A signal ends the process: there is nothing to keep.
     let work = || trace(&plan, plan.scenario(0), at, &view, &|| false);
-    let bytes = bytes(instants(&plan, every_s), extras);
-    ensure_memory_of(bytes)?;
     // A thread for each model, where there may be two; they write the same bytes as one.
-    let pool = ensure_heaps(2, bytes).ok().and_then(|()| threads::pool(2).ok());
-    let trace = match pool {
+    let trace = match threads::pool(2).ok() {
         Some(pool) => pool.install(work),
         None => work(),
     }

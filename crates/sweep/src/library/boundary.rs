@@ -11,7 +11,6 @@ use sweep_engine::boundary::file::{job, table};
 use sweep_engine::boundary::search::{BoundaryTask, Stopped};
 use sweep_engine::commands::boundary::search;
 use sweep_engine::exit::Error;
-use sweep_engine::random_keys::draw_random_keys;
 use sweep_engine::store::{OpenedTrials, Trials};
 use sweep_files::{FileKind, Output};
 
@@ -42,7 +41,6 @@ pub fn find_boundary(
     options: BoundaryOptions<'_>,
     effort: Effort<'_>,
 ) -> Result<Option<ResultTable>, Error> {
-    draw_random_keys()?;
     let names = Washer::quantities();
     if !names.iter().any(|name| name == options.quantity) {
         let (given, expected) =

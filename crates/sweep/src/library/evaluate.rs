@@ -16,7 +16,6 @@ use crate::engine::{ModelEngine, Watch};
 use crate::plan::Plan;
 use sweep_engine::exit::Error;
 use sweep_engine::progress::Progress;
-use sweep_engine::random_keys::draw_random_keys;
 use sweep_engine::store::Done;
 use sweep_engine::store::{BATCH_ROWS, Job, Layout, ResultRows, StoreError};
 use sweep_engine::threads::{self, ThreadsError};
@@ -82,7 +81,6 @@ impl Evaluator {
     }
 
     fn rows(&self, job: &Job<'_>, effort: Effort<'_>) -> Result<Evaluated, Error> {
-        draw_random_keys()?;
         let engine = match self.ladders.get() {
             Some(ladders) => ModelEngine::with_ladders(&self.plan, ladders.clone())?,
             None => ModelEngine::new(&self.plan)?,

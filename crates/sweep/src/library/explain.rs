@@ -8,7 +8,6 @@ use crate::engine::simd_from_environment;
 use crate::explain::{explain, json, words};
 use crate::speeds::Speeds;
 use sweep_engine::exit::Error;
-use sweep_engine::random_keys::draw_random_keys;
 use sweep_engine::threads;
 
 /// What is found at a point.
@@ -33,7 +32,6 @@ pub fn explain_point(
     speeds_rpm: Option<&[f64]>,
     effort: Effort<'_>,
 ) -> Result<Option<Explained>, Error> {
-    draw_random_keys()?;
     let (plan, at) = grid.load_point(at)?;
     let even = |speeds: &[f64]| {
         Speeds::of_values(speeds).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {

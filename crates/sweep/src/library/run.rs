@@ -7,7 +7,6 @@ use super::result::ResultTable;
 use crate::engine::{Engine, ModelEngine};
 use crate::plan::Plan;
 use sweep_engine::exit::Error;
-use sweep_engine::random_keys::draw_random_keys;
 use sweep_engine::run::{self as runner, Ended, RunOptions};
 use sweep_engine::store::Job;
 
@@ -52,7 +51,6 @@ pub(super) fn into_file(
     tell: &dyn Fn(&str),
     effort: Effort<'_>,
 ) -> Result<RanToFile, Error> {
-    draw_random_keys()?;
     let options = RunOptions {
         threads: effort.threads()?,
         fresh,

@@ -10,7 +10,6 @@ use crate::plan::Plan;
 use crate::speeds::MOST_SPEEDS;
 use crate::stability::{DwellEngine, check};
 use sweep_engine::exit::Error;
-use sweep_engine::random_keys::draw_random_keys;
 
 /// The periodic response of both models at each point of a plan's grid and each constant speed
 /// (rpm, rising), and how fast disturbances of it grow; speeds vary fastest.
@@ -22,7 +21,6 @@ pub fn find_stability(
     speeds_rpm: &[f64],
     effort: Effort<'_>,
 ) -> Result<Evaluated, Error> {
-    draw_random_keys()?;
     check_speeds(plan, speeds_rpm)?;
     let engine = DwellEngine::new(plan, speeds_rpm)?;
     let job = crate::stability::job(plan, speeds_rpm);

@@ -5,7 +5,6 @@ use crate::config::GridInput;
 use crate::trace::{self, Extras, View, every, start_of, start_value};
 use sweep_engine::exit::Error;
 use sweep_engine::interrupt::Interrupt;
-use sweep_engine::random_keys::draw_random_keys;
 use sweep_engine::threads;
 
 /// What a trace holds.
@@ -33,7 +32,6 @@ pub fn trace_point(
     options: &TraceOptions,
     interrupt: &Interrupt,
 ) -> Result<Option<(ResultTable, Vec<String>)>, Error> {
-    draw_random_keys()?;
     let (plan, at) = grid.load_point(at)?;
     let every_s = every(options.every_s, &plan)?;
     let start = options.start.iter().map(|text| {
