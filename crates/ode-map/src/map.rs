@@ -322,7 +322,7 @@ struct Row<const C: usize> {
     ratio_limit: f64,
     method: usize,
     error: Option<f64>,
-    sensitive: Option<bool>,
+    converged: Option<bool>,
 }
 
 impl<const C: usize> Row<C> {
@@ -351,8 +351,13 @@ impl<const C: usize> Compared for Row<C> {
         self.greatest().map(|(_, ratio)| ratio < self.ratio_limit)
     }
 
+    fn converged(&self) -> Option<bool> {
+        self.converged
+    }
+
     fn sensitive(&self) -> Option<bool> {
-        self.sensitive
+        // No twin is run.
+        None
     }
 
     fn method(&self) -> usize {
@@ -467,8 +472,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             let now = [nonlinear[0], linear[0]];
             let error = before.and_then(|before| error_left(&before, &now, &row.channels));
             (row.runs, row.error) = (Some(now), error);
-            row.sensitive = Some(error.is_none_or(|error| error > accuracy));
-            if row.sensitive == Some(false) {
+            row.converged = Some(error.is_some_and(|error| error <= accuracy));
+            if row.converged == Some(true) {
                 return;
             }
             before = Some(now);
@@ -484,7 +489,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             ratio_limit: reliability.ratio_limit,
             method: 0,
             error: None,
-            sensitive: None,
+            converged: None,
         }
     }
 }

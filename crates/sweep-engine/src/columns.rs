@@ -18,7 +18,9 @@ pub trait Compared: 'static {
     fn greatest(&self) -> Option<(usize, f64)>;
     /// Whether the greatest ratio is below the limit.
     fn reliable(&self) -> Option<bool>;
-    /// Whether the method does not agree with itself.
+    /// Whether the error left is within the accuracy asked for.
+    fn converged(&self) -> Option<bool>;
+    /// Whether the motion is chaotic.
     fn sensitive(&self) -> Option<bool>;
     /// The position of the method's name.
     fn method(&self) -> usize;
@@ -131,7 +133,7 @@ pub fn verdict_columns<R: Compared, C: Channel>(
     ratio_limit: f64,
     methods: Vec<&'static str>,
     told: &str,
-) -> [ResultColumn<R>; 6] {
+) -> [ResultColumn<R>; 7] {
     let channels = channels.iter().map(|channel| channel.name()).collect();
     [
         ResultColumn::new(
@@ -155,9 +157,9 @@ pub fn verdict_columns<R: Compared, C: Channel>(
         ResultColumn::new(
             "sensitive",
             "",
-            "true where plain rk4 does not agree with itself at two steps: the motion is \
-                 chaotic, and the row's \
-                 digits are those of one trajectory; null where nothing was compared",
+            "true where the motion is chaotic, and the row's digits are those of one trajectory: \
+             plain rk4 does not agree with itself at two steps, and a near twin departs \
+             exponentially; null where nothing was compared",
             Cell::Flag(Box::new(|row: &R| row.sensitive())),
         ),
         ResultColumn::new(
@@ -173,6 +175,12 @@ pub fn verdict_columns<R: Compared, C: Channel>(
                  its method; null where \
                  nothing was compared",
             Cell::Measured(Box::new(|row: &R| row.error())),
+        ),
+        ResultColumn::new(
+            "converged",
+            "",
+            "true where error is within the accuracy asked for; null where nothing was compared",
+            Cell::Flag(Box::new(|row: &R| row.converged())),
         ),
     ]
 }

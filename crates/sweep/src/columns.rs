@@ -97,6 +97,10 @@ impl Compared for ResultRow {
         self.verdict.reliable
     }
 
+    fn converged(&self) -> Option<bool> {
+        self.outcome.converged
+    }
+
     fn sensitive(&self) -> Option<bool> {
         self.outcome.sensitive
     }
@@ -212,7 +216,7 @@ impl Asked {
         columns
     }
 
-    fn verdict_columns(&self) -> [WasherColumn; 6] {
+    fn verdict_columns(&self) -> [WasherColumn; 7] {
         let told = "what the row's numbers come from: fast, fine and finest are rungs of the fast \
                     method, the others methods of that name";
         verdict_columns(

@@ -2,11 +2,11 @@
 
 use lane_ode::{Failure, Simd};
 use washer_model::{
-    Channel, Disturbance, Dwell, Machine, ModelKind, Point, Response, Spin, Start, Target, Timing,
-    history, prepare, respond,
+    Channel, Disturbance, Dwell, Machine, Method, ModelKind, Point, Response, Spin, Start, Target,
+    Timing, history, prepare, respond,
 };
 use washer_row::{
-    Climbs, Demand, Deviations, Ladder, Level, MODELS, Next, Outcome, Rule, Rung, RungRun, Status,
+    Climbs, Demand, Deviations, Ladder, Level, MODELS, Next, Outcome, Rule, RungRun, Status,
     Trajectory, Verdict, runs,
 };
 
@@ -151,7 +151,7 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
             alike.iter().filter_map(|&k| ready[k].as_ref().ok()).map(|(_, point)| point).collect();
         let rungs = [0, 1].map(|model| quick_rung(&ladders[model]));
         let [nonlinear, linear] = [0, 1]
-            .map(|model| by_rung(model, &ladders[model].rungs[rungs[model]], &ready_ones, &rule));
+            .map(|model| by_method(model, ladders[model].method(rungs[model]), &ready_ones, &rule));
         let mut pairs = nonlinear.into_iter().zip(linear);
         for &k in alike {
             let answer = |(nonlinear, linear): (RungRun, RungRun)| {
@@ -183,14 +183,16 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
             Next::Runs(wanted) => {
                 for (model, rung) in wanted {
                     let ladder = &ladders[model];
-                    for run in by_rung(model, &ladder.rungs[rung], &[&point], rule) {
+                    let twin = (rung == ladder.twin()).then(|| point.nudged());
+                    let started = twin.as_ref().unwrap_or(&point);
+                    for run in by_method(model, ladder.method(rung), &[started], rule) {
                         climbs.take((model, rung), run, ladder, &point, rule);
                     }
                 }
             }
         }
     };
-    let last = [0, 1].map(|model| climbs.last(model));
+    let last = [0, 1].map(|model| climbs.last(model, &ladders[model]));
     let [Some(nonlinear), Some(linear)] = last else { return Err(NoPoint::NoEquilibrium) };
     let last = [nonlinear, linear];
     let (amplitudes, rungs) = (last.map(|(run, ..)| run.amplitudes), last.map(|(_, at, _)| at));
@@ -198,8 +200,8 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
     Ok(Answer { errors: last.map(|(.., error)| error), ..answer })
 }
 
-fn by_rung(model: usize, rung: &Rung, points: &[&Point], rule: &Rule) -> Vec<RungRun> {
-    let found = runs(Simd::best(), MODELS[model], &rung.method, points, rule, &|| false);
+fn by_method(model: usize, method: &Method, points: &[&Point], rule: &Rule) -> Vec<RungRun> {
+    let found = runs(Simd::best(), MODELS[model], method, points, rule, &|| false);
     found.unwrap_or_default()
 }
 

@@ -79,6 +79,7 @@ impl Setup {
         out.count(self.sliders.axes);
         for ladder in self.ladders.iter().chain(&self.wide_ladders) {
             out.count(ladder.rungs.len());
+            out.count(ladder.reference().unwrap_or(0));
             ladder.rungs.iter().for_each(|rung| write_rung(&mut out, rung));
         }
         out.0
@@ -122,8 +123,11 @@ impl Setup {
         let sliders = Sliders { parameters: sliders, axes: from.count(MOST)? };
         let mut ladder = || -> Option<Ladder> {
             let count = from.count(MOST).filter(|count| *count > 1)?;
-            let rungs = (0..count).map(|_| read_rung(&mut from)).collect::<Option<_>>()?;
-            Some(Ladder::checked(rungs, None))
+            let reference = from.count(MOST).filter(|at| (1..count).contains(at))?;
+            let mut rungs: Vec<Rung> =
+                (0..count).map(|_| read_rung(&mut from)).collect::<Option<_>>()?;
+            let finer = rungs.split_off(reference + 1);
+            Some(Ladder::checked(rungs, None).with_finer(finer))
         };
         let ladders = [ladder()?, ladder()?];
         let wide_ladders = [ladder()?, ladder()?];
@@ -163,6 +167,7 @@ fn write_rung(out: &mut Writer, rung: &Rung) {
     for number in [contraction, believed_to, own_error, expected] {
         out.number(number);
     }
+    out.count(usize::from(rung.follows_bearings));
     match rung.method {
         Method::Geared(Geared { gears }) => {
             out.count(1);
@@ -190,6 +195,7 @@ fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
         own_error: from.number()?,
         expected: from.number()?,
     };
+    let follows_bearings = from.count(2)? > 0;
     let method = match from.count(2)? {
         0 => Method::Rk4 { step_s: from.number()? },
         _ => {
@@ -203,5 +209,5 @@ fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
             Method::Geared(Geared { gears: [gear()?, gear()?, gear()?] })
         }
     };
-    Some(Rung { level, method, convergence })
+    Some(Rung { level, method, convergence, follows_bearings })
 }

@@ -29,6 +29,9 @@ pub struct Timing {
     pub checkpoints: u32,
 }
 
+/// How far a twin's start is from its original's (m, rad).
+const NUDGE: f64 = 1e-10;
+
 /// The machine has no static equilibrium, or none that is stable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the machine has no stable static equilibrium: its springs cannot carry it")]
@@ -49,6 +52,8 @@ pub struct Point {
     pub(crate) stretches: Arc<[SpinStretch]>,
     pub(crate) legs: Arc<[PlannedLeg]>,
     pub(crate) ringing: Ringing,
+    /// By how much the nonlinear model starts beside its equilibrium, in every coordinate (m, rad).
+    pub(crate) nudge: f64,
     /// Weight of all bodies (N).
     pub(crate) weight_n: f64,
     /// What the cabinet's feet take of its loads, if it is described.
@@ -90,6 +95,27 @@ impl Point {
     #[must_use]
     pub fn ringing(&self) -> [f64; CHANNELS] {
         self.ringing.channels()
+    }
+
+    /// As [`Self::ringing`], by the bearings alone: what steps leave out that follow the hinge.
+    #[must_use]
+    pub fn bearing_ringing(&self) -> [f64; CHANNELS] {
+        self.ringing.of_bearings().channels()
+    }
+
+    /// How far each channel (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) is
+    /// where it is because the weight of drum and unbalance bends the hinge. Seen from the shaft
+    /// that bend turns backwards, where a cap on the hinge is not exact.
+    #[must_use]
+    pub fn hinge_sag(&self) -> [f64; CHANNELS] {
+        self.ringing.sag()
+    }
+
+    /// The same point, started [`NUDGE`] beside its equilibrium in every coordinate of the
+    /// nonlinear model: a near twin, whose departure tells chaos from a step that is too long.
+    #[must_use]
+    pub fn nudged(&self) -> Self {
+        Self { nudge: NUDGE, ..self.clone() }
     }
 
     /// Weight (N) of what the springs carry.
@@ -184,6 +210,7 @@ impl Kernel for Prepare<'_> {
                     let steepest = steepest.map(|tangents| Box::new(linear.with_tub(tangents)));
                     Ok(Point {
                         ringing: Ringing::new(machine, course.jumps_rad_per_s2),
+                        nudge: 0.0,
                         machine: coefficients,
                         equilibrium: q.map(|q| q.0.get(lane)),
                         rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),

@@ -3,10 +3,10 @@
 use washer_model::{ModelKind, Point};
 
 use crate::ladder::{Ladder, Rung};
-use crate::level::Level;
 use crate::measures::{Metric, TURN_FLOOR};
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::run::{Rule, RungRun};
+use crate::twin::Departure;
 use crate::verdict::Verdict;
 
 /// What an outcome must be good for.
@@ -30,6 +30,9 @@ const SHARE: f64 = 4.0;
 /// course.
 const ROUGHLY: f64 = 2.0;
 
+/// Two runs that differ by no more than this have one course.
+const COMMON_COURSE: f64 = 0.05;
+
 /// Fail times that differ by less than this share of the run are one. Where a trajectory fails for
 /// a step that is too long, the times at two steps differ by more: by 6e-4 was seen.
 const SAME_TIME: f64 = 1e-4;
@@ -37,6 +40,10 @@ const SAME_TIME: f64 = 1e-4;
 /// Differences of metrics are shares of the greater of their value and this part of what they are
 /// measured against.
 const METRIC_FLOOR: f64 = 1e-3;
+
+/// A capped hinge errs in its bend under gravity by so many times the accuracy, at most: 15 was
+/// seen. So motions as small as that bend times this are for plain RK4.
+const SAGS: f64 = 32.0;
 
 /// Differences of a turn's peak count so many times. Where it lies beside the turn's cut, it errs
 /// with the phase of the motion, and shrinks less from rung to rung than the motion's error does.
@@ -50,11 +57,21 @@ pub const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
 struct Climb {
     /// The rung of `run`.
     rung: usize,
-    /// The last run.
+    /// The last run, but for a twin's.
     run: Option<RungRun>,
-    /// The error left in it; absent where nothing says so.
-    error: Option<f64>,
-    /// How far the numbers of the row were from those of the run before.
+    /// How far it is from the run before; absent where they do not compare.
+    difference: Option<Difference>,
+    /// The error that `run` and the run before it have in common.
+    unseen: f64,
+    /// What the reference's twin says, once there was one.
+    twin: Option<Twin>,
+}
+
+/// A twin of the reference's run.
+#[derive(Clone, Copy, Debug)]
+struct Twin {
+    is_chaotic: bool,
+    /// How far its numbers are from the row's; absent where one of them failed.
     spread: Option<f64>,
 }
 
@@ -73,20 +90,89 @@ impl Climb {
             return;
         };
         let found = difference(&before, &now, point, model, rule);
-        let Rung { level, convergence, .. } = &ladder.rungs[rung];
-        let unseen = unseen(&now, *level, point, rule);
-        self.error = found.map(|found| convergence.error_left(found.greatest(), unseen));
-        self.spread = found.map(|found| found.of_numbers);
+        if rung == ladder.twin() {
+            let departure = Departure::new(&point.departure(&before.course, &now.course));
+            let spread = found.map(|found| found.of_numbers);
+            self.twin = Some(Twin { is_chaotic: departure.is_exponential(), spread });
+            self.run = Some(before);
+            return;
+        }
+        self.unseen = unseen(&now, &ladder.rungs[rung], point, rule);
+        self.difference = found;
         (self.rung, self.run) = (rung, Some(now));
     }
 
+    /// The error left; absent where nothing says so. `unseen` is what no comparison shows.
+    fn error_with(&self, ladder: &Ladder, unseen: f64) -> Option<f64> {
+        if self.is_chaotic() {
+            return self.spread().map(|spread| (ROUGHLY * spread).max(unseen));
+        }
+        let found = self.difference?;
+        let convergence = &ladder.rungs[self.rung].convergence;
+        // Nothing finer settles the course. Bearings that still ring do so soon in another phase,
+        // which the course shows and no number.
+        if ladder.is_finer(self.rung) {
+            let is_common = found.of_course <= COMMON_COURSE;
+            let share = if is_common { convergence.contraction } else { ROUGHLY };
+            return Some((share * found.of_numbers).max(unseen));
+        }
+        Some(convergence.error_left(found.greatest(), unseen))
+    }
+
+    fn error(&self, ladder: &Ladder) -> Option<f64> {
+        self.error_with(ladder, self.unseen)
+    }
+
     /// The error left, also where errors are not of first order any more.
-    fn roughly(&self) -> Option<f64> {
-        self.error.zip(self.spread).map(|(error, spread)| error.min(ROUGHLY * spread))
+    fn roughly(&self, ladder: &Ladder) -> Option<f64> {
+        let of_numbers = self.spread().map(|spread| (ROUGHLY * spread).max(self.unseen));
+        self.error(ladder).zip(of_numbers).map(|(error, of_numbers)| error.min(of_numbers))
+    }
+
+    /// Whether a twin departs as chaos has it.
+    fn is_chaotic(&self) -> bool {
+        self.twin.is_some_and(|twin| twin.is_chaotic)
+    }
+
+    /// How far the numbers of the row are from those of the run before, and from the twin's.
+    fn spread(&self) -> Option<f64> {
+        let from_before = self.difference?.of_numbers;
+        match self.twin {
+            Some(twin) => twin.spread.map(|spread| spread.max(from_before)),
+            None => Some(from_before),
+        }
     }
 
     fn failed(&self) -> bool {
         self.run.as_ref().is_some_and(|run| run.trajectory.status != Status::Ok)
+    }
+
+    /// The run to ask for next for an error of at most `tolerance`; none if it is there, or if no
+    /// further run would help.
+    fn higher(&self, ladder: &Ladder, model: ModelKind, tolerance: f64) -> Option<usize> {
+        if self.run.is_none() {
+            return Some(0);
+        }
+        let reference = ladder.reference()?;
+        if self.failed() && self.rung + 1 < reference {
+            // It may be the caps that do not hold: RK4 has the word, and at both steps.
+            return Some(reference - 1);
+        }
+        let is_settled = |error: Option<f64>| error.is_some_and(|error| error <= tolerance);
+        if is_settled(self.error(ladder)) || self.is_chaotic() {
+            return None;
+        }
+        // What the two runs differ in may be chaos, which no step settles.
+        let is_in_doubt = self.rung == reference && !is_settled(self.error_with(ladder, 0.0));
+        if is_in_doubt && model == ModelKind::Nonlinear && self.twin.is_none() {
+            return Some(ladder.twin());
+        }
+        // Behind half the reference's step, steps are for bearings that ring.
+        if ladder.is_finer(self.rung) && self.unseen <= tolerance {
+            return None;
+        }
+        let higher = self.rung + 1;
+        (higher < ladder.rungs.len()).then_some(higher)
     }
 }
 
@@ -119,9 +205,9 @@ impl Climbs {
     /// The last run of a model with its rung and the error left in it, once there is one. The error
     /// is absent where nothing says so.
     #[must_use]
-    pub fn last(&self, model: usize) -> Option<(&RungRun, usize, Option<f64>)> {
-        let Climb { run, rung, error, .. } = &self.0[model];
-        run.as_ref().map(|run| (run, *rung, *error))
+    pub fn last(&self, model: usize, ladder: &Ladder) -> Option<(&RungRun, usize, Option<f64>)> {
+        let climb = &self.0[model];
+        climb.run.as_ref().map(|run| (run, climb.rung, climb.error(ladder)))
     }
 
     /// What is to be done once every run that was asked for is there. `id` is what the outcome
@@ -141,32 +227,35 @@ impl Climbs {
         }
         let outcome = self.outcome(id, point, ladders, rule);
         let margin = outcome.as_ref().and_then(|outcome| margin(outcome, rule));
-        let is_sure = |climb: &Climb| match (demand, margin) {
+        let is_sure = |climb: &Climb, ladder: &Ladder| match (demand, margin) {
             (Demand::Side, Some(margin)) => {
-                climb.roughly().is_some_and(|error| SURE * error <= margin)
+                climb.roughly(ladder).is_some_and(|error| SURE * error <= margin)
             }
             _ => false,
         };
         let higher = |(model, climb): (usize, &Climb)| {
-            let rung = climb.higher(&ladders[model], rule.accuracy)?;
-            (!is_sure(climb)).then_some((model, rung))
+            let ladder = &ladders[model];
+            let rung = climb.higher(ladder, MODELS[model], rule.accuracy)?;
+            (!is_sure(climb, ladder)).then_some((model, rung))
         };
         let mut runs: Vec<_> = self.0.iter().enumerate().filter_map(higher).collect();
         let Some(outcome) = outcome.filter(|_| runs.is_empty()) else { return Next::Runs(runs) };
         // The verdict is plain RK4's: where the error left could turn it, RK4 has the word.
-        let errors: f64 = self.0.iter().filter_map(|climb| climb.error).sum();
-        if let Some(margin) = margin.filter(|margin| *margin <= errors) {
+        let errors = [0, 1].map(|model| self.0[model].error(&ladders[model]));
+        let sum: f64 = errors.iter().flatten().sum();
+        if let Some(margin) = margin.filter(|margin| *margin <= sum) {
             for (model, climb) in self.0.iter().enumerate() {
-                let Some(top) = ladders[model].top().filter(|top| climb.rung < *top) else {
+                let reference = ladders[model].reference();
+                let Some(reference) = reference.filter(|reference| climb.rung < *reference) else {
                     continue;
                 };
                 match demand {
                     // By way of its first step: only RK4 against RK4 tells chaos from a coarse
                     // rung.
-                    Demand::Row => runs.push((model, (climb.rung + 1).max(top - 1))),
+                    Demand::Row => runs.push((model, (climb.rung + 1).max(reference - 1))),
                     // Of the side alone, the next rung may make sure: where it cannot, the one
                     // after.
-                    Demand::Side if climb.error.is_some_and(|error| SHARE * error > margin) => {
+                    Demand::Side if errors[model].is_some_and(|error| SHARE * error > margin) => {
                         runs.push((model, climb.rung + 1));
                     }
                     Demand::Side | Demand::Growth => {}
@@ -192,14 +281,12 @@ impl Climbs {
         if rule.measures.metrics.contains(&Metric::StaticSag) {
             outcome.static_sag_m = Some(point.static_sag_m());
         }
-        if let [Some(nonlinear_top), Some(linear_top)] = [ladders[0].top(), ladders[1].top()] {
-            let is_chaotic = |climb: &Climb, top: usize| {
-                climb.rung == top && climb.error.is_none_or(|error| error > rule.accuracy)
-            };
-            outcome.sensitive =
-                Some(is_chaotic(nonlinear, nonlinear_top) || is_chaotic(linear, linear_top));
-            let errors = nonlinear.error.zip(linear.error);
+        if ladders.iter().all(|ladder| ladder.reference().is_some()) {
+            let errors = nonlinear.error(&ladders[0]).zip(linear.error(&ladders[1]));
             outcome.error = errors.map(|(nonlinear, linear)| nonlinear.max(linear));
+            outcome.converged = Some(outcome.error.is_some_and(|error| error <= rule.accuracy));
+            let disagrees = nonlinear.spread().is_none_or(|spread| spread > rule.accuracy);
+            outcome.sensitive = Some(nonlinear.is_chaotic() && disagrees);
         }
         Some(outcome)
     }
@@ -211,24 +298,8 @@ fn margin(outcome: &Outcome, rule: &Rule) -> Option<f64> {
     verdict.greatest.map(|(_, ratio)| (ratio / rule.ratio_limit - 1.0).abs())
 }
 
-impl Climb {
-    /// The rung to go to for an error of at most `tolerance`; none if it is there, or at the top.
-    fn higher(&self, ladder: &Ladder, tolerance: f64) -> Option<usize> {
-        if self.run.is_none() {
-            return Some(0);
-        }
-        let top = ladder.top()?;
-        if self.failed() && self.rung + 1 < top {
-            // It may be the caps that do not hold: RK4 has the word, and at both steps.
-            return Some(top - 1);
-        }
-        let is_settled = self.rung == top || self.error.is_some_and(|error| error <= tolerance);
-        (!is_settled).then_some(self.rung + 1)
-    }
-}
-
 /// How far two runs are apart, relative.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Difference {
     /// Over the course of the motion.
     of_course: f64,
@@ -264,14 +335,20 @@ fn difference(
     Some(Difference { of_course, of_numbers: of_numbers(of_a, of_b, point, rule) })
 }
 
-/// The error that rungs of this level have in common, so that no comparison shows it: bearings and
-/// hinge that are left swinging.
-fn unseen(run: &RungRun, level: Level, point: &Point, rule: &Rule) -> f64 {
-    if !level.is_capped() {
+/// The error that this rung has in common with others, so that no comparison shows it: what bearings
+/// and hinge swing after jumps, and what caps make of the hinge's bend under gravity.
+fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
+    if rung.follows_bearings {
         return 0.0;
     }
+    let is_capped = rung.level.is_capped();
+    let mut swings = if is_capped { point.ringing() } else { point.bearing_ringing() };
+    if is_capped {
+        for (swing, sag) in swings.iter_mut().zip(point.hinge_sag()) {
+            *swing += SAGS * rule.accuracy * sag;
+        }
+    }
     let numbers = &run.trajectory;
-    let swings = point.ringing();
     let share = |swing: f64, of: f64| if swing == 0.0 { 0.0 } else { swing / of };
     let channels = &rule.channels;
     let of_amplitudes = channels.iter().zip(&numbers.amplitudes);

@@ -15,6 +15,9 @@ pub struct Rung {
     pub method: Method,
     /// What its difference from the rung before says.
     pub convergence: Convergence,
+    /// Whether its steps follow the bearings, so that what they swing after a jump of the drum's
+    /// acceleration is in its numbers.
+    pub follows_bearings: bool,
 }
 
 impl Rung {
@@ -52,8 +55,8 @@ impl Rung {
 pub struct Ladder {
     /// From the quickest; at least one.
     pub rungs: Vec<Rung>,
-    /// Whether there is more than one, and the last ones are plain RK4.
-    is_checked: bool,
+    /// The place of the reference, if rungs check one another.
+    reference: Option<usize>,
     /// What elements of the machines hold the quick rungs back, if any do.
     pub held_back: Option<String>,
 }
@@ -62,20 +65,49 @@ impl Ladder {
     /// One method, which nothing is compared with.
     #[must_use]
     pub fn direct(level: Level, method: Method) -> Self {
-        let rungs = vec![Rung { level, method, convergence: Convergence::NONE }];
-        Self { rungs, is_checked: false, held_back: None }
+        let rung = Rung { level, method, convergence: Convergence::NONE, follows_bearings: false };
+        Self { rungs: vec![rung], reference: None, held_back: None }
     }
 
-    /// Rungs that check one another, the last ones plain RK4; at least two.
+    /// Rungs that check one another, at least two. The last two are plain RK4, the very last the
+    /// reference.
     #[must_use]
     pub const fn checked(rungs: Vec<Rung>, held_back: Option<String>) -> Self {
-        Self { rungs, is_checked: true, held_back }
+        let reference = Some(rungs.len() - 1);
+        Self { rungs, reference, held_back }
     }
 
-    /// The last rung, if there are others below it.
+    /// With rungs of shorter steps behind the reference, for rows that it leaves in doubt.
     #[must_use]
-    pub fn top(&self) -> Option<usize> {
-        self.is_checked.then(|| self.rungs.len() - 1)
+    pub fn with_finer(mut self, finer: impl IntoIterator<Item = Rung>) -> Self {
+        self.rungs.extend(finer);
+        self
+    }
+
+    /// The place of the reference: plain RK4 whose step agrees with a longer one, mostly. None
+    /// where there is nothing but one method.
+    #[must_use]
+    pub const fn reference(&self) -> Option<usize> {
+        self.reference
+    }
+
+    /// Whether this rung is behind the reference.
+    pub(crate) fn is_finer(&self, rung: usize) -> bool {
+        self.reference.is_some_and(|reference| rung > reference)
+    }
+
+    /// Stands behind all rungs for the reference's method from a start beside the row's own
+    /// ([`Point::nudged`](washer_model::Point::nudged)).
+    #[must_use]
+    pub const fn twin(&self) -> usize {
+        self.rungs.len()
+    }
+
+    /// The method of a rung, or of the twin.
+    #[must_use]
+    pub fn method(&self, rung: usize) -> &Method {
+        let of_twin = self.reference.unwrap_or(0);
+        &self.rungs[if rung == self.twin() { of_twin } else { rung }].method
     }
 
     /// The method of the rows that capped modes of this level hold; of a ladder without such a

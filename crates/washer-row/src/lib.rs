@@ -17,6 +17,7 @@ mod level;
 mod measures;
 mod outcome;
 mod run;
+mod twin;
 mod verdict;
 
 pub use climb::{Climbs, Demand, MODELS, Next};

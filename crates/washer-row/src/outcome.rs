@@ -145,8 +145,10 @@ pub struct Outcome {
     /// The relative error left in the row's numbers, at most, as seen by comparing rungs; `None`
     /// where nothing was compared.
     pub error: Option<f64>,
-    /// Whether plain RK4 does not agree with itself at two steps: the motion is chaotic. `None`
-    /// where nothing was compared.
+    /// Whether that is within the accuracy asked for. `None` where nothing was compared.
+    pub converged: Option<bool>,
+    /// Whether the motion is chaotic: plain RK4 does not agree with itself at two steps, and a near
+    /// twin departs exponentially. `None` where nothing was compared.
     pub sensitive: Option<bool>,
     /// Ratios per channel of the plan where they are found turn by turn; `None` where undefined.
     /// Empty where the amplitudes' quotients are the ratios, or a model failed.
@@ -170,6 +172,7 @@ impl Outcome {
             linear,
             method: Level::Rk4,
             error: None,
+            converged: None,
             sensitive: None,
             turn_ratios: Vec::new(),
             static_sag_m: None,

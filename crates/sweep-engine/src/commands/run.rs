@@ -287,9 +287,12 @@ pub fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String) -> St
         line(&mut text, "failed", &list.join(", "));
     }
     if tally.sensitive > 0 {
-        let told =
-            format!("{}: chaotic, rk4 does not agree with itself at two steps", tally.sensitive);
+        let told = format!("{}: chaotic, a near twin departs exponentially", tally.sensitive);
         line(&mut text, "sensitive", &told);
+    }
+    if tally.unconverged > 0 {
+        let told = format!("all but {}, whose error is above the accuracy", tally.unconverged);
+        line(&mut text, "converged", &told);
     }
     if let Some(greatest) = &tally.greatest_error {
         let methods: Vec<String> =

@@ -93,11 +93,13 @@ pub struct Tally {
     pub unreliable: u64,
     /// Rows without a verdict: a model failed, or nothing moves.
     pub undefined: u64,
-    /// Rows known to be chaotic: plain RK4 does not agree with itself.
+    /// Rows known to be chaotic.
     pub sensitive: u64,
+    /// Rows whose error is above the accuracy asked for.
+    pub unconverged: u64,
     /// Rows by the method that their numbers come from, where the file says so.
     pub by_method: BTreeMap<String, u64>,
-    /// The greatest error left in a row that is not sensitive.
+    /// The greatest error left in a row.
     pub greatest_error: Option<Extreme>,
     /// The greatest ratio.
     pub greatest_ratio: Option<Extreme>,
@@ -148,7 +150,7 @@ impl StatusCounts {
 /// # Errors
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
 pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 10] = [
+    const COLUMNS: [&str; 11] = [
         "point",
         "status",
         "stable",
@@ -157,6 +159,7 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         "sensitive",
         "method",
         "error",
+        "converged",
         "ratio_max",
         "min_gap_nonlinear_m",
     ];
@@ -208,19 +211,13 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
             None => tally.undefined += 1,
         }
     }
-    let sensitive = cells::flags(column("sensitive")?)?;
-    tally.sensitive += sensitive.true_count() as u64;
+    tally.sensitive += cells::flags(column("sensitive")?)?.true_count() as u64;
+    // Older files have no such column.
+    if let Some(converged) = batch.column_by_name("converged") {
+        tally.unconverged += cells::flags(converged)?.false_count() as u64;
+    }
     for name in cells::texts(column("method")?)?.into_iter().flatten() {
         *tally.by_method.entry(name.to_owned()).or_default() += 1;
-    }
-    let errors = cells::numbers(column("error")?)?.into_iter().zip(sensitive.iter()).zip(points);
-    for ((error, sensitive), point) in errors {
-        if let (Some(value), Some(point)) = (error, point)
-            && sensitive != Some(true)
-            && tally.greatest_error.as_ref().is_none_or(|greatest| value > greatest.value)
-        {
-            tally.greatest_error = Some(Extreme { value, point });
-        }
     }
     let extreme = |name: &str, best: &mut Option<Extreme>, better: fn(f64, f64) -> bool| {
         let Some(column) = batch.column_by_name(name) else { return Ok(()) };
@@ -233,6 +230,7 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
         }
         Ok::<(), ParquetError>(())
     };
+    extreme("error", &mut tally.greatest_error, |a, b| a > b)?;
     extreme("ratio_max", &mut tally.greatest_ratio, |a, b| a > b)?;
     extreme("min_gap_nonlinear_m", &mut tally.least_gap_nonlinear_m, |a, b| a < b)?;
     Ok(())

@@ -200,8 +200,8 @@ function createLive(host, data) {
       element("p", { class: "kind" }, kind),
       element("p", { class: "verdict" }, answer.isChecked ? verdict : `${verdict}?`),
       ...(largest ? [element("p", {}, largest)] : []),
-      ...(answer.sensitive ? [element("p", {}, "The motion is chaotic: plain rk4 does not agree "
-        + "with itself at two steps. The digits are those of one trajectory.")] : []),
+      ...(answer.sensitive ? [element("p", {}, "The motion is chaotic: a near twin departs "
+        + "exponentially. The digits are those of one trajectory.")] : []),
       element("table", {},
         element("caption", {}, `${capitalised(live.criterion[0])}. Ratio: ${live.criterion[1]}.`),
         element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)),

@@ -344,13 +344,12 @@ function createMap(host, data, panel) {
     });
   }
 
-  // Where plain rk4 does not agree with itself.
+  // Where no step settles the digits.
   function chaos(cell) {
     const [points, chaotic] = [counts?.points[cell] ?? 1, counts?.sensitive[cell] ?? 0];
     if (points > 1 ? chaotic === 0 : word("sensitive", cell) !== "true") return [];
     const where = points > 1 ? `at ${chaotic} of ${points} points` : "here";
-    const said = `The motion is chaotic ${where}: `
-      + "plain rk4 does not agree with itself at two steps.";
+    const said = `The motion is chaotic ${where}: a near twin departs exponentially.`;
     return [element("p", {}, said)];
   }
 

@@ -37,6 +37,7 @@ fn columns_stand_as_the_contract_says() {
             "sensitive",
             "method",
             "error",
+            "converged",
             "min_gap_nonlinear_m",
             "min_gap_linear_m",
             "status",

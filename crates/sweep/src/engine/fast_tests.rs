@@ -52,7 +52,7 @@ fn hold_against_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> 
     let (rows, expected) = (rows(&fast), at(step_s));
     for (row, expected) in rows.iter().zip(&expected) {
         assert_eq!(row.nonlinear.status, expected.nonlinear.status, "{row:?}");
-        if row.sensitive == Some(true) {
+        if row.converged == Some(false) {
             continue;
         }
         assert_eq!(reliable(plan, row), reliable(plan, expected), "{}: {row:?}", plan.name);
@@ -71,8 +71,8 @@ fn every_row_of_fig12_is_that_of_rk4_or_flagged() {
     let plan = load(include_str!("../../../../sweeps/fig12.toml"));
     assert_eq!(plan.points(), 39 * 33);
     let rows = hold_against_rk4(&plan, 1e-3);
-    let sensitive = rows.iter().filter(|row| row.sensitive == Some(true)).count();
-    assert!(sensitive < 26, "{sensitive} rows are flagged: more than 2 %");
+    let left = rows.iter().filter(|row| row.converged == Some(false)).count();
+    assert!(left < 13, "{left} rows are in doubt: more than 1 %");
     for level in [Level::Fast, Level::Fine, Level::Finest, Level::Rk4] {
         assert!(rows.iter().any(|row| row.method == level), "no row holds {level:?}");
     }
@@ -324,4 +324,64 @@ fn a_side_is_that_of_the_row() {
     for (side, row) in sides.iter().zip(&rows) {
         assert_eq!(reliable(&plan, side), reliable(&plan, row), "{side:?}");
     }
+}
+
+#[test]
+fn rows_of_a_drum_that_brakes_hard_follow_the_bearings() {
+    for brake_s in [1.5e-3, 4e-3] {
+        let plan = load(&format!(
+            "name = \"brake\"\nmetrics = [\"cabinet_force\"]\n[spin]\nprofile = \"table\"\n\
+             time_s = [0, 1.5, {}, 4.3]\nspeed_rpm = [0, 556, 100, 200]\n\
+             [time]\nend_s = 4.3\nwindow_s = [2.25, 3.6]\n\
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.05, 0.5, 1.0]\n\
+             [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [110, 280]\n",
+            1.5 + brake_s
+        ));
+        let fast = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };
+        let found = rows(&fast);
+        // The bearings' fastest mode times this is 0.12.
+        let following = Integrator::Rk4 { step_s: 1.25e-5 };
+        let expected = rows(&Plan { integrator: following, ..fast });
+        for (row, expected) in found.iter().zip(&expected) {
+            assert_eq!((row.converged, row.sensitive), (Some(true), Some(false)), "{row:?}");
+            let models = [(&row.nonlinear, &expected.nonlinear), (&row.linear, &expected.linear)];
+            for (model, expected) in models {
+                let (force_n, expected_n) = (model.metrics[0], expected.metrics[0]);
+                assert!((force_n / expected_n - 1.0).abs() < 1e-3, "{force_n} for {expected_n}");
+            }
+            assert!(error(row, expected) < 1e-3, "{row:?}");
+        }
+    }
+}
+
+#[test]
+fn motions_of_micrometres_are_rk4s() {
+    let plan = load(
+        "name = \"tiny\"\n[spin]\nprofile = \"ramp\"\npeak_rpm = 350\nramp_s = 12\n\
+         [time]\nend_s = 14\nwindow_s = [4, 14]\n\
+         [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0, 1e-6, 3e-5, 1e-4]\n\
+         [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [60, 120, 240]\n\
+         [reliability]\nratio_limit = 1.001\n",
+    );
+    for accuracy in [1e-2, 1e-3] {
+        let rows = hold_against_rk4_at(1e-4, &plan, accuracy);
+        assert!(rows.iter().all(|row| row.converged == Some(true)));
+    }
+}
+
+#[test]
+fn what_a_shorter_step_settles_is_not_chaos() {
+    // The motion passes bands that amplify errors by 1e9; RK4 at 2e-4 s and at 1.25 times that
+    // differ by up to half of it.
+    let plan = load(
+        "name = \"bands\"\n[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n\
+         [time]\nend_s = 50\nwindow_s = [30, 50]\n\
+         [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.788888888888889, 0.98]\n\
+         [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [51, 68, 82, 100]\n\
+         [reliability]\nchannels = [\"tub_front_y\"]\n",
+    );
+    let rows = hold_against_rk4_at(5e-5, &plan, 1e-3);
+    let told: Vec<_> = rows.iter().map(|row| (row.converged, row.sensitive)).collect();
+    assert!(told.iter().all(|told| *told == (Some(true), Some(false))), "{told:?}");
+    assert!(rows.iter().any(|row| row.method == Level::Rk4));
 }

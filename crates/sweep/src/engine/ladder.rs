@@ -7,7 +7,9 @@
 //! whole course of the motion and in every number of the row. Steps and caps say which share of
 //! that difference is left as error, as long as errors are small enough to be of first order.
 //! Motions that pass through bands of instability amplify errors a thousandfold and climb. Chaotic
-//! motions climb to the top, where RK4 does not agree with itself.
+//! motions climb to the reference, where RK4 does not agree with itself and a twin departs. Shorter
+//! steps than the reference's are for rows that are not chaotic and still in doubt, and for jumps of
+//! the drum's acceleration: the bearings keep swinging after them, and only the last steps follow.
 //!
 //! Friction and stops give forces corners. A step that spans one errs by its own length, whatever
 //! the order of its formula, and two long steps that pass the same corner in the same way agree on
@@ -17,6 +19,7 @@
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
 use lane_ode::dop853::DOP853_STABILITY_LIMIT;
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind};
 use washer_row::{Convergence, Ladder, Level, Rung};
 
@@ -32,6 +35,17 @@ const LONGER_STEP: f64 = 1.25;
 /// Error of the reference as a share of its difference from that: 1 / (1.25^4 - 1) = 0.7 where it
 /// is of fourth order. Nearly chaotic motions keep to no order; 3.3 was seen.
 const REFERENCE_CONTRACTION: f64 = 4.0;
+
+/// The same with half the reference's step: 1/15 where it is of fourth order, with the same reserve.
+const CONTRACTION_OF_HALVED: f64 = 0.4;
+
+/// The same with a step that follows the bearings, whose ringing is 0.08 too small at most.
+const CONTRACTION_OF_FOLLOWING: f64 = 0.2;
+
+/// Step of RK4 times the bearings' fastest mode (rad) where it follows their ringing: it damps it
+/// by 0.07 a second, their dampers by 0.3. At 0.5 rad it damps it by 2 a second, and the reference
+/// at 2 rad within a few steps.
+const FOLLOWED_RAD: f64 = 0.25;
 
 /// A finest rung is climbed if it costs less than this share of the reference.
 const WORTH_IT: f64 = 0.5;
@@ -107,10 +121,12 @@ const BEST_CONTRACTION: f64 = 1e-3;
 /// The rungs of the fast method for these cases.
 pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladder {
     let has_corners = model == ModelKind::Nonlinear && cases.are_nonsmooth();
+    let following_step_s = following_step_s(cases);
     let plain = |step_s: f64, contraction: f64, believed_to: f64| Rung {
         level: Level::Rk4,
         method: Method::Rk4 { step_s },
         convergence: Convergence { contraction, believed_to, ..Convergence::NONE },
+        follows_bearings: step_s <= following_step_s,
     };
     let reference_step_s = reference_step_s(cases);
     if has_corners {
@@ -127,7 +143,12 @@ pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladd
         longer.convergence.own_error = OWN_ERROR_OF_RK4;
     }
     rungs.extend([longer, plain(reference_step_s, REFERENCE_CONTRACTION, f64::INFINITY)]);
-    Ladder::checked(rungs, held_back)
+    let halved_s = 0.5 * reference_step_s;
+    let halved = plain(halved_s, CONTRACTION_OF_HALVED, f64::INFINITY);
+    let following = plain(following_step_s, CONTRACTION_OF_FOLLOWING, f64::INFINITY);
+    let is_needed = !halved.follows_bearings;
+    let finer = [Some(halved), is_needed.then_some(following)];
+    Ladder::checked(rungs, held_back).with_finer(finer.into_iter().flatten())
 }
 
 /// Why a machine with friction or stops has no quick rungs.
@@ -190,6 +211,7 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
         Rung {
             level: *level,
             method: Method::Geared(*geared),
+            follows_bearings: false,
             convergence: Convergence {
                 contraction,
                 believed_to: first_order(model),
@@ -241,6 +263,12 @@ fn refined(geared: &Geared) -> Geared {
         Gear { step_s, caps: Caps { bearings_rad_per_s, hinge_rad_per_s }, ..gear }
     };
     Geared { gears: geared.gears.map(refined) }
+}
+
+/// The longest step of RK4 that follows the bearings.
+fn following_step_s(cases: &Cases<'_>) -> f64 {
+    let share = FOLLOWED_RAD / RK4_STABILITY_LIMIT;
+    cases.plain_step_s().map_or(f64::INFINITY, |longest_s| share * longest_s)
 }
 
 /// Step of the reference method.

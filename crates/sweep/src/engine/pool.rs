@@ -43,7 +43,7 @@ pub(super) type Keep<'a> = dyn Fn(Outcome) + Sync + 'a;
 /// How long a thread that waits for others goes without a look at the stop flag.
 const LOOK_UP: Duration = Duration::from_millis(50);
 
-/// Runs of one rung of one model: positions in `MODELS` and on its ladder.
+/// Runs of one rung of one model: positions in `MODELS` and on its ladder, behind it for twins.
 type ModelRung = (usize, usize);
 
 /// A point's row on its way.
@@ -147,12 +147,16 @@ impl Pool<'_> {
                 Work::Runs((model, rung), taken) => {
                     state.at_work.push(above(rung));
                     drop(state);
-                    let points: Vec<&Point> =
-                        taken.iter().map(|(_, point)| point.as_ref()).collect();
                     let Some(ladders) = self.engine.ladders_under(self.watch) else { break };
                     let ladder = &ladders[model];
-                    let method = &ladder.rungs[rung].method;
-                    let runs = self.engine.runs(model, method, &points, self.watch);
+                    let points = || taken.iter().map(|(_, point)| point.as_ref());
+                    let twins: Vec<Point> = match rung == ladder.twin() {
+                        true => points().map(Point::nudged).collect(),
+                        false => Vec::new(),
+                    };
+                    let points: Vec<&Point> =
+                        if twins.is_empty() { points().collect() } else { twins.iter().collect() };
+                    let runs = self.engine.runs(model, ladder.method(rung), &points, self.watch);
                     // They may have been cut short.
                     if self.watch.stopped() {
                         break;

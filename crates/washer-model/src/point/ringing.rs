@@ -16,11 +16,13 @@ const MOST: f64 = 2.0;
 /// Motion of the tub as a share of the drum's swing: the drum has far less mass and inertia.
 const SHARE_OF_TUB: f64 = 0.25;
 
-/// The greatest swings of hinge and bearings.
+/// The greatest swings of hinge and bearings, and how far the hinge hangs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ringing {
     hinge_rad: f64,
     bearings_m: f64,
+    /// By the weight of what it carries.
+    sag_rad: f64,
     /// From the hinge to the drum's front (m).
     reach_m: f64,
     /// Between the bearings (m).
@@ -48,17 +50,27 @@ impl Ringing {
         let span_m = (bearings.front_x_m - bearings.rear_x_m).abs();
         let softer = bearings.front_stiffness_n_per_m.min(bearings.rear_stiffness_n_per_m);
         let (mut moment_n_m, mut on_bearings_n) = (0.0, 0.0);
+        let hinge_x_m = machine.drum.hinge_x_m;
+        let mut hanging_kg_m = machine.drum.mass_kg * (machine.drum.centre_x_m - hinge_x_m);
         for unbalance in core::iter::once(&machine.unbalance).chain(&machine.further_unbalances) {
             let load_n = unbalance.mass_kg * unbalance.radius_m.abs() * jumps_rad_per_s2;
-            moment_n_m += load_n * (unbalance.x_m - machine.drum.hinge_x_m).abs();
+            moment_n_m += load_n * (unbalance.x_m - hinge_x_m).abs();
+            hanging_kg_m += unbalance.mass_kg * (unbalance.x_m - hinge_x_m);
             on_bearings_n += load_n * (1.0 + unbalance.x_m.abs() / span_m);
         }
+        let flexure_n_m_per_rad = machine.flexure.stiffness_n_m_per_rad;
         Self {
-            hinge_rad: moment_n_m / machine.flexure.stiffness_n_m_per_rad,
+            hinge_rad: moment_n_m / flexure_n_m_per_rad,
             bearings_m: on_bearings_n / softer,
-            reach_m: (machine.drum.front_x_m - machine.drum.hinge_x_m).abs(),
+            sag_rad: hanging_kg_m.abs() * machine.gravity_m_per_s2 / flexure_n_m_per_rad,
+            reach_m: (machine.drum.front_x_m - hinge_x_m).abs(),
             span_m,
         }
+    }
+
+    /// The part of it that is the bearings'.
+    pub(crate) fn of_bearings(&self) -> Self {
+        Self { hinge_rad: 0.0, ..*self }
     }
 
     /// The greatest swing of the gap between drum and tub (m).
@@ -76,13 +88,20 @@ impl Ringing {
 
     /// The greatest swing of each channel (m, rad), in the order of `Channel::ALL`.
     pub(crate) fn channels(&self) -> [f64; CHANNELS] {
-        Channel::ALL.map(|channel| {
-            let swing = match channel.kind() {
-                Kind::DrumPoint => self.drum_front_m(),
-                Kind::TubPoint => SHARE_OF_TUB * self.drum_front_m(),
-                Kind::TubAngle => SHARE_OF_TUB * self.tilt_rad(),
-            };
-            MOST * swing
-        })
+        in_channels(MOST * self.drum_front_m(), MOST * self.tilt_rad())
     }
+
+    /// How far each channel (m, rad) is where it is for the hinge's sag.
+    pub(crate) fn sag(&self) -> [f64; CHANNELS] {
+        in_channels(self.reach_m * self.sag_rad, self.sag_rad)
+    }
+}
+
+/// What a motion of the drum's front and tilt is in each channel, at most.
+fn in_channels(drum_front_m: f64, tilt_rad: f64) -> [f64; CHANNELS] {
+    Channel::ALL.map(|channel| match channel.kind() {
+        Kind::DrumPoint => drum_front_m,
+        Kind::TubPoint => SHARE_OF_TUB * drum_front_m,
+        Kind::TubAngle => SHARE_OF_TUB * tilt_rad,
+    })
 }

@@ -133,7 +133,8 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
     }
 
     fn at_rest(point: &Point) -> [f64; STATES] {
-        core::array::from_fn(|i| if i < COORDINATES { point.equilibrium[i] } else { 0.0 })
+        let nudged = |i: usize| point.equilibrium[i] + point.nudge;
+        core::array::from_fn(|i| if i < COORDINATES { nudged(i) } else { 0.0 })
     }
 
     #[inline(always)]

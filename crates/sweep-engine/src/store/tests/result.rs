@@ -37,7 +37,7 @@ fn every_cell_is_what_the_outcome_says() {
         for name in ["nonlinear_a", "linear_a", "ratio_max", "error", "fail_time_s"] {
             assert_eq!(number(name, row), cell(name).map(f64::from_bits), "{name}");
         }
-        for name in ["reliable", "sensitive"] {
+        for name in ["reliable", "sensitive", "converged"] {
             assert_eq!(flag(name, row), cell(name).map(|flag| flag == 1), "{name}");
         }
         let method = cell("method").map(|method| ["rk4", "dopri5"][method as usize]);
