@@ -190,7 +190,7 @@ fn columns() -> String {
         })
         .collect();
     let metrics = Metric::ALL.to_vec();
-    let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
+    let measures = Measures { metrics, stops: 2, feet: 3, dampers: 2, ..Measures::default() };
     let layout = columns::of_measures(axes, &Channel::ALL, 2.0, measures);
     row(&mut text, &["column", "type", "unit", "meaning"]);
     row(&mut text, &["---"; 4]);
