@@ -240,7 +240,7 @@ fn columns() -> String {
         text,
         "\nThe columns of a metric ({}) are there only where the grid file's `metrics` names it, \
          in its order. Machines with two stops or more have those of `stop_1` for each of them \
-         (`stop_2_force_nonlinear_n`), and so have feet.",
+         (`stop_2_force_nonlinear_n`), and so have feet and dampers.",
         metrics.join(", ")
     );
     let statuses: Vec<String> = ROW_STATUSES.iter().map(|status| format!("`{status}`")).collect();
