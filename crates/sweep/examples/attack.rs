@@ -274,7 +274,10 @@ fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
                     Metric::ClashTime | Metric::StopContact => CLASH_FLOOR * (to_s - from_s),
                     Metric::StopForce => PUSH_FLOOR * weight_n,
                     Metric::FootLoad | Metric::SlipMargin => weight_n,
-                    Metric::CabinetForce | Metric::StaticSag | Metric::Growth => 0.0,
+                    Metric::CabinetForce
+                    | Metric::StaticSag
+                    | Metric::Growth
+                    | Metric::DamperSpeed => 0.0,
                 };
                 (number.column(model), relative_from(least, *a, *b))
             },
@@ -368,7 +371,7 @@ fn attack(seed: u64, kind: Kind, folder: &std::path::Path) -> Found {
     }
     if kind == Kind::Elements {
         let loads = "\"cabinet_force\", \"stop_force\", \"stop_contact\", \"foot_load\", \
-                     \"slip_margin\"";
+                     \"slip_margin\", \"damper_speed\"";
         text = text.replace("\"cabinet_force\"", loads);
         text = with_elements(seed, &text, folder);
     }

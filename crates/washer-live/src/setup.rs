@@ -157,7 +157,8 @@ fn read_rule(from: &mut Reader<'_>, machine: &Machine) -> Option<Rule> {
     let metric = |of: &f64| Metric::ALL.get(*of as usize).copied();
     let metrics = from.counted()?.iter().map(metric).collect::<Option<_>>()?;
     let (stops, feet) = (machine.stops.len(), machine.feet.len());
-    let measures = Measures { criterion, metrics, stops, feet };
+    let dampers = machine.dampers.len();
+    let measures = Measures { criterion, metrics, stops, feet, dampers };
     Some(Rule { end_s, window_s, accuracy, ratio_limit, channels, measures })
 }
 

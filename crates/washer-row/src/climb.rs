@@ -396,7 +396,7 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, rule: &Rule) -> f64
             Metric::FootLoad | Metric::SlipMargin => point.weight_n(),
             // Of open stops no more is left than rounding.
             Metric::StopForce => METRIC_FLOOR * point.weight_n(),
-            Metric::CabinetForce | Metric::StaticSag | Metric::Growth => 0.0,
+            Metric::CabinetForce | Metric::StaticSag | Metric::Growth | Metric::DamperSpeed => 0.0,
         };
         compare(*a, *b, least);
     }

@@ -84,11 +84,13 @@ pub enum Metric {
     SlipMargin,
     /// How fast disturbances grow at constant speeds.
     Growth,
+    /// The greatest speed of a damper.
+    DamperSpeed,
 }
 
 impl Metric {
     /// Every metric.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::CabinetForce,
         Self::ClashTime,
         Self::StaticSag,
@@ -97,6 +99,7 @@ impl Metric {
         Self::FootLoad,
         Self::SlipMargin,
         Self::Growth,
+        Self::DamperSpeed,
     ];
 
     /// Name in grid files.
@@ -111,6 +114,7 @@ impl Metric {
             Self::FootLoad => "foot_load",
             Self::SlipMargin => "slip_margin",
             Self::Growth => "growth",
+            Self::DamperSpeed => "damper_speed",
         }
     }
 
@@ -128,6 +132,7 @@ impl Metric {
             Self::ClashTime | Self::StopContact => "s",
             Self::StaticSag => "m",
             Self::Growth => "1/s",
+            Self::DamperSpeed => "m/s",
         }
     }
 
@@ -143,6 +148,7 @@ impl Metric {
             Self::FootLoad => format!("foot_load_{model}_n"),
             Self::SlipMargin => format!("slip_margin_{model}_n"),
             Self::Growth => "growth_per_s".to_owned(),
+            Self::DamperSpeed => format!("damper_speed_{model}_m_per_s"),
         }
     }
 
@@ -177,6 +183,10 @@ impl Metric {
                 "how fast the fastest growing disturbance of the nonlinear response grows, at that \
                  of the speeds of [stability] at which it is greatest"
             }
+            Self::DamperSpeed => {
+                "greatest speed along any damper in the window: what \
+                 `friction_linear_speed_m_per_s` should be near"
+            }
         }
     }
 
@@ -198,6 +208,9 @@ impl Metric {
                 "least vertical load of the foot in the window, by statics; below zero it would \
                  lift",
             ),
+            Self::DamperSpeed => {
+                (Part::Damper, "speed", "greatest speed along the damper in the window")
+            }
             Self::CabinetForce
             | Self::ClashTime
             | Self::StaticSag
@@ -213,6 +226,7 @@ impl Metric {
 enum Part {
     Stop,
     Foot,
+    Damper,
 }
 
 /// What each part has of a metric.
@@ -247,8 +261,9 @@ impl Measured {
         let part = match part {
             Part::Stop => "stop",
             Part::Foot => "foot",
+            Part::Damper => "damper",
         };
-        let unit = self.metric.unit().to_lowercase();
+        let unit = self.metric.unit().to_lowercase().replace('/', "_per_");
         format!("{part}_{}_{what}_{model}_{unit}", index + 1)
     }
 
@@ -268,6 +283,9 @@ impl Measured {
             Metric::StopContact => self.one_or(stops.map(|stop| stop.contact_s), f64::max),
             Metric::FootLoad => self.one_or(extra.foot_loads_n.iter().copied(), f64::min),
             Metric::SlipMargin => extra.slip_margin_n,
+            Metric::DamperSpeed => {
+                self.one_or(extra.damper_speeds_m_per_s.iter().copied(), f64::max)
+            }
             Metric::StaticSag | Metric::Growth => None,
         }
     }
@@ -296,6 +314,8 @@ pub struct Measures {
     pub stops: usize,
     /// How many feet the machine has.
     pub feet: usize,
+    /// How many dampers the machine has.
+    pub dampers: usize,
 }
 
 impl Measures {
@@ -313,6 +333,7 @@ impl Measures {
         let parts = match metric.of_each().map(|of_each| of_each.part) {
             Some(Part::Stop) => self.stops,
             Some(Part::Foot) => self.feet,
+            Some(Part::Damper) => self.dampers,
             None => 0,
         };
         let of_each = if parts > 1 { 0..parts } else { 0..0 };
@@ -331,6 +352,7 @@ impl Measures {
             clash_time: self.metrics.contains(&Metric::ClashTime),
             stops: [Metric::StopForce, Metric::StopContact].iter().any(asked),
             feet: [Metric::FootLoad, Metric::SlipMargin].iter().any(asked),
+            damper_speeds: self.metrics.contains(&Metric::DamperSpeed),
             course: false,
         }
     }

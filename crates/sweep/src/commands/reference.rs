@@ -190,7 +190,7 @@ fn columns() -> String {
         })
         .collect();
     let metrics = Metric::ALL.to_vec();
-    let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
+    let measures = Measures { metrics, stops: 2, feet: 3, dampers: 2, ..Measures::default() };
     let layout = columns::of_measures(axes, &Channel::ALL, 2.0, measures);
     row(&mut text, &["column", "type", "unit", "meaning"]);
     row(&mut text, &["---"; 4]);
@@ -240,7 +240,7 @@ fn columns() -> String {
         text,
         "\nThe columns of a metric ({}) are there only where the grid file's `metrics` names it, \
          in its order. Machines with two stops or more have those of `stop_1` for each of them \
-         (`stop_2_force_nonlinear_n`), and so have feet.",
+         (`stop_2_force_nonlinear_n`), and so have feet and dampers.",
         metrics.join(", ")
     );
     let statuses: Vec<String> = ROW_STATUSES.iter().map(|status| format!("`{status}`")).collect();

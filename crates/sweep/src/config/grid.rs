@@ -101,6 +101,9 @@ pub(crate) fn judge_metrics(metrics: &[Metric], machine: &Machine, root: &Sectio
                 machine.cabinet.is_some(),
                 "cabinet: expected [cabinet] and three or four [[feet]] in the machine file",
             ),
+            Metric::DamperSpeed => {
+                (!machine.dampers.is_empty(), "dampers: expected [[dampers]] in the machine file")
+            }
             Metric::CabinetForce | Metric::ClashTime | Metric::StaticSag | Metric::Growth => {
                 continue;
             }

@@ -25,7 +25,8 @@ impl Read for Washer {
         grid::judge_metrics(&metrics, &machine, root);
         let growth_speeds = grid::stability(root, &metrics);
         let (stops, feet) = (machine.stops.len(), machine.feet.len());
-        let measures = Measures { metrics, stops, feet, ..Measures::default() };
+        let dampers = machine.dampers.len();
+        let measures = Measures { metrics, stops, feet, dampers, ..Measures::default() };
         Self { machine, spin, measures, growth_speeds }
     }
 
@@ -50,8 +51,8 @@ impl Read for Washer {
         plan.insert("machine".to_owned(), machine_json(&self.machine));
         plan.insert("spin".to_owned(), spin::to_json(&self.spin));
         // What is left out stands for the default, so that plans which do not ask for more read as
-        // ever. The machine says how many stops and feet it has.
-        let Measures { criterion, metrics, stops: _, feet: _ } = &self.measures;
+        // ever. The machine says how many stops, feet and dampers it has.
+        let Measures { criterion, metrics, stops: _, feet: _, dampers: _ } = &self.measures;
         if *criterion != Criterion::default() {
             plan["reliability"]["criterion"] = criterion.name().into();
         }

@@ -98,6 +98,15 @@ impl<T: Lane> Elements<T> {
         let point = tub.point(&stop.tub, &tub.midpoint_velocity_in_tub());
         [stop.depth(&point), stop.push(&point)]
     }
+
+    /// The speed along a damper (m/s).
+    #[inline(always)]
+    pub(crate) fn damper_speed(&self, number: usize, tub: &TubMotion<'_, T>) -> N<T> {
+        let ends = &self.dampers[number].ends;
+        let span = span(tub.tilt, &tub.midpoint, ends);
+        let velocity = plus_cross(&tub.midpoint_velocity_in_tub().0, tub.rate, &ends.tub);
+        dot(&span, &velocity) / dot(&span, &span).sqrt()
+    }
 }
 
 /// What not every machine has, added to the load on the tub. A zero stiffness or friction adds a

@@ -32,6 +32,8 @@ pub struct Wanted {
     pub stops: bool,
     /// The least load of each foot of the cabinet, and the least margin against slipping.
     pub feet: bool,
+    /// The greatest speed of each damper.
+    pub damper_speeds: bool,
     /// The coordinates at the ends of legs ([`Timing::checkpoints`](crate::Timing)).
     pub course: bool,
 }
@@ -73,6 +75,9 @@ pub struct Extra {
     /// The least margin against slipping (N): friction on all feet together less the horizontal
     /// force; below zero the cabinet slips. Absent if the machine has no cabinet.
     pub slip_margin_n: Option<f64>,
+    /// The greatest speed of each damper along it (m/s), in the machine's order; empty unless asked
+    /// for.
+    pub damper_speeds_m_per_s: Vec<f64>,
     /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed.
     /// Empty unless asked for.
     pub course: Course,
@@ -126,8 +131,8 @@ impl<T: Lane> Extras<T> {
         } else {
             None
         };
-        let loads = if wanted.stops || wanted.feet {
-            Some(Loads::new(zero, model, point, parts))
+        let loads = if wanted.stops || wanted.feet || wanted.damper_speeds {
+            Some(Loads::new(zero, model, point, parts, wanted.damper_speeds))
         } else {
             None
         };
@@ -181,6 +186,8 @@ impl<T: Lane> Extras<T> {
             stops: loads.map_or_else(Vec::new, |loads| loads.stops(lane)),
             foot_loads_n: loads.map_or_else(Vec::new, |loads| loads.foot_loads_n(lane)),
             slip_margin_n: loads.and_then(|loads| loads.slip_margin_n(lane)),
+            damper_speeds_m_per_s: loads
+                .map_or_else(Vec::new, |loads| loads.damper_speeds_m_per_s(lane)),
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),
             turns,
             cabinet_force_n: self.force.as_ref().map(|force| force.lane_n(lane)),

@@ -1,4 +1,4 @@
-//! Loads of stops and of the cabinet's feet, over lanes.
+//! Loads of stops and of the cabinet's feet, and the speeds of dampers, over lanes.
 //!
 //! The laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers for
 //! their rates; the linear model's are first order in its deviations from equilibrium.
@@ -117,8 +117,12 @@ impl<T: Lane> FirstOrder<T> {
 enum Laws<T> {
     /// Of the machine's elements, over duals for rates.
     Nonlinear(Elements<Dual<T>>),
-    /// Loads on the cabinet; then of each stop depth and push.
-    Linear { load: [FirstOrder<T>; LOAD], stops: Vec<[FirstOrder<T>; 2]> },
+    /// Loads on the cabinet; of each stop depth and push; the speed of each damper.
+    Linear {
+        load: [FirstOrder<T>; LOAD],
+        stops: Vec<[FirstOrder<T>; 2]>,
+        speeds: Vec<FirstOrder<T>>,
+    },
 }
 
 impl<T: Lane> Laws<T> {
@@ -126,7 +130,7 @@ impl<T: Lane> Laws<T> {
     fn set_point(&mut self, lane: usize, point: &Point) {
         match self {
             Self::Nonlinear(elements) => elements.set_lane(lane, &point.machine.elements),
-            Self::Linear { load, stops } => {
+            Self::Linear { load, stops, speeds } => {
                 let elements = point.machine.elements.with_viscous_friction().constant();
                 let rest = TUB.map(|q| point.equilibrium[q]);
                 for k in 0..4 {
@@ -155,6 +159,14 @@ impl<T: Lane> Laws<T> {
                             stop.set(lane, place.value, k, place.slope, speed.slope);
                         }
                     }
+                    for (number, first_order) in speeds.iter_mut().enumerate() {
+                        let of_place =
+                            with_motion!(&place, tub => elements.damper_speed(number, &tub)).0;
+                        let of_speed =
+                            with_motion!(&speed, tub => elements.damper_speed(number, &tub)).0;
+                        let rest = of_place.value;
+                        first_order.set(lane, rest, k, of_place.slope, of_speed.slope);
+                    }
                 }
             }
         }
@@ -182,6 +194,8 @@ pub(crate) struct Loads<T> {
     weight: N<T>,
     feet: usize,
     stops: Vec<SeenStop<T>>,
+    /// The speed of each damper; none unless asked for.
+    speeds: Vec<Peaks<T, 1>>,
     /// Coordinates, speeds and accelerations of [`TUB`] where the next step begins.
     last: [Sample<T>; 4],
     /// Parts that a step is cut into.
@@ -189,21 +203,37 @@ pub(crate) struct Loads<T> {
 }
 
 impl<T: Lane> Loads<T> {
-    /// Nothing seen yet, with the same point in every lane.
+    /// Nothing seen yet, with the same point in every lane; the speeds of dampers only
+    /// `with_speeds`.
     #[inline(always)]
-    pub(crate) fn new(zero: N<T>, model: ModelKind, point: &Point, parts: u32) -> Self {
+    pub(crate) fn new(
+        zero: N<T>,
+        model: ModelKind,
+        point: &Point,
+        parts: u32,
+        with_speeds: bool,
+    ) -> Self {
         let elements = &point.machine.elements;
         let number = elements.stops.len();
+        let dampers = if with_speeds { elements.dampers.len() } else { 0 };
         let laws = match model {
             ModelKind::Nonlinear => Laws::Nonlinear(Elements::splat(zero.constant(), elements)),
             ModelKind::Linear => {
                 let none = FirstOrder::new(zero);
-                Laws::Linear { load: [none; LOAD], stops: vec![[none; 2]; number] }
+                Laws::Linear {
+                    load: [none; LOAD],
+                    stops: vec![[none; 2]; number],
+                    speeds: vec![none; dampers],
+                }
             }
         };
         let mut stops = Vec::with_capacity(number);
         for _ in 0..number {
             stops.push(SeenStop { push: Peaks::new(zero), contact: TimeAbove::new(zero) });
+        }
+        let mut speeds = Vec::with_capacity(dampers);
+        for _ in 0..dampers {
+            speeds.push(Peaks::new(zero));
         }
         let mut loads = Self {
             laws,
@@ -214,6 +244,7 @@ impl<T: Lane> Loads<T> {
             weight: zero,
             feet: 0,
             stops,
+            speeds,
             last: [Sample::still(zero, zero); 4],
             parts,
         };
@@ -230,6 +261,9 @@ impl<T: Lane> Loads<T> {
         for stop in &mut self.stops {
             stop.push.reset(lane);
             stop.contact.reset(lane);
+        }
+        for speed in &mut self.speeds {
+            speed.reset(lane);
         }
         if let Some(feet) = &point.feet {
             self.feet = feet.count;
@@ -261,6 +295,15 @@ impl<T: Lane> Loads<T> {
             StopLoad { push_n, contact_s: stop.contact.lane(lane) }
         };
         self.stops.iter().map(of_stop).collect()
+    }
+
+    /// The greatest speed of each damper of one lane (m/s); empty unless asked for.
+    pub(crate) fn damper_speeds_m_per_s(&self, lane: usize) -> Vec<f64> {
+        let of_damper = |speed: &Peaks<T, 1>| {
+            let [speed_m_per_s] = speed.lane(lane);
+            speed_m_per_s
+        };
+        self.speeds.iter().map(of_damper).collect()
     }
 
     /// A state whose derivative is `dx`: at the end of a step, of which end and length (s) are
@@ -328,6 +371,18 @@ impl<T: Lane> Loads<T> {
                 Laws::Linear { stops, .. } => [stops[k][0].at(tub), stops[k][1].at(tub)],
             };
             self.see_stop(k, step_s, &sample(depth), &sample(push), counts);
+        }
+        for k in 0..self.speeds.len() {
+            let speed = match &self.laws {
+                Laws::Nonlinear(elements) => {
+                    with_motion!(&state, motion => elements.damper_speed(k, &motion))
+                }
+                Laws::Linear { speeds, .. } => speeds[k].at(tub),
+            };
+            match step_s {
+                Some(step_s) => self.speeds[k].advance_by_slopes(step_s, &[sample(speed)], counts),
+                None => self.speeds[k].begin(&[sample(speed)], counts),
+            }
         }
     }
 

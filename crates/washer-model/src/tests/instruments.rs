@@ -18,6 +18,7 @@ pub(super) const EVERYTHING: Wanted = Wanted {
     clash_time: true,
     stops: true,
     feet: true,
+    damper_speeds: true,
     course: true,
 };
 

@@ -1,4 +1,4 @@
-//! Loads of stops and feet, against the forces of densely sampled time histories.
+//! Loads of stops and feet and speeds of dampers, against the forces of densely sampled time histories.
 
 use super::elements::with_every_element;
 use super::energy::{axes, place};
@@ -19,6 +19,7 @@ const WANTED: Wanted = Wanted {
     clash_time: false,
     stops: true,
     feet: true,
+    damper_speeds: true,
     course: false,
 };
 
@@ -102,6 +103,7 @@ fn they_are_what_a_densely_sampled_history_shows() {
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
     let (mut feet_n, mut margin_n) = (vec![f64::INFINITY; 4], f64::INFINITY);
     let (mut pushes_n, mut closed_s) = (vec![0.0_f64; 3], vec![0.0_f64; 3]);
+    let mut tautest_n = vec![0.0_f64; machine.dampers.len()];
     for k in first..=last {
         let forces = history.forces(k).unwrap();
         let instant = history.instant(k).unwrap();
@@ -118,6 +120,9 @@ fn they_are_what_a_densely_sampled_history_shows() {
         feet_n = least([feet_n, loads_n].into_iter());
         for (push_n, now_n) in pushes_n.iter_mut().zip(&forces.stops_n) {
             *push_n = push_n.max(*now_n);
+        }
+        for (tautest_n, now_n) in tautest_n.iter_mut().zip(&forces.dampers_n) {
+            *tautest_n = tautest_n.max(now_n.abs());
         }
         let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + instant.deviations[i]);
         for (closed_s, stop) in closed_s.iter_mut().zip(&machine.stops) {
@@ -136,6 +141,18 @@ fn they_are_what_a_densely_sampled_history_shows() {
     let of_stops = |of: fn(&StopLoad) -> f64| extra.stops.iter().map(of).collect::<Vec<_>>();
     let greatest_n = pushes_n.iter().copied().fold(0.0, f64::max);
     all_close("push of stop", &of_stops(|stop| stop.push_n), &pushes_n, 1e-3 * greatest_n);
+    // A damper's tension grows with its speed.
+    let tensions_n: Vec<f64> = extra
+        .damper_speeds_m_per_s
+        .iter()
+        .zip(&machine.dampers)
+        .map(|(speed, damper)| {
+            let turn = damper.friction_speed_m_per_s;
+            damper.damping_n_s_per_m * speed
+                + damper.friction_n * speed / (speed * speed + turn * turn).sqrt()
+        })
+        .collect();
+    all_close("tension at the greatest speed of damper", &tensions_n, &tautest_n, 1e-2);
     // Every swing may be off by a sample at both ends.
     all_close("contact of stop", &of_stops(|stop| stop.contact_s), &closed_s, 40.0 * EVERY_S);
     assert_eq!(found(&point, ModelKind::Nonlinear, Simd::Scalar), extra);
@@ -145,7 +162,7 @@ fn they_are_what_a_densely_sampled_history_shows() {
 fn the_linear_models_loads_are_those_of_its_history() {
     let mut machine = on_feet(with_every_element());
     machine.unbalance.mass_kg = 0.9;
-    let point = point(machine);
+    let point = point(machine.clone());
     let method = Method::Rk4 { step_s: 1e-4 };
     let history = history(ModelKind::Linear, &method, &point, &Start::default(), EVERY_S);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
@@ -161,6 +178,19 @@ fn the_linear_models_loads_are_those_of_its_history() {
     all_close("margin", &[extra.slip_margin_n.unwrap()], &margin_n, 1e-2);
     let found_n: Vec<f64> = extra.stops.iter().map(|stop| stop.push_n).collect();
     all_close("push of stop", &found_n, &pushes_n, 1e-6);
+    let dampers = machine.dampers.iter().zip(&extra.damper_speeds_m_per_s);
+    let tensions_n: Vec<f64> = dampers
+        .map(|(damper, speed)| {
+            let linear_speed = damper.friction_linear_speed_m_per_s.unwrap_or(f64::INFINITY);
+            let of_friction = 4.0 * damper.friction_n / (std::f64::consts::PI * linear_speed);
+            (damper.damping_n_s_per_m + of_friction) * speed
+        })
+        .collect();
+    let slackest_n =
+        least(forces.iter().map(|forces| forces.dampers_n.iter().map(|n| -n.abs()).collect()));
+    let tautest_n: Vec<f64> = slackest_n.iter().map(|n| -n).collect();
+    assert!(tautest_n.iter().all(|n| *n > 1.0), "{tautest_n:?}");
+    all_close("tension at the greatest speed of damper", &tensions_n, &tautest_n, 1e-2);
 }
 
 #[test]
@@ -195,5 +225,6 @@ fn in_small_motions_both_models_load_the_feet_alike() {
 fn a_machine_without_stops_or_cabinet_has_no_such_loads() {
     let point = point(Machine::paper());
     let extra = found(&point, ModelKind::Nonlinear, Simd::best());
-    assert_eq!(extra, Extra::default());
+    assert_eq!(extra.damper_speeds_m_per_s.len(), 2);
+    assert_eq!(Extra { damper_speeds_m_per_s: Vec::new(), ..extra }, Extra::default());
 }
