@@ -148,9 +148,10 @@ impl StatusCounts {
 /// # Errors
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
 pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 10] = [
+    const COLUMNS: [&str; 11] = [
         "point",
         "status",
+        "motion",
         "stable",
         "beyond",
         "reliable",
@@ -199,6 +200,10 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
                 None => dwells.unknown += 1,
             }
         }
+        return Ok(());
+    }
+    // A result of `sweep dwell` has no verdicts.
+    if batch.column_by_name("motion").is_some() {
         return Ok(());
     }
     for reliable in cells::flags(column("reliable")?)? {

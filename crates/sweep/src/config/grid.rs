@@ -11,7 +11,7 @@ use washer_model::Machine;
 use washer_row::{Criterion, Metric};
 
 use super::{GridInput, machine};
-use crate::speeds::{Speeds, turning};
+use crate::speeds::SpeedList;
 
 /// `machine` when the grid names none.
 pub(super) const DEFAULT_MACHINE: &str = "paper";
@@ -88,7 +88,7 @@ pub(crate) fn stability(
     root: &mut Section<'_>,
     metrics: &[Metric],
     report: &mut Report,
-) -> Option<Speeds> {
+) -> Option<SpeedList> {
     let field = root.table("stability", "[stability]", report);
     if let (Field::Given(section), false) = (&field, metrics.contains(&Metric::Growth)) {
         let title = "[stability] is for the metric `growth`, which is not asked for";
@@ -103,14 +103,18 @@ pub(crate) fn stability(
     }
     let mut section = field.given()?.value;
     let field = section.text("speed_rpm", report);
-    let found =
-        section.require(field, "speed_rpm", "constant speeds as \"FROM:TO:STEP\" in rpm", report);
+    let found = section.require(
+        field,
+        "speed_rpm",
+        "constant speeds in rpm, as \"250\", \"240,305\" or \"60:400:1\"",
+        report,
+    );
     section.finish(report);
     let found = found?;
-    match turning(found.value) {
+    match found.value.parse() {
         Ok(speeds) => Some(speeds),
         Err(expected) => {
-            let title = format!("`speed_rpm` = \"{}\" is no range of speeds", found.value);
+            let title = format!("`speed_rpm` = \"{}\" is no list of speeds", found.value);
             report.push(Diagnostic::new(title).at(&found.at, expected));
             None
         }

@@ -33,8 +33,11 @@ const FIRST_ASKED: usize = 4;
 /// A spectrum whose strongest line and multiples leave less than this share is of two frequencies.
 const TWO_LINES: f64 = 0.1;
 
-/// Closer than this share to an unstable response nothing is settled.
-const LEAVING: f64 = 1e-2;
+/// Closer than the first share to an unstable response nothing is settled; nor closer than the
+/// second while a window is farther from it than the one before, by more than the third.
+const CLOSE: f64 = 1e-2;
+const NEAR: f64 = 0.5;
+const FARTHER: f64 = 1.02;
 
 /// What a trajectory needs next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -158,9 +161,15 @@ impl<'a> Course<'a> {
 
     /// Whether it is still beside a response that it leaves.
     fn is_leaving(&self) -> bool {
+        let window = (self.turns.len() / 2).min(WINDOW);
+        let (before, after) = self.turns.split_at(self.turns.len() - window);
         self.leaves.iter().any(|response| {
-            let far = LEAVING * size(self.held.row.point, response);
-            apart(&self.held.row, &self.held.state, response) < far
+            let size = size(self.held.row.point, response);
+            let of = |turn: &Turn| apart(&self.held.row, &turn.end, response) / size;
+            let farthest = |turns: &[Turn]| turns.iter().map(of).fold(0.0, f64::max);
+            let now = farthest(after);
+            let then = farthest(&before[before.len() - window..]);
+            now < CLOSE || (now < NEAR && now > FARTHER * then)
         })
     }
 

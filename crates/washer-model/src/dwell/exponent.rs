@@ -13,7 +13,7 @@ const CLOSE: f64 = 1e-7;
 /// Turns before any count, and turns that do, in parts whose scatter gives the error.
 const FIRST_TURNS: usize = 16;
 const PARTS: usize = 8;
-const TURNS_A_PART: usize = 16;
+const TURNS_A_PART: usize = 32;
 
 /// How fast neighbours part.
 #[derive(Clone, Copy, Debug, PartialEq)]
