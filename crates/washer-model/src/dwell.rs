@@ -48,7 +48,7 @@ pub struct Starts {
 
 impl Default for Starts {
     fn default() -> Self {
-        Self { count: 8, kick_rad_per_s: 6.0, longest_s: 400.0, with_threshold: false }
+        Self { count: 8, kick_rad_per_s: 6.0, longest_s: 600.0, with_threshold: false }
     }
 }
 
@@ -93,8 +93,8 @@ pub struct Ending {
     pub settled: Option<Settled>,
     /// How many starts ended in it.
     pub starts: u32,
-    /// Largest deviation from equilibrium over its last turns (128; 256 of a chaotic one), in the
-    /// order of [`Channel::ALL`](crate::Channel::ALL) (m, rad).
+    /// Largest deviation from equilibrium over its last turns (32 where it repeats, 128 with two
+    /// frequencies, else 256), in the order of [`Channel::ALL`](crate::Channel::ALL) (m, rad).
     pub peaks: [f64; CHANNELS],
     /// Least gap between drum and tub at the ends of steps of these turns (m).
     pub min_gap_m: f64,

@@ -38,7 +38,7 @@ pub(super) struct SearchArgs {
     #[arg(long)]
     threshold: bool,
     /// Follow a motion that does not settle for at most this long, in s
-    #[arg(long, value_name = "SECONDS", default_value_t = 400.0, value_parser = positive)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0, value_parser = positive)]
     longest: f64,
 }
 

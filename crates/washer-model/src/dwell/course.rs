@@ -20,7 +20,7 @@ const LONGEST_PERIOD: usize = 16;
 /// Turns that must repeat, and how well: soon, or once the windows are alike.
 const REPEATING: usize = 32;
 const REPEATS: f64 = 1e-4;
-const ROUGHLY_REPEATS: f64 = 5e-3;
+const ROUGHLY_REPEATS: f64 = 1e-3;
 
 /// Windows are alike whose largest deviations differ by less than this share; those of chaotic
 /// motions by less than the second.
@@ -32,6 +32,10 @@ const FIRST_ASKED: usize = 4;
 
 /// A spectrum whose strongest line and multiples leave less than this share is of two frequencies.
 const TWO_LINES: f64 = 0.1;
+
+/// What repeats this well, or has a line this strong, is on its way from one motion to another where
+/// neighbours part: chaos does neither.
+const ON_ITS_WAY: [f64; 2] = [0.05, 0.3];
 
 /// Closer than the first share to an unstable response nothing is settled; nor closer than the
 /// second while a window is farther from it than the one before, by more than the third.
@@ -120,9 +124,12 @@ impl<'a> Course<'a> {
     /// How fast its neighbours part.
     pub(super) fn take_exponent(&mut self, exponent: Option<Exponent>) {
         (self.need, self.exponent) = (Need::Turns, exponent);
-        if exponent.is_some_and(|exponent| exponent.is_positive()) {
+        let [repeats, line] = ON_ITS_WAY;
+        let is_on_its_way = self.period(repeats).is_some() || self.two_frequencies(line).is_some();
+        if !is_on_its_way && exponent.is_some_and(|exponent| exponent.is_positive()) {
             self.settle(Settled::Chaotic);
-        } else if self.are_alike(WINDOW, ALIKE)
+        } else if !is_on_its_way
+            && self.are_alike(WINDOW, ALIKE)
             && let Some(two) = self.two_frequencies(f64::INFINITY)
         {
             self.settle(two);
@@ -142,8 +149,9 @@ impl<'a> Course<'a> {
     /// Where it ended.
     pub(super) fn ending(&self) -> Ending {
         let of = match self.settled {
+            Some(Settled::Periodic { .. }) => REPEATING,
+            Some(Settled::QuasiPeriodic { .. }) => WINDOW,
             Some(Settled::Chaotic) | None => 2 * WINDOW,
-            Some(_) => WINDOW,
         };
         let turns = &self.turns[self.turns.len().saturating_sub(of)..];
         Ending {

@@ -100,6 +100,8 @@ fn check(name: &str, speed_rpm: f64, at: &Value, found: &Endings) {
         let motion = found.motions.iter().min_by(nearest).unwrap();
         assert!(off(motion, end) < 5e-3, "{what}: {}", off(motion, end));
         let same = match motion.settled {
+            // The reference looks for no period beyond four turns.
+            Some(Settled::Periodic { turns: turns @ 5.. }) => period == 0 && turns < 17,
             Some(Settled::Periodic { turns }) => u64::from(turns) == period,
             Some(Settled::QuasiPeriodic { .. }) => period == 0,
             _ => false,
