@@ -245,6 +245,9 @@ impl Engine for DwellEngine<'_> {
     }
 
     fn simd(&self) -> &str {
-        Simd::narrow().name()
+        match self.asked {
+            Asked::Responses(_) => Simd::narrow().name(),
+            Asked::Motions(_) => self.simd.name(),
+        }
     }
 }

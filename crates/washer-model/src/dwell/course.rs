@@ -22,6 +22,10 @@ const REPEATING: usize = 32;
 const REPEATS: f64 = 1e-4;
 const ROUGHLY_REPEATS: f64 = 1e-3;
 
+/// A motion has a longer period where it misses shorter ones by this much more; else it still
+/// settles.
+const CLEARLY: f64 = 20.0;
+
 /// Windows are alike whose largest deviations differ by less than this share; those of chaotic
 /// motions by less than the second.
 const ALIKE: f64 = 3e-3;
@@ -99,13 +103,13 @@ impl<'a> Course<'a> {
         }
         if self.is_leaving() {
             // It has not left yet.
-        } else if let Some(turns) = self.period(REPEATS)
+        } else if let Some(turns) = self.clear_period(REPEATS)
             && self.are_alike(REPEATING, REPEATS)
         {
             self.settle(Settled::Periodic { turns });
         } else if self.made.is_multiple_of(WINDOW) && self.turns.len() == 2 * WINDOW {
             if self.are_alike(WINDOW, ALIKE) {
-                if let Some(turns) = self.period(ROUGHLY_REPEATS) {
+                if let Some(turns) = self.clear_period(ROUGHLY_REPEATS) {
                     self.settle(Settled::Periodic { turns });
                 } else if let Some(two) = self.two_frequencies(TWO_LINES) {
                     self.settle(two);
@@ -201,6 +205,12 @@ impl<'a> Course<'a> {
                 })
         };
         (1..=LONGEST_PERIOD).find(repeats).map(|period| period as u32)
+    }
+
+    /// As [`Self::period`], where shorter ones are clearly none.
+    fn clear_period(&self, share: f64) -> Option<u32> {
+        let period = self.period(share)?;
+        (self.period(CLEARLY * share) == Some(period)).then_some(period)
     }
 
     /// Two frequencies, if their lines leave no more than this share of yaw and pitch once a turn.
