@@ -114,8 +114,8 @@ pub struct Ending {
 pub struct Endings {
     /// The periodic responses: none where none was found, and the machine then starts from rest.
     pub responses: Vec<Response>,
-    /// The motions in the order in which starts led to them: the first is the one that the disturbed
-    /// periodic response ends in.
+    /// The motions in the order in which starts led to them: the first is the one that the
+    /// disturbed periodic response ends in.
     pub motions: Vec<Ending>,
     /// How many starts there were.
     pub starts: u32,
@@ -125,8 +125,8 @@ pub struct Endings {
 }
 
 /// Motions of some dwells, on lanes of `simd` at most. What is found of one does not depend on the
-/// others. Of the dwells whose place in `carried` has a state, that state alone is a start, disturbed
-/// as the responses are.
+/// others. Of the dwells whose place in `carried` has a state, that state alone is a start,
+/// disturbed as the responses are.
 ///
 /// # Errors
 /// Per dwell, [`NoAnswer`]. Once `is_stopped` says so, [`NoAnswer::Stopped`].

@@ -173,8 +173,8 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
     })
 }
 
-/// The part of a line over speed where the response is unstable, or where it is not. Each dash begins
-/// and ends where the solid line does.
+/// The part of a line over speed where the response is unstable, or where it is not. Each dash
+/// begins and ends where the solid line does.
 pub(super) fn part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
     let at = |i: usize| growth.get(i).is_some_and(|growth| (*growth > 0.0) == wanted);
     let near = |i: usize| at(i) || (!wanted && (i > 0 && at(i - 1) || at(i + 1)));

@@ -192,7 +192,8 @@ pub(super) fn columns(plan: &Plan) -> Vec<DwellColumn> {
         measured(
             "min_gap_m",
             "m",
-            "least gap between drum and tub over the motion's last turns; negative where they clash",
+            "least gap between drum and tub over the motion's last turns; negative where they \
+             clash",
             |row| Some(row.within()?.min_gap_m),
         ),
         measured(

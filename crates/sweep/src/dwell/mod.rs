@@ -12,9 +12,9 @@ use serde_json::{Value, json};
 use washer_model::{Dwell, Endings, NoAnswer, STATE_LEN, Starts, State, endings};
 use washer_row::Status;
 
+use crate::columns::at_speeds;
 use crate::engine::together_or_alone;
 use crate::plan::Plan;
-use crate::stability::at_speeds;
 use columns::{DwellColumn, RowOf, columns};
 use sweep_engine::columns::row;
 use sweep_engine::store::{Column, Done, Job, Kind as Cells, Layout, axis_columns};

@@ -17,9 +17,9 @@ use crate::engine::{
 };
 use crate::plan::Plan;
 use crate::speeds::SpeedList;
-use serde_json::{Value, json};
+use serde_json::json;
 use sweep_engine::exit::Error;
-use sweep_engine::store::{Done, Job, Layout};
+use sweep_engine::store::{Done, Job};
 
 /// Rows that a thread takes at once: those of enough points to fill lanes, because a point's rows
 /// share its curve of responses; but no fewer and no more than these.
@@ -65,32 +65,7 @@ pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<()
 #[must_use]
 pub(crate) fn job<'a>(plan: &'a Plan, speeds_rpm: &[f64]) -> Job<'a> {
     let asked = json!({ "speed_rpm": speeds_rpm });
-    at_speeds(plan, speeds_rpm, columns::of_dwells(plan, speeds_rpm), ("stability", asked))
-}
-
-/// Rows of this layout for each point and speed; the plan says what was asked under a name.
-pub(crate) fn at_speeds<'a>(
-    plan: &'a Plan,
-    speeds_rpm: &[f64],
-    layout: Layout,
-    (name, asked): (&str, Value),
-) -> Job<'a> {
-    let of_run = Job::of(plan);
-    let mut json = of_run.plan;
-    json[name] = asked;
-    let speeds_rpm = speeds_rpm.to_vec();
-    let speeds = speeds_rpm.len() as u64;
-    Job {
-        plan: json,
-        points: plan.points() * speeds,
-        layout,
-        axis_values: Box::new(move |row| {
-            let mut values = plan.axis_values(row / speeds);
-            values.push(speeds_rpm[(row % speeds) as usize]);
-            values
-        }),
-        ..of_run
-    }
+    columns::at_speeds(plan, speeds_rpm, columns::of_dwells(plan, speeds_rpm), ("stability", asked))
 }
 
 /// The dwells of a plan at these speeds, and where their result goes unless it is said.

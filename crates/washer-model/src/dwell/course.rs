@@ -37,8 +37,8 @@ const FIRST_ASKED: usize = 4;
 /// A spectrum whose strongest line and multiples leave less than this share is of two frequencies.
 const TWO_LINES: f64 = 0.1;
 
-/// What repeats this well, or has a line this strong, is on its way from one motion to another where
-/// neighbours part: chaos does neither.
+/// What repeats this well, or has a line this strong, is on its way from one motion to another
+/// where neighbours part: chaos does neither.
 const ON_ITS_WAY: [f64; 2] = [0.05, 0.3];
 
 /// Closer than the first share to an unstable response nothing is settled; nor closer than the

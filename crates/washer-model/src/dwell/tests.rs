@@ -116,7 +116,7 @@ fn val_motions_of_held_speeds_match_an_independent_program() {
 }
 
 #[test]
-#[ignore = "a minute: friction takes short steps"]
-fn val_all_motions_of_held_speeds_match_an_independent_program() {
-    held(|_, _| true);
+#[ignore = "friction takes short steps: some ten seconds"]
+fn val_more_motions_of_held_speeds_match_an_independent_program() {
+    held(|name, speed| name.starts_with("paper") || (name == "friction_heavy" && speed <= 250.0));
 }
