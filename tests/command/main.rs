@@ -10,6 +10,7 @@ mod boundary;
 mod corpora;
 mod decisions;
 mod determinism;
+mod dwell;
 mod elements;
 mod explain;
 mod faults;

@@ -28,6 +28,8 @@ pub mod key {
     pub const MODES: &str = "sweep.modes";
     /// Speeds, and what the rows mean. In files of `sweep stability` alone.
     pub const STABILITY: &str = "sweep.stability";
+    /// Speeds and starts. In files of `sweep dwell` alone.
+    pub const DWELL: &str = "sweep.dwell";
     /// Which files were compared, and where their plans part. In files of differences alone.
     pub const DIFFERENCES: &str = "sweep.differences";
     /// BLAKE3 hash of the whole file with zeros in this place, hexadecimal.
@@ -47,6 +49,8 @@ pub enum FileKind<'a> {
     Boundary,
     /// Result of `sweep stability`.
     Stability,
+    /// Result of `sweep dwell`.
+    Dwell,
     /// Result of `sweep compare --out`.
     Differences,
     /// A table that `sweep export` wrote.
@@ -81,6 +85,7 @@ impl FileKind<'_> {
             Self::Modes => "result of `sweep modes`",
             Self::Boundary => "result of `sweep boundary`",
             Self::Stability => "result of `sweep stability`",
+            Self::Dwell => "result of `sweep dwell`",
             Self::Differences => "result of `sweep compare --out`",
             Self::Exported { .. } => "table of `sweep export`",
             Self::Account { .. } => "account of the run with this --out",
@@ -105,6 +110,7 @@ impl FileKind<'_> {
             | Self::Modes
             | Self::Boundary
             | Self::Stability
+            | Self::Dwell
             | Self::Differences => match ParquetFile::look(path) {
                 Ok(file) if self.has_keys(&|key| file.value(key).is_some()) => true,
                 Ok(_) => {
@@ -135,14 +141,21 @@ impl FileKind<'_> {
     pub fn has_keys(self, has: &dyn Fn(&str) -> bool) -> bool {
         let own = match self {
             Self::Map => {
-                const OF_OTHERS: [&str; 5] =
-                    [key::TRACE, key::MODES, key::BOUNDARY, key::STABILITY, key::DIFFERENCES];
+                const OF_OTHERS: [&str; 6] = [
+                    key::TRACE,
+                    key::MODES,
+                    key::BOUNDARY,
+                    key::STABILITY,
+                    key::DWELL,
+                    key::DIFFERENCES,
+                ];
                 return has(key::PLAN) && !OF_OTHERS.into_iter().any(has);
             }
             Self::Trace => key::TRACE,
             Self::Modes => key::MODES,
             Self::Boundary => key::BOUNDARY,
             Self::Stability => key::STABILITY,
+            Self::Dwell => key::DWELL,
             Self::Differences => key::DIFFERENCES,
             Self::Account { .. }
             | Self::Exported { .. }

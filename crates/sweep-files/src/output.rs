@@ -129,12 +129,13 @@ mod tests {
     use super::*;
     use crate::{key, seal};
 
-    const PARQUET: [FileKind<'_>; 6] = [
+    const PARQUET: [FileKind<'_>; 7] = [
         FileKind::Map,
         FileKind::Trace,
         FileKind::Modes,
         FileKind::Boundary,
         FileKind::Stability,
+        FileKind::Dwell,
         FileKind::Differences,
     ];
 
@@ -146,6 +147,7 @@ mod tests {
             FileKind::Modes => key::MODES,
             FileKind::Boundary => key::BOUNDARY,
             FileKind::Stability => key::STABILITY,
+            FileKind::Dwell => key::DWELL,
             FileKind::Differences => key::DIFFERENCES,
             FileKind::Exported { ending: "csv" } => {
                 return format!("{}x\n", crate::EXPORTED_CSV).into_bytes();

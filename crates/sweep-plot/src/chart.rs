@@ -93,6 +93,8 @@ pub(crate) enum Style {
     Solid(f64),
     /// A dashed line.
     Dashed,
+    /// A dot at each point, and no line.
+    Dots,
     /// The line, and the area between these two values at each point.
     Band(Vec<f64>, Vec<f64>),
 }
@@ -244,6 +246,12 @@ fn draw_panel(
             }
             scene.fill(outline, series.colour.with_alpha(90));
         }
+        if series.style == Style::Dots {
+            for dot in (0..xs.len()).filter_map(|k| at(&series.y, k)) {
+                scene.fill(Outline::circle(dot, DOT), series.colour);
+            }
+            continue;
+        }
         let kept = envelope(xs, &series.y, panel.xs.from, panel.xs.to, panel.width as usize);
         let places: Vec<_> = kept.into_iter().map(|k| at(&series.y, k)).collect();
         let mut outline = Outline::default();
@@ -262,7 +270,7 @@ fn stroke(series: &Series) -> Stroke {
     match series.style {
         Style::Solid(width) => Stroke::solid(series.colour, width),
         Style::Dashed => Stroke::dashed(series.colour, 1.8, &[8.0, 5.0]),
-        Style::Band(..) => Stroke::solid(series.colour, 2.2),
+        Style::Band(..) | Style::Dots => Stroke::solid(series.colour, 2.2),
     }
 }
 
@@ -273,6 +281,9 @@ fn level_stroke() -> Stroke {
 fn mark_stroke() -> Stroke {
     Stroke::dashed(MUTED, 1.2, &[6.0, 4.0])
 }
+
+/// Radius of a dot, px.
+const DOT: f64 = 2.8;
 
 /// Radius of a star, px.
 const STAR: f64 = 10.0;
@@ -379,6 +390,11 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
     };
     for panel in panels {
         for series in &panel.series {
+            if series.style == Style::Dots {
+                let dot = (Outline::circle([0.0, 0.0], 1.4 * DOT), true);
+                add(Sign::Dot(dot, series.colour), &series.name);
+                continue;
+            }
             let mut stroke = stroke(series);
             stroke.width = stroke.width.max(2.2);
             add(Sign::Line(stroke), &series.name);

@@ -297,6 +297,7 @@ fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>
         Kind::Design => design(source, options, format),
         Kind::Differences => differences(source, options, format),
         Kind::Stability => stability(&source, options, format),
+        Kind::Dwell => written(&source, &figures::dwell::chart(&source, options)?, format),
         Kind::Trace | Kind::Modes | Kind::Boundary => chart(&Table::read(source)?, options, format),
     }
 }
@@ -423,9 +424,7 @@ fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>
         (Kind::Modes, Some(View::Variation)) => figures::turn::chart(table)?,
         (Kind::Modes, Some(View::Shapes)) => figures::shapes::chart(table)?,
         (Kind::Modes, _) => figures::campbell::chart(table, options)?,
-        (Kind::Boundary | Kind::Map | Kind::Design | Kind::Differences | Kind::Stability, _) => {
-            figures::boundary::chart(table)?
-        }
+        _ => figures::boundary::chart(table)?,
     };
     written(&table.source, &chart, format)
 }
@@ -469,6 +468,7 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
     let trace = source.kind == Kind::Trace;
     let view_fits = options.view.is_some_and(|view| view.of() == source.kind);
     let (modes, stability) = (source.kind == Kind::Modes, source.kind == Kind::Stability);
+    let dwell = source.kind == Kind::Dwell;
     let over_modes = modes && matches!(options.view, None | Some(View::Frequencies));
     let responses = stability && options.view == Some(View::Responses);
     let over_time = trace && options.view != Some(View::Passages);
@@ -477,10 +477,15 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
         (
             "--channel",
             !options.channels.is_empty(),
-            map || design || trace || responses,
-            "maps, traces and responses of stability files",
+            map || design || trace || responses || dwell,
+            "maps, traces, dwells and responses of stability files",
         ),
-        ("--at", !options.at.is_empty(), map || stability, "maps and stability files"),
+        (
+            "--at",
+            !options.at.is_empty(),
+            map || stability || dwell,
+            "maps, stability and dwell files",
+        ),
         ("--resonances", !options.resonances_rpm.is_empty(), trace, "traces"),
         ("--modes", options.modes.is_some(), trace, "traces"),
         (

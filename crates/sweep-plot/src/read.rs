@@ -32,6 +32,8 @@ pub(crate) enum Kind {
     Differences,
     /// Periodic responses over constant speeds.
     Stability,
+    /// Motions that held speeds end in.
+    Dwell,
 }
 
 impl Kind {
@@ -45,6 +47,7 @@ impl Kind {
             Self::Boundary => "boundary",
             Self::Differences => "differences",
             Self::Stability => "stability",
+            Self::Dwell => "dwell",
         }
     }
 }
@@ -338,7 +341,9 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 
 fn recognise(names: &[&str]) -> Option<Kind> {
     let has = |name: &str| names.contains(&name);
-    if has("growth_per_s") && has("speed_rpm") {
+    if has("motion") && has("speed_rpm") {
+        Some(Kind::Dwell)
+    } else if has("growth_per_s") && has("speed_rpm") {
         Some(Kind::Stability)
     } else if has("status") && has("ratio_max") {
         Some(Kind::Map)

@@ -127,6 +127,19 @@ impl Outline {
         )
     }
 
+    /// A disc around `centre`.
+    pub(crate) fn circle(centre: [f64; 2], radius: f64) -> Self {
+        let points: Vec<[f64; 2]> = (0..16)
+            .map(|k| {
+                let (sin, cos) = (std::f64::consts::PI * f64::from(k) / 8.0).sin_cos();
+                [centre[0] + radius * sin, centre[1] - radius * cos]
+            })
+            .collect();
+        let mut outline = Self::default();
+        outline.add_polygon(&points);
+        outline
+    }
+
     /// A five-pointed star around `centre`, `radius` from centre to tip.
     pub(crate) fn star(centre: [f64; 2], radius: f64) -> Self {
         let points: Vec<[f64; 2]> = (0..10)

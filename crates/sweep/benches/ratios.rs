@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use lane_ode::Simd;
 use washer_model::{
-    BumpStop, Bushing, Cases, Dwell, Machine, Method, ModelKind, Point, Spin, Timing, prepare,
-    respond, simulate,
+    BumpStop, Bushing, Cases, Dwell, Machine, Method, ModelKind, Point, Spin, Starts, Timing,
+    endings, prepare, respond, simulate,
 };
 
 /// As many as the widest lanes hold.
@@ -27,6 +27,7 @@ fn main() {
     threads(rounds, once_s);
     boundaries(rounds);
     dwells(rounds, once_s / 1287.0);
+    motions(rounds);
     elements(rounds);
 }
 
@@ -265,6 +266,51 @@ fn dwells(rounds: usize, pair_s: f64) {
         "| ratio | |\n|---|---|\n| a speed of a point against its two trajectories of 50 s, \
          rk4-mass-scaled, 1e-3 | {:.3} |\n",
         1e-3 * medians[0] / pair_s
+    );
+}
+
+/// What a held speed ends in, from eight starts, against eight trajectories with peaks of as many
+/// steps of the same formula.
+fn motions(rounds: usize) {
+    const SPEED_RPM: f64 = 250.0;
+    const STEPS_A_TURN: f64 = 96.0;
+    let mut machine = Machine::paper();
+    machine.unbalance.mass_kg = 0.4;
+    let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![SPEED_RPM] };
+    let ready = |end_s: f64| -> Vec<Point> {
+        let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
+        let scenarios = vec![(machine.clone(), spin.clone()); TRAJECTORIES];
+        let points: Result<_, _> = prepare(Simd::best(), &scenarios, &timing).into_iter().collect();
+        points.expect("the paper's machine has an equilibrium")
+    };
+    let dwell = ready(1.0);
+    let dwells = [Dwell { point: &dwell[0], speed_rpm: SPEED_RPM }];
+    let starts = Starts { count: TRAJECTORIES, ..Starts::default() };
+    let find = || endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0);
+    let followed_s = find().map(|found| found.motions[0].time_s).expect("it has motions");
+    let steps = followed_s * SPEED_RPM / 60.0 * STEPS_A_TURN;
+    let points = ready(steps * STEP_S);
+    let points: Vec<&Point> = points.iter().collect();
+    let mut times = vec![Vec::new(); 2];
+    for _ in 0..rounds {
+        let begin = Instant::now();
+        assert!(find().is_ok());
+        times[0].push(begin.elapsed().as_secs_f64() * 1e3);
+        let begin = Instant::now();
+        let method = Method::Rk4 { step_s: STEP_S };
+        let records = simulate(Simd::best(), ModelKind::Nonlinear, &method, &points);
+        times[1].push(begin.elapsed().as_secs_f64() * 1e3);
+        assert!(records.iter().all(|record| record.failure.is_none()));
+    }
+    println!(
+        "One core, what {SPEED_RPM} rpm ends in from {TRAJECTORIES} starts, the first followed for \
+         {followed_s:.0} s:\n"
+    );
+    let names = ["responses, starts, settling", "trajectories of as many RK4 steps"];
+    let medians = table("ms", &names.map(str::to_owned), &times);
+    println!(
+        "| ratio | |\n|---|---|\n| motions against trajectories of as many steps | {:.2} |\n",
+        medians[0] / medians[1]
     );
 }
 

@@ -1,10 +1,10 @@
 //! The columns of results, and rows of outcomes: the one place that says what a file holds.
 
-use serde_json::json;
+use serde_json::{Value, json};
 use sweep_engine::columns::{
     Cell, Compared, ResultColumn, amplitude_columns, row, run_columns, verdict_columns,
 };
-use sweep_engine::store::{Column, Done, Kind as Cells, Layout, Row, Rows, axis_columns};
+use sweep_engine::store::{Column, Done, Job, Kind as Cells, Layout, Row, Rows, axis_columns};
 use sweep_files::{FileKind, key};
 use washer_model::{Beyond, Channel, Disturbance, Kind, Motion};
 use washer_row::{Level, Measures, Metric, Outcome, ROW_STATUSES, Trajectory, Verdict, row_status};
@@ -168,6 +168,31 @@ pub(crate) fn of_dwells(plan: &Plan, speeds_rpm: &[f64]) -> Layout {
         rows_a_point: speeds_rpm.len() as u64,
         has_several: true,
         metadata: vec![(key::STABILITY, json!({ "speeds_rpm": speeds_rpm }))],
+    }
+}
+
+/// Rows of this layout for each point and speed; the plan says what was asked under a name.
+pub(crate) fn at_speeds<'a>(
+    plan: &'a Plan,
+    speeds_rpm: &[f64],
+    layout: Layout,
+    (name, asked): (&str, Value),
+) -> Job<'a> {
+    let of_run = Job::of(plan);
+    let mut json = of_run.plan;
+    json[name] = asked;
+    let speeds_rpm = speeds_rpm.to_vec();
+    let speeds = speeds_rpm.len() as u64;
+    Job {
+        plan: json,
+        points: plan.points() * speeds,
+        layout,
+        axis_values: Box::new(move |row| {
+            let mut values = plan.axis_values(row / speeds);
+            values.push(speeds_rpm[(row % speeds) as usize]);
+            values
+        }),
+        ..of_run
     }
 }
 

@@ -42,6 +42,7 @@ mod boundary_tests;
 mod columns;
 mod commands;
 mod config;
+mod dwell;
 mod engine;
 mod estimate;
 mod explain;

@@ -8,7 +8,7 @@ use washer_row::Measures;
 
 use crate::identity::BUILD;
 use crate::method::Integrator;
-use crate::speeds::Speeds;
+use crate::speeds::SpeedList;
 
 /// Channels that are compared if the grid file names none.
 const DEFAULT_CHANNELS: [Channel; 6] = [
@@ -30,7 +30,7 @@ pub struct Washer {
     /// What is measured of the motions.
     pub measures: Measures,
     /// The constant speeds that the metric `growth` is about; `None` if it is not asked for.
-    pub growth_speeds: Option<Speeds>,
+    pub growth_speeds: Option<SpeedList>,
 }
 
 impl Model for Washer {

@@ -1,4 +1,4 @@
-//! `--speed FROM:TO:STEP`: even spin speeds.
+//! Spin speeds as they are asked for: even ones, FROM:TO:STEP, and lists.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,11 +10,11 @@ pub(crate) const MOST_SPEEDS: f64 = 100_000.0;
 
 /// Even speeds, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Speeds {
+pub(crate) struct Speeds {
     /// First (rpm).
-    pub from: f64,
+    pub(crate) from: f64,
     /// Last (rpm).
-    pub to: f64,
+    pub(crate) to: f64,
     /// Between two (rpm).
     pub(crate) step: f64,
 }
@@ -79,7 +79,60 @@ impl Speeds {
     }
 }
 
-/// Speeds at which the drum turns.
+/// Speeds at which the drum turns, rising: one, even ones, or several of these.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpeedList {
+    /// As it was written.
+    text: String,
+    values_rpm: Vec<f64>,
+}
+
+impl SpeedList {
+    /// The speeds (rpm).
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values_rpm
+    }
+}
+
+impl fmt::Display for SpeedList {
+    /// As it is written on a command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl FromStr for SpeedList {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut values_rpm: Vec<f64> = Vec::new();
+        for part in text.split(',') {
+            if part.contains(':') {
+                values_rpm.extend(turning(part)?.values());
+                continue;
+            }
+            match part.trim().parse::<f64>() {
+                Ok(speed) if speed.is_finite() && speed > 0.0 => values_rpm.push(speed),
+                _ => {
+                    return Err("expected a speed above 0 rpm, several with commas, or \
+                                FROM:TO:STEP, as in 250 or 240,305 or 60:400:1"
+                        .to_owned());
+                }
+            }
+        }
+        if values_rpm.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err("expected rising speeds".to_owned());
+        }
+        let count = values_rpm.len();
+        if count as f64 > MOST_SPEEDS + 1.0 {
+            return Err(format!("these are {count} speeds, expected at most {MOST_SPEEDS}"));
+        }
+        Ok(Self { text: text.split_whitespace().collect(), values_rpm })
+    }
+}
+
+/// Even speeds at which the drum turns.
 ///
 /// # Errors
 /// What is no such range, in words.
@@ -96,6 +149,26 @@ pub(crate) fn turning(text: &str) -> Result<Speeds, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_list_has_single_speeds_and_even_ones() {
+        let values = |text: &str| text.parse::<SpeedList>().map(|list| list.values_rpm);
+        assert_eq!(values("250").unwrap(), [250.0]);
+        assert_eq!(values("240, 250:260:5,305.5").unwrap(), [240.0, 250.0, 255.0, 260.0, 305.5]);
+        assert_eq!("60:400:1".parse::<SpeedList>().unwrap().to_string(), "60:400:1");
+        for (text, said) in [
+            ("", "above 0 rpm"),
+            ("0", "above 0 rpm"),
+            ("nan", "above 0 rpm"),
+            ("250,240", "rising"),
+            ("250,250", "rising"),
+            ("240:250:5,250", "rising"),
+            ("0:10:1", "above 0 rpm"),
+        ] {
+            let refused = values(text).unwrap_err();
+            assert!(refused.contains(said), "{text}: {refused}");
+        }
+    }
 
     #[test]
     fn speeds_are_even_and_end_where_told() {

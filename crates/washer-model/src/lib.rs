@@ -62,6 +62,7 @@
 pub mod bench;
 mod channel;
 mod coordinates;
+mod dwell;
 mod fast;
 mod kind;
 mod lanes;
@@ -75,6 +76,7 @@ mod stability;
 
 pub use channel::Channel;
 pub use coordinates::COORDINATES;
+pub use dwell::{Ending, Endings, Exponent, Settled, Starts, State, endings};
 pub use fast::Cases;
 pub use fast::geared::{Formula, Gear, Geared};
 pub use kind::ModelKind;

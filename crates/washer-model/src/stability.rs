@@ -4,16 +4,16 @@ mod branch;
 mod crossing;
 mod exponents;
 mod monodromy;
-mod orbit;
+pub(crate) mod orbit;
 mod participants;
 #[cfg(test)]
 mod plain;
 mod respond;
-mod search;
-mod settings;
+pub(crate) mod search;
+pub(crate) mod settings;
 #[cfg(test)]
 mod tests;
-mod turn;
+pub(crate) mod turn;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -229,6 +229,6 @@ pub enum NoAnswer {
 /// Digits of a multiplier that count: its last ones are the processor's own.
 const MULTIPLIER_DIGITS: f64 = (1_u64 << 36) as f64;
 
-fn rounded(part: f64) -> f64 {
+pub(crate) fn rounded(part: f64) -> f64 {
     (part * MULTIPLIER_DIGITS).round_ties_even() / MULTIPLIER_DIGITS
 }

@@ -150,9 +150,10 @@ impl StatusCounts {
 /// # Errors
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
 pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 11] = [
+    const COLUMNS: [&str; 12] = [
         "point",
         "status",
+        "motion",
         "stable",
         "beyond",
         "reliable",
@@ -202,6 +203,10 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
                 None => dwells.unknown += 1,
             }
         }
+        return Ok(());
+    }
+    // A result of `sweep dwell` has no verdicts.
+    if batch.column_by_name("motion").is_some() {
         return Ok(());
     }
     for reliable in cells::flags(column("reliable")?)? {

@@ -3,6 +3,7 @@
 pub(crate) mod boundary;
 pub(crate) mod campbell;
 pub(crate) mod curves;
+pub(crate) mod dwell;
 pub(crate) mod histogram;
 pub(crate) mod influence;
 pub(crate) mod map;

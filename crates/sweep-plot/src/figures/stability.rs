@@ -41,7 +41,7 @@ pub(super) struct Swept {
 type Points = Vec<Vec<f64>>;
 
 /// The columns of numbers between the point's index and the speed.
-fn axes(source: &Source) -> Vec<&ColumnFacts> {
+pub(super) fn axes(source: &Source) -> Vec<&ColumnFacts> {
     let before = source.columns.iter().take_while(|column| column.name != "speed_rpm");
     before.filter(|column| column.cells == Cells::Numbers && column.name != "point").collect()
 }
@@ -118,22 +118,8 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         .into_iter()
         .filter(|(name, _)| source.column(&format!("linear_{name}")).is_some())
         .collect();
+    let is_shown = shown(source, &channels, &options.channels)?;
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
-    if let Some(unknown) = options.channels.iter().find(|asked| !names.contains(&asked.as_str())) {
-        return Err(PlotError::NotThere {
-            option: "--channel",
-            given: unknown.clone(),
-            path: source.path.clone(),
-            what: "channel",
-            known: names.join(", "),
-        });
-    }
-    let usual: Vec<&str> = USUAL.into_iter().filter(|name| names.contains(name)).collect();
-    let is_shown = |name: &str| match (&options.channels[..], &usual[..]) {
-        ([], []) => true,
-        ([], usual) => usual.contains(&name),
-        (asked, _) => asked.iter().any(|asked| asked == name),
-    };
     let columns: Vec<String> = names
         .iter()
         .flat_map(|name| ["nonlinear", "linear"].map(|model| format!("{model}_{name}")))
@@ -148,12 +134,7 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
             one.columns[place].iter().map(|value| value * factor).collect()
         };
         let nonlinear = scaled(2 * k);
-        // Each dash begins and ends where the solid line does.
-        let of = |wanted: bool| -> Vec<f64> {
-            let at = |i: usize| one.growth.get(i).is_some_and(|growth| (*growth > 0.0) == wanted);
-            let near = |i: usize| at(i) || (!wanted && (i > 0 && at(i - 1) || at(i + 1)));
-            (0..nonlinear.len()).map(|i| if near(i) { nonlinear[i] } else { f64::NAN }).collect()
-        };
+        let of = |wanted: bool| part(&nonlinear, &one.growth, wanted);
         let series = |name: &str, colour, y, style| Series {
             name: name.to_owned(),
             colour,
@@ -168,7 +149,7 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         ];
         let words = label::capitalised(&label::channel(name));
         ChartPanel {
-            shown: is_shown(name),
+            shown: is_shown[k],
             height: 170.0,
             ..ChartPanel::new(name, Label::new(&words, unit), lines)
         }
@@ -190,6 +171,42 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         marks: Vec::new(),
         mark_meaning: String::new(),
     })
+}
+
+/// The part of a line over speed where the response is unstable, or where it is not. Each dash
+/// begins and ends where the solid line does.
+pub(super) fn part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
+    let at = |i: usize| growth.get(i).is_some_and(|growth| (*growth > 0.0) == wanted);
+    let near = |i: usize| at(i) || (!wanted && (i > 0 && at(i - 1) || at(i + 1)));
+    (0..line.len()).map(|i| if near(i) { line[i] } else { f64::NAN }).collect()
+}
+
+/// Which of the channels a picture shows: those asked for, else the usual ones, else all.
+///
+/// # Errors
+/// [`PlotError::NotThere`] for an unknown channel.
+pub(super) fn shown(
+    source: &Source,
+    channels: &[(&str, &ColumnFacts)],
+    asked: &[String],
+) -> Result<Vec<bool>, PlotError> {
+    let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
+    if let Some(unknown) = asked.iter().find(|asked| !names.contains(&asked.as_str())) {
+        return Err(PlotError::NotThere {
+            option: "--channel",
+            given: unknown.clone(),
+            path: source.path.clone(),
+            what: "channel",
+            known: names.join(", "),
+        });
+    }
+    let usual: Vec<&str> = USUAL.into_iter().filter(|name| names.contains(name)).collect();
+    let is_shown = |name: &&str| match (asked, &usual[..]) {
+        ([], []) => true,
+        ([], usual) => usual.contains(name),
+        (asked, _) => asked.iter().any(|asked| asked == name),
+    };
+    Ok(names.iter().map(is_shown).collect())
 }
 
 /// A file of `--stability`.
@@ -248,7 +265,7 @@ pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotEr
     })
 }
 
-fn said(axis: &ColumnFacts, value: f64) -> String {
+pub(super) fn said(axis: &ColumnFacts, value: f64) -> String {
     let unit = if axis.unit.is_empty() { String::new() } else { format!(" {}", axis.unit) };
     format!("{} {}{unit}", label::words(&axis.name), label::significant(value, 4))
 }
@@ -260,11 +277,14 @@ fn said_within(axis: &ColumnFacts, value: f64) -> String {
 }
 
 /// The values of a row's axes, and whether it is at the values asked for.
-fn row_values(columns: &[Vec<f64>], row: usize) -> Vec<f64> {
+pub(super) fn row_values(columns: &[Vec<f64>], row: usize) -> Vec<f64> {
     columns.iter().map(|column| column[row]).collect()
 }
 
-fn axis_columns(batch: &Batch<'_>, axes: &[&ColumnFacts]) -> Result<Vec<Vec<f64>>, PlotError> {
+pub(super) fn axis_columns(
+    batch: &Batch<'_>,
+    axes: &[&ColumnFacts],
+) -> Result<Vec<Vec<f64>>, PlotError> {
     axes.iter().map(|axis| batch.numbers(&axis.name)).collect()
 }
 
@@ -314,7 +334,7 @@ fn points(
         }
     }
     if !seen_rows {
-        let reason = "the stability file has no rows";
+        let reason = "it has no rows";
         return Err(PlotError::Empty { path: source.path.clone(), reason });
     }
     if found.is_empty() {
@@ -334,7 +354,7 @@ fn points(
 ///
 /// # Errors
 /// As [`points`]; [`PlotError::Unfit`] where there are several.
-fn one_point(
+pub(super) fn one_point(
     source: &Source,
     axes: &[&ColumnFacts],
     at: &[(String, f64)],
@@ -353,7 +373,7 @@ fn one_point(
             _ => format!("the file to be drawn does not say which by {free}"),
         };
         return Err(PlotError::Unfit(format!(
-            "{}: this stability file has {} points, and {what}",
+            "{}: this file has {} points, and {what}",
             source.path.display(),
             found.len()
         )));
@@ -409,7 +429,7 @@ fn read(
 }
 
 /// The ranges of speed in which growth is above 0, taken as linear between the given speeds.
-fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
+pub(super) fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
     let mut ranges: Vec<[f64; 2]> = Vec::new();
     // A speed without an answer has no growth (NaN), and is no part of a range.
     for k in (0..speed.len()).filter(|&k| growth[k] > 0.0) {

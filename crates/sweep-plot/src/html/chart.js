@@ -198,6 +198,15 @@ function createChart(host, spec, name) {
       context.fill();
       context.globalAlpha = 1;
     }
+    if (series.dots) {
+      for (let k = from; k <= to; k++) {
+        if (!Number.isFinite(series.y[k])) continue;
+        context.beginPath();
+        context.arc(atX(grid[k]), atY(series.y[k]), series.width / 2, 0, 2 * Math.PI);
+        context.fill();
+      }
+      return;
+    }
     context.globalAlpha = series.alpha ?? 1;
     context.lineWidth = series.width;
     context.setLineDash(series.dashed ? [8, 5] : []);
@@ -265,8 +274,9 @@ function createChart(host, spec, name) {
     made.style.cssText = style;
     return made;
   };
-  const lineSign = (series) => swatch(
-    `height:0;border-top:3px ${series.dashed ? "dashed" : "solid"} ${lineColour(series.colour)}`);
+  const lineSign = (series) => swatch(series.dots
+    ? `width:9px;height:9px;border-radius:5px;margin:0 9px;background:${lineColour(series.colour)}`
+    : `height:0;border-top:3px ${series.dashed ? "dashed" : "solid"} ${lineColour(series.colour)}`);
 
   // What lines and marks are.
   function tellLegend() {

@@ -403,6 +403,7 @@ fn series_json(series: &Series) -> Value {
     let (width, dashed, low, high) = match &series.style {
         Style::Solid(width) => (*width, false, None, None),
         Style::Dashed => (1.8, true, None, None),
+        Style::Dots => (5.6, false, None, None),
         Style::Band(low, high) => (2.2, false, Some(data(low)), Some(data(high))),
     };
     json!({
@@ -412,6 +413,7 @@ fn series_json(series: &Series) -> Value {
         "alpha": embed::short(f64::from(series.colour.alpha) / 255.0),
         "width": width,
         "dashed": dashed,
+        "dots": series.style == Style::Dots,
         "y": data(&series.y),
         "low": low,
         "high": high,

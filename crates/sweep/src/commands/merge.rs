@@ -1,8 +1,7 @@
 //! `sweep merge GRID.toml`: finished shards into the one file, of a run or of dwells.
 
+use super::held::HeldArgs;
 use crate::plan::Plan;
-use crate::speeds::{Speeds, turning};
-use crate::stability::dwells;
 use sweep_engine::commands::merge::{self, of_job};
 use sweep_engine::exit::{Error, Exit};
 
@@ -11,9 +10,8 @@ use sweep_engine::exit::{Error, Exit};
 pub struct Args {
     #[command(flatten)]
     merge: merge::Args,
-    /// Of `sweep stability` with these speeds, not of `sweep run`
-    #[arg(long, value_name = "FROM:TO:STEP", value_parser = turning, allow_hyphen_values = true)]
-    speed: Option<Speeds>,
+    #[command(flatten)]
+    held: HeldArgs,
 }
 
 /// Joins what the shards have left.
@@ -22,8 +20,9 @@ pub struct Args {
 /// As the engine's command.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let target = &args.merge.target;
-    let Some(speed) = args.speed else { return merge::run::<crate::Washer>(&args.merge) };
     let plan: Plan = target.grid.load()?;
-    let (job, output) = dwells(&plan, speed, target.out.as_deref());
+    let Some((job, output, _)) = args.held.job(&plan, target.out.as_deref()) else {
+        return merge::run::<crate::Washer>(&args.merge);
+    };
     of_job(&plan.name, &job, &output)
 }

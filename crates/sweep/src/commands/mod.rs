@@ -1,7 +1,9 @@
 //! The command line: one module a subcommand, each with its arguments and `run`.
 
 mod completions;
+mod dwell;
 mod explain;
+mod held;
 mod init;
 mod lines;
 mod man;
@@ -41,7 +43,7 @@ const EXAMPLES: Examples = &[
 /// Subcommands by what they are for, as help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Run", &["run", "check"]),
-    ("Ask", &["boundary", "trace", "modes", "stability", "explain"]),
+    ("Ask", &["boundary", "trace", "modes", "stability", "dwell", "explain"]),
     ("Look", &["show", "plot", "require", "compare", "export"]),
     ("Cluster", &["status", "merge", "slurm"]),
     ("Set up", &["init", "parameters", "schema", "man", "completions"]),
@@ -78,6 +80,8 @@ pub enum Command {
     Modes(modes::Args),
     /// Find periodic responses at constant speeds, and unstable ones
     Stability(stability::Args),
+    /// Find the motions that held speeds end in
+    Dwell(dwell::Args),
     /// Explain why the linear model fails at one point
     Explain(explain::Args),
     /// Show what a result file holds: verdicts, extremes, metrics
@@ -127,6 +131,7 @@ fn examples_of(name: &str) -> Examples {
         "trace" => trace::EXAMPLES,
         "modes" => modes::EXAMPLES,
         "stability" => stability::EXAMPLES,
+        "dwell" => dwell::EXAMPLES,
         "explain" => explain::EXAMPLES,
         "boundary" => lines::BOUNDARY,
         "plot" => plot::EXAMPLES,
@@ -234,6 +239,7 @@ impl Command {
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Stability(args) => stability::run(args),
+            Self::Dwell(args) => dwell::run(args),
             Self::Explain(args) => explain::run(args),
             Self::Boundary(args) => boundary::run::<crate::Washer>(args),
             Self::Plot(args) => plot::run(args),

@@ -1,5 +1,6 @@
 //! `sweep show FILE`: what a Parquet file of this program holds.
 
+use crate::dwell;
 use crate::stability::tongues;
 use sweep_engine::commands::show::{self, Args, Further};
 use sweep_engine::exit::{Error, Exit};
@@ -17,6 +18,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
     if FileKind::Stability.has_keys(&|key| file.value(key).is_some()) {
         return Ok(tongues::summary(file)?.lines());
+    }
+    if FileKind::Dwell.has_keys(&|key| file.value(key).is_some()) {
+        return Ok(dwell::summary::lines(file)?);
     }
     Ok(Vec::new())
 }

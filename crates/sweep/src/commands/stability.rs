@@ -1,22 +1,14 @@
 //! `sweep stability GRID.toml --speed FROM:TO:STEP`: periodic responses and whether they are
 //! stable.
 
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-
+use super::held::Held;
 use crate::plan::Plan;
-use crate::speeds::{Speeds, turning};
-use crate::stability::dwells;
-use crate::stability::{DwellEngine, check, tongues};
+use crate::speeds::SpeedList;
+use crate::stability::{DwellEngine, check, dwells, tongues};
 use sweep_engine::commands::examples::Examples;
-use sweep_engine::commands::grid::{ResultArgs, quoted};
-use sweep_engine::commands::run::{WorkArgs, line, work};
-use sweep_engine::exit::{Error, Exit, tell};
-use sweep_engine::interrupt::Interrupt;
-use sweep_engine::progress::duration;
-use sweep_engine::run::{self as runner, Ended, RunReport};
-use sweep_engine::threads::Environment;
-use sweep_files::ParquetFile;
+use sweep_engine::commands::grid::ResultArgs;
+use sweep_engine::commands::run::WorkArgs;
+use sweep_engine::exit::{Error, Exit};
 
 /// Shown by `--help`.
 pub(super) const EXAMPLES: Examples = &[
@@ -34,9 +26,9 @@ pub struct Args {
     /// The grid, and the file: results/NAME-stability.parquet by default.
     #[command(flatten)]
     target: ResultArgs,
-    /// Constant spin speeds, in rpm, above 0
-    #[arg(long, value_name = "FROM:TO:STEP", value_parser = turning, allow_hyphen_values = true)]
-    speed: Speeds,
+    /// Constant spin speeds in rpm, above 0: one, several with commas, FROM:TO:STEP
+    #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
+    speed: SpeedList,
     /// How it is done.
     #[command(flatten)]
     work: WorkArgs,
@@ -64,76 +56,16 @@ command goes on from there.";
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan: Plan = args.target.grid.load()?;
     check(&plan, "--speed", &args.speed.to_string())?;
-    let speeds_rpm = args.speed.values();
-    let engine = DwellEngine::new(&plan, &speeds_rpm)?;
-    let (job, output) = dwells(&plan, args.speed, args.target.out.as_deref());
-    let interrupt = Interrupt::install().map_err(|source| Error::File {
-        action: "install signal handlers for",
-        path: PathBuf::from("this process"),
-        source,
-    })?;
-    let environment: Environment<'_> = &|name| std::env::var(name).ok();
-    let options = args.work.options(environment)?;
-    let report = runner::run(&engine, &job, &output, options, &interrupt)?;
-    for note in &report.notes {
-        tell(note);
-    }
-    tell(summary(args, &plan.name, &output, &report)?.trim_end());
-    Ok(match report.ended {
-        Ended::Interrupted { signal: 15, .. } => Exit::Terminated,
-        Ended::Interrupted { .. } => Exit::Interrupted,
-        Ended::Already(_, tally) | Ended::Finished(tally)
-            if args.fail_on_error && tally.by_status.failed() > 0 =>
-        {
-            Exit::PointsFailed
-        }
-        _ => Exit::Done,
-    })
-}
-
-/// What came of it.
-fn summary(args: &Args, name: &str, output: &Path, report: &RunReport) -> Result<String, Error> {
-    let mut text = String::new();
-    let speed = format!("--speed {}", args.speed);
-    // Writing to a String cannot fail.
-    let _ = match (&report.ended, &report.session) {
-        (Ended::Already(file, _), _) => writeln!(
-            text,
-            "{name}: all {} rows are there already (--fresh computes them again)",
-            file.points
-        ),
-        (Ended::Interrupted { kept, points, .. }, session) => {
-            let after = session.as_ref().map(|session| duration(session.wall_s));
-            let after = after.map(|wall| format!(", after {wall}")).unwrap_or_default();
-            writeln!(text, "{name}: interrupted with {kept} of {points} rows kept{after}")
-        }
-        (Ended::Shard(shard), Some(session)) => {
-            writeln!(text, "{name}, shard {} of {}: {}", shard.index, shard.of, work(session))
-        }
-        (_, Some(session)) => writeln!(text, "{name}: {}", work(session)),
-        (_, None) => Ok(()),
+    let engine = DwellEngine::new(&plan, args.speed.values())?;
+    let (job, output) = dwells(&plan, &args.speed, args.target.out.as_deref());
+    let options = format!("--speed {}", args.speed);
+    let held = Held {
+        verb: "stability",
+        target: &args.target,
+        work: &args.work,
+        options: [options.clone(), options],
+        fail_on_error: args.fail_on_error,
+        lines: |file| Ok(tongues::summary(file)?.lines()),
     };
-    match &report.ended {
-        Ended::Already(..) | Ended::Finished(_) => {
-            for (name, words) in tongues::summary(&ParquetFile::open(output)?)?.lines() {
-                line(&mut text, name, &words);
-            }
-            let shown = output.display().to_string();
-            line(&mut text, "file", &shown);
-            line(&mut text, "next", &format!("sweep show {}", quoted(&shown)));
-        }
-        Ended::Shard(_) => {
-            let merge = args.target.command("merge");
-            line(&mut text, "next", &format!("{merge} {speed}, when all shards are done"));
-        }
-        Ended::Interrupted { .. } => {
-            let mut again = format!("{} {speed}", args.target.command("stability"));
-            let shard = report.session.as_ref().and_then(|session| session.shard.as_deref());
-            if let Some(shard) = shard {
-                let _ = write!(again, " --shard {shard}");
-            }
-            line(&mut text, "go on", &again);
-        }
-    }
-    Ok(text)
+    held.carry_out(&plan.name, &engine, &job, &output)
 }

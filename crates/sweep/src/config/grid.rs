@@ -9,7 +9,7 @@ use washer_model::Machine;
 use washer_row::{Criterion, Metric};
 
 use super::{GridInput, machine};
-use crate::speeds::{Speeds, turning};
+use crate::speeds::SpeedList;
 
 /// `machine` when the grid names none.
 pub(super) const DEFAULT_MACHINE: &str = "paper";
@@ -63,7 +63,7 @@ pub(crate) fn criterion(section: &Section<'_>) -> Criterion {
 }
 
 /// The speeds that the metric `growth` is about. The section and the metric need each other.
-pub(crate) fn stability(root: &Section<'_>, metrics: &[Metric]) -> Option<Speeds> {
+pub(crate) fn stability(root: &Section<'_>, metrics: &[Metric]) -> Option<SpeedList> {
     let (field, report) = (root.table("stability", "[stability]"), root.report);
     if let (Field::Given(section), false) = (&field, metrics.contains(&Metric::Growth)) {
         let title = "[stability] is for the metric `growth`, which is not asked for";
@@ -77,13 +77,13 @@ pub(crate) fn stability(root: &Section<'_>, metrics: &[Metric]) -> Option<Speeds
         report.push_missing(Diagnostic::new(title).at(root.at(), expected));
     }
     let section = field.given()?.value;
-    let expected = "constant speeds as \"FROM:TO:STEP\" in rpm";
+    let expected = "constant speeds in rpm, as \"250\", \"240,305\" or \"60:400:1\"";
     let found = section.require(section.text("speed_rpm"), "speed_rpm", expected);
     section.finish();
     let found = found?;
-    turning(found.value).map_or_else(
+    found.value.parse().map_or_else(
         |expected| {
-            let title = format!("`speed_rpm` = \"{}\" is no range of speeds", found.value);
+            let title = format!("`speed_rpm` = \"{}\" is no list of speeds", found.value);
             report.refuse(&found.at, title, expected)
         },
         Some,

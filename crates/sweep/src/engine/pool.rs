@@ -224,7 +224,7 @@ impl Pool<'_> {
             outcome.forget_turns();
             if let (Some(speeds), Ok(point)) = (&self.engine.plan.model.growth_speeds, point) {
                 let is_stopped = || self.watch.stopped();
-                outcome.growth = fastest_growth(&point, &speeds.values(), &is_stopped);
+                outcome.growth = fastest_growth(&point, speeds.values(), &is_stopped);
                 if is_stopped() {
                     return;
                 }

@@ -26,6 +26,8 @@ pub enum ResultKind {
     Modes,
     /// Periodic responses at constant speeds.
     Stability,
+    /// Motions that held speeds end in.
+    Dwell,
     /// What differs between two results.
     Differences,
 }
@@ -40,6 +42,7 @@ impl ResultKind {
             Self::Trace => "trace",
             Self::Modes => "modes",
             Self::Stability => "stability",
+            Self::Dwell => "dwell",
             Self::Differences => "differences",
         }
     }
@@ -51,6 +54,7 @@ impl ResultKind {
             Self::Trace => FileKind::Trace,
             Self::Modes => FileKind::Modes,
             Self::Stability => FileKind::Stability,
+            Self::Dwell => FileKind::Dwell,
             Self::Differences => FileKind::Differences,
         }
     }
@@ -96,6 +100,7 @@ impl ResultTable {
     pub(super) fn of_rows(map: MapPlan, batches: Vec<RecordBatch>) -> Self {
         let kind = match map.layout.kind {
             FileKind::Stability => ResultKind::Stability,
+            FileKind::Dwell => ResultKind::Dwell,
             _ => ResultKind::Map,
         };
         Self {
@@ -135,6 +140,7 @@ impl ResultTable {
             () if has(key::TRACE) => ResultKind::Trace,
             () if has(key::MODES) => ResultKind::Modes,
             () if has(key::STABILITY) => ResultKind::Stability,
+            () if has(key::DWELL) => ResultKind::Dwell,
             () if has(key::DIFFERENCES) => ResultKind::Differences,
             () => ResultKind::Map,
         };

@@ -11,11 +11,12 @@ use washer_model::{Dwell, Machine, Point, Response, Spin, Target, Timing, prepar
 use washer_row::{Growth, Outcome, Status, Trajectory};
 
 use crate::columns::{self, Columns};
+use crate::dwell::Motions;
 use crate::engine::{
     Engine, EngineError, Watch, responses, simd_from_environment, together_or_alone,
 };
 use crate::plan::Plan;
-use crate::speeds::Speeds;
+use crate::speeds::SpeedList;
 use serde_json::json;
 use sweep_engine::exit::Error;
 use sweep_engine::store::{Done, Job};
@@ -63,57 +64,67 @@ pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<()
 /// and speed, speeds varying fastest.
 #[must_use]
 pub(crate) fn job<'a>(plan: &'a Plan, speeds_rpm: &[f64]) -> Job<'a> {
-    let of_run = Job::of(plan);
-    let mut json = of_run.plan;
-    json["stability"] = json!({ "speed_rpm": speeds_rpm });
-    let layout = columns::of_dwells(plan, speeds_rpm);
-    let speeds_rpm = speeds_rpm.to_vec();
-    let speeds = speeds_rpm.len() as u64;
-    Job {
-        plan: json,
-        points: plan.points() * speeds,
-        layout,
-        axis_values: Box::new(move |row| {
-            let mut values = plan.axis_values(row / speeds);
-            values.push(speeds_rpm[(row % speeds) as usize]);
-            values
-        }),
-        ..of_run
-    }
+    let asked = json!({ "speed_rpm": speeds_rpm });
+    columns::at_speeds(plan, speeds_rpm, columns::of_dwells(plan, speeds_rpm), ("stability", asked))
 }
 
 /// The dwells of a plan at these speeds, and where their result goes unless it is said.
-pub(crate) fn dwells<'a>(plan: &'a Plan, speeds: Speeds, out: Option<&Path>) -> (Job<'a>, PathBuf) {
+pub(crate) fn dwells<'a>(
+    plan: &'a Plan,
+    speeds: &SpeedList,
+    out: Option<&Path>,
+) -> (Job<'a>, PathBuf) {
     let default = || PathBuf::from(format!("results/{}-stability.parquet", plan.name));
-    (job(plan, &speeds.values()), out.map_or_else(default, Path::to_owned))
+    (job(plan, speeds.values()), out.map_or_else(default, Path::to_owned))
 }
 
-/// Both models' periodic responses at a plan's points and speeds. Row r is the point r / speeds at
-/// the speed r % speeds.
+/// What is asked of a plan's points at its speeds.
+pub(crate) enum Asked {
+    /// The periodic responses of both models.
+    Responses(Columns),
+    /// The motions that the nonlinear one ends in.
+    Motions(Motions),
+}
+
+/// What is asked of a plan's points at constant speeds. Row r is the point r / speeds at the speed
+/// r % speeds.
 pub(crate) struct DwellEngine<'a> {
     plan: &'a Plan,
     speeds_rpm: &'a [f64],
     simd: Simd,
+    asked: Asked,
 }
 
 impl<'a> DwellEngine<'a> {
-    /// On the best instruction set or the one asked for.
+    /// Responses, on the best instruction set or the one asked for.
     ///
     /// # Errors
     /// An instruction set that is not there.
     pub(crate) fn new(plan: &'a Plan, speeds_rpm: &'a [f64]) -> Result<Self, EngineError> {
-        Ok(Self { plan, speeds_rpm, simd: simd_from_environment()? })
+        Self::asking(plan, speeds_rpm, Asked::Responses(Columns::of_dwells(plan, speeds_rpm)))
+    }
+
+    /// As [`Self::new`], of anything.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn asking(
+        plan: &'a Plan,
+        speeds_rpm: &'a [f64],
+        asked: Asked,
+    ) -> Result<Self, EngineError> {
+        Ok(Self { plan, speeds_rpm, simd: simd_from_environment()?, asked })
     }
 
     /// These rows, those of neighbouring points and speeds in lanes together. Once `is_stopped`
     /// says so, what comes means nothing.
-    fn rows(&self, rows: &[u64], is_stopped: &dyn Fn() -> bool) -> Vec<Outcome> {
+    fn rows(&self, rows: &[u64], is_stopped: &dyn Fn() -> bool) -> Vec<Done> {
         let speeds = self.speeds_rpm.len() as u64;
         let mut wanted: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
         wanted.dedup();
         let points: BTreeMap<u64, Result<Point, Status>> =
             wanted.iter().copied().zip(self.ready(&wanted)).collect();
-        let (mut outcomes, mut dwells) = (Vec::with_capacity(rows.len()), Vec::new());
+        let (mut done, mut dwells) = (Vec::with_capacity(rows.len()), Vec::new());
         let mut asked = Vec::with_capacity(rows.len());
         for &row in rows {
             match &points[&(row / speeds)] {
@@ -122,16 +133,27 @@ impl<'a> DwellEngine<'a> {
                     dwells.push(Dwell { point, speed_rpm });
                     asked.push(row);
                 }
-                Err(status) => outcomes.push(failed(row, *status)),
+                Err(status) => done.push(match &self.asked {
+                    Asked::Responses(columns) => columns.done(failed(row, *status)),
+                    Asked::Motions(motions) => motions.failed(row, *status),
+                }),
             }
         }
-        for (row, found) in asked.into_iter().zip(responses(&dwells, is_stopped)) {
-            outcomes.push(match found {
-                Ok(responses) => self.outcome(row, &responses),
-                Err(status) => failed(row, status),
-            });
+        match &self.asked {
+            Asked::Responses(columns) => {
+                for (row, found) in asked.into_iter().zip(responses(&dwells, is_stopped)) {
+                    done.push(columns.done(match found {
+                        Ok(responses) => self.outcome(row, &responses),
+                        Err(status) => failed(row, status),
+                    }));
+                }
+            }
+            Asked::Motions(motions) => {
+                let asked: Vec<_> = asked.into_iter().zip(dwells).collect();
+                done.extend(motions.find(self.simd, self.speeds_rpm, &asked, is_stopped));
+            }
         }
-        outcomes
+        done
     }
 
     fn ready(&self, points: &[u64]) -> Vec<Result<Point, Status>> {
@@ -178,24 +200,29 @@ impl Engine for DwellEngine<'_> {
         let speeds = self.speeds_rpm.len() as u64;
         // All threads have some of few rows.
         let share = self.plan.points().saturating_mul(speeds) / rayon::current_num_threads() as u64;
-        let at_once = share.min(POINTS_AT_ONCE * speeds).clamp(AT_ONCE[0], AT_ONCE[1]);
+        let at_once = match &self.asked {
+            Asked::Responses(_) => share.min(POINTS_AT_ONCE * speeds).clamp(AT_ONCE[0], AT_ONCE[1]),
+            Asked::Motions(motions) => motions.at_once(share, speeds),
+        };
         let is_stopped = || watch.stopped();
-        let columns = Columns::of_dwells(self.plan, self.speeds_rpm);
         rayon::broadcast(|_| {
             while !watch.stopped() {
                 let rows: Vec<u64> = std::iter::from_fn(next).take(at_once as usize).collect();
                 if rows.is_empty() {
                     break;
                 }
-                let outcomes = self.rows(&rows, &is_stopped);
+                let done = self.rows(&rows, &is_stopped);
                 if !watch.stopped() {
-                    outcomes.into_iter().for_each(|outcome| keep(columns.done(outcome)));
+                    done.into_iter().for_each(keep);
                 }
             }
         });
     }
 
     fn simd(&self) -> &str {
-        Simd::narrow().name()
+        match self.asked {
+            Asked::Responses(_) => Simd::narrow().name(),
+            Asked::Motions(_) => self.simd.name(),
+        }
     }
 }

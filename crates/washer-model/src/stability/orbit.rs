@@ -22,13 +22,13 @@ pub(super) type Square = [[N<f64>; STATES]; STATES];
 
 /// A point at a constant speed.
 #[derive(Clone, Copy)]
-pub(super) struct Row<'a> {
-    pub(super) point: &'a Point,
-    pub(super) speed_rpm: f64,
+pub(crate) struct Row<'a> {
+    pub(crate) point: &'a Point,
+    pub(crate) speed_rpm: f64,
     /// Steps of a turn.
-    pub(super) steps: usize,
+    pub(crate) steps: usize,
     /// On the modes of bearings and hinge; none if the steps follow these.
-    pub(super) caps: Option<Caps>,
+    pub(crate) caps: Option<Caps>,
 }
 
 impl Row<'_> {
@@ -38,7 +38,7 @@ impl Row<'_> {
         Self { speed_rpm, caps, ..self }
     }
 
-    pub(super) fn turn_s(&self) -> f64 {
+    pub(crate) fn turn_s(&self) -> f64 {
         60.0 / self.speed_rpm
     }
 
@@ -58,7 +58,7 @@ impl Row<'_> {
     }
 
     /// What must be equal of rows that turn side by side.
-    fn kind(&self) -> (usize, bool, bool) {
+    pub(crate) fn kind(&self) -> (usize, bool, bool) {
         (self.steps, self.caps.is_some(), self.has_corners())
     }
 }
@@ -133,7 +133,7 @@ impl Kernel for Turns<'_> {
 
 /// A model with each row in its lane, and the last in those that are left over.
 #[inline(always)]
-pub(super) fn model<T: Lane, M: Model<T>>(zero: N<T>, rows: &[Row<'_>]) -> M {
+pub(crate) fn model<T: Lane, M: Model<T>>(zero: N<T>, rows: &[Row<'_>]) -> M {
     let coupling = Coupling::new(zero, rows[0].caps.as_ref());
     let mut model = M::splat(zero, rows[0].point, coupling);
     for lane in 0..T::LANES {
@@ -149,7 +149,7 @@ pub(super) fn model<T: Lane, M: Model<T>>(zero: N<T>, rows: &[Row<'_>]) -> M {
 
 /// The clock of rows in lanes, the last in those that are left over.
 #[inline(always)]
-fn clock<T: Lane>(zero: N<T>, rows: &[Row<'_>]) -> Clock<T> {
+pub(crate) fn clock<T: Lane>(zero: N<T>, rows: &[Row<'_>]) -> Clock<T> {
     let mut clock = Clock { step_s: zero, steps: rows[0].steps };
     for lane in 0..T::LANES {
         clock.step_s.0.set(lane, rows[lane.min(rows.len() - 1)].step_s());
@@ -301,15 +301,17 @@ fn linear<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<LinearResponse>
 }
 
 /// What is seen of a turn.
-struct Watched<'m, T, M> {
+pub(crate) struct Watched<'m, T, M> {
     model: &'m M,
     clock: &'m Clock<T>,
-    with_outputs: bool,
+    pub(crate) with_outputs: bool,
+    /// Whether to keep states at even instants of what has outputs.
+    pub(crate) with_states: bool,
     /// Above 0 in every lane.
     windows: N<T>,
-    peaks: Peaks<T, CHANNELS>,
+    pub(crate) peaks: Peaks<T, CHANNELS>,
     /// The greatest distance of the drum from the tub's axis, squared (m^2).
-    radial_squared: N<T>,
+    pub(crate) radial_squared: N<T>,
     /// At even instants, the first at the turn's start.
     states: Vec<[N<T>; STATES]>,
     /// At the ends of all steps, if that is wanted.
@@ -319,12 +321,13 @@ struct Watched<'m, T, M> {
 
 impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
     #[inline(always)]
-    fn new(zero: N<T>, model: &'m M, clock: &'m Clock<T>) -> Self {
+    pub(crate) fn new(zero: N<T>, model: &'m M, clock: &'m Clock<T>) -> Self {
         let (windows, peaks) = (zero.lit(1.0), Peaks::new(zero));
         Self {
             model,
             clock,
             with_outputs: false,
+            with_states: true,
             windows,
             peaks,
             radial_squared: zero,
@@ -341,7 +344,7 @@ impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
         if !self.with_outputs {
             return;
         }
-        if k.is_multiple_of(self.clock.steps / INSTANTS) {
+        if self.with_states && k.is_multiple_of(self.clock.steps / INSTANTS) {
             self.states.push(*x);
         }
         if self.with_path {

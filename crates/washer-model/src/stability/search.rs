@@ -52,7 +52,7 @@ const FAST_ENOUGH: f64 = 0.2;
 
 /// How far a turn is from closing, as a share of its deviation; not finite if it left the model's
 /// range.
-pub(super) fn missing(
+pub(crate) fn missing(
     point: &Point,
     speed_rpm: f64,
     start: &[f64; STATES],

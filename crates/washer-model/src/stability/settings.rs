@@ -46,17 +46,17 @@ const RANGES: f64 = 4.0;
 
 /// A row, and what is known of its machine with theta frozen.
 #[derive(Clone)]
-pub(super) struct Case<'a> {
-    pub(super) row: Row<'a>,
+pub(crate) struct Case<'a> {
+    pub(crate) row: Row<'a>,
     /// At the low end of the range that the speed is in.
-    pub(super) frozen: Arc<Modes>,
+    pub(crate) frozen: Arc<Modes>,
     /// Modes that are judged, the slowest.
     pub(super) judged: usize,
 }
 
 impl<'a> Case<'a> {
     /// The same for the machine as it is.
-    pub(super) fn without_caps(&self) -> Result<Self, NoAnswer> {
+    pub(crate) fn without_caps(&self) -> Result<Self, NoAnswer> {
         let steps = plain_steps(self.row.point, self.row.speed_rpm, self.row.turn_s())?;
         let row = Row { steps, caps: None, ..self.row };
         Ok(Self { row, frozen: Arc::clone(&self.frozen), judged: self.judged })
@@ -78,8 +78,8 @@ fn whole(steps: f64) -> Result<usize, NoAnswer> {
 
 /// Steps and caps at a point's speeds.
 #[derive(Clone)]
-pub(super) struct Settings<'a> {
-    pub(super) point: &'a Point,
+pub(crate) struct Settings<'a> {
+    pub(crate) point: &'a Point,
     rest: Option<Modes>,
     /// By range, and whether responses are only followed.
     ranges: BTreeMap<(i64, bool), Result<Setting, NoAnswer>>,
@@ -94,7 +94,7 @@ struct Setting {
 }
 
 impl<'a> Settings<'a> {
-    pub(super) fn new(point: &'a Point) -> Self {
+    pub(crate) fn new(point: &'a Point) -> Self {
         Self { point, rest: modes(point, 0.0, 0.0).ok(), ranges: BTreeMap::new() }
     }
 
@@ -109,7 +109,7 @@ impl<'a> Settings<'a> {
     ///
     /// # Errors
     /// [`NoAnswer::Eigenvalues`]; [`NoAnswer::TooSlow`].
-    pub(super) fn case(&mut self, speed_rpm: f64) -> Result<Case<'a>, NoAnswer> {
+    pub(crate) fn case(&mut self, speed_rpm: f64) -> Result<Case<'a>, NoAnswer> {
         self.chosen(speed_rpm, false)
     }
 

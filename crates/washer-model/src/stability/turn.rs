@@ -5,7 +5,7 @@ use lane_ode::{Lane, N, System};
 
 /// Even steps over one turn of each lane's drum.
 #[derive(Clone, Copy)]
-pub(super) struct Clock<T> {
+pub(crate) struct Clock<T> {
     /// Length of a step (s).
     pub(super) step_s: N<T>,
     /// Steps a turn.
@@ -82,7 +82,7 @@ pub(super) fn step<T: Lane, S: System<T, STATES>>(
 }
 
 /// Takes what is to be seen of a turn.
-pub(super) trait Watch<T: Lane, S: System<T, STATES>> {
+pub(crate) trait Watch<T: Lane, S: System<T, STATES>> {
     /// The state at the start of step `k`, with its slope; at last the turn's end.
     fn see(&mut self, k: usize, forcing: &S::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]);
 }
@@ -97,7 +97,7 @@ impl<T: Lane, S: System<T, STATES>> Watch<T, S> for Unwatched {
 
 /// One turn of every one of these states; the first is watched, if any is.
 #[inline(always)]
-pub(super) fn turn<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
+pub(crate) fn turn<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
     system: &S,
     clock: &Clock<T>,
     states: &mut [[N<T>; STATES]],

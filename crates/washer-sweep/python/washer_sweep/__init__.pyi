@@ -158,7 +158,7 @@ class Result:
     @property
     def kind(
         self,
-    ) -> Literal["map", "boundary", "trace", "modes", "stability", "differences"]: ...
+    ) -> Literal["map", "boundary", "trace", "modes", "stability", "dwell", "differences"]: ...
     @property
     def plan(self) -> dict[str, Any]:
         """The plan that it came of, as its file carries it; of differences, what was compared."""

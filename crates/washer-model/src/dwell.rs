@@ -1,0 +1,379 @@
+//! What a machine held at a speed ends in: its motions, by trajectories from many starts.
+//!
+//! A search, not a proof: a motion that no start leads to is not found.
+
+mod course;
+mod exponent;
+mod hold;
+mod lines;
+mod starts;
+#[cfg(test)]
+mod tests;
+
+use crate::channel::CHANNELS;
+use crate::coordinates::{COORDINATES, STATES};
+use crate::modes::Modes;
+use crate::run::model::{Model, Nonlinear};
+use crate::stability::settings::{Case, Settings};
+use crate::stability::{Dwell, NoAnswer, Response, respond};
+use course::{BLOCK, Course, Need, are_alike};
+use exponent::exponents;
+use hold::{Held, hold};
+use lane_ode::Simd;
+use starts::{DIRECTIONS, Kick, directions, disturbed, kicked, kicks};
+use std::sync::Arc;
+
+pub use exponent::Exponent;
+
+/// Motions are the same whose largest deviations agree to this share in all channels; chaotic ones
+/// to the second, because no two stretches of one agree.
+const SAME: f64 = 0.01;
+const SAME_CHAOS: f64 = 0.5;
+
+/// Rounds in which the gap between a kick that comes back and one that does not is halved.
+const HALVINGS: usize = 5;
+
+/// From where and for how long motions are looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Starts {
+    /// How many at least, the disturbed responses among them.
+    pub count: usize,
+    /// The hardest kick (rad/s of the tub's rocking).
+    pub kick_rad_per_s: f64,
+    /// How long a trajectory may take (s).
+    pub longest_s: f64,
+    /// Whether to look for the smallest kick that does not come back.
+    pub with_threshold: bool,
+}
+
+impl Default for Starts {
+    fn default() -> Self {
+        Self { count: 8, kick_rad_per_s: 6.0, longest_s: 600.0, with_threshold: false }
+    }
+}
+
+/// How a trajectory ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum State {
+    /// It settled.
+    Ok,
+    /// It went farther than the model is good for.
+    LeftRange {
+        /// When, to a turn (s).
+        time_s: f64,
+    },
+    /// It did not settle in time.
+    NotSettled,
+}
+
+/// What a motion settled into.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Settled {
+    /// It repeats.
+    Periodic {
+        /// After so many turns.
+        turns: u32,
+    },
+    /// Two frequencies that no turn locks: states once a turn fill a closed curve.
+    QuasiPeriodic {
+        /// The strongest line of these states, from 0 to half the drum's speed (cycles per
+        /// minute); the drum's speed less it is another.
+        frequency_cpm: f64,
+    },
+    /// Neighbours part: the largest Lyapunov exponent is above 0 by three standard errors.
+    Chaotic,
+}
+
+/// A motion that a held speed ends in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ending {
+    /// How its first trajectory ended.
+    pub state: State,
+    /// What it is, once it has settled.
+    pub settled: Option<Settled>,
+    /// How many starts ended in it.
+    pub starts: u32,
+    /// Largest deviation from equilibrium over its last turns (32 where it repeats, 128 with two
+    /// frequencies, else 256), in the order of [`Channel::ALL`](crate::Channel::ALL) (m, rad).
+    pub peaks: [f64; CHANNELS],
+    /// Least gap between drum and tub at the ends of steps of these turns (m).
+    pub min_gap_m: f64,
+    /// How fast neighbours part, where that was asked: of motions whose spectrum does not say what
+    /// they are.
+    pub exponent: Option<Exponent>,
+    /// How long the trajectory was followed (s).
+    pub time_s: f64,
+    /// Its last state where the unbalance is up: coordinates (m, rad), then their speeds (per s).
+    pub end: [f64; STATES],
+    /// Such states, once a turn, of its last 256 turns at most.
+    pub sections: Vec<[f64; STATES]>,
+}
+
+/// What was found at a speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Endings {
+    /// The periodic responses: none where none was found, and the machine then starts from rest.
+    pub responses: Vec<Response>,
+    /// The motions in the order in which starts led to them: the first is the one that the
+    /// disturbed periodic response ends in.
+    pub motions: Vec<Ending>,
+    /// How many starts there were.
+    pub starts: u32,
+    /// The smallest kick (rad/s) that does not come back to the first motion, of those that were
+    /// tried; none where all do, or it was not asked for.
+    pub threshold_rad_per_s: Option<f64>,
+}
+
+/// Motions of some dwells, on lanes of `simd` at most. What is found of one does not depend on the
+/// others. Of the dwells whose place in `carried` has a state, that state alone is a start,
+/// disturbed as the responses are.
+///
+/// # Errors
+/// Per dwell, [`NoAnswer`]. Once `is_stopped` says so, [`NoAnswer::Stopped`].
+pub fn endings(
+    simd: Simd,
+    dwells: &[Dwell<'_>],
+    carried: &[Option<[f64; STATES]>],
+    starts: &Starts,
+    is_stopped: &dyn Fn() -> bool,
+) -> Vec<Result<Endings, NoAnswer>> {
+    let mut hunts: Vec<Result<Hunt<'_>, NoAnswer>> = Vec::with_capacity(dwells.len());
+    let mut settings: Option<Settings<'_>> = None;
+    for (k, (dwell, answer)) in dwells.iter().zip(respond(dwells, is_stopped)).enumerate() {
+        let is_same = |of: &Settings<'_>| core::ptr::eq(of.point, dwell.point);
+        let settings = match settings.take().filter(is_same) {
+            Some(known) => settings.insert(known),
+            None => settings.insert(Settings::new(dwell.point)),
+        };
+        let responses = match answer {
+            Ok(responses) => responses,
+            Err(NoAnswer::NoResponse) => Vec::new(),
+            Err(none) => {
+                hunts.push(Err(none));
+                continue;
+            }
+        };
+        let carried = carried.get(k).copied().flatten();
+        let hunt = |case| Hunt::new(case, responses, carried, starts);
+        hunts.push(settings.case(dwell.speed_rpm).map(hunt));
+    }
+    let mut is_whole = finish(simd, &mut hunts, is_stopped);
+    if starts.with_threshold {
+        for hunt in hunts.iter_mut().flatten() {
+            hunt.bracket();
+        }
+        for _ in 0..HALVINGS {
+            for hunt in hunts.iter_mut().flatten() {
+                hunt.halve();
+            }
+            is_whole = is_whole && finish(simd, &mut hunts, is_stopped);
+            for hunt in hunts.iter_mut().flatten() {
+                hunt.narrow();
+            }
+        }
+    }
+    let whole = |hunt: Hunt<'_>| if is_whole { Ok(hunt.found()) } else { Err(NoAnswer::Stopped) };
+    hunts.into_iter().map(|hunt| hunt.and_then(whole)).collect()
+}
+
+/// Takes all trajectories to their ends, those of all hunts in lanes together. False if it was
+/// stopped.
+fn finish(
+    simd: Simd,
+    hunts: &mut [Result<Hunt<'_>, NoAnswer>],
+    is_stopped: &dyn Fn() -> bool,
+) -> bool {
+    loop {
+        if is_stopped() {
+            return false;
+        }
+        let mut running: Vec<&mut Course<'_>> = Vec::new();
+        let (mut asking, mut twins) = (Vec::new(), Vec::new());
+        for hunt in hunts.iter_mut().flatten() {
+            let direction = hunt.directions[DIRECTIONS - 1];
+            for course in &mut hunt.courses {
+                match course.need {
+                    Need::Turns => running.push(course),
+                    Need::Exponent => {
+                        twins.push((course.held, direction));
+                        asking.push(course);
+                    }
+                    Need::Nothing => {}
+                }
+            }
+        }
+        if running.is_empty() && asking.is_empty() {
+            return true;
+        }
+        let held: Vec<Held<'_>> = running.iter().map(|course| course.held).collect();
+        for (course, turns) in running.into_iter().zip(hold(simd, &held, BLOCK)) {
+            course.take(turns);
+        }
+        if !asking.is_empty() {
+            for (course, exponent) in asking.into_iter().zip(exponents(simd, &twins)) {
+                course.take_exponent(exponent);
+            }
+        }
+    }
+}
+
+/// The search at one dwell.
+struct Hunt<'a> {
+    case: Case<'a>,
+    responses: Vec<Response>,
+    from: [f64; STATES],
+    directions: [[f64; COORDINATES]; DIRECTIONS],
+    longest_s: f64,
+    courses: Vec<Course<'a>>,
+    /// Of each course its kick, if it has one.
+    kicks: Vec<Option<Kick>>,
+    /// Courses that are starts; the others look for the threshold.
+    starts: usize,
+    /// By direction, sizes of kicks that come back and that do not (rad/s).
+    brackets: [Option<[f64; 2]>; DIRECTIONS],
+}
+
+impl<'a> Hunt<'a> {
+    fn new(
+        case: Case<'a>,
+        responses: Vec<Response>,
+        carried: Option<[f64; STATES]>,
+        starts: &Starts,
+    ) -> Self {
+        let point = case.row.point;
+        let frozen: Arc<Modes> = Arc::clone(&case.frozen);
+        let rest = <Nonlinear<f64> as Model<f64>>::at_rest(point);
+        let from = responses.first().map_or(rest, |response| response.start);
+        let mut states: Vec<([f64; STATES], Option<Kick>)> = Vec::new();
+        let directions = directions(point, &frozen);
+        if let Some(carried) = carried {
+            states.push((disturbed(point, &frozen, &carried), None));
+        } else {
+            let firsts = responses.iter().map(|response| response.start);
+            let firsts: Vec<_> = if responses.is_empty() { vec![from] } else { firsts.collect() };
+            states.extend(firsts.iter().map(|first| (disturbed(point, &frozen, first), None)));
+            let kicks = kicks(starts.count.saturating_sub(states.len()), starts.kick_rad_per_s);
+            states.extend(
+                kicks.into_iter().map(|kick| (kicked(&from, &directions, kick), Some(kick))),
+            );
+        }
+        let mut hunt = Self {
+            case,
+            responses,
+            from,
+            directions,
+            longest_s: starts.longest_s,
+            courses: Vec::new(),
+            kicks: Vec::new(),
+            starts: states.len(),
+            brackets: [None; DIRECTIONS],
+        };
+        for (state, kick) in states {
+            hunt.start(state, kick);
+        }
+        hunt
+    }
+
+    fn start(&mut self, state: [f64; STATES], kick: Option<Kick>) {
+        let held = Held { row: self.case.row, state };
+        let grows = |response: &&Response| response.growth_per_s() > 0.0;
+        let leaves = self.responses.iter().filter(grows).map(|response| response.start).collect();
+        self.courses.push(Course::new(held, leaves, self.longest_s));
+        self.kicks.push(kick);
+    }
+
+    /// Whether a course ended where the first one did.
+    fn comes_back(&self, course: usize) -> bool {
+        are_same(&self.courses[0].ending(), &self.courses[course].ending())
+    }
+
+    /// Of every direction the kicks between which some stop coming back.
+    fn bracket(&mut self) {
+        for direction in 0..DIRECTIONS {
+            let mut kicks: Vec<(f64, bool)> = Vec::new();
+            for (course, kick) in self.kicks.iter().enumerate() {
+                if let Some((of, size)) = kick
+                    && *of == direction
+                {
+                    kicks.push((*size, self.comes_back(course)));
+                }
+            }
+            kicks.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let gone = kicks.iter().position(|(_, comes_back)| !comes_back);
+            self.brackets[direction] = gone.map(|gone| {
+                let back = gone.checked_sub(1).map_or(0.0, |back| kicks[back].0);
+                [back, kicks[gone].0]
+            });
+        }
+    }
+
+    /// Starts in the middle of the brackets.
+    fn halve(&mut self) {
+        for direction in 0..DIRECTIONS {
+            if let Some([back, gone]) = self.brackets[direction] {
+                let kick = (direction, 0.5 * (back + gone));
+                self.start(kicked(&self.from, &self.directions, kick), Some(kick));
+            }
+        }
+    }
+
+    /// Halves the brackets by what came of their middles.
+    fn narrow(&mut self) {
+        let asked = self.brackets.iter().flatten().count();
+        for course in self.courses.len() - asked..self.courses.len() {
+            let comes_back = self.comes_back(course);
+            if let Some((direction, size)) = self.kicks[course]
+                && let Some(bracket) = &mut self.brackets[direction]
+            {
+                bracket[usize::from(!comes_back)] = size;
+            }
+        }
+    }
+
+    fn found(self) -> Endings {
+        let mut motions: Vec<Ending> = Vec::new();
+        for course in &self.courses[..self.starts] {
+            let ending = course.ending();
+            match motions.iter_mut().find(|motion| are_same(motion, &ending)) {
+                Some(known) => known.also(&ending),
+                None => motions.push(ending),
+            }
+        }
+        let gone = self.brackets.iter().flatten().map(|[_, gone]| *gone);
+        Endings {
+            motions,
+            starts: self.starts as u32,
+            threshold_rad_per_s: gone.reduce(f64::min),
+            responses: self.responses,
+        }
+    }
+}
+
+/// Whether two trajectories ended in the same motion.
+fn are_same(a: &Ending, b: &Ending) -> bool {
+    match (a.state, b.state) {
+        (State::LeftRange { .. }, State::LeftRange { .. }) => true,
+        (State::LeftRange { .. }, _) | (_, State::LeftRange { .. }) => false,
+        _ => {
+            let chaos = Some(Settled::Chaotic);
+            let are_chaotic = a.settled == chaos && b.settled == chaos;
+            are_alike(&a.peaks, &b.peaks, if are_chaotic { SAME_CHAOS } else { SAME })
+        }
+    }
+}
+
+impl Ending {
+    /// Another start ended here: the largest deviations are of all of them.
+    fn also(&mut self, other: &Self) {
+        self.starts += 1;
+        if self.state == State::NotSettled && other.state == State::Ok {
+            (self.state, self.settled) = (other.state, other.settled);
+        }
+        if self.settled == Some(Settled::Chaotic) {
+            for (peak, other) in self.peaks.iter_mut().zip(other.peaks) {
+                *peak = peak.max(other);
+            }
+            self.min_gap_m = self.min_gap_m.min(other.min_gap_m);
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Turns at constant speeds, one after the other: trajectories in lanes, what is seen of each turn.
+
+use crate::channel::CHANNELS;
+use crate::coordinates::STATES;
+use crate::run::model::Nonlinear;
+use crate::stability::orbit::{Row, Watched, clock, model};
+use crate::stability::turn::turn;
+use lane_ode::{Kernel, Lane, N, Simd, System as _};
+
+/// A machine held at a speed.
+#[derive(Clone, Copy)]
+pub(super) struct Held<'a> {
+    pub(super) row: Row<'a>,
+    /// Where the unbalance is up: coordinates (m, rad), then their speeds (per s).
+    pub(super) state: [f64; STATES],
+}
+
+/// What is seen of a turn.
+#[derive(Clone, Debug)]
+pub(super) struct Turn {
+    /// The state at its end.
+    pub(super) end: [f64; STATES],
+    /// Largest deviations from equilibrium (m, rad).
+    pub(super) peaks: [f64; CHANNELS],
+    /// Least gap between drum and tub at the ends of its steps (m).
+    pub(super) gap_m: f64,
+}
+
+/// So many turns of each; fewer where one leaves the model's range. They share lanes of `simd` at
+/// most, and what is found of one does not depend on the others.
+pub(super) fn hold(simd: Simd, held: &[Held<'_>], turns: usize) -> Vec<Vec<Turn>> {
+    let kind = |k: usize| held[k].row.kind();
+    let mut order: Vec<usize> = (0..held.len()).collect();
+    order.sort_by_key(|&k| kind(k));
+    let mut found: Vec<Vec<Turn>> = vec![Vec::new(); held.len()];
+    for places in order.chunk_by(|&a, &b| kind(a) == kind(b)) {
+        for places in places.chunks(simd.lanes()) {
+            let together: Vec<Held<'_>> = places.iter().map(|&k| held[k]).collect();
+            let simd = narrowest(simd, together.len());
+            let turned = simd.dispatch(Hold { held: &together, turns });
+            for (&k, turns) in places.iter().zip(turned) {
+                found[k] = turns;
+            }
+        }
+    }
+    found
+}
+
+/// The instruction set with the fewest lanes that hold so many, up to a widest.
+fn narrowest(widest: Simd, count: usize) -> Simd {
+    let fits =
+        |simd: &Simd| simd.is_available() && (count..=widest.lanes()).contains(&simd.lanes());
+    Simd::ALL.into_iter().filter(fits).min_by_key(|simd| simd.lanes()).unwrap_or(widest)
+}
+
+/// Rows of one kind, no more than there are lanes.
+struct Hold<'a> {
+    held: &'a [Held<'a>],
+    turns: usize,
+}
+
+impl Kernel for Hold<'_> {
+    type Output = Vec<Vec<Turn>>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
+        let mut found = Vec::with_capacity(self.held.len());
+        for held in self.held.chunks(T::LANES) {
+            hold_lanes(N(zero), held, self.turns, &mut found);
+        }
+        found
+    }
+}
+
+#[inline(always)]
+fn hold_lanes<T: Lane>(zero: N<T>, held: &[Held<'_>], turns: usize, found: &mut Vec<Vec<Turn>>) {
+    let rows: Vec<Row<'_>> = held.iter().map(|held| held.row).collect();
+    let clock = clock(zero, &rows);
+    let model: Nonlinear<T> = model(zero, &rows);
+    let mut states = [[zero; STATES]];
+    for lane in 0..T::LANES {
+        for i in 0..STATES {
+            states[0][i].0.set(lane, held[lane.min(held.len() - 1)].state[i]);
+        }
+    }
+    let first = found.len();
+    found.extend(held.iter().map(|_| Vec::with_capacity(turns)));
+    let mut watched = Watched::new(zero, &model, &clock);
+    (watched.with_outputs, watched.with_states) = (true, false);
+    for made in 0..turns {
+        turn(&model, &clock, &mut states, Some(&mut watched));
+        let in_range = T::bits(model.in_range(&states[0]));
+        for (lane, held) in held.iter().enumerate() {
+            let of_lane = &mut found[first + lane];
+            if in_range >> lane & 1 == 1 && of_lane.len() == made {
+                let radial_m = watched.radial_squared.0.get(lane).sqrt();
+                of_lane.push(Turn {
+                    end: core::array::from_fn(|i| states[0][i].0.get(lane)),
+                    peaks: watched.peaks.lane(lane),
+                    gap_m: held.row.point.clearance_m() - radial_m,
+                });
+            }
+        }
+        for lane in 0..T::LANES {
+            watched.peaks.reset(lane);
+        }
+        watched.radial_squared = zero;
+    }
+}
