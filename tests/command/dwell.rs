@@ -15,7 +15,7 @@ ramp_s = 50.0
 end_s = 50.0
 [[axis]]
 parameter = "unbalance_mass_kg"
-values = [0.2, 0.4]
+values = [0.1, 0.4]
 "#;
 
 fn folder() -> tempfile::TempDir {
@@ -46,7 +46,7 @@ fn every_motion_of_a_held_speed_has_a_row() {
     let shown = said(&sweep(&folder, &["show", file], None));
     for told in [&said(&done), &shown] {
         for line in [
-            "4 at 4 points and speeds: 1 periodic, 1 periodic 2, 2 quasi periodic",
+            "4 at 4 points and speeds: 2 periodic, 1 periodic 2, 1 quasi periodic",
             "tub yaw 152.3 mrad, quasi periodic, at unbalance_mass_kg 0.4, 250 rpm",
             "tub pitch 163.7 mrad, periodic 2, at unbalance_mass_kg 0.4, 297.5 rpm",
         ] {
@@ -98,7 +98,7 @@ fn what_makes_no_sense_is_refused() {
         (&["--speed", "0"][..], "above 0 rpm"),
         (&["--speed", "250,240"], "rising"),
         (&["--speed", "250", "--starts", "0"], "1..=1024"),
-        (&["--speed", "250", "--kick", "-1"], "above 0"),
+        (&["--speed", "250", "--kick=-1"], "above 0"),
         (&["--speed", "250", "--carry", "sideways"], "up or down"),
         (&["--speed", "250", "--carry", "up", "--threshold"], "cannot be used with"),
     ] {

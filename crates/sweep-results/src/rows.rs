@@ -164,7 +164,7 @@ impl ResultTable {
     /// counts on along them in files that are no maps.
     #[must_use]
     pub fn places(&self) -> Vec<&str> {
-        let further = ["crossing", "speed_rpm", "branch", "mode", "time_s"];
+        let further = ["crossing", "speed_rpm", "branch", "motion", "mode", "time_s"];
         let mut names: Vec<&str> = ["point"].into_iter().chain(self.axes()).collect();
         names.extend(further.into_iter().filter(|name| !names.contains(name)).collect::<Vec<_>>());
         names.retain(|name| self.column(name).is_some());

@@ -1,6 +1,6 @@
 //! A row on its way: both models' trajectories, each as far up its ladder as it has come.
 
-use washer_model::{ModelKind, Point};
+use washer_model::{Channel, ModelKind, Point};
 
 use crate::ladder::{Ladder, Rung};
 use crate::measures::{Metric, TURN_FLOOR};
@@ -63,11 +63,13 @@ struct Climb {
     difference: Option<Difference>,
     /// The error that `run` and the run before it have in common.
     unseen: f64,
-    /// What the reference's twin says, once there was one.
+    /// What `run` errs by its caps, however alike the runs are.
+    of_sag: f64,
+    /// What a near twin says, once there was one.
     twin: Option<Twin>,
 }
 
-/// A twin of the reference's run.
+/// A near twin of a run.
 #[derive(Clone, Copy, Debug)]
 struct Twin {
     is_chaotic: bool,
@@ -98,6 +100,7 @@ impl Climb {
             return;
         }
         self.unseen = unseen(&now, &ladder.rungs[rung], point, rule);
+        self.of_sag = of_sag(&now, &ladder.rungs[rung], point, rule);
         self.difference = found;
         (self.rung, self.run) = (rung, Some(now));
     }
@@ -116,7 +119,7 @@ impl Climb {
             let share = if is_common { convergence.contraction } else { ROUGHLY };
             return Some((share * found.of_numbers).max(unseen));
         }
-        Some(convergence.error_left(found.greatest(), unseen))
+        Some(convergence.error_left(found.greatest(), unseen).max(self.of_sag))
     }
 
     fn error(&self, ladder: &Ladder) -> Option<f64> {
@@ -162,14 +165,17 @@ impl Climb {
         if is_settled(self.error(ladder)) || self.is_chaotic() {
             return None;
         }
-        // What the two runs differ in may be chaos, which no step settles.
-        let is_in_doubt = self.rung == reference && !is_settled(self.error_with(ladder, 0.0));
-        if is_in_doubt && model == ModelKind::Nonlinear && self.twin.is_none() {
-            return Some(ladder.twin());
-        }
-        // Behind half the reference's step, steps are for bearings that ring.
-        if ladder.is_finer(self.rung) && self.unseen <= tolerance {
-            return None;
+        if self.rung >= ladder.judge().unwrap_or(reference) {
+            // What two steps of plain RK4 leave in doubt may be chaos, which no step settles.
+            let is_in_doubt = !is_settled(self.error_with(ladder, 0.0));
+            let may_be_chaos = is_in_doubt && model == ModelKind::Nonlinear;
+            if may_be_chaos && self.twin.is_none() && Some(self.rung) == ladder.judge() {
+                return Some(ladder.twin());
+            }
+            // The last step is for bearings that ring.
+            if self.unseen <= tolerance {
+                return None;
+            }
         }
         let higher = self.rung + 1;
         (higher < ladder.rungs.len()).then_some(higher)
@@ -336,35 +342,44 @@ fn difference(
 }
 
 /// The error that this rung has in common with others, so that no comparison shows it: what bearings
-/// and hinge swing after jumps, and what caps make of the hinge's bend under gravity.
+/// and hinge swing after jumps.
 fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
     if rung.follows_bearings {
         return 0.0;
     }
     let is_capped = rung.level.is_capped();
-    let mut swings = if is_capped { point.ringing() } else { point.bearing_ringing() };
-    if is_capped {
-        for (swing, sag) in swings.iter_mut().zip(point.hinge_sag()) {
-            *swing += SAGS * rule.accuracy * sag;
-        }
-    }
-    let numbers = &run.trajectory;
-    let share = |swing: f64, of: f64| if swing == 0.0 { 0.0 } else { swing / of };
-    let channels = &rule.channels;
-    let of_amplitudes = channels.iter().zip(&numbers.amplitudes);
-    let of_amplitudes = of_amplitudes.map(|(channel, of)| share(swings[channel.index()], *of));
-    let of_turns = numbers.turns.iter().flat_map(|turn| {
-        channels
-            .iter()
-            .map(|channel| share(swings[channel.index()], turn[channel.index()].max(TURN_FLOOR)))
-    });
-    let metrics = rule.measures.of_model().zip(&numbers.metrics);
+    let swings = if is_capped { point.ringing() } else { point.bearing_ringing() };
+    let of_swings = of_motion(&swings, &run.trajectory, rule);
+    let metrics = rule.measures.of_model().zip(&run.trajectory.metrics);
     let of_clash = metrics.filter(|(number, _)| number.metric == Metric::ClashTime);
     let clash_s = of_clash.map(|(_, time)| *time);
     let of_clash = clash_s
         .zip(run.clash_doubt_s)
         .map(|(time_s, doubt_s)| doubt_s / time_s.max(clash_floor_s(rule)));
-    of_amplitudes.chain(of_turns).chain(of_clash).fold(0.0, f64::max)
+    of_clash.fold(of_swings, f64::max)
+}
+
+/// What caps make of the hinge's bend under gravity. No motion amplifies that.
+fn of_sag(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
+    if !rung.level.is_capped() {
+        return 0.0;
+    }
+    let sags = point.hinge_sag().map(|sag| SAGS * rule.accuracy * sag);
+    of_motion(&sags, &run.trajectory, rule)
+}
+
+/// The greatest of these deviations (m, rad) as a share of the motion's in the same channel.
+fn of_motion(deviations: &[f64; Channel::ALL.len()], numbers: &Trajectory, rule: &Rule) -> f64 {
+    let share = |channel: &Channel, of: f64| match deviations[channel.index()] {
+        0.0 => 0.0,
+        deviation => deviation / of,
+    };
+    let channels = || rule.channels.iter();
+    let of_amplitudes = channels().zip(&numbers.amplitudes).map(|(of, most)| share(of, *most));
+    let of_turns = numbers.turns.iter().flat_map(|turn| {
+        channels().map(|channel| share(channel, turn[channel.index()].max(TURN_FLOOR)))
+    });
+    of_amplitudes.chain(of_turns).fold(0.0, f64::max)
 }
 
 /// A clash that just happens is a time that just is not zero: shorter ones are compared with this.

@@ -96,7 +96,14 @@ impl Ladder {
         self.reference.is_some_and(|reference| rung > reference)
     }
 
-    /// Stands behind all rungs for the reference's method from a start beside the row's own
+    /// The place of the rung whose twin tells chaos: half the reference's step where there is such a
+    /// rung, because that settles most of what the reference leaves in doubt.
+    #[must_use]
+    pub(crate) fn judge(&self) -> Option<usize> {
+        self.reference.map(|reference| (reference + 1).min(self.rungs.len() - 1))
+    }
+
+    /// Stands behind all rungs for the method of [`Self::judge`] from a start beside the row's own
     /// ([`Point::nudged`](washer_model::Point::nudged)).
     #[must_use]
     pub const fn twin(&self) -> usize {
@@ -106,7 +113,7 @@ impl Ladder {
     /// The method of a rung, or of the twin.
     #[must_use]
     pub fn method(&self, rung: usize) -> &Method {
-        let of_twin = self.reference.unwrap_or(0);
+        let of_twin = self.judge().unwrap_or(0);
         &self.rungs[if rung == self.twin() { of_twin } else { rung }].method
     }
 

@@ -141,7 +141,7 @@ fn a_starter_grid_is_the_documented_one() {
 #[test]
 fn what_is_measured_is_part_of_the_plan_only_where_it_is_not_the_default() {
     let plain = load_text(SMALLEST, &[]).unwrap();
-    assert_eq!(plain.model.measures, Measures::default());
+    assert_eq!(plain.model.measures, Measures { dampers: 2, ..Measures::default() });
     let told = load_text(format!("{SMALLEST}[reliability]\ncriterion = \"peak\"\n"), &[]).unwrap();
     assert_eq!(told.to_json(), plain.to_json());
     let more = format!(

@@ -98,7 +98,7 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, S
 fn axes(file: &ParquetFile) -> Vec<String> {
     let plan: Option<serde_json::Value> =
         file.value(key::PLAN).and_then(|plan| serde_json::from_str(plan).ok());
-    let axes = plan.as_ref().and_then(|plan| plan["axes"].as_array());
+    let axes = plan.as_ref().and_then(|plan| plan["axis"].as_array());
     let names = axes.into_iter().flatten().filter_map(|axis| axis["parameter"].as_str());
     names.map(str::to_owned).chain(["speed_rpm".to_owned()]).collect()
 }
