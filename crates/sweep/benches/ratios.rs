@@ -36,14 +36,17 @@ fn median(values: &[f64]) -> f64 {
     sorted[sorted.len() / 2]
 }
 
-/// A row per subject: every round, then the median.
+/// A row per subject, its median; in the header, how far the rounds are from their medians.
 fn table(unit: &str, subjects: &[String], rounds: &[Vec<f64>]) -> Vec<f64> {
-    println!("| {unit} | {} median |", "| ".repeat(rounds[0].len()));
-    println!("|---|{}---|", "---|".repeat(rounds[0].len()));
-    let medians: Vec<_> = rounds.iter().map(|values| median(values)).collect();
-    for ((subject, values), median) in subjects.iter().zip(rounds).zip(&medians) {
-        let raw: String = values.iter().map(|value| format!(" {value:.3} |")).collect();
-        println!("| {subject} |{raw} **{median:.3}** |");
+    let medians: Vec<f64> = rounds.iter().map(|values| median(values)).collect();
+    let farthest = rounds
+        .iter()
+        .zip(&medians)
+        .flat_map(|(values, median)| values.iter().map(move |value| (value / median - 1.0).abs()))
+        .fold(0.0, f64::max);
+    println!("| {unit}, rounds within {:.0} % | |\n|---|---|", 1e2 * farthest);
+    for (subject, median) in subjects.iter().zip(&medians) {
+        println!("| {subject} | {median:.3} |");
     }
     println!();
     medians
