@@ -94,12 +94,6 @@ fn trajectories(rounds: usize) {
             }
         }
     }
-    for simd in &available {
-        if let (Some(nonlinear), Some(linear)) = (of(*simd, "nonlinear"), of(*simd, "linear")) {
-            let both = (nonlinear + linear) / nonlinear;
-            println!("| both models against the nonlinear alone, {} | {both:.2} |", simd.name());
-        }
-    }
     println!();
 }
 
@@ -172,13 +166,6 @@ fn methods(rounds: usize) -> f64 {
             let ratio = medians[model] / medians[2 * method + model];
             println!("| {} against {} | {ratio:.1} |", names[2 * method + model], methods[0].0);
         }
-    }
-    for (method, (name, _)) in methods.iter().enumerate() {
-        let [nonlinear, linear] = [medians[2 * method], medians[2 * method + 1]];
-        println!(
-            "| both models against the nonlinear alone, {name} | {:.2} |",
-            (nonlinear + linear) / nonlinear
-        );
     }
     println!();
     medians[2] + medians[3]
