@@ -25,9 +25,10 @@ fact() { lscpu | sed -n "s/^$1: *//p"; }
   echo
   echo "## Ratios"
   echo
-  echo "\`cargo bench --bench ratios -- $rounds\`"
+  echo "\`cargo bench --bench ratios -- $rounds\`, medians of $rounds rounds"
   echo
   cargo bench --quiet --bench ratios -- "$rounds"
+  echo
   echo "## Instructions"
   echo
   echo "\`scripts/benchmarks/instructions.sh\`"

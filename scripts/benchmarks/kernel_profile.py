@@ -40,7 +40,7 @@ KINDS = {
     "added": r"v(add|sub)[ps]d",
     "divided, rooted": r"v(div|sqrt)[ps]d",
 }
-COLUMNS = [*KINDS, "loads", "stores", "all instructions"]
+COLUMNS = ["fused", "loads", "stores", "all instructions"]
 
 libc = ctypes.CDLL(None, use_errno=True)
 libc.ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
@@ -81,17 +81,17 @@ def executed(pid):
 
 
 def disassembled(binary, addresses):
-    """Length, mnemonic and operands of the instructions at and between the given ones."""
+    """Mnemonic and operands of the instructions at and between the given ones."""
     span = [f"--start-address={min(addresses)}", f"--stop-address={max(addresses) + 16}"]
     command = ["objdump", "-d", "--insn-width=16", *span, binary]
     found = {}
     for line in subprocess.run(command, capture_output=True, text=True, check=True).stdout.split(
         "\n"
     ):
-        match = re.match(r"\s*([0-9a-f]+):\t((?:[0-9a-f]{2} )+)\s*(\S+)\s*(.*)", line)
+        match = re.match(r"\s*([0-9a-f]+):\t(?:[0-9a-f]{2} )+\s*(\S+)\s*(.*)", line)
         if match:
-            address, code, mnemonic, operands = match.groups()
-            found[int(address, 16)] = (len(code.split()), mnemonic, operands.split("#")[0].strip())
+            address, mnemonic, operands = match.groups()
+            found[int(address, 16)] = (mnemonic, operands.split("#")[0].strip())
     return found
 
 
@@ -108,14 +108,13 @@ def whole_steps(trace):
 
 
 def per_step(samples, code):
-    """Executions of every kind in a step, and the bytes of code that every step runs."""
+    """Executions of every kind in a step."""
     kinds = collections.Counter()
-    steps, hot = 0, set()
+    steps = 0
     for counts, within in map(whole_steps, samples):
         steps += within
-        hot |= {address for address, count in counts.items() if count >= within}
         for address, count in counts.items():
-            _, mnemonic, operands = code.get(address, (0, "", ""))
+            mnemonic, operands = code.get(address, ("", ""))
             kinds["all instructions"] += count
             for kind, pattern in KINDS.items():
                 if re.match(pattern, mnemonic):
@@ -123,9 +122,7 @@ def per_step(samples, code):
             if mnemonic.startswith("v") and "(" in operands:
                 is_store = mnemonic.startswith("vmov") and operands.endswith(")")
                 kinds["stores" if is_store else "loads"] += count
-    return {kind: count / steps for kind, count in kinds.items()}, sum(
-        code[a][0] for a in hot if a in code
-    )
+    return {kind: count / steps for kind, count in kinds.items()}
 
 
 def fastest_ns(output):
@@ -183,9 +180,9 @@ def main():
         f"GHz.\n"
     )
     print(
-        "| | "
+        "| | arithmetic | of it "
         + " | ".join(COLUMNS)
-        + " | bytes of code | ns | instructions a cycle | share of peak |"
+        + " | ns | instructions a cycle | share of peak |"
     )
     print("|---|" + "---:|" * (len(COLUMNS) + 4))
     for instruction_set, flag in SETS.items():
@@ -207,10 +204,11 @@ def main():
             followed.kill()
             followed.wait()
             code = disassembled(binary, set().union(*samples))
-            kinds, size = per_step(samples, code)
+            kinds = per_step(samples, code)
             ns = fastest_ns(free)
             arithmetic = sum(kinds.get(kind, 0) for kind in KINDS)
-            cells = [f"{kinds.get(column, 0):.0f}" for column in COLUMNS] + [str(size), f"{ns:.0f}"]
+            counts = [arithmetic, *(kinds.get(column, 0) for column in COLUMNS), ns]
+            cells = [f"{count:.0f}" for count in counts]
             cells += [
                 f"{kinds['all instructions'] / (ns * ghz):.1f}",
                 f"{100 * arithmetic / (2 * ns * ghz):.0f} %",

@@ -129,8 +129,13 @@ def main() -> int:
         "| as assumed | | " + " | ".join(cell(base[mass], None) for mass in masses) + " |",
     ]
 
+    unmoved: dict[str, list[str]] = {}
+
     def add(what: str, change: str, found: dict[float, list[dict]]) -> None:
         cells = [cell(found[mass], base[mass]) for mass in masses]
+        if all(said.endswith("(+0.0)") for said in cells):
+            unmoved.setdefault(what, []).append(change)
+            return
         lines.append(f"| {what} | {change} | " + " | ".join(cells) + " |")
         print(lines[-1], file=sys.stderr)
 
@@ -149,6 +154,8 @@ def main() -> int:
             found, more = trace(options.sweep, grid, [])
         points += more
         add("ramp", f"{RAMP_S:g} to {ramp_s:g} s", found)
+    listed = [f"- {what}: {', '.join(changes)}" for what, changes in unmoved.items()]
+    lines += ["", "These move the boundary by less than 0.05 N s/m:", "", *listed]
     lines += ["", f"{points} points in all."]
 
     table = "\n".join(lines)

@@ -37,14 +37,17 @@ fn median(values: &[f64]) -> f64 {
     sorted[sorted.len() / 2]
 }
 
-/// A row per subject: every round, then the median.
+/// A row per subject, its median; in the header, how far the rounds are from their medians.
 fn table(unit: &str, subjects: &[String], rounds: &[Vec<f64>]) -> Vec<f64> {
-    println!("| {unit} | {} median |", "| ".repeat(rounds[0].len()));
-    println!("|---|{}---|", "---|".repeat(rounds[0].len()));
-    let medians: Vec<_> = rounds.iter().map(|values| median(values)).collect();
-    for ((subject, values), median) in subjects.iter().zip(rounds).zip(&medians) {
-        let raw: String = values.iter().map(|value| format!(" {value:.3} |")).collect();
-        println!("| {subject} |{raw} **{median:.3}** |");
+    let medians: Vec<f64> = rounds.iter().map(|values| median(values)).collect();
+    let farthest = rounds
+        .iter()
+        .zip(&medians)
+        .flat_map(|(values, median)| values.iter().map(move |value| (value / median - 1.0).abs()))
+        .fold(0.0, f64::max);
+    println!("| {unit}, rounds within {:.0} % | |\n|---|---|", 1e2 * farthest);
+    for (subject, median) in subjects.iter().zip(&medians) {
+        println!("| {subject} | {median:.3} |");
     }
     println!();
     medians
@@ -90,12 +93,6 @@ fn trajectories(rounds: usize) {
             if let (Some(wide), Some(scalar)) = (of(*simd, name), of(Simd::Scalar, name)) {
                 println!("| {name}: {} against scalar | {:.2} |", simd.name(), scalar / wide);
             }
-        }
-    }
-    for simd in &available {
-        if let (Some(nonlinear), Some(linear)) = (of(*simd, "nonlinear"), of(*simd, "linear")) {
-            let both = (nonlinear + linear) / nonlinear;
-            println!("| both models against the nonlinear alone, {} | {both:.2} |", simd.name());
         }
     }
     println!();
@@ -170,13 +167,6 @@ fn methods(rounds: usize) -> f64 {
             let ratio = medians[model] / medians[2 * method + model];
             println!("| {} against {} | {ratio:.1} |", names[2 * method + model], methods[0].0);
         }
-    }
-    for (method, (name, _)) in methods.iter().enumerate() {
-        let [nonlinear, linear] = [medians[2 * method], medians[2 * method + 1]];
-        println!(
-            "| both models against the nonlinear alone, {name} | {:.2} |",
-            (nonlinear + linear) / nonlinear
-        );
     }
     println!();
     medians[2] + medians[3]
