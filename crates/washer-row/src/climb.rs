@@ -341,8 +341,8 @@ fn difference(
     Some(Difference { of_course, of_numbers: of_numbers(of_a, of_b, point, rule) })
 }
 
-/// The error that this rung has in common with others, so that no comparison shows it: what bearings
-/// and hinge swing after jumps.
+/// The error that this rung has in common with others, so that no comparison shows it: what
+/// bearings and hinge swing after jumps.
 fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
     if rung.follows_bearings {
         return 0.0;

@@ -96,8 +96,8 @@ impl Ladder {
         self.reference.is_some_and(|reference| rung > reference)
     }
 
-    /// The place of the rung whose twin tells chaos: half the reference's step where there is such a
-    /// rung, because that settles most of what the reference leaves in doubt.
+    /// The place of the rung whose twin tells chaos: half the reference's step where there is such
+    /// a rung, because that settles most of what the reference leaves in doubt.
     #[must_use]
     pub(crate) fn judge(&self) -> Option<usize> {
         self.reference.map(|reference| (reference + 1).min(self.rungs.len() - 1))

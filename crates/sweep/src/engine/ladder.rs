@@ -7,9 +7,9 @@
 //! whole course of the motion and in every number of the row. Steps and caps say which share of
 //! that difference is left as error, as long as errors are small enough to be of first order.
 //! Motions that pass through bands of instability amplify errors a thousandfold and climb. Chaotic
-//! motions climb to the reference, where RK4 does not agree with itself and a twin departs. Shorter
-//! steps than the reference's are for rows that are not chaotic and still in doubt, and for jumps of
-//! the drum's acceleration: the bearings keep swinging after them, and only the last steps follow.
+//! motions climb to half the reference's step, where RK4 does not agree with itself and a twin
+//! departs. Still shorter steps are for jumps of the drum's acceleration: the bearings keep
+//! swinging after them, and only the last steps follow.
 //!
 //! Friction and stops give forces corners. A step that spans one errs by its own length, whatever
 //! the order of its formula, and two long steps that pass the same corner in the same way agree on
@@ -36,7 +36,7 @@ const LONGER_STEP: f64 = 1.25;
 /// is of fourth order. Nearly chaotic motions keep to no order; 3.3 was seen.
 const REFERENCE_CONTRACTION: f64 = 4.0;
 
-/// The same with half the reference's step: 1/15 where it is of fourth order, with the same reserve.
+/// The same with half the reference's step: 1/15 where it is of fourth order, with that reserve.
 const CONTRACTION_OF_HALVED: f64 = 0.4;
 
 /// The same with a step that follows the bearings, whose ringing is 0.08 too small at most.

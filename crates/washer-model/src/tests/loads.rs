@@ -1,4 +1,4 @@
-//! Loads of stops and feet and speeds of dampers, against the forces of densely sampled time histories.
+//! Loads of stops and feet and speeds of dampers, against the forces of dense time histories.
 
 use super::elements::with_every_element;
 use super::energy::{axes, place};
