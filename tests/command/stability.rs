@@ -4,7 +4,7 @@
 
 use std::fs;
 use std::process::{Command, Output, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::home::sweep_binary;
 use crate::signal;
@@ -126,7 +126,9 @@ fn what_a_signal_stops_goes_on_to_the_same_bytes() {
     let is_chunk = |entry: std::io::Result<fs::DirEntry>| {
         entry.is_ok_and(|entry| entry.file_name().to_string_lossy().starts_with("chunk-"))
     };
+    let began = Instant::now();
     while !fs::read_dir(&partial).is_ok_and(|mut entries| entries.any(is_chunk)) {
+        assert!(began.elapsed() < Duration::from_secs(60), "no chunk is kept");
         std::thread::sleep(Duration::from_millis(20));
     }
     signal("TERM", child.id());

@@ -1,5 +1,6 @@
 //! What can go wrong with a file, each with the path and what to do about it.
 
+use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// The file system said no.
-    #[error("cannot {action} {}: {source}\n  = help: {}", path.display(), advice(source))]
+    #[error("cannot {action} {}: {source}\n  = help: {}", path.display(), advice(path, source))]
     Io {
         /// What was being done, in the infinitive.
         action: &'static str,
@@ -65,8 +66,8 @@ impl FileError {
 
 /// What a user can do about an I/O failure. Finished chunks are whole whatever happened, so it ends
 /// alike.
-fn advice(source: &io::Error) -> &'static str {
-    match source.kind() {
+fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
+    let told = match source.kind() {
         io::ErrorKind::StorageFull => {
             "the disk is full: free some space and run the same command again; finished chunks \
              are kept"
@@ -83,8 +84,11 @@ fn advice(source: &io::Error) -> &'static str {
             "make it writable for this user, or write elsewhere with --out"
         }
         io::ErrorKind::NotFound => {
-            "it was there and has vanished, or its folder cannot be reached: bring it back and run \
-             the same command again; chunks that are still there are used"
+            if let Some(near) = near(path) {
+                return format!("{} is there: is it meant?", near.display()).into();
+            }
+            "check the name; if it was there and has vanished, bring it back and run the same \
+             command again: chunks that are still there are used"
         }
         io::ErrorKind::NotADirectory => {
             "a part of that path is a file, not a folder: move it, or write elsewhere with --out"
@@ -94,7 +98,19 @@ fn advice(source: &io::Error) -> &'static str {
             "check the disk (the system's log may say more) and run the same command again; \
              finished chunks are kept"
         }
+    };
+    told.into()
+}
+
+/// The result that a path without its folder or ending means.
+fn near(path: &Path) -> Option<PathBuf> {
+    let name = path.file_name()?;
+    let mut whole = name.to_owned();
+    if path.extension().is_none_or(|ending| ending != "parquet") {
+        whole.push(".parquet");
     }
+    let places = [path.with_file_name(&whole), path.with_file_name("results").join(&whole)];
+    places.into_iter().find(|place| place.is_file())
 }
 
 /// Why a Parquet file is not read, found before the library would fail at it.

@@ -3,9 +3,10 @@
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use arrow_array::RecordBatch;
-use arrow_schema::SchemaRef;
+use arrow_schema::{DataType, Field, FieldRef, Schema, SchemaRef};
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader,
     ParquetRecordBatchReaderBuilder,
@@ -95,7 +96,11 @@ impl ParquetFile {
 
     fn parse(path: &Path, file: File, seal: Seal) -> Result<Self, FileError> {
         footer::check(&mut &file).map_err(refused(path))?;
-        let load = || ArrowReaderMetadata::load(&file, ArrowReaderOptions::new());
+        let load = || {
+            let found = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())?;
+            let coded = ArrowReaderOptions::new().with_schema(with_words_once(found.schema()));
+            ArrowReaderMetadata::try_new(Arc::clone(found.metadata()), coded)
+        };
         let metadata = guarded(load).map_err(not_parquet(path))?;
         Ok(Self { path: path.to_path_buf(), file, metadata, seal })
     }
@@ -197,6 +202,20 @@ impl Iterator for Batches {
     }
 }
 
+/// A schema in which a word takes memory once, however many rows have it: a file of a few hundred
+/// bytes may repeat one of a megabyte.
+fn with_words_once(schema: &SchemaRef) -> SchemaRef {
+    let fields = schema.fields().iter().map(|field| match field.data_type() {
+        DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View => {
+            let words = DataType::Dictionary(DataType::Int32.into(), DataType::Utf8.into());
+            Arc::new(Field::clone(field).with_data_type(words))
+        }
+        _ => Arc::clone(field),
+    });
+    let fields: Vec<FieldRef> = fields.collect();
+    Arc::new(Schema::new_with_metadata(fields, schema.metadata().clone()))
+}
+
 /// Has the library read.
 fn guarded<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
     panics::in_parquet("it makes no sense inside", work)
@@ -225,17 +244,19 @@ fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
         },
         error => {
             let text = error.to_string();
-            let reason = text.strip_prefix("Parquet error: ").unwrap_or(&text).trim().to_owned();
-            FileError::NotParquet { path, reason }
+            let reason = text.strip_prefix("Parquet error: ").unwrap_or(&text).trim();
+            let reason = match path.extension().is_some_and(|ending| ending == "toml") {
+                true => "a grid or machine file is no result; `sweep run GRID.toml` writes one",
+                false => reason,
+            };
+            FileError::NotParquet { reason: reason.to_owned(), path }
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
-    use arrow_array::Float64Array;
+    use arrow_array::{Float64Array, StringArray};
     use parquet::arrow::ArrowWriter;
     use parquet::file::properties::WriterProperties;
 
@@ -289,6 +310,44 @@ mod tests {
         changed[20] ^= 1;
         std::fs::write(&path, &changed).unwrap();
         assert!(matches!(file.bytes(), Err(FileError::Damaged { .. })));
+    }
+
+    #[test]
+    fn a_word_that_many_rows_have_is_read_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.parquet");
+        // 3 GB if it were read row by row, more than Arrow's offsets can count.
+        let words: StringArray = vec![Some("a".repeat(1 << 20)); 3].into_iter().collect();
+        let batch = RecordBatch::try_from_iter([("status", Arc::new(words) as _)]).unwrap();
+        let file = File::create(&path).unwrap();
+        let properties =
+            WriterProperties::builder().set_dictionary_page_size_limit(4 << 20).build();
+        let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties)).unwrap();
+        for _ in 0..1000 {
+            writer.write(&batch).unwrap();
+        }
+        writer.close().unwrap();
+        let file = ParquetFile::open(&path).unwrap();
+        let rows = file.batches(|builder| builder.with_batch_size(4096)).unwrap();
+        let rows: Vec<RecordBatch> = rows.collect::<Result<_, _>>().unwrap();
+        assert_eq!(rows.iter().map(RecordBatch::num_rows).sum::<usize>(), 3000);
+        assert!(rows.iter().all(|rows| rows.get_array_memory_size() < 8 << 20));
+    }
+
+    #[test]
+    fn a_mistyped_name_and_a_grid_file_say_what_to_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let result = folder.path().join("results/tol60.parquet");
+        std::fs::create_dir(folder.path().join("results")).unwrap();
+        std::fs::write(&result, ours()).unwrap();
+        std::fs::write(folder.path().join("g.toml"), "name = \"tol60\"\n").unwrap();
+        let told =
+            |name: &str| ParquetFile::open(&folder.path().join(name)).unwrap_err().to_string();
+        for name in ["tol60.parquet", "tol60", "results/tol60"] {
+            assert!(told(name).contains(&format!("{} is there", result.display())), "{name}");
+        }
+        assert!(told("none.parquet").contains("check the name"), "{}", told("none.parquet"));
+        assert!(told("g.toml").contains("`sweep run GRID.toml`"), "{}", told("g.toml"));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! A result file as columns and rows.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use arrow_array::ArrayRef;
@@ -255,8 +256,10 @@ fn decode(array: &ArrayRef, kind: CellKind) -> Result<Decoded, ArrowError> {
         CellKind::Flag => Decoded::Flags(cells::flags(array)?.iter().collect()),
         CellKind::Text => {
             let mut names: Vec<String> = Vec::new();
+            // By place: the words of a batch lie there once, and may be long.
+            let mut places = HashMap::new();
             let mut code = |word: &str| {
-                names.iter().rposition(|name| name == word).unwrap_or_else(|| {
+                *places.entry((word.as_ptr(), word.len())).or_insert_with(|| {
                     names.push(word.to_owned());
                     names.len() - 1
                 })

@@ -82,9 +82,12 @@ impl SearchArgs {
     }
 }
 
+/// Where the result goes.
+const OUT: &str = "Result file [default: results/NAME-dwell.parquet]";
+
 /// Arguments of `sweep dwell`.
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = LONG)]
+#[command(after_long_help = LONG, mut_arg("out", |out| out.help(OUT)))]
 pub struct Args {
     /// The grid, and the file: results/NAME-dwell.parquet by default.
     #[command(flatten)]

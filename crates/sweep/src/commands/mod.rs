@@ -354,6 +354,15 @@ mod tests {
     }
 
     #[test]
+    fn help_names_the_file_that_a_command_writes() {
+        for (name, file) in [("run", "NAME"), ("stability", "NAME-stability")] {
+            let mut command = command();
+            let help = command.find_subcommand_mut(name).unwrap().render_help().to_string();
+            assert!(help.contains(&format!("[default: results/{file}.parquet]")), "{help}");
+        }
+    }
+
+    #[test]
     fn help_shows_the_examples_before_the_usage_and_the_exit_codes_after() {
         let help = command().render_help().to_string();
         let place = |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));

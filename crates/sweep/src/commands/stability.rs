@@ -21,7 +21,7 @@ pub(super) const EXAMPLES: Examples = &[
 
 /// Arguments of `sweep stability`.
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = LONG)]
+#[command(after_long_help = LONG, mut_arg("out", |out| out.help(OUT)))]
 pub struct Args {
     /// The grid, and the file: results/NAME-stability.parquet by default.
     #[command(flatten)]
@@ -36,6 +36,9 @@ pub struct Args {
     #[arg(long)]
     fail_on_error: bool,
 }
+
+/// Where the result goes, which is not where a run's goes.
+const OUT: &str = "Result file [default: results/NAME-stability.parquet]";
 
 /// What `--help` adds.
 const LONG: &str = "\
