@@ -60,10 +60,7 @@ pub(crate) fn of(found: &Explanation) -> String {
             "dwells",
             &format!(
                 "the periodic response is unstable in {} from {from} to {to} rpm:",
-                match found.tongues.len() {
-                    1 => "one band of speed (a \"tongue\")".to_owned(),
-                    count => format!("{count} bands of speed (\"tongues\")"),
-                }
+                bands(found.tongues.iter().map(|(tongue, _)| tongue.ends))
             ),
         );
     }
@@ -92,6 +89,19 @@ pub(crate) fn of(found: &Explanation) -> String {
     judgement(&mut text, found);
     limits(&mut text, found);
     text.0
+}
+
+/// How many bands of speed there are, and tongues in them. Where a tongue ends because the motion
+/// grows in another way, its band goes on.
+fn bands(ends: impl ExactSizeIterator<Item = [End; 2]>) -> String {
+    let tongues = ends.len();
+    let bands = ends.filter(|[from, _]| *from != End::OtherKind).count().max(1);
+    match (bands, tongues) {
+        (1, 1) => "one band of speed (a \"tongue\")".to_owned(),
+        (1, _) => format!("one band of speed, with {tongues} ways to grow (\"tongues\"),"),
+        _ if bands == tongues => format!("{bands} bands of speed (\"tongues\")"),
+        _ => format!("{bands} bands of speed, with {tongues} ways to grow (\"tongues\"),"),
+    }
 }
 
 fn milli(value: f64, channel: Channel) -> String {
@@ -387,6 +397,16 @@ mod tests {
         assert!(lines.len() > 1 && lines.iter().all(|line| line.chars().count() <= WIDTH));
         assert!(lines[0].starts_with("      name  word"), "{}", lines[0]);
         assert!(lines[1].starts_with("            word"), "{}", lines[1]);
+    }
+
+    #[test]
+    fn a_band_goes_on_where_the_motion_grows_in_another_way() {
+        let of = |ends: &[[End; 2]]| bands(ends.iter().copied());
+        let (edge, other) = (End::Edge, End::OtherKind);
+        assert_eq!(of(&[[edge, edge]]), "one band of speed (a \"tongue\")");
+        assert_eq!(of(&[[edge, edge], [edge, edge]]), "2 bands of speed (\"tongues\")");
+        let words = of(&[[edge, edge], [edge, other], [other, edge]]);
+        assert_eq!(words, "2 bands of speed, with 3 ways to grow (\"tongues\"),");
     }
 
     #[test]
