@@ -34,7 +34,8 @@ def test_stability_has_the_commands_bytes(sweep, tmp_path):
     assert saved.read_bytes() == by_command.read_bytes()
     assert rows(in_memory) == rows(result)
     assert result.kind == in_memory.kind == washer_sweep.read(by_command).kind == "stability"
-    assert len(result) == 5 * len(plan)
+    # A point at a speed may have several responses.
+    assert len(result) >= 5 * len(plan)
     assert (result["stable"] == False).any(), "250 rpm is unstable"  # noqa: E712
     with pytest.raises(PlanError, match="another plan"):
         washer_sweep.stability(plan, [240.0], by_call, progress=False)
