@@ -103,8 +103,8 @@ impl Ladder {
         self.reference.map(|reference| (reference + 1).min(self.rungs.len() - 1))
     }
 
-    /// Stands behind all rungs for the method of [`Self::judge`] from a start beside the row's own
-    /// ([`Point::nudged`](washer_model::Point::nudged)).
+    /// Stands behind all rungs for the last one that rows are judged by, from a start beside the
+    /// row's own ([`Point::nudged`](washer_model::Point::nudged)).
     #[must_use]
     pub const fn twin(&self) -> usize {
         self.rungs.len()
