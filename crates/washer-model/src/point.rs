@@ -111,7 +111,7 @@ impl Point {
         self.ringing.sag()
     }
 
-    /// The same point, started [`NUDGE`] beside its equilibrium in every coordinate of the
+    /// The same point, started 1e-10 (m, rad) beside its equilibrium in every coordinate of the
     /// nonlinear model: a near twin, whose departure tells chaos from a step that is too long.
     #[must_use]
     pub fn nudged(&self) -> Self {
