@@ -167,7 +167,7 @@ pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
         // Whole at the panel's edge too.
         let within = |y: f64| (panel.y..=panel.y + panel.height).contains(&y);
         for (place, colour) in alone.into_iter().filter(|([_, y], _)| within(*y)) {
-            scene.fill(Outline::disc(place, ALONE), colour);
+            scene.fill(Outline::circle(place, ALONE), colour);
         }
         panel.y_label(&mut scene, typeface, &content.label.to_string(), 62.0);
         if last {

@@ -85,19 +85,6 @@ impl Outline {
         outline
     }
 
-    /// A disc around `centre`.
-    pub(crate) fn disc(centre: [f64; 2], radius: f64) -> Self {
-        let points: Vec<[f64; 2]> = (0..16)
-            .map(|k| {
-                let (sin, cos) = (std::f64::consts::PI * f64::from(k) / 8.0).sin_cos();
-                [centre[0] + radius * sin, centre[1] - radius * cos]
-            })
-            .collect();
-        let mut outline = Self::default();
-        outline.add_polygon(&points);
-        outline
-    }
-
     /// Adds a line through each run of places that are known; gives those that stand alone, which
     /// no line shows.
     pub(crate) fn add_runs(&mut self, places: &[Option<[f64; 2]>]) -> Vec<[f64; 2]> {

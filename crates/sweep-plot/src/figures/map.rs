@@ -135,8 +135,8 @@ fn draw_overlay(scene: &mut Scene, panel: &Panel, overlay: &Overlay) {
     scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
     scene.line(outline, overlay_stroke());
     for place in alone {
-        scene.fill(Outline::disc(place, 4.5), PAPER);
-        scene.fill(Outline::disc(place, 3.5), OVERLAY);
+        scene.fill(Outline::circle(place, 4.5), PAPER);
+        scene.fill(Outline::circle(place, 3.5), OVERLAY);
     }
 }
 
