@@ -44,9 +44,11 @@ done
 "$SWEEP" plot results/fig10.parquet --view passages --channel tub_yaw --channel tub_pitch $centre \
     --modes results/fig7.parquet -o "$figures/delay.svg"
 "$SWEEP" run sweeps/held.toml --progress plain
-# shellcheck disable=SC2086
-"$SWEEP" plot results/held.parquet --quantity linear --channel tub_yaw --channel tub_pitch $centre \
-    -o "$figures/held.svg"
+held=()
+for channel in tub_yaw tub_pitch total_centre_y total_centre_z; do
+    held+=(--quantity "linear_$channel")
+done
+"$SWEEP" plot results/held.parquet "${held[@]}" -o "$figures/held.svg"
 
 "$SWEEP" run sweeps/fig12.toml --progress plain
 "$SWEEP" plot results/fig12.parquet -o "$figures/fig12.svg"

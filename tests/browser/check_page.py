@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
@@ -39,16 +40,8 @@ FLAGS = [
 # The modifier of an input event.
 CTRL = 2
 
-# Quantities that no channel has: their columns, and the page's unit as a part of the file's.
-WHOLE = {
-    "gap-nonlinear": ("min_gap_nonlinear_m", 1000),
-    "gap-linear": ("min_gap_linear_m", 1000),
-    "cabinet-force-nonlinear": ("cabinet_force_nonlinear_n", 1),
-    "cabinet-force-linear": ("cabinet_force_linear_n", 1),
-    "clash-time-nonlinear": ("clash_time_nonlinear_s", 1),
-    "clash-time-linear": ("clash_time_linear_s", 1),
-    "static-sag": ("static_sag_m", 1000),
-}
+# Columns that are on no picture.
+UNSHOWN = ("point", "steps_", "rejected_")
 
 
 class Wrong(Exception):
@@ -73,7 +66,13 @@ class Map:
         ratios = [name for name in names if name.startswith("ratio_")]
         self.channels = [name.removeprefix("ratio_") for name in ratios
                          if name not in ("ratio_max", "ratio_max_channel")]
-        self.whole = [group for group, (column, _) in WHOLE.items() if column in names]
+        # What a page shows of every column of numbers, as a part of the file's unit.
+        shown = {"m": 1000, "rad": 1000}
+        self.factors = {
+            field.name: shown.get((field.metadata or {}).get(b"unit", b"").decode(), 1)
+            for field in table.schema
+            if (pa.types.is_floating(field.type) or pa.types.is_integer(field.type))
+            and field.name not in self.axes and not field.name.startswith(UNSHOWN)}
         self.values = [sorted({row[axis] for row in self.rows}) for axis in self.axes]
         # The page opens with every axis after the second at its first value.
         cuts = list(zip(self.axes[2:], self.values[2:]))
@@ -221,6 +220,9 @@ def same(shown, true):
 
 def hovering_shows_the_file(page, data, log, when):
     """At points all over the map, everything the page says is in the file."""
+    lines = page.driver.execute_script("return DATA.rows")
+    kinds = ("ratio_", "nonlinear_", "linear_")
+    others = [column for column in data.factors if not column.startswith(kinds)]
     for row in data.some():
         page.mouse("mouseMoved", *page.place(row[data.axes[0]], row[data.axes[1]], log))
         expected = f"Point {row['point']}"
@@ -238,59 +240,49 @@ def hovering_shows_the_file(page, data, log, when):
                 true = true * 1000 if true is not None and kind != "ratio" else true
                 check(same(number_in(text), true),
                       f"{when}: {expected}, {kind} {channel}: {text} for {true}")
-        for group in data.whole:
-            column, factor = WHOLE[group]
-            name, _, kind = group.rpartition("-")
-            if kind not in ("nonlinear", "linear"):
-                name, kind = group, "nonlinear"
-            name = name.replace("-", "_")
+        told = {column: (line["name"], kind) for line in lines
+                for kind, column in zip(("nonlinear", "linear"), line["columns"]) if column}
+        for column in others:
+            name, kind = told[column]
             selector = f'#readout tr[data-channel="{name}"] td[data-kind="{kind}"]'
             text = page.driver.find_element(By.CSS_SELECTOR, selector).text
-            true = None if row[column] is None else factor * row[column]
-            check(same(number_in(text), true), f"{when}: {expected}, {group}: {text} for {true}")
+            true = None if row[column] is None else data.factors[column] * row[column]
+            check(same(number_in(text), true), f"{when}: {expected}, {column}: {text} for {true}")
         if row["status"] != "ok":
             check(f"Failed: {row['status'].replace('_', ' ')}" in said,
                   f"{when}: {expected} hides its status: {said}")
         elif row["reliable"] is not None:
             verdict = "Linear model reliable" if row["reliable"] else "Linear model unreliable"
             check(verdict in said, f"{when}: {expected}: not '{verdict}': {said}")
-    values = 3 * len(data.channels) + len(data.whole)
+    values = 3 * len(data.channels) + len(others)
     return f"{when}: {len(data.some())} points, {values} values each"
 
 
 def switches_redraw(page, data, log):
-    """Each quantity and channel has its own picture, and the tip shows its value."""
+    """Each column has its own picture, and the tip shows its value."""
     quantity = Select(page.driver.find_element(By.ID, "quantity"))
-    channel = Select(page.driver.find_element(By.ID, "channel"))
     row = next(row for row in data.some() if row["ratio_max"] is not None)
     pictures = {}
-    groups = [option.get_attribute("value") for option in quantity.options]
-    missing = set(data.whole) - set(groups)
+    columns = [option.get_attribute("value") for option in quantity.options]
+    missing = set(data.factors) - set(columns)
     check(not missing, f"the page does not offer {missing}")
-    for group in groups:
-        quantity.select_by_value(group)
-        for name in [option.get_attribute("value") for option in channel.options]:
-            if len(channel.options) > 1:
-                channel.select_by_value(name)
-            page.mouse("mouseMoved", 5, 5)
-            page.mouse("mouseMoved", *page.place(row[data.axes[0]], row[data.axes[1]], log))
-            page.wait(lambda: page.text("tip"), f"{group} {name}: no tip at the pointer")
-            channel_column = (f"{group}_{name or 'max'}", 1 if group == "ratio" else 1000)
-            column, factor = WHOLE.get(group, channel_column)
-            values = [row.get("status" if group == "status" else column) for row in data.shown]
-            pictures[group, name] = (page.pixels(), values)
-            if group != "status":
-                true = row[column] * factor
-                lines = page.text("tip").split("\n")
-                shown = next(line for line in lines if ": " in line).rsplit(": ", 1)[1]
-                check(same(number_in(shown), true),
-                      f"{group} {name}: the tip says {shown} for {true}")
-        page.shot(f"quantity-{group}")
+    for column in columns:
+        quantity.select_by_value(column)
+        page.mouse("mouseMoved", 5, 5)
+        page.mouse("mouseMoved", *page.place(row[data.axes[0]], row[data.axes[1]], log))
+        page.wait(lambda: page.text("tip"), f"{column}: no tip at the pointer")
+        pictures[column] = (page.pixels(), [row[column] for row in data.shown])
+        if column != "status" and row[column] is not None:
+            true = row[column] * data.factors[column]
+            lines = page.text("tip").split("\n")
+            shown = next(line for line in lines if ": " in line).rsplit(": ", 1)[1]
+            check(same(number_in(shown), true), f"{column}: the tip says {shown} for {true}")
+        page.shot(f"quantity-{column}")
     for (first, picture), (second, other) in zip(pictures.items(), list(pictures.items())[1:]):
         # Two metrics that are zero everywhere look alike.
         alike = picture[1] == other[1]
         check(alike or picture[0] != other[0], f"switching from {first} to {second} did not redraw")
-    quantity.select_by_value("ratio")
+    quantity.select_by_value("ratio_max")
     return f"{len(pictures)} pictures, each redrawn, each with its value at the pointer"
 
 
@@ -436,7 +428,13 @@ def report_and_downloads(page, data):
     check((folder / "map.png").read_bytes()[:4] == b"\x89PNG", "the picture is no PNG")
     page.press("+")
     quantity = Select(page.driver.find_element(By.ID, "quantity"))
-    quantity.select_by_value("gap-nonlinear")
+    quantity.select_by_value("min_gap_nonlinear_m")
+    least = min((row for row in data.rows if row["min_gap_nonlinear_m"] is not None),
+                key=lambda row: row["min_gap_nonlinear_m"])
+    first = page.driver.execute_script(
+        "return document.querySelector('#points tbody tr').innerText")
+    gap = f"{1000 * least['min_gap_nonlinear_m']:.3g}"
+    check(gap in first, f"the least gap, {gap} mm, is not in the first row: {first}")
     page.driver.execute_script("document.getElementById('link').click()")
     view, address = page.figure().get_attribute("data-view"), page.driver.current_url
     check("#" in address, "the link holds nothing")

@@ -167,7 +167,7 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
     assert!(markdown.starts_with("### `results/light.parquet` compared with"), "{markdown}");
     let written = home.sweep(&[&arguments[..], &["--out", "d.parquet"]].concat());
     assert_eq!(code(&written), Some(0), "{}", said(&written));
-    for quantity in ["ratio-change", "gap-change"] {
+    for quantity in ["ratio_change", "gap_change_m"] {
         let drawn = home.sweep(&["plot", "d.parquet", "-o", "d.svg", "--quantity", quantity]);
         assert_eq!(code(&drawn), Some(0), "{}", said(&drawn));
     }

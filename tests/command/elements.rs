@@ -121,16 +121,16 @@ fn each_stop_and_foot_has_what_the_trace_shows_of_it() {
     let closed = |k: usize| of_row(format!("stop_{k}_contact_nonlinear_s"));
     assert!(closed(1) > 0.01 && closed(2) > 0.01 && closed(1) != closed(2));
 
-    let drawn = |channel: &str| {
-        let quantity = ["--quantity", "stop-force-nonlinear", "--channel", channel];
-        home.sweep(&[&["plot", "map.parquet", "-o", "map.svg"], &quantity[..]].concat())
+    let drawn = |stop: &str| {
+        let column = format!("{stop}_force_nonlinear_n");
+        home.sweep(&["plot", "map.parquet", "-o", "map.svg", "--quantity", &column])
     };
     assert!(drawn("stop_2").status.success());
     let picture = fs::read_to_string(home.path("map.svg")).expect("it was written");
-    assert!(picture.contains("Greatest push of a stop: stop 2"));
+    assert!(picture.contains("Stop 2 force"));
     let refused = drawn("stop_4");
     assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
-    assert!(said(&refused).contains("stop_1, stop_2, stop_3"), "{}", said(&refused));
+    assert!(said(&refused).contains("stop_3_force_nonlinear_n"), "{}", said(&refused));
     let met = home.sweep(&["require", "map.parquet", "stop_3_contact_nonlinear_s == 0"]);
     assert_eq!(met.status.success(), closed(3) == 0.0, "{}", said(&met));
 }

@@ -185,12 +185,12 @@ fn growth_is_a_metric_of_maps_and_a_quantity_of_boundaries() {
         assert!(said(&shown).contains(column), "{column}: {}", said(&shown));
     }
     assert!(said(&shown).contains("period_doubling"), "{}", said(&shown));
-    let traced = sweep(&folder, &["boundary", "grid.toml", "--quantity", "growth"]).output();
+    let traced = sweep(&folder, &["boundary", "grid.toml", "--quantity", "growth_per_s"]).output();
     let traced = traced.expect("it starts");
     assert_eq!(traced.status.code(), Some(0), "{}", said(&traced));
     assert!(said(&traced).contains("1 crossing"), "{}", said(&traced));
     let plain = folder_with("");
-    let refused = sweep(&plain, &["boundary", "grid.toml", "--quantity", "growth"]).output();
+    let refused = sweep(&plain, &["boundary", "grid.toml", "--quantity", "growth_per_s"]).output();
     let refused = refused.expect("it starts");
     assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
     assert!(said(&refused).contains("[stability]"), "{}", said(&refused));

@@ -6,8 +6,7 @@ use std::time::Instant;
 
 use lane_ode::{Failure, MAX_LANES, Simd};
 use serde_json::{Map as JsonMap, Value};
-use sweep_engine::boundary::quantity::TracedQuantity;
-use sweep_engine::boundary::search::Distances;
+use sweep_engine::boundary::search::Values;
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, row, run_columns, verdict_columns,
 };
@@ -22,7 +21,7 @@ use sweep_engine::{
     UnknownParameter, Watch, methods,
 };
 use sweep_files::FileKind;
-use sweep_parameter::{Channel, Range};
+use sweep_parameter::{Channel, Range, RatioLimits};
 
 use crate::equations::Case;
 use crate::run::{Method, Model, Run, runs};
@@ -291,11 +290,9 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
         })
     }
 
-    fn search<'a>(
-        plan: &'a Plan<Self>,
-        quantity: &TracedQuantity,
-    ) -> Result<Box<dyn Distances + 'a>, Error> {
-        Ok(Box::new(Searched { rows: Evaluator { plan }, quantity: quantity.clone() }))
+    fn search<'a>(plan: &'a Plan<Self>, column: &str) -> Result<Box<dyn Values + 'a>, Error> {
+        let column = columns(plan).into_iter().find(|known| known.declared.name == column);
+        Ok(Box::new(Searched { rows: Evaluator { plan }, column }))
     }
 
     fn listed(plan: Option<&Plan<Self>>) -> Vec<Listed<Self>> {
@@ -319,7 +316,7 @@ struct Row<const C: usize> {
     runs: Option<[Run<C>; 2]>,
     /// Coordinates that the plan compares.
     channels: Vec<usize>,
-    ratio_limit: f64,
+    limits: RatioLimits,
     method: usize,
     error: Option<f64>,
     converged: Option<bool>,
@@ -328,6 +325,11 @@ struct Row<const C: usize> {
 impl<const C: usize> Row<C> {
     fn run(&self, model: usize) -> Option<&Run<C>> {
         self.runs.as_ref().map(|runs| &runs[model])
+    }
+
+    /// The defined ratios with their channels.
+    fn defined(&self) -> impl Iterator<Item = (usize, f64)> {
+        (0..self.channels.len()).filter_map(|k| Some((k, self.ratio(k)?)))
     }
 }
 
@@ -343,12 +345,15 @@ impl<const C: usize> Compared for Row<C> {
     }
 
     fn greatest(&self) -> Option<(usize, f64)> {
-        let ratios = (0..self.channels.len()).filter_map(|k| Some((k, self.ratio(k)?)));
-        ratios.reduce(|most, next| if next.1 > most.1 { next } else { most })
+        self.defined().reduce(|most, next| if next.1 > most.1 { next } else { most })
+    }
+
+    fn least(&self) -> Option<(usize, f64)> {
+        self.defined().reduce(|least, next| if next.1 < least.1 { next } else { least })
     }
 
     fn reliable(&self) -> Option<bool> {
-        self.greatest().map(|(_, ratio)| ratio < self.ratio_limit)
+        self.least().zip(self.greatest()).map(|(least, most)| self.limits.trust(least.1, most.1))
     }
 
     fn converged(&self) -> Option<bool> {
@@ -403,10 +408,10 @@ fn columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usiz
     let amplitude = "largest deviation from equilibrium in the window";
     let ratio = "nonlinear over linear amplitude; null where the linear one is zero or a model \
                  failed";
-    let mut columns = amplitude_columns(&reliability.channels, amplitude, ratio);
-    let (limit, methods) = (reliability.ratio_limit, METHODS.to_vec());
+    let (limits, methods) = (reliability.limits, METHODS.to_vec());
+    let mut columns = amplitude_columns(&reliability.channels, limits, amplitude, ratio);
     let told = "the method that the row's numbers come from";
-    columns.extend(verdict_columns(&reliability.channels, limit, methods, told));
+    columns.extend(verdict_columns(&reliability.channels, limits, methods, told));
     columns.extend(run_columns(STATUSES.to_vec()));
     columns
 }
@@ -486,7 +491,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         Row {
             runs: None,
             channels: reliability.channels.iter().map(|channel| channel.place).collect(),
-            ratio_limit: reliability.ratio_limit,
+            limits: reliability.limits,
             method: 0,
             error: None,
             converged: None,
@@ -551,16 +556,16 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
     }
 }
 
-/// Distances of a ratio from its limit.
+/// The numbers of a column.
 struct Searched<'a, O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> {
     rows: Evaluator<'a, O, C, D, P>,
-    quantity: TracedQuantity,
+    column: Option<ResultColumn<Row<C>>>,
 }
 
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Distances
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Values
     for Searched<'_, O, C, D, P>
 {
-    fn distances(
+    fn values(
         &self,
         axis_values: &[Vec<f64>],
         seen: &(dyn Fn(usize, Option<f64>) + Sync),
@@ -577,9 +582,9 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Dis
                     break;
                 }
                 for (place, row) in (first..last).zip(&rows) {
-                    let distance = row.greatest().map(|(_, ratio)| self.quantity.distance(ratio));
-                    seen(place, distance);
-                    lock(&found)[place] = distance;
+                    let value = self.column.as_ref().and_then(|column| column.number(row));
+                    seen(place, value);
+                    lock(&found)[place] = value;
                 }
             }
         });

@@ -1,7 +1,7 @@
 //! Columns as functions of a row: those of every comparison of a nonlinear with a linear motion,
 //! and the parts of a model's own columns.
 
-use sweep_parameter::Channel;
+use sweep_parameter::{Channel, Limit, RatioLimits, Worse};
 
 use crate::store::{Column, Kind, Row};
 
@@ -16,7 +16,9 @@ pub trait Compared: 'static {
     fn ratio(&self, channel: usize) -> Option<f64>;
     /// The greatest ratio with its channel; the first wins a tie.
     fn greatest(&self) -> Option<(usize, f64)>;
-    /// Whether the greatest ratio is below the limit.
+    /// The least ratio with its channel; the first wins a tie.
+    fn least(&self) -> Option<(usize, f64)>;
+    /// Whether the ratios are within the limits.
     fn reliable(&self) -> Option<bool>;
     /// Whether the error left is within the accuracy asked for.
     fn converged(&self) -> Option<bool>;
@@ -81,6 +83,31 @@ impl<R> ResultColumn<R> {
         Self { declared: Column::new(name, unit, description, kind), cell }
     }
 
+    /// The same, with which way it is bad.
+    #[must_use]
+    pub fn worse(mut self, worse: Worse) -> Self {
+        self.declared.worse = Some(worse);
+        self
+    }
+
+    /// The same, with the limit that has a meaning.
+    #[must_use]
+    pub fn limit(mut self, value: f64, scale: f64) -> Self {
+        self.declared.limit = Some(Limit { value, scale });
+        self
+    }
+
+    /// Its number of a row, if it is a column of numbers.
+    #[must_use]
+    pub fn number(&self, row: &R) -> Option<f64> {
+        match &self.cell {
+            Cell::Count(get) => Some(get(row) as f64),
+            Cell::KnownCount(get) => get(row).map(|count| count as f64),
+            Cell::Measured(get) | Cell::Time(get) => get(row),
+            Cell::Flag(_) | Cell::Name(..) => None,
+        }
+    }
+
     /// Its cell of a row.
     #[must_use]
     pub fn cell(&self, row: &R) -> Option<u64> {
@@ -104,6 +131,7 @@ pub fn row<R>(columns: &[ResultColumn<R>], of: &R) -> Row {
 #[must_use]
 pub fn amplitude_columns<R: Compared, C: Channel>(
     channels: &[C],
+    limits: RatioLimits,
     amplitude: &str,
     ratio: &str,
 ) -> Vec<ResultColumn<R>> {
@@ -114,44 +142,40 @@ pub fn amplitude_columns<R: Compared, C: Channel>(
             let text = format!("{what}: {amplitude}, {model} model; null if it failed");
             let cell = Cell::Measured(Box::new(move |row: &R| row.amplitude(k, i)));
             let name = format!("{model}_{}", channel.name());
-            columns.push(ResultColumn::new(name, channel.unit(), text, cell));
+            let column = ResultColumn::new(name, channel.unit(), text, cell);
+            columns.push(column.worse(Worse::Greater));
         }
     }
     for (i, channel) in channels.iter().enumerate() {
         let text = format!("{}: {ratio}", channel.description());
         let cell = Cell::Measured(Box::new(move |row: &R| row.ratio(i)));
-        columns.push(ResultColumn::new(format!("ratio_{}", channel.name()), "1", text, cell));
+        let column = ResultColumn::new(format!("ratio_{}", channel.name()), "1", text, cell);
+        columns.push(column.worse(Worse::Greater).limit(limits.most, 1.0));
     }
     columns
 }
 
-/// The verdict, and how far it can be trusted. `methods` are the names of methods, `told` what they
+/// The verdict, and how far it can be trusted; the greatest ratio and its channel come first.
+/// `methods` are the names of methods, `told` what they
 /// are.
 #[must_use]
 pub fn verdict_columns<R: Compared, C: Channel>(
     channels: &[C],
-    ratio_limit: f64,
+    limits: RatioLimits,
     methods: Vec<&'static str>,
     told: &str,
-) -> [ResultColumn<R>; 7] {
-    let channels = channels.iter().map(|channel| channel.name()).collect();
-    [
-        ResultColumn::new(
-            "ratio_max",
-            "1",
-            "greatest of the defined ratios; null if none is",
-            Cell::Measured(Box::new(|row: &R| row.greatest().map(|(_, ratio)| ratio))),
-        ),
-        ResultColumn::new(
-            "ratio_max_channel",
-            "",
-            "channel of ratio_max; the first of the plan's channels wins a tie",
-            Cell::Name(channels, Box::new(|row: &R| row.greatest().map(|(channel, _)| channel))),
-        ),
+) -> Vec<ResultColumn<R>> {
+    let mut columns = extreme_ratio(channels, "max", R::greatest, Worse::Greater, limits.most);
+    let mut rule = format!("ratio_max below {}", limits.most);
+    if let Some(least) = limits.least {
+        columns.extend(extreme_ratio(channels, "min", R::least, Worse::Less, least));
+        rule.push_str(&format!(" and ratio_min above {least}"));
+    }
+    columns.extend([
         ResultColumn::new(
             "reliable",
             "",
-            format!("ratio_max below {}; null where ratio_max is", ratio_limit),
+            format!("{rule}; null where ratio_max is"),
             Cell::Flag(Box::new(|row: &R| row.reliable())),
         ),
         ResultColumn::new(
@@ -175,13 +199,36 @@ pub fn verdict_columns<R: Compared, C: Channel>(
                  its method; null where \
                  nothing was compared",
             Cell::Measured(Box::new(|row: &R| row.error())),
-        ),
+        )
+        .worse(Worse::Greater),
         ResultColumn::new(
             "converged",
             "",
             "true where error is within the accuracy asked for; null where nothing was compared",
             Cell::Flag(Box::new(|row: &R| row.converged())),
         ),
+    ]);
+    columns
+}
+
+/// The greatest or the least ratio, and its channel.
+pub fn extreme_ratio<R: Compared, C: Channel>(
+    channels: &[C],
+    name: &str,
+    of: fn(&R) -> Option<(usize, f64)>,
+    worse: Worse,
+    limit: f64,
+) -> Vec<ResultColumn<R>> {
+    let names = channels.iter().map(|channel| channel.name()).collect();
+    let number = Cell::Measured(Box::new(move |row: &R| of(row).map(|(_, ratio)| ratio)));
+    let channel = Cell::Name(names, Box::new(move |row: &R| of(row).map(|(channel, _)| channel)));
+    let text = format!("{} of the defined ratios; null if none is", worse.extreme());
+    let tie = format!("channel of ratio_{name}; the first of the plan's channels wins a tie");
+    vec![
+        ResultColumn::new(format!("ratio_{name}"), "1", text, number)
+            .worse(worse)
+            .limit(limit, 1.0),
+        ResultColumn::new(format!("ratio_{name}_channel"), "", tie, channel),
     ]
 }
 
@@ -195,12 +242,15 @@ pub fn run_columns<R: Compared>(statuses: Vec<&'static str>) -> Vec<ResultColumn
         "ok, or why the nonlinear model failed, or behind linear_ why the linear model alone did",
         Cell::Name(statuses, Box::new(|row: &R| Some(row.status()))),
     ));
-    columns.push(ResultColumn::new(
-        "fail_time_s",
-        "s",
-        "when the model named by status failed; null if none did or it never started",
-        Cell::Time(Box::new(|row: &R| row.fail_time_s())),
-    ));
+    columns.push(
+        ResultColumn::new(
+            "fail_time_s",
+            "s",
+            "when the model named by status failed; null if none did or it never started",
+            Cell::Time(Box::new(|row: &R| row.fail_time_s())),
+        )
+        .worse(Worse::Less),
+    );
     let counts: [(&str, &str, fn(&R, usize) -> u64); 2] =
         [("steps", "accepted", R::steps), ("rejected", "rejected", R::rejected)];
     for (name, kind, count) in counts {

@@ -2,7 +2,7 @@
 //! reports read it.
 
 use serde_json::Value;
-use sweep_parameter::Parameter as _;
+use sweep_parameter::{Parameter as _, RatioLimits};
 
 use crate::design::{Design, Distribution};
 use crate::model::Model;
@@ -275,8 +275,8 @@ impl<M: Model> Plan<M> {
 /// The verdict's rule.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reliability<M: Model> {
-    /// A point is reliable when its greatest ratio is below this.
-    pub ratio_limit: f64,
+    /// A point is reliable when its ratios are between these.
+    pub limits: RatioLimits,
     /// The channels that are compared, in column order.
     pub channels: Vec<M::Channel>,
 }

@@ -1,9 +1,6 @@
 //! What computes a model's rows.
 
-use sweep_parameter::Channel;
-
-use crate::boundary::quantity::{TracedQuantity, ratio};
-use crate::boundary::search::Distances;
+use crate::boundary::search::Values;
 use crate::estimate::Estimate;
 use crate::exit::Error;
 use crate::model::Model;
@@ -35,29 +32,20 @@ pub trait Swept: Rows {
         ""
     }
 
-    /// What a boundary can be drawn through, the default first.
-    fn quantities() -> Vec<String> {
-        let ratios =
-            Self::Channel::every().iter().map(|channel| format!("ratio_{}", channel.name()));
-        std::iter::once("ratio_max".to_owned()).chain(ratios).collect()
+    /// What a message about a column that no row has says of those that a grid file can ask for.
+    const FURTHER: &'static str = "";
+
+    /// Plans of the same points whose rows hold further columns, which this one does not ask for:
+    /// one plan for each thing that can be measured.
+    fn variants(_: &Plan<Self>) -> Vec<Plan<Self>> {
+        Vec::new()
     }
 
-    /// One of [`Self::quantities`], and the plan that computes it.
-    ///
-    /// # Errors
-    /// A plan that cannot compute it.
-    fn traced(plan: &Plan<Self>, name: &str) -> Result<(TracedQuantity, Plan<Self>), Error> {
-        Ok(ratio(plan, name))
-    }
-
-    /// What computes distances of a quantity from its limit.
+    /// What computes the numbers of one column of the plan's rows.
     ///
     /// # Errors
     /// As [`Self::engine`].
-    fn search<'a>(
-        plan: &'a Plan<Self>,
-        quantity: &TracedQuantity,
-    ) -> Result<Box<dyn Distances + 'a>, Error>;
+    fn search<'a>(plan: &'a Plan<Self>, column: &str) -> Result<Box<dyn Values + 'a>, Error>;
 
     /// Every parameter with its value, as `parameters` lists them; without a plan those that need
     /// no grid file.

@@ -1,5 +1,6 @@
 //! Numbers that can be set and swept: their ranges, their form in messages, the unit at the end of
-//! their names. Models and the engine share them.
+//! their names; and which way a number of a result is bad. Models, the engine and whoever reads
+//! results share them.
 
 use std::fmt;
 
@@ -71,6 +72,98 @@ impl Range {
         } else {
             self.to_string()
         }
+    }
+}
+
+/// Which way a number is bad.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Worse {
+    /// The greater it is.
+    Greater,
+    /// The less it is.
+    Less,
+}
+
+impl Worse {
+    /// As column dictionaries say it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Greater => "greater",
+            Self::Less => "less",
+        }
+    }
+
+    /// Of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::Greater, Self::Less].into_iter().find(|one| one.name() == name)
+    }
+
+    /// The worst value: the greatest or the least.
+    #[must_use]
+    pub const fn extreme(self) -> &'static str {
+        match self {
+            Self::Greater => "greatest",
+            Self::Less => "least",
+        }
+    }
+
+    /// How much worse `a` is than `b`; at most 0 where it is not.
+    #[must_use]
+    pub fn by(self, a: f64, b: f64) -> f64 {
+        match self {
+            Self::Greater => a - b,
+            Self::Less => b - a,
+        }
+    }
+}
+
+/// The value up to which a number is good, which has a meaning of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limit {
+    /// In the number's unit.
+    pub value: f64,
+    /// A difference from the limit that counts as much as a factor of e counts of a ratio, in the
+    /// number's unit.
+    pub scale: f64,
+}
+
+/// The ratios, nonlinear over linear, between which a linear model is trusted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RatioLimits {
+    /// The greatest ratio must be below this.
+    pub most: f64,
+    /// The least ratio must be above this, if it is asked for.
+    pub least: Option<f64>,
+}
+
+impl From<f64> for RatioLimits {
+    /// No lower limit.
+    fn from(most: f64) -> Self {
+        Self { most, least: None }
+    }
+}
+
+impl RatioLimits {
+    /// Whether a point with these least and greatest ratios is trusted.
+    #[must_use]
+    pub fn trust(self, least: f64, greatest: f64) -> bool {
+        greatest < self.most && self.least.is_none_or(|limit| least > limit)
+    }
+
+    /// How far such a point is from turning its verdict, as a share of the limit.
+    #[must_use]
+    pub fn margin(self, least: f64, greatest: f64) -> f64 {
+        let from = |ratio: f64, limit: f64| (ratio / limit - 1.0).abs();
+        let of_least = self.least.map_or(f64::INFINITY, |limit| from(least, limit));
+        from(greatest, self.most).min(of_least)
+    }
+
+    /// Below this ratio the linear model over-estimates as much as it may under-estimate.
+    #[must_use]
+    pub fn over_estimate(self) -> f64 {
+        self.least.unwrap_or(1.0 / self.most)
     }
 }
 

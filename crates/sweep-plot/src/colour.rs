@@ -80,14 +80,14 @@ pub(crate) enum ColourScale {
 
 impl ColourScale {
     /// For ratios around a limit.
-    pub(crate) fn ratio(values: impl Iterator<Item = f64>, limit: f64) -> Self {
+    pub(crate) fn ratio(values: impl Iterator<Item = f64>, limit: f64, reversed: bool) -> Self {
         let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((limit, limit));
         Self::Diverging {
             log: true,
             low: low.min(limit / 2.0),
             centre: limit,
             high: high.max(limit * 2.0),
-            reversed: false,
+            reversed,
             neutral: false,
         }
     }
@@ -115,32 +115,30 @@ impl ColourScale {
         Self::Diverging { log: false, low: -most, centre: 0.0, high: most, reversed, neutral: true }
     }
 
-    /// For gaps: below zero there is contact. Gaps that are all open, or all closed, have all the
-    /// colours for themselves.
-    pub(crate) fn gap(values: impl Iterator<Item = f64>) -> Self {
+    /// For what has a limit, which is the middle. Values that are all on one side of it have all
+    /// the colours for themselves. `reversed` where less is worse.
+    pub(crate) fn about(values: impl Iterator<Item = f64>, limit: f64, reversed: bool) -> Self {
         match extremes(values) {
-            Some((low, high)) if low < 0.0 && high > 0.0 => Self::Diverging {
-                log: false,
-                low,
-                centre: 0.0,
-                high,
-                reversed: true,
-                neutral: false,
-            },
-            found => Self::even(found.map(<[f64; 2]>::from).into_iter().flatten()),
+            Some((low, high)) if low < limit && high > limit => {
+                Self::Diverging { log: false, low, centre: limit, high, reversed, neutral: false }
+            }
+            found => Self::even(found.unwrap_or((0.0, 1.0))),
         }
     }
 
-    /// For what is read by its differences: from the least value to the greatest.
-    pub(crate) fn even(values: impl Iterator<Item = f64>) -> Self {
-        let (low, high) = extremes(values).unwrap_or((0.0, 1.0));
+    /// From the least value to the greatest.
+    fn even((low, high): (f64, f64)) -> Self {
         let high = if high > low { high } else { low + (0.1 * low.abs()).max(f64::EPSILON) };
         Self::Sequential(Scale::linear(low, high))
     }
 
-    /// For amplitudes: by the logarithm when they span more than a factor of ten.
+    /// For what has no limit: by the logarithm where all is above zero and spans more than a factor
+    /// of ten.
     pub(crate) fn amplitude(values: impl Iterator<Item = f64>) -> Self {
-        let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((0.5, 1.0));
+        let (low, high) = extremes(values).unwrap_or((0.5, 1.0));
+        if low <= 0.0 {
+            return Self::even((low, high));
+        }
         let (low, high) = if high > low { (low, high) } else { (0.9 * low, 1.1 * low) };
         Self::Sequential(if high > 10.0 * low {
             Scale::log(low, high)
@@ -222,7 +220,7 @@ mod tests {
 
     #[test]
     fn the_limit_is_the_middle_of_the_scale() {
-        let scale = ColourScale::ratio([1.0, 1.3, 50.0].into_iter(), 2.0);
+        let scale = ColourScale::ratio([1.0, 1.3, 50.0].into_iter(), 2.0, false);
         assert_eq!(scale.position(1.0), 0.0);
         assert_eq!(scale.position(2.0), 0.5);
         assert_eq!(scale.position(50.0), 1.0);
@@ -237,7 +235,7 @@ mod tests {
 
     #[test]
     fn without_colour_a_scale_is_still_a_scale() {
-        let limit = ColourScale::ratio([1.0, 9.0].into_iter(), 2.0);
+        let limit = ColourScale::ratio([1.0, 9.0].into_iter(), 2.0, false);
         let light = |level| {
             let [red, green, blue] = limit.colour(level).rgb.map(f64::from);
             0.2126 * red + 0.7152 * green + 0.0722 * blue
@@ -248,11 +246,11 @@ mod tests {
 
     #[test]
     fn gaps_without_contact_have_all_the_colours() {
-        let scale = ColourScale::gap([0.004, 0.012].into_iter());
+        let scale = ColourScale::about([0.004, 0.012].into_iter(), 0.0, true);
         assert_eq!([0.004, 0.012].map(|gap| scale.position(gap)), [0.0, 1.0]);
-        let mixed = ColourScale::gap([-0.001, 0.012].into_iter());
+        let mixed = ColourScale::about([-0.001, 0.012].into_iter(), 0.0, true);
         assert_eq!([-0.001, 0.0, 0.012].map(|gap| mixed.position(gap)), [0.0, 0.5, 1.0]);
-        assert!(ColourScale::even([3.0, 3.0].into_iter()).position(3.0).is_finite());
+        assert!(ColourScale::amplitude([3.0, 3.0].into_iter()).position(3.0).is_finite());
     }
 
     #[test]
@@ -277,7 +275,8 @@ mod tests {
 
     #[test]
     fn contact_is_red() {
-        let [red, _, blue] = ColourScale::gap([-0.004, 0.008].into_iter()).colour(0).rgb;
+        let [red, _, blue] =
+            ColourScale::about([-0.004, 0.008].into_iter(), 0.0, true).colour(0).rgb;
         assert!(red > blue);
     }
 }

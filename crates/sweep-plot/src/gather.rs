@@ -2,7 +2,7 @@
 //! number of cells, not of rows.
 //!
 //! A cell of one point has that point's values. A cell of several has the worst of them, column by
-//! column: the greatest amplitude and ratio, the least gap. It counts its reliable, unreliable and
+//! column: the greatest, or the least of what is the worse the less it is. It counts its reliable, unreliable and
 //! failed points.
 
 use std::collections::BTreeMap;
@@ -11,6 +11,7 @@ use super::error::PlotError;
 use super::grid::{Grid, GridAxis};
 use super::read::{Batch, Cells, ColumnFacts, Source};
 use super::table::{Column, NONE, SEVERAL, Table, Values, Words};
+use sweep_parameter::Worse;
 
 /// Least and greatest finite values of a column over all rows of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -186,8 +187,7 @@ impl Rule {
         match (column.name.as_str(), column.cells) {
             ("point" | "ratio_max_channel", _) => Self::OfGreatestRatio,
             (_, Cells::Words) => Self::Common,
-            ("fail_time_s", _) => Self::Least,
-            (name, Cells::Numbers) if name.starts_with("min_") => Self::Least,
+            _ if column.worse == Some(Worse::Less) => Self::Least,
             _ => Self::Greatest,
         }
     }

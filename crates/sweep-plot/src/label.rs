@@ -62,6 +62,20 @@ pub(crate) fn words(name: &str) -> String {
     capitalised(&parted(name).0.join(" "))
 }
 
+/// A column's name in words without its unit and its model, and the model: `min_gap_linear_m` is
+/// the "least gap" of "linear".
+pub(crate) fn of_model(name: &str) -> (String, &'static str) {
+    let (mut words, _) = parted(name);
+    let model = ["nonlinear", "linear"].into_iter().find(|model| words.contains(model));
+    words.retain(|word| Some(*word) != model);
+    match words.first_mut() {
+        Some(first) if *first == "min" => *first = "least",
+        Some(first) if *first == "max" => *first = "greatest",
+        _ => {}
+    }
+    (words.join(" "), model.unwrap_or(""))
+}
+
 /// A channel's name in words: `tub_front_y` is "tub front, vertical".
 pub(crate) fn channel(name: &str) -> String {
     for (suffix, words) in [("_y", ", vertical"), ("_z", ", horizontal")] {
@@ -170,6 +184,9 @@ mod tests {
             assert_eq!((words(name).as_str(), unit_of_name(name).as_str()), (plain, unit));
         }
         assert_eq!(channel("drum_front_z"), "drum front, horizontal");
+        assert_eq!(of_model("min_gap_linear_m"), ("least gap".to_owned(), "linear"));
+        assert_eq!(of_model("stop_2_force_nonlinear_n"), ("stop 2 force".to_owned(), "nonlinear"));
+        assert_eq!(of_model("static_sag_m"), ("static sag".to_owned(), ""));
     }
 
     #[test]

@@ -1,21 +1,60 @@
-//! What a map can show: one value per cell, with its words and colours.
+//! What a map can show: one column, with its words and colours.
 
+use sweep_parameter::Worse;
+
+use super::PlotOptions;
 use super::colour::ColourScale;
 use super::error::PlotError;
 use super::gather::{Divide, Map};
 use super::label::{self, capitalised};
-use super::read::{ColumnFacts, Source};
-use super::{PlotOptions, Quantity};
+use super::read::{ColumnFacts, Kind, Source};
 
-/// A quantity of a map and the column that holds it, before any row is read.
+/// A column of numbers that a map shows.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Shown {
-    /// What it is.
-    pub(crate) quantity: Quantity,
-    /// Its channel, if it has one; for a load, the stop or the foot.
+    facts: ColumnFacts,
+    /// What it is of.
+    pub(crate) group: Group,
+    /// Its channel, if it has one.
     pub(crate) channel: Option<String>,
-    /// Name of its column.
-    pub(crate) column: String,
+}
+
+/// What columns are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Group {
+    /// A ratio of both models.
+    Ratio,
+    /// An amplitude of the nonlinear model.
+    Nonlinear,
+    /// An amplitude of the linear model.
+    Linear,
+    /// Anything else.
+    Other,
+}
+
+impl Group {
+    /// Every group, in the order in which a page offers them.
+    pub(crate) const ALL: [Self; 4] = [Self::Ratio, Self::Nonlinear, Self::Linear, Self::Other];
+
+    /// As a page knows it; what the names of a channel's columns start with.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Ratio => "ratio",
+            Self::Nonlinear => "nonlinear",
+            Self::Linear => "linear",
+            Self::Other => "other",
+        }
+    }
+
+    /// In words, for a list to choose from.
+    pub(crate) const fn words(self) -> &'static str {
+        match self {
+            Self::Ratio => "ratio, nonlinear / linear",
+            Self::Nonlinear => "amplitude, nonlinear model",
+            Self::Linear => "amplitude, linear model",
+            Self::Other => "further quantities",
+        }
+    }
 }
 
 /// One value per cell of a map.
@@ -53,6 +92,8 @@ pub(crate) struct Level {
     pub(crate) value: f64,
     /// Distances from the level are taken by the logarithm.
     pub(crate) log: bool,
+    /// The side that is bad.
+    pub(crate) worse: Worse,
     /// Name of the line.
     pub(crate) line: String,
     /// What it means to lie above, within the picture and in the legend.
@@ -93,360 +134,139 @@ impl Layer {
     }
 }
 
-/// A quantity of a point that no channel has: of both models, or of the machine at rest.
-pub(crate) struct Whole {
-    /// Short name, of a chart's panel and of a page's row.
-    pub(crate) name: &'static str,
-    /// What it is, for headings and axes.
-    pub(crate) words: &'static str,
-    /// The same beside the colours.
-    label: &'static str,
-    /// The quantities by model (empty at rest) and column.
-    pub(crate) columns: &'static [(Quantity, &'static str, &'static str)],
-}
-
-/// Every [`Whole`], in the order in which a page offers them.
-pub(crate) const WHOLE: [Whole; 10] = [
-    Whole {
-        name: "gap",
-        words: "least gap between drum and tub",
-        label: "least gap over the run",
-        columns: &[
-            (Quantity::GapNonlinear, "nonlinear", "min_gap_nonlinear_m"),
-            (Quantity::GapLinear, "linear", "min_gap_linear_m"),
-        ],
-    },
-    Whole {
-        name: "cabinet_force",
-        words: "greatest force on the cabinet",
-        label: "greatest force in the window",
-        columns: &[
-            (Quantity::CabinetForceNonlinear, "nonlinear", "cabinet_force_nonlinear_n"),
-            (Quantity::CabinetForceLinear, "linear", "cabinet_force_linear_n"),
-        ],
-    },
-    Whole {
-        name: "clash_time",
-        words: "time of clash between drum and tub",
-        label: "time of clash in the window",
-        columns: &[
-            (Quantity::ClashTimeNonlinear, "nonlinear", "clash_time_nonlinear_s"),
-            (Quantity::ClashTimeLinear, "linear", "clash_time_linear_s"),
-        ],
-    },
-    Whole {
-        name: "static_sag",
-        words: "static sag of the tub",
-        label: "static sag of the tub",
-        columns: &[(Quantity::StaticSag, "", "static_sag_m")],
-    },
-    Whole {
-        name: "stop_force",
-        words: "greatest push of a stop",
-        label: "greatest push in the window",
-        columns: &[
-            (Quantity::StopForceNonlinear, "nonlinear", "stop_force_nonlinear_n"),
-            (Quantity::StopForceLinear, "linear", "stop_force_linear_n"),
-        ],
-    },
-    Whole {
-        name: "stop_contact",
-        words: "time that a stop is closed",
-        label: "time of contact in the window",
-        columns: &[
-            (Quantity::StopContactNonlinear, "nonlinear", "stop_contact_nonlinear_s"),
-            (Quantity::StopContactLinear, "linear", "stop_contact_linear_s"),
-        ],
-    },
-    Whole {
-        name: "foot_load",
-        words: "least load of a foot",
-        label: "least load in the window",
-        columns: &[
-            (Quantity::FootLoadNonlinear, "nonlinear", "foot_load_nonlinear_n"),
-            (Quantity::FootLoadLinear, "linear", "foot_load_linear_n"),
-        ],
-    },
-    Whole {
-        name: "slip_margin",
-        words: "least margin against slipping",
-        label: "least margin in the window",
-        columns: &[
-            (Quantity::SlipMarginNonlinear, "nonlinear", "slip_margin_nonlinear_n"),
-            (Quantity::SlipMarginLinear, "linear", "slip_margin_linear_n"),
-        ],
-    },
-    Whole {
-        name: "ratio_change",
-        words: "change of the greatest ratio, second over first",
-        label: "factor of the greatest ratio",
-        columns: &[(Quantity::RatioChange, "", "ratio_change")],
-    },
-    Whole {
-        name: "gap_change",
-        words: "change of the least gap, second less first",
-        label: "change of the least gap",
-        columns: &[(Quantity::GapChange, "", "gap_change_m")],
-    },
-];
-
-/// The names by which a channel's column can go: `ratio_<channel>` and the like, without
-/// `ratio_max`.
-pub(crate) fn channels<'a>(source: &'a Source, prefix: &str) -> Vec<(&'a str, &'a ColumnFacts)> {
-    let mut columns = source.with_prefix(prefix);
-    columns.retain(|(name, _)| *name != "max");
+/// The columns of a motion by channel: `ratio_<channel>` and the like, without the extremes of all.
+pub(crate) fn channels(source: &Source, group: Group) -> Vec<(&str, &ColumnFacts)> {
+    let prefix = format!("{}_", group.name());
+    let mut columns = source.with_prefix(&prefix);
+    columns.retain(|(name, _)| !["max", "min", "change"].contains(name));
     columns
 }
 
-/// What one stop or foot has of a [`Whole`].
-pub(crate) struct OfPart<'a> {
-    /// The part, as a channel: `stop_2`.
-    pub(crate) part: &'a str,
-    /// Short name, as [`Whole::name`]: `stop_2_force`.
+/// A quantity that no channel has, with its column of each model or the one of none.
+pub(crate) struct Family<'a> {
+    /// Without unit and model: `min_gap`.
     pub(crate) name: String,
-    /// As [`Whole::words`].
+    /// In words.
     pub(crate) words: String,
-    /// The columns by model.
-    pub(crate) columns: [(&'static str, &'a str); 2],
+    /// By model; the empty one where no model is named.
+    pub(crate) columns: Vec<(&'static str, &'a ColumnFacts)>,
 }
 
-impl Whole {
-    /// The columns of single stops or feet in a file, if there are several.
-    pub(crate) fn parts<'a>(&self, source: &'a Source) -> Vec<OfPart<'a>> {
-        let [(_, first, of_first), (_, second, of_second)] = self.columns else {
-            return Vec::new();
-        };
-        let what = self.name.split('_').next_back().unwrap_or_default();
-        let pairs = parts(source, of_first).into_iter().zip(parts(source, of_second));
-        pairs
-            .map(|((part, of_first), (_, of_second))| OfPart {
-                part,
-                name: format!("{part}_{what}"),
-                words: format!("{}: {}", self.words, label::channel(part)),
-                columns: [(*first, &of_first.name), (*second, &of_second.name)],
-            })
-            .collect()
-    }
-}
-
-/// The columns of single stops or feet beside the one of all, as channels: beside
-/// `stop_force_linear_n` stands `stop_2_force_linear_n`, of `stop_2`.
-pub(crate) fn parts<'a>(source: &'a Source, column: &str) -> Vec<(&'a str, &'a ColumnFacts)> {
-    let of_part = |facts: &'a ColumnFacts| Some((part_of(&facts.name, column)?, facts));
-    source.columns.iter().filter_map(of_part).collect()
-}
-
-/// The part that a column is of, if it stands beside this one of all.
-fn part_of<'a>(name: &'a str, column: &str) -> Option<&'a str> {
-    let (kind, what) = column.split_once('_')?;
-    let part = name.strip_suffix(what)?.strip_suffix('_')?;
-    let number = part.strip_prefix(kind)?.strip_prefix('_')?;
-    number.parse::<u32>().is_ok().then_some(part)
-}
-
-/// A column in words, if it is of a [`Whole`] or of one of its parts.
-pub(crate) fn words_of_whole(name: &str) -> Option<String> {
-    WHOLE.iter().find_map(|whole| {
-        let mut columns = whole.columns.iter().map(|(.., column)| *column);
-        if columns.clone().any(|column| column == name) {
-            return Some(capitalised(whole.words));
+/// Every family of a file, in file order.
+pub(crate) fn families(source: &Source) -> Vec<Family<'_>> {
+    let mut found: Vec<Family<'_>> = Vec::new();
+    for shown in all(source).into_iter().filter(|shown| shown.group == Group::Other) {
+        let Some(facts) = source.column(shown.column()) else { continue };
+        let (words, model) = label::of_model(&facts.name);
+        match found.iter_mut().find(|family| family.words == words) {
+            Some(family) => family.columns.push((model, facts)),
+            None => {
+                let name = words.replace(' ', "_");
+                found.push(Family { name, words, columns: vec![(model, facts)] });
+            }
         }
-        let part = columns.find_map(|column| part_of(name, column))?;
-        Some(format!("{}: {}", capitalised(whole.words), label::channel(part)))
-    })
+    }
+    found
 }
 
-/// What the options ask for; none if that is the status, which has no values.
+/// The one column that the options ask for; none if that is the status, which has no values.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] for a channel that the file does not have, [`PlotError::Unfit`] for a
-/// quantity that needs another choice of channel.
+/// As [`asked`]; [`PlotError::Unfit`] for several.
 pub(crate) fn chosen(source: &Source, options: &PlotOptions) -> Result<Option<Shown>, PlotError> {
-    let channel = match &options.channels[..] {
-        [] => None,
-        [one] => Some(one.as_str()),
-        _ => {
-            return Err(PlotError::Unfit(
-                "a map shows one channel at a time: give `--channel` once".to_owned(),
-            ));
-        }
-    };
-    let quantity = options.quantity;
-    match (quantity.prefix(), channel) {
-        (Some(_), None) if quantity == Quantity::Ratio => {
-            Ok(Some(Shown::whole(quantity, "ratio_max")))
-        }
-        (Some(prefix), None) => Err(PlotError::Unfit(format!(
-            "an amplitude is that of one channel: add `--channel NAME`, one of {}",
-            listed(&channels(source, prefix))
-        ))),
-        (Some(prefix), Some(channel)) => {
-            find(source, quantity, &channels(source, prefix), channel).map(Some)
-        }
-        (None, Some(channel)) => {
-            quantity.there(source)?;
-            let known = quantity.column().map_or_else(Vec::new, |column| parts(source, column));
-            if known.is_empty() {
-                return Err(PlotError::Unfit(format!(
-                    "{} belongs to no channel: leave out `--channel`",
-                    quantity.name().replace('-', " ")
-                )));
-            }
-            find(source, quantity, &known, channel).map(Some)
-        }
-        (None, None) => {
-            quantity.there(source)?;
-            Ok(quantity.column().map(|column| Shown::whole(quantity, column)))
-        }
+    let mut asked = asked(source, options)?;
+    match asked.len() {
+        0 | 1 => Ok(asked.pop().flatten()),
+        _ => Err(PlotError::Unfit(
+            "a map over two axes shows one column at a time: give `--quantity` once".to_owned(),
+        )),
     }
 }
 
-/// The channel that was asked for, among those that the quantity has.
-fn find(
+/// The columns that the options ask for, else the first that the file has to show; none for the
+/// status.
+///
+/// # Errors
+/// [`PlotError::NotThere`] for a column that the file does not have.
+pub(crate) fn asked(
     source: &Source,
-    quantity: Quantity,
-    known: &[(&str, &ColumnFacts)],
-    channel: &str,
-) -> Result<Shown, PlotError> {
-    match known.iter().find(|(name, _)| *name == channel) {
-        Some((name, column)) => Ok(Shown::of_channel(quantity, name, column)),
+    options: &PlotOptions,
+) -> Result<Vec<Option<Shown>>, PlotError> {
+    let mut all = all(source);
+    if options.quantity.is_empty() {
+        all.truncate(1);
+        return Ok(all.into_iter().map(Some).collect());
+    }
+    let known = || all.iter().map(Shown::column).chain([STATUS]).collect::<Vec<_>>().join(", ");
+    let of_name = |name: &String| match all.iter().find(|shown| shown.column() == name) {
+        None if name == STATUS => Ok(None),
         None => Err(PlotError::NotThere {
-            option: "--channel",
-            given: channel.to_owned(),
-            path: source.path.clone(),
-            what: "channel",
-            known: listed(known),
-        }),
-    }
-}
-
-/// Everything that a map file has to show, in the order in which a page offers it.
-pub(crate) fn all(source: &Source) -> Vec<Shown> {
-    let mut shown = vec![Shown::whole(Quantity::Ratio, "ratio_max")];
-    for quantity in [Quantity::Ratio, Quantity::Nonlinear, Quantity::Linear] {
-        let prefix = quantity.prefix().unwrap_or_default();
-        let channels = channels(source, prefix).into_iter();
-        shown.extend(channels.map(|(name, column)| Shown::of_channel(quantity, name, column)));
-    }
-    let whole = WHOLE.iter().flat_map(|whole| whole.columns);
-    let there = whole.filter(|(_, _, column)| source.column(column).is_some());
-    for (quantity, _, column) in there {
-        shown.push(Shown::whole(*quantity, column));
-        let parts = parts(source, column).into_iter();
-        shown.extend(parts.map(|(name, column)| Shown::of_channel(*quantity, name, column)));
-    }
-    shown
-}
-
-/// Words with the model that they are of, if they are of one.
-fn of_model(words: &str, model: &str) -> String {
-    if model.is_empty() { words.to_owned() } else { format!("{words}, {model} model") }
-}
-
-fn listed(columns: &[(&str, &ColumnFacts)]) -> String {
-    columns.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
-}
-
-/// The level of a column that has one: the limit of ratios, and gaps that close.
-pub(crate) fn divide(ratio_limit: f64, column: &str) -> Option<Divide> {
-    if column.starts_with("ratio_") {
-        Some(Divide { value: ratio_limit, log: true })
-    } else {
-        column.starts_with("min_gap_").then_some(Divide { value: 0.0, log: false })
-    }
-}
-
-impl Quantity {
-    /// What the column of a channel starts with, of a quantity that channels have.
-    fn prefix(self) -> Option<&'static str> {
-        match self {
-            Self::Ratio => Some("ratio_"),
-            Self::Nonlinear => Some("nonlinear_"),
-            Self::Linear => Some("linear_"),
-            _ => None,
-        }
-    }
-
-    /// A quantity without a channel: the quantity, its model (empty at rest), its column.
-    pub(crate) fn whole(self) -> Option<(&'static Whole, &'static str, &'static str)> {
-        WHOLE.iter().find_map(|whole| {
-            let (_, model, column) = whole.columns.iter().find(|(known, ..)| *known == self)?;
-            Some((whole, *model, *column))
-        })
-    }
-
-    /// The column of a quantity that channels do not have.
-    fn column(self) -> Option<&'static str> {
-        self.whole().map(|(_, _, column)| column)
-    }
-
-    /// Refuses a quantity that a map file does not have.
-    ///
-    /// # Errors
-    /// [`PlotError::NotThere`].
-    pub(crate) fn there(self, source: &Source) -> Result<(), PlotError> {
-        if self.column().is_none_or(|column| source.column(column).is_some()) {
-            return Ok(());
-        }
-        let whole = WHOLE.iter().flat_map(|whole| whole.columns);
-        let there = whole.filter(|(_, _, column)| source.column(column).is_some());
-        let known = ["ratio", "nonlinear", "linear"].into_iter();
-        let known = known.chain(there.map(|(quantity, ..)| quantity.name())).chain(["status"]);
-        Err(PlotError::NotThere {
             option: "--quantity",
-            given: self.name().to_owned(),
+            given: name.clone(),
             path: source.path.clone(),
-            what: "quantity",
-            known: known.collect::<Vec<_>>().join(", "),
-        })
-    }
+            what: "column of numbers to show",
+            known: known(),
+        }),
+        shown => Ok(shown.cloned()),
+    };
+    options.quantity.iter().map(of_name).collect()
+}
 
-    /// As on the command line; a page knows it by the same name.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Ratio => "ratio",
-            Self::Nonlinear => "nonlinear",
-            Self::Linear => "linear",
-            Self::GapNonlinear => "gap-nonlinear",
-            Self::GapLinear => "gap-linear",
-            Self::CabinetForceNonlinear => "cabinet-force-nonlinear",
-            Self::CabinetForceLinear => "cabinet-force-linear",
-            Self::ClashTimeNonlinear => "clash-time-nonlinear",
-            Self::ClashTimeLinear => "clash-time-linear",
-            Self::StaticSag => "static-sag",
-            Self::StopForceNonlinear => "stop-force-nonlinear",
-            Self::StopForceLinear => "stop-force-linear",
-            Self::StopContactNonlinear => "stop-contact-nonlinear",
-            Self::StopContactLinear => "stop-contact-linear",
-            Self::FootLoadNonlinear => "foot-load-nonlinear",
-            Self::FootLoadLinear => "foot-load-linear",
-            Self::SlipMarginNonlinear => "slip-margin-nonlinear",
-            Self::SlipMarginLinear => "slip-margin-linear",
-            Self::RatioChange => "ratio-change",
-            Self::GapChange => "gap-change",
-            Self::Status => "status",
-        }
-    }
+/// The column that says how each point ended.
+pub(crate) const STATUS: &str = "status";
 
-    /// In words, for a list to choose from.
-    pub(crate) fn words(self) -> String {
-        match (self, self.whole()) {
-            (Self::Ratio, _) => "ratio, nonlinear / linear".to_owned(),
-            (Self::Nonlinear, _) => "amplitude, nonlinear model".to_owned(),
-            (Self::Linear, _) => "amplitude, linear model".to_owned(),
-            (_, Some((whole, model, _))) => of_model(whole.words, model),
-            (_, None) => "status".to_owned(),
-        }
-    }
+/// Everything that a map file has to show, in the order in which a page offers it: every column of
+/// numbers but the axes and counts.
+pub(crate) fn all(source: &Source) -> Vec<Shown> {
+    let axes = super::swept::columns(source);
+    let numbers = source.numeric().filter(|column| {
+        let is_count = ["point", "steps_", "rejected_", "starts"];
+        !axes.contains(column) && !is_count.iter().any(|start| column.name.starts_with(start))
+    });
+    let mut all: Vec<Shown> = numbers.map(Shown::new).collect();
+    let first = |shown: &Shown| !["ratio_max", "ratio_change"].contains(&shown.column());
+    all.sort_by_key(|shown| (shown.group as usize, first(shown), shown.channel.is_some()));
+    all
+}
+
+/// The level of a column that has one.
+pub(crate) fn divide(source: &Source, column: &str) -> Option<Divide> {
+    let shown = Shown::new(source.column(column)?);
+    let (value, log) = (shown.limit(source)?, shown.group == Group::Ratio);
+    Some(Divide { value, log })
 }
 
 impl Shown {
-    fn whole(quantity: Quantity, column: &str) -> Self {
-        Self { quantity, channel: None, column: column.to_owned() }
+    fn new(facts: &ColumnFacts) -> Self {
+        let name = facts.name.as_str();
+        let of =
+            |group: &Group| Some((*group, name.strip_prefix(group.name())?.strip_prefix('_')?));
+        let found = Group::ALL.iter().find_map(of).filter(|(_, rest)| *rest != "change");
+        let (group, channel) = found.map_or((Group::Other, None), |(group, rest)| {
+            (group, (!["max", "min"].contains(&rest)).then(|| rest.to_owned()))
+        });
+        Self { facts: facts.clone(), group, channel }
     }
 
-    fn of_channel(quantity: Quantity, channel: &str, column: &ColumnFacts) -> Self {
-        Self { quantity, channel: Some(channel.to_owned()), column: column.name.clone() }
+    /// Name of its column.
+    pub(crate) fn column(&self) -> &str {
+        &self.facts.name
+    }
+
+    /// Which way it is bad, if it is.
+    pub(crate) const fn worse(&self) -> Option<Worse> {
+        self.facts.worse
+    }
+
+    /// Whether it alone is what the verdict goes by.
+    pub(crate) fn is_verdict(&self, source: &Source) -> bool {
+        self.column() == "ratio_max" && source.column("ratio_min").is_none()
+    }
+
+    /// Up to where it is good, in the column's unit: its own limit, or the run's of ratios.
+    fn limit(&self, source: &Source) -> Option<f64> {
+        let of_run = || (self.group == Group::Ratio).then(|| source.ratio_limit());
+        self.facts.limit.or_else(of_run)
     }
 
     /// The values of a map that was read with this column.
@@ -454,49 +274,37 @@ impl Shown {
     /// # Errors
     /// [`PlotError::Column`] if it was not, because the file does not have it.
     pub(crate) fn layer(&self, map: &Map) -> Result<Layer, PlotError> {
-        let numbers = map.table.numbers(&self.column)?;
-        let facts = map.table.source.column(&self.column);
-        let (unit, factor) = label::shown(facts.map_or("", |facts| &facts.unit));
-        let extent = map.extents.get(&self.column).copied();
+        let numbers = map.table.numbers(self.column())?;
+        let (unit, factor) = label::shown(&self.facts.unit);
+        let extent = map.extents.get(self.column()).copied();
         let extent =
             extent.into_iter().flat_map(|extent| extent.values().map(|value| value * factor));
-        let limit = map.table.source.ratio_limit();
-        let ratio = self.quantity == Quantity::Ratio;
+        let source = &map.table.source;
+        let ratio = self.group == Group::Ratio;
         // No excitation can leave an infinite ratio, which has no place on any scale.
         let value = |value: f64| {
             if ratio && !(value > 0.0 && value.is_finite()) { f64::NAN } else { value }
         };
-        let scale = match self.quantity {
-            Quantity::Ratio => ColourScale::ratio(extent, limit),
-            Quantity::GapChange => ColourScale::difference(extent, true),
-            Quantity::RatioChange => ColourScale::factor(extent),
-            Quantity::GapNonlinear
-            | Quantity::GapLinear
-            | Quantity::FootLoadNonlinear
-            | Quantity::FootLoadLinear
-            | Quantity::SlipMarginNonlinear
-            | Quantity::SlipMarginLinear => ColourScale::gap(extent),
-            Quantity::ClashTimeNonlinear
-            | Quantity::ClashTimeLinear
-            | Quantity::StopForceNonlinear
-            | Quantity::StopForceLinear
-            | Quantity::StopContactNonlinear
-            | Quantity::StopContactLinear
-            | Quantity::StaticSag => ColourScale::even(extent),
-            _ => ColourScale::amplitude(extent),
+        let is_less_worse = self.worse() == Some(Worse::Less);
+        let scale = match (source.kind, self.limit(source)) {
+            (Kind::Differences, _) if self.column() == "ratio_change" => {
+                ColourScale::factor(extent)
+            }
+            (Kind::Differences, _) => ColourScale::difference(extent, is_less_worse),
+            (_, Some(limit)) if ratio => ColourScale::ratio(extent, limit, is_less_worse),
+            (_, Some(limit)) => ColourScale::about(extent, limit * factor, is_less_worse),
+            (_, None) => ColourScale::amplitude(extent),
         };
-        let (title, label) = self.words(map.table.source.compared(), unit);
+        let (title, label) = self.words(source, unit);
+        let level = self.level(source);
         Ok(Layer {
-            nonlinear: match self.quantity.whole() {
-                Some((_, model, _)) => model == "nonlinear",
-                None => self.quantity != Quantity::Linear,
-            },
+            nonlinear: self.group == Group::Ratio || label::of_model(self.column()).1 != "linear",
             title,
             label,
             values: numbers.iter().map(|number| value(number * factor)).collect(),
-            level: self.level(limit).filter(|_| matches!(scale, ColourScale::Diverging { .. })),
+            level: level.filter(|_| matches!(scale, ColourScale::Diverging { .. })),
             scale,
-            divided: map.sides.get(&self.column).map(|sides| Divided {
+            divided: map.sides.get(self.column()).map(|sides| Divided {
                 both: sides.both.clone(),
                 undefined: sides.undefined.clone(),
                 mean: sides.mean.iter().map(|mean| mean * factor).collect(),
@@ -504,73 +312,70 @@ impl Shown {
         })
     }
 
+    /// For a list to choose from, beside its group.
+    pub(crate) fn short(&self) -> String {
+        match (self.group, &self.channel, label::of_model(self.column())) {
+            (_, Some(channel), _) => capitalised(&label::channel(channel)),
+            (Group::Ratio, None, _) => {
+                format!("{} ratio", capitalised(self.worse().unwrap_or(Worse::Greater).extreme()))
+            }
+            (_, None, (words, "")) => capitalised(&words),
+            (_, None, (words, model)) => format!("{}, {model} model", capitalised(&words)),
+        }
+    }
+
     /// For the heading, and beside the colours.
-    pub(crate) fn words(&self, compared: &str, unit: &str) -> (String, String) {
-        let channel = self.channel.as_deref().map(label::channel);
-        match (self.quantity, channel) {
-            (Quantity::Ratio, None) => (
-                "Where the linear model can be trusted".to_owned(),
-                format!("largest ratio of {compared}, nonlinear / linear"),
-            ),
-            (Quantity::Ratio, Some(channel)) => (
+    pub(crate) fn words(&self, source: &Source, unit: &str) -> (String, String) {
+        let compared = source.compared();
+        match (self.group, self.channel.as_deref().map(label::channel)) {
+            (Group::Ratio, None) => {
+                let (title, which) = match self.worse() {
+                    Some(Worse::Less) => ("Where the linear model over-estimates", "least"),
+                    _ if self.is_verdict(source) => {
+                        ("Where the linear model can be trusted", "largest")
+                    }
+                    _ => ("Where the linear model under-estimates", "largest"),
+                };
+                (title.to_owned(), format!("{which} ratio of {compared}, nonlinear / linear"))
+            }
+            (Group::Ratio, Some(channel)) => (
                 format!("Ratio of {compared}: {channel}"),
                 format!("ratio of {compared}, nonlinear / linear"),
             ),
-            (quantity, channel) => match quantity.whole() {
-                Some((whole, model, _)) => {
-                    let of_part = channel.map_or_else(String::new, |part| format!(": {part}"));
-                    (
-                        label::capitalised(&of_model(whole.words, model)) + &of_part,
-                        label::with_unit(whole.label, unit),
-                    )
-                }
-                None => {
-                    let title = format!("{}: {}", quantity.words(), channel.unwrap_or_default());
-                    (label::capitalised(&title), label::with_unit(&quantity.words(), unit))
-                }
-            },
+            (group @ (Group::Nonlinear | Group::Linear), Some(channel)) => (
+                capitalised(&format!("{}: {channel}", group.words())),
+                label::with_unit(group.words(), unit),
+            ),
+            _ => {
+                let (words, _) = label::of_model(self.column());
+                (self.short(), label::with_unit(&words, unit))
+            }
         }
     }
 
     /// The level that divides its values, if one does.
-    pub(crate) fn level(&self, limit: f64) -> Option<Level> {
-        let said = label::significant(limit, 4);
-        let words = |[inside, legend]: [&str; 2]| [inside.to_owned(), legend.to_owned()];
-        match (self.quantity, &self.channel) {
-            (Quantity::Ratio, channel) => {
-                let [at_least, below] =
-                    [format!("ratio {said} or more"), format!("ratio below {said}")];
-                let line = format!("boundary: ratio {said}");
-                let level = Level {
-                    value: limit,
-                    log: true,
-                    line,
-                    above: [format!("ratio above {said}"), at_least.clone()],
-                    below: [below.clone(), below],
-                    both: "both: points on either side".to_owned(),
-                };
-                Some(match channel {
-                    Some(_) => level,
-                    None => Level {
-                        above: words([
-                            "linear model unreliable",
-                            &format!("unreliable: {at_least}"),
-                        ]),
-                        below: words(["linear model reliable", &format!("reliable: below {said}")]),
-                        both: "both: reliable and unreliable points".to_owned(),
-                        ..level
-                    },
-                })
-            }
-            (Quantity::GapNonlinear | Quantity::GapLinear, _) => Some(Level {
-                value: 0.0,
-                log: false,
-                line: "gap closed".to_owned(),
-                above: words(["drum and tub apart", "apart"]),
-                below: words(["drum touches tub", "contact: gap below 0"]),
-                both: "both: points with and without contact".to_owned(),
-            }),
-            _ => None,
+    pub(crate) fn level(&self, source: &Source) -> Option<Level> {
+        let (limit, worse) = (self.limit(source)?, self.worse().unwrap_or(Worse::Greater));
+        let (unit, factor) = label::shown(&self.facts.unit);
+        let (value, log) = (limit * factor, self.group == Group::Ratio);
+        let said = format!("{} {unit}", label::significant(value, 4)).trim_end().to_owned();
+        let what = if log { "ratio".to_owned() } else { label::of_model(self.column()).0 };
+        let [above, below] = [format!("{what} above {said}"), format!("{what} below {said}")];
+        let mut level = Level {
+            value,
+            log,
+            worse,
+            line: format!("boundary: {what} {said}"),
+            above: [above, format!("{what} {said} or more")],
+            below: [below.clone(), below],
+            both: "both: points on either side".to_owned(),
+        };
+        if self.is_verdict(source) {
+            level.above =
+                ["linear model unreliable".to_owned(), format!("unreliable: ratio {said} or more")];
+            level.below = ["linear model reliable".to_owned(), format!("reliable: below {said}")];
+            level.both = "both: reliable and unreliable points".to_owned();
         }
+        Some(level)
     }
 }

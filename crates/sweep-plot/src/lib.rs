@@ -47,6 +47,7 @@ mod tests_stability;
 mod thin;
 mod together;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub use error::PlotError;
@@ -55,7 +56,7 @@ pub use share::Share;
 use chart::Chart;
 use cuts::Cuts;
 use figures::boundary::Overlay;
-use gather::Map;
+use gather::{Divide, Map};
 use grid::Grid;
 use raster::Typeface;
 use read::{Kind, Source};
@@ -69,55 +70,6 @@ use sweep_files::{self as files, Output};
 
 /// Image pixels to a scene pixel in a PNG: sharp on dense screens and in print.
 const PNG_SCALE: f64 = 2.0;
-
-/// What a map shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
-pub enum Quantity {
-    /// Nonlinear over linear amplitude: of `--channel`, or the largest of all
-    #[default]
-    Ratio,
-    /// Amplitude of `--channel` in the nonlinear model
-    Nonlinear,
-    /// Amplitude of `--channel` in the linear model
-    Linear,
-    /// Least gap between drum and tub in the nonlinear model
-    GapNonlinear,
-    /// Least gap between drum and tub in the linear model
-    GapLinear,
-    /// Greatest force on the cabinet in the nonlinear model, if the run has this metric
-    CabinetForceNonlinear,
-    /// Greatest force on the cabinet in the linear model, if the run has this metric
-    CabinetForceLinear,
-    /// How long drum and tub clash in the nonlinear model, if the run has this metric
-    ClashTimeNonlinear,
-    /// How long drum and tub clash in the linear model, if the run has this metric
-    ClashTimeLinear,
-    /// How far the tub sinks at rest, if the run has this metric
-    StaticSag,
-    /// Greatest push of a stop in the nonlinear model, if the run has this metric
-    StopForceNonlinear,
-    /// Greatest push of a stop in the linear model, if the run has this metric
-    StopForceLinear,
-    /// How long a stop is closed in the nonlinear model, if the run has this metric
-    StopContactNonlinear,
-    /// How long a stop is closed in the linear model, if the run has this metric
-    StopContactLinear,
-    /// Least load of a foot in the nonlinear model, if the run has this metric
-    FootLoadNonlinear,
-    /// Least load of a foot in the linear model, if the run has this metric
-    FootLoadLinear,
-    /// Least margin against slipping in the nonlinear model, if the run has this metric
-    SlipMarginNonlinear,
-    /// Least margin against slipping in the linear model, if the run has this metric
-    SlipMarginLinear,
-    /// Of differences: how the greatest ratio changed, as a factor
-    RatioChange,
-    /// Of differences: how the least gap changed in the nonlinear model
-    GapChange,
-    /// How each point ended
-    Status,
-}
 
 /// Which figure of a file that has several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -162,9 +114,10 @@ impl View {
 pub struct PlotOptions {
     /// Modes, trace, design, stability: which figure; by default the first.
     pub view: Option<View>,
-    /// Map: what the colours are. Design: what depends on the parameters.
-    pub quantity: Quantity,
-    /// Map, design: the channel of the quantity. Trace: the channels shown.
+    /// Map: the column that the colours are, by default the greatest ratio, or `status`; over one
+    /// axis the columns that are drawn. Design: the column that depends on the parameters.
+    pub quantity: Vec<String>,
+    /// Trace, dwell, responses of a stability file: the channels shown.
     pub channels: Vec<String>,
     /// Map of three or more axes: where to cut an axis beyond the second, by name and value.
     /// Stability: values of the points that are shown.
@@ -218,6 +171,8 @@ pub struct Live {
     pub accuracy: f64,
     /// Ratios below it are reliable.
     pub ratio_limit: f64,
+    /// And above this, if it is asked for.
+    pub ratio_min: Option<f64>,
     /// The rungs of the nonlinear and of the linear model, in words.
     pub rungs: [Vec<String>; 2],
     /// Of the program that chose them.
@@ -304,13 +259,7 @@ fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>
 
 /// The options of the picture that a page shows where scripts are switched off.
 fn of_still(options: &PlotOptions) -> PlotOptions {
-    let mut still = PlotOptions { traces: None, live: None, ..options.clone() };
-    // A page lets its reader choose the channel.
-    if still.channels.is_empty() && matches!(still.quantity, Quantity::Nonlinear | Quantity::Linear)
-    {
-        still.quantity = Quantity::default();
-    }
-    still
+    PlotOptions { traces: None, live: None, ..options.clone() }
 }
 
 /// Whether a map file's points are a design's. One that lists a whole grid, or spreads points over
@@ -344,12 +293,14 @@ const PICTURE_CELLS: usize = 1 << 17;
 
 fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
     let axes = swept::axes(&source)?;
-    let limit = source.ratio_limit();
-    let divide = |name: &str| layer::divide(limit, name);
+    let levels: BTreeMap<String, Divide> = (source.columns.iter())
+        .filter_map(|column| Some((column.name.clone(), layer::divide(&source, &column.name)?)))
+        .collect();
+    let divide = |name: &str| levels.get(name).copied();
     if format != Format::Html && axes.len() > 1 {
         let shown = layer::chosen(&source, options)?;
         let columns: Vec<&str> =
-            shown.iter().map(|shown| shown.column.as_str()).chain(["status"]).collect();
+            shown.iter().map(|shown| shown.column()).chain([layer::STATUS]).collect();
         let cuts = Cuts::of_picture(&source, &axes, options)?;
         let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
         let map = Map::read(source, grid, &columns, divide)?;
@@ -370,11 +321,6 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
     if axes.len() == 1 {
         let map = Map::read(source, grid, &columns, divide)?;
         return written(&map.table.source, &figures::curves::chart(&map, options)?, format);
-    }
-    // An amplitude without a channel is chosen on the page.
-    let choice = matches!(options.quantity, Quantity::Nonlinear | Quantity::Linear);
-    if !(choice && options.channels.is_empty()) {
-        layer::chosen(&source, options)?;
     }
     let map = Map::read(source, grid, &columns, divide)?;
     Ok(html::map_page(&map, &cuts, options)?.into_bytes())
@@ -398,7 +344,7 @@ fn overlay(path: &Path, axes: &[SweptAxis], map: &Source) -> Result<Overlay, Plo
     Ok(line)
 }
 
-/// A picture of what differs between two maps: of ratios, unless the options say gaps.
+/// A picture of what differs between two maps.
 fn differences(
     source: Source,
     options: &PlotOptions,
@@ -410,11 +356,7 @@ fn differences(
             "{path} is a differences file, which is drawn as .svg or .png over two axes or more"
         )));
     }
-    let mut options = options.clone();
-    if options.quantity == Quantity::default() {
-        options.quantity = Quantity::RatioChange;
-    }
-    map(source, &options, format)
+    map(source, options, format)
 }
 
 fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
@@ -473,12 +415,13 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
     let responses = stability && options.view == Some(View::Responses);
     let over_time = trace && options.view != Some(View::Passages);
     let rules = [
-        ("--quantity", options.quantity != Quantity::default(), map || design, "maps"),
+        ("--quantity", !options.quantity.is_empty(), map || design, "maps"),
         (
             "--channel",
             !options.channels.is_empty(),
-            map || design || trace || responses || dwell,
-            "maps, traces, dwells and responses of stability files",
+            trace || responses || dwell,
+            "traces, dwells and responses of stability files (a map shows a channel's column: \
+             --quantity ratio_tub_yaw)",
         ),
         (
             "--at",

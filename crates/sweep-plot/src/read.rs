@@ -12,8 +12,8 @@ use serde_json::Value;
 
 use super::error::PlotError;
 use super::label;
-use sweep_files::cells;
-use sweep_files::{self as files, FileError, ParquetFile};
+use sweep_files::{self as files, FileError, ParquetFile, cells, key};
+use sweep_parameter::Worse;
 
 /// What a file holds. Its columns show which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +73,10 @@ pub(crate) struct ColumnFacts {
     pub(crate) description: String,
     /// What its cells are.
     pub(crate) cells: Cells,
+    /// Which way it is bad, if the file says so.
+    pub(crate) worse: Option<Worse>,
+    /// Up to where it is good, if the file says so.
+    pub(crate) limit: Option<f64>,
     /// Its place among the file's fields.
     field: usize,
 }
@@ -383,6 +387,11 @@ fn column(field: &Field, place: usize) -> Option<ColumnFacts> {
         unit: if unit == "1" { String::new() } else { unit },
         description: told("description").unwrap_or_default(),
         cells,
+        // A file that went through another program has its columns' names alone.
+        worse: told(key::WORSE)
+            .and_then(|name| Worse::named(&name))
+            .or_else(|| field.name().starts_with("min_").then_some(Worse::Less)),
+        limit: told(key::LIMIT).and_then(|limit| limit.parse().ok()),
         field: place,
     })
 }

@@ -46,6 +46,16 @@ impl Sample {
         self.column(name, unit, Arc::new(values.collect::<Float64Array>()))
     }
 
+    /// The last column, with which way it is bad and up to where it is good.
+    pub(crate) fn bad(mut self, worse: &str, limit: Option<f64>) -> Self {
+        let (field, _) = self.columns.last_mut().unwrap();
+        let mut metadata = field.metadata().clone();
+        metadata.insert("worse".to_owned(), worse.to_owned());
+        metadata.extend(limit.map(|limit| ("limit".to_owned(), limit.to_string())));
+        *field = field.clone().with_metadata(metadata);
+        self
+    }
+
     pub(crate) fn counts(self, name: &str, values: impl IntoIterator<Item = u64>) -> Self {
         self.column(name, "1", Arc::new(UInt64Array::from_iter_values(values)))
     }
@@ -177,7 +187,11 @@ impl MapSample<'_> {
             .flags("reliable", ratio.iter().map(reliable))
             .flags("sensitive", points.iter().map(|at| Some((self.chaotic)(at))))
             .numbers("min_gap_nonlinear_m", "m", model(0).into_iter().map(|yaw| 0.01 - 0.1 * yaw))
+            .bad("less", Some(0.0))
+            .numbers("margin_n", "N", model(0).into_iter().map(|yaw| 1.0 - yaw))
+            .bad("less", None)
             .numbers("min_gap_linear_m", "m", model(1).into_iter().map(|yaw| 0.01 - 0.1 * yaw))
+            .bad("less", Some(0.0))
             .words("status", yaws.iter().map(status))
             .numbers("fail_time_s", "s", yaws.iter().map(fail_time))
             .counts("steps_nonlinear", points.iter().map(|_| 250_000))

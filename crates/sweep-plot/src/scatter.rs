@@ -1,13 +1,14 @@
 //! Points that are scattered rather than on a grid: what a design's figures need of its file.
 
+use super::PlotOptions;
 use super::error::PlotError;
 use super::influence::Influence;
 use super::label::{self, Label};
-use super::layer::{self, Level, Shown};
+use super::layer::{self, Group, Level, Shown};
 use super::read::Source;
 use super::share::Share;
 use super::swept;
-use super::{PlotOptions, Quantity};
+use sweep_parameter::Worse;
 
 /// Most numbers of points that are kept; of a longer file some points are picked.
 const MOST_NUMBERS: usize = 600_000;
@@ -74,17 +75,23 @@ struct Wanted<'a> {
     shown: Shown,
     factor: f64,
     level: Option<Level>,
+    /// The quantity is what the verdict goes by.
+    is_verdict: bool,
 }
 
 impl Wanted<'_> {
     fn side(&self, raw: f64, verdict: Option<&str>, status: Option<&str>) -> Side {
         // The verdict itself, where that is what is shown or nothing else divides the points.
-        let own = self.level.as_ref().filter(|_| self.shown.column != RATIO);
+        let own = self.level.as_ref().filter(|_| !self.is_verdict);
         let good = match own {
-            Some(level) if level.log => {
-                (raw > 0.0 && raw.is_finite()).then_some(raw * self.factor < level.value)
+            Some(level) => {
+                let value = raw * self.factor;
+                let is_good = match level.worse {
+                    Worse::Greater => value < level.value,
+                    Worse::Less => value >= level.value,
+                };
+                (raw.is_finite() && (raw > 0.0 || !level.log)).then_some(is_good)
             }
-            Some(level) => raw.is_finite().then_some(raw * self.factor >= level.value),
             None => verdict.map(|verdict| verdict == "true"),
         };
         match good {
@@ -95,9 +102,6 @@ impl Wanted<'_> {
         }
     }
 }
-
-/// The column of the verdict's ratio.
-const RATIO: &str = "ratio_max";
 
 impl Scatter {
     /// Reads a design's file: every point for the counts, and as many as a figure keeps.
@@ -114,15 +118,16 @@ impl Scatter {
                     .to_owned(),
             ));
         };
-        let facts = source.column(&shown.column);
+        let facts = source.column(shown.column());
         let (unit, factor) = label::shown(facts.map_or("", |facts| &facts.unit));
-        let (title, label) = shown.words(source.compared(), unit);
-        let level = shown.level(source.ratio_limit());
-        let ratio = shown.quantity == Quantity::Ratio;
+        let (title, label) = shown.words(&source, unit);
+        let level = shown.level(&source);
+        let ratio = shown.group == Group::Ratio;
         let axes: Vec<&str> =
             swept::columns(&source).iter().map(|column| column.name.as_str()).collect();
         let stride = (source.rows * (axes.len() + 3)).div_ceil(MOST_NUMBERS).max(1) as u64;
-        let wanted = Wanted { axes, shown, factor, level };
+        let is_verdict = shown.is_verdict(&source);
+        let wanted = Wanted { axes, shown, factor, level, is_verdict };
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); wanted.axes.len()];
         let (mut points, mut quantity, mut sides) = (Vec::new(), Vec::new(), Vec::new());
         let (mut counts, mut row) = ([0; 4], 0_usize);
@@ -130,11 +135,11 @@ impl Scatter {
             .axes
             .iter()
             .copied()
-            .chain([&*wanted.shown.column, "reliable", "status"])
+            .chain([wanted.shown.column(), "reliable", layer::STATUS])
             .collect();
         for batch in source.batches(&names)? {
             let batch = batch?;
-            let raw = batch.numbers(&wanted.shown.column)?;
+            let raw = batch.numbers(wanted.shown.column())?;
             let (verdicts, statuses) = (batch.words("reliable")?, batch.words("status")?);
             let axes = wanted.axes.iter().map(|name| batch.numbers(name));
             let axes = axes.collect::<Result<Vec<_>, _>>()?;
@@ -175,13 +180,11 @@ impl Scatter {
         if parameters.is_empty() {
             return Err(empty(&source, "no parameter varies from point to point"));
         }
-        let log = match shown.quantity {
-            Quantity::Ratio => true,
-            _ => level.is_none() && crate::chart::spans_decades(quantity.iter().copied()),
-        };
+        let spans = || crate::chart::spans_decades(quantity.iter().copied());
+        let log = ratio || (level.is_none() && spans());
         let words = label.strip_suffix(&format!(" ({unit})")).unwrap_or(&label);
         let (label, short) =
-            (Label::new(&label::capitalised(words), unit), Label::new(&short(&shown), unit));
+            (Label::new(&label::capitalised(words), unit), Label::new(&shown.short(), unit));
         Ok(Self {
             source,
             title,
@@ -205,12 +208,11 @@ impl Scatter {
 
     /// What it means to be on a side.
     pub(crate) fn words(&self, side: Side) -> String {
-        let level = self.level.as_ref();
-        match (side, level) {
-            (Side::Good, Some(level)) if level.log => level.below[1].clone(),
-            (Side::Bad, Some(level)) if level.log => level.above[1].clone(),
-            (Side::Good, Some(level)) => level.above[1].clone(),
-            (Side::Bad, Some(level)) => level.below[1].clone(),
+        match (side, &self.level) {
+            (Side::Good | Side::Bad, Some(level)) => {
+                let is_above = (side == Side::Bad) == (level.worse == Worse::Greater);
+                if is_above { level.above[1].clone() } else { level.below[1].clone() }
+            }
             (Side::Good, None) => "reliable".to_owned(),
             (Side::Bad, None) => "unreliable".to_owned(),
             (Side::Undefined, _) => "undefined: no excitation".to_owned(),
@@ -258,21 +260,6 @@ impl Scatter {
 
 /// Makes the second choice of points independent of the first.
 const SECOND: u64 = 0x5bf0_3635_0000_0000;
-
-/// A quantity in two words or three.
-fn short(shown: &Shown) -> String {
-    let channel = shown.channel.as_deref().map(label::channel);
-    match (shown.quantity.whole(), channel) {
-        (Some((whole, ..)), None) => label::capitalised(&whole.name.replace('_', " ")),
-        // The part stands first, as in the column's name.
-        (Some((whole, ..)), Some(part)) => {
-            let what = whole.name.split('_').next_back().unwrap_or_default();
-            label::capitalised(&format!("{part} {what}"))
-        }
-        (None, None) => "Greatest ratio".to_owned(),
-        (None, Some(channel)) => label::capitalised(&channel),
-    }
-}
 
 /// Whether a row is among the one of `stride` that are kept. Every `stride`-th would pick from a
 /// part of the box alone where the stride is a power of two and the points are Sobol's.

@@ -1,7 +1,7 @@
 //! Figures of scattered points.
 
 use super::sample::Sample;
-use super::tests::{carried, draw, message, svg};
+use super::tests::{carried, draw, message, showing, svg};
 use super::*;
 
 /// Points whose ratio is 4 where the mass is above a half, whatever the damping; of the rows, the
@@ -36,6 +36,7 @@ fn points_with(count: u32, further: impl Fn(Sample) -> Sample) -> Sample {
         .numbers("ratio_max", "1", of(&ratio))
         .flags("reliable", (0..count as usize).map(|k| ratio(k).map(|ratio| ratio < 2.0)))
         .numbers("min_gap_nonlinear_m", "m", of(&|k| ratio(k).map(|ratio| 0.003 - 0.001 * ratio)))
+        .bad("less", Some(0.0))
         .words("status", (0..count).map(|k| Some(if k + 1 == count { "diverged" } else { "ok" })))
         .metadata("sweep.plan", plan)
 }
@@ -140,15 +141,13 @@ fn a_histogram_tells_the_share_and_how_sure_it_is() {
     assert!(figure.contains("51.0 % of the points reliable"), "{figure}");
     assert!(figure.contains("41.3 to 60.6 % (Wilson)"), "{figure}");
     assert!(figure.contains("1 undefined · 1 failed"), "{figure}");
-    let quantity = Quantity::GapNonlinear;
-    let gap = svg(points(102), &PlotOptions { quantity, ..view(View::Histogram) });
-    assert!(gap.contains("51.0 % of the points apart"), "{gap}");
-    let yaw = PlotOptions {
-        quantity: Quantity::Nonlinear,
-        channels: vec!["tub_yaw".to_owned()],
-        ..view(View::Histogram)
+    let histogram = |column| {
+        let options = PlotOptions { view: Some(View::Histogram), ..showing(column) };
+        svg(points(102), &options)
     };
-    assert!(svg(points(102), &yaw).contains("51.0 % of the points reliable"));
+    let gap = histogram("min_gap_nonlinear_m");
+    assert!(gap.contains("51.0 % of the points with least gap 0 mm or more"), "{gap}");
+    assert!(histogram("nonlinear_tub_yaw").contains("51.0 % of the points reliable"));
 }
 
 #[test]
@@ -201,8 +200,7 @@ fn many_points_are_picked_not_all_drawn_and_all_counted() {
 fn a_grid_is_no_design_and_a_list_of_a_grid_is_a_map() {
     let refused = message(draw(super::sample::map(), &view(View::Scatter), "a.svg"));
     assert!(refused.contains("`--view` is for designs"), "{refused}");
-    let status = PlotOptions { quantity: Quantity::Status, ..PlotOptions::default() };
-    assert!(message(draw(points(50), &status, "a.svg")).contains("no number"));
+    assert!(message(draw(points(50), &showing("status"), "a.svg")).contains("no number"));
     let at = PlotOptions { at: vec![("x".to_owned(), 1.0)], ..PlotOptions::default() };
     assert!(message(draw(points(50), &at, "a.svg")).contains("`--at` is for maps"));
     let listed = || {

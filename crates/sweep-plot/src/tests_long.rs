@@ -86,7 +86,8 @@ fn a_cell_of_several_points_shows_the_worst_and_says_what_it_holds() {
         ["points", "reliable", "unreliable"].map(|name| floats(&data["counts"][name]));
     let worst = floats(&data["columns"]["ratio_max"]["data"]);
     let index = floats(&data["columns"]["point"]["data"]);
-    let gap = floats(&data["columns"]["min_gap_nonlinear_m"]["data"]);
+    let [gap, margin] =
+        ["min_gap_nonlinear_m", "margin_n"].map(|name| floats(&data["columns"][name]["data"]));
     let says_both = bits(&data["layers"][0]["both"]);
     let within = |span: &[f64; 2]| (span[0] as usize..=span[1] as usize).map(|k| k as f64);
     let mut both = 0;
@@ -103,6 +104,7 @@ fn a_cell_of_several_points_shows_the_worst_and_says_what_it_holds() {
             assert!((worst[cell] - greatest).abs() < 1e-6 * greatest);
             let least_gap = 0.01 - 0.1 * 0.01 * greatest;
             assert!((gap[cell] - least_gap).abs() < 1e-8, "the least gap of the cell");
+            assert!((margin[cell] - 1.0 + 0.01 * greatest).abs() < 1e-6, "and its least margin");
             let index = index[cell] as usize;
             let at = [index / counts[1], index % counts[1]].map(|place| place as f64);
             assert_eq!(ratio(&at), greatest, "the point named is the worst one");
@@ -164,9 +166,7 @@ fn undefined_and_sensitive_points_show_in_their_cell() {
     }
     // The linear model is never chaotic.
     let output = folder.path().join("linear.svg");
-    let channels = vec!["tub_yaw".to_owned()];
-    let options = PlotOptions { quantity: Quantity::Linear, channels, ..PlotOptions::default() };
-    render(&input, &options, &output).unwrap();
+    render(&input, &super::tests::showing("linear_tub_yaw"), &output).unwrap();
     assert!(!std::fs::read_to_string(output).unwrap().contains("sensitive"));
 }
 

@@ -26,5 +26,5 @@ pub use condition::{Condition, Mistake};
 pub use error::ResultsError;
 pub use export::{Format, export};
 pub use require::{Checked, Offender, check};
-pub use rows::{Cell, CellKind, Column, ResultTable};
-pub use top::{Order, top};
+pub use rows::{Cell, CellKind, Column, ResultTable, ratio_limits};
+pub use top::top;

@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::condition::{Condition, Context, Folded, each_row};
 use crate::error::ResultsError;
 use crate::rows::{Cell, ResultTable};
+use crate::top::{keep_worst, most_held};
 
 /// A row that does not keep a condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -37,7 +38,7 @@ pub struct Checked {
     pub folded: Vec<Cell>,
     /// How many rows those are.
     pub folded_rows: Vec<u64>,
-    /// The first of the rows that do not keep it.
+    /// Rows that do not keep it: the worst in the first of its columns that can be bad.
     pub offenders: Vec<Offender>,
 }
 
@@ -72,7 +73,10 @@ pub fn check(
         folded: folds.into_iter().map(|fold| fold.value).collect(),
         offenders: Vec::new(),
     };
-    let mut whole = None;
+    let (mut whole, mut offenders) = (None, Vec::new());
+    let column = |(k, name): (usize, &String)| Some((k, table.column(name)?.worse?));
+    let by = condition.columns.iter().enumerate().find_map(column);
+    let held = if by.is_some() { most_held(most_offenders) } else { most_offenders };
     let places = table.places();
     let place = Condition {
         columns: places.iter().map(|name| (*name).to_owned()).collect(),
@@ -91,7 +95,7 @@ pub fn check(
             None => checked.undefined += 1,
         }
         let offends = !(allow_null && truth.is_none());
-        if offends && checked.offenders.len() < most_offenders {
+        if offends && offenders.len() < held {
             let own = condition.columns.len();
             let placed = places.iter().enumerate().map(|(k, name)| (*name, own + k));
             let read = condition.columns.iter().enumerate().map(|(k, name)| (name.as_str(), k));
@@ -99,14 +103,25 @@ pub fn check(
             let cells = placed
                 .chain(read)
                 .map(|(name, column)| (name.to_owned(), at.rows.cell(column, at.row)));
-            checked.offenders.push(Offender {
+            let offender = Offender {
                 row: at.rows.first + at.row as u64,
                 undefined: truth.is_none(),
                 cells: cells.collect(),
-            });
+            };
+            let value = by.and_then(|(column, _)| at.rows.cell(column, at.row).number());
+            offenders.push((value, offender));
+            if let Some((_, worse)) = by
+                && offenders.len() == held
+            {
+                keep_worst(&mut offenders, worse, most_offenders);
+            }
         }
         Ok(())
     })?;
+    if let Some((_, worse)) = by {
+        keep_worst(&mut offenders, worse, most_offenders);
+    }
+    checked.offenders = offenders.into_iter().map(|(_, offender)| offender).collect();
     checked.holds = checked.rows > 0
         && if condition.by_row {
             checked.failing == 0 && (allow_null || checked.undefined == 0)
@@ -142,6 +157,14 @@ mod tests {
         assert_eq!(first.cells[1].1, Cell::Number(0.1));
         assert_eq!(first.cells[3].1, Cell::Number(2.5));
         assert!(found.offenders[1].undefined);
+    }
+
+    #[test]
+    fn the_worst_of_the_rows_that_break_a_condition_come_first() {
+        // Gaps fall with the ratio: 0.009, 0.0085, 0.0075, null, 0.006, 0.0088 m.
+        let found = checked("min_gap_nonlinear_m > 0.0089", None, false);
+        assert_eq!((found.failing, found.undefined), (4, 1));
+        assert_eq!(found.offenders.iter().map(|o| o.row).collect::<Vec<_>>(), [4, 2, 1]);
     }
 
     #[test]

@@ -9,6 +9,7 @@ use parquet::arrow::ProjectionMask;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 use sweep_files::{FileError, ParquetFile, cells, key};
+use sweep_parameter::{RatioLimits, Worse};
 
 use crate::error::ResultsError;
 
@@ -48,6 +49,8 @@ pub struct Column {
     pub kind: CellKind,
     /// Whether the file keeps it as whole numbers.
     pub whole: bool,
+    /// Which way it is bad, if the file says so.
+    pub worse: Option<Worse>,
     field: usize,
 }
 
@@ -84,6 +87,14 @@ impl Serialize for Cell {
             Self::Flag(flag) => serializer.serialize_bool(*flag),
         }
     }
+}
+
+/// The limits of a plan's ratios.
+#[must_use]
+pub fn ratio_limits(plan: &Value) -> Option<RatioLimits> {
+    let reliability = &plan["reliability"];
+    let most = reliability["ratio_limit"].as_f64()?;
+    Some(RatioLimits { most, least: reliability["ratio_min"].as_f64() })
 }
 
 /// Rows decoded at once.
@@ -285,6 +296,7 @@ fn column(field: &Field, place: usize) -> Option<Column> {
         description: told("description"),
         kind,
         whole: field.data_type().is_integer(),
+        worse: Worse::named(&told(key::WORSE)),
         field: place,
     })
 }

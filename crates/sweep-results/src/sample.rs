@@ -11,6 +11,7 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde_json::{Value, json};
 use sweep_files::key;
+use sweep_parameter::Worse;
 
 use crate::rows::ResultTable;
 
@@ -33,7 +34,9 @@ pub(crate) fn texts(values: &[&str]) -> ArrayRef {
 pub(crate) fn write(path: &Path, columns: Vec<Made>, keys: &[(&str, Value)]) {
     let field = |(name, unit, array): &Made| {
         let unit = ("unit".to_owned(), (*unit).to_owned());
-        let metadata = std::collections::HashMap::from([unit]);
+        let is_gap = name.starts_with("min_gap");
+        let worse = is_gap.then(|| (key::WORSE.to_owned(), Worse::Less.name().to_owned()));
+        let metadata: std::collections::HashMap<_, _> = [unit].into_iter().chain(worse).collect();
         Field::new(*name, array.data_type().clone(), true).with_metadata(metadata)
     };
     let schema = Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<_>>()));

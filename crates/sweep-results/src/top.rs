@@ -5,17 +5,10 @@ use std::cmp::Ordering;
 use crate::condition::{Condition, each_row};
 use crate::error::ResultsError;
 use crate::rows::{Cell, CellKind, ResultTable};
+use sweep_parameter::Worse;
 
-/// Which rows come first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// The greatest.
-    Descending,
-    /// The least.
-    Ascending,
-}
-
-/// The first `count` rows by the column `by`, or in file order, of those for which `keep` is true,
+/// The first `count` rows by the column `by`, as if it were the worse the greater or the less it
+/// is, or in file order, of those for which `keep` is true,
 /// as the cells of `columns`. Rows without a value of `by` come last, equal ones in file order.
 ///
 /// # Errors
@@ -25,7 +18,7 @@ pub fn top(
     table: &ResultTable,
     columns: &[&str],
     keep: Option<&Condition>,
-    by: Option<(&str, Order)>,
+    by: Option<(&str, Worse)>,
     count: usize,
 ) -> Result<Vec<Vec<Cell>>, ResultsError> {
     for name in columns.iter().copied().chain(by.map(|(name, _)| name)) {
@@ -49,8 +42,6 @@ pub fn top(
         by_row: true,
     };
     let mut found: Vec<(Option<f64>, Vec<Cell>)> = Vec::new();
-    // Sorting now and then keeps what is held at twice what is asked for.
-    let most = count.saturating_mul(2).max(1024);
     each_row(table, &[&cells], keep, |at| {
         if by.is_none() && found.len() == count {
             return Ok(());
@@ -61,27 +52,35 @@ pub fn top(
         });
         let row = (0..columns.len()).map(|column| at.rows.cell(column, at.row)).collect();
         found.push((value, row));
-        if found.len() == most {
-            sort(&mut found, by);
-            found.truncate(count);
+        if let Some((_, worse)) = by
+            && found.len() == most_held(count)
+        {
+            keep_worst(&mut found, worse, count);
         }
         Ok(())
     })?;
-    sort(&mut found, by);
-    found.truncate(count);
+    if let Some((_, worse)) = by {
+        keep_worst(&mut found, worse, count);
+    }
     Ok(found.into_iter().map(|(_, row)| row).collect())
 }
 
-fn sort(found: &mut [(Option<f64>, Vec<Cell>)], by: Option<(&str, Order)>) {
-    let Some((_, order)) = by else { return };
+/// Puts the worst first, those without a value last, and keeps so many.
+pub(crate) fn keep_worst<T>(found: &mut Vec<(Option<f64>, T)>, worse: Worse, count: usize) {
     // A stable sort: rows of one value stay in file order.
     found.sort_by(|(a, _), (b, _)| match (a, b) {
-        (Some(a), Some(b)) if order == Order::Ascending => a.total_cmp(b),
+        (Some(a), Some(b)) if worse == Worse::Less => a.total_cmp(b),
         (Some(a), Some(b)) => b.total_cmp(a),
         (Some(_), None) => Ordering::Less,
         (None, Some(_)) => Ordering::Greater,
         (None, None) => Ordering::Equal,
     });
+    found.truncate(count);
+}
+
+/// Sorting now and then keeps what is held at twice what is asked for.
+pub(crate) fn most_held(count: usize) -> usize {
+    count.saturating_mul(2).max(1024)
 }
 
 #[cfg(test)]
@@ -89,7 +88,7 @@ mod tests {
     use super::*;
     use crate::sample;
 
-    fn ratios(keep: Option<&str>, order: Order, count: usize) -> Vec<Cell> {
+    fn ratios(keep: Option<&str>, order: Worse, count: usize) -> Vec<Cell> {
         let table = sample::table();
         let keep = keep.map(|keep| Condition::parse(keep, &table).unwrap());
         let by = Some(("ratio_max", order));
@@ -100,17 +99,17 @@ mod tests {
     #[test]
     fn rows_come_in_order_and_those_without_a_value_last() {
         let numbers = |values: &[f64]| values.iter().map(|v| Cell::Number(*v)).collect::<Vec<_>>();
-        assert_eq!(ratios(None, Order::Descending, 2), numbers(&[4.0, 2.5]));
-        assert_eq!(ratios(None, Order::Ascending, 3), numbers(&[1.0, 1.2, 1.5]));
-        assert_eq!(ratios(None, Order::Ascending, 9).last(), Some(&Cell::Null));
-        assert_eq!(ratios(Some("not sensitive"), Order::Descending, 1), numbers(&[2.5]));
-        assert!(ratios(Some("false"), Order::Descending, 1).is_empty());
+        assert_eq!(ratios(None, Worse::Greater, 2), numbers(&[4.0, 2.5]));
+        assert_eq!(ratios(None, Worse::Less, 3), numbers(&[1.0, 1.2, 1.5]));
+        assert_eq!(ratios(None, Worse::Less, 9).last(), Some(&Cell::Null));
+        assert_eq!(ratios(Some("not sensitive"), Worse::Greater, 1), numbers(&[2.5]));
+        assert!(ratios(Some("false"), Worse::Greater, 1).is_empty());
     }
 
     #[test]
     fn what_has_no_order_is_refused() {
         let table = sample::table();
-        let by = |name| top(&table, &["point"], None, Some((name, Order::Descending)), 1);
+        let by = |name| top(&table, &["point"], None, Some((name, Worse::Greater)), 1);
         assert!(matches!(by("status"), Err(ResultsError::NoOrder { .. })));
         assert!(matches!(by("none"), Err(ResultsError::Column { .. })));
         assert!(by("reliable").is_ok());

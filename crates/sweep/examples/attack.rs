@@ -288,7 +288,7 @@ fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
 
 fn verdict(plan: &Plan, outcome: &Outcome) -> Option<bool> {
     let rule = &plan.reliability;
-    Verdict::new(outcome, rule.channels.len(), rule.ratio_limit).reliable
+    Verdict::new(outcome, rule.channels.len(), rule.limits).reliable
 }
 
 fn statuses(outcome: &Outcome) -> [Status; 2] {

@@ -6,10 +6,12 @@ use crate::model::Washer;
 use crate::plan::Plan;
 use sweep_engine::Swept as _;
 use sweep_engine::boundary::file::{job, table};
+use sweep_engine::boundary::quantity;
 use sweep_engine::boundary::search::{BoundaryError, BoundaryTask, Models, Stopped};
 use sweep_engine::boundary::{Edge, EdgeKind, Traced, trace};
 use sweep_engine::interrupt::Interrupt;
-use sweep_engine::store::{OpenedTrials, Trials};
+use sweep_engine::store::{OpenedTrials, Rows as _, Trials};
+use sweep_parameter::Worse;
 use sweep_plot::contour::zero_lines;
 use washer_row::{Criterion, Outcome, Verdict};
 
@@ -50,9 +52,9 @@ fn traced(
     threads: usize,
     interrupt: &Interrupt,
 ) -> Result<Traced, Stopped> {
-    let (quantity, _) = Washer::traced(plan, "ratio_max").unwrap();
-    let distances = Washer::search(plan, &quantity).unwrap();
-    let models = Models::new(plan, distances, threads, interrupt, &|_| {}).unwrap();
+    let (quantity, _) = quantity::traced(plan, "ratio_max", None).unwrap();
+    let values = Washer::search(plan, &quantity.name).unwrap();
+    let models = Models::new(plan, (&quantity, values), threads, interrupt, &|_| {}).unwrap();
     trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {})
 }
 
@@ -67,7 +69,7 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
     let task = BoundaryTask::new(&plan, Some(0.5), 3).unwrap();
     let interrupt = Interrupt::new();
     let traced = [1, 3].map(|threads| traced(&plan, &task, threads, &interrupt).unwrap());
-    let (quantity, _) = Washer::traced(&plan, "ratio_max").unwrap();
+    let (quantity, _) = quantity::traced(&plan, "ratio_max", None).unwrap();
     let job = job(&plan, &quantity, &task);
     let [one, three] =
         [0, 1].map(|k| table(&job, &plan, &quantity, &task, &traced[k]).into_bytes().unwrap());
@@ -111,7 +113,7 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
 
 /// The distance of an outcome's greatest ratio from the limit.
 fn distance(outcome: &Outcome, plan: &Plan) -> f64 {
-    let (quantity, _) = Washer::traced(plan, "ratio_max").unwrap();
+    let (quantity, _) = quantity::traced(plan, "ratio_max", None).unwrap();
     let verdict = Verdict::new(outcome, plan.reliability.channels.len(), quantity.limit);
     quantity.distance(verdict.greatest.unwrap().1)
 }
@@ -189,7 +191,7 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
     let whole = traced(&plan, &task, 1, &Interrupt::new()).unwrap();
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.parquet");
-    let (quantity, _) = Washer::traced(&plan, "ratio_max").unwrap();
+    let (quantity, _) = quantity::traced(&plan, "ratio_max", None).unwrap();
     let job = job(&plan, &quantity, &task);
     let mut stops = 0;
     let (found, trials) = loop {
@@ -202,8 +204,8 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
                 interrupt.raise(2);
             }
         };
-        let distances = Washer::search(&plan, &quantity).unwrap();
-        let models = Models::new(&plan, distances, 2, &interrupt, &tell).unwrap();
+        let values = Washer::search(&plan, &quantity.name).unwrap();
+        let models = Models::new(&plan, (&quantity, values), 2, &interrupt, &tell).unwrap();
         let models = models.keeping(*trials);
         let found = trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {});
         let trials = models.into_kept().unwrap();
@@ -279,18 +281,66 @@ fn plans_without_a_boundary_say_why() {
 }
 
 #[test]
-fn every_quantity_is_found_by_its_name_and_back_from_its_distance() {
+fn every_column_of_numbers_that_is_bad_one_way_has_a_boundary() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    for name in Washer::quantities().iter().filter(|name| *name != "growth") {
-        let (quantity, _) = Washer::traced(&plan, name).unwrap();
-        assert_eq!(&quantity.name, name);
-        assert_eq!(quantity.value(0.0), quantity.limit);
-        for value in [0.5, 1.5, 3.0] {
-            let back = quantity.value(quantity.distance(value));
-            assert!((back - value).abs() < 1e-15 * 4.0, "{name}: {back}");
-        }
+    let offered = quantity::offered(&plan);
+    let names: Vec<&str> = offered.iter().map(|(column, _)| column.name.as_str()).collect();
+    assert_eq!(names[0], "ratio_max");
+    for name in [
+        "ratio_min",
+        "ratio_drum_rear_y",
+        "nonlinear_tub_yaw",
+        "min_gap_linear_m",
+        "cabinet_force_nonlinear_n",
+        "static_sag_m",
+        "damper_1_speed_linear_m_per_s",
+    ] {
+        assert!(names.contains(&name), "{name}: {names:?}");
     }
-    let (_, of_one) = Washer::traced(&plan, "ratio_tub_yaw").unwrap();
+    // The paper's machine has no feet and no stops, and the grid no speeds.
+    for name in ["steps_nonlinear", "slip_margin_nonlinear_n", "growth_per_s", "damping_n_s_per_m"]
+    {
+        assert!(!names.contains(&name), "{name}");
+    }
+    for name in names {
+        let (quantity, plan) = quantity::traced(&plan, name, Some(0.75)).unwrap();
+        assert_eq!((quantity.name.as_str(), quantity.value(0.0)), (name, 0.75));
+        for value in [0.5, 1.5, 3.0] {
+            let distance = quantity.distance(value);
+            assert_eq!(distance < 0.0, (quantity.worse == Worse::Greater) == (value < 0.75));
+            assert!((quantity.value(distance) - value).abs() < 1e-14, "{name}");
+        }
+        assert!(Washer::layout(&plan).position(name).is_some(), "{name}");
+    }
+    let (_, of_one) = quantity::traced(&plan, "ratio_tub_yaw", None).unwrap();
     assert_eq!(of_one.reliability.channels, [washer_model::Channel::TubYaw]);
-    assert!(Washer::traced(&plan, "growth").unwrap_err().to_string().contains("[stability]"));
+    let refused = |name, limit| quantity::traced(&plan, name, limit).unwrap_err().to_string();
+    assert!(refused("growth_per_s", None).contains("[stability]"));
+    assert!(refused("cabinet_force", None).contains("did you mean `cabinet_force_nonlinear_n`?"));
+    assert!(refused("cabinet_force_linear_n", None).contains("no limit of its own"));
+    assert!(refused("ratio_max", Some(0.0)).contains("greater than 0"));
+    assert!(refused("clash_time_linear_s", Some(0.0)).contains("greater than 0"));
+}
+
+#[test]
+fn a_force_crosses_its_limit_where_the_grid_says_so() {
+    let plan = plan(&format!("{HEAD}{GRID}"));
+    let limit = 900.0;
+    let (quantity, plan) =
+        quantity::traced(&plan, "cabinet_force_nonlinear_n", Some(limit)).unwrap();
+    let task = BoundaryTask::new(&plan, Some(2.0), 3).unwrap();
+    let values = Washer::search(&plan, &quantity.name).unwrap();
+    let interrupt = Interrupt::new();
+    let models = Models::new(&plan, (&quantity, values), 2, &interrupt, &|_| {}).unwrap();
+    let rows = trace(&models, &task.firsts, 1, &task.search, &mut |_| {}).unwrap().curves.remove(0);
+    let crossings = rows.iter().flat_map(|row| row.edges.iter().map(|edge| (row.first, edge)));
+    let mut found = 0;
+    for (mass, edge) in crossings.filter(|(_, edge)| edge.kind == EdgeKind::Crossing) {
+        let ends = edge.bracket.unwrap().map(|damping| vec![mass, damping]);
+        let outcomes = ModelEngine::new(&plan).unwrap().evaluate_at(&ends);
+        let forces: Vec<f64> = outcomes.iter().map(|of| of.nonlinear.metrics[0]).collect();
+        assert!((forces[0] < limit) != (forces[1] < limit), "{mass} kg: {forces:?}");
+        found += 1;
+    }
+    assert!(found > 0, "{rows:?}");
 }

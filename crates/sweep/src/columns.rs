@@ -6,6 +6,7 @@ use sweep_engine::columns::{
 };
 use sweep_engine::store::{Column, Done, Job, Kind as Cells, Layout, Row, Rows, axis_columns};
 use sweep_files::{FileKind, key};
+use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Beyond, Channel, Disturbance, Kind, Motion};
 use washer_row::{Level, Measures, Metric, Outcome, ROW_STATUSES, Trajectory, Verdict, row_status};
 
@@ -40,7 +41,7 @@ struct ResultRow {
 pub(crate) struct Columns {
     columns: Vec<WasherColumn>,
     channels: usize,
-    ratio_limit: f64,
+    limits: RatioLimits,
 }
 
 impl Columns {
@@ -55,8 +56,7 @@ impl Columns {
     }
 
     fn of(asked: &Asked) -> Self {
-        let (channels, ratio_limit) = (asked.channels.len(), asked.ratio_limit);
-        Self { columns: asked.columns(), channels, ratio_limit }
+        Self { columns: asked.columns(), channels: asked.channels.len(), limits: asked.limits }
     }
 
     /// The rows of what came of a point.
@@ -66,9 +66,19 @@ impl Columns {
     }
 
     fn row(&self, outcome: Outcome) -> Row {
-        let verdict = Verdict::new(&outcome, self.channels, self.ratio_limit);
+        row(&self.columns, &self.result(outcome))
+    }
+
+    /// The number of one column of what came of a point.
+    pub(crate) fn number(&self, column: &str, outcome: &Outcome) -> Option<f64> {
+        let column = self.columns.iter().find(|known| known.declared.name == column)?;
+        column.number(&self.result(outcome.clone()))
+    }
+
+    fn result(&self, outcome: Outcome) -> ResultRow {
+        let verdict = Verdict::new(&outcome, self.channels, self.limits);
         let (status, fail_time_s) = row_status(&outcome);
-        row(&self.columns, &ResultRow { outcome, verdict, status, fail_time_s })
+        ResultRow { outcome, verdict, status, fail_time_s }
     }
 }
 
@@ -91,6 +101,10 @@ impl Compared for ResultRow {
 
     fn greatest(&self) -> Option<(usize, f64)> {
         self.verdict.greatest
+    }
+
+    fn least(&self) -> Option<(usize, f64)> {
+        self.verdict.least
     }
 
     fn reliable(&self) -> Option<bool> {
@@ -134,17 +148,17 @@ impl Compared for ResultRow {
 pub(crate) fn of_run(plan: &Plan) -> Layout {
     let reliability = &plan.reliability;
     let measures = plan.model.measures.clone();
-    of_measures(axis_columns(plan), &reliability.channels, reliability.ratio_limit, measures)
+    of_measures(axis_columns(plan), &reliability.channels, reliability.limits, measures)
 }
 
 /// The same, by what it depends on.
 pub(crate) fn of_measures(
     axes: Vec<Column>,
     channels: &[Channel],
-    ratio_limit: f64,
+    limits: RatioLimits,
     measures: Measures,
 ) -> Layout {
-    let asked = Asked { channels: channels.to_vec(), ratio_limit, measures, rows: RowKind::Run };
+    let asked = Asked { channels: channels.to_vec(), limits, measures, rows: RowKind::Run };
     let columns = Columns::of(&asked).columns;
     Layout {
         axes,
@@ -199,7 +213,7 @@ pub(crate) fn at_speeds<'a>(
 /// What the columns depend on.
 struct Asked {
     channels: Vec<Channel>,
-    ratio_limit: f64,
+    limits: RatioLimits,
     measures: Measures,
     rows: RowKind,
 }
@@ -216,7 +230,7 @@ impl Asked {
             RowKind::Dwell(_) => Measures::default(),
         };
         let channels = plan.reliability.channels.clone();
-        Self { channels, ratio_limit: plan.reliability.ratio_limit, measures, rows }
+        Self { channels, limits: plan.reliability.limits, measures, rows }
     }
 
     /// Every column, in order: the one place that says what the file holds.
@@ -226,14 +240,14 @@ impl Asked {
             columns.extend(growth_columns(""));
             let amplitude = "largest deviation from equilibrium over a turn";
             let ratio = "nonlinear over linear amplitude; null where that is zero";
-            columns.extend(amplitude_columns(&self.channels, amplitude, ratio));
-            let [greatest, channel, ..] = self.verdict_columns();
-            columns.extend([greatest, channel, dwell_status_column()]);
+            columns.extend(amplitude_columns(&self.channels, self.limits, amplitude, ratio));
+            columns.extend(self.verdict_columns().into_iter().take(2));
+            columns.push(dwell_status_column());
             return columns;
         }
         let criterion = self.measures.criterion;
         let (amplitude, ratio) = (criterion.amplitude(), criterion.ratio());
-        columns.extend(amplitude_columns(&self.channels, amplitude, ratio));
+        columns.extend(amplitude_columns(&self.channels, self.limits, amplitude, ratio));
         columns.extend(self.verdict_columns());
         columns.extend(gap_columns());
         columns.extend(self.metric_columns());
@@ -241,15 +255,10 @@ impl Asked {
         columns
     }
 
-    fn verdict_columns(&self) -> [WasherColumn; 7] {
+    fn verdict_columns(&self) -> Vec<WasherColumn> {
         let told = "what the row's numbers come from: fast, fine and finest are rungs of the fast \
                     method, the others methods of that name";
-        verdict_columns(
-            &self.channels,
-            self.ratio_limit,
-            Level::ALL.map(Level::name).to_vec(),
-            told,
-        )
+        verdict_columns(&self.channels, self.limits, Level::ALL.map(Level::name).to_vec(), told)
     }
 
     /// Columns of the metrics that are asked for, and no others.
@@ -263,12 +272,9 @@ impl Asked {
             }
             if !metric.is_of_model() {
                 let cell = Cell::Measured(Box::new(|row: &ResultRow| row.outcome.static_sag_m));
-                columns.push(ResultColumn::new(
-                    metric.column(""),
-                    metric.unit(),
-                    metric.description(),
-                    cell,
-                ));
+                let (name, text) = (metric.column(""), metric.description());
+                columns
+                    .push(of_metric(*metric, ResultColumn::new(name, metric.unit(), text, cell)));
                 continue;
             }
             for number in self.measures.numbers_of(*metric) {
@@ -279,12 +285,22 @@ impl Asked {
                         of(&row.outcome).metrics.get(position).copied()
                     }));
                     let name = number.column(model);
-                    columns.push(ResultColumn::new(name, metric.unit(), text, cell));
+                    let column = ResultColumn::new(name, metric.unit(), text, cell);
+                    columns.push(of_metric(*metric, column));
                 }
                 position += 1;
             }
         }
         columns
+    }
+}
+
+/// A column of a metric, with which way it is bad.
+fn of_metric(metric: Metric, column: WasherColumn) -> WasherColumn {
+    let column = column.worse(metric.worse());
+    match metric.limit() {
+        Some(Limit { value, scale }) => column.limit(value, scale),
+        None => column,
     }
 }
 
@@ -332,7 +348,9 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
         }));
         let name =
             if name.starts_with(prefix) { name.to_owned() } else { format!("{prefix}{name}") };
-        columns.push(ResultColumn::new(name, unit, text, cell));
+        let column = ResultColumn::new(name, unit, text, cell);
+        let is_growth = unit == Metric::Growth.unit();
+        columns.push(if is_growth { of_metric(Metric::Growth, column) } else { column });
     }
     let kind = |row: &ResultRow| {
         let kind = row.outcome.growth.as_ref()?.fastest.kind();
@@ -444,6 +462,9 @@ fn dwell_status_column() -> WasherColumn {
     )
 }
 
+/// A gap that is by so much smaller is as much worse as a ratio that is greater by a factor of e.
+const GAP_SCALE_M: f64 = 0.010;
+
 /// Columns of the least gaps, the same for every plan.
 fn gap_columns() -> Vec<WasherColumn> {
     let mut columns = Vec::new();
@@ -454,7 +475,8 @@ fn gap_columns() -> Vec<WasherColumn> {
              it failed"
         );
         let cell = Cell::Measured(Box::new(move |row: &ResultRow| of(&row.outcome).min_gap_m));
-        columns.push(ResultColumn::new(format!("min_gap_{model}_m"), "m", text, cell));
+        let column = ResultColumn::new(format!("min_gap_{model}_m"), "m", text, cell);
+        columns.push(column.worse(Worse::Less).limit(0.0, GAP_SCALE_M));
     }
     columns
 }

@@ -292,7 +292,7 @@ pub(crate) fn rule(plan: &Plan) -> Rule {
         end_s: plan.end_s,
         window_s: plan.window_s,
         accuracy,
-        ratio_limit: plan.reliability.ratio_limit,
+        limits: plan.reliability.limits,
         channels: plan.reliability.channels.clone(),
         measures: plan.model.measures.clone(),
     }

@@ -32,7 +32,7 @@
 //! let plan = Plan { end_s: 2.0, window_s: [1.0, 2.0], ..plan };
 //! let outcome = &ModelEngine::new(&plan)?.evaluate_at(&[vec![0.4, 100.0]])[0];
 //! let channels = plan.reliability.channels.len();
-//! let verdict = Verdict::new(outcome, channels, plan.reliability.ratio_limit);
+//! let verdict = Verdict::new(outcome, channels, plan.reliability.limits);
 //! assert_eq!(verdict.reliable, Some(true));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -52,7 +52,7 @@ mod tests {
             end_s: 50.0,
             window_s: [30.0, 50.0],
             integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 },
-            reliability: Reliability { ratio_limit: 2.0, channels: Channel::ALL.to_vec() },
+            reliability: Reliability { limits: 2.0.into(), channels: Channel::ALL.to_vec() },
             set: Vec::new(),
         }
     }

@@ -1,18 +1,16 @@
 //! What computes the washing machine's rows, for the engine's commands.
 
-use sweep_engine::boundary::quantity::{Scale, TracedQuantity, ratio};
-use sweep_engine::boundary::search::Distances;
+use sweep_engine::boundary::search::Values;
 use sweep_engine::estimate::Estimate;
 use sweep_engine::{Engine, Error, Swept, Watch};
-use washer_model::{Channel, Machine, Parameter, Spin, Target};
-use washer_row::{Criterion, Demand, Outcome, Verdict};
+use washer_model::{Machine, Parameter, Spin, Target};
+use washer_row::{Criterion, Demand, Metric, Outcome};
 
+use crate::columns::Columns;
+use crate::config::grid::lacking;
 use crate::engine::ModelEngine;
 use crate::model::Washer;
 use crate::plan::Plan;
-
-/// Gaps are compared with this, so that their distances are of order one, as those of ratios.
-const GAP_SCALE_M: f64 = 0.010;
 
 impl Swept for Washer {
     fn engine(plan: &Plan) -> Result<Box<dyn Engine + '_>, Error> {
@@ -36,39 +34,25 @@ impl Swept for Washer {
         }
     }
 
-    fn quantities() -> Vec<String> {
-        let ratios = Channel::ALL.map(|channel| format!("ratio_{}", channel.name()));
-        let further = ["min_gap_nonlinear_m", "min_gap_linear_m", "growth"].map(str::to_owned);
-        std::iter::once("ratio_max".to_owned()).chain(ratios).chain(further).collect()
-    }
+    const FURTHER: &'static str = "; a machine with [cabinet] and feet, with stops, and a grid \
+                                   file with [stability] have more";
 
-    fn traced(plan: &Plan, name: &str) -> Result<(TracedQuantity, Plan), Error> {
-        let (unit, per) = match name {
-            "growth" if plan.model.growth_speeds.is_none() => {
-                return Err(Error::Option {
-                    option: "--quantity",
-                    given: name.to_owned(),
-                    expected:
-                        "a grid file with constant speeds, which this one does not name: put \
-                               metrics = [\"growth\"] at its top, and a section [stability] with \
-                               speed_rpm = \"FROM:TO:STEP\""
-                            .to_owned(),
-                });
-            }
-            "growth" => ("1/s", 1.0),
-            "min_gap_nonlinear_m" | "min_gap_linear_m" => ("m", -GAP_SCALE_M),
-            _ => return Ok(ratio(plan, name)),
+    fn variants(plan: &Plan) -> Vec<Plan> {
+        let can_have = |metric: &Metric| match metric {
+            Metric::Growth => plan.model.growth_speeds.is_some(),
+            metric => lacking(*metric, &plan.model.machine).is_none(),
         };
-        let (name, scale) = (name.to_owned(), Scale::Over(per));
-        Ok((TracedQuantity { name, unit, limit: 0.0, scale }, plan.clone()))
+        let with = |metric| {
+            let mut plan = plan.clone();
+            plan.model.measures.metrics = vec![metric];
+            plan
+        };
+        Metric::ALL.into_iter().filter(can_have).map(with).collect()
     }
 
-    fn search<'a>(
-        plan: &'a Plan,
-        quantity: &TracedQuantity,
-    ) -> Result<Box<dyn Distances + 'a>, Error> {
+    fn search<'a>(plan: &'a Plan, column: &str) -> Result<Box<dyn Values + 'a>, Error> {
         let engine = ModelEngine::new(plan).map_err(Error::model)?;
-        Ok(Box::new(Searched { engine, plan, quantity: quantity.clone() }))
+        Ok(Box::new(Searched { engine, columns: Columns::of_run(plan), column: column.to_owned() }))
     }
 
     fn listed(plan: Option<&Plan>) -> Vec<Listed> {
@@ -109,48 +93,38 @@ fn rows(machine: &Machine, spin: &Spin, window_s: Option<[f64; 2]>) -> Vec<Liste
     Parameter::all(machine, spin).into_iter().map(row).collect()
 }
 
-/// Distances of a quantity from its limit, by the engine.
+/// The numbers of a column, by the engine.
 struct Searched<'a> {
     engine: ModelEngine<'a>,
-    plan: &'a Plan,
-    quantity: TracedQuantity,
+    columns: Columns,
+    column: String,
 }
 
 impl Searched<'_> {
-    /// What the engine is asked for: it makes sure of a ratio's side, and knows nothing of a gap's.
+    /// What the engine is asked for: it makes sure of a ratio's side, and knows nothing of the
+    /// limits of other columns.
     fn demand(&self) -> Demand {
-        match self.quantity.name.as_str() {
-            "growth" => Demand::Growth,
-            "min_gap_nonlinear_m" | "min_gap_linear_m" => Demand::Row,
-            _ => Demand::Side,
+        if self.column.starts_with("ratio_") {
+            Demand::Side
+        } else if self.column.starts_with("growth_") {
+            Demand::Growth
+        } else {
+            Demand::Row
         }
-    }
-
-    fn distance(&self, outcome: &Outcome) -> Option<f64> {
-        let value = match self.quantity.name.as_str() {
-            "growth" => outcome.growth.as_ref()?.fastest.growth_per_s(),
-            "min_gap_nonlinear_m" => outcome.nonlinear.min_gap_m?,
-            "min_gap_linear_m" => outcome.linear.min_gap_m?,
-            _ => {
-                let rule = &self.plan.reliability;
-                let verdict = Verdict::new(outcome, rule.channels.len(), rule.ratio_limit);
-                verdict.greatest?.1
-            }
-        };
-        Some(self.quantity.distance(value))
     }
 }
 
-impl Distances for Searched<'_> {
-    fn distances(
+impl Values for Searched<'_> {
+    fn values(
         &self,
         axis_values: &[Vec<f64>],
         seen: &(dyn Fn(usize, Option<f64>) + Sync),
         watch: &Watch<'_>,
     ) -> Option<Vec<Option<f64>>> {
-        let shown = |outcome: &Outcome| seen(outcome.point as usize, self.distance(outcome));
+        let value = |outcome: &Outcome| self.columns.number(&self.column, outcome);
+        let shown = |outcome: &Outcome| seen(outcome.point as usize, value(outcome));
         let found = self.engine.evaluate_for(axis_values, self.demand(), &shown, watch)?;
-        Some(found.iter().map(|outcome| self.distance(outcome)).collect())
+        Some(found.iter().map(value).collect())
     }
 }
 

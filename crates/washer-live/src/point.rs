@@ -1,6 +1,7 @@
 //! One point, ready to run, and its runs by one rung.
 
 use lane_ode::{Failure, Simd};
+use sweep_parameter::RatioLimits;
 use washer_model::{
     Channel, Disturbance, Dwell, Machine, Method, ModelKind, Point, Response, Spin, Start, Target,
     Timing, history, prepare, respond,
@@ -44,7 +45,7 @@ impl Answer {
         amplitudes: [Deviations; 2],
         rungs: [usize; 2],
         ladders: &[Ladder; 2],
-        ratio_limit: f64,
+        limits: RatioLimits,
     ) -> Self {
         let every = |of: &Trajectory, amplitudes: &Deviations| match of.status {
             Status::Ok => Trajectory { amplitudes: amplitudes.to_vec(), ..of.clone() },
@@ -56,7 +57,7 @@ impl Answer {
             every(&outcome.linear, &amplitudes[1]),
         );
         compared.compare_turns(&Channel::ALL);
-        let Verdict { ratios, .. } = Verdict::new(&compared, Channel::ALL.len(), ratio_limit);
+        let Verdict { ratios, .. } = Verdict::new(&compared, Channel::ALL.len(), limits);
         let levels = [0, 1].map(|model| ladders[model].rungs[rungs[model]].level);
         Self { outcome, amplitudes, ratios, rungs, levels, errors: [None; 2] }
     }
@@ -158,7 +159,7 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
                 let amplitudes = [nonlinear.amplitudes, linear.amplitudes];
                 let mut outcome = Outcome::new(0, nonlinear.trajectory, linear.trajectory);
                 outcome.compare_turns(&rule.channels);
-                Answer::new(outcome, amplitudes, rungs, ladders, rule.ratio_limit)
+                Answer::new(outcome, amplitudes, rungs, ladders, rule.limits)
             };
             found.push(match &ready[k] {
                 Ok(_) => pairs.next().map(answer).ok_or(NoPoint::NoEquilibrium),
@@ -196,7 +197,7 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
     let [Some(nonlinear), Some(linear)] = last else { return Err(NoPoint::NoEquilibrium) };
     let last = [nonlinear, linear];
     let (amplitudes, rungs) = (last.map(|(run, ..)| run.amplitudes), last.map(|(_, at, _)| at));
-    let answer = Answer::new(outcome, amplitudes, rungs, ladders, rule.ratio_limit);
+    let answer = Answer::new(outcome, amplitudes, rungs, ladders, rule.limits);
     Ok(Answer { errors: last.map(|(.., error)| error), ..answer })
 }
 

@@ -1,5 +1,6 @@
 //! What a page computes with.
 
+use sweep_parameter::RatioLimits;
 use washer_model::{
     BumpStop, Bushing, Cabinet, Caps, Channel, Foot, Gear, Geared, Machine, Method, Parameter,
     Spin, Unbalance,
@@ -137,10 +138,11 @@ impl Setup {
 
 /// Stops and feet are counted with the machine.
 fn write_rule(out: &mut Writer, rule: &Rule) {
-    let Rule { end_s, window_s: [from_s, to_s], accuracy, ratio_limit, channels, measures } = rule;
-    for number in [end_s, from_s, to_s, accuracy, ratio_limit] {
+    let Rule { end_s, window_s: [from_s, to_s], accuracy, limits, channels, measures } = rule;
+    for number in [end_s, from_s, to_s, accuracy, &limits.most] {
         out.number(*number);
     }
+    out.optional(limits.least);
     let channels: Vec<f64> = channels.iter().map(|of| of.index() as f64).collect();
     out.counted(&channels);
     out.count(measures.criterion as usize);
@@ -150,7 +152,8 @@ fn write_rule(out: &mut Writer, rule: &Rule) {
 
 fn read_rule(from: &mut Reader<'_>, machine: &Machine) -> Option<Rule> {
     let (end_s, window_s) = (from.number()?, [from.number()?, from.number()?]);
-    let (accuracy, ratio_limit) = (from.number()?, from.number()?);
+    let accuracy = from.number()?;
+    let limits = RatioLimits { most: from.number()?, least: from.optional()? };
     let channel = |of: &f64| Channel::ALL.get(*of as usize).copied();
     let channels = from.counted()?.iter().map(channel).collect::<Option<_>>()?;
     let criterion = *Criterion::ALL.get(from.count(MOST)?)?;
@@ -159,7 +162,7 @@ fn read_rule(from: &mut Reader<'_>, machine: &Machine) -> Option<Rule> {
     let (stops, feet) = (machine.stops.len(), machine.feet.len());
     let dampers = machine.dampers.len();
     let measures = Measures { criterion, metrics, stops, feet, dampers };
-    Some(Rule { end_s, window_s, accuracy, ratio_limit, channels, measures })
+    Some(Rule { end_s, window_s, accuracy, limits, channels, measures })
 }
 
 fn write_rung(out: &mut Writer, rung: &Rung) {

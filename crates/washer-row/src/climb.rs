@@ -298,10 +298,10 @@ impl Climbs {
     }
 }
 
-/// How far the greatest ratio is from the limit, as a share of the limit.
+/// How far the ratios are from a limit, as a share of the limit.
 fn margin(outcome: &Outcome, rule: &Rule) -> Option<f64> {
-    let verdict = Verdict::new(outcome, rule.channels.len(), rule.ratio_limit);
-    verdict.greatest.map(|(_, ratio)| (ratio / rule.ratio_limit - 1.0).abs())
+    let Verdict { least, greatest, .. } = Verdict::new(outcome, rule.channels.len(), rule.limits);
+    Some(rule.limits.margin(least?.1, greatest?.1))
 }
 
 /// How far two runs are apart, relative.

@@ -1,5 +1,6 @@
 //! What a run measures: the amplitude by which the two models are compared, and metrics.
 
+use sweep_parameter::{Limit, Worse};
 use washer_model::{Channel, Extra, Wanted};
 
 use crate::outcome::{Deviations, Outcome};
@@ -133,6 +134,25 @@ impl Metric {
             Self::StaticSag => "m",
             Self::Growth => "1/s",
             Self::DamperSpeed => "m/s",
+        }
+    }
+
+    /// Which way it is bad.
+    #[must_use]
+    pub const fn worse(self) -> Worse {
+        match self {
+            Self::FootLoad | Self::SlipMargin => Worse::Less,
+            _ => Worse::Greater,
+        }
+    }
+
+    /// Up to where it is good, if that has a meaning of its own.
+    #[must_use]
+    pub const fn limit(self) -> Option<Limit> {
+        match self {
+            Self::FootLoad | Self::SlipMargin => Some(Limit { value: 0.0, scale: 100.0 }),
+            Self::Growth => Some(Limit { value: 0.0, scale: 1.0 }),
+            _ => None,
         }
     }
 

@@ -1,6 +1,7 @@
 //! One model's trajectories by one rung, and what a row takes from each.
 
 use lane_ode::{Failure, Simd};
+use sweep_parameter::RatioLimits;
 use washer_model::{
     Channel, Course, Extra, Method, ModelKind, Point, Record, Wanted, simulate_until,
 };
@@ -17,8 +18,8 @@ pub struct Rule {
     pub window_s: [f64; 2],
     /// Largest error of a row's numbers, relative; infinite where nothing is compared.
     pub accuracy: f64,
-    /// Ratios below it are reliable.
-    pub ratio_limit: f64,
+    /// Ratios between them are reliable.
+    pub limits: RatioLimits,
     /// What the verdict compares.
     pub channels: Vec<Channel>,
     /// What is measured of the motions.

@@ -1,6 +1,8 @@
 //! From two trajectories to a verdict: the ratios, the greatest of them, reliable or not, and the
 //! row's status.
 
+use sweep_parameter::RatioLimits;
+
 use crate::outcome::{Outcome, Status};
 
 /// Every value of the result file's `status` column, in the order of its dictionary.
@@ -53,14 +55,17 @@ pub struct Verdict {
     /// The greatest defined ratio and its channel's position in the plan; the first channel wins a
     /// tie.
     pub greatest: Option<(usize, f64)>,
-    /// Whether the greatest ratio is below the limit; `None` where no ratio is defined.
+    /// The same of the least.
+    pub least: Option<(usize, f64)>,
+    /// Whether the ratios are between the limits; `None` where no ratio is defined.
     pub reliable: Option<bool>,
 }
 
 impl Verdict {
     /// Compares the amplitudes of an outcome over `channels` channels.
     #[must_use]
-    pub fn new(outcome: &Outcome, channels: usize, ratio_limit: f64) -> Self {
+    pub fn new(outcome: &Outcome, channels: usize, limits: impl Into<RatioLimits>) -> Self {
+        let limits = limits.into();
         let (nonlinear, linear) = (&outcome.nonlinear.amplitudes, &outcome.linear.amplitudes);
         let by_turns = &outcome.turn_ratios;
         let ratios: Vec<Option<f64>> = (0..channels)
@@ -71,15 +76,13 @@ impl Verdict {
             .enumerate()
             .map(|(i, of_amplitudes)| by_turns.get(i).copied().unwrap_or(of_amplitudes))
             .collect();
-        let mut greatest: Option<(usize, f64)> = None;
-        for (channel, ratio) in ratios.iter().enumerate() {
-            if let Some(ratio) = *ratio
-                && greatest.is_none_or(|(_, so_far)| ratio > so_far)
-            {
-                greatest = Some((channel, ratio));
-            }
-        }
-        Self { ratios, greatest, reliable: greatest.map(|(_, ratio)| ratio < ratio_limit) }
+        let extreme = |is_further: fn(f64, f64) -> bool| {
+            let defined = ratios.iter().enumerate().filter_map(|(i, ratio)| Some((i, (*ratio)?)));
+            defined.reduce(|most, next| if is_further(next.1, most.1) { next } else { most })
+        };
+        let [greatest, least] = [extreme(|a, b| a > b), extreme(|a, b| a < b)];
+        let reliable = least.zip(greatest).map(|((_, least), (_, most))| limits.trust(least, most));
+        Self { ratios, greatest, least, reliable }
     }
 }
 
@@ -110,6 +113,19 @@ mod tests {
     }
 
     #[test]
+    fn a_lower_limit_refuses_what_the_linear_model_over_estimates() {
+        let row = outcome(
+            trajectory(Status::Ok, &[1.5, 0.3, 0.3], None),
+            trajectory(Status::Ok, &[1.0, 2.0, 2.0], None),
+        );
+        let reliable =
+            |least| Verdict::new(&row, 3, RatioLimits { most: 2.0, least }).reliable.unwrap();
+        assert_eq!(Verdict::new(&row, 3, 2.0).least, Some((1, 0.15)));
+        assert!(reliable(None) && reliable(Some(0.1)));
+        assert!(!reliable(Some(0.15)) && !reliable(Some(0.5)), "at the limit is not above it");
+    }
+
+    #[test]
     fn ratios_by_turns_stand_in_the_place_of_the_amplitudes() {
         let mut row = outcome(
             trajectory(Status::Ok, &[2.0, 3.0], None),
@@ -135,7 +151,7 @@ mod tests {
         );
         assert_eq!(
             Verdict::new(&still, 2, 2.0),
-            Verdict { ratios: vec![None, None], greatest: None, reliable: None }
+            Verdict { ratios: vec![None, None], greatest: None, least: None, reliable: None }
         );
     }
 

@@ -121,14 +121,15 @@ impl PyPlan {
 
     /// The curve on which a quantity is at its limit.
     #[pyo3(signature = (
-        quantity="ratio_max", *, tolerance=None, lattice=6, out=None, threads=None, progress=true,
-        fresh=false
+        quantity="ratio_max", *, limit=None, tolerance=None, lattice=6, out=None, threads=None,
+        progress=true, fresh=false
     ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn boundary(
         &self,
         py: Python<'_>,
         quantity: &str,
+        limit: Option<f64>,
         tolerance: Option<f64>,
         lattice: u16,
         out: Option<PathBuf>,
@@ -137,7 +138,7 @@ impl PyPlan {
         fresh: bool,
     ) -> PyResult<PyResultTable> {
         let output = out.as_deref();
-        let options = BoundaryOptions { quantity, tolerance, lattice, output, fresh };
+        let options = BoundaryOptions { quantity, limit, tolerance, lattice, output, fresh };
         let found = attended(py, |interrupt| {
             let effort = Effort { threads, progress: ended::mode(progress), interrupt };
             sweep::find_boundary(self.evaluator.plan(), options, effort)

@@ -44,6 +44,7 @@ pub fn job<'a, M: Rows>(
 fn asked(quantity: &TracedQuantity, task: &BoundaryTask) -> Value {
     json!({
         "quantity": &quantity.name,
+        "limit": quantity.limit,
         "tolerance": task.search.tolerance,
         "lattice": task.search.lattice,
     })
@@ -58,7 +59,7 @@ pub fn table<M: Rows>(
     traced: &Traced,
 ) -> Table {
     let mut about = asked(quantity, task);
-    about["limit"] = quantity.limit.into();
+    about["worse"] = quantity.worse.name().into();
     about["points"] = traced.trials.into();
     about["rounds"] = traced.rounds.into();
     let mut table = Table::new(M::BUILD);
@@ -112,7 +113,7 @@ fn add_columns<M: Rows>(
     for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
         table.numbers(
             &format!("quantity_{word}"),
-            quantity.unit,
+            &quantity.unit,
             &format!("{} at the bracket's {side} end; null where not defined", quantity.name),
             lines
                 .iter()

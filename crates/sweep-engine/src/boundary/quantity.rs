@@ -1,9 +1,12 @@
-//! The quantity of a boundary, and its limit.
+//! The quantity of a boundary, and its limit: any column of numbers that a plan's rows can have.
 
-use sweep_parameter::Channel as _;
+use sweep_parameter::{Channel as _, Worse};
 
-use crate::model::Model;
+use crate::exit::Error;
+use crate::nearest::nearest;
 use crate::plan::Plan;
+use crate::store::{Column, Kind};
+use crate::swept::Swept;
 
 /// A quantity with a limit, named as its column in a result file.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,9 +14,11 @@ pub struct TracedQuantity {
     /// The column's name.
     pub name: String,
     /// Its unit.
-    pub unit: &'static str,
+    pub unit: String,
     /// The value at which the boundary runs.
     pub limit: f64,
+    /// The side of the limit that is bad.
+    pub worse: Worse,
     /// What its distances from the limit are.
     pub scale: Scale,
 }
@@ -23,45 +28,127 @@ pub struct TracedQuantity {
 pub enum Scale {
     /// The logarithm of the quantity over its limit.
     Logarithm,
-    /// The quantity, whose limit is zero, over this; negative where less of it is worse.
+    /// The difference over this.
     Over(f64),
 }
 
+/// What the columns of ratios start with.
+const RATIO: &str = "ratio_";
+/// The column of the least ratio.
+const LEAST_RATIO: &str = "ratio_min";
+
 impl TracedQuantity {
-    /// Signed distance of a value from the limit, negative on the reliable side.
+    /// Signed distance of a value from the limit, negative on the good side.
     #[must_use]
     pub fn distance(&self, value: f64) -> f64 {
-        match self.scale {
-            Scale::Logarithm => {
-                let distance = libm::log(value / self.limit);
-                // A ratio one rounding below the limit is still below it.
-                if value < self.limit { distance.min(-f64::MIN_POSITIVE) } else { distance }
+        match (self.scale, self.worse) {
+            (Scale::Logarithm, worse) => {
+                let distance = worse.by(libm::log(value / self.limit), 0.0);
+                // A ratio one rounding on the good side of the limit is still there.
+                let is_good = worse.by(value, self.limit) < 0.0;
+                if is_good { distance.min(-f64::MIN_POSITIVE) } else { distance }
             }
-            Scale::Over(per) => value / per,
+            (Scale::Over(per), worse) => worse.by(value, self.limit) / per,
         }
     }
 
     /// The quantity at a distance from its limit.
     #[must_use]
     pub fn value(&self, distance: f64) -> f64 {
+        let away = self.worse.by(distance, 0.0);
         match self.scale {
-            Scale::Logarithm => self.limit * libm::exp(distance),
-            Scale::Over(per) => distance * per,
+            Scale::Logarithm => self.limit * libm::exp(away),
+            Scale::Over(per) => self.limit + away * per,
         }
     }
 }
 
-/// A ratio at its limit, and the plan that computes it: a channel of its own is compared even if
-/// the grid file leaves it out.
+/// Every column that a boundary of this plan can be drawn through, each with the plan that computes
+/// it: a channel is compared even if the grid file leaves it out, and so is a metric measured that
+/// the model can have.
 #[must_use]
-pub fn ratio<M: Model>(plan: &Plan<M>, name: &str) -> (TracedQuantity, Plan<M>) {
-    let mut plan = plan.clone();
-    let of = |channel: &&M::Channel| name.strip_prefix("ratio_") == Some(channel.name());
-    if let Some(channel) = M::Channel::every().iter().find(of) {
+pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
+    // A search of one channel does not make sure of the others.
+    let of_one = |channel: &M::Channel| {
+        let mut plan = plan.clone();
         plan.reliability.channels = vec![*channel];
+        (plan, Some(of_channel(channel.name())))
+    };
+    let mut least = plan.clone();
+    least.reliability.limits.least = Some(plan.reliability.limits.over_estimate());
+    let further = [plan.clone(), least].into_iter().chain(M::variants(plan));
+    let plans = M::Channel::every().iter().map(of_one).chain(further.map(|plan| (plan, None)));
+    let mut offered: Vec<(Column, Plan<M>)> = Vec::new();
+    for (plan, only) in plans {
+        for column in M::layout(&plan).columns {
+            let is_number = matches!(column.kind, Kind::Measured | Kind::Time | Kind::Count);
+            let is_asked = only.as_ref().is_none_or(|only| only.contains(&column.name));
+            let is_new = offered.iter().all(|(known, _)| known.name != column.name);
+            if is_number && column.worse.is_some() && is_asked && is_new {
+                offered.push((column, plan.clone()));
+            }
+        }
     }
-    let limit = plan.reliability.ratio_limit;
-    let quantity =
-        TracedQuantity { name: name.to_owned(), unit: "1", limit, scale: Scale::Logarithm };
-    (quantity, plan)
+    // The verdict's ratios foremost.
+    offered.sort_by_key(|(column, _)| !["ratio_max", LEAST_RATIO].contains(&&*column.name));
+    offered
+}
+
+/// The columns of a channel.
+fn of_channel(name: &str) -> [String; 3] {
+    [RATIO, "nonlinear_", "linear_"].map(|kind| format!("{kind}{name}"))
+}
+
+/// The column of this name at a limit, its own if none is given, and the plan that computes it.
+///
+/// # Errors
+/// A column that the plan's rows cannot have, or that has no limit of its own where none is given.
+pub fn traced<M: Swept>(
+    plan: &Plan<M>,
+    name: &str,
+    limit: Option<f64>,
+) -> Result<(TracedQuantity, Plan<M>), Error> {
+    let mut offered = offered(plan);
+    let Some(at) = offered.iter().position(|(column, _)| column.name == name) else {
+        let names = || offered.iter().map(|(column, _)| column.name.as_str());
+        let meant = nearest(name, names());
+        let meant = meant.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
+        let of_channels: Vec<String> =
+            M::Channel::every().iter().flat_map(|channel| of_channel(channel.name())).collect();
+        let is_of_channel = |name: &&str| of_channels.iter().any(|known| known == name);
+        let names: Vec<&str> = names().filter(|name| !is_of_channel(name)).collect();
+        let [ratio, nonlinear, linear] = of_channel("CHANNEL");
+        let expected = format!(
+            "one of {}, {ratio}, {nonlinear}, {linear}{}{meant}",
+            names.join(", "),
+            M::FURTHER
+        );
+        return Err(Error::Option { option: "--quantity", given: name.to_owned(), expected });
+    };
+    let (column, mut plan) = offered.swap_remove(at);
+    let own = column.limit;
+    let Some(value) = limit.or(own.map(|limit| limit.value)) else {
+        let (given, unit) = (name.to_owned(), &column.unit);
+        let expected = format!("--limit with it, in {unit}: it has no limit of its own");
+        return Err(Error::Option { option: "--quantity", given, expected });
+    };
+    let is_ratio = name.starts_with(RATIO);
+    let scale = own.map_or(value.abs(), |limit| limit.scale);
+    if !value.is_finite() || (is_ratio && value <= 0.0) || scale == 0.0 {
+        let expected = format!("a number greater than 0, as {name} is never below");
+        return Err(Error::Option { option: "--limit", given: value.to_string(), expected });
+    }
+    if name == LEAST_RATIO {
+        plan.reliability.limits.least = Some(value);
+    } else if is_ratio {
+        plan.reliability.limits.most = value;
+    }
+    let quantity = TracedQuantity {
+        name: column.name,
+        unit: column.unit,
+        limit: value,
+        worse: column.worse.unwrap_or(Worse::Greater),
+        scale: if is_ratio { Scale::Logarithm } else { Scale::Over(scale) },
+    };
+    Ok((quantity, plan))
 }

@@ -4,6 +4,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use super::quantity::TracedQuantity;
 use super::{Evaluate, Search, Trial};
 use crate::interrupt::Interrupt;
 use crate::model::Model;
@@ -144,12 +145,13 @@ pub fn further_values<M: Model>(plan: &Plan<M>, curve: usize) -> Vec<f64> {
     values
 }
 
-/// What computes distances of a quantity from its limit.
-pub trait Distances: Sync {
-    /// One signed distance a point given by the values of the axes, `None` where the quantity is
-    /// not defined. Each is shown to `seen` by its position as it comes, on any thread of the rayon
-    /// pool that this is called in; `None` if `watch` stopped it.
-    fn distances(
+/// What computes the numbers of a column.
+pub trait Values: Sync {
+    /// One number a point given by the values of the axes, `None` where it is null. Each is shown
+    /// to `seen` by its position as it comes, on any thread of the rayon pool that this is called
+    /// in; `None` if `watch` stopped it. A ratio's is good for telling on which side of the plan's
+    /// limit it is, and near the limit for its value.
+    fn values(
         &self,
         axis_values: &[Vec<f64>],
         seen: &(dyn Fn(usize, Option<f64>) + Sync),
@@ -160,7 +162,8 @@ pub trait Distances: Sync {
 /// A model at trial points.
 pub struct Models<'a, M: Model> {
     plan: &'a Plan<M>,
-    distances: Box<dyn Distances + 'a>,
+    quantity: &'a TracedQuantity,
+    values: Box<dyn Values + 'a>,
     pool: rayon::ThreadPool,
     interrupt: &'a Interrupt,
     /// What is known from before, and where answers are kept as they come.
@@ -176,14 +179,14 @@ impl<'a, M: Model> Models<'a, M> {
     /// [`ThreadsError::Start`].
     pub fn new(
         plan: &'a Plan<M>,
-        distances: Box<dyn Distances + 'a>,
+        (quantity, values): (&'a TracedQuantity, Box<dyn Values + 'a>),
         threads: usize,
         interrupt: &'a Interrupt,
         tell: &'a (dyn Fn(u64) + Sync),
     ) -> Result<Self, ThreadsError> {
         let pool = threads::pool(threads)?;
         let done = AtomicU64::new(0);
-        Ok(Self { plan, distances, pool, interrupt, kept: None, done, tell })
+        Ok(Self { plan, quantity, values, pool, interrupt, kept: None, done, tell })
     }
 
     /// The same with a memory: it makes no trial again that is known from before.
@@ -233,23 +236,24 @@ impl<M: Model> Evaluate for Models<'_, M> {
         let axis_values: Vec<Vec<f64>> = new.iter().map(values).collect();
         let watch = Watch::new(self.interrupt);
         let failure = Mutex::new(None);
-        let seen = |place: usize, distance| {
+        let distance = |value: Option<f64>| value.map(|value| self.quantity.distance(value));
+        let seen = |place: usize, value| {
             if let (Some(mut kept), Some(position)) = (self.kept(), new.get(place))
-                && let Err(error) = kept.keep(key(&trials[*position]), distance)
+                && let Err(error) = kept.keep(key(&trials[*position]), distance(value))
             {
                 failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
                 watch.abort();
             }
             self.count(1);
         };
-        let found = self.pool.install(|| self.distances.distances(&axis_values, &seen, &watch));
+        let found = self.pool.install(|| self.values.values(&axis_values, &seen, &watch));
         let settled = self.kept().map_or(Ok(()), |kept| kept.settle());
         let failure = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(error) = failure.or(settled.err()) {
             return Err(Stopped::Failed(error));
         }
-        for (position, distance) in new.iter().zip(found.ok_or(Stopped::Interrupted)?) {
-            distances[*position] = Some(distance);
+        for (position, value) in new.iter().zip(found.ok_or(Stopped::Interrupted)?) {
+            distances[*position] = Some(distance(value));
         }
         Ok(distances.into_iter().flatten().collect())
     }

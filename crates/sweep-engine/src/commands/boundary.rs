@@ -6,23 +6,25 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
+use super::cells::short;
 use super::grid::{GridArgs, quoted};
+use super::plot::finite;
 use super::run::line;
-use crate::boundary::file::{job, table};
-use crate::boundary::quantity::TracedQuantity;
+use crate::boundary::file::{self, job};
+use crate::boundary::quantity::{TracedQuantity, offered, traced};
 use crate::boundary::search::{BoundaryTask, Models, Stopped};
 use crate::boundary::{EdgeKind, Standing, Traced, trace};
 use crate::effort::Effort;
-use crate::exit::{Error, Exit, tell};
+use crate::exit::{Error, Exit, show, tell};
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
 use crate::program::program;
 use crate::progress::{Progress, ProgressMode, duration};
-use crate::store::{OpenedTrials, StoreError, Trials};
+use crate::store::{Column, OpenedTrials, StoreError, Trials};
 use crate::swept::Swept;
 use crate::threads;
 use sweep_files::{FileKind, Output};
-use sweep_parameter::Parameter as _;
+use sweep_parameter::{Parameter as _, Worse};
 
 /// Arguments of `sweep boundary`.
 #[derive(Debug, clap::Args)]
@@ -34,10 +36,20 @@ pub struct Args {
     /// Boundary file [default: results/NAME-boundary.parquet]
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// What is at its limit: ratio_max, ratio_CHANNEL, min_gap_nonlinear_m or min_gap_linear_m (at
-    /// no gap)
-    #[arg(long, value_name = "NAME", default_value = "ratio_max")]
+    /// What is at its limit: any column of numbers that the grid's rows can have, such as
+    /// ratio_max, ratio_CHANNEL or nonlinear_CHANNEL; without a name, lists them
+    #[arg(
+        long,
+        value_name = "COLUMN",
+        default_value = "ratio_max",
+        num_args = 0..=1,
+        default_missing_value = ""
+    )]
     pub quantity: String,
+    /// Where its limit is, in the column's unit [default: the column's own; of ratios that of the
+    /// grid file]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
+    pub limit: Option<f64>,
     /// Width of the final brackets, in the second axis's unit; if that axis is logarithmic, as a
     /// fraction of its value [default: 1/480 of the range]
     #[arg(long, value_name = "WIDTH")]
@@ -84,12 +96,10 @@ search has found out stays in FILE.partial, and the same command goes on from th
 /// being written.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.grid.load()?;
-    let names = M::quantities();
-    if !names.contains(&args.quantity) {
-        let (given, expected) = (args.quantity.clone(), format!("one of {}", names.join(", ")));
-        return Err(Error::Option { option: "--quantity", given, expected });
+    if args.quantity.is_empty() {
+        return show(&listing(&plan));
     }
-    let (quantity, plan) = M::traced(&plan, &args.quantity)?;
+    let (quantity, plan) = traced(&plan, &args.quantity, args.limit)?;
     let task = BoundaryTask::new(&plan, args.tolerance, usize::from(args.lattice))?;
     let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
     let output = args.out.clone().unwrap_or_else(default);
@@ -114,9 +124,9 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     }
     let began = Instant::now();
     let effort = Effort { threads: args.threads, progress: args.progress, interrupt: &interrupt };
-    let (traced, trials) = search(&plan, &quantity, &task, Some(trials), effort)?;
-    let traced = match traced {
-        Ok(traced) => traced,
+    let (found, trials) = search(&plan, &quantity, &task, Some(trials), effort)?;
+    let found = match found {
+        Ok(found) => found,
         Err(Stopped::Failed(error)) => return Err(error.into()),
         Err(Stopped::Interrupted) => {
             let kept = trials.map_or(0, |trials| trials.count());
@@ -131,15 +141,29 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
             });
         }
     };
-    let bytes = table(&job, &plan, &quantity, &task, &traced).into_bytes();
+    let bytes = file::table(&job, &plan, &quantity, &task, &found).into_bytes();
     file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
-    let mut text = summary(&plan, &quantity, &task, &traced, began.elapsed().as_secs_f64());
+    let mut text = summary(&plan, &quantity, &task, &found, began.elapsed().as_secs_f64());
     next(&mut text, &output);
     tell(text.trim_end());
     Ok(Exit::Done)
+}
+
+/// Every column that a boundary can be drawn through: unit, bad side, limit, meaning.
+fn listing<M: Swept>(plan: &Plan<M>) -> String {
+    let columns = offered(plan);
+    let width = columns.iter().map(|(column, _)| column.name.len()).max().unwrap_or(0);
+    let row = |(column, _): &(Column, Plan<M>)| {
+        let side = column.worse.map_or("", Worse::name);
+        let limit = column.limit.map_or_else(|| "--limit".to_owned(), |of| short(of.value));
+        let meaning = column.description.split(';').next().unwrap_or_default();
+        let Column { name, unit, .. } = column;
+        format!("{name:width$}  {unit:>4}  worse the {side:7}  limit {limit:7}  {meaning}\n")
+    };
+    columns.iter().map(row).collect()
 }
 
 /// What there is to say if the boundary is there.
@@ -247,14 +271,15 @@ pub fn search<M: Swept>(
         }
     };
     let threads = effort.threads()?;
-    let models = Models::new(plan, M::search(plan, quantity)?, threads, effort.interrupt, &shown)?;
+    let values = M::search(plan, &quantity.name)?;
+    let models = Models::new(plan, (quantity, values), threads, effort.interrupt, &shown)?;
     let models = match trials {
         Some(trials) => models.keeping(trials),
         None => models,
     };
     let mut standing =
         |standing: &Standing| rows_done.store(standing.rows as u64, Ordering::Relaxed);
-    let traced = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
+    let found = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
     progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
-    Ok((traced, models.into_kept()))
+    Ok((found, models.into_kept()))
 }

@@ -69,8 +69,12 @@ fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
     line(
         "verdict",
         format!(
-            "reliable where every ratio is below {}{}",
-            plan.reliability.ratio_limit,
+            "reliable where every ratio is below {}{}{}",
+            plan.reliability.limits.most,
+            plan.reliability
+                .limits
+                .least
+                .map_or(String::new(), |least| format!(" and above {least}")),
             plan.model.criterion()
         ),
     );

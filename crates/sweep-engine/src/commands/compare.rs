@@ -37,7 +37,7 @@ pub struct Args {
     /// Write the differences of maps, row by row, to a Parquet file that `sweep plot` draws
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Exit with 4 if this differs: any, plan, flips, sensitive, rows, ratio=PART, gap=M or
+    /// Exit with 4 if this differs: any, plan, flips, lost, sensitive, rows, ratio=PART, gap=M or
     /// boundary=WIDTH; may be repeated
     #[arg(long, value_name = "WHAT", value_parser = str::parse::<FailOn>)]
     fail_on: Vec<FailOn>,
@@ -60,6 +60,7 @@ What --fail-on takes:
   plan            parameters, spin, method or version
   rows            a row is in one file only
   flips           a verdict differs, in a row that is not sensitive
+  lost            a reliable row is so no more, and not sensitive
   sensitive       a verdict differs, in a sensitive row
   ratio=0.05      a ratio changed by more than 5 % either way, or is in one file only
   gap=0.001       a least gap changed by more than 1 mm, or is in one file only
@@ -239,6 +240,13 @@ fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
         );
         facts.push(("verdicts", told));
     }
+    if let Some([first, second]) = found.over_estimated.filter(|of| *of != [0, 0]) {
+        let told = format!(
+            "in {first} rows of A, {second} of B the linear model over-estimates: a ratio is below \
+             1 / ratio_limit, or ratio_min"
+        );
+        facts.push(("too high", told));
+    }
     if let Some(moved) = &found.boundary {
         facts.push(("boundary", boundary(moved)));
     }
@@ -265,7 +273,7 @@ fn boundary(moved: &Moved) -> String {
     let unit = &moved.unit;
     let mut told = match moved.farthest() {
         None => "no crossing in both".to_owned(),
-        Some(farthest) if farthest.by() == 0.0 => {
+        Some(_) if moved.crossings.iter().all(|crossing| crossing.by() == [0.0; 2]) => {
             format!("{} crossings, none moved", moved.crossings.len())
         }
         Some(farthest) => {
@@ -279,17 +287,17 @@ fn boundary(moved: &Moved) -> String {
                 let [low, high] = farthest.bracket[side];
                 format!("{} to {}", short(low), short(high))
             };
+            let range = |[least, greatest]: [f64; 2]| format!("{least:+.3} to {greatest:+.3}");
             format!(
-                "{} crossings along {}, moved by {:+.3} {unit} in the mean and {:+.3} at most, at \
-                 {}: from within {} to within {}; {} moved farther than their brackets explain",
+                "{} crossings along {}, {} moved farther than their brackets explain; in the mean \
+                 they moved by {} {unit}; farthest at {}: from within {} to within {}",
                 moved.crossings.len(),
                 moved.axis,
-                moved.mean(),
-                farthest.by(),
+                moved.certain(),
+                range(moved.mean()),
                 place.join(", "),
                 bracket(0),
                 bracket(1),
-                moved.certain(),
             )
         }
     };
@@ -412,6 +420,7 @@ fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
         "plan": found.plan,
         "rows": {
             "in_both": found.shared.len(),
+            "over_estimated": found.over_estimated,
             "only_in_first": found.alone[0],
             "only_in_second": found.alone[1],
             "differing": found.shared.iter().filter(|row| row.differs).count(),

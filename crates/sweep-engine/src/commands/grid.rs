@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::config::Read;
 use crate::config::{self, Diagnostics, GridInput};
+use crate::exit::tell;
 use crate::plan::Plan;
 use crate::program::program;
 
@@ -40,7 +41,20 @@ impl GridArgs {
         if let Some(name) = &self.name {
             plan.name.clone_from(name);
         }
+        self.tell_window(&plan);
         Ok(plan)
+    }
+
+    /// Says so where `--set end_s` leaves the window's end where the grid file puts it.
+    pub fn tell_window<M: Read>(&self, plan: &Plan<M>) {
+        let is_set =
+            |name| self.sets.iter().any(|set| set.split('=').next().map(str::trim) == Some(name));
+        let ([from, to], end_s) = (plan.window_s, plan.end_s);
+        if is_set("end_s") && !is_set("window_to_s") && to < end_s {
+            tell(&format!(
+                "the window stays at {from} to {to} s; --set window_to_s={end_s} moves its end"
+            ));
+        }
     }
 }
 

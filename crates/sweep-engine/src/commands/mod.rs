@@ -39,7 +39,7 @@ enum Command {
     Run(run::Args),
     /// Check a grid file and show what it would do, without doing it
     Check(check::Args),
-    /// Trace the curve where the ratio is at its limit
+    /// Trace the curve where a ratio, or any other quantity, is at its limit
     Boundary(boundary::Args),
     /// Show what a result file holds: verdicts and extremes
     Show(show::Args),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::exit::{Error, Exit, tell};
 use sweep_files::beside;
-use sweep_plot::{PlotOptions, Quantity, View, render};
+use sweep_plot::{PlotOptions, View, render};
 
 /// Arguments of `plot`.
 #[derive(Debug, clap::Args)]
@@ -22,12 +22,13 @@ pub struct Args {
     #[arg(long, value_enum)]
     pub view: Option<View>,
 
-    /// Map: what the colours show. Design: what is shown over the parameters
-    #[arg(long, value_enum, default_value_t)]
-    pub quantity: Quantity,
+    /// Map: the column that the colours show, or `status`; over one axis again for more of them.
+    /// Design: the column over the parameters [default: ratio_max]
+    #[arg(long, value_name = "COLUMN")]
+    pub quantity: Vec<String>,
 
-    /// Channel to show, as in the column names; of a load, which stop or foot (stop_2, foot_1);
-    /// again for more of them in a trace
+    /// Channel to show of a trace, of dwells or of responses, as in the column names; may be
+    /// repeated
     #[arg(long = "channel", value_name = "NAME")]
     pub channels: Vec<String>,
 
@@ -57,7 +58,7 @@ pub fn draw(args: &Args, further: PlotOptions) -> Result<Exit, Error> {
     let output = args.output.clone().unwrap_or_else(|| beside(&args.file, "svg"));
     let options = PlotOptions {
         view: args.view,
-        quantity: args.quantity,
+        quantity: args.quantity.clone(),
         channels: args.channels.clone(),
         at: args.at.clone(),
         boundary: args.boundary.clone(),

@@ -27,7 +27,7 @@ pub struct Args {
     /// let functions over all rows leave them out
     #[arg(long)]
     allow_null: bool,
-    /// Show at most this many offending rows of each expression
+    /// Show at most this many offending rows of each expression, the worst first
     #[arg(long, value_name = "N", default_value_t = 10)]
     rows: u16,
     /// Print what came of each expression as JSON

@@ -17,6 +17,7 @@ use crate::store::{Job, ShardRequest};
 use crate::swept::Swept;
 use crate::threads::{self, Environment};
 use crate::watch::Engine;
+use sweep_parameter::RatioLimits;
 use sweep_plot::Share;
 
 /// Arguments of `sweep run`.
@@ -251,7 +252,7 @@ pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
             .map(|(axis, value)| format!("{} {}", axis.name, short(value)));
         place.collect::<Vec<_>>().join(", ")
     };
-    counts(tally, job.ratio_limit, &at)
+    counts(tally, job.limits, &at)
 }
 
 /// The share of reliable points among those with a verdict, with the interval in which the true
@@ -269,17 +270,33 @@ fn share(tally: &Tally) -> String {
 }
 
 /// As [`rows`], where `at` says where a point lies.
-pub fn counts(tally: &Tally, ratio_limit: f64, at: &dyn Fn(u64) -> String) -> String {
+pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) -> String {
     let mut text = String::new();
     let percent = |count: u64| 100.0 * count as f64 / tally.points.max(1) as f64;
+    let most = limits.most;
+    let range = limits.least.map_or_else(
+        || format!("below ratio {most}"),
+        |least| format!("with ratios from {least} to {most}"),
+    );
     let verdicts = format!(
-        "{} ({:.1} %) below ratio {ratio_limit}, {} not, {} undefined",
+        "{} ({:.1} %) {range}, {} not, {} undefined",
         tally.reliable,
         percent(tally.reliable),
         tally.unreliable,
         tally.undefined
     );
     line(&mut text, "reliable", &verdicts);
+    if tally.over_estimated > 0 {
+        let told = format!(
+            "in {} ({:.1} %), {} of them reliable: the linear model over-estimates, a ratio is \
+             below {}",
+            tally.over_estimated,
+            percent(tally.over_estimated),
+            tally.over_estimated_reliable,
+            short(limits.over_estimate())
+        );
+        line(&mut text, "too high", &told);
+    }
     if tally.by_status.failed() > 0 {
         let by_status = tally.by_status.iter().filter(|(status, _)| *status != "ok");
         let list: Vec<String> =

@@ -12,7 +12,8 @@ use crate::exit::{Error, Exit, show};
 use crate::nearest::nearest;
 use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, Tally, overview, row, tally};
 use sweep_files::{ParquetFile, key};
-use sweep_results::{Cell, Condition, Order, ResultTable, ResultsError, top};
+use sweep_parameter::Worse;
+use sweep_results::{Cell, Condition, ResultTable, ResultsError, ratio_limits, top};
 
 /// Rows shown where none are asked for by number.
 const ROWS_SHOWN: u16 = 10;
@@ -26,12 +27,16 @@ pub struct Args {
     /// Show this many rows, and no summary [default: 10 with --by or --where]
     #[arg(long, value_name = "N")]
     top: Option<u16>,
-    /// Order the rows by this column, the greatest first [default: file order]
+    /// Order the rows by this column, the worst first, or the greatest of a column that is not bad
+    /// either way [default: file order]
     #[arg(long, value_name = "COLUMN")]
     by: Option<String>,
     /// Order them from the least
     #[arg(long, requires = "by")]
     ascending: bool,
+    /// Order them from the greatest
+    #[arg(long, requires = "by", conflicts_with = "ascending")]
+    descending: bool,
     /// Show only rows for which this expression is true, as `sweep require` takes them
     #[arg(long = "where", value_name = "EXPRESSION")]
     keep: Option<String>,
@@ -89,7 +94,7 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
                 );
             }
             let tally = tally(&opened)?;
-            let limit = result.plan["reliability"]["ratio_limit"].as_f64().unwrap_or(f64::NAN);
+            let limits = ratio_limits(&result.plan).unwrap_or(f64::NAN.into());
             let places = extremes_at(&opened, result, &tally)?;
             let at = |point| {
                 let place = places.iter().find(|(known, _)| *known == point);
@@ -99,7 +104,7 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
                     said.collect::<Vec<_>>().join(", ")
                 })
             };
-            text.push_str(&counts(&tally, limit, &at));
+            text.push_str(&counts(&tally, limits, &at));
         }
         None => {
             line(&mut text, "made by", opened.created_by().unwrap_or("unknown"));
@@ -129,8 +134,12 @@ fn rows(args: &Args) -> Result<Exit, Error> {
     let keep = conditions::parse("--where", &keep, &file)?;
     let keep = conditions::rows_only("--where", keep)?.pop();
     let columns = shown_columns(args, &file, keep.as_ref());
-    let order = if args.ascending { Order::Ascending } else { Order::Descending };
-    let by = args.by.as_deref().map(|by| (by, order));
+    let order = |by| match (args.ascending, args.descending) {
+        (true, _) => Worse::Less,
+        (_, true) => Worse::Greater,
+        _ => file.column(by).and_then(|column| column.worse).unwrap_or(Worse::Greater),
+    };
+    let by = args.by.as_deref().map(|by| (by, order(by)));
     let count = usize::from(args.top.unwrap_or(ROWS_SHOWN));
     let names: Vec<&str> = columns.iter().map(String::as_str).collect();
     let rows = top(&file, &names, keep.as_ref(), by, count);

@@ -25,10 +25,13 @@ impl<M: Read> Plan<M> {
             "integrator": self.integrator.to_json(),
             "axis": axes.collect::<Value>(),
             "reliability": {
-                "ratio_limit": self.reliability.ratio_limit,
+                "ratio_limit": self.reliability.limits.most,
                 "channels": channels.collect::<Value>(),
             },
         });
+        if let Some(least) = self.reliability.limits.least {
+            plan["reliability"]["ratio_min"] = least.into();
+        }
         if let Some(design) = &self.design {
             plan["design"] = self::design(design);
         }

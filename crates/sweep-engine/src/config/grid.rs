@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use sweep_parameter::{Channel, Range, decimal};
+use sweep_parameter::{Channel, Range, RatioLimits, decimal};
 
 use super::Read;
 use super::parameters::WrittenConstant;
@@ -17,6 +17,8 @@ use crate::plan::{Plan, Reliability};
 
 /// `ratio_limit` of `[reliability]`.
 pub const DEFAULT_RATIO_LIMIT: f64 = 2.0;
+/// What `ratio_min` may be.
+pub const RATIO_MIN: Range = Range::Within(0.0, 1.0);
 /// Longest integration that is accepted: eleven days.
 pub const LONGEST_S: f64 = 1e6;
 
@@ -229,17 +231,19 @@ fn integrator<I: Integrator>(root: &Section<'_>) -> I {
 
 fn reliability<M: Read>(root: &Section<'_>, model: &mut M) -> Reliability<M> {
     let stand_in =
-        Reliability { ratio_limit: DEFAULT_RATIO_LIMIT, channels: M::default_channels() };
+        Reliability { limits: DEFAULT_RATIO_LIMIT.into(), channels: M::default_channels() };
     let Some(section) = root.table("reliability", "[reliability]").given() else {
         return stand_in;
     };
     let section = section.value;
     model.read_reliability(&section);
-    let ratio_limit = section.number("ratio_limit", Range::Positive).or(DEFAULT_RATIO_LIMIT);
+    let most = section.number("ratio_limit", Range::Positive).or(DEFAULT_RATIO_LIMIT);
+    let most = most.unwrap_or(DEFAULT_RATIO_LIMIT);
+    let least = section.number("ratio_min", RATIO_MIN).given().map(|least| least.value);
     let channels = names(&section, "channels", "channel", M::Channel::every(), M::Channel::name);
     section.finish();
     Reliability {
-        ratio_limit: ratio_limit.unwrap_or(DEFAULT_RATIO_LIMIT),
+        limits: RatioLimits { most, least },
         channels: channels.unwrap_or(stand_in.channels),
     }
 }

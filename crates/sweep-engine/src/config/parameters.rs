@@ -135,17 +135,19 @@ pub fn unknown<M: Read>(
     let title = format!("unknown parameter {}", quoted(name.value));
     let diagnostic = Diagnostic::new(title).at(&name.at, reason.as_str());
     let section = match name.value {
-        "window_s" => Some("[time], or as `window_from_s` and `window_to_s` here"),
-        "end_s" => Some("[time]"),
+        "end_s" | "window_s" => Some("[time]"),
         "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator]"),
-        "ratio_limit" | "criterion" | "channels" => Some("[reliability]"),
+        "ratio_limit" | "ratio_min" | "criterion" | "channels" => Some("[reliability]"),
         _ => None,
     };
     match (is_strange, section) {
-        (true, Some(section)) => diagnostic.help(format!(
-            "`{}` is set in {section} of the grid file and is the same at every point",
-            name.value
-        )),
+        (true, Some(section)) => {
+            let set = format!("`{}` is set in {section} of the grid file", name.value);
+            diagnostic.help(match name.value {
+                "window_s" => format!("{set}; `window_from_s` and `window_to_s` are its ends here"),
+                _ => format!("{set} and is the same at every point"),
+            })
+        }
         (true, None) => {
             let all = model.parameters();
             let near =

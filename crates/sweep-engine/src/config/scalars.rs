@@ -7,7 +7,7 @@ use sweep_parameter::{Channel, Range, decimal};
 use super::Read;
 use super::axes::MOST_POINTS;
 use super::design::{MOST_SEED, MOST_SOBOL};
-use super::grid::{Draft, LONGEST_S, some_of};
+use super::grid::{Draft, LONGEST_S, RATIO_MIN, some_of};
 use super::parameters::twice;
 use super::report::Report;
 use super::section::{check_number, quoted, short, unknown_word};
@@ -16,7 +16,8 @@ use crate::design::Design;
 use crate::method::{Integrator, settings};
 
 /// Those that stand outside of `[integrator]`.
-const OWN: [&str; 6] = ["end_s", "ratio_limit", "channels", "method", "points", "seed"];
+const OWN: [&str; 7] =
+    ["end_s", "ratio_limit", "ratio_min", "channels", "method", "points", "seed"];
 
 /// Every name.
 pub fn names<M: Read>() -> impl Iterator<Item = &'static str> {
@@ -158,8 +159,13 @@ fn put<M: Read>(written: &Written<'_>, draft: &mut Draft<'_, M>) -> Option<Value
             json!(written.value.value)
         }
         "ratio_limit" => {
-            plan.reliability.ratio_limit = written.number(Range::Positive)?.value;
-            json!(plan.reliability.ratio_limit)
+            plan.reliability.limits.most = written.number(Range::Positive)?.value;
+            json!(plan.reliability.limits.most)
+        }
+        "ratio_min" => {
+            let least = written.number(RATIO_MIN)?.value;
+            plan.reliability.limits.least = Some(least);
+            json!(least)
         }
         "method" => {
             let names: Vec<_> = M::Integrator::methods().iter().map(|entry| entry.name).collect();

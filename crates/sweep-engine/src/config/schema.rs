@@ -6,7 +6,7 @@ use sweep_parameter::{Channel as _, Parameter, Range};
 
 use super::axes::MOST_POINTS;
 use super::design::{DEFAULT_SEED, MOST_SEED, MOST_SOBOL};
-use super::grid::{DEFAULT_RATIO_LIMIT, LONGEST_S};
+use super::grid::{DEFAULT_RATIO_LIMIT, LONGEST_S, RATIO_MIN};
 use super::read::{Read, Schema};
 use crate::method::{Entry, Integrator, default_method};
 
@@ -190,7 +190,10 @@ fn reliability<M: Read>(further: Vec<(&'static str, Value)>) -> Value {
         "description": "motions that are compared",
     });
     let ratio_limit = described(number(Range::Positive), DEFAULT_RATIO_LIMIT, limit);
-    let own = [("ratio_limit", ratio_limit), ("channels", channels)];
+    let mut ratio_min = number(RATIO_MIN);
+    ratio_min["description"] =
+        "if given, a point is reliable where every ratio is above this too".into();
+    let own = [("ratio_limit", ratio_limit), ("ratio_min", ratio_min), ("channels", channels)];
     table(own.into_iter().chain(further), &[])
 }
 

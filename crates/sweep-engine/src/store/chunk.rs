@@ -34,7 +34,7 @@ const HASH: usize = blake3::OUT_LEN;
 const MOST_ROWS: u64 = 32;
 
 /// What a record holds.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
     columns: Arc<[Column]>,
     /// Whether there may be several rows of a point.
@@ -56,7 +56,7 @@ impl Shape {
 }
 
 /// What a chunk's header must say to be the chunk that is looked for.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Place {
     /// Hash of the plan.
     pub plan: blake3::Hash,

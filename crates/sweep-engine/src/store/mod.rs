@@ -49,7 +49,7 @@ pub use status::FolderStatus;
 pub use status::{State, status};
 pub use trials::{Key, OpenedTrials, Trials};
 
-use sweep_parameter::Parameter as _;
+use sweep_parameter::{Parameter as _, RatioLimits};
 
 use crate::config::Read;
 use crate::model::Model;
@@ -72,8 +72,8 @@ pub struct Job<'a> {
     pub points: u64,
     /// What the columns depend on.
     pub layout: Layout,
-    /// A row is reliable when its greatest ratio is below this.
-    pub ratio_limit: f64,
+    /// A row is reliable when its ratios are between these.
+    pub limits: RatioLimits,
     /// Axis values by point.
     pub axis_values: AxisValues<'a>,
 }
@@ -88,7 +88,7 @@ impl<'a> Job<'a> {
             numerics: M::BUILD.numerics,
             points: plan.points(),
             layout: M::layout(plan),
-            ratio_limit: plan.reliability.ratio_limit,
+            limits: plan.reliability.limits,
             axis_values: Box::new(|point| plan.axis_values(point)),
         }
     }

@@ -18,6 +18,8 @@ use serde_json::Value;
 use super::error::StoreError;
 use sweep_files::cells;
 use sweep_files::{FileKind, ParquetFile, key};
+use sweep_parameter::RatioLimits;
+use sweep_results::ratio_limits;
 
 /// What a finished result says of itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,6 +95,11 @@ pub struct Tally {
     pub unreliable: u64,
     /// Rows without a verdict: a model failed, or nothing moves.
     pub undefined: u64,
+    /// Rows with a ratio so low that the linear model over-estimates as much as a reliable one may
+    /// under-estimate.
+    pub over_estimated: u64,
+    /// Of these the reliable ones.
+    pub over_estimated_reliable: u64,
     /// Rows known to be chaotic.
     pub sensitive: u64,
     /// Rows whose error is above the accuracy asked for.
@@ -150,7 +157,7 @@ impl StatusCounts {
 /// # Errors
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
 pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 12] = [
+    const COLUMNS: [&str; 11] = [
         "point",
         "status",
         "motion",
@@ -161,22 +168,31 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         "method",
         "error",
         "converged",
-        "ratio_max",
         "min_gap_nonlinear_m",
     ];
     let failed = StoreError::parquet("read", file.path());
     let mut tally = Tally::default();
+    let fields = file.schema().fields().iter().map(|field| field.name().clone());
+    let ratios: Vec<String> = fields.filter(|name| name.starts_with("ratio_")).collect();
     let batches = file.batches(|builder| {
-        let mask = ProjectionMask::columns(builder.parquet_schema(), COLUMNS);
+        let columns = COLUMNS.into_iter().chain(ratios.iter().map(String::as_str));
+        let mask = ProjectionMask::columns(builder.parquet_schema(), columns);
         builder.with_projection(mask)
     })?;
+    let limits =
+        file.value(key::PLAN).and_then(|plan| ratio_limits(&serde_json::from_str(plan).ok()?));
     for batch in batches {
-        count(&batch?, &mut tally).map_err(&failed)?;
+        count(&batch?, &ratios, limits, &mut tally).map_err(&failed)?;
     }
     Ok(tally)
 }
 
-fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
+fn count(
+    batch: &RecordBatch,
+    ratios: &[String],
+    limits: Option<RatioLimits>,
+    tally: &mut Tally,
+) -> Result<(), ParquetError> {
     let column = |name: &str| {
         batch
             .column_by_name(name)
@@ -209,12 +225,24 @@ fn count(batch: &RecordBatch, tally: &mut Tally) -> Result<(), ParquetError> {
     if batch.column_by_name("motion").is_some() {
         return Ok(());
     }
-    for reliable in cells::flags(column("reliable")?)? {
+    let mut least = vec![f64::INFINITY; batch.num_rows()];
+    for column in ratios.iter().filter_map(|name| batch.column_by_name(name)) {
+        if cells::is_number(column.data_type()) {
+            let ratios = cells::numbers(column)?.into_iter();
+            least.iter_mut().zip(ratios).for_each(|(least, ratio)| {
+                *least = least.min(ratio.unwrap_or(f64::INFINITY));
+            });
+        }
+    }
+    let over = limits.map_or(0.0, RatioLimits::over_estimate);
+    for (reliable, least) in cells::flags(column("reliable")?)?.iter().zip(least) {
         match reliable {
             Some(true) => tally.reliable += 1,
             Some(false) => tally.unreliable += 1,
             None => tally.undefined += 1,
         }
+        tally.over_estimated += u64::from(least < over);
+        tally.over_estimated_reliable += u64::from(least < over && reliable == Some(true));
     }
     tally.sensitive += cells::flags(column("sensitive")?)?.true_count() as u64;
     // Older files have no such column.

@@ -20,6 +20,7 @@ use serde_json::{Map, Value};
 use super::Job;
 use crate::table::{dictionary_entry, field_metadata};
 use sweep_files::{CREATED_BY, FileKind, key};
+use sweep_parameter::{Limit, Worse};
 
 /// Rows in a row group: fixed, so that chunking leaves no trace in the file. A group of 25 columns
 /// takes about 30 MB in memory while it is written.
@@ -49,7 +50,7 @@ pub enum Kind {
 }
 
 /// A column of the file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// Name.
     pub name: String,
@@ -59,6 +60,10 @@ pub struct Column {
     pub description: String,
     /// What its cells are.
     pub kind: Kind,
+    /// Which way it is bad, if it is a number that can be.
+    pub worse: Option<Worse>,
+    /// Up to where it is good, if that has a meaning of its own.
+    pub limit: Option<Limit>,
 }
 
 /// What the columns depend on.
@@ -101,7 +106,8 @@ impl Column {
         description: impl Into<String>,
         kind: Kind,
     ) -> Self {
-        Self { name: name.into(), unit: unit.into(), description: description.into(), kind }
+        let (name, description) = (name.into(), description.into());
+        Self { name, unit: unit.into(), description, kind, worse: None, limit: None }
     }
 
     fn field(&self) -> Field {
@@ -114,8 +120,18 @@ impl Column {
             Kind::Flag => (DataType::Boolean, true),
             Kind::Name(_) => (names(), true),
         };
-        let metadata = field_metadata(&self.unit, &self.description);
+        let mut metadata = field_metadata(&self.unit, &self.description);
+        let of_worth = self.of_worth().map(|(key, value)| {
+            (key.to_owned(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+        });
+        metadata.extend(of_worth);
         Field::new(&self.name, data_type, nullable).with_metadata(metadata)
+    }
+
+    /// Which way it is bad, and up to where it is good, as the file says them.
+    fn of_worth(&self) -> impl Iterator<Item = (&'static str, Value)> {
+        let worse = self.worse.map(|worse| (key::WORSE, worse.name().into()));
+        worse.into_iter().chain(self.limit.map(|limit| (key::LIMIT, limit.value.into())))
     }
 
     /// The column's array; cells that must be there and are not become zeros.
@@ -192,7 +208,8 @@ impl Layout {
     /// The column dictionary: name to type, unit and description.
     fn dictionary(&self) -> Value {
         let entry = |column: &Column| {
-            let entry = dictionary_entry(column.type_name(), &column.unit, &column.description);
+            let mut entry = dictionary_entry(column.type_name(), &column.unit, &column.description);
+            column.of_worth().for_each(|(key, value)| entry[key] = value);
             (column.name.clone(), entry)
         };
         Value::Object(self.all().map(entry).collect::<Map<_, _>>())

@@ -43,7 +43,7 @@ pub fn job(points: u64) -> Job<'static> {
         numerics: 1,
         points,
         layout: layout(),
-        ratio_limit: 2.0,
+        limits: 2.0.into(),
         axis_values: Box::new(|point| {
             vec![0.05 * (point / 9 + 1) as f64, 60.0 + 10.0 * (point % 9) as f64]
         }),

@@ -1,6 +1,8 @@
 //! The traced curve on which a quantity is at its limit, with the bracket it is known to lie in.
 
 use serde_json::Value;
+use sweep_files::key;
+use sweep_parameter::Worse;
 
 use crate::axis::evenly_by_log;
 use crate::chart::{Chart, ChartPanel, Series, Style};
@@ -82,12 +84,12 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
             Series { name: name.clone(), colour, grid: 0, y: pick(|place| place.y), style }
         }));
     }
-    let side = far_side(&curves, quantity(table));
+    let side = far_side(&curves, side_words(table));
     Ok(Chart {
-        title: if is_growth(quantity(table)) {
-            "Where the machine may dwell at any speed".to_owned()
-        } else {
-            "Boundary of the linear model's reliability".to_owned()
+        title: match quantity(table) {
+            growth if is_growth(growth) => "Where the machine may dwell at any speed".to_owned(),
+            ratio if is_ratio(ratio) => "Boundary of the linear model's reliability".to_owned(),
+            other => format!("Limit of the {}", in_words(other)),
         },
         subtitle: table.source.subtitle(&format!(
             "{} values of {}{side}",
@@ -109,7 +111,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
 }
 
 /// What the region above the uppermost places is, where all of these say the same.
-fn far_side(curves: &[(String, Vec<Place>)], quantity: &str) -> String {
+fn far_side(curves: &[(String, Vec<Place>)], [falling, rising]: [&str; 2]) -> String {
     let mut uppermost: Vec<Place> = Vec::new();
     for place in curves.iter().flat_map(|(_, places)| places).filter(|place| place.y.is_finite()) {
         match uppermost.iter_mut().find(|known| known.x == place.x) {
@@ -120,11 +122,6 @@ fn far_side(curves: &[(String, Vec<Place>)], quantity: &str) -> String {
     }
     let all = |rising: bool| {
         !uppermost.is_empty() && uppermost.iter().all(|place| place.rising == Some(rising))
-    };
-    let [falling, rising] = match quantity {
-        gap if gap.starts_with("min_gap") => ["gap closed", "gap open"],
-        growth if is_growth(growth) => ["stable", "unstable"],
-        _ => ["reliable", "unreliable"],
     };
     let side = match (all(true), all(false)) {
         (false, true) => falling,
@@ -144,6 +141,32 @@ fn quantity(table: &Table) -> &str {
     table.source.find("quantity").and_then(Value::as_str).unwrap_or("ratio_max")
 }
 
+/// What the side is towards which the quantity falls below its limit, and the other.
+fn side_words(table: &Table) -> [&'static str; 2] {
+    let about = table.source.find(key::BOUNDARY);
+    let worse = about.and_then(|about| Worse::named(about.get(key::WORSE)?.as_str()?));
+    match (quantity(table), worse) {
+        (growth, _) if is_growth(growth) => ["stable", "unstable"],
+        ("ratio_min", _) => ["unreliable", "reliable"],
+        (ratio, _) if is_ratio(ratio) => ["reliable", "unreliable"],
+        (_, Some(Worse::Less)) => ["beyond the limit", "within the limit"],
+        _ => ["within the limit", "beyond the limit"],
+    }
+}
+
+/// Whether that is a ratio of both models.
+fn is_ratio(quantity: &str) -> bool {
+    quantity.starts_with("ratio_")
+}
+
+/// As in "least gap, nonlinear model".
+fn in_words(quantity: &str) -> String {
+    match label::of_model(quantity) {
+        (words, "") => words,
+        (words, model) => format!("{words}, {model} model"),
+    }
+}
+
 /// Whether that is the growth of disturbances.
 fn is_growth(quantity: &str) -> bool {
     quantity.starts_with("growth")
@@ -153,7 +176,7 @@ fn is_growth(quantity: &str) -> bool {
 pub(crate) fn follows_from(table: &Table) -> &'static [&'static str] {
     match quantity(table) {
         growth if is_growth(growth) => together::MACHINE,
-        "ratio_max" => together::RATIOS,
+        "ratio_max" | "ratio_min" => together::RATIOS,
         _ => together::RUN,
     }
 }
@@ -192,12 +215,18 @@ pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay, PlotErr
 
 /// What is at its limit, as the file says, or else the ratio.
 fn limit(table: &Table) -> String {
-    let ratio = label::significant(table.source.ratio_limit(), 4);
+    let about = table.source.find(key::BOUNDARY);
+    let told = about.and_then(|about| about.get(key::LIMIT)?.as_f64());
+    let unit = table.column("quantity_low").map_or("", |column| &column.unit);
+    let (unit, factor) = label::shown(unit);
+    let limit = told.map_or(table.source.ratio_limit(), |limit| limit * factor);
+    let limit = format!("{} {unit}", label::significant(limit, 4)).trim_end().to_owned();
     match quantity(table) {
-        "ratio_max" => format!("ratio {ratio}"),
-        gap if gap.starts_with("min_gap") => format!("{} 0", label::words(gap)),
-        growth if is_growth(growth) => "no growth at any speed".to_owned(),
-        other => format!("{} {ratio}", label::words(other)),
+        "ratio_max" => format!("ratio {limit}"),
+        growth if is_growth(growth) && told.is_none_or(|limit| limit == 0.0) => {
+            "no growth at any speed".to_owned()
+        }
+        other => format!("{} {limit}", in_words(other)),
     }
 }
 

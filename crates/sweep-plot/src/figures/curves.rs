@@ -1,14 +1,15 @@
 //! A map file of one axis: ratios, amplitudes and gaps as curves over it.
 
+use crate::PlotOptions;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style, spans_decades};
 use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
 use crate::error::PlotError;
 use crate::gather::Map;
 use crate::label::{self, Label};
-use crate::layer::{WHOLE, channels};
+use crate::layer::{self, Group, Shown};
+use crate::read::ColumnFacts;
 use crate::scene::{Colour, INK};
 use crate::table::Column;
-use crate::{PlotOptions, Quantity};
 
 /// Most failed points that are marked: as many lines as a figure has room for.
 const MOST_MARKS: usize = 400;
@@ -16,90 +17,56 @@ const MOST_MARKS: usize = 400;
 /// The chart of a map file of one axis.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] for an unknown channel or a quantity that the file does not have,
-/// [`PlotError::Unfit`] for a quantity that is not a curve.
+/// [`PlotError::NotThere`] for a column that the file does not have, [`PlotError::Unfit`] for what
+/// is not a curve.
 pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError> {
-    if options.quantity == Quantity::Status {
+    let (axis, table) = (&map.grid.axes[0], &map.table);
+    let source = &table.source;
+    let asked: Option<Vec<Shown>> = layer::asked(source, options)?.into_iter().collect();
+    let Some(asked) = asked else {
         return Err(PlotError::Unfit(
             "status is drawn on maps of two or more axes; over one axis, failed points are marked"
                 .to_owned(),
         ));
-    }
-    let (axis, table) = (&map.grid.axes[0], &map.table);
-    options.quantity.there(&table.source)?;
+    };
     let cells: Vec<usize> = (0..map.counts.len()).filter(|&cell| map.filled(cell)).collect();
     let values = |column: &Column, factor: f64| -> Vec<f64> {
         let values = column.numbers().unwrap_or_default();
         cells.iter().map(|&cell| values[cell] * factor).collect()
     };
-    let mut names: Vec<&str> =
-        channels(&table.source, "nonlinear_").into_iter().map(|(name, _)| name).collect();
-    if let Some((whole, ..)) = options.quantity.whole() {
-        names.extend(whole.parts(&table.source).into_iter().map(|of_part| of_part.part));
-    }
-    for asked in &options.channels {
-        if !names.contains(&asked.as_str()) {
-            return Err(PlotError::NotThere {
-                option: "--channel",
-                given: asked.clone(),
-                path: table.source.path.clone(),
-                what: "channel",
-                known: names.join(", "),
-            });
-        }
-    }
+    let ratios_asked: Vec<&Shown> =
+        asked.iter().filter(|shown| shown.group == Group::Ratio).collect();
     let wanted = |name: &str| {
-        options.channels.is_empty() || options.channels.iter().any(|asked| asked == name)
+        ratios_asked.iter().any(|shown| shown.channel.as_deref().is_none_or(|of| of == name))
     };
-
-    let mut panels = vec![ratios(map, options.quantity == Quantity::Ratio, &values, &wanted)];
-    let amplitudes = matches!(options.quantity, Quantity::Nonlinear | Quantity::Linear);
-    for (name, facts) in channels(&table.source, "nonlinear_") {
-        let (unit, factor) = label::shown(&facts.unit);
-        let models = [("nonlinear", NONLINEAR), ("linear", LINEAR)].into_iter().filter_map(
-            |(model, colour)| {
-                let column = table.column(&format!("{model}_{name}"))?;
-                Some(line(&format!("{model} model"), colour, values(column, factor)))
-            },
-        );
-        let series = models.collect();
-        panels.push(ChartPanel {
-            shown: amplitudes && wanted(name),
-            height: 190.0,
-            ..ChartPanel::new(name, Label::new(&label::channel(name), unit), series)
-        });
-    }
-    let model_colour = |model: &str| if model == "linear" { LINEAR } else { NONLINEAR };
-    let panel = |name: &str, words: &str, columns: &[(&str, &str)]| {
-        let mut unit = "";
-        let lines = columns.iter().filter_map(|(model, name)| {
-            let column = table.column(name)?;
-            let factor;
-            (unit, factor) = label::shown(&column.unit);
+    let mut panels = vec![ratios(map, !ratios_asked.is_empty(), &values, &|name| {
+        ratios_asked.is_empty() || wanted(name)
+    })];
+    // A panel of both models' columns.
+    let panel = |name: &str, words: &str, columns: &[(&str, &ColumnFacts)]| {
+        let (unit, factor) = label::shown(&columns[0].1.unit);
+        let lines = columns.iter().filter_map(|(model, facts)| {
             let said = if model.is_empty() { String::new() } else { format!("{model} model") };
-            Some(line(&said, model_colour(model), values(column, factor)))
+            let colour = if *model == "linear" { LINEAR } else { NONLINEAR };
+            Some(line(&said, colour, values(table.column(&facts.name)?, factor)))
         });
-        let lines: Vec<Series> = lines.collect();
-        ChartPanel::new(name, Label::new(&label::capitalised(words), unit), lines)
-    };
-    for whole in &WHOLE {
-        let columns: Vec<_> =
-            whole.columns.iter().map(|(_, model, name)| (*model, *name)).collect();
-        let gap = whole.name == "gap";
-        let asked = whole.columns.iter().any(|(quantity, ..)| *quantity == options.quantity);
-        let parts = whole.parts(&table.source);
-        let asked_part = |part: &str| asked && options.channels.iter().any(|name| name == part);
-        panels.push(ChartPanel {
-            shown: asked && !parts.iter().any(|of_part| asked_part(of_part.part)),
-            levels: if gap { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() },
-            ..panel(whole.name, whole.words, &columns)
-        });
-        for of_part in &parts {
-            panels.push(ChartPanel {
-                shown: asked_part(of_part.part),
-                ..panel(&of_part.name, &of_part.words, &of_part.columns)
-            });
+        let limit = columns[0].1.limit.map(|limit| limit * factor);
+        ChartPanel {
+            shown: columns
+                .iter()
+                .any(|(_, facts)| asked.iter().any(|shown| shown.column() == facts.name)),
+            levels: limit.map(|limit| (limit, "limit".to_owned())).into_iter().collect(),
+            ..ChartPanel::new(name, Label::new(&label::capitalised(words), unit), lines.collect())
         }
+    };
+    for (name, facts) in layer::channels(source, Group::Nonlinear) {
+        let of_linear = source.column(&format!("linear_{name}"));
+        let both = [Some(("nonlinear", facts)), of_linear.map(|facts| ("linear", facts))];
+        let columns: Vec<_> = both.into_iter().flatten().collect();
+        panels.push(ChartPanel { height: 190.0, ..panel(name, &label::channel(name), &columns) });
+    }
+    for family in layer::families(source) {
+        panels.push(panel(&family.name, &family.words, &family.columns));
     }
     panels.retain(|panel| !panel.series.is_empty());
 
@@ -116,10 +83,10 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
         format!("failed: no result; one of {each} places is marked")
     };
     Ok(Chart {
-        title: match (options.quantity, options.quantity.whole()) {
-            (Quantity::Ratio, _) => "Where the linear model can be trusted".to_owned(),
-            (_, Some((whole, ..))) => label::capitalised(whole.words),
-            _ => "Amplitudes of both models".to_owned(),
+        title: match asked.first().map(|shown| (shown.group, shown)) {
+            Some((Group::Nonlinear | Group::Linear, _)) => "Amplitudes of both models".to_owned(),
+            Some((Group::Other, of)) => label::capitalised(&label::of_model(of.column()).0),
+            _ => "Where the linear model can be trusted".to_owned(),
         },
         subtitle: super::map::subtitle(map, &[]),
         x_label: Label::new(&axis.words, &axis.unit),
@@ -140,7 +107,7 @@ fn ratios(
     wanted: &impl Fn(&str) -> bool,
 ) -> ChartPanel {
     let limit = map.table.source.ratio_limit();
-    let mut series: Vec<Series> = channels(&map.table.source, "ratio_")
+    let mut series: Vec<Series> = layer::channels(&map.table.source, Group::Ratio)
         .into_iter()
         .enumerate()
         .filter(|(_, (name, _))| wanted(name))

@@ -6,7 +6,7 @@ use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, LINEAR, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::stability::{
-    UNSTABLE, axes, axis_columns, one_point, part, row_values, said, shown, unstable,
+    UNSTABLE, axes, axis_columns, one_point, part, row_values, said_within, shown, unstable,
 };
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Source};
@@ -91,7 +91,7 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
     });
     let panels = panels.collect();
     let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
-    notes.extend(axes.iter().zip(&point).map(|(axis, value)| said(axis, *value).to_lowercase()));
+    notes.extend(axes.iter().zip(&point).map(|(axis, value)| said_within(axis, *value)));
     notes.push("largest deviation from equilibrium".to_owned());
     Ok(Chart {
         title: "What a held speed ends in".to_owned(),

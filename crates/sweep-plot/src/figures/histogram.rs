@@ -70,9 +70,11 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
 
 /// What share of the points is on the good side.
 fn title(scatter: &Scatter) -> String {
-    // Of "reliable: below 2" the first word.
-    let words = scatter.words(Side::Good);
-    let words = words.split(':').next().unwrap_or_default();
+    let words = match scatter.words(Side::Good) {
+        // Of "reliable: below 2" the first word.
+        words if words.starts_with("reliable") => "reliable".to_owned(),
+        words => format!("with {words}"),
+    };
     match scatter.share() {
         Some(share) => {
             format!("{}: {:.1} % of the points {words}", scatter.title, 100.0 * share.part)

@@ -25,9 +25,6 @@ const GAP: f64 = 20.0;
 /// Greatest height of a panel, px.
 const TALLEST: f64 = 330.0;
 
-/// The title of a design's scatter matrix.
-pub(crate) const TITLE: &str = "Where the linear model can be trusted";
-
 /// A value along one direction of the matrix.
 struct Direction<'a> {
     label: &'a Label,
@@ -61,12 +58,6 @@ pub(crate) fn notes(scatter: &Scatter) -> Vec<String> {
 pub(crate) fn drawn(scatter: &Scatter) -> Vec<usize> {
     let stride = scatter.points.len().div_ceil(MOST_POINTS).max(1);
     scatter.picked(stride)
-}
-
-/// The title: what the colours mean.
-pub(crate) fn title(scatter: &Scatter) -> &str {
-    let verdict = scatter.level.as_ref().is_some_and(|level| level.log);
-    if verdict { TITLE } else { &scatter.title }
 }
 
 /// The scale that holds some values, with room for the dots at its ends.
@@ -106,7 +97,7 @@ pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> Scene {
     let below = BELOW + 1.2 * LABEL_SIZE * lines.unwrap_or(1).saturating_sub(1) as f64;
     let panels_height = count as f64 * (height + GAP) - GAP;
     let total = HEADING_HEIGHT + panels_height + below + legend_height + 8.0;
-    let title = title(scatter);
+    let title = &scatter.title;
     let subtitle = scatter.subtitle(&notes(scatter));
     let mut scene = Scene::new(WIDTH, total, format!("{title}. {subtitle}"));
     heading(&mut scene, typeface, title, &subtitle);

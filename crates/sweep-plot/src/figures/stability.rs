@@ -271,7 +271,7 @@ pub(super) fn said(axis: &ColumnFacts, value: f64) -> String {
 }
 
 /// As [`said`], within a sentence: the words are small, the unit keeps its letters.
-fn said_within(axis: &ColumnFacts, value: f64) -> String {
+pub(super) fn said_within(axis: &ColumnFacts, value: f64) -> String {
     let words = label::words(&axis.name);
     said(axis, value).replacen(&words, &words.to_lowercase(), 1)
 }

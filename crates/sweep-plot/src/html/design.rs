@@ -12,7 +12,7 @@ use crate::scatter::{Scatter, Side};
 
 /// The page, which opens with `first`.
 pub(crate) fn page_of(scatter: &Scatter, first: Option<View>) -> String {
-    let title = matrix::title(scatter);
+    let title = &scatter.title;
     let drawn = matrix::drawn(scatter);
     let chart = histogram::chart(scatter);
     let pick = |values: &[f64]| embed::floats(drawn.iter().map(|&k| values[k]));

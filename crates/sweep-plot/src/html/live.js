@@ -156,6 +156,11 @@ function createLive(host, data) {
     return greatest;
   }
 
+  const leastOf = (ratios) => Math.min(...live.compared.map((channel) => ratios[channel])
+    .filter(Number.isFinite));
+  const isTrusted = (ratios) => greatestOf(ratios).ratio < live.ratioLimit
+    && (live.ratioMin === null || leastOf(ratios) > live.ratioMin);
+
   function show(answer) {
     const panel = host.querySelector("#live");
     panel.dataset.kind = answer.isChecked ? "checked" : "preview";
@@ -179,7 +184,7 @@ function createLive(host, data) {
       ? `The ${["nonlinear", "linear"][failed]} model ${FAILURES[records[failed].failure]} at `
         + `${significant(records[failed].failTime)} s`
       : !greatest ? "Undefined: no excitation"
-        : `Linear model ${greatest.ratio < live.ratioLimit ? "" : "un"}reliable here`;
+        : `Linear model ${isTrusted(ratios) ? "" : "un"}reliable here`;
     const kind = answer.isChecked ? "Checked" : "Preview, not checked";
     const row = (words, unit, of, beside = "") => element("tr", {},
       element("th", { scope: "row" }, withUnit(words, unit)),
@@ -258,7 +263,8 @@ function createLive(host, data) {
 
   // What a layer of the map shows of a finer cell; NaN where it shows something else.
   function layerValue(layer, { records, ratios, sag }) {
-    if (layer.group === "ratio" && !layer.channel) return greatestOf(ratios)?.ratio ?? NaN;
+    if (layer.column === "ratio_max") return greatestOf(ratios)?.ratio ?? NaN;
+    if (layer.column === "ratio_min") return leastOf(ratios);
     const model = { nonlinear: 0, linear: 1 };
     if (layer.group in model || layer.group === "ratio") {
       const channel = live.channels.findIndex((one) => one.name === layer.channel);
@@ -266,8 +272,8 @@ function createLive(host, data) {
       if (layer.group === "ratio") return ratios[channel];
       return records[model[layer.group]].amplitudes[channel] * live.channels[channel].factor;
     }
-    const gap = { "gap-nonlinear": 0, "gap-linear": 1 }[layer.group];
-    if (gap !== undefined) return records[gap].gap * 1e3;
+    const gap = ["min_gap_nonlinear_m", "min_gap_linear_m"].indexOf(layer.column);
+    if (gap >= 0) return records[gap].gap * 1e3;
     if (layer.column === "static_sag_m") return sag * 1e3;
     for (const [k, { columns, factor }] of live.metrics.entries()) {
       const of = columns.indexOf(layer.column);

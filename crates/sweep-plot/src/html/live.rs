@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::embed;
 use crate::grid::GridAxis;
-use crate::{Live, Slider, label, layer};
+use crate::{Live, Slider, label};
 
 /// The module of `crates/washer-live`, packed by gzip; `scripts/release/build_live.sh` makes it.
 const MODULE: &[u8] = include_bytes!("../../assets/live.wasm.gz");
@@ -34,6 +34,7 @@ pub(crate) fn json(live: &Live, axes: &[GridAxis]) -> Value {
         "levels": live.levels,
         "accuracy": live.accuracy,
         "ratioLimit": live.ratio_limit,
+        "ratioMin": live.ratio_min,
         "rungs": live.rungs,
         "version": live.version,
     })
@@ -42,7 +43,7 @@ pub(crate) fn json(live: &Live, axes: &[GridAxis]) -> Value {
 fn metric(columns: &[String; 2]) -> Value {
     let unit = label::unit_of_name(&columns[0]);
     let (unit, factor) = label::shown(&unit);
-    let words = layer::words_of_whole(&columns[0]).unwrap_or_else(|| label::words(&columns[0]));
+    let words = label::capitalised(&label::of_model(&columns[0]).0);
     json!({ "columns": columns, "words": words, "unit": unit, "factor": factor })
 }
 

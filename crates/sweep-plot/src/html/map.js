@@ -23,6 +23,7 @@ function createMap(host, data, panel) {
   const full = borders.map((list) => [list[0], list[list.length - 1]]);
   let view = full.map((range) => [...range]);
   let rest = [...data.first.rest];
+  const listeners = [];
   let hovered = null;
   let pinned = null;
   let cursor = [Math.floor(nx / 2), Math.floor(ny / 2)];
@@ -34,13 +35,16 @@ function createMap(host, data, panel) {
   };
 
   // Controls.
-  const quantity = element("select", { id: "quantity", onchange: () => offerChannels() });
-  for (const [value, words] of data.quantities) {
-    quantity.append(element("option", { value, selected: value === data.first.group }, words));
+  const quantity = element("select", { id: "quantity", onchange: () => changed() });
+  for (const { group, groupWords } of data.layers) {
+    if (quantity.querySelector(`[data-group="${group}"]`)) continue;
+    quantity.append(element("optgroup", { label: groupWords, "data-group": group },
+      ...data.layers.filter((layer) => layer.group === group)
+        .map((layer) => element("option", { value: layer.column }, layer.words))));
   }
-  const channel = element("select", { id: "channel", onchange: () => changed() });
-  const controls = element("div", { class: "controls" },
-    element("label", {}, "Show", quantity), element("label", {}, "of", channel));
+  quantity.append(element("option", { value: "status" }, "status"));
+  quantity.value = data.first.column;
+  const controls = element("div", { class: "controls" }, element("label", {}, "Show", quantity));
   extra.forEach((axis, k) => {
     const cut = element("select", { "data-axis": axis.name, onchange: () => {
       rest[k] = Number(cut.value);
@@ -82,24 +86,7 @@ function createMap(host, data, panel) {
   over.canvas.classList.add("over");
   figure.append(tip);
 
-  function offerChannels() {
-    const before = channel.value || data.first.channel;
-    const layers = data.layers.filter((layer) => layer.group === quantity.value);
-    const offered = layers.some((layer) => layer.channel) ? layers : [];
-    channel.replaceChildren();
-    for (const layer of offered) {
-      channel.append(element("option", { value: layer.channel }, layer.channelWords));
-    }
-    channel.disabled = offered.length === 0;
-    if (offered.length === 0) channel.append(element("option", { value: "" }, "no channel"));
-    if (offered.some((layer) => layer.channel === before)) channel.value = before;
-    changed();
-  }
-
-  function currentLayer() {
-    const shown = (layer) => layer.group === quantity.value && layer.channel === channel.value;
-    return data.layers.find(shown) ?? null;
-  }
+  const currentLayer = () => data.layers.find((layer) => layer.column === quantity.value) ?? null;
 
   function changed() {
     const layer = currentLayer();
@@ -109,6 +96,7 @@ function createMap(host, data, panel) {
     cells.request();
     over.request();
     tell();
+    listeners.forEach((listener) => listener());
   }
 
   function setView(next) {
@@ -475,7 +463,7 @@ function createMap(host, data, panel) {
     const trace = place && data.traces?.[point];
     if (!trace) return;
     histories.append(element("h2", {}, `Time histories at ${coordinates(place).join(", ")}`));
-    const shown = channel.value || word("ratio_max_channel", point);
+    const shown = currentLayer()?.channel ?? word("ratio_max_channel", point);
     createHistories(histories, trace, shown);
   }
 
@@ -545,10 +533,12 @@ function createMap(host, data, panel) {
     event.preventDefault();
   });
   darkTheme.addEventListener("change", () => tellLegend(currentLayer()));
-  offerChannels();
+  changed();
   panel?.connect(connected());
   return {
     cells: { columns, counts, filled, word, verdict, shownValue },
+    layer: currentLayer,
+    onChange: (listener) => listeners.push(listener),
     // The parts of the picture, from below.
     canvases: [cells.canvas, over.canvas],
     title: () => document.getElementById("title").textContent,
@@ -557,12 +547,10 @@ function createMap(host, data, panel) {
     index: pointAt,
     coordinates,
     // What a link holds, and back.
-    state: () => ({ show: quantity.value, of: channel.value, rest, view: view.flat(), pinned }),
+    state: () => ({ show: quantity.value, rest, view: view.flat(), pinned }),
     restore(state) {
       const offers = (select, value) => [...select.options].some((one) => one.value === value);
       if (offers(quantity, state.show)) quantity.value = state.show;
-      offerChannels();
-      if (offers(channel, state.of)) channel.value = state.of;
       extra.forEach((axis, k) => {
         if (state.rest?.[k] >= 0 && state.rest[k] < axis.values.length) cutAt(k, state.rest[k]);
       });

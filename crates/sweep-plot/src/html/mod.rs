@@ -12,7 +12,6 @@ pub(crate) use design::page_of as design_page;
 use serde_json::{Map as Object, Value, json};
 
 use super::PlotOptions;
-use super::Quantity;
 use super::axis::{LEAST_TICKS, SLACK, Scale, Step, Tick, log_sets};
 use super::chart::{Chart, ChartPanel, Series, Style, x_scale, y_scale};
 use super::colour::{BOTH, ColourScale, DISTINCT, FAILED, LEVELS, SHADE};
@@ -23,12 +22,13 @@ use super::figures;
 use super::gather::{Counts, Map};
 use super::grid::GridAxis;
 use super::label;
-use super::layer::{self, Layer, Level, Shown};
+use super::layer::{self, Group, Layer, Level, Shown};
 use super::read::Source;
 use super::scene::{Colour, INK};
 use super::svg::escape;
 use super::swept::SweptAxis;
 use super::table::{Column, Table};
+use sweep_parameter::Worse;
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("style.css");
@@ -74,7 +74,7 @@ pub(crate) fn most_cells(columns: usize) -> usize {
 /// brings.
 pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<String, PlotError> {
     let source = &map.table.source;
-    options.quantity.there(source)?;
+    let first = layer::chosen(source, options)?;
     let all = layer::all(source);
     let room = MOST_POINTS / all.len();
     let layers = all.iter().map(|shown| Ok(layer_json(map, shown, &shown.layer(map)?, room)));
@@ -95,12 +95,14 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
         "axes": map.grid.axes.iter().map(axis_json).collect::<Vec<_>>(),
         "columns": columns_json(&map.table),
         "codes": codes_json(&map.table),
-        "quantities": quantities_json(&all),
         "rows": rows_json(source),
         "layers": layers,
-        "first": first_view(options, cuts),
+        "first": {
+            "column": first.as_ref().map_or(layer::STATUS, Shown::column),
+            "rest": cuts.cuts.first().map_or(&[][..], |cut| &cut.rest),
+        },
         "palettes": {
-            "diverging": palette(&ColourScale::ratio(std::iter::empty(), 2.0)),
+            "diverging": palette(&ColourScale::ratio(std::iter::empty(), 2.0, false)),
             "sequential": palette(&ColourScale::amplitude(std::iter::empty())),
             "kinds": DISTINCT.map(Colour::css),
             "failed": FAILED.css(),
@@ -193,23 +195,6 @@ fn log_ticks_json(scale: Scale) -> Value {
     json!(sets.map(|set| set.into_iter().map(tick).collect::<Vec<_>>()))
 }
 
-/// The layer and the cut that the page opens with.
-fn first_view(options: &PlotOptions, cuts: &Cuts) -> Value {
-    json!({
-        "group": options.quantity.name(),
-        "channel": options.channels.first().map_or("", String::as_str),
-        "rest": cuts.cuts.first().map_or(&[][..], |cut| &cut.rest),
-    })
-}
-
-/// The quantities that the page offers, by name and in words.
-fn quantities_json(all: &[Shown]) -> Value {
-    let mut offered: Vec<Quantity> = all.iter().map(|shown| shown.quantity).collect();
-    offered.dedup();
-    offered.push(Quantity::Status);
-    offered.iter().map(|quantity| json!([quantity.name(), quantity.words()])).collect()
-}
-
 /// The rows of a point's table: name, words, unit, and the columns that hold the values of both
 /// models and their ratio.
 fn rows_json(source: &Source) -> Value {
@@ -218,20 +203,16 @@ fn rows_json(source: &Source) -> Value {
         let unit = unit.map_or("", |column| label::shown(&column.unit).0);
         json!({ "name": name, "words": words, "unit": unit, "columns": columns })
     };
-    let channels = layer::channels(source, "nonlinear_").into_iter().map(|(name, _)| {
+    let channels = layer::channels(source, Group::Nonlinear).into_iter().map(|(name, _)| {
         let columns = ["nonlinear", "linear", "ratio"].map(|kind| Some(format!("{kind}_{name}")));
         row(name, &label::channel(name), columns)
     });
-    let whole = layer::WHOLE.iter().filter_map(|whole| {
-        let mut columns = whole.columns.iter().map(|(_, _, column)| source.column(column));
-        let [nonlinear, linear] = [0, 1].map(|_| Some(columns.next()??.name.clone()));
-        nonlinear.is_some().then(|| row(whole.name, whole.words, [nonlinear, linear, None]))
+    let families = layer::families(source).into_iter().map(|family| {
+        let mut columns = family.columns.iter().map(|(_, facts)| Some(facts.name.clone()));
+        let [nonlinear, linear] = [0, 1].map(|_| columns.next().flatten());
+        row(&family.name, &family.words, [nonlinear, linear, None])
     });
-    let parts = layer::WHOLE.iter().flat_map(|whole| whole.parts(source)).map(|part| {
-        let [nonlinear, linear] = part.columns.map(|(_, column)| Some(column.to_owned()));
-        row(&part.name, &part.words, [nonlinear, linear, None])
-    });
-    channels.chain(whole).chain(parts).collect()
+    channels.chain(families).collect()
 }
 
 fn axis_json(axis: &GridAxis) -> Value {
@@ -306,18 +287,15 @@ fn layer_json(map: &Map, shown: &Shown, layer: &Layer, room: usize) -> Value {
         .iter()
         .map(|tick| json!([embed::short(tick.value), tick.label]))
         .collect();
-    let channel = shown.channel.as_deref().unwrap_or_default();
     let mut data = json!({
-        "group": shown.quantity.name(),
-        "channel": channel,
-        "channelWords": match (shown.quantity, channel) {
-            (Quantity::Ratio, "") => "all channels (largest)".to_owned(),
-            (_, "") => "all together".to_owned(),
-            (_, channel) => label::channel(channel),
-        },
+        "group": shown.group.name(),
+        "groupWords": shown.group.words(),
+        "channel": shown.channel,
+        "words": shown.short(),
+        "worse": shown.worse().map(Worse::name),
         "title": layer.title,
         "label": layer.label,
-        "column": shown.column,
+        "column": shown.column(),
         "scale": scale,
         "ticks": ticks,
         "nonlinear": layer.nonlinear,

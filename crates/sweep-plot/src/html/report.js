@@ -1,5 +1,5 @@
 // What makes a map's page a report: the run in words, what to be careful about, all points in a
-// table, the worst first, and what can be taken away.
+// table, the worst in what is shown first, and what can be taken away.
 
 // Rows of the table at a time.
 const ROWS_AT_ONCE = 20;
@@ -8,10 +8,6 @@ function createReport(host, data, map, panel) {
   const { columns, counts, filled, word, verdict, shownValue } = map.cells;
   const all = Array.from({ length: columns.point.values.length }, (_, cell) => cell)
     .filter(filled);
-  const ratio = (cell) => columns.ratio_max?.values[cell] ?? NaN;
-  // The worst first; what has no ratio last.
-  const order = (cell) => (Number.isFinite(ratio(cell)) ? -ratio(cell) : Infinity);
-  all.sort((a, b) => order(a) - order(b));
 
   const said = element("p", { class: "help", role: "status" });
   const button = (text, id, onclick) => element("button", { type: "button", id, onclick }, text);
@@ -28,7 +24,7 @@ function createReport(host, data, map, panel) {
     ...(data.resonances?.length ? [modes()] : []),
     element("h2", {}, "What to be careful about"),
     element("ul", {}, ...caveats().map((text) => element("li", {}, text))),
-    element("h2", {}, "Points, the worst first"), table));
+    ...table));
 
   function modes() {
     const heads = ["Motion", "Resonance (rpm)", "Damping ratio"];
@@ -69,6 +65,26 @@ function createReport(host, data, map, panel) {
     const heads = ["", ...data.axes.map((axis) => withUnit(axis.words, axis.unit)),
       "Largest ratio", "in", "Verdict"];
     const body = element("tbody");
+    const [title, shownHead] = [element("h2"), element("th", { scope: "col" })];
+    // What is shown, beside the ratio that stands there anyway.
+    let layer = null;
+    function sort() {
+      layer = map.layer() ?? data.layers[0];
+      const { values } = columns[layer.column];
+      const sign = layer.worse === "less" ? 1 : -1;
+      // What has no value last.
+      const order = (cell) => (Number.isFinite(values[cell]) ? sign * values[cell] : Infinity);
+      const order0 = new Map(all.map((cell) => [cell, order(cell)]));
+      all.sort((a, b) => order0.get(a) - order0.get(b) || a - b);
+      const isOther = layer.column !== "ratio_max";
+      shownHead.hidden = !isOther;
+      shownHead.textContent = withUnit(layer.title, columns[layer.column].unit);
+      title.textContent = `Points, the ${layer.worse ? "worst" : "greatest"} first`
+        + (isOther ? `: ${layer.title}` : "");
+      body.replaceChildren();
+      shown = 0;
+      extend();
+    }
     const more = button(`${ROWS_AT_ONCE} more`, "more", () => extend());
     let shown = 0;
     function extend() {
@@ -82,16 +98,20 @@ function createReport(host, data, map, panel) {
       const values = valuesOf(cell).map((value) => element("td", {}, significant(value)));
       const largest = word("ratio_max_channel", cell);
       const of = data.rows.find((one) => one.name === largest)?.words ?? "";
+      const own = layer.column === "ratio_max" ? []
+        : [element("td", {}, shownValue(layer.column, cell))];
       return element("tr", {},
-        element("td", {}, button("show", null, () => map.go(cell))), ...values,
+        element("td", {}, button("show", null, () => map.go(cell))), ...values, ...own,
         element("td", {}, shownValue("ratio_max", cell)), element("td", {}, of),
         element("td", {}, verdict(cell).replace("linear model ", "")));
     }
-    extend();
-    return element("div", { class: "wide-table" },
+    const headCells = heads.map((text) => element("th", { scope: "col" }, text));
+    headCells.splice(data.axes.length + 1, 0, shownHead);
+    sort();
+    map.onChange(() => map.layer() !== layer && sort());
+    return [title, element("div", { class: "wide-table" },
       element("table", { id: "points" },
-        element("thead", {}, element("tr", {}, ...heads.map((text) => element("th",
-          { scope: "col" }, text)))), body), more);
+        element("thead", {}, element("tr", {}, ...headCells)), body), more)];
   }
 
   // Values of the axes at a cell.

@@ -79,8 +79,11 @@ fn method(integrator: &Value) -> Option<String> {
 fn verdict(reliability: &Value) -> Option<String> {
     let limit = significant(reliability["ratio_limit"].as_f64()?, 4);
     let channels = reliability["channels"].as_array()?.len();
+    let least = reliability["ratio_min"].as_f64();
+    let least =
+        least.map_or(String::new(), |least| format!(" and above {}", significant(least, 4)));
     Some(format!(
         "the linear model is reliable where the ratio of nonlinear to linear amplitude is below \
-         {limit} in all of {channels} channels"
+         {limit}{least} in all of {channels} channels"
     ))
 }

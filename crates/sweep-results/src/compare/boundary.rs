@@ -22,17 +22,21 @@ pub struct Crossing {
 }
 
 impl Crossing {
-    /// How far it moved.
+    /// How far it may have moved, by its brackets: the least and the greatest.
     #[must_use]
-    pub fn by(&self) -> f64 {
-        self.at[1] - self.at[0]
+    pub fn by(&self) -> [f64; 2] {
+        let [[first_low, first_high], [second_low, second_high]] = self.bracket;
+        if self.at[0] == self.at[1] && self.bracket[0] == self.bracket[1] {
+            return [0.0; 2];
+        }
+        [second_low - first_high, second_high - first_low]
     }
 
     /// How far it moved at least: the distance of the brackets, 0 where they overlap.
     #[must_use]
     pub fn at_least(&self) -> f64 {
-        let [[first_low, first_high], [second_low, second_high]] = self.bracket;
-        (second_low - first_high).max(first_low - second_high).max(0.0)
+        let [least, greatest] = self.by();
+        least.max(-greatest).max(0.0)
     }
 }
 
@@ -52,17 +56,20 @@ pub struct Moved {
 }
 
 impl Moved {
-    /// The crossing that moved farthest.
+    /// The crossing that moved farthest, for certain or else perhaps.
     #[must_use]
     pub fn farthest(&self) -> Option<&Crossing> {
-        self.crossings.iter().max_by(|a, b| a.by().abs().total_cmp(&b.by().abs()))
+        let perhaps = |crossing: &Crossing| (crossing.at[1] - crossing.at[0]).abs();
+        self.crossings.iter().max_by(|a, b| {
+            a.at_least().total_cmp(&b.at_least()).then(perhaps(a).total_cmp(&perhaps(b)))
+        })
     }
 
-    /// Mean of how far crossings moved, with sign.
+    /// How far crossings moved in the mean, with sign: the least and the greatest by their brackets.
     #[must_use]
-    pub fn mean(&self) -> f64 {
+    pub fn mean(&self) -> [f64; 2] {
         let count = self.crossings.len().max(1) as f64;
-        self.crossings.iter().map(Crossing::by).sum::<f64>() / count
+        [0, 1].map(|end| self.crossings.iter().map(|one| one.by()[end]).sum::<f64>() / count)
     }
 
     /// Crossings that moved farther than their brackets explain.

@@ -13,7 +13,7 @@ pub use boundary::{Crossing, Moved};
 pub use plans::PlanChange;
 
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable};
+use crate::rows::{Cell, ResultTable, ratio_limits};
 use side::Side;
 
 /// What became of a row's verdict.
@@ -52,10 +52,14 @@ pub struct SharedRow {
     pub place: Vec<f64>,
     /// The greatest ratio in either file.
     pub ratio: [Option<f64>; 2],
+    /// The least ratio in either file.
+    pub least_ratio: [Option<f64>; 2],
     /// The least gap of the nonlinear model in either file, m.
     pub gap_m: [Option<f64>; 2],
     /// What became of the verdict.
     pub flip: Flip,
+    /// Whether it was reliable and is so no more: not reliable, or without a verdict.
+    pub is_lost: bool,
     /// Whether either file calls the row sensitive: its digits, and maybe its verdict, are those of
     /// one trajectory.
     pub sensitive: bool,
@@ -136,6 +140,9 @@ pub struct Comparison {
     pub columns: Vec<ColumnChange>,
     /// Whether the files have verdicts.
     pub has_verdicts: bool,
+    /// Shared rows that the linear model over-estimates as much as it may under-estimate a reliable
+    /// one, in either file; of files with limits.
+    pub over_estimated: Option<[usize; 2]>,
     /// Whether the files have ratios.
     pub has_ratios: bool,
     /// Whether the files have least gaps of the nonlinear model.
@@ -263,6 +270,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
         plan: plans::changes(first.file(), second.file()),
         alone: [0, 1].map(|place| (sides[place].rows - pairs.len()) as u64),
         has_verdicts: both_have("reliable"),
+        over_estimated: over_estimated(tables, &shared),
         has_ratios: both_have("ratio_max"),
         has_gaps: both_have("min_gap_nonlinear_m"),
         keys,
@@ -273,6 +281,16 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
         columns,
         boundary,
     })
+}
+
+/// How many of the rows have too low a ratio in either file, by its own limits.
+fn over_estimated(tables: [&ResultTable; 2], shared: &[SharedRow]) -> Option<[usize; 2]> {
+    let of = |side: usize| {
+        let limit = ratio_limits(tables[side].plan.as_ref()?)?.over_estimate();
+        let is_below = |row: &&SharedRow| row.least_ratio[side].is_some_and(|least| least < limit);
+        Some(shared.iter().filter(is_below).count())
+    };
+    Some([of(0)?, of(1)?])
 }
 
 /// Places of the rows that both sides have, in the order of the first. Rows of one key are paired

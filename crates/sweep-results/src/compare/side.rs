@@ -165,6 +165,11 @@ impl Side {
         column.map_or(Cell::Null, |(_, cells)| cells.get(row))
     }
 
+    fn least_ratio(&self, row: usize) -> Option<f64> {
+        let ratios = self.columns.iter().filter(|(column, _)| column.name.starts_with("ratio_"));
+        ratios.filter_map(|(_, cells)| cells.get(row).number()).reduce(f64::min)
+    }
+
     /// A pair of rows as both files have it.
     pub(super) fn shared(&self, other: &Self, pair: [usize; 2]) -> SharedRow {
         let cells = |name: &str| [self.cell(name, pair[0]), other.cell(name, pair[1])];
@@ -175,7 +180,8 @@ impl Side {
                 _ => None,
             })
         };
-        let flip = match flags("reliable") {
+        let verdicts = flags("reliable");
+        let flip = match verdicts {
             [first, second] if first == second => Flip::None,
             [Some(true), Some(false)] => Flip::Lost,
             [Some(false), Some(true)] => Flip::Gained,
@@ -185,8 +191,10 @@ impl Side {
             rows: pair.map(|row| row as u64),
             place: self.keys.iter().map(|key| key[pair[0]]).collect(),
             ratio: numbers("ratio_max"),
+            least_ratio: [self.least_ratio(pair[0]), other.least_ratio(pair[1])],
             gap_m: numbers("min_gap_nonlinear_m"),
             flip,
+            is_lost: verdicts[0] == Some(true) && verdicts[1] != Some(true),
             sensitive: flags("sensitive").contains(&Some(true)),
             differs: false,
         }

@@ -13,6 +13,7 @@ use crate::{columns, config};
 use sweep_engine::exit::{Error, Exit, print};
 use sweep_engine::method::{Integrator as _, default_method};
 use sweep_engine::store::{Column, Kind};
+use sweep_files::key;
 
 /// Arguments of `sweep reference`.
 #[derive(Debug, clap::Args)]
@@ -173,9 +174,13 @@ fn columns() -> String {
          parameter: here the two axes of `sweeps/fig12.toml`. MODEL is `nonlinear` or `linear`, \
          CHANNEL a\n\
          channel of `[reliability]`.\n\n\
-         The file holds each column's unit and description, in the Arrow metadata of its field \
-         (`unit`,\n\
-         `description`) and as JSON under the key `sweep.columns`. Other keys are `sweep.plan` \
+         The file holds each column's unit and description, which way it is bad and up to where it \
+         is good,\n\
+         in the Arrow metadata of its field (`unit`, `description`, `worse`, `limit`) and as JSON \
+         under the key\n\
+         `sweep.columns`. Where `[reliability]` has a `ratio_min`, `ratio_min` and \
+         `ratio_min_channel` stand behind\n\
+         `ratio_max_channel`. Other keys are `sweep.plan` \
          (the grid as run,\n\
          with the full machine), `sweep.plan_hash`, `sweep.version`, `sweep.numerics` (which \
          builds write the\n\
@@ -191,9 +196,9 @@ fn columns() -> String {
         .collect();
     let metrics = Metric::ALL.to_vec();
     let measures = Measures { metrics, stops: 2, feet: 3, dampers: 2, ..Measures::default() };
-    let layout = columns::of_measures(axes, &Channel::ALL, 2.0, measures);
-    row(&mut text, &["column", "type", "unit", "meaning"]);
-    row(&mut text, &["---"; 4]);
+    let layout = columns::of_measures(axes, &Channel::ALL, 2.0.into(), measures);
+    row(&mut text, &["column", "type", "unit", "worse", "limit", "meaning"]);
+    row(&mut text, &["---"; 6]);
     let mut names = HashSet::new();
     for field in layout.schema().fields().iter().filter(|field| !is_a_further_one(field.name())) {
         let name = of_any(field.name());
@@ -214,6 +219,8 @@ fn columns() -> String {
                 &format!("`{name}`"),
                 &data_type,
                 if name == "MODEL_CHANNEL" { "the channel's" } else { told("unit") },
+                told(key::WORSE),
+                told(key::LIMIT),
                 &of_any_model(told("description")),
             ],
         );

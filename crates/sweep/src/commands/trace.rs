@@ -15,7 +15,8 @@ use sweep_engine::exit::{Error, Exit, tell};
 use sweep_engine::store::Job;
 use sweep_engine::threads;
 use sweep_files::{FileKind, Output, key};
-use sweep_results::{Cell, Order, ResultTable, top};
+use sweep_parameter::Worse;
+use sweep_results::{Cell, ResultTable, top};
 use washer_row::{Trajectory, Verdict};
 
 /// Shown by `--help`.
@@ -41,8 +42,7 @@ pub struct Args {
     /// The point of this number in the grid, as in a result's column `point`
     #[arg(long, value_name = "N", conflicts_with = "worst")]
     point: Option<u64>,
-    /// The point of the grid's result where this column is greatest, or a gap is least [default:
-    /// ratio_max]
+    /// The point of the grid's result where this column is worst [default: ratio_max]
     #[arg(
         long,
         value_name = "COLUMN",
@@ -83,6 +83,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     if let Some(name) = &args.grid.name {
         plan.name.clone_from(name);
     }
+    args.grid.tell_window(&plan);
     let every_s = every(args.every, &plan)?;
     let extras = Extras { states: args.states, forces: args.forces };
     let start = start_of(&args.start);
@@ -115,8 +116,8 @@ fn chosen(args: &Args) -> Result<Vec<String>, Error> {
     let plan: Plan = args.grid.load()?;
     let point = match (&args.worst, args.point) {
         (Some(column), _) => {
-            let point = worst(args, &plan, column)?;
-            tell(&format!("point {point} is where {column} is {}", extreme_of(column)));
+            let (point, worse) = worst(args, &plan, column)?;
+            tell(&format!("point {point} is where {column} is {}", worse.extreme()));
             point
         }
         (None, point) => point.unwrap_or_default(),
@@ -133,17 +134,8 @@ fn chosen(args: &Args) -> Result<Vec<String>, Error> {
     Ok(names.zip(plan.axis_values(point)).map(|(name, value)| format!("{name}={value}")).collect())
 }
 
-/// The bad end of a column: a gap is worst where it is least.
-fn is_worst_where_least(column: &str) -> bool {
-    column.starts_with("min_gap_")
-}
-
-fn extreme_of(column: &str) -> &'static str {
-    if is_worst_where_least(column) { "least" } else { "greatest" }
-}
-
-/// The worst point of the grid's result.
-fn worst(args: &Args, plan: &Plan, column: &str) -> Result<u64, Error> {
+/// The worst point of the grid's result, and which way that is.
+fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> {
     let default = || PathBuf::from(format!("results/{}.parquet", plan.name));
     let path = args.result.clone().unwrap_or_else(default);
     let refused =
@@ -159,11 +151,19 @@ fn worst(args: &Args, plan: &Plan, column: &str) -> Result<u64, Error> {
         let expected = format!("a result of this very grid, which {} is not", path.display());
         return Err(refused(expected));
     }
-    let order = if is_worst_where_least(column) { Order::Ascending } else { Order::Descending };
-    let rows = top(&file, &["point", column], None, Some((column, order)), 1);
+    let worse = match file.column(column) {
+        Some(known) => known.worse.ok_or_else(|| {
+            refused(format!(
+                "a column that is bad one way, which {column} is not: --point takes \
+                             the number of any row"
+            ))
+        })?,
+        None => Worse::Greater,
+    };
+    let rows = top(&file, &["point", column], None, Some((column, worse)), 1);
     let rows = rows.map_err(|error| sweep_engine::commands::show::with_nearest(error, &file))?;
     match rows.first().map(Vec::as_slice) {
-        Some([Cell::Number(point), Cell::Number(_) | Cell::Flag(_)]) => Ok(*point as u64),
+        Some([Cell::Number(point), Cell::Number(_)]) => Ok((*point as u64, worse)),
         _ => Err(refused(format!("a column that has values in {}", path.display()))),
     }
 }
@@ -175,7 +175,7 @@ fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
     let mut text = String::new();
     for outcome in engine.evaluate_at(&[Vec::new()]) {
         let channels = &plan.reliability.channels;
-        let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.ratio_limit);
+        let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.limits);
         let number = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), short);
         let rows: Vec<Vec<String>> = channels
             .iter()
@@ -204,7 +204,7 @@ fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
                 if reliable { "reliable" } else { "not reliable" },
                 short(ratio),
                 channels.get(channel).map_or("", |channel| channel.name()),
-                short(plan.reliability.ratio_limit),
+                short(plan.reliability.limits.most),
             ),
             _ => "undefined: no ratio is".to_owned(),
         };

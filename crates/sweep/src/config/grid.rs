@@ -90,25 +90,30 @@ pub(crate) fn stability(root: &Section<'_>, metrics: &[Metric]) -> Option<SpeedL
     )
 }
 
+/// What a machine has not got and this metric is of.
+pub(crate) fn lacking(metric: Metric, machine: &Machine) -> Option<&'static str> {
+    let (is_there, what) = match metric {
+        Metric::StopForce | Metric::StopContact => {
+            (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file")
+        }
+        Metric::FootLoad | Metric::SlipMargin => (
+            machine.cabinet.is_some(),
+            "cabinet: expected [cabinet] and three or four [[feet]] in the machine file",
+        ),
+        Metric::DamperSpeed => {
+            (!machine.dampers.is_empty(), "dampers: expected [[dampers]] in the machine file")
+        }
+        Metric::CabinetForce | Metric::ClashTime | Metric::StaticSag | Metric::Growth => {
+            return None;
+        }
+    };
+    (!is_there).then_some(what)
+}
+
 /// Metrics of what the machine has not got.
 pub(crate) fn judge_metrics(metrics: &[Metric], machine: &Machine, root: &Section<'_>) {
     for metric in metrics {
-        let (is_there, what) = match metric {
-            Metric::StopForce | Metric::StopContact => {
-                (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file")
-            }
-            Metric::FootLoad | Metric::SlipMargin => (
-                machine.cabinet.is_some(),
-                "cabinet: expected [cabinet] and three or four [[feet]] in the machine file",
-            ),
-            Metric::DamperSpeed => {
-                (!machine.dampers.is_empty(), "dampers: expected [[dampers]] in the machine file")
-            }
-            Metric::CabinetForce | Metric::ClashTime | Metric::StaticSag | Metric::Growth => {
-                continue;
-            }
-        };
-        if !is_there {
+        if let Some(what) = lacking(*metric, machine) {
             let title = format!("the metric `{}` needs a machine with more parts", metric.name());
             let refusal =
                 Diagnostic::new(title).at(root.at(), format!("the machine has no {what}"));

@@ -11,7 +11,7 @@
 mod again_tests;
 #[cfg(test)]
 mod bounds_tests;
-mod grid;
+pub(crate) mod grid;
 mod machine;
 #[cfg(test)]
 mod points_tests;

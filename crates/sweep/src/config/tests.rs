@@ -112,7 +112,7 @@ fn what_is_left_out_has_its_default() {
     assert_eq!((plan.end_s, plan.window_s), (50.0, [0.0, 50.0]));
     assert_eq!(plan.integrator, Integrator::Rk4MassScaled { accuracy: 1e-3 });
     assert_eq!(plan.points(), 1);
-    assert_eq!(plan.reliability.ratio_limit, 2.0);
+    assert_eq!(plan.reliability.limits, 2.0.into());
     let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name()).collect();
     assert_eq!(
         channels,

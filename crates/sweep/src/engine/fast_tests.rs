@@ -23,7 +23,7 @@ fn rows(plan: &Plan) -> Vec<Outcome> {
 
 fn reliable(plan: &Plan, outcome: &Outcome) -> Option<bool> {
     let rule = &plan.reliability;
-    Verdict::new(outcome, rule.channels.len(), rule.ratio_limit).reliable
+    Verdict::new(outcome, rule.channels.len(), rule.limits).reliable
 }
 
 /// The greatest relative difference of two rows' amplitudes and ratios by turn.
@@ -285,7 +285,8 @@ fn where_the_verdict_is_in_doubt_rk4_is_held_against_rk4() {
     let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
     assert_eq!(row.method, Level::Fast);
     let ratio = Verdict::new(row, plan.reliability.channels.len(), 2.0).greatest.unwrap().1;
-    let reliability = sweep_engine::Reliability { ratio_limit: ratio, ..plan.reliability.clone() };
+    let reliability =
+        sweep_engine::Reliability { limits: ratio.into(), ..plan.reliability.clone() };
     let plan = Plan { reliability, ..plan };
     let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
     assert_eq!((row.method, row.sensitive), (Level::Rk4, Some(false)));

@@ -57,7 +57,8 @@ fn of_swept(swept: &Swept) -> Value {
         "status": swept.status,
         "fail_time_s": swept.fail_time_s,
         "reliable": swept.verdict.reliable,
-        "ratio_limit": swept.ratio_limit,
+        "ratio_limit": swept.limits.most,
+        "ratio_min": swept.limits.least,
         "ratio_max": greatest.map(|(_, ratio)| ratio),
         "ratio_max_channel": greatest.map(|(channel, _)| swept.channels[channel].name()),
         "ratios": ratios

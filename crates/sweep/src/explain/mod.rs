@@ -20,6 +20,7 @@ use sweep_engine::config::NamedValues;
 use sweep_engine::exit::Error;
 use sweep_engine::interrupt::Interrupt;
 
+use sweep_parameter::RatioLimits;
 use tongue::{Asker, Seen, tongues};
 pub(crate) use tongue::{Closing, End, Resonance, Tongue};
 use washer_row::{Demand, Outcome, ROW_STATUSES, Status, Trajectory, Verdict, row_status};
@@ -60,7 +61,7 @@ pub(crate) struct Explanation {
 pub(crate) struct Swept {
     pub(crate) channels: Vec<Channel>,
     pub(crate) window_s: [f64; 2],
-    pub(crate) ratio_limit: f64,
+    pub(crate) limits: RatioLimits,
     /// One of the result file's.
     pub(crate) status: &'static str,
     pub(crate) fail_time_s: Option<f64>,
@@ -174,11 +175,11 @@ fn swept(plan: &Plan, interrupt: &Interrupt) -> Result<Swept, Error> {
     let outcome = outcomes.and_then(|mut outcomes| outcomes.pop());
     let outcome = outcome.unwrap_or_else(|| Outcome::new(0, none(), none()));
     let (status, fail_time_s) = row_status(&outcome);
-    let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.ratio_limit);
+    let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.limits);
     Ok(Swept {
         channels,
         window_s: scenario.window_s,
-        ratio_limit: plan.reliability.ratio_limit,
+        limits: plan.reliability.limits,
         status: ROW_STATUSES[status],
         fail_time_s,
         amplitudes: [outcome.nonlinear.amplitudes, outcome.linear.amplitudes],

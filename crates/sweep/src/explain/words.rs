@@ -143,7 +143,7 @@ fn verdict(text: &mut Text, swept: &Swept) {
             channel.name(),
             significant(ratio),
             amplitudes.join(" against "),
-            decimal(swept.ratio_limit)
+            decimal(swept.limits.most)
         ),
     );
     let others: Vec<String> = swept
@@ -338,7 +338,7 @@ fn judgement(text: &mut Text, found: &Explanation) {
                     significant(ratio),
                     channel.name()
                 );
-                match (reliable, ratio < swept.ratio_limit) {
+                match (reliable, ratio < swept.limits.most) {
                     (false, true) => format!(
                         "{same}, within the limit: the verdict rests on motion left over from \
                          before the tongue, and would change with the ramp"

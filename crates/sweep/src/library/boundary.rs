@@ -4,10 +4,9 @@ use std::path::Path;
 
 use super::Effort;
 use super::result::{ResultKind, ResultTable};
-use crate::model::Washer;
 use crate::plan::Plan;
-use sweep_engine::Swept as _;
 use sweep_engine::boundary::file::{job, table};
+use sweep_engine::boundary::quantity::traced;
 use sweep_engine::boundary::search::{BoundaryTask, Stopped};
 use sweep_engine::commands::boundary::search;
 use sweep_engine::exit::Error;
@@ -17,8 +16,10 @@ use sweep_files::{FileKind, Output};
 /// What is asked of a boundary.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundaryOptions<'a> {
-    /// `ratio_max`, `ratio_CHANNEL`, `min_gap_nonlinear_m` or `min_gap_linear_m`.
+    /// Any column of numbers that the plan's rows can have.
     pub quantity: &'a str,
+    /// Where its limit is, in the column's unit; if `None`, its own.
+    pub limit: Option<f64>,
     /// Width of the final brackets, in the second axis's unit, or as a fraction of its value if it
     /// is logarithmic; if `None`, 1/480 of the range.
     pub tolerance: Option<f64>,
@@ -41,17 +42,11 @@ pub fn find_boundary(
     options: BoundaryOptions<'_>,
     effort: Effort<'_>,
 ) -> Result<Option<ResultTable>, Error> {
-    let names = Washer::quantities();
-    if !names.iter().any(|name| name == options.quantity) {
-        let (given, expected) =
-            (options.quantity.to_owned(), format!("one of {}", names.join(", ")));
-        return Err(Error::Option { option: "quantity", given, expected });
-    }
     if !(1..=1000).contains(&options.lattice) {
         let given = options.lattice.to_string();
         return Err(Error::Option { option: "lattice", given, expected: "from 1 to 1000".into() });
     }
-    let (quantity, plan) = &Washer::traced(plan, options.quantity)?;
+    let (quantity, plan) = &traced(plan, options.quantity, options.limit)?;
     let task = BoundaryTask::new(plan, options.tolerance, usize::from(options.lattice))?;
     let job = job(plan, quantity, &task);
     let begin = |path| Output::begin(path, FileKind::Boundary);
@@ -65,13 +60,13 @@ pub fn find_boundary(
             }
         },
     };
-    let (traced, trials) = search(plan, quantity, &task, trials, effort)?;
-    let traced = match traced {
-        Ok(traced) => traced,
+    let (found, trials) = search(plan, quantity, &task, trials, effort)?;
+    let found = match found {
+        Ok(found) => found,
         Err(Stopped::Failed(error)) => return Err(error.into()),
         Err(Stopped::Interrupted) => return Ok(None),
     };
-    let found = table(&job, plan, quantity, &task, &traced);
+    let found = table(&job, plan, quantity, &task, &found);
     let found = ResultTable::of_table(ResultKind::Boundary, found)?;
     if let Some(file) = file {
         found.finish(file)?;

@@ -237,7 +237,7 @@ impl MapPlan {
             points: self.points,
             layout: self.layout.clone(),
             // Of tables and progress alone.
-            ratio_limit: f64::NAN,
+            limits: f64::NAN.into(),
             axis_values: Box::new(|_| Vec::new()),
         };
         Ok(write_map(&job, batches, path)?)

@@ -69,7 +69,7 @@ stability = { speed_rpm = "200:240:20" }
         assert!(outcome.static_sag_m > Some(0.0));
         is_row(outcome, &setup, &values);
         let answer = washer_live::check(&setup, &values).unwrap();
-        let limit = plan.reliability.ratio_limit;
+        let limit = plan.reliability.limits;
         let verdict = Verdict::new(outcome, setup.rule.channels.len(), limit);
         // The page has them of every channel.
         let of_turns = answer.outcome.turn_ratios;

@@ -106,6 +106,7 @@ class Plan:
         self,
         quantity: str = "ratio_max",
         *,
+        limit: float | None = None,
         tolerance: float | None = None,
         lattice: int = 6,
         out: str | PathLike[str] | None = None,
@@ -115,8 +116,8 @@ class Plan:
     ) -> Result:
         """The curve on which a quantity is at its limit, over the first two axes.
 
-        `quantity` is `ratio_max`, `ratio_CHANNEL`, `min_gap_nonlinear_m`, `min_gap_linear_m` or
-        `growth`.
+        `quantity` is any column of numbers that rows of this plan can have and that is bad one way,
+        `limit` a number in its unit; without one, the column's own.
         `tolerance` is the width of the final brackets. With `out` the search writes that file and
         goes on there after an interruption.
         """

@@ -12,6 +12,7 @@ pub(super) enum FailOn {
     Plan,
     Rows,
     Flips,
+    Lost,
     Sensitive,
     Ratio(f64),
     Gap(f64),
@@ -23,7 +24,7 @@ impl FromStr for FailOn {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || {
-            "expected any, plan, rows, flips, sensitive, ratio=PART, gap=M or boundary=WIDTH"
+            "expected any, plan, rows, flips, lost, sensitive, ratio=PART, gap=M or boundary=WIDTH"
                 .to_owned()
         };
         let (name, value) = match text.split_once('=') {
@@ -41,6 +42,7 @@ impl FromStr for FailOn {
             ("plan", None) => Ok(Self::Plan),
             ("rows", None) => Ok(Self::Rows),
             ("flips", None) => Ok(Self::Flips),
+            ("lost", None) => Ok(Self::Lost),
             ("sensitive", None) => Ok(Self::Sensitive),
             ("ratio", _) => Ok(Self::Ratio(number()?)),
             ("gap", _) => Ok(Self::Gap(number()?)),
@@ -57,6 +59,7 @@ impl FailOn {
         let (has, lacks) = match self {
             Self::Any | Self::Plan | Self::Rows => return None,
             Self::Flips => (found.has_verdicts, ["flips", "two files with verdicts"]),
+            Self::Lost => (found.has_verdicts, ["lost", "two files with verdicts"]),
             Self::Sensitive => (found.has_verdicts, ["sensitive", "two files with verdicts"]),
             Self::Ratio(_) => (found.has_ratios, ["ratio", "two files with `ratio_max`"]),
             Self::Gap(_) => (found.has_gaps, ["gap", "two files with `min_gap_nonlinear_m`"]),
@@ -78,6 +81,10 @@ impl FailOn {
                 counted("rows of one file alone", found.alone.iter().sum::<u64>() as usize)
             }
             Self::Flips => counted("verdicts that flipped", found.flips(false).count()),
+            Self::Lost => {
+                let lost = found.flips(false).filter(|row| row.is_lost).count();
+                counted("reliable rows that are so no more", lost)
+            }
             Self::Sensitive => {
                 counted("sensitive verdicts that flipped", found.flips(true).count())
             }
