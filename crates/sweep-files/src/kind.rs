@@ -78,6 +78,16 @@ pub enum FileKind<'a> {
     ManPage,
 }
 
+/// Results that are no maps: each kind in a word, and the key that only its files have.
+const OWN: [(FileKind<'static>, &str, &str); 6] = [
+    (FileKind::Trace, "trace", key::TRACE),
+    (FileKind::Modes, "modes", key::MODES),
+    (FileKind::Boundary, "boundary", key::BOUNDARY),
+    (FileKind::Stability, "stability", key::STABILITY),
+    (FileKind::Dwell, "dwell", key::DWELL),
+    (FileKind::Differences, "differences", key::DIFFERENCES),
+];
+
 /// The first line of an exported CSV file.
 pub const EXPORTED_CSV: &str = "# exported by sweep ";
 
@@ -110,13 +120,14 @@ impl FileKind<'_> {
             Ok(start.starts_with(with))
         };
         let is_ours = match self {
-            Self::Map
-            | Self::Trace
-            | Self::Modes
-            | Self::Boundary
-            | Self::Stability
-            | Self::Dwell
-            | Self::Differences => match ParquetFile::look(path) {
+            Self::Exported { ending: "csv" } => begins(EXPORTED_CSV.as_bytes())?,
+            Self::Exported { .. } => begins(b"PK\x03\x04")?,
+            Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,
+            Self::Svg => begins(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
+            Self::Png => begins(b"\x89PNG\r\n\x1a\n")?,
+            Self::Html => begins(b"<!doctype html>\n")?,
+            Self::ManPage => begins(b".ie \\n(.g ")?,
+            _ => match ParquetFile::look(path) {
                 Ok(file) if self.has_keys(&|key| file.value(key).is_some()) => true,
                 Ok(_) => {
                     // A damaged key makes one of ours look like another's.
@@ -131,47 +142,24 @@ impl FileKind<'_> {
                 }
                 Err(error) => return Err(error),
             },
-            Self::Exported { ending: "csv" } => begins(EXPORTED_CSV.as_bytes())?,
-            Self::Exported { .. } => begins(b"PK\x03\x04")?,
-            Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,
-            Self::Svg => begins(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
-            Self::Png => begins(b"\x89PNG\r\n\x1a\n")?,
-            Self::Html => begins(b"<!doctype html>\n")?,
-            Self::ManPage => begins(b".ie \\n(.g ")?,
         };
         Ok(if is_ours { None } else { Some(format!("the file there is no {}", self.name())) })
     }
 
     /// Whether the metadata of one of our Parquet files says that it is of this kind.
     pub fn has_keys(self, has: &dyn Fn(&str) -> bool) -> bool {
-        let own = match self {
-            Self::Map => {
-                const OF_OTHERS: [&str; 6] = [
-                    key::TRACE,
-                    key::MODES,
-                    key::BOUNDARY,
-                    key::STABILITY,
-                    key::DWELL,
-                    key::DIFFERENCES,
-                ];
-                return has(key::PLAN) && !OF_OTHERS.into_iter().any(has);
-            }
-            Self::Trace => key::TRACE,
-            Self::Modes => key::MODES,
-            Self::Boundary => key::BOUNDARY,
-            Self::Stability => key::STABILITY,
-            Self::Dwell => key::DWELL,
-            Self::Differences => key::DIFFERENCES,
-            Self::Account { .. }
-            | Self::Exported { .. }
-            | Self::Svg
-            | Self::Png
-            | Self::Html
-            | Self::ManPage => {
-                return false;
-            }
-        };
-        has(own)
+        FileKind::of_result(has) == Some(self)
+    }
+
+    /// The kind of result that the metadata of one of our Parquet files speaks of, if of any.
+    pub fn of_result(has: &dyn Fn(&str) -> bool) -> Option<Self> {
+        let map = has(key::PLAN).then_some(Self::Map);
+        OWN.iter().find(|(.., own)| has(own)).map(|(kind, ..)| *kind).or(map)
+    }
+
+    /// A kind of result in one word.
+    pub fn word(self) -> &'static str {
+        OWN.iter().find(|(kind, ..)| *kind == self).map_or("map", |(_, word, _)| word)
     }
 }
 

@@ -62,9 +62,9 @@ pub use config::{Diagnostics, GridInput, Mistake, load};
 pub use engine::ModelEngine;
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use library::{
-    BoundaryOptions, Effort, Evaluated, Evaluator, Explained, PointTable, RanToFile, ResultKind,
-    ResultTable, TraceOptions, explain_point, find_boundary, find_modes, find_stability,
-    list_parameters, run_to_file, stability_to_file, trace_point,
+    BoundaryOptions, Effort, Evaluated, Evaluator, Explained, PointTable, RanToFile, ResultTable,
+    TraceOptions, explain_point, find_boundary, find_modes, find_stability, list_parameters,
+    run_to_file, stability_to_file, trace_point,
 };
 pub use method::Integrator;
 pub use model::Washer;

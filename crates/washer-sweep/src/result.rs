@@ -11,8 +11,8 @@ use arrow_schema::{DataType, Field};
 use pyo3::exceptions::{PyKeyError, PyOSError};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyCapsule, PyDict, PyList};
-use sweep::{ResultKind, ResultTable};
-use sweep_files::cells;
+use sweep::ResultTable;
+use sweep_files::{FileKind, cells};
 use sweep_plot::PlotOptions;
 
 use crate::arrow;
@@ -39,7 +39,7 @@ impl PyResultTable {
     /// a map of them would be mostly empty.
     fn is_scattered(&self) -> bool {
         let plan = self.0.plan();
-        if self.0.kind() != ResultKind::Map || plan["design"].is_null() {
+        if self.0.kind() != FileKind::Map || plan["design"].is_null() {
             return false;
         }
         let axes = plan["axis"].as_array().map_or(&[][..], Vec::as_slice);
@@ -141,7 +141,7 @@ impl PyResultTable {
     /// `"map"`, `"boundary"`, `"trace"` or `"modes"`.
     #[getter]
     fn kind(&self) -> &'static str {
-        self.0.kind().name()
+        self.0.kind().word()
     }
 
     /// The plan that it came of, as its file carries it.
@@ -179,7 +179,7 @@ impl PyResultTable {
 
     fn __repr__(&self) -> String {
         let name = self.0.plan()["name"].as_str().unwrap_or("unnamed");
-        let (kind, rows) = (self.0.kind().name(), self.0.rows());
+        let (kind, rows) = (self.0.kind().word(), self.0.rows());
         let columns = self.0.schema().fields().len();
         format!("<washer_sweep.Result: {kind} of {name}, {rows} rows, {columns} columns>")
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Effort;
-use super::result::{ResultKind, ResultTable};
+use super::result::ResultTable;
 use crate::plan::Plan;
 use sweep_engine::boundary::file::{job, table};
 use sweep_engine::boundary::quantity::traced;
@@ -67,7 +67,7 @@ pub fn find_boundary(
         Err(Stopped::Interrupted) => return Ok(None),
     };
     let found = table(&job, plan, quantity, &task, &found);
-    let found = ResultTable::of_table(ResultKind::Boundary, found)?;
+    let found = ResultTable::of_table(FileKind::Boundary, found)?;
     if let Some(file) = file {
         found.finish(file)?;
     }

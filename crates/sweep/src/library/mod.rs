@@ -20,7 +20,7 @@ pub use explain::{Explained, explain_point};
 pub use modes::find_modes;
 pub use parameters::list_parameters;
 pub use points::PointTable;
-pub use result::{ResultKind, ResultTable};
+pub use result::ResultTable;
 pub use run::{RanToFile, run_to_file};
 pub use stability::{find_stability, stability_to_file};
 pub use trace::{TraceOptions, trace_point};

@@ -8,13 +8,13 @@ use washer_model::{
 };
 
 use super::refused_speeds;
-use super::result::{ResultKind, ResultTable};
+use super::result::ResultTable;
 use crate::config::{self, GridInput};
 use crate::speeds::MOST_SPEEDS;
 use sweep_engine::exit::Error;
 use sweep_engine::interrupt::Interrupt;
 use sweep_engine::table::Table;
-use sweep_files::key;
+use sweep_files::{FileKind, key};
 
 /// The modes of a grid's machine at spin speeds (rpm, rising); `at` gives axes a value, which have
 /// none otherwise. Without a grid, those of the built-in machine. `None` if it was interrupted.
@@ -50,7 +50,7 @@ pub fn find_modes(
     let Some(analysis) = Analysis::new(&machine, &spin, speeds_rpm, false, &stop)? else {
         return Ok(None);
     };
-    ResultTable::of_table(ResultKind::Modes, analysis.table(&name, &machine)).map(Some)
+    ResultTable::of_table(FileKind::Modes, analysis.table(&name, &machine)).map(Some)
 }
 
 /// The built-in machine by its name, on its way to a speed (rpm).

@@ -13,57 +13,10 @@ use sweep_engine::table::Table;
 use sweep_files::{FileError, FileKind, Output, ParquetFile, key};
 use sweep_plot::{PlotOptions, render};
 
-/// What a result is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ResultKind {
-    /// One row a point: of a run, or of an evaluation.
-    Map,
-    /// Where a quantity is at its limit.
-    Boundary,
-    /// Time histories at one point.
-    Trace,
-    /// Modes over spin speed.
-    Modes,
-    /// Periodic responses at constant speeds.
-    Stability,
-    /// Motions that held speeds end in.
-    Dwell,
-    /// What differs between two results.
-    Differences,
-}
-
-impl ResultKind {
-    /// In one word.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Map => "map",
-            Self::Boundary => "boundary",
-            Self::Trace => "trace",
-            Self::Modes => "modes",
-            Self::Stability => "stability",
-            Self::Dwell => "dwell",
-            Self::Differences => "differences",
-        }
-    }
-
-    const fn file(self) -> FileKind<'static> {
-        match self {
-            Self::Map => FileKind::Map,
-            Self::Boundary => FileKind::Boundary,
-            Self::Trace => FileKind::Trace,
-            Self::Modes => FileKind::Modes,
-            Self::Stability => FileKind::Stability,
-            Self::Dwell => FileKind::Dwell,
-            Self::Differences => FileKind::Differences,
-        }
-    }
-}
-
 /// A result with its rows in memory.
 #[derive(Debug)]
 pub struct ResultTable {
-    kind: ResultKind,
+    kind: FileKind<'static>,
     plan: Value,
     schema: SchemaRef,
     batches: Vec<RecordBatch>,
@@ -98,13 +51,8 @@ impl MapPlan {
 impl ResultTable {
     /// The rows of a run, or of one at constant speeds.
     pub(super) fn of_rows(map: MapPlan, batches: Vec<RecordBatch>) -> Self {
-        let kind = match map.layout.kind {
-            FileKind::Stability => ResultKind::Stability,
-            FileKind::Dwell => ResultKind::Dwell,
-            _ => ResultKind::Map,
-        };
         Self {
-            kind,
+            kind: map.layout.kind,
             plan: map.plan.clone(),
             schema: map.layout.schema(),
             batches,
@@ -113,7 +61,7 @@ impl ResultTable {
     }
 
     /// A small result.
-    pub(super) fn of_table(kind: ResultKind, table: Table) -> Result<Self, Error> {
+    pub(super) fn of_table(kind: FileKind<'static>, table: Table) -> Result<Self, Error> {
         let plan = table.plan();
         let (batch, bytes) =
             table.finish().map_err(StoreError::parquet("write", Path::new("a table")))?;
@@ -134,16 +82,7 @@ impl ResultTable {
         let plan = file.value(key::PLAN).or_else(|| file.value(key::DIFFERENCES));
         let plan = plan.and_then(|plan| serde_json::from_str(plan).ok());
         let plan = plan.ok_or_else(not_ours)?;
-        let has = |key| file.value(key).is_some();
-        let kind = match () {
-            () if has(key::BOUNDARY) => ResultKind::Boundary,
-            () if has(key::TRACE) => ResultKind::Trace,
-            () if has(key::MODES) => ResultKind::Modes,
-            () if has(key::STABILITY) => ResultKind::Stability,
-            () if has(key::DWELL) => ResultKind::Dwell,
-            () if has(key::DIFFERENCES) => ResultKind::Differences,
-            () => ResultKind::Map,
-        };
+        let kind = FileKind::of_result(&|key| file.value(key).is_some()).ok_or_else(not_ours)?;
         let batches = file.batches(|builder| builder)?.collect::<Result<Vec<_>, _>>()?;
         // The file's own keys are no part of the rows' schema.
         let schema = SchemaRef::new(Schema::new(file.schema().fields().clone()));
@@ -159,7 +98,7 @@ impl ResultTable {
 
     /// What it is.
     #[must_use]
-    pub fn kind(&self) -> ResultKind {
+    pub fn kind(&self) -> FileKind<'static> {
         self.kind
     }
 
@@ -195,7 +134,7 @@ impl ResultTable {
     pub fn save(&self, path: &Path) -> Result<(), Error> {
         match &self.file {
             FileContent::Rows(map) => Ok(map.write(&self.batches, path)?),
-            FileContent::Bytes(_) => self.finish(Output::begin(path, self.kind.file())?),
+            FileContent::Bytes(_) => self.finish(Output::begin(path, self.kind)?),
         }
     }
 

@@ -1,11 +1,12 @@
 //! Time histories at one point, in memory.
 
-use super::result::{ResultKind, ResultTable};
+use super::result::ResultTable;
 use crate::config::GridInput;
 use crate::trace::{self, Extras, View, every, start_of, start_value};
 use sweep_engine::exit::Error;
 use sweep_engine::interrupt::Interrupt;
 use sweep_engine::threads;
+use sweep_files::FileKind;
 
 /// What a trace holds.
 #[derive(Clone, Debug)]
@@ -56,7 +57,7 @@ pub fn trace_point(
         return Ok(None);
     }
     let failures = trace.failures.clone();
-    Ok(Some((ResultTable::of_table(ResultKind::Trace, trace.into_table())?, failures)))
+    Ok(Some((ResultTable::of_table(FileKind::Trace, trace.into_table())?, failures)))
 }
 
 #[cfg(test)]
