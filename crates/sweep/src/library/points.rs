@@ -1,22 +1,17 @@
 //! Points in memory: a table whose columns are parameters and whose rows are points.
 
-use std::sync::Arc;
-
-use arrow_array::{Array as _, ArrayRef, Float64Array, RecordBatch};
-use arrow_schema::{DataType, Schema};
+use arrow_array::{Float64Array, RecordBatch};
+use arrow_schema::Schema;
 
 use crate::config::{Diagnostics, check_columns, not_numbers};
 use crate::plan::Plan;
 use sweep_files::cells;
 
-/// A table of points, column by column. Columns of `f64` are taken as they are, without a copy.
+/// A table of points, column by column.
 #[derive(Clone, Debug)]
 pub struct PointTable {
     names: Vec<String>,
-    /// Of each column, its part of each batch.
-    columns: Vec<Vec<Float64Array>>,
-    /// The first row of each batch.
-    starts: Vec<usize>,
+    columns: Vec<Float64Array>,
     rows: usize,
 }
 
@@ -27,22 +22,17 @@ impl PointTable {
     /// [`Diagnostics`] for a column that holds no numbers.
     pub fn new(schema: &Schema, batches: &[RecordBatch]) -> Result<Self, Diagnostics> {
         let names: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
-        let mut starts = Vec::with_capacity(batches.len());
-        let mut rows = 0;
-        for batch in batches {
-            starts.push(rows);
-            rows += batch.num_rows();
-        }
         let mut columns = Vec::with_capacity(names.len());
         for (k, field) in schema.fields().iter().enumerate() {
             let refused = || not_numbers(&names, k, &field.data_type().to_string());
             if !cells::is_number(field.data_type()) {
                 return Err(refused());
             }
-            let parts = batches.iter().map(|batch| as_numbers(batch.column(k)));
-            columns.push(parts.collect::<Option<Vec<_>>>().ok_or_else(refused)?);
+            let parts = batches.iter().map(|batch| cells::numbers(batch.column(k)));
+            let parts = parts.collect::<Result<Vec<_>, _>>().map_err(|_| refused())?;
+            columns.push(parts.concat().into());
         }
-        Ok(Self { names, columns, starts, rows })
+        Ok(Self { names, columns, rows: batches.iter().map(RecordBatch::num_rows).sum() })
     }
 
     /// From columns of equal length, each with its name.
@@ -55,8 +45,8 @@ impl PointTable {
         if let Some(k) = columns.iter().position(|(_, values)| values.len() != rows) {
             return Err(crate::config::other_length(&names, k, columns[k].1.len(), rows));
         }
-        let columns = columns.into_iter().map(|(_, values)| vec![values.into()]).collect();
-        Ok(Self { names, columns, starts: vec![0], rows })
+        let columns = columns.into_iter().map(|(_, values)| values.into()).collect();
+        Ok(Self { names, columns, rows })
     }
 
     /// How many points.
@@ -65,32 +55,14 @@ impl PointTable {
         self.rows
     }
 
-    /// A column's values in order.
-    fn values(&self, column: usize) -> impl Iterator<Item = Option<f64>> {
-        self.columns[column].iter().flatten()
-    }
-
-    fn value(&self, column: usize, row: usize) -> f64 {
-        let batch = self.starts.partition_point(|&start| start <= row) - 1;
-        self.columns[column][batch].value(row - self.starts[batch])
-    }
-
     /// The points as those of a plan.
     ///
     /// # Errors
     /// Every column that is unknown, no axis of the plan or missing, and every value off its axis.
     pub(super) fn on<'a>(&'a self, plan: &'a Plan) -> Result<PointsOnAxes<'a>, Diagnostics> {
         let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
-        let columns = check_columns(plan, &names, |column| self.values(column))?;
+        let columns = check_columns(plan, &names, |column| self.columns[column].iter())?;
         Ok(PointsOnAxes { table: self, plan, columns })
-    }
-}
-
-/// A table's column as numbers, if it holds such.
-fn as_numbers(column: &ArrayRef) -> Option<Float64Array> {
-    match column.data_type() {
-        DataType::Float64 => column.as_any().downcast_ref::<Float64Array>().cloned(),
-        _ => Some(cells::numbers(&Arc::clone(column)).ok()?.into()),
     }
 }
 
@@ -107,7 +79,7 @@ impl PointsOnAxes<'_> {
         // A row of the table, whose rows are counted by `usize`.
         let row = usize::try_from(point).unwrap_or(usize::MAX);
         let value = |(axis, column): (&crate::plan::Axis, &Option<usize>)| match column {
-            Some(column) => self.table.value(*column, row),
+            Some(column) => self.table.columns[*column].value(row),
             None => axis.values.value(0),
         };
         self.plan.axes.iter().zip(&self.columns).map(value).collect()
