@@ -187,7 +187,7 @@ fn compute(
         loop {
             match receiver.recv_timeout(Duration::from_millis(100)) {
                 Ok((chunk, outcomes)) => {
-                    if let Err(error) = run.write_chunk(chunk, &outcomes) {
+                    if let Err(error) = run.write_chunk(chunk, outcomes) {
                         // A chunk that makes no sense costs itself; a disk that fails would cost
                         // them all.
                         if !matches!(error, StoreError::Engine { .. }) {
@@ -234,7 +234,7 @@ impl<'a> Hand<'a> {
         let evaluated = self.evaluate(engine, watch);
         let parts = std::mem::take(&mut *lock(&self.parts));
         // A part that makes no sense costs itself.
-        let kept = parts.into_iter().map(|(chunk, part)| self.run.write_part(chunk, part));
+        let kept = parts.into_iter().map(|(chunk, part)| self.run.write_chunk(chunk, part));
         kept.fold(evaluated, Result::and)
     }
 

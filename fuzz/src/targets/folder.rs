@@ -2,8 +2,8 @@
 //! a result whose bytes are those of the undisturbed one, unless the file is a chunk that passes
 //! for one.
 //!
-//! The first byte of an input says which file it is for. A chunk, and a part of one, gets the right
-//! header and the right hash, so that the fuzzer has records to change.
+//! The first byte of an input says which file it is for. A chunk gets the right header and the right
+//! hash, so that the fuzzer has records to change: as many as it has, or as long as the input.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -28,27 +28,24 @@ const NAMES: [&str; 8] = [
     CHUNK,
     // Beside the folder.
     "../x.run.json",
-    PART,
+    CHUNK,
 ];
-/// Of a chunk that is not there.
-const PART: &str = "part-00000000.bin";
 const CHUNK: &str = "chunk-00000000.bin";
 
 /// Tries one input; a panic is a finding.
 pub(crate) fn run(bytes: &[u8]) {
     let Some((which, content)) = bytes.split_first() else { return };
     let home = home();
-    let name = NAMES[usize::from(*which) % NAMES.len()];
+    let which = usize::from(*which) % NAMES.len();
+    let name = NAMES[which];
+    let records = home.chunk.len() - HEADER - HASH;
     let content = match name {
-        CHUNK => as_chunk(content, &home.chunk),
-        PART => as_part(content, &home.chunk),
+        CHUNK if which + 1 == NAMES.len() => as_chunk(content, content.len(), &home.chunk),
+        CHUNK => as_chunk(content, records, &home.chunk),
         _ => content.to_vec(),
     };
     let partial = home.folder.path().join("x.parquet.partial");
     reset(home, &partial);
-    if name == PART {
-        fs::remove_file(partial.join(CHUNK)).expect("there is a chunk");
-    }
     fs::write(partial.join(name), &content).expect("the input is written");
 
     let job = Job::of(&home.plan);
@@ -72,7 +69,7 @@ pub(crate) fn run(bytes: &[u8]) {
             assert!(name == CHUNK || result == home.result, "{name} has changed the result");
             let _ = opened.complete(&job, tally, None);
         }
-        Err(error) => assert!([CHUNK, PART].contains(&name), "{name}: {error}"),
+        Err(error) => assert!(name == CHUNK, "{name}: {error}"),
     }
 }
 
@@ -81,20 +78,12 @@ fn options() -> OpenOptions<'static> {
 }
 
 /// The records of an input between a right header and a right hash.
-fn as_chunk(records: &[u8], chunk: &[u8]) -> Vec<u8> {
-    let length = chunk.len() - HEADER - HASH;
+fn as_chunk(records: &[u8], length: usize, chunk: &[u8]) -> Vec<u8> {
     let mut bytes = chunk[..HEADER].to_vec();
     bytes.extend(records.iter().copied().chain(std::iter::repeat(0)).take(length));
     let hash = blake3::hash(&bytes);
     bytes.extend_from_slice(hash.as_bytes());
     bytes
-}
-
-/// The same of a part, as long as the input.
-fn as_part(records: &[u8], chunk: &[u8]) -> Vec<u8> {
-    let bytes = [b"SWEEPPRT", &chunk[8..HEADER], records].concat();
-    let hash = blake3::hash(&bytes);
-    [bytes.as_slice(), hash.as_bytes()].concat()
 }
 
 struct Home {

@@ -16,8 +16,7 @@
 //! as many as it takes, and the cells (u64): the bits of numbers, positions of names, 0 or 1. What
 //! is not there is zero.
 //!
-//! A part is what an interrupted process has of a chunk: the same with `SWEEPPRT`, and records of
-//! some of the points, in order.
+//! Points are in order. An interrupted process leaves a chunk that lacks some: a part.
 
 use std::sync::Arc;
 
@@ -25,7 +24,6 @@ use super::error::StoreError;
 use super::schema::{Column, Done, Layout, Row};
 
 const MAGIC: [u8; 8] = *b"SWEEPCHK";
-const PART_MAGIC: [u8; 8] = *b"SWEEPPRT";
 const FORMAT: u32 = 5;
 const HEADER: usize = 8 + 4 + 4 + 32 + 3 * 8;
 const HASH: usize = blake3::OUT_LEN;
@@ -99,46 +97,22 @@ fn reject(place: &Place, reason: String) -> StoreError {
     StoreError::Engine { first: place.first, last, reason }
 }
 
-/// The chunk's file.
-pub(super) fn encode(place: &Place, outcomes: &[Done]) -> Result<Vec<u8>, StoreError> {
-    if outcomes.len() as u64 != place.count {
-        return Err(reject(
-            place,
-            format!("{} outcomes for {} points", outcomes.len(), place.count),
-        ));
-    }
-    for (outcome, point) in outcomes.iter().zip(place.first..) {
-        if outcome.point != point {
-            return Err(reject(
-                place,
-                format!("an outcome of point {} in the place of {point}", outcome.point),
-            ));
-        }
-    }
-    write(MAGIC, place, outcomes)
-}
-
-/// The file of a part of a chunk: outcomes of some of its points, in order.
-pub(super) fn encode_part(place: &Place, outcomes: &[Done]) -> Result<Vec<u8>, StoreError> {
-    if !is_part(place, outcomes) {
-        let reason = format!("{} outcomes that are no part of the chunk", outcomes.len());
-        return Err(reject(place, reason));
-    }
-    write(PART_MAGIC, place, outcomes)
-}
-
-/// Whether these are some of a chunk's points, in order, and not all.
-fn is_part(place: &Place, outcomes: &[Done]) -> bool {
+/// Whether these are points of a chunk, in order.
+fn are_of(place: &Place, outcomes: &[Done]) -> bool {
     let points = place.first..place.first.saturating_add(place.count);
-    (outcomes.len() as u64) < place.count
-        && outcomes.iter().all(|outcome| points.contains(&outcome.point))
+    outcomes.iter().all(|outcome| points.contains(&outcome.point))
         && outcomes.is_sorted_by(|a, b| a.point < b.point)
 }
 
-fn write(magic: [u8; 8], place: &Place, outcomes: &[Done]) -> Result<Vec<u8>, StoreError> {
+/// The chunk's file.
+pub(super) fn encode(place: &Place, outcomes: &[Done]) -> Result<Vec<u8>, StoreError> {
+    if !are_of(place, outcomes) {
+        let reason = format!("{} outcomes that are not of its points", outcomes.len());
+        return Err(reject(place, reason));
+    }
     let shape = &place.shape;
     let mut bytes = Vec::with_capacity(HEADER + outcomes.len() * shape.bytes_a_row() + HASH);
-    bytes.extend_from_slice(&header(magic, place));
+    bytes.extend_from_slice(&header(place));
     for (point, row) in outcomes
         .iter()
         .flat_map(|done| done.rows.iter().take(MOST_ROWS as usize).map(|row| (done.point, row)))
@@ -156,31 +130,14 @@ fn write(magic: [u8; 8], place: &Place, outcomes: &[Done]) -> Result<Vec<u8>, St
     Ok(bytes)
 }
 
-/// The outcomes in a chunk's file, if every byte is as it was written and it is the chunk looked
-/// for.
+/// What a chunk's file holds.
 pub(super) fn decode(place: &Place, bytes: &[u8]) -> Result<Vec<Done>, Damage> {
-    let outcomes = read(MAGIC, place, bytes)?;
-    if outcomes.len() as u64 != place.count {
-        return Err(Damage::Length);
-    }
-    let is_whole =
-        outcomes.iter().zip(place.first..).all(|(outcome, point)| outcome.point == point);
-    if is_whole { Ok(outcomes) } else { Err(Damage::Record) }
-}
-
-/// As [`decode`], of a part of the chunk.
-pub(super) fn decode_part(place: &Place, bytes: &[u8]) -> Result<Vec<Done>, Damage> {
-    let outcomes = read(PART_MAGIC, place, bytes)?;
-    if is_part(place, &outcomes) { Ok(outcomes) } else { Err(Damage::Record) }
-}
-
-fn read(magic: [u8; 8], place: &Place, bytes: &[u8]) -> Result<Vec<Done>, Damage> {
     let (body, hash) = bytes.split_last_chunk::<HASH>().ok_or(Damage::Length)?;
     if blake3::hash(body) != *hash {
         return Err(Damage::Hash);
     }
     let (found, records) = body.split_at_checked(HEADER).ok_or(Damage::Length)?;
-    if found != header(magic, place) {
+    if found != header(place) {
         return Err(Damage::Foreign);
     }
     let shape = &place.shape;
@@ -196,12 +153,12 @@ fn read(magic: [u8; 8], place: &Place, bytes: &[u8]) -> Result<Vec<Done>, Damage
             _ => outcomes.push(Done { point, rows: vec![row] }),
         }
     }
-    Ok(outcomes)
+    if are_of(place, &outcomes) { Ok(outcomes) } else { Err(Damage::Record) }
 }
 
-fn header(magic: [u8; 8], place: &Place) -> Vec<u8> {
+fn header(place: &Place) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER);
-    bytes.extend_from_slice(&magic);
+    bytes.extend_from_slice(&MAGIC);
     bytes.extend_from_slice(&FORMAT.to_le_bytes());
     bytes.extend_from_slice(&(place.shape.columns.len() as u32).to_le_bytes());
     bytes.extend_from_slice(place.plan.as_bytes());
@@ -309,9 +266,8 @@ mod tests {
         let place = place(2);
         let good = outcomes(&place);
         let reason = |outcomes: &[Done]| encode(&place, outcomes).unwrap_err().to_string();
-        assert!(reason(&good[..1]).contains("1 outcomes for 2 points"));
         let swapped: Vec<Done> = good.iter().rev().cloned().collect();
-        assert!(reason(&swapped).contains("an outcome of point 49 in the place of 48"));
+        assert!(reason(&swapped).contains("2 outcomes that are not of its points"));
         let mut short = good.clone();
         short[0].rows[0].pop();
         assert!(reason(&short).contains("does not fit"), "{}", reason(&short));
@@ -322,29 +278,25 @@ mod tests {
     }
 
     #[test]
-    fn a_part_is_some_points_in_order_and_no_chunk() {
+    fn a_chunk_has_points_of_its_own_each_once_in_order() {
         let place = place(4);
         let all = outcomes(&place);
-        for some in [&all[..0], &all[1..2], &all[..3]] {
-            let bytes = encode_part(&place, some).unwrap();
-            assert_eq!(decode_part(&place, &bytes).as_deref(), Ok(some));
-            assert_eq!(decode(&place, &bytes), Err(Damage::Foreign));
-            for at in 0..bytes.len() {
-                let mut broken = bytes.clone();
-                broken[at] ^= 1;
-                assert_eq!(decode_part(&place, &broken), Err(Damage::Hash), "byte {at}");
-                assert!(decode_part(&place, &bytes[..at]).is_err(), "cut to {at}");
-            }
+        for some in [&all[..0], &all[1..2], &all[..3], &all] {
+            let bytes = encode(&place, some).unwrap();
+            assert_eq!(decode(&place, &bytes).as_deref(), Ok(some));
         }
         let elsewhere = [synthetic::done(place.first + 4)];
         let backwards = [all[1].clone(), all[0].clone()];
-        for wrong in [all.as_slice(), &elsewhere, &backwards] {
-            assert!(encode_part(&place, wrong).is_err(), "{wrong:?}");
-            let bytes = write(PART_MAGIC, &place, wrong).unwrap();
-            assert_eq!(decode_part(&place, &bytes), Err(Damage::Record));
+        let larger = Place { first: 0, count: 100, ..place.clone() };
+        for wrong in [elsewhere.as_slice(), &backwards] {
+            assert!(encode(&place, wrong).is_err(), "{wrong:?}");
         }
-        let whole = encode(&place, &all).unwrap();
-        assert_eq!(decode_part(&place, &whole), Err(Damage::Foreign));
+        let mut bytes = encode(&larger, &elsewhere).unwrap();
+        bytes.truncate(bytes.len() - HASH);
+        bytes[..HEADER].copy_from_slice(&header(&place));
+        let hash = blake3::hash(&bytes);
+        bytes.extend_from_slice(hash.as_bytes());
+        assert_eq!(decode(&place, &bytes), Err(Damage::Record));
     }
 
     fn row() -> impl Strategy<Value = Row> {

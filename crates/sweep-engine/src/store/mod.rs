@@ -6,8 +6,7 @@
 //! |---|---|
 //! | `plan.json` | the frozen plan, written first (`plan_file`) |
 //! | `shards.json` | into how many shards the run was dealt, if it was (`shard`) |
-//! | `chunk-<index>.bin` | outcomes of neighbouring points, each file whole or absent (`chunk`) |
-//! | `part-<index>.bin` | what an interrupted process had of a chunk (`chunk`) |
+//! | `chunk-<index>.bin` | outcomes of neighbouring points, or what an interrupted process had of them (`chunk`) |
 //! | `trials.bin` | the trials of a search, in place of chunks (`trials`) |
 //! | `*.damaged` | what was not as it had been written; computed again |
 //! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
@@ -185,11 +184,7 @@ impl Folder {
     }
 
     fn chunk(&self, chunk: u64) -> PathBuf {
-        self.path.join(Named::Chunk.name(chunk))
-    }
-
-    fn part(&self, chunk: u64) -> PathBuf {
-        self.path.join(Named::Part.name(chunk))
+        self.path.join(chunk_name(chunk))
     }
 
     /// The sidecar that says how the run went.
@@ -203,28 +198,12 @@ impl Folder {
     }
 }
 
-/// Files of a run's folder that are named after a chunk.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Named {
-    Chunk,
-    Part,
+fn chunk_name(chunk: u64) -> String {
+    format!("chunk-{chunk:08}.bin")
 }
 
-impl Named {
-    const fn stem(self) -> &'static str {
-        match self {
-            Self::Chunk => "chunk-",
-            Self::Part => "part-",
-        }
-    }
-
-    fn name(self, chunk: u64) -> String {
-        format!("{}{chunk:08}.bin", self.stem())
-    }
-
-    /// The chunk that such a file is named after, if any.
-    fn chunk_of(self, name: &str) -> Option<u64> {
-        let chunk = name.strip_prefix(self.stem())?.strip_suffix(".bin")?.parse().ok()?;
-        (self.name(chunk) == name).then_some(chunk)
-    }
+/// The chunk that a file is named after, if any.
+fn chunk_of_name(name: &str) -> Option<u64> {
+    let chunk = name.strip_prefix("chunk-")?.strip_suffix(".bin")?.parse().ok()?;
+    (chunk_name(chunk) == name).then_some(chunk)
 }

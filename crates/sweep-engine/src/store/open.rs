@@ -16,7 +16,7 @@ use super::plan_file::{Found, PlanDifference, PlanFile, set_aside};
 use super::read::{self, ResultFile, Tally};
 use super::schema::Done;
 use super::shard::{self, Dealing, Shard, ShardRequest};
-use super::{Folder, Job, Named, chunk_points, provenance, trials};
+use super::{Folder, Job, chunk_of_name, chunk_points, provenance, trials};
 use crate::threads::Environment;
 use sweep_files::{FileError, atomic, regular};
 
@@ -139,51 +139,45 @@ impl OpenRun {
     /// # Errors
     /// [`StoreError::File`].
     pub fn rescan(&mut self) -> Result<(), StoreError> {
-        let mut present = BTreeSet::new();
-        for chunk in chunks_named(&self.folder, Named::Chunk)? {
+        let (mut present, mut parts) = (BTreeSet::new(), BTreeMap::new());
+        for chunk in chunks_there(&self.folder)? {
             if chunk >= self.chunks() || !self.owns(chunk) {
                 continue;
             }
-            if self.read_chunk(chunk)?.is_some() {
-                present.insert(chunk);
+            match self.read(chunk)? {
+                Some(outcomes) if outcomes.len() as u64 == self.place(chunk).count => {
+                    present.insert(chunk);
+                }
+                Some(part) => {
+                    parts.insert(chunk, part);
+                }
+                None => {}
             }
         }
         *self.present() = present;
-        let mut parts = BTreeMap::new();
-        for chunk in chunks_named(&self.folder, Named::Part)? {
-            if chunk < self.chunks() && self.is_missing(chunk) {
-                let path = self.folder.part(chunk);
-                let found = read_part(&self.folder, &self.place(chunk))?;
-                let outcomes = self.undamaged(found, &path)?;
-                parts.extend(outcomes.map(|outcomes| (chunk, outcomes)));
-            }
-        }
         *lock_of(&self.parts) = parts;
         Ok(())
     }
 
-    /// A chunk's outcomes; `None`, with the file set aside and noted, if it is damaged, or if it is
-    /// not there.
+    /// A whole chunk's outcomes; `None` if it is not there, or, with the file set aside and noted,
+    /// if it is damaged.
     pub fn read_chunk(&mut self, chunk: u64) -> Result<Option<Vec<Done>>, StoreError> {
-        let found = read_chunk(&self.folder, &self.place(chunk))?;
-        let outcomes = self.undamaged(found, &self.folder.chunk(chunk))?;
-        if outcomes.is_none() {
+        let count = self.place(chunk).count;
+        let whole = self.read(chunk)?.filter(|outcomes| outcomes.len() as u64 == count);
+        if whole.is_none() {
             self.present().remove(&chunk);
         }
-        Ok(outcomes)
+        Ok(whole)
     }
 
-    /// What a file holds; a damaged one is set aside and noted.
-    fn undamaged(
-        &mut self,
-        found: ChunkFile,
-        path: &Path,
-    ) -> Result<Option<Vec<Done>>, StoreError> {
-        match found {
-            ChunkFile::Whole(outcomes) => Ok(Some(outcomes)),
+    /// What there is of a chunk; a damaged file is set aside and noted.
+    fn read(&mut self, chunk: u64) -> Result<Option<Vec<Done>>, StoreError> {
+        match read_chunk(&self.folder, &self.place(chunk))? {
+            ChunkFile::There(outcomes) => Ok(Some(outcomes)),
             ChunkFile::Absent => Ok(None),
             ChunkFile::Damaged(damage) => {
-                let aside = set_aside(path)?;
+                let path = self.folder.chunk(chunk);
+                let aside = set_aside(&path)?;
                 self.notes.push(format!(
                     "{}: {damage}; kept as {} and computed again",
                     path.display(),
@@ -194,34 +188,35 @@ impl OpenRun {
         }
     }
 
-    /// Keeps a chunk for good: when this returns, it outlives a power cut.
+    /// Keeps what there is of a chunk, in any order: when this returns, it outlives a power cut.
+    /// What is not whole is for the next process to go on from.
     ///
     /// # Errors
-    /// [`StoreError::Engine`] when the outcomes are not this chunk's points in order,
-    /// [`StoreError::File`].
-    pub fn write_chunk(&self, chunk: u64, outcomes: &[Done]) -> Result<(), StoreError> {
-        let bytes = chunk::encode(&self.place(chunk), outcomes)?;
+    /// [`StoreError::Engine`] when the outcomes are not this chunk's, [`StoreError::File`].
+    pub fn write_chunk(&self, chunk: u64, mut outcomes: Vec<Done>) -> Result<(), StoreError> {
+        let place = self.place(chunk);
+        outcomes.sort_by_key(|outcome| outcome.point);
+        let bytes = chunk::encode(&place, &outcomes)?;
+        let is_whole = outcomes.len() as u64 == place.count;
+        // Another process with the same shard may have done it.
+        if !is_whole
+            && let ChunkFile::There(known) = read_chunk(&self.folder, &place)?
+            && known.len() > outcomes.len()
+        {
+            return Ok(());
+        }
         atomic::write(&self.folder.path, &self.folder.chunk(chunk), &bytes)?;
-        self.present().insert(chunk);
+        if is_whole {
+            self.present().insert(chunk);
+        } else {
+            lock_of(&self.parts).insert(chunk, outcomes);
+        }
         Ok(())
     }
 
     /// The outcomes there are of chunks that are not whole, to go on from.
     pub fn take_parts(&self) -> BTreeMap<u64, Vec<Done>> {
         std::mem::take(&mut *lock_of(&self.parts))
-    }
-
-    /// Keeps what there is of a chunk, in any order, for the next process to go on from. Once the
-    /// chunk is there, nobody reads the part.
-    ///
-    /// # Errors
-    /// As [`OpenRun::write_chunk`].
-    pub fn write_part(&self, chunk: u64, mut outcomes: Vec<Done>) -> Result<(), StoreError> {
-        outcomes.sort_by_key(|outcome| outcome.point);
-        let bytes = chunk::encode_part(&self.place(chunk), &outcomes)?;
-        atomic::write(&self.folder.path, &self.folder.part(chunk), &bytes)?;
-        lock_of(&self.parts).insert(chunk, outcomes);
-        Ok(())
     }
 
     /// How many chunks make up the whole result.
@@ -321,9 +316,9 @@ impl OpenRun {
     }
 }
 
-/// What is in a chunk's place.
+/// What is where a chunk's file would be.
 pub(super) enum ChunkFile {
-    Whole(Vec<Done>),
+    There(Vec<Done>),
     Absent,
     Damaged(Damage),
 }
@@ -332,21 +327,9 @@ fn lock_of<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Reads and verifies a chunk, leaving the file alone.
+/// Reads a chunk's file.
 pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
-    read_file(&folder.chunk(place.chunk), place, chunk::decode)
-}
-
-/// As [`read_chunk`], of what there is of a chunk.
-pub(super) fn read_part(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
-    read_file(&folder.part(place.chunk), place, chunk::decode_part)
-}
-
-fn read_file(
-    path: &Path,
-    place: &Place,
-    decode: fn(&Place, &[u8]) -> Result<Vec<Done>, Damage>,
-) -> Result<ChunkFile, StoreError> {
+    let path = &folder.chunk(place.chunk);
     let mut bytes = Vec::new();
     // A byte too many is enough to know that it is too long.
     let read = regular::open(path)
@@ -356,17 +339,17 @@ fn read_file(
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(ChunkFile::Absent),
         Err(error) => return Err(StoreError::io("read", path)(error)),
     }
-    Ok(match decode(place, &bytes) {
-        Ok(outcomes) => ChunkFile::Whole(outcomes),
+    Ok(match chunk::decode(place, &bytes) {
+        Ok(outcomes) => ChunkFile::There(outcomes),
         Err(damage) => ChunkFile::Damaged(damage),
     })
 }
 
-/// Chunks that a folder has such files of by name, unread.
-pub(super) fn chunks_named(folder: &Folder, named: Named) -> Result<BTreeSet<u64>, StoreError> {
+/// The chunks that have a file.
+pub(super) fn chunks_there(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
     let mut chunks = BTreeSet::new();
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
-        chunks.extend(name.to_str().and_then(|name| named.chunk_of(name)));
+        chunks.extend(name.to_str().and_then(chunk_of_name));
     }
     Ok(chunks)
 }
@@ -473,7 +456,7 @@ pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
 fn is_ours(name: &str) -> bool {
     let whole = name.strip_suffix(".damaged").unwrap_or(name);
     ["plan.json", "shards.json", trials::NAME].contains(&whole)
-        || [Named::Chunk, Named::Part].iter().any(|named| named.chunk_of(whole).is_some())
+        || chunk_of_name(whole).is_some()
         || lock::shard_of_name(name).is_some()
         || provenance::is_session(name)
         || atomic::is_temporary(name)

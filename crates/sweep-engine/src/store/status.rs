@@ -7,12 +7,12 @@ use serde::Serialize;
 
 use super::chunk::{Place, Shape};
 use super::error::{Holder, StoreError};
-use super::open::{self, ChunkFile, chunks_named, read_chunk, read_part};
+use super::open::{self, ChunkFile, chunks_there, read_chunk};
 use super::plan_file::{Found, PlanFile};
 use super::read::StatusCounts;
 use super::schema::{Done, Kind};
 use super::shard::{self, Dealing};
-use super::{Folder, Job, Named, chunk_points, lock};
+use super::{Folder, Job, chunk_points, lock};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -110,25 +110,19 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         let Kind::Name(names) = &job.layout.columns[column].kind else { return None };
         names.get((*done.rows.first()?.get(column)?)? as usize).copied()
     };
-    let count = |points: &[Done], status: &mut FolderStatus| {
-        status.points_done += points.len() as u64;
-        points.iter().filter_map(name).for_each(|name| status.by_status.add(name));
-    };
-    let named = |named| Ok::<_, StoreError>(chunks_named(&folder, named)?.into_iter());
-    for chunk in named(Named::Chunk)?.filter(|chunk| *chunk < chunks) {
-        match read_chunk(&folder, &place(chunk))? {
-            ChunkFile::Whole(outcomes) => {
-                present.insert(chunk);
-                count(&outcomes, &mut status);
+    for chunk in chunks_there(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
+        let place = place(chunk);
+        match read_chunk(&folder, &place)? {
+            ChunkFile::There(points) => {
+                if points.len() as u64 == place.count {
+                    present.insert(chunk);
+                }
+                status.points_done += points.len() as u64;
+                points.iter().filter_map(name).for_each(|name| status.by_status.add(name));
             }
             ChunkFile::Damaged(_) => status.chunks_damaged.push(chunk),
             // The run was finished, or the chunk set aside, a moment ago.
             ChunkFile::Absent => {}
-        }
-    }
-    for chunk in named(Named::Part)?.filter(|chunk| *chunk < chunks && !present.contains(chunk)) {
-        if let ChunkFile::Whole(outcomes) = read_part(&folder, &place(chunk))? {
-            count(&outcomes, &mut status);
         }
     }
     status.chunks_done = present.len() as u64;

@@ -12,9 +12,7 @@ fn chunk_sizes_feed_small_grids_to_all_cores_and_bound_large_ones() {
 #[test]
 fn chunk_names_stand_for_chunks_and_nothing_else_does() {
     for chunk in [0, 7, 99_999_999, 100_000_000, u64::MAX] {
-        for named in [Named::Chunk, Named::Part] {
-            assert_eq!(named.chunk_of(&named.name(chunk)), Some(chunk));
-        }
+        assert_eq!(chunk_of_name(&chunk_name(chunk)), Some(chunk));
     }
     for name in [
         "chunk-7.bin",
@@ -23,7 +21,7 @@ fn chunk_names_stand_for_chunks_and_nothing_else_does() {
         "part-00000007.bin",
         "plan.json",
     ] {
-        assert_eq!(Named::Chunk.chunk_of(name), None, "{name}");
+        assert_eq!(chunk_of_name(name), None, "{name}");
     }
 }
 
@@ -55,7 +53,7 @@ proptest! {
         drop(run);
         let mut harmed = std::collections::BTreeSet::new();
         for (chunk, at, how) in harm {
-            let path = home.partial().join(Named::Chunk.name(chunk));
+            let path = home.partial().join(chunk_name(chunk));
             let Ok(mut bytes) = fs::read(&path) else { continue };
             let at = at.index(bytes.len().max(1));
             match how {
@@ -71,7 +69,7 @@ proptest! {
         let mut run = open(&home.output(), &job);
         prop_assert_eq!(run.take_notes().len(), harmed.len());
         for chunk in &harmed {
-            let damaged = format!("{}.damaged", Named::Chunk.name(*chunk));
+            let damaged = format!("{}.damaged", chunk_name(*chunk));
             prop_assert!(home.partial().join(damaged).exists());
         }
         prop_assert_eq!(write_missing(&run), harmed.len() as u64);
@@ -85,8 +83,8 @@ fn damage_after_opening_is_met_at_the_join() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     let mut run = open(&home.output(), &job);
     write_missing(&run);
-    fs::write(home.partial().join(Named::Chunk.name(4)), b"not a chunk").unwrap();
-    fs::remove_file(home.partial().join(Named::Chunk.name(6))).unwrap();
+    fs::write(home.partial().join(chunk_name(4)), b"not a chunk").unwrap();
+    fs::remove_file(home.partial().join(chunk_name(6))).unwrap();
     let error = run.join(&job, &|| false).unwrap_err();
     assert!(error.to_string().contains("2 of 11 chunks are missing"), "{error}");
     assert!(!home.output().exists());
@@ -179,7 +177,7 @@ fn status_counts_without_touching_anything() {
     let run = open(&home.output(), &job);
     write(&run, 0);
     write(&run, 1);
-    fs::write(home.partial().join(Named::Chunk.name(1)), "not a chunk").unwrap();
+    fs::write(home.partial().join(chunk_name(1)), "not a chunk").unwrap();
     let found = status(&home.output(), &job).unwrap();
     assert_eq!(
         (found.chunks_done, found.chunks_damaged.as_slice(), found.points_done),
@@ -187,7 +185,7 @@ fn status_counts_without_touching_anything() {
     );
     assert_eq!(found.points_failed, 2, "points 4 and 7 of the formula fail");
     assert_eq!(found.running[0].pid, std::process::id());
-    assert!(home.partial().join(Named::Chunk.name(1)).exists());
+    assert!(home.partial().join(chunk_name(1)).exists());
     let other = Job { plan: json!({}), ..synthetic::job(POINTS) };
     assert!(matches!(status(&home.output(), &other).unwrap_err(), StoreError::PlanDiffers { .. }));
 }
@@ -202,12 +200,12 @@ fn a_part_is_gone_on_from_until_its_chunk_is_whole() {
     let run = open(&home.output(), &job);
     write(&run, 0);
     // As rows come: in any order.
-    run.write_part(3, outcomes([30, 25, 27].into_iter())).unwrap();
+    run.write_chunk(3, outcomes([30, 25, 27].into_iter())).unwrap();
     assert_eq!(run.own_points(), (POINTS, 8 + 3));
     drop(run);
     let seen = status(&home.output(), &job).unwrap();
     assert_eq!((seen.points_done, seen.chunks_done), (11, 1));
-    assert!(home.partial().join("part-00000003.bin").exists());
+    assert!(home.partial().join("chunk-00000003.bin").exists());
 
     let run = open(&home.output(), &job);
     assert_eq!(run.own_points(), (POINTS, 11));
@@ -220,13 +218,13 @@ fn a_part_is_gone_on_from_until_its_chunk_is_whole() {
 }
 
 #[test]
-fn a_damaged_part_is_set_aside_and_one_beside_its_chunk_is_not_read() {
+fn a_damaged_part_is_set_aside_and_a_whole_chunk_takes_its_place() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     let run = open(&home.output(), &job);
-    run.write_part(1, outcomes(8..10)).unwrap();
-    run.write_part(2, outcomes(16..20)).unwrap();
+    run.write_chunk(1, outcomes(8..10)).unwrap();
+    run.write_chunk(2, outcomes(16..20)).unwrap();
     drop(run);
-    let part = home.partial().join("part-00000002.bin");
+    let part = home.partial().join("chunk-00000002.bin");
     let mut bytes = fs::read(&part).unwrap();
     bytes[100] ^= 1;
     fs::write(&part, bytes).unwrap();
@@ -235,7 +233,7 @@ fn a_damaged_part_is_set_aside_and_one_beside_its_chunk_is_not_read() {
     let mut run = open(&home.output(), &job);
     assert!(run.take_parts().is_empty());
     assert_eq!(run.take_notes().len(), 0, "it was told of when it was set aside");
-    assert!(home.partial().join("part-00000002.bin.damaged").exists());
+    assert!(home.partial().join("chunk-00000002.bin.damaged").exists());
     write_missing(&run);
     finish(run, &job);
     assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));

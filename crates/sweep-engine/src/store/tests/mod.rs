@@ -52,14 +52,14 @@ fn open(output: &Path, job: &Job<'_>) -> OpenRun {
 
 fn write(run: &OpenRun, chunk: u64) {
     let outcomes: Vec<_> = run.chunk_range(chunk).map(synthetic::done).collect();
-    run.write_chunk(chunk, &outcomes).unwrap();
+    run.write_chunk(chunk, outcomes).unwrap();
 }
 
 fn write_bytes(job: &Job<'_>, chunk: u64) -> Vec<u8> {
     let home = Home::new();
     let run = open(&home.output(), job);
     write(&run, chunk);
-    fs::read(home.partial().join(Named::Chunk.name(chunk))).unwrap()
+    fs::read(home.partial().join(chunk_name(chunk))).unwrap()
 }
 
 fn write_missing(run: &OpenRun) -> u64 {

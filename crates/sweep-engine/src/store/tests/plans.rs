@@ -51,7 +51,7 @@ fn another_build_of_the_version_is_another_run() {
 
     // A chunk of that build under this one's plan.
     let foreign = write_bytes(&other, 3);
-    fs::write(home.partial().join(Named::Chunk.name(3)), foreign).unwrap();
+    fs::write(home.partial().join(chunk_name(3)), foreign).unwrap();
     let mut run = open(&home.output(), &job);
     assert!(run.is_missing(3) && !run.is_missing(0));
     let notes = run.take_notes();

@@ -8,7 +8,7 @@ fn starting_over_deletes_what_a_run_wrote_and_nothing_else() {
     let run = open(&home.output(), &job);
     write_missing(&run);
     drop(run);
-    let damaged = format!("{}.damaged", Named::Chunk.name(2));
+    let damaged = format!("{}.damaged", chunk_name(2));
     let theirs = ["chunk-notes.txt", "session-notes.md", "shard-plan.txt", "plan.json.old"];
     for name in theirs.into_iter().chain([damaged.as_str(), "shard-3.lock"]) {
         fs::write(home.partial().join(name), "").unwrap();
@@ -70,7 +70,7 @@ fn death_between_publishing_and_removing_the_folder_loses_nothing() {
 
     // The same, half-way through the removal: the plan goes first.
     fs::create_dir(home.partial()).unwrap();
-    fs::write(home.partial().join(Named::Chunk.name(3)), "left").unwrap();
+    fs::write(home.partial().join(chunk_name(3)), "left").unwrap();
     assert!(matches!(
         OpenRun::open(&home.output(), &job, options()).unwrap(),
         Opened::Finished(..)
