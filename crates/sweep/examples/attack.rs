@@ -25,7 +25,7 @@
 use std::process::ExitCode;
 
 use rayon::prelude::*;
-use sweep::{Integrator, Metric, ModelEngine, Outcome, Plan, Status, Trajectory, Verdict};
+use sweep::{Floor, Integrator, ModelEngine, Outcome, Plan, Status, Trajectory, Verdict};
 
 /// What is asked of the fast method.
 const ACCURACIES: [f64; 4] = [1e-3, 1e-3, 1e-4, 1e-2];
@@ -270,14 +270,11 @@ fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
     let metrics = models.iter().flat_map(|(model, a, b)| {
         plan.model.measures.of_model().zip(a.metrics.iter().zip(&b.metrics)).map(
             |(number, (a, b))| {
-                let least = match number.metric {
-                    Metric::ClashTime | Metric::StopContact => CLASH_FLOOR * (to_s - from_s),
-                    Metric::StopForce => PUSH_FLOOR * weight_n,
-                    Metric::FootLoad | Metric::SlipMargin => weight_n,
-                    Metric::CabinetForce
-                    | Metric::StaticSag
-                    | Metric::Growth
-                    | Metric::DamperSpeed => 0.0,
+                let least = match number.metric.floor() {
+                    Floor::None => 0.0,
+                    Floor::PartOfWindow => CLASH_FLOOR * (to_s - from_s),
+                    Floor::Weight => weight_n,
+                    Floor::PartOfWeight => PUSH_FLOOR * weight_n,
                 };
                 (number.column(model), relative_from(least, *a, *b))
             },

@@ -75,4 +75,4 @@ pub use sweep_engine::store::{
     Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, State, StoreError, status,
 };
 pub use sweep_engine::{Error, Exit, Interrupt, survive_file_size_limits, tell};
-pub use washer_row::{Metric, Outcome, Status, Trajectory, Verdict};
+pub use washer_row::{Floor, Outcome, Status, Trajectory, Verdict};

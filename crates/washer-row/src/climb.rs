@@ -3,7 +3,7 @@
 use washer_model::{Channel, ModelKind, Point};
 
 use crate::ladder::{Ladder, Rung};
-use crate::measures::{Metric, TURN_FLOOR};
+use crate::measures::{Floor, Metric, TURN_FLOOR};
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::run::{Rule, RungRun};
 use crate::twin::Departure;
@@ -405,13 +405,11 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, rule: &Rule) -> f64
         compare(a, b, point.clearance_m());
     }
     for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(rule.measures.of_model()) {
-        let least = match number.metric {
-            Metric::ClashTime | Metric::StopContact => clash_floor_s(rule),
-            // These may pass through zero.
-            Metric::FootLoad | Metric::SlipMargin => point.weight_n(),
-            // Of open stops no more is left than rounding.
-            Metric::StopForce => METRIC_FLOOR * point.weight_n(),
-            Metric::CabinetForce | Metric::StaticSag | Metric::Growth | Metric::DamperSpeed => 0.0,
+        let least = match number.metric.floor() {
+            Floor::None => 0.0,
+            Floor::PartOfWindow => clash_floor_s(rule),
+            Floor::Weight => point.weight_n(),
+            Floor::PartOfWeight => METRIC_FLOOR * point.weight_n(),
         };
         compare(*a, *b, least);
     }

@@ -103,159 +103,235 @@ impl Metric {
         Self::DamperSpeed,
     ];
 
+    const fn facts(self) -> &'static Facts {
+        &METRICS[self as usize]
+    }
+
     /// Name in grid files.
-    #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::CabinetForce => "cabinet_force",
-            Self::ClashTime => "clash_time",
-            Self::StaticSag => "static_sag",
-            Self::StopForce => "stop_force",
-            Self::StopContact => "stop_contact",
-            Self::FootLoad => "foot_load",
-            Self::SlipMargin => "slip_margin",
-            Self::Growth => "growth",
-            Self::DamperSpeed => "damper_speed",
-        }
+        self.facts().name
     }
 
     /// Whether each model has its own; else it belongs to the machine.
-    #[must_use]
     pub const fn is_of_model(self) -> bool {
-        !matches!(self, Self::StaticSag | Self::Growth)
+        self.facts().of.is_some()
+    }
+
+    /// What the machine must have.
+    pub const fn part(self) -> Option<Part> {
+        self.facts().part
+    }
+
+    /// What differences of it are compared with where it is less.
+    pub const fn floor(self) -> Floor {
+        self.facts().floor
     }
 
     /// Unit.
-    #[must_use]
     pub const fn unit(self) -> &'static str {
-        match self {
-            Self::CabinetForce | Self::StopForce | Self::FootLoad | Self::SlipMargin => "N",
-            Self::ClashTime | Self::StopContact => "s",
-            Self::StaticSag => "m",
-            Self::Growth => "1/s",
-            Self::DamperSpeed => "m/s",
-        }
+        self.facts().unit
     }
 
     /// Which way it is bad.
-    #[must_use]
     pub const fn worse(self) -> Worse {
-        match self {
-            Self::FootLoad | Self::SlipMargin => Worse::Less,
-            _ => Worse::Greater,
-        }
+        self.facts().worse
     }
 
     /// Up to where it is good, if that has a meaning of its own.
-    #[must_use]
     pub const fn limit(self) -> Option<Limit> {
-        match self {
-            Self::FootLoad | Self::SlipMargin => Some(Limit { value: 0.0, scale: 100.0 }),
-            Self::Growth => Some(Limit { value: 0.0, scale: 1.0 }),
-            _ => None,
-        }
+        self.facts().limit
     }
 
     /// The column's name; `model` only if each has its own.
-    #[must_use]
     pub fn column(self, model: &str) -> String {
-        match self {
-            Self::CabinetForce => format!("cabinet_force_{model}_n"),
-            Self::ClashTime => format!("clash_time_{model}_s"),
-            Self::StaticSag => "static_sag_m".to_owned(),
-            Self::StopForce => format!("stop_force_{model}_n"),
-            Self::StopContact => format!("stop_contact_{model}_s"),
-            Self::FootLoad => format!("foot_load_{model}_n"),
-            Self::SlipMargin => format!("slip_margin_{model}_n"),
-            Self::Growth => "growth_per_s".to_owned(),
-            Self::DamperSpeed => format!("damper_speed_{model}_m_per_s"),
-        }
+        column(self.name(), if self.is_of_model() { model } else { "" }, self.unit())
     }
 
     /// One line for column dictionaries and docs.
-    #[must_use]
     pub const fn description(self) -> &'static str {
-        match self {
-            Self::CabinetForce => {
-                "greatest magnitude in the window of the sum of all spring and damper forces on \
-                 the cabinet (at rest the weight)"
-            }
-            Self::ClashTime => "time in the window with a gap between drum and tub below zero",
-            Self::StaticSag => {
-                "how far the tub's mass centre sinks from where the machine file draws it to the \
-                 static equilibrium; null if \
-                 there is none"
-            }
-            Self::StopForce => {
-                "greatest push of any stop in the window; the linear model has the tangents of the \
-                 stops at equilibrium, next to nothing while they are open"
-            }
-            Self::StopContact => "longest time in the window for which any one stop is closed",
-            Self::FootLoad => {
-                "least vertical load of any foot of the cabinet in the window, by statics; below \
-                 zero it would lift"
-            }
-            Self::SlipMargin => {
-                "least margin of the cabinet against slipping in the window: friction on all feet \
-                 together less the horizontal force"
-            }
-            Self::Growth => {
-                "how fast the fastest growing disturbance of the nonlinear response grows, at that \
-                 of the speeds of [stability] at which it is greatest"
-            }
-            Self::DamperSpeed => {
-                "greatest speed along any damper in the window: what \
-                 `friction_linear_speed_m_per_s` should be near"
-            }
-        }
+        self.facts().description
     }
+}
 
-    /// What each stop or each foot has of it; none if there is no such thing.
-    const fn of_each(self) -> Option<OfEach> {
-        let (part, what, description) = match self {
-            Self::StopForce => (
-                Part::Stop,
-                "force",
-                "greatest push of the stop in the window; the linear model has its tangent at \
-                 equilibrium, next to nothing while it is open",
-            ),
-            Self::StopContact => {
-                (Part::Stop, "contact", "time in the window for which the stop is closed")
-            }
-            Self::FootLoad => (
-                Part::Foot,
-                "load",
-                "least vertical load of the foot in the window, by statics; below zero it would \
-                 lift",
-            ),
-            Self::DamperSpeed => {
-                (Part::Damper, "speed", "greatest speed along the damper in the window")
-            }
-            Self::CabinetForce
-            | Self::ClashTime
-            | Self::StaticSag
-            | Self::SlipMargin
-            | Self::Growth => return None,
-        };
-        Some(OfEach { part, what, description })
-    }
+/// A column's name: what it holds, of which model, in which unit.
+fn column(what: &str, model: &str, unit: &str) -> String {
+    let unit = unit.to_lowercase().replace("1/", "per_").replace('/', "_per_");
+    [what, model, &unit].into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
 }
 
 /// A part that a machine may have several of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
+pub enum Part {
+    /// A stop.
     Stop,
+    /// A foot of the cabinet.
     Foot,
+    /// A damper.
     Damper,
 }
 
-/// What each part has of a metric.
-struct OfEach {
-    part: Part,
-    /// In the column's name, behind the part's number.
-    what: &'static str,
-    description: &'static str,
+impl Part {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Stop => "stop",
+            Self::Foot => "foot",
+            Self::Damper => "damper",
+        }
+    }
 }
+
+/// What two values of a metric are compared by where both are less: what no machine feels decides
+/// nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Floor {
+    /// By themselves.
+    None,
+    /// A part of the window: a clash that just happens is a time that just is not zero.
+    PartOfWindow,
+    /// The weight of what moves: it may pass through zero.
+    Weight,
+    /// A part of that weight: of open stops no more is left than rounding.
+    PartOfWeight,
+}
+
+/// What there is to say of a metric, once.
+struct Facts {
+    name: &'static str,
+    unit: &'static str,
+    description: &'static str,
+    /// What a machine must have.
+    part: Option<Part>,
+    /// In the column of one part, and what that holds; none if parts have no columns.
+    of_each: Option<[&'static str; 2]>,
+    floor: Floor,
+    /// What trajectories must record.
+    record: fn(&mut Wanted),
+    /// Its values in such a record, of each part or the only one; none if it is the machine's own.
+    of: Option<fn(&Extra) -> Vec<f64>>,
+    /// Which way it is bad: of several parts, the worst stands for all.
+    worse: Worse,
+    /// Up to where it is good, if that has a meaning of its own.
+    limit: Option<Limit>,
+}
+
+/// Of the whole machine, and always known.
+const PLAIN: Facts = Facts {
+    name: "",
+    unit: "",
+    description: "",
+    part: None,
+    of_each: None,
+    floor: Floor::None,
+    record: |_| (),
+    of: None,
+    worse: Worse::Greater,
+    limit: None,
+};
+
+/// Every metric, in the order of [`Metric::ALL`].
+const METRICS: [Facts; Metric::ALL.len()] = [
+    Facts {
+        name: "cabinet_force",
+        unit: "N",
+        description: "greatest magnitude in the window of the sum of all spring and damper forces \
+                      on the cabinet (at rest the weight)",
+        record: |wanted| wanted.cabinet_force = true,
+        of: Some(|extra| extra.cabinet_force_n.into_iter().collect()),
+        ..PLAIN
+    },
+    Facts {
+        name: "clash_time",
+        unit: "s",
+        description: "time in the window with a gap between drum and tub below zero",
+        floor: Floor::PartOfWindow,
+        record: |wanted| wanted.clash_time = true,
+        of: Some(|extra| extra.clash_time_s.into_iter().collect()),
+        ..PLAIN
+    },
+    Facts {
+        name: "static_sag",
+        unit: "m",
+        description: "how far the tub's mass centre sinks from where the machine file draws it to \
+                      the static equilibrium; null if there is none",
+        ..PLAIN
+    },
+    Facts {
+        name: "stop_force",
+        unit: "N",
+        description: "greatest push of any stop in the window; the linear model has the tangents \
+                      of the stops at equilibrium, next to nothing while they are open",
+        part: Some(Part::Stop),
+        of_each: Some([
+            "force",
+            "greatest push of the stop in the window; the linear model has its tangent at \
+             equilibrium, next to nothing while it is open",
+        ]),
+        floor: Floor::PartOfWeight,
+        record: |wanted| wanted.stops = true,
+        of: Some(|extra| extra.stops.iter().map(|stop| stop.push_n).collect()),
+        ..PLAIN
+    },
+    Facts {
+        name: "stop_contact",
+        unit: "s",
+        description: "longest time in the window for which any one stop is closed",
+        part: Some(Part::Stop),
+        of_each: Some(["contact", "time in the window for which the stop is closed"]),
+        floor: Floor::PartOfWindow,
+        record: |wanted| wanted.stops = true,
+        of: Some(|extra| extra.stops.iter().map(|stop| stop.contact_s).collect()),
+        ..PLAIN
+    },
+    Facts {
+        name: "foot_load",
+        unit: "N",
+        description: "least vertical load of any foot of the cabinet in the window, by statics; \
+                      below zero it would lift",
+        part: Some(Part::Foot),
+        of_each: Some([
+            "load",
+            "least vertical load of the foot in the window, by statics; below zero it would lift",
+        ]),
+        floor: Floor::Weight,
+        record: |wanted| wanted.feet = true,
+        of: Some(|extra| extra.foot_loads_n.clone()),
+        worse: Worse::Less,
+        limit: Some(Limit { value: 0.0, scale: 100.0 }),
+        ..PLAIN
+    },
+    Facts {
+        name: "slip_margin",
+        unit: "N",
+        description: "least margin of the cabinet against slipping in the window: friction on all \
+                      feet together less the horizontal force",
+        part: Some(Part::Foot),
+        floor: Floor::Weight,
+        record: |wanted| wanted.feet = true,
+        of: Some(|extra| extra.slip_margin_n.into_iter().collect()),
+        worse: Worse::Less,
+        limit: Some(Limit { value: 0.0, scale: 100.0 }),
+        ..PLAIN
+    },
+    Facts {
+        name: "growth",
+        unit: "1/s",
+        description: "how fast the fastest growing disturbance of the nonlinear response grows, \
+                      at that of the speeds of [stability] at which it is greatest",
+        limit: Some(Limit { value: 0.0, scale: 1.0 }),
+        ..PLAIN
+    },
+    Facts {
+        name: "damper_speed",
+        unit: "m/s",
+        description: "greatest speed along any damper in the window: what \
+                      `friction_linear_speed_m_per_s` should be near",
+        part: Some(Part::Damper),
+        of_each: Some(["speed", "greatest speed along the damper in the window"]),
+        record: |wanted| wanted.damper_speeds = true,
+        of: Some(|extra| extra.damper_speeds_m_per_s.clone()),
+        ..PLAIN
+    },
+];
 
 /// A number that each model has of its own: a metric of the whole machine, or what one stop or foot
 /// has of it.
@@ -268,57 +344,34 @@ pub struct Measured {
 }
 
 impl Measured {
-    fn of_part(self) -> Option<(OfEach, usize)> {
-        self.metric.of_each().zip(self.part)
+    /// In the column's name and what it holds, of one part.
+    fn of_part(self) -> Option<(&'static [&'static str; 2], String)> {
+        let Facts { part, of_each, .. } = self.metric.facts();
+        let part = format!("{}_{}", (*part)?.name(), self.part? + 1);
+        Some((of_each.as_ref()?, part))
     }
 
     /// The column's name.
-    #[must_use]
     pub fn column(self, model: &str) -> String {
-        let Some((OfEach { part, what, .. }, index)) = self.of_part() else {
-            return self.metric.column(model);
-        };
-        let part = match part {
-            Part::Stop => "stop",
-            Part::Foot => "foot",
-            Part::Damper => "damper",
-        };
-        let unit = self.metric.unit().to_lowercase().replace('/', "_per_");
-        format!("{part}_{}_{what}_{model}_{unit}", index + 1)
+        match self.of_part() {
+            Some(([what, _], part)) => column(&format!("{part}_{what}"), model, self.metric.unit()),
+            None => self.metric.column(model),
+        }
     }
 
     /// One line for column dictionaries and docs.
-    #[must_use]
     pub fn description(self) -> &'static str {
-        self.of_part().map_or(self.metric.description(), |(of_each, _)| of_each.description)
+        self.of_part().map_or(self.metric.description(), |([_, description], _)| description)
     }
 
     /// Its value in a trajectory's records, if it was recorded.
     pub fn of(self, extra: &Extra) -> Option<f64> {
-        let stops = extra.stops.iter();
-        match self.metric {
-            Metric::CabinetForce => extra.cabinet_force_n,
-            Metric::ClashTime => extra.clash_time_s,
-            Metric::StopForce => self.one_or(stops.map(|stop| stop.push_n), f64::max),
-            Metric::StopContact => self.one_or(stops.map(|stop| stop.contact_s), f64::max),
-            Metric::FootLoad => self.one_or(extra.foot_loads_n.iter().copied(), f64::min),
-            Metric::SlipMargin => extra.slip_margin_n,
-            Metric::DamperSpeed => {
-                self.one_or(extra.damper_speeds_m_per_s.iter().copied(), f64::max)
-            }
-            Metric::StaticSag | Metric::Growth => None,
-        }
-    }
-
-    /// The part's value, or the extreme of all.
-    fn one_or(
-        self,
-        mut values: impl Iterator<Item = f64>,
-        extreme: fn(f64, f64) -> f64,
-    ) -> Option<f64> {
+        let Facts { of, worse, .. } = self.metric.facts();
+        let values = (*of)?(extra);
         match self.part {
-            Some(index) => values.nth(index),
-            None => values.reduce(extreme),
+            Some(part) => values.get(part).copied(),
+            None if *worse == Worse::Less => values.into_iter().reduce(f64::min),
+            None => values.into_iter().reduce(f64::max),
         }
     }
 }
@@ -350,7 +403,7 @@ impl Measures {
     /// The numbers of a metric that each model has its own of: of all parts, then of each if there
     /// are several.
     pub fn numbers_of(&self, metric: Metric) -> impl Iterator<Item = Measured> + use<> {
-        let parts = match metric.of_each().map(|of_each| of_each.part) {
+        let parts = match metric.facts().of_each.and(metric.part()) {
             Some(Part::Stop) => self.stops,
             Some(Part::Foot) => self.feet,
             Some(Part::Damper) => self.dampers,
@@ -364,17 +417,15 @@ impl Measures {
     /// What trajectories must record.
     #[must_use]
     pub fn wanted(&self) -> Wanted {
-        let asked = |metric: &Metric| self.metrics.contains(metric);
-        Wanted {
+        let mut wanted = Wanted {
             root_mean_squares: self.criterion == Criterion::Rms,
             turns: self.criterion == Criterion::Envelope,
-            cabinet_force: self.metrics.contains(&Metric::CabinetForce),
-            clash_time: self.metrics.contains(&Metric::ClashTime),
-            stops: [Metric::StopForce, Metric::StopContact].iter().any(asked),
-            feet: [Metric::FootLoad, Metric::SlipMargin].iter().any(asked),
-            damper_speeds: self.metrics.contains(&Metric::DamperSpeed),
-            course: false,
+            ..Wanted::default()
+        };
+        for metric in &self.metrics {
+            (metric.facts().record)(&mut wanted);
         }
+        wanted
     }
 }
 
@@ -477,6 +528,15 @@ mod tests {
         let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
         let found: Vec<_> = measures.of_model().filter_map(|number| number.of(&extra)).collect();
         assert_eq!(found, [50.0, 20.0, 50.0, 0.3, 0.3, 0.1, -5.0, 90.0, -5.0, 70.0]);
+    }
+
+    #[test]
+    fn each_metric_has_the_row_of_its_name() {
+        let names = Metric::ALL.map(|metric| format!("{metric:?}").to_lowercase());
+        assert_eq!(names, Metric::ALL.map(|metric| metric.name().replace('_', "")));
+        let columns = [Metric::StaticSag, Metric::Growth, Metric::DamperSpeed];
+        let columns = columns.map(|metric| metric.column("linear"));
+        assert_eq!(columns, ["static_sag_m", "growth_per_s", "damper_speed_linear_m_per_s"]);
     }
 
     #[test]

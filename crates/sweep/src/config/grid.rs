@@ -6,7 +6,7 @@ use sweep_engine::config::section::{Field, Section, cut};
 use sweep_engine::config::source::{Location, beside, read};
 use sweep_engine::config::syntax::parse;
 use washer_model::Machine;
-use washer_row::{Criterion, Metric};
+use washer_row::{Criterion, Metric, Part};
 
 use super::{GridInput, machine};
 use crate::speeds::SpeedList;
@@ -92,19 +92,14 @@ pub(crate) fn stability(root: &Section<'_>, metrics: &[Metric]) -> Option<SpeedL
 
 /// What a machine has not got and this metric is of.
 pub(crate) fn lacking(metric: Metric, machine: &Machine) -> Option<&'static str> {
-    let (is_there, what) = match metric {
-        Metric::StopForce | Metric::StopContact => {
-            (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file")
-        }
-        Metric::FootLoad | Metric::SlipMargin => (
+    let (is_there, what) = match metric.part()? {
+        Part::Stop => (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file"),
+        Part::Foot => (
             machine.cabinet.is_some(),
             "cabinet: expected [cabinet] and three or four [[feet]] in the machine file",
         ),
-        Metric::DamperSpeed => {
+        Part::Damper => {
             (!machine.dampers.is_empty(), "dampers: expected [[dampers]] in the machine file")
-        }
-        Metric::CabinetForce | Metric::ClashTime | Metric::StaticSag | Metric::Growth => {
-            return None;
         }
     };
     (!is_there).then_some(what)
