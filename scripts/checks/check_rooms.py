@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Checks that no two rooms of a crate import each other, directly or by way of others; and that
+"""Checks that no two files of a crate import each other, directly or by way of others; and that
 the engine has no word of the machine that it sweeps.
 
     python3 scripts/checks/check_rooms.py [--draw] [SOURCE_FOLDER ...]
 
-A room is a top-level module with all that is below it. Tests may import what they like. --draw
-prints who imports whom, lowest rooms first, each with the number of files that import it. Without
-a folder it checks every crate's source. Python's own library is all it needs.
+A module's file and the files of its folder are one thing: what a file imports from the modules that
+it is in does not count. Tests may import what they like. --draw prints who imports whom, lowest
+first. Without a folder it checks every crate's source. Python's own library is all it needs.
 """
 
 import pathlib
@@ -16,18 +16,23 @@ from graphlib import CycleError, TopologicalSorter
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 CHECKED = sorted(ROOT.glob("crates/*/src"))
-# The crate's root and the program, which may import every room.
-ROOTS = {"lib", "main"}
 # Crates that know no machine, and words that would say otherwise.
 ENGINE = ["sweep-engine", "ode-map"]
 MACHINE = re.compile(r"(?<![a-z])(washer|drum|tub|rpm)s?(?![a-z])", re.IGNORECASE)
-TEST_FILE = re.compile(r"(^|_)tests(_\w+)?\.rs$")
+TEST_FILE = re.compile(r"(^|_)tests(_\w+)?$")
 TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\s*mod \w+ \{")
+USE = re.compile(r"^\s*(?:pub(?:\([^)]*\))? )?use ([^;\"]+);", re.MULTILINE)
 
 
-def room_of(file, source):
-    """The top-level module that a file belongs to."""
-    return file.relative_to(source).parts[0].removesuffix(".rs")
+def modules(source):
+    """The files of a crate that hold no tests, by the names that lead to them."""
+    found = {}
+    for file in sorted(source.rglob("*.rs")):
+        names = [part.removesuffix(".rs") for part in file.relative_to(source).parts]
+        if not any(TEST_FILE.search(name) for name in names):
+            is_root = names in (["lib"], ["main"])
+            found[() if is_root else tuple(name for name in names if name != "mod")] = file
+    return found
 
 
 def code(file):
@@ -35,48 +40,65 @@ def code(file):
     return TEST_MODULE.split(re.sub(r"//.*", "", file.read_text()))[0]
 
 
-def imported(text):
-    """Names right behind `crate::`, alone or in a list."""
-    for alone, listed in re.findall(r"\bcrate::(?:(\w+)|\{([^;]*)\})", text):
-        if alone:
-            yield alone
-        # Of a::{b, c} only a is a room.
-        yield from re.findall(r"(?:^|,)\s*(\w+)", re.sub(r"\{[^{}]*\}", "", listed))
+def paths(tree):
+    """The paths of one `use`: a::{b, c::d} is a::b and a::c::d."""
+    head, brace, rest = tree.partition("{")
+    if not brace:
+        return [tree.split(" as ")[0].strip()]
+    parts, depth = [""], 0
+    for letter in rest[: rest.rindex("}")]:
+        depth += (letter == "{") - (letter == "}")
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [path for part in parts if part.strip() for path in paths(head.strip() + part.strip())]
+
+
+def imported(own, text, known):
+    """The modules that a file's text names, by `use` or where it stands."""
+    named = [path for tree in USE.findall(text) for path in paths(re.sub(r"\s+", " ", tree))]
+    named += re.findall(r"\b(?:crate|super|self)(?:::\w+)+", USE.sub("", text))
+    for path in named:
+        names = path.split("::")
+        at = own if names[0] in ("self", "super") else ()
+        while names and names[0] in ("self", "super", "crate"):
+            at = at[:-1] if names.pop(0) == "super" else at
+        if at == () and path.split("::")[0] not in ("crate", "super"):
+            at = own
+        while names and (*at, names[0]) in known:
+            at = (*at, names.pop(0))
+        yield at
 
 
 def imports(source):
-    """Of each room, the rooms that it imports, with the files that do."""
-    files = [file for file in sorted(source.rglob("*.rs")) if not TEST_FILE.search(file.name)]
-    rooms = {room_of(file, source) for file in files} - ROOTS
-    graph = {room: {} for room in sorted(rooms)}
-    for file in files:
-        room = room_of(file, source)
-        for other in imported(code(file)) if room in rooms else ():
-            if other in rooms - {room}:
-                graph[room].setdefault(other, set()).add(file.relative_to(source))
+    """Of each file, the files that it imports; not those of the modules that it is in."""
+    known = modules(source)
+    graph = {}
+    for own, file in known.items():
+        others = set(imported(own, code(file), known))
+        # A module's file is made of those in its folder.
+        related = [it for it in others if own[: len(it)] == it or it[: len(own)] == own]
+        graph[own] = others.difference(related)
     return graph
 
 
 def check(source, draw):
-    """Reports a cycle among the rooms of a source folder; True if there is none."""
+    """Reports a cycle among the files of a source folder; True if there is none."""
     graph = imports(source)
-    arrows = sum(map(len, graph.values()))
+    said, name = "::".join, source.relative_to(ROOT)
     try:
         order = list(TopologicalSorter(graph).static_order())
     except CycleError as error:
         # Each imports the one before it.
-        cycle = list(reversed(error.args[1]))
-        print(f"{source.relative_to(ROOT)}: rooms import each other:", file=sys.stderr)
-        for room, other in zip(cycle, cycle[1:]):
-            files = ", ".join(str(file) for file in sorted(graph[room][other]))
-            print(f"  {room} imports {other} in {files}", file=sys.stderr)
+        cycle = " imports ".join(said(file) or "the root" for file in reversed(error.args[1]))
+        print(f"{name}: files import each other: {cycle}", file=sys.stderr)
         return False
     if draw:
-        for room in order:
-            listed = (f"{other} ({len(graph[room][other])})" for other in sorted(graph[room]))
-            print(f"{room}: {', '.join(listed) or '-'}")
-    name = source.relative_to(ROOT)
-    print(f"{name}: {len(graph)} rooms, {arrows} imports between them, no cycle", file=sys.stderr)
+        for file in order:
+            print(f"{said(file)}: {', '.join(sorted(map(said, graph[file]))) or '-'}")
+    arrows = sum(map(len, graph.values()))
+    print(f"{name}: {len(graph)} files, {arrows} imports between them, no cycle", file=sys.stderr)
     return True
 
 
@@ -92,7 +114,7 @@ def words():
 
 
 def main():
-    """Check every folder; exit with 1 if rooms of any import each other, or know a machine."""
+    """Check every folder; exit with 1 if files of any import each other, or know a machine."""
     arguments = sys.argv[1:]
     sources = [word for word in arguments if word != "--draw"] or CHECKED
     sound = [check((ROOT / source).resolve(), "--draw" in arguments) for source in sources]

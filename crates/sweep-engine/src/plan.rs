@@ -2,10 +2,19 @@
 //! reports read it.
 
 use serde_json::Value;
-use sweep_parameter::{Parameter as _, RatioLimits};
+use sweep_parameter::{Parameter as _, Range, RatioLimits};
 
 use crate::design::{Design, Distribution};
 use crate::model::Model;
+
+/// Most grid points that are accepted. A hundred thousand points a second would take four months.
+pub const MOST_POINTS: u64 = 1_000_000_000_000;
+
+/// Longest integration that is accepted: eleven days.
+pub const LONGEST_S: f64 = 1e6;
+
+/// What `ratio_min` may be.
+pub const RATIO_MIN: Range = Range::Within(0.0, 1.0);
 
 /// Most steps that a trajectory may need by a method whose steps are bounded by its stability; at
 /// this many, one point takes an hour or more.

@@ -22,8 +22,7 @@ use crate::linear::rotor_terms::{
 };
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};
-use crate::nonlinear::coupling::Deflection;
-use crate::nonlinear::forces::AxisLoad;
+use crate::nonlinear::forces::{AxisLoad, Deflection};
 use crate::nonlinear::frame::Tilt;
 use crate::nonlinear::{Half, rotor, tub};
 use lane_ode::{Dual, Lane, N, Real};

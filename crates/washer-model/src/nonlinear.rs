@@ -18,10 +18,10 @@ use crate::coordinates::{
 };
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};
-use crate::nonlinear::coupling::{Coupling, Deflection, Sag};
+use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::floating::{Factors, Floating};
-use crate::nonlinear::forces::Flexure;
+use crate::nonlinear::forces::{Deflection, Flexure};
 use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
 use lane_ode::{Lane, N, Real};
 

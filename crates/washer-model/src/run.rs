@@ -11,7 +11,8 @@ pub(crate) mod stiff;
 pub(crate) mod suspension;
 mod tangent;
 
-pub use extras::{Extra, StopLoad, Wanted};
+pub use extras::{Extra, Wanted};
+pub use loads::StopLoad;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};

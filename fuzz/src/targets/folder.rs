@@ -2,8 +2,8 @@
 //! a result whose bytes are those of the undisturbed one, unless the file is a chunk that passes
 //! for one.
 //!
-//! The first byte of an input says which file it is for. A chunk gets the right header and the right
-//! hash, so that the fuzzer has records to change: as many as it has, or as long as the input.
+//! The first byte of an input says which file it is for. A chunk gets a right header and a right
+//! hash, so that the fuzzer has records to change: those of all points, or as long as the input.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -24,6 +24,7 @@
 mod batch;
 pub mod file;
 mod look;
+mod neighbour;
 mod net;
 mod pockets;
 pub mod quantity;
@@ -31,6 +32,7 @@ pub mod quantity;
 mod random_tests;
 mod row;
 pub mod search;
+mod span;
 #[cfg(test)]
 mod tests;
 mod trace;

@@ -1,7 +1,7 @@
 //! Nets: trial places on both sides of an expected change of side. They are so close together that
 //! they catch a bracket within tolerance, or so far apart that they catch one for certain.
 
-use super::row::Span;
+use super::span::Span;
 
 /// Neighbouring places of the closest net are this far from each other, in tolerances: a little
 /// less than one, so that the bracket they make is within tolerance whatever is rounded.
@@ -133,6 +133,33 @@ fn inverse(near: &[(f64, f64)]) -> Option<f64> {
             + x2 * (y0 / (y2 - y0)) * (y1 / (y2 - y1))
     };
     is_monotone.then(root)
+}
+
+/// Something that a row wants tried.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Want {
+    /// One place.
+    At(f64),
+    /// The places of a net.
+    Net(Net),
+}
+
+impl Want {
+    /// Places that it needs at least.
+    pub(super) fn needed(&self) -> usize {
+        match self {
+            Self::At(_) => 1,
+            Self::Net(net) => net.least,
+        }
+    }
+
+    /// Its places, so many.
+    pub(super) fn places(&self, count: usize, span: &Span) -> Vec<f64> {
+        match self {
+            Self::At(at) => vec![*at],
+            Self::Net(net) => net.places(count, span),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Pockets that a neighbour announces: places to look at in a row because the row beside it is on
 //! another side there.
 
-use super::row::{Question, RowSearch, SideRange, Span};
-use super::warm::{Neighbour, hint, nearest, shared};
+use super::neighbour::{Neighbour, hint, nearest, shared};
+use super::row::RowSearch;
+use super::span::{Question, SideRange, Span};
 
 /// A neighbour's pocket is looked for until no gap between trials is wider than this part of it.
 const PART: f64 = 0.25;

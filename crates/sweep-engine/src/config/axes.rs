@@ -6,17 +6,14 @@ use std::collections::BTreeMap;
 use sweep_parameter::{Parameter as _, Range, decimal};
 
 use super::Read;
-use super::grid::Draft;
+use super::draft::Draft;
 use super::list::{self, List};
-use super::parameters::{find, twice};
+use super::parameters::find;
 use super::report::{Diagnostic, Report};
-use super::section::{Field, Section, quoted, refused_number};
+use super::section::{Field, Section, quoted, refused_number, twice};
 use super::source::{Located, Location};
 use crate::design::{Design, Distribution, MOST_AXES, REACH, Shape};
-use crate::plan::{Axis, AxisValues};
-
-/// Most grid points that are accepted. A hundred thousand points a second would take four months.
-pub const MOST_POINTS: u64 = 1_000_000_000_000;
+use crate::plan::{Axis, AxisValues, MOST_POINTS};
 
 /// What axes write so far, by the single numbers.
 type Swept = BTreeMap<Cow<'static, str>, Located<String>>;

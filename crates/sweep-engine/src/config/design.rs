@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use super::axes::MOST_POINTS;
 use super::list::{self, List};
 use super::section::{Field, Section};
 use super::source::Located;
 use crate::design::Design;
+use crate::plan::MOST_POINTS;
 
 /// The methods by name.
 pub const METHODS: [&str; 4] = ["latin_hypercube", "sobol", "monte_carlo", "list"];

@@ -6,31 +6,18 @@ use std::path::Path;
 use sweep_parameter::{Channel, Range, RatioLimits, decimal};
 
 use super::Read;
-use super::parameters::WrittenConstant;
+use super::draft::Draft;
 use super::report::{Diagnostic, Report};
-use super::section::{Field, Section, unknown_word};
+use super::section::{Field, Section};
 use super::source::{Located, Location, ReadError, is_blank, read};
 use super::syntax::parse;
+use super::words::names;
 use super::{GridInput, axes, design, parameters, scalars};
 use crate::method::{Integrator, default_method, settings};
-use crate::plan::{Plan, Reliability};
+use crate::plan::{LONGEST_S, Plan, RATIO_MIN, Reliability};
 
 /// `ratio_limit` of `[reliability]`.
 pub const DEFAULT_RATIO_LIMIT: f64 = 2.0;
-/// What `ratio_min` may be.
-pub const RATIO_MIN: Range = Range::Within(0.0, 1.0);
-/// Longest integration that is accepted: eleven days.
-pub const LONGEST_S: f64 = 1e6;
-
-/// A plan in the making: whole, but sound only if nothing was reported.
-pub struct Draft<'a, M: Read> {
-    /// The plan.
-    pub plan: Plan<M>,
-    /// Where its numbers were written, and what is wrong.
-    pub report: &'a Report,
-    /// What `[set]`, `--set` and `--at` have written.
-    pub constants: Vec<WrittenConstant>,
-}
 
 /// Reads the grid file and puts the constants in place. `None` if the grid file has no text.
 pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
@@ -246,53 +233,4 @@ fn reliability<M: Read>(root: &Section<'_>, model: &mut M) -> Reliability<M> {
         limits: RatioLimits { most, least },
         channels: channels.unwrap_or(stand_in.channels),
     }
-}
-
-/// A list of some of `all`, each once, by their names; an empty one is a mistake.
-pub fn names<T: Copy + PartialEq>(
-    section: &Section<'_>,
-    key: &'static str,
-    what: &str,
-    all: &[T],
-    name: fn(T) -> &'static str,
-) -> Option<Vec<T>> {
-    let list = section.texts(key).given()?;
-    if list.value.is_empty() {
-        let known: Vec<&str> = all.iter().copied().map(name).collect();
-        let expected = format!("expected at least one of `{}`", known.join("`, `"));
-        section.report.push(Diagnostic::new(format!("`{key}` is empty")).at(&list.at, expected));
-    }
-    Some(some_of(list.value, what, all, name, section.report).0)
-}
-
-/// Those of `all` that are named, each once, and whether that is what every name says.
-pub fn some_of<'t, T: Copy + PartialEq>(
-    found: impl IntoIterator<Item = Located<&'t str>>,
-    what: &str,
-    all: &[T],
-    name: fn(T) -> &'static str,
-    report: &Report,
-) -> (Vec<T>, bool) {
-    let known: Vec<&str> = all.iter().copied().map(name).collect();
-    let (mut chosen, mut is_sound): (Vec<Located<T>>, _) = (Vec::new(), true);
-    for found in found {
-        let one = all.iter().find(|one| name(**one) == found.value);
-        let first = chosen.iter().find(|other| Some(&other.value) == one);
-        is_sound &= one.is_some() && first.is_none();
-        match (one, first) {
-            (None, _) => report.push_with(|_| unknown_word(what, &found, &known)),
-            (Some(_), Some(first)) => {
-                let title = format!("the {what} \"{}\" is given twice", found.value);
-                let refusal =
-                    Diagnostic::new(title).at(&found.at, format!("expected each {what} once"));
-                // Names of one argument have one place.
-                report.push(match first.at == found.at {
-                    true => refusal,
-                    false => refusal.at(&first.at, "first given here"),
-                });
-            }
-            (Some(&value), None) => chosen.push(Located { value, at: found.at }),
-        }
-    }
-    (chosen.into_iter().map(|one| one.value).collect(), is_sound)
 }

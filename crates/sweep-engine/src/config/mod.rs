@@ -25,6 +25,7 @@ mod again;
 pub mod axes;
 mod canonical;
 pub mod design;
+mod draft;
 pub mod grid;
 mod list;
 pub mod parameters;
@@ -38,11 +39,12 @@ pub mod section;
 pub mod source;
 pub mod syntax;
 pub mod whole;
+pub mod words;
 
 use std::marker::PhantomData;
 use std::path::PathBuf;
 
-pub use grid::Draft;
+pub use draft::Draft;
 pub use points::{check_columns, not_numbers, other_length};
 pub use read::{Read, Schema};
 pub use report::{Diagnostics, Mistake};

@@ -7,10 +7,10 @@ use sweep_parameter::{Parameter as _, Range};
 
 use super::NamedValues;
 use super::Read;
-use super::grid::Draft;
+use super::draft::{Draft, WrittenConstant};
 use super::report::Diagnostic;
 use super::scalars::{self, Written};
-use super::section::{Section, quoted};
+use super::section::{Section, quoted, twice};
 use super::source::Located;
 use crate::model::UnknownParameter;
 use crate::plan::Plan;
@@ -25,14 +25,6 @@ struct Constant<'a, M: Read> {
     name: Located<&'a str>,
     parameter: M::Parameter,
     value: Located<f64>,
-}
-
-/// A constant that was put in place.
-pub struct WrittenConstant {
-    /// Of the parameter.
-    pub name: Located<String>,
-    /// The numbers that it writes.
-    pub parts: Vec<Cow<'static, str>>,
 }
 
 /// Reads `[set]`, then `--set`, which overrides it, and writes both into the plan.
@@ -185,16 +177,4 @@ fn write<M: Read>(parameter: &M::Parameter, plan: &mut Plan<M>, value: f64) {
         Some(edge) => plan.window_s[edge] = value,
         None => plan.model.write(parameter, value),
     }
-}
-
-/// The mistake of a number that is written twice.
-pub fn twice(second: &Located<&str>, first: &Located<&str>) -> Diagnostic {
-    let title = if second.value == first.value {
-        format!("`{}` is given twice", second.value)
-    } else {
-        format!("`{}` and `{}` write the same number", first.value, second.value)
-    };
-    Diagnostic::new(title)
-        .at(&second.at, "expected each number once")
-        .at(&first.at, "first written here")
 }

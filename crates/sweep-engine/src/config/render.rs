@@ -1,10 +1,11 @@
 //! A mistake as text, in the form of rustc's messages.
 
+use std::fmt;
 use std::ops::Range;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 
-use super::report::Diagnostic;
+use super::report::{Diagnostic, Diagnostics};
 use super::source::{Line, Location, Sources, floor_char_boundary};
 
 /// Lines longer than this are shown only around the place that matters.
@@ -18,7 +19,7 @@ fn renderer(colour: bool) -> Renderer {
 }
 
 /// One mistake, without a newline at the end.
-pub(super) fn diagnostic(diagnostic: &Diagnostic, sources: &Sources, colour: bool) -> String {
+fn diagnostic(diagnostic: &Diagnostic, sources: &Sources, colour: bool) -> String {
     let mut group = Group::with_title(Level::ERROR.primary_title(diagnostic.title.as_str()));
     // Places on one line share its picture.
     let mut shown: Vec<(usize, &Location)> = Vec::new();
@@ -77,9 +78,35 @@ fn window(line: &Line<'_>) -> Range<usize> {
 }
 
 /// The last line.
-pub(super) fn summary(count: usize, beyond: usize, colour: bool) -> String {
+fn summary(count: usize, beyond: usize, colour: bool) -> String {
     let mistakes = if count == 1 { "1 mistake".to_owned() } else { format!("{count} mistakes") };
     let shown = if beyond == 0 { String::new() } else { format!(" ({} shown)", count - beyond) };
     let title = format!("{mistakes}{shown}, nothing was done");
     renderer(colour).render(&[Group::with_title(Level::ERROR.primary_title(title))])
 }
+
+impl Diagnostics {
+    /// The whole text with terminal colours.
+    #[must_use]
+    pub fn styled(&self) -> String {
+        self.text(true)
+    }
+
+    fn text(&self, colour: bool) -> String {
+        let mut text = String::new();
+        for found in &self.found {
+            text.push_str(&diagnostic(found, &self.sources, colour));
+            text.push_str("\n\n");
+        }
+        text.push_str(&summary(self.count(), self.beyond, colour));
+        text
+    }
+}
+
+impl fmt::Display for Diagnostics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text(false))
+    }
+}
+
+impl std::error::Error for Diagnostics {}

@@ -2,9 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
 
-use super::render;
 use super::source::{Location, SourceId, Sources};
 use crate::nearest::nearest;
 
@@ -204,9 +202,9 @@ impl Report {
 /// and the nearest valid name, without colour; [`Diagnostics::styled`] the same with colour.
 #[derive(Debug)]
 pub struct Diagnostics {
-    sources: Sources,
-    found: Vec<Diagnostic>,
-    beyond: usize,
+    pub(super) sources: Sources,
+    pub(super) found: Vec<Diagnostic>,
+    pub(super) beyond: usize,
 }
 
 impl Diagnostics {
@@ -220,22 +218,6 @@ impl Diagnostics {
     #[must_use]
     pub fn mistakes(&self) -> Vec<Mistake> {
         self.found.iter().map(|diagnostic| Mistake::of(diagnostic, &self.sources)).collect()
-    }
-
-    /// The whole text with terminal colours.
-    #[must_use]
-    pub fn styled(&self) -> String {
-        self.text(true)
-    }
-
-    fn text(&self, colour: bool) -> String {
-        let mut text = String::new();
-        for diagnostic in &self.found {
-            text.push_str(&render::diagnostic(diagnostic, &self.sources, colour));
-            text.push_str("\n\n");
-        }
-        text.push_str(&render::summary(self.count(), self.beyond, colour));
-        text
     }
 }
 
@@ -270,14 +252,6 @@ impl Mistake {
         }
     }
 }
-
-impl fmt::Display for Diagnostics {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text(false))
-    }
-}
-
-impl std::error::Error for Diagnostics {}
 
 #[cfg(test)]
 mod tests {

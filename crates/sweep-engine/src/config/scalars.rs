@@ -5,15 +5,15 @@ use serde_json::{Value, json};
 use sweep_parameter::{Channel, Range, decimal};
 
 use super::Read;
-use super::axes::MOST_POINTS;
 use super::design::{MOST_SEED, MOST_SOBOL};
-use super::grid::{Draft, LONGEST_S, RATIO_MIN, some_of};
-use super::parameters::twice;
+use super::draft::Draft;
 use super::report::Report;
-use super::section::{check_number, quoted, short, unknown_word};
+use super::section::{check_number, quoted, short, twice, unknown_word};
 use super::source::{Located, Location};
+use super::words::some_of;
 use crate::design::Design;
 use crate::method::{Integrator, settings};
+use crate::plan::{LONGEST_S, MOST_POINTS, RATIO_MIN};
 
 /// Those that stand outside of `[integrator]`.
 const OWN: [&str; 7] =

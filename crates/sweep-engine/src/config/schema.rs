@@ -4,11 +4,11 @@
 use serde_json::{Map, Value, json};
 use sweep_parameter::{Channel as _, Parameter, Range};
 
-use super::axes::MOST_POINTS;
 use super::design::{DEFAULT_SEED, MOST_SEED, MOST_SOBOL};
-use super::grid::{DEFAULT_RATIO_LIMIT, LONGEST_S, RATIO_MIN};
+use super::grid::DEFAULT_RATIO_LIMIT;
 use super::read::{Read, Schema};
 use crate::method::{Entry, Integrator, default_method};
+use crate::plan::{LONGEST_S, MOST_POINTS, RATIO_MIN};
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 

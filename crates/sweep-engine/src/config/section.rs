@@ -328,6 +328,18 @@ impl<'a> Section<'a> {
     }
 }
 
+/// The mistake of a number that is written twice.
+pub fn twice(second: &Located<&str>, first: &Located<&str>) -> Diagnostic {
+    let title = if second.value == first.value {
+        format!("`{}` is given twice", second.value)
+    } else {
+        format!("`{}` and `{}` write the same number", first.value, second.value)
+    };
+    Diagnostic::new(title)
+        .at(&second.at, "expected each number once")
+        .at(&first.at, "first written here")
+}
+
 /// Refuses a word that is not among the choices.
 pub fn unknown_word(what: &str, found: &Located<&str>, choices: &[&str]) -> Diagnostic {
     Diagnostic::new(format!("unknown {what} \"{}\"", short(found.value)))

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use sweep_parameter::decimal;
 
 use super::Read;
-use super::grid::Draft;
+use super::draft::Draft;
 use super::report::Diagnostic;
 use super::source::{Location, Sources};
 use crate::method::{Integrator as _, Steps};

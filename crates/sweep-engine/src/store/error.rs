@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::plan_file::PlanDifference;
+use super::differences::PlanDifference;
 use crate::threads::ThreadsError;
 use sweep_files::FileError;
 

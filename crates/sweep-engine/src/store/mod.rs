@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `plan.json` | the frozen plan, written first (`plan_file`) |
 //! | `shards.json` | into how many shards the run was dealt, if it was (`shard`) |
-//! | `chunk-<index>.bin` | outcomes of neighbouring points, or what an interrupted process had of them (`chunk`) |
+//! | `chunk-<index>.bin` | rows of neighbouring points, or some of them (`chunk`) |
 //! | `trials.bin` | the trials of a search, in place of chunks (`trials`) |
 //! | `*.damaged` | what was not as it had been written; computed again |
 //! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
@@ -17,6 +17,7 @@
 //! them.
 
 mod chunk;
+mod differences;
 mod error;
 mod lock;
 mod merge;
@@ -136,6 +137,9 @@ pub const fn chunk_points(points: u64) -> u64 {
         wanted.next_power_of_two()
     }
 }
+
+/// The file of a search's folder that holds its trials.
+const TRIALS: &str = "trials.bin";
 
 /// The paths of one run.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -10,13 +10,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use arrow_schema::SchemaRef;
 
 use super::chunk::{self, Damage, Place, Shape};
+use super::differences::PlanDifference;
 use super::error::StoreError;
 use super::lock::{self, Lock};
-use super::plan_file::{Found, PlanDifference, PlanFile, set_aside};
+use super::plan_file::{Found, PlanFile, set_aside};
+use super::provenance::{self, Session};
 use super::read::{self, ResultFile, Tally};
 use super::schema::Done;
 use super::shard::{self, Dealing, Shard, ShardRequest};
-use super::{Folder, Job, chunk_of_name, chunk_points, provenance, trials};
+use super::{Folder, Job, TRIALS, chunk_of_name, chunk_points};
 use crate::threads::Environment;
 use sweep_files::{FileError, atomic, regular};
 
@@ -301,6 +303,21 @@ impl OpenRun {
         Place { chunk, first: range.start, count: range.end - range.start, ..self.place.clone() }
     }
 
+    /// Records this process's work in the folder, for the sidecar of the process that finishes the
+    /// run.
+    ///
+    /// # Errors
+    /// [`StoreError::File`].
+    pub fn record(&self, session: &Session) -> Result<(), StoreError> {
+        let name =
+            format!("session-{}-{}-{}.json", session.host, session.pid, session.started_unix_s);
+        let path = self.folder().join(name.replace(['/', '\0'], "_"));
+        let text = serde_json::to_vec_pretty(session)
+            .map_err(io::Error::from)
+            .map_err(StoreError::io("write", &path))?;
+        Ok(atomic::write(self.folder(), &path, &text)?)
+    }
+
     /// The error that says which chunks, and of which shards, are missing from the whole.
     pub fn incomplete(&self) -> Result<StoreError, StoreError> {
         let chunks = self.chunks();
@@ -455,7 +472,7 @@ pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
 /// Whether a run writes files of this name into its folder, the lock aside.
 fn is_ours(name: &str) -> bool {
     let whole = name.strip_suffix(".damaged").unwrap_or(name);
-    ["plan.json", "shards.json", trials::NAME].contains(&whole)
+    ["plan.json", "shards.json", TRIALS].contains(&whole)
         || chunk_of_name(whole).is_some()
         || lock::shard_of_name(name).is_some()
         || provenance::is_session(name)

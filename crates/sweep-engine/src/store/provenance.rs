@@ -8,10 +8,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 
 use super::error::StoreError;
-use super::open::OpenRun;
 use super::read::Tally;
 use super::{Folder, Job};
-use sweep_files::{atomic, regular};
+use sweep_files::regular;
 
 /// How one process worked on a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,23 +59,6 @@ struct Sidecar<'a> {
     threads: usize,
     rows: &'a Tally,
     sessions: &'a [Session],
-}
-
-impl OpenRun {
-    /// Records this process's work in the folder, for the sidecar of the process that finishes the
-    /// run.
-    ///
-    /// # Errors
-    /// [`StoreError::File`].
-    pub fn record(&self, session: &Session) -> Result<(), StoreError> {
-        let name =
-            format!("session-{}-{}-{}.json", session.host, session.pid, session.started_unix_s);
-        let path = self.folder().join(name.replace(['/', '\0'], "_"));
-        let text = serde_json::to_vec_pretty(session)
-            .map_err(io::Error::from)
-            .map_err(StoreError::io("write", &path))?;
-        Ok(atomic::write(self.folder(), &path, &text)?)
-    }
 }
 
 /// The sidecar: this session and those that were recorded before. Killed sessions left no record.

@@ -26,11 +26,9 @@ use super::lock::Lock;
 use super::open;
 use super::plan_file::{PlanFile, set_aside};
 use super::read;
-use super::{Folder, Job};
+use super::{Folder, Job, TRIALS};
 use sweep_files::{FileError, FileKind, ParquetFile, atomic, key, regular};
 
-/// The file of a search's folder that holds its trials.
-pub(super) const NAME: &str = "trials.bin";
 /// Bytes of a point and its answer.
 const CONTENT_BYTES: usize = 32;
 /// Bytes of a record.
@@ -88,7 +86,7 @@ impl Trials {
             open::remove(&folder, lock);
             return Ok(OpenedTrials::Finished);
         }
-        let path = folder.path.join(NAME);
+        let path = folder.path.join(TRIALS);
         let plan = *job.hash().as_bytes();
         let (mut file, found, known) = contents(&path, &plan)?;
         if known.is_empty() && found > 0 {

@@ -6,6 +6,7 @@ pub(crate) mod curves;
 pub(crate) mod dwell;
 pub(crate) mod histogram;
 pub(crate) mod influence;
+mod machine;
 pub(crate) mod map;
 pub(crate) mod matrix;
 pub(crate) mod passages;

@@ -7,7 +7,7 @@ use crate::PlotOptions;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
 use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
 use crate::error::PlotError;
-use crate::figures::trace;
+use crate::figures::machine::machine;
 use crate::label::{self, Label};
 use crate::read::{Batch, Cells, ColumnFacts, Kind, Source};
 use crate::swept::SweptAxis;
@@ -243,7 +243,7 @@ pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotEr
     let source = open(path)?;
     let axes = axes(&source);
     let mut at: Vec<(String, f64)> =
-        trace::machine(table).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        machine(table).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     let named = together::at(&table.source);
     at.retain(|(known, _)| !named.iter().any(|(name, _)| name == known));
     at.extend(named.iter().cloned());

@@ -1,6 +1,6 @@
 //! `sweep merge GRID.toml`: finished shards into the one file, of a run or of dwells.
 
-use super::held::HeldArgs;
+use super::held_args::HeldArgs;
 use crate::plan::Plan;
 use sweep_engine::commands::merge::{self, of_job};
 use sweep_engine::exit::{Error, Exit};

@@ -4,6 +4,7 @@ mod completions;
 mod dwell;
 mod explain;
 mod held;
+mod held_args;
 mod init;
 mod lines;
 mod man;

@@ -1,6 +1,6 @@
 //! `sweep status GRID.toml`: progress of a run, or of dwells.
 
-use super::held::HeldArgs;
+use super::held_args::HeldArgs;
 use crate::plan::Plan;
 use sweep_engine::commands::status::{self, of_job};
 use sweep_engine::exit::{Error, Exit};

@@ -13,9 +13,9 @@ use crate::linear::rotor_terms::{self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, 
 use crate::linear::symmetric::Symmetric4;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
-use crate::nonlinear::coupling::{Coupling, Deflection, HingeMass, mass_scaled_system};
+use crate::nonlinear::coupling::{Coupling, HingeMass, mass_scaled_system};
 use crate::nonlinear::floating::{Factors, Floating};
-use crate::nonlinear::forces::AxisLoad;
+use crate::nonlinear::forces::{AxisLoad, Deflection};
 use lane_ode::{Lane, N};
 
 lane_struct! {

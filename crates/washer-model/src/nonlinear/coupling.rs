@@ -10,17 +10,10 @@ use crate::coordinates::{
 use crate::lanes::lane_struct;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
-use crate::nonlinear::floating::{Factors, Floating};
-use crate::nonlinear::forces::AxisLoad;
+use crate::nonlinear::floating::{Factors, Floating, Response};
+use crate::nonlinear::forces::{AxisLoad, Deflection};
 use crate::nonlinear::frame::Tilt;
 use lane_ode::{Lane, N, Real};
-
-lane_struct! {
-    /// Where the shaft's bearing midpoint is from the tub's, and its axis from the tub's axis; y
-    /// and z.
-    #[derive(Clone, Copy, Debug)]
-    Deflection { offset: [N<T>; 2], tilt: [N<T>; 2] }
-}
 
 impl<T: Real> Deflection<T> {
     /// Of the nonlinear model.
@@ -200,14 +193,6 @@ impl<T: Real> Coupling<T> {
         let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(rotor_inertia, &on_shaft);
         [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
     }
-}
-
-/// How a half's midpoint (y, z) and axis (y, z) accelerate: on their own, and per unit of force (y,
-/// z) and moment (y, z).
-pub(crate) struct Response<T> {
-    pub(crate) free: [N<T>; 4],
-    /// Symmetric; lower triangle.
-    pub(crate) compliance: [[N<T>; 4]; 4],
 }
 
 /// w^2 K^-1 + C, lower triangle: from the compliances of the bearings in one direction (offset by

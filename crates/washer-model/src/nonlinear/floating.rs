@@ -4,9 +4,16 @@
 //! Written for the mass centre of the chain, its two translations decouple from the rotations
 //! (section 4.1 of the model page): J is 2x2 for the tub, 4x4 for the rotor.
 
-use crate::nonlinear::coupling::Response;
 use crate::nonlinear::forces::AxisLoad;
 use lane_ode::{Lane, N, Real};
+
+/// How a half's midpoint (y, z) and axis (y, z) accelerate: on their own, and per unit of force (y,
+/// z) and moment (y, z).
+pub(crate) struct Response<T> {
+    pub(crate) free: [N<T>; 4],
+    /// Symmetric; lower triangle.
+    pub(crate) compliance: [[N<T>; 4]; 4],
+}
 
 /// Equations of motion of one half of the machine, with `R` rotations. The first is the axis's yaw
 /// about c2, so that its partial velocities have no y component; the second is the axis's pitch.

@@ -3,7 +3,6 @@
 
 use crate::lanes::lane_struct;
 use crate::nonlinear::coefficients::Bodies;
-use crate::nonlinear::coupling::Deflection;
 use lane_ode::{N, Real};
 
 lane_struct! {
@@ -24,6 +23,13 @@ impl<T: Real> AxisLoad<T> {
         let [[fy, fz], [my, mz]] = [self.force, self.moment];
         Self { force: [-fy, -fz], moment: [-my, -mz] }
     }
+}
+
+lane_struct! {
+    /// Where the shaft's bearing midpoint is from the tub's, and its axis from the tub's axis; y
+    /// and z.
+    #[derive(Clone, Copy, Debug)]
+    Deflection { offset: [N<T>; 2], tilt: [N<T>; 2] }
 }
 
 impl<T: Real> Deflection<T> {

@@ -4,7 +4,7 @@
 //! that the loop over steps does not change where they are not in use.
 
 use super::cabinet_force::GreatestForce;
-use super::loads::Loads;
+use super::loads::{Loads, StopLoad};
 use super::{Course, Method};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -36,15 +36,6 @@ pub struct Wanted {
     pub damper_speeds: bool,
     /// The coordinates at the ends of legs ([`Timing::checkpoints`](crate::Timing)).
     pub course: bool,
-}
-
-/// The record of one stop.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StopLoad {
-    /// Its greatest push (N).
-    pub push_n: f64,
-    /// How long it is closed (s).
-    pub contact_s: f64,
 }
 
 /// The records that [`Wanted`] asks for, of one trajectory, within the window.

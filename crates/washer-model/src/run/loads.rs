@@ -3,7 +3,6 @@
 //! The laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers for
 //! their rates; the linear model's are first order in its deviations from equilibrium.
 
-use super::extras::StopLoad;
 use crate::coordinates::{COORDINATES, STATES, TUB};
 use crate::kind::ModelKind;
 use crate::lanes::{Constant as _, InLanes as _};
@@ -12,6 +11,15 @@ use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::Tilt;
 use crate::point::Point;
 use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
+
+/// The record of one stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StopLoad {
+    /// Its greatest push (N).
+    pub push_n: f64,
+    /// How long it is closed (s).
+    pub contact_s: f64,
+}
 
 /// Least values are found as greatest distances below this (N), farther than any load.
 const FAR_N: f64 = 1_048_576.0;

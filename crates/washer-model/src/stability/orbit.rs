@@ -5,7 +5,6 @@
 //! `search.rs` at one speed, and followed over speed by `branch.rs`.
 
 use super::monodromy::{INSTANTS, along_every_step, monodromy, slopes_along, weights};
-use super::settings::caps;
 use super::turn::{Clock, Watch, turn};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -15,10 +14,15 @@ use crate::nonlinear::outputs::squared;
 use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
 use core::array::from_fn;
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use lane_ode::{Dual, Kernel, Lane, Lu, N, Peaks, Simd};
 
 /// Rows and columns of a state's disturbance.
 pub(super) type Square = [[N<f64>; STATES]; STATES];
+
+/// Step times cap, as a share of the formula's limit. Gyroscopic effects may make whirls of the
+/// capped hinge faster than its cap.
+const CAP_SHARE: f64 = 0.7;
 
 /// A point at a constant speed.
 #[derive(Clone, Copy)]
@@ -129,6 +133,12 @@ impl Kernel for Turns<'_> {
         }
         turned
     }
+}
+
+/// As high as so many steps a turn allow.
+pub(super) fn caps(steps: usize, turn_s: f64) -> Caps {
+    let cap = CAP_SHARE * RK4_STABILITY_LIMIT * steps as f64 / turn_s;
+    Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) }
 }
 
 /// A model with each row in its lane, and the last in those that are left over.

@@ -1,14 +1,13 @@
 //! Steps and caps at constant speeds, and what of a machine's motion they leave right.
 
 use super::NoAnswer;
-use super::orbit::Row;
+use super::orbit::{Row, caps};
 use crate::coordinates::COORDINATES;
 use crate::fast::{HINGE_TO_DRUM, SUSPENSION_MODES, hinge_shift};
 use crate::modes::{Modes, highest_frequency_rad_per_s, modes, motions_with_caps};
 use crate::nonlinear::coupling::Caps;
 use crate::point::Point;
 use core::f64::consts::TAU;
-use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -17,10 +16,6 @@ const STEPS: usize = 96;
 
 /// Longest step times the fastest of the suspension's modes, all of which the steps must follow.
 const LONGEST_PHASE: f64 = 0.25;
-
-/// Step times cap, as a share of the formula's limit. Gyroscopic effects may make whirls of the
-/// capped hinge faster than its cap.
-const CAP_SHARE: f64 = 0.7;
 
 /// Step times the fastest mode, where none is capped.
 const PLAIN_PHASE: f64 = 1.0;
@@ -182,12 +177,6 @@ fn setting(
     }
     let [frozen, _] = frozen;
     Ok(Setting { frozen: Arc::new(frozen), steps, is_capped })
-}
-
-/// As high as so many steps a turn allow.
-pub(super) fn caps(steps: usize, turn_s: f64) -> Caps {
-    let cap = CAP_SHARE * RK4_STABILITY_LIMIT * steps as f64 / turn_s;
-    Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) }
 }
 
 /// How far caps move the suspension's modes.

@@ -1,0 +1,26 @@
+//! A grid file while it is read.
+
+use std::borrow::Cow;
+
+use super::Read;
+use super::report::Report;
+use super::source::Located;
+use crate::plan::Plan;
+
+/// A plan in the making: whole, but sound only if nothing was reported.
+pub struct Draft<'a, M: Read> {
+    /// The plan.
+    pub plan: Plan<M>,
+    /// Where its numbers were written, and what is wrong.
+    pub report: &'a Report,
+    /// What `[set]`, `--set` and `--at` have written.
+    pub constants: Vec<WrittenConstant>,
+}
+
+/// A constant that was put in place.
+pub struct WrittenConstant {
+    /// Of the parameter.
+    pub name: Located<String>,
+    /// The numbers that it writes.
+    pub parts: Vec<Cow<'static, str>>,
+}

@@ -1,0 +1,109 @@
+//! Where two plans part.
+
+use std::fmt;
+
+use serde_json::Value;
+
+/// One place where two plans part.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlanDifference {
+    /// JSON pointer into the plan.
+    pub pointer: String,
+    /// Value in the older plan; `None` if it had none there.
+    pub was: Option<String>,
+    /// Value in the plan of now.
+    pub is: Option<String>,
+}
+
+impl fmt::Display for PlanDifference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let side = |value: &Option<String>| value.clone().unwrap_or_else(|| "absent".into());
+        write!(f, "{}: was {}, is {}", self.pointer, side(&self.was), side(&self.is))
+    }
+}
+
+/// Every leaf at which two JSON values part.
+pub(super) fn differences(was: &Value, is: &Value) -> Vec<PlanDifference> {
+    let mut found = Vec::new();
+    descend(Some(was), Some(is), &mut String::new(), &mut found);
+    found
+}
+
+fn descend(
+    was: Option<&Value>,
+    is: Option<&Value>,
+    pointer: &mut String,
+    found: &mut Vec<PlanDifference>,
+) {
+    if was == is {
+        return;
+    }
+    let length = pointer.len();
+    let mut step = |key: &str, was: Option<&Value>, is: Option<&Value>| {
+        pointer.push('/');
+        pointer.push_str(&key.replace('~', "~0").replace('/', "~1"));
+        descend(was, is, pointer, found);
+        pointer.truncate(length);
+    };
+    match (was, is) {
+        (Some(Value::Object(was)), Some(Value::Object(is))) => {
+            for (key, value) in was {
+                step(key, Some(value), is.get(key));
+            }
+            for (key, value) in is.iter().filter(|(key, _)| !was.contains_key(*key)) {
+                step(key, None, Some(value));
+            }
+        }
+        (Some(Value::Array(was)), Some(Value::Array(is))) => {
+            for i in 0..was.len().max(is.len()) {
+                step(&i.to_string(), was.get(i), is.get(i));
+            }
+        }
+        _ => found.push(PlanDifference {
+            pointer: pointer.clone(),
+            was: was.map(brief),
+            is: is.map(brief),
+        }),
+    }
+}
+
+/// A value on one line; long ones (a whole machine part) are cut.
+fn brief(value: &Value) -> String {
+    const SHOWN: usize = 60;
+    let text = value.to_string();
+    match text.char_indices().nth(SHOWN) {
+        Some((cut, _)) => format!("{}...", &text[..cut]),
+        None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn differences_name_every_leaf_by_pointer() {
+        let was = json!({ "axes": [{ "count": 39 }, { "count": 33 }], "gone": 1, "a/b": [1, 2] });
+        let is = json!({ "axes": [{ "count": 40 }, { "count": 33 }], "new": true, "a/b": [1] });
+        let lines: Vec<String> = differences(&was, &is).iter().map(ToString::to_string).collect();
+        assert_eq!(
+            lines,
+            [
+                "/a~1b/1: was 2, is absent",
+                "/axes/0/count: was 39, is 40",
+                "/gone: was 1, is absent",
+                "/new: was absent, is true",
+            ]
+        );
+        assert!(differences(&was, &was).is_empty());
+    }
+
+    #[test]
+    fn long_values_are_cut_on_a_character() {
+        let was = json!({ "name": "ä".repeat(100) });
+        let shown = differences(&was, &json!({}))[0].was.clone().unwrap();
+        assert!(shown.ends_with("...") && shown.chars().count() == 63, "{shown}");
+    }
+}
