@@ -29,7 +29,7 @@ class Design(Page):
         return self.driver.find_element(By.CSS_SELECTOR, "#scatter .figure")
 
     def drawn(self):
-        return self.driver.find_elements(By.CSS_SELECTOR, "#main canvas")
+        return self.driver.find_elements(By.CSS_SELECTOR, "#scatter svg")
 
     def tip(self):
         """The point that the tip is for, its verdict, and its values by name."""
@@ -63,7 +63,7 @@ def hovering_shows_the_file(page, rows):
     bounds = page.driver.execute_script(script, page.figure())
     found = set()
     for x in range(100, int(bounds["width"] * 0.45), 10):
-        for y in (60, 140, 220):
+        for y in (80, 160, 240):
             page.mouse("mouseMoved", bounds["left"] + x, bounds["top"] + y)
             page.frame()
             if page.tip()[0] is not None:
@@ -87,7 +87,7 @@ def keys_go_from_point_to_point(page, rows):
 
 def counts_are_the_files(page, rows):
     """The legend counts every point, and the table has every parameter."""
-    items = page.driver.find_elements(By.CSS_SELECTOR, "#scatter .legend li")
+    items = page.driver.find_elements(By.CSS_SELECTOR, "#scatter svg text")
     text = " ".join(item.text for item in items)
     for verdict, value in [("reliable: below", True), ("unreliable: ratio", False)]:
         count = rows["reliable"].count(value)

@@ -276,14 +276,14 @@ fn is_scattered(source: &Source, options: &PlotOptions) -> Result<bool, PlotErro
 
 fn design(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
     let scatter = Scatter::read(source, options)?;
-    if format == Format::Html {
-        return Ok(html::design_page(&scatter, options.view).into_bytes());
-    }
     let typeface = Typeface::load()?;
+    if format == Format::Html {
+        return Ok(html::design_page(&scatter, options.view, &typeface).into_bytes());
+    }
     let scene = match options.view {
         Some(View::Histogram) => chart::draw(&figures::histogram::chart(&scatter), &typeface),
         Some(View::Influence) => figures::influence::draw(&scatter, &typeface),
-        _ => figures::matrix::draw(&scatter, &typeface),
+        _ => figures::matrix::draw(&scatter, &typeface).0,
     };
     image(&scene, format)
 }

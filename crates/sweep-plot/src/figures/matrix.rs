@@ -26,10 +26,10 @@ const GAP: f64 = 20.0;
 const TALLEST: f64 = 330.0;
 
 /// A value along one direction of the matrix.
-struct Direction<'a> {
-    label: &'a Label,
-    values: &'a [f64],
-    scale: Scale,
+pub(crate) struct Direction<'a> {
+    pub(crate) label: &'a Label,
+    pub(crate) values: &'a [f64],
+    pub(crate) scale: Scale,
 }
 
 /// The parameters that are shown: all, or the most influential, in file order.
@@ -71,22 +71,22 @@ pub(crate) fn scale(values: &[f64], log: bool) -> Scale {
     Scale::log(low / room, high * room)
 }
 
+/// What the panels are over: the parameters, and last the quantity.
+pub(crate) fn directions(scatter: &Scatter) -> Vec<Direction<'_>> {
+    let parameters = shown(scatter).into_iter().map(|k| &scatter.parameters[k]);
+    let parameters = parameters.map(|one| (&one.label, &one.values[..], one.log));
+    let all = parameters.chain([(&scatter.short, &scatter.quantity[..], scatter.log)]);
+    all.map(|(label, values, log)| Direction { label, values, scale: scale(values, log) }).collect()
+}
+
+/// Of each panel what is along it and what up it, as numbers of directions, and where it is: left,
+/// top, width and height.
+pub(crate) type Places = Vec<(usize, usize, f64, f64, f64, f64)>;
+
 /// The matrix: below its diagonal every pair of parameters, and in its last row the quantity.
-pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> Scene {
-    let parameters: Vec<Direction<'_>> = shown(scatter)
-        .into_iter()
-        .map(|k| &scatter.parameters[k])
-        .map(|one| Direction {
-            label: &one.label,
-            values: &one.values,
-            scale: scale(&one.values, one.log),
-        })
-        .collect();
-    let quantity = Direction {
-        label: &scatter.short,
-        values: &scatter.quantity,
-        scale: scale(&scatter.quantity, scatter.log),
-    };
+pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> (Scene, Places) {
+    let directions = directions(scatter);
+    let parameters = &directions[..directions.len() - 1];
     let count = parameters.len();
     let width = (WIDTH - LEFT - RIGHT - GAP * (count - 1) as f64) / count as f64;
     let height = (0.8 * width).clamp(130.0, TALLEST);
@@ -102,9 +102,10 @@ pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> Scene {
     let mut scene = Scene::new(WIDTH, total, format!("{title}. {subtitle}"));
     heading(&mut scene, typeface, title, &subtitle);
     let dots = Dots::new(scatter, width);
+    let mut places = Places::new();
     for row in 0..count {
         let last = row + 1 == count;
-        let y = if last { &quantity } else { &parameters[row + 1] };
+        let y = &directions[row + 1];
         for (column, x) in parameters.iter().enumerate().take(if last { count } else { row + 1 }) {
             let panel = Panel {
                 x: LEFT + column as f64 * (width + GAP),
@@ -114,6 +115,7 @@ pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> Scene {
                 xs: x.scale,
                 ys: y.scale,
             };
+            places.push((column, row + 1, panel.x, panel.y, width, height));
             panel.rules(&mut scene);
             scene.clipped(panel.outline(), |scene| {
                 if let (true, Some(level)) = (last, &scatter.level) {
@@ -134,7 +136,7 @@ pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> Scene {
     }
     let y = HEADING_HEIGHT + panels_height + below + LEGEND_ROW / 2.0;
     legend(&mut scene, typeface, &entries, LEFT, y, room);
-    scene
+    (scene, places)
 }
 
 fn level_stroke() -> Stroke {

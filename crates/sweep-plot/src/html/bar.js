@@ -22,8 +22,8 @@ function palette(layer) {
   return layer.scale.reversed ? [...diverging].reverse() : diverging;
 }
 
-// The colour bar below a narrow map, `right` px from the figure's edge.
-function drawBarBelow(context, box, layer, margin) {
+// The colour bar below a map, `margin` px from the figure's edge.
+function drawBar(context, box, layer, margin) {
   const [y, thick, right] = [box.top + box.height + 72, 16, box.left + box.width];
   const colours = palette(layer);
   colours.forEach((colour, k) => {
@@ -53,37 +53,6 @@ function drawBarBelow(context, box, layer, margin) {
   }
   context.font = `13px ${FONT}`;
   context.fillText(layer.label, box.left + box.width / 2, y + thick + 38, box.width + 50);
-}
-
-// The colour bar on the right of a map.
-function drawBarBeside(context, box, layer, width) {
-  const [x, thick] = [box.left + box.width + 22, 20];
-  const colours = palette(layer);
-  const bottom = box.top + box.height;
-  colours.forEach((colour, k) => {
-    const border = (step) => Math.round(bottom - (step / colours.length) * box.height);
-    const [low, high] = [border(k), border(k + 1)];
-    context.fillStyle = colour;
-    context.fillRect(x, high, thick, low - high);
-  });
-  context.strokeStyle = context.fillStyle = themed("ink");
-  context.strokeRect(x, box.top, thick, box.height);
-  context.textAlign = "left";
-  for (const [value, label] of layer.ticks) {
-    const y = bottom - position(layer.scale, value) * box.height;
-    const centre = value === layer.scale.centre;
-    const colour = centre ? "#1b1f24" : themed("ink");
-    drawLine(context, centre ? x : x + thick, y, x + thick + 5, y, [], colour);
-    context.font = `${centre ? "bold " : ""}13px ${FONT}`;
-    context.fillText(label, x + thick + 8, y + 4.5);
-  }
-  context.save();
-  context.font = `13px ${FONT}`;
-  context.translate(width - 8, box.top + box.height / 2);
-  context.rotate(-Math.PI / 2);
-  context.textAlign = "center";
-  context.fillText(layer.label, 0, 0);
-  context.restore();
 }
 
 // Slanted lines, on a ground of that colour or on what is there: each a colour and a width.

@@ -2,37 +2,33 @@
 
 use serde_json::{Value, json};
 
-use super::{CHART, CORE, DESIGN, START, chart_json, embed, log_ticks_json, page, provenance};
+use super::{CHART, CORE, DESIGN, START, chart_json, embed, page, provenance};
 use crate::View;
-use crate::axis::Scale;
 use crate::figures::{histogram, influence, matrix};
+use crate::frame::HEADING_HEIGHT;
 use crate::influence::chance;
-use crate::label::Label;
+use crate::raster::Typeface;
 use crate::scatter::{Scatter, Side};
+use crate::svg;
 
 /// The page, which opens with `first`.
-pub(crate) fn page_of(scatter: &Scatter, first: Option<View>) -> String {
+pub(crate) fn page_of(scatter: &Scatter, first: Option<View>, typeface: &Typeface) -> String {
     let title = &scatter.title;
     let drawn = matrix::drawn(scatter);
     let chart = histogram::chart(scatter);
     let pick = |values: &[f64]| embed::floats(drawn.iter().map(|&k| values[k]));
-    let direction = |label: &Label, values: &[f64], scale: Scale| {
+    let direction = |one: &matrix::Direction<'_>| {
         json!({
-            "words": label.words,
-            "unit": label.unit,
-            "values": pick(values),
-            "log": scale.log,
-            "range": [scale.from, scale.to],
-            "ticks": log_ticks_json(scale),
+            "words": one.label.words,
+            "unit": one.label.unit,
+            "values": pick(one.values),
+            "log": one.scale.log,
+            "range": [one.scale.from, one.scale.to],
         })
     };
-    let parameters = matrix::shown(scatter).into_iter().map(|k| &scatter.parameters[k]);
-    let parameters = parameters
-        .map(|one| direction(&one.label, &one.values, matrix::scale(&one.values, one.log)));
-    let sides = Side::ALL.into_iter().zip(scatter.counts).map(|(side, count)| {
-        let colour = matrix::colour(side);
-        json!({ "words": scatter.words(side), "colour": colour.css(), "count": count })
-    });
+    let (picture, panels) = matrix::draw(scatter, typeface);
+    let [top, width, height] = [HEADING_HEIGHT, picture.width, picture.height - HEADING_HEIGHT];
+    let sides = Side::ALL.map(|side| scatter.words(side));
     let influences = scatter.by_influence().into_iter().map(|k| {
         let one = &scatter.parameters[k];
         let found = one.influence;
@@ -48,16 +44,13 @@ pub(crate) fn page_of(scatter: &Scatter, first: Option<View>) -> String {
             _ => "scatter",
         },
         "scatter": {
-            "parameters": parameters.collect::<Value>(),
-            "quantity": direction(
-                &scatter.short,
-                &scatter.quantity,
-                matrix::scale(&scatter.quantity, scatter.log),
-            ),
-            "level": scatter.level.as_ref().map(|level| json!([level.value, level.line])),
+            "picture": svg::write(&picture),
+            "view": [0.0, top, width, height],
+            "panels": panels,
+            "directions": matrix::directions(scatter).iter().map(direction).collect::<Value>(),
             "points": drawn.iter().map(|&k| scatter.points[k]).collect::<Value>(),
             "of": drawn.iter().map(|&k| scatter.sides[k] as usize).collect::<Value>(),
-            "sides": sides.collect::<Value>(),
+            "sides": sides,
             "note": matrix::notes(scatter).join("; "),
         },
         "histogram": {

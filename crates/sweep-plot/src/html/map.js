@@ -2,11 +2,8 @@
 // histories on a click. A cell is one point, or a block of points where the file has more than a
 // page carries: then its values are the worst of them, and `counts` says how many are what.
 
-// Margins with the colour bar beside the map, and below it where the page is narrow.
-const WIDE = { left: 76, right: 128, top: 10, bottom: 52, height: 560 };
-const NARROW = { left: 58, right: 14, top: 10, bottom: 130, height: 470 };
-// Narrower figures, px, have their colour bar below.
-const NARROWEST_WIDE = 560;
+// Margins around the map, px, with the colour bar below.
+const MARGINS = { left: 70, right: 14, top: 10, bottom: 130 };
 
 // `panel` computes: it paints finer cells and marks its point.
 function createMap(host, data, panel) {
@@ -79,8 +76,7 @@ function createMap(host, data, panel) {
   host.append(controls, element("div", { class: "columns" },
     element("div", {}, figure, legend, help, said), readout), histories);
 
-  const margins = () => (figure.clientWidth < NARROWEST_WIDE ? NARROW : WIDE);
-  const height = () => margins().height;
+  const height = () => Math.min(Math.max(figure.clientWidth, 470), 640);
   const cells = surface(figure, height, paint);
   const over = surface(figure, height, paintOver);
   over.canvas.classList.add("over");
@@ -110,8 +106,8 @@ function createMap(host, data, panel) {
 
   // Geometry: the plot's rectangle, and positions within it.
   function area() {
-    const { left, right, top, bottom, height: all } = margins();
-    return { left, top, width: figure.clientWidth - left - right, height: all - top - bottom };
+    const { left, right, top, bottom } = MARGINS;
+    return { left, top, width: figure.clientWidth - left - right, height: height() - top - bottom };
   }
   const part = (value, k) => (value - view[k][0]) / (view[k][1] - view[k][0]);
   const at = (share, k) => view[k][0] + share * (view[k][1] - view[k][0]);
@@ -152,7 +148,7 @@ function createMap(host, data, panel) {
       ? themed("faint") : kinds[next++ % kinds.length]));
   }
 
-  function paint(context, width) {
+  function paint(context) {
     const box = area();
     const layer = currentLayer();
     const fill = filler(layer);
@@ -220,8 +216,7 @@ function createMap(host, data, panel) {
     context.restore();
     drawMapAxes(context, box, [xAxis, yAxis], view,
       [(value) => toPx(box, evenX(value)), (value) => toPy(box, evenY(value))]);
-    if (layer && margins() === NARROW) drawBarBelow(context, box, layer, NARROW.right);
-    else if (layer) drawBarBeside(context, box, layer, width);
+    if (layer) drawBar(context, box, layer, MARGINS.right);
     figure.dataset.area = [box.left, box.top, box.width, box.height].join(" ");
     figure.dataset.view = view.flat().join(" ");
   }
