@@ -11,7 +11,7 @@ use super::raster::Typeface;
 use super::scene::{Colour, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
 
 /// A figure of curves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub(crate) struct Chart {
     /// What is shown.
     pub(crate) title: String,

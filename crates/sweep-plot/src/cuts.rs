@@ -152,13 +152,8 @@ fn pins(
     }
     let mut pins = vec![None; extra.len()];
     for (name, value) in &options.at {
-        let missing = |what, known: String| PlotError::NotThere {
-            option: "--at",
-            given: format!("{name}={value}"),
-            path: source.path.clone(),
-            what,
-            known,
-        };
+        let missing =
+            |what, known: String| source.not_there("--at", format!("{name}={value}"), what, known);
         let place = extra.iter().position(|axis| axis.name == *name).ok_or_else(|| {
             let known: Vec<&str> = extra.iter().map(|axis| axis.name.as_str()).collect();
             let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };

@@ -103,7 +103,7 @@ pub(crate) fn capitalised(text: &str) -> String {
 }
 
 /// What an axis shows; as text, with the unit in brackets.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Label {
     /// In words.
     pub(crate) words: String,

@@ -200,13 +200,7 @@ pub(crate) fn asked(
     let known = || all.iter().map(Shown::column).chain([STATUS]).collect::<Vec<_>>().join(", ");
     let of_name = |name: &String| match all.iter().find(|shown| shown.column() == name) {
         None if name == STATUS => Ok(None),
-        None => Err(PlotError::NotThere {
-            option: "--quantity",
-            given: name.clone(),
-            path: source.path.clone(),
-            what: "column of numbers to show",
-            known: known(),
-        }),
+        None => Err(source.not_there("--quantity", name, "column of numbers to show", known())),
         shown => Ok(shown.cloned()),
     };
     options.quantity.iter().map(of_name).collect()

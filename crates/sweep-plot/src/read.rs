@@ -171,6 +171,18 @@ impl Source {
         self.columns.iter().filter(|column| column.cells == Cells::Numbers)
     }
 
+    /// The error that something the options name is not there, and what is.
+    pub(crate) fn not_there(
+        &self,
+        option: &'static str,
+        given: impl Into<String>,
+        what: &'static str,
+        known: impl Into<String>,
+    ) -> PlotError {
+        let (given, known) = (given.into(), known.into());
+        PlotError::NotThere { option, given, path: self.path.clone(), what, known }
+    }
+
     /// A column that this kind of file must have is missing.
     pub(crate) fn lacks(&self, column: &str, expected: &'static str) -> PlotError {
         PlotError::Column {

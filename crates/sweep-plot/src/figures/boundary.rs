@@ -103,10 +103,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
             height: 440.0,
             ..ChartPanel::new("boundary", Label::new(&label::words(&y.name), &y.unit), series)
         }],
-        marks: Vec::new(),
-        mark_meaning: String::new(),
-        shades: Vec::new(),
-        shade_meaning: String::new(),
+        ..Chart::default()
     })
 }
 

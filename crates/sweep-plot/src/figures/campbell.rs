@@ -100,7 +100,6 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         title: "Natural frequencies over spin speed".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Spin speed", "rpm"),
-        x_log: false,
         grids,
         panels: vec![ChartPanel {
             range: Some(range),
@@ -112,10 +111,9 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
                 series,
             )
         }],
-        marks: Vec::new(),
-        mark_meaning: String::new(),
         shades: unstable.map_or_else(Vec::new, |unstable| unstable.speeds),
         shade_meaning: stability::UNSTABLE.to_owned(),
+        ..Chart::default()
     })
 }
 

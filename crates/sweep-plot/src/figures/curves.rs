@@ -93,10 +93,9 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
         x_log: axis.log,
         marks: failed.iter().step_by(each).map(mark).collect(),
         mark_meaning,
-        shades: Vec::new(),
-        shade_meaning: String::new(),
         grids: vec![cells.iter().map(|&cell| axis.values[cell]).collect()],
         panels,
+        ..Chart::default()
     })
 }
 

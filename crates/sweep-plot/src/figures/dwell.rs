@@ -97,13 +97,11 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         title: "What a held speed ends in".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        x_log: false,
         shades: unstable(&held.speed, &held.growth),
         shade_meaning: UNSTABLE.to_owned(),
         grids,
         panels,
-        marks: Vec::new(),
-        mark_meaning: String::new(),
+        ..Chart::default()
     })
 }
 

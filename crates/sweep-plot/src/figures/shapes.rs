@@ -67,16 +67,12 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
             .source
             .subtitle("deflection of the axis as a share of the greatest, unbalance up"),
         x_label: Label::new("Place along the drum's axis, towards the door", "m"),
-        x_log: false,
         grids: vec![
             vec![places.rear, places.tub_front],
             vec![places.rear, places.hinge, places.drum_front],
         ],
         panels,
-        marks: Vec::new(),
-        mark_meaning: String::new(),
-        shades: Vec::new(),
-        shade_meaning: String::new(),
+        ..Chart::default()
     })
 }
 

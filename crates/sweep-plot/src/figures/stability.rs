@@ -97,13 +97,13 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
         title: "Where a dwell at constant speed is unstable".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        x_log: false,
         grids: swept.into_iter().map(|point| point.speed).collect(),
         panels: vec![panel],
         marks,
         mark_meaning: "edge".to_owned(),
         shades: alone,
         shade_meaning: UNSTABLE.to_owned(),
+        ..Chart::default()
     })
 }
 
@@ -163,13 +163,11 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         title: "Periodic responses at constant speed".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        x_log: false,
         shades: unstable(&one.speed, &one.growth),
         shade_meaning: UNSTABLE.to_owned(),
         grids: vec![one.speed],
         panels,
-        marks: Vec::new(),
-        mark_meaning: String::new(),
+        ..Chart::default()
     })
 }
 
@@ -192,13 +190,7 @@ pub(super) fn shown(
 ) -> Result<Vec<bool>, PlotError> {
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     if let Some(unknown) = asked.iter().find(|asked| !names.contains(&asked.as_str())) {
-        return Err(PlotError::NotThere {
-            option: "--channel",
-            given: unknown.clone(),
-            path: source.path.clone(),
-            what: "channel",
-            known: names.join(", "),
-        });
+        return Err(source.not_there("--channel", unknown, "channel", names.join(", ")));
     }
     let usual: Vec<&str> = USUAL.into_iter().filter(|name| names.contains(name)).collect();
     let is_shown = |name: &&str| match (asked, &usual[..]) {
@@ -305,13 +297,8 @@ fn points(
             Some(place) => pins.push((place, *value)),
             None => {
                 let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
-                return Err(PlotError::NotThere {
-                    option,
-                    given: name.clone(),
-                    path: source.path.clone(),
-                    what: "axis",
-                    known: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
-                });
+                let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                return Err(source.not_there(option, name, "axis", known));
             }
         }
     }
@@ -339,13 +326,12 @@ fn points(
     }
     if found.is_empty() {
         let given: Vec<String> = at.iter().map(|(name, value)| format!("{name}={value}")).collect();
-        return Err(PlotError::NotThere {
+        return Err(source.not_there(
             option,
-            given: given.join(", "),
-            path: source.path.clone(),
-            what: "point",
-            known: "other values of these axes".to_owned(),
-        });
+            given.join(", "),
+            "point",
+            "other values of these axes",
+        ));
     }
     Ok(found)
 }

@@ -37,13 +37,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let channels: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
     if let Some(unknown) = options.channels.iter().find(|asked| !channels.contains(&asked.as_str()))
     {
-        return Err(PlotError::NotThere {
-            option: "--channel",
-            given: unknown.clone(),
-            path: table.source.path.clone(),
-            what: "channel",
-            known: channels.join(", "),
-        });
+        return Err(table.source.not_there("--channel", unknown, "channel", channels.join(", ")));
     }
     let usual: Vec<&str> = USUAL.into_iter().filter(|name| channels.contains(name)).collect();
     let shown: Vec<&str> = match (&options.channels[..], &usual[..]) {
@@ -144,7 +138,6 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             None => subtitle(table, &least, apart),
         } + &note,
         x_label: Label::new("Time", "s"),
-        x_log: false,
         grids: match &other {
             Some(other) => vec![time, other.numbers("time_s")?.to_vec()],
             None => vec![time],
@@ -154,6 +147,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         mark_meaning: "resonance speed passed".to_owned(),
         shades,
         shade_meaning: stability::UNSTABLE.to_owned(),
+        ..Chart::default()
     })
 }
 

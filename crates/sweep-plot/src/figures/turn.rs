@@ -51,7 +51,6 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         title: "Natural frequencies over a turn of the drum".to_owned(),
         subtitle: table.source.subtitle("half the distance from least to greatest"),
         x_label: Label::new("Spin speed", "rpm"),
-        x_log: false,
         grids,
         panels: vec![ChartPanel {
             stars,
@@ -61,10 +60,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
                 series,
             )
         }],
-        marks: Vec::new(),
-        mark_meaning: String::new(),
-        shades: Vec::new(),
-        shade_meaning: String::new(),
+        ..Chart::default()
     })
 }
 
