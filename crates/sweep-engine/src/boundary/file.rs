@@ -4,7 +4,7 @@
 use serde_json::{Value, json};
 use sweep_parameter::{Parameter as _, unit_suffix};
 
-use super::quantity::TracedQuantity;
+use super::distance::TracedQuantity;
 use super::search::{BoundaryTask, further_values};
 use super::{Edge, Traced, TracedRow};
 use crate::plan::Plan;

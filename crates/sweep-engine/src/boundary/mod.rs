@@ -22,6 +22,7 @@
 //! pure function of the input.
 
 mod batch;
+pub mod distance;
 pub mod file;
 mod look;
 mod neighbour;

@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::quantity::TracedQuantity;
+use super::distance::TracedQuantity;
 use super::{Evaluate, Search, Trial};
 use crate::interrupt::Interrupt;
 use crate::model::Model;
