@@ -48,6 +48,11 @@ impl Exit {
         Self::Terminated,
     ];
 
+    /// What a process ends with that this signal has interrupted.
+    pub fn interrupted(signal: Option<u8>) -> Self {
+        if signal == Some(15) { Self::Terminated } else { Self::Interrupted }
+    }
+
     /// What it means to a script.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
@@ -134,6 +139,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// The process cannot listen to signals.
+    pub fn signals(source: std::io::Error) -> Self {
+        Self::File { action: "install signal handlers for", path: "this process".into(), source }
+    }
+
     /// What a model says that it cannot do.
     pub fn model(error: impl std::error::Error + Send + Sync + 'static) -> Self {
         Self::Model(Box::new(error))

@@ -231,23 +231,6 @@ impl<M: Model> Plan<M> {
         }
     }
 
-    /// Points of a grid where every axis is at its least or greatest value, beyond the eighth axis
-    /// at its least; none of a design, whose points need not be there.
-    #[must_use]
-    pub fn corner_points(&self) -> Vec<u64> {
-        if self.design.is_some() {
-            return Vec::new();
-        }
-        let free = self.axes.len().min(Self::CORNER_AXES);
-        let corner = |sides: u32| {
-            self.axes.iter().enumerate().fold(0, |point, (k, axis)| {
-                let greatest = k < free && sides >> k & 1 == 1;
-                point * axis.values.len() + axis.values.extremes()[usize::from(greatest)]
-            })
-        };
-        (0..1_u32 << free).map(corner).collect()
-    }
-
     /// Number of corners: places where a condition that is monotonic along each axis is hardest to
     /// meet. Every axis is at its least or greatest value there; the corners of a list are all of
     /// its points. One without axes.

@@ -14,10 +14,6 @@ fn main() -> ExitCode {
 
 fn run() -> Result<Exit, Error> {
     let cli = Cli::read();
-    survive_file_size_limits().map_err(|source| Error::File {
-        action: "install signal handlers for",
-        path: "this process".into(),
-        source,
-    })?;
+    survive_file_size_limits().map_err(Error::signals)?;
     cli.command.run()
 }

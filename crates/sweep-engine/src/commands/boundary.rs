@@ -9,14 +9,14 @@ use std::time::Instant;
 use super::cells::short;
 use super::grid::{GridArgs, quoted};
 use super::plot::finite;
-use super::run::line;
+use super::run::{installed, line};
+use crate::boundary::distance::TracedQuantity;
 use crate::boundary::file::{self, job};
-use crate::boundary::quantity::{TracedQuantity, offered, traced};
+use crate::boundary::quantity::{offered, traced};
 use crate::boundary::search::{BoundaryTask, Models, Stopped};
 use crate::boundary::{EdgeKind, Standing, Traced, trace};
 use crate::effort::Effort;
 use crate::exit::{Error, Exit, show, tell};
-use crate::interrupt::Interrupt;
 use crate::plan::Plan;
 use crate::program::program;
 use crate::progress::{Progress, ProgressMode, duration};
@@ -104,11 +104,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
     let output = args.out.clone().unwrap_or_else(default);
     let file = Output::begin(&output, FileKind::Boundary)?;
-    let interrupt = Interrupt::install().map_err(|source| Error::File {
-        action: "install signal handlers for",
-        path: PathBuf::from("this process"),
-        source,
-    })?;
+    let interrupt = installed()?;
     let job = job(&plan, &quantity, &task);
     let mut trials = match Trials::open(&output, &job, args.fresh)? {
         OpenedTrials::Open(trials) => *trials,
@@ -135,10 +131,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
                 format!("{}: interrupted with {kept} points kept, after {wall}\n", plan.name);
             line(&mut text, "go on", "the same command");
             tell(text.trim_end());
-            return Ok(match interrupt.signal() {
-                Some(15) => Exit::Terminated,
-                _ => Exit::Interrupted,
-            });
+            return Ok(Exit::interrupted(interrupt.signal()));
         }
     };
     let bytes = file::table(&job, &plan, &quantity, &task, &found).into_bytes();

@@ -48,11 +48,7 @@ pub fn of_job(name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
     }
     let Some(tally) = run.join(job, &|| interrupt.stopped())? else {
         tell("interrupted; the chunks are kept");
-        return Ok(if interrupt.signal() == Some(15) {
-            Exit::Terminated
-        } else {
-            Exit::Interrupted
-        });
+        return Ok(Exit::interrupted(interrupt.signal()));
     };
     let joined = run.complete(job, tally, None)?;
     for note in &joined.notes {

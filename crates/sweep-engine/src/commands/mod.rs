@@ -75,11 +75,7 @@ pub fn main<M: Swept>(name: &'static str) -> ExitCode {
 }
 
 fn run<M: Swept>(command: &Command) -> Result<Exit, Error> {
-    survive_file_size_limits().map_err(|source| Error::File {
-        action: "install signal handlers for",
-        path: "this process".into(),
-        source,
-    })?;
+    survive_file_size_limits().map_err(Error::signals)?;
     match command {
         Command::Run(args) => run::run::<M>(args),
         Command::Check(args) => check::run::<M>(args),

@@ -1,7 +1,7 @@
 //! `sweep run GRID.toml`: the sweep.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::cells::short;
 use super::grid::{ResultArgs, quoted};
@@ -88,11 +88,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
 /// # Errors
 /// What the system refuses.
 pub fn installed() -> Result<Interrupt, Error> {
-    Interrupt::install().map_err(|source| Error::File {
-        action: "install signal handlers for",
-        path: PathBuf::from("this process"),
-        source,
-    })
+    Interrupt::install().map_err(Error::signals)
 }
 
 /// Runs a plan, with an engine made for it, and prints a summary. `options` are what the command
@@ -121,8 +117,7 @@ pub fn execute<M: Swept>(
 #[must_use]
 pub fn exit(fail_on_error: bool, report: &RunReport) -> Exit {
     match &report.ended {
-        Ended::Interrupted { signal: 15, .. } => Exit::Terminated,
-        Ended::Interrupted { .. } => Exit::Interrupted,
+        Ended::Interrupted { signal, .. } => Exit::interrupted(Some(*signal)),
         Ended::Already(_, tally) | Ended::Finished(tally)
             if fail_on_error && tally.by_status.failed() > 0 =>
         {

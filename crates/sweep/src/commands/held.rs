@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::engine::Engine;
 use sweep_engine::commands::grid::{ResultArgs, quoted};
-use sweep_engine::commands::run::{WorkArgs, installed, line, work};
+use sweep_engine::commands::run::{WorkArgs, exit, installed, line, work};
 use sweep_engine::exit::{Error, Exit, tell};
 use sweep_engine::progress::duration;
 use sweep_engine::run::{self as runner, Ended, RunReport};
@@ -46,16 +46,7 @@ impl Held<'_> {
             tell(note);
         }
         tell(self.summary(name, output, &report)?.trim_end());
-        Ok(match report.ended {
-            Ended::Interrupted { signal: 15, .. } => Exit::Terminated,
-            Ended::Interrupted { .. } => Exit::Interrupted,
-            Ended::Already(_, tally) | Ended::Finished(tally)
-                if self.fail_on_error && tally.by_status.failed() > 0 =>
-            {
-                Exit::PointsFailed
-            }
-            _ => Exit::Done,
-        })
+        Ok(exit(self.fail_on_error, &report))
     }
 
     /// What came of it.

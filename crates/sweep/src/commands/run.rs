@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         ended?;
         if let Some(signal) = interrupt.signal() {
             tell("interrupted; the map is kept, and the traces so far");
-            return Ok(if signal == 15 { Exit::Terminated } else { Exit::Interrupted });
+            return Ok(Exit::interrupted(Some(signal)));
         }
         tell(&format!("traces      {}", folder.display()));
     }
