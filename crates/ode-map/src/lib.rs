@@ -64,7 +64,6 @@ pub trait Oscillator<const C: usize, const D: usize, const P: usize>:
 }
 
 /// The program of an oscillator: does what this process's arguments say. `name` is its name.
-#[must_use]
 pub fn main<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
     name: &'static str,
 ) -> ExitCode {

@@ -12,7 +12,6 @@ pub struct Build {
 }
 
 /// Version and numerics, as `show` prints them.
-#[must_use]
 pub fn words(version: &str, numerics: u32) -> String {
     format!("sweep {version}, numerics {numerics}")
 }

@@ -65,7 +65,6 @@ pub struct ResultColumn<R> {
 
 impl<R> ResultColumn<R> {
     /// A column.
-    #[must_use]
     pub fn new(
         name: impl Into<String>,
         unit: &str,
@@ -84,21 +83,18 @@ impl<R> ResultColumn<R> {
     }
 
     /// The same, with which way it is bad.
-    #[must_use]
     pub fn worse(mut self, worse: Worse) -> Self {
         self.declared.worse = Some(worse);
         self
     }
 
     /// The same, with the limit that has a meaning.
-    #[must_use]
     pub fn limit(mut self, value: f64, scale: f64) -> Self {
         self.declared.limit = Some(Limit { value, scale });
         self
     }
 
     /// Its number of a row, if it is a column of numbers.
-    #[must_use]
     pub fn number(&self, row: &R) -> Option<f64> {
         match &self.cell {
             Cell::Count(get) => Some(get(row) as f64),
@@ -109,7 +105,6 @@ impl<R> ResultColumn<R> {
     }
 
     /// Its cell of a row.
-    #[must_use]
     pub fn cell(&self, row: &R) -> Option<u64> {
         match &self.cell {
             Cell::Count(get) => Some(get(row)),
@@ -122,13 +117,11 @@ impl<R> ResultColumn<R> {
 }
 
 /// The cells of a row.
-#[must_use]
 pub fn row<R>(columns: &[ResultColumn<R>], of: &R) -> Row {
     columns.iter().map(|column| column.cell(of)).collect()
 }
 
 /// Amplitudes of both models and ratios. `amplitude` and `ratio` are what these are of.
-#[must_use]
 pub fn amplitude_columns<R: Compared, C: Channel>(
     channels: &[C],
     limits: RatioLimits,
@@ -158,7 +151,6 @@ pub fn amplitude_columns<R: Compared, C: Channel>(
 /// The verdict, and how far it can be trusted; the greatest ratio and its channel come first.
 /// `methods` are the names of methods, `told` what they
 /// are.
-#[must_use]
 pub fn verdict_columns<R: Compared, C: Channel>(
     channels: &[C],
     limits: RatioLimits,
@@ -233,7 +225,6 @@ pub fn extreme_ratio<R: Compared, C: Channel>(
 }
 
 /// Columns about the two integrations, the same for every plan.
-#[must_use]
 pub fn run_columns<R: Compared>(statuses: Vec<&'static str>) -> Vec<ResultColumn<R>> {
     let mut columns = Vec::new();
     columns.push(ResultColumn::new(

@@ -26,7 +26,6 @@ pub struct Estimate {
 }
 
 /// A size with three digits.
-#[must_use]
 pub fn size(bytes: f64) -> String {
     const UNITS: [&str; 5] = ["bytes", "kB", "MB", "GB", "TB"];
     let mut scaled = bytes;

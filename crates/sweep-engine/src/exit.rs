@@ -54,7 +54,6 @@ impl Exit {
     }
 
     /// What it means to a script.
-    #[must_use]
     pub const fn meaning(self) -> &'static str {
         match self {
             Self::Done => "done",
@@ -69,7 +68,6 @@ impl Exit {
     }
 
     /// All codes with their meanings, for `--help`.
-    #[must_use]
     pub fn table() -> String {
         let mut table = "Exit codes:".to_owned();
         for exit in Self::ALL {
@@ -150,7 +148,6 @@ impl Error {
     }
 
     /// The exit code it ends with.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
             Self::Input(_) => Exit::BadInput,
@@ -169,7 +166,6 @@ impl Error {
     }
 
     /// What to do about it, where something can be said.
-    #[must_use]
     pub fn hint(&self) -> Option<&'static str> {
         match self {
             Self::File { source, .. } if source.kind() == io::ErrorKind::AlreadyExists => {

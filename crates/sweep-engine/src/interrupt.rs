@@ -28,7 +28,6 @@ pub struct Interrupt {
 
 impl Interrupt {
     /// A flag that only [`Interrupt::raise`] sets.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
@@ -60,13 +59,11 @@ impl Interrupt {
     }
 
     /// Whether a stop was asked for.
-    #[must_use]
     pub fn stopped(&self) -> bool {
         self.stop.load(Ordering::Acquire)
     }
 
     /// The signal that asked (2 for SIGINT, 15 for SIGTERM).
-    #[must_use]
     pub fn signal(&self) -> Option<u8> {
         if self.stopped() { u8::try_from(self.signal.load(Ordering::Relaxed)).ok() } else { None }
     }

@@ -158,21 +158,18 @@ macro_rules! methods {
 }
 
 /// The method that is taken where a grid file names none.
-#[must_use]
 pub fn default_method<I: Integrator>() -> &'static Entry<I> {
     &I::methods()[I::methods().len() - 1]
 }
 
 impl<I> Entry<I> {
     /// The method with every setting at its default.
-    #[must_use]
     pub fn with_defaults(&self) -> I {
         (self.with)(&mut |setting| setting.default)
     }
 }
 
 /// Every setting once, each with the names of the methods that take it.
-#[must_use]
 pub fn settings<I: Integrator>() -> Vec<(&'static Setting, Vec<&'static str>)> {
     let mut settings: Vec<(&Setting, Vec<&str>)> = Vec::new();
     for entry in I::methods() {

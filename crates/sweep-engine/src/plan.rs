@@ -21,7 +21,6 @@ pub const RATIO_MIN: Range = Range::Within(0.0, 1.0);
 pub const MOST_STEPS: f64 = 1e10;
 
 /// The shortest step with which a trajectory to `end_s` takes at most [`MOST_STEPS`].
-#[must_use]
 pub fn shortest_step_s(end_s: f64) -> f64 {
     end_s / MOST_STEPS
 }
@@ -90,7 +89,6 @@ pub enum AxisValues {
 
 impl AxisValues {
     /// How many values.
-    #[must_use]
     pub fn len(&self) -> u64 {
         match self {
             Self::List(values) => values.len() as u64,
@@ -101,7 +99,6 @@ impl AxisValues {
     }
 
     /// Whether there are none; never in a plan.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -112,7 +109,6 @@ impl AxisValues {
     ///
     /// # Panics
     /// If there are no values.
-    #[must_use]
     pub fn value(&self, i: u64) -> f64 {
         let at = |from: f64, to: f64, count: u64, between: &dyn Fn(f64, f64) -> f64| {
             if i == 0 {
@@ -140,7 +136,6 @@ impl AxisValues {
 
     /// The value a part `place` (0 to 1) of the way from the first to the last, evenly or by the
     /// logarithm; a list has no values between its own, and gives the nearest.
-    #[must_use]
     pub fn between(&self, place: f64) -> f64 {
         match *self {
             Self::List(ref values) => {
@@ -153,7 +148,6 @@ impl AxisValues {
     }
 
     /// Indices of the least and the greatest value.
-    #[must_use]
     pub fn extremes(&self) -> [u64; 2] {
         match self {
             Self::List(values) => {
@@ -182,7 +176,6 @@ impl<M: Model> Plan<M> {
     const MOST_PREPARED: u64 = 256;
 
     /// Number of points, of the design or of the grid; 1 without axes.
-    #[must_use]
     pub fn points(&self) -> u64 {
         if let Some(design) = &self.design {
             return design.points();
@@ -191,7 +184,6 @@ impl<M: Model> Plan<M> {
     }
 
     /// Value of each axis at a point; of a grid, the first axis varies slowest.
-    #[must_use]
     pub fn axis_values(&self, point: u64) -> Vec<f64> {
         if let Some(design) = &self.design {
             let value = |(k, axis): (usize, &Axis<M>)| match design.place(point, k) {
@@ -210,13 +202,11 @@ impl<M: Model> Plan<M> {
     }
 
     /// The model at a grid point.
-    #[must_use]
     pub fn scenario(&self, point: u64) -> Scenario<M> {
         self.scenario_at(&self.axis_values(point))
     }
 
     /// The model at the given value of each axis, on the grid or between its points.
-    #[must_use]
     pub fn scenario_at(&self, axis_values: &[f64]) -> Scenario<M> {
         let mut scenario = Scenario { model: self.model.clone(), window_s: self.window_s };
         self.place(&mut scenario, axis_values);
@@ -234,7 +224,6 @@ impl<M: Model> Plan<M> {
     /// Number of corners: places where a condition that is monotonic along each axis is hardest to
     /// meet. Every axis is at its least or greatest value there; the corners of a list are all of
     /// its points. One without axes.
-    #[must_use]
     pub fn corners(&self) -> u64 {
         match &self.design {
             Some(Design::List { points, .. }) => *points,
@@ -243,7 +232,6 @@ impl<M: Model> Plan<M> {
     }
 
     /// Values of the axes at corner `corner`, from 0.
-    #[must_use]
     pub fn corner(&self, corner: u64) -> Vec<f64> {
         if matches!(self.design, Some(Design::List { .. })) {
             return self.axis_values(corner);
@@ -257,7 +245,6 @@ impl<M: Model> Plan<M> {
 
     /// At most 256 of the corners, spread evenly. The corners of a list are all of its points, and
     /// a machine's modes are expensive.
-    #[must_use]
     pub fn some_corners(&self) -> Vec<Vec<f64>> {
         let every = self.corners().div_ceil(Self::MOST_PREPARED);
         (0..self.corners().div_ceil(every)).map(|k| self.corner(k * every)).collect()

@@ -5,7 +5,6 @@ use std::sync::OnceLock;
 static PROGRAM: OnceLock<&str> = OnceLock::new();
 
 /// The program's name.
-#[must_use]
 pub fn program() -> &'static str {
     PROGRAM.get().copied().unwrap_or("sweep")
 }

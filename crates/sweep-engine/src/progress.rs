@@ -170,7 +170,6 @@ fn bar(template: &str, total: u64, start: u64) -> ProgressBar {
 }
 
 /// A duration as people say it: `0.42 s`, `12 s`, `3 min 20 s`, `5 h 02 min`.
-#[must_use]
 pub fn duration(seconds: f64) -> String {
     if seconds < 10.0 {
         return format!("{seconds:.2} s");
@@ -186,7 +185,6 @@ pub fn duration(seconds: f64) -> String {
 }
 
 /// A rate with three digits.
-#[must_use]
 pub fn per_second(rate: f64) -> String {
     if rate >= 100.0 { format!("{rate:.0} points/s") } else { format!("{rate:.3} points/s") }
 }

@@ -42,7 +42,6 @@ pub struct Table {
 
 impl Table {
     /// Without columns, by this build.
-    #[must_use]
     pub fn new(build: Build) -> Self {
         Self {
             build,

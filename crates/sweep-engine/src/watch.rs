@@ -34,7 +34,6 @@ pub struct Watch<'a> {
 
 impl<'a> Watch<'a> {
     /// A watch over nothing but the stop flag.
-    #[must_use]
     pub const fn new(interrupt: &'a Interrupt) -> Self {
         Self { interrupt, abort: AtomicBool::new(false), done: AtomicU64::new(0) }
     }
@@ -55,7 +54,6 @@ impl<'a> Watch<'a> {
     }
 
     /// Whether the engine is to stop.
-    #[must_use]
     pub fn stopped(&self) -> bool {
         self.interrupt.stopped() || self.abort.load(Ordering::Relaxed)
     }

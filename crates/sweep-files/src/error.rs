@@ -58,7 +58,6 @@ impl FileError {
     }
 
     /// Whether the request is at fault, and nothing was done.
-    #[must_use]
     pub const fn is_refusal(&self) -> bool {
         matches!(self, Self::Refused { .. })
     }

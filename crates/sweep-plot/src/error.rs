@@ -95,7 +95,6 @@ pub enum PlotError {
 
 impl PlotError {
     /// Whether the command line is at fault rather than a file or the machine.
-    #[must_use]
     pub fn is_usage(&self) -> bool {
         match self {
             Self::File(error) => error.is_refusal(),

@@ -17,7 +17,6 @@ impl Share {
     ///
     /// E. B. Wilson, Probable inference, the law of succession, and statistical inference, Journal
     /// of the American Statistical Association 22 (1927), 209-212.
-    #[must_use]
     pub fn of(count: u64, all: u64) -> Option<Self> {
         const Z: f64 = 1.959_963_984_540_054;
         if all == 0 {

@@ -84,13 +84,11 @@ pub struct Condition {
 
 impl Condition {
     /// Whether it speaks of single rows; if not, of the file as a whole.
-    #[must_use]
     pub const fn is_by_row(&self) -> bool {
         self.by_row
     }
 
     /// Whether it has functions over all rows.
-    #[must_use]
     pub const fn has_folds(&self) -> bool {
         !self.folds.is_empty()
     }

@@ -64,7 +64,6 @@ pub enum ResultsError {
 
 impl ResultsError {
     /// Whether the user's words are to blame, rather than a file.
-    #[must_use]
     pub const fn is_refusal(&self) -> bool {
         !matches!(self, Self::File(_))
     }

@@ -26,7 +26,6 @@ pub enum CellKind {
 
 impl CellKind {
     /// In a sentence: "a number".
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Number => "a number",
@@ -69,7 +68,6 @@ pub enum Cell {
 
 impl Cell {
     /// The number, if it is one.
-    #[must_use]
     pub const fn number(&self) -> Option<f64> {
         match self {
             Self::Number(number) => Some(*number),
@@ -90,7 +88,6 @@ impl Serialize for Cell {
 }
 
 /// The limits of a plan's ratios.
-#[must_use]
 pub fn ratio_limits(plan: &Value) -> Option<RatioLimits> {
     let reliability = &plan["reliability"];
     let most = reliability["ratio_limit"].as_f64()?;
@@ -120,7 +117,6 @@ impl ResultTable {
     }
 
     /// The columns of an open file.
-    #[must_use]
     pub fn of(file: ParquetFile) -> Self {
         let fields = file.schema().fields().iter().enumerate();
         let columns = fields.filter_map(|(place, field)| column(field, place)).collect();
@@ -129,31 +125,26 @@ impl ResultTable {
     }
 
     /// The file.
-    #[must_use]
     pub const fn file(&self) -> &ParquetFile {
         &self.file
     }
 
     /// Where it is.
-    #[must_use]
     pub fn path(&self) -> &Path {
         self.file.path()
     }
 
     /// How many rows it has.
-    #[must_use]
     pub fn rows(&self) -> u64 {
         self.file.rows()
     }
 
     /// The column of that name.
-    #[must_use]
     pub fn column(&self, name: &str) -> Option<&Column> {
         self.columns.iter().find(|column| column.name == name)
     }
 
     /// The names of the swept parameters that have a column: of a map all, in order.
-    #[must_use]
     pub fn axes(&self) -> Vec<&str> {
         let planned = self.plan.as_ref().and_then(|plan| plan["axis"].as_array());
         if let Some(axes) = planned {
@@ -174,7 +165,6 @@ impl ResultTable {
 
     /// The names of the columns that say where a row is: the point's index, the axes, and what
     /// counts on along them in files that are no maps.
-    #[must_use]
     pub fn places(&self) -> Vec<&str> {
         let further = ["crossing", "speed_rpm", "branch", "motion", "mode", "time_s"];
         let mut names: Vec<&str> = ["point"].into_iter().chain(self.axes()).collect();
@@ -234,7 +224,6 @@ pub struct Rows {
 
 impl Rows {
     /// The cell of a row in the `column`-th of the columns that were asked for.
-    #[must_use]
     pub fn cell(&self, column: usize, row: usize) -> Cell {
         match self.columns.get(column) {
             Some(Decoded::Numbers(cells)) => {

@@ -174,7 +174,6 @@ impl<'a> ModelEngine<'a> {
     /// One row per point given by the values of its axes, on the grid or between its points;
     /// `point` of an outcome is the position among them. On all threads of the rayon pool it is
     /// called in, if in one.
-    #[must_use]
     pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
         let interrupt = Interrupt::new();
         let watch = Watch::new(&interrupt);
@@ -183,7 +182,6 @@ impl<'a> ModelEngine<'a> {
 
     /// As [`Self::evaluate_at`], with outcomes good for what is asked, each shown to `seen` as it
     /// comes, on any thread; `None` if `watch` stopped it.
-    #[must_use]
     pub fn evaluate_for(
         &self,
         axis_values: &[Vec<f64>],

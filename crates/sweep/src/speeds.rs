@@ -89,7 +89,6 @@ pub struct SpeedList {
 
 impl SpeedList {
     /// The speeds (rpm).
-    #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values_rpm
     }

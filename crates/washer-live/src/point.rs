@@ -136,7 +136,6 @@ fn ready(setup: &Setup, values: &[f64]) -> Result<(Scenario, Point), NoPoint> {
 }
 
 /// Both models at points by the quick rung, in lanes. Nothing is compared with these runs.
-#[must_use]
 pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
     let ready: Vec<_> = points.iter().map(|values| self::ready(setup, values)).collect();
     let rule = Rule { accuracy: f64::INFINITY, ..setup.rule.clone() };

@@ -43,7 +43,6 @@ pub struct Sliders {
 
 impl Setup {
     /// As numbers.
-    #[must_use]
     pub fn to_numbers(&self) -> Vec<f64> {
         let mut out = Writer::default();
         let machine = &self.machine;
@@ -87,7 +86,6 @@ impl Setup {
     }
 
     /// From [`Self::to_numbers`]; `None` from anything else.
-    #[must_use]
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         let mut from = Reader(numbers);
         let mut machine = Machine::paper();

@@ -210,7 +210,6 @@ impl Climbs {
 
     /// The last run of a model with its rung and the error left in it, once there is one. The error
     /// is absent where nothing says so.
-    #[must_use]
     pub fn last(&self, model: usize, ladder: &Ladder) -> Option<(&RungRun, usize, Option<f64>)> {
         let climb = &self.0[model];
         climb.run.as_ref().map(|run| (run, climb.rung, climb.error(ladder)))
@@ -218,7 +217,6 @@ impl Climbs {
 
     /// What is to be done once every run that was asked for is there. `id` is what the outcome
     /// calls the point.
-    #[must_use]
     pub fn next(
         &self,
         id: u64,

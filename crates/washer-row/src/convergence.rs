@@ -30,7 +30,6 @@ impl Convergence {
 
     /// The error left, of this difference. `unseen` is what both runs leave out, as a share of the
     /// motion without amplification: it grows with the motion as their difference did.
-    #[must_use]
     pub fn error_left(&self, difference: f64, unseen: f64) -> f64 {
         let Self { contraction, believed_to, own_error, expected } = *self;
         let seen = if difference <= believed_to {

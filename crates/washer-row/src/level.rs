@@ -23,7 +23,6 @@ impl Level {
         [Self::Fast, Self::Fine, Self::Finest, Self::Rk4, Self::Dopri5, Self::Rodas5p];
 
     /// Whether it is a rung on which modes of bearings and hinge are capped.
-    #[must_use]
     pub const fn is_capped(self) -> bool {
         match self {
             Self::Fast | Self::Fine | Self::Finest => true,
@@ -32,7 +31,6 @@ impl Level {
     }
 
     /// As in the file.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Fast => "fast",

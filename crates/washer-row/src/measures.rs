@@ -26,7 +26,6 @@ impl Criterion {
     pub const ALL: [Self; 3] = [Self::Peak, Self::Envelope, Self::Rms];
 
     /// Name in grid files.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Peak => "peak",
@@ -36,7 +35,6 @@ impl Criterion {
     }
 
     /// What a channel's column of one model holds.
-    #[must_use]
     pub const fn amplitude(self) -> &'static str {
         match self {
             Self::Peak | Self::Envelope => "largest deviation from equilibrium in the window",
@@ -45,7 +43,6 @@ impl Criterion {
     }
 
     /// What a channel's ratio is, and where there is none.
-    #[must_use]
     pub const fn ratio(self) -> &'static str {
         match self {
             Self::Peak => {
@@ -415,7 +412,6 @@ impl Measures {
     }
 
     /// What trajectories must record.
-    #[must_use]
     pub fn wanted(&self) -> Wanted {
         let mut wanted = Wanted {
             root_mean_squares: self.criterion == Criterion::Rms,

@@ -70,7 +70,6 @@ pub type Deviations = [f64; Channel::ALL.len()];
 
 impl Trajectory {
     /// Nothing but a status.
-    #[must_use]
     pub const fn failed(status: Status) -> Self {
         Self {
             status,
@@ -164,7 +163,6 @@ pub struct Outcome {
 
 impl Outcome {
     /// Both models' trajectories, not yet assessed together.
-    #[must_use]
     pub const fn new(point: u64, nonlinear: Trajectory, linear: Trajectory) -> Self {
         Self {
             point,

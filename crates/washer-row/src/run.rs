@@ -28,7 +28,6 @@ pub struct Rule {
 
 impl Rule {
     /// What trajectories must record.
-    #[must_use]
     pub fn wanted(&self) -> Wanted {
         Wanted { course: self.accuracy.is_finite(), ..self.measures.wanted() }
     }
@@ -49,7 +48,6 @@ pub struct RungRun {
 
 impl RungRun {
     /// Nothing but a status.
-    #[must_use]
     pub const fn failed(status: Status) -> Self {
         Self {
             trajectory: Trajectory::failed(status),
@@ -72,7 +70,6 @@ impl RungRun {
 }
 
 /// One model at every point, by one method; `None` once `is_stopped` says so.
-#[must_use]
 pub fn runs(
     simd: Simd,
     model: ModelKind,

@@ -22,7 +22,6 @@ pub(crate) struct Departure {
 
 impl Departure {
     /// Of distances at instants (s, share of the motion).
-    #[must_use]
     pub(crate) fn new(distances: &[(f64, f64)]) -> Self {
         let apart = distances.iter().filter(|(_, distance)| *distance > 0.0);
         let mut least: Option<(f64, f64)> = None;
@@ -40,13 +39,11 @@ impl Departure {
     }
 
     /// The mean exponent of the growth (1/s).
-    #[must_use]
     pub(crate) fn exponent_per_s(&self) -> f64 {
         if self.time_s > 0.0 { self.rise / self.time_s } else { 0.0 }
     }
 
     /// Whether the motion is chaotic.
-    #[must_use]
     pub(crate) fn is_exponential(&self) -> bool {
         self.greatest >= APART
             && self.rise >= LEAST_RISE

@@ -30,7 +30,6 @@ pub const ROW_STATUSES: [&str; 14] = [
 const OF_EITHER: usize = Status::Panicked as usize + 1;
 
 /// The row's entry in [`ROW_STATUSES`], and the failing model's time of failure.
-#[must_use]
 pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
     // Those of both models together stand behind those of either.
     let code = |status: Status, of_linear: usize| match status as usize {
@@ -63,7 +62,6 @@ pub struct Verdict {
 
 impl Verdict {
     /// Compares the amplitudes of an outcome over `channels` channels.
-    #[must_use]
     pub fn new(outcome: &Outcome, channels: usize, limits: impl Into<RatioLimits>) -> Self {
         let limits = limits.into();
         let (nonlinear, linear) = (&outcome.nonlinear.amplitudes, &outcome.linear.amplitudes);

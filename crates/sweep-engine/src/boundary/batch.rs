@@ -9,7 +9,6 @@ use super::span::Span;
 pub(super) const LANES: usize = 8;
 
 /// What a batch costs.
-#[must_use]
 pub(super) const fn lane_groups(trials: usize) -> usize {
     trials.div_ceil(LANES)
 }

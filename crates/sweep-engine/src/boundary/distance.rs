@@ -28,7 +28,6 @@ pub enum Scale {
 
 impl TracedQuantity {
     /// Signed distance of a value from the limit, negative on the good side.
-    #[must_use]
     pub fn distance(&self, value: f64) -> f64 {
         match (self.scale, self.worse) {
             (Scale::Logarithm, worse) => {
@@ -42,7 +41,6 @@ impl TracedQuantity {
     }
 
     /// The quantity at a distance from its limit.
-    #[must_use]
     pub fn value(&self, distance: f64) -> f64 {
         let away = self.worse.by(distance, 0.0);
         match self.scale {

@@ -30,7 +30,6 @@ fn within(name: &str, unit: &str, word: &str) -> String {
 }
 
 /// What the store must know of a search: its plan, with what is asked of it beside the grid.
-#[must_use]
 pub fn job<'a, M: Rows>(
     plan: &'a Plan<M>,
     quantity: &TracedQuantity,

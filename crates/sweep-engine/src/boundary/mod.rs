@@ -113,7 +113,6 @@ impl EdgeKind {
     ];
 
     /// As in the file.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Crossing => "crossing",

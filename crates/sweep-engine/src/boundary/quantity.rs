@@ -17,7 +17,6 @@ const LEAST_RATIO: &str = "ratio_min";
 /// Every column that a boundary of this plan can be drawn through, each with the plan that computes
 /// it: a channel is compared even if the grid file leaves it out, and so is a metric measured that
 /// the model can have.
-#[must_use]
 pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
     // A search of one channel does not make sure of the others.
     let of_one = |channel: &M::Channel| {

@@ -133,7 +133,6 @@ fn all<M: Model>(axis: &Axis<M>) -> Vec<f64> {
 }
 
 /// Values of the axes beyond the second, of a curve; the last varies fastest.
-#[must_use]
 pub fn further_values<M: Model>(plan: &Plan<M>, curve: usize) -> Vec<f64> {
     let further = plan.axes.get(2..).unwrap_or_default();
     let mut values = vec![0.0; further.len()];
@@ -190,13 +189,11 @@ impl<'a, M: Model> Models<'a, M> {
     }
 
     /// The same with a memory: it makes no trial again that is known from before.
-    #[must_use]
     pub fn keeping(self, trials: Trials) -> Self {
         Self { kept: Some(Mutex::new(trials)), ..self }
     }
 
     /// The memory, at the end.
-    #[must_use]
     pub fn into_kept(self) -> Option<Trials> {
         self.kept.map(|kept| kept.into_inner().unwrap_or_else(PoisonError::into_inner))
     }

@@ -8,7 +8,6 @@ pub type Examples = &'static [[&'static str; 2]];
 pub const WIDEST: usize = 80;
 
 /// Examples as help shows them; `None` if there are none.
-#[must_use]
 pub fn shown(lines: Examples) -> Option<String> {
     let width = lines.iter().map(|[line, _]| line.len()).max()?;
     let fits = lines.iter().all(|[_, does]| 2 + width + 3 + does.len() <= WIDEST);

@@ -71,13 +71,11 @@ pub struct ResultArgs {
 
 impl ResultArgs {
     /// The result file.
-    #[must_use]
     pub fn output<M: Read>(&self, plan: &Plan<M>) -> PathBuf {
         self.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{}.parquet", plan.name)))
     }
 
     /// A command line about the same run, for a user to copy.
-    #[must_use]
     pub fn command(&self, verb: &str) -> String {
         let mut line =
             format!("{} {verb} {}", program(), quoted(&self.grid.grid.display().to_string()));

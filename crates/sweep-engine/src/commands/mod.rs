@@ -62,7 +62,6 @@ enum Command {
 }
 
 /// The program of a model: does what this process's arguments say. `name` is how it is called.
-#[must_use]
 pub fn main<M: Swept>(name: &'static str) -> ExitCode {
     call_program(name);
     let matches = Cli::command().name(name).bin_name(name).get_matches();

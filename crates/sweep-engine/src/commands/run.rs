@@ -114,7 +114,6 @@ pub fn execute<M: Swept>(
 }
 
 /// How a run ends the program.
-#[must_use]
 pub fn exit(fail_on_error: bool, report: &RunReport) -> Exit {
     match &report.ended {
         Ended::Interrupted { signal, .. } => Exit::interrupted(Some(*signal)),

@@ -15,7 +15,6 @@ impl<M: Read> Plan<M> {
     ///
     /// Canonical: keys are sorted, and numbers are written as the shortest decimal that reads back
     /// to the same bits, so two plans are the same if and only if their texts are.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         let axes = self.axes.iter().map(|axis| self::axis(axis, self.design.as_ref()));
         let channels = self.reliability.channels.iter().map(|channel| channel.name());

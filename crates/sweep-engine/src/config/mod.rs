@@ -70,14 +70,12 @@ pub struct GridInput<M> {
 
 impl<M: Read> GridInput<M> {
     /// A grid file. The paths in it are relative to its folder.
-    #[must_use]
     pub fn file(path: PathBuf, sets: Vec<String>) -> Self {
         Self { path, text: None, own_file: None, sets, model: PhantomData }
     }
 
     /// The text of a grid file. Messages call it by this name, which is also that of the run if the
     /// text gives none. The paths in it are relative to the working directory.
-    #[must_use]
     pub fn text(name: &str, text: String, sets: Vec<String>) -> Self {
         Self { path: name.into(), text: Some(text), own_file: None, sets, model: PhantomData }
     }
@@ -148,7 +146,6 @@ fn resolve<M: Read, T>(
 }
 
 /// Mistakes in expressions that an option or argument takes, each with its text.
-#[must_use]
 pub fn mistakes_in_expressions<'a>(
     option: &str,
     mistakes: impl IntoIterator<Item = (&'a str, sweep_results::Mistake)>,

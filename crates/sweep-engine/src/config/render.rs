@@ -87,7 +87,6 @@ fn summary(count: usize, beyond: usize, colour: bool) -> String {
 
 impl Diagnostics {
     /// The whole text with terminal colours.
-    #[must_use]
     pub fn styled(&self) -> String {
         self.text(true)
     }

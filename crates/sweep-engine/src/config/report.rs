@@ -209,13 +209,11 @@ pub struct Diagnostics {
 
 impl Diagnostics {
     /// How many mistakes, at least 1.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.found.len() + self.beyond
     }
 
     /// Each mistake that is kept, in the order of the text.
-    #[must_use]
     pub fn mistakes(&self) -> Vec<Mistake> {
         self.found.iter().map(|diagnostic| Mistake::of(diagnostic, &self.sources)).collect()
     }

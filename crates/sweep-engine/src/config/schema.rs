@@ -13,7 +13,6 @@ use crate::plan::{LONGEST_S, MOST_POINTS, RATIO_MIN};
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
 /// The schema of a model's grid files.
-#[must_use]
 pub fn grid<M: Read>() -> Value {
     let name = json!({
         "type": "string",
@@ -79,7 +78,6 @@ fn design() -> Value {
 }
 
 /// A schema as a document.
-#[must_use]
 pub fn document(title: &str, mut schema: Value) -> Value {
     schema["$schema"] = DRAFT.into();
     schema["title"] = title.into();
@@ -87,7 +85,6 @@ pub fn document(title: &str, mut schema: Value) -> Value {
 }
 
 /// An object with these properties and no others.
-#[must_use]
 pub fn table<'k>(
     properties: impl IntoIterator<Item = (&'k str, Value)>,
     required: &[&str],
@@ -103,7 +100,6 @@ pub fn table<'k>(
 }
 
 /// A number in a range.
-#[must_use]
 pub fn number(range: Range) -> Value {
     let largest = Range::LARGEST;
     match range {
@@ -124,7 +120,6 @@ fn described(mut schema: Value, default: f64, description: &str) -> Value {
 }
 
 /// A parameter's number.
-#[must_use]
 pub fn of(parameter: &impl Parameter) -> Value {
     let mut schema = number(parameter.range());
     schema["description"] = format!("{}, {}", parameter.description(), parameter.unit()).into();
@@ -132,7 +127,6 @@ pub fn of(parameter: &impl Parameter) -> Value {
 }
 
 /// `[set]`: parameters by name, and those of numbered elements as patterns.
-#[must_use]
 pub fn set(parameters: &[impl Parameter], patterns: Map<String, Value>) -> Value {
     let properties: Map<String, Value> =
         parameters.iter().map(|parameter| (parameter.name().to_owned(), of(parameter))).collect();

@@ -10,13 +10,11 @@ use std::path::Path;
 pub const LONGEST_BYTES: u64 = 896 << 10;
 
 /// A path in a file, relative to that file's folder.
-#[must_use]
 pub fn beside(file: &Path, named: &str) -> std::path::PathBuf {
     file.parent().unwrap_or(Path::new("")).join(named)
 }
 
 /// Nothing but white space and perhaps a byte order mark.
-#[must_use]
 pub fn is_blank(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim().is_empty()
 }

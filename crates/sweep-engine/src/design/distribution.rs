@@ -38,7 +38,6 @@ pub struct Distribution {
 
 impl Shape {
     /// Name in grid files.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Normal { .. } => "normal",
@@ -47,7 +46,6 @@ impl Shape {
     }
 
     /// Its two numbers with their keys in grid files.
-    #[must_use]
     pub const fn numbers(self) -> [(&'static str, f64); 2] {
         match self {
             Self::Normal { mean, sd } => [("mean", mean), ("sd", sd)],
@@ -56,7 +54,6 @@ impl Shape {
     }
 
     /// The value so many standard deviations from the middle.
-    #[must_use]
     pub fn at(self, deviations: f64) -> f64 {
         match self {
             Self::Normal { mean, sd } => mean + sd * deviations,
@@ -76,7 +73,6 @@ impl Shape {
 impl Distribution {
     /// The value below which a part `place` (0 to 1) lies. The same on every machine: no platform's
     /// functions take part.
-    #[must_use]
     pub fn quantile(&self, place: f64) -> f64 {
         let [low, high] = [self.from, self.to].map(|bound| self.shape.deviations(bound));
         // Above the middle the part beyond is small and keeps its digits; so it is turned around.

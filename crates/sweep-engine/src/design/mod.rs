@@ -54,7 +54,6 @@ pub enum Design {
 
 impl Design {
     /// Number of points.
-    #[must_use]
     pub const fn points(&self) -> u64 {
         match self {
             Self::LatinHypercube { points, .. }
@@ -65,7 +64,6 @@ impl Design {
     }
 
     /// Its name in grid files.
-    #[must_use]
     pub const fn method(&self) -> &'static str {
         match self {
             Self::LatinHypercube { .. } => "latin_hypercube",
@@ -77,7 +75,6 @@ impl Design {
 
     /// Where point `point` lies along axis `axis`, strictly between 0 and 1; `None` for a list,
     /// whose axes hold the values themselves.
-    #[must_use]
     pub fn place(&self, point: u64, axis: usize) -> Option<f64> {
         match *self {
             Self::LatinHypercube { points, seed } => Some(latin::place(point, points, axis, seed)),

@@ -41,13 +41,11 @@ pub struct Shape {
 
 impl Shape {
     /// That of a result file's rows.
-    #[must_use]
     pub fn of(layout: &Layout) -> Self {
         Self { columns: layout.columns.as_slice().into(), has_several: layout.has_several }
     }
 
     /// Bytes of a record.
-    #[must_use]
     pub fn bytes_a_row(&self) -> usize {
         8 + self.columns.len().div_ceil(8) + 8 * self.columns.len()
     }

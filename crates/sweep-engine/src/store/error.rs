@@ -154,7 +154,6 @@ impl StoreError {
     }
 
     /// Whether nothing was begun, because the request does not fit what is there.
-    #[must_use]
     pub fn is_refusal(&self) -> bool {
         match self {
             Self::PlanDiffers { .. }

@@ -80,7 +80,6 @@ pub struct Job<'a> {
 
 impl<'a> Job<'a> {
     /// What the store must know of this plan, as run by this build of its program.
-    #[must_use]
     pub fn of<M: Rows>(plan: &'a Plan<M>) -> Self {
         Self {
             plan: plan.to_json(),
@@ -94,7 +93,6 @@ impl<'a> Job<'a> {
     }
 
     /// Hash of version, numerics and plan.
-    #[must_use]
     pub fn hash(&self) -> blake3::Hash {
         plan_file::plan_hash(self.version, self.numerics, &self.plan)
     }
@@ -107,7 +105,6 @@ pub trait Rows: Read {
 }
 
 /// The axes of a plan as columns.
-#[must_use]
 pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<Column> {
     let column = |axis: &Axis<M>| {
         let parameter = &axis.parameter;
@@ -121,7 +118,6 @@ pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<Column> {
 /// A power of two, so that chunks fill whole SIMD lane groups: 8 for the smallest grids, so that
 /// every core gets some; then 32 to 4096, for about a thousand chunks; then 4096 each, for chunks
 /// of a megabyte.
-#[must_use]
 pub const fn chunk_points(points: u64) -> u64 {
     const SMALL_GRID: u64 = 128;
     const CHUNKS: u64 = 1024;

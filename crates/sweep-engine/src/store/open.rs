@@ -222,26 +222,22 @@ impl OpenRun {
     }
 
     /// How many chunks make up the whole result.
-    #[must_use]
     pub fn chunks(&self) -> u64 {
         self.points.div_ceil(self.chunk_points)
     }
 
     /// The points of a chunk.
-    #[must_use]
     pub fn chunk_range(&self, chunk: u64) -> Range<u64> {
         let first = chunk.saturating_mul(self.chunk_points).min(self.points);
         first..first.saturating_add(self.chunk_points).min(self.points)
     }
 
     /// The chunk that a point is in.
-    #[must_use]
     pub const fn chunk_of(&self, point: u64) -> u64 {
         point / self.chunk_points
     }
 
     /// The part this process computes, if not the whole.
-    #[must_use]
     pub fn shard(&self) -> Option<Shard> {
         self.dealt.map(|(shard, _)| shard)
     }
@@ -251,7 +247,6 @@ impl OpenRun {
     }
 
     /// Whether a chunk is this process's to compute and not there yet.
-    #[must_use]
     pub fn is_missing(&self, chunk: u64) -> bool {
         self.owns(chunk) && !self.present().contains(&chunk)
     }
@@ -261,7 +256,6 @@ impl OpenRun {
     }
 
     /// Points this process answers for, and how many of them are there.
-    #[must_use]
     pub fn own_points(&self) -> (u64, u64) {
         let length = |chunk| {
             let range = self.chunk_range(chunk);
@@ -281,13 +275,11 @@ impl OpenRun {
     }
 
     /// The unfinished run's folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder.path
     }
 
     /// Where the finished file goes.
-    #[must_use]
     pub fn output(&self) -> &Path {
         &self.folder.output
     }

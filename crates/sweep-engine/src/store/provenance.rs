@@ -118,7 +118,6 @@ pub fn is_session(name: &str) -> bool {
 }
 
 /// This machine's name.
-#[must_use]
 pub fn host() -> String {
     #[cfg(unix)]
     let name = rustix::system::uname().nodename().to_string_lossy().into_owned();
@@ -128,7 +127,6 @@ pub fn host() -> String {
 }
 
 /// The processor's model, where Linux reports it.
-#[must_use]
 pub fn cpu_model() -> Option<String> {
     let text = fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;
@@ -136,7 +134,6 @@ pub fn cpu_model() -> Option<String> {
 }
 
 /// Seconds since 1970.
-#[must_use]
 pub fn now_unix_s() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }

@@ -142,7 +142,6 @@ impl StatusCounts {
     }
 
     /// Rows whose status is not `ok`.
-    #[must_use]
     pub fn failed(&self) -> u64 {
         self.iter().filter(|(name, _)| *name != "ok").map(|(_, count)| count).sum()
     }

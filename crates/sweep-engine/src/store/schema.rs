@@ -99,7 +99,6 @@ pub struct Done {
 
 impl Column {
     /// A column.
-    #[must_use]
     pub fn new(
         name: impl Into<String>,
         unit: &str,
@@ -194,13 +193,11 @@ impl Layout {
     }
 
     /// The Arrow schema.
-    #[must_use]
     pub fn schema(&self) -> SchemaRef {
         Arc::new(Schema::new(self.all().map(Column::field).collect::<Vec<_>>()))
     }
 
     /// The position of one of the model's columns.
-    #[must_use]
     pub fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column.name == name)
     }
@@ -257,20 +254,17 @@ pub struct ResultRows<'a> {
 
 impl<'a> ResultRows<'a> {
     /// Of a layout.
-    #[must_use]
     pub fn new(layout: &'a Layout) -> Self {
         Self::sharing(layout, layout.schema())
     }
 
     /// With the schema of other batches of this layout: every field carries its description, so
     /// that one of their own would take 4 % of a batch's memory.
-    #[must_use]
     pub fn sharing(layout: &'a Layout, schema: SchemaRef) -> Self {
         Self { layout, schema, rows: Vec::with_capacity(BATCH_ROWS) }
     }
 
     /// The schema of its batches.
-    #[must_use]
     pub fn schema(&self) -> SchemaRef {
         Arc::clone(&self.schema)
     }

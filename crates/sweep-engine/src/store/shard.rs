@@ -31,13 +31,11 @@ pub struct Shard {
 
 impl Shard {
     /// Whether a chunk is this shard's to compute.
-    #[must_use]
     pub fn owns(self, chunk: u64) -> bool {
         chunk % self.of == self.index - 1
     }
 
     /// How many of a run's chunks are its own.
-    #[must_use]
     pub const fn chunks(self, chunks: u64) -> u64 {
         chunks.saturating_sub(self.index - 1).div_ceil(self.of)
     }

@@ -114,13 +114,11 @@ impl Trials {
     }
 
     /// How many trials are there.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.known.len()
     }
 
     /// The answer to a trial that was made before.
-    #[must_use]
     pub fn recall(&self, key: &Key) -> Option<Option<f64>> {
         self.known.get(key).copied()
     }
@@ -150,7 +148,6 @@ impl Trials {
     }
 
     /// Removes the folder of a search whose file is in place; a failure is only worth a note.
-    #[must_use]
     pub fn complete(self) -> Option<String> {
         open::remove(&self.folder, self.lock)
     }

@@ -23,7 +23,6 @@ pub struct Crossing {
 
 impl Crossing {
     /// How far it may have moved, by its brackets: the least and the greatest.
-    #[must_use]
     pub fn by(&self) -> [f64; 2] {
         let [[first_low, first_high], [second_low, second_high]] = self.bracket;
         if self.at[0] == self.at[1] && self.bracket[0] == self.bracket[1] {
@@ -33,7 +32,6 @@ impl Crossing {
     }
 
     /// How far it moved at least: the distance of the brackets, 0 where they overlap.
-    #[must_use]
     pub fn at_least(&self) -> f64 {
         let [least, greatest] = self.by();
         least.max(-greatest).max(0.0)
@@ -57,7 +55,6 @@ pub struct Moved {
 
 impl Moved {
     /// The crossing that moved farthest, for certain or else perhaps.
-    #[must_use]
     pub fn farthest(&self) -> Option<&Crossing> {
         let perhaps = |crossing: &Crossing| (crossing.at[1] - crossing.at[0]).abs();
         self.crossings.iter().max_by(|a, b| {
@@ -66,14 +63,12 @@ impl Moved {
     }
 
     /// How far crossings moved in the mean, with sign: the least and the greatest by their brackets.
-    #[must_use]
     pub fn mean(&self) -> [f64; 2] {
         let count = self.crossings.len().max(1) as f64;
         [0, 1].map(|end| self.crossings.iter().map(|one| one.by()[end]).sum::<f64>() / count)
     }
 
     /// Crossings that moved farther than their brackets explain.
-    #[must_use]
     pub fn certain(&self) -> usize {
         self.crossings.iter().filter(|crossing| crossing.at_least() > 0.0).count()
     }

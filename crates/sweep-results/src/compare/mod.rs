@@ -32,7 +32,6 @@ pub enum Flip {
 
 impl Flip {
     /// In the file of differences.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::None => "none",
@@ -69,27 +68,23 @@ pub struct SharedRow {
 
 impl SharedRow {
     /// The second ratio over the first.
-    #[must_use]
     pub fn ratio_change(&self) -> Option<f64> {
         let [first, second] = [self.ratio[0]?, self.ratio[1]?];
         Some(second / first).filter(|change| change.is_finite())
     }
 
     /// The second gap less the first, m.
-    #[must_use]
     pub fn gap_change_m(&self) -> Option<f64> {
         Some(self.gap_m[1]? - self.gap_m[0]?)
     }
 
     /// By how much the ratio changed either way, as a factor less 1; infinite where one file alone
     /// has a ratio.
-    #[must_use]
     pub fn ratio_by(&self) -> f64 {
         by(self.ratio, |first, second| (second / first).max(first / second) - 1.0)
     }
 
     /// By how much the gap changed either way, m; infinite where one file alone has a gap.
-    #[must_use]
     pub fn gap_by_m(&self) -> f64 {
         by(self.gap_m, |first, second| (second - first).abs())
     }
@@ -153,7 +148,6 @@ pub struct Comparison {
 
 impl Comparison {
     /// Whether nothing at all differs.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.plan.is_empty()
             && self.alone == [0, 0]
@@ -169,7 +163,6 @@ impl Comparison {
 
     /// The `count` rows with the greatest changes by `of`, those without a change left out; of
     /// `sensitive` rows, or of the others.
-    #[must_use]
     pub fn greatest(
         &self,
         count: usize,

@@ -24,7 +24,6 @@ impl Format {
     pub const ALL: [Self; 2] = [Self::Csv, Self::Xlsx];
 
     /// The ending of its files, without a point.
-    #[must_use]
     pub const fn ending(self) -> &'static str {
         match self {
             Self::Csv => "csv",
@@ -33,14 +32,12 @@ impl Format {
     }
 
     /// The format of a file's name.
-    #[must_use]
     pub fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         Self::ALL.into_iter().find(|format| format.ending() == ending)
     }
 
     /// What such a file may be written over.
-    #[must_use]
     pub const fn kind(self) -> FileKind<'static> {
         FileKind::Exported { ending: self.ending() }
     }

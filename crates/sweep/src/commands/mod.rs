@@ -146,7 +146,6 @@ fn examples_of(name: &str) -> Examples {
 }
 
 /// The command line with everything that its help shows.
-#[must_use]
 pub(crate) fn command() -> clap::Command {
     let with = |command: clap::Command, lines: Examples| match examples::shown(lines) {
         Some(examples) => command.before_help(examples),
@@ -181,7 +180,6 @@ fn grouped_help(program: &clap::Command) -> String {
 }
 
 /// The command line without what help hides, for what lists every subcommand.
-#[must_use]
 pub(crate) fn shown_command() -> clap::Command {
     let whole = command();
     let shown = whole.get_subcommands().filter(|command| !command.is_hide_set()).cloned();
@@ -214,7 +212,6 @@ fn suggest(mut error: clap::Error) -> clap::Error {
 impl Cli {
     /// Reads this process's command line. Prints a mistake or the help asked for, and ends the
     /// process.
-    #[must_use]
     pub fn read() -> Self {
         let matches = command().try_get_matches().unwrap_or_else(|error| suggest(error).exit());
         Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())

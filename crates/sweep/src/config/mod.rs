@@ -61,13 +61,11 @@ pub(crate) fn load_point(
 pub(crate) use machine::with_one_of_each;
 
 /// A machine in full, as a result file carries it.
-#[must_use]
 pub(crate) fn machine_json(machine: &Machine) -> serde_json::Value {
     machine::to_json(machine)
 }
 
 /// A machine as the text of a machine file: loading it gives the same machine, bit for bit.
-#[must_use]
 pub(crate) fn machine_file(machine: &Machine) -> String {
     machine::to_toml(machine)
 }

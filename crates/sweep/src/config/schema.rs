@@ -11,7 +11,6 @@ use super::machine::{Key, LeftOut, PARTS, Part, Times, no_spin, with_one_of_each
 use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
 
 /// What grid files have beside what the engine reads.
-#[must_use]
 pub(crate) fn grid() -> Schema {
     let machine = json!({
         "type": "string",
@@ -38,7 +37,6 @@ pub(crate) fn grid() -> Schema {
 }
 
 /// The schema of machine files.
-#[must_use]
 pub(crate) fn machine() -> Value {
     let (mut properties, mut required) = (Vec::new(), Vec::new());
     for part in &PARTS {

@@ -42,13 +42,11 @@ pub struct Evaluated {
 
 impl Evaluator {
     /// An evaluator of this plan.
-    #[must_use]
     pub fn new(plan: Plan) -> Self {
         Self { plan, ladders: OnceLock::new() }
     }
 
     /// The plan.
-    #[must_use]
     pub fn plan(&self) -> &Plan {
         &self.plan
     }

@@ -9,7 +9,6 @@ use crate::plan::Plan;
 /// Every number that can be set or swept as a JSON array of objects: `name`, `value`, `unit`,
 /// `description`, `range` and `source`. The values are the plan's, before its axes; without a plan
 /// those of the built-in machine.
-#[must_use]
 pub fn list_parameters(plan: Option<&Plan>) -> String {
     as_json(&Washer::listed(plan))
 }

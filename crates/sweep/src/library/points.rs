@@ -50,7 +50,6 @@ impl PointTable {
     }
 
     /// How many points.
-    #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }

@@ -97,31 +97,26 @@ impl ResultTable {
     }
 
     /// What it is.
-    #[must_use]
     pub fn kind(&self) -> FileKind<'static> {
         self.kind
     }
 
     /// The plan as JSON, as the file carries it; of differences, what was compared.
-    #[must_use]
     pub fn plan(&self) -> &Value {
         &self.plan
     }
 
     /// The columns: names, types, and in each field's metadata `unit` and `description`.
-    #[must_use]
     pub fn schema(&self) -> &SchemaRef {
         &self.schema
     }
 
     /// The rows.
-    #[must_use]
     pub fn batches(&self) -> &[RecordBatch] {
         &self.batches
     }
 
     /// How many rows.
-    #[must_use]
     pub fn rows(&self) -> usize {
         self.batches.iter().map(RecordBatch::num_rows).sum()
     }

@@ -62,7 +62,6 @@ pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<()
 
 /// The dwells of a plan's points at these speeds (rpm), for `sweep stability`: a row for each point
 /// and speed, speeds varying fastest.
-#[must_use]
 pub(crate) fn job<'a>(plan: &'a Plan, speeds_rpm: &[f64]) -> Job<'a> {
     let asked = json!({ "speed_rpm": speeds_rpm });
     columns::at_speeds(plan, speeds_rpm, columns::of_dwells(plan, speeds_rpm), ("stability", asked))
