@@ -294,7 +294,6 @@ const METRICS: [Facts; Metric::ALL.len()] = [
         of: Some(|extra| extra.foot_loads_n.clone()),
         worse: Worse::Less,
         limit: Some(Limit { value: 0.0, scale: 100.0 }),
-        ..PLAIN
     },
     Facts {
         name: "slip_margin",
