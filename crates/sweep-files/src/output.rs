@@ -29,12 +29,20 @@ impl<'a> Output<'a> {
         Ok(Self { path, kind, temporary: atomic::begin(folder)? })
     }
 
-    /// Writes the file whole, or leaves what was there.
+    /// Writes what comes next of it.
+    ///
+    /// # Errors
+    /// [`FileError::Io`].
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), FileError> {
+        self.temporary.write_all(bytes).map_err(FileError::io("write", self.path))
+    }
+
+    /// Ends it with these bytes: from then on the file is whole at its path.
     ///
     /// # Errors
     /// As [`Output::begin`], for a file that has appeared there meanwhile.
     pub fn finish(mut self, bytes: &[u8]) -> Result<(), FileError> {
-        self.temporary.write_all(bytes).map_err(FileError::io("write", self.path))?;
+        self.write(bytes)?;
         judge(self.path, self.kind)?;
         atomic::publish(self.temporary, self.path)
     }

@@ -11,6 +11,7 @@ use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader,
     ParquetRecordBatchReaderBuilder,
 };
+use parquet::basic::Type;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{FileMetaData, KeyValue};
 
@@ -18,8 +19,10 @@ use crate::pages::{self, Unpacked};
 use crate::seal::{self, Seal};
 use crate::{FileError, Refused, footer, key, panics, regular};
 
-/// Most bytes that the pages of a file may unpack into at once. Ours have pages of 1 MiB.
+/// Most bytes that the pages of a file may unpack into at once, and those of one column of words,
+/// which are copied as they are coded. Ours have pages of 1 MiB.
 const MOST_AT_ONCE: u64 = 1 << 30;
+const MOST_WORDS_AT_ONCE: u64 = 1 << 27;
 
 /// The beginning of the name by which this program signs its files; a version follows.
 pub const CREATED_BY: &str = "sweep version ";
@@ -76,7 +79,9 @@ impl ParquetFile {
                     path: self.path.clone(),
                     reason: "a column lies outside of it".to_owned(),
                 })?;
-                let most = Unpacked { total: u64::MAX, at_once: MOST_AT_ONCE - at_once };
+                let is_words = column.column_type() == Type::BYTE_ARRAY;
+                let most = if is_words { MOST_WORDS_AT_ONCE } else { MOST_AT_ONCE };
+                let most = Unpacked { total: u64::MAX, at_once: most.min(MOST_AT_ONCE - at_once) };
                 let codec = column.compression();
                 let sizes = pages::unpacked(&mut &self.file, start, length, codec, most);
                 at_once += sizes.map_err(refused(&self.path))?.at_once;
@@ -226,8 +231,10 @@ fn refused(path: &Path) -> impl FnOnce(Refused) -> FileError {
     move |refused| match refused {
         Refused::Io(source) => FileError::io("read", path)(source),
         Refused::TooLong => {
-            let reason =
-                format!("its pages unpack into more than {} GiB at once", MOST_AT_ONCE >> 30);
+            let [all, words] = [MOST_AT_ONCE, MOST_WORDS_AT_ONCE].map(|bytes| bytes >> 20);
+            let reason = format!(
+                "its pages unpack into more than {all} MiB at once, or into {words} MiB of words"
+            );
             FileError::NotParquet { path: path.to_path_buf(), reason }
         }
         refused => FileError::NotParquet { path: path.to_path_buf(), reason: refused.to_string() },
@@ -332,6 +339,30 @@ mod tests {
         let rows: Vec<RecordBatch> = rows.collect::<Result<_, _>>().unwrap();
         assert_eq!(rows.iter().map(RecordBatch::num_rows).sum::<usize>(), 3000);
         assert!(rows.iter().all(|rows| rows.get_array_memory_size() < 8 << 20));
+    }
+
+    #[test]
+    fn words_that_are_not_coded_are_few_bytes_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.parquet");
+        let properties = WriterProperties::builder()
+            .set_dictionary_enabled(false)
+            .set_data_page_size_limit(1 << 30)
+            .set_write_batch_size(1 << 20)
+            .set_compression(parquet::basic::Compression::ZSTD(Default::default()));
+        let write = |mebibytes: usize| {
+            let words: StringArray =
+                vec![Some("a".repeat(1 << 20)); mebibytes].into_iter().collect();
+            let batch = RecordBatch::try_from_iter([("status", Arc::new(words) as _)]).unwrap();
+            let (file, properties) = (File::create(&path).unwrap(), properties.clone().build());
+            let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties)).unwrap();
+            writer.write(&batch).unwrap();
+            writer.close().unwrap();
+            ParquetFile::open(&path)
+        };
+        assert_eq!(write(10).unwrap().rows(), 10);
+        let told = write(130).unwrap_err().to_string();
+        assert!(told.contains("into 128 MiB of words"), "{told}");
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     };
     let output = Output::begin(&args.out, format.kind())?;
     let file = ResultTable::open(&args.file)?;
-    output.finish(&export(&file, format)?)?;
+    export(&file, format, output)?;
     tell(&format!("wrote {}: {} rows", args.out.display(), file.rows()));
     Ok(Exit::Done)
 }

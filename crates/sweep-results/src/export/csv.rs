@@ -2,13 +2,20 @@
 
 use std::fmt::Write as _;
 
-use sweep_files::{EXPORTED_CSV, key};
+use sweep_files::{EXPORTED_CSV, FileError, key};
 
 use super::names;
 use crate::error::ResultsError;
 use crate::rows::{Cell, ResultTable};
 
-pub(super) fn bytes(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
+/// Bytes of text that are written at once, at least.
+const AT_ONCE: usize = 1 << 16;
+
+/// Writes rows as they are read: one word of a small file may stand in all of its rows.
+pub(super) fn write(
+    table: &ResultTable,
+    put: &mut dyn FnMut(&str) -> Result<(), FileError>,
+) -> Result<(), ResultsError> {
     let version = table.file().value(key::VERSION).unwrap_or("of another version");
     let mut text = format!("{EXPORTED_CSV}{}\n", no_cells(version));
     // Writing to a String cannot fail.
@@ -43,9 +50,13 @@ pub(super) fn bytes(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
                 }
             }
             text.push('\n');
+            if text.len() >= AT_ONCE {
+                put(&text)?;
+                text.clear();
+            }
         }
     }
-    Ok(text.into_bytes())
+    Ok(put(&text)?)
 }
 
 /// The shortest digits of a number, with an exponent where that is shorter.
@@ -92,7 +103,12 @@ mod tests {
 
     #[test]
     fn rows_stand_under_their_names_and_units_above() {
-        let text = String::from_utf8(bytes(&sample::table()).unwrap()).unwrap();
+        let mut text = String::new();
+        let mut put = |more: &str| {
+            text.push_str(more);
+            Ok(())
+        };
+        write(&sample::table(), &mut put).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         assert!(lines[0].starts_with("# exported by sweep "), "{}", lines[0]);
         assert!(lines.iter().any(|line| line.starts_with("# damping_n_s_per_m [N s/m]")));
@@ -101,6 +117,21 @@ mod tests {
         assert_eq!(lines[head + 1], "0,0.1,60,1,1,1,1,true,false,0.009000000000000001,ok");
         assert_eq!(lines[head + 4], "3,0.2,60,,1,,,,false,,diverged");
         assert_eq!(lines.len(), head + 7);
+    }
+
+    #[test]
+    fn a_word_of_many_rows_is_in_memory_a_few_times_at_once() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("x.parquet");
+        let word = "a".repeat(1 << 18);
+        sample::write(&path, vec![("status", "", sample::texts(&vec![word.as_str(); 100]))], &[]);
+        let (mut most, mut all) = (0, 0);
+        let mut put = |text: &str| {
+            (most, all) = (text.len().max(most), all + text.len());
+            Ok(())
+        };
+        write(&ResultTable::open(&path).unwrap(), &mut put).unwrap();
+        assert!(all > 100 << 18 && most < 2 << 18, "{all} {most}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ mod xlsx;
 
 use std::path::Path;
 
-use sweep_files::FileKind;
+use sweep_files::{FileKind, Output};
 
 use crate::error::ResultsError;
 use crate::rows::ResultTable;
@@ -43,24 +43,23 @@ impl Format {
     }
 }
 
-/// Most cells that are exported: the file is made in memory.
-const MOST_CELLS: u64 = 100_000_000;
-
-/// The bytes of a file with all rows of a result.
+/// Writes all rows of a result.
 ///
 /// # Errors
-/// [`ResultsError::File`], [`ResultsError::TooLarge`], and [`ResultsError::Export`] where the
-/// format has no room for it.
-pub fn export(table: &ResultTable, format: Format) -> Result<Vec<u8>, ResultsError> {
-    let cells = table.rows().saturating_mul(table.columns.len() as u64);
-    if cells > MOST_CELLS {
-        let path = table.path().to_owned();
-        return Err(ResultsError::TooLarge { path, cells, most: MOST_CELLS });
-    }
-    match format {
-        Format::Csv => csv::bytes(table),
-        Format::Xlsx => xlsx::bytes(table),
-    }
+/// [`ResultsError::File`], and [`ResultsError::Export`] where the format has no room for it.
+pub fn export(
+    table: &ResultTable,
+    format: Format,
+    mut output: Output<'_>,
+) -> Result<(), ResultsError> {
+    let rest = match format {
+        Format::Csv => {
+            csv::write(table, &mut |text| output.write(text.as_bytes()))?;
+            Vec::new()
+        }
+        Format::Xlsx => xlsx::bytes(table)?,
+    };
+    Ok(output.finish(&rest)?)
 }
 
 /// The names of all columns.
