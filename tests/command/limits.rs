@@ -178,15 +178,23 @@ fn a_signal_is_answered_within_a_trajectory() {
     }
 }
 
+/// A shell's loop until a condition holds; given up after a minute, as a run that has ended by
+/// itself never fulfils it.
+fn until(condition: &str) -> String {
+    format!("tries=0; until {condition} || test $((tries += 1)) -gt 3000; do sleep 0.02; done\n")
+}
+
 #[test]
 fn a_signal_is_answered_while_steps_are_chosen() {
     let home = fresh_home();
     home.choose_for_seconds();
     // The folder is made before steps are chosen.
-    let script = "\"$@\" & sweep=$!\n\
-        while ! test -e x.parquet.partial/plan.json; do sleep 0.02; done\n\
-        sleep 0.1; date +%s%N; kill -TERM $sweep; wait $sweep; code=$?; date +%s%N; exit $code";
-    let run = under(&home, &["sh", "-c", script, "sh"], RUN);
+    let script = format!(
+        "\"$@\" & sweep=$!\n{}sleep 0.1; date +%s%N; kill -TERM $sweep; wait $sweep; code=$?; \
+         date +%s%N; exit $code",
+        until("test -e x.parquet.partial/plan.json")
+    );
+    let run = under(&home, &["sh", "-c", &script, "sh"], RUN);
     assert_eq!(run.status.code(), Some(143), "{}", said(&run));
     assert!(said(&run).contains("interrupted with 0 of 256 points kept"), "{}", said(&run));
     let times = String::from_utf8_lossy(&run.stdout).into_owned();
@@ -199,13 +207,15 @@ fn a_signal_is_answered_while_steps_are_chosen() {
 #[test]
 fn an_interrupted_shard_is_gone_on_with_as_that_shard() {
     let home = fresh_home();
-    let long = grid(200, 0).replace("end_s = 0.1", "end_s = 50.0");
+    // Long beside its first chunk: under a load the shell looks late.
+    let long = grid(2000, 0).replace("end_s = 0.1", "end_s = 50.0");
     fs::write(home.path("g.toml"), long).expect("the grid is written");
-    let script = "\"$@\" & sweep=$!\n\
-        while ! ls x.parquet.partial/chunk-* > /dev/null 2>&1; do sleep 0.05; done\n\
-        kill -TERM $sweep; wait $sweep";
+    let script = format!(
+        "\"$@\" & sweep=$!\n{}kill -TERM $sweep; wait $sweep",
+        until("ls x.parquet.partial/chunk-* > /dev/null 2>&1")
+    );
     let words = ["run", "g.toml", "--threads", "1", "--shard", "2/3", "--out", "x.parquet"];
-    let run = under(&home, &["sh", "-c", script, "sh"], &words);
+    let run = under(&home, &["sh", "-c", &script, "sh"], &words);
     assert_eq!(run.status.code(), Some(143), "{}", said(&run));
     assert!(
         said(&run).contains("go on  sweep run g.toml --out x.parquet --shard 2/3"),

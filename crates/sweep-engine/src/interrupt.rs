@@ -68,17 +68,3 @@ impl Interrupt {
         if self.stopped() { u8::try_from(self.signal.load(Ordering::Relaxed)).ok() } else { None }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_signal_sets_the_flag_and_is_remembered() {
-        let interrupt = Interrupt::install().unwrap();
-        assert_eq!(interrupt.signal(), None);
-        signal_hook::low_level::raise(SIGTERM).unwrap();
-        assert!(interrupt.stopped());
-        assert_eq!(interrupt.signal(), Some(15));
-    }
-}
