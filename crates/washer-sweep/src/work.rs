@@ -52,16 +52,16 @@ pub(crate) fn abandonable<T: Send + 'static>(
         };
         std::thread::Builder::new().spawn(work).map_err(no_thread)?;
         loop {
-            match ended.recv_timeout(LOOK_UP) {
+            let come = ended.recv_timeout(LOOK_UP);
+            // Of a work that is done too: a signal since the last look is its own.
+            if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                // As SIGINT would.
+                interrupt.raise(2);
+                return Err(raised);
+            }
+            match come {
                 Ok(value) => return Ok(value),
-                Err(RecvTimeoutError::Timeout) => {
-                    // As SIGINT would.
-                    let raised = |error| {
-                        interrupt.raise(2);
-                        error
-                    };
-                    Python::attach(|py| py.check_signals()).map_err(raised)?;
-                }
+                Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Err(panicked()),
             }
         }
@@ -99,15 +99,16 @@ pub(crate) fn attended<T: Send>(
             let worker =
                 std::thread::Builder::new().spawn_scoped(scope, work).map_err(no_thread)?;
             loop {
-                match ended.recv_timeout(LOOK_UP) {
-                    Ok(value) => return Ok(Attended { value, raised }),
-                    Err(RecvTimeoutError::Timeout) if raised.is_none() => {
-                        raised = Python::attach(|py| py.check_signals().err());
-                        if raised.is_some() {
-                            // As SIGINT would.
-                            interrupt.raise(2);
-                        }
+                let come = ended.recv_timeout(LOOK_UP);
+                if raised.is_none() {
+                    raised = Python::attach(|py| py.check_signals().err());
+                    if raised.is_some() {
+                        // As SIGINT would.
+                        interrupt.raise(2);
                     }
+                }
+                match come {
+                    Ok(value) => return Ok(Attended { value, raised }),
                     Err(RecvTimeoutError::Timeout) => {}
                     Err(RecvTimeoutError::Disconnected) => {
                         // Joined here, or the scope would pass the panic on.

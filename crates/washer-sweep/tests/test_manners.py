@@ -77,6 +77,27 @@ def test_ctrl_c_is_answered_in_half_a_second(long, work):
     assert stopped.result is None or work not in ("trace", "explain")
 
 
+def test_ctrl_c_is_told_though_the_work_is_done_before_it_is_looked_for(short):
+    # Work of some hundredths of a second, between two looks; a busy machine may be late.
+    for rows in (200, 400, 800, 1600):
+        begun = time.perf_counter()
+        short.evaluate(table(rows), threads=1)
+        took_s = time.perf_counter() - begun
+        if took_s > 0.03:
+            break
+    stopped, _ = interrupted(lambda: short.evaluate(table(rows), threads=1), 0.3 * took_s)
+    assert isinstance(stopped, washer_sweep.Interrupted)
+    assert 0 < len(pa.table(stopped.result)) <= rows
+
+
+def test_ctrl_c_at_a_speed_that_takes_too_many_steps_is_answered(long):
+    # The slowest drum ends by itself, or is stopped.
+    begun = time.perf_counter()
+    rows = pa.table(washer_sweep.stability(long, [0.01], progress=False))
+    assert time.perf_counter() - begun < 5.0
+    assert set(rows["status"].to_pylist()) == {"too_slow"}
+
+
 def test_ctrl_c_ends_the_threads_of_an_explanation(long):
     def threads():
         return len(os.listdir("/proc/self/task"))
