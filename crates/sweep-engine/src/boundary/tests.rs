@@ -254,6 +254,24 @@ fn a_pocket_found_late_is_followed_through_every_row() {
     }
 }
 
+/// Over ramps of 4 to 30 s, three pockets of 0.3 to 0.5 s: cells of 4.3 s promise none of them.
+#[test]
+fn pockets_are_found_once_a_cell_fits_into_them() {
+    let pockets = [[7.1, 7.4], [13.3, 13.7], [21.0, 21.5]];
+    let of = |_: f64, ramp_s: f64| {
+        let inside = pockets.iter().any(|[from, to]| (from..=to).contains(&&ramp_s));
+        Some(if inside { 0.5 } else { -0.5 })
+    };
+    let search = Search { least: 4.0, greatest: 30.0, tolerance: 0.02, ..SEARCH };
+    let edges = |lattice: usize| {
+        let traced = traced(of, &masses(3), &Search { lattice, ..search });
+        check_edges(&traced, of, 0.02);
+        traced.curves[0].iter().map(|row| row.edges.len()).collect::<Vec<_>>()
+    };
+    assert_eq!(edges(87), [6, 6, 6], "cells of 0.299 s");
+    assert_eq!(edges(6), [1, 1, 1], "no crossing, and none is promised");
+}
+
 #[test]
 fn where_the_quantity_is_not_defined_is_said() {
     let broken =

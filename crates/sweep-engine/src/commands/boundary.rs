@@ -237,7 +237,7 @@ fn summary<M: Swept>(
     line(
         &mut text,
         "promises",
-        &format!("every island that a cell of the lattice fits into, {cell} (--lattice)"),
+        &format!("every island of {cell}; smaller ones may be missed (--lattice)"),
     );
     text
 }
