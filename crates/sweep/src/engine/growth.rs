@@ -24,7 +24,8 @@ pub(crate) fn responses(
 }
 
 /// The fastest growing disturbance at any of these speeds, of the response that a machine is in
-/// that runs up; the first speed wins a tie. Speeds without a response are left out.
+/// that runs up; the first speed wins a tie. Speeds without a response are left out. Where that
+/// response is within the machine's geometry, what another passes is told.
 pub(super) fn fastest_growth(
     point: &Point,
     speeds_rpm: &[f64],
@@ -33,9 +34,9 @@ pub(super) fn fastest_growth(
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
     let found = responses(&dwells, is_stopped);
-    let fastest =
-        found.iter().flatten().filter_map(|responses| responses.first()).reduce(|most, next| {
-            if next.growth_per_s() > most.growth_per_s() { next } else { most }
-        })?;
-    Some(Growth::from(fastest))
+    let there = || found.iter().flatten().filter_map(|responses| responses.first());
+    let fastest = there()
+        .reduce(|most, next| if next.growth_per_s() > most.growth_per_s() { next } else { most })?;
+    let beyond = fastest.beyond.or_else(|| there().find_map(|response| response.beyond));
+    Some(Growth { beyond, ..Growth::from(fastest) })
 }

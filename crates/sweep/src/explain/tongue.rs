@@ -35,9 +35,10 @@ const CLOSED_BY_PER_S: f64 = 5e-4;
 /// Dampers are not made stronger than this.
 const MOST_DAMPING_FACTOR: f64 = 32.0;
 
-/// Such factors that are tried at once, in lanes; the one that closes a tongue is found this
-/// closely, relative.
-const FACTORS: usize = 8;
+/// Such factors that are tried at once, in lanes, each so many times the last; the one that closes a
+/// tongue is found this closely, relative.
+const FACTORS: usize = 4;
+const FACTOR_STEP: f64 = 1.55;
 const FACTOR_TOLERANCE: f64 = 5e-4;
 
 /// Where such factors are tried once two are known between which one closes it: by how many
@@ -69,7 +70,7 @@ impl Asker<'_> {
     /// Follows the point's responses up to a speed (rpm).
     pub(crate) fn follow(&mut self, fastest_rpm: f64) {
         let is_stopped = || self.interrupt.stopped();
-        self.followed = Responses::follow(&[(self.point, fastest_rpm)], &is_stopped);
+        self.followed = Responses::follow(&[(self.point, fastest_rpm)], None, &is_stopped);
     }
 
     /// The responses at some speeds of a machine that runs up, on all threads; none where there is
@@ -348,8 +349,7 @@ fn resonance(point: &Point, at: &Response) -> Option<Resonance> {
 /// given with the growth that it leaves.
 fn trials(open: [f64; 2], closed: Option<[f64; 2]>) -> Vec<f64> {
     let Some(closed) = closed else {
-        let step = MOST_DAMPING_FACTOR.powf(1.0 / FACTORS as f64);
-        return (1..=FACTORS).map(|k| step.powi(k as i32)).collect();
+        return (1..=FACTORS).map(|k| open[0] * FACTOR_STEP.powi(k as i32)).collect();
     };
     // Growth falls evenly over short ways.
     let fall = ((open[1] + CLOSED_BY_PER_S) / (open[1] - closed[1])).clamp(0.0, 1.0);
@@ -387,7 +387,7 @@ impl Tongue {
                 }
                 open = tried;
             }
-            if closed.is_none() {
+            if closed.is_none() && open[0] > MOST_DAMPING_FACTOR {
                 return Closing::NotUpTo(MOST_DAMPING_FACTOR);
             }
         }
@@ -420,7 +420,9 @@ impl Tongue {
         let is_stopped = || asker.interrupt.stopped();
         let wanted: Vec<(&Point, f64)> =
             points.iter().flatten().map(|point| (point, about[1])).collect();
-        let mut followed = Responses::follow(&wanted, &is_stopped);
+        // From below the tongue, on the response of the machine as it is.
+        let below = asker.responses(&[about[0]]).pop().flatten();
+        let mut followed = Responses::follow(&wanted, below.as_ref(), &is_stopped);
         let mut growths = vec![f64::NEG_INFINITY; wanted.len()];
         let mut around = vec![about; wanted.len()];
         let mut count = TRIAL_SPEEDS;

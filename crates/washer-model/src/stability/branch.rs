@@ -449,7 +449,10 @@ impl<'a> Curve<'a> {
                 continue;
             }
             let share = bisected(|share| (between(a, b, share).0[SPEED] < target) == rises);
-            let nearest = if share < 0.5 { a } else { b };
+            let mean = |i: usize, j: usize| {
+                (1.0 - share) * a.monodromy[i][j].0 + share * b.monodromy[i][j].0
+            };
+            let monodromy = core::array::from_fn(|i| core::array::from_fn(|j| N(mean(i, j))));
             let branch = self.folds.iter().filter(|&&fold| fold <= k).count();
             let fold = |number: usize| {
                 let place = *self.folds.get(number)?;
@@ -460,7 +463,7 @@ impl<'a> Curve<'a> {
                 branch: branch as u32,
                 between_rpm: if branch % 2 == 0 { ends } else { [ends[1], ends[0]] },
                 state: state_of(&between(a, b, share).0),
-                factors: apart(&nearest.monodromy),
+                factors: apart(&monodromy),
                 is_on_curve: true,
             });
         }

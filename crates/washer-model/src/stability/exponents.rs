@@ -1,6 +1,7 @@
 //! The linear model exactly: it is periodic in theta, and its Floquet exponents are its true
 //! frequencies and dampings, where modal analysis freezes theta.
 
+use super::monodromy::INSTANTS;
 use super::orbit::{Row, Square, model};
 use super::participants::energies;
 use super::turn::{Clock, Unwatched, turn};
@@ -59,7 +60,7 @@ pub fn exact_motions(point: &Point, speed_rpm: f64) -> Result<Vec<Exact>, NoAnsw
     let speed = speed_rpm * TAU / 60.0;
     let highest = highest_frequency_rad_per_s(point, speed).map_err(|_| NoAnswer::Eigenvalues)?;
     let steps = (highest * 60.0 / speed_rpm / STEP_PHASE).ceil().max(LEAST_STEPS);
-    let row = Row { point, speed_rpm, steps: steps as usize, caps: None };
+    let row = Row { point, speed_rpm, steps: steps as usize, instants: INSTANTS, caps: None };
     let unit_per_s = row.unit_per_s();
     let matrix = Simd::dispatch_narrow(OfTurn(row));
     let matrix = Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0);

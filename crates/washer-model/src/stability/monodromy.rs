@@ -8,10 +8,10 @@
 use super::turn::{Clock, REACH, WEIGHT, WHEN};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::run::model::Nonlinear;
-use core::array::from_fn;
 use lane_ode::{Dual, Lane, N, System, trig};
 
-/// Instants a turn at which the derivatives are taken: harmonics of the turn up to the seventh.
+/// Instants a turn at which the derivatives are taken, at most: harmonics of the turn up to the
+/// seventh.
 pub(super) const INSTANTS: usize = 16;
 
 /// Disturbances taken through a step at once, so that they stay in the nearest cache.
@@ -26,20 +26,22 @@ const TOGETHER: usize = 10;
 /// Of every acceleration, its derivative by each coordinate, then by each speed.
 pub(super) type Slopes<T> = [[N<T>; STATES]; COORDINATES];
 
-/// The derivatives at states of even instants of a turn, the first at its start.
+/// The derivatives at so many even instants of a turn, the first at its start, of its states at
+/// [`INSTANTS`] of them.
 #[inline(always)]
 pub(super) fn slopes_along<T: Lane>(
     zero: N<T>,
     model: &Nonlinear<Dual<T>>,
     clock: &Clock<T>,
     states: &[[N<T>; STATES]],
+    instants: usize,
 ) -> Vec<Slopes<T>> {
-    let every = clock.steps / INSTANTS;
-    let mut along = Vec::with_capacity(INSTANTS);
-    for k in 0..INSTANTS {
+    let (every, of_states) = (clock.steps / instants, INSTANTS / instants);
+    let mut along = Vec::with_capacity(instants);
+    for k in 0..instants {
         let forcing = model.forcing(clock.time_s((k * every) as f64).constant());
         let mut found = [[zero; STATES]; COORDINATES];
-        slopes(zero, model, &forcing, &states[k], &mut found);
+        slopes(zero, model, &forcing, &states[k * of_states], &mut found);
         along.push(found);
     }
     along
@@ -51,7 +53,7 @@ pub(super) fn slopes_along<T: Lane>(
 pub(super) fn monodromy<T: Lane>(
     zero: N<T>,
     along: &[Slopes<T>],
-    weights: &[[f64; INSTANTS]],
+    weights: &[Vec<f64>],
     clock: &Clock<T>,
 ) -> Vec<[N<T>; STATES]> {
     let mut columns = vec![[zero; STATES]; STATES];
@@ -191,18 +193,19 @@ fn slopes<T: Lane>(
     rate
 }
 
-/// Weights of the values at [`INSTANTS`] even instants in the trigonometric polynomial through
-/// them, at each place from the first instant up to the second where turns of so many steps need
-/// them: at the ends of steps and halfway between.
-pub(super) fn weights(steps: usize) -> Vec<[f64; INSTANTS]> {
-    let parts = 2 * steps / INSTANTS;
+/// Weights of the values at so many even instants in the trigonometric polynomial through them, at
+/// each place from the first instant up to the second where turns of so many steps need them: at
+/// the ends of steps and halfway between.
+pub(super) fn weights(steps: usize, instants: usize) -> Vec<Vec<f64>> {
+    let parts = 2 * steps / instants;
     let weight = |place: usize, instant: usize| {
-        let turns = (place as f64 / parts as f64 - instant as f64) / INSTANTS as f64;
+        let turns = (place as f64 / parts as f64 - instant as f64) / instants as f64;
         let cosine = |harmonic: usize| trig::sin_cos_turns(N(harmonic as f64 * turns)).1.0;
-        let harmonics: f64 = (1..INSTANTS / 2).map(|harmonic| 2.0 * cosine(harmonic)).sum();
-        (1.0 + harmonics + cosine(INSTANTS / 2)) / INSTANTS as f64
+        let harmonics: f64 = (1..instants / 2).map(|harmonic| 2.0 * cosine(harmonic)).sum();
+        (1.0 + harmonics + cosine(instants / 2)) / instants as f64
     };
-    (0..parts).map(|place| from_fn(|instant| weight(place, instant))).collect()
+    let of_place = |place| (0..instants).map(|instant| weight(place, instant)).collect();
+    (0..parts).map(of_place).collect()
 }
 
 /// The derivatives at one of the places of [`weights`], counted through the turn.
@@ -210,23 +213,23 @@ pub(super) fn weights(steps: usize) -> Vec<[f64; INSTANTS]> {
 fn between<T: Lane>(
     zero: N<T>,
     along: &[Slopes<T>],
-    weights: &[[f64; INSTANTS]],
+    weights: &[Vec<f64>],
     place: usize,
     slopes: &mut Slopes<T>,
 ) {
     let (first, part) = (place / weights.len(), place % weights.len());
     if part == 0 {
-        *slopes = along[first % INSTANTS];
+        *slopes = along[first % along.len()];
         return;
     }
     let mut factors = [zero; INSTANTS];
-    for instant in 0..INSTANTS {
-        factors[(first + instant) % INSTANTS] = zero.lit(weights[part][instant]);
+    for (instant, weight) in weights[part].iter().enumerate() {
+        factors[(first + instant) % along.len()] = zero.lit(*weight);
     }
     for i in 0..COORDINATES {
         for first in (0..STATES).step_by(TOGETHER) {
             let mut sums = [zero; TOGETHER];
-            for instant in 0..INSTANTS {
+            for instant in 0..along.len() {
                 for j in 0..TOGETHER {
                     sums[j] += along[instant][i][first + j] * factors[instant];
                 }
@@ -275,13 +278,14 @@ fn step<T: Lane>(zero: N<T>, h: N<T>, at: [&Slopes<T>; 4], block: &mut [[N<T>; S
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::array::from_fn;
     use core::f64::consts::TAU;
 
     #[test]
     fn a_trigonometric_polynomial_is_met_between_its_instants() {
         let wave = |turns: f64| 0.3 + (TAU * turns).sin() - 0.5 * (7.0 * TAU * turns + 0.2).cos();
         let values: [f64; INSTANTS] = from_fn(|k| wave(k as f64 / INSTANTS as f64));
-        for (part, weights) in weights(5 * INSTANTS / 2).iter().enumerate() {
+        for (part, weights) in weights(5 * INSTANTS / 2, INSTANTS).iter().enumerate() {
             let sum: f64 = weights.iter().zip(values).map(|(weight, value)| weight * value).sum();
             let turns = part as f64 / 5.0 / INSTANTS as f64;
             assert!((sum - wave(turns)).abs() < 1e-14, "{part}: {sum}");

@@ -31,6 +31,8 @@ pub(crate) struct Row<'a> {
     pub(crate) speed_rpm: f64,
     /// Steps of a turn.
     pub(crate) steps: usize,
+    /// Even instants of it at which derivatives are taken, where forces have no corners.
+    pub(crate) instants: usize,
     /// On the modes of bearings and hinge; none if the steps follow these.
     pub(crate) caps: Option<Caps>,
 }
@@ -57,13 +59,13 @@ impl Row<'_> {
     }
 
     /// Whether forces have corners, between which derivatives at a few instants say nothing.
-    fn has_corners(&self) -> bool {
+    pub(super) fn has_corners(&self) -> bool {
         self.point.machine.elements.are_nonsmooth()
     }
 
     /// What must be equal of rows that turn side by side.
-    pub(crate) fn kind(&self) -> (usize, bool, bool) {
-        (self.steps, self.caps.is_some(), self.has_corners())
+    pub(crate) fn kind(&self) -> (usize, usize, bool, bool) {
+        (self.steps, self.instants, self.caps.is_some(), self.has_corners())
     }
 }
 
@@ -98,15 +100,15 @@ pub(super) struct Seen {
 }
 
 /// Takes turns, in lanes, those of a kind together. What is found of one does not depend on the
-/// others.
-pub(super) fn turns(asked: &[Asked<'_>]) -> Vec<Turned> {
+/// others. Once `is_stopped` says so, some are missing.
+pub(super) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<Turned> {
     let kind = |k: usize| (asked[k].row.kind(), asked[k].is_seen);
     let mut order: Vec<usize> = (0..asked.len()).collect();
     order.sort_by_key(|&k| kind(k));
     let mut turned: Vec<Option<Turned>> = asked.iter().map(|_| None).collect();
     for places in order.chunk_by(|&a, &b| kind(a) == kind(b)) {
         let together: Vec<Asked<'_>> = places.iter().map(|&k| asked[k]).collect();
-        let found = Simd::dispatch_narrow(Turns { asked: &together });
+        let found = Simd::dispatch_narrow(Turns { asked: &together, is_stopped });
         for (&k, found) in places.iter().zip(found) {
             turned[k] = Some(found);
         }
@@ -117,6 +119,7 @@ pub(super) fn turns(asked: &[Asked<'_>]) -> Vec<Turned> {
 /// Turns of one kind.
 struct Turns<'a> {
     asked: &'a [Asked<'a>],
+    is_stopped: &'a dyn Fn() -> bool,
 }
 
 impl Kernel for Turns<'_> {
@@ -127,8 +130,12 @@ impl Kernel for Turns<'_> {
         let mut turned = Vec::with_capacity(self.asked.len());
         let Some(first) = self.asked.first() else { return turned };
         let with_weights = first.is_seen && !first.row.has_corners();
-        let weights = if with_weights { weights(first.row.steps) } else { Vec::new() };
+        let Row { steps, instants, .. } = first.row;
+        let weights = if with_weights { weights(steps, instants) } else { Vec::new() };
         for asked in self.asked.chunks(T::LANES) {
+            if (self.is_stopped)() {
+                break;
+            }
             see(N(zero), asked, &weights, &mut turned);
         }
         turned
@@ -168,12 +175,7 @@ pub(crate) fn clock<T: Lane>(zero: N<T>, rows: &[Row<'_>]) -> Clock<T> {
 }
 
 #[inline(always)]
-fn see<T: Lane>(
-    zero: N<T>,
-    asked: &[Asked<'_>],
-    weights: &[[f64; INSTANTS]],
-    turned: &mut Vec<Turned>,
-) {
+fn see<T: Lane>(zero: N<T>, asked: &[Asked<'_>], weights: &[Vec<f64>], turned: &mut Vec<Turned>) {
     let rows: Vec<Row<'_>> = asked.iter().map(|asked| asked.row).collect();
     let clock = clock(zero, &rows);
     let model: Nonlinear<T> = model(zero, &rows);
@@ -203,7 +205,7 @@ fn see<T: Lane>(
         monodromies.extend(columns.iter().map(square));
     } else if asked[0].is_seen {
         let tangent: Nonlinear<Dual<T>> = self::model(zero.constant(), &rows);
-        let slopes = slopes_along(zero, &tangent, &clock, &watched.states);
+        let slopes = slopes_along(zero, &tangent, &clock, &watched.states, rows[0].instants);
         let columns = monodromy(zero, &slopes, weights, &clock);
         let in_lane = |lane| -> Square { from_fn(|i| from_fn(|j| N(columns[j][i].0.get(lane)))) };
         monodromies.extend((0..rows.len()).map(in_lane));
@@ -233,14 +235,18 @@ pub(super) struct LinearResponse {
     pub(super) peaks: [f64; CHANNELS],
 }
 
-/// The linear model's responses, in lanes, those of a kind together.
-pub(super) fn linear_responses(rows: &[Row<'_>]) -> Vec<LinearResponse> {
+/// The linear model's responses, in lanes, those of a kind together. Once `is_stopped` says so,
+/// some are missing.
+pub(super) fn linear_responses(
+    rows: &[Row<'_>],
+    is_stopped: &dyn Fn() -> bool,
+) -> Vec<LinearResponse> {
     let mut order: Vec<usize> = (0..rows.len()).collect();
     order.sort_by_key(|&k| rows[k].kind());
     let mut found: Vec<Option<LinearResponse>> = rows.iter().map(|_| None).collect();
     for places in order.chunk_by(|&a, &b| rows[a].kind() == rows[b].kind()) {
         let together: Vec<Row<'_>> = places.iter().map(|&k| rows[k]).collect();
-        let of_kind = Simd::dispatch_narrow(OfLinear { rows: &together });
+        let of_kind = Simd::dispatch_narrow(OfLinear { rows: &together, is_stopped });
         for (&k, response) in places.iter().zip(of_kind) {
             found[k] = Some(response);
         }
@@ -251,6 +257,7 @@ pub(super) fn linear_responses(rows: &[Row<'_>]) -> Vec<LinearResponse> {
 /// Those of one kind. The map is affine, so that one linear solve finds what it returns to.
 struct OfLinear<'a> {
     rows: &'a [Row<'a>],
+    is_stopped: &'a dyn Fn() -> bool,
 }
 
 impl Kernel for OfLinear<'_> {
@@ -260,6 +267,9 @@ impl Kernel for OfLinear<'_> {
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut found = Vec::with_capacity(self.rows.len());
         for rows in self.rows.chunks(T::LANES) {
+            if (self.is_stopped)() {
+                break;
+            }
             linear(N(zero), rows, &mut found);
         }
         found
@@ -324,7 +334,7 @@ pub(crate) struct Watched<'m, T, M> {
     pub(crate) radial_squared: N<T>,
     /// At even instants, the first at the turn's start.
     states: Vec<[N<T>; STATES]>,
-    /// At the ends of all steps, if that is wanted.
+    /// At the start and the ends of all steps, if that is wanted.
     path: Vec<[N<T>; STATES]>,
     with_path: bool,
 }

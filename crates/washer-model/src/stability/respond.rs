@@ -45,7 +45,7 @@ pub fn respond(
         asked.extend(group.iter().map(|dwell| (points.len(), dwell.speed_rpm)));
         points.push((group[0].point, fastest_rpm));
     }
-    let mut followed = Responses::follow(&points, is_stopped);
+    let mut followed = Responses::follow(&points, None, is_stopped);
     Responses::at(&mut followed, &asked, is_stopped)
 }
 
@@ -55,21 +55,33 @@ pub struct Responses<'a>(Curve<'a>);
 
 impl<'a> Responses<'a> {
     /// Follows the responses of some points from a low speed up, each to the fastest speed (rpm)
-    /// that will be asked for; on lanes. What there is when `is_stopped` says so means nothing.
+    /// that will be asked for; on lanes. `from` another machine's response, it begins with the one
+    /// nearby at that speed. What there is when `is_stopped` says so means nothing.
     #[must_use]
-    pub fn follow(points: &[(&'a Point, f64)], is_stopped: &dyn Fn() -> bool) -> Vec<Self> {
+    pub fn follow(
+        points: &[(&'a Point, f64)],
+        from: Option<&Response>,
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Vec<Self> {
         let mut curves: Vec<Curve<'a>> =
             points.iter().map(|(point, _)| Curve::new(Settings::new(point))).collect();
         let mut starts = Vec::new();
         for (curve, (_, fastest_rpm)) in curves.iter_mut().zip(points) {
-            let lowest = curve.settings.lowest_rpm().ok().filter(|lowest| lowest < fastest_rpm);
+            let lowest = from.map_or_else(|| curve.settings.lowest_rpm(), |it| Ok(it.speed_rpm));
+            let lowest = lowest.ok().filter(|lowest| lowest < fastest_rpm);
             starts.push(lowest.and_then(|lowest| curve.settings.case(lowest).ok()));
         }
-        let rows: Vec<Row<'_>> = starts.iter().flatten().map(|case| case.row).collect();
-        let linear = linear_responses(&rows);
+        let of_start = |(curve, case): (&mut Curve<'a>, &Option<Case<'a>>)| {
+            Some(curve.settings.linear(case.as_ref()?.row))
+        };
+        let rows: Vec<Row<'_>> = curves.iter_mut().zip(&starts).filter_map(of_start).collect();
+        let linear = linear_responses(&rows, is_stopped);
         let begun = starts.iter().flatten().zip(&linear);
         let mut solves: Vec<Solve<'_>> = begun
-            .map(|(case, linear)| Solve::new(case.row, from_linear(case, linear).state, None))
+            .map(|(case, linear)| {
+                let state = from.map_or_else(|| from_linear(case, linear).state, |it| it.start);
+                Solve::new(case.row, state, None)
+            })
             .collect();
         let mut is_whole = finish(&mut solves, is_stopped);
         let mut solves = solves.into_iter();
@@ -77,7 +89,8 @@ impl<'a> Responses<'a> {
             if let Some(case) = start
                 && let Some((state, _)) = solves.next().and_then(Solve::found)
             {
-                curve.begin(case.row.speed_rpm, &state, BEYOND * fastest_rpm);
+                let until_rpm = from.map_or(BEYOND, |_| 1.0) * fastest_rpm;
+                curve.begin(case.row.speed_rpm, &state, until_rpm);
             }
         }
         is_whole = is_whole && finish(&mut curves, is_stopped);
@@ -103,13 +116,14 @@ impl<'a> Responses<'a> {
         if is_stopped() {
             return stopped();
         }
-        let mut cases = Vec::with_capacity(asked.len());
+        let (mut cases, mut rows) = (Vec::with_capacity(asked.len()), Vec::new());
         for &(place, speed_rpm) in asked {
             let Some(Self(curve)) = followed.get_mut(place) else { return stopped() };
-            cases.push(curve.settings.case(speed_rpm));
+            let case = curve.settings.case(speed_rpm);
+            rows.extend(case.as_ref().ok().map(|case| curve.settings.linear(case.row)));
+            cases.push(case);
         }
-        let rows: Vec<Row<'_>> = cases.iter().flatten().map(|case| case.row).collect();
-        let mut linear = linear_responses(&rows).into_iter();
+        let mut linear = linear_responses(&rows, is_stopped).into_iter();
         let (mut looked, mut solves): (Vec<Look<'_>>, Vec<Solve<'_>>) = Default::default();
         for (number, (case, (place, speed_rpm))) in cases.iter().zip(asked).enumerate() {
             let Ok(case) = case else { continue };
@@ -132,7 +146,7 @@ impl<'a> Responses<'a> {
             return stopped();
         }
         // What is close to an edge, or moved by the caps, is asked of the machine as it is.
-        let are_moved = are_moved(&looked, &found);
+        let are_moved = are_moved(&looked, &found, is_stopped);
         let mut close = Vec::new();
         for (place, response) in found.iter().enumerate() {
             let Ok(response) = response else { continue };
@@ -174,7 +188,11 @@ impl<'a> Responses<'a> {
 
 /// Whether a turn of the machine as it is leaves these responses, where a harmonic of the drum's
 /// speed may be near the hinge's frequency.
-fn are_moved(looked: &[Look<'_>], found: &[Result<Response, NoAnswer>]) -> Vec<bool> {
+fn are_moved(
+    looked: &[Look<'_>],
+    found: &[Result<Response, NoAnswer>],
+    is_stopped: &dyn Fn() -> bool,
+) -> Vec<bool> {
     let mut are_moved = vec![false; looked.len()];
     let (mut places, mut asked) = (Vec::new(), Vec::new());
     for (place, (look, response)) in looked.iter().zip(found).enumerate() {
@@ -187,7 +205,7 @@ fn are_moved(looked: &[Look<'_>], found: &[Result<Response, NoAnswer>]) -> Vec<b
             asked.push(Asked { row: plain.row, start: response.start, is_seen: false });
         }
     }
-    for ((place, asked), turned) in places.into_iter().zip(&asked).zip(turns(&asked)) {
+    for ((place, asked), turned) in places.into_iter().zip(&asked).zip(turns(&asked, is_stopped)) {
         let Row { point, speed_rpm, .. } = asked.row;
         let missing = missing(point, speed_rpm, &asked.start, &turned.end);
         are_moved[place] = missing.is_nan() || missing > RETURNS;

@@ -25,10 +25,10 @@ pub(super) fn finish<'a, S: Search<'a>>(searches: &mut [S], is_stopped: &dyn Fn(
         if asked.is_empty() {
             return true;
         }
+        let mut turned = turns(&asked, is_stopped).into_iter();
         if is_stopped() {
             return false;
         }
-        let mut turned = turns(&asked).into_iter();
         for (search, wanted) in searches.iter_mut().zip(wanted) {
             if !wanted.is_empty() {
                 search.take(turned.by_ref().take(wanted.len()).collect());
@@ -38,17 +38,22 @@ pub(super) fn finish<'a, S: Search<'a>>(searches: &mut [S], is_stopped: &dyn Fn(
 }
 
 /// Turns that the search for a response may take.
-const MOST_TURNS: usize = 30;
+const MOST_TURNS: usize = 80;
 
 /// A response is found once another turn moves it by less than this share of its greatest
 /// coordinate.
 const CLOSE: f64 = 1e-10;
 
+/// Where the last corrections let that be expected, this is enough.
+const CLOSE_AT_LAST: f64 = 1e-8;
+
 /// Smaller deviations (m, rad) count as this: without unbalance there is none but rounding.
 const LEAST_SIZE: f64 = 1e-4;
 
-/// The matrix is taken anew where a correction leaves more than this share of what was missing.
+/// The matrix is taken anew where a correction leaves more than this share of what was missing; and
+/// where forces have corners, which make the matrix dear beside turns.
 const FAST_ENOUGH: f64 = 0.2;
+const FAST_ENOUGH_AT_CORNERS: f64 = 0.6;
 
 /// How far a turn is from closing, as a share of its deviation; not finite if it left the model's
 /// range.
@@ -129,16 +134,18 @@ impl<'a> Search<'a> for Solve<'a> {
         let Some(Turned { end, seen }) = turned.into_iter().next() else { return };
         self.turns += 1;
         let missing = missing(self.row.point, self.row.speed_rpm, &self.state, &end);
-        if self.is_last || (missing < CLOSE && seen.is_some()) {
+        if seen.is_some() && missing < if self.is_last { CLOSE_AT_LAST } else { CLOSE } {
             (self.is_over, self.found) = (true, seen);
             return;
         }
+        let corners = self.row.has_corners();
+        let enough = if corners { FAST_ENOUGH_AT_CORNERS } else { FAST_ENOUGH };
         match seen {
             Some(seen) => {
                 self.factors = apart(&seen.monodromy);
                 self.is_over = self.factors.is_none();
             }
-            None if missing > FAST_ENOUGH * self.missing => self.factors = None,
+            None if missing > enough * self.missing => self.factors = None,
             None => {}
         }
         self.is_over |= !missing.is_finite() || self.turns == MOST_TURNS;
@@ -148,7 +155,9 @@ impl<'a> Search<'a> for Solve<'a> {
             for i in 0..STATES {
                 self.state[i] += correction[i].0;
             }
-            self.is_last = missing < CLOSE;
+            // The next correction leaves as much less as the last one did.
+            let rate = if self.missing.is_finite() { missing / self.missing } else { 1.0 };
+            self.is_last = missing * rate.min(1.0) < CLOSE;
             // Slow progress is judged over corrections, not over looks.
             self.missing = missing;
         }

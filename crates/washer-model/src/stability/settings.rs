@@ -1,6 +1,7 @@
 //! Steps and caps at constant speeds, and what of a machine's motion they leave right.
 
 use super::NoAnswer;
+use super::monodromy::INSTANTS;
 use super::orbit::{Row, caps};
 use crate::coordinates::COORDINATES;
 use crate::fast::{HINGE_TO_DRUM, SUSPENSION_MODES, hinge_shift};
@@ -11,21 +12,47 @@ use core::f64::consts::TAU;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Steps a turn, at least, and what their number is a multiple of.
-const STEPS: usize = 96;
+/// What numbers of steps are multiples of.
+const STEPS: usize = 16;
 
-/// Longest step times the fastest of the suspension's modes, all of which the steps must follow.
-const LONGEST_PHASE: f64 = 0.25;
+/// By how much there are more steps where so many are not enough.
+const MORE_STEPS: f64 = 1.5;
 
 /// Step times the fastest mode, where none is capped.
 const PLAIN_PHASE: f64 = 1.0;
 
-/// How much caps may move modes of the suspension (1/s, rad/s), and the longest steps (s) where
-/// friction and stops give forces corners: of rows,
-const OF_ROWS: [f64; 2] = [3e-4, 1e-4];
+/// What steps, caps and derivatives are to keep to.
+struct Care {
+    /// Steps of a turn, at least.
+    steps: usize,
+    /// Instants of it at which derivatives are taken.
+    instants: usize,
+    /// Longest step times the fastest of the suspension's modes.
+    phase: f64,
+    /// How much caps may move these modes (1/s, rad/s).
+    shift_per_s: f64,
+    /// Longest steps (s) where friction and stops give forces corners.
+    at_corners_s: f64,
+}
 
-/// and where responses are only followed: what lies on the curve is looked for anew.
-const OF_FOLLOWED: [f64; 2] = [3e-3, 5e-4];
+/// What a setting is for.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Use {
+    Rows,
+    Linear,
+    Followed,
+}
+
+/// Of rows.
+const OF_ROWS: Care =
+    Care { steps: 96, instants: INSTANTS, phase: 0.25, shift_per_s: 3e-4, at_corners_s: 1e-4 };
+
+/// Of the linear model, whose forces have no corners, and whose response turns with the drum.
+const OF_LINEAR: Care = Care { at_corners_s: f64::INFINITY, ..OF_FOLLOWED };
+
+/// Where responses are only followed: what lies on the curve is looked for anew.
+const OF_FOLLOWED: Care =
+    Care { steps: 48, instants: 8, phase: 0.4, shift_per_s: 3e-3, at_corners_s: 5e-4 };
 
 /// Responses are followed from this share of the slowest mode's frequency, a multiple of so many
 /// parts of a turn per minute.
@@ -53,7 +80,7 @@ impl<'a> Case<'a> {
     /// The same for the machine as it is.
     pub(crate) fn without_caps(&self) -> Result<Self, NoAnswer> {
         let steps = plain_steps(self.row.point, self.row.speed_rpm, self.row.turn_s())?;
-        let row = Row { steps, caps: None, ..self.row };
+        let row = Row { steps, caps: None, instants: INSTANTS, ..self.row };
         Ok(Self { row, frozen: Arc::clone(&self.frozen), judged: self.judged })
     }
 }
@@ -76,8 +103,10 @@ fn whole(steps: f64) -> Result<usize, NoAnswer> {
 pub(crate) struct Settings<'a> {
     pub(crate) point: &'a Point,
     rest: Option<Modes>,
-    /// By range, and whether responses are only followed.
-    ranges: BTreeMap<(i64, bool), Result<Setting, NoAnswer>>,
+    /// Modes where ranges begin, by range.
+    frozen: BTreeMap<i64, Result<Arc<Modes>, NoAnswer>>,
+    /// By range and use.
+    ranges: BTreeMap<(i64, Use), Result<Setting, NoAnswer>>,
 }
 
 /// Those of a range of speeds.
@@ -88,9 +117,15 @@ struct Setting {
     is_capped: bool,
 }
 
+/// Where a range begins (rpm).
+fn begins_rpm(range: i64) -> f64 {
+    libm::exp2(range as f64 / RANGES)
+}
+
 impl<'a> Settings<'a> {
     pub(crate) fn new(point: &'a Point) -> Self {
-        Self { point, rest: modes(point, 0.0, 0.0).ok(), ranges: BTreeMap::new() }
+        let rest = modes(point, 0.0, 0.0).ok();
+        Self { point, rest, frozen: BTreeMap::new(), ranges: BTreeMap::new() }
     }
 
     /// From where responses are followed (rpm): below all that the suspension answers to.
@@ -105,7 +140,12 @@ impl<'a> Settings<'a> {
     /// # Errors
     /// [`NoAnswer::Eigenvalues`]; [`NoAnswer::TooSlow`].
     pub(crate) fn case(&mut self, speed_rpm: f64) -> Result<Case<'a>, NoAnswer> {
-        self.chosen(speed_rpm, false)
+        self.chosen(speed_rpm, Use::Rows)
+    }
+
+    /// A row for the linear model.
+    pub(super) fn linear(&mut self, row: Row<'a>) -> Row<'a> {
+        self.chosen(row.speed_rpm, Use::Linear).map_or(row, |case| case.row)
     }
 
     /// As [`Self::case`], where responses are only followed.
@@ -113,70 +153,73 @@ impl<'a> Settings<'a> {
     /// # Errors
     /// As [`Self::case`].
     pub(super) fn followed(&mut self, speed_rpm: f64) -> Result<Row<'a>, NoAnswer> {
-        Ok(self.chosen(speed_rpm, true)?.row)
+        Ok(self.chosen(speed_rpm, Use::Followed)?.row)
     }
 
-    fn chosen(&mut self, speed_rpm: f64, is_followed: bool) -> Result<Case<'a>, NoAnswer> {
-        let range = (RANGES * libm::log2(speed_rpm)).floor();
-        let point = self.point;
-        let rest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?;
-        let setting = self.ranges.entry((range as i64, is_followed)).or_insert_with(|| {
-            let end_rpm = |range: f64| libm::exp2(range / RANGES);
-            let most = if is_followed { OF_FOLLOWED } else { OF_ROWS };
-            setting(point, rest, [end_rpm(range), end_rpm(range + 1.0)], most)
+    fn chosen(&mut self, speed_rpm: f64, of: Use) -> Result<Case<'a>, NoAnswer> {
+        let range = (RANGES * libm::log2(speed_rpm)).floor() as i64;
+        let care = match of {
+            Use::Rows => OF_ROWS,
+            Use::Linear => OF_LINEAR,
+            Use::Followed => OF_FOLLOWED,
+        };
+        let known = self.ranges.get(&(range, of)).cloned();
+        let setting = known.unwrap_or_else(|| {
+            let setting = self.setting(range, &care);
+            self.ranges.insert((range, of), setting.clone());
+            setting
         });
-        let Setting { frozen, steps, is_capped } = setting.clone()?;
+        let (Setting { frozen, steps, is_capped }, point) = (setting?, self.point);
         let caps = is_capped.then(|| caps(steps, 60.0 / speed_rpm));
-        let row = Row { point, speed_rpm, steps, caps };
+        let row = Row { point, speed_rpm, steps, instants: care.instants, caps };
         let judged = if is_capped { SUSPENSION_MODES } else { SUSPENSION_MODES + 2 };
         Ok(Case { row, frozen, judged })
     }
-}
 
-/// As many steps a turn as the suspension's modes ask for in a range of speeds, and caps as high as
-/// these steps allow. Where these would move the suspension's modes, there are more steps; where
-/// the drum is not slow beside the hinge, there are no caps (`fast.rs`).
-fn setting(
-    point: &Point,
-    rest: &Modes,
-    ends_rpm: [f64; 2],
-    [most_shift_per_s, longest_at_corners_s]: [f64; 2],
-) -> Result<Setting, NoAnswer> {
-    let of_modes = |speed_rpm: f64| {
-        modes(point, 0.0, speed_rpm * TAU / 60.0).map_err(|_| NoAnswer::Eigenvalues)
-    };
-    let turn_s = 60.0 / ends_rpm[0];
-    let fastest = rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
-    let mut steps = whole(fastest * turn_s / LONGEST_PHASE)?;
-    if point.machine.elements.are_nonsmooth() {
-        steps = steps.max(whole(turn_s / longest_at_corners_s)?);
+    /// Modes where a range begins.
+    fn frozen(&mut self, range: i64) -> Result<Arc<Modes>, NoAnswer> {
+        let found = || modes(self.point, 0.0, begins_rpm(range) * TAU / 60.0);
+        let found = || found().map(Arc::new).map_err(|_| NoAnswer::Eigenvalues);
+        self.frozen.entry(range).or_insert_with(found).clone()
     }
-    let frozen = [of_modes(ends_rpm[0])?, of_modes(ends_rpm[1])?];
-    let mut is_capped = false;
-    let top_rad_per_s = ends_rpm[1] * TAU / 60.0;
-    if rest.modes[SUSPENSION_MODES].magnitude_rad_per_s >= HINGE_TO_DRUM * top_rad_per_s {
-        let highest = rest.modes[COORDINATES - 1].magnitude_rad_per_s;
-        // More steps than that cap nothing.
-        while !is_capped && (steps as f64) < highest * turn_s {
-            let shift = |end: usize| {
-                let caps = caps(steps, 60.0 / ends_rpm[end]);
-                shift_per_s(point, ends_rpm[end] * TAU / 60.0, &frozen[end], &caps)
-            };
-            is_capped = shift(0)?.max(shift(1)?) <= most_shift_per_s;
-            if !is_capped {
-                steps *= 2;
+
+    /// As many steps a turn as the suspension's modes ask for in a range of speeds, and caps as
+    /// high as these steps allow. Where these would move the suspension's modes, there are more
+    /// steps; where the drum is not slow beside the hinge, there are no caps (`fast.rs`).
+    fn setting(&mut self, range: i64, care: &Care) -> Result<Setting, NoAnswer> {
+        let point = self.point;
+        let ends_rpm = [range, range + 1].map(begins_rpm);
+        let frozen = [self.frozen(range)?, self.frozen(range + 1)?];
+        let rest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?;
+        let turn_s = 60.0 / ends_rpm[0];
+        let fastest = rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
+        let mut steps = whole(fastest * turn_s / care.phase)?.max(care.steps);
+        if point.machine.elements.are_nonsmooth() {
+            steps = steps.max(whole(turn_s / care.at_corners_s)?);
+        }
+        let mut is_capped = false;
+        let top_rad_per_s = ends_rpm[1] * TAU / 60.0;
+        if rest.modes[SUSPENSION_MODES].magnitude_rad_per_s >= HINGE_TO_DRUM * top_rad_per_s {
+            let highest = rest.modes[COORDINATES - 1].magnitude_rad_per_s;
+            // More steps than that cap nothing.
+            while !is_capped && (steps as f64) < highest * turn_s {
+                let shift = |end: usize| {
+                    let caps = caps(steps, 60.0 / ends_rpm[end]);
+                    shift_per_s(point, ends_rpm[end] * TAU / 60.0, &frozen[end], &caps)
+                };
+                is_capped = shift(0)?.max(shift(1)?) <= care.shift_per_s;
+                if !is_capped {
+                    steps = whole(MORE_STEPS * steps as f64)?;
+                }
             }
         }
+        if !is_capped {
+            let [low, high] = ends_rpm.map(|rpm| plain_steps(point, rpm, turn_s));
+            steps = low?.max(high?);
+        }
+        let [frozen, _] = frozen;
+        Ok(Setting { frozen, steps, is_capped })
     }
-    if !is_capped {
-        steps =
-            plain_steps(point, ends_rpm[0], turn_s)?.max(plain_steps(point, ends_rpm[1], turn_s)?);
-    }
-    if steps > MOST_STEPS {
-        return Err(NoAnswer::TooSlow);
-    }
-    let [frozen, _] = frozen;
-    Ok(Setting { frozen: Arc::new(frozen), steps, is_capped })
 }
 
 /// How far caps move the suspension's modes.

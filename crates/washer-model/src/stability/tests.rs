@@ -9,7 +9,7 @@ use super::*;
 use crate::coordinates::COORDINATES;
 use crate::fast::SUSPENSION_MODES;
 use crate::tests::reference::reference;
-use crate::{Channel, Machine, Method, ModelKind, Spin, Start, Timing, history, prepare};
+use crate::{BumpStop, Channel, Machine, Method, ModelKind, Spin, Start, Timing, history, prepare};
 use faer::{Mat, c64};
 use lane_ode::Simd;
 use serde_json::Value;
@@ -167,11 +167,12 @@ fn multipliers_are_those_of_the_machine_as_it_is() {
     }
 }
 
-/// Of the machine at a constant speed with a small disturbance: how fast that grows, from the state
-/// after every turn.
-fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
+/// How far a small disturbance of a dwell moves the machine from turn to turn: what the response
+/// itself has in it drops out.
+fn simulated(machine: Machine, response: &Response, end_s: f64) -> Vec<[f64; COORDINATES]> {
     let speed_rpm = response.speed_rpm;
     let point = prepared(machine, speed_rpm);
+    let step_s = if point.machine.elements.are_nonsmooth() { 5e-5 } else { 2e-4 };
     let mut start = Start::default();
     for i in 0..COORDINATES {
         start.deviations[i] = response.start[i] - point.equilibrium()[i];
@@ -181,20 +182,22 @@ fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
         start.deviations[i] += 1e-6;
     }
     let turn_s = 60.0 / speed_rpm;
-    let method = Method::Rk4 { step_s: 2e-4 };
+    let method = Method::Rk4 { step_s };
     let history = history(ModelKind::Nonlinear, &method, &point, &start, turn_s);
-    // A thousandfold at most: after that the disturbance is not small.
-    let end_s = TIMING.end_s.min(7.0 / response.growth_per_s());
-    let turns = (end_s / turn_s) as usize;
-    // From turn to turn: what the response itself has in it drops out.
+    let turns = (TIMING.end_s.min(end_s) / turn_s) as usize;
     let states: Vec<[f64; COORDINATES]> =
         (0..turns).map(|k| history.instant(k).unwrap().deviations).collect();
-    let moved: Vec<[f64; COORDINATES]> =
-        states.windows(2).map(|pair| core::array::from_fn(|i| pair[1][i] - pair[0][i])).collect();
+    states.windows(2).map(|pair| core::array::from_fn(|i| pair[1][i] - pair[0][i])).collect()
+}
+
+/// How fast that grows.
+fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
+    // A thousandfold at most: after that the disturbance is not small.
+    let moved = simulated(machine, response, 7.0 / response.growth_per_s());
     // Once the others have decayed, two multipliers are left: least squares of d[k + 2] = a d[k +
     // 1] + b d[k].
     let (mut g, mut h) = ([[0.0; 2]; 2], [0.0; 2]);
-    for k in turns / 2..moved.len() - 2 {
+    for k in moved.len().div_ceil(2)..moved.len() - 2 {
         for i in 0..COORDINATES {
             let [d0, d1, d2] = [moved[k][i], moved[k + 1][i], moved[k + 2][i]];
             g[0][0] += d1 * d1;
@@ -210,7 +213,7 @@ fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
     let discriminant = 0.25 * a * a + b;
     let largest =
         if discriminant < 0.0 { (-b).sqrt() } else { (0.5 * a).abs() + discriminant.sqrt() };
-    largest.ln() / turn_s
+    largest.ln() * response.speed_rpm / 60.0
 }
 
 #[test]
@@ -354,6 +357,68 @@ fn random(random: &mut fastrand::Rng) -> Machine {
     machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m *= factor(0.7, 1.4));
     machine.flexure.stiffness_n_m_per_rad *= factor(0.5, 2.0);
     machine
+}
+
+/// Friction in the dampers, and stops to either side, for a machine.
+fn add_elements(machine: &mut Machine, random: &mut fastrand::Rng) {
+    let friction_n = 5.0 + 75.0 * random.f64();
+    for damper in &mut machine.dampers {
+        damper.friction_n = friction_n;
+        damper.friction_linear_speed_m_per_s = Some(0.1);
+    }
+    let clearance_m = 0.004 + 0.016 * random.f64();
+    machine.stops = [1.0, -1.0]
+        .map(|side| BumpStop {
+            tub_m: [0.35, 0.0, 0.28 * side],
+            direction: [0.0, 0.0, side],
+            clearance_m,
+            stiffness_n_per_m: 4e4,
+            damping_n_s_per_m: 100.0,
+            softness_m: 1e-4,
+        })
+        .into();
+}
+
+/// Of random machines, every other with friction and stops: disturbances of simulated dwells grow
+/// as fast as is said, or decay where the response is said to be stable.
+#[test]
+#[ignore = "minutes of work"]
+fn random_machines_do_what_is_said() {
+    let seed = std::env::var("SEED").map_or(2026, |seed| seed.parse().unwrap());
+    let mut numbers = fastrand::Rng::with_seed(seed);
+    let (mut grown, mut decayed, mut worst) = ([0, 0], [0, 0], [0.0_f64; 2]);
+    for number in 0..30 {
+        let kind = number % 2;
+        let mut machine = random(&mut numbers);
+        if kind == 1 {
+            add_elements(&mut machine, &mut numbers);
+        }
+        let point = prepared(machine.clone(), 100.0);
+        let speeds: Vec<f64> = (0..40).map(|_| 60.0 + 300.0 * numbers.f64()).collect();
+        let dwells: Vec<_> =
+            speeds.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+        let found = all(&dwells);
+        let there = || found.iter().flatten().filter_map(|responses| responses.first());
+        for response in there().filter(|it| (0.2..2.0).contains(&it.growth_per_s())).take(2) {
+            let simulated = simulated_growth_per_s(machine.clone(), response);
+            let error = (simulated / response.growth_per_s() - 1.0).abs();
+            println!("machine {number}, {} rpm: {error:e}", response.speed_rpm);
+            worst[kind] = worst[kind].max(error);
+            grown[kind] += 1;
+        }
+        for response in there().filter(|it| it.growth_per_s() < -0.3).take(1) {
+            let moved = simulated(machine.clone(), response, 20.0);
+            let size = |d: &[f64; COORDINATES]| d[4].abs().max(d[5].abs());
+            let most = moved.iter().map(size).fold(0.0, f64::max);
+            let left = moved[moved.len() - 20..].iter().map(size).fold(0.0, f64::max) / most;
+            println!("machine {number}, {} rpm: {left:e} left", response.speed_rpm);
+            assert!(left < 0.1, "machine {number}: {response:?}");
+            decayed[kind] += 1;
+        }
+    }
+    println!("{grown:?} grown, worst {worst:?}; {decayed:?} decayed");
+    assert!(worst[0] < 0.02 && worst[1] < 0.05, "{worst:?}");
+    assert!(grown[0] + grown[1] >= 20 && decayed[0] + decayed[1] >= 20);
 }
 
 /// Responses of random machines are those that steps of 0.05 rpm lead to, until these are lost; and
