@@ -1,0 +1,92 @@
+#!/bin/sh
+# The CI kit of docs/workflows in a throw-away repository whose grid names a machine file in another
+# folder: its scripts, with `gh` and the release's server replaced by stand-ins on this machine.
+#
+#     scripts/checks/workflow.sh SWEEP
+set -eu
+sweep=$(realpath "$1")
+kit=$(realpath "$(dirname "$0")/../../docs/workflows")
+home=$(mktemp -d)
+trap 'rm -rf "$home"' EXIT
+fails() { echo "workflow.sh: $1" >&2; exit 1; }
+
+# A release, on a file system: its archive with its digest.
+name=sweep-1.2.3-$(uname -m)-linux
+release=$home/origin/releases/download/v1.2.3
+mkdir -p "$release" "$home/$name"
+cp "$sweep" "$home/$name/sweep"
+(cd "$home" && tar -czf "$release/$name.tar.gz" "$name")
+(cd "$release" && sha256sum "$name.tar.gz" > "$name.tar.gz.sha256")
+sh "$kit/install.sh" "file://$home/origin" v1.2.3 "$home/tool" > /dev/null
+rm -r "$home/origin"
+# From the cache now: the release is gone.
+sh "$kit/install.sh" "file://$home/origin" v1.2.3 "$home/tool"
+PATH=$home/tool/bin:$home/bin:$PATH
+export PATH
+
+git init -q "$home/repository"
+cd "$home/repository"
+git config user.name ci
+git config user.email ci@example.org
+mkdir grids machines
+sweep init machines/mine.toml --machine > /dev/null
+cat > grids/my.toml << 'GRID'
+machine = "../machines/mine.toml"
+spin = { profile = "triangular", peak_rpm = 100.0, ramp_s = 4.0 }
+time = { end_s = 4.0 }
+[[axis]]
+parameter = "unbalance_mass_kg"
+values = [0.1, 0.5]
+[[axis]]
+parameter = "damping_n_s_per_m"
+values = [100, 200]
+GRID
+git add . && git commit -qm "A machine and its grid"
+
+compare() {
+    code=0
+    sh "$kit/compare.sh" HEAD grids/my.toml out > log.txt 2>&1 || code=$?
+    [ "$code" = "$1" ] || { cat log.txt; fails "$2: exit code $code"; }
+}
+compare 0 "nothing has changed"
+grep -q "They do not differ" out/summary.md || fails "no word that nothing differs"
+# The change is in the machine's file, in another folder than the grid's.
+sed -i 's/23.87/20.0/' machines/mine.toml
+FAIL_ON=plan compare 4 "another machine"
+grep -q mass_kg out/summary.md || fails "the machine's change is not told"
+GATE='ratio_max < 0' compare 4 "a gate that cannot open"
+grep -q FAILS out/summary.md || fails "the gate is not told"
+sed 's/0.5/0.6/' grids/my.toml > grids/new.toml
+sh "$kit/compare.sh" HEAD grids/new.toml out > /dev/null 2>&1 || fails "a new grid"
+
+# `gh` keeps one comment a file: posting twice leaves one, with the later text.
+mkdir -p "$home/bin" "$home/comments"
+cat > "$home/bin/gh" << 'GH'
+#!/bin/sh
+comments=COMMENTS
+case "$*" in
+    *--paginate*)
+        for file in "$comments"/*; do
+            [ -e "$file" ] && printf '%s\t%s\n' "$(basename "$file")" "$(head -n 1 "$file")"
+        done ;;
+    *PATCH*) cp "${6#body=@}" "$comments/${4##*/}" ;;
+    *POST*) cp "${6#body=@}" "$comments/$(($(ls "$comments" | wc -l) + 1))" ;;
+esac
+exit 0
+GH
+sed -i "s|COMMENTS|$home/comments|" "$home/bin/gh"
+chmod +x "$home/bin/gh"
+echo "somebody else's" > "$home/comments/1"
+sh "$kit/comment.sh" out/summary.md me/mine 7
+echo "a later run" >> out/summary.md
+sh "$kit/comment.sh" out/summary.md me/mine 7
+[ "$(ls "$home/comments" | wc -l)" = 2 ] || fails "not one comment"
+grep -q "a later run" "$home/comments/2" || fails "the comment is not the last run's"
+
+# The action's steps call scripts that exist, with inputs that it has.
+for script in $(grep -o '[a-z]*\.sh' "$kit/action.yml" | sort -u); do
+    [ -x "$kit/$script" ] || fails "the action calls $script"
+done
+for input in $(grep -o 'inputs\.[a-z-]*' "$kit/action.yml" | cut -d. -f2 | sort -u); do
+    grep -q "^  $input:" "$kit/action.yml" || fails "the action has no input $input"
+done
