@@ -408,6 +408,9 @@ impl<'a> Columns<'a> {
             let description = "margin of the cabinet against slipping, friction on all feet \
                                together less the horizontal force";
             add("slip_margin", description, &|at| at.slip_margin_n.unwrap_or(f64::NAN));
+            let description = "margin of the cabinet against walking: that against slipping less \
+                               what turning takes of it";
+            add("walk_margin", description, &|at| at.walk_margin_n.unwrap_or(f64::NAN));
         }
     }
 

@@ -80,6 +80,8 @@ pub enum Metric {
     FootLoad,
     /// The least margin of the cabinet against slipping.
     SlipMargin,
+    /// The least margin of the cabinet against slipping, turning or both.
+    WalkMargin,
     /// How fast disturbances grow at constant speeds.
     Growth,
     /// The greatest speed of a damper.
@@ -88,7 +90,7 @@ pub enum Metric {
 
 impl Metric {
     /// Every metric.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::CabinetForce,
         Self::ClashTime,
         Self::StaticSag,
@@ -96,6 +98,7 @@ impl Metric {
         Self::StopContact,
         Self::FootLoad,
         Self::SlipMargin,
+        Self::WalkMargin,
         Self::Growth,
         Self::DamperSpeed,
     ];
@@ -304,6 +307,20 @@ const METRICS: [Facts; Metric::ALL.len()] = [
         floor: Floor::Weight,
         record: |wanted| wanted.feet = true,
         of: Some(|extra| extra.slip_margin_n.into_iter().collect()),
+        worse: Worse::Less,
+        limit: Some(Limit { value: 0.0, scale: 100.0 }),
+        ..PLAIN
+    },
+    Facts {
+        name: "walk_margin",
+        unit: "N",
+        description: "least margin of the cabinet against slipping, turning or both in the \
+                      window: the margin against slipping less what the moment about the vertical \
+                      takes of it",
+        part: Some(Part::Foot),
+        floor: Floor::Weight,
+        record: |wanted| wanted.feet = true,
+        of: Some(|extra| extra.walk_margin_n.into_iter().collect()),
         worse: Worse::Less,
         limit: Some(Limit { value: 0.0, scale: 100.0 }),
         ..PLAIN

@@ -1,6 +1,8 @@
 //! What the cabinet's feet carry: the floor holds a cabinet that does not move against its own
 //! weight and the forces of the suspension.
 
+use lane_ode::{N, Real};
+
 use crate::machine::Machine;
 
 /// Most feet.
@@ -9,6 +11,9 @@ pub(crate) const FEET: usize = 4;
 /// Components of a load on the cabinet: its force along c1, c2 and c3 (N), and its moment about O
 /// (N m).
 pub(crate) const LOAD: usize = 6;
+
+/// Added to the sum of the feet's loads (N), which may be none.
+const LEAST_N: f64 = 1e-9;
 
 /// Feet closer to one line than this share of their distances hold no cabinet upright.
 const IN_LINE: f64 = 1e-6;
@@ -26,6 +31,8 @@ pub(crate) struct Feet {
     pub(crate) own_n: [f64; FEET],
     /// What each takes of a load on the cabinet.
     pub(crate) shares: [[f64; LOAD]; FEET],
+    /// Where each is along c1 and c3 (m); beyond the last the first again, which carries nothing.
+    pub(crate) places_m: [[f64; 2]; FEET],
     /// Coefficient of friction.
     pub(crate) friction: f64,
     /// Weight of the cabinet (N).
@@ -76,7 +83,9 @@ impl Feet {
                 -of_x,
             ];
         }
-        Some(Self { count, own_n, shares, friction: cabinet.friction, weight_n })
+        let place = |k: usize| machine.feet[if k < count { k } else { 0 }].foot_m;
+        let places_m = core::array::from_fn(|k| [place(k)[0], place(k)[2]]);
+        Some(Self { count, own_n, shares, places_m, friction: cabinet.friction, weight_n })
     }
 
     /// The vertical loads of the feet (N) under a load on the cabinet.
@@ -92,6 +101,17 @@ impl Feet {
     pub(crate) fn slip_margin_n(&self, load: &[f64; LOAD]) -> f64 {
         let [along_x, along_y, along_z, ..] = *load;
         self.friction * (self.weight_n - along_y) - (along_x * along_x + along_z * along_z).sqrt()
+    }
+
+    /// The margin against walking (N) under a load on the cabinet: against slipping, turning or
+    /// both.
+    pub(crate) fn walk_margin_n(&self, load: &[f64; LOAD]) -> f64 {
+        let mut carried = [N(0.0); FEET];
+        for (carried, load_n) in carried.iter_mut().zip(self.loads_n(load)) {
+            *carried = N(load_n);
+        }
+        let places = self.places_m.map(|place| place.map(N));
+        self.slip_margin_n(load) - turning_n(&places, &carried, &load.map(N)).0
     }
 
     /// The loads before the machine sags.
@@ -110,6 +130,40 @@ impl Feet {
         }
         self.loads_n(&[0.0, -weight_n, 0.0, 0.0, 0.0, -moment_n_m])
     }
+}
+
+/// What a load's moment about the vertical takes of the margin against slipping (N).
+///
+/// Floor forces hold the cabinet if each is within the friction of its foot. Those that share the
+/// horizontal force by the feet's loads leave the moment about the centre of the loads; forces
+/// across the arms from there, by load and arm, take it, and add up to no force. The foot with the
+/// longest arm has most of both.
+#[inline(always)]
+pub(crate) fn turning_n<T: Real>(
+    places: &[[N<T>; 2]; FEET],
+    carried: &[N<T>; FEET],
+    load: &[N<T>; LOAD],
+) -> N<T> {
+    let nothing = load[0].lit(0.0);
+    let (mut sum, mut moments) = (load[0].lit(LEAST_N), [nothing; 2]);
+    let mut loaded = *carried;
+    for k in 0..FEET {
+        // A foot that would lift holds nothing.
+        loaded[k] = carried[k].where_less(nothing, nothing, carried[k]);
+        sum += loaded[k];
+        moments[0] += loaded[k] * places[k][0];
+        moments[1] += loaded[k] * places[k][1];
+    }
+    let [x, z] = [moments[0] / sum, moments[1] / sum];
+    let (mut second, mut farthest) = (load[0].lit(LEAST_N), nothing);
+    for k in 0..FEET {
+        let [arm_x, arm_z] = [places[k][0] - x, places[k][1] - z];
+        let squared = arm_x * arm_x + arm_z * arm_z;
+        second += loaded[k] * squared;
+        farthest = farthest.where_less(squared, squared, farthest);
+    }
+    let moment = load[4] - (z * load[0] - x * load[2]);
+    moment.abs() * farthest.sqrt() * sum / second
 }
 
 #[cfg(test)]
@@ -162,6 +216,59 @@ mod tests {
                 assert!(left[i].abs() < 1e-10, "{i}: {}", left[i]);
             }
         }
+    }
+
+    // The floor's forces, foot by foot: they hold the cabinet, and the margin is zero where the
+    // first of them, its parts taken by their sizes, is all that its foot's friction gives.
+    #[test]
+    fn a_cabinet_with_a_margin_against_walking_is_held_within_the_friction_of_every_foot() {
+        let mut decided = 0;
+        for feet in [&CORNERS[..], &[[0.5, -0.5, 0.2], [0.45, -0.5, -0.3], [-0.1, -0.5, 0.1]]] {
+            let machine = on(feet);
+            let feet_of = Feet::new(&machine).unwrap();
+            for seed in 0..200_u32 {
+                let draw = |k: u32| f64::from((seed * 7919 + k * 104_729) % 2003) / 1001.5 - 1.0;
+                let load =
+                    [60.0 * draw(1), -350.0 + 90.0 * draw(2), 60.0 * draw(3), 12.0 * draw(4)];
+                let load = [load[0], load[1], load[2], load[3], 40.0 * draw(5), -70.0];
+                let loads_n = feet_of.loads_n(&load);
+                let all_n: f64 = loads_n.iter().sum();
+                if loads_n.iter().any(|n| *n < 1.0) {
+                    continue;
+                }
+                let mean = |axis: usize| {
+                    let moments = feet.iter().zip(&loads_n).map(|(foot, n)| foot[axis] * n);
+                    moments.sum::<f64>() / all_n
+                };
+                let arms: Vec<[f64; 2]> =
+                    feet.iter().map(|foot| [foot[0] - mean(0), foot[2] - mean(2)]).collect();
+                let second: f64 =
+                    arms.iter().zip(&loads_n).map(|([x, z], n)| n * (x * x + z * z)).sum();
+                let about = |force: [f64; 2], at: [f64; 2]| at[1] * force[0] - at[0] * force[1];
+                let moment = load[4] - about([load[0], load[2]], [mean(0), mean(2)]);
+                let (mut sum, mut held, mut most) = ([0.0; 2], 0.0, 0.0_f64);
+                for (([x, z], foot), n) in arms.iter().zip(feet).zip(&loads_n) {
+                    let [shared, turned] = [n / all_n, moment * n / second];
+                    let force = [-load[0] * shared - turned * z, -load[2] * shared + turned * x];
+                    sum = [sum[0] + force[0], sum[1] + force[1]];
+                    held += about(force, [foot[0], foot[2]]);
+                    assert!(
+                        (0.4 * n - force[0].hypot(force[1])) / n * all_n
+                            >= feet_of.walk_margin_n(&load) - 1e-9
+                    );
+                    let both = load[0].hypot(load[2]) * shared + turned.abs() * x.hypot(*z);
+                    most = most.max(both / n);
+                }
+                assert!((sum[0] + load[0]).abs() < 1e-9 && (sum[1] + load[2]).abs() < 1e-9);
+                assert!((held + load[4]).abs() < 1e-9, "{held} for {}", load[4]);
+                let margin_n = (0.4 - most) * all_n;
+                let found_n = feet_of.walk_margin_n(&load);
+                assert!((found_n - margin_n).abs() < 1e-6, "{found_n} for {margin_n}");
+                assert!(found_n <= feet_of.slip_margin_n(&load));
+                decided += i32::from((found_n < 0.0) != (feet_of.slip_margin_n(&load) < 0.0));
+            }
+        }
+        assert!(decided > 20, "{decided} turn before they slip");
     }
 
     #[test]

@@ -30,7 +30,8 @@ pub struct Wanted {
     pub clash_time: bool,
     /// The greatest push of each stop, and how long it is closed.
     pub stops: bool,
-    /// The least load of each foot of the cabinet, and the least margin against slipping.
+    /// The least load of each foot of the cabinet, and the least margins against slipping and
+    /// walking.
     pub feet: bool,
     /// The greatest speed of each damper.
     pub damper_speeds: bool,
@@ -66,6 +67,9 @@ pub struct Extra {
     /// The least margin against slipping (N): friction on all feet together less the horizontal
     /// force; below zero the cabinet slips. Absent if the machine has no cabinet.
     pub slip_margin_n: Option<f64>,
+    /// The least margin against walking (N): that against slipping less what turning takes of it.
+    /// Absent if the machine has no cabinet.
+    pub walk_margin_n: Option<f64>,
     /// The greatest speed of each damper along it (m/s), in the machine's order; empty unless asked
     /// for.
     pub damper_speeds_m_per_s: Vec<f64>,
@@ -177,6 +181,7 @@ impl<T: Lane> Extras<T> {
             stops: loads.map_or_else(Vec::new, |loads| loads.stops(lane)),
             foot_loads_n: loads.map_or_else(Vec::new, |loads| loads.foot_loads_n(lane)),
             slip_margin_n: loads.and_then(|loads| loads.slip_margin_n(lane)),
+            walk_margin_n: loads.and_then(|loads| loads.walk_margin_n(lane)),
             damper_speeds_m_per_s: loads
                 .map_or_else(Vec::new, |loads| loads.damper_speeds_m_per_s(lane)),
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),

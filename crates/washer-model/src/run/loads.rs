@@ -6,7 +6,7 @@
 use crate::coordinates::{COORDINATES, STATES, TUB};
 use crate::kind::ModelKind;
 use crate::lanes::{Constant as _, InLanes as _};
-use crate::machine::feet::{FEET, LOAD};
+use crate::machine::feet::{FEET, LOAD, turning_n};
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::Tilt;
 use crate::point::Point;
@@ -29,6 +29,8 @@ const LEAST_SQUARED_N2: f64 = 1e-18;
 
 /// The margin against slipping, after the feet.
 const SLIP: usize = FEET;
+/// The margin against walking, after that.
+const WALK: usize = FEET + 1;
 
 /// Coordinates of the tub and their speeds, in the order of [`TUB`].
 struct TubState<T> {
@@ -194,10 +196,11 @@ struct SeenStop<T> {
 /// interpolated first, and the loads evaluated at a few places of it.
 pub(crate) struct Loads<T> {
     laws: Laws<T>,
-    /// How far the loads of the feet are below [`FAR_N`], and then the margin against slipping.
-    below: Peaks<T, { FEET + 1 }>,
+    /// How far the loads of the feet are below [`FAR_N`], and then the two margins.
+    below: Peaks<T, { FEET + 2 }>,
     own: [N<T>; FEET],
     shares: [[N<T>; LOAD]; FEET],
+    places: [[N<T>; 2]; FEET],
     friction: N<T>,
     weight: N<T>,
     feet: usize,
@@ -248,6 +251,7 @@ impl<T: Lane> Loads<T> {
             below: Peaks::new(zero),
             own: [zero; FEET],
             shares: [[zero; LOAD]; FEET],
+            places: [[zero; 2]; FEET],
             friction: zero,
             weight: zero,
             feet: 0,
@@ -280,6 +284,9 @@ impl<T: Lane> Loads<T> {
                 for i in 0..LOAD {
                     self.shares[k][i].0.set(lane, feet.shares[k][i]);
                 }
+                for i in 0..2 {
+                    self.places[k][i].0.set(lane, feet.places_m[k][i]);
+                }
             }
             self.friction.0.set(lane, feet.friction);
             self.weight.0.set(lane, feet.weight_n);
@@ -294,6 +301,11 @@ impl<T: Lane> Loads<T> {
     /// The least margin against slipping of one lane (N); none without feet.
     pub(crate) fn slip_margin_n(&self, lane: usize) -> Option<f64> {
         (self.feet > 0).then(|| FAR_N - self.below.lane(lane)[SLIP])
+    }
+
+    /// The least margin against walking of one lane (N); none without feet.
+    pub(crate) fn walk_margin_n(&self, lane: usize) -> Option<f64> {
+        (self.feet > 0).then(|| FAR_N - self.below.lane(lane)[WALK])
     }
 
     /// What one lane has seen of each stop; empty without stops.
@@ -397,17 +409,24 @@ impl<T: Lane> Loads<T> {
     #[inline(always)]
     fn see_feet(&mut self, step_s: Option<N<T>>, load: &[N<Dual<T>>; LOAD], counts: T::Mask) {
         let far = load[0].lit(FAR_N);
-        let mut below = [sample(far); FEET + 1];
+        let mut below = [sample(far); FEET + 2];
+        let (mut loads, mut places) = ([far; FEET], [[far; 2]; FEET]);
         for k in 0..FEET {
             let mut carried = self.own[k].constant();
             for i in 0..LOAD {
                 carried += self.shares[k][i].constant() * load[i];
             }
             below[k] = sample(far - carried);
+            loads[k] = carried;
+            for i in 0..2 {
+                places[k][i] = self.places[k][i].constant();
+            }
         }
         let squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(LEAST_SQUARED_N2);
         let margin = self.friction.constant() * (self.weight.constant() - load[1]);
-        below[SLIP] = sample(far - (margin - squared.sqrt()));
+        let margin = margin - squared.sqrt();
+        below[SLIP] = sample(far - margin);
+        below[WALK] = sample(far - (margin - turning_n(&places, &loads, load)));
         match step_s {
             Some(step_s) => self.below.advance_by_slopes(step_s, &below, counts),
             None => self.below.begin(&below, counts),

@@ -31,6 +31,8 @@ pub struct Forces {
     pub feet_n: Vec<f64>,
     /// Margin of the cabinet against slipping (N); absent without a cabinet.
     pub slip_margin_n: Option<f64>,
+    /// Margin of the cabinet against walking (N); absent without a cabinet.
+    pub walk_margin_n: Option<f64>,
 }
 
 /// The forces at a state: whole coordinates of the nonlinear model, deviations of the linear one.
@@ -57,6 +59,7 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
         cabinet_n: [0.0; 3],
         feet_n: Vec::new(),
         slip_margin_n: None,
+        walk_margin_n: None,
     };
     // How the force is divided among the axes differs by a rounding: results on record have it so.
     for (spring, stiffening) in elements.springs.iter().zip(&elements.stiffenings) {
@@ -97,6 +100,7 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
         let load = load_on_cabinet(point, model, state);
         forces.feet_n = feet.loads_n(&load);
         forces.slip_margin_n = Some(feet.slip_margin_n(&load));
+        forces.walk_margin_n = Some(feet.walk_margin_n(&load));
     }
     forces
 }

@@ -59,12 +59,13 @@ fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
         stops,
         foot_loads_n,
         slip_margin_n,
+        walk_margin_n,
         damper_speeds_m_per_s,
         course,
     } = extra;
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
     bits.extend(course.iter().flatten().map(|q| q.to_bits()));
-    let metrics = [cabinet_force_n, clash_time_s, clash_doubt_s, slip_margin_n];
+    let metrics = [cabinet_force_n, clash_time_s, clash_doubt_s, slip_margin_n, walk_margin_n];
     let of_each = foot_loads_n.iter().chain(damper_speeds_m_per_s);
     bits.extend(metrics.into_iter().flatten().chain(of_each).map(|number| number.to_bits()));
     bits.extend(stops.iter().flat_map(|stop| [stop.push_n.to_bits(), stop.contact_s.to_bits()]));

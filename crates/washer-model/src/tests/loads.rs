@@ -102,6 +102,7 @@ fn they_are_what_a_densely_sampled_history_shows() {
     let history = history(ModelKind::Nonlinear, &method, &point, &Start::default(), EVERY_S);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
     let (mut feet_n, mut margin_n) = (vec![f64::INFINITY; 4], f64::INFINITY);
+    let mut walk_n = f64::INFINITY;
     let (mut pushes_n, mut closed_s) = (vec![0.0_f64; 3], vec![0.0_f64; 3]);
     let mut tautest_n = vec![0.0_f64; machine.dampers.len()];
     for k in first..=last {
@@ -117,6 +118,21 @@ fn they_are_what_a_densely_sampled_history_shows() {
         let margin_now_n = 0.4 * (feet.weight_n - load[1]) - horizontal_n;
         assert!((forces.slip_margin_n.unwrap() - margin_now_n).abs() < 1e-9);
         margin_n = margin_n.min(margin_now_n);
+        // The feet are the corners of a rectangle: the moment about the centre of their loads.
+        let loaded_n: Vec<f64> = loads_n.iter().map(|n| n.max(0.0)).collect();
+        let all_n: f64 = loaded_n.iter().sum();
+        let mean = |axis: usize| {
+            let feet = machine.feet.iter().zip(&loaded_n);
+            feet.map(|(foot, n)| foot.foot_m[axis] * n / all_n).sum::<f64>()
+        };
+        let arm = |foot: &Foot| (foot.foot_m[0] - mean(0)).hypot(foot.foot_m[2] - mean(2));
+        let arms: Vec<f64> = machine.feet.iter().map(arm).collect();
+        let held: f64 = arms.iter().zip(&loaded_n).map(|(arm, n)| n / all_n * arm * arm).sum();
+        let longest = arms.iter().copied().fold(0.0, f64::max);
+        let moment = load[4] + mean(0) * load[2] - mean(2) * load[0];
+        let walk_now_n = margin_now_n - moment.abs() * longest / held;
+        assert!((forces.walk_margin_n.unwrap() - walk_now_n).abs() < 1e-6);
+        walk_n = walk_n.min(walk_now_n);
         feet_n = least([feet_n, loads_n].into_iter());
         for (push_n, now_n) in pushes_n.iter_mut().zip(&forces.stops_n) {
             *push_n = push_n.max(*now_n);
@@ -138,6 +154,8 @@ fn they_are_what_a_densely_sampled_history_shows() {
     let extra = found(&point, ModelKind::Nonlinear, Simd::best());
     all_close("least load of foot", &extra.foot_loads_n, &feet_n, 1e-2);
     all_close("margin", &[extra.slip_margin_n.unwrap()], &[margin_n], 1e-2);
+    all_close("walking", &[extra.walk_margin_n.unwrap()], &[walk_n], 0.1);
+    assert!(walk_n < margin_n - 1.0, "{walk_n} N, {margin_n} N: this machine turns");
     let of_stops = |of: fn(&StopLoad) -> f64| extra.stops.iter().map(of).collect::<Vec<_>>();
     let greatest_n = pushes_n.iter().copied().fold(0.0, f64::max);
     all_close("push of stop", &of_stops(|stop| stop.push_n), &pushes_n, 1e-3 * greatest_n);
