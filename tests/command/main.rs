@@ -19,6 +19,7 @@ mod flips;
 mod goldens;
 mod home;
 mod limits;
+mod optimise;
 mod pictures;
 mod stability;
 

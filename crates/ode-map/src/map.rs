@@ -526,19 +526,18 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
 {
     fn evaluate(
         &self,
-        next: &(dyn Fn() -> Option<u64> + Sync),
+        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
         keep: &(dyn Fn(Done) + Sync),
         watch: &Watch<'_>,
     ) {
         let columns = columns(self.plan);
         rayon::broadcast(|_| {
             while !watch.stopped() {
-                let points: Vec<u64> = std::iter::from_fn(next).take(MAX_LANES).collect();
+                let (points, at): (Vec<u64>, Vec<Vec<f64>>) =
+                    std::iter::from_fn(next).take(MAX_LANES).unzip();
                 if points.is_empty() {
                     break;
                 }
-                let at: Vec<Vec<f64>> =
-                    points.iter().map(|point| self.plan.axis_values(*point)).collect();
                 let rows = self.rows(&at, &|| watch.stopped());
                 // They may have been cut short.
                 if watch.stopped() {

@@ -159,6 +159,37 @@ fn every_command_has_something_to_say() {
 }
 
 #[test]
+fn a_study_finds_the_resonance_that_a_fine_map_shows() {
+    let axis = "[[axis]]\nparameter = \"forcing_rad_per_s\"\n\
+                range = { from = 0.7, to = 1.5, count = 401 }\n";
+    let home = Home::new(&grid(FAST, axis));
+    home.does("run grid.toml --out x.parquet --progress none");
+    let rows = home.rows("x.parquet");
+    let at = |row| number(&rows, "linear_x1", row).unwrap();
+    let highest = (0..rows.num_rows()).max_by(|a, b| at(*a).total_cmp(&at(*b))).unwrap();
+    let resonance = number(&rows, "forcing_rad_per_s", highest).unwrap();
+    let write = |name: &str, text: &str| std::fs::write(home.0.path().join(name), text).unwrap();
+    write("point.toml", &grid(FAST, ""));
+    write(
+        "study.toml",
+        "grid = \"point.toml\"\ncandidates = 160\npopulation = 16\n\
+         [[objective]]\nmaximise = \"linear_x1\"\n\
+         [[parameter]]\nname = \"forcing_rad_per_s\"\nfrom = 0.7\nto = 1.5\n",
+    );
+    for threads in [1, 2] {
+        let line = format!("optimise study.toml --threads {threads} --progress none --out");
+        let text = home.does(&format!("{line} {threads}.parquet"));
+        assert!(text.contains("160 of 160, 1 on the front"), "{text}");
+    }
+    assert!(home.bytes("1.parquet") == home.bytes("2.parquet"));
+    let best = home.does("show 1.parquet --where on_front --json");
+    let best: serde_json::Value = serde_json::from_str(&best).unwrap();
+    let found = best[0]["forcing_rad_per_s"].as_f64().unwrap();
+    assert!((found - resonance).abs() <= 0.003, "{found} for {resonance}");
+    assert!(best[0]["linear_x1"].as_f64().unwrap() >= at(highest), "{best}");
+}
+
+#[test]
 fn designs_spread_points() {
     let design = "[design]\nmethod = \"sobol\"\npoints = 16\n\
                   [[axis]]\nparameter = \"zeta_1\"\nrange = { from = 0.005, to = 0.05 }\n";

@@ -22,6 +22,7 @@ pub mod interrupt;
 pub mod method;
 pub mod model;
 pub mod nearest;
+pub mod optimise;
 pub mod plan;
 pub mod program;
 pub mod progress;

@@ -143,7 +143,7 @@ fn compute_and_join(
 ) -> Result<Option<Tally>, StoreError> {
     let mut attempts_left = 2;
     loop {
-        compute(engine, run, threads, progress, interrupt)?;
+        compute(engine, job, run, threads, progress, interrupt)?;
         if interrupt.stopped() || run.shard().is_some() {
             return Ok(None);
         }
@@ -161,6 +161,7 @@ fn compute_and_join(
 /// error lets.
 fn compute(
     engine: &dyn Engine,
+    job: &Job<'_>,
     run: &OpenRun,
     threads: usize,
     progress: &mut Progress,
@@ -175,7 +176,7 @@ fn compute(
     let mut result = Ok(());
     std::thread::scope(|scope| {
         let (watch, pool) = (&watch, &pool);
-        let work = move || pool.install(|| hand.fill(engine, watch));
+        let work = move || pool.install(|| hand.fill(engine, job, watch));
         // Where it cannot be started, the sender goes with it, and the loop below ends.
         let work = match std::thread::Builder::new().spawn_scoped(scope, work) {
             Ok(work) => Some(work),
@@ -230,16 +231,24 @@ impl<'a> Hand<'a> {
 
     /// Has the engine evaluate everything that is missing, and keeps what there is of chunks that
     /// did not become whole.
-    fn fill(self, engine: &dyn Engine, watch: &Watch<'_>) -> Result<(), StoreError> {
-        let evaluated = self.evaluate(engine, watch);
+    fn fill(self, engine: &dyn Engine, job: &Job<'_>, watch: &Watch<'_>) -> Result<(), StoreError> {
+        let evaluated = self.evaluate(engine, job, watch);
         let parts = std::mem::take(&mut *lock(&self.parts));
         // A part that makes no sense costs itself.
         let kept = parts.into_iter().map(|(chunk, part)| self.run.write_chunk(chunk, part));
         kept.fold(evaluated, Result::and)
     }
 
-    fn evaluate(&self, engine: &dyn Engine, watch: &Watch<'_>) -> Result<(), StoreError> {
-        let next = || if watch.stopped() { None } else { lock(&self.left).next() };
+    fn evaluate(
+        &self,
+        engine: &dyn Engine,
+        job: &Job<'_>,
+        watch: &Watch<'_>,
+    ) -> Result<(), StoreError> {
+        let next = || {
+            let point = if watch.stopped() { None } else { lock(&self.left).next() }?;
+            Some((point, (job.axis_values)(point)))
+        };
         let keep = |outcome| self.keep(outcome, watch);
         let panic = catch_unwind(AssertUnwindSafe(|| engine.evaluate(&next, &keep, watch))).err();
         let reason = match panic {

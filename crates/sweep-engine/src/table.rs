@@ -6,7 +6,9 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use arrow_array::types::Int32Type;
-use arrow_array::{ArrayRef, DictionaryArray, Float64Array, RecordBatch, UInt64Array};
+use arrow_array::{
+    ArrayRef, BooleanArray, DictionaryArray, Float64Array, RecordBatch, UInt64Array,
+};
 use arrow_schema::{DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
@@ -78,6 +80,12 @@ impl Table {
     ) {
         let array: DictionaryArray<Int32Type> = values.into_iter().collect();
         self.add(name, "", description, "string", Arc::new(array));
+    }
+
+    /// Adds truth values.
+    pub fn flags(&mut self, name: &str, description: &str, values: impl Iterator<Item = bool>) {
+        let array: BooleanArray = values.map(Some).collect();
+        self.add(name, "", description, "bool", Arc::new(array));
     }
 
     fn add(&mut self, name: &str, unit: &str, description: &str, type_name: &str, array: ArrayRef) {

@@ -7,15 +7,16 @@ use crate::store::Done;
 
 /// What computes points.
 pub trait Engine: Sync {
-    /// Evaluates points until `next` gives none, and hands each outcome to `keep`, in any order;
-    /// fewer if it stopped because [`Watch::stopped`] said so. Works on all threads of the rayon
-    /// pool that it is called in, and calls both from any of them.
+    /// Evaluates points until `next` gives none, each with what it is known by and the values of
+    /// the plan's axes there, on the grid or between its points. Hands each outcome to `keep`, in
+    /// any order; fewer if it stopped because [`Watch::stopped`] said so. Works on all threads of
+    /// the rayon pool that it is called in, and calls both from any of them.
     ///
     /// A point that fails, even by a panic, is an outcome; a panic that leaves this function costs
     /// all that is in hand.
     fn evaluate(
         &self,
-        next: &(dyn Fn() -> Option<u64> + Sync),
+        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
         keep: &(dyn Fn(Done) + Sync),
         watch: &Watch<'_>,
     );

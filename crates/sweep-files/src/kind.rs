@@ -35,6 +35,8 @@ pub mod key {
     pub const STABILITY: &str = "sweep.stability";
     /// Speeds and starts. In files of `sweep dwell` alone.
     pub const DWELL: &str = "sweep.dwell";
+    /// What was looked for, and which candidate is the best. In files of `sweep optimise` alone.
+    pub const OPTIMISE: &str = "sweep.optimise";
     /// Which files were compared, and where their plans part. In files of differences alone.
     pub const DIFFERENCES: &str = "sweep.differences";
     /// BLAKE3 hash of the whole file with zeros in this place, hexadecimal.
@@ -56,6 +58,8 @@ pub enum FileKind<'a> {
     Stability,
     /// Result of `sweep dwell`.
     Dwell,
+    /// Result of `sweep optimise`.
+    Optimise,
     /// Result of `sweep compare --out`.
     Differences,
     /// A table that `sweep export` wrote.
@@ -79,12 +83,13 @@ pub enum FileKind<'a> {
 }
 
 /// Results that are no maps: each kind in a word, and the key that only its files have.
-const OWN: [(FileKind<'static>, &str, &str); 6] = [
+const OWN: [(FileKind<'static>, &str, &str); 7] = [
     (FileKind::Trace, "trace", key::TRACE),
     (FileKind::Modes, "modes", key::MODES),
     (FileKind::Boundary, "boundary", key::BOUNDARY),
     (FileKind::Stability, "stability", key::STABILITY),
     (FileKind::Dwell, "dwell", key::DWELL),
+    (FileKind::Optimise, "study", key::OPTIMISE),
     (FileKind::Differences, "differences", key::DIFFERENCES),
 ];
 
@@ -93,7 +98,7 @@ pub const EXPORTED_CSV: &str = "# exported by sweep ";
 
 impl FileKind<'_> {
     /// The kind in words: "the file there is no <name>".
-    pub(crate) const fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Map => "result of `sweep run`",
             Self::Trace => "result of `sweep trace`",
@@ -101,6 +106,7 @@ impl FileKind<'_> {
             Self::Boundary => "result of `sweep boundary`",
             Self::Stability => "result of `sweep stability`",
             Self::Dwell => "result of `sweep dwell`",
+            Self::Optimise => "result of `sweep optimise`",
             Self::Differences => "result of `sweep compare --out`",
             Self::Exported { .. } => "table of `sweep export`",
             Self::Account { .. } => "account of the run with this --out",

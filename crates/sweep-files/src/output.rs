@@ -137,13 +137,14 @@ mod tests {
     use super::*;
     use crate::{key, seal};
 
-    const PARQUET: [FileKind<'_>; 7] = [
+    const PARQUET: [FileKind<'_>; 8] = [
         FileKind::Map,
         FileKind::Trace,
         FileKind::Modes,
         FileKind::Boundary,
         FileKind::Stability,
         FileKind::Dwell,
+        FileKind::Optimise,
         FileKind::Differences,
     ];
 
@@ -156,6 +157,7 @@ mod tests {
             FileKind::Boundary => key::BOUNDARY,
             FileKind::Stability => key::STABILITY,
             FileKind::Dwell => key::DWELL,
+            FileKind::Optimise => key::OPTIMISE,
             FileKind::Differences => key::DIFFERENCES,
             FileKind::Exported { ending: "csv" } => {
                 return format!("{}x\n", crate::EXPORTED_CSV).into_bytes();

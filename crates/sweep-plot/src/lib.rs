@@ -51,7 +51,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub use error::PlotError;
+pub use html::sheet;
 pub use share::Share;
+pub use svg::escape;
 
 use chart::Chart;
 use cuts::Cuts;
@@ -241,6 +243,17 @@ pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), 
     Ok(file.finish(&bytes)?)
 }
 
+/// A file's figure as an SVG picture of its own within HTML, and what its plan says in words, each
+/// with a title.
+///
+/// # Errors
+/// As [`render`].
+pub fn described(input: &Path) -> Result<(String, Vec<(&'static str, String)>), PlotError> {
+    let svg = figure(input, &PlotOptions::default(), Format::Svg)?;
+    let about = html::about(&Source::open(input)?);
+    Ok((html::picture(&svg), about))
+}
+
 fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
     let mut source = Source::open(input)?;
     if is_scattered(&source, options)? {
@@ -253,6 +266,7 @@ fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>
         Kind::Differences => differences(source, options, format),
         Kind::Stability => stability(&source, options, format),
         Kind::Dwell => written(&source, &figures::dwell::chart(&source, options)?, format),
+        Kind::Optimise => written(&source, &figures::optimise::chart(&source)?, format),
         Kind::Trace | Kind::Modes | Kind::Boundary => chart(&Table::read(source)?, options, format),
     }
 }

@@ -34,6 +34,8 @@ pub(crate) enum Kind {
     Stability,
     /// Motions that held speeds end in.
     Dwell,
+    /// Candidates of a study.
+    Optimise,
 }
 
 impl Kind {
@@ -48,6 +50,7 @@ impl Kind {
             Self::Differences => "differences",
             Self::Stability => "stability",
             Self::Dwell => "dwell",
+            Self::Optimise => "study",
         }
     }
 }
@@ -357,7 +360,9 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 
 fn recognise(names: &[&str]) -> Option<Kind> {
     let has = |name: &str| names.contains(&name);
-    if has("motion") && has("speed_rpm") {
+    if has("candidate") && has("on_front") {
+        Some(Kind::Optimise)
+    } else if has("motion") && has("speed_rpm") {
         Some(Kind::Dwell)
     } else if has("growth_per_s") && has("speed_rpm") {
         Some(Kind::Stability)

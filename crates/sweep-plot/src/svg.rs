@@ -187,7 +187,8 @@ fn number(value: f64) -> String {
 }
 
 /// Text as XML character data.
-pub(crate) fn escape(text: &str) -> String {
+#[must_use]
+pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {
         match letter {

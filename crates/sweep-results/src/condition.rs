@@ -40,7 +40,7 @@ pub(crate) enum Operation {
 }
 
 /// How all rows become one number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Fold {
     /// Rows for which a condition is true.
     Count,
@@ -49,6 +49,8 @@ pub(crate) enum Fold {
     Least,
     Greatest,
     Mean,
+    /// The number below which this part of the rows lies, between neighbours by a straight line.
+    Quantile(f64),
 }
 
 /// A node of an expression; the parser has made sure of the types.
@@ -166,6 +168,16 @@ impl Operation {
 }
 
 impl Comparison {
+    /// How far two numbers are from keeping it; 0 where they do.
+    pub(crate) fn excess(self, left: f64, right: f64) -> f64 {
+        match self {
+            Self::Less | Self::AtMost => (left - right).max(0.0),
+            Self::Greater | Self::AtLeast => (right - left).max(0.0),
+            Self::Equal => (left - right).abs(),
+            Self::NotEqual => 1.0,
+        }
+    }
+
     fn of(self, left: &Cell, right: &Cell) -> Option<bool> {
         let order = match (left, right) {
             (Cell::Number(left), Cell::Number(right)) => left.partial_cmp(right)?,
@@ -196,14 +208,16 @@ pub(crate) struct Folded {
 }
 
 /// The number that rows are folded into, on its way.
-#[derive(Clone, Copy, Debug, Default)]
-struct Folding {
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Folding {
     rows: u64,
     over: u64,
     counted: u64,
     sum: f64,
     least: Option<f64>,
     greatest: Option<f64>,
+    /// Of a quantile alone.
+    numbers: Vec<f64>,
 }
 
 impl Condition {
@@ -222,21 +236,7 @@ impl Condition {
         let mut foldings = vec![Folding::default(); self.folds.len()];
         each_row(table, &[self], keep, |at| {
             for ((fold, node), folding) in self.folds.iter().zip(&mut foldings) {
-                folding.rows += 1;
-                match fold {
-                    Fold::Count | Fold::Share => {
-                        let Some(truth) = node.truth(at) else { continue };
-                        folding.over += 1;
-                        folding.counted += u64::from(truth);
-                    }
-                    Fold::Least | Fold::Greatest | Fold::Mean => {
-                        let Some(number) = node.number(at) else { continue };
-                        folding.over += 1;
-                        folding.sum += number;
-                        folding.least = Some(folding.least.map_or(number, |l| l.min(number)));
-                        folding.greatest = Some(folding.greatest.map_or(number, |g| g.max(number)));
-                    }
-                }
+                folding.add(*fold, node, at);
             }
             Ok(())
         })?;
@@ -246,16 +246,43 @@ impl Condition {
 }
 
 impl Folding {
-    fn finish(self, fold: Fold) -> Folded {
+    pub(crate) fn add(&mut self, fold: Fold, node: &Node, at: &Context<'_>) {
+        self.rows += 1;
+        if let Fold::Count | Fold::Share = fold {
+            let Some(truth) = node.truth(at) else { return };
+            self.over += 1;
+            self.counted += u64::from(truth);
+            return;
+        }
+        let Some(number) = node.number(at) else { return };
+        self.over += 1;
+        self.sum += number;
+        self.least = Some(self.least.map_or(number, |least| least.min(number)));
+        self.greatest = Some(self.greatest.map_or(number, |greatest| greatest.max(number)));
+        if let Fold::Quantile(_) = fold {
+            self.numbers.push(number);
+        }
+    }
+
+    pub(crate) fn finish(self, fold: Fold) -> Folded {
         let value = match fold {
             Fold::Count => Some(self.counted as f64),
             Fold::Share => Some(self.counted as f64 / self.rows as f64),
             Fold::Least => self.least,
             Fold::Greatest => self.greatest,
             Fold::Mean => Some(self.sum / self.over as f64),
+            Fold::Quantile(part) => quantile(self.numbers, part),
         };
         Folded { value: number(value), over: self.over, whole: self.over == self.rows }
     }
+}
+
+/// The quantile of numbers, as NumPy's by default.
+fn quantile(mut numbers: Vec<f64>, part: f64) -> Option<f64> {
+    numbers.sort_by(f64::total_cmp);
+    let place = part * numbers.len().checked_sub(1)? as f64;
+    let (below, above) = (numbers[place.floor() as usize], numbers[place.ceil() as usize]);
+    Some(below + (above - below) * place.fract())
 }
 
 /// Calls `work` for each row that `keep` takes, with the columns of the first of `conditions`.

@@ -12,6 +12,7 @@ mod compare;
 mod condition;
 mod error;
 mod export;
+mod goal;
 mod parse;
 mod require;
 mod rows;
@@ -25,6 +26,7 @@ pub use compare::{
 pub use condition::{Condition, Mistake};
 pub use error::ResultsError;
 pub use export::{Format, export};
+pub use goal::Goal;
 pub use require::{Checked, Offender, check};
-pub use rows::{Cell, CellKind, Column, ResultTable, ratio_limits};
+pub use rows::{Cell, CellKind, Column, ResultTable, columns, ratio_limits};
 pub use top::top;

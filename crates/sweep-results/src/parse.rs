@@ -10,6 +10,7 @@
 //! factor     := '-' factor | NUMBER | "TEXT" | 'true' | 'false' | COLUMN | '(' condition ')'
 //!             | 'abs' '(' sum ')'
 //!             | ('count' | 'share') '(' condition ')' | ('min' | 'max' | 'mean') '(' sum ')'
+//!             | 'quantile' '(' sum ',' NUMBER ')'
 //! ```
 
 use std::ops::Range;
@@ -33,14 +34,14 @@ enum Token {
 }
 
 /// Longer signs first.
-const SIGNS: [&str; 12] = ["<=", ">=", "==", "!=", "<", ">", "(", ")", "+", "-", "*", "/"];
+const SIGNS: [&str; 13] = ["<=", ">=", "==", "!=", "<", ">", "(", ")", "+", "-", "*", "/", ","];
 
 /// What other languages write, and what is meant.
 const FOREIGN: [(&str, &str); 5] =
     [("&&", "and"), ("||", "or"), ("!", "not"), ("=", "=="), ("<>", "!=")];
 
 /// Words that are no columns.
-const FUNCTIONS: [&str; 6] = ["abs", "count", "share", "min", "max", "mean"];
+const FUNCTIONS: [&str; 7] = ["abs", "count", "share", "min", "max", "mean", "quantile"];
 
 type Spanned = (Token, Range<usize>);
 
@@ -124,7 +125,7 @@ impl Condition {
     /// # Errors
     /// The first mistake in it.
     pub fn parse(text: &str, table: &ResultTable) -> Result<Self, Mistake> {
-        condition(text, &table.columns)
+        expression(text, &table.columns, CellKind::Flag)
     }
 }
 
@@ -139,8 +140,12 @@ struct Parser<'a> {
     depth: usize,
 }
 
-/// Reads a condition over these columns.
-fn condition(text: &str, columns: &[Column]) -> Result<Condition, Mistake> {
+/// Reads an expression over these columns: true or false, or a number.
+pub(crate) fn expression(
+    text: &str,
+    columns: &[Column],
+    wanted: CellKind,
+) -> Result<Condition, Mistake> {
     let mut parser = Parser {
         tokens: tokens(text)?,
         next: 0,
@@ -157,10 +162,15 @@ fn condition(text: &str, columns: &[Column]) -> Result<Condition, Mistake> {
         let expected = "expected `and`, `or`, a comparison, or the end";
         return Err(mistake("the expression goes on after its end", span, expected));
     }
-    if root.kind != CellKind::Flag {
-        let title =
-            format!("the expression is {}, which neither holds nor fails", root.kind.name());
-        return Err(mistake(title, root.span, "expected a comparison, as in `ratio_max < 1.5`"));
+    if root.kind != wanted {
+        let (not, expected) = match wanted {
+            CellKind::Flag => {
+                ("neither holds nor fails", "expected a comparison, as in `ratio_max < 1.5`")
+            }
+            _ => ("cannot be minimised", "expected a number, as in `max(ratio_max)`"),
+        };
+        let title = format!("the expression is {}, which {not}", root.kind.name());
+        return Err(mistake(title, root.span, expected));
     }
     let Parser { used, folds, by_row, .. } = parser;
     let by_row = by_row || folds.is_empty();
@@ -354,6 +364,7 @@ impl Parser<'_> {
             "min" => Some(Fold::Least),
             "max" => Some(Fold::Greatest),
             "mean" => Some(Fold::Mean),
+            "quantile" => Some(Fold::Quantile(f64::NAN)),
             _ => None,
         };
         if fold.is_some() && self.in_fold {
@@ -365,6 +376,10 @@ impl Parser<'_> {
         let inner = self.deeper(Self::any_of);
         self.in_fold = outer;
         let inner = inner?;
+        let fold = match fold {
+            Some(Fold::Quantile(_)) => Some(Fold::Quantile(self.part()?)),
+            other => other,
+        };
         let end = self.closing()?;
         let wanted = match fold {
             Some(Fold::Count | Fold::Share) => CellKind::Flag,
@@ -379,6 +394,23 @@ impl Parser<'_> {
             None => Node::Absolute(Box::new(inner.node)),
         };
         Ok(Typed { node, kind: CellKind::Number, span: span.start..end })
+    }
+
+    /// The part of all rows that a quantile is of.
+    fn part(&mut self) -> Result<f64, Mistake> {
+        let expected = "expected a comma and a number from 0 to 1, as in `quantile(x, 0.95)`";
+        let (sign, span) = self.take();
+        if sign != Token::Sign(",") {
+            return Err(mistake(
+                "`quantile` takes a number and a part of all rows",
+                span,
+                expected,
+            ));
+        }
+        match self.take() {
+            (Token::Number(part), _) if part <= 1.0 => Ok(part),
+            (_, span) => Err(mistake("no part of all rows", span, expected)),
+        }
     }
 
     /// The end of a closing parenthesis.

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use arrow_array::ArrayRef;
-use arrow_schema::{ArrowError, DataType, Field};
+use arrow_array::{ArrayRef, RecordBatch};
+use arrow_schema::{ArrowError, DataType, Field, Schema};
 use parquet::arrow::ProjectionMask;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
@@ -50,6 +50,8 @@ pub struct Column {
     pub whole: bool,
     /// Which way it is bad, if the file says so.
     pub worse: Option<Worse>,
+    /// Up to where it is good, if the file says so.
+    pub limit: Option<f64>,
     field: usize,
 }
 
@@ -118,8 +120,7 @@ impl ResultTable {
 
     /// The columns of an open file.
     pub fn of(file: ParquetFile) -> Self {
-        let fields = file.schema().fields().iter().enumerate();
-        let columns = fields.filter_map(|(place, field)| column(field, place)).collect();
+        let columns = columns(file.schema());
         let plan = file.value(key::PLAN).and_then(|plan| serde_json::from_str(plan).ok());
         Self { columns, plan, file }
     }
@@ -223,6 +224,13 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// These columns of rows in memory.
+    pub(crate) fn of(batch: &RecordBatch, columns: &[Column]) -> Result<Self, ArrowError> {
+        let decoded = |column: &Column| decode(batch.column(column.field), column.kind);
+        let columns = columns.iter().map(decoded).collect::<Result<_, _>>()?;
+        Ok(Self { first: 0, count: batch.num_rows(), columns })
+    }
+
     /// The cell of a row in the `column`-th of the columns that were asked for.
     pub fn cell(&self, column: usize, row: usize) -> Cell {
         match self.columns.get(column) {
@@ -270,6 +278,13 @@ fn decode(array: &ArrayRef, kind: CellKind) -> Result<Decoded, ArrowError> {
     })
 }
 
+/// The columns of rows, without those of types that none of our files has.
+#[must_use]
+pub fn columns(schema: &Schema) -> Vec<Column> {
+    let fields = schema.fields().iter().enumerate();
+    fields.filter_map(|(place, field)| column(field, place)).collect()
+}
+
 fn column(field: &Field, place: usize) -> Option<Column> {
     let kind = match field.data_type() {
         DataType::Boolean => CellKind::Flag,
@@ -286,6 +301,7 @@ fn column(field: &Field, place: usize) -> Option<Column> {
         kind,
         whole: field.data_type().is_integer(),
         worse: Worse::named(&told(key::WORSE)),
+        limit: told(key::LIMIT).parse().ok(),
         field: place,
     })
 }

@@ -210,24 +210,6 @@ impl<'a> ModelEngine<'a> {
         (found.len() == axis_values.len()).then_some(found)
     }
 
-    /// Evaluates rows until `next` gives none, each with what it is known by and the values of the
-    /// axes, and hands each outcome to `keep`, in any order; fewer if `watch` stopped it. On all
-    /// threads of the rayon pool that it is called in.
-    pub(crate) fn evaluate_rows(
-        &self,
-        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
-        keep: &(dyn Fn(Done) + Sync),
-        watch: &Watch<'_>,
-    ) {
-        let columns = Columns::of_run(self.plan);
-        let keep = |outcome: Outcome| keep(columns.done(outcome));
-        let feed = |most: usize| {
-            let rows = std::iter::from_fn(next).take(most);
-            rows.map(|(row, values)| (row, self.plan.scenario_at(&values))).collect()
-        };
-        self.through_lanes(Demand::Row, &feed, &keep, watch);
-    }
-
     /// Rows from a feed to a keeper, on all threads of the rayon pool this is called in.
     fn through_lanes(&self, demand: Demand, feed: &Feed<'_>, keep: &Keep<'_>, watch: &Watch<'_>) {
         let pool = Pool { engine: self, demand, feed, keep, watch, shared: Shared::default() };
@@ -314,12 +296,17 @@ pub(crate) fn together_or_alone<I, R>(
 impl Engine for ModelEngine<'_> {
     fn evaluate(
         &self,
-        feed: &(dyn Fn() -> Option<u64> + Sync),
+        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
         keep: &(dyn Fn(Done) + Sync),
         watch: &Watch<'_>,
     ) {
-        let next = || feed().map(|point| (point, self.plan.axis_values(point)));
-        self.evaluate_rows(&next, keep, watch);
+        let columns = Columns::of_run(self.plan);
+        let keep = |outcome: Outcome| keep(columns.done(outcome));
+        let feed = |most: usize| {
+            let rows = std::iter::from_fn(next).take(most);
+            rows.map(|(row, values)| (row, self.plan.scenario_at(&values))).collect()
+        };
+        self.through_lanes(Demand::Row, &feed, &keep, watch);
     }
 
     fn simd(&self) -> &str {

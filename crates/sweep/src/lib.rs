@@ -64,7 +64,7 @@ pub use identity::{NUMERICS_VERSION, VERSION};
 pub use library::{
     BoundaryOptions, Effort, Evaluated, Evaluator, Explained, PointTable, RanToFile, ResultTable,
     TraceOptions, explain_point, find_boundary, find_modes, find_stability, list_parameters,
-    run_to_file, stability_to_file, trace_point,
+    optimise_study, run_to_file, stability_to_file, trace_point,
 };
 pub use method::Integrator;
 pub use model::Washer;

@@ -117,7 +117,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
 
 /// Resonances of the plan's own machine, before the axes, up to its greatest speed; none where it
 /// has no modes.
-fn resonances(plan: &Plan) -> Vec<[String; 3]> {
+pub(crate) fn resonances(plan: &Plan) -> Vec<[String; 3]> {
     let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
     let machines = [(plan.model.machine.clone(), plan.model.spin.clone())];
     let greatest_rpm = plan.model.spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;

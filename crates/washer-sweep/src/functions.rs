@@ -67,6 +67,28 @@ pub(crate) fn stability(
     ended::file(py, ran, &out)
 }
 
+/// Candidates of a study.
+#[pyfunction]
+#[pyo3(signature = (study, out=None, *, set=None, threads=None, progress=true, fresh=false))]
+pub(crate) fn optimise(
+    py: Python<'_>,
+    study: PathBuf,
+    out: Option<PathBuf>,
+    set: Option<&Bound<'_, PyMapping>>,
+    threads: Option<usize>,
+    progress: bool,
+    fresh: bool,
+) -> PyResult<PyResultTable> {
+    let sets = assignments(set)?;
+    let found = attended(py, |interrupt| {
+        let effort = Effort { threads, progress: ended::mode(progress), interrupt };
+        sweep::optimise_study(&study, &sets, out.as_deref(), fresh, effort)
+    })?;
+    let found = found.or_raise(py, |_| errors::early(py))?;
+    let found = found.map_err(|error| errors::error(py, &error))?;
+    found.map(PyResultTable::new).ok_or_else(|| errors::early(py))
+}
+
 /// Why the linear model fails at a point.
 #[pyfunction]
 #[pyo3(signature = (plan, at=None, *, speeds_rpm=None, threads=None))]

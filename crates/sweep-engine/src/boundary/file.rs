@@ -10,7 +10,7 @@ use super::{Edge, Traced, TracedRow};
 use crate::plan::Plan;
 use crate::store::{Job, Rows};
 use crate::table::Table;
-use sweep_files::key;
+use sweep_files::{FileKind, key};
 
 /// One line of the file.
 struct Line<'a> {
@@ -36,6 +36,7 @@ pub fn job<'a, M: Rows>(
     task: &BoundaryTask,
 ) -> Job<'a> {
     let mut job = Job::of(plan);
+    job.layout.kind = FileKind::Boundary;
     job.plan["boundary"] = asked(quantity, task);
     job
 }

@@ -9,8 +9,10 @@ pub mod examples;
 pub mod export;
 pub mod grid;
 pub mod merge;
+pub mod optimise;
 pub mod parameters;
 pub mod plot;
+pub mod report;
 pub mod require;
 pub mod run;
 pub mod schema;
@@ -41,10 +43,14 @@ enum Command {
     Check(check::Args),
     /// Trace the curve where a ratio, or any other quantity, is at its limit
     Boundary(boundary::Args),
+    /// Find the parameters at which some numbers are least, within limits
+    Optimise(optimise::Args),
     /// Show what a result file holds: verdicts and extremes
     Show(show::Args),
     /// Draw a map or a boundary
     Plot(plot::Args),
+    /// Write one page to print: verdicts, the worst, pictures, the model in words
+    Report(report::Args),
     /// Check expressions on a result, and show the rows that break them
     Require(require::Args),
     /// Say what differs between two results
@@ -79,8 +85,10 @@ fn run<M: Swept>(command: &Command) -> Result<Exit, Error> {
         Command::Run(args) => run::run::<M>(args),
         Command::Check(args) => check::run::<M>(args),
         Command::Boundary(args) => boundary::run::<M>(args),
+        Command::Optimise(args) => optimise::run::<M>(args),
         Command::Show(args) => show::run(args, &show::Further::NONE),
         Command::Plot(args) => plot::run(args),
+        Command::Report(args) => report::run::<M>(args, &show::Further::NONE, &|_| Vec::new()),
         Command::Require(args) => require::run(args),
         Command::Compare(args) => compare::run(args, M::BUILD),
         Command::Export(args) => export::run(args),

@@ -101,7 +101,8 @@ pub fn axes<M: Read>(
     draft.plan.design = design.map(|design| design.value);
 }
 
-fn add<M: Read>(axis: Axis<M>, at: Location, draft: &mut Draft<'_, M>) {
+/// Adds an axis to the plan.
+pub fn add<M: Read>(axis: Axis<M>, at: Location, draft: &mut Draft<'_, M>) {
     draft.report.put(format!("axis[{}]", draft.plan.axes.len()), at);
     draft.plan.axes.push(axis);
 }
@@ -285,7 +286,11 @@ fn list(
 }
 
 /// A range: with a count, or for so many points of a design.
-fn spacing(section: Section<'_>, range: Range, points: Option<u64>) -> Option<Located<AxisValues>> {
+pub fn spacing(
+    section: Section<'_>,
+    range: Range,
+    points: Option<u64>,
+) -> Option<Located<AxisValues>> {
     let (at, report) = (section.at().clone(), section.report);
     let [from, to] =
         ["from", "to"].map(|key| section.require(section.number(key, range), key, "a number"));

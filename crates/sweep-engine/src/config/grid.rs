@@ -96,7 +96,8 @@ pub fn plain_name(text: &str) -> Result<String, String> {
     if is_plain(text) { Ok(text.to_owned()) } else { Err(format!("expected {PLAIN_NAME}")) }
 }
 
-fn name(root: &Section<'_>, path: &Path) -> String {
+/// The name that a file gives its run, or its own.
+pub fn name(root: &Section<'_>, path: &Path) -> String {
     match root.text("name") {
         Field::Given(found) if is_plain(found.value) => return found.value.to_owned(),
         Field::Given(found) => {

@@ -83,8 +83,9 @@ impl<M: Read> GridInput<M> {
     /// The grid that a result was made of, by its plan in the result (`Plan::to_json`). The points
     /// of a design are left out.
     pub fn of_plan(name: &str, plan: &Value) -> Self {
-        let is_read =
-            |key: &str| !["design", "set", "boundary"].contains(&key) && Some(key) != M::OWN_FILE;
+        let is_read = |key: &str| {
+            !["design", "set", "boundary", "optimise"].contains(&key) && Some(key) != M::OWN_FILE
+        };
         let entries = |value: Option<&'_ Value>| -> Vec<(String, Value)> {
             let object = value.and_then(Value::as_object).into_iter().flatten();
             object.map(|(key, value)| (key.clone(), value.clone())).collect()

@@ -106,7 +106,11 @@ impl<'a> Section<'a> {
 
     /// Refuses these keys with a reason of their own instead of "unknown key".
     pub fn misplace(&self, keys: &[&'static str], reason: &str) {
-        self.misplaced.borrow_mut().extend(keys.iter().map(|&key| (key, reason.to_owned())));
+        // The first reason is the caller's own.
+        let mut misplaced = self.misplaced.borrow_mut();
+        for key in keys {
+            misplaced.entry(key).or_insert_with(|| reason.to_owned());
+        }
     }
 
     /// Reports a key that must be there.

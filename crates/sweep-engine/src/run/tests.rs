@@ -25,12 +25,12 @@ impl<F: Fn(u64) + Sync> Formula<F> {
 impl<F: Fn(u64) + Sync> Engine for Formula<F> {
     fn evaluate(
         &self,
-        next: &(dyn Fn() -> Option<u64> + Sync),
+        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
         keep: &(dyn Fn(Done) + Sync),
         watch: &Watch<'_>,
     ) {
         rayon::broadcast(|_| {
-            while let Some(point) = next() {
+            while let Some((point, _)) = next() {
                 (self.on_point)(point);
                 if watch.stopped() {
                     return;

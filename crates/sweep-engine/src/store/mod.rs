@@ -155,11 +155,6 @@ impl Folder {
         Ok(folder)
     }
 
-    /// Those of the search with this output.
-    fn of_search(output: &Path) -> Result<Self, StoreError> {
-        Self::beside(output, FileKind::Boundary)
-    }
-
     fn beside(output: &Path, kind: FileKind<'_>) -> Result<Self, StoreError> {
         files::judge(output, kind)?;
         let mut name = output.file_name().unwrap_or_default().to_owned();

@@ -70,7 +70,7 @@ impl Trials {
     /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::File`] for
     /// anything else at the output that is not ours, and for the file system.
     pub fn open(output: &Path, job: &Job<'_>, fresh: bool) -> Result<OpenedTrials, StoreError> {
-        let folder = Folder::of_search(output)?;
+        let folder = Folder::beside(output, job.layout.kind)?;
         if !fresh && !folder.path.exists() && is_finished(&folder, job)? {
             return Ok(OpenedTrials::Finished);
         }
@@ -174,9 +174,9 @@ fn contents(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> Result<(File, usize, K
 fn is_finished(folder: &Folder, job: &Job<'_>) -> Result<bool, StoreError> {
     let Some(file) = read::finished(&folder.output)? else { return Ok(false) };
     let ours = PlanFile::of(job);
-    let was = frozen(&file, &ours).ok_or_else(|| {
-        let reason = "its metadata is not that of a result of `sweep boundary`";
-        let error = parquet::errors::ParquetError::General(reason.into());
+    let was = frozen(&file, job.layout.kind, &ours).ok_or_else(|| {
+        let reason = format!("its metadata is not that of a {}", job.layout.kind.name());
+        let error = parquet::errors::ParquetError::General(reason);
         StoreError::parquet("read", file.path())(error)
     })?;
     if was.plan_hash != ours.plan_hash {
@@ -191,8 +191,8 @@ fn is_finished(folder: &Folder, job: &Job<'_>) -> Result<bool, StoreError> {
 }
 
 /// The plan that a finished file was made with.
-fn frozen(file: &ParquetFile, ours: &PlanFile) -> Option<PlanFile> {
-    if !FileKind::Boundary.has_keys(&|key| file.value(key).is_some()) {
+fn frozen(file: &ParquetFile, kind: FileKind<'_>, ours: &PlanFile) -> Option<PlanFile> {
+    if !kind.has_keys(&|key| file.value(key).is_some()) {
         return None;
     }
     Some(PlanFile {

@@ -9,6 +9,7 @@ pub(crate) mod influence;
 mod machine;
 pub(crate) mod map;
 pub(crate) mod matrix;
+pub(crate) mod optimise;
 pub(crate) mod passages;
 pub(crate) mod shapes;
 pub(crate) mod stability;

@@ -8,6 +8,7 @@ mod live;
 mod report;
 
 pub(crate) use design::page_of as design_page;
+pub(crate) use report::about;
 
 use serde_json::{Map as Object, Value, json};
 
@@ -31,6 +32,7 @@ use super::table::{Column, Table};
 use sweep_parameter::Worse;
 
 const PAGE: &str = include_str!("page.html");
+const SHEET: &str = include_str!("sheet.html");
 const STYLE: &str = include_str!("style.css");
 const CORE: &str = include_str!("core.js");
 const CHART: &str = include_str!("chart.js");
@@ -109,7 +111,7 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
         },
         "statuses": map.statuses,
         "traces": traces,
-        "about": report::about(source),
+        "about": json!(about(source)),
         "provenance": provenance(source),
     });
     if map.grid.merged() {
@@ -161,6 +163,18 @@ pub(crate) fn with_still(page: &[u8], picture: &[u8]) -> Vec<u8> {
     let picture = embed::bytes(picture.iter().copied());
     // It stands before the data, which might hold anything.
     String::from_utf8_lossy(page).replacen("{{still}}", &picture, 1).into_bytes()
+}
+
+/// A page of this body, which is HTML, without scripts: to be read and printed.
+#[must_use]
+pub fn sheet(title: &str, body: &str) -> String {
+    SHEET.replace("{{title}}", &escape(title)).replace("{{style}}", STYLE).replace("{{body}}", body)
+}
+
+/// An SVG picture as an element: names within it are its own.
+pub(crate) fn picture(svg: &[u8]) -> String {
+    let data = embed::bytes(svg.iter().copied());
+    format!("<img alt=\"figure\" src=\"data:image/svg+xml;base64,{data}\">")
 }
 
 fn page(title: &str, mut data: Value, scripts: &[&str]) -> String {

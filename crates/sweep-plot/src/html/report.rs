@@ -1,13 +1,13 @@
 //! A run in words: what a reader of the page must know of it without the program.
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::label::{significant, unit_of_name, words};
 use crate::read::Source;
 use sweep_files::key;
 
 /// Title and text of what was run, from the plan in the file; empty if it carries none.
-pub(crate) fn about(source: &Source) -> Vec<Value> {
+pub(crate) fn about(source: &Source) -> Vec<(&'static str, String)> {
     let Some(plan) = source.find(key::PLAN) else { return Vec::new() };
     let lines = [
         ("Machine", machine(&plan["machine"])),
@@ -16,7 +16,7 @@ pub(crate) fn about(source: &Source) -> Vec<Value> {
         ("Method", method(&plan["integrator"])),
         ("Verdict", verdict(&plan["reliability"])),
     ];
-    lines.into_iter().filter_map(|(title, text)| Some(json!([title, text?]))).collect()
+    lines.into_iter().filter_map(|(title, text)| Some((title, text?))).collect()
 }
 
 /// A number under a key, with the unit that the key's end says.

@@ -35,6 +35,13 @@ pub(super) const SHOW: Examples = &[
     ["sweep show map.parquet --json", "the same for a program"],
 ];
 
+/// Of `sweep report`.
+pub(super) const REPORT: Examples = &[
+    ["sweep report map.parquet", "to map.html: print it from a browser"],
+    ["sweep report map.parquet dwell.parquet modes.parquet", "with their figures"],
+    ["sweep report map.parquet --require 'min(slip_margin_nonlinear_n)>0'", "a limit of your own"],
+];
+
 /// Of `sweep require`.
 pub(super) const REQUIRE: Examples = &[
     ["sweep require map.parquet 'ratio_max<1.5' 'min_gap_nonlinear_m>0'", "of every row"],
@@ -53,6 +60,13 @@ pub(super) const COMPARE: Examples = &[
 pub(super) const EXPORT: Examples = &[
     ["sweep export map.parquet map.csv", "text; units in comments (pandas: comment=\"#\")"],
     ["sweep export map.parquet map.xlsx", "a workbook: rows, columns with units, plan"],
+];
+
+/// Of `sweep optimise`.
+pub(super) const OPTIMISE: Examples = &[
+    ["sweep optimise study.toml", "to results/NAME.parquet; after an interruption, it goes on"],
+    ["sweep optimise study.toml --best machine.toml", "and the machine file of the best"],
+    ["sweep optimise study.toml --best soft.toml --candidate 412", "of another one"],
 ];
 
 /// Of `sweep boundary`.

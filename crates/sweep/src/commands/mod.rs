@@ -25,7 +25,7 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use sweep_engine::commands::examples::{self, Examples};
 use sweep_engine::commands::{
-    boundary, check, compare, export, parameters, require, show as show_engine,
+    boundary, check, compare, export, optimise, parameters, report, require, show as show_engine,
 };
 
 use sweep_engine::exit::{Error, Exit};
@@ -44,8 +44,8 @@ const EXAMPLES: Examples = &[
 /// Subcommands by what they are for, as help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Run", &["run", "check"]),
-    ("Ask", &["boundary", "trace", "modes", "stability", "dwell", "explain"]),
-    ("Look", &["show", "plot", "require", "compare", "export"]),
+    ("Ask", &["boundary", "trace", "modes", "stability", "dwell", "explain", "optimise"]),
+    ("Look", &["show", "plot", "report", "require", "compare", "export"]),
     ("Cluster", &["status", "merge", "slurm"]),
     ("Set up", &["init", "parameters", "schema", "man", "completions"]),
 ];
@@ -85,10 +85,14 @@ pub enum Command {
     Dwell(dwell::Args),
     /// Explain why the linear model fails at one point
     Explain(explain::Args),
+    /// Find the parameters at which some numbers are least, within limits
+    Optimise(optimise::Args),
     /// Show what a result file holds: verdicts, extremes, metrics
     Show(show_engine::Args),
     /// Draw a file: map, boundary, time histories, Campbell diagram
     Plot(plot::Args),
+    /// Write one page to print: verdicts, the worst, pictures, the machine
+    Report(report::Args),
     /// Check expressions on a result, and show the rows that break them
     Require(require::Args),
     /// Say what differs between two results
@@ -126,6 +130,7 @@ fn examples_of(name: &str) -> Examples {
         "status" => lines::STATUS,
         "slurm" => slurm::EXAMPLES,
         "show" => lines::SHOW,
+        "report" => lines::REPORT,
         "require" => lines::REQUIRE,
         "compare" => lines::COMPARE,
         "export" => lines::EXPORT,
@@ -135,6 +140,7 @@ fn examples_of(name: &str) -> Examples {
         "dwell" => dwell::EXAMPLES,
         "explain" => explain::EXAMPLES,
         "boundary" => lines::BOUNDARY,
+        "optimise" => lines::OPTIMISE,
         "plot" => plot::EXAMPLES,
         "parameters" => lines::PARAMETERS,
         "init" => init::EXAMPLES,
@@ -231,6 +237,7 @@ impl Command {
             Self::Status(args) => status::run(args),
             Self::Slurm(args) => slurm::run(args),
             Self::Show(args) => show::run(args),
+            Self::Report(args) => report::run(args, &show::FURTHER, &crate::live::resonances),
             Self::Require(args) => require::run(args),
             Self::Compare(args) => compare::run(args, crate::identity::BUILD),
             Self::Export(args) => export::run(args),
@@ -240,6 +247,7 @@ impl Command {
             Self::Dwell(args) => dwell::run(args),
             Self::Explain(args) => explain::run(args),
             Self::Boundary(args) => boundary::run::<crate::Washer>(args),
+            Self::Optimise(args) => optimise::run::<crate::Washer>(args),
             Self::Plot(args) => plot::run(args),
             Self::Parameters(args) => parameters::run::<crate::Washer>(args),
             Self::Init(args) => init::run(args),

@@ -12,8 +12,11 @@ use washer_row::Metric;
 /// # Errors
 /// As the engine's command.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    show::run(args, &Further { lines: &lines, is_of_a_metric })
+    show::run(args, &FURTHER)
 }
+
+/// What is said beside what all models' files say.
+pub(super) const FURTHER: Further<'static> = Further { lines: &lines, is_of_a_metric };
 
 fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
     if FileKind::Stability.has_keys(&|key| file.value(key).is_some()) {

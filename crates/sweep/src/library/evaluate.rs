@@ -12,7 +12,7 @@ use serde_json::json;
 use super::Effort;
 use super::points::PointTable;
 use super::result::{MapPlan, ResultTable};
-use crate::engine::{ModelEngine, Watch};
+use crate::engine::{Engine, ModelEngine, Watch};
 use crate::plan::Plan;
 use sweep_engine::exit::Error;
 use sweep_engine::progress::Progress;
@@ -83,10 +83,7 @@ impl Evaluator {
             Some(ladders) => ModelEngine::with_ladders(&self.plan, ladders.clone())?,
             None => ModelEngine::new(&self.plan)?,
         };
-        let evaluated = in_memory(job, effort, &|next, keep, watch| {
-            let feed = || next().map(|point| (point, (job.axis_values)(point)));
-            engine.evaluate_rows(&feed, keep, watch);
-        })?;
+        let evaluated = in_memory(job, effort, &engine)?;
         if let Some(found) = engine.ladders_found() {
             // Another call may have found the same.
             let _ = self.ladders.set(found.clone());
@@ -95,11 +92,6 @@ impl Evaluator {
     }
 }
 
-/// Computes rows: takes their numbers from the first until there are no more, and hands on the
-/// outcome of each.
-type Compute<'a> =
-    dyn Fn(&(dyn Fn() -> Option<u64> + Sync), &(dyn Fn(Done) + Sync), &Watch<'_>) + Sync + 'a;
-
 /// Every row of a job, in memory.
 ///
 /// # Errors
@@ -107,13 +99,16 @@ type Compute<'a> =
 pub(super) fn in_memory(
     job: &Job<'_>,
     effort: Effort<'_>,
-    compute: &Compute<'_>,
+    engine: &dyn Engine,
 ) -> Result<Evaluated, Error> {
     let threads = effort.threads()?;
     let pool = threads::pool(threads)?;
     let watch = Watch::new(effort.interrupt);
     let rows = Mutex::new(0..job.points);
-    let next = || if watch.stopped() { None } else { lock(&rows).next() };
+    let next = || {
+        let row = if watch.stopped() { None } else { lock(&rows).next() }?;
+        Some((row, (job.axis_values)(row)))
+    };
     let gathered = Gathered::new(job);
     let keep = |outcome| gathered.keep(outcome, &watch);
     let mut progress = Progress::new(effort.progress, job.points, 0);
@@ -123,7 +118,7 @@ pub(super) fn in_memory(
         let (pool, next, keep, watch) = (&pool, &next, &keep, &watch);
         let work = move || {
             let _working = working;
-            pool.install(|| compute(next, keep, watch));
+            pool.install(|| engine.evaluate(next, keep, watch));
         };
         let work = std::thread::Builder::new()
             .spawn_scoped(scope, work)

@@ -5,7 +5,6 @@ use std::path::Path;
 use super::evaluate::{Evaluated, in_memory};
 use super::run::{RanToFile, into_file};
 use super::{Effort, refused_speeds};
-use crate::engine::Engine as _;
 use crate::plan::Plan;
 use crate::speeds::MOST_SPEEDS;
 use crate::stability::{DwellEngine, check};
@@ -24,7 +23,7 @@ pub fn find_stability(
     check_speeds(plan, speeds_rpm)?;
     let engine = DwellEngine::new(plan, speeds_rpm)?;
     let job = crate::stability::job(plan, speeds_rpm);
-    in_memory(&job, effort, &|next, keep, watch| engine.evaluate(next, keep, watch))
+    in_memory(&job, effort, &engine)
 }
 
 /// As [`find_stability`], into a result file: the bytes of `sweep stability`, resumed if it was

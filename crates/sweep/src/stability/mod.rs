@@ -192,7 +192,7 @@ fn failed(row: u64, status: Status) -> Outcome {
 impl Engine for DwellEngine<'_> {
     fn evaluate(
         &self,
-        next: &(dyn Fn() -> Option<u64> + Sync),
+        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
         keep: &(dyn Fn(Done) + Sync),
         watch: &Watch<'_>,
     ) {
@@ -206,7 +206,8 @@ impl Engine for DwellEngine<'_> {
         let is_stopped = || watch.stopped();
         rayon::broadcast(|_| {
             while !watch.stopped() {
-                let rows: Vec<u64> = std::iter::from_fn(next).take(at_once as usize).collect();
+                let rows = std::iter::from_fn(next).map(|(row, _)| row);
+                let rows: Vec<u64> = rows.take(at_once as usize).collect();
                 if rows.is_empty() {
                     break;
                 }

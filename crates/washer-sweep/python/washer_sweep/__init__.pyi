@@ -24,6 +24,7 @@ __all__ = [
     "__version__",
     "explain",
     "modes",
+    "optimise",
     "parameters",
     "read",
     "stability",
@@ -159,7 +160,9 @@ class Result:
     @property
     def kind(
         self,
-    ) -> Literal["map", "boundary", "trace", "modes", "stability", "dwell", "differences"]: ...
+    ) -> Literal[
+        "map", "boundary", "trace", "modes", "stability", "dwell", "study", "differences"
+    ]: ...
     @property
     def plan(self) -> dict[str, Any]:
         """The plan that it came of, as its file carries it; of differences, what was compared."""
@@ -183,6 +186,21 @@ def modes(
 
     Of the plan's machine, axes left aside unless `at` gives them values; without a plan, of the
     built-in machine.
+    """
+
+def optimise(
+    study: str | PathLike[str],
+    out: str | PathLike[str] | None = None,
+    *,
+    set: Mapping[str, float] | None = None,
+    threads: int | None = None,
+    progress: bool = True,
+    fresh: bool = False,
+) -> Result:
+    """The candidates of a study file: what is least over its parameters, within its conditions.
+
+    `set` gives constants over those of its grid. With `out` it writes that Parquet file, byte for
+    byte as `sweep optimise` does, and goes on there after an interruption.
     """
 
 def stability(

@@ -1,0 +1,189 @@
+//! `sweep optimise STUDY.toml`: the least of some numbers over some parameters.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::cells::{table as text_table, word};
+use super::grid::quoted;
+use super::run::line;
+use crate::boundary::search::Stopped;
+use crate::effort::Effort;
+use crate::exit::{Error, Exit, tell};
+use crate::interrupt::Interrupt;
+use crate::optimise::Study;
+use crate::optimise::file::{own_file, parameters, table};
+use crate::optimise::search::search;
+use crate::program::program;
+use crate::progress::{ProgressMode, duration};
+use crate::store::{OpenedTrials, StoreError, Trials};
+use crate::swept::Swept;
+use crate::threads;
+use sweep_files::{FileKind, Output, atomic, key};
+use sweep_parameter::Parameter as _;
+use sweep_results::{Cell, ResultTable};
+
+/// Arguments of `sweep optimise`.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = LONG)]
+pub struct Args {
+    /// Study file
+    #[arg(value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// Set a constant of the grid file that the study names; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    sets: Vec<String>,
+    /// File of all candidates [default: results/NAME.parquet]
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write the model's own file (of a washing machine: the machine file) of the best candidate
+    #[arg(long, value_name = "FILE")]
+    best: Option<PathBuf>,
+    /// With --best: of this candidate instead
+    #[arg(long, value_name = "N", requires = "best")]
+    candidate: Option<u64>,
+    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    threads: Option<usize>,
+    /// Start over, even if the file is there or another study was begun
+    #[arg(long)]
+    fresh: bool,
+    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
+    /// 5 s) or none
+    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
+    progress: ProgressMode,
+}
+
+/// What `--help` adds.
+const LONG: &str = "\
+A study names a grid file, numbers to minimise or maximise, parameters with bounds, and \
+conditions as `sweep require` takes them. Every candidate is tried at all points of the grid. \
+docs/optimise.md describes study files.
+
+Of several objectives the front is looked for: the candidates that no other beats in all of them. \
+The best is then the one of them that is nearest to the least of each.
+
+The file is a pure function of its input, whatever the number of threads and interruptions. What \
+an interrupted search has found out stays in FILE.partial, and the same command goes on there.";
+
+/// Most candidates that the summary lists.
+const LISTED: usize = 12;
+
+/// Searches, and says what came of it.
+///
+/// # Errors
+/// Mistakes in the study and its grid file, and whatever keeps a file from being written.
+pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+    let study = Study::<M>::load(&args.study, &args.sets)?;
+    let default = || PathBuf::from(format!("results/{}.parquet", study.name));
+    let output = args.out.clone().unwrap_or_else(default);
+    let file = Output::begin(&output, FileKind::Optimise)?;
+    let interrupt = Interrupt::install().map_err(|source| Error::File {
+        action: "install signal handlers for",
+        path: PathBuf::from("this process"),
+        source,
+    })?;
+    let mut trials = match Trials::open(&output, &study.job(), args.fresh)? {
+        OpenedTrials::Open(trials) => *trials,
+        OpenedTrials::Finished => {
+            return told(&study, args, &output, "it is there already (--fresh searches again)");
+        }
+    };
+    trials.take_notes().iter().for_each(|note| tell(note));
+    let began = Instant::now();
+    let effort = Effort { threads: args.threads, progress: args.progress, interrupt: &interrupt };
+    let (tried, trials) = search(&study, Some(trials), effort)?;
+    let wall_s = began.elapsed().as_secs_f64();
+    let tried = match tried {
+        Ok(tried) => tried,
+        Err(Stopped::Failed(error)) => return Err(error.into()),
+        Err(Stopped::Interrupted) => {
+            let wall = duration(wall_s);
+            tell(&format!("{}: interrupted after {wall}; the same command goes on", study.name));
+            return Ok(match interrupt.signal() {
+                Some(15) => Exit::Terminated,
+                _ => Exit::Interrupted,
+            });
+        }
+    };
+    let bytes = table(&study, &tried).into_bytes();
+    file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;
+    if let Some(note) = trials.and_then(Trials::complete) {
+        tell(&note);
+    }
+    let (candidates, rows) = (tried.len() as u64, study.rows());
+    let how = format!(
+        "{candidates} candidates of {rows} points in {}, {:.0} points/s",
+        duration(wall_s),
+        (candidates * rows) as f64 / wall_s
+    );
+    told(&study, args, &output, &how)
+}
+
+/// The file's content in short, and the model's file of a candidate if one is asked for.
+fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Result<Exit, Error> {
+    let mut text = format!("{}: {how}\n", study.name);
+    let file = ResultTable::open(output)?;
+    let about: serde_json::Value = file
+        .file()
+        .value(key::OPTIMISE)
+        .and_then(|text| serde_json::from_str(text).ok())
+        .unwrap_or_default();
+    let own = parameters(study).iter().map(|axis| axis.parameter.name());
+    let objectives = study.objectives.iter().map(|one| one.name.as_str());
+    let names: Vec<&str> =
+        ["candidate", "feasible", "on_front"].into_iter().chain(own).chain(objectives).collect();
+    let chosen = args.candidate.or_else(|| about["best"].as_u64());
+    let (mut feasible, mut front, mut values) = (0, Vec::new(), None);
+    for rows in file.read(&names)? {
+        let rows = rows?;
+        for row in 0..rows.count {
+            let cells: Vec<Cell> = (0..names.len()).map(|column| rows.cell(column, row)).collect();
+            feasible += usize::from(cells[1] == Cell::Flag(true));
+            if rows.first + row as u64 == chosen.unwrap_or(u64::MAX) {
+                let own = cells[3..].iter().take(study.parameters.len());
+                values = own.map(Cell::number).collect::<Option<Vec<f64>>>();
+            }
+            if cells[2] == Cell::Flag(true) {
+                front.push(cells);
+            }
+        }
+    }
+    let all = file.rows();
+    line(&mut text, "feasible", &format!("{feasible} of {all}, {} on the front", front.len()));
+    if let Some(best) = about["best"].as_u64() {
+        line(&mut text, "best", &format!("candidate {best}"));
+    }
+    front.sort_by(|a, b| {
+        let of = |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);
+        of(a).unwrap_or(f64::NAN).total_cmp(&of(b).unwrap_or(f64::NAN))
+    });
+    let listed = front.iter().step_by(front.len().div_ceil(LISTED).max(1));
+    let shown = |cells: &[Cell]| cells.iter().take(1).chain(&cells[3..]).map(word).collect();
+    let headings: Vec<String> =
+        names.iter().take(1).chain(&names[3..]).map(|&name| name.to_owned()).collect();
+    let listed: Vec<Vec<String>> = listed.map(|cells| shown(cells)).collect();
+    text.push_str(&text_table(&headings, &listed, "  "));
+    if let Some(path) = &args.best {
+        let own = values.as_deref().and_then(|values| own_file(study, values));
+        let own = own.ok_or_else(|| Error::Option {
+            option: "--best",
+            given: path.display().to_string(),
+            expected: match chosen {
+                None => "a study with a feasible candidate; this one has none".to_owned(),
+                Some(chosen) => {
+                    format!("a model with a file of its own, and candidate {chosen} of {all}")
+                }
+            },
+        })?;
+        let own = format!("# Candidate {} of {}.\n{own}", chosen.unwrap_or_default(), study.name);
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        atomic::write(folder.unwrap_or(Path::new(".")), path, own.as_bytes())?;
+        line(&mut text, "wrote", &path.display().to_string());
+    }
+    let shown = output.display().to_string();
+    line(&mut text, "file", &shown);
+    line(&mut text, "next", &format!("{} plot {}", program(), quoted(&shown)));
+    tell(text.trim_end());
+    // Nothing that keeps the conditions was found.
+    Ok(if front.is_empty() { Exit::NotHeld } else { Exit::Done })
+}

@@ -1,0 +1,201 @@
+//! `sweep report RESULT [FILE ...]`: one page to print, for whoever decides.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use super::cells::{short, word};
+use super::conditions;
+use super::show::Further;
+use crate::config::GridInput;
+use crate::exit::{Error, Exit, tell};
+use crate::plan::Plan;
+use crate::store::read::tally;
+use crate::swept::Swept;
+use sweep_files::{FileKind, Output, ParquetFile, key};
+use sweep_parameter::Parameter as _;
+use sweep_plot::{described, escape, sheet};
+use sweep_results::{Cell, ResultTable, check, top};
+
+/// Arguments of `sweep report`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A result of `sweep run`
+    #[arg(value_name = "RESULT")]
+    result: PathBuf,
+    /// Further files of this program, each shown with its figure
+    #[arg(value_name = "FILE")]
+    further: Vec<PathBuf>,
+    /// The page [default: RESULT with the ending .html]
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// The question that the page answers
+    #[arg(long, value_name = "TEXT", default_value = "Where can the linear model be trusted?")]
+    question: String,
+    /// What must hold, as `sweep require` takes it; may be repeated
+    #[arg(long = "require", value_name = "EXPRESSION")]
+    requirements: Vec<String>,
+}
+
+/// The resonances of a plan's model: motion, speed (rpm) and damping ratio of each.
+pub type Resonances<M> = dyn Fn(&Plan<M>) -> Vec<[String; 3]>;
+
+/// Writes the page.
+///
+/// # Errors
+/// Files that cannot be read or drawn, mistakes in the requirements, and a page that cannot be
+/// written.
+pub fn run<M: Swept>(
+    args: &Args,
+    further: &Further<'_>,
+    resonances: &Resonances<M>,
+) -> Result<Exit, Error> {
+    let output = args.out.clone().unwrap_or_else(|| args.result.with_extension("html"));
+    let page = Output::begin(&output, FileKind::Html)?;
+    let file = ResultTable::open(&args.result)?;
+    if !FileKind::Map.has_keys(&|key| file.file().value(key).is_some()) {
+        let (option, given) = ("RESULT", args.result.display().to_string());
+        let expected = format!("a {}; other files go behind it", FileKind::Map.name());
+        return Err(Error::Option { option, given, expected });
+    }
+    let requirements = conditions::parse("--require", &args.requirements, &file)?;
+    let (picture, about) = described(&args.result)?;
+    let plan = file.plan.clone().unwrap_or_default();
+    let name = plan["name"].as_str().unwrap_or_default();
+
+    // Writing to a String cannot fail.
+    let mut body = String::new();
+    let _ = writeln!(
+        body,
+        "<header><h1>{}</h1><p>{}</p></header>",
+        escape(&args.question),
+        escape(name)
+    );
+    let tally = tally(file.file())?;
+    let limit = plan["reliability"]["ratio_limit"].as_f64();
+    let share = 100.0 * tally.reliable as f64 / (tally.points as f64).max(1.0);
+    let _ = writeln!(
+        body,
+        "<p class=\"share\">{share:.1} %</p>\n<p>{} of {} points are reliable: both models \
+         differ by less than the factor {}. {} are chaotic, {} have no verdict.</p>",
+        tally.reliable,
+        tally.points,
+        limit.map_or_else(String::new, short),
+        tally.sensitive,
+        tally.undefined
+    );
+    rows(&mut body, "The worst of it", &["", "worst", "limit", "at"], &worst(&file, limit)?);
+    let mut held = true;
+    let mut claims = Vec::new();
+    for condition in &requirements {
+        let checked = check(&file, condition, None, false, 1)?;
+        held &= checked.holds;
+        let folded: Vec<String> = checked.folded.iter().map(word).collect();
+        let found = match checked.by_row {
+            true => {
+                format!("{} of {} rows break it", checked.failing + checked.undefined, checked.rows)
+            }
+            false => folded.join(", "),
+        };
+        let verdict = if checked.holds { "holds" } else { "FAILS" };
+        claims.push(vec![checked.expression, found, verdict.to_owned()]);
+    }
+    rows(&mut body, "What is required", &["", "found", ""], &claims);
+    let _ = writeln!(body, "<figure>{picture}</figure>");
+    for path in &args.further {
+        let opened = ParquetFile::open(path)?;
+        let (picture, _) = described(path)?;
+        let lines = (further.lines)(&opened)?;
+        let lines: Vec<_> =
+            lines.into_iter().map(|(name, text)| vec![name.to_owned(), text]).collect();
+        let shown = path.file_stem().unwrap_or_default().to_string_lossy();
+        rows(&mut body, &shown, &["", ""], &lines);
+        let _ = writeln!(body, "<figure>{picture}</figure>");
+    }
+    let run = GridInput::<M>::of_plan(name, &plan).load();
+    if let Ok(run) = &run {
+        let found: Vec<_> = resonances(run).into_iter().map(Vec::from).collect();
+        let heads = ["motion", "resonance, rpm", "damping ratio"];
+        rows(&mut body, "Resonances of the machine as given", &heads, &found);
+    }
+    let about: Vec<_> =
+        about.into_iter().map(|(title, text)| vec![title.to_owned(), text]).collect();
+    rows(&mut body, "What was run", &["", ""], &about);
+    if let Ok(run) = &run {
+        rows(&mut body, "Where the machine's numbers are from", &["", ""], &sources(run));
+    }
+    let hashes = [key::PLAN_HASH, key::VERSION, key::NUMERICS, key::DIGEST].into_iter();
+    let hashes = hashes.filter_map(|key| Some((key, file.file().value(key)?)));
+    let hashes: Vec<String> = hashes.map(|(key, value)| format!("{key} {value}")).collect();
+    let _ = writeln!(
+        body,
+        "<details><summary>File and hashes</summary><p>{}</p><p>{}</p></details>",
+        escape(&args.result.display().to_string()),
+        escape(&hashes.join(", "))
+    );
+    page.finish(sheet(&args.question, &body).as_bytes())?;
+    tell(&format!("wrote {}", output.display()));
+    Ok(if held { Exit::Done } else { Exit::NotHeld })
+}
+
+/// A table under a heading; nothing without rows.
+fn rows(body: &mut String, title: &str, heads: &[&str], rows: &[Vec<String>]) {
+    if rows.is_empty() {
+        return;
+    }
+    let row = |cells: &[String], cell: &str| {
+        let cells = cells.iter().map(|text| format!("<{cell}>{}</{cell}>", escape(text)));
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
+    };
+    let heads: Vec<String> = heads.iter().map(|head| (*head).to_owned()).collect();
+    let all: String = rows.iter().map(|cells| row(cells, "td")).collect();
+    let head = if heads.iter().all(String::is_empty) { String::new() } else { row(&heads, "th") };
+    let _ = writeln!(
+        body,
+        "<h2>{}</h2>\n<table><thead>{head}</thead><tbody>\n{all}</tbody></table>",
+        escape(title)
+    );
+}
+
+/// Of every quantity of the nonlinear model its worst value, its limit and where it is.
+fn worst(file: &ResultTable, ratio_limit: Option<f64>) -> Result<Vec<Vec<String>>, Error> {
+    let axes = file.axes();
+    let mut found = Vec::new();
+    for column in &file.columns {
+        let name = column.name.as_str();
+        let is_shown = name == "ratio_max" || name.contains("nonlinear") || name.contains("growth");
+        let Some(worse) = column.worse.filter(|_| is_shown) else { continue };
+        let limit = if name == "ratio_max" { ratio_limit } else { column.limit };
+        let columns: Vec<&str> = [name].into_iter().chain(axes.iter().copied()).collect();
+        let rows = top(file, &columns, None, Some((name, worse)), 1)?;
+        let Some([value, at @ ..]) = rows.first().map(Vec::as_slice) else { continue };
+        let Cell::Number(number) = value else { continue };
+        let places = axes.iter().zip(at).map(|(axis, value)| format!("{axis} {}", word(value)));
+        let with_unit =
+            |value: f64| format!("{} {}", short(value), column.unit).trim_end().to_owned();
+        found.push(vec![
+            name.replace('_', " "),
+            with_unit(*number),
+            limit.map_or_else(String::new, with_unit),
+            places.collect::<Vec<_>>().join(", "),
+        ]);
+    }
+    Ok(found)
+}
+
+/// How many of a machine's numbers have which source, with the names of those that are few.
+fn sources<M: Swept>(plan: &Plan<M>) -> Vec<Vec<String>> {
+    const FEW: usize = 12;
+    let mut by_source: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for line in M::listed(Some(plan)).into_iter().filter(|line| line.value.is_some()) {
+        // What follows the colon says why it is assumed.
+        let source = line.source.split(':').next().unwrap_or_default().to_owned();
+        by_source.entry(source).or_default().push(line.parameter.name().to_owned());
+    }
+    let said = |(source, names): (String, Vec<String>)| {
+        let some = names.iter().take(FEW).cloned().collect::<Vec<_>>().join(", ");
+        let more = if names.len() > FEW { ", ..." } else { "" };
+        vec![source, format!("{}: {some}{more}", names.len())]
+    };
+    by_source.into_iter().map(said).collect()
+}

@@ -1,0 +1,301 @@
+//! Differential evolution towards a front: GDE3.
+//!
+//! A trial challenges every member of a generation: another member, moved by a part of the
+//! difference of two more. The better of the two stays, both if neither is better; then the least
+//! crowded of the best fronts go on, as in NSGA-II. With one objective this is plain differential
+//! evolution. What breaks a condition less is better than what breaks it more, whatever its
+//! objectives.
+//!
+//! S. Kukkonen, J. Lampinen, GDE3: the third evolution step of generalized differential evolution,
+//! CEC 2005, 443-450. K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, A fast and elitist
+//! multiobjective genetic algorithm: NSGA-II, IEEE Transactions on Evolutionary Computation 6
+//! (2002), 182-197.
+
+use std::cmp::Ordering;
+
+use crate::design::Design;
+
+/// Share of a trial's coordinates that come from the mutant.
+const CROSSOVER: f64 = 0.9;
+/// Between these, evenly, is the factor of the difference (S. Das, A. Konar, U. K. Chakraborty, Two
+/// improved differential evolution schemes for faster global search, GECCO 2005).
+const FACTOR: [f64; 2] = [0.3, 0.9];
+
+/// What is looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Evolution {
+    /// Coordinates, each from 0 to 1.
+    pub parameters: usize,
+    /// Numbers of an answer that are minimised; the others are excesses over conditions.
+    pub objectives: usize,
+    /// Members of a generation, at least 4.
+    pub population: u64,
+    /// Trials in all.
+    pub candidates: u64,
+    /// Another seed, another search.
+    pub seed: u64,
+}
+
+/// A place that was tried.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// In the unit box.
+    pub place: Vec<f64>,
+    /// Objectives, then excesses; none if one of them is missing.
+    pub answers: Option<Vec<f64>>,
+    /// From 0.
+    pub generation: u64,
+}
+
+impl Candidate {
+    /// Whether it has every number and breaks no condition.
+    #[must_use]
+    pub fn is_feasible(&self, objectives: usize) -> bool {
+        self.answers.as_ref().is_some_and(|all| all[objectives..].iter().all(|&one| one <= 0.0))
+    }
+}
+
+/// Everything that was tried, in order. `ask` answers places, whole generations at a time; all
+/// numbers are minimised. With the same answers it is asked for the same places.
+///
+/// # Errors
+/// Those of `ask`.
+pub fn evolve<E>(
+    evolution: &Evolution,
+    ask: &mut dyn FnMut(&[Vec<f64>]) -> Result<Vec<Option<Vec<f64>>>, E>,
+) -> Result<Vec<Candidate>, E> {
+    let Evolution { parameters, objectives, population, candidates, seed } = *evolution;
+    let mut tried: Vec<Candidate> = Vec::new();
+    let mut members: Vec<usize> = Vec::new();
+    for generation in 0.. {
+        let count = population.min(candidates - tried.len() as u64);
+        if count == 0 {
+            break;
+        }
+        let first = tried.len();
+        let start = Design::LatinHypercube { points: count, seed };
+        let place = |k: u64| -> Vec<f64> {
+            if generation == 0 {
+                return (0..parameters).filter_map(|axis| start.place(k, axis)).collect();
+            }
+            mutant(&tried, &members, k as usize, first as u64 + k, evolution)
+        };
+        let places: Vec<Vec<f64>> = (0..count).map(place).collect();
+        let answers = ask(&places)?;
+        let trials = places.into_iter().zip(answers);
+        tried.extend(trials.map(|(place, answers)| Candidate { place, answers, generation }));
+        if generation == 0 {
+            members = (0..tried.len()).collect();
+            continue;
+        }
+        let ranks = Ranks::of(&tried, objectives);
+        let mut next = Vec::with_capacity(2 * members.len());
+        for (k, &member) in members.iter().enumerate() {
+            let trial = Some(first + k).filter(|&trial| trial < tried.len());
+            match trial.map(|trial| (trial, ranks.compare(trial, member))) {
+                Some((trial, Some(Ordering::Less | Ordering::Equal))) => next.push(trial),
+                Some((trial, None)) => next.extend([member, trial]),
+                Some((_, Some(Ordering::Greater))) | None => next.push(member),
+            }
+        }
+        members = ranks.best(next, population as usize);
+    }
+    Ok(tried)
+}
+
+/// The trial that challenges a member: its number decides what is drawn.
+fn mutant(
+    tried: &[Candidate],
+    members: &[usize],
+    member: usize,
+    number: u64,
+    evolution: &Evolution,
+) -> Vec<f64> {
+    let draws = Design::MonteCarlo { points: evolution.candidates, seed: evolution.seed };
+    let mut axis = 0;
+    let mut draw = || {
+        axis += 1;
+        draws.place(number, axis).unwrap_or(0.5)
+    };
+    let mut others = [member; 4];
+    for k in 1..4 {
+        while others[..k].contains(&others[k]) {
+            others[k] = (draw() * members.len() as f64) as usize;
+        }
+    }
+    let [own, base, plus, minus] = others.map(|other| tried[members[other]].place.as_slice());
+    let factor = FACTOR[0] + (FACTOR[1] - FACTOR[0]) * draw();
+    let sure = (draw() * own.len() as f64) as usize;
+    let coordinate = |k: usize| {
+        let mutated = (base[k] + factor * (plus[k] - minus[k])).clamp(0.0, 1.0);
+        if draw() < CROSSOVER || k == sure { mutated } else { own[k] }
+    };
+    (0..own.len()).map(coordinate).collect()
+}
+
+/// The candidates that are on the front of all: feasible, and beaten in every objective by none.
+#[must_use]
+pub fn front(tried: &[Candidate], objectives: usize) -> Vec<usize> {
+    let ranks = Ranks::of(tried, objectives);
+    let feasible = (0..tried.len()).filter(|&k| tried[k].is_feasible(objectives));
+    let feasible: Vec<usize> = feasible.collect();
+    let beaten =
+        |k: usize| feasible.iter().any(|&other| ranks.compare(other, k) == Some(Ordering::Less));
+    feasible.iter().copied().filter(|&k| !beaten(k)).collect()
+}
+
+/// What candidates are compared by.
+struct Ranks<'a> {
+    tried: &'a [Candidate],
+    objectives: usize,
+    /// Of each candidate the sum of its excesses, each over the greatest of all.
+    broken: Vec<f64>,
+}
+
+impl<'a> Ranks<'a> {
+    fn of(tried: &'a [Candidate], objectives: usize) -> Self {
+        let excesses = || tried.iter().filter_map(|one| Some(&one.answers.as_ref()?[objectives..]));
+        let conditions = excesses().next().map_or(0, <[f64]>::len);
+        let greatest: Vec<f64> = (0..conditions)
+            .map(|k| excesses().map(|all| all[k]).fold(f64::MIN_POSITIVE, f64::max))
+            .collect();
+        let broken = |one: &Candidate| match &one.answers {
+            Some(all) => {
+                all[objectives..].iter().zip(&greatest).map(|(own, most)| own / most).sum()
+            }
+            None => f64::INFINITY,
+        };
+        Self { tried, objectives, broken: tried.iter().map(broken).collect() }
+    }
+
+    fn objectives(&self, candidate: usize) -> &[f64] {
+        self.tried[candidate].answers.as_ref().map_or(&[], |all| &all[..self.objectives])
+    }
+
+    /// `Less` where the first is better; none where each is better in something.
+    fn compare(&self, first: usize, second: usize) -> Option<Ordering> {
+        let [a, b] = [self.broken[first], self.broken[second]];
+        if a > 0.0 || b > 0.0 {
+            return Some(a.total_cmp(&b));
+        }
+        let (mut less, mut greater) = (false, false);
+        for (a, b) in self.objectives(first).iter().zip(self.objectives(second)) {
+            less |= a < b;
+            greater |= a > b;
+        }
+        match (less, greater) {
+            (true, true) => None,
+            (true, false) => Some(Ordering::Less),
+            (false, true) => Some(Ordering::Greater),
+            (false, false) => Some(Ordering::Equal),
+        }
+    }
+
+    /// The best of these by fronts, the least crowded of the last.
+    fn best(&self, mut left: Vec<usize>, most: usize) -> Vec<usize> {
+        let mut chosen = Vec::with_capacity(most);
+        while left.len() + chosen.len() > most && chosen.len() < most {
+            let beaten = |k: &usize| {
+                left.iter().any(|&other| self.compare(other, *k) == Some(Ordering::Less))
+            };
+            let (rest, mut front): (Vec<usize>, Vec<usize>) = left.iter().partition(|k| beaten(k));
+            while front.len() + chosen.len() > most {
+                front.remove(self.most_crowded(&front));
+            }
+            chosen.extend(front);
+            left = rest;
+        }
+        if chosen.len() < most {
+            chosen.extend(left);
+        }
+        chosen
+    }
+
+    /// The place of the member of a front whose neighbours are nearest.
+    fn most_crowded(&self, front: &[usize]) -> usize {
+        let mut distances = vec![0.0; front.len()];
+        for k in 0..self.objectives {
+            let value = |place: usize| self.objectives(front[place]).get(k).copied().unwrap_or(0.0);
+            let mut order: Vec<usize> = (0..front.len()).collect();
+            order.sort_by(|&a, &b| value(a).total_cmp(&value(b)));
+            let [low, high] = [order[0], order[order.len() - 1]];
+            distances[low] = f64::INFINITY;
+            distances[high] = f64::INFINITY;
+            let extent = (value(high) - value(low)).max(f64::MIN_POSITIVE);
+            for of in order.windows(3) {
+                distances[of[1]] += (value(of[2]) - value(of[0])) / extent;
+            }
+        }
+        let nearest = (0..front.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b]));
+        nearest.unwrap_or(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use super::*;
+
+    fn tried(evolution: Evolution, answer: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Vec<Candidate> {
+        let mut ask = |places: &[Vec<f64>]| {
+            Ok::<_, Infallible>(places.iter().map(|place| answer(place)).collect())
+        };
+        let Ok(tried) = evolve(&evolution, &mut ask);
+        assert_eq!(tried.len() as u64, evolution.candidates);
+        assert!(tried.iter().flat_map(|one| &one.place).all(|x| (0.0..=1.0).contains(x)));
+        tried
+    }
+
+    const ONE: Evolution =
+        Evolution { parameters: 2, objectives: 1, population: 32, candidates: 1500, seed: 1 };
+
+    #[test]
+    fn a_narrow_curved_valley_is_followed_to_its_least() {
+        // Rosenbrock's, in [-2, 2]: least at (1, 1), which is (0.75, 0.75) of the box.
+        let found = tried(ONE, |at| {
+            let [x, y] = [4.0 * at[0] - 2.0, 4.0 * at[1] - 2.0];
+            Some(vec![(1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2)])
+        });
+        let best = &found[front(&found, 1)[0]];
+        assert!(best.place.iter().all(|x| (x - 0.75).abs() < 2e-3), "{best:?}");
+    }
+
+    #[test]
+    fn conditions_hold_at_the_least_that_is_found_and_what_has_no_number_loses() {
+        // The least of x + y where x y >= 0.25 is at (0.5, 0.5); nothing is known where x > 0.9.
+        let found = tried(ONE, |at| {
+            let number = vec![at[0] + at[1], (0.25 - at[0] * at[1]).max(0.0)];
+            (at[0] <= 0.9).then_some(number)
+        });
+        let best = &found[front(&found, 1)[0]];
+        let sum = best.answers.as_ref().unwrap()[0];
+        assert!(best.is_feasible(1) && (1.0..1.0005).contains(&sum), "{best:?}");
+        assert_eq!(front(&found[..0], 1), [0; 0]);
+    }
+
+    #[test]
+    fn a_front_is_covered_from_end_to_end() {
+        // Schaffer's: the front is x from 0 to 2, where sqrt(f) + sqrt(g) = 2.
+        let two = Evolution { parameters: 1, objectives: 2, ..ONE };
+        let found = tried(two, |at| {
+            let x = 20.0 * at[0] - 10.0;
+            Some(vec![x * x, (x - 2.0) * (x - 2.0)])
+        });
+        let mut roots: Vec<f64> = front(&found, 2)
+            .iter()
+            .map(|&k| found[k].answers.as_ref().unwrap()[0].sqrt())
+            .collect();
+        roots.sort_by(f64::total_cmp);
+        assert!(roots.len() > 100 && roots[0] < 0.02 && roots[roots.len() - 1] > 1.98, "{roots:?}");
+        assert!(roots.windows(2).all(|pair| pair[1] - pair[0] < 0.1), "{roots:?}");
+    }
+
+    #[test]
+    fn the_same_answers_are_asked_for_the_same_places() {
+        let sphere = |at: &[f64]| Some(vec![at.iter().map(|x| x * x).sum()]);
+        let short = Evolution { candidates: 100, ..ONE };
+        assert_eq!(tried(ONE, sphere)[..96], tried(short, sphere)[..96]);
+        assert_ne!(tried(short, sphere), tried(Evolution { seed: 2, ..short }, sphere));
+    }
+}

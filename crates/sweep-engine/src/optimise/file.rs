@@ -1,0 +1,88 @@
+//! The file of a study: a row per candidate, in the order in which they were tried.
+
+use sweep_files::key;
+use sweep_parameter::Parameter as _;
+
+use super::evolve::{Candidate, front};
+use super::study::Study;
+use crate::config::GridInput;
+use crate::plan::Axis;
+use crate::store::Rows;
+use crate::table::Table;
+
+/// The file of what a study has tried.
+#[must_use]
+pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
+    let objectives = study.objectives.len();
+    let front = front(tried, objectives);
+    let mut table = Table::new(M::BUILD);
+    table.counts("candidate", "index, in the order of trial", 0..tried.len() as u64);
+    table.counts("generation", "from 0", tried.iter().map(|one| one.generation));
+    let values: Vec<Vec<f64>> = tried.iter().map(|one| study.values(&one.place)).collect();
+    for (k, Axis { parameter, .. }) in parameters(study).iter().enumerate() {
+        let column = values.iter().map(|values| Some(values[k]));
+        table.numbers(parameter.name(), parameter.unit(), parameter.description(), column);
+    }
+    let answer = |k: usize, sign: f64| {
+        tried.iter().map(move |one| one.answers.as_ref().map(|answers| sign * answers[k]))
+    };
+    for (k, one) in study.objectives.iter().enumerate() {
+        let unit = if one.goal.unit().is_empty() { "1" } else { one.goal.unit() };
+        let verb = if one.sign > 0.0 { "minimised" } else { "maximised" };
+        let said = format!("{}, {verb}; null where a row has no value", one.goal.text());
+        table.numbers(&one.name, unit, &said, answer(k, one.sign));
+    }
+    for (k, goal) in study.conditions.iter().enumerate() {
+        let said = format!("how far the rows are from keeping {}; 0 where they do", goal.text());
+        table.numbers(&format!("excess_{}", k + 1), "1", &said, answer(objectives + k, 1.0));
+    }
+    let feasible = tried.iter().map(|one| one.is_feasible(objectives));
+    table.flags("feasible", "whether every condition holds", feasible);
+    let on_front = (0..tried.len()).map(|k| front.contains(&k));
+    table.flags("on_front", "whether no feasible candidate beats it in every objective", on_front);
+    let mut about = study.asked();
+    about["best"] = best(tried, &front, objectives).into();
+    let job = study.job();
+    table.metadata(key::PLAN, &job.plan);
+    table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
+    table.metadata(key::OPTIMISE, &about);
+    table
+}
+
+/// The parameters of a study.
+pub fn parameters<M: Rows>(study: &Study<M>) -> &[Axis<M>] {
+    &study.plan.axes[study.grid.axes.len()..]
+}
+
+/// The candidate of the front that is nearest to the least of every objective, each as a part of
+/// its extent over the front.
+fn best(tried: &[Candidate], front: &[usize], objectives: usize) -> Option<usize> {
+    let value = |candidate: usize, k: usize| {
+        tried[candidate].answers.as_ref().map_or(f64::INFINITY, |answers| answers[k])
+    };
+    let extents: Vec<[f64; 2]> = (0..objectives)
+        .map(|k| {
+            let values = || front.iter().map(|&one| value(one, k));
+            [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
+        })
+        .collect();
+    let distance = |candidate: usize| -> f64 {
+        let parts = extents.iter().enumerate().map(|(k, [low, high])| {
+            (value(candidate, k) - low) / (high - low).max(f64::MIN_POSITIVE)
+        });
+        parts.map(|part| part * part).sum()
+    };
+    front.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+}
+
+/// The model's own file with these values of the parameters, if the model has one.
+#[must_use]
+pub fn own_file<M: Rows>(study: &Study<M>, values: &[f64]) -> Option<String> {
+    let mut plan = study.grid.clone();
+    let mut scenario = crate::plan::Scenario { model: plan.model, window_s: plan.window_s };
+    for (axis, &value) in parameters(study).iter().zip(values) {
+        scenario.write(&axis.parameter, value);
+    }
+    plan.model = scenario.model;
+    GridInput::<M>::of_plan(&study.name, &plan.to_json()).own_file
+}

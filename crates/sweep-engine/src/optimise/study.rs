@@ -1,0 +1,382 @@
+//! A study file: what is minimised over which parameters, and what must hold.
+
+use std::io::ErrorKind;
+use std::path::Path;
+
+use serde_json::{Value, json};
+use sweep_files::FileKind;
+use sweep_parameter::{Parameter as _, Range};
+use sweep_results::{Column, Goal, Mistake, columns};
+
+use crate::config::Draft;
+use crate::config::axes::{add, spacing};
+use crate::config::design::{DEFAULT_SEED, MOST_SEED};
+use crate::config::grid::{draft, name};
+use crate::config::parameters::find;
+use crate::config::report::{Diagnostic, Report};
+use crate::config::section::{Field, Section, listed, twice};
+use crate::config::source::{Located, Location, ReadError, beside, read};
+use crate::config::syntax::parse;
+use crate::config::{Diagnostics, GridInput, whole};
+use crate::design::{Design, MOST_AXES};
+use crate::model::Model;
+use crate::plan::{AxisValues, Plan};
+use crate::store::{Job, Rows};
+
+/// Most candidates, most rows that a candidate is tried at, and most parameters.
+const MOST: [u64; 3] = [1_000_000, 100_000, 20];
+
+/// Generations in the default number of candidates.
+const GENERATIONS: u64 = 24;
+
+/// A search for the least of some numbers over some parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Study<M: Model> {
+    /// Name of the study: its file defaults to `results/<name>.parquet`.
+    pub name: String,
+    /// The grid's axes, as ranges, then the parameters: where the rows of candidates are.
+    pub plan: Plan<M>,
+    /// The grid: every candidate is tried at all of its points.
+    pub grid: Plan<M>,
+    /// What is looked for.
+    pub parameters: Vec<Sought>,
+    /// What is least.
+    pub objectives: Vec<Objective>,
+    /// What must hold.
+    pub conditions: Vec<Goal>,
+    /// Candidates of a generation.
+    pub population: u64,
+    /// Candidates in all.
+    pub candidates: u64,
+    /// Another seed, another search.
+    pub seed: u64,
+}
+
+/// The values of a parameter that are looked among.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sought {
+    /// From the least to the greatest, evenly or by the logarithm.
+    pub bounds: AxisValues,
+    /// Products differ from the candidate by up to this part of its value; the grid's design
+    /// spreads them.
+    pub tolerance: f64,
+}
+
+/// A number that is least, or greatest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Objective {
+    /// Name of its column.
+    pub name: String,
+    /// Its number over the rows of a candidate.
+    pub goal: Goal,
+    /// 1 if it is minimised, -1 if it is maximised.
+    pub sign: f64,
+}
+
+impl<M: Rows> Study<M> {
+    /// Reads a study file, and the grid file that it names, with constants over those of the grid.
+    ///
+    /// # Errors
+    /// Every mistake in both, in one pass.
+    pub fn load(path: &Path, sets: &[String]) -> Result<Self, Diagnostics> {
+        let report = Report::default();
+        let study = Self::read(path, sets, &report);
+        match study {
+            Some(study) => report.finish(study),
+            None => Err(report.into_diagnostics()),
+        }
+    }
+
+    fn read(path: &Path, sets: &[String], report: &Report) -> Option<Self> {
+        let shown = path.display();
+        let text = match read(path) {
+            Ok(text) => text,
+            Err(error) => {
+                let refusal =
+                    Diagnostic::new(format!("cannot read the study file {shown}: {error}"));
+                let is_missing =
+                    matches!(&error, ReadError::Io(error) if error.kind() == ErrorKind::NotFound);
+                let help = "docs/optimise.md has one to start from";
+                report.push(if is_missing { refusal.help(help) } else { refusal });
+                return None;
+            }
+        };
+        let source = report.add(shown.to_string(), text.as_str());
+        let table = parse(&text, source, report);
+        let root =
+            Section::new("the study file", Location::new(source, 0..0), table.get_ref(), report);
+        let name = name(&root, path);
+        let grid = root.require(root.text("grid"), "grid", "a grid file, relative to this file");
+        let input = grid.map(|grid| GridInput::file(beside(path, grid.value), sets.to_vec()));
+        let mut draft = input.and_then(|input| draft::<M>(&input, report));
+        let grid = draft.as_ref().map(|draft| draft.plan.clone());
+        if let Some(draft) = &mut draft {
+            flatten(&mut draft.plan);
+        }
+        let design = grid.as_ref().and_then(|grid| grid.design.as_ref());
+        let parameters = parameters(&root, design, &mut draft);
+        let population = root.whole("population", 4..=MOST[0]).or(0);
+        let candidates = root.count("candidates", MOST[0]).or(0);
+        let seed = root.whole("seed", 0..=MOST_SEED).or(DEFAULT_SEED);
+        // Candidates of a single row fill whole groups of lanes.
+        let usual = (10 * parameters.len() as u64).next_multiple_of(8).max(32);
+        let population = population.filter(|&one| one > 0).unwrap_or(usual);
+        let candidates = candidates.filter(|&one| one > 0).unwrap_or(GENERATIONS * population);
+        if let Some(draft) = &draft {
+            whole::steps(draft);
+            M::judge(draft);
+        }
+        // Columns are those of a sound plan.
+        let plan = draft.filter(|_| report.is_clean()).map(|draft| draft.plan);
+        let known = plan.as_ref().map(|plan| columns(&M::layout(plan).schema()));
+        let rows = grid.as_ref().map_or(1, Plan::points);
+        if rows > MOST[1] {
+            let title = format!("a grid of {rows} points for every candidate");
+            report.refuse::<()>(root.at(), title, format!("expected at most {}", MOST[1]));
+        }
+        let goals = Goals { known: known.as_deref(), rows, text: &text, report };
+        let objectives = objectives(&root, &goals);
+        let conditions = root.texts("conditions").given();
+        let conditions = conditions.into_iter().flat_map(|texts| texts.value);
+        let conditions = conditions.filter_map(|text| goals.read(&text, Goal::excess)).collect();
+        root.finish();
+        let (mut plan, grid, seed) = (plan?, grid?, seed?);
+        plan.name.clone_from(&name);
+        Some(Self {
+            name,
+            plan,
+            grid,
+            parameters,
+            objectives,
+            conditions,
+            population,
+            candidates,
+            seed,
+        })
+    }
+
+    /// Rows of a candidate.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.grid.points()
+    }
+
+    /// The candidate's parameters at a place in the box of their bounds, each from 0 to 1.
+    #[must_use]
+    pub fn values(&self, place: &[f64]) -> Vec<f64> {
+        let values = self.parameters.iter().zip(place);
+        values.map(|(parameter, &place)| parameter.bounds.between(place)).collect()
+    }
+
+    /// Values of the plan's axes in a row of a candidate.
+    #[must_use]
+    pub fn axis_values(&self, values: &[f64], row: u64) -> Vec<f64> {
+        let mut at = self.grid.axis_values(row);
+        let own = at.len();
+        let spread = |k: usize| {
+            let place = self.grid.design.as_ref().and_then(|design| design.place(row, own + k));
+            2.0 * place.unwrap_or(0.5) - 1.0
+        };
+        let parameters = self.parameters.iter().zip(values).enumerate();
+        let actual = parameters.map(|(k, (parameter, &value))| match parameter.tolerance {
+            0.0 => value,
+            tolerance => value * (1.0 + tolerance * spread(k)),
+        });
+        at.extend(actual);
+        at
+    }
+
+    /// What the store must know of it.
+    #[must_use]
+    pub fn job(&self) -> Job<'_> {
+        let mut job = Job::of(&self.plan);
+        job.layout.kind = FileKind::Optimise;
+        job.plan["optimise"] = self.asked();
+        job
+    }
+
+    /// What is asked beside the plan.
+    #[must_use]
+    pub fn asked(&self) -> Value {
+        let verb = |one: &Objective| if one.sign > 0.0 { "minimise" } else { "maximise" };
+        let objectives = self.objectives.iter();
+        let objectives =
+            objectives.map(|one| json!({ "name": one.name, verb(one): one.goal.text() }));
+        json!({
+            "grid": self.grid.to_json(),
+            "objective": objectives.collect::<Value>(),
+            "conditions": self.conditions.iter().map(Goal::text).collect::<Value>(),
+            "tolerance": self.parameters.iter().map(|one| one.tolerance).collect::<Value>(),
+            "population": self.population,
+            "candidates": self.candidates,
+            "seed": self.seed,
+        })
+    }
+}
+
+/// Makes every axis a range and drops the design: rows of candidates are anywhere between.
+fn flatten<M: Model>(plan: &mut Plan<M>) {
+    for axis in &mut plan.axes {
+        if let AxisValues::List(_) = axis.values {
+            let [from, to] = axis.values.extremes().map(|k| axis.values.value(k));
+            axis.values = AxisValues::Linear { from, to, count: if from < to { 2 } else { 1 } };
+        }
+    }
+    plan.design = None;
+}
+
+/// Reads every `[[parameter]]`, and adds an axis for each that is right.
+fn parameters<M: Rows>(
+    root: &Section<'_>,
+    design: Option<&Design>,
+    draft: &mut Option<Draft<'_, M>>,
+) -> Vec<Sought> {
+    let (report, sections) = (root.report, root.tables("parameter"));
+    if sections.is_empty() || sections.len() as u64 > MOST[2] {
+        let title = format!("{} tables [[parameter]]", sections.len());
+        let expected = format!("expected from 1 to {}, each with name, from and to", MOST[2]);
+        report.push_missing(Diagnostic::new(title).at(root.at(), expected));
+    }
+    let mut sought = Vec::new();
+    for section in sections {
+        let at = section.at().clone();
+        let name = section.require(section.text("name"), "name", "the name of a parameter");
+        let tolerance = section.number("tolerance", Range::NonNegative);
+        let found = name.as_ref().zip(draft.as_ref()).and_then(|(name, draft)| find(name, draft));
+        let range = found.as_ref().map_or(Range::Any, |parameter| parameter.range());
+        section.misplace(&["count"], "the study has `candidates`, and finds the values itself");
+        let bounds = spacing(section, range, Some(2));
+        let spread = match tolerance {
+            Field::Given(part) if part.value >= 1.0 => {
+                let title = "a tolerance of the whole value or more";
+                report.refuse(&part.at, title, "expected a part of the value, as 0.05")
+            }
+            Field::Given(part) if draft.is_some() && !spreads(design, draft) => {
+                let title = "a tolerance that no design spreads";
+                let expected = format!(
+                    "expected a [design] in the grid file, by \"sobol\" over at most {MOST_AXES} \
+                     axes and parameters, \"latin_hypercube\" or \"monte_carlo\""
+                );
+                report.refuse(&part.at, title, expected)
+            }
+            Field::Given(part) => Some(part.value),
+            _ => Some(0.0),
+        };
+        let (Some(name), Some(parameter), Some(bounds), Some(tolerance), Some(draft)) =
+            (name, found, bounds, spread, draft.as_mut())
+        else {
+            continue;
+        };
+        let parts = draft.plan.model.parts(&parameter);
+        let shares = |other: &M::Parameter| {
+            draft.plan.model.parts(other).iter().any(|part| parts.contains(part))
+        };
+        let other = draft.plan.axes.iter().position(|axis| shares(&axis.parameter));
+        if let Some((k, first)) =
+            other.and_then(|k| Some((k, report.place(&format!("axis[{k}]"))?)))
+        {
+            let value = draft.plan.axes[k].parameter.name();
+            report.push(twice(&name, &Located { value, at: first }));
+            continue;
+        }
+        let mut axis = crate::plan::Axis { parameter, values: bounds.value.clone() };
+        if let AxisValues::Linear { from, to, .. } | AxisValues::Log { from, to, .. } =
+            &mut axis.values
+        {
+            let [low, high] = if from < to { [from, to] } else { [to, from] };
+            *low -= tolerance * low.abs();
+            *high += tolerance * high.abs();
+        }
+        add(axis, at, draft);
+        sought.push(Sought { bounds: bounds.value, tolerance });
+    }
+    sought
+}
+
+/// Whether a design has room for one more axis.
+fn spreads<M: Rows>(design: Option<&Design>, draft: &Option<Draft<'_, M>>) -> bool {
+    let axes = draft.as_ref().map_or(0, |draft| draft.plan.axes.len());
+    match design {
+        None | Some(Design::List { .. }) => false,
+        Some(Design::Sobol { .. }) => axes < MOST_AXES,
+        Some(_) => true,
+    }
+}
+
+/// Reads every `[[objective]]`.
+fn objectives(root: &Section<'_>, goals: &Goals<'_>) -> Vec<Objective> {
+    const VERBS: [(&str, f64); 2] = [("minimise", 1.0), ("maximise", -1.0)];
+    let mut objectives: Vec<Objective> = Vec::new();
+    let sections = root.tables("objective");
+    if sections.is_empty() {
+        root.missing("objective", "[[objective]] with `minimise` or `maximise`");
+    }
+    for section in sections {
+        let at = section.at().clone();
+        let texts = VERBS.map(|(verb, sign)| (section.text(verb).given(), sign));
+        section.finish();
+        let [text] = &texts
+            .into_iter()
+            .filter_map(|(text, sign)| Some((text?, sign)))
+            .collect::<Vec<_>>()[..]
+        else {
+            let expected =
+                format!("expected {}, and an expression", listed(&VERBS.map(|(v, _)| v)));
+            root.report.refuse::<()>(&at, "an objective without one number", expected);
+            continue;
+        };
+        let (text, sign) = text;
+        let Some(goal) = goals.read(text, Goal::number) else { continue };
+        let name = column_name(text.value);
+        if goal.is_by_row() && goals.rows > 1 {
+            let title = format!("a number of one row, and every candidate has {}", goals.rows);
+            let expected = "expected max(), min(), mean() or quantile() of it";
+            root.report.refuse::<()>(&text.at, title, expected);
+        } else if objectives.iter().any(|one| one.name == name) {
+            root.report.refuse::<()>(&text.at, "an objective twice", "expected each once");
+        } else {
+            objectives.push(Objective { name, goal, sign: *sign });
+        }
+    }
+    objectives
+}
+
+/// An expression as the name of a column: its words.
+fn column_name(text: &str) -> String {
+    let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+    words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
+}
+
+/// What expressions are read over.
+struct Goals<'a> {
+    /// The columns of rows; none while the plan is not sound.
+    known: Option<&'a [Column]>,
+    rows: u64,
+    text: &'a str,
+    report: &'a Report,
+}
+
+impl Goals<'_> {
+    fn read(
+        &self,
+        found: &Located<&str>,
+        read: fn(&str, &[Column]) -> Result<Goal, Mistake>,
+    ) -> Option<Goal> {
+        let mistake = match read(found.value, self.known?) {
+            Ok(goal) => return Some(goal),
+            Err(mistake) => mistake,
+        };
+        // Behind the quote, unless escapes have moved it.
+        let start = found.at.span.start + 1;
+        let is_plain = self.text.get(start..).is_some_and(|rest| rest.starts_with(found.value));
+        let span = start + mistake.span.start..start + mistake.span.end;
+        let at =
+            Location::new(found.at.source, if is_plain { span } else { found.at.span.clone() });
+        let diagnostic = Diagnostic::new(mistake.title).at(&at, mistake.expected);
+        self.report.push(match &mistake.candidates {
+            Some((typed, names)) => diagnostic.nearest(typed, names.iter().map(String::as_str)),
+            None => diagnostic,
+        });
+        None
+    }
+}

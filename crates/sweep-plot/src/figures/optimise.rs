@@ -1,0 +1,94 @@
+//! What a study has tried: the other objectives over the first, with the front; of one objective,
+//! how it fell from candidate to candidate.
+
+use crate::chart::{Chart, ChartPanel, Series, Style};
+use crate::colour::{DISTINCT, FAILED, NONLINEAR};
+use crate::error::PlotError;
+use crate::label::{self, Label};
+use crate::read::{ColumnFacts, Source};
+
+/// The candidates by what became of them, their words and colours; the last are drawn on top.
+const KINDS: [&str; 3] = ["breaks a condition", "tried", "on the front"];
+
+/// The chart of a study's file.
+///
+/// # Errors
+/// A file without objectives.
+pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
+    let named = source.find("objective").and_then(|all| all.as_array()).into_iter().flatten();
+    let objectives: Vec<&ColumnFacts> =
+        named.filter_map(|one| source.column(one["name"].as_str()?)).collect();
+    let [first, further @ ..] = objectives.as_slice() else {
+        return Err(source.lacks("an objective", "written by `sweep optimise`"));
+    };
+    let number =
+        source.column("candidate").ok_or_else(|| source.lacks("candidate", "its index"))?;
+    let (x, ys) = if further.is_empty() { (number, &objectives[..]) } else { (*first, further) };
+    // Parameters stand between the generation and the first objective.
+    let own = source.numeric().skip_while(|column| column.name != "generation").skip(1);
+    let own = own.take_while(|column| column.name != first.name);
+    let shown: Vec<(&ColumnFacts, bool)> =
+        ys.iter().map(|column| (*column, true)).chain(own.map(|column| (column, false))).collect();
+    let mut names = vec!["feasible", "on_front", x.name.as_str()];
+    names.extend(shown.iter().map(|(column, _)| column.name.as_str()));
+    let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
+    for batch in source.batches(&names)? {
+        let batch = batch?;
+        let is = |name: &str| -> Result<Vec<bool>, PlotError> {
+            Ok(batch.words(name)?.iter().map(|word| *word == Some("true")).collect())
+        };
+        let (feasible, on_front) = (is("feasible")?, is("on_front")?);
+        let columns: Vec<Vec<f64>> =
+            names[2..].iter().map(|name| batch.numbers(name)).collect::<Result<_, _>>()?;
+        rows.extend((0..batch.rows).map(|row| {
+            let kind = usize::from(feasible[row]) + usize::from(on_front[row]);
+            (kind, columns.iter().map(|column| column[row]).collect())
+        }));
+    }
+    rows.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
+    let units: Vec<(&str, f64)> = std::iter::once(x)
+        .chain(shown.iter().map(|(column, _)| *column))
+        .map(|column| label::shown(&column.unit))
+        .collect();
+    let of = |kind: usize, k: usize| -> Vec<f64> {
+        let own = rows.iter().filter(|(of, values)| *of == kind && values[0].is_finite());
+        own.map(|(_, values)| values[k] * units[k].1).collect()
+    };
+    let grids: Vec<Vec<f64>> = (0..KINDS.len()).map(|kind| of(kind, 0)).collect();
+    let panels = shown.iter().enumerate().map(|(k, (column, is_shown))| {
+        let colours = [FAILED, DISTINCT[5], NONLINEAR];
+        let dots = |kind: usize| Series {
+            name: KINDS[kind].to_owned(),
+            colour: colours[kind],
+            grid: kind,
+            y: of(kind, k + 1),
+            style: Style::Dots,
+        };
+        let drawn = (0..KINDS.len()).filter(|&kind| !grids[kind].is_empty());
+        let words = label::capitalised(&column.name.replace('_', " "));
+        ChartPanel {
+            shown: *is_shown,
+            height: 300.0,
+            ..ChartPanel::new(
+                &column.name,
+                Label::new(&words, units[k + 1].0),
+                drawn.map(dots).collect(),
+            )
+        }
+    });
+    let panels = panels.collect();
+    let words = label::capitalised(&x.name.replace('_', " "));
+    Ok(Chart {
+        title: if further.is_empty() { "What was tried" } else { "What no other choice beats" }
+            .to_owned(),
+        subtitle: source.subtitle(&format!("{} candidates", source.rows)),
+        x_label: Label::new(&words, units[0].0),
+        x_log: false,
+        shades: Vec::new(),
+        shade_meaning: String::new(),
+        grids,
+        panels,
+        marks: Vec::new(),
+        mark_meaning: String::new(),
+    })
+}

@@ -1,0 +1,191 @@
+//! `sweep optimise` as a user meets it: mistakes, interruptions, and the machine file of the best.
+
+#![cfg(unix)]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::home::sweep_binary;
+use crate::signal;
+
+const GRID: &str = r#"
+machine = "paper"
+metrics = ["cabinet_force"]
+spin = { profile = "ramp", peak_rpm = 350.0, ramp_s = 2.0 }
+time = { end_s = END }
+integrator = { method = "rk4", step_s = 2.0e-4 }
+[[axis]]
+parameter = "unbalance_mass_kg"
+range = { from = 0.1, to = 0.4, count = 4 }
+"#;
+
+const STUDY: &str = r#"
+grid = "grid.toml"
+seed = 3
+population = 8
+candidates = 24
+conditions = ["quantile(nonlinear_tub_front_y, 0.9) < 0.02", "max(ratio_max) < 50"]
+[[objective]]
+minimise = "max(cabinet_force_nonlinear_n)"
+[[parameter]]
+name = "spring_stiffness_n_per_m"
+from = 4000
+to = 12000
+spacing = "log"
+[[parameter]]
+name = "damping_n_s_per_m"
+from = 60
+to = 400
+"#;
+
+fn folder_with(end_s: &str, study: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, text: &str| {
+        fs::write(folder.path().join(name), text).expect("it is written");
+    };
+    write("grid.toml", &GRID.replace("END", end_s));
+    write("study.toml", study);
+    folder
+}
+
+fn sweep(folder: &tempfile::TempDir, line: &str) -> Command {
+    let mut command = Command::new(sweep_binary());
+    command.current_dir(folder.path()).args(line.split(' '));
+    command
+}
+
+fn said(output: &Output) -> String {
+    [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat()
+}
+
+fn does(folder: &tempfile::TempDir, line: &str) -> String {
+    let output = sweep(folder, line).output().expect("it starts");
+    assert_eq!(output.status.code(), Some(0), "{line}: {}", said(&output));
+    said(&output)
+}
+
+/// A number in a column of a row of a file.
+fn number(folder: &tempfile::TempDir, line: &str, column: &str) -> f64 {
+    let rows: serde_json::Value = serde_json::from_str(&does(folder, line)).expect("it is JSON");
+    rows[0][column].as_f64().unwrap_or_else(|| panic!("no {column} in {rows}"))
+}
+
+#[test]
+fn the_machine_file_of_the_best_has_the_force_that_the_study_says() {
+    let folder = folder_with("2", STUDY);
+    let text = does(&folder, "optimise study.toml --best best.toml --threads 2");
+    assert!(text.contains("24 candidates of 4 points"), "{text}");
+    let file = "results/study.parquet";
+    let best = format!("show {file} --where on_front --json");
+    let force_n = number(&folder, &best, "max_cabinet_force_nonlinear_n");
+    let grid = fs::read_to_string(folder.path().join("grid.toml")).expect("there is a grid");
+    let own = grid.replace("\"paper\"", "\"best.toml\"");
+    fs::write(folder.path().join("own.toml"), own).expect("it is written");
+    does(&folder, "run own.toml --out own.parquet");
+    let worst = "show own.parquet --by cabinet_force_nonlinear_n --top 1 --json \
+                 --columns cabinet_force_nonlinear_n";
+    let own_n = number(
+        &folder,
+        &worst.split_whitespace().collect::<Vec<_>>().join(" "),
+        "cabinet_force_nonlinear_n",
+    );
+    assert_eq!(own_n, force_n, "a fixed step: the same bits");
+    // Every candidate within its bounds; none that is feasible beats the best.
+    let require = [
+        "spring_stiffness_n_per_m >= 4000 and damping_n_s_per_m <= 400".to_owned(),
+        format!("not feasible or max_cabinet_force_nonlinear_n >= {force_n}"),
+        "count(on_front) == 1".to_owned(),
+        "feasible == (excess_1 + excess_2 == 0)".to_owned(),
+    ];
+    let checked = sweep(&folder, &format!("require {file}")).args(&require).output();
+    let checked = checked.expect("it starts");
+    assert_eq!(checked.status.code(), Some(0), "{}", said(&checked));
+    does(&folder, &format!("plot {file} -o study.svg"));
+    does(&folder, &format!("plot {file} -o study.html"));
+    does(&folder, &format!("export {file} study.csv"));
+    assert!(does(&folder, "optimise study.toml").contains("it is there already"));
+}
+
+#[test]
+fn an_interrupted_study_goes_on_and_ends_in_the_same_bytes() {
+    let folder = folder_with("6", STUDY);
+    let line = "optimise study.toml --threads 1 --progress none --out";
+    does(&folder, &format!("{line} whole.parquet"));
+    let trials = folder.path().join("x.parquet.partial/trials.bin");
+    for name in ["INT", "KILL"] {
+        let kept = fs::metadata(&trials).map_or(0, |file| file.len());
+        let mut child = sweep(&folder, &format!("{line} x.parquet"))
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it starts");
+        let until = Instant::now() + Duration::from_secs(60);
+        while fs::metadata(&trials).map_or(0, |file| file.len()) <= kept {
+            assert!(Instant::now() < until, "no answer was kept");
+            assert!(child.try_wait().expect("it is ours").is_none(), "it ended");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        signal(name, child.id());
+        let code = child.wait().expect("it ends").code();
+        assert_eq!(code, if name == "INT" { Some(130) } else { None });
+        assert!(!folder.path().join("x.parquet").exists());
+    }
+    does(&folder, &format!("{} x.parquet", line.replace("threads 1", "threads 2")));
+    let bytes = |name: &str| fs::read(folder.path().join(name)).expect("there is a file");
+    assert!(bytes("x.parquet") == bytes("whole.parquet"), "other bytes");
+    assert!(!Path::new(&trials).exists());
+    fs::write(folder.path().join("study.toml"), STUDY.replace("seed = 3", "seed = 4"))
+        .expect("it is written");
+    let other = sweep(&folder, &format!("{line} x.parquet")).output().expect("it starts");
+    assert_eq!(other.status.code(), Some(2), "{}", said(&other));
+    assert!(said(&other).contains("/optimise/seed: was 3, is 4"), "{}", said(&other));
+}
+
+#[test]
+fn every_mistake_in_a_study_and_its_grid_is_told_at_once() {
+    let wrong = STUDY
+        .replace("candidates = 24", "candidate = 24")
+        .replace("damping_n_s_per_m", "dampin_n_s_per_m")
+        .replace("to = 12000", "to = 4000\ntolerance = 0.1");
+    let folder = folder_with("-2", &wrong);
+    let refused = sweep(&folder, "optimise study.toml").output().expect("it starts");
+    assert_eq!(refused.status.code(), Some(2));
+    for told in [
+        "did you mean `candidates`?",
+        "did you mean `damping_n_s_per_m`?",
+        "study.toml:5:1",
+        "from 4000 to 4000",
+        "a tolerance that no design spreads",
+        "grid.toml:5:18",
+        "6 mistakes",
+    ] {
+        assert!(said(&refused).contains(told), "no {told} in {}", said(&refused));
+    }
+    // Expressions are read once everything else is right.
+    let wrong = STUDY
+        .replace("ratio_max) < 50", "ratio_mx) < 50")
+        .replace("max(cabinet_force_nonlinear_n)", "cabinet_force_nonlinear_n");
+    let folder = folder_with("2", &wrong);
+    let refused = sweep(&folder, "optimise study.toml").output().expect("it starts");
+    for told in ["did you mean `ratio_max`?", "study.toml:6:64", "expected max(), min(), mean()"] {
+        assert!(said(&refused).contains(told), "no {told} in {}", said(&refused));
+    }
+    assert!(!folder.path().join("results").exists());
+}
+
+#[test]
+fn tolerances_of_what_is_looked_for_spread_over_the_design() {
+    let folder = folder_with("2", &STUDY.replace("to = 400\n", "to = 400\ntolerance = 0.2\n"));
+    let grid = GRID.replace("END", "2").replace(", count = 4", "");
+    let design = "[design]\nmethod = \"sobol\"\npoints = 8\n";
+    fs::write(folder.path().join("grid.toml"), format!("{grid}{design}")).expect("it is written");
+    does(&folder, "optimise study.toml --out wide.parquet");
+    fs::write(folder.path().join("study.toml"), STUDY).expect("it is written");
+    does(&folder, "optimise study.toml --out exact.parquet");
+    let first = |file: &str| {
+        number(&folder, &format!("show {file} --top 1 --json"), "max_cabinet_force_nonlinear_n")
+    };
+    // The same first candidate: of eight machines apart in damping, the worst is worse.
+    assert_ne!(first("wide.parquet"), first("exact.parquet"));
+}
