@@ -49,7 +49,7 @@ enum Command {
     Show(show::Args),
     /// Draw a map or a boundary
     Plot(plot::Args),
-    /// Write one page to print: verdicts, the worst, pictures, the model in words
+    /// Write one page to print: verdict, worst values, pictures
     Report(report::Args),
     /// Check expressions on a result, and show the rows that break them
     Require(require::Args),

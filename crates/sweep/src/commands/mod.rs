@@ -91,7 +91,7 @@ pub enum Command {
     Show(show_engine::Args),
     /// Draw a file: map, boundary, time histories, Campbell diagram
     Plot(plot::Args),
-    /// Write one page to print: verdicts, the worst, pictures, the machine
+    /// Write one page to print: verdict, worst values, pictures
     Report(report::Args),
     /// Check expressions on a result, and show the rows that break them
     Require(require::Args),
