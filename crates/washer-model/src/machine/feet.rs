@@ -230,7 +230,7 @@ mod tests {
                 let draw = |k: u32| f64::from((seed * 7919 + k * 104_729) % 2003) / 1001.5 - 1.0;
                 let load =
                     [60.0 * draw(1), -350.0 + 90.0 * draw(2), 60.0 * draw(3), 12.0 * draw(4)];
-                let load = [load[0], load[1], load[2], load[3], 40.0 * draw(5), -70.0];
+                let load = [load[0], load[1], load[2], load[3], 160.0 * draw(5), -70.0];
                 let loads_n = feet_of.loads_n(&load);
                 let all_n: f64 = loads_n.iter().sum();
                 if loads_n.iter().any(|n| *n < 1.0) {
