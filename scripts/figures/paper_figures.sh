@@ -38,6 +38,11 @@ done
 "$SWEEP" plot results/fig11.parquet --stability results/fig11-stability.parquet \
     --channel tub_yaw --channel tub_pitch -o "$figures/fig11_tongues.svg"
 
+# What held speeds end in, and the run of Fig. 10 that passes them.
+"$SWEEP" dwell docs/examples/plateau.toml --speed 225:330:1 --out results/fig10-dwell.parquet
+"$SWEEP" plot results/fig10-dwell.parquet --against results/fig10.parquet --channel tub_yaw \
+    -o "$figures/ends.svg"
+
 # Each resonance in the motion that is most of it: late on the way up and on the way down, and at
 # held speeds.
 # shellcheck disable=SC2086

@@ -63,6 +63,86 @@ fn every_motion_of_a_held_speed_has_a_row() {
 }
 
 #[test]
+fn a_point_may_stand_in_place_of_an_axis() {
+    let folder = folder();
+    let files = [("--at", "a.parquet"), ("--set", "b.parquet")].map(|(option, file)| {
+        let point = [option, "unbalance_mass_kg=0.4"];
+        let dwell = ["dwell", "grid.toml", "--speed", "250", "--starts", "1", "--out", file];
+        let done = sweep(&folder, &[&dwell[..], &point].concat(), None);
+        assert!(
+            said(&done).contains("1 at 1 points and speeds: 1 quasi periodic"),
+            "{}",
+            said(&done)
+        );
+        fs::read(folder.path().join(file)).expect("it is there")
+    });
+    assert!(files[0] == files[1]);
+    let of = |more: &[&str]| {
+        let stability = ["stability", "grid.toml", "--speed", "250", "--fresh"];
+        said(&sweep(&folder, &[&stability[..], more].concat(), None))
+    };
+    assert!(of(&[]).contains("unbalance_mass_kg 0.4: 250 to 250 rpm, quasi periodic"));
+    assert!(of(&["--at", "unbalance_mass_kg=0.4"]).contains("unstable  250 to 250 rpm"));
+    let twice = of(&["--at", "unbalance_mass_kg=0.4", "--set", "unbalance_mass_kg=0.1"]);
+    assert!(twice.contains("given twice"), "{twice}");
+}
+
+#[test]
+fn how_far_dwells_go_is_a_metric_of_maps() {
+    let folder = folder();
+    let grid = format!("metrics = [\"dwell\"]\n{GRID}\n[stability]\nspeed_rpm = \"250,297.5\"\n");
+    fs::write(folder.path().join("map.toml"), grid).expect("it is written");
+    let ran = sweep(&folder, &["run", "map.toml"], None);
+    assert_eq!(ran.status.code(), Some(0), "{}", said(&ran));
+    let file = "results/map.parquet";
+    let columns = "dwell_tub_yaw,dwell_tub_pitch,dwell_speed_rpm,dwell_kind";
+    let rows = ["show", file, "--top", "2", "--by", "dwell_tub_yaw", "--columns", columns];
+    let told = said(&sweep(&folder, &rows, None));
+    // Yaw is of 250 rpm, pitch of 297.5, where the machine turns farthest.
+    let first = told.lines().find(|line| line.contains("0.152"));
+    let first = first.unwrap_or_else(|| panic!("{told}"));
+    assert!(first.contains("0.1637") && first.contains("297.5") && first.contains("periodic_2"));
+    let gate = ["require", file, "dwell_tub_yaw < 0.02"];
+    assert_eq!(sweep(&folder, &gate, None).status.code(), Some(4));
+    let map = ["plot", file, "--quantity", "dwell_tub_yaw", "-o", "m.svg"];
+    let drawn = sweep(&folder, &map, None);
+    assert_eq!(drawn.status.code(), Some(0), "{}", said(&drawn));
+    let without = sweep(&folder, &["run", "grid.toml", "--set", "metrics=dwell"], None);
+    assert!(said(&without).contains("the metric `dwell` needs speeds"), "{}", said(&without));
+}
+
+#[test]
+fn motions_keep_sections_and_metrics_and_are_compared() {
+    let folder = folder();
+    let grid = format!("metrics = [\"cabinet_force\", \"clash_time\"]\n{GRID}");
+    fs::write(folder.path().join("grid.toml"), grid).expect("it is written");
+    let dwell = |damping: &str, more: &[&str], out: &str| {
+        let at = ["--at", "unbalance_mass_kg=0.4", "--set", damping, "--starts", "1"];
+        let dwell = ["dwell", "grid.toml", "--speed", "250,280", "--out", out];
+        let done = sweep(&folder, &[&dwell[..], &at, more].concat(), None);
+        assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+        said(&done)
+    };
+    let told = dwell("damping_n_s_per_m=140", &["--sections", "64"], "a.parquet");
+    assert!(told.contains("2 at 2 points and speeds"), "{told}");
+    let shown = said(&sweep(&folder, &["show", "a.parquet", "--all"], None));
+    for column in ["turn", "q5_rad", "u10_rad_per_s", "cabinet_force_nonlinear_n"] {
+        assert!(shown.contains(column), "{column}\n{shown}");
+    }
+    assert!(!shown.contains("clash_time"), "a motion that goes on has no such time");
+    let view = ["plot", "a.parquet", "--view", "sections", "-o", "s.html"];
+    let drawn = sweep(&folder, &view, None);
+    assert_eq!(drawn.status.code(), Some(0), "{}", said(&drawn));
+    dwell("damping_n_s_per_m=140", &[], "b.parquet");
+    dwell("damping_n_s_per_m=240", &[], "c.parquet");
+    let gate = ["compare", "b.parquet", "c.parquet", "--fail-on", "any"];
+    let compared = sweep(&folder, &gate, None);
+    assert_eq!(compared.status.code(), Some(4), "{}", said(&compared));
+    let top = ["show", "b.parquet", "--top", "1", "--by", "nonlinear_tub_yaw"];
+    assert!(said(&sweep(&folder, &top, None)).contains("0.15232"));
+}
+
+#[test]
 fn bytes_depend_on_neither_threads_nor_instruction_set_nor_shards() {
     let folder = folder();
     for search in [&["--starts", "3", "--threshold"][..], &["--carry", "down"]] {

@@ -97,6 +97,8 @@ pub enum View {
     Growth,
     /// Stability: the periodic response of both models over constant speeds
     Responses,
+    /// Dwell with `--sections`: states once a turn
+    Sections,
 }
 
 impl View {
@@ -107,6 +109,7 @@ impl View {
             Self::Time | Self::Passages => Kind::Trace,
             Self::Scatter | Self::Histogram | Self::Influence => Kind::Design,
             Self::Growth | Self::Responses => Kind::Stability,
+            Self::Sections => Kind::Dwell,
         }
     }
 }
@@ -133,7 +136,8 @@ pub struct PlotOptions {
     pub stability: Option<PathBuf>,
     /// Map as a picture: a boundary file over the same axes, whose line is drawn too.
     pub boundary: Option<PathBuf>,
-    /// Trace: another trace file, whose nonlinear model is drawn in place of the linear one.
+    /// Trace: another trace file, whose nonlinear model is drawn in place of the linear one. Dwell: a
+    /// trace file whose run passes over the held speeds.
     pub against: Option<PathBuf>,
     /// Map as a page: a folder of trace files; clicking a point that has one shows it.
     pub traces: Option<PathBuf>,
@@ -265,7 +269,7 @@ fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>
         Kind::Design => design(source, options, format),
         Kind::Differences => differences(source, options, format),
         Kind::Stability => stability(&source, options, format),
-        Kind::Dwell => written(&source, &figures::dwell::chart(&source, options)?, format),
+        Kind::Dwell => dwell(&source, options, format),
         Kind::Optimise => written(&source, &figures::optimise::chart(&source)?, format),
         Kind::Trace | Kind::Modes | Kind::Boundary => chart(&Table::read(source)?, options, format),
     }
@@ -393,6 +397,14 @@ fn stability(source: &Source, options: &PlotOptions, format: Format) -> Result<V
     written(source, &chart, format)
 }
 
+fn dwell(source: &Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+    let chart = match options.view {
+        Some(View::Sections) => figures::dwell::sections(source, options)?,
+        _ => figures::dwell::chart(source, options)?,
+    };
+    written(source, &chart, format)
+}
+
 fn written(source: &Source, chart: &Chart, format: Format) -> Result<Vec<u8>, PlotError> {
     match format {
         Format::Html => Ok(html::chart_page(source, chart).into_bytes()),
@@ -412,6 +424,7 @@ fn view_of(options: &PlotOptions) -> &'static str {
     match options.view.map(View::of) {
         Some(Kind::Modes) => "modes files",
         Some(Kind::Stability) => "stability files",
+        Some(Kind::Dwell) => "dwell files",
         Some(Kind::Design) => "designs: results of a grid file with [design]",
         _ => "traces",
     }
@@ -458,7 +471,12 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
             "maps drawn as .svg or .png",
         ),
         ("--view", options.view.is_some(), view_fits, view_of(options)),
-        ("--against", options.against.is_some(), over_time, "traces over time"),
+        (
+            "--against",
+            options.against.is_some(),
+            over_time || dwell,
+            "traces over time and dwell files",
+        ),
         ("--live", options.live.is_some(), map && format == Format::Html, "maps drawn as .html"),
         (
             "--traces",

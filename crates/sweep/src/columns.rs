@@ -7,7 +7,7 @@ use sweep_engine::columns::{
 use sweep_engine::store::{Column, Done, Job, Kind as Cells, Layout, Row, Rows, axis_columns};
 use sweep_files::{FileKind, key};
 use sweep_parameter::{Limit, RatioLimits, Worse};
-use washer_model::{Beyond, Channel, Disturbance, Kind, Motion};
+use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, Motion};
 use washer_row::{Level, Measures, Metric, Outcome, ROW_STATUSES, Trajectory, Verdict, row_status};
 
 use crate::model::Washer;
@@ -270,6 +270,10 @@ impl Asked {
                 columns.extend(growth_columns("growth_"));
                 continue;
             }
+            if let Metric::Dwell = metric {
+                columns.extend(dwelt_columns(&self.channels));
+                continue;
+            }
             if !metric.is_of_model() {
                 let cell = Cell::Measured(Box::new(|row: &ResultRow| row.outcome.static_sag_m));
                 let (name, text) = (metric.column(""), metric.description());
@@ -302,6 +306,34 @@ fn of_metric(metric: Metric, column: WasherColumn) -> WasherColumn {
         Some(Limit { value, scale }) => column.limit(value, scale),
         None => column,
     }
+}
+
+/// Columns of how far motions at the plan's constant speeds go.
+fn dwelt_columns(channels: &[Channel]) -> Vec<WasherColumn> {
+    let mut columns: Vec<WasherColumn> = Vec::new();
+    for &channel in channels {
+        let cell = Cell::Measured(Box::new(move |row: &ResultRow| {
+            Some(row.outcome.dwelt?.deviations[channel.index()])
+        }));
+        let text = format!("{}: {}", channel.description(), Metric::Dwell.description());
+        let name = format!("dwell_{}", channel.name());
+        let column = ResultColumn::new(name, channel.unit(), text, cell);
+        columns.push(of_metric(Metric::Dwell, column));
+    }
+    columns.push(ResultColumn::new(
+        "dwell_speed_rpm",
+        "rpm",
+        "the speed at which yaw or pitch of the tub, whichever is larger, goes farthest",
+        Cell::Measured(Box::new(|row: &ResultRow| Some(row.outcome.dwelt?.speed_rpm))),
+    ));
+    columns.push(ResultColumn::new(
+        "dwell_kind",
+        "",
+        "what that motion is, as in a file of `sweep dwell`, or that it left the model's range or \
+         did not settle",
+        Cell::Name(Ending::KINDS.to_vec(), Box::new(|row| Some(row.outcome.dwelt.as_ref()?.kind))),
+    ));
+    columns
 }
 
 /// Columns of the fastest growing disturbance at a constant speed. In maps they stand behind a

@@ -4,7 +4,7 @@ mod growth;
 mod ladder;
 mod pool;
 
-pub(crate) use growth::responses;
+pub(crate) use growth::{Carried, motions, responses};
 pub(crate) use ladder::reference_step_s;
 pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
 pub(crate) use sweep_engine::{Engine, Watch};
@@ -220,6 +220,11 @@ impl<'a> ModelEngine<'a> {
         }
     }
 
+    /// What groups of any size run on.
+    fn widest(&self) -> Simd {
+        self.forced.unwrap_or_else(Simd::best)
+    }
+
     fn simd_for(&self, trajectories: usize) -> Simd {
         self.forced.unwrap_or_else(|| narrowest(trajectories))
     }
@@ -310,7 +315,7 @@ impl Engine for ModelEngine<'_> {
     }
 
     fn simd(&self) -> &str {
-        self.forced.unwrap_or_else(Simd::best).name()
+        self.widest().name()
     }
 }
 

@@ -51,6 +51,7 @@ mod library;
 mod live;
 mod method;
 mod model;
+mod places;
 mod plan;
 mod speeds;
 mod stability;
@@ -59,12 +60,13 @@ mod trace;
 
 pub use commands::Cli;
 pub use config::{Diagnostics, GridInput, Mistake, load};
+pub use dwell::{Carry, Search};
 pub use engine::ModelEngine;
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use library::{
     BoundaryOptions, Effort, Evaluated, Evaluator, Explained, PointTable, RanToFile, ResultTable,
-    TraceOptions, explain_point, find_boundary, find_modes, find_stability, list_parameters,
-    optimise_study, run_to_file, stability_to_file, trace_point,
+    TraceOptions, explain_point, find_boundary, find_held, find_modes, held_to_file,
+    list_parameters, optimise_study, run_to_file, trace_point,
 };
 pub use method::Integrator;
 pub use model::Washer;
@@ -75,4 +77,5 @@ pub use sweep_engine::store::{
     Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, State, StoreError, status,
 };
 pub use sweep_engine::{Error, Exit, Interrupt, survive_file_size_limits, tell};
+pub use washer_model::Starts;
 pub use washer_row::{Floor, Outcome, Status, Trajectory, Verdict};

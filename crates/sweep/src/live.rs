@@ -164,8 +164,8 @@ fn plan_of(file: &Path) -> Result<Plan, Error> {
 
 /// A page does not have the metric: it takes a response at each of the plan's speeds.
 fn without_growth(mut plan: Plan) -> Plan {
-    plan.model.measures.metrics.retain(|metric| *metric != Metric::Growth);
-    plan.model.growth_speeds = None;
+    plan.model.measures.metrics.retain(|metric| !metric.is_of_speeds());
+    plan.model.held_speeds = None;
     plan
 }
 

@@ -29,8 +29,8 @@ pub struct Washer {
     pub spin: Spin,
     /// What is measured of the motions.
     pub measures: Measures,
-    /// The constant speeds that the metric `growth` is about; `None` if it is not asked for.
-    pub growth_speeds: Option<SpeedList>,
+    /// The constant speeds of the metrics `growth` and `dwell`; `None` if neither is asked for.
+    pub held_speeds: Option<SpeedList>,
 }
 
 impl Model for Washer {

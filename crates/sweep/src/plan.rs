@@ -48,7 +48,7 @@ mod tests {
             name: "test".to_owned(),
             axes: axes.iter().map(axis).collect(),
             design: None,
-            model: Washer { machine, spin, measures: Measures::default(), growth_speeds: None },
+            model: Washer { machine, spin, measures: Measures::default(), held_speeds: None },
             end_s: 50.0,
             window_s: [30.0, 50.0],
             integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 },

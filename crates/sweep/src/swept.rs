@@ -39,7 +39,7 @@ impl Swept for Washer {
 
     fn variants(plan: &Plan) -> Vec<Plan> {
         let can_have = |metric: &Metric| match metric {
-            Metric::Growth => plan.model.growth_speeds.is_some(),
+            metric if metric.is_of_speeds() => plan.model.held_speeds.is_some(),
             metric => lacking(*metric, &plan.model.machine).is_none(),
         };
         let with = |metric| {
@@ -106,7 +106,7 @@ impl Searched<'_> {
     fn demand(&self) -> Demand {
         if self.column.starts_with("ratio_") {
             Demand::Side
-        } else if self.column.starts_with("growth_") {
+        } else if ["growth_", "dwell_"].iter().any(|of| self.column.starts_with(of)) {
             Demand::Growth
         } else {
             Demand::Row

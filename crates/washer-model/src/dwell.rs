@@ -14,21 +14,25 @@ use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
 use crate::modes::Modes;
 use crate::run::model::{Model, Nonlinear};
+use crate::run::{Extra, Wanted};
+use crate::stability::orbit::Row;
 use crate::stability::settings::{Case, Settings};
 use crate::stability::{Dwell, NoAnswer, Response, respond};
-use course::{BLOCK, Course, Need, are_alike};
+use course::{BLOCK, Course, Need, WINDOW, are_alike};
 use exponent::exponents;
-use hold::{Held, hold};
+use hold::{Held, hold, recorded};
 use lane_ode::Simd;
 use starts::{DIRECTIONS, Kick, directions, disturbed, kicked, kicks};
 use std::sync::Arc;
 
 pub use exponent::Exponent;
 
-/// Motions are the same whose largest deviations agree to this share in all channels; chaotic ones
-/// to the second, because no two stretches of one agree.
+/// Motions are the same whose largest deviations agree to this share in all channels; chaotic ones,
+/// of which no two stretches agree, and those that have not settled, to the second. What has not
+/// settled is on its way to a motion that has, if they agree to the third.
 const SAME: f64 = 0.01;
-const SAME_CHAOS: f64 = 0.5;
+const SAME_ROUGHLY: f64 = 0.5;
+const SAME_NEARLY: f64 = 0.05;
 
 /// Rounds in which the gap between a kick that comes back and one that does not is halved.
 const HALVINGS: usize = 5;
@@ -44,11 +48,19 @@ pub struct Starts {
     pub longest_s: f64,
     /// Whether to look for the smallest kick that does not come back.
     pub with_threshold: bool,
+    /// Further records of each motion.
+    pub wanted: Wanted,
 }
 
 impl Default for Starts {
     fn default() -> Self {
-        Self { count: 8, kick_rad_per_s: 6.0, longest_s: 600.0, with_threshold: false }
+        Self {
+            count: 8,
+            kick_rad_per_s: 6.0,
+            longest_s: 600.0,
+            with_threshold: false,
+            wanted: Wanted::default(),
+        }
     }
 }
 
@@ -105,8 +117,10 @@ pub struct Ending {
     pub time_s: f64,
     /// Its last state where the unbalance is up: coordinates (m, rad), then their speeds (per s).
     pub end: [f64; STATES],
-    /// Such states, once a turn, of its last 256 turns at most.
+    /// Such states, once a turn, of its last 256 turns at most; coordinates from equilibrium.
     pub sections: Vec<[f64; STATES]>,
+    /// What [`Starts::wanted`] asks for, over 128 further turns.
+    pub extra: Extra,
 }
 
 /// What was found at a speed.
@@ -137,9 +151,24 @@ pub fn endings(
     starts: &Starts,
     is_stopped: &dyn Fn() -> bool,
 ) -> Vec<Result<Endings, NoAnswer>> {
+    endings_beside(simd, dwells, respond(dwells, is_stopped), carried, starts, is_stopped)
+}
+
+/// As [`endings`], of dwells whose periodic responses are known, as [`respond`] gives them.
+///
+/// # Errors
+/// As there.
+pub fn endings_beside(
+    simd: Simd,
+    dwells: &[Dwell<'_>],
+    answers: Vec<Result<Vec<Response>, NoAnswer>>,
+    carried: &[Option<[f64; STATES]>],
+    starts: &Starts,
+    is_stopped: &dyn Fn() -> bool,
+) -> Vec<Result<Endings, NoAnswer>> {
     let mut hunts: Vec<Result<Hunt<'_>, NoAnswer>> = Vec::with_capacity(dwells.len());
     let mut settings: Option<Settings<'_>> = None;
-    for (k, (dwell, answer)) in dwells.iter().zip(respond(dwells, is_stopped)).enumerate() {
+    for (k, (dwell, answer)) in dwells.iter().zip(answers).enumerate() {
         let is_same = |of: &Settings<'_>| core::ptr::eq(of.point, dwell.point);
         let settings = match settings.take().filter(is_same) {
             Some(known) => settings.insert(known),
@@ -172,8 +201,37 @@ pub fn endings(
             }
         }
     }
-    let whole = |hunt: Hunt<'_>| if is_whole { Ok(hunt.found()) } else { Err(NoAnswer::Stopped) };
-    hunts.into_iter().map(|hunt| hunt.and_then(whole)).collect()
+    let found = hunts.into_iter().map(|hunt| match hunt {
+        Ok(hunt) if is_whole => Ok(hunt.found()),
+        Ok(_) => Err(NoAnswer::Stopped),
+        Err(none) => Err(none),
+    });
+    let mut found: Vec<Result<(Endings, Row<'_>), NoAnswer>> = found.collect();
+    if starts.wanted.anything() {
+        record(simd, found.iter_mut().flatten(), starts.wanted);
+    }
+    found.into_iter().map(|found| found.map(|(endings, _)| endings)).collect()
+}
+
+/// Follows motions on, with further records.
+fn record<'a, 'f>(
+    simd: Simd,
+    found: impl Iterator<Item = &'f mut (Endings, Row<'a>)>,
+    wanted: Wanted,
+) where
+    'a: 'f,
+{
+    let (mut motions, mut held) = (Vec::new(), Vec::new());
+    for (endings, row) in found {
+        let within = |motion: &&mut Ending| !matches!(motion.state, State::LeftRange { .. });
+        for motion in endings.motions.iter_mut().filter(within) {
+            held.push(Held { row: *row, state: motion.end });
+            motions.push(motion);
+        }
+    }
+    for (motion, (_, extra)) in motions.into_iter().zip(recorded(simd, &held, WINDOW, wanted)) {
+        motion.extra = extra;
+    }
 }
 
 /// Takes all trajectories to their ends, those of all hunts in lanes together. False if it was
@@ -330,7 +388,7 @@ impl<'a> Hunt<'a> {
         }
     }
 
-    fn found(self) -> Endings {
+    fn found(self) -> (Endings, Row<'a>) {
         let mut motions: Vec<Ending> = Vec::new();
         for course in &self.courses[..self.starts] {
             let ending = course.ending();
@@ -340,40 +398,79 @@ impl<'a> Hunt<'a> {
             }
         }
         let gone = self.brackets.iter().flatten().map(|[_, gone]| *gone);
-        Endings {
+        let endings = Endings {
             motions,
             starts: self.starts as u32,
             threshold_rad_per_s: gone.reduce(f64::min),
             responses: self.responses,
-        }
+        };
+        (endings, self.case.row)
     }
 }
 
 /// Whether two trajectories ended in the same motion.
 fn are_same(a: &Ending, b: &Ending) -> bool {
     match (a.state, b.state) {
-        (State::LeftRange { .. }, State::LeftRange { .. }) => true,
-        (State::LeftRange { .. }, _) | (_, State::LeftRange { .. }) => false,
-        _ => {
-            let chaos = Some(Settled::Chaotic);
-            let are_chaotic = a.settled == chaos && b.settled == chaos;
-            are_alike(&a.peaks, &b.peaks, if are_chaotic { SAME_CHAOS } else { SAME })
-        }
+        (State::LeftRange { .. }, State::LeftRange { .. }) => return true,
+        (State::LeftRange { .. }, _) | (_, State::LeftRange { .. }) => return false,
+        _ => {}
+    }
+    let is_rough = |of: &Ending| matches!(of.settled, None | Some(Settled::Chaotic));
+    let share = match (a.settled, b.settled) {
+        _ if is_rough(a) && is_rough(b) => SAME_ROUGHLY,
+        (None, _) | (_, None) => SAME_NEARLY,
+        _ => SAME,
+    };
+    are_alike(&a.peaks, &b.peaks, share)
+}
+
+impl Endings {
+    /// Whether a motion's largest deviations are about those of a periodic response: what has not
+    /// settled there comes to it or leaves it slowly.
+    #[must_use]
+    pub fn is_near_response(&self, motion: &Ending) -> bool {
+        let near =
+            |response: &Response| are_alike(&motion.peaks, &response.nonlinear, SAME_ROUGHLY);
+        self.responses.iter().any(near)
     }
 }
 
 impl Ending {
-    /// Another start ended here: the largest deviations are of all of them.
-    fn also(&mut self, other: &Self) {
-        self.starts += 1;
-        if self.state == State::NotSettled && other.state == State::Ok {
-            (self.state, self.settled) = (other.state, other.settled);
+    /// What motions are, by name: in words what they do once a turn, then why that is not known.
+    pub const KINDS: [&str; 7] = [
+        "periodic",
+        "periodic_2",
+        "periodic_m",
+        "quasi_periodic",
+        "chaotic",
+        "left_range",
+        "not_settled",
+    ];
+
+    /// Its position in [`Self::KINDS`].
+    #[must_use]
+    pub fn kind(&self) -> usize {
+        match (self.settled, self.state) {
+            (Some(Settled::Periodic { turns }), _) => (turns as usize).min(3) - 1,
+            (Some(Settled::QuasiPeriodic { .. }), _) => 3,
+            (Some(Settled::Chaotic), _) => 4,
+            (None, State::LeftRange { .. }) => 5,
+            (None, State::Ok | State::NotSettled) => 6,
         }
-        if self.settled == Some(Settled::Chaotic) {
+    }
+
+    /// Another start ended here. Of chaotic motions, and of what has not settled, the largest
+    /// deviations are those of all starts.
+    fn also(&mut self, other: &Self) {
+        let starts = self.starts + 1;
+        if self.settled.is_none() && other.settled.is_some() {
+            *self = other.clone();
+        } else if matches!(self.settled, None | Some(Settled::Chaotic)) {
             for (peak, other) in self.peaks.iter_mut().zip(other.peaks) {
                 *peak = peak.max(other);
             }
             self.min_gap_m = self.min_gap_m.min(other.min_gap_m);
         }
+        self.starts = starts;
     }
 }

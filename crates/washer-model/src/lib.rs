@@ -76,7 +76,7 @@ mod stability;
 
 pub use channel::Channel;
 pub use coordinates::COORDINATES;
-pub use dwell::{Ending, Endings, Exponent, Settled, Starts, State, endings};
+pub use dwell::{Ending, Endings, Exponent, Settled, Starts, State, endings, endings_beside};
 pub use fast::Cases;
 pub use fast::geared::{Formula, Gear, Geared};
 pub use kind::ModelKind;

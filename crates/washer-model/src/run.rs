@@ -3,7 +3,7 @@
 mod cabinet_force;
 mod course;
 pub(crate) mod equations;
-mod extras;
+pub(crate) mod extras;
 pub(crate) mod history;
 mod loads;
 pub(crate) mod model;
@@ -23,7 +23,7 @@ use crate::nonlinear::outputs::{RADIAL, squared};
 use crate::point::{PlannedLeg, Point};
 use crate::run::model::{Linear, Model, Nonlinear};
 use core::marker::PhantomData;
-use extras::{Extras, Seen};
+use extras::{Extras, Instants, Seen};
 use lane_ode::{
     Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, Task,
     Tolerance, dop853, dopri5, rk4,
@@ -332,8 +332,13 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     /// Asks for more records than the peaks.
     #[inline(always)]
     fn record(&mut self, zero: N<T>, wanted: Wanted, model: ModelKind) {
-        self.extras =
-            Extras::new(zero, wanted, (model, self.method), self.points[0], self.points.len());
+        self.extras = Extras::new(
+            zero,
+            wanted,
+            (model, Instants::of(self.method)),
+            self.points[0],
+            self.points.len(),
+        );
         if wanted.course {
             self.courses =
                 self.points.iter().map(|point| Vec::with_capacity(point.legs.len())).collect();

@@ -25,6 +25,6 @@ pub use convergence::Convergence;
 pub use ladder::{Ladder, Rung};
 pub use level::Level;
 pub use measures::{Criterion, Floor, Measured, Measures, Metric, Part};
-pub use outcome::{Deviations, GrowingMode, Growth, Outcome, Status, Trajectory};
+pub use outcome::{Deviations, Dwelt, GrowingMode, Growth, Outcome, Status, Trajectory};
 pub use run::{Rule, RungRun, runs};
 pub use verdict::{ROW_STATUSES, Verdict, row_status};

@@ -86,6 +86,8 @@ pub enum Metric {
     Growth,
     /// The greatest speed of a damper.
     DamperSpeed,
+    /// How far the motions go that constant speeds end in.
+    Dwell,
 }
 
 impl Metric {
@@ -101,6 +103,7 @@ impl Metric {
         Self::WalkMargin,
         Self::Growth,
         Self::DamperSpeed,
+        Self::Dwell,
     ];
 
     const fn facts(self) -> &'static Facts {
@@ -115,6 +118,17 @@ impl Metric {
     /// Whether each model has its own; else it belongs to the machine.
     pub const fn is_of_model(self) -> bool {
         self.facts().of.is_some()
+    }
+
+    /// Whether it is of the constant speeds of `[stability]`.
+    pub const fn is_of_speeds(self) -> bool {
+        matches!(self, Self::Growth | Self::Dwell)
+    }
+
+    /// Whether a motion that goes on for ever has it: a force or a speed, not a time within a
+    /// window.
+    pub const fn is_of_turns(self) -> bool {
+        self.is_of_model() && !matches!(self, Self::ClashTime | Self::StopContact)
     }
 
     /// What the machine must have.
@@ -342,6 +356,13 @@ const METRICS: [Facts; Metric::ALL.len()] = [
         of_each: Some(["speed", "greatest speed along the damper in the window"]),
         record: |wanted| wanted.damper_speeds = true,
         of: Some(|extra| extra.damper_speeds_m_per_s.clone()),
+        ..PLAIN
+    },
+    // Each channel has a column of its own, in its unit.
+    Facts {
+        name: "dwell",
+        description: "largest deviation of any motion that the drum held at any of the speeds of \
+                      [stability] ends in (`sweep dwell`)",
         ..PLAIN
     },
 ];

@@ -1,6 +1,6 @@
 //! The outcome of a grid point: one row of the result file.
 
-use washer_model::{Beyond, Channel, Disturbance, Response};
+use washer_model::{Beyond, Channel, Disturbance, Ending, NoAnswer, Response};
 
 use crate::level::Level;
 
@@ -40,6 +40,16 @@ impl Status {
         Self::NoMultipliers,
         Self::TooSlow,
     ];
+}
+
+impl From<NoAnswer> for Status {
+    fn from(none: NoAnswer) -> Self {
+        match none {
+            NoAnswer::NoResponse | NoAnswer::Stopped => Self::NoResponse,
+            NoAnswer::Eigenvalues => Self::NoMultipliers,
+            NoAnswer::TooSlow => Self::TooSlow,
+        }
+    }
 }
 
 /// One model's trajectory at one grid point.
@@ -130,6 +140,40 @@ impl From<&Response> for Growth {
     }
 }
 
+/// How far the motions go that some constant speeds end in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dwelt {
+    /// The largest of all these motions; of one that left the model's range, before it did.
+    pub deviations: Deviations,
+    /// The speed (rpm) at which the tub turns farthest, by yaw or by pitch.
+    pub speed_rpm: f64,
+    /// What that motion is: position in [`Ending::KINDS`].
+    pub kind: usize,
+}
+
+impl Dwelt {
+    /// Of these motions, each with its speed (rpm); the first of equals counts.
+    pub fn of<'a>(motions: impl IntoIterator<Item = (f64, &'a Ending)>) -> Option<Self> {
+        let turned = |of: &Deviations| {
+            [Channel::TubYaw, Channel::TubPitch].map(|channel| of[channel.index()])
+        };
+        let turned = |of: &Deviations| turned(of).into_iter().fold(0.0, f64::max);
+        let mut farthest = 0.0;
+        motions.into_iter().fold(None, |most: Option<Self>, (speed_rpm, motion)| {
+            let this = Self { deviations: motion.peaks, speed_rpm, kind: motion.kind() };
+            let mut most = most.unwrap_or(this);
+            if turned(&motion.peaks) > farthest {
+                farthest = turned(&motion.peaks);
+                most = Self { deviations: most.deviations, ..this };
+            }
+            for (most, one) in most.deviations.iter_mut().zip(motion.peaks) {
+                *most = most.max(one);
+            }
+            Some(most)
+        })
+    }
+}
+
 /// Both models at one grid point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
@@ -157,6 +201,8 @@ pub struct Outcome {
     /// What becomes of disturbances at a constant speed: the row's own, or the one of the plan's
     /// speeds at which they grow fastest. `None` where it is not asked for or not known.
     pub growth: Option<Growth>,
+    /// How far motions at the plan's constant speeds go, if it asks for that.
+    pub dwelt: Option<Dwelt>,
     /// Other responses at the same point and constant speed: rows of their own, behind this one.
     pub coexisting: Vec<Outcome>,
 }
@@ -175,6 +221,7 @@ impl Outcome {
             turn_ratios: Vec::new(),
             static_sag_m: None,
             growth: None,
+            dwelt: None,
             coexisting: Vec::new(),
         }
     }

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
-use sweep::{Effort, ProgressMode};
+use sweep::{Effort, ProgressMode, Search, Starts};
 
 use crate::columns::numbers;
 use crate::ended;
@@ -48,6 +48,49 @@ pub(crate) fn stability(
     progress: bool,
     fresh: bool,
 ) -> PyResult<PyResultTable> {
+    held(plan, speeds_rpm, None, out, (threads, progress, fresh))
+}
+
+/// The motions that constant speeds end in.
+#[pyfunction]
+#[pyo3(signature = (plan, speeds_rpm, out=None, *, starts=8, kick=6.0, carry=None, threshold=false,
+                    longest=600.0, sections=0, threads=None, progress=true, fresh=false))]
+// Options of a Python function.
+#[expect(clippy::too_many_arguments)]
+pub(crate) fn dwell(
+    plan: &Bound<'_, PyPlan>,
+    speeds_rpm: &Bound<'_, PyAny>,
+    out: Option<PathBuf>,
+    starts: usize,
+    kick: f64,
+    carry: Option<&str>,
+    threshold: bool,
+    longest: f64,
+    sections: usize,
+    threads: Option<usize>,
+    progress: bool,
+    fresh: bool,
+) -> PyResult<PyResultTable> {
+    let starts = Starts {
+        count: starts,
+        kick_rad_per_s: kick,
+        longest_s: longest,
+        with_threshold: threshold,
+        ..Starts::default()
+    };
+    let carry = carry.map(str::parse).transpose();
+    let carry = carry.map_err(|wrong: String| PyValueError::new_err(format!("carry: {wrong}")))?;
+    let search = Search { starts, carry, sections };
+    held(plan, speeds_rpm, Some(search), out, (threads, progress, fresh))
+}
+
+fn held(
+    plan: &Bound<'_, PyPlan>,
+    speeds_rpm: &Bound<'_, PyAny>,
+    search: Option<Search>,
+    out: Option<PathBuf>,
+    (threads, progress, fresh): (Option<usize>, bool, bool),
+) -> PyResult<PyResultTable> {
     let py = plan.py();
     let speeds_rpm = numbers(speeds_rpm)?;
     let plan = plan.get().evaluator.plan();
@@ -55,14 +98,14 @@ pub(crate) fn stability(
     let Some(out) = out else {
         let found = attended(py, |interrupt| {
             let effort = Effort { threads, progress: mode, interrupt };
-            sweep::find_stability(plan, &speeds_rpm, effort)
+            sweep::find_held(plan, &speeds_rpm, search, effort)
         })?;
         return ended::rows(py, found);
     };
     let ran = attended(py, |interrupt| {
         let effort = Effort { threads, progress: mode, interrupt };
         let tell = ended::teller(progress);
-        sweep::stability_to_file(plan, &speeds_rpm, &out, fresh, tell, effort)
+        sweep::held_to_file(plan, (&speeds_rpm, search), &out, fresh, tell, effort)
     })?;
     ended::file(py, ran, &out)
 }

@@ -41,6 +41,23 @@ def test_stability_has_the_commands_bytes(sweep, tmp_path):
         washer_sweep.stability(plan, [240.0], by_call, progress=False)
 
 
+def test_dwells_have_the_commands_bytes(sweep, tmp_path):
+    by_command, by_call, saved = (tmp_path / f"{name}.parquet" for name in "abc")
+    told(sweep, "dwell", QUICK, "--speed", "250,297.5", "--starts", "2", "--out", by_command,
+         "--progress", "none")
+    plan = Plan.from_toml(QUICK)
+    result = washer_sweep.dwell(plan, [250, 297.5], by_call, starts=2, progress=False)
+    assert by_call.read_bytes() == by_command.read_bytes()
+    washer_sweep.dwell(plan, [250, 297.5], starts=2, progress=False).save(saved)
+    assert saved.read_bytes() == by_command.read_bytes()
+    assert result.kind == "dwell"
+    for options, said in [
+        ({"starts": 0}, "from 1 to 1024"), ({"kick": -1}, "above 0"), ({"carry": "x"}, "up or down")
+    ]:
+        with pytest.raises(ValueError, match=said):
+            washer_sweep.dwell(plan, [250], **options)
+
+
 def test_an_explanation_is_the_commands(sweep):
     words = [sweep, "explain", QUICK, "--speed", "240:320:4"]
     for name, value in POINT.items():

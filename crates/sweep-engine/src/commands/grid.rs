@@ -17,6 +17,10 @@ pub struct GridArgs {
     /// Set a constant, over those of the grid file; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub sets: Vec<String>,
+    /// The point, on the grid or between its points: a value for an axis, which sweeps nothing
+    /// then, and for any other parameter; may be repeated
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub at: Vec<String>,
     /// Call a ratio below this reliable, over the grid file's limit
     #[arg(long, value_name = "RATIO")]
     pub ratio_limit: Option<f64>,
@@ -26,7 +30,7 @@ pub struct GridArgs {
 }
 
 impl GridArgs {
-    /// What is set, in one list.
+    /// What is set beside `--at`, in one list.
     pub fn sets(&self) -> Vec<String> {
         let limit = self.ratio_limit.map(|limit| format!("ratio_limit={limit}"));
         self.sets.iter().cloned().chain(limit).collect()
@@ -37,7 +41,8 @@ impl GridArgs {
     /// # Errors
     /// Every mistake in the grid file and the constants.
     pub fn load<M: Read>(&self) -> Result<Plan<M>, Diagnostics> {
-        let mut plan = GridInput::<M>::file(self.grid.clone(), self.sets()).load()?;
+        let mut plan =
+            GridInput::<M>::file(self.grid.clone(), self.sets()).fixing(&self.at).load()?;
         if let Some(name) = &self.name {
             plan.name.clone_from(name);
         }
@@ -82,6 +87,9 @@ impl ResultArgs {
         for set in self.grid.sets() {
             line.push_str(&format!(" --set {}", quoted(&set)));
         }
+        for at in &self.grid.at {
+            line.push_str(&format!(" --at {}", quoted(at)));
+        }
         if let Some(name) = &self.grid.name {
             line.push_str(&format!(" --name {}", quoted(name)));
         }
@@ -111,6 +119,7 @@ mod tests {
         let grid = GridArgs {
             grid: "my grids/it's.toml".into(),
             sets: vec!["mass_kg=20".into()],
+            at: vec!["damping=9".into()],
             ratio_limit: Some(1.5),
             name: Some("light".into()),
         };
@@ -118,7 +127,7 @@ mod tests {
         assert_eq!(
             target.command("merge"),
             "sweep merge 'my grids/it'\\''s.toml' --set mass_kg=20 --set ratio_limit=1.5 \
-             --name light --out x.parquet"
+             --at damping=9 --name light --out x.parquet"
         );
     }
 }

@@ -48,6 +48,13 @@ fn claim<M: Read>(
     true
 }
 
+/// Whether an option has given all of an axis's numbers a value: it sweeps nothing then.
+fn is_fixed<M: Read>(parameter: &M::Parameter, draft: &Draft<'_, M>) -> bool {
+    let parts = draft.plan.model.parts(parameter);
+    let mut options = draft.constants.iter().filter(|constant| constant.is_over_file);
+    options.any(|constant| parts.iter().all(|part| constant.parts.contains(part)))
+}
+
 /// Reads every `[[axis]]`: of a grid, or of a design that fills a box: a range each, without a
 /// count.
 pub fn axes<M: Read>(
@@ -79,6 +86,9 @@ pub fn axes<M: Read>(
             None => values(&section, range),
         };
         section.finish();
+        if parameter.as_ref().is_some_and(|parameter| is_fixed(parameter, draft)) {
+            continue;
+        }
         if design.is_none() {
             let count = values.as_ref().map_or(1, |values| values.value.len());
             let product = points.and_then(|points| points.checked_mul(count));
@@ -98,7 +108,9 @@ pub fn axes<M: Read>(
             add(Axis { parameter, values: values.value }, values.at, draft);
         }
     }
-    draft.plan.design = design.map(|design| design.value);
+    // Where every axis is fixed there is one point.
+    let is_point = draft.plan.axes.is_empty();
+    draft.plan.design = design.map(|design| design.value).filter(|_| !is_point);
 }
 
 /// Adds an axis to the plan.

@@ -23,4 +23,6 @@ pub struct WrittenConstant {
     pub name: Located<String>,
     /// The numbers that it writes.
     pub parts: Vec<Cow<'static, str>>,
+    /// Whether it is over the file, and so fixes what an axis sweeps.
+    pub is_over_file: bool,
 }

@@ -21,7 +21,7 @@ pub const DEFAULT_RATIO_LIMIT: f64 = 2.0;
 
 /// Reads the grid file and puts the constants in place. `None` if the grid file has no text.
 pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
-    let GridInput { path, text, sets, .. } = input;
+    let GridInput { path, text, sets, at, .. } = input;
     let to_start = |diagnostic: Diagnostic| match M::TO_START {
         Some(help) => diagnostic.help(help),
         None => diagnostic,
@@ -65,7 +65,7 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
         set: Vec::new(),
     };
     let mut draft = Draft { plan, report, constants: Vec::new() };
-    parameters::constants(&root, sets, &mut draft);
+    parameters::constants(&root, sets, at, &mut draft);
     match design::read(&root, path) {
         design::WrittenDesign::None => axes::axes(&root, None, &mut draft),
         design::WrittenDesign::Box(design) => axes::axes(&root, Some(design), &mut draft),

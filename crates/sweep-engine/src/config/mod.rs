@@ -65,19 +65,20 @@ pub struct GridInput<M> {
     /// The text of a file of the model's own, in place of the one that the grid names.
     pub own_file: Option<String>,
     sets: Vec<String>,
+    at: Vec<String>,
     model: PhantomData<M>,
 }
 
 impl<M: Read> GridInput<M> {
     /// A grid file. The paths in it are relative to its folder.
     pub fn file(path: PathBuf, sets: Vec<String>) -> Self {
-        Self { path, text: None, own_file: None, sets, model: PhantomData }
+        Self { path, text: None, own_file: None, sets, at: Vec::new(), model: PhantomData }
     }
 
     /// The text of a grid file. Messages call it by this name, which is also that of the run if the
     /// text gives none. The paths in it are relative to the working directory.
     pub fn text(name: &str, text: String, sets: Vec<String>) -> Self {
-        Self { path: name.into(), text: Some(text), own_file: None, sets, model: PhantomData }
+        Self { text: Some(text), ..Self::file(name.into(), sets) }
     }
 
     /// The grid that a result was made of, by its plan in the result (`Plan::to_json`). The points
@@ -96,9 +97,15 @@ impl<M: Read> GridInput<M> {
             path: name.into(),
             text: Some(again::file(top)),
             own_file: own.map(|own| again::file(entries(Some(own)))),
-            sets: Vec::new(),
-            model: PhantomData,
+            ..Self::file(PathBuf::new(), Vec::new())
         }
+    }
+
+    /// As it is, with these `NAME=VALUE` beside the constants: a parameter that an axis sweeps
+    /// is fixed by one, as it is by a constant.
+    #[must_use]
+    pub fn fixing(self, at: &[String]) -> Self {
+        Self { at: at.to_vec(), ..self }
     }
 
     /// Reads the grid, puts the constants in place, and checks the whole.

@@ -27,8 +27,13 @@ struct Constant<'a, M: Read> {
     value: Located<f64>,
 }
 
-/// Reads `[set]`, then `--set`, which overrides it, and writes both into the plan.
-pub fn constants<M: Read>(root: &Section<'_>, sets: &[String], draft: &mut Draft<'_, M>) {
+/// Reads `[set]`, then `--set` and `--at`, which override it, and writes all into the plan.
+pub fn constants<M: Read>(
+    root: &Section<'_>,
+    sets: &[String],
+    at: &[String],
+    draft: &mut Draft<'_, M>,
+) {
     let mut constants = Vec::new();
     if let Some(section) = root.table("set", "[set]").given() {
         let section = section.value;
@@ -36,13 +41,14 @@ pub fn constants<M: Read>(root: &Section<'_>, sets: &[String], draft: &mut Draft
             let number = |range: Range| section.number_named(name.value, range);
             constants.extend(constant(name.clone(), number, draft));
         }
-        apply(&constants, draft);
+        apply(&constants, false, draft);
     }
     let sets: Vec<String> =
         sets.iter().filter(|argument| !scalars::is_one::<M>(argument)).cloned().collect();
-    let constants = arguments("--set", &sets, draft);
+    let mut constants = arguments("--set", &sets, draft);
+    constants.extend(arguments("--at", at, draft));
     let before = draft.plan.clone();
-    apply(&constants, draft);
+    apply(&constants, true, draft);
     // What is set to what it was leaves the plan as it was.
     let changes = |constant: &&Constant<'_, M>| {
         let mut after = before.clone();
@@ -79,7 +85,7 @@ pub fn point<M: Read>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
         }
     }
     draft.plan.design = None;
-    apply(&constants, draft);
+    apply(&constants, true, draft);
     constants
         .iter()
         .map(|constant| (constant.name.value.to_owned(), constant.value.value))
@@ -152,7 +158,7 @@ pub fn unknown<M: Read>(
 
 /// Writes constants of equal rank; no number may be written twice, as nothing says which comes
 /// last.
-fn apply<M: Read>(constants: &[Constant<'_, M>], draft: &mut Draft<'_, M>) {
+fn apply<M: Read>(constants: &[Constant<'_, M>], is_over_file: bool, draft: &mut Draft<'_, M>) {
     let mut written: BTreeMap<Cow<'static, str>, &Constant<'_, M>> = BTreeMap::new();
     for constant in constants {
         let parts = draft.plan.model.parts(&constant.parameter);
@@ -166,7 +172,7 @@ fn apply<M: Read>(constants: &[Constant<'_, M>], draft: &mut Draft<'_, M>) {
                 }
                 let name =
                     Located { value: constant.name.value.to_owned(), at: constant.name.at.clone() };
-                draft.constants.push(WrittenConstant { name, parts });
+                draft.constants.push(WrittenConstant { name, parts, is_over_file });
             }
         }
     }

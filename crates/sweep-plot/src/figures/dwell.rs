@@ -1,16 +1,21 @@
 //! What held speeds end in: every motion a dot over the speed, in the colour of its kind, and the
 //! periodic response as a line.
 
+use std::path::Path;
+
 use crate::PlotOptions;
+use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, LINEAR, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::stability::{
     UNSTABLE, axes, axis_columns, one_point, part, row_values, said_within, shown, unstable,
 };
+use crate::figures::{passages, trace};
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Source};
-use crate::scene::Colour;
+use crate::scene::{Colour, INK};
+use crate::together::{self, At};
 
 /// Kinds of motions as the file has them, in words, and their colours; the last is what did not
 /// settle.
@@ -22,6 +27,17 @@ const KINDS: [(&str, &str, Colour); 6] = [
     ("chaotic", "chaotic", DISTINCT[3]),
     ("", "not settled", FAILED),
 ];
+
+/// The curve of a trace's way up.
+const RISING: &str = "nonlinear model, speed rising";
+
+/// Deviations that differ by this factor are drawn by their logarithms.
+const WIDE: f64 = 10.0;
+
+/// Columns of states once a turn: their turn, yaw and pitch of the tub.
+const TURN: &str = "turn";
+const YAW: &str = "q5_rad";
+const PITCH: &str = "q6_rad";
 
 /// The file's one point over speed.
 struct Held {
@@ -47,10 +63,17 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
     let axes = axes(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
     let held = read(source, &axes, &point, &channels)?;
-    // A grid of speeds of the lines, then one of the motions of each kind.
+    let passing = options.against.as_ref().map(|path| passing(source, (&axes, &point), path));
+    let passing = passing.transpose()?;
+    // A grid of speeds of the lines, then one of the motions of each kind, then those of a run.
     let of_kind = |kind: usize| held.motions.iter().filter(move |(_, of, _)| *of == kind);
     let mut grids = vec![held.speed.clone()];
     grids.extend((0..KINDS.len()).map(|kind| of_kind(kind).map(|(speed, ..)| *speed).collect()));
+    let of_run = grids.len();
+    let (first, last) = (held.speed.first().copied(), held.speed.last().copied());
+    let is_held = |speed: &f64| first <= Some(*speed) && Some(*speed) <= last;
+    let grids_of_run = passing.iter().flat_map(|run| &run.grids);
+    grids.extend(grids_of_run.map(|grid| grid.iter().copied().filter(is_held).collect()));
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
         let (unit, factor) = label::shown(&facts.unit);
         let scaled = |values: &[f64]| values.iter().map(|value| value * factor).collect();
@@ -82,16 +105,35 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
                 });
             }
         }
+        let runs = passing.iter().flat_map(|run| &run.panels).filter(|panel| panel.name == *name);
+        let runs = runs.flat_map(|panel| &panel.series);
+        let rising = runs.filter(|run| run.name == RISING);
+        series.extend(passing.iter().zip(rising).map(|(chart, run)| {
+            Series {
+                name: "a run that passes these speeds".to_owned(),
+                colour: INK,
+                grid: of_run + run.grid,
+                y: chart.grids[run.grid]
+                    .iter()
+                    .zip(&run.y)
+                    .filter_map(|(speed, y)| is_held(speed).then_some(*y))
+                    .collect(),
+                style: Style::Solid(1.4),
+            }
+        }));
+        let motions = series.iter().flat_map(|series| &series.y).copied();
+        let log =
+            extremes(motions.filter(|y| *y > 0.0)).is_some_and(|(low, high)| high > WIDE * low);
         let words = label::capitalised(&label::channel(name));
         ChartPanel {
             shown: is_shown[k],
             height: 190.0,
+            log,
             ..ChartPanel::new(name, Label::new(&words, unit), series)
         }
     });
     let panels = panels.collect();
-    let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
-    notes.extend(axes.iter().zip(&point).map(|(axis, value)| said_within(axis, *value)));
+    let mut notes = notes(source, &axes, &point);
     notes.push("largest deviation from equilibrium".to_owned());
     Ok(Chart {
         title: "What a held speed ends in".to_owned(),
@@ -103,6 +145,22 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         panels,
         ..Chart::default()
     })
+}
+
+/// The chart of how far a run goes in each turn that passes over these speeds.
+///
+/// # Errors
+/// [`PlotError::Unfit`] for a file that is no trace or of another machine.
+fn passing(
+    source: &Source,
+    (axes, point): (&[&ColumnFacts], &[f64]),
+    path: &Path,
+) -> Result<Chart, PlotError> {
+    let trace = trace::other_trace(path)?;
+    let own: At = axes.iter().map(|axis| axis.name.clone()).zip(point.iter().copied()).collect();
+    let files = [(&trace.source, &together::at(&trace.source)), (source, &own)];
+    together::agree("--against", path, files, together::MACHINE)?;
+    passages::chart(&trace, &PlotOptions::default())
 }
 
 fn read(
@@ -124,6 +182,8 @@ fn read(
         lines: vec![[Vec::new(), Vec::new()]; channels.len()],
         motions: Vec::new(),
     };
+    let has_turns = source.column(TURN).is_some();
+    names.extend(has_turns.then_some(TURN));
     for batch in source.batches(&names)? {
         let batch = batch?;
         let of_axes = axis_columns(&batch, axes)?;
@@ -131,7 +191,12 @@ fn read(
         let kinds = batch.words("kind")?;
         let values: Vec<Vec<f64>> =
             columns.iter().map(|name| batch.numbers(name)).collect::<Result<_, _>>()?;
-        for row in (0..batch.rows).filter(|&row| row_values(&of_axes, row) == point) {
+        let turns = if has_turns { batch.numbers(TURN)? } else { Vec::new() };
+        // Of each motion the first of its turns.
+        let is_shown = |row: &usize| {
+            row_values(&of_axes, *row) == point && turns.get(*row).is_none_or(|t| *t <= 0.0)
+        };
+        for row in (0..batch.rows).filter(is_shown) {
             if held.speed.last() != Some(&speed[row]) {
                 held.speed.push(speed[row]);
                 held.growth.push(growth[row]);
@@ -140,11 +205,85 @@ fn read(
                     periodic.push(values[3 * k + 1][row]);
                 }
             }
-            let kind = kinds[row].unwrap_or_default();
-            let kind = KINDS.iter().position(|(known, ..)| *known == kind);
             let deviations = (0..channels.len()).map(|k| values[3 * k + 2][row]).collect();
-            held.motions.push((speed[row], kind.unwrap_or(KINDS.len() - 1), deviations));
+            held.motions.push((speed[row], place_of(kinds[row]), deviations));
         }
     }
     Ok(held)
+}
+
+/// The place of a kind in [`KINDS`].
+fn place_of(kind: Option<&str>) -> usize {
+    let kind = kind.unwrap_or_default();
+    KINDS.iter().position(|(known, ..)| *known == kind).unwrap_or(KINDS.len() - 1)
+}
+
+/// The chart of a dwell file's states once a turn: pitch of the tub over its yaw, the motions of
+/// each speed in a panel.
+///
+/// # Errors
+/// As [`one_point`]; [`PlotError::Column`] where no states were kept.
+pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
+    let axes = axes(source);
+    let point = one_point(source, &axes, &options.at, "--at")?;
+    let mut names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
+    names.extend(["speed_rpm", "motion", "kind", YAW, PITCH]);
+    // Of each speed and motion its kind, and states by yaw.
+    let mut found: Vec<(f64, f64, usize, Vec<[f64; 2]>)> = Vec::new();
+    for batch in source.batches(&names)? {
+        let batch = batch?;
+        let of_axes = axis_columns(&batch, &axes)?;
+        let [speed, motion, yaw, pitch] =
+            ["speed_rpm", "motion", YAW, PITCH].map(|name| batch.numbers(name));
+        let (speed, motion, yaw, pitch) = (speed?, motion?, yaw?, pitch?);
+        let kinds = batch.words("kind")?;
+        for row in (0..batch.rows).filter(|&row| row_values(&of_axes, row) == point) {
+            if found.last().is_none_or(|last| (last.0, last.1) != (speed[row], motion[row])) {
+                found.push((speed[row], motion[row], place_of(kinds[row]), Vec::new()));
+            }
+            found.iter_mut().last().into_iter().for_each(|(.., states)| {
+                states.push([1e3 * yaw[row], 1e3 * pitch[row]]);
+            });
+        }
+    }
+    let mut grids = Vec::new();
+    let mut panels: Vec<ChartPanel> = Vec::new();
+    for (speed, motion, kind, mut states) in found {
+        states.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let (_, words, colour) = KINDS[kind];
+        let said = format!("{} rpm", label::significant(speed, 6));
+        let series = Series {
+            name: format!("motion {motion}: {words}"),
+            colour: if motion == 0.0 { colour } else { DISTINCT[motion as usize % DISTINCT.len()] },
+            grid: grids.len(),
+            y: states.iter().map(|state| state[1]).collect(),
+            style: Style::Dots,
+        };
+        grids.push(states.iter().map(|state| state[0]).collect());
+        match panels.last_mut().filter(|panel| panel.name == said) {
+            Some(panel) => panel.series.push(series),
+            None => {
+                let label = Label::new(&format!("Pitch at {said}"), "mrad");
+                panels.push(ChartPanel::new(&said, label, vec![series]));
+            }
+        }
+    }
+    Ok(Chart {
+        title: "States once a turn, where the unbalance is up".to_owned(),
+        subtitle: notes(source, &axes, &point).join(" · "),
+        x_label: Label::new("Yaw of the tub from equilibrium", "mrad"),
+        x_log: false,
+        grids,
+        panels,
+        marks: Vec::new(),
+        mark_meaning: String::new(),
+        shades: Vec::new(),
+        shade_meaning: String::new(),
+    })
+}
+
+/// The run and the point.
+fn notes(source: &Source, axes: &[&ColumnFacts], point: &[f64]) -> Vec<String> {
+    let run = source.run_name().map(str::to_owned).into_iter();
+    run.chain(axes.iter().zip(point).map(|(axis, value)| said_within(axis, *value))).collect()
 }

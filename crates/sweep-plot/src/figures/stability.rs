@@ -257,7 +257,7 @@ pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotEr
     })
 }
 
-pub(super) fn said(axis: &ColumnFacts, value: f64) -> String {
+fn said(axis: &ColumnFacts, value: f64) -> String {
     let unit = if axis.unit.is_empty() { String::new() } else { format!(" {}", axis.unit) };
     format!("{} {}{unit}", label::words(&axis.name), label::significant(value, 4))
 }

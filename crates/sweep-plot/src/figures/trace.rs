@@ -204,7 +204,7 @@ fn difference(panels: &[ChartPanel]) -> Option<f64> {
 }
 
 /// The trace whose nonlinear model is drawn in place of the linear one.
-fn other_trace(path: &Path) -> Result<Table, PlotError> {
+pub(super) fn other_trace(path: &Path) -> Result<Table, PlotError> {
     let table = Table::open(path)?;
     if table.source.kind == Kind::Trace {
         return Ok(table);

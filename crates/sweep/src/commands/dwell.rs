@@ -4,10 +4,9 @@ use std::fmt;
 
 use washer_model::{Starts, decimal};
 
-use super::held::Held;
-use crate::dwell::{Carry, Motions, Search, motions, summary};
+use super::held::{Held, SpeedArgs};
+use crate::dwell::{Carry, Motions, POSITIVE, Search, is_positive, motions, summary};
 use crate::plan::Plan;
-use crate::speeds::SpeedList;
 use crate::stability::{Asked, DwellEngine, check};
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::ResultArgs;
@@ -26,7 +25,7 @@ pub(super) const EXAMPLES: Examples = &[
 pub(super) struct SearchArgs {
     /// Starts a speed, the disturbed periodic response among them
     #[arg(long, value_name = "N", default_value_t = 8,
-          value_parser = clap::value_parser!(u16).range(1..=1024))]
+          value_parser = clap::value_parser!(u16).range(1..=Search::MOST_STARTS))]
     starts: u16,
     /// Hardest kick, in rad/s of the tub's rocking
     #[arg(long, value_name = "RAD/S", default_value_t = 6.0, value_parser = positive)]
@@ -37,16 +36,18 @@ pub(super) struct SearchArgs {
     /// Look for the smallest kick that does not come back, where there are several motions
     #[arg(long)]
     threshold: bool,
+    /// Keep so many states of each motion, once a turn: a row each, with its coordinates
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true,
+          value_parser = clap::value_parser!(u16).range(..=256))]
+    sections: u16,
     /// Follow a motion that does not settle for at most this long, in s
     #[arg(long, value_name = "SECONDS", default_value_t = 600.0, value_parser = positive)]
     longest: f64,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value <= 1e5 => Ok(value),
-        _ => Err("expected a number above 0, at most 1e5".to_owned()),
-    }
+    let value = text.parse().ok().filter(|value| is_positive(*value));
+    value.ok_or_else(|| format!("expected {POSITIVE}"))
 }
 
 impl fmt::Display for SearchArgs {
@@ -66,6 +67,9 @@ impl fmt::Display for SearchArgs {
         if starts.longest_s != usual.longest_s {
             write!(f, " --longest {}", decimal(starts.longest_s))?;
         }
+        if self.sections > 0 {
+            write!(f, " --sections {}", self.sections)?;
+        }
         if self.threshold { f.write_str(" --threshold") } else { Ok(()) }
     }
 }
@@ -77,8 +81,9 @@ impl SearchArgs {
             kick_rad_per_s: self.kick,
             longest_s: self.longest,
             with_threshold: self.threshold,
+            ..Starts::default()
         };
-        Search { starts, carry: self.carry }
+        Search { starts, carry: self.carry, sections: usize::from(self.sections) }
     }
 }
 
@@ -92,9 +97,8 @@ pub struct Args {
     /// The grid, and the file: results/NAME-dwell.parquet by default.
     #[command(flatten)]
     target: ResultArgs,
-    /// Constant spin speeds in rpm, above 0: one, several with commas, FROM:TO:STEP
-    #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
-    speed: SpeedList,
+    #[command(flatten)]
+    held: SpeedArgs,
     /// How motions are looked for.
     #[command(flatten)]
     search: SearchArgs,
@@ -125,12 +129,12 @@ interrupted command has computed stays in FILE.partial, and the same command goe
 /// finished chunks are kept.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan: Plan = args.target.grid.load()?;
-    check(&plan, "--speed", &args.speed.to_string())?;
-    let (search, speeds_rpm) = (args.search.search(), args.speed.values());
+    check(&plan, "--speed", &args.held.speed.to_string())?;
+    let (search, speeds_rpm) = (args.search.search(), args.held.speed.values());
     let engine =
         DwellEngine::asking(&plan, speeds_rpm, Asked::Motions(Motions::new(&plan, search)))?;
     let (job, output) = motions(&plan, speeds_rpm, &search, args.target.out.as_deref());
-    let options = format!("--speed {}{}", args.speed, args.search);
+    let options = format!("--speed {}{}", args.held.speed, args.search);
     let held = Held {
         verb: "dwell",
         target: &args.target,

@@ -28,10 +28,6 @@ pub(super) const EXAMPLES: Examples = &[
 pub struct Args {
     #[command(flatten)]
     grid: GridArgs,
-    /// The point: a value for each axis, on the grid or between its points, and for any other
-    /// parameter; may be repeated
-    #[arg(long, value_name = "NAME=VALUE")]
-    at: Vec<String>,
     /// Speeds to look at, in rpm, above 0 [default: from half of the slowest mode's frequency to
     /// the profile's fastest speed, by 1]
     #[arg(long, value_name = "FROM:TO:STEP", value_parser = turning, allow_hyphen_values = true)]
@@ -56,7 +52,7 @@ disturbance is measured by its energy. docs/stability.md explains every line.";
 /// Mistakes in the grid file or the options, a profile that cannot be explained, and a machine
 /// without equilibrium or modes.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let (plan, at) = config::load_point(&args.grid.grid, &args.grid.sets, &args.at)?;
+    let (plan, at) = config::load_point(&args.grid.grid, &args.grid.sets, &args.grid.at)?;
     let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
     let simd = simd_from_environment()?;
     // A signal ends the process: there is nothing to keep.

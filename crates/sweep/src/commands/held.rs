@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::engine::Engine;
+use crate::speeds::SpeedList;
 use sweep_engine::commands::grid::{ResultArgs, quoted};
 use sweep_engine::commands::run::{WorkArgs, exit, installed, line, work};
 use sweep_engine::exit::{Error, Exit, tell};
@@ -12,6 +13,14 @@ use sweep_engine::run::{self as runner, Ended, RunReport};
 use sweep_engine::store::{Job, StoreError};
 use sweep_engine::threads::Environment;
 use sweep_files::ParquetFile;
+
+/// Speeds that the drum holds.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct SpeedArgs {
+    /// Constant spin speeds in rpm, above 0: one, several with commas, FROM:TO:STEP
+    #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
+    pub(super) speed: SpeedList,
+}
 
 /// A command about held speeds.
 pub(super) struct Held<'a> {

@@ -41,7 +41,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub stability: Option<PathBuf>,
 
-    /// Trace: compare with this trace: both nonlinear models, the linear one left out
+    /// Trace: compare with this trace: both nonlinear models, the linear one left out. Dwell: how
+    /// far this trace's run goes that passes over the held speeds
     #[arg(long, value_name = "FILE")]
     pub against: Option<PathBuf>,
 

@@ -112,7 +112,8 @@ fn names_fit(args: &Args, folder: &Path, program: &Path) -> Result<(), Error> {
     ];
     let paths = paths.into_iter().filter_map(|(what, path)| Some((what, path?.as_os_str())));
     let sets = grid.sets.iter().map(|set| ("--set", OsStr::new(set)));
-    for (option, name) in paths.chain(sets) {
+    let at = grid.at.iter().map(|at| ("--at", OsStr::new(at)));
+    for (option, name) in paths.chain(sets).chain(at) {
         if name.to_str().is_none_or(|name| word(name).is_err()) {
             return Err(Error::Option {
                 option,

@@ -1,9 +1,8 @@
 //! `sweep stability GRID.toml --speed FROM:TO:STEP`: periodic responses and whether they are
 //! stable.
 
-use super::held::Held;
+use super::held::{Held, SpeedArgs};
 use crate::plan::Plan;
-use crate::speeds::SpeedList;
 use crate::stability::{DwellEngine, check, dwells, tongues};
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::ResultArgs;
@@ -26,9 +25,8 @@ pub struct Args {
     /// The grid, and the file: results/NAME-stability.parquet by default.
     #[command(flatten)]
     target: ResultArgs,
-    /// Constant spin speeds in rpm, above 0: one, several with commas, FROM:TO:STEP
-    #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
-    speed: SpeedList,
+    #[command(flatten)]
+    held: SpeedArgs,
     /// How it is done.
     #[command(flatten)]
     work: WorkArgs,
@@ -58,10 +56,10 @@ command goes on from there.";
 /// finished chunks are kept.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan: Plan = args.target.grid.load()?;
-    check(&plan, "--speed", &args.speed.to_string())?;
-    let engine = DwellEngine::new(&plan, args.speed.values())?;
-    let (job, output) = dwells(&plan, &args.speed, args.target.out.as_deref());
-    let options = format!("--speed {}", args.speed);
+    check(&plan, "--speed", &args.held.speed.to_string())?;
+    let engine = DwellEngine::new(&plan, args.held.speed.values())?;
+    let (job, output) = dwells(&plan, &args.held.speed, args.target.out.as_deref());
+    let options = format!("--speed {}", args.held.speed);
     let held = Held {
         verb: "stability",
         target: &args.target,

@@ -35,17 +35,14 @@ pub(super) const EXAMPLES: Examples = &[
 pub struct Args {
     #[command(flatten)]
     grid: sweep_engine::commands::grid::GridArgs,
-    /// The point: a value for each axis, on the grid or between its points, and for any other
-    /// parameter; may be repeated
-    #[arg(long, value_name = "NAME=VALUE", conflicts_with_all = ["point", "worst"])]
-    at: Vec<String>,
     /// The point of this number in the grid, as in a result's column `point`
-    #[arg(long, value_name = "N", conflicts_with = "worst")]
+    #[arg(long, value_name = "N", conflicts_with_all = ["worst", "at"])]
     point: Option<u64>,
     /// The point of the grid's result where this column is worst [default: ratio_max]
     #[arg(
         long,
         value_name = "COLUMN",
+        conflicts_with = "at",
         num_args = 0..=1,
         default_missing_value = "ratio_max"
     )]
@@ -111,7 +108,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 /// The point as `--at` would give it.
 fn chosen(args: &Args) -> Result<Vec<String>, Error> {
     if args.point.is_none() && args.worst.is_none() {
-        return Ok(args.at.clone());
+        return Ok(args.grid.at.clone());
     }
     let plan: Plan = args.grid.load()?;
     let point = match (&args.worst, args.point) {

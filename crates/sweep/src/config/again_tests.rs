@@ -30,7 +30,7 @@ fn a_plan_is_read_again_from_its_own_json() {
     };
     assert_eq!(again(&plan), plan);
     // Its stops have no growth.
-    (plan.model.measures.metrics, plan.model.growth_speeds) = (vec![Metric::StopForce], None);
+    (plan.model.measures.metrics, plan.model.held_speeds) = (vec![Metric::StopForce], None);
     plan.model.machine = with_one_of_each();
     plan.model.machine.feet = [[0.5, -0.4, 0.3], [0.5, -0.4, -0.3], [-0.2, -0.4, 0.0]]
         .map(|foot_m| washer_model::Foot { foot_m })

@@ -62,18 +62,20 @@ pub(crate) fn criterion(section: &Section<'_>) -> Criterion {
     })
 }
 
-/// The speeds that the metric `growth` is about. The section and the metric need each other.
+/// The speeds of the metrics that are of constant ones. The section and these need each other.
 pub(crate) fn stability(root: &Section<'_>, metrics: &[Metric]) -> Option<SpeedList> {
     let (field, report) = (root.table("stability", "[stability]"), root.report);
-    if let (Field::Given(section), false) = (&field, metrics.contains(&Metric::Growth)) {
-        let title = "[stability] is for the metric `growth`, which is not asked for";
-        let expected = "expected metrics = [\"growth\"] at the top of the file, or no [stability]; \
-                        `sweep stability` takes its speeds as --speed";
+    let of_speeds = metrics.iter().find(|metric| metric.is_of_speeds());
+    if let (Field::Given(section), None) = (&field, of_speeds) {
+        let title = "[stability] is for the metrics `growth` and `dwell`, and neither is asked for";
+        let expected = "expected metrics = [\"growth\"] or [\"dwell\"] at the top of the file, or \
+                        no [stability]; `sweep stability` takes its speeds as --speed";
         report.push(Diagnostic::new(title).at(&section.at, expected));
     }
-    if let (Field::Absent, true) = (&field, metrics.contains(&Metric::Growth)) {
-        let title = "the metric `growth` needs speeds";
-        let expected = "expected a section [stability] with speed_rpm = \"FROM:TO:STEP\"";
+    if let (Field::Absent, Some(metric)) = (&field, of_speeds) {
+        let title = format!("the metric `{}` needs speeds", metric.name());
+        let expected =
+            "expected a section [stability] with speed_rpm = \"250\" or \"FROM:TO:STEP\"";
         report.push_missing(Diagnostic::new(title).at(root.at(), expected));
     }
     let section = field.given()?.value;

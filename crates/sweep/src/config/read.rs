@@ -23,11 +23,11 @@ impl Read for Washer {
         let metrics = names(root, "metrics", "metric", &Metric::ALL, Metric::name);
         let metrics = metrics.unwrap_or_default();
         grid::judge_metrics(&metrics, &machine, root);
-        let growth_speeds = grid::stability(root, &metrics);
+        let held_speeds = grid::stability(root, &metrics);
         let (stops, feet) = (machine.stops.len(), machine.feet.len());
         let dampers = machine.dampers.len();
         let measures = Measures { metrics, stops, feet, dampers, ..Measures::default() };
-        Self { machine, spin, measures, growth_speeds }
+        Self { machine, spin, measures, held_speeds }
     }
 
     fn read_reliability(&mut self, section: &Section<'_>) {
@@ -60,7 +60,7 @@ impl Read for Washer {
             let metrics = metrics.iter().map(|metric| metric.name()).collect();
             plan.insert("metrics".to_owned(), metrics);
         }
-        if let Some(speeds) = &self.growth_speeds {
+        if let Some(speeds) = &self.held_speeds {
             plan.insert("stability".to_owned(), json!({ "speed_rpm": speeds.to_string() }));
         }
     }

@@ -29,11 +29,12 @@ pub(crate) fn put(written: &Written<'_>, draft: &mut Draft<'_, Washer>) -> Optio
         }
         "metrics" => {
             let metrics = written.list("metric", &Metric::ALL, Metric::name)?;
-            let speeds = &mut plan.model.growth_speeds;
-            if !metrics.contains(&Metric::Growth) {
+            let speeds = &mut plan.model.held_speeds;
+            let of_speeds = metrics.iter().find(|metric| metric.is_of_speeds());
+            if of_speeds.is_none() {
                 *speeds = None;
-            } else if speeds.is_none() {
-                let title = "the metric `growth` needs speeds";
+            } else if let (Some(metric), None) = (of_speeds, &speeds) {
+                let title = format!("the metric `{}` needs speeds", metric.name());
                 let expected = "expected a grid file with this metric and a section [stability]";
                 return report.refuse(&written.value.at, title, expected);
             }

@@ -166,8 +166,8 @@ fn metrics() -> Value {
 fn stability() -> Value {
     let speeds = json!({
         "type": "string",
-        "description": "constant spin speeds FROM:TO:STEP in rpm, above 0, as in \"60:400:1\": \
-                        what `growth` among the metrics is about",
+        "description": "constant spin speeds in rpm, above 0, as \"250\", \"240,305\" or \
+                        \"60:400:1\": those of the metrics `growth` and `dwell`",
     });
     table([("speed_rpm", speeds)], &["speed_rpm"])
 }

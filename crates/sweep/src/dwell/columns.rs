@@ -1,21 +1,23 @@
 //! The columns of results of `sweep dwell`.
 
+use std::sync::Arc;
+
 use sweep_engine::columns::{Cell, MODELS, ResultColumn};
-use washer_model::{Channel, Ending, Endings, Settled, State};
-use washer_row::Status;
+use washer_model::{COORDINATES, Channel, Ending, Endings, STATE_LEN, Settled, State};
+use washer_row::{Measured, Status};
 
 use crate::plan::Plan;
 
-/// A row: one of the motions of a dwell, or none.
+/// A row: one of the motions of a dwell, at one of its turns from 0 if these are kept; or none.
 pub(super) enum RowOf {
-    Motion(Endings, usize),
+    Motion(Arc<Endings>, usize, usize),
     Failed(Status),
 }
 
 pub(super) type DwellColumn = ResultColumn<RowOf>;
 
-/// Kinds of motions. A motion of any other period is `periodic_m`.
-const KINDS: [&str; 5] = ["periodic", "periodic_2", "periodic_m", "quasi_periodic", "chaotic"];
+/// Kinds of motions that have settled, of [`Ending::KINDS`].
+const SETTLED: usize = 5;
 
 /// How a row came about.
 const STATUSES: [&str; 8] = [
@@ -32,14 +34,14 @@ const STATUSES: [&str; 8] = [
 impl RowOf {
     fn found(&self) -> Option<&Endings> {
         match self {
-            Self::Motion(found, _) => Some(found),
+            Self::Motion(found, ..) => Some(found),
             Self::Failed(_) => None,
         }
     }
 
     fn motion(&self) -> Option<&Ending> {
         match self {
-            Self::Motion(found, motion) => found.motions.get(*motion),
+            Self::Motion(found, motion, _) => found.motions.get(*motion),
             Self::Failed(_) => None,
         }
     }
@@ -57,11 +59,7 @@ impl RowOf {
     }
 
     fn kind(&self) -> Option<usize> {
-        Some(match self.motion()?.settled? {
-            Settled::Periodic { turns } => (turns as usize).min(3) - 1,
-            Settled::QuasiPeriodic { .. } => 3,
-            Settled::Chaotic => 4,
-        })
+        Some(self.motion()?.kind()).filter(|kind| *kind < SETTLED)
     }
 
     fn frequency_cpm(&self) -> Option<f64> {
@@ -94,7 +92,7 @@ fn measured(name: &str, unit: &str, text: &str, of: Number) -> DwellColumn {
 }
 
 /// Every column, in order.
-pub(super) fn columns(plan: &Plan) -> Vec<DwellColumn> {
+pub(super) fn columns(plan: &Plan, sections: usize) -> Vec<DwellColumn> {
     let channels = &plan.reliability.channels;
     let mut columns = vec![
         ResultColumn::new(
@@ -103,7 +101,7 @@ pub(super) fn columns(plan: &Plan) -> Vec<DwellColumn> {
             "number of the motion at this speed: 0 is the one that the disturbed periodic response \
              ends in",
             Cell::Count(Box::new(|row: &RowOf| match row {
-                RowOf::Motion(_, motion) => *motion as u64,
+                RowOf::Motion(_, motion, _) => *motion as u64,
                 RowOf::Failed(_) => 0,
             })),
         ),
@@ -125,7 +123,7 @@ pub(super) fn columns(plan: &Plan) -> Vec<DwellColumn> {
             "periodic: it repeats every turn; periodic_2: every second; periodic_m: every \
              period_turns; quasi_periodic: two frequencies; chaotic: neighbours part; null where \
              it did not settle",
-            Cell::Name(KINDS.to_vec(), Box::new(RowOf::kind)),
+            Cell::Name(Ending::KINDS[..SETTLED].to_vec(), Box::new(RowOf::kind)),
         ),
         ResultColumn::new(
             "period_turns",
@@ -162,6 +160,18 @@ pub(super) fn columns(plan: &Plan) -> Vec<DwellColumn> {
         }));
         let name = format!("periodic_{}", channel.name());
         columns.push(ResultColumn::new(name, channel.unit(), text, cell));
+    }
+    let of_turns = |number: &Measured| number.metric.is_of_turns();
+    for number in plan.model.measures.of_model().filter(of_turns) {
+        let text = format!("{}, over 128 further turns of the motion", number.description());
+        let text = text.replace(" in the window", "");
+        let cell = Cell::Measured(Box::new(move |row: &RowOf| number.of(&row.within()?.extra)));
+        columns.push(ResultColumn::new(
+            number.column("nonlinear"),
+            number.metric.unit(),
+            text,
+            cell,
+        ));
     }
     columns.extend([
         measured(
@@ -203,6 +213,16 @@ pub(super) fn columns(plan: &Plan) -> Vec<DwellColumn> {
              or --threshold was not given",
             |row| row.found()?.threshold_rad_per_s,
         ),
+        ResultColumn::new(
+            "near_response",
+            "",
+            "of a motion that did not settle: whether its largest deviations are within a factor \
+             of two of the periodic response's, which it then comes to or leaves slowly",
+            Cell::Flag(Box::new(|row: &RowOf| {
+                let motion = row.motion().filter(|motion| motion.state == State::NotSettled)?;
+                Some(row.found()?.is_near_response(motion))
+            })),
+        ),
         measured("followed_s", "s", "how long its first trajectory was followed", |row| {
             Some(row.motion()?.time_s)
         }),
@@ -214,5 +234,35 @@ pub(super) fn columns(plan: &Plan) -> Vec<DwellColumn> {
             Cell::Name(STATUSES.to_vec(), Box::new(|row: &RowOf| Some(row.status()))),
         ),
     ]);
+    if sections > 0 {
+        columns.extend(section_columns());
+    }
+    columns
+}
+
+/// Columns of states once a turn.
+fn section_columns() -> Vec<DwellColumn> {
+    let turn = |row: &RowOf| match row {
+        RowOf::Motion(_, _, turn) => Some(*turn as u64),
+        RowOf::Failed(_) => None,
+    };
+    let text = "number of the turn among those kept, from 0: what follows is where it ends";
+    let mut columns = vec![ResultColumn::new("turn", "1", text, Cell::KnownCount(Box::new(turn)))];
+    for i in 0..STATE_LEN {
+        let q = i % COORDINATES;
+        let unit = if q < 4 { "m" } else { "rad" };
+        let (name, unit, text) = match i < COORDINATES {
+            true => (format!("q{}_{unit}", q + 1), unit.to_owned(), "coordinate from equilibrium"),
+            false => (format!("u{}_{unit}_per_s", q + 1), format!("{unit}/s"), "its speed"),
+        };
+        let cell = Cell::Measured(Box::new(move |row: &RowOf| match row {
+            RowOf::Motion(found, motion, turn) => {
+                Some(found.motions.get(*motion)?.sections.get(*turn)?[i])
+            }
+            RowOf::Failed(_) => None,
+        }));
+        let text = format!("{text}, where the unbalance is up");
+        columns.push(ResultColumn::new(name, &unit, text, cell));
+    }
     columns
 }

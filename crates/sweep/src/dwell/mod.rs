@@ -6,16 +6,18 @@ pub(crate) mod summary;
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
 use lane_ode::Simd;
 use serde_json::{Value, json};
-use washer_model::{Dwell, Endings, NoAnswer, STATE_LEN, Starts, State, endings};
+use washer_model::{Dwell, Endings, Starts, State, Wanted};
 use washer_row::Status;
 
 use crate::columns::at_speeds;
-use crate::engine::together_or_alone;
+use crate::engine::{Carried, motions as motions_of};
 use crate::plan::Plan;
 use columns::{DwellColumn, RowOf, columns};
+use sweep_engine::Error;
 use sweep_engine::columns::row;
 use sweep_engine::store::{Column, Done, Job, Kind as Cells, Layout, axis_columns};
 use sweep_files::{FileKind, key};
@@ -25,8 +27,10 @@ const MOST_AT_ONCE: u64 = 16;
 
 /// Which way the last motion is taken along from speed to speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Carry {
+pub enum Carry {
+    /// From the lowest speed up.
     Up,
+    /// From the highest speed down.
     Down,
 }
 
@@ -51,20 +55,58 @@ impl Carry {
     }
 }
 
+/// What a kick and the longest time may be.
+pub(crate) const POSITIVE: &str = "a number above 0, at most 1e5";
+
+/// Whether it is that.
+pub(crate) fn is_positive(value: f64) -> bool {
+    value > 0.0 && value <= 1e5
+}
+
 /// How motions are looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Search {
-    pub(crate) starts: Starts,
-    pub(crate) carry: Option<Carry>,
+pub struct Search {
+    /// From where and for how long.
+    pub starts: Starts,
+    /// A motion that is taken along instead of starts at each speed.
+    pub carry: Option<Carry>,
+    /// How many states once a turn are kept of each motion, a row each.
+    pub sections: usize,
 }
 
 impl Search {
+    /// Most starts a speed.
+    pub(crate) const MOST_STARTS: i64 = 1024;
+
+    /// Refuses what is out of bounds.
+    ///
+    /// # Errors
+    /// [`Error::Option`].
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let Starts { count, kick_rad_per_s, longest_s, .. } = self.starts;
+        let refuse = |option, given: String, expected: &str| {
+            Err(Error::Option { option, given, expected: expected.to_owned() })
+        };
+        if !(1..=Self::MOST_STARTS as usize).contains(&count) {
+            return refuse("starts", count.to_string(), "a number from 1 to 1024");
+        }
+        for (option, value) in [("kick", kick_rad_per_s), ("longest", longest_s)] {
+            if !is_positive(value) {
+                return refuse(option, value.to_string(), POSITIVE);
+            }
+        }
+        Ok(())
+    }
+
     fn json(&self, speeds_rpm: &[f64]) -> Value {
         let mut json = json!({
             "speed_rpm": speeds_rpm,
             "longest_s": self.starts.longest_s,
             "threshold": self.starts.with_threshold,
         });
+        if self.sections > 0 {
+            json["sections"] = json!(self.sections);
+        }
         match self.carry {
             Some(carry) => json["carry"] = json!(carry.name()),
             None => {
@@ -89,7 +131,7 @@ pub(crate) fn motions<'a>(
     axes.push(Column::new("speed_rpm", "rpm", "constant spin of the shaft", Cells::Axis));
     let layout = Layout {
         axes,
-        columns: columns(plan).into_iter().map(|column| column.declared).collect(),
+        columns: columns(plan, search.sections).into_iter().map(|column| column.declared).collect(),
         kind: FileKind::Dwell,
         rows_a_point: speeds_rpm.len() as u64,
         has_several: true,
@@ -107,8 +149,15 @@ pub(crate) struct Motions {
 }
 
 impl Motions {
-    pub(crate) fn new(plan: &Plan, search: Search) -> Self {
-        Self { search, columns: columns(plan) }
+    pub(crate) fn new(plan: &Plan, mut search: Search) -> Self {
+        // Of a motion that goes on for ever there are no times and no windows.
+        search.starts.wanted = Wanted {
+            root_mean_squares: false,
+            turns: false,
+            clash_time: false,
+            ..plan.model.measures.wanted()
+        };
+        Self { columns: columns(plan, search.sections), search }
     }
 
     /// Rows that a thread takes at once, of its share and of a number of speeds a point.
@@ -186,32 +235,33 @@ impl Motions {
         if self.search.carry.is_some() {
             starts.count = 1;
         }
-        let together = |dwells: &[(Dwell<'_>, Carried)]| {
-            let (dwells, carried): (Vec<_>, Vec<_>) = dwells.iter().copied().unzip();
-            let found = endings(simd, &dwells, &carried, &starts, is_stopped).into_iter();
-            let status = |none| match none {
-                NoAnswer::NoResponse | NoAnswer::Stopped => Status::NoResponse,
-                NoAnswer::Eigenvalues => Status::NoMultipliers,
-                NoAnswer::TooSlow => Status::TooSlow,
-            };
-            found.map(|found| found.map_err(status)).collect()
-        };
-        together_or_alone(dwells, together, || Err(Status::Panicked))
+        motions_of(simd, dwells, &starts, is_stopped)
+    }
+
+    fn with_last_sections(&self, mut found: Endings) -> Endings {
+        for motion in &mut found.motions {
+            let others = motion.sections.len().saturating_sub(self.search.sections);
+            motion.sections.drain(..others);
+        }
+        found
     }
 
     fn done(&self, number: u64, found: Result<Endings, Status>) -> Done {
         match found {
             Ok(found) => {
-                let of = |motion| row(&self.columns, &RowOf::Motion(found.clone(), motion));
-                Done { point: number, rows: (0..found.motions.len()).map(of).collect() }
+                let found = Arc::new(self.with_last_sections(found));
+                let turns = |motion: usize| 0..found.motions[motion].sections.len().max(1);
+                let places = (0..found.motions.len())
+                    .flat_map(|motion| turns(motion).map(move |turn| (motion, turn)));
+                let of = |(motion, turn)| {
+                    row(&self.columns, &RowOf::Motion(Arc::clone(&found), motion, turn))
+                };
+                Done { point: number, rows: places.map(of).collect() }
             }
             Err(status) => self.failed(number, status),
         }
     }
 }
-
-/// A state that is taken along.
-type Carried = Option<[f64; STATE_LEN]>;
 
 /// Where a machine is that is taken to the next speed.
 fn last_state(found: &Endings) -> Carried {

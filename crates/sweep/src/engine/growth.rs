@@ -1,9 +1,13 @@
-//! Disturbances of periodic responses at constant speeds.
+//! What becomes of machines at constant speeds: growth of disturbances, motions that they end in.
 
-use washer_model::{Dwell, NoAnswer, Point, Response, respond};
-use washer_row::{Growth, Status};
+use lane_ode::Simd;
+use washer_model::{Dwell, Endings, Point, Response, STATE_LEN, Starts, endings, respond};
+use washer_row::{Dwelt, Growth, Metric, Outcome, Status};
 
 use super::together_or_alone;
+
+/// A state that a machine brings along from another speed.
+pub(crate) type Carried = Option<[f64; STATE_LEN]>;
 
 /// The periodic responses of points at constant speeds, that of a machine that runs up first, or
 /// why there is none. Once `is_stopped` says so, what comes means nothing.
@@ -13,30 +17,58 @@ pub(crate) fn responses(
 ) -> Vec<Result<Vec<Response>, Status>> {
     let together = |dwells: &[Dwell<'_>]| {
         let answers = respond(dwells, is_stopped).into_iter();
-        let status = |none| match none {
-            NoAnswer::NoResponse | NoAnswer::Stopped => Status::NoResponse,
-            NoAnswer::Eigenvalues => Status::NoMultipliers,
-            NoAnswer::TooSlow => Status::TooSlow,
-        };
-        answers.map(|answer| answer.map_err(status)).collect()
+        answers.map(|answer| answer.map_err(Status::from)).collect()
     };
     together_or_alone(dwells, together, || Err(Status::Panicked))
 }
 
-/// The fastest growing disturbance at any of these speeds, of the response that a machine is in
-/// that runs up; the first speed wins a tie. Speeds without a response are left out. Where that
-/// response is within the machine's geometry, what another passes is told.
-pub(super) fn fastest_growth(
-    point: &Point,
-    speeds_rpm: &[f64],
+/// The motions that points end in at constant speeds, or why there are none. Once `is_stopped` says
+/// so, what comes means nothing.
+pub(crate) fn motions(
+    simd: Simd,
+    dwells: &[(Dwell<'_>, Carried)],
+    starts: &Starts,
     is_stopped: &dyn Fn() -> bool,
-) -> Option<Growth> {
-    let dwells: Vec<Dwell<'_>> =
-        speeds_rpm.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
-    let found = responses(&dwells, is_stopped);
-    let there = || found.iter().flatten().filter_map(|responses| responses.first());
-    let fastest = there()
-        .reduce(|most, next| if next.growth_per_s() > most.growth_per_s() { next } else { most })?;
-    let beyond = fastest.beyond.or_else(|| there().find_map(|response| response.beyond));
-    Some(Growth { beyond, ..Growth::from(fastest) })
+) -> Vec<Result<Endings, Status>> {
+    let together = |dwells: &[(Dwell<'_>, Carried)]| {
+        let (dwells, carried): (Vec<_>, Vec<_>) = dwells.iter().copied().unzip();
+        let found = endings(simd, &dwells, &carried, starts, is_stopped).into_iter();
+        found.map(|found| found.map_err(Status::from)).collect()
+    };
+    together_or_alone(dwells, together, || Err(Status::Panicked))
+}
+
+/// Adds what metrics ask of a point at constant speeds (rpm): the fastest growing disturbance of
+/// the response that a machine is in that runs up, where the first speed wins a tie, and how far
+/// its motions go. Speeds without an answer are left out. Where that response is within the machine's
+/// geometry, what another passes is told.
+pub(super) fn add(
+    outcome: &mut Outcome,
+    simd: Simd,
+    point: &Point,
+    (speeds_rpm, metrics): (&[f64], &[Metric]),
+    is_stopped: &dyn Fn() -> bool,
+) {
+    let dwell = |&speed_rpm| Dwell { point, speed_rpm };
+    if metrics.contains(&Metric::Growth) {
+        let dwells: Vec<Dwell<'_>> = speeds_rpm.iter().map(dwell).collect();
+        let found = responses(&dwells, is_stopped);
+        let there = || found.iter().flatten().filter_map(|responses| responses.first());
+        let fastest = there().reduce(|most, next| {
+            if next.growth_per_s() > most.growth_per_s() { next } else { most }
+        });
+        outcome.growth = fastest.map(|fastest| {
+            let beyond = fastest.beyond.or_else(|| there().find_map(|response| response.beyond));
+            Growth { beyond, ..Growth::from(fastest) }
+        });
+    }
+    if metrics.contains(&Metric::Dwell) {
+        let dwells: Vec<_> = speeds_rpm.iter().map(|speed| (dwell(speed), None)).collect();
+        let found = motions(simd, &dwells, &Starts::default(), is_stopped);
+        let all = speeds_rpm.iter().zip(&found).flat_map(|(speed, found)| {
+            let motions = found.iter().flat_map(|found| &found.motions);
+            motions.map(|motion| (*speed, motion))
+        });
+        outcome.dwelt = Dwelt::of(all);
+    }
 }

@@ -16,8 +16,7 @@ use lane_ode::MAX_LANES;
 use washer_model::Point;
 use washer_row::{Climbs, Demand, Ladder, Next, Outcome, Rule, Status, Trajectory};
 
-use super::growth::fastest_growth;
-use super::{ModelEngine, Watch};
+use super::{ModelEngine, Watch, growth};
 use crate::plan::Scenario;
 
 /// Points that are made ready together.
@@ -222,9 +221,11 @@ impl Pool<'_> {
         self.shared.changed.notify_all();
         for (mut outcome, point) in done {
             outcome.forget_turns();
-            if let (Some(speeds), Ok(point)) = (&self.engine.plan.model.growth_speeds, point) {
+            let model = &self.engine.plan.model;
+            if let (Some(speeds), Ok(point)) = (&model.held_speeds, point) {
                 let is_stopped = || self.watch.stopped();
-                outcome.growth = fastest_growth(&point, speeds.values(), &is_stopped);
+                let asked = (speeds.values(), model.measures.metrics.as_slice());
+                growth::add(&mut outcome, self.engine.widest(), &point, asked, &is_stopped);
                 if is_stopped() {
                     return;
                 }

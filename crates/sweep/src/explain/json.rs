@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
-use washer_model::{LeftRange, Participant};
+use washer_model::{Ending, LeftRange, Participant};
 
 use super::{Closing, End, Explanation, Passage, Resonance, Swept, Tongue};
 
 /// Everything that was found; units stand in the names.
 pub(crate) fn of(found: &Explanation) -> Value {
-    let tongues = found.tongues.iter().map(|(tongue, passages)| of_tongue(tongue, passages));
+    let tongues =
+        found.tongues.iter().map(|(tongue, passages)| of_tongue(tongue, passages, &found.swept));
     let without = found.without_departures.as_ref().map(|entered| match entered {
         Ok(amplitudes) => {
             let greatest = found.swept.greatest_of(amplitudes);
@@ -70,7 +71,7 @@ fn of_swept(swept: &Swept) -> Value {
     })
 }
 
-fn of_tongue(tongue: &Tongue, passages: &[Passage]) -> Value {
+fn of_tongue(tongue: &Tongue, passages: &[Passage], swept: &Swept) -> Value {
     let at = &tongue.at;
     json!({
         "from_rpm": tongue.from_to_rpm[0],
@@ -84,6 +85,11 @@ fn of_tongue(tongue: &Tongue, passages: &[Passage]) -> Value {
         "modes": at.participants.iter().map(participant).collect::<Value>(),
         "resonance": tongue.resonance.as_ref().map(resonance),
         "crossed": passages.iter().map(passage).collect::<Value>(),
+        "ends_in": tongue.ends_in.as_ref().map(|motion| json!({
+            "kind": Ending::KINDS[motion.kind()],
+            "amplitudes": by_channel(swept, &swept.of_plan(&motion.peaks)),
+            "followed_s": motion.time_s,
+        })),
         "closed_by": tongue.closing.map(closing),
     })
 }

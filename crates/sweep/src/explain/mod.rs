@@ -71,6 +71,11 @@ pub(crate) struct Swept {
 }
 
 impl Swept {
+    /// The plan's channels of all.
+    pub(crate) fn of_plan(&self, peaks: &[f64; Channel::ALL.len()]) -> Vec<f64> {
+        self.channels.iter().map(|channel| peaks[channel.index()]).collect()
+    }
+
     /// The greatest ratio of other amplitudes of the nonlinear model to the linear one's.
     pub(crate) fn greatest_of(&self, nonlinear: &[f64]) -> Option<(f64, Channel)> {
         let pairs = nonlinear.iter().zip(&self.amplitudes[1]).zip(&self.channels);
@@ -118,14 +123,14 @@ pub(crate) fn explain(
     asker.follow(looked.to.max(profile_rpm[1]));
     let (seen, swept) = rayon::join(|| tongues(&asker, looked), || swept(plan, interrupt));
     let (Seen { tongues: found, without_response, jumps_rpm, beyond }, swept) = (seen, swept?);
-    let (crossings, closings) = rayon::join(
-        || crossings(&asker, &found, &swept),
+    let ((crossings, ends_in), closings) = rayon::join(
+        || rayon::join(|| crossings(&asker, &found, &swept), || tongue::ends_in(&asker, &found)),
         || found.par_iter().map(|tongue| tongue.closing(&asker)).collect::<Vec<_>>(),
     );
     let (passages, without_departures) = crossings;
-    let tongues = found.into_iter().zip(closings).zip(passages);
-    let tongues = tongues.map(|((tongue, closing), passages)| {
-        (Tongue { closing: Some(closing), ..tongue }, passages)
+    let tongues = found.into_iter().zip(closings).zip(ends_in).zip(passages);
+    let tongues = tongues.map(|(((tongue, closing), ends_in), passages)| {
+        (Tongue { closing: Some(closing), ends_in, ..tongue }, passages)
     });
     Ok(Explanation {
         name: plan.name.clone(),
@@ -233,10 +238,7 @@ fn crossings(
         || {
             crossings.iter().find(before_end)?;
             let peaks = peaks_without_departures(asker.point, step_s, &crossings, swept.window_s);
-            let of_plan = |peaks: [f64; Channel::ALL.len()]| {
-                swept.channels.iter().map(|channel| peaks[channel.index()]).collect()
-            };
-            Some(peaks.map(of_plan))
+            Some(peaks.map(|peaks| swept.of_plan(&peaks)))
         },
     );
     let mut passages: Vec<Vec<Passage>> = tongues.iter().map(|_| Vec::new()).collect();

@@ -4,7 +4,9 @@
 use lane_ode::Simd;
 use rayon::iter::ParallelIterator as _;
 use rayon::slice::ParallelSlice as _;
-use washer_model::{Beyond, Kind, Point, Response, Responses, modes};
+use washer_model::{
+    Beyond, Dwell, Ending, Kind, Point, Response, Responses, Starts, endings_beside, modes,
+};
 
 use super::ready;
 use crate::plan::{Plan, Scenario};
@@ -117,6 +119,8 @@ pub(crate) struct Tongue {
     pub(crate) resonance: Option<Resonance>,
     /// What closes it; not known at first.
     pub(crate) closing: Option<Closing>,
+    /// What the drum held where it grows most ends in; not known at first.
+    pub(crate) ends_in: Option<Ending>,
 }
 
 /// Two frequencies of modes whose sum or difference is a multiple of the speed; or one, twice.
@@ -211,6 +215,17 @@ pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> Seen {
     }
 }
 
+/// What the drum ends in that is held where each of these grows most, slightly disturbed.
+pub(crate) fn ends_in(asker: &Asker<'_>, tongues: &[Tongue]) -> Vec<Option<Ending>> {
+    let dwell = |of: &Tongue| Dwell { point: asker.point, speed_rpm: of.at.speed_rpm };
+    let dwells: Vec<Dwell<'_>> = tongues.iter().map(dwell).collect();
+    let responses = tongues.iter().map(|tongue| Ok(vec![tongue.at.clone()])).collect();
+    let starts = Starts { count: 1, ..Starts::default() };
+    let is_stopped = || asker.interrupt.stopped();
+    let found = endings_beside(asker.simd, &dwells, responses, &[], &starts, &is_stopped);
+    found.into_iter().map(|found| found.ok()?.motions.into_iter().next()).collect()
+}
+
 fn tongue(asker: &Asker<'_>, kind: Kind, run: &[&Response], [from, to]: [(f64, End); 2]) -> Tongue {
     let mut growths: Vec<[f64; 2]> =
         run.iter().map(|response| [response.speed_rpm, response.growth_per_s()]).collect();
@@ -233,6 +248,7 @@ fn tongue(asker: &Asker<'_>, kind: Kind, run: &[&Response], [from, to]: [(f64, E
         at,
         resonance,
         closing: None,
+        ends_in: None,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use washer_model::{Channel, Kind, LeftRange, decimal};
+use washer_model::{Channel, Ending, Kind, LeftRange, Settled, State, decimal};
 
 use super::{Closing, End, Explanation, Passage, Resonance, Swept, Tongue};
 
@@ -207,6 +207,9 @@ fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[
             .to_owned(),
     };
     text.line("meeting", &words);
+    if let Some(ends_in) = &tongue.ends_in {
+        text.line("ends in", &end(ends_in));
+    }
     if passages.is_empty() {
         let [least, most] = found.profile_rpm.map(decimal);
         text.line(
@@ -218,6 +221,26 @@ fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[
         crossed(text, passage);
     }
     closes(text, tongue);
+}
+
+/// What a held speed ends in.
+fn end(motion: &Ending) -> String {
+    let far = [Channel::TubYaw, Channel::TubPitch].map(|channel| {
+        let name = channel.name().replace('_', " ");
+        format!("{name} {}", milli(motion.peaks[channel.index()], channel))
+    });
+    let after = format!("after {:.0} s", motion.time_s);
+    let what = match (motion.settled, motion.state) {
+        (Some(Settled::Periodic { turns: 1 }), _) => "repeating every turn".to_owned(),
+        (Some(Settled::Periodic { turns }), _) => format!("repeating every {turns} turns"),
+        (Some(Settled::QuasiPeriodic { .. }), _) => "with two frequencies".to_owned(),
+        (Some(Settled::Chaotic), _) => "chaotic".to_owned(),
+        (None, State::LeftRange { .. }) => {
+            return format!("farther than the model is good for, {after}");
+        }
+        (None, State::Ok | State::NotSettled) => format!("not settled {after}"),
+    };
+    format!("{}, {what}, if the drum is held there (`sweep dwell`)", far.join(", "))
 }
 
 fn ends(tongue: &Tongue) -> String {

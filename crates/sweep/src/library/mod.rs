@@ -24,7 +24,7 @@ pub use parameters::list_parameters;
 pub use points::PointTable;
 pub use result::ResultTable;
 pub use run::{RanToFile, run_to_file};
-pub use stability::{find_stability, stability_to_file};
+pub use stability::{find_held, held_to_file};
 pub use trace::{TraceOptions, trace_point};
 
 pub use sweep_engine::effort::Effort;

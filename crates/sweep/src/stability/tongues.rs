@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use arrow_schema::ArrowError;
 use washer_model::decimal;
 
+use crate::places;
 use sweep_engine::store::StoreError;
 use sweep_files::{ParquetFile, cells};
 
@@ -15,6 +16,8 @@ const MOST_LISTED: usize = 12;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Row {
     pub(crate) point: f64,
+    /// The values of the point's axes.
+    pub(crate) at: Vec<f64>,
     pub(crate) speed_rpm: f64,
     /// Not finite where there is no response.
     pub(crate) growth_per_s: f64,
@@ -41,6 +44,7 @@ pub(crate) struct Tongue {
 /// What a file says as a whole.
 #[derive(Debug, Default)]
 pub(crate) struct Summary {
+    axes: Vec<String>,
     rows: u64,
     points: u64,
     without: u64,
@@ -51,7 +55,7 @@ pub(crate) struct Summary {
     coexisting: u64,
     tongues: Vec<Tongue>,
     /// Points and speeds (rpm) at which a branch ends that a machine runs up on.
-    jumps: Vec<(f64, f64)>,
+    jumps: Vec<(Row, f64)>,
     last: Option<Row>,
 }
 
@@ -67,9 +71,9 @@ impl Summary {
         }
         self.rows += 1;
         if let Some(to_rpm) = row.branch_to_rpm
-            && self.jumps.last() != Some(&(row.point, to_rpm))
+            && !self.jumps.last().is_some_and(|(of, rpm)| (of.point, *rpm) == (row.point, to_rpm))
         {
-            self.jumps.push((row.point, to_rpm));
+            self.jumps.push((row.clone(), to_rpm));
         }
         let follows = same_point && self.last.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
         self.points += u64::from(!same_point);
@@ -114,15 +118,15 @@ impl Summary {
             let words = "further rows: other responses at the same speeds (column branch)";
             lines.push(("others", format!("{} {words}", self.coexisting)));
         }
-        for (point, rpm) in self.jumps.iter().take(MOST_LISTED) {
-            let of_point = if self.points > 1 { format!("point {point}: ") } else { String::new() };
+        for (row, rpm) in self.jumps.iter().take(MOST_LISTED) {
+            let of_point = self.of_point(row);
             let words = "running up, the response folds back and the motion jumps";
             lines.push(("jump", format!("{of_point}at {rpm:.2} rpm, {words}")));
         }
         if self.jumps.len() > MOST_LISTED {
             lines.push(("", format!("and {} more jumps", self.jumps.len() - MOST_LISTED)));
         }
-        // All of one point; else the worst, each point by its number.
+        // All of one point; else the worst.
         let mut listed: Vec<&Tongue> = self.tongues.iter().collect();
         if self.points > 1 {
             listed.sort_by(|a, b| b.at.growth_per_s.total_cmp(&a.at.growth_per_s));
@@ -136,14 +140,19 @@ impl Summary {
         lines
     }
 
+    /// Which of several points.
+    fn of_point(&self, row: &Row) -> String {
+        match self.points {
+            0 | 1 => String::new(),
+            _ => format!("{}: ", places::words(&self.axes, &row.at)),
+        }
+    }
+
     fn words(&self, tongue: &Tongue) -> String {
         let Tongue { at, from_to_rpm: [from, to] } = tongue;
-        let mut text = String::new();
-        if self.points > 1 {
-            // Writing to a String cannot fail.
-            let _ = write!(text, "point {}: ", at.point);
-        }
+        let mut text = self.of_point(at);
         let speed = decimal(at.speed_rpm);
+        // Writing to a String cannot fail.
         let _ = write!(
             text,
             "{} to {} rpm, {}, up to {:.4} /s at {speed} rpm ({:.1} and {:.1} per minute)",
@@ -167,7 +176,8 @@ impl Summary {
 /// [`StoreError::File`] and [`StoreError::Parquet`].
 pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, StoreError> {
     let failed = StoreError::parquet("read", file.path());
-    let mut summary = Summary::default();
+    let mut summary = Summary { axes: places::axes(file), ..Summary::default() };
+    let axes = summary.axes.clone();
     for batch in file.batches(|builder| builder)? {
         let batch = batch?;
         let missing = |name: &str| ArrowError::SchemaError(format!("there is no column {name}"));
@@ -182,6 +192,7 @@ pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, StoreError> {
             let (branch_to, beyond) = (numbers("branch_to_rpm")?, words("beyond")?);
             let [kind, name_1, name_2, status] =
                 ["kind", "mode_1_name", "mode_2_name", "status"].map(words);
+            let at = axes.iter().map(|axis| numbers(axis)).collect::<Result<Vec<_>, _>>()?;
             let (point, speed, growth, frequency) = (point?, speed?, growth?, frequency?);
             let modes = [(mode_1?, name_1?), (mode_2?, name_2?)];
             let (kind, status) = (kind?, status?);
@@ -193,6 +204,7 @@ pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, StoreError> {
                 });
                 summary.add(Row {
                     point: number(&point),
+                    at: at.iter().map(|values| number(values)).collect(),
                     speed_rpm: number(&speed),
                     growth_per_s: number(&growth),
                     frequency_cpm: number(&frequency),
@@ -216,7 +228,8 @@ mod tests {
 
     #[test]
     fn tongues_are_runs_of_one_point_and_kind() {
-        let mut summary = Summary::default();
+        let axes = vec!["unbalance_mass_kg".to_owned()];
+        let mut summary = Summary { axes, ..Summary::default() };
         let rows = [
             (0.0, 1.0, -0.1, "stable"),
             (0.0, 2.0, 0.1, "quasi_periodic"),
@@ -232,6 +245,7 @@ mod tests {
             let status = if growth_per_s.is_nan() { "no_response" } else { "ok" };
             summary.add(Row {
                 point,
+                at: vec![0.1 * (point + 1.0)],
                 speed_rpm,
                 growth_per_s,
                 kind: kind.to_owned(),
@@ -248,8 +262,8 @@ mod tests {
         let lines = summary.lines();
         assert_eq!(lines[0].1, "1 of 7 rows, 5 not, 1 without a response; 2 points");
         assert!(lines[1].1.starts_with("1 further rows"));
-        assert!(
-            lines[2].1.starts_with("point 0: 2 to 3 rpm, quasi periodic, up to 0.3000 /s at 3")
-        );
+        assert!(lines[2].1.starts_with(
+            "unbalance_mass_kg 0.1: 2 to 3 rpm, quasi periodic, up to 0.3000 /s at 3"
+        ));
     }
 }

@@ -7,12 +7,13 @@ use super::starts::size;
 use super::{Ending, Settled, State};
 use crate::channel::CHANNELS;
 use crate::coordinates::{STATES, TUB_PITCH, TUB_YAW};
+use crate::run::Extra;
 
 /// Turns between two looks.
 pub(super) const BLOCK: usize = 16;
 
 /// Turns over which largest deviations are taken.
-const WINDOW: usize = 128;
+pub(super) const WINDOW: usize = 128;
 
 /// The longest period, in turns.
 const LONGEST_PERIOD: usize = 16;
@@ -31,7 +32,8 @@ const CLEARLY: f64 = 20.0;
 const ALIKE: f64 = 3e-3;
 const ROUGHLY_ALIKE: f64 = 0.4;
 
-/// The first window after which a motion that does not settle is asked for its exponent.
+/// The first window after which a motion that does not settle is asked for its exponent; each next
+/// time it has gone on for twice as long.
 const FIRST_ASKED: usize = 4;
 
 /// A spectrum whose strongest line and multiples leave less than this share is of two frequencies.
@@ -65,6 +67,8 @@ pub(super) struct Course<'a> {
     made: usize,
     most: usize,
     pub(super) need: Need,
+    /// Turns before which it is not asked for its exponent again.
+    asked_from: usize,
     exponent: Option<Exponent>,
     state: State,
     settled: Option<Settled>,
@@ -80,6 +84,7 @@ impl<'a> Course<'a> {
             made: 0,
             most: windows as usize * WINDOW,
             need: Need::Turns,
+            asked_from: 0,
             exponent: None,
             state: State::NotSettled,
             settled: None,
@@ -108,15 +113,19 @@ impl<'a> Course<'a> {
         {
             self.settle(Settled::Periodic { turns });
         } else if self.made.is_multiple_of(WINDOW) && self.turns.len() == 2 * WINDOW {
+            let may_ask = self.made >= self.asked_from;
             if self.are_alike(WINDOW, ALIKE) {
                 if let Some(turns) = self.clear_period(ROUGHLY_REPEATS) {
                     self.settle(Settled::Periodic { turns });
                 } else if let Some(two) = self.two_frequencies(TWO_LINES) {
                     self.settle(two);
-                } else {
+                } else if may_ask {
                     self.need = Need::Exponent;
                 }
-            } else if self.made >= FIRST_ASKED * WINDOW && self.are_alike(WINDOW, ROUGHLY_ALIKE) {
+            } else if may_ask
+                && self.made >= FIRST_ASKED * WINDOW
+                && self.are_alike(WINDOW, ROUGHLY_ALIKE)
+            {
                 self.need = Need::Exponent;
             }
         }
@@ -128,11 +137,13 @@ impl<'a> Course<'a> {
     /// How fast its neighbours part.
     pub(super) fn take_exponent(&mut self, exponent: Option<Exponent>) {
         (self.need, self.exponent) = (Need::Turns, exponent);
+        self.asked_from = 2 * self.made;
         let [repeats, line] = ON_ITS_WAY;
         let is_on_its_way = self.period(repeats).is_some() || self.two_frequencies(line).is_some();
-        if !is_on_its_way && exponent.is_some_and(|exponent| exponent.is_positive()) {
+        let is_positive = exponent.is_some_and(|exponent| exponent.is_positive());
+        if is_positive && !is_on_its_way {
             self.settle(Settled::Chaotic);
-        } else if !is_on_its_way
+        } else if !is_positive
             && self.are_alike(WINDOW, ALIKE)
             && let Some(two) = self.two_frequencies(f64::INFINITY)
         {
@@ -148,6 +159,11 @@ impl<'a> Course<'a> {
 
     fn turn_s(&self) -> f64 {
         self.held.row.turn_s()
+    }
+
+    fn from_rest(&self, state: &[f64; STATES]) -> [f64; STATES] {
+        let rest = self.held.row.point.equilibrium();
+        core::array::from_fn(|i| state[i] - rest.get(i).copied().unwrap_or(0.0))
     }
 
     /// Where it ended.
@@ -167,7 +183,8 @@ impl<'a> Course<'a> {
             exponent: self.exponent,
             time_s: self.made as f64 * self.turn_s(),
             end: self.held.state,
-            sections: self.turns.iter().map(|turn| turn.end).collect(),
+            sections: self.turns.iter().map(|turn| self.from_rest(&turn.end)).collect(),
+            extra: Extra::default(),
         }
     }
 

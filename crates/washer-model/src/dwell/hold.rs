@@ -2,6 +2,8 @@
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
+use crate::kind::ModelKind;
+use crate::run::extras::{Extra, Extras, Instants, Wanted};
 use crate::run::model::Nonlinear;
 use crate::stability::orbit::{Row, Watched, clock, model};
 use crate::stability::turn::turn;
@@ -29,17 +31,28 @@ pub(super) struct Turn {
 /// So many turns of each; fewer where one leaves the model's range. They share lanes of `simd` at
 /// most, and what is found of one does not depend on the others.
 pub(super) fn hold(simd: Simd, held: &[Held<'_>], turns: usize) -> Vec<Vec<Turn>> {
+    let found = recorded(simd, held, turns, Wanted::default());
+    found.into_iter().map(|(turns, _)| turns).collect()
+}
+
+/// As [`hold`], with further records of these turns if any are wanted.
+pub(super) fn recorded(
+    simd: Simd,
+    held: &[Held<'_>],
+    turns: usize,
+    wanted: Wanted,
+) -> Vec<(Vec<Turn>, Extra)> {
     let kind = |k: usize| held[k].row.kind();
     let mut order: Vec<usize> = (0..held.len()).collect();
     order.sort_by_key(|&k| kind(k));
-    let mut found: Vec<Vec<Turn>> = vec![Vec::new(); held.len()];
+    let mut found: Vec<(Vec<Turn>, Extra)> = vec![Default::default(); held.len()];
     for places in order.chunk_by(|&a, &b| kind(a) == kind(b)) {
         for places in places.chunks(simd.lanes()) {
             let together: Vec<Held<'_>> = places.iter().map(|&k| held[k]).collect();
             let simd = narrowest(simd, together.len());
-            let turned = simd.dispatch(Hold { held: &together, turns });
-            for (&k, turns) in places.iter().zip(turned) {
-                found[k] = turns;
+            let turned = simd.dispatch(Hold { held: &together, turns, wanted });
+            for (&k, turned) in places.iter().zip(turned) {
+                found[k] = turned;
             }
         }
     }
@@ -57,23 +70,30 @@ fn narrowest(widest: Simd, count: usize) -> Simd {
 struct Hold<'a> {
     held: &'a [Held<'a>],
     turns: usize,
+    wanted: Wanted,
 }
 
 impl Kernel for Hold<'_> {
-    type Output = Vec<Vec<Turn>>;
+    type Output = Vec<(Vec<Turn>, Extra)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut found = Vec::with_capacity(self.held.len());
         for held in self.held.chunks(T::LANES) {
-            hold_lanes(N(zero), held, self.turns, &mut found);
+            hold_lanes(N(zero), held, self.turns, self.wanted, &mut found);
         }
         found
     }
 }
 
 #[inline(always)]
-fn hold_lanes<T: Lane>(zero: N<T>, held: &[Held<'_>], turns: usize, found: &mut Vec<Vec<Turn>>) {
+fn hold_lanes<T: Lane>(
+    zero: N<T>,
+    held: &[Held<'_>],
+    turns: usize,
+    wanted: Wanted,
+    found: &mut Vec<(Vec<Turn>, Extra)>,
+) {
     let rows: Vec<Row<'_>> = held.iter().map(|held| held.row).collect();
     let clock = clock(zero, &rows);
     let model: Nonlinear<T> = model(zero, &rows);
@@ -84,14 +104,21 @@ fn hold_lanes<T: Lane>(zero: N<T>, held: &[Held<'_>], turns: usize, found: &mut 
         }
     }
     let first = found.len();
-    found.extend(held.iter().map(|_| Vec::with_capacity(turns)));
+    found.extend(held.iter().map(|_| (Vec::with_capacity(turns), Extra::default())));
     let mut watched = Watched::new(zero, &model, &clock);
     (watched.with_outputs, watched.with_states) = (true, false);
+    let of = (ModelKind::Nonlinear, Instants::of_steps(rows[0].caps.is_none()));
+    watched.extras = Extras::new(zero, wanted, of, rows[0].point, held.len());
+    if let Some(extras) = &mut watched.extras {
+        for lane in 0..T::LANES {
+            extras.set_point(lane, rows[lane.min(rows.len() - 1)].point);
+        }
+    }
     for made in 0..turns {
         turn(&model, &clock, &mut states, Some(&mut watched));
         let in_range = T::bits(model.in_range(&states[0]));
         for (lane, held) in held.iter().enumerate() {
-            let of_lane = &mut found[first + lane];
+            let (of_lane, _) = &mut found[first + lane];
             if in_range >> lane & 1 == 1 && of_lane.len() == made {
                 let radial_m = watched.radial_squared.0.get(lane).sqrt();
                 of_lane.push(Turn {
@@ -105,5 +132,12 @@ fn hold_lanes<T: Lane>(zero: N<T>, held: &[Held<'_>], turns: usize, found: &mut 
             watched.peaks.reset(lane);
         }
         watched.radial_squared = zero;
+    }
+    if let Some(mut extras) = watched.extras {
+        for (lane, held) in held.iter().enumerate() {
+            let (of_lane, extra) = &mut found[first + lane];
+            extras.finish(lane, lane, held.row.point, of_lane.len() < turns);
+            *extra = core::mem::take(&mut extras.found[lane]);
+        }
     }
 }

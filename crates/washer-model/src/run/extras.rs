@@ -80,13 +80,38 @@ pub struct Extra {
 
 impl Wanted {
     /// Whether any record needs more than the ends of legs.
-    fn anything(self) -> bool {
+    pub(crate) fn anything(self) -> bool {
         Self { course: false, ..self } != Self::default()
     }
 }
 
+/// Where recorders look between the ends of steps.
+#[derive(Clone, Copy)]
+pub(crate) struct Instants {
+    /// Parts into which they cut a step.
+    parts: u32,
+    /// Clearances by which they time a clash.
+    clearances: usize,
+}
+
+impl Instants {
+    /// Of steps that are held short by the bearings, or of longer ones.
+    pub(crate) const fn of_steps(are_short: bool) -> Self {
+        Self { parts: if are_short { 1 } else { PARTS_OF_A_LONG_STEP }, clearances: 1 }
+    }
+
+    /// Of a method's steps.
+    pub(crate) const fn of(method: &Method) -> Self {
+        match method {
+            Method::Rk4 { .. } => Self::of_steps(true),
+            Method::Geared(_) => Self { clearances: 3, ..Self::of_steps(false) },
+            Method::Dopri5(_) | Method::Rodas5p(_) => Self::of_steps(false),
+        }
+    }
+}
+
 /// The recorders, over lanes.
-pub(super) struct Extras<T> {
+pub(crate) struct Extras<T> {
     wanted: Wanted,
     squares: SquareIntegrals<T, CHANNELS>,
     turns: PartPeaks<T, CHANNELS>,
@@ -99,16 +124,16 @@ pub(super) struct Extras<T> {
     /// How many of these are in use.
     clearances: usize,
     /// Of every point, as far as they have ended.
-    pub(super) found: Vec<Extra>,
+    pub(crate) found: Vec<Extra>,
 }
 
 impl<T: Lane> Extras<T> {
     /// For `count` points, of which `point` is any; `None` if nothing is wanted.
     #[inline(always)]
-    pub(super) fn new(
+    pub(crate) fn new(
         zero: N<T>,
         wanted: Wanted,
-        (model, method): (ModelKind, &Method),
+        (model, instants): (ModelKind, Instants),
         point: &Point,
         count: usize,
     ) -> Option<Self> {
@@ -116,11 +141,7 @@ impl<T: Lane> Extras<T> {
         if !wanted.anything() {
             return None;
         }
-        let (parts, clearances) = match method {
-            Method::Rk4 { .. } => (1, 1),
-            Method::Geared(_) => (PARTS_OF_A_LONG_STEP, 3),
-            Method::Dopri5(_) | Method::Rodas5p(_) => (PARTS_OF_A_LONG_STEP, 1),
-        };
+        let Instants { parts, clearances } = instants;
         let force = if wanted.cabinet_force {
             Some(GreatestForce::new(zero, model, point, parts))
         } else {
@@ -145,7 +166,7 @@ impl<T: Lane> Extras<T> {
     }
 
     /// Begins a point's trajectory in one lane.
-    pub(super) fn set_point(&mut self, lane: usize, point: &Point) {
+    pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
         self.squares.reset(lane);
         let clearance_m = point.machine.bodies.clearance.0;
         let swing_m = point.ringing.gap_m();
@@ -166,7 +187,7 @@ impl<T: Lane> Extras<T> {
     }
 
     /// Ends a lane's trajectory, that of point `index`. A failed one leaves no record.
-    pub(super) fn finish(&mut self, lane: usize, index: usize, point: &Point, failed: bool) {
+    pub(crate) fn finish(&mut self, lane: usize, index: usize, point: &Point, failed: bool) {
         let turns = if self.wanted.turns { self.turns.finish(lane) } else { Vec::new() };
         if failed {
             return;
@@ -196,16 +217,16 @@ impl<T: Lane> Extras<T> {
 }
 
 /// An instant as the recorders see it.
-pub(super) struct Seen<'a, T: Lane> {
-    pub(super) extras: &'a mut Extras<T>,
+pub(crate) struct Seen<'a, T: Lane> {
+    pub(crate) extras: &'a mut Extras<T>,
     /// End and length of the step that leads here (s); none where a leg begins.
-    pub(super) step: Option<(N<T>, N<T>)>,
-    pub(super) x: &'a [N<T>; STATES],
-    pub(super) dx: &'a [N<T>; STATES],
-    pub(super) radial: &'a [Sample<T>; RADIAL],
-    pub(super) channels: &'a [Sample<T>; CHANNELS],
+    pub(crate) step: Option<(N<T>, N<T>)>,
+    pub(crate) x: &'a [N<T>; STATES],
+    pub(crate) dx: &'a [N<T>; STATES],
+    pub(crate) radial: &'a [Sample<T>; RADIAL],
+    pub(crate) channels: &'a [Sample<T>; CHANNELS],
     /// Which lanes are inside their windows.
-    pub(super) inside: T::Mask,
+    pub(crate) inside: T::Mask,
 }
 
 impl<T: Lane> Aside for Seen<'_, T> {

@@ -12,6 +12,7 @@ use crate::machine::spin::SpinStretch;
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::outputs::squared;
 use crate::point::Point;
+use crate::run::extras::{Extras, Seen as Recorded};
 use crate::run::model::{Linear, Model, Nonlinear};
 use core::array::from_fn;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
@@ -337,6 +338,8 @@ pub(crate) struct Watched<'m, T, M> {
     /// At the start and the ends of all steps, if that is wanted.
     path: Vec<[N<T>; STATES]>,
     with_path: bool,
+    /// Further records of what has outputs.
+    pub(crate) extras: Option<Extras<T>>,
 }
 
 impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
@@ -354,6 +357,7 @@ impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
             states: Vec::with_capacity(INSTANTS + 1),
             path: Vec::new(),
             with_path: false,
+            extras: None,
         }
     }
 }
@@ -376,6 +380,15 @@ impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
                 self.peaks.begin(&channels, everywhere);
             } else {
                 self.peaks.advance(self.clock.step_s, &channels, everywhere);
+            }
+            if let Some(extras) = &mut self.extras {
+                let (radial, channels, inside) = (&radial, &channels, everywhere);
+                let step = if k == 0 {
+                    None
+                } else {
+                    Some((self.clock.time_s(k as f64), self.clock.step_s))
+                };
+                self.windows.0.aside(Recorded { extras, step, x, dx, radial, channels, inside });
             }
             let (most, here) = (self.radial_squared.0, squared(&radial).value.0);
             self.radial_squared = N(T::select(most.less(here), here, most));

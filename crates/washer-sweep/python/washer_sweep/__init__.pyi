@@ -22,6 +22,7 @@ __all__ = [
     "PlanError",
     "Result",
     "__version__",
+    "dwell",
     "explain",
     "modes",
     "optimise",
@@ -217,6 +218,29 @@ def stability(
 
     With `out` it writes that Parquet file, byte for byte as `sweep stability` does, and goes on
     there after an interruption.
+    """
+
+def dwell(
+    plan: Plan,
+    speeds_rpm: Sequence[float] | NDArray[np.float64],
+    out: str | PathLike[str] | None = None,
+    *,
+    starts: int = 8,
+    kick: float = 6.0,
+    carry: Literal["up", "down"] | None = None,
+    threshold: bool = False,
+    longest: float = 600.0,
+    sections: int = 0,
+    threads: int | None = None,
+    progress: bool = True,
+    fresh: bool = False,
+) -> Result:
+    """What each point of the plan's grid ends in that is held at each constant speed: a row for
+    each motion that is found.
+
+    `starts` a speed, kicks of up to `kick` rad/s among them, or with `carry` the motion of the
+    speed before; `threshold` asks for the smallest kick that does not come back; `longest` seconds
+    at most; `sections` keeps so many states once a turn, a row each. With `out` it writes that Parquet file, byte for byte as `sweep dwell` does.
     """
 
 def explain(
