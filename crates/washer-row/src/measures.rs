@@ -92,7 +92,7 @@ pub enum Metric {
 
 impl Metric {
     /// Every metric.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::CabinetForce,
         Self::ClashTime,
         Self::StaticSag,

@@ -54,9 +54,12 @@ pub(super) fn add(
         let dwells: Vec<Dwell<'_>> = speeds_rpm.iter().map(dwell).collect();
         let found = responses(&dwells, is_stopped);
         let there = || found.iter().flatten().filter_map(|responses| responses.first());
-        let fastest = there().reduce(|most, next| {
-            if next.growth_per_s() > most.growth_per_s() { next } else { most }
-        });
+        let fastest =
+            there().reduce(
+                |most, next| {
+                    if next.growth_per_s() > most.growth_per_s() { next } else { most }
+                },
+            );
         outcome.growth = fastest.map(|fastest| {
             let beyond = fastest.beyond.or_else(|| there().find_map(|response| response.beyond));
             Growth { beyond, ..Growth::from(fastest) }
