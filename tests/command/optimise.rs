@@ -158,7 +158,7 @@ fn every_mistake_in_a_study_and_its_grid_is_told_at_once() {
         "from 4000 to 4000",
         "a tolerance that no design spreads",
         "grid.toml:5:18",
-        "6 mistakes",
+        "5 mistakes",
     ] {
         assert!(said(&refused).contains(told), "no {told} in {}", said(&refused));
     }
@@ -168,7 +168,7 @@ fn every_mistake_in_a_study_and_its_grid_is_told_at_once() {
         .replace("max(cabinet_force_nonlinear_n)", "cabinet_force_nonlinear_n");
     let folder = folder_with("2", &wrong);
     let refused = sweep(&folder, "optimise study.toml").output().expect("it starts");
-    for told in ["did you mean `ratio_max`?", "study.toml:6:64", "expected max(), min(), mean()"] {
+    for told in ["did you mean `ratio_max`?", "study.toml:6:67", "expected max(), min(), mean()"] {
         assert!(said(&refused).contains(told), "no {told} in {}", said(&refused));
     }
     assert!(!folder.path().join("results").exists());
