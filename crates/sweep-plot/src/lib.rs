@@ -34,16 +34,6 @@ mod swept;
 mod table;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod tests_designs;
-#[cfg(test)]
-mod tests_drawing;
-#[cfg(test)]
-mod tests_long;
-#[cfg(test)]
-mod tests_metrics;
-#[cfg(test)]
-mod tests_stability;
 mod thin;
 mod together;
 

@@ -1,5 +1,11 @@
 //! Files in, figures out.
 
+mod designs;
+mod drawing;
+mod long;
+mod metrics;
+mod stability;
+
 use std::io::Read as _;
 use std::path::Path;
 

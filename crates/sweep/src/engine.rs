@@ -320,6 +320,4 @@ impl Engine for ModelEngine<'_> {
 }
 
 #[cfg(test)]
-mod fast_tests;
-#[cfg(test)]
 mod tests;

@@ -37,8 +37,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-#[cfg(test)]
-mod boundary_tests;
 mod columns;
 mod commands;
 mod config;
@@ -56,6 +54,8 @@ mod plan;
 mod speeds;
 mod stability;
 mod swept;
+#[cfg(test)]
+mod tests;
 mod trace;
 
 pub use commands::Cli;

@@ -1,5 +1,7 @@
 //! The search against functions whose edges are known.
 
+mod random;
+
 use std::cell::{Cell, RefCell};
 use std::convert::Infallible;
 

@@ -5,6 +5,10 @@
 //! line `# args: --set NAME=VALUE ...` adds the command line's part; `--at` makes it the load of a
 //! point.
 
+mod again;
+mod bounds;
+mod points;
+
 use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;

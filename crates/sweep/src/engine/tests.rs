@@ -1,5 +1,7 @@
 //! Failures are rows, each its own: the others are the same bits with and without them.
 
+mod fast;
+
 use super::*;
 
 /// Springs too soft to carry the machine, unbalances that throw it out of the model's range, and

@@ -1,9 +1,9 @@
 //! What is drawn where: places that stand alone, names off lines, legends that tell lines apart.
 
-use super::sample::{Sample, boundary, map};
-use super::scene::{Item, Outline};
-use super::tests::svg;
-use super::*;
+use super::super::sample::{Sample, boundary, map};
+use super::super::scene::{Item, Outline};
+use super::super::*;
+use super::svg;
 
 /// One crossing at each of three masses, and two more at the last.
 fn folded(axes: &str) -> Sample {

@@ -7,14 +7,8 @@
 //! Precedence: `damping_n_s_per_m` writes every `damper_1_damping_n_s_per_m`, so that not both may
 //! stand in one place.
 
-#[cfg(test)]
-mod again_tests;
-#[cfg(test)]
-mod bounds_tests;
 pub(crate) mod grid;
 mod machine;
-#[cfg(test)]
-mod points_tests;
 mod read;
 mod scalars;
 pub(crate) mod schema;

@@ -5,7 +5,7 @@
 use rayon::prelude::*;
 use washer_row::{Level, Verdict};
 
-use super::*;
+use super::super::*;
 use crate::method::Integrator;
 
 fn load(text: &str) -> Plan {
@@ -68,7 +68,7 @@ fn hold_against_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> 
 
 #[test]
 fn every_row_of_fig12_is_that_of_rk4_or_flagged() {
-    let plan = load(include_str!("../../../../sweeps/fig12.toml"));
+    let plan = load(include_str!("../../../../../sweeps/fig12.toml"));
     assert_eq!(plan.points(), 39 * 33);
     let rows = hold_against_rk4(&plan, 1e-3);
     let left = rows.iter().filter(|row| row.converged == Some(false)).count();
@@ -135,7 +135,7 @@ fn rows_are_rk4s_on_other_machines() {
 
 #[test]
 fn rows_are_rk4s_on_machines_with_friction_stops_and_gasket() {
-    let machine = include_str!("../../../../docs/examples/friction.toml");
+    let machine = include_str!("../../../../../docs/examples/friction.toml");
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("machine.toml"), machine).unwrap();
     let stiff = "stop_1_stiffness_n_per_m = 1e7\nstop_2_stiffness_n_per_m = 1e7\n";
@@ -280,7 +280,7 @@ fn rows_by_other_criteria_are_rk4s() {
 
 #[test]
 fn where_the_verdict_is_in_doubt_rk4_is_held_against_rk4() {
-    let plan = load(include_str!("../../../../sweeps/fig12.toml"));
+    let plan = load(include_str!("../../../../../sweeps/fig12.toml"));
     let at = [vec![0.4, 140.0]];
     let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
     assert_eq!(row.method, Level::Fast);
@@ -296,7 +296,7 @@ fn where_the_verdict_is_in_doubt_rk4_is_held_against_rk4() {
 
 #[test]
 fn a_row_does_not_depend_on_its_company() {
-    let plan = load(include_str!("../../../../sweeps/quick.toml"));
+    let plan = load(include_str!("../../../../../sweeps/quick.toml"));
     let plan = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };
     let engine = ModelEngine::new(&plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
@@ -311,7 +311,7 @@ fn a_row_does_not_depend_on_its_company() {
 
 #[test]
 fn a_side_is_that_of_the_row() {
-    let plan = load(include_str!("../../../../sweeps/quick.toml"));
+    let plan = load(include_str!("../../../../../sweeps/quick.toml"));
     let plan = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };
     let engine = ModelEngine::new(&plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();

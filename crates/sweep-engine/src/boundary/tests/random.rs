@@ -1,8 +1,8 @@
 //! The search against fields drawn at random, whose edges are known everywhere: a boundary with
 //! islands, tongues and folds of either kind, smooth or with a jump. Which pockets does it miss?
 
-use super::tests::{SEARCH, check_edges, traced};
-use super::*;
+use super::super::*;
+use super::{SEARCH, check_edges, traced};
 
 /// How many fields are drawn.
 const FIELDS: u64 = 1000;

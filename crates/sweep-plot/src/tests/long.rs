@@ -4,9 +4,9 @@
 use base64::Engine as _;
 use serde_json::Value;
 
-use super::sample::{MapSample, Sample};
-use super::tests::{carried, draw, message, svg};
-use super::*;
+use super::super::sample::{MapSample, Sample};
+use super::super::*;
+use super::{carried, draw, message, svg};
 
 /// Values from 0 in steps of 1.
 fn counted(count: usize) -> Vec<f64> {
@@ -166,7 +166,7 @@ fn undefined_and_sensitive_points_show_in_their_cell() {
     }
     // The linear model is never chaotic.
     let output = folder.path().join("linear.svg");
-    render(&input, &super::tests::showing("linear_tub_yaw"), &output).unwrap();
+    render(&input, &super::showing("linear_tub_yaw"), &output).unwrap();
     assert!(!std::fs::read_to_string(output).unwrap().contains("sensitive"));
 }
 

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use proptest::prelude::*;
 
-use super::tests::{SMALLEST, load_text};
-use super::*;
+use super::super::*;
+use super::{SMALLEST, load_text};
 use crate::estimate;
 
 /// A grid whose spin is a table of so many rows.

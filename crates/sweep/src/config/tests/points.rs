@@ -1,6 +1,6 @@
 //! Columns of a table as the axes of a plan.
 
-use super::{GridInput, check_columns};
+use super::super::{GridInput, check_columns};
 
 const GRID: &str = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n\
     [time]\nend_s = 2\n\

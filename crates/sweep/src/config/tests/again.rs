@@ -2,7 +2,7 @@
 
 use washer_row::Metric;
 
-use super::{GridInput, with_one_of_each};
+use super::super::{GridInput, with_one_of_each};
 
 const GRID: &str = r#"
 name = "again"

@@ -1,8 +1,8 @@
 //! Figures of scattered points.
 
-use super::sample::Sample;
-use super::tests::{carried, draw, message, showing, svg};
-use super::*;
+use super::super::sample::Sample;
+use super::super::*;
+use super::{carried, draw, message, showing, svg};
 
 /// Points whose ratio is 4 where the mass is above a half, whatever the damping; of the rows, the
 /// last failed and the one before it is undefined.
@@ -156,7 +156,7 @@ fn bins_hold_every_point_once_on_its_side() {
     let series = page["histogram"]["chart"]["panels"][0]["series"].as_array().unwrap();
     let shares = series.iter().map(|series| {
         // Each bin has two ends.
-        let ends = super::tests::curve(series);
+        let ends = super::curve(series);
         ends.iter().filter(|share| share.is_finite()).sum::<f64>() / 2.0
     });
     let shares: Vec<f64> = shares.collect();
@@ -203,14 +203,14 @@ fn many_points_are_picked_not_all_drawn_and_all_counted() {
 
 #[test]
 fn a_grid_is_no_design_and_a_list_of_a_grid_is_a_map() {
-    let refused = message(draw(super::sample::map(), &view(View::Scatter), "a.svg"));
+    let refused = message(draw(super::super::sample::map(), &view(View::Scatter), "a.svg"));
     assert!(refused.contains("`--view` is for designs"), "{refused}");
     assert!(message(draw(points(50), &showing("status"), "a.svg")).contains("no number"));
     let at = PlotOptions { at: vec![("x".to_owned(), 1.0)], ..PlotOptions::default() };
     assert!(message(draw(points(50), &at, "a.svg")).contains("`--at` is for maps"));
     let listed = || {
         let plan = r#"{ "design": { "method": "list" } }"#;
-        super::sample::map().metadata("sweep.listed", plan)
+        super::super::sample::map().metadata("sweep.listed", plan)
     };
     assert!(svg(listed(), &PlotOptions::default()).contains("linear model unreliable"));
     assert!(svg(listed(), &view(View::Histogram)).contains("Share of the points (%)"));

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::sample::{Sample, boundary, map, modes, trace};
-use super::tests::{carried, data, draw, message, svg};
-use super::*;
+use super::super::sample::{Sample, boundary, map, modes, trace};
+use super::super::*;
+use super::{carried, data, draw, message, svg};
 
 /// Points of these unbalances over 200 to 300 rpm. Growth is above 0 from 230 to 250 rpm, by as
 /// much as the unbalance.

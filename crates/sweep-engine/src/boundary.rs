@@ -29,8 +29,6 @@ mod neighbour;
 mod net;
 mod pockets;
 pub mod quantity;
-#[cfg(test)]
-mod random_tests;
 mod row;
 pub mod search;
 mod span;

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use super::sample::{Sample, map};
-use super::tests::{data, draw, message, one_axis, showing, svg};
+use super::super::sample::{Sample, map};
+use super::{data, draw, message, one_axis, showing, svg};
 
 /// A map with columns that are bad either way.
 fn with_metrics() -> Sample {
