@@ -78,8 +78,9 @@ fn the_machine_file_of_the_best_has_the_force_that_the_study_says() {
     let text = does(&folder, "optimise study.toml --best best.toml --threads 2");
     assert!(text.contains("24 candidates of 4 points"), "{text}");
     let file = "results/study.parquet";
-    let best = format!("show {file} --where on_front --json");
-    let force_n = number(&folder, &best, "max_cabinet_force_nonlinear_n");
+    let column = "max_cabinet_force_nonlinear_n";
+    let best = format!("show {file} --where on_front --json --columns {column}");
+    let force_n = number(&folder, &best, column);
     let grid = fs::read_to_string(folder.path().join("grid.toml")).expect("there is a grid");
     let own = grid.replace("\"paper\"", "\"best.toml\"");
     fs::write(folder.path().join("own.toml"), own).expect("it is written");
@@ -183,8 +184,9 @@ fn tolerances_of_what_is_looked_for_spread_over_the_design() {
     does(&folder, "optimise study.toml --out wide.parquet");
     fs::write(folder.path().join("study.toml"), STUDY).expect("it is written");
     does(&folder, "optimise study.toml --out exact.parquet");
+    let column = "max_cabinet_force_nonlinear_n";
     let first = |file: &str| {
-        number(&folder, &format!("show {file} --top 1 --json"), "max_cabinet_force_nonlinear_n")
+        number(&folder, &format!("show {file} --top 1 --json --columns {column}"), column)
     };
     // The same first candidate: of eight machines apart in damping, the worst is worse.
     assert_ne!(first("wide.parquet"), first("exact.parquet"));

@@ -182,7 +182,8 @@ fn a_study_finds_the_resonance_that_a_fine_map_shows() {
         assert!(text.contains("160 of 160, 1 on the front"), "{text}");
     }
     assert!(home.bytes("1.parquet") == home.bytes("2.parquet"));
-    let best = home.does("show 1.parquet --where on_front --json");
+    let best =
+        home.does("show 1.parquet --where on_front --json --columns forcing_rad_per_s,linear_x1");
     let best: serde_json::Value = serde_json::from_str(&best).unwrap();
     let found = best[0]["forcing_rad_per_s"].as_f64().unwrap();
     assert!((found - resonance).abs() <= 0.003, "{found} for {resonance}");
