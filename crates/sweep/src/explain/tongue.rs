@@ -464,7 +464,8 @@ impl Tongue {
             }
             for (around, rpm) in around.iter_mut().zip(most_rpm) {
                 let reach = (around[1] - around[0]) / (count + 1) as f64;
-                *around = if rpm > 0.0 { [rpm - reach, rpm + reach] } else { *around };
+                let near = [rpm - reach, rpm + reach].map(|rpm| rpm.clamp(about[0], about[1]));
+                *around = if rpm > 0.0 { near } else { *around };
             }
             count = BETWEEN;
         }
