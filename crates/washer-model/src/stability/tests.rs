@@ -380,15 +380,16 @@ fn add_elements(machine: &mut Machine, random: &mut fastrand::Rng) {
 }
 
 /// Of random machines, every other with friction and stops: disturbances of simulated dwells grow
-/// as fast as is said, or decay where the response is said to be stable.
+/// as fast as is said, or decay where the response is said to be stable. SEED and MACHINES choose
+/// others.
 #[test]
 #[ignore = "minutes of work"]
 fn random_machines_do_what_is_said() {
-    let seed = std::env::var("SEED").map_or(2026, |seed| seed.parse().unwrap());
-    let mut numbers = fastrand::Rng::with_seed(seed);
+    let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
+    let mut numbers = fastrand::Rng::with_seed(given("SEED", 2026));
     let (mut grown, mut decayed, mut worst) = ([0, 0], [0, 0], [0.0_f64; 2]);
-    for number in 0..30 {
-        let kind = number % 2;
+    for number in 0..given("MACHINES", 3) {
+        let kind = (number % 2) as usize;
         let mut machine = random(&mut numbers);
         if kind == 1 {
             add_elements(&mut machine, &mut numbers);
@@ -418,7 +419,7 @@ fn random_machines_do_what_is_said() {
     }
     println!("{grown:?} grown, worst {worst:?}; {decayed:?} decayed");
     assert!(worst[0] < 0.02 && worst[1] < 0.05, "{worst:?}");
-    assert!(grown[0] + grown[1] >= 20 && decayed[0] + decayed[1] >= 20);
+    assert!(grown[0] > 0 && grown[1] > 0 && decayed[0] > 0 && decayed[1] > 0);
 }
 
 /// Responses of random machines are those that steps of 0.05 rpm lead to, until these are lost; and
