@@ -178,3 +178,69 @@ fn machines_with_friction_and_stops_have_responses_and_growth() {
     let met = home.sweep(&["require", "s.parquet", "count(status == 'ok') > 0"]);
     assert_eq!(met.status.code(), Some(0), "{}", said(&met));
 }
+
+#[test]
+fn friction_is_taken_at_the_speed_that_the_linear_motion_has() {
+    let home = home(&example());
+    let metrics = "metrics=stop_force,damper_speed";
+    let run = home.sweep(&["run", "g.toml", "--set", metrics, "--out", "map.parquet"]);
+    assert!(run.status.success(), "{}", said(&run));
+    assert!(said(&run).contains("friction  0 rows whose linear model"), "{}", said(&run));
+    let held = ["friction_speed_off >= 1", "friction_speed_off < 1.01"];
+    let met = home.sweep(&[&["require", "map.parquet"][..], &held].concat());
+    assert_eq!(met.status.code(), Some(0), "{}", said(&met));
+
+    // A trace, and modes, have the linear model of the row.
+    let at = ["--at", "unbalance_mass_kg=1"];
+    let modes = home.sweep(&[&["modes", "g.toml", "--json"][..], &at].concat());
+    let modes: serde_json::Value = serde_json::from_slice(&modes.stdout).expect("it is JSON");
+    let export = home.sweep(&["export", "map.parquet", "map.csv"]);
+    assert!(export.status.success(), "{}", said(&export));
+    let csv = fs::read_to_string(home.path("map.csv")).expect("it was written");
+    for damper in 1..=2 {
+        let row = column(&csv, &format!("damper_{damper}_speed_linear_m_per_s"))[1];
+        let taken = &modes["friction_speeds_m_per_s"][format!("damper_{damper}")];
+        let off = taken.as_f64().expect("a speed") / row;
+        assert!((off - 1.0).abs() < 0.01, "{taken} for {row} m/s");
+    }
+
+    let slow = ["--set", "friction_linear_speed_m_per_s=0.02"];
+    let given = home.sweep(&[&["run", "g.toml", "--out", "given.parquet"], &slow[..]].concat());
+    assert!(said(&given).contains("friction  1 rows whose linear model"), "{}", said(&given));
+    let shown = home.sweep(&["show", "given.parquet"]);
+    assert!(said(&shown).contains("friction  1 rows whose linear model"), "{}", said(&shown));
+}
+
+#[test]
+fn live_pages_are_for_one_axis_and_for_designs_of_any_machine() {
+    let home = home(&example());
+    let page = |words: &[&str], map: &str| {
+        let run = home.sweep(&[words, &["--out", map]].concat());
+        assert!(run.status.success(), "{}", said(&run));
+        let plot = home.sweep(&["plot", map, "-o", "page.html", "--live"]);
+        assert!(plot.status.success(), "{}", said(&plot));
+        fs::read_to_string(home.path("page.html")).expect("it was written")
+    };
+    let one_axis = page(&["run", "g.toml"], "map.parquet");
+    for part in ["\"kind\":\"chart\"", "\"setup\":", "with friction of 50 N", "a cabinet of 35 kg"]
+    {
+        assert!(one_axis.contains(part), "{part}");
+    }
+    assert!(!one_axis.contains("built-in machine"));
+    let design = GRID.replace("values = [0.05, 1.0]", "range = { from = 0.05, to = 1.0 }");
+    let design = format!("{design}[design]\nmethod = \"sobol\"\npoints = 4\n");
+    fs::write(home.path("d.toml"), design).expect("the grid is written");
+    fs::write(home.path("points.csv"), "unbalance_mass_kg,friction_n\n0.1,20\n0.3,60\n0.2,50\n")
+        .expect("the list is written");
+    let (head, _) = GRID.split_once("[[axis]]").expect("an axis");
+    let list = format!("{head}[design]\nmethod = \"list\"\nfile = \"points.csv\"\n");
+    fs::write(home.path("l.toml"), list).expect("the grid is written");
+    // A design over one parameter is drawn as curves.
+    for (grid, kind) in [("d.toml", "chart"), ("l.toml", "design")] {
+        let text = page(&["run", grid], &format!("{grid}.parquet"));
+        assert!(text.contains(&format!("\"kind\":\"{kind}\"")), "{grid}");
+        let slider =
+            "\"axis\":true,\"description\":\"friction of all dampers (F_f)\",\"from\":20.0";
+        assert_eq!(text.contains(slider), grid == "l.toml", "{grid}");
+    }
+}

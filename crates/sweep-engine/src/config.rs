@@ -53,7 +53,7 @@ use report::{Diagnostic, Report};
 use serde_json::Value;
 use source::Location;
 
-use crate::plan::Plan;
+use crate::plan::{Plan, WrittenIn};
 
 /// A grid as a user gives it: a file or a text, with the constants `NAME=VALUE` over those it sets.
 #[derive(Clone, Debug)]
@@ -149,7 +149,8 @@ fn resolve<M: Read, T>(
     let finished = finish(&mut draft);
     whole::steps(&draft);
     M::judge(&draft);
-    let plan = draft.plan;
+    let mut plan = draft.plan;
+    plan.written = WrittenIn(report.written());
     report.finish((plan, finished))
 }
 

@@ -1,6 +1,8 @@
 //! A run with every value resolved and checked. The configuration makes it; engine, store and
 //! reports read it.
 
+use std::collections::BTreeMap;
+
 use serde_json::Value;
 use sweep_parameter::{Parameter as _, Range, RatioLimits};
 
@@ -49,6 +51,19 @@ pub struct Plan<M: Model> {
     pub reliability: Reliability<M>,
     /// What `--set` has changed, by name.
     pub set: Vec<(String, Value)>,
+    /// Where numbers were written.
+    pub written: WrittenIn,
+}
+
+/// The file or option in which each single number was last written, by its parameter's name. No
+/// result depends on it, so plans that differ in nothing else are equal.
+#[derive(Clone, Debug, Default)]
+pub struct WrittenIn(pub BTreeMap<String, String>);
+
+impl PartialEq for WrittenIn {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// One swept parameter.

@@ -12,7 +12,6 @@ pub(crate) use report::about;
 
 use serde_json::{Map as Object, Value, json};
 
-use super::PlotOptions;
 use super::axis::{LEAST_TICKS, SLACK, Scale, Step, Tick, log_sets};
 use super::chart::{Chart, ChartPanel, Series, Style, x_scale, y_scale};
 use super::colour::{BOTH, ColourScale, DISTINCT, FAILED, LEVELS, SHADE};
@@ -29,6 +28,7 @@ use super::scene::{Colour, INK};
 use super::svg::escape;
 use super::swept::SweptAxis;
 use super::table::{Column, Table};
+use super::{Live, PlotOptions};
 use sweep_parameter::Worse;
 
 const PAGE: &str = include_str!("html/page.html");
@@ -117,16 +117,25 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
     if map.grid.merged() {
         data["counts"] = counts_json(map);
     }
-    let Some(live) = &options.live else {
-        return Ok(page(title, data, &[CORE, CHART, BAR, HISTORIES, CELLS, MAP, REPORT, START]));
-    };
-    data["live"] = live::json(live, &map.grid.axes);
+    let axes = map.grid.axes.iter().map(|axis| (axis.name.as_str(), axis.log)).collect::<Vec<_>>();
+    let computing = computing(&mut data, options.live.as_ref(), source, &axes);
+    let scripts = [&[CORE, CHART, BAR, HISTORIES, CELLS, MAP][..], computing, &[REPORT, START]];
+    Ok(page(title, data, &scripts.concat()))
+}
+
+/// Adds what a page computes with, if it does, and the run in words. The scripts that it takes;
+/// `axes` by name, and whether they are logarithmic.
+fn computing(
+    data: &mut Value,
+    live: Option<&Live>,
+    source: &Source,
+    axes: &[(&str, bool)],
+) -> &'static [&'static str] {
+    let Some(live) = live else { return &[] };
+    data["about"] = report::about(source).into();
+    data["live"] = live::json(live, axes);
     data["resonances"] = json!(live.resonances);
-    let scripts = [
-        CORE, CHART, BAR, HISTORIES, SPECTRUM, POOL, CURVES, GROWTH, LIVE, CELLS, MAP, REPORT,
-        START,
-    ];
-    Ok(page(title, data, &scripts))
+    &[SPECTRUM, POOL, CURVES, GROWTH, LIVE]
 }
 
 /// The file's own word about itself, without what would fill the page: a list of a million values,
@@ -146,16 +155,20 @@ fn provenance(source: &Source) -> Value {
 /// Longest entry of a file's metadata that a page carries whole, characters.
 const MOST_PROVENANCE: usize = 100_000;
 
-/// The page of a chart: every panel, those that a picture shows at first.
-pub(crate) fn chart_page(source: &Source, chart: &Chart) -> String {
-    let data = json!({
+/// The page of a chart: every panel, those that a picture shows at first. It may compute, along
+/// an axis of this name.
+pub(crate) fn chart_page(source: &Source, chart: &Chart, live: Option<(&Live, &str)>) -> String {
+    let mut data = json!({
         "kind": "chart",
         "title": chart.title,
         "subtitle": chart.subtitle,
         "chart": chart_json(chart),
         "provenance": provenance(source),
     });
-    page(&chart.title, data, &[CORE, CHART, START])
+    let axis = live.map_or("", |(_, axis)| axis);
+    let live = live.map(|(live, _)| live);
+    let computing = computing(&mut data, live, source, &[(axis, chart.x_log)]);
+    page(&chart.title, data, &[&[CORE, CHART][..], computing, &[START]].concat())
 }
 
 /// A page with the picture that it shows where scripts are switched off.

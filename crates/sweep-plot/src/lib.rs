@@ -131,7 +131,7 @@ pub struct PlotOptions {
     pub against: Option<PathBuf>,
     /// Map as a page: a folder of trace files; clicking a point that has one shows it.
     pub traces: Option<PathBuf>,
-    /// Map as a page: what it computes with.
+    /// Map or design as a page: what it computes with.
     pub live: Option<Live>,
 }
 
@@ -158,6 +158,8 @@ pub struct Live {
     pub metrics: Vec<[String; 2]>,
     /// Whether the map has the static sag.
     pub has_static_sag: bool,
+    /// The constant speeds (rpm) that the map's growth is about; none if it has none.
+    pub growth_speeds_rpm: Vec<f64>,
     /// Ways in which a response at a constant speed can lose its stability, in the module's order;
     /// none where that cannot be asked of the machine.
     pub kinds: Vec<String>,
@@ -286,7 +288,7 @@ fn design(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u
     let scatter = Scatter::read(source, options)?;
     let typeface = Typeface::load()?;
     if format == Format::Html {
-        return Ok(html::design_page(&scatter, options.view, &typeface).into_bytes());
+        return Ok(html::design_page(&scatter, options, &typeface).into_bytes());
     }
     let scene = match options.view {
         Some(View::Histogram) => chart::draw(&figures::histogram::chart(&scatter), &typeface),
@@ -328,7 +330,13 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
     let grid = Grid::new(&axes, &cuts.picks, most);
     if axes.len() == 1 {
         let map = Map::read(source, grid, &columns, divide)?;
-        return written(&map.table.source, &figures::curves::chart(&map, options)?, format);
+        let (source, chart) = (&map.table.source, figures::curves::chart(&map, options)?);
+        return match &options.live {
+            Some(live) if format == Format::Html => {
+                Ok(html::chart_page(source, &chart, Some((live, &axes[0].name))).into_bytes())
+            }
+            _ => written(source, &chart, format),
+        };
     }
     let map = Map::read(source, grid, &columns, divide)?;
     Ok(html::map_page(&map, &cuts, options)?.into_bytes())
@@ -397,7 +405,7 @@ fn dwell(source: &Source, options: &PlotOptions, format: Format) -> Result<Vec<u
 
 fn written(source: &Source, chart: &Chart, format: Format) -> Result<Vec<u8>, PlotError> {
     match format {
-        Format::Html => Ok(html::chart_page(source, chart).into_bytes()),
+        Format::Html => Ok(html::chart_page(source, chart, None).into_bytes()),
         Format::Svg | Format::Png => image(&chart::draw(chart, &Typeface::load()?), format),
     }
 }
@@ -467,7 +475,12 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
             over_time || dwell,
             "traces over time and dwell files",
         ),
-        ("--live", options.live.is_some(), map && format == Format::Html, "maps drawn as .html"),
+        (
+            "--live",
+            options.live.is_some(),
+            (map || design) && format == Format::Html,
+            "maps drawn as .html",
+        ),
         (
             "--traces",
             options.traces.is_some(),

@@ -33,6 +33,8 @@ impl Side {
 
 /// A parameter that varies from point to point.
 pub(crate) struct Spread {
+    /// As in grid files.
+    pub(crate) name: String,
     /// In words, with its unit.
     pub(crate) label: Label,
     /// Spread evenly by the logarithm.
@@ -169,6 +171,7 @@ impl Scatter {
             let facts = source.column(name)?;
             let varies = values.iter().any(|value| *value != values[0]);
             varies.then(|| Spread {
+                name: (*name).to_owned(),
                 label: Label::new(&label::words(name), &facts.unit),
                 log: source.is_log(name) && values.iter().all(|value| *value > 0.0),
                 influence: Influence::of(&values, &quantity),

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 use sweep_engine::columns::{
     Cell, Compared, ResultColumn, amplitude_columns, row, run_columns, verdict_columns,
 };
+use sweep_engine::store::read::FAR_OFF;
 use sweep_engine::store::{Column, Done, Job, Kind as Cells, Layout, Row, Rows, axis_columns};
 use sweep_files::{FileKind, key};
 use sweep_parameter::{Limit, RatioLimits, Worse};
@@ -11,7 +12,7 @@ use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, Motion};
 use washer_row::{Level, Measures, Metric, Outcome, ROW_STATUSES, Trajectory, Verdict, row_status};
 
 use crate::model::Washer;
-use crate::plan::Plan;
+use crate::plan::{Plan, has_friction};
 
 impl Rows for Washer {
     fn layout(plan: &Plan) -> Layout {
@@ -148,7 +149,8 @@ impl Compared for ResultRow {
 pub(crate) fn of_run(plan: &Plan) -> Layout {
     let reliability = &plan.reliability;
     let measures = plan.model.measures.clone();
-    of_measures(axis_columns(plan), &reliability.channels, reliability.limits, measures)
+    let rubs = has_friction(plan);
+    of_measures(axis_columns(plan), &reliability.channels, reliability.limits, measures, rubs)
 }
 
 /// The same, by what it depends on.
@@ -157,8 +159,10 @@ pub(crate) fn of_measures(
     channels: &[Channel],
     limits: RatioLimits,
     measures: Measures,
+    has_friction: bool,
 ) -> Layout {
-    let asked = Asked { channels: channels.to_vec(), limits, measures, rows: RowKind::Run };
+    let (channels, rows) = (channels.to_vec(), RowKind::Run);
+    let asked = Asked { channels, limits, measures, has_friction, rows };
     let columns = Columns::of(&asked).columns;
     Layout {
         axes,
@@ -215,6 +219,7 @@ struct Asked {
     channels: Vec<Channel>,
     limits: RatioLimits,
     measures: Measures,
+    has_friction: bool,
     rows: RowKind,
 }
 
@@ -230,7 +235,8 @@ impl Asked {
             RowKind::Dwell(_) => Measures::default(),
         };
         let channels = plan.reliability.channels.clone();
-        Self { channels, limits: plan.reliability.limits, measures, rows }
+        let (limits, has_friction) = (plan.reliability.limits, has_friction(plan));
+        Self { channels, limits, measures, has_friction, rows }
     }
 
     /// Every column, in order: the one place that says what the file holds.
@@ -250,6 +256,9 @@ impl Asked {
         columns.extend(amplitude_columns(&self.channels, self.limits, amplitude, ratio));
         columns.extend(self.verdict_columns());
         columns.extend(gap_columns());
+        if self.has_friction {
+            columns.push(friction_column());
+        }
         columns.extend(self.metric_columns());
         columns.extend(run_columns(ROW_STATUSES.to_vec()));
         columns
@@ -334,6 +343,20 @@ fn dwelt_columns(channels: &[Channel]) -> Vec<WasherColumn> {
         Cell::Name(Ending::KINDS.to_vec(), Box::new(|row| Some(row.outcome.dwelt.as_ref()?.kind))),
     ));
     columns
+}
+
+/// What the linear model's friction was taken at.
+fn friction_column() -> WasherColumn {
+    ResultColumn::new(
+        "friction_speed_off",
+        "1",
+        "by what factor the speed amplitude at which the linear model takes the friction of a \
+         damper is off from that of its own motion in the window, the greatest of all dampers; 1 \
+         where \"auto\" found it, null without friction or if the linear model failed",
+        Cell::Measured(Box::new(|row: &ResultRow| row.outcome.linear.friction_speed_off)),
+    )
+    .worse(Worse::Greater)
+    .limit(FAR_OFF, 1.0)
 }
 
 /// Columns of the fastest growing disturbance at a constant speed. In maps they stand behind a

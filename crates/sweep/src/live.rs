@@ -8,15 +8,17 @@ use serde_json::Value;
 use sweep_files::{ParquetFile, key};
 use sweep_plot::{Live, Slider};
 use washer_live::{Setup, Sliders};
-use washer_model::{Channel, Kind, ModeOverSpeed, ModelKind, Parameter, Timing, campbell, prepare};
+use washer_model::{Channel, Kind, ModeOverSpeed, ModelKind, Parameter, campbell, prepare};
 use washer_row::{Level, Measured, Metric};
 
 use crate::config::GridInput;
 use crate::engine::{CHECKPOINTS, ModelEngine, rule};
 use crate::method::Integrator;
-use crate::plan::{Axis, AxisValues, Plan};
+use crate::model::Washer;
+use crate::plan::{Axis, AxisValues, Plan, timing};
 use sweep_engine::exit::Error;
 use sweep_engine::method::{ACCURACY, Integrator as _, Steps};
+use sweep_engine::store::read::overview;
 
 /// Parameters that a page offers beside the axes, where the machine has them.
 const OFFERED: [&str; 6] = [
@@ -74,7 +76,8 @@ pub(crate) fn slider_range(text: &str) -> Result<SliderRange, String> {
 /// # Errors
 /// A file that is not the map of a grid with its plan; ranges that no machine can have.
 pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
-    let plan = plan_of(file)?;
+    let mut plan = plan_of(file)?;
+    let growth_speeds_rpm = take_growth(&mut plan);
     let sliders = match ranges {
         [] => usual(&plan),
         _ => chosen(&plan, ranges)?,
@@ -102,6 +105,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
             [criterion.amplitude(), ratio].map(str::to_owned)
         },
         metrics: plan.model.measures.of_model().map(columns).collect(),
+        growth_speeds_rpm,
         has_static_sag: plan.model.measures.metrics.contains(&Metric::StaticSag),
         kinds: Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
         compared: plan.reliability.channels.iter().map(|channel| channel.index()).collect(),
@@ -118,12 +122,11 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
 /// Resonances of the plan's own machine, before the axes, up to its greatest speed; none where it
 /// has no modes.
 pub(crate) fn resonances(plan: &Plan) -> Vec<[String; 3]> {
-    let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
     let machines = [(plan.model.machine.clone(), plan.model.spin.clone())];
     let greatest_rpm = plan.model.spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
     let count = (greatest_rpm / MODES_EVERY_RPM).ceil() as u32;
     let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODES_EVERY_RPM * f64::from(k)).collect();
-    let points = prepare(Simd::Scalar, &machines, &timing);
+    let points = prepare(Simd::Scalar, &machines, &timing(plan));
     let Some(Ok(point)) = points.into_iter().next() else { return Vec::new() };
     let modes = campbell(&point, &speeds_rpm).unwrap_or_default();
     let of_mode = |mode: ModeOverSpeed| {
@@ -149,24 +152,39 @@ fn plan_of(file: &Path) -> Result<Plan, Error> {
         given: file.display().to_string(),
         expected: expected.to_owned(),
     };
-    let text = ParquetFile::open(file)?.value(key::PLAN).map(str::to_owned);
+    let opened = ParquetFile::open(file)?;
+    let text = opened.value(key::PLAN).map(str::to_owned);
     let json = text.and_then(|text| serde_json::from_str::<Value>(&text).ok());
-    let json = json.ok_or_else(|| refused("a map by `sweep run`, which carries its plan"))?;
-    if json.get("design").is_some() {
-        return Err(refused("the map of a grid; this one's points are a design's"));
+    let mut json = json.ok_or_else(|| refused("a map by `sweep run`, which carries its plan"))?;
+    let name = file.display().to_string();
+    if json.get("design").is_none() {
+        let plan: Plan = GridInput::of_plan(&name, &json).load()?;
+        return if plan.axes.is_empty() { Err(refused("a map with an axis")) } else { Ok(plan) };
     }
-    let plan = GridInput::of_plan(&file.display().to_string(), &json).load()?;
-    if plan.axes.len() < 2 {
-        return Err(refused("a map of two axes or more"));
+    // Points of a design are wherever its file has them.
+    let axes = json["axis"].take();
+    let mut plan: Plan = GridInput::of_plan(&name, &json).load()?;
+    let columns = overview(&opened)?.columns;
+    for axis in axes.as_array().into_iter().flatten() {
+        let name = axis["parameter"].as_str().unwrap_or_default();
+        let parameter = Parameter::find(name, &plan.model.machine, &plan.model.spin);
+        let range = columns.iter().find(|column| column.name == name);
+        if let (Ok(parameter), Some((from, to))) = (parameter, range.and_then(|one| one.range)) {
+            let values = AxisValues::Linear { from, to, count: 2 };
+            plan.axes.push(Axis { parameter, values });
+        }
     }
-    Ok(without_growth(plan))
+    Ok(plan)
 }
 
-/// A page does not have the metric: it takes a response at each of the plan's speeds.
-fn without_growth(mut plan: Plan) -> Plan {
-    plan.model.measures.metrics.retain(|metric| !metric.is_of_speeds());
-    plan.model.held_speeds = None;
-    plan
+/// The speeds (rpm) of the metric growth, which a page asks for beside a point's row. Motions that
+/// held speeds end in it does not have.
+fn take_growth(plan: &mut Plan) -> Vec<f64> {
+    let Washer { measures, held_speeds, .. } = &mut plan.model;
+    let has_growth = measures.metrics.contains(&Metric::Growth);
+    measures.metrics.retain(|metric| !metric.is_of_speeds());
+    let speeds = held_speeds.take().filter(|_| has_growth);
+    speeds.map_or_else(Vec::new, |speeds| speeds.values().to_vec())
 }
 
 /// What checked amplitudes are good for: the map's own accuracy, or the usual one.

@@ -1,5 +1,8 @@
 //! The engine's plan, of a washing machine.
 
+use serde_json::{Map, Value};
+use washer_model::{Point, Timing};
+
 use crate::model::Washer;
 
 pub(crate) use sweep_engine::AxisValues;
@@ -13,12 +16,27 @@ pub(crate) type Axis = sweep_engine::Axis<Washer>;
 /// One grid point's input: machine, spin and window with that point's axis values in place.
 pub(crate) type Scenario = sweep_engine::Scenario<Washer>;
 
+/// When a plan's run ends, and its window.
+pub(crate) fn timing(plan: &Plan) -> Timing {
+    Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 }
+}
+
+/// At which speeds (m/s) a point's linear model takes the friction of its dampers, by name.
+pub(crate) fn friction_speeds(point: &Point) -> Map<String, Value> {
+    let speeds = point.friction_speeds().iter();
+    speeds.map(|of| (format!("damper_{}", of.damper + 1), of.speed_m_per_s.into())).collect()
+}
+
+/// Whether some damper has friction at some point of a plan.
+pub(crate) fn has_friction(plan: &Plan) -> bool {
+    plan.model.machine.dampers.iter().any(|damper| damper.friction_n != 0.0)
+        || plan.axes.iter().any(|axis| axis.parameter.name().ends_with("friction_n"))
+}
+
 /// What gives forces corners at some point of a plan, in words; `None` where all are smooth.
 #[must_use]
 pub(crate) fn corners_of_forces(plan: &Plan) -> Option<&'static str> {
-    let rubs = plan.model.machine.dampers.iter().any(|damper| damper.friction_n != 0.0);
-    let may_rub = plan.axes.iter().any(|axis| axis.parameter.name().ends_with("friction_n"));
-    match (rubs || may_rub, plan.model.machine.stops.is_empty()) {
+    match (has_friction(plan), plan.model.machine.stops.is_empty()) {
         (true, true) => Some("dampers with friction"),
         (true, false) => Some("dampers with friction, and stops"),
         (false, false) => Some("stops"),
@@ -54,6 +72,7 @@ mod tests {
             integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 },
             reliability: Reliability { limits: 2.0.into(), channels: Channel::ALL.to_vec() },
             set: Vec::new(),
+            written: Default::default(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use sweep_engine::boundary::search::Values;
 use sweep_engine::estimate::Estimate;
+use sweep_engine::plan::WrittenIn;
 use sweep_engine::{Engine, Error, Swept, Watch};
 use washer_model::{Machine, Parameter, Spin, Target};
 use washer_row::{Criterion, Demand, Metric, Outcome};
@@ -66,27 +67,41 @@ pub(crate) type Listed = sweep_engine::Listed<Washer>;
 /// Every parameter with its value.
 fn listed(plan: Option<&Plan>) -> Vec<Listed> {
     match plan {
-        Some(plan) => rows(&plan.model.machine, &plan.model.spin, Some(plan.window_s)),
+        Some(plan) => {
+            rows(&plan.model.machine, &plan.model.spin, Some(plan.window_s), &plan.written)
+        }
         // The spin's parameters exist without a grid, but have no value.
-        None => rows(&Machine::paper(), &Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 }, None),
+        None => {
+            let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
+            rows(&Machine::paper(), &spin, None, &WrittenIn::default())
+        }
     }
 }
 
 /// Every parameter with its value; those of spin and window have one only if a grid gives its
 /// window.
-fn rows(machine: &Machine, spin: &Spin, window_s: Option<[f64; 2]>) -> Vec<Listed> {
-    let built_in = Machine::paper();
+fn rows(
+    machine: &Machine,
+    spin: &Spin,
+    window_s: Option<[f64; 2]>,
+    WrittenIn(written): &WrittenIn,
+) -> Vec<Listed> {
     let row = |parameter: Parameter| {
         let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
         let value = match parameter.target() {
             Target::Window(edge) => window_s.map(|window_s| window_s[edge]),
             _ => parameter.get(machine, spin).filter(|_| window_s.is_some() || !of_grid),
         };
-        let as_built_in = parameter.get(&built_in, spin) == value;
-        let source = if of_grid || as_built_in {
-            parameter.source().to_string()
-        } else {
-            "given".to_owned()
+        // Of several numbers at once each may have been written elsewhere.
+        let mut places: Vec<&str> = Vec::new();
+        for part in parameter.parts(machine) {
+            places.extend(written.get(part.as_ref()).map(String::as_str));
+        }
+        places.dedup();
+        let source = match places[..] {
+            _ if of_grid => parameter.source().to_string(),
+            [] => parameter.source().to_string(),
+            _ => format!("given: {}", places.join(", ")),
         };
         Listed { parameter, value, source }
     };
@@ -138,7 +153,7 @@ mod tests {
     #[test]
     fn json_holds_every_parameter() {
         let spin = Spin::Ramp { peak_rpm: 120.0, ramp_s: 2.0 };
-        let rows = rows(&Machine::paper(), &spin, Some([0.0, 1.0]));
+        let rows = rows(&Machine::paper(), &spin, Some([0.0, 1.0]), &WrittenIn::default());
         let json: Value = serde_json::from_str(&as_json(&rows)).unwrap();
         assert_eq!(
             json.as_array().map(Vec::len),
@@ -148,13 +163,30 @@ mod tests {
     }
 
     #[test]
-    fn a_value_of_the_users_own_is_not_ascribed_to_the_paper() {
-        let mut machine = Machine::paper();
-        machine.tub.mass_kg = 20.0;
-        let rows = rows(&machine, &Spin::Ramp { peak_rpm: 120.0, ramp_s: 2.0 }, None);
-        let row = |name: &str| rows.iter().find(|row| row.parameter.name() == name).unwrap();
-        assert_eq!(row("tub_mass_kg").source, "given");
-        assert_eq!(row("shaft_mass_kg").source, "paper, Table 2");
-        assert_eq!(row("spin_peak_rpm").value, None);
+    fn what_a_user_wrote_is_not_ascribed_to_the_paper_whatever_its_value() {
+        let folder = tempfile::tempdir().unwrap();
+        let machine = crate::config::machine_file(&Machine::paper());
+        std::fs::write(folder.path().join("own.toml"), machine).unwrap();
+        let grid = folder.path().join("grid.toml");
+        let text = "spin = { profile = \"ramp\", peak_rpm = 120, ramp_s = 2 }\ntime.end_s = 2\n";
+        let sources = |named: &str, sets: &[&str]| {
+            std::fs::write(&grid, format!("{named}{text}")).unwrap();
+            let sets: Vec<String> = sets.iter().copied().map(str::to_owned).collect();
+            let plan = crate::config::load(&grid, &sets).unwrap();
+            move |name: &str| {
+                let rows = listed(Some(&plan));
+                rows.iter().find(|row| row.parameter.name() == name).unwrap().source.clone()
+            }
+        };
+        let own = sources("machine = \"own.toml\"\n", &["damper_1_damping_n_s_per_m=140"]);
+        let file = folder.path().join("own.toml").display().to_string();
+        assert_eq!(own("tub_mass_kg"), format!("given: {file}"));
+        assert_eq!(own("damper_1_damping_n_s_per_m"), "given: --set");
+        assert_eq!(own("damping_n_s_per_m"), format!("given: --set, {file}"));
+        assert_eq!(own("spring_1_cubic_n_per_m3"), "assumed: none unless given");
+        assert_eq!(own("spin_peak_rpm"), "the grid file's [spin]");
+        let built_in = sources("", &["tub_mass_kg=23.87"]);
+        assert_eq!(built_in("tub_mass_kg"), "given: --set");
+        assert_eq!(built_in("shaft_mass_kg"), "paper, Table 2");
     }
 }

@@ -14,7 +14,7 @@ use washer_model::{
 use crate::engine::{ModelEngine, Quick, reference_step_s};
 use crate::method::Integrator;
 use crate::model::Washer;
-use crate::plan::{Plan, Scenario};
+use crate::plan::{Plan, Scenario, friction_speeds};
 use sweep_engine::config::NamedValues;
 use sweep_engine::exit::Error;
 use sweep_engine::method::Integrator as _;
@@ -182,21 +182,23 @@ pub(crate) fn trace(
     }
     let failures = models.iter().map(Columns::failure).collect::<Vec<_>>();
     table.metadata(key::PLAN, &plan.to_json());
-    table.metadata(
-        key::TRACE,
-        &json!({
-            "at": at.into_iter().collect::<BTreeMap<_, _>>(),
-            "every_s": every_s,
-            "equilibrium": named('q', point.equilibrium()),
-            "start": {
-                "deviations": named('q', &start.deviations),
-                "speeds": named('u', &start.speeds),
-            },
-            "integrator": method_json,
-            "nonlinear_failure": failures[0],
-            "linear_failure": failures[1],
-        }),
-    );
+    let mut facts = json!({
+        "at": at.into_iter().collect::<BTreeMap<_, _>>(),
+        "every_s": every_s,
+        "equilibrium": named('q', point.equilibrium()),
+        "start": {
+            "deviations": named('q', &start.deviations),
+            "speeds": named('u', &start.speeds),
+        },
+        "integrator": method_json,
+        "nonlinear_failure": failures[0],
+        "linear_failure": failures[1],
+    });
+    let taken = friction_speeds(&point);
+    if !taken.is_empty() {
+        facts["friction_speeds_m_per_s"] = taken.into();
+    }
+    table.metadata(key::TRACE, &facts);
     Ok(Trace { table, instants, failures: failures.into_iter().flatten().collect() })
 }
 

@@ -71,6 +71,7 @@ mod machine;
 mod modes;
 mod nonlinear;
 mod point;
+mod ready;
 mod run;
 mod stability;
 
@@ -94,7 +95,9 @@ pub use modes::campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell, campb
 pub use modes::shape::{Motion, Movement, Plane};
 pub use modes::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
 pub use nonlinear::coupling::Caps;
-pub use point::{NoEquilibrium, Point, Timing, prepare};
+pub use point::friction::FrictionSpeed;
+pub use point::{NoEquilibrium, Point, Timing};
+pub use ready::prepare;
 pub use run::equations::{Equations, STATE_LEN};
 pub use run::history::{History, Instant, Start, history, history_until};
 pub use run::suspension::Forces;

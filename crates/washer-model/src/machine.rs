@@ -141,7 +141,7 @@ pub struct Damper {
     /// Speed v_s below which friction fades to zero.
     pub friction_speed_m_per_s: f64,
     /// Speed amplitude V at which the linear model's viscous damping takes as much energy out of a
-    /// swing as friction does: 4 F_f / (pi V). It must be there where there is friction.
+    /// swing as friction does: 4 F_f / (pi V). Where it is absent, that of the linear motion.
     pub friction_linear_speed_m_per_s: Option<f64>,
 }
 
@@ -216,6 +216,8 @@ pub struct Foot {
 impl Damper {
     /// Speed v_s of a damper that gives none.
     pub const FRICTION_SPEED_M_PER_S: f64 = 0.01;
+    /// Where the search begins for a speed V that is the motion's: a usual one.
+    pub(crate) const FIRST_LINEAR_SPEED_M_PER_S: f64 = 0.1;
 }
 
 impl Machine {

@@ -1,5 +1,6 @@
 //! A grid point made ready: everything that is computed once, before its trajectories start.
 
+pub(crate) mod friction;
 pub(crate) mod ringing;
 
 use crate::channel::CHANNELS;
@@ -13,6 +14,7 @@ use crate::machine::spin::{Spin, SpinState, SpinStretch, stretch_at};
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, Motion};
+use crate::point::friction::FrictionSpeed;
 use crate::point::ringing::{Ringing, jumps_rad_per_s2};
 use lane_ode::{Kernel, Lane, N, Simd};
 use std::sync::Arc;
@@ -46,6 +48,8 @@ pub struct Point {
     pub(crate) rest: [f64; CHANNELS],
     pub(crate) linear: LinearPoint,
     pub(crate) linear_outputs: LinearOutputs<f64>,
+    /// Of the dampers with friction.
+    pub(crate) friction_speeds: Vec<FrictionSpeed>,
     /// The linear model of the machine at its steepest, if its elements are not linear along their
     /// lines: what explicit steps must bear.
     pub(crate) steepest: Option<Box<LinearPoint>>,
@@ -137,6 +141,38 @@ impl Point {
         [from, inside().next_back().map_or(from, |leg| leg.end_s)]
     }
 
+    /// At which speed amplitudes the linear model takes the friction of the dampers that have it.
+    #[must_use]
+    pub fn friction_speeds(&self) -> &[FrictionSpeed] {
+        &self.friction_speeds
+    }
+
+    /// By what factor these are off from the speeds (m/s) that the dampers had in a motion, the
+    /// greatest of all; `None` without friction.
+    #[must_use]
+    pub fn friction_speed_off(&self, occurred_m_per_s: &[f64]) -> Option<f64> {
+        let off = self.friction_speeds.iter().filter_map(|taken| {
+            let occurred = occurred_m_per_s.get(taken.damper)?.max(taken.least_m_per_s);
+            let quotient = taken.speed_m_per_s.max(taken.least_m_per_s) / occurred;
+            Some(quotient.max(1.0 / quotient))
+        });
+        off.reduce(f64::max)
+    }
+
+    /// The same point with friction taken at other own speeds, in their order.
+    pub(crate) fn at_own_speeds(&self, speeds_m_per_s: &[f64]) -> Self {
+        let mut point = self.clone();
+        let own = point.friction_speeds.iter_mut().filter(|taken| taken.is_own);
+        for (taken, speed_m_per_s) in own.zip(speeds_m_per_s) {
+            taken.speed_m_per_s = *speed_m_per_s;
+            point.machine.elements.take_friction_at(taken.damper, *speed_m_per_s);
+        }
+        let tangents =
+            tub_tangents(&point.machine.with_viscous_friction(), &self.equilibrium.map(N));
+        point.linear = point.linear.with_tub(tangents);
+        point
+    }
+
     /// M, C, K and F of the linear model (Eq. 41) at spin angle `theta_rad`, speed and
     /// acceleration.
     #[must_use]
@@ -152,12 +188,11 @@ impl Point {
     }
 }
 
-/// Makes points ready, on lanes.
+/// Makes points ready, on lanes, but for speeds at which friction is taken that the motion has.
 ///
 /// # Errors
 /// Per point: [`NoEquilibrium`].
-#[must_use]
-pub fn prepare(
+pub(crate) fn prepare(
     simd: Simd,
     points: &[(Machine, Spin)],
     timing: &Timing,
@@ -216,6 +251,7 @@ impl Kernel for Prepare<'_> {
                         rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),
                         linear,
                         linear_outputs,
+                        friction_speeds: FrictionSpeed::all(machine),
                         steepest,
                         stretches: course.stretches,
                         legs: course.legs,
@@ -279,7 +315,7 @@ fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<Course> {
 }
 
 /// The run cut at every kink.
-fn legs(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedLeg> {
+pub(crate) fn legs(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedLeg> {
     let [from, to] = timing.window_s;
     let kinks = stretches.iter().map(|s| s.start_s).chain([0.0, from, to, timing.end_s]);
     let parts = f64::from(timing.checkpoints);

@@ -5,7 +5,7 @@ mod course;
 pub(crate) mod equations;
 pub(crate) mod extras;
 pub(crate) mod history;
-mod loads;
+pub(crate) mod loads;
 pub(crate) mod model;
 pub(crate) mod stiff;
 pub(crate) mod suspension;

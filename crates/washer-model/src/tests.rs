@@ -8,6 +8,7 @@ mod energy;
 mod expansion;
 mod extras;
 mod findings;
+pub(crate) mod friction;
 mod instruments;
 mod loads;
 mod long_tables;

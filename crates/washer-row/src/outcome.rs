@@ -70,6 +70,9 @@ pub struct Trajectory {
     pub rejected: u64,
     /// The model's metrics that the plan asks for, in column order; empty if the model failed.
     pub metrics: Vec<f64>,
+    /// By what factor the speeds at which the linear model takes friction are off from those of its
+    /// motion. `None` without friction, and of the nonlinear model.
+    pub friction_speed_off: Option<f64>,
     /// Largest deviations by turn of the drum, in the order of `Channel::ALL`: while the two models
     /// are being compared by them.
     pub turns: Vec<Deviations>,
@@ -89,6 +92,7 @@ impl Trajectory {
             steps: 0,
             rejected: 0,
             metrics: Vec::new(),
+            friction_speed_off: None,
             turns: Vec::new(),
         }
     }

@@ -78,11 +78,23 @@ pub fn runs(
     rule: &Rule,
     is_stopped: &dyn Fn() -> bool,
 ) -> Option<Vec<RungRun>> {
-    let (records, extras) = simulate_until(simd, model, method, points, rule.wanted(), is_stopped)?;
+    let has_friction = |point: &&Point| !point.friction_speeds().is_empty();
+    let mut wanted = rule.wanted();
+    wanted.damper_speeds |= model == ModelKind::Linear && points.iter().any(has_friction);
+    let (records, extras) = simulate_until(simd, model, method, points, wanted, is_stopped)?;
     // None at all if nothing was wanted.
     let mut extras = extras.into_iter();
-    let run = |record: &Record| RungRun::new(record, extras.next().unwrap_or_default(), rule);
-    Some(records.iter().map(run).collect())
+    let run = |(record, point): (&Record, &&Point)| {
+        let extra = extras.next().unwrap_or_default();
+        let off = match model {
+            ModelKind::Linear => point.friction_speed_off(&extra.damper_speeds_m_per_s),
+            ModelKind::Nonlinear => None,
+        };
+        let mut run = RungRun::new(record, extra, rule);
+        run.trajectory.friction_speed_off = off;
+        run
+    };
+    Some(records.iter().zip(points).map(run).collect())
 }
 
 fn trajectory(record: &Record, extra: Extra, amplitudes: &Deviations, rule: &Rule) -> Trajectory {
@@ -109,6 +121,7 @@ fn trajectory(record: &Record, extra: Extra, amplitudes: &Deviations, rule: &Rul
         steps,
         rejected,
         metrics: metrics.collect(),
+        friction_speed_off: None,
         turns: extra.turns,
     }
 }

@@ -12,7 +12,7 @@ use crate::program::program;
 use crate::progress::{ProgressMode, duration, per_second};
 use crate::run::{self as runner, Ended, RunOptions, RunReport};
 use crate::store::provenance::Session;
-use crate::store::read::Tally;
+use crate::store::read::{FAR_OFF, Tally};
 use crate::store::{Job, ShardRequest};
 use crate::swept::Swept;
 use crate::threads::{self, Environment};
@@ -319,6 +319,16 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         place if place.is_empty() => place,
         place => format!(" at {place}"),
     };
+    if let Some(greatest) = &tally.greatest_off {
+        let told = format!(
+            "{} rows whose linear model takes it at a speed off by more than {FAR_OFF}; at most \
+             {:.3}{}",
+            tally.far_off,
+            greatest.value,
+            place(greatest.point)
+        );
+        line(&mut text, "friction", &told);
+    }
     if let Some(greatest) = &tally.greatest_ratio {
         line(
             &mut text,

@@ -243,7 +243,7 @@ fn extremes_at(
 ) -> Result<Vec<(u64, Vec<(String, f64)>)>, Error> {
     let axes: Vec<&str> =
         axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
-    let extremes = [&tally.greatest_ratio, &tally.least_gap_nonlinear_m];
+    let extremes = [&tally.greatest_ratio, &tally.least_gap_nonlinear_m, &tally.greatest_off];
     let place = |extreme: &Extreme| {
         let values = row(file, extreme.point, &axes)?;
         let named = axes.iter().map(|axis| (*axis).to_owned()).zip(values);

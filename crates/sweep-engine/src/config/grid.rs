@@ -14,7 +14,7 @@ use super::syntax::parse;
 use super::words::names;
 use super::{GridInput, axes, design, parameters, scalars};
 use crate::method::{Integrator, default_method, settings};
-use crate::plan::{LONGEST_S, Plan, RATIO_MIN, Reliability};
+use crate::plan::{LONGEST_S, Plan, RATIO_MIN, Reliability, WrittenIn};
 
 /// `ratio_limit` of `[reliability]`.
 pub const DEFAULT_RATIO_LIMIT: f64 = 2.0;
@@ -63,6 +63,7 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
         design: None,
         reliability,
         set: Vec::new(),
+        written: WrittenIn::default(),
     };
     let mut draft = Draft { plan, report, constants: Vec::new() };
     parameters::constants(&root, sets, at, &mut draft);

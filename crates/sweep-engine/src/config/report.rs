@@ -106,6 +106,13 @@ impl Report {
         self.places.borrow().get(key).cloned()
     }
 
+    /// Of each parameter that was written, the text in which it stands last.
+    pub fn written(&self) -> BTreeMap<String, String> {
+        let (places, sources) = (self.places.borrow(), self.sources.borrow());
+        let parameters = places.iter().filter(|(key, _)| !key.contains(['.', '[']));
+        parameters.map(|(key, at)| (key.clone(), sources.name(at.source).to_owned())).collect()
+    }
+
     /// Whether it was refused or missing.
     pub fn is_doubtful(&self, key: &str) -> bool {
         self.doubtful.borrow().contains(key)

@@ -182,6 +182,11 @@ impl<'a> Section<'a> {
         text(&quoted(key), self.at.source, value, self.report).map_or(Field::Bad, Field::Given)
     }
 
+    /// Whether a string stands there, where something else may.
+    pub fn is_text(&self, key: &'static str) -> bool {
+        self.get(key).is_some_and(|value| value.get_ref().is_str())
+    }
+
     /// One of a few words. Given back as the word's position in `choices`.
     pub fn choice(&self, key: &'static str, choices: &[&str]) -> Field<usize> {
         self.text(key).then(|found| {

@@ -82,6 +82,14 @@ pub struct Extreme {
     pub point: u64,
 }
 
+/// A linear model that takes friction at a speed off by more than this is that of another motion.
+pub const FAR_OFF: f64 = 2.0;
+
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_none(count: &u64) -> bool {
+    *count == 0
+}
+
 /// What a result holds, counted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Tally {
@@ -112,6 +120,12 @@ pub struct Tally {
     pub greatest_ratio: Option<Extreme>,
     /// The least gap of the nonlinear model, m.
     pub least_gap_nonlinear_m: Option<Extreme>,
+    /// Rows whose linear model takes friction at a speed off by more than [`FAR_OFF`].
+    #[serde(skip_serializing_if = "is_none")]
+    pub far_off: u64,
+    /// By what factor a speed is off at most, where there is friction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub greatest_off: Option<Extreme>,
     /// Of a result of `sweep stability`, which has none of the verdicts above.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dwells: Option<DwellCounts>,
@@ -156,7 +170,7 @@ impl StatusCounts {
 /// # Errors
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
 pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 11] = [
+    const COLUMNS: [&str; 12] = [
         "point",
         "status",
         "motion",
@@ -168,6 +182,7 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         "error",
         "converged",
         "min_gap_nonlinear_m",
+        "friction_speed_off",
     ];
     let failed = StoreError::parquet("read", file.path());
     let mut tally = Tally::default();
@@ -262,6 +277,12 @@ fn count(
         }
         Ok::<(), ParquetError>(())
     };
+    if let Some(off) = batch.column_by_name("friction_speed_off") {
+        let is_far = |off: &f64| *off > FAR_OFF;
+        let far = cells::numbers(off)?.into_iter().flatten().filter(is_far).count();
+        tally.far_off += far as u64;
+    }
+    extreme("friction_speed_off", &mut tally.greatest_off, |a, b| a > b)?;
     extreme("error", &mut tally.greatest_error, |a, b| a > b)?;
     extreme("ratio_max", &mut tally.greatest_ratio, |a, b| a > b)?;
     extreme("min_gap_nonlinear_m", &mut tally.least_gap_nonlinear_m, |a, b| a < b)?;

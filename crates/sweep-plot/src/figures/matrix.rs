@@ -27,6 +27,8 @@ const TALLEST: f64 = 330.0;
 
 /// A value along one direction of the matrix.
 pub(crate) struct Direction<'a> {
+    /// As in grid files; empty of the quantity.
+    pub(crate) name: &'a str,
     pub(crate) label: &'a Label,
     pub(crate) values: &'a [f64],
     pub(crate) scale: Scale,
@@ -74,9 +76,13 @@ pub(crate) fn scale(values: &[f64], log: bool) -> Scale {
 /// What the panels are over: the parameters, and last the quantity.
 pub(crate) fn directions(scatter: &Scatter) -> Vec<Direction<'_>> {
     let parameters = shown(scatter).into_iter().map(|k| &scatter.parameters[k]);
-    let parameters = parameters.map(|one| (&one.label, &one.values[..], one.log));
-    let all = parameters.chain([(&scatter.short, &scatter.quantity[..], scatter.log)]);
-    all.map(|(label, values, log)| Direction { label, values, scale: scale(values, log) }).collect()
+    let parameters = parameters.map(|one| (&one.name[..], &one.label, &one.values[..], one.log));
+    let all = parameters.chain([("", &scatter.short, &scatter.quantity[..], scatter.log)]);
+    let direction = |(name, label, values, log)| {
+        let scale = scale(values, log);
+        Direction { name, label, values, scale }
+    };
+    all.map(direction).collect()
 }
 
 /// Of each panel what is along it and what up it, as numbers of directions, and where it is: left,

@@ -4,7 +4,8 @@ const CHART = { left: 84, right: 16, top: 12, gap: 14, bottom: 46 };
 
 // `spec` as the page's data has it, with decoded arrays: { xWords, xUnit, xLog, xTicks, grids,
 // panels, marks, markMeaning, shades, shadeMeaning }.
-function createChart(host, spec, name) {
+// `pick` hears of the x of a click, and of Enter.
+function createChart(host, spec, name, pick = () => {}) {
   const even = (x) => (spec.xLog ? Math.log(x) : x);
   const back = (x) => (spec.xLog ? Math.exp(x) : x);
   const ends = spec.grids.flatMap((grid) => [grid[0], grid[grid.length - 1]]);
@@ -385,7 +386,10 @@ function createChart(host, spec, name) {
     figure.setPointerCapture(event.pointerId);
   });
   figure.addEventListener("pointerup", (event) => {
-    if (drag && !drag.far) read(event);
+    if (drag && !drag.far) {
+      read(event);
+      if (cursor !== null) pick(cursor);
+    }
     drag = null;
   });
   figure.addEventListener("pointercancel", () => { drag = null; });
@@ -409,6 +413,7 @@ function createChart(host, spec, name) {
     else if (event.key === "-") zoomBy(1 / 0.7, centre());
     else if (event.key === "0") setView([...all]);
     else if (event.key === "Escape") setCursor(null);
+    else if (event.key === "Enter" && cursor !== null) pick(cursor);
     else return;
     event.preventDefault();
   });

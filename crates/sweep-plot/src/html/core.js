@@ -176,6 +176,24 @@ function moved([low, high], by, [least, greatest]) {
   return [low + shift, high + shift];
 }
 
+// What was run, in words, and the modes of its machine.
+function createAbout(data) {
+  const about = element("dl", { class: "about" });
+  for (const [title, text] of data.about) {
+    about.append(element("dt", {}, title), element("dd", {}, text));
+  }
+  const parts = data.about.length ? [element("h2", {}, "What was run"), about] : [];
+  if (!data.resonances?.length) return parts;
+  const heads = ["Motion", "Resonance (rpm)", "Damping ratio"];
+  return [...parts, element("h2", {}, "Resonances of the machine as given"),
+    element("table", { class: "modes" },
+      element("thead", {}, element("tr", {}, ...heads.map((text) => element("th",
+        { scope: "col" }, text)))),
+      element("tbody", {}, ...data.resonances.map(([motion, speed, damping]) => element("tr", {},
+        element("th", { scope: "row" }, motion), element("td", {}, speed),
+        element("td", {}, damping)))))];
+}
+
 function showProvenance(entries) {
   const list = element("dl");
   for (const [key, value] of entries) {

@@ -4,9 +4,10 @@
 // Pixels within which the pointer finds a point.
 const REACH = 12;
 
-function createDesign(main, data) {
+// `panel` computes the point that is chosen.
+function createDesign(main, data, panel) {
   const parts = {
-    scatter: (host) => createMatrix(host, data.scatter),
+    scatter: (host) => createMatrix(host, data.scatter, panel?.chosen),
     histogram: (host) => {
       const { title, subtitle, chart } = data.histogram;
       host.append(element("h2", {}, title), element("p", { class: "help" }, subtitle));
@@ -23,7 +24,7 @@ function createDesign(main, data) {
 }
 
 // The picture is the program's own; the page finds points in it and marks them.
-function createMatrix(host, data) {
+function createMatrix(host, data, choose = () => {}) {
   const decoded = (one) => ({ ...one, values: floats(one.values) });
   const directions = data.directions.map(decoded);
   let found = null;
@@ -107,7 +108,14 @@ function createMatrix(host, data) {
   }
 
   figure.addEventListener("pointermove", read);
-  figure.addEventListener("pointerdown", read);
+  figure.addEventListener("pointerdown", (event) => {
+    read(event);
+    chosen();
+  });
+  function chosen() {
+    if (found === null) return;
+    choose(Object.fromEntries(directions.map((one) => [one.name, one.values[found]])));
+  }
   // A finger that is lifted leaves what it has read.
   const letGo = () => {
     found = null;
@@ -120,6 +128,7 @@ function createMatrix(host, data) {
   figure.addEventListener("keydown", (event) => {
     const step = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -10, ArrowDown: 10 }[event.key];
     if (event.key === "Escape") letGo();
+    else if (event.key === "Enter") chosen();
     else if (step && data.of.length) {
       const next = found === null ? 0 : found + step;
       found = Math.min(Math.max(next, 0), data.of.length - 1);

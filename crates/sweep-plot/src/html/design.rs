@@ -2,23 +2,24 @@
 
 use serde_json::{Value, json};
 
-use super::{CHART, CORE, DESIGN, START, chart_json, embed, page, provenance};
-use crate::View;
+use super::{CHART, CORE, DESIGN, START, chart_json, computing, embed, page, provenance};
 use crate::figures::{histogram, influence, matrix};
 use crate::frame::HEADING_HEIGHT;
 use crate::influence::chance;
 use crate::raster::Typeface;
 use crate::scatter::{Scatter, Side};
 use crate::svg;
+use crate::{PlotOptions, View};
 
-/// The page, which opens with `first`.
-pub(crate) fn page_of(scatter: &Scatter, first: Option<View>, typeface: &Typeface) -> String {
+/// The page, which opens with the view that the options name.
+pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions, typeface: &Typeface) -> String {
     let title = &scatter.title;
     let drawn = matrix::drawn(scatter);
     let chart = histogram::chart(scatter);
     let pick = |values: &[f64]| embed::floats(drawn.iter().map(|&k| values[k]));
     let direction = |one: &matrix::Direction<'_>| {
         json!({
+            "name": one.name,
             "words": one.label.words,
             "unit": one.label.unit,
             "values": pick(one.values),
@@ -34,11 +35,11 @@ pub(crate) fn page_of(scatter: &Scatter, first: Option<View>, typeface: &Typefac
         let found = one.influence;
         json!([one.label.words, found.map(|found| found.rank), found.and_then(|found| found.any)])
     });
-    let data = json!({
+    let mut data = json!({
         "kind": "design",
         "title": title,
         "subtitle": scatter.subtitle(&[]),
-        "first": match first {
+        "first": match options.view {
             Some(View::Histogram) => "histogram",
             Some(View::Influence) => "influence",
             _ => "scatter",
@@ -64,5 +65,8 @@ pub(crate) fn page_of(scatter: &Scatter, first: Option<View>, typeface: &Typefac
         },
         "provenance": provenance(&scatter.source),
     });
-    page(title, data, &[CORE, CHART, DESIGN, START])
+    let axes: Vec<(&str, bool)> =
+        scatter.parameters.iter().map(|one| (one.name.as_str(), one.log)).collect();
+    let computing = computing(&mut data, options.live.as_ref(), &scatter.source, &axes);
+    page(title, data, &[&[CORE, CHART, DESIGN][..], computing, &[START]].concat())
 }

@@ -88,7 +88,7 @@ function createLive(host, data) {
     clearTimeout(resting);
     pool.drop("check");
     growth?.moved();
-    map?.mark();
+    map?.mark?.();
     if (isBusy) isMoved = true;
     else preview();
   }
@@ -134,11 +134,30 @@ function createLive(host, data) {
       const speeds = (await asked).numbers;
       if (of === latest) {
         curves.show(found.map((one) => one.numbers), speeds);
+        if (live.growthSpeeds.length) tellGrowth(of).catch(tellError);
         growth?.rested([...values], speeds.reduce((most, speed) => Math.max(most, speed)));
       }
     } catch (error) {
       tellError(error);
     }
+  }
+
+  // The map's own metric, over the speeds that it is about.
+  async function tellGrowth(of) {
+    const line = element("p", { id: "growth-metric" }, "Growth at constant speeds: computing.");
+    told.append(line);
+    const { numbers } = await pool.ask("check", 1, "growth", [...values, ...live.growthSpeeds],
+      [values.length]);
+    if (of !== latest) return;
+    let most = null;
+    live.growthSpeeds.forEach((speed, k) => {
+      const growth = numbers[1 + 3 * k];
+      if (growth > (most?.growth ?? -Infinity)) most = { growth, speed };
+    });
+    line.textContent = most ? `Growth at most ${significant(most.growth, 3)} /s, at `
+      + `${significant(most.speed)} rpm of ${live.growthSpeeds.length} constant speeds`
+      : "No response at any of the map's constant speeds";
+    line.dataset.growth = most?.growth;
   }
 
   // Work that was let go fails without an error.
@@ -297,15 +316,30 @@ function createLive(host, data) {
       element("p", {}, "Linear model:"), list(live.rungs[1]));
   }
 
+  // The sliders of axes, and the middles of their ranges.
+  function alone() {
+    const sliders = live.sliders.flatMap((slider, k) => (slider.axis ? [k] : []));
+    const middle = ({ from, to, log }) => (log ? Math.sqrt(from * to) : 0.5 * (from + to));
+    return { sliders, start: sliders.map((k) => Number(middle(live.sliders[k]).toPrecision(4))) };
+  }
+
   return {
-    // The map calls these; `connect` gives what it lets this panel do.
-    connect(given) {
+    // The figure calls these; `connect` gives what a map lets this panel do.
+    connect(given = alone()) {
       map = given;
+      refine.hidden = !map.region;
       map.start.forEach((value, k) => set(map.sliders[k], value));
       changed();
     },
     pinned(place) {
       place.forEach((value, k) => set(map.sliders[k], value));
+      changed();
+    },
+    // By name; as a file's numbers of 32 bits.
+    chosen(point) {
+      live.sliders.forEach(({ name }, k) => {
+        if (name in point) set(k, Number(point[name].toPrecision(7)));
+      });
       changed();
     },
     values: () => [...values],

@@ -3,7 +3,6 @@
 use serde_json::{Value, json};
 
 use super::embed;
-use crate::grid::GridAxis;
 use crate::{Live, Slider, label};
 
 /// The module of `crates/washer-live`, packed by gzip; `scripts/release/build_live.sh` makes it.
@@ -13,7 +12,8 @@ const MODULE: &[u8] = include_bytes!("../../assets/live.wasm.gz");
 pub(crate) const WORKER: &str =
     concat!("<script type=\"text/plain\" id=\"worker\">", include_str!("worker.js"), "</script>\n");
 
-pub(crate) fn json(live: &Live, axes: &[GridAxis]) -> Value {
+/// `axes` by name, and whether they are logarithmic.
+pub(crate) fn json(live: &Live, axes: &[(&str, bool)]) -> Value {
     let channel = |name: &String| {
         let (unit, factor) = label::shown(label::unit_of_channel(name));
         json!({ "name": name, "words": label::channel(name), "unit": unit, "factor": factor })
@@ -30,6 +30,7 @@ pub(crate) fn json(live: &Live, axes: &[GridAxis]) -> Value {
         "criterion": live.criterion,
         "metrics": live.metrics.iter().map(metric).collect::<Vec<_>>(),
         "staticSag": live.has_static_sag,
+        "growthSpeeds": live.growth_speeds_rpm,
         "kinds": live.kinds.iter().map(|kind| kind.replace('_', " ")).collect::<Vec<_>>(),
         "levels": live.levels,
         "accuracy": live.accuracy,
@@ -47,8 +48,8 @@ fn metric(columns: &[String; 2]) -> Value {
     json!({ "columns": columns, "words": words, "unit": unit, "factor": factor })
 }
 
-fn slider(slider: &Slider, axes: &[GridAxis]) -> Value {
-    let axis = axes.iter().find(|axis| axis.name == slider.name);
+fn slider(slider: &Slider, axes: &[(&str, bool)]) -> Value {
+    let axis = axes.iter().find(|(name, _)| *name == slider.name);
     json!({
         "name": slider.name,
         "words": label::words(&slider.name),
@@ -57,7 +58,7 @@ fn slider(slider: &Slider, axes: &[GridAxis]) -> Value {
         "from": slider.from,
         "to": slider.to,
         "value": slider.value.unwrap_or(slider.from),
-        "axis": axis.is_some(),
-        "log": axis.is_some_and(|axis| axis.log),
+        "axis": slider.value.is_none(),
+        "log": axis.is_some_and(|(_, log)| *log),
     })
 }

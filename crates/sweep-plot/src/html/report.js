@@ -14,28 +14,12 @@ function createReport(host, data, map, panel) {
   const take = element("div", { class: "controls", id: "take" },
     button("Link to this view", "link", link), button("Picture (PNG)", "picture", picture),
     button("Numbers of this point (CSV)", "numbers", numbers));
-  const about = element("dl", { class: "about" });
-  for (const [title, text] of data.about) {
-    about.append(element("dt", {}, title), element("dd", {}, text));
-  }
   const table = createTable();
   host.append(take, said, element("section", { id: "about" },
-    ...(data.about.length ? [element("h2", {}, "What was run"), about] : []),
-    ...(data.resonances?.length ? [modes()] : []),
+    ...createAbout(data),
     element("h2", {}, "What to be careful about"),
     element("ul", {}, ...caveats().map((text) => element("li", {}, text))),
     ...table));
-
-  function modes() {
-    const heads = ["Motion", "Resonance (rpm)", "Damping ratio"];
-    const title = element("h2", {}, "Resonances of the machine as given");
-    return element("div", {}, title, element("table", { class: "modes" },
-      element("thead", {}, element("tr", {}, ...heads.map((text) => element("th",
-        { scope: "col" }, text)))),
-      element("tbody", {}, ...data.resonances.map(([motion, speed, damping]) => element("tr", {},
-        element("th", { scope: "row" }, motion), element("td", {}, speed),
-        element("td", {}, damping))))));
-  }
 
   function caveats() {
     const what = counts ? "cells" : "points";
@@ -55,9 +39,8 @@ function createReport(host, data, map, panel) {
     }
     found.push("A map shows one course of speeds. Whether the machine may stay at a speed is "
       + "another question; the command sweep stability answers it.");
-    found.push("Numbers of the built-in machine that the paper does not print are assumed: "
-      + "lengths, clearance and free lengths of the springs. The command sweep parameters marks "
-      + "them.");
+    found.push("Numbers that nobody gave are assumed. The command sweep parameters says of each "
+      + "where it is from.");
     return found;
   }
 

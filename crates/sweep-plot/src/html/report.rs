@@ -35,18 +35,30 @@ fn machine(machine: &Value) -> Option<String> {
         mass("unbalance")?,
         quantity(&machine["unbalance"], "radius_m")?
     )];
-    let mut elements = |list: &str, number: &str| {
+    // Numbers that all elements of a list have in common, each behind its word.
+    let elements = |(list, numbers): (&str, &[(&str, &str)])| {
         let all = machine.get(list).and_then(Value::as_array)?;
-        let of_first = quantity(all.first()?, number)?;
-        let alike = all.iter().all(|one| one[number] == all[0][number]);
-        let each = if alike { format!(" of {of_first}") } else { String::new() };
-        parts.push(format!("{} {list}{each}", all.len()));
-        Some(())
+        let first = all.first()?;
+        let common = numbers.iter().filter_map(|(word, number)| {
+            let alike = all.iter().all(|one| one[number] == first[number]);
+            Some(format!(" {word} {}", quantity(first, number).filter(|_| alike)?))
+        });
+        let words = list.replace('_', " ");
+        let words = if all.len() == 1 { words.trim_end_matches('s') } else { &words };
+        Some(format!("{} {words}{}", all.len(), common.collect::<Vec<_>>().join(",")))
     };
-    elements("springs", "stiffness_n_per_m");
-    elements("dampers", "damping_n_s_per_m");
-    elements("stops", "stiffness_n_per_m");
-    elements("bushings", "stiffness_n_per_m");
+    let lists: [(&str, &[(&str, &str)]); 6] = [
+        ("springs", &[("of", "stiffness_n_per_m")]),
+        ("dampers", &[("of", "damping_n_s_per_m"), ("with friction of", "friction_n")]),
+        ("stops", &[("of", "stiffness_n_per_m"), ("after", "clearance_m")]),
+        ("bushings", &[]),
+        ("further_unbalances", &[("of", "mass_kg")]),
+        ("feet", &[]),
+    ];
+    parts.extend(lists.into_iter().filter_map(elements));
+    if let Some(mass) = machine.get("cabinet").and_then(|cabinet| quantity(cabinet, "mass_kg")) {
+        parts.push(format!("a cabinet of {mass}"));
+    }
     if let Some(gap) = quantity(machine, "radial_clearance_m") {
         parts.push(format!("a gap of {gap} between drum and tub"));
     }

@@ -2,13 +2,19 @@
   document.getElementById("title").textContent = DATA.title;
   document.getElementById("subtitle").textContent = DATA.subtitle;
   const main = document.getElementById("main");
+  const [figureHost, panelHost, reportHost] = [0, 1, 2].map(() => element("div"));
+  main.append(figureHost, panelHost, reportHost);
+  const panel = DATA.live ? createLive(panelHost, DATA) : null;
   if (DATA.kind === "map") {
-    const [mapHost, panelHost, reportHost] = [0, 1, 2].map(() => element("div"));
-    main.append(mapHost, panelHost, reportHost);
-    const panel = DATA.live ? createLive(panelHost, DATA) : null;
-    createReport(reportHost, DATA, createMap(mapHost, DATA, panel), panel);
+    createReport(reportHost, DATA, createMap(figureHost, DATA, panel), panel);
+  } else {
+    if (DATA.kind === "design") createDesign(figureHost, DATA, panel);
+    else {
+      const chart = decodedChart(DATA.chart);
+      createChart(figureHost, chart, DATA.title, (x) => panel?.pinned([x]));
+    }
+    panel?.connect();
+    if (panel) reportHost.append(...createAbout(DATA));
   }
-  else if (DATA.kind === "design") createDesign(main, DATA);
-  else createChart(main, decodedChart(DATA.chart), DATA.title);
   showProvenance(DATA.provenance);
 })();

@@ -12,7 +12,7 @@ fn layout(measures: Measures) -> Layout {
     let axis =
         |name: &str, unit: &str| Column::new(name, unit, format!("swept {name}"), Cells::Axis);
     let axes = vec![axis("unbalance_mass_kg", "kg"), axis("damping_n_s_per_m", "N s/m")];
-    of_measures(axes, &CHANNELS, 2.0.into(), measures)
+    of_measures(axes, &CHANNELS, 2.0.into(), measures, false)
 }
 
 #[test]
@@ -56,8 +56,13 @@ fn metrics_have_columns_in_the_order_asked_for_and_criteria_say_what_they_are() 
     let metrics = vec![Metric::StaticSag, Metric::ClashTime, Metric::CabinetForce];
     let measures = Measures { criterion: Criterion::Rms, metrics, ..Measures::default() };
     let layout = layout(measures.clone());
-    let asked =
-        Asked { channels: CHANNELS.to_vec(), limits: 2.0.into(), measures, rows: RowKind::Run };
+    let asked = Asked {
+        channels: CHANNELS.to_vec(),
+        limits: 2.0.into(),
+        measures,
+        has_friction: false,
+        rows: RowKind::Run,
+    };
     let model = |metrics: &[f64]| Trajectory {
         amplitudes: vec![0.1, 0.2],
         metrics: metrics.to_vec(),

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use washer_model::{Exact, ModeAtSpeed, ModeOverSpeed, decimal};
 
 use crate::config;
-use crate::library::modes::{Analysis, built_in};
+use crate::library::modes::{Analysis, built_in, of_plan};
 use crate::speeds::Speeds;
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::exit::{Error, Exit, show, tell};
@@ -58,7 +58,7 @@ pub struct Args {
 /// Mistakes in the grid file or the options, a machine without equilibrium or modes, and what
 /// cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let (name, machine, spin) = match &args.grid {
+    let (name, machine, spin, timing) = match &args.grid {
         None => built_in(args.speed.to),
         Some(grid) => {
             let plan = if args.at.is_empty() {
@@ -66,16 +66,15 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
             } else {
                 config::load_point(grid, &args.sets, &args.at)?.0
             };
-            (plan.name, plan.model.machine, plan.model.spin)
+            of_plan(plan)
         }
     };
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
     let speeds = args.speed.values();
     // A signal ends the process: there is nothing to keep.
-    let Some(analysis) = Analysis::new(&machine, &spin, &speeds, args.exact, &|| false)? else {
-        return Ok(Exit::Interrupted);
-    };
+    let found = Analysis::new(&machine, &spin, &timing, &speeds, args.exact, &|| false)?;
+    let Some(analysis) = found else { return Ok(Exit::Interrupted) };
     if let (Some(path), Some(output)) = (&args.out, output) {
         let bytes = analysis.table(&name, &machine).into_bytes();
         let bytes = bytes.map_err(StoreError::parquet("write", path))?;
@@ -92,6 +91,17 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     }
     let mut text = listing(&speeds, &analysis.modes);
     text.push_str(&differences(&analysis));
+    if !analysis.friction_speeds.is_empty() {
+        let taken: Vec<String> = analysis
+            .friction_speeds
+            .iter()
+            .map(|(damper, speed)| {
+                let speed = speed.as_f64().unwrap_or_default();
+                format!("{} at {speed:.3} m/s", damper.replace('_', " "))
+            })
+            .collect();
+        text.push_str(&format!("friction is taken as in the run: {}\n", taken.join(", ")));
+    }
     tell(text.trim_end());
     Ok(Exit::Done)
 }

@@ -196,7 +196,7 @@ fn columns() -> String {
         .collect();
     let metrics = Metric::ALL.to_vec();
     let measures = Measures { metrics, stops: 2, feet: 3, dampers: 2, ..Measures::default() };
-    let layout = columns::of_measures(axes, &Channel::ALL, 2.0.into(), measures);
+    let layout = columns::of_measures(axes, &Channel::ALL, 2.0.into(), measures, true);
     row(&mut text, &["column", "type", "unit", "worse", "limit", "meaning"]);
     row(&mut text, &["---"; 6]);
     let mut names = HashSet::new();

@@ -54,7 +54,12 @@ pub(super) enum LeftOut {
     Is(f64),
     /// It is no number of the file.
     Nothing,
+    /// The same, and [`AUTO`] says so too.
+    Auto,
 }
+
+/// What stands for a number that the program finds.
+pub(super) const AUTO: &str = "auto";
 
 impl Part {
     /// What the parameters of an element begin with.
@@ -95,7 +100,7 @@ impl Key {
             LeftOut::Refused => true,
             LeftOut::Is(default) => values.iter().any(|value| *value != default),
             // A spring has a free length by its ends, too.
-            LeftOut::Nothing => {
+            LeftOut::Nothing | LeftOut::Auto => {
                 self.name != FREE_LENGTH || machine.springs[k].free_length_m.is_some()
             }
         };
@@ -218,7 +223,7 @@ pub(super) const PARTS: [Part; 14] = [
             TUB_END,
             optional("friction_n", LeftOut::Is(0.0)),
             optional("friction_speed_m_per_s", LeftOut::Is(Damper::FRICTION_SPEED_M_PER_S)),
-            optional("friction_linear_speed_m_per_s", LeftOut::Nothing),
+            optional("friction_linear_speed_m_per_s", LeftOut::Auto),
         ],
         count: |machine| machine.dampers.len(),
         fill: |machine, count| machine.dampers = vec![Machine::paper().dampers[0]; count],
@@ -360,12 +365,19 @@ fn elements<'a>(part: &Part, root: &Section<'a>) -> Vec<Section<'a>> {
 
 fn read_key(key: &Key, prefix: &str, section: &Section<'_>, machine: &mut Machine) {
     let (names, report) = (key.names(prefix), section.report);
+    if key.left_out == LeftOut::Auto && section.is_text(key.name) {
+        if section.choice(key.name, &[AUTO]).given().is_none() {
+            doubt(names, report);
+        }
+        return;
+    }
     let parameters: Vec<_> = names.iter().filter_map(|name| find(name, machine)).collect();
     let Some(first) = parameters.first() else { return };
     let (field, expected) = if key.is_vector() {
         (section.numbers(key.name, first.range()), "an array of three numbers".to_owned())
     } else {
-        let expected = format!("{}: {}", first.description(), first.range());
+        let or_auto = if key.left_out == LeftOut::Auto { ", or \"auto\"" } else { "" };
+        let expected = format!("{}: {}{or_auto}", first.description(), first.range());
         (section.number(key.name, first.range()).map(|number| vec![number]), expected)
     };
     if matches!(field, Field::Absent) && key.left_out != LeftOut::Refused {
@@ -407,8 +419,14 @@ pub(crate) fn to_json(machine: &Machine) -> Value {
     for part in &PARTS {
         let count = (part.count)(machine);
         let entry = |key: &Key, k: usize| {
-            let values = key.given(part, k, machine)?;
-            let value = if key.is_vector() { values.into() } else { values[0].into() };
+            let value = match key.given(part, k, machine) {
+                Some(values) if key.is_vector() => values.into(),
+                Some(values) => values[0].into(),
+                None if key.left_out == LeftOut::Auto && machine.dampers[k].friction_n != 0.0 => {
+                    AUTO.into()
+                }
+                None => return None,
+            };
             Some((key.name.to_owned(), value))
         };
         let element = |k: usize| -> Map<String, Value> {

@@ -7,7 +7,7 @@ use washer_model::{Parameter, Range, Spin};
 use washer_row::{Criterion, Metric};
 
 use super::grid::DEFAULT_MACHINE;
-use super::machine::{Key, LeftOut, PARTS, Part, Times, no_spin, with_one_of_each};
+use super::machine::{AUTO, Key, LeftOut, PARTS, Part, Times, no_spin, with_one_of_each};
 use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
 
 /// What grid files have beside what the engine reads.
@@ -66,8 +66,12 @@ fn keys(part: &Part) -> (Vec<(&'static str, Value)>, Vec<&'static str>) {
     let one = |key: &Key| {
         let first = &key.names(&part.prefix(0))[0];
         let mut schema = if key.is_vector() { vector(first) } else { parameter(first) };
-        if let (LeftOut::Is(default), false) = (key.left_out, key.is_vector()) {
-            schema["default"] = default.into();
+        match key.left_out {
+            LeftOut::Is(default) if !key.is_vector() => schema["default"] = default.into(),
+            LeftOut::Auto => {
+                schema = json!({ "anyOf": [schema, { "const": AUTO }], "default": AUTO })
+            }
+            _ => {}
         }
         (key.name, schema)
     };

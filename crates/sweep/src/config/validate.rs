@@ -4,14 +4,12 @@ use std::collections::BTreeSet;
 
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
-use washer_model::{
-    Spin, Target, Timing, Violation, decimal, highest_frequency_rad_per_s, prepare,
-};
+use washer_model::{Spin, Target, Violation, decimal, highest_frequency_rad_per_s, prepare};
 use washer_row::Criterion;
 
 use crate::method::{REFERENCE_SHARE, SHORTEST_AT_CORNERS};
 use crate::model::Washer;
-use crate::plan::{Plan, Scenario};
+use crate::plan::{Plan, Scenario, timing};
 use sweep_engine::config::Draft;
 use sweep_engine::config::report::Diagnostic;
 use sweep_engine::config::source::Location;
@@ -240,10 +238,14 @@ pub(crate) fn stability(draft: &Draft<'_, Washer>) {
 /// equilibrium has none, and its rows will say so.
 fn highest_frequency_of_corners_rad_per_s(draft: &Draft<'_, Washer>) -> f64 {
     let plan = &draft.plan;
-    let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
+    let timing = timing(plan);
     let mut highest = 0.0_f64;
     for values in plan.some_corners() {
-        let Washer { machine, spin, .. } = plan.scenario_at(&values).model;
+        let Washer { mut machine, spin, .. } = plan.scenario_at(&values).model;
+        // What friction is taken at bounds no frequency: its steepest slope does.
+        for damper in &mut machine.dampers {
+            damper.friction_linear_speed_m_per_s.get_or_insert(damper.friction_speed_m_per_s);
+        }
         let speed = spin.greatest_speed_rad_per_s(plan.end_s);
         for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
             // Matrices without eigenvalues leave it to the run to tell whether the machine can

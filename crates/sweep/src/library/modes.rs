@@ -1,7 +1,7 @@
 //! The modes of a machine over spin speed, as a table.
 
 use lane_ode::Simd;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use washer_model::{
     COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Spin, Stop, Timing,
     campbell_until, exact_motions, prepare,
@@ -10,6 +10,7 @@ use washer_model::{
 use super::refused_speeds;
 use super::result::ResultTable;
 use crate::config::{self, GridInput};
+use crate::plan::{Plan, friction_speeds, timing};
 use crate::speeds::MOST_SPEEDS;
 use sweep_engine::exit::Error;
 use sweep_engine::interrupt::Interrupt;
@@ -39,23 +40,31 @@ pub fn find_modes(
             ),
         ));
     }
-    let (name, machine, spin) = match grid {
+    let (name, machine, spin, timing) = match grid {
         None => built_in(speeds_rpm[count - 1]),
         Some(grid) => {
             let plan = if at.is_empty() { grid.load()? } else { grid.load_point(at)?.0 };
-            (plan.name, plan.model.machine, plan.model.spin)
+            of_plan(plan)
         }
     };
     let stop = || interrupt.stopped();
-    let Some(analysis) = Analysis::new(&machine, &spin, speeds_rpm, false, &stop)? else {
+    let Some(analysis) = Analysis::new(&machine, &spin, &timing, speeds_rpm, false, &stop)? else {
         return Ok(None);
     };
     ResultTable::of_table(FileKind::Modes, analysis.table(&name, &machine)).map(Some)
 }
 
 /// The built-in machine by its name, on its way to a speed (rpm).
-pub(crate) fn built_in(greatest_rpm: f64) -> (String, Machine, Spin) {
-    ("paper".to_owned(), Machine::paper(), Spin::Ramp { peak_rpm: greatest_rpm, ramp_s: 1.0 })
+pub(crate) fn built_in(greatest_rpm: f64) -> (String, Machine, Spin, Timing) {
+    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
+    let spin = Spin::Ramp { peak_rpm: greatest_rpm, ramp_s: 1.0 };
+    ("paper".to_owned(), Machine::paper(), spin, timing)
+}
+
+/// A plan's name, its machine, its spin, and when it runs.
+pub(crate) fn of_plan(plan: Plan) -> (String, Machine, Spin, Timing) {
+    let timing = timing(&plan);
+    (plan.name, plan.model.machine, plan.model.spin, timing)
 }
 
 /// The modes of a machine at spin speeds.
@@ -65,27 +74,31 @@ pub(crate) struct Analysis {
     /// Of each speed and mode the exact motion, where it was asked for; none at standstill, where
     /// theta is frozen indeed, and where a mode was not found at theta = 0.
     pub(crate) exact: Option<Vec<Vec<Option<Exact>>>>,
+    /// At which speeds (m/s) friction is taken, by damper.
+    pub(crate) friction_speeds: Map<String, Value>,
 }
 
 impl Analysis {
     /// The modes at each speed (rpm), with exact motions if wanted; `None` once `stop` says so.
+    /// Friction is taken at the speeds that it has in the run.
     ///
     /// # Errors
     /// A machine without equilibrium, or whose modes cannot be computed.
     pub(crate) fn new(
         machine: &Machine,
         spin: &Spin,
+        timing: &Timing,
         speeds_rpm: &[f64],
         is_exact: bool,
         stop: Stop<'_>,
     ) -> Result<Option<Self>, Error> {
-        let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-        let point = prepare(Simd::Scalar, &[(machine.clone(), spin.clone())], &timing).remove(0);
+        let point = prepare(Simd::Scalar, &[(machine.clone(), spin.clone())], timing).remove(0);
         let point = point.map_err(Error::model)?;
         let modes = campbell_until(&point, speeds_rpm, stop).map_err(Error::model)?;
         let Some(modes) = modes else { return Ok(None) };
         let exact = if is_exact { Some(exact_over(&point, speeds_rpm, &modes)?) } else { None };
-        Ok(Some(Self { speeds_rpm: speeds_rpm.to_vec(), modes, exact }))
+        let friction_speeds = friction_speeds(&point);
+        Ok(Some(Self { speeds_rpm: speeds_rpm.to_vec(), modes, exact, friction_speeds }))
     }
 
     /// The modes as JSON.
@@ -103,7 +116,11 @@ impl Analysis {
             facts["at_speed"] = mode.at_speed.iter().enumerate().map(at).collect();
             facts
         });
-        json!({ "name": name, "modes": modes.collect::<Value>() })
+        let mut found = json!({ "name": name, "modes": modes.collect::<Value>() });
+        if !self.friction_speeds.is_empty() {
+            found["friction_speeds_m_per_s"] = self.friction_speeds.clone().into();
+        }
+        found
     }
 
     /// The modes as columns, with what is known of each in the metadata.

@@ -59,7 +59,8 @@ stability = { speed_rpm = "200:240:20" }
 "#;
     for criterion in ["rms", "envelope"] {
         let further = further.replace("CRITERION", criterion);
-        let plan = without_growth(plan(&(further + GRID)));
+        let mut plan = plan(&(further + GRID));
+        assert_eq!(take_growth(&mut plan), [200.0, 220.0, 240.0]);
         let (setup, _) = setup(&plan, &[]).unwrap();
         let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
         let engine = ModelEngine::new(&plan).unwrap();

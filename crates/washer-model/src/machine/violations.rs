@@ -41,11 +41,6 @@ pub enum Violation {
         /// Distance between its ends.
         length_m: f64,
     },
-    /// A damper with friction, of which the linear model does not know at what speed to take it.
-    FrictionWithoutLinearSpeed {
-        /// Which damper, from 1.
-        number: usize,
-    },
     /// A stop whose direction has no length.
     NoDirection {
         /// Which stop, from 1.
@@ -133,10 +128,6 @@ impl Violation {
                     ["x", "y", "z"].map(|axis| format!("{element}_{number}_{end}_{axis}_m"))
                 })
                 .collect(),
-            Self::FrictionWithoutLinearSpeed { number } => vec![
-                format!("damper_{number}_friction_n"),
-                format!("damper_{number}_friction_linear_speed_m_per_s"),
-            ],
             Self::NoDirection { number } => {
                 ["x", "y", "z"].map(|axis| format!("stop_{number}_direction_{axis}")).into()
             }
@@ -163,11 +154,6 @@ impl Violation {
             Self::OutOfRange { parameter, value } => parameter.range().instead_of(*value),
             Self::Inertia { .. } => "each moment at most the sum of the other two".to_owned(),
             Self::ZeroLength { .. } => format!("ends at least {SHORTEST_M:e} m apart"),
-            Self::FrictionWithoutLinearSpeed { .. } => {
-                "`friction_linear_speed_m_per_s` beside it: the linear model has the viscous \
-                 damping 4 F / (pi V) of that speed amplitude V"
-                    .to_owned()
-            }
             Self::NoDirection { .. } => {
                 "the way from the tub to the stop, such as [0, 0, 1]; any length but 0 is made 1"
                     .to_owned()
@@ -225,11 +211,6 @@ impl fmt::Display for Violation {
                     rounded(*length_m)
                 )
             }
-            Self::FrictionWithoutLinearSpeed { number } => write!(
-                f,
-                "damper {number} has friction, and nothing says at what speed the linear model \
-                 takes it"
-            ),
             Self::NoDirection { number } => write!(f, "stop {number} has no direction"),
             Self::OnAxis { number } => write!(
                 f,
@@ -326,11 +307,6 @@ impl Machine {
         for (k, (element, length_m)) in springs.chain(dampers) {
             if length_m < SHORTEST_M {
                 joint.push(Violation::ZeroLength { element, number: k + 1, length_m });
-            }
-        }
-        for (k, damper) in self.dampers.iter().enumerate() {
-            if damper.friction_n != 0.0 && damper.friction_linear_speed_m_per_s.is_none() {
-                joint.push(Violation::FrictionWithoutLinearSpeed { number: k + 1 });
             }
         }
         for (k, stop) in self.stops.iter().enumerate() {

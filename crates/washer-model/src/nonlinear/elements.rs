@@ -55,6 +55,12 @@ impl Elements<f64> {
         !self.stops.is_empty() || self.frictions.iter().any(|friction| friction.force.0 != 0.0)
     }
 
+    /// The linear model takes a damper's friction at another speed amplitude.
+    pub(crate) fn take_friction_at(&mut self, damper: usize, speed_m_per_s: f64) {
+        let friction = &mut self.frictions[damper];
+        friction.viscous = N(viscous(friction.force.0, speed_m_per_s));
+    }
+
     /// The elements of which the linear model is the first order: friction has become the viscous
     /// damping that takes as much energy out of a swing.
     pub(crate) fn with_viscous_friction(&self) -> Self {
@@ -215,14 +221,21 @@ lane_struct! {
     }
 }
 
+/// The viscous damping (N s/m) that takes as much energy out of a swing as a friction does.
+fn viscous(friction_n: f64, speed_m_per_s: f64) -> f64 {
+    4.0 * friction_n / (PI * speed_m_per_s)
+}
+
 impl FrictionOf<f64> {
     fn new(damper: &Damper) -> Self {
-        let of_speed = |speed_m_per_s: f64| 4.0 * damper.friction_n / (PI * speed_m_per_s);
+        // An own speed is found later.
+        let given = damper.friction_linear_speed_m_per_s;
+        let speed_m_per_s = given.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S);
         Self {
             ends: Ends::new(damper.cabinet_m, damper.tub_m),
             force: N(damper.friction_n),
             speed_squared: N(damper.friction_speed_m_per_s * damper.friction_speed_m_per_s),
-            viscous: N(damper.friction_linear_speed_m_per_s.map_or(0.0, of_speed)),
+            viscous: N(viscous(damper.friction_n, speed_m_per_s)),
         }
     }
 }

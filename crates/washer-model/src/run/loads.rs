@@ -89,6 +89,18 @@ pub(crate) fn load_on_cabinet(
     load.map(|N(first_order)| first_order.value + first_order.slope)
 }
 
+/// The speed along each damper (m/s) by the linear model, at deviations from equilibrium.
+pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -> Vec<f64> {
+    let elements = point.machine.elements.constant();
+    let dual = |value: f64, slope: f64| N(Dual { value, slope });
+    let tub = TubState {
+        q: TUB.map(|q| dual(point.equilibrium[q], deviations[q])),
+        u: TUB.map(|q| dual(0.0, deviations[COORDINATES + q])),
+    };
+    let speed = |number| with_motion!(&tub, motion => elements.damper_speed(number, &motion));
+    (0..elements.dampers.len()).map(|number| speed(number).0.slope).collect()
+}
+
 /// First order of something in the tub's deviations from equilibrium.
 #[derive(Clone, Copy)]
 struct FirstOrder<T> {

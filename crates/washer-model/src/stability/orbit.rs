@@ -12,7 +12,9 @@ use crate::machine::spin::SpinStretch;
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::outputs::squared;
 use crate::point::Point;
+use crate::ready::{MOST_MOTIONS, Search, own};
 use crate::run::extras::{Extras, Seen as Recorded};
+use crate::run::loads::damper_speeds_m_per_s;
 use crate::run::model::{Linear, Model, Nonlinear};
 use core::array::from_fn;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
@@ -234,11 +236,52 @@ pub(super) struct LinearResponse {
     pub(super) start: [f64; STATES],
     /// Largest deviations from equilibrium (m, rad).
     pub(super) peaks: [f64; CHANNELS],
+    /// Deviations and their speeds at even instants, [`INSTANTS`] to a turn.
+    states: Vec<[f64; STATES]>,
 }
 
-/// The linear model's responses, in lanes, those of a kind together. Once `is_stopped` says so,
-/// some are missing.
+impl LinearResponse {
+    /// The speed amplitudes (m/s) of dampers.
+    fn damper_speeds_m_per_s(&self, point: &Point) -> Vec<f64> {
+        let at = |state| damper_speeds_m_per_s(point, state);
+        let along: Vec<Vec<f64>> = self.states[..INSTANTS].iter().map(at).collect();
+        let squares = |k: usize| along.iter().map(|speeds| speeds[k] * speeds[k]).sum::<f64>();
+        (0..along[0].len()).map(|k| (2.0 * squares(k) / INSTANTS as f64).sqrt()).collect()
+    }
+}
+
+/// The linear model's responses. Where the speeds at which it takes friction are the motion's own,
+/// they are those of the response. Once `is_stopped` says so, some are missing.
 pub(super) fn linear_responses(
+    rows: &[Row<'_>],
+    is_stopped: &dyn Fn() -> bool,
+) -> Vec<LinearResponse> {
+    let mut found = together(rows, is_stopped);
+    let searched = |(k, row): (usize, &Row<'_>)| Some((k, Search::new(row.point)?));
+    let mut open: Vec<(usize, Search)> = rows.iter().enumerate().filter_map(searched).collect();
+    for _ in 0..MOST_MOTIONS {
+        let at_speeds =
+            |(k, search): &(usize, Search)| rows[*k].point.at_own_speeds(&search.speeds_m_per_s());
+        let points: Vec<Point> = open.iter().map(at_speeds).collect();
+        let asked = open.iter().zip(&points).map(|((k, _), point)| Row { point, ..rows[*k] });
+        let responses = together(&asked.collect::<Vec<_>>(), is_stopped);
+        if is_stopped() {
+            break;
+        }
+        let mut left = Vec::new();
+        for (((k, mut search), point), response) in open.into_iter().zip(&points).zip(responses) {
+            if !search.take(&own(point, &response.damper_speeds_m_per_s(point))) {
+                left.push((k, search));
+            }
+            found[k] = response;
+        }
+        open = left;
+    }
+    found
+}
+
+/// The same with friction taken at the points' speeds, in lanes, those of a kind together.
+pub(super) fn together(
     rows: &[Row<'_>],
     is_stopped: &dyn Fn() -> bool,
 ) -> Vec<LinearResponse> {
@@ -301,6 +344,7 @@ fn linear<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<LinearResponse>
                 found.push(LinearResponse {
                     start: from_fn(|i| start[i].0.get(lane)),
                     peaks: watched.peaks.lane(lane),
+                    states: watched.states.iter().map(|x| from_fn(|i| x[i].0.get(lane))).collect(),
                 });
                 continue;
             }

@@ -2,7 +2,7 @@
 //! them, and what becomes of disturbances there.
 
 use super::branch::{BEYOND, Curve, Guess};
-use super::orbit::{Asked, LinearResponse, Row, Seen, linear_responses, turns};
+use super::orbit::{Asked, LinearResponse, Row, Seen, linear_responses, together, turns};
 use super::participants::{named, shares, vector_of};
 use super::search::{Solve, finish, missing};
 use super::settings::{Case, Settings};
@@ -75,7 +75,7 @@ impl<'a> Responses<'a> {
             Some(curve.settings.linear(case.as_ref()?.row))
         };
         let rows: Vec<Row<'_>> = curves.iter_mut().zip(&starts).filter_map(of_start).collect();
-        let linear = linear_responses(&rows, is_stopped);
+        let linear = together(&rows, is_stopped);
         let begun = starts.iter().flatten().zip(&linear);
         let mut solves: Vec<Solve<'_>> = begun
             .map(|(case, linear)| {

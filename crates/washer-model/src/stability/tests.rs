@@ -1,7 +1,7 @@
 //! Against numbers from a program independent of this one, against the machine as it is, and
 //! against its simulation.
 
-use super::orbit::Row;
+use super::orbit::{Row, linear_responses};
 use super::plain::{Plain, Trace};
 use super::search::{Solve, finish};
 use super::settings::Settings;
@@ -565,6 +565,22 @@ fn val_the_linear_models_exact_motions_differ_from_frozen_ones() {
     let apart = second.damping_ratio() / second.frozen.damping_ratio() - 1.0;
     println!("{apart}");
     assert!((apart.abs() - 0.08).abs() < 0.03, "{apart}");
+}
+
+#[test]
+fn a_linear_response_takes_friction_at_its_own_speed() {
+    let of = |speed_rpm: f64, given_m_per_s: Option<f64>| {
+        let machine = crate::tests::friction::machine(0.3, [40.0, 60.0], given_m_per_s);
+        let point = prepared(machine, speed_rpm);
+        let case = Settings::new(&point).case(150.0).unwrap();
+        let peaks = linear_responses(&[case.row], &|| false).remove(0).peaks;
+        (point.friction_speeds()[0].speed_m_per_s, peaks[Channel::TubFrontZ.index()])
+    };
+    let [(slow_m_per_s, slow_m), (fast_m_per_s, fast_m)] = [of(60.0, None), of(300.0, None)];
+    assert!((slow_m_per_s / fast_m_per_s - 1.0).abs() > 0.1, "{slow_m_per_s}, {fast_m_per_s}");
+    assert!((slow_m / fast_m - 1.0).abs() < 3e-3, "whatever the run: {slow_m}, {fast_m}");
+    let (_, given_m) = of(60.0, Some(slow_m_per_s));
+    assert!((given_m / slow_m - 1.0).abs() > 0.01, "{given_m}, {slow_m}");
 }
 
 #[test]

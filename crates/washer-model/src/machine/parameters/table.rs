@@ -78,8 +78,9 @@ const TABLE_2: Source = Paper("Table 2");
 const TABLE_3: Source = Paper("Table 3");
 const TABLE_4: Source = Paper("Table 4");
 const SECTION_3_1: Source = Paper("section 3.1");
-const NONE: Source = Assumed("none in the paper's machine");
+const NONE: Source = Assumed("none unless given");
 const USUAL_SPEED: Source = Assumed("a usual value");
+const OWN_SPEED: Source = Assumed("that of the linear motion");
 /// Speeds at which friction is taken: what divides by them stays finite.
 const SPEED: Range = Within(1e-6, 1e3);
 const SPLIT: Source = Derived("the drum of Tables 2 and 3 less its 0.4 kg unbalance");
@@ -169,7 +170,7 @@ pub(super) static TABLE: &[Row] = &[
         Target::Dampers("friction_speed_m_per_s"),
         get |m, _, _| common(&m.dampers, |d| d.friction_speed_m_per_s),
         set |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.friction_speed_m_per_s = v)),
-    row!("friction_linear_speed_m_per_s", "m/s", SPEED, NONE,
+    row!("friction_linear_speed_m_per_s", "m/s", SPEED, OWN_SPEED,
         "speed amplitude at which the linear model takes the friction of all dampers (V)",
         Target::Dampers("friction_linear_speed_m_per_s"),
         get |m, _, _| {
@@ -238,7 +239,7 @@ static DAMPER: &[Row] = &[
     row!("friction_speed_m_per_s", "m/s", SPEED, USUAL_SPEED,
         "speed below which the friction of this damper fades (v_s)",
         of dampers friction_speed_m_per_s),
-    row!("friction_linear_speed_m_per_s", "m/s", SPEED, NONE,
+    row!("friction_linear_speed_m_per_s", "m/s", SPEED, OWN_SPEED,
         "speed amplitude at which the linear model takes the friction of this damper (V)",
         Target::Machine,
         get |m, _, k| m.dampers.get(k)?.friction_linear_speed_m_per_s,

@@ -1,0 +1,213 @@
+//! The speed amplitudes at which the linear model takes friction, where a machine leaves them to
+//! its motion: of each damper that which the linear motion itself has.
+//!
+//! Speeds and motion depend on each other. A resonance that a force drives against the dampings c
+//! and 4 F / (pi V) has a speed whose reciprocal is linear in that of V. So a fixed point is looked
+//! for in reciprocals, by Broyden's secants (Math. Comp. 19, 1965), and mostly found by three or
+//! four linear runs.
+//!
+//! Friction that moves more slowly than 4 v_s / pi is viscous by its own law, with F / v_s. That is
+//! the least speed: a damper that the drum cannot move against its friction is taken at it.
+
+use crate::fast::geared::Geared;
+use crate::kind::ModelKind;
+use crate::machine::Machine;
+use crate::machine::spin::Spin;
+use crate::modes::fastest_rigid_rad_per_s;
+use crate::nonlinear::coupling::Caps;
+use crate::point::friction::FrictionSpeed;
+use crate::point::{self, NoEquilibrium, Point, Timing, legs};
+use crate::run::{Method, Wanted, simulate_with};
+use lane_ode::Simd;
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
+
+/// A speed is found when that of the motion differs from it by no more than this share.
+const FOUND_WITHIN: f64 = 5e-3;
+
+/// Most motions that are tried.
+pub(crate) const MOST_MOTIONS: usize = 24;
+
+/// Phase of the fastest motion in a step of the runs, and how much shorter steps are tried where
+/// one is not stable. Steps of 0.4 rad give speeds within half a percent.
+const STEP_RAD: f64 = 0.4;
+const SHORTER: f64 = 0.7;
+
+/// How much shorter steps are tried, as a share of the first.
+const MOST_SHORTENED: f64 = 0.01;
+
+/// The bearings' cap times the step, as a share of the limit of stability.
+const STEP_TIMES_CAP: f64 = 0.9;
+
+/// Binary digits of a step: the last ones of an eigenvalue depend on the processor.
+const STEP_DIGITS: f64 = 256.0;
+
+/// A search for the own speeds of a point.
+pub(crate) struct Search {
+    /// Reciprocals of the speeds (s/m), and the greatest that they may be.
+    reciprocals: Vec<f64>,
+    most: Vec<f64>,
+    /// The last reciprocals, and how far those of their motion were from them.
+    last: Option<[Vec<f64>; 2]>,
+    /// The inverse of the Jacobian of that difference, by rows.
+    inverse: Vec<Vec<f64>>,
+}
+
+impl Search {
+    /// `None` where there is nothing to look for.
+    pub(crate) fn new(point: &Point) -> Option<Self> {
+        let own: Vec<_> = point.friction_speeds.iter().filter(|taken| taken.is_own).collect();
+        let count = own.len();
+        let most: Vec<f64> = own.iter().map(|taken| 1.0 / taken.least_m_per_s).collect();
+        let first = |(taken, most): (&&FrictionSpeed, &f64)| most.min(1.0 / taken.speed_m_per_s);
+        (count > 0).then(|| Self {
+            reciprocals: own.iter().zip(&most).map(first).collect(),
+            last: None,
+            inverse: (0..count)
+                .map(|i| (0..count).map(|j| if i == j { -1.0 } else { 0.0 }).collect())
+                .collect(),
+            most,
+        })
+    }
+
+    /// The speeds to take friction at (m/s).
+    pub(crate) fn speeds_m_per_s(&self) -> Vec<f64> {
+        self.reciprocals.iter().map(|reciprocal| 1.0 / reciprocal).collect()
+    }
+
+    /// Takes the speeds (m/s) of the motion by the present ones, and changes these; says whether
+    /// that was needless, because both agree.
+    pub(crate) fn take(&mut self, occurred_m_per_s: &[f64]) -> bool {
+        let occurred = occurred_m_per_s.iter().zip(&self.most);
+        let missing: Vec<f64> = occurred
+            .zip(&self.reciprocals)
+            .map(|((occurred, most), now)| (1.0 / occurred).min(*most) - now)
+            .collect();
+        let is_found = |(missing, now): (&f64, &f64)| missing.abs() <= FOUND_WITHIN * now;
+        if missing.iter().zip(&self.reciprocals).all(is_found) {
+            return true;
+        }
+        if let Some([before, missed]) = &self.last {
+            let moved: Vec<f64> = difference(&self.reciprocals, before);
+            let changed = difference(&missing, missed);
+            let expected = self.inverse.iter().map(|row| dot(row, &changed)).collect::<Vec<_>>();
+            let along: Vec<f64> = (0..moved.len())
+                .map(|j| self.inverse.iter().zip(&moved).map(|(row, moved)| moved * row[j]).sum())
+                .collect();
+            let scale = dot(&along, &changed);
+            if scale != 0.0 {
+                for (row, (moved, expected)) in
+                    self.inverse.iter_mut().zip(moved.iter().zip(&expected))
+                {
+                    let by = (moved - expected) / scale;
+                    row.iter_mut().zip(&along).for_each(|(entry, along)| *entry += by * along);
+                }
+            }
+        }
+        let steps: Vec<f64> = self.inverse.iter().map(|row| -dot(row, &missing)).collect();
+        self.last = Some([self.reciprocals.clone(), missing.clone()]);
+        for (k, now) in self.reciprocals.iter_mut().enumerate() {
+            let (step, missing, most) = (steps[k], missing[k], self.most[k]);
+            let next = match (step * missing > 0.0, missing > 0.0) {
+                (true, _) => *now + step,
+                // Slower than it is taken, and the more so the slower it is taken: it is stuck.
+                (false, true) => most,
+                (false, false) => *now + missing,
+            };
+            *now = if next > 0.0 { next.min(most) } else { 0.5 * *now };
+        }
+        false
+    }
+}
+
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Of the speeds of all dampers those that friction is taken at.
+pub(crate) fn own(point: &Point, speeds_m_per_s: &[f64]) -> Vec<f64> {
+    let own = point.friction_speeds.iter().filter(|taken| taken.is_own);
+    own.map(|taken| speeds_m_per_s[taken.damper]).collect()
+}
+
+/// A point whose own speeds are looked for.
+struct Open {
+    place: usize,
+    /// With the run up to the window's end.
+    point: Point,
+    search: Search,
+    step_s: f64,
+    shortest_s: f64,
+    is_done: bool,
+}
+
+/// Makes points ready, on lanes. Where a machine leaves the speeds at which its linear model takes
+/// friction to the motion, they are found, by runs up to the window's end. What a point has does
+/// not depend on the others.
+///
+/// # Errors
+/// Per point: [`NoEquilibrium`].
+#[must_use]
+pub fn prepare(
+    simd: Simd,
+    points: &[(Machine, Spin)],
+    timing: &Timing,
+) -> Vec<Result<Point, NoEquilibrium>> {
+    let mut ready = point::prepare(simd, points, timing);
+    let to_window = Timing { end_s: timing.window_s[1], checkpoints: 0, ..*timing };
+    let open = |(place, point): (usize, &Result<Point, NoEquilibrium>)| {
+        let point = point.as_ref().ok()?;
+        let search = Search::new(point)?;
+        let legs = legs(&point.stretches, &to_window).into();
+        let point = Point { legs, ..point.at_own_speeds(&search.speeds_m_per_s()) };
+        let swing = fastest_rigid_rad_per_s(&point, &point.linear).ok()?;
+        let step_s = rounded_down(STEP_RAD / swing.max(point.legs.last()?.fastest_rad_per_s));
+        let shortest_s = MOST_SHORTENED * step_s;
+        Some(Open { place, point, search, step_s, shortest_s, is_done: false })
+    };
+    let mut all: Vec<Open> = ready.iter().enumerate().filter_map(open).collect();
+    let wanted = Wanted { damper_speeds: true, ..Wanted::default() };
+    for _ in 0..MOST_MOTIONS {
+        let mut open: Vec<&mut Open> = all.iter_mut().filter(|one| !one.is_done).collect();
+        for alike in open.chunk_by_mut(|a, b| a.step_s == b.step_s) {
+            let step_s = alike[0].step_s;
+            let cap = STEP_TIMES_CAP * RK4_STABILITY_LIMIT / step_s;
+            let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
+            let method = Method::Geared(Geared::steady(step_s, caps));
+            let runs: Vec<&Point> = alike.iter().map(|one| &one.point).collect();
+            let (_, extras) = simulate_with(simd, ModelKind::Linear, &method, &runs, wanted);
+            for (one, extra) in alike.iter_mut().zip(extras) {
+                one.take(&extra.damper_speeds_m_per_s);
+            }
+        }
+    }
+    for Open { place, search, .. } in all {
+        if let Ok(point) = &mut ready[place] {
+            *point = point.at_own_speeds(&search.speeds_m_per_s());
+        }
+    }
+    ready
+}
+
+impl Open {
+    /// Takes the speeds (m/s) of all dampers in a run; none if it failed.
+    fn take(&mut self, speeds_m_per_s: &[f64]) {
+        if speeds_m_per_s.is_empty() {
+            // A hinge under its cap, or friction at a low speed, is too stiff for the step.
+            self.step_s = rounded_down(SHORTER * self.step_s);
+            self.is_done = self.step_s < self.shortest_s;
+            return;
+        }
+        self.is_done = self.search.take(&own(&self.point, speeds_m_per_s));
+        self.point = self.point.at_own_speeds(&self.search.speeds_m_per_s());
+    }
+}
+
+/// With few digits: the last ones of an eigenvalue depend on the processor.
+fn rounded_down(step_s: f64) -> f64 {
+    let unit = step_s.log2().floor().exp2() / STEP_DIGITS;
+    (step_s / unit).floor() * unit
+}

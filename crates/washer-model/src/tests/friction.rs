@@ -1,0 +1,67 @@
+//! The speeds at which the linear model takes friction, where they are its own motion's.
+
+use crate::{
+    Damper, Machine, Method, ModelKind, Point, Spin, Timing, Wanted, prepare, simulate_with,
+};
+use lane_ode::Simd;
+
+const TIMING: Timing = Timing { end_s: 12.0, window_s: [4.0, 10.0], checkpoints: 0 };
+
+/// With friction of all dampers, at own speeds or at a given one.
+pub(crate) fn machine(
+    unbalance_mass_kg: f64,
+    frictions_n: [f64; 2],
+    given_m_per_s: Option<f64>,
+) -> Machine {
+    let mut machine = Machine::paper();
+    machine.unbalance.mass_kg = unbalance_mass_kg;
+    for (damper, friction_n) in machine.dampers.iter_mut().zip(frictions_n) {
+        let friction_linear_speed_m_per_s = given_m_per_s;
+        *damper = Damper {
+            damping_n_s_per_m: 10.0,
+            friction_n,
+            friction_linear_speed_m_per_s,
+            ..*damper
+        };
+    }
+    machine
+}
+
+fn ready(machines: &[Machine]) -> Vec<Point> {
+    let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 12.0 };
+    let points: Vec<_> = machines.iter().map(|machine| (machine.clone(), spin.clone())).collect();
+    prepare(Simd::best(), &points, &TIMING).into_iter().map(Result::unwrap).collect()
+}
+
+#[test]
+fn own_speeds_are_those_of_the_linear_motion() {
+    let cases = [(0.4, [60.0, 60.0]), (0.2, [20.0, 60.0]), (0.9, [10.0, 0.0]), (0.5, [80.0, 81.0])];
+    let machines = cases.map(|(mass_kg, frictions_n)| machine(mass_kg, frictions_n, None));
+    let points = ready(&machines);
+    let method = Method::Rk4 { step_s: 2e-4 };
+    let wanted = Wanted { damper_speeds: true, ..Wanted::default() };
+    let simulated: Vec<&Point> = points.iter().collect();
+    let (_, extras) = simulate_with(Simd::best(), ModelKind::Linear, &method, &simulated, wanted);
+    for ((point, extra), machine) in points.iter().zip(&extras).zip(&machines) {
+        let off = point.friction_speed_off(&extra.damper_speeds_m_per_s).unwrap();
+        assert!(off < 1.01, "{off}: {:?} for {extra:?}", point.friction_speeds());
+        // Nor do they depend on what else is made ready.
+        let alone = ready(std::slice::from_ref(machine)).remove(0);
+        assert_eq!(alone.friction_speeds(), point.friction_speeds());
+        let count = machine.dampers.iter().filter(|damper| damper.friction_n > 0.0).count();
+        assert_eq!(point.friction_speeds().len(), count);
+    }
+    let given = ready(&[machine(0.4, [60.0, 60.0], Some(0.02))]).remove(0);
+    let off = given.friction_speed_off(&[0.1, 0.005]).unwrap();
+    assert!((off - 5.0).abs() < 1e-12, "{off}: below 4 v_s / pi friction is viscous");
+}
+
+#[test]
+fn a_damper_that_is_stuck_is_taken_as_its_law_has_it() {
+    let machine = machine(0.01, [120.0, 120.0], None);
+    let stuck = ready(std::slice::from_ref(&machine)).remove(0);
+    let least = 4.0 * machine.dampers[0].friction_speed_m_per_s / std::f64::consts::PI;
+    for taken in stuck.friction_speeds() {
+        assert!((taken.speed_m_per_s / least - 1.0).abs() < 1e-12, "{taken:?}, least {least}");
+    }
+}
