@@ -281,10 +281,7 @@ pub(super) fn linear_responses(
 }
 
 /// The same with friction taken at the points' speeds, in lanes, those of a kind together.
-pub(super) fn together(
-    rows: &[Row<'_>],
-    is_stopped: &dyn Fn() -> bool,
-) -> Vec<LinearResponse> {
+pub(super) fn together(rows: &[Row<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<LinearResponse> {
     let mut order: Vec<usize> = (0..rows.len()).collect();
     order.sort_by_key(|&k| rows[k].kind());
     let mut found: Vec<Option<LinearResponse>> = rows.iter().map(|_| None).collect();
