@@ -132,7 +132,7 @@ fn computing(
     axes: &[(&str, bool)],
 ) -> &'static [&'static str] {
     let Some(live) = live else { return &[] };
-    data["about"] = report::about(source).into();
+    data["about"] = json!(report::about(source));
     data["live"] = live::json(live, axes);
     data["resonances"] = json!(live.resonances);
     &[SPECTRUM, POOL, CURVES, GROWTH, LIVE]
