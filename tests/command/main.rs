@@ -15,6 +15,7 @@ mod elements;
 mod explain;
 mod faults;
 mod files;
+mod fit;
 mod flips;
 mod goldens;
 mod home;

@@ -27,7 +27,7 @@ mod canonical;
 pub mod design;
 mod draft;
 pub mod grid;
-mod list;
+pub mod list;
 pub mod parameters;
 mod points;
 pub mod read;

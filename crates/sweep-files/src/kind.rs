@@ -37,6 +37,8 @@ pub mod key {
     pub const DWELL: &str = "sweep.dwell";
     /// What was looked for, and which candidate is the best. In files of `sweep optimise` alone.
     pub const OPTIMISE: &str = "sweep.optimise";
+    /// What a fit found. In the curves of `sweep fit` alone.
+    pub const FIT: &str = "sweep.fit";
     /// Which files were compared, and where their plans part. In files of differences alone.
     pub const DIFFERENCES: &str = "sweep.differences";
     /// BLAKE3 hash of the whole file with zeros in this place, hexadecimal.
@@ -60,6 +62,8 @@ pub enum FileKind<'a> {
     Dwell,
     /// Result of `sweep optimise`.
     Optimise,
+    /// Curves of `sweep fit`.
+    Fit,
     /// Result of `sweep compare --out`.
     Differences,
     /// A table that `sweep export` wrote.
@@ -83,13 +87,14 @@ pub enum FileKind<'a> {
 }
 
 /// Results that are no maps: each kind in a word, and the key that only its files have.
-const OWN: [(FileKind<'static>, &str, &str); 7] = [
+const OWN: [(FileKind<'static>, &str, &str); 8] = [
     (FileKind::Trace, "trace", key::TRACE),
     (FileKind::Modes, "modes", key::MODES),
     (FileKind::Boundary, "boundary", key::BOUNDARY),
     (FileKind::Stability, "stability", key::STABILITY),
     (FileKind::Dwell, "dwell", key::DWELL),
     (FileKind::Optimise, "study", key::OPTIMISE),
+    (FileKind::Fit, "fit", key::FIT),
     (FileKind::Differences, "differences", key::DIFFERENCES),
 ];
 
@@ -107,6 +112,7 @@ impl FileKind<'_> {
             Self::Stability => "result of `sweep stability`",
             Self::Dwell => "result of `sweep dwell`",
             Self::Optimise => "result of `sweep optimise`",
+            Self::Fit => "curves of `sweep fit`",
             Self::Differences => "result of `sweep compare --out`",
             Self::Exported { .. } => "table of `sweep export`",
             Self::Account { .. } => "account of the run with this --out",

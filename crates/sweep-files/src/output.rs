@@ -137,7 +137,7 @@ mod tests {
     use super::*;
     use crate::{key, seal};
 
-    const PARQUET: [FileKind<'_>; 8] = [
+    const PARQUET: [FileKind<'_>; 9] = [
         FileKind::Map,
         FileKind::Trace,
         FileKind::Modes,
@@ -145,6 +145,7 @@ mod tests {
         FileKind::Stability,
         FileKind::Dwell,
         FileKind::Optimise,
+        FileKind::Fit,
         FileKind::Differences,
     ];
 
@@ -158,6 +159,7 @@ mod tests {
             FileKind::Stability => key::STABILITY,
             FileKind::Dwell => key::DWELL,
             FileKind::Optimise => key::OPTIMISE,
+            FileKind::Fit => key::FIT,
             FileKind::Differences => key::DIFFERENCES,
             FileKind::Exported { ending: "csv" } => {
                 return format!("{}x\n", crate::EXPORTED_CSV).into_bytes();

@@ -11,6 +11,7 @@ pub(crate) mod map;
 pub(crate) mod matrix;
 pub(crate) mod optimise;
 pub(crate) mod passages;
+pub(crate) mod profiles;
 pub(crate) mod shapes;
 pub(crate) mod stability;
 pub(crate) mod trace;

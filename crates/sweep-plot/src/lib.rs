@@ -77,6 +77,8 @@ pub enum View {
     Time,
     /// Trace: greatest deviation in each turn over spin speed, on the way up and down
     Passages,
+    /// Curves of a fit: how the cost rises beside each fitted number
+    Profiles,
     /// Design: points over every pair of parameters, and the quantity over each
     Scatter,
     /// Design: how the quantity is distributed, and the share of reliable points
@@ -96,7 +98,7 @@ impl View {
     const fn of(self) -> Kind {
         match self {
             Self::Frequencies | Self::Variation | Self::Shapes => Kind::Modes,
-            Self::Time | Self::Passages => Kind::Trace,
+            Self::Time | Self::Passages | Self::Profiles => Kind::Trace,
             Self::Scatter | Self::Histogram | Self::Influence => Kind::Design,
             Self::Growth | Self::Responses => Kind::Stability,
             Self::Sections => Kind::Dwell,
@@ -378,6 +380,7 @@ fn differences(
 fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
     let chart = match (table.source.kind, options.view) {
         (Kind::Trace, Some(View::Passages)) => figures::passages::chart(table, options)?,
+        (Kind::Trace, Some(View::Profiles)) => figures::profiles::chart(table)?,
         (Kind::Trace, _) => figures::trace::chart(table, options)?,
         (Kind::Modes, Some(View::Variation)) => figures::turn::chart(table)?,
         (Kind::Modes, Some(View::Shapes)) => figures::shapes::chart(table)?,
@@ -438,7 +441,7 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
     let dwell = source.kind == Kind::Dwell;
     let over_modes = modes && matches!(options.view, None | Some(View::Frequencies));
     let responses = stability && options.view == Some(View::Responses);
-    let over_time = trace && options.view != Some(View::Passages);
+    let over_time = trace && matches!(options.view, None | Some(View::Time));
     let rules = [
         ("--quantity", !options.quantity.is_empty(), map || design, "maps"),
         (

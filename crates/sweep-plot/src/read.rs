@@ -22,7 +22,7 @@ pub(crate) enum Kind {
     Map,
     /// One row per point, scattered.
     Design,
-    /// Time histories of both models at one point.
+    /// Time histories of both models at one point, or of a measurement and the model fitted to it.
     Trace,
     /// Modes over spin speed.
     Modes,
@@ -370,7 +370,9 @@ fn recognise(names: &[&str]) -> Option<Kind> {
         Some(Kind::Map)
     } else if has("ratio_change") && has("flip") {
         Some(Kind::Differences)
-    } else if has("time_s") && names.iter().any(|name| name.starts_with("nonlinear_")) {
+    } else if has("time_s")
+        && names.iter().any(|name| name.starts_with("nonlinear_") || name.starts_with("measured_"))
+    {
         Some(Kind::Trace)
     } else if has("mode") && has("frequency_rpm") && has("speed_rpm") {
         Some(Kind::Modes)

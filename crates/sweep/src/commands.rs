@@ -3,6 +3,7 @@
 mod completions;
 mod dwell;
 mod explain;
+mod fit;
 mod held;
 mod held_args;
 mod init;
@@ -44,7 +45,7 @@ const EXAMPLES: Examples = &[
 /// Subcommands by what they are for, as help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Run", &["run", "check"]),
-    ("Ask", &["boundary", "trace", "modes", "stability", "dwell", "explain", "optimise"]),
+    ("Ask", &["boundary", "trace", "modes", "stability", "dwell", "explain", "fit", "optimise"]),
     ("Look", &["show", "plot", "report", "require", "compare", "export"]),
     ("Cluster", &["status", "merge", "slurm"]),
     ("Set up", &["init", "parameters", "schema", "man", "completions"]),
@@ -85,6 +86,8 @@ pub enum Command {
     Dwell(dwell::Args),
     /// Explain why the linear model fails at one point
     Explain(explain::Args),
+    /// Find the numbers of a machine from measured run-ups
+    Fit(fit::Args),
     /// Find the parameters at which some numbers are least, within limits
     Optimise(optimise::Args),
     /// Show what a result file holds: verdicts, extremes, metrics
@@ -139,6 +142,7 @@ fn examples_of(name: &str) -> Examples {
         "stability" => stability::EXAMPLES,
         "dwell" => dwell::EXAMPLES,
         "explain" => explain::EXAMPLES,
+        "fit" => fit::EXAMPLES,
         "boundary" => lines::BOUNDARY,
         "optimise" => lines::OPTIMISE,
         "plot" => plot::EXAMPLES,
@@ -246,6 +250,7 @@ impl Command {
             Self::Stability(args) => stability::run(args),
             Self::Dwell(args) => dwell::run(args),
             Self::Explain(args) => explain::run(args),
+            Self::Fit(args) => fit::run(args),
             Self::Boundary(args) => boundary::run::<crate::Washer>(args),
             Self::Optimise(args) => optimise::run::<crate::Washer>(args),
             Self::Plot(args) => plot::run(args),

@@ -44,6 +44,7 @@ mod dwell;
 mod engine;
 mod estimate;
 mod explain;
+mod fit;
 mod identity;
 mod library;
 mod live;
@@ -62,10 +63,11 @@ pub use commands::Cli;
 pub use config::{Diagnostics, GridInput, Mistake, load};
 pub use dwell::{Carry, Search};
 pub use engine::ModelEngine;
+pub use fit::FitOptions;
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use library::{
     BoundaryOptions, Effort, Evaluated, Evaluator, Explained, PointTable, RanToFile, ResultTable,
-    TraceOptions, explain_point, find_boundary, find_held, find_modes, held_to_file,
+    TraceOptions, explain_point, find_boundary, find_held, find_modes, fit_tables, held_to_file,
     list_parameters, optimise_study, run_to_file, trace_point,
 };
 pub use method::Integrator;

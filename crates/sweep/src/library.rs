@@ -6,6 +6,7 @@
 pub(crate) mod boundary;
 mod evaluate;
 mod explain;
+mod fit;
 pub(crate) mod modes;
 mod optimise;
 pub(crate) mod parameters;
@@ -18,6 +19,7 @@ mod trace;
 pub use boundary::{BoundaryOptions, find_boundary};
 pub use evaluate::{Evaluated, Evaluator};
 pub use explain::{Explained, explain_point};
+pub use fit::fit_tables;
 pub use modes::find_modes;
 pub use optimise::optimise_study;
 pub use parameters::list_parameters;

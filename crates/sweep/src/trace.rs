@@ -37,6 +37,8 @@ const KEPT_INSTANTS: f64 = 2000.0;
 /// What a trace holds beside channels, gap and speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Extras {
+    /// Rates and accelerations of the channels.
+    pub rates: bool,
     /// Coordinates and their speeds.
     pub states: bool,
     /// Forces of the elements between cabinet and tub, their sum, and what the feet carry.
@@ -174,6 +176,9 @@ pub(crate) fn trace(
     ];
     models.iter().for_each(|model| model.channels(&mut table));
     models.iter().for_each(|model| model.gap(&mut table));
+    if extras.rates {
+        models.iter().for_each(|model| model.rates(&mut table));
+    }
     if extras.states {
         models.iter().for_each(|model| model.states(&mut table));
     }
@@ -341,6 +346,19 @@ impl<'a> Columns<'a> {
             self.column(table, (&name, channel.unit(), &description), |at| {
                 at.channels[channel.index()]
             });
+        }
+    }
+
+    fn rates(&self, table: &mut Table) {
+        for channel in Channel::ALL {
+            let (name, unit, k) = (channel.name(), channel.unit(), channel.index());
+            let name = |per: &str| format!("{}_{name}_{unit}_per_{per}", self.model);
+            let what = channel.description();
+            let rate = format!("rate of the {what}");
+            self.column(table, (&name("s"), &format!("{unit}/s"), &rate), |at| at.rates[k]);
+            let acceleration = format!("acceleration of the {what}");
+            let named = (&*name("s2"), &*format!("{unit}/s^2"), &*acceleration);
+            self.column(table, named, |at| at.accelerations[k]);
         }
     }
 

@@ -102,7 +102,8 @@ pub use run::equations::{Equations, STATE_LEN};
 pub use run::history::{History, Instant, Start, history, history_until};
 pub use run::suspension::Forces;
 pub use run::{
-    Course, Extra, Method, Record, Stop, StopLoad, Wanted, simulate, simulate_until, simulate_with,
+    Course, Extra, Method, Record, Snapshot, Stop, StopLoad, Wanted, simulate, simulate_until,
+    simulate_with,
 };
 pub use stability::{
     Beyond, Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant,

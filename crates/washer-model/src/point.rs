@@ -58,6 +58,8 @@ pub struct Point {
     pub(crate) ringing: Ringing,
     /// By how much the nonlinear model starts beside its equilibrium, in every coordinate (m, rad).
     pub(crate) nudge: f64,
+    /// When all outputs are recorded, if they are (s).
+    pub(crate) instants_s: Arc<[f64]>,
     /// Weight of all bodies (N).
     pub(crate) weight_n: f64,
     /// What the cabinet's feet take of its loads, if it is described.
@@ -120,6 +122,13 @@ impl Point {
     #[must_use]
     pub fn nudged(&self) -> Self {
         Self { nudge: NUDGE, ..self.clone() }
+    }
+
+    /// The same point, with instants (s, rising) at which [`Wanted`](crate::Wanted) can have its
+    /// outputs recorded.
+    #[must_use]
+    pub fn seen_at(self, instants_s: Arc<[f64]>) -> Self {
+        Self { instants_s, ..self }
     }
 
     /// Weight (N) of what the springs carry.
@@ -246,6 +255,7 @@ impl Kernel for Prepare<'_> {
                     Ok(Point {
                         ringing: Ringing::new(machine, course.jumps_rad_per_s2),
                         nudge: 0.0,
+                        instants_s: [].into(),
                         machine: coefficients,
                         equilibrium: q.map(|q| q.0.get(lane)),
                         rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),

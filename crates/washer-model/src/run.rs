@@ -7,12 +7,14 @@ pub(crate) mod extras;
 pub(crate) mod history;
 pub(crate) mod loads;
 pub(crate) mod model;
+mod snapshots;
 pub(crate) mod stiff;
 pub(crate) mod suspension;
 mod tangent;
 
 pub use extras::{Extra, Wanted};
 pub use loads::StopLoad;
+pub use snapshots::Snapshot;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyMapping;
-use sweep::{Effort, ProgressMode, Search, Starts};
+use pyo3::types::{PyList, PyMapping};
+use sweep::{Effort, Explained, FitOptions, ProgressMode, Search, Starts};
 
-use crate::columns::numbers;
+use crate::columns::{numbers, points};
 use crate::ended;
 use crate::errors;
 use crate::mappings::assignments;
@@ -149,9 +149,58 @@ pub(crate) fn explain<'py>(
         sweep::explain_point(&input, &at, speeds_rpm.as_deref(), effort)
     })?;
     let explained = explained.map_err(|error| errors::error(py, &error))?;
-    let explained = explained.ok_or_else(|| errors::early(py))?;
-    let found = py.import("json")?.call_method1("loads", (explained.found.to_string(),))?;
-    py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((found, explained.text))
+    explanation(py, explained.ok_or_else(|| errors::early(py))?)
+}
+
+/// Numbers of a machine from measured run-ups.
+#[pyfunction]
+#[pyo3(signature = (
+    plan, table, free, *, own=Vec::new(), at=None, linear=false, shift=true, starts=1, bootstrap=0,
+    draws=64, threads=None
+))]
+#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+pub(crate) fn fit<'py>(
+    plan: &Bound<'py, PyPlan>,
+    table: &Bound<'py, PyAny>,
+    free: Vec<String>,
+    own: Vec<String>,
+    at: Option<&Bound<'py, PyAny>>,
+    linear: bool,
+    shift: bool,
+    starts: usize,
+    bootstrap: usize,
+    draws: u64,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = plan.py();
+    let several = |of: &Bound<'py, PyAny>| -> PyResult<Vec<Bound<'py, PyAny>>> {
+        if of.is_instance_of::<PyList>() { of.extract() } else { Ok(vec![of.clone()]) }
+    };
+    let tables = several(table)?;
+    let at = at.map_or_else(|| Ok(Vec::new()), several)?;
+    if at.len() > tables.len() {
+        return Err(PyTypeError::new_err("`at` has more entries than there are tables"));
+    }
+    let constants = |k: usize| match at.get(k) {
+        Some(at) => assignments(Some(at.cast::<PyMapping>()?)),
+        None => Ok(Vec::new()),
+    };
+    let tables = tables.iter().enumerate().map(|(k, table)| Ok((points(table)?, constants(k)?)));
+    let tables = tables.collect::<PyResult<Vec<_>>>()?;
+    let options = FitOptions { free, own, linear, with_shift: shift, starts, bootstrap, draws };
+    let input = plan.get().input.clone();
+    let fitted = abandonable(py, move |interrupt| {
+        let effort = Effort { threads, progress: ProgressMode::None, interrupt };
+        sweep::fit_tables(&input, tables, &options, effort)
+    })?;
+    let fitted = fitted.map_err(|error| errors::error(py, &error))?;
+    explanation(py, fitted.ok_or_else(|| errors::early(py))?)
+}
+
+/// Data and words, as Python has them.
+fn explanation(py: Python<'_>, found: Explained) -> PyResult<Bound<'_, PyAny>> {
+    let data = py.import("json")?.call_method1("loads", (found.found.to_string(),))?;
+    py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((data, found.text))
 }
 
 /// Every number that can be set or swept.

@@ -20,7 +20,7 @@ use pyo3::pymodule;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::functions::{dwell, explain, modes, optimise, parameters, stability};
+    use super::functions::{dwell, explain, fit, modes, optimise, parameters, stability};
     #[pymodule_export]
     use super::plan::PyPlan;
     #[pymodule_export]

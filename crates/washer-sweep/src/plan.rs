@@ -97,18 +97,22 @@ impl PyPlan {
     }
 
     /// Time histories of both models at one point.
-    #[pyo3(signature = (at=None, *, every=0.01, states=false, forces=false, start=None))]
+    #[pyo3(signature = (
+        at=None, *, every=0.01, rates=false, states=false, forces=false, start=None
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn trace(
         &self,
         py: Python<'_>,
         at: Option<&Bound<'_, PyMapping>>,
         every: f64,
+        rates: bool,
         states: bool,
         forces: bool,
         start: Option<&Bound<'_, PyMapping>>,
     ) -> PyResult<PyResultTable> {
         let (at, start) = (assignments(at)?, assignments(start)?);
-        let options = TraceOptions { every_s: every, states, forces, start };
+        let options = TraceOptions { every_s: every, rates, states, forces, start };
         let input = self.input.clone();
         let work = move |interrupt: &_| sweep::trace_point(&input, &at, &options, interrupt);
         let traced = abandonable(py, work)?.map_err(|error| errors::error(py, &error))?;

@@ -27,16 +27,63 @@ const LONGEST_PATH: usize = 1000;
 /// Name of a column that is no parameter: it tells people which row is which.
 pub(super) const ID: &str = "id";
 
-/// A list of points.
-pub struct List {
-    pub design: Design,
+/// A table of numbers in a file of its own, whatever they are; NaN where a value is missing.
+pub struct NumberTable {
+    /// Its columns, all of one length.
     pub columns: Vec<ListColumn>,
     rows: Rows,
 }
 
-/// One parameter's values.
+impl NumberTable {
+    /// Reads a CSV or Parquet file of numbers; `None` after mistakes, which are reported.
+    pub fn read(path: &Path, report: &Report) -> Option<Self> {
+        let shown = shown(path);
+        let file = Location::new(report.add(shown.as_str(), String::new()), 0..0);
+        match columns(path, &file, true, report) {
+            Ok(read) => read.map(|(columns, rows, _)| Self { columns, rows }),
+            Err(reason) => {
+                let title = format!("cannot read {shown}: {reason}");
+                let help = "expected a CSV or Parquet file of numbers under a line of names";
+                report.push(Diagnostic::new(title).help(help));
+                None
+            }
+        }
+    }
+
+    /// A table in memory, which messages call so.
+    pub fn of_columns(name: &str, columns: Vec<(String, Vec<f64>)>, report: &Report) -> Self {
+        let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+        let source = report.add(name, names.join(","));
+        let mut start = 0;
+        let located = |(name, values): (String, Vec<f64>)| {
+            let at = Location::new(source, start..start + name.len());
+            start = at.span.end + 1;
+            ListColumn { name: Located { value: name, at }, values }
+        };
+        let columns = columns.into_iter().map(located).collect();
+        Self { columns, rows: Rows::Binary(Location::new(source, 0..0)) }
+    }
+
+    /// The place of a value, both counted from 0.
+    pub fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
+        self.rows.place(sources, column, row)
+    }
+}
+
+/// A list of points.
+pub struct List {
+    /// The design of its points.
+    pub design: Design,
+    /// Its parameters.
+    pub columns: Vec<ListColumn>,
+    rows: Rows,
+}
+
+/// A column of numbers.
 pub struct ListColumn {
+    /// Its name, with its place.
     pub name: Located<String>,
+    /// Row by row.
     pub values: Vec<f64>,
 }
 
@@ -81,9 +128,15 @@ enum Unreadable {
 impl List {
     /// The place of a value, both counted from 0.
     pub fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
-        match &self.rows {
-            Rows::Binary(at) => at.clone(),
-            Rows::Lines { source, starts } => {
+        self.rows.place(sources, column, row)
+    }
+}
+
+impl Rows {
+    fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
+        match self {
+            Self::Binary(at) => at.clone(),
+            Self::Lines { source, starts } => {
                 let start = starts.get(row).map_or(0, |&start| start as usize);
                 let span = csv::cell_span(sources.text(*source), start, column);
                 Location::new(*source, span)
@@ -92,31 +145,42 @@ impl List {
     }
 }
 
+/// A path in a message.
+fn shown(path: &Path) -> String {
+    cut(&path.display().to_string(), LONGEST_PATH)
+}
+
+/// Columns of a file of numbers, the places of its rows, and the hash of its bytes; `None` after
+/// mistakes, which are reported. `file` is where it is named. With `gaps`, a missing value is NaN.
+fn columns(
+    path: &Path,
+    file: &Location,
+    gaps: bool,
+    report: &Report,
+) -> Result<Option<(Vec<ListColumn>, Rows, String)>, Unreadable> {
+    let bytes = bytes(path)?;
+    let hash = blake3::hash(&bytes).to_hex().to_string();
+    if bytes.starts_with(b"PAR1") {
+        let columns = parquet::columns(bytes, gaps)?;
+        let located = |value| Located { value, at: file.clone() };
+        let column = |(name, values)| ListColumn { name: located(name), values };
+        let columns = columns.into_iter().map(column).collect();
+        return Ok(Some((columns, Rows::Binary(file.clone()), hash)));
+    }
+    let text = String::from_utf8(bytes)
+        .map_err(|error| Unreadable::NotText(error.utf8_error().valid_up_to() + 1))?;
+    // Messages quote the text when all is read; until then it is held here.
+    let source = report.add(shown(path), String::new());
+    let read = csv::read(&text, source, gaps, report);
+    report.fill(source, text);
+    Ok(read?.map(|(columns, starts)| (columns, Rows::Lines { source, starts }, hash)))
+}
+
 /// Reads the listed points.
 pub(super) fn read(file: &Located<&str>, grid: &Path, report: &Report) -> Option<List> {
     let path = beside(grid, file.value);
-    let shown = cut(&path.display().to_string(), LONGEST_PATH);
-    let read = bytes(&path).and_then(|bytes| {
-        let hash = blake3::hash(&bytes).to_hex().to_string();
-        if bytes.starts_with(b"PAR1") {
-            let columns = parquet::columns(bytes)?;
-            let located = |value| Located { value, at: file.at.clone() };
-            let column = |(name, values)| ListColumn { name: located(name), values };
-            let columns = columns.into_iter().map(column).collect();
-            return Ok(Some((columns, Rows::Binary(file.at.clone()), hash)));
-        }
-        let text = String::from_utf8(bytes)
-            .map_err(|error| Unreadable::NotText(error.utf8_error().valid_up_to() + 1))?;
-        // Messages quote the text when all is read; until then it is held here.
-        let source = report.add(shown.as_str(), String::new());
-        let read = csv::read(&text, source, report);
-        report.fill(source, text);
-        let (columns, starts) = match read? {
-            Some(read) => read,
-            None => return Ok(None),
-        };
-        Ok(Some((columns, Rows::Lines { source, starts }, hash)))
-    });
+    let shown = shown(&path);
+    let read = columns(&path, &file.at, false, report);
     let (columns, rows, hash) = match read {
         Ok(read) => read?,
         Err(reason) => {

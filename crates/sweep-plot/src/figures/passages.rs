@@ -58,7 +58,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
 
 /// A curve over time as one over speed for each stretch.
 fn by_turn(series: &Series, stretches: &[(bool, Vec<[usize; 2]>)]) -> Vec<Series> {
-    let linear = series.name.starts_with("linear");
+    let linear = series.name.starts_with("linear") || series.name == "model";
     let curve = |(grid, (gains, turns)): (usize, &(bool, Vec<[usize; 2]>))| Series {
         name: format!("{}, speed {}", series.name, if *gains { "rising" } else { "falling" }),
         colour: DISTINCT[usize::from(!gains)],

@@ -33,7 +33,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             reason: "a trace needs at least two instants",
         });
     }
-    let found = quantities(table);
+    let sides = sides(table);
+    let found = quantities(table, sides);
     let channels: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
     if let Some(unknown) = options.channels.iter().find(|asked| !channels.contains(&asked.as_str()))
     {
@@ -60,8 +61,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
                 (other, first, another.clone(), front, 1),
             ],
             _ => [
-                (table, first, "nonlinear model".to_owned(), NONLINEAR, 0),
-                (table, second, "linear model".to_owned(), front, 0),
+                (table, first, said_of(sides[0]), NONLINEAR, 0),
+                (table, second, said_of(sides[1]), front, 0),
             ],
         };
         curves
@@ -77,7 +78,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         .iter()
         .map(|quantity| {
             let (unit, factor) = label::shown(quantity.unit);
-            let words = if quantity.channel {
+            let words = if quantity.channel && sides == MODELS {
                 label::channel(quantity.name)
             } else {
                 label::words(quantity.name)
@@ -86,13 +87,23 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
                 quantity.name,
                 Label::new(&words, unit),
                 shown.contains(&quantity.name),
-                pair(quantity.columns(), factor),
+                pair(quantity.columns(sides), factor),
             )
         })
         .collect();
     // Rows of two files that were thinned do not lie at the same instants.
     let whole = other.as_ref().is_some_and(|other| table.stretch.or(other.stretch).is_none());
     let apart = if whole { difference(&panels) } else { None };
+    for (name, column) in table.with_prefix("residual_") {
+        let (unit, factor) = label::shown(&column.unit);
+        let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
+        let residual =
+            Series { name: "residual".to_owned(), colour: INK, grid: 0, y, style: Style::Dots };
+        let words = format!("residual, {}", label::words(name));
+        let shown = shown.contains(&name);
+        let label = Label::new(&words, unit);
+        panels.push(panel(&format!("residual_{name}"), label, shown, vec![residual]));
+    }
     let mut gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
     if other.is_some() && gaps.len() < 2 {
         gaps.clear();
@@ -130,6 +141,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     Ok(Chart {
         title: match &names {
             Some(_) => "Nonlinear motion from static equilibrium".to_owned(),
+            None if sides == FITTED => "A measurement, and the model fitted to it".to_owned(),
             None => "Motion of both models from static equilibrium".to_owned(),
         },
         subtitle: match &names {
@@ -151,6 +163,20 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     })
 }
 
+/// What stands before the columns of both sides of a trace, and of a fit.
+const MODELS: [&str; 2] = ["nonlinear", "linear"];
+const FITTED: [&str; 2] = ["measured", "model"];
+
+/// The sides of a file.
+fn sides(table: &Table) -> [&'static str; 2] {
+    if table.with_prefix("measured_").is_empty() { MODELS } else { FITTED }
+}
+
+/// A side in the legend.
+fn said_of(side: &str) -> String {
+    if MODELS.contains(&side) { format!("{side} model") } else { side.to_owned() }
+}
+
 /// What a trace holds of both models over time.
 struct Quantity<'a> {
     /// A channel's name; of a coordinate, a speed or a force what stands before the model's name:
@@ -163,9 +189,9 @@ struct Quantity<'a> {
 }
 
 impl Quantity<'_> {
-    /// Columns of the nonlinear and of the linear model.
-    fn columns(&self) -> [String; 2] {
-        ["nonlinear", "linear"].map(|model| {
+    /// Columns of both sides.
+    fn columns(&self, sides: [&str; 2]) -> [String; 2] {
+        sides.map(|model| {
             if self.channel {
                 format!("{model}_{}", self.name)
             } else {
@@ -176,11 +202,13 @@ impl Quantity<'_> {
 }
 
 /// Channels first, then states and forces; the gap has its own panel.
-fn quantities(table: &Table) -> Vec<Quantity<'_>> {
-    let channels = table.with_prefix("nonlinear_").into_iter().map(|(name, column)| {
-        let unit = if column.unit.is_empty() { label::unit_of_channel(name) } else { &column.unit };
-        Quantity { name, unit, end: "", channel: true }
-    });
+fn quantities<'a>(table: &'a Table, sides: [&str; 2]) -> Vec<Quantity<'a>> {
+    let channels =
+        table.with_prefix(&format!("{}_", sides[0])).into_iter().map(|(name, column)| {
+            let unit =
+                if column.unit.is_empty() { label::unit_of_channel(name) } else { &column.unit };
+            Quantity { name, unit, end: "", channel: true }
+        });
     let further =
         table.columns.iter().filter(|column| column.numbers().is_some()).filter_map(|column| {
             let (name, end) =

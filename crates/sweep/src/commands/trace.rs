@@ -53,6 +53,9 @@ pub struct Args {
     /// Time between two instants of the file, in s; the integration's steps are its own
     #[arg(long, value_name = "S", default_value_t = 0.01)]
     every: f64,
+    /// Add rates and accelerations of the channels
+    #[arg(long)]
+    rates: bool,
     /// Add the ten coordinates and their speeds
     #[arg(long)]
     states: bool,
@@ -82,7 +85,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     }
     args.grid.tell_window(&plan);
     let every_s = every(args.every, &plan)?;
-    let extras = Extras { states: args.states, forces: args.forces };
+    let extras = Extras { rates: args.rates, states: args.states, forces: args.forces };
     let start = start_of(&args.start);
     let output = Output::begin(&args.out, FileKind::Trace)?;
     let view = View { every_s, start, extras, quick: None };

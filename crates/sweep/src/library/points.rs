@@ -54,6 +54,14 @@ impl PointTable {
         self.rows
     }
 
+    /// The columns, NaN where a value is missing.
+    pub(super) fn into_columns(self) -> Vec<(String, Vec<f64>)> {
+        let values = |column: &Float64Array| -> Vec<f64> {
+            column.iter().map(|value| value.unwrap_or(f64::NAN)).collect()
+        };
+        self.names.iter().cloned().zip(self.columns.iter().map(values)).collect()
+    }
+
     /// The points as those of a plan.
     ///
     /// # Errors

@@ -9,10 +9,12 @@ use sweep_engine::threads;
 use sweep_files::FileKind;
 
 /// What a trace holds.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct TraceOptions {
     /// Time between two instants, s.
     pub every_s: f64,
+    /// Whether rates and accelerations of the channels are there too.
+    pub rates: bool,
     /// Whether the ten coordinates and their speeds are there too.
     pub states: bool,
     /// Whether the forces of springs and dampers are there too.
@@ -43,7 +45,8 @@ pub fn trace_point(
         })
     });
     let start = start_of(&start.collect::<Result<Vec<_>, _>>()?);
-    let extras = Extras { states: options.states, forces: options.forces };
+    let TraceOptions { rates, states, forces, .. } = *options;
+    let extras = Extras { rates, states, forces };
     let view = View { every_s, start, extras, quick: None };
     let stop = || interrupt.stopped();
     let work = || trace::trace(&plan, plan.scenario(0), at, &view, &stop);
@@ -74,8 +77,7 @@ mod tests {
         let speeds: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
         let interrupt = Interrupt::new();
         interrupt.raise(2);
-        let options =
-            TraceOptions { every_s: 1.0, states: false, forces: false, start: Vec::new() };
+        let options = TraceOptions { every_s: 1.0, ..TraceOptions::default() };
         assert!(trace_point(&grid, &[], &options, &interrupt).unwrap().is_none());
         assert!(find_modes(Some(&grid), &[], &speeds, &interrupt).unwrap().is_none());
     }

@@ -5,6 +5,7 @@
 
 use super::cabinet_force::GreatestForce;
 use super::loads::{Loads, StopLoad};
+use super::snapshots::{Snapshot, Snapshots};
 use super::{Course, Method};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -37,6 +38,8 @@ pub struct Wanted {
     pub damper_speeds: bool,
     /// The coordinates at the ends of legs ([`Timing::checkpoints`](crate::Timing)).
     pub course: bool,
+    /// All outputs at the point's own instants ([`Point::seen_at`]), within the window.
+    pub snapshots: bool,
 }
 
 /// The records that [`Wanted`] asks for, of one trajectory, within the window.
@@ -76,6 +79,8 @@ pub struct Extra {
     /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed.
     /// Empty unless asked for.
     pub course: Course,
+    /// All outputs at the point's own instants. Empty unless asked for.
+    pub snapshots: Vec<Snapshot>,
 }
 
 impl Wanted {
@@ -123,6 +128,7 @@ pub(crate) struct Extras<T> {
     clearances_squared: [N<T>; 3],
     /// How many of these are in use.
     clearances: usize,
+    snapshots: Option<Snapshots<T>>,
     /// Of every point, as far as they have ended.
     pub(crate) found: Vec<Extra>,
 }
@@ -152,6 +158,7 @@ impl<T: Lane> Extras<T> {
         } else {
             None
         };
+        let snapshots = if wanted.snapshots { Some(Snapshots::new(zero)) } else { None };
         Some(Self {
             wanted,
             squares: SquareIntegrals::new(zero),
@@ -161,6 +168,7 @@ impl<T: Lane> Extras<T> {
             clash: [TimeAbove::new(zero); 3],
             clearances_squared: [zero; 3],
             clearances,
+            snapshots,
             found: vec![Extra::default(); count],
         })
     }
@@ -184,11 +192,15 @@ impl<T: Lane> Extras<T> {
         if let Some(loads) = &mut self.loads {
             loads.set_point(lane, point);
         }
+        if let Some(snapshots) = &mut self.snapshots {
+            snapshots.set_point(lane, point);
+        }
     }
 
     /// Ends a lane's trajectory, that of point `index`. A failed one leaves no record.
     pub(crate) fn finish(&mut self, lane: usize, index: usize, point: &Point, failed: bool) {
         let turns = if self.wanted.turns { self.turns.finish(lane) } else { Vec::new() };
+        let snapshots = self.snapshots.as_mut().map_or_else(Vec::new, |it| it.finish(lane));
         if failed {
             return;
         }
@@ -212,6 +224,7 @@ impl<T: Lane> Extras<T> {
             clash_doubt_s: (wanted.clash_time && self.clearances > 1)
                 .then_some((longer_s - clash_s).max(clash_s - shorter_s)),
             course: Course::new(),
+            snapshots,
         };
     }
 }
@@ -251,6 +264,9 @@ impl<T: Lane> Aside for Seen<'_, T> {
         }
         if let Some(loads) = &mut extras.loads {
             loads.see(step, x, dx, inside);
+        }
+        if let Some(snapshots) = &mut extras.snapshots {
+            snapshots.see(step, (x, dx), channels);
         }
         if wanted.clash_time {
             let distance_squared = squared(radial);

@@ -20,7 +20,8 @@ use crate::run::suspension::{Forces, forces};
 use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, first_step};
 use core::marker::PhantomData;
 use lane_ode::{
-    Dual, Ended, Failure, Leg, N, ScalarKernel, Simd, Step, Task, dop853, dopri5, rk4, rodas,
+    Dual, Ended, Failure, Leg, N, Sample as Sampled, ScalarKernel, Simd, Step, Task, dop853,
+    dopri5, rk4, rodas,
 };
 
 /// An instant this share of a step past its end is its end.
@@ -42,6 +43,10 @@ pub struct History<'a> {
 pub struct Instant {
     /// Deviations from equilibrium in the order of `Channel::ALL` (m, rad).
     pub channels: [f64; CHANNELS],
+    /// Their rates (m/s, rad/s).
+    pub rates: [f64; CHANNELS],
+    /// Their accelerations (m/s^2, rad/s^2), by the equations at the instant.
+    pub accelerations: [f64; CHANNELS],
     /// Gap between drum and tub (m).
     pub gap_m: f64,
     /// Coordinates q1 to q10 as deviations from equilibrium (m, rad).
@@ -122,7 +127,7 @@ impl History<'_> {
     pub fn instant(&self, k: usize) -> Option<Instant> {
         let state = self.states.get(k)?;
         let time_s = k as f64 * self.every_s;
-        let (channels, gap_m) = match self.model {
+        let ([channels, rates, accelerations], gap_m) = match self.model {
             ModelKind::Nonlinear => observed::<Nonlinear<f64>>(self.point, time_s, state),
             ModelKind::Linear => observed::<Linear<f64>>(self.point, time_s, state),
         };
@@ -132,6 +137,8 @@ impl History<'_> {
         }
         Some(Instant {
             channels,
+            rates,
+            accelerations,
             gap_m,
             deviations,
             speeds: core::array::from_fn(|i| state[COORDINATES + i]),
@@ -145,18 +152,22 @@ impl History<'_> {
     }
 }
 
-/// Channels and gap of a state.
+/// Channels with their rates and accelerations, and the gap, of a state.
 fn observed<M: Model<f64>>(
     point: &Point,
     time_s: f64,
     state: &[f64; STATES],
-) -> ([f64; CHANNELS], f64) {
+) -> ([[f64; CHANNELS]; 3], f64) {
     let mut model = M::splat(N(0.0), point, Coupling::Springs);
     model.set_spin(0, &point.stretches[stretch_at(&point.stretches, time_s)]);
+    let (forcing, state) = (model.forcing(N(time_s)), state.map(N));
     let (radial, channels) =
-        model.observe(&model.forcing(N(time_s)), &state.map(N), &[N(0.0); STATES], true);
+        model.observe(&forcing, &state, &model.derivative(&forcing, &state), true);
     let gap_m = point.machine.bodies.clearance.0 - squared(&radial).value.0.sqrt();
-    (channels.map_or([f64::NAN; CHANNELS], |channels| channels.map(|sample| sample.value.0)), gap_m)
+    let of = |take: fn(&Sampled<f64>) -> N<f64>| {
+        channels.map_or([f64::NAN; CHANNELS], |channels| channels.map(|sample| take(&sample).0))
+    };
+    ([of(|it| it.value), of(|it| it.slope), of(|it| it.curvature)], gap_m)
 }
 
 struct Sample<'a, F> {

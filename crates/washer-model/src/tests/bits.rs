@@ -62,6 +62,8 @@ fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
         walk_margin_n,
         damper_speeds_m_per_s,
         course,
+        // Compared by `run/snapshots.rs`.
+        snapshots: _,
     } = extra;
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
     bits.extend(course.iter().flatten().map(|q| q.to_bits()));

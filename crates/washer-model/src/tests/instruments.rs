@@ -20,6 +20,7 @@ pub(super) const EVERYTHING: Wanted = Wanted {
     feet: true,
     damper_speeds: true,
     course: true,
+    snapshots: true,
 };
 
 /// Fig. 12's spin.

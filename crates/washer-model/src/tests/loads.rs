@@ -21,6 +21,7 @@ const WANTED: Wanted = Wanted {
     feet: true,
     damper_speeds: true,
     course: false,
+    snapshots: false,
 };
 
 fn on_feet(mut machine: Machine) -> Machine {

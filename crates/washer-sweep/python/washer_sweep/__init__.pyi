@@ -24,6 +24,7 @@ __all__ = [
     "__version__",
     "dwell",
     "explain",
+    "fit",
     "modes",
     "optimise",
     "parameters",
@@ -92,14 +93,15 @@ class Plan:
         at: Mapping[str, float] | None = None,
         *,
         every: float = 0.01,
+        rates: bool = False,
         states: bool = False,
         forces: bool = False,
         start: Mapping[str, float] | None = None,
     ) -> Result:
         """Time histories of both models at one point, every `every` s.
 
-        `at` gives a value to each axis, and to any other parameter. `states` adds the ten
-        coordinates and their speeds, `forces` those of springs, dampers, stops and bushings, and
+        `at` gives a value to each axis, and to any other parameter. `rates` adds rates and
+        accelerations of the channels, `states` the ten coordinates and their speeds, `forces` those of springs, dampers, stops and bushings, and
         what the feet carry. `start` begins away from equilibrium: q1 to q10 (m, rad), u1 to u10
         (per s). Warns of a model that failed; its values are null from there on.
         """
@@ -162,7 +164,7 @@ class Result:
     def kind(
         self,
     ) -> Literal[
-        "map", "boundary", "trace", "modes", "stability", "dwell", "study", "differences"
+        "map", "boundary", "trace", "modes", "stability", "dwell", "fit", "study", "differences"
     ]: ...
     @property
     def plan(self) -> dict[str, Any]:
@@ -256,6 +258,27 @@ def explain(
     `at` gives a value to each axis, and to any other parameter. `speeds_rpm` are even speeds to
     look at; by default each rpm from half of the slowest mode's frequency to the fastest speed of
     the run.
+    """
+
+def fit(
+    plan: Plan,
+    table: ArrowStream | Mapping[str, ArrayLike] | list[ArrowStream | Mapping[str, ArrayLike]],
+    free: Sequence[str],
+    *,
+    own: Sequence[str] = (),
+    at: Mapping[str, float] | list[Mapping[str, float]] | None = None,
+    linear: bool = False,
+    shift: bool = True,
+    starts: int = 1,
+    bootstrap: int = 0,
+    draws: int = 64,
+    threads: int | None = None,
+) -> Explanation:
+    """The numbers of the plan's machine that make it follow a measured run-up, or several.
+
+    A table has `time_s`, perhaps `speed_rpm`, and channels with their units, such as
+    `tub_front_y_m_per_s2`; NaN where no sample is. `free` are names, or `name=from:to`; every table
+    has its `own`, and its constants in `at`. The keys are those of `sweep fit --json`.
     """
 
 def parameters(plan: Plan | None = None) -> list[Parameter]:

@@ -1,4 +1,4 @@
-"""What `explain` returns."""
+"""What `explain` and `fit` return."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 
 class Explanation(dict[str, Any]):
-    """What was found at a point: the keys of `sweep explain --json`.
+    """What was found: the keys of `sweep explain --json`, or of `sweep fit --json`.
 
-    As text, and in a notebook, it is what `sweep explain` prints.
+    As text, and in a notebook, it is what the command prints.
     """
 
     text: str

@@ -13,6 +13,7 @@ use super::{ID, ListColumn, MOST_COLUMNS, Unreadable, fits};
 pub(super) fn read(
     text: &str,
     source: SourceId,
+    gaps: bool,
     report: &Report,
 ) -> Result<Option<(Vec<ListColumn>, Vec<u32>)>, Unreadable> {
     let mut columns: Vec<ListColumn> = Vec::new();
@@ -60,6 +61,10 @@ pub(super) fn read(
             if column.name.value == ID {
                 // Whatever it says; a number holds its place.
                 column.values.push(0.0);
+                continue;
+            }
+            if gaps && cell.is_empty() {
+                column.values.push(f64::NAN);
                 continue;
             }
             if let Ok(value) = cell.parse::<f64>() {

@@ -20,13 +20,13 @@ pub(super) const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
 /// Rows that are decoded at a time.
 const BATCH_ROWS: usize = 8192;
 
-/// Names and values of the columns.
-pub(super) fn columns(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
+/// Names and values of the columns. With `gaps`, a null is NaN.
+pub(super) fn columns(bytes: Vec<u8>, gaps: bool) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
     let panicked = |panic| Err(Unreadable::Damaged(format!("it makes no sense inside: {panic}")));
-    panics::caught(|| read(bytes.into())).unwrap_or_else(panicked)
+    panics::caught(|| read(bytes.into(), gaps)).unwrap_or_else(panicked)
 }
 
-fn read(bytes: Bytes) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
+fn read(bytes: Bytes, gaps: bool) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
     footer::check(&mut Cursor::new(&bytes)).map_err(refused)?;
     let builder = ParquetRecordBatchReaderBuilder::try_new(bytes.clone()).map_err(damaged)?;
     let fields = builder.schema().fields().clone();
@@ -48,6 +48,7 @@ fn read(bytes: Bytes) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
             let numbers = cells::numbers(array).map_err(|error| damaged(error.into()))?;
             for (k, value) in numbers.into_iter().enumerate() {
                 let no_value = || Unreadable::NoValue { column: name.clone(), row: rows + k + 1 };
+                let value = if gaps { value.or(Some(f64::NAN)) } else { value };
                 values.push(value.ok_or_else(no_value)?);
             }
         }

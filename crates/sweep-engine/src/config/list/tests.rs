@@ -47,17 +47,17 @@ fn small(codec: Compression, version: WriterVersion) -> Vec<u8> {
 }
 
 fn refusal(bytes: Vec<u8>) -> String {
-    parquet::columns(bytes).expect_err("not a list").to_string()
+    parquet::columns(bytes, false).expect_err("not a list").to_string()
 }
 
 #[test]
 fn every_usual_compression_reads_alike() {
     let plain = small(Compression::UNCOMPRESSED, WriterVersion::PARQUET_1_0);
-    let plain = parquet::columns(plain).unwrap();
+    let plain = parquet::columns(plain, false).unwrap();
     assert_eq!((plain[0].1[49], plain[1].1[6]), (0.1 + 0.001 * 49.0, 26.0));
     for codec in readable() {
         for version in [WriterVersion::PARQUET_1_0, WriterVersion::PARQUET_2_0] {
-            let read = parquet::columns(small(codec, version));
+            let read = parquet::columns(small(codec, version), false);
             assert_eq!(read.unwrap(), plain, "{codec}, {version:?}");
         }
     }
@@ -102,13 +102,16 @@ fn damage_is_an_error_or_another_list_and_nothing_else() {
     for codec in readable() {
         let whole = small(codec, WriterVersion::PARQUET_2_0);
         for length in (0..whole.len()).step_by(7) {
-            assert!(parquet::columns(whole[..length].to_vec()).is_err(), "{codec}: {length} bytes");
+            assert!(
+                parquet::columns(whole[..length].to_vec(), false).is_err(),
+                "{codec}: {length} bytes"
+            );
         }
         for at in 0..whole.len() {
             for bit in [0, 3, 7] {
                 let mut flipped = whole.clone();
                 flipped[at] ^= 1 << bit;
-                if let Ok(columns) = parquet::columns(flipped) {
+                if let Ok(columns) = parquet::columns(flipped, false) {
                     assert!(columns.iter().all(|(_, values)| values.len() as u64 <= MOST_NUMBERS));
                 }
             }
@@ -119,7 +122,7 @@ fn damage_is_an_error_or_another_list_and_nothing_else() {
 fn csv_of(text: &str) -> Result<Option<(Vec<ListColumn>, Vec<u32>)>, Unreadable> {
     let report = Report::default();
     let source = report.add("list.csv", String::new());
-    csv::read(text, source, &report)
+    csv::read(text, source, false, &report)
 }
 
 #[test]
@@ -137,7 +140,7 @@ fn a_row_of_too_many_numbers_is_one_mistake() {
     let report = Report::default();
     let source = report.add("list.csv", String::new());
     let text = format!("a,b\n{}\n1,2\n", ",".repeat(100_000_000));
-    assert!(csv::read(&text, source, &report).unwrap().is_none());
+    assert!(csv::read(&text, source, false, &report).unwrap().is_none());
     assert_eq!(report.into_diagnostics().count(), 1);
 }
 

@@ -1,0 +1,60 @@
+//! How the cost of a fit rises on both sides of each fitted number, the others fitted again.
+
+use serde_json::Value;
+
+use crate::chart::{Chart, ChartPanel, Series, Style};
+use crate::colour::DISTINCT;
+use crate::error::PlotError;
+use crate::label::{self, Label};
+use crate::scene::MUTED;
+use crate::table::Table;
+
+/// The cost at either end of a 95 % interval, above the least.
+const AT_95: f64 = 3.84;
+
+/// The chart of a fit's curves.
+///
+/// # Errors
+/// [`PlotError::Empty`] for a file that has no profiles.
+pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+    let empty = || PlotError::Empty {
+        path: table.source.path.clone(),
+        reason: "it has no profiles: they are in the curves of `sweep fit`, if the model follows",
+    };
+    let numbers = |of: &Value| -> Vec<f64> {
+        of.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
+    };
+    let profiles = table.source.find("profiles").and_then(Value::as_array).ok_or_else(empty)?;
+    let grid = profiles.first().map(|profile| numbers(&profile["deviations"]));
+    let grid = grid.filter(|grid| grid.len() > 1).ok_or_else(empty)?;
+    let series = profiles.iter().enumerate().map(|(k, profile)| {
+        let name = label::words(profile["name"].as_str().unwrap_or_default());
+        let y = numbers(&profile["cost_above"]);
+        Series { name, colour: DISTINCT[k % 6], grid: 0, y, style: Style::Solid(1.8) }
+    });
+    let parabola = grid.iter().map(|deviation| deviation * deviation).collect();
+    let parabola = Series {
+        name: "by the standard errors".to_owned(),
+        colour: MUTED,
+        grid: 0,
+        y: parabola,
+        style: Style::Dashed,
+    };
+    let series = series.chain([parabola]).collect();
+    let panel = ChartPanel {
+        levels: vec![(AT_95, "95 %".to_owned())],
+        ..ChartPanel::new("cost", Label::new("Cost above the least", ""), series)
+    };
+    Ok(Chart {
+        title: "How well the fitted numbers are known".to_owned(),
+        subtitle: table.source.subtitle("each moved, the others fitted again"),
+        x_label: Label::new("Distance from the fitted number in standard errors", ""),
+        x_log: false,
+        grids: vec![grid],
+        panels: vec![panel],
+        marks: Vec::new(),
+        mark_meaning: String::new(),
+        shades: Vec::new(),
+        shade_meaning: String::new(),
+    })
+}

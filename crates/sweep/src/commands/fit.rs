@@ -1,0 +1,190 @@
+//! `sweep fit GRID.toml MEASURED.csv --free NAME,...`: the numbers that make the model follow a
+//! measurement.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::PoisonError;
+
+use crate::config::{self, GridInput};
+use crate::fit::{self, FitOptions, Measured, Work};
+use sweep_engine::commands::examples::Examples;
+use sweep_engine::commands::grid::GridArgs;
+use sweep_engine::exit::{Error, Exit, show, tell};
+use sweep_engine::interrupt::Interrupt;
+use sweep_engine::progress::{Progress, ProgressMode};
+use sweep_engine::store::StoreError;
+use sweep_engine::threads;
+use sweep_files::{self as files, FileKind, atomic};
+
+/// Shown by `--help`.
+pub(super) const EXAMPLES: Examples = &[
+    [
+        "sweep fit my.toml run.csv --free unbalance_mass_kg,damping_n_s_per_m --out bench.toml",
+        "the machine on the bench, as a machine file",
+    ],
+    [
+        "sweep fit my.toml a.csv b.csv@unbalance_mass_kg=0.6 --free damping_n_s_per_m",
+        "two runs with loads of their own",
+    ],
+    [
+        "sweep fit my.toml run.csv --free damping_n_s_per_m,friction_n=0:100 --starts 24 --json",
+        "every minimum that two dozen starts lead to, for programs",
+    ],
+];
+
+/// Arguments of `sweep fit`.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = LONG)]
+pub struct Args {
+    #[command(flatten)]
+    grid: GridArgs,
+    /// Measured run: a CSV or Parquet file of time_s, perhaps speed_rpm, and channels with their
+    /// units; after @ constants of its own
+    #[arg(value_name = "FILE[@NAME=VALUE,...]", required = true)]
+    measured: Vec<String>,
+    /// Parameters to fit, each perhaps between two values; separated by commas
+    #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
+    free: Vec<String>,
+    /// Parameters of which every file has its own
+    #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
+    own: Vec<String>,
+    /// Fit the nonlinear model, or the linear one
+    #[arg(long, value_name = "MODEL", default_value = "nonlinear")]
+    #[arg(value_parser = ["nonlinear", "linear"])]
+    model: String,
+    /// Take the clock of every file as it is, instead of fitting a shift of it
+    #[arg(long)]
+    no_shift: bool,
+    /// Starts that are looked at for further minima
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    starts: u32,
+    /// Fit again so many times with resampled residuals
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    bootstrap: u32,
+    /// Rows of the map over the fitted distribution, for the verdict's probability; 0 for no verdict
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    draws: u32,
+    /// Machine file to write
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// File of curves to write, for `sweep plot`: measured, model and residual, and profiles; of
+    /// further files under -2 and so on
+    #[arg(long, value_name = "FILE")]
+    curves: Option<PathBuf>,
+    /// Print everything as JSON
+    #[arg(long)]
+    json: bool,
+    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    threads: Option<usize>,
+    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
+    /// 5 s) or none
+    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
+    progress: ProgressMode,
+}
+
+/// What `--help` adds.
+const LONG: &str = "\
+Columns are channels of `sweep trace` with their units: tub_front_y_m, tub_yaw_rad, rates \
+(tub_yaw_rad_per_s), accelerations (tub_front_y_m_per_s2), cabinet_force_y_n. A missing sample is \
+empty. The run begins at time 0, at rest; with speed_rpm the spin is the measured one, else the \
+grid's. An offset of every column is fitted beside the parameters.
+
+With --out, what an interrupted fit has found out stays in FILE.partial, and the same command goes \
+on from there. docs/fit.md explains every line.";
+
+/// Fits, and prints.
+///
+/// # Errors
+/// Mistakes in the grid file, the measurements or the options; data that cannot tell; and a machine
+/// file that cannot be written.
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+    let grid = GridInput::file(args.grid.grid.clone(), args.grid.sets());
+    let mut cases = Vec::new();
+    for text in &args.measured {
+        let (path, constants) = parted(text);
+        cases.push(fit::case(&grid, &constants, Measured::read(path)?)?);
+    }
+    let options = FitOptions {
+        free: args.free.clone(),
+        own: args.own.clone(),
+        linear: args.model == "linear",
+        with_shift: !args.no_shift,
+        starts: args.starts as usize,
+        bootstrap: args.bootstrap as usize,
+        draws: u64::from(args.draws),
+    };
+    if let Some(path) = args.out.as_ref().filter(|path| path.exists()) {
+        let source = ErrorKind::AlreadyExists.into();
+        return Err(Error::File { action: "write", path: path.clone(), source });
+    }
+    let count = if args.curves.is_some() { cases.len() } else { 0 };
+    let curves: Vec<PathBuf> =
+        (0..count).filter_map(|case| Some(numbered(args.curves.as_ref()?, case))).collect();
+    for path in &curves {
+        files::ready(atomic::parent(path))?;
+        files::judge(path, FileKind::Fit)?;
+    }
+    let interrupt = Interrupt::install().map_err(Error::signals)?;
+    let progress = Mutex::new(Progress::of_search(args.progress, 1, 0));
+    let seen = |made: usize| {
+        progress.lock().unwrap_or_else(PoisonError::into_inner).show_search(0, made as u64);
+    };
+    let journal = args.out.as_ref().map(|out| {
+        let mut name = out.as_os_str().to_owned();
+        name.push(".partial");
+        PathBuf::from(name)
+    });
+    let stop = || interrupt.stopped();
+    let work = Work { stop: &stop, seen: &seen, journal };
+    let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
+    let found = threads::pool(threads)?.install(|| fit::fit(cases, &options, &work))?;
+    progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+    let Some(fitted) = found else {
+        tell("interrupted: with --out, what was found out is kept, and the same command goes on");
+        return Ok(Exit::interrupted(interrupt.signal()));
+    };
+    if let Some(path) = &args.out {
+        let (machine, _) = fitted.problem.machine(0, &fitted.x);
+        let text = config::machine_file(&machine);
+        if !atomic::create(atomic::parent(path), path, text.as_bytes())? {
+            let source = ErrorKind::AlreadyExists.into();
+            return Err(Error::File { action: "write", path: path.clone(), source });
+        }
+        tell(&format!("wrote {}", path.display()));
+    }
+    for (case, path) in curves.iter().enumerate() {
+        let bytes = fitted.curves(case, &stop).into_bytes();
+        let bytes = bytes.map_err(StoreError::parquet("write", path))?;
+        files::write(path, FileKind::Fit, &bytes)?;
+        tell(&format!("wrote {0}; next: sweep plot {0}", path.display()));
+    }
+    match args.json {
+        true => show(&format!("{:#}\n", serde_json::json!(fitted.report))),
+        false => show(&fitted.report.text()),
+    }
+}
+
+/// The file of curves of a case: the first has the name itself.
+fn numbered(path: &Path, case: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    match case {
+        0 => path.to_owned(),
+        _ => path.with_file_name(format!("{stem}-{}.{ending}", case + 1)),
+    }
+}
+
+/// A file and the constants after its name; a file whose own name has an @ is taken as it is.
+fn parted(text: &str) -> (&Path, Vec<String>) {
+    match text.rsplit_once('@') {
+        Some((path, constants)) if !Path::new(text).exists() => {
+            (Path::new(path), constants.split(',').map(str::to_owned).collect())
+        }
+        _ => (Path::new(text), Vec::new()),
+    }
+}

@@ -1,0 +1,487 @@
+//! `sweep fit`: the numbers that make the model follow a measurement, how well they are known, and
+//! what the map says of that machine.
+//!
+//! `measured` and `speed` read a measurement. `model` compares it with the model and its
+//! derivatives, `search` finds the least cost, `statistics` says how well the numbers are known,
+//! and `report` holds all of it. `journal` keeps what a fit has found out.
+
+mod algebra;
+mod curves;
+mod iso18571;
+mod journal;
+mod measured;
+mod model;
+mod report;
+mod search;
+mod speed;
+mod statistics;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+use washer_model::{Method, ModelKind, Parameter, Target};
+
+use crate::config::GridInput;
+use crate::engine::simd_from_environment;
+use sweep_engine::config::Diagnostics;
+use sweep_engine::config::report::{Diagnostic, Report as Mistakes};
+use sweep_engine::config::source::Location;
+use sweep_engine::design::{Design, Distribution, Shape};
+use sweep_engine::exit::{Error, tell};
+
+use algebra::Symmetric;
+use journal::Journal;
+pub(crate) use measured::Measured;
+use model::{Against, Case, Free, Problem, Summary};
+pub(crate) use report::Report;
+use search::{Descent, Stopped, descend};
+use statistics::Statistics;
+
+/// Shares of a start between which further starts lie, where no range is given.
+const AROUND: [f64; 2] = [0.3, 1.7];
+/// Starts from which a descent begins, of all that are looked at.
+const DESCENTS: usize = 3;
+/// Seed of all draws.
+const SEED: u64 = 1;
+/// Half the step may move no number by more than this share of its standard error.
+const STEP_EFFECT: f64 = 0.3;
+/// How often the step is halved.
+const HALVINGS: usize = 2;
+
+/// What is asked of a fit.
+#[derive(Clone, Debug)]
+pub struct FitOptions {
+    /// Parameters to fit: `NAME` or `NAME=FROM:TO`.
+    pub free: Vec<String>,
+    /// Parameters of which every measurement has its own.
+    pub own: Vec<String>,
+    /// The linear model instead of the nonlinear one.
+    pub linear: bool,
+    /// Whether each measurement's clock may be off.
+    pub with_shift: bool,
+    /// How many starts are looked at.
+    pub starts: usize,
+    /// How many times the fit is repeated with resampled residuals.
+    pub bootstrap: usize,
+    /// Rows of the map over the fitted distribution; none if 0.
+    pub draws: u64,
+}
+
+/// Why there is no fit.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+enum FitError {
+    #[error("{unknowns} unknowns for {samples} samples: expected more samples, or fewer `--free`")]
+    TooFew { unknowns: usize, samples: usize },
+    #[error(
+        "the measurement does not depend on {0}: expected another channel, or to leave it out of \
+         `--free`"
+    )]
+    NoInfluence(String),
+    #[error(
+        "the model does not get through the record at the starting values: expected a start from \
+         which it does (`--set NAME=VALUE`)"
+    )]
+    NoAnswer,
+}
+
+/// A fit that was made.
+pub(crate) struct Fitted {
+    pub(crate) problem: Problem,
+    pub(crate) x: Vec<f64>,
+    against: Vec<Against>,
+    pub(crate) report: Report,
+}
+
+/// How a fit goes about its work.
+pub(crate) struct Work<'a> {
+    /// Ends it early; what comes then means nothing.
+    pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
+    /// Hears of every evaluation: how many there were.
+    pub(crate) seen: &'a (dyn Fn(usize) + Sync),
+    /// Where answers are kept.
+    pub(crate) journal: Option<PathBuf>,
+}
+
+/// The cases of a fit: each measurement with the grid and its own constants.
+///
+/// # Errors
+/// Mistakes in the grid and the constants. An axis without a constant stands at its middle.
+pub(crate) fn case(
+    grid: &GridInput,
+    constants: &[String],
+    measured: Measured,
+) -> Result<Case, Error> {
+    let (plan, _) = grid.load_point(&[&middle(grid, constants)?, constants].concat())?;
+    let smoothed = measured.speed_rpm.as_ref();
+    let smoothed = smoothed.and_then(|speed| speed::smoothed(&measured.time_s, speed));
+    Ok(Case { plan, measured, smoothed })
+}
+
+/// A value for every axis of several that has no constant.
+fn middle(grid: &GridInput, constants: &[String]) -> Result<Vec<String>, Diagnostics> {
+    let plan = grid.load()?;
+    let is_given = |name: &str| constants.iter().any(|it| it.split('=').next() == Some(name));
+    let several =
+        plan.axes.iter().filter(|axis| axis.values.len() > 1 && !is_given(axis.parameter.name()));
+    let value = |axis: &crate::plan::Axis| {
+        let [from, to] = axis.values.extremes().map(|k| axis.values.value(k));
+        format!("{}={}", axis.parameter.name(), 0.5 * (from + to))
+    };
+    Ok(several.map(value).collect())
+}
+
+/// The free numbers as they are asked for.
+fn free(options: &FitOptions, cases: &[Case]) -> Result<Vec<Free>, Diagnostics> {
+    let mistakes = Mistakes::default();
+    let mut found: Vec<Free> = Vec::new();
+    let shared = options.free.iter().map(|text| (text, "--free", 1));
+    let own = options.own.iter().map(|text| (text, "--own", cases.len()));
+    for (text, option, count) in shared.chain(own) {
+        let source = mistakes.add(option, text.as_str());
+        let (name, range) = match text.split_once('=') {
+            Some((name, range)) => (name.trim(), Some(range)),
+            None => (text.trim(), None),
+        };
+        let at = Location::new(source, 0..text.len());
+        let refuse = |title: String, expected: &str| {
+            mistakes.push(Diagnostic::new(title).at(&at, expected));
+        };
+        for k in 0..count {
+            let model = &cases[k].plan.model;
+            let spin = cases[k].spin();
+            let parameter = match Parameter::find(name, &model.machine, spin) {
+                Ok(parameter) if !matches!(parameter.target(), Target::Window(_)) => parameter,
+                Ok(_) => {
+                    refuse(format!("`{name}` is no number of the machine"), "expected another");
+                    break;
+                }
+                Err(error) => {
+                    let known = Parameter::all(&model.machine, spin);
+                    let title = format!("`{name}` cannot be fitted: {error}");
+                    let refusal = Diagnostic::new(title).at(&at, "expected a parameter");
+                    mistakes.push(refusal.nearest(name, known.iter().map(|known| known.name())));
+                    break;
+                }
+            };
+            if found.iter().any(|free| free.parameter == parameter && count == 1) {
+                refuse(format!("`{name}` is free twice"), "expected each once");
+                break;
+            }
+            let least = match parameter.range() {
+                washer_model::Range::Within(from, to) => [from, to],
+                washer_model::Range::NonNegative | washer_model::Range::Positive => {
+                    [0.0, f64::INFINITY]
+                }
+                washer_model::Range::Negative => [f64::NEG_INFINITY, 0.0],
+                washer_model::Range::Any => [f64::NEG_INFINITY, f64::INFINITY],
+            };
+            let parsed = range.map(|range| {
+                let (from, to) = range.split_once(':')?;
+                let (from, to) = (from.trim().parse().ok()?, to.trim().parse().ok()?);
+                let within = least[0] <= from && from < to && to <= least[1];
+                (within && f64::is_finite(from) && f64::is_finite(to)).then_some([from, to])
+            });
+            let range = match parsed {
+                Some(Some(range)) => range,
+                Some(None) => {
+                    let title = format!("`{text}` is no range");
+                    refuse(title, "expected NAME=FROM:TO with FROM below TO, both allowed");
+                    break;
+                }
+                None => least,
+            };
+            let known = parameter.get(&model.machine, spin);
+            let inside = known.filter(|value| (range[0]..=range[1]).contains(value));
+            let bounded = range.iter().all(|end| end.is_finite()) && parsed.is_some();
+            let start = match inside {
+                Some(value) if value != 0.0 || bounded => value,
+                _ if bounded => 0.5 * (range[0] + range[1]),
+                _ => {
+                    let title = format!("`{name}` has no value to start from");
+                    refuse(title, "expected a range, NAME=FROM:TO, or a value by --set");
+                    break;
+                }
+            };
+            let case = (option == "--own").then_some(k);
+            found.push(Free { parameter, range, start, case });
+        }
+    }
+    mistakes.finish(found)
+}
+
+/// Fits; `None` if it was stopped. On all threads of the rayon pool it is called in.
+///
+/// # Errors
+/// Mistakes in the options; data that cannot tell; a model that does not get through.
+pub(crate) fn fit(
+    cases: Vec<Case>,
+    options: &FitOptions,
+    work: &Work<'_>,
+) -> Result<Option<Fitted>, Error> {
+    let free = free(options, &cases)?;
+    let method = Problem::method(&cases).map_err(Error::model)?;
+    let model = if options.linear { ModelKind::Linear } else { ModelKind::Nonlinear };
+    let simd = simd_from_environment()?;
+    let with_shift = options.with_shift;
+    let mut problem = Problem { cases, free, model, with_shift, method, simd };
+    let samples: usize = problem.cases.iter().map(|case| case.measured.count()).sum();
+    let unknowns = problem.unknowns() + problem.signals().count();
+    if unknowns >= samples {
+        return Err(Error::model(FitError::TooFew { unknowns, samples }));
+    }
+    let journal = work.journal.as_deref();
+    let journal = journal.map(|path| open(path, &problem)).transpose()?;
+    let made = AtomicUsize::new(0);
+    let search = Search { problem: &problem, journal: journal.as_ref(), work, made: &made };
+    let Ok(minima) = search.minima(options.starts) else { return Ok(None) };
+    let mut minima = minima.map_err(Error::model)?;
+    if minima.is_empty() {
+        return Err(Error::model(FitError::NoAnswer));
+    }
+    let mut best = minima[0].clone();
+    let mut step_effect = None;
+    // A step too long for the forces' corners shows in the numbers: then it is halved.
+    for _ in 0..=HALVINGS {
+        let Method::Rk4 { step_s } = problem.method else { break };
+        let Some(against) = problem.against(&best.x, work.stop) else { return Ok(None) };
+        let bread = algebra::inverse(&best.summary.normal);
+        problem.method = Method::Rk4 { step_s: 0.5 * step_s };
+        let Some(finer) = problem.against(&best.x, work.stop) else { return Ok(None) };
+        let moved = effect(&best.summary, &against, &finer, &bread);
+        step_effect = Some(moved);
+        if moved < STEP_EFFECT {
+            problem.method = Method::Rk4 { step_s };
+            break;
+        }
+        let search = Search { problem: &problem, journal: None, work, made: &made };
+        match search.from(&best.x) {
+            Ok(Some(found)) => best = found,
+            Ok(None) => return Err(Error::model(FitError::NoAnswer)),
+            Err(Stopped) => return Ok(None),
+        }
+        minima[0] = best.clone();
+    }
+    let evaluations = made.load(Ordering::Relaxed);
+    let Some(against) = problem.against(&best.x, work.stop) else { return Ok(None) };
+    let statistics = Statistics::of(&problem, &against, &best.summary);
+    let repeated = match options.bootstrap {
+        0 => None,
+        count => match bootstrap(&mut problem, &best.x, &against, count, work) {
+            Some(repeated) => Some(repeated),
+            None => return Ok(None),
+        },
+    };
+    let found = report::Found {
+        problem: &problem,
+        minima: &minima,
+        against: &against,
+        statistics: &statistics,
+        evaluations,
+        step_effect,
+        repeated: repeated.as_deref(),
+    };
+    let report = found.report(options.draws, work.stop)?;
+    if (work.stop)() {
+        return Ok(None);
+    }
+    if let Some(journal) = journal {
+        journal.complete();
+    }
+    Ok(Some(Fitted { problem, x: best.x, against, report }))
+}
+
+/// The journal of a problem.
+fn open(path: &Path, problem: &Problem) -> Result<Journal, Error> {
+    let mut hasher = blake3::Hasher::new();
+    for case in &problem.cases {
+        hasher.update(case.plan.to_json().to_string().as_bytes());
+        hasher.update(format!("{:?}", case.measured).as_bytes());
+    }
+    let further = (&problem.free, problem.model, problem.with_shift, problem.method);
+    hasher.update(format!("{further:?} {:?}", crate::identity::BUILD).as_bytes());
+    let journal = Journal::open(path, hasher.finalize());
+    let refused = |source| Error::File { action: "write", path: path.to_owned(), source };
+    let journal = journal.map_err(refused)?;
+    if journal.count() > 0 {
+        tell(&format!("going on: {} evaluations are there", journal.count()));
+    }
+    Ok(journal)
+}
+
+/// By how many standard errors a finer integration would move the number that it moves most.
+fn effect(summary: &Summary, rough: &[Against], fine: &[Against], bread: &[Vec<f64>]) -> f64 {
+    let n = bread.len();
+    let mut pull = vec![0.0; n];
+    for ((rough, fine), sigma) in rough.iter().zip(fine).zip(&summary.sigma) {
+        let apart: Vec<f64> =
+            fine.residual.iter().zip(&rough.residual).map(|(fine, rough)| fine - rough).collect();
+        for (pull, slope) in pull.iter_mut().zip(&rough.slopes) {
+            *pull += algebra::dot(slope, &apart) / (sigma * sigma);
+        }
+    }
+    let moved = |k: usize| algebra::dot(&bread[k], &pull).abs() / bread[k][k].sqrt();
+    (0..n).filter(|&k| bread[k][k] > 0.0).map(moved).fold(0.0, f64::max)
+}
+
+/// The fit again and again, with its residuals resampled in blocks longer than they are correlated:
+/// the free numbers of each; `None` if it was stopped.
+fn bootstrap(
+    problem: &mut Problem,
+    x: &[f64],
+    against: &[Against],
+    count: usize,
+    work: &Work<'_>,
+) -> Option<Vec<Vec<f64>>> {
+    const BLOCK: usize = 100;
+    let measured: Vec<Vec<f64>> = problem.signals().map(|(.., it)| it.values.clone()).collect();
+    let draw = Design::MonteCarlo { points: 0, seed: SEED };
+    let mut drawn = 0;
+    let mut found = Vec::with_capacity(count);
+    for _ in 0..count {
+        for (k, one) in against.iter().enumerate() {
+            let residual = &one.residual;
+            let mut resampled = Vec::with_capacity(residual.len() + BLOCK);
+            while resampled.len() < residual.len() {
+                let place = draw.place(drawn, 0).unwrap_or(0.5);
+                drawn += 1;
+                let first = (place * residual.len() as f64) as usize;
+                resampled.extend((first..first + BLOCK).map(|i| residual[i % residual.len()]));
+            }
+            let signal = &mut problem.cases[one.case].measured.signals[one.signal];
+            let rows: Vec<usize> = signal.samples().map(|(row, _)| row).collect();
+            for (row, residual) in rows.into_iter().zip(resampled) {
+                signal.values[row] = one.model[row] + one.offset + residual;
+            }
+            debug_assert_eq!(measured[k].len(), one.model.len());
+        }
+        let made = AtomicUsize::new(0);
+        let search = Search { problem, journal: None, work, made: &made };
+        let again = search.from(x).ok()?;
+        found.extend(again.map(|again| again.x[..problem.free.len()].to_vec()));
+    }
+    let places: Vec<(usize, usize)> = against.iter().map(|one| (one.case, one.signal)).collect();
+    for ((case, signal), values) in places.into_iter().zip(measured) {
+        problem.cases[case].measured.signals[signal].values = values;
+    }
+    Some(found)
+}
+
+/// A search for the least cost of a problem.
+struct Search<'a> {
+    problem: &'a Problem,
+    journal: Option<&'a Journal>,
+    work: &'a Work<'a>,
+    /// How many evaluations were made.
+    made: &'a AtomicUsize,
+}
+
+impl Search<'_> {
+    fn evaluate(&self, x: &[f64]) -> Result<Option<Summary>, Stopped> {
+        let find = || {
+            let found = self.problem.against(x, self.work.stop);
+            if (self.work.stop)() {
+                return Err(Stopped);
+            }
+            Ok(found.map(|against| self.problem.summary(&against)))
+        };
+        let found = match self.journal {
+            Some(journal) => journal.answer(x, find),
+            None => find(),
+        }?;
+        (self.work.seen)(1 + self.made.fetch_add(1, Ordering::Relaxed));
+        Ok(found)
+    }
+
+    /// The descent from a start.
+    fn from(&self, start: &[f64]) -> Result<Option<Descent>, Stopped> {
+        let ranges: Vec<[f64; 2]> =
+            (0..self.problem.unknowns()).map(|k| self.problem.range(k)).collect();
+        descend(start, &ranges, &|x| self.evaluate(x))
+    }
+
+    /// Every minimum that is found from so many starts, the least first.
+    fn minima(&self, starts: usize) -> Result<Result<Vec<Descent>, FitError>, Stopped> {
+        let start = self.problem.start();
+        if let Some(summary) = self.evaluate(&start)? {
+            let dead = |k: &usize| summary.normal[*k][*k] == 0.0;
+            let dead: Vec<&str> = (0..self.problem.free.len())
+                .filter(dead)
+                .map(|k| self.problem.free[k].parameter.name())
+                .collect();
+            if !dead.is_empty() {
+                return Ok(Err(FitError::NoInfluence(dead.join(", "))));
+            }
+        }
+        let mut chosen = vec![start.clone()];
+        if starts > 1 {
+            let design = Design::LatinHypercube { points: starts as u64 - 1, seed: SEED };
+            let place = |point: u64, k: usize| {
+                let free = &self.problem.free[k];
+                let around = AROUND.map(|share| share * free.start);
+                let ends = free.range.iter().zip(around);
+                let ends: Vec<f64> =
+                    ends.map(|(end, near)| if end.is_finite() { *end } else { near }).collect();
+                let bounded = free.range.iter().all(|end| end.is_finite());
+                let [from, to] =
+                    if bounded { free.range } else { [around[0].max(ends[0]), around[1]] };
+                from + design.place(point, k).unwrap_or(0.5) * (to - from)
+            };
+            let sets: Vec<Vec<f64>> = (0..starts as u64 - 1)
+                .map(|point| {
+                    let mut x = start.clone();
+                    (0..self.problem.free.len()).for_each(|k| x[k] = place(point, k));
+                    x
+                })
+                .collect();
+            let costs = self.problem.costs(&sets, self.work.stop);
+            let mut order: Vec<usize> = (0..sets.len()).filter(|&k| costs[k].is_finite()).collect();
+            order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+            chosen.extend(order.into_iter().take(DESCENTS - 1).map(|k| sets[k].clone()));
+        }
+        let ended: Vec<_> = chosen.par_iter().map(|start| self.from(start)).collect();
+        let mut minima: Vec<Descent> = Vec::new();
+        for descent in ended {
+            minima.extend(descent?);
+        }
+        minima.sort_by(|a, b| a.summary.cost.total_cmp(&b.summary.cost));
+        let mut apart: Vec<Descent> = Vec::new();
+        for minimum in minima {
+            if !apart.iter().any(|other| self.is_same(other, &minimum)) {
+                apart.push(minimum);
+            }
+        }
+        Ok(Ok(apart))
+    }
+
+    /// Whether two descents ended in one minimum: within a few standard errors, or a thousandth.
+    fn is_same(&self, a: &Descent, b: &Descent) -> bool {
+        let bread = algebra::inverse(&a.summary.normal);
+        (0..self.problem.free.len()).all(|k| {
+            let reach = (5.0 * bread[k][k].max(0.0).sqrt()).max(1e-3 * a.x[k].abs());
+            (a.x[k] - b.x[k]).abs() <= reach
+        })
+    }
+}
+
+/// Free numbers drawn from the fitted distribution, evenly spread, each within its range.
+fn draws(problem: &Problem, x: &[f64], covariance: &[Vec<f64>], count: u64) -> Vec<Vec<f64>> {
+    let design = Design::LatinHypercube { points: count, seed: SEED };
+    let shape = Shape::Normal { mean: 0.0, sd: 1.0 };
+    let normal = Distribution { shape, from: -6.0, to: 6.0 };
+    let (unit, scale) = algebra::scaled(covariance);
+    let eigen = Symmetric::of(&unit);
+    let draw = |point: u64| {
+        let places = (0..scale.len()).map(|k| design.place(point, k).unwrap_or(0.5));
+        let even: Vec<f64> = places.map(|place| normal.quantile(place)).collect();
+        let moved = eigen.apply(&even, |value| value.max(0.0).sqrt());
+        let value = |k: usize| {
+            let [from, to] = problem.range(k);
+            (x[k] + scale[k] * moved[k]).clamp(from, to)
+        };
+        (0..scale.len()).map(value).collect()
+    };
+    (0..count).map(draw).collect()
+}

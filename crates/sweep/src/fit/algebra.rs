@@ -1,0 +1,123 @@
+//! Small symmetric matrices by their eigenvalues.
+
+/// A symmetric matrix as its eigenvalues and eigenvectors.
+pub(crate) struct Symmetric {
+    /// In rising order.
+    pub(crate) values: Vec<f64>,
+    /// Of each eigenvalue, of unit length.
+    pub(crate) vectors: Vec<Vec<f64>>,
+}
+
+impl Symmetric {
+    /// By Jacobi's rotations: the same bits on any machine.
+    ///
+    /// G. H. Golub, C. F. Van Loan, Matrix Computations, section 8.5.
+    pub(crate) fn of(matrix: &[Vec<f64>]) -> Self {
+        let n = matrix.len();
+        let mut a = matrix.to_vec();
+        let mut v: Vec<Vec<f64>> =
+            (0..n).map(|i| (0..n).map(|j| f64::from(u8::from(i == j))).collect()).collect();
+        for _ in 0..60 {
+            let mut largest = 0.0_f64;
+            for p in 0..n {
+                for q in p + 1..n {
+                    let scale = (a[p][p] * a[q][q]).abs().sqrt();
+                    if a[p][q] == 0.0 || a[p][q].abs() <= 1e-18 * scale {
+                        continue;
+                    }
+                    largest = largest.max(a[p][q].abs() / scale.max(f64::MIN_POSITIVE));
+                    let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+                    let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+                    let c = 1.0 / (t * t + 1.0).sqrt();
+                    let s = t * c;
+                    for row in &mut a {
+                        (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+                    }
+                    for k in 0..n {
+                        (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+                        (v[p][k], v[q][k]) = (c * v[p][k] - s * v[q][k], s * v[p][k] + c * v[q][k]);
+                    }
+                }
+            }
+            if largest < 1e-15 {
+                break;
+            }
+        }
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
+        Self {
+            values: order.iter().map(|&i| a[i][i]).collect(),
+            vectors: order.iter().map(|&i| v[i].clone()).collect(),
+        }
+    }
+
+    /// f of the matrix, times a vector, with f of the eigenvalues.
+    pub(crate) fn apply(&self, x: &[f64], f: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut out = vec![0.0; x.len()];
+        for (value, vector) in self.values.iter().zip(&self.vectors) {
+            let along = f(*value) * dot(vector, x);
+            out.iter_mut().zip(vector).for_each(|(out, v)| *out += along * v);
+        }
+        out
+    }
+}
+
+/// a b
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// A matrix with unit diagonal and the square roots that were its scale. A row of zeros keeps its
+/// zero, on scale 1.
+pub(crate) fn scaled(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let scale: Vec<f64> = (0..matrix.len())
+        .map(|i| if matrix[i][i] > 0.0 { matrix[i][i].sqrt() } else { 1.0 })
+        .collect();
+    let row = |(i, row): (usize, &Vec<f64>)| {
+        row.iter().enumerate().map(|(j, x)| x / (scale[i] * scale[j])).collect()
+    };
+    (matrix.iter().enumerate().map(row).collect(), scale)
+}
+
+/// The inverse of a symmetric matrix, without directions that it does not know: those of which
+/// nothing is left in double precision once its diagonal is one.
+pub(crate) fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let (unit, scale) = scaled(matrix);
+    let eigen = Symmetric::of(&unit);
+    let column = |j: usize| {
+        let mut e = vec![0.0; unit.len()];
+        e[j] = 1.0 / scale[j];
+        let x = eigen.apply(&e, |value| if value > 1e-13 { 1.0 / value } else { 0.0 });
+        x.iter().zip(&scale).map(|(x, scale)| x / scale).collect()
+    };
+    (0..matrix.len()).map(column).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_inverse_undoes_its_matrix_on_any_scale() {
+        let scales = [1.0, 1e4, 1e-5, 30.0];
+        let matrix: Vec<Vec<f64>> = (0..4)
+            .map(|i| {
+                let entry = |j: usize| {
+                    let near = if i == j { 1.0 } else { 0.7_f64.powi((i + j) as i32) };
+                    near * scales[i] * scales[j]
+                };
+                (0..4).map(entry).collect()
+            })
+            .collect();
+        let inverse = inverse(&matrix);
+        for i in 0..4 {
+            for j in 0..4 {
+                let product = dot(&matrix[i], &inverse[j]) * scales[j] / scales[i];
+                let expected = f64::from(u8::from(i == j));
+                assert!((product - expected).abs() < 1e-11, "{i} {j}: {product}");
+            }
+        }
+        let eigen = Symmetric::of(&[vec![2.0, 1.0], vec![1.0, 2.0]]);
+        assert!((eigen.values[0] - 1.0).abs() < 1e-15 && (eigen.values[1] - 3.0).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,83 @@
+//! A fit as curves: the measurement, the model and what is left, for figures.
+
+use serde_json::{Value, json};
+use sweep_engine::table::Table;
+use sweep_files::key;
+
+use super::algebra::inverse;
+use super::model::Against;
+use super::{Fitted, Problem};
+
+/// Standard errors to which profiles reach on both sides.
+const REACH: i32 = 3;
+
+impl Fitted {
+    /// How the cost rises beside each free number, the others fitted again as far as they go along
+    /// straight lines.
+    fn profiles(&self, stop: &(dyn Fn() -> bool + Sync)) -> Value {
+        let Problem { free, .. } = &self.problem;
+        let summary = self.problem.summary(&self.against);
+        let bread = inverse(&summary.normal);
+        let deviations: Vec<f64> = (-REACH..=REACH).map(f64::from).collect();
+        let set = |k: usize, deviation: f64| -> Vec<f64> {
+            let along = deviation / bread[k][k].max(f64::MIN_POSITIVE).sqrt();
+            (0..self.x.len())
+                .map(|j| {
+                    let [from, to] = self.problem.range(j);
+                    (self.x[j] + along * bread[k][j]).clamp(from, to)
+                })
+                .collect()
+        };
+        let sets: Vec<Vec<f64>> = (0..free.len())
+            .flat_map(|k| deviations.iter().map(move |deviation| (k, *deviation)))
+            .map(|(k, deviation)| set(k, deviation))
+            .collect();
+        let costs = self.problem.costs(&sets, stop);
+        let of = |k: usize| {
+            let own = k * deviations.len()..(k + 1) * deviations.len();
+            json!({
+                "name": free[k].parameter.name(),
+                "values": sets[own.clone()].iter().map(|set| set[k]).collect::<Vec<_>>(),
+                "deviations": deviations,
+                "cost_above": costs[own].iter().map(|cost| cost - summary.cost).collect::<Vec<_>>(),
+            })
+        };
+        (0..free.len()).map(of).collect()
+    }
+
+    /// The curves of one case.
+    pub(crate) fn curves(&self, case: usize, stop: &(dyn Fn() -> bool + Sync)) -> Table {
+        let at = &self.problem.cases[case];
+        let measured = &at.measured;
+        let mut table = Table::new(crate::identity::BUILD);
+        let times = &measured.time_s;
+        table.numbers("time_s", "s", "time since the start", times.iter().copied().map(Some));
+        let shift_s = self.problem.shift_s(case, &self.x);
+        let speeds = at.spin().speeds_rpm(times.iter().map(|time| time + shift_s)).map(Some);
+        table.numbers("speed_rpm", "rpm", "spin of the shaft, smoothed if measured", speeds);
+        for one in self.against.iter().filter(|one| one.case == case) {
+            let Against { signal, offset, model, .. } = one;
+            let signal = &measured.signals[*signal];
+            let (name, (unit, _)) = (signal.quantity.column(), signal.quantity.units());
+            let known = |value: f64| (!value.is_nan()).then_some(value);
+            let mut add =
+                |what: &str, said: &str, values: &mut dyn Iterator<Item = Option<f64>>| {
+                    table.numbers(&format!("{what}_{name}"), &unit, said, values);
+                };
+            let values = signal.values.iter().copied();
+            add("measured", "as measured", &mut values.clone().map(known));
+            let shown = || model.iter().map(|model| model + offset);
+            add("model", "the fitted model, with the offset", &mut shown().map(Some));
+            let left = values.zip(shown()).map(|(measured, model)| known(measured - model));
+            add("residual", "measured less model", &mut { left });
+        }
+        let plan = at.plan.to_json();
+        table.metadata(key::PLAN, &plan);
+        let mut found = json!({ "report": self.report });
+        if self.report.follows {
+            found["profiles"] = self.profiles(stop);
+        }
+        table.metadata(key::FIT, &found);
+        table
+    }
+}

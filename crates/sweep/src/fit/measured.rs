@@ -1,0 +1,272 @@
+//! A measurement: columns of a file over time, each a channel of the model.
+
+use std::path::Path;
+
+use sweep_engine::config::Diagnostics;
+use sweep_engine::config::list::NumberTable;
+use sweep_engine::config::report::{Diagnostic, Report};
+use washer_model::Channel;
+
+/// Fewest samples of a column: fewer say nothing of their noise.
+const FEWEST: usize = 16;
+
+/// What a column measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quantity {
+    /// A channel, its rate or its acceleration (0, 1, 2).
+    Motion(Channel, usize),
+    /// The force on the cabinet along c1, c2 or c3 (0, 1, 2).
+    CabinetForce(usize),
+}
+
+impl Quantity {
+    /// Everything that can be measured.
+    fn all() -> impl Iterator<Item = Self> {
+        let motions = Channel::ALL
+            .into_iter()
+            .flat_map(|channel| (0..3).map(move |order| Self::Motion(channel, order)));
+        motions.chain((0..3).map(Self::CabinetForce))
+    }
+
+    /// Its unit, and the one in which it is measured by mistake, with that one's size.
+    pub(crate) fn units(self) -> (String, Option<(&'static str, f64)>) {
+        const G: f64 = 9.806_65;
+        let Self::Motion(channel, order) = self else { return ("N".to_owned(), None) };
+        let unit = channel.unit();
+        let mistaken = match (unit, order) {
+            ("rad", 0) => Some(("degrees", 180.0 / std::f64::consts::PI)),
+            ("rad", _) => Some(("degrees per s", 180.0 / std::f64::consts::PI)),
+            (_, 2) => Some(("g", 1.0 / G)),
+            _ => Some(("mm", 1e3)),
+        };
+        (format!("{unit}{}", ["", "/s", "/s^2"][order]), mistaken)
+    }
+
+    /// The name of its column.
+    pub(crate) fn column(self) -> String {
+        match self {
+            Self::Motion(channel, order) => {
+                let (name, unit) = (channel.name(), channel.unit());
+                format!("{name}_{unit}{}", ["", "_per_s", "_per_s2"][order])
+            }
+            Self::CabinetForce(axis) => format!("cabinet_force_{}_n", ["x", "y", "z"][axis]),
+        }
+    }
+
+    /// What a column of this name measures. A place or an angle may go without its unit.
+    fn named(name: &str) -> Option<Self> {
+        let is = |quantity: &Self| match quantity {
+            Self::Motion(channel, 0) if channel.name() == name => true,
+            _ => quantity.column() == name,
+        };
+        Self::all().find(is)
+    }
+}
+
+/// One column of a measurement.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Signal {
+    pub(crate) quantity: Quantity,
+    /// NaN where there is no sample.
+    pub(crate) values: Vec<f64>,
+}
+
+impl Signal {
+    /// The samples that there are, with their places in time.
+    pub(crate) fn samples(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.values.iter().copied().enumerate().filter(|(_, value)| !value.is_nan())
+    }
+}
+
+/// A measurement of one run.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Measured {
+    /// The file's name, as messages and reports have it.
+    pub(crate) name: String,
+    /// Rising, from 0 on or later (s).
+    pub(crate) time_s: Vec<f64>,
+    /// The tachometer, if there is one (rpm); NaN where it has no sample.
+    pub(crate) speed_rpm: Option<Vec<f64>>,
+    pub(crate) signals: Vec<Signal>,
+    /// Stretches of time without any row (s).
+    pub(crate) gaps_s: Vec<[f64; 2]>,
+}
+
+impl Measured {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// Every mistake in it, with its place.
+    pub(crate) fn read(path: &Path) -> Result<Self, Diagnostics> {
+        let report = Report::default();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let found = NumberTable::read(path, &report).map(|table| judged(name, table, &report));
+        match found {
+            Some(measured) => report.finish(measured),
+            None => Err(report.into_diagnostics()),
+        }
+    }
+
+    /// A measurement in memory.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub(crate) fn of_columns(columns: Vec<(String, Vec<f64>)>) -> Result<Self, Diagnostics> {
+        let report = Report::default();
+        let table = NumberTable::of_columns("table", columns, &report);
+        let measured = judged("table".to_owned(), table, &report);
+        report.finish(measured)
+    }
+
+    /// Samples of all columns together.
+    pub(crate) fn count(&self) -> usize {
+        self.signals.iter().map(|signal| signal.samples().count()).sum()
+    }
+}
+
+/// The table as a measurement; what is wrong with it is reported.
+fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
+    let mut measured = Measured {
+        name,
+        time_s: Vec::new(),
+        speed_rpm: None,
+        signals: Vec::new(),
+        gaps_s: Vec::new(),
+    };
+    let mut seen: Vec<&str> = Vec::new();
+    for (k, column) in table.columns.iter().enumerate() {
+        let (name, at) = (column.name.value.as_str(), &column.name.at);
+        if seen.contains(&name) {
+            let title = format!("the column `{name}` is given twice");
+            report.push(Diagnostic::new(title).at(at, "expected each column once"));
+            continue;
+        }
+        seen.push(name);
+        if let Some(row) = column.values.iter().position(|value| value.is_infinite()) {
+            report.push_with(|sources| {
+                let title = format!("`{name}` is infinite in row {}", row + 1);
+                let expected = "expected a number, or nothing where no sample is";
+                Diagnostic::new(title).at(&table.place(sources, k, row), expected)
+            });
+        }
+        let samples = column.values.iter().filter(|value| !value.is_nan()).count();
+        match (name, Quantity::named(name)) {
+            ("time_s", _) => {
+                measured.time_s.clone_from(&column.values);
+                times(&table, k, report);
+            }
+            ("speed_rpm", _) => measured.speed_rpm = Some(column.values.clone()),
+            (_, Some(quantity)) if samples >= FEWEST => {
+                measured.signals.push(Signal { quantity, values: column.values.clone() });
+            }
+            (_, Some(_)) => {
+                let title = format!("the column `{name}` has {samples} samples");
+                report.push(Diagnostic::new(title).at(at, format!("expected {FEWEST} at least")));
+            }
+            (_, None) => report.push_with(|_| {
+                let known: Vec<String> = Quantity::all().map(Quantity::column).collect();
+                let known = known.iter().map(String::as_str).chain(["time_s", "speed_rpm"]);
+                let title = format!("the column `{name}` is no channel");
+                let expected = "expected a channel of `sweep trace` with its unit, as in \
+                                tub_front_y_m_per_s2, tub_yaw_rad or cabinet_force_y_n";
+                Diagnostic::new(title).at(at, expected).nearest(name, known)
+            }),
+        }
+    }
+    let whole = report.is_clean();
+    for (name, is_there) in
+        [("time_s", seen.contains(&"time_s")), ("any channel", !measured.signals.is_empty())]
+    {
+        if whole && !is_there {
+            let title = format!("{} has no column of {name}", measured.name);
+            let help = "expected time_s, and channels of `sweep trace` with their units, as in \
+                        tub_front_y_m_per_s2";
+            report.push(Diagnostic::new(title).help(help));
+        }
+    }
+    measured.gaps_s = gaps(&measured.time_s);
+    measured
+}
+
+/// Judges the column of times.
+fn times(table: &NumberTable, column: usize, report: &Report) {
+    let mut last = f64::NEG_INFINITY;
+    for (row, &time_s) in table.columns[column].values.iter().enumerate() {
+        let said = match time_s {
+            _ if time_s.is_nan() => "a row without its time".to_owned(),
+            _ if time_s < 0.0 => format!("time_s = {time_s} s: the run begins at 0, at rest"),
+            _ if time_s <= last => format!("time goes back: {time_s} s after {last} s"),
+            _ => {
+                last = time_s;
+                continue;
+            }
+        };
+        report.push_with(|sources| {
+            let expected = "expected times in s that rise from row to row, 0 where the run begins";
+            Diagnostic::new(said).at(&table.place(sources, column, row), expected)
+        });
+    }
+}
+
+/// Stretches of time without rows: longer than twenty of the usual distance.
+fn gaps(time_s: &[f64]) -> Vec<[f64; 2]> {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let Some(&usual) = steps.get(steps.len() / 2) else { return Vec::new() };
+    let gaps = time_s.windows(2).filter(|pair| pair[1] - pair[0] > 20.0 * usual);
+    gaps.map(|pair| [pair[0], pair[1]]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(text: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        std::fs::write(&path, text).unwrap();
+        Measured::read(&path).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn columns_are_known_by_their_units() {
+        let named = |name| Quantity::named(name).map(Quantity::column);
+        for name in ["tub_front_y_m_per_s2", "tub_yaw_rad_per_s", "tub_pitch_rad"] {
+            assert_eq!(named(name).as_deref(), Some(name));
+        }
+        assert_eq!(named("drum_front_z").as_deref(), Some("drum_front_z_m"));
+        assert_eq!(named("cabinet_force_z_n").as_deref(), Some("cabinet_force_z_n"));
+        assert_eq!(named("tub_yaw_m"), None);
+    }
+
+    #[test]
+    fn mistakes_have_their_places() {
+        let text = refused("time_s,tub_front_y_m_s2\n0,1\n0.1,2\n0.1,3\n,4\n");
+        for said in
+            ["no channel", "did you mean `tub_front_y_m", "time goes back", "without its time"]
+        {
+            assert!(text.contains(said), "{said}: {text}");
+        }
+        assert!(text.contains(":4:") && text.contains(":5:"), "{text}");
+        assert!(refused("time_s,tub_yaw_rad\n0,1\n1,\n").contains("has 1 samples"));
+        assert!(refused("tub_yaw_rad\n1\n").contains("has 1 samples"));
+        let rows: String = (0..20).map(|k| format!("{k},\n")).collect();
+        assert!(refused(&format!("time_s,tub_yaw\n{rows}")).contains("has 0 samples"));
+        assert!(refused("time_s\n1\n2\n").contains("no column of any channel"));
+        assert!(refused("time_s,tub_yaw\n0,inf\n").contains("is infinite"));
+    }
+
+    #[test]
+    fn a_missing_sample_is_not_a_number_and_a_gap_is_seen() {
+        let row = |k: usize| {
+            let t = if k < 10 { 0.01 * k as f64 } else { 5.0 + 0.01 * k as f64 };
+            (t, if k % 3 == 0 { f64::NAN } else { 1.0 })
+        };
+        let (time_s, yaw) = (0..40).map(row).unzip();
+        let columns = vec![("time_s".to_owned(), time_s), ("tub_yaw".to_owned(), yaw)];
+        let measured = Measured::of_columns(columns).unwrap();
+        assert_eq!(measured.count(), 26);
+        assert_eq!(measured.gaps_s.len(), 1);
+        assert!((measured.gaps_s[0][1] - 5.1).abs() < 1e-12);
+    }
+}

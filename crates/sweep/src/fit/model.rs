@@ -1,0 +1,355 @@
+//! What is fitted, and what the model says of it: trajectories of a point and its neighbours side
+//! by side in lanes.
+
+use std::sync::Arc;
+
+use lane_ode::Simd;
+use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+use washer_model::{
+    Cases, Machine, Method, ModelKind, Parameter, Point, Snapshot, Spin, Timing, Wanted, prepare,
+    simulate_until,
+};
+
+use super::algebra::dot;
+use super::measured::{Measured, Quantity, Signal};
+use super::speed::Smoothed;
+use crate::engine::reference_step_s;
+use crate::plan::Plan;
+
+/// Neighbours are this share of a number away from it.
+const NEAR: f64 = 1e-5;
+/// The farthest a measurement's clock may be off (s).
+pub(super) const MOST_SHIFT_S: f64 = 0.25;
+/// A neighbour in time (s).
+const NEAR_S: f64 = 1e-5;
+
+/// One measurement, and the run that it is of.
+#[derive(Clone, Debug)]
+pub(crate) struct Case {
+    /// The grid with this run's own constants.
+    pub(crate) plan: Plan,
+    pub(crate) measured: Measured,
+    /// The spin, if it was measured.
+    pub(crate) smoothed: Option<Smoothed>,
+}
+
+impl Case {
+    /// The run's spin.
+    pub(crate) fn spin(&self) -> &Spin {
+        self.smoothed.as_ref().map_or(&self.plan.model.spin, |smoothed| &smoothed.spin)
+    }
+
+    /// When its run ends: late enough for a late clock.
+    fn end_s(&self) -> f64 {
+        self.measured.time_s.last().copied().unwrap_or_default() + MOST_SHIFT_S
+    }
+}
+
+/// A number that is fitted.
+#[derive(Clone, Debug)]
+pub(crate) struct Free {
+    pub(crate) parameter: Parameter,
+    /// Between which values.
+    pub(crate) range: [f64; 2],
+    pub(crate) start: f64,
+    /// The case whose own it is; of all if none.
+    pub(crate) case: Option<usize>,
+}
+
+impl Free {
+    fn is_of(&self, case: usize) -> bool {
+        self.case.is_none_or(|own| own == case)
+    }
+}
+
+/// The fit's question. Its unknowns are the free numbers, then the shift of each case's clock if
+/// those are wanted. The offsets of signals are no unknowns: means are taken off.
+pub(crate) struct Problem {
+    pub(crate) cases: Vec<Case>,
+    pub(crate) free: Vec<Free>,
+    pub(crate) model: ModelKind,
+    pub(crate) with_shift: bool,
+    pub(crate) method: Method,
+    pub(crate) simd: Simd,
+}
+
+/// One signal against the model.
+#[derive(Clone, Debug)]
+pub(crate) struct Against {
+    pub(crate) case: usize,
+    pub(crate) signal: usize,
+    /// The model at every row, without offset.
+    pub(crate) model: Vec<f64>,
+    pub(crate) offset: f64,
+    /// Measured less model and offset, at the samples that there are.
+    pub(crate) residual: Vec<f64>,
+    /// The model's derivative by each unknown there, less its mean; empty where there is none.
+    pub(crate) slopes: Vec<Vec<f64>>,
+}
+
+/// What a descent needs to know of a point. Costs are twice a negative log-likelihood, with every
+/// signal's noise as its residual says.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Summary {
+    pub(crate) cost: f64,
+    /// Noise of each signal.
+    pub(crate) sigma: Vec<f64>,
+    /// J' W J
+    pub(crate) normal: Vec<Vec<f64>>,
+    /// J' W r
+    pub(crate) pull: Vec<f64>,
+}
+
+impl Problem {
+    /// How the model is integrated: by the grid's method where that is one, else by the reference's
+    /// step, which depends on the machine at the start alone.
+    pub(crate) fn method(cases: &[Case]) -> Result<Method, washer_model::NoEquilibrium> {
+        if let Some((_, method)) = cases.iter().find_map(|case| case.plan.integrator.direct()) {
+            return Ok(method);
+        }
+        let mut step_s = f64::INFINITY;
+        for case in cases {
+            let (end_s, machine) = (case.end_s(), case.plan.model.machine.clone());
+            let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
+            let point =
+                prepare(Simd::Scalar, &[(machine, case.spin().clone())], &timing).remove(0)?;
+            step_s = step_s.min(reference_step_s(&Cases::new([(&point, case.spin())], end_s)));
+        }
+        Ok(Method::Rk4 { step_s })
+    }
+
+    /// How many unknowns there are.
+    pub(crate) fn unknowns(&self) -> usize {
+        self.free.len() + if self.with_shift { self.cases.len() } else { 0 }
+    }
+
+    /// What an unknown may be.
+    pub(crate) fn range(&self, unknown: usize) -> [f64; 2] {
+        self.free.get(unknown).map_or([-MOST_SHIFT_S, MOST_SHIFT_S], |free| free.range)
+    }
+
+    /// Where the unknowns start.
+    pub(crate) fn start(&self) -> Vec<f64> {
+        let shifts = self.unknowns() - self.free.len();
+        self.free.iter().map(|free| free.start).chain(std::iter::repeat_n(0.0, shifts)).collect()
+    }
+
+    /// Every signal of every case, in order.
+    pub(crate) fn signals(&self) -> impl Iterator<Item = (usize, usize, &Signal)> {
+        self.cases.iter().enumerate().flat_map(|(c, case)| {
+            case.measured.signals.iter().enumerate().map(move |(s, signal)| (c, s, signal))
+        })
+    }
+
+    /// The shift of a case's clock (s).
+    pub(crate) fn shift_s(&self, case: usize, x: &[f64]) -> f64 {
+        if self.with_shift { x[self.free.len() + case] } else { 0.0 }
+    }
+
+    /// The machine and the spin of a case.
+    pub(crate) fn machine(&self, case: usize, x: &[f64]) -> (Machine, Spin) {
+        let mut machine = self.cases[case].plan.model.machine.clone();
+        let mut spin = self.cases[case].spin().clone();
+        for (free, value) in self.free.iter().zip(x).filter(|(free, _)| free.is_of(case)) {
+            free.parameter.set(&mut machine, &mut spin, *value);
+        }
+        (machine, spin)
+    }
+
+    /// Whether an unknown matters to a case.
+    fn matters(&self, unknown: usize, case: usize) -> bool {
+        match self.free.get(unknown) {
+            Some(free) => free.is_of(case),
+            None => unknown - self.free.len() == case,
+        }
+    }
+
+    /// By how much a neighbour is away along an unknown, to the inside of its range.
+    fn nudge(&self, unknown: usize, x: &[f64]) -> f64 {
+        let step = self.free.get(unknown).map_or(NEAR_S, |free| {
+            let width = free.range[1] - free.range[0];
+            let size = x[unknown].abs().max(free.start.abs());
+            NEAR * if width.is_finite() { size.max(0.01 * width) } else { size }
+        });
+        if x[unknown] + step > self.range(unknown)[1] { -step } else { step }
+    }
+
+    /// Every signal at several sets of unknowns; `None` of one whose machine is none, or whose
+    /// trajectory fails, and of all once `stop` says so.
+    fn seen(
+        &self,
+        case: usize,
+        sets: &[Vec<f64>],
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Vec<Option<Vec<Vec<f64>>>> {
+        let mut found = vec![None; sets.len()];
+        let (measured, end_s) = (&self.cases[case].measured, self.cases[case].end_s());
+        let machines: Vec<(Machine, Spin)> = sets.iter().map(|x| self.machine(case, x)).collect();
+        let sound: Vec<usize> =
+            (0..sets.len()).filter(|&k| machines[k].0.violations().is_empty()).collect();
+        let chosen: Vec<(Machine, Spin)> = sound.iter().map(|&k| machines[k].clone()).collect();
+        let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
+        let points: Vec<(usize, Point)> = sound
+            .iter()
+            .zip(prepare(self.simd, &chosen, &timing))
+            .filter_map(|(&k, point)| {
+                let shift_s = self.shift_s(case, &sets[k]);
+                let instants: Arc<[f64]> =
+                    measured.time_s.iter().map(|time| (time + shift_s).max(0.0)).collect();
+                Some((k, point.ok()?.seen_at(instants)))
+            })
+            .collect();
+        let all: Vec<&Point> = points.iter().map(|(_, point)| point).collect();
+        let wanted = Wanted { snapshots: true, ..Wanted::default() };
+        let runs = simulate_until(self.simd, self.model, &self.method, &all, wanted, &|| stop());
+        let Some((_, extras)) = runs else { return found };
+        for ((k, point), extra) in points.iter().zip(extras) {
+            let shots = &extra.snapshots;
+            if shots.len() < measured.time_s.len() {
+                continue;
+            }
+            let values = |signal: &Signal| -> Vec<f64> {
+                shots.iter().map(|shot| self.value(shot, signal, point)).collect()
+            };
+            let values = measured.signals.iter().map(values);
+            found[*k] = Some(values.collect());
+        }
+        found
+    }
+
+    fn value(&self, shot: &Snapshot, signal: &Signal, point: &Point) -> f64 {
+        match signal.quantity {
+            Quantity::Motion(channel, order) => shot.channels[channel.index()][order],
+            Quantity::CabinetForce(axis) => shot.cabinet_force_n(point, self.model)[axis],
+        }
+    }
+
+    /// Every signal against the model. On all threads of the rayon pool it is called in.
+    pub(crate) fn against(
+        &self,
+        x: &[f64],
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Vec<Against>> {
+        let unknowns = self.unknowns();
+        let nudges: Vec<f64> = (0..unknowns).map(|k| self.nudge(k, x)).collect();
+        // The point, then a neighbour along each unknown that matters to the case.
+        let work: Vec<(usize, Vec<Option<usize>>)> = (0..self.cases.len())
+            .flat_map(|case| {
+                let near = (0..unknowns).filter(|&k| self.matters(k, case)).map(Some);
+                let all: Vec<_> = std::iter::once(None).chain(near).collect();
+                let lanes = self.simd.lanes().max(2);
+                all.chunks(lanes).map(|some| (case, some.to_vec())).collect::<Vec<_>>()
+            })
+            .collect();
+        let seen: Vec<Vec<Option<Vec<Vec<f64>>>>> = work
+            .par_iter()
+            .map(|(case, which)| {
+                let set = |unknown: &Option<usize>| {
+                    let mut x = x.to_vec();
+                    if let Some(k) = unknown {
+                        x[*k] += nudges[*k];
+                    }
+                    x
+                };
+                let sets: Vec<Vec<f64>> = which.iter().map(set).collect();
+                self.seen(*case, &sets, stop)
+            })
+            .collect();
+        let mut values = vec![vec![None; unknowns + 1]; self.cases.len()];
+        for ((case, which), seen) in work.iter().zip(seen) {
+            for (unknown, seen) in which.iter().zip(seen) {
+                values[*case][unknown.map_or(unknowns, |k| k)] = Some(seen?);
+            }
+        }
+        let of = |(case, s, signal): (usize, usize, &Signal)| {
+            let model = values[case][unknowns].as_ref()?[s].clone();
+            let slope = |k: usize| -> Vec<f64> {
+                let Some(near) = &values[case][k] else { return Vec::new() };
+                let by = |(row, _)| (near[s][row] - model[row]) / nudges[k];
+                centred(signal.samples().map(by).collect()).0
+            };
+            let slopes = (0..unknowns).map(slope).collect();
+            let apart = signal.samples().map(|(row, measured)| measured - model[row]).collect();
+            let (residual, offset) = centred(apart);
+            Some(Against { case, signal: s, model, offset, residual, slopes })
+        };
+        self.signals().map(of).collect()
+    }
+
+    /// The cost of many sets of unknowns, without derivatives; infinite where there is no answer.
+    pub(crate) fn costs(&self, sets: &[Vec<f64>], stop: &(dyn Fn() -> bool + Sync)) -> Vec<f64> {
+        let groups: Vec<&[Vec<f64>]> = sets.chunks(self.simd.lanes().max(2)).collect();
+        let work: Vec<(usize, &[Vec<f64>])> = groups
+            .iter()
+            .flat_map(|group| (0..self.cases.len()).map(move |case| (case, *group)))
+            .collect();
+        let parts: Vec<Vec<f64>> = work
+            .par_iter()
+            .map(|&(case, group)| {
+                let seen = self.seen(case, group, stop);
+                let cost = |seen: Option<Vec<Vec<f64>>>| {
+                    let Some(models) = seen else { return f64::INFINITY };
+                    let signals = self.cases[case].measured.signals.iter().zip(models);
+                    let of = |(signal, model): (&Signal, Vec<f64>)| {
+                        let apart = signal.samples().map(|(row, value)| value - model[row]);
+                        let (residual, _) = centred(apart.collect());
+                        likelihood(&residual, signal).0
+                    };
+                    signals.map(of).sum()
+                };
+                seen.into_iter().map(cost).collect()
+            })
+            .collect();
+        let mut costs = vec![0.0; sets.len()];
+        for (place, part) in parts.iter().enumerate() {
+            let first = place / self.cases.len() * self.simd.lanes().max(2);
+            part.iter().enumerate().for_each(|(k, cost)| costs[first + k] += cost);
+        }
+        costs
+    }
+
+    /// The summary of a comparison.
+    pub(crate) fn summary(&self, against: &[Against]) -> Summary {
+        let n = self.unknowns();
+        let mut summary = Summary {
+            cost: 0.0,
+            sigma: Vec::new(),
+            normal: vec![vec![0.0; n]; n],
+            pull: vec![0.0; n],
+        };
+        for ((.., signal), against) in self.signals().zip(against) {
+            let (cost, sigma) = likelihood(&against.residual, signal);
+            summary.cost += cost;
+            summary.sigma.push(sigma);
+            let weight = 1.0 / (sigma * sigma);
+            for i in 0..n {
+                summary.pull[i] += weight * dot(&against.slopes[i], &against.residual);
+                for j in 0..=i {
+                    let product = weight * dot(&against.slopes[i], &against.slopes[j]);
+                    summary.normal[i][j] += product;
+                    if i != j {
+                        summary.normal[j][i] += product;
+                    }
+                }
+            }
+        }
+        summary
+    }
+}
+
+/// Numbers less their mean, and the mean.
+pub(super) fn centred(mut values: Vec<f64>) -> (Vec<f64>, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter_mut().for_each(|value| *value -= mean);
+    (values, mean)
+}
+
+/// A signal's share of the cost, and its noise: the residual's, and of one that is exact a
+/// millionth of the signal.
+fn likelihood(residual: &[f64], signal: &Signal) -> (f64, f64) {
+    let (swing, _) = centred(signal.samples().map(|(_, value)| value).collect());
+    let count = residual.len() as f64;
+    let least = 1e-12 * dot(&swing, &swing) + f64::MIN_POSITIVE;
+    let mean_square = (dot(residual, residual) + least) / count;
+    (count * libm::log(mean_square), mean_square.sqrt())
+}

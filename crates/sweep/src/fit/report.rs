@@ -1,0 +1,522 @@
+//! What a fit has to say: one structure, as text and as JSON.
+
+use std::collections::BTreeMap;
+
+use lane_ode::Simd;
+use serde::Serialize;
+use serde_json::Value;
+use washer_model::{Dwell, Method, Timing, prepare};
+use washer_row::Verdict as RowVerdict;
+
+use super::algebra::dot;
+use super::iso18571::{Rating, rate};
+use super::model::{Against, Problem};
+use super::search::Descent;
+use super::statistics::Statistics;
+use crate::config;
+use crate::engine::{ModelEngine, responses};
+use crate::plan::{Axis, AxisValues, Plan};
+use sweep_engine::commands::cells::table;
+use sweep_engine::commands::run::line;
+use sweep_engine::exit::Error;
+
+/// Standard errors to either end of a 95 % interval.
+const REACH: f64 = 1.959_964;
+/// Between which share of two units a signal is taken for one in the other.
+const UNIT_SLACK: f64 = 1.5;
+/// Speeds at which the fitted machine's stability is looked at.
+const SPEEDS: u32 = 120;
+
+/// Numbers by the name of their column.
+type ByColumn<T> = BTreeMap<String, T>;
+
+/// What a fit found. Numbers that are not known are null.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Report {
+    /// Whether the model follows the measurement within its noise. If not, there are no intervals.
+    pub(crate) follows: bool,
+    /// Why not.
+    pub(crate) objection: Option<String>,
+    pub(crate) parameters: Vec<Fit>,
+    /// Row by row in the order of the parameters.
+    pub(crate) correlations: Vec<Vec<f64>>,
+    /// What the data cannot tell, in words.
+    pub(crate) untold: Vec<String>,
+    /// The first file's entries, as in `files`.
+    #[serde(flatten)]
+    pub(crate) first: OfFile,
+    pub(crate) files: Vec<OfFile>,
+    /// Every minimum that was found, the least first.
+    pub(crate) minima: Vec<Minimum>,
+    /// Whether the search came to its end.
+    pub(crate) settled: bool,
+    /// Points at which the model and its derivatives were found.
+    pub(crate) evaluations: usize,
+    /// The integration's step (s), if it is fixed.
+    pub(crate) step_s: Option<f64>,
+    /// By how many standard errors half the step moves the number that it moves most.
+    pub(crate) step_effect: Option<f64>,
+    /// What else a reader should know.
+    pub(crate) notes: Vec<String>,
+}
+
+/// A fitted number.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Fit {
+    pub(crate) name: String,
+    pub(crate) unit: String,
+    /// The file whose own it is; of all if none.
+    pub(crate) file: Option<String>,
+    pub(crate) start: f64,
+    pub(crate) value: f64,
+    pub(crate) standard_error: Option<f64>,
+    pub(crate) interval_95: Option<[f64; 2]>,
+    /// By the fits of resampled residuals, if they were asked for.
+    pub(crate) bootstrap_95: Option<[f64; 2]>,
+    /// Whether it is at an end of its range.
+    pub(crate) at_bound: bool,
+}
+
+/// What is said of one measurement.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct OfFile {
+    pub(crate) file: String,
+    pub(crate) samples: usize,
+    /// Standard deviation of the part of the residual that is noise.
+    pub(crate) noise: ByColumn<f64>,
+    pub(crate) offset: ByColumn<f64>,
+    /// By how much the model's clock is ahead (s).
+    pub(crate) shift_s: Option<f64>,
+    pub(crate) residual_rms: ByColumn<f64>,
+    /// Correlation of neighbouring residuals.
+    pub(crate) autocorrelation: ByColumn<f64>,
+    /// By how much that widens variances.
+    pub(crate) widening: ByColumn<f64>,
+    pub(crate) iso18571: ByColumn<Rating>,
+    /// Noise (rpm) and knots of the measured spin.
+    pub(crate) spin: Option<SpinFit>,
+    pub(crate) gaps_s: Vec<[f64; 2]>,
+    /// The fitted machine, as a machine file has it.
+    pub(crate) machine: Value,
+    pub(crate) verdict: Option<Verdict>,
+}
+
+/// The spline through a measured spin.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct SpinFit {
+    pub(crate) noise_rpm: f64,
+    pub(crate) knots: usize,
+}
+
+/// The map's row at the fitted machine.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Verdict {
+    pub(crate) reliable: Option<bool>,
+    pub(crate) ratio_max: Option<f64>,
+    pub(crate) ratio_limit: f64,
+    /// Share of rows over the fitted distribution that are reliable.
+    pub(crate) probability_reliable: Option<f64>,
+    /// Between which the greatest ratio lies in 95 % of them.
+    pub(crate) ratio_max_95: Option<[f64; 2]>,
+    /// How many there are.
+    pub(crate) draws: usize,
+    /// The fastest growing disturbance of the periodic responses up to the fastest speed: below
+    /// zero, the machine is outside every band of instability, by so much.
+    pub(crate) growth_per_s: Option<f64>,
+    pub(crate) growth_at_rpm: Option<f64>,
+}
+
+/// One minimum.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Minimum {
+    pub(crate) values: ByColumn<f64>,
+    /// Twice the log of how much less likely than the first.
+    pub(crate) cost_above: f64,
+    pub(crate) evaluations: usize,
+}
+
+/// What a report is made of.
+pub(super) struct Found<'a> {
+    pub(super) problem: &'a Problem,
+    pub(super) minima: &'a [Descent],
+    pub(super) against: &'a [Against],
+    pub(super) statistics: &'a Statistics,
+    pub(super) evaluations: usize,
+    pub(super) step_effect: Option<f64>,
+    pub(super) repeated: Option<&'a [Vec<f64>]>,
+}
+
+impl Found<'_> {
+    /// The whole.
+    pub(super) fn report(
+        &self,
+        draws: u64,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Report, Error> {
+        let Self { problem, statistics, .. } = *self;
+        let best = &self.minima[0];
+        let objection = statistics.objection(problem);
+        let covariance = statistics.of_free(problem);
+        let error = |k: usize| covariance[k][k].max(0.0).sqrt();
+        let free = problem.free.len();
+        let correlation = |i: usize, j: usize| {
+            let size = error(i) * error(j);
+            if i == j {
+                1.0
+            } else if size > 0.0 {
+                covariance[i][j] / size
+            } else {
+                0.0
+            }
+        };
+        let mut files = Vec::new();
+        for case in 0..problem.cases.len() {
+            files.push(self.of_file(case, &covariance, draws, objection.is_none(), stop)?);
+        }
+        let name = |k: usize| self.name(k);
+        let minimum = |descent: &Descent| Minimum {
+            values: (0..free).map(|k| (name(k), descent.x[k])).collect(),
+            cost_above: descent.summary.cost - best.summary.cost,
+            evaluations: descent.evaluations,
+        };
+        Ok(Report {
+            follows: objection.is_none(),
+            parameters: (0..free)
+                .map(|k| self.parameter(k, error(k), objection.is_none()))
+                .collect(),
+            objection,
+            correlations: (0..free)
+                .map(|i| (0..free).map(|j| correlation(i, j)).collect())
+                .collect(),
+            untold: statistics.untold(problem, &best.x),
+            first: files[0].clone(),
+            files,
+            minima: self.minima.iter().map(minimum).collect(),
+            settled: best.is_settled,
+            evaluations: self.evaluations,
+            step_s: match problem.method {
+                Method::Rk4 { step_s } => Some(step_s),
+                _ => None,
+            },
+            step_effect: self.step_effect,
+            notes: self.notes(),
+        })
+    }
+
+    /// A free number's name; of a file's own, with the file.
+    fn name(&self, k: usize) -> String {
+        let free = &self.problem.free[k];
+        let name = free.parameter.name();
+        free.case.map_or_else(
+            || name.to_owned(),
+            |case| format!("{name} ({})", self.problem.cases[case].measured.name),
+        )
+    }
+
+    fn parameter(&self, k: usize, error: f64, follows: bool) -> Fit {
+        let free = &self.problem.free[k];
+        let value = self.minima[0].x[k];
+        let at_bound = free.range.contains(&value);
+        let known = follows && !at_bound && error > 0.0;
+        let quantiles = |repeated: &[Vec<f64>]| {
+            let mut values: Vec<f64> = repeated.iter().map(|x| x[k]).collect();
+            values.sort_by(f64::total_cmp);
+            let at = |part: f64| values.get((part * (values.len() as f64 - 1.0)).round() as usize);
+            Some([*at(0.025)?, *at(0.975)?])
+        };
+        Fit {
+            name: free.parameter.name().to_owned(),
+            unit: free.parameter.unit().to_owned(),
+            file: free.case.map(|case| self.problem.cases[case].measured.name.clone()),
+            start: free.start,
+            value,
+            standard_error: known.then_some(error),
+            interval_95: known.then(|| [value - REACH * error, value + REACH * error]),
+            bootstrap_95: self.repeated.and_then(quantiles),
+            at_bound,
+        }
+    }
+
+    fn of_file(
+        &self,
+        case: usize,
+        covariance: &[Vec<f64>],
+        draws: u64,
+        follows: bool,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<OfFile, Error> {
+        let problem = self.problem;
+        let x = &self.minima[0].x;
+        let measured = &problem.cases[case].measured;
+        let own = || {
+            problem.signals().zip(self.against).enumerate().filter(move |(_, (at, _))| at.0 == case)
+        };
+        let by = |of: &dyn Fn(usize, &Against) -> f64| -> ByColumn<f64> {
+            own().map(|(k, ((.., it), one))| (it.quantity.column(), of(k, one))).collect()
+        };
+        let rms =
+            |one: &Against| (dot(&one.residual, &one.residual) / one.residual.len() as f64).sqrt();
+        let rho = &self.statistics.neighbours;
+        let smoothed = problem.cases[case].smoothed.as_ref();
+        Ok(OfFile {
+            file: measured.name.clone(),
+            samples: measured.count(),
+            noise: by(&|k, one| rms(one) * (1.0 - rho[k].max(0.0)).sqrt()),
+            offset: by(&|_, one| one.offset),
+            shift_s: problem.with_shift.then(|| problem.shift_s(case, x)),
+            residual_rms: by(&|_, one| rms(one)),
+            autocorrelation: by(&|k, _| rho[k]),
+            widening: by(&|k, _| self.statistics.widening[k]),
+            iso18571: own()
+                .map(|(_, ((.., it), one))| {
+                    let pairs = it.samples().map(|(row, v)| (v - one.offset, one.model[row]));
+                    let (measured, model): (Vec<f64>, Vec<f64>) = pairs.unzip();
+                    (it.quantity.column(), rate(&measured, &model))
+                })
+                .collect(),
+            spin: smoothed.map(|it| SpinFit { noise_rpm: it.noise_rpm, knots: it.knots }),
+            gaps_s: measured.gaps_s.clone(),
+            machine: config::machine_json(&problem.machine(case, x).0),
+            verdict: match draws {
+                0 => None,
+                _ => Some(self.verdict(case, covariance, draws, follows, stop)?),
+            },
+        })
+    }
+
+    /// The row of a case's map at its fitted machine, and over the fitted distribution.
+    fn verdict(
+        &self,
+        case: usize,
+        covariance: &[Vec<f64>],
+        draws: u64,
+        follows: bool,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Verdict, Error> {
+        let problem = self.problem;
+        let x = &self.minima[0].x;
+        // The map's spin is the grid's, of which a measured one has no numbers.
+        let mut plan = Plan { axes: Vec::new(), design: None, ..problem.cases[case].plan.clone() };
+        let own: Vec<usize> = (0..problem.free.len())
+            .filter(|&k| problem.free[k].case.is_none_or(|own| own == case))
+            .collect();
+        let sets = if follows { super::draws(problem, x, covariance, draws) } else { Vec::new() };
+        let sets: Vec<&[f64]> =
+            std::iter::once(&x[..]).chain(sets.iter().map(Vec::as_slice)).collect();
+        for &k in &own {
+            let values = || sets.iter().map(|set| set[k]);
+            let [from, to] = [
+                values().fold(f64::INFINITY, f64::min),
+                values().fold(f64::NEG_INFINITY, f64::max),
+            ];
+            let values = match from < to {
+                true => AxisValues::Linear { from, to, count: 2 },
+                false => AxisValues::List(vec![from]),
+            };
+            plan.axes.push(Axis { parameter: problem.free[k].parameter.clone(), values });
+        }
+        let points: Vec<Vec<f64>> =
+            sets.iter().map(|set| own.iter().map(|&k| set[k]).collect()).collect();
+        let outcomes =
+            if stop() { Vec::new() } else { ModelEngine::new(&plan)?.evaluate_at(&points) };
+        let limits = plan.reliability.limits;
+        let verdicts: Vec<RowVerdict> = outcomes
+            .iter()
+            .map(|outcome| RowVerdict::new(outcome, plan.reliability.channels.len(), limits))
+            .collect();
+        let ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
+        let drawn = verdicts.get(1..).unwrap_or_default();
+        let mut ratios: Vec<f64> = drawn.iter().filter_map(ratio).collect();
+        ratios.sort_by(f64::total_cmp);
+        let at = |part: f64| ratios.get((part * (ratios.len() as f64 - 1.0)).round() as usize);
+        let reliable = drawn.iter().filter(|it| it.reliable == Some(true)).count();
+        let growth = self.growth(case, &plan, stop);
+        Ok(Verdict {
+            reliable: verdicts.first().and_then(|verdict| verdict.reliable),
+            ratio_max: verdicts.first().and_then(ratio),
+            ratio_limit: limits.most,
+            probability_reliable: (!drawn.is_empty()).then(|| reliable as f64 / drawn.len() as f64),
+            ratio_max_95: at(0.025).zip(at(0.975)).map(|(from, to)| [*from, *to]),
+            draws: drawn.len(),
+            growth_per_s: growth.map(|[growth, _]| growth),
+            growth_at_rpm: growth.map(|[_, speed]| speed),
+        })
+    }
+
+    /// The fastest growing disturbance of the fitted machine at speeds up to its fastest: its growth
+    /// (1/s), and where (rpm).
+    fn growth(
+        &self,
+        case: usize,
+        plan: &Plan,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<[f64; 2]> {
+        let (machine, spin) = self.problem.machine(case, &self.minima[0].x);
+        let times = (0..=1000).map(|k| plan.end_s * f64::from(k) / 1000.0);
+        let fastest = spin.speeds_rpm(times).fold(0.0, f64::max);
+        let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
+        let point = prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).ok()?;
+        let speeds: Vec<f64> = (SPEEDS / 5..=SPEEDS)
+            .map(|k| fastest * f64::from(k) / f64::from(SPEEDS))
+            .filter(|speed| *speed > 0.0)
+            .collect();
+        let dwell = |&speed_rpm: &f64| Dwell { point: &point, speed_rpm };
+        let found = responses(&speeds.iter().map(dwell).collect::<Vec<_>>(), &|| stop());
+        let there = found.iter().flatten().filter_map(|responses| responses.first());
+        there
+            .map(|response| [response.growth_per_s(), response.speed_rpm])
+            .reduce(|most, next| if next[0] > most[0] { next } else { most })
+    }
+
+    /// What else a reader should know.
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        for ((case, _, signal), one) in self.problem.signals().zip(self.against) {
+            let (unit, mistaken) = signal.quantity.units();
+            let Some((other, factor)) = mistaken else { continue };
+            let (swing, _) = super::model::centred(signal.samples().map(|(_, v)| v).collect());
+            let (moves, _) =
+                super::model::centred(signal.samples().map(|(row, _)| one.model[row]).collect());
+            let size = (dot(&swing, &swing) / dot(&moves, &moves)).sqrt();
+            if (1.0 / UNIT_SLACK..UNIT_SLACK).contains(&(size / factor)) {
+                notes.push(format!(
+                    "{} of {} is {size:.3} times as large as the model's: it seems to be in \
+                     {other} ({factor:.4}), expected {unit}",
+                    signal.quantity.column(),
+                    self.problem.cases[case].measured.name
+                ));
+            }
+        }
+        for case in &self.problem.cases {
+            let measured = &case.measured;
+            for [from, to] in &measured.gaps_s {
+                notes.push(format!("{} has no rows from {from} to {to} s", measured.name));
+            }
+            let first = case.smoothed.as_ref().and_then(|_| case.spin().speeds_rpm([0.0]).next());
+            if let Some(first) = first.filter(|first| first.abs() > 5.0) {
+                notes.push(format!(
+                    "{} begins at {first:.1} rpm: the model starts at rest there, and is not the \
+                     machine's before its start has died away",
+                    measured.name
+                ));
+            }
+        }
+        if !self.minima[0].is_settled {
+            notes.push("the search did not come to its end".to_owned());
+        }
+        notes
+    }
+}
+
+impl Report {
+    /// As a command prints it.
+    pub(crate) fn text(&self) -> String {
+        let significant = |value: f64| format!("{value:.6}");
+        let short = |value: f64| {
+            if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
+                let digits = (5 - value.abs().log10().floor().clamp(-4.0, 5.0) as i32).max(0);
+                format!("{value:.*}", digits as usize)
+            } else {
+                format!("{value:.4e}")
+            }
+        };
+        let mut rows = Vec::new();
+        for fit in &self.parameters {
+            let file = fit.file.as_ref().map_or_else(String::new, |file| format!(" ({file})"));
+            let interval = |ends: &Option<[f64; 2]>| {
+                ends.map(|[a, b]| format!("{} to {}", short(a), short(b)))
+            };
+            let known = match (&fit.interval_95, fit.at_bound) {
+                (None, true) => "at its bound".to_owned(),
+                (None, false) => "not known".to_owned(),
+                (known, _) => interval(known).unwrap_or_default(),
+            };
+            let error = fit.standard_error.map_or_else(|| "-".to_owned(), short);
+            let mut row = vec![
+                format!("{}{file}", fit.name),
+                fit.unit.clone(),
+                short(fit.value),
+                error,
+                known,
+            ];
+            row.extend(interval(&fit.bootstrap_95));
+            rows.push(row);
+        }
+        let mut headings =
+            ["", "unit", "value", "standard error", "95 % interval"].map(str::to_owned).to_vec();
+        if self.parameters.iter().any(|fit| fit.bootstrap_95.is_some()) {
+            headings.push("by bootstrap".to_owned());
+        }
+        let mut text = table(&headings, &rows, "");
+        let mut say = |what: &str, said: &str| line(&mut text, what, said);
+        match &self.objection {
+            None => say("model", "follows the measurement within its noise"),
+            Some(reason) => say("model", &format!("does not follow: {reason}; so no intervals")),
+        }
+        self.untold.iter().for_each(|untold| say("untold", untold));
+        for file in &self.files {
+            let columns: Vec<String> = file
+                .noise
+                .iter()
+                .map(|(column, noise)| {
+                    format!(
+                        "{column} {} ({:.3})",
+                        short(*noise),
+                        file.iso18571.get(column).map_or(0.0, |rating| rating.overall)
+                    )
+                })
+                .collect();
+            say("file", &format!("{}: {} samples", file.file, file.samples));
+            say("noise", &format!("{} (ISO/TS 18571)", columns.join(", ")));
+            if let Some(shift_s) = file.shift_s {
+                say("clock", &format!("shifted by {} s", significant(shift_s)));
+            }
+            if let Some(spin) = &file.spin {
+                let noise = short(spin.noise_rpm);
+                say("spin", &format!("measured: {} knots, noise {noise} rpm", spin.knots));
+            }
+            if let Some(verdict) = &file.verdict {
+                let what = match verdict.reliable {
+                    Some(true) => "reliable",
+                    Some(false) => "not reliable",
+                    None => "undefined",
+                };
+                let ratio = verdict
+                    .ratio_max
+                    .map_or_else(String::new, |ratio| format!(", greatest ratio {}", short(ratio)));
+                let chance = match (verdict.probability_reliable, verdict.ratio_max_95) {
+                    (Some(share), Some([from, to])) => format!(
+                        "; reliable with probability {share:.3} (ratio {} to {} in 95 % of {} \
+                         rows)",
+                        short(from),
+                        short(to),
+                        verdict.draws
+                    ),
+                    _ => "; no probability, because the intervals are not known".to_owned(),
+                };
+                say("verdict", &format!("{what}{ratio}{chance}"));
+                if let (Some(growth), Some(speed)) = (verdict.growth_per_s, verdict.growth_at_rpm) {
+                    let side = if growth > 0.0 {
+                        "inside a band of instability: disturbances grow"
+                    } else {
+                        "outside every band of instability: disturbances die away"
+                    };
+                    let rate = short(growth.abs());
+                    say("margin", &format!("{side} by {rate} /s at {speed:.0} rpm"));
+                }
+            }
+        }
+        for (k, minimum) in self.minima.iter().enumerate().skip(1) {
+            let values: Vec<String> =
+                minimum.values.iter().map(|(name, x)| format!("{name} {}", short(*x))).collect();
+            let above = short(minimum.cost_above);
+            say("minimum", &format!("{}: {}, cost above {above}", k + 1, values.join(", ")));
+        }
+        let effect = self.step_effect.map_or_else(String::new, |effect| {
+            format!("; half the step moves numbers by {effect:.3} standard errors at most")
+        });
+        say("search", &format!("{} evaluations{effect}", self.evaluations));
+        self.notes.iter().for_each(|note| say("note", note));
+        text
+    }
+}

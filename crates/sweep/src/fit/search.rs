@@ -1,0 +1,119 @@
+//! The least cost: Levenberg and Marquardt's descent, from one or several starts.
+//!
+//! D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters, Journal of
+//! the Society for Industrial and Applied Mathematics 11 (1963), 431-441.
+
+use super::algebra::{Symmetric, dot, scaled};
+use super::model::Summary;
+
+/// A descent ends where a step would lower the cost by less: some hundredth of a standard error.
+const WORTH: f64 = 2e-4;
+/// As little may be left to gain where no step gains it.
+const ROUGH: f64 = 0.1;
+/// No step changes a number by more than this share of it, or of a tenth of its range.
+const LONGEST: f64 = 0.5;
+/// Most evaluations of a descent.
+const MOST: usize = 80;
+
+/// Where a descent ended.
+#[derive(Clone, Debug)]
+pub(crate) struct Descent {
+    pub(crate) x: Vec<f64>,
+    pub(crate) summary: Summary,
+    /// Points at which model and derivatives were found.
+    pub(crate) evaluations: usize,
+    /// Whether no step lowers the cost any more.
+    pub(crate) is_settled: bool,
+}
+
+/// Descends from a start within ranges; `None` if there is no answer at the start, or if one is
+/// refused because the work was stopped.
+pub(crate) fn descend(
+    start: &[f64],
+    ranges: &[[f64; 2]],
+    evaluate: &dyn Fn(&[f64]) -> Result<Option<Summary>, Stopped>,
+) -> Result<Option<Descent>, Stopped> {
+    let Some(mut now) = evaluate(start)? else { return Ok(None) };
+    let mut x = start.to_vec();
+    let (mut evaluations, mut damping) = (1, 1e-3);
+    let done = |x, summary, evaluations, is_settled| {
+        Ok(Some(Descent { x, summary, evaluations, is_settled }))
+    };
+    loop {
+        // A number that is at an end of its range and pulled outwards stays there.
+        let moving: Vec<usize> = (0..x.len())
+            .filter(|&k| {
+                let [from, to] = ranges[k];
+                let pull = now.pull[k];
+                now.normal[k][k] > 0.0 && !(x[k] <= from && pull < 0.0 || x[k] >= to && pull > 0.0)
+            })
+            .collect();
+        let part: Vec<Vec<f64>> =
+            moving.iter().map(|&i| moving.iter().map(|&j| now.normal[i][j]).collect()).collect();
+        let (unit, scale) = scaled(&part);
+        let eigen = Symmetric::of(&unit);
+        let pull: Vec<f64> = moving.iter().zip(&scale).map(|(&k, s)| now.pull[k] / s).collect();
+        let solved = |damping: f64| eigen.apply(&pull, |value| 1.0 / (value.max(0.0) + damping));
+        // By how much the cost would fall if it were quadratic.
+        let left = dot(&solved(1e-9), &pull);
+        if left < WORTH {
+            return done(x, now, evaluations, true);
+        }
+        loop {
+            let step: Vec<f64> =
+                solved(damping).iter().zip(&scale).map(|(step, s)| step / s).collect();
+            let shorter = moving.iter().zip(&step).fold(1.0_f64, |share, (&k, step)| {
+                let width = ranges[k][1] - ranges[k][0];
+                let width = if width.is_finite() { 0.1 * width } else { 0.0 };
+                let size = x[k].abs().max(start[k].abs()).max(width);
+                share.min(LONGEST * size / step.abs())
+            });
+            let mut trial = x.clone();
+            for (&k, step) in moving.iter().zip(&step) {
+                trial[k] = (trial[k] + shorter * step).clamp(ranges[k][0], ranges[k][1]);
+            }
+            // Where rounding hides what is left to gain, as corners of friction do, it ends too.
+            if evaluations >= MOST || damping > 1e4 {
+                return done(x, now, evaluations, left < ROUGH);
+            }
+            evaluations += 1;
+            match evaluate(&trial)? {
+                Some(found) if found.cost < now.cost => {
+                    (x, now) = (trial, found);
+                    damping = (damping * 0.1).max(1e-9);
+                    break;
+                }
+                _ => damping = (damping * 10.0).max(1e-4),
+            }
+        }
+    }
+}
+
+/// The work was stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Stopped;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rosenbrock's valley as residuals 10 (b - a^2) and 1 - a of noise 1.
+    fn valley(x: &[f64]) -> Result<Option<Summary>, Stopped> {
+        let residual = [-10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
+        let slopes = [[-20.0 * x[0], 1.0], [10.0, 0.0]];
+        let normal = slopes.map(|a| slopes.map(|b| dot(&a, &b)).to_vec()).to_vec();
+        let pull = slopes.map(|a| dot(&a, &residual)).to_vec();
+        Ok(Some(Summary { cost: dot(&residual, &residual), sigma: vec![1.0; 2], normal, pull }))
+    }
+
+    #[test]
+    fn a_curved_valley_is_followed_to_its_end_or_to_a_bound() {
+        let free = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+        let found = descend(&[-1.2, 1.0], &free, &valley).unwrap().unwrap();
+        assert!(found.is_settled && found.evaluations < 60, "{found:?}");
+        assert!((found.x[0] - 1.0).abs() < 0.02 && (found.x[1] - 1.0).abs() < 0.04, "{found:?}");
+        let bound = [[-2.0, 0.5], [-2.0, 2.0]];
+        let found = descend(&[-1.2, 1.0], &bound, &valley).unwrap().unwrap();
+        assert!((found.x[0] - 0.5).abs() < 1e-9 && (found.x[1] - 0.25).abs() < 0.02, "{found:?}");
+    }
+}

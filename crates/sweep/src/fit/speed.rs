@@ -1,0 +1,186 @@
+//! The spin from a tachometer: a spline of first degree, which is a table of the spin's.
+
+use washer_model::Spin;
+
+/// Noise of a tachometer at least, as a share of its greatest speed: rounded digits are no noise.
+const LEAST_NOISE: f64 = 1e-5;
+/// Places of a span at which a further knot is tried.
+const TRIED: usize = 31;
+/// Most knots.
+const MOST_KNOTS: usize = 1000;
+
+/// A smoothed measurement of the spin.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Smoothed {
+    pub(crate) spin: Spin,
+    /// Its noise, from second differences (rpm).
+    pub(crate) noise_rpm: f64,
+    /// Of the spline.
+    pub(crate) knots: usize,
+}
+
+/// The least-squares spline of first degree, with a knot wherever one more explains what noise does
+/// not. Its angle keeps to the measured one: over any span the residuals add up to nearly nothing.
+pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
+    let samples: Vec<[f64; 2]> = time_s
+        .iter()
+        .zip(speed_rpm)
+        .filter(|(_, speed)| !speed.is_nan())
+        .map(|(time, speed)| [*time, *speed])
+        .collect();
+    let ([first, _], [last, _]) = (samples.first()?, samples.last()?);
+    let greatest = samples.iter().fold(0.0_f64, |most, [_, speed]| most.max(speed.abs()));
+    let noise_rpm = noise(&samples).max(LEAST_NOISE * greatest);
+    // As the Bayesian information criterion weighs a knot, whose place counts too.
+    let worth = 3.0 * libm::log(samples.len() as f64) * noise_rpm * noise_rpm;
+    let mut knots = vec![*first, *last];
+    let mut speeds = fitted(&samples, &knots)?;
+    while knots.len() < MOST_KNOTS {
+        let further = further(&samples, &knots, &speeds, worth);
+        if further.is_empty() {
+            break;
+        }
+        knots.extend(further);
+        knots.sort_by(f64::total_cmp);
+        speeds = fitted(&samples, &knots)?;
+    }
+    let noise_free = knots.len();
+    if *first > 0.0 {
+        // Back to the start of the run, along the first span but not through zero.
+        let slope = (speeds[1] - speeds[0]) / (knots[1] - knots[0]);
+        let start = speeds[0] - slope * first;
+        let [low, high] = [speeds[0].min(0.0), speeds[0].max(0.0)];
+        knots.insert(0, 0.0);
+        speeds.insert(0, start.clamp(low, high));
+    }
+    Some(Smoothed {
+        spin: Spin::Table { time_s: knots, speed_rpm: speeds },
+        noise_rpm,
+        knots: noise_free,
+    })
+}
+
+/// Standard deviation of white noise about a smooth course, from the distance of every sample to
+/// the line through its neighbours; the median, which jumps do not move.
+fn noise(samples: &[[f64; 2]]) -> f64 {
+    let mut distances: Vec<f64> = samples
+        .windows(3)
+        .map(|three| {
+            let share = (three[1][0] - three[0][0]) / (three[2][0] - three[0][0]);
+            let [before, after] = [1.0 - share, share];
+            let apart = three[1][1] - before * three[0][1] - after * three[2][1];
+            apart.abs() / (1.0 + before * before + after * after).sqrt()
+        })
+        .collect();
+    distances.sort_by(f64::total_cmp);
+    // The median of |x| of a normal distribution.
+    distances.get(distances.len() / 2).map_or(0.0, |median| median / 0.674_489_75)
+}
+
+/// Between which knots a time lies, and its share of the way.
+fn place(knots: &[f64], time_s: f64) -> (usize, f64) {
+    let span = knots.partition_point(|&knot| knot <= time_s).clamp(1, knots.len() - 1) - 1;
+    (span, (time_s - knots[span]) / (knots[span + 1] - knots[span]))
+}
+
+/// The spline's values at its knots, by least squares. `None` if they are not all determined.
+fn fitted(samples: &[[f64; 2]], knots: &[f64]) -> Option<Vec<f64>> {
+    let (mut diagonal, mut beside, mut right) =
+        (vec![0.0; knots.len()], vec![0.0; knots.len()], vec![0.0; knots.len()]);
+    for &[time, speed] in samples {
+        let (k, share) = place(knots, time);
+        let rest = 1.0 - share;
+        diagonal[k] += rest * rest;
+        diagonal[k + 1] += share * share;
+        beside[k] += rest * share;
+        right[k] += rest * speed;
+        right[k + 1] += share * speed;
+    }
+    for k in 1..knots.len() {
+        let factor = beside[k - 1] / diagonal[k - 1];
+        diagonal[k] -= factor * beside[k - 1];
+        right[k] -= factor * right[k - 1];
+    }
+    for k in (0..knots.len()).rev() {
+        if k + 1 < knots.len() {
+            right[k] -= beside[k] * right[k + 1];
+        }
+        right[k] /= diagonal[k];
+    }
+    right.iter().all(|speed| speed.is_finite()).then_some(right)
+}
+
+/// The best further knot of each span that is worth one.
+fn further(samples: &[[f64; 2]], knots: &[f64], speeds: &[f64], worth: f64) -> Vec<f64> {
+    let mut found = Vec::new();
+    for (span, ends) in knots.windows(2).enumerate() {
+        let from = samples.partition_point(|[time, _]| *time < ends[0]);
+        let to = samples.partition_point(|[time, _]| *time <= ends[1]);
+        let inside = &samples[from..to];
+        let mut best = (worth, None);
+        for tried in 1..=TRIED {
+            let place = tried * inside.len() / (TRIED + 1);
+            // Each span keeps a few samples.
+            if place < 3 || place + 4 > inside.len() {
+                continue;
+            }
+            let knot = inside[place][0];
+            let (mut along, mut size) = (0.0, 0.0);
+            for &[time, speed] in inside {
+                let share = (time - ends[0]) / (ends[1] - ends[0]);
+                let residual = speed - speeds[span] * (1.0 - share) - speeds[span + 1] * share;
+                let hat = match time <= knot {
+                    true => (time - ends[0]) / (knot - ends[0]),
+                    false => (ends[1] - time) / (ends[1] - knot),
+                };
+                along += hat * residual;
+                size += hat * hat;
+            }
+            let gain = along * along / size;
+            if gain > best.0 {
+                best = (gain, Some(knot));
+            }
+        }
+        found.extend(best.1);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sweep_engine::design::Design;
+    use sweep_engine::design::{Distribution, Shape};
+
+    #[test]
+    fn a_noisy_course_with_kinks_keeps_its_angle() {
+        let course = |t: f64| if t < 7.3 { 40.0 * t } else { 292.0 - 20.0 * (t - 7.3) };
+        let normal =
+            Distribution { shape: Shape::Normal { mean: 0.0, sd: 1.5 }, from: -9.0, to: 9.0 };
+        let noise = Design::MonteCarlo { points: 0, seed: 5 };
+        let time_s: Vec<f64> = (0..3000).map(|k| 0.003 + 0.004 * f64::from(k)).collect();
+        let speed: Vec<f64> = time_s
+            .iter()
+            .enumerate()
+            .map(|(k, t)| course(*t) + normal.quantile(noise.place(k as u64, 0).unwrap()))
+            .collect();
+        let found = smoothed(&time_s, &speed).unwrap();
+        assert!((found.noise_rpm - 1.5).abs() < 0.1, "{found:?}");
+        assert!((3..12).contains(&found.knots), "{found:?}");
+        let mut angle = 0.0_f64;
+        let mut worst = 0.0_f64;
+        for (t, ours) in time_s.iter().zip(found.spin.speeds_rpm(time_s.iter().copied())) {
+            angle += (ours - course(*t)) / 60.0 * 0.004;
+            worst = worst.max(angle.abs());
+        }
+        // Turns; the noise itself wanders by 1.5 / 60 sqrt(12 * 0.004) = 5e-3.
+        assert!(worst < 0.01, "{worst}");
+        let exact: Vec<f64> = time_s.iter().map(|t| course(*t)).collect();
+        let found = smoothed(&time_s, &exact).unwrap();
+        let apart = time_s
+            .iter()
+            .zip(found.spin.speeds_rpm(time_s.iter().copied()))
+            .fold(0.0_f64, |most, (t, ours)| most.max((ours - course(*t)).abs()));
+        assert!(apart < 0.2, "{apart}: {found:?}");
+    }
+}

@@ -1,0 +1,232 @@
+//! Fits of reference data: run-ups by an independent program, with known numbers.
+
+use std::path::Path;
+
+use super::*;
+use sweep_engine::design::Design;
+
+/// The reference's spin; of a run shorter than it, less.
+const GRID: &str = "spin = { profile = \"triangular\", peak_rpm = 350, ramp_s = 12 }\n\
+                    time = { end_s = 24 }\n";
+/// What the noisy files' noise is (m/s^2, rad).
+const NOISE: [f64; 4] = [0.3, 0.3, 5e-4, 5e-4];
+
+const VISCOUS: [(&str, f64); 3] = [
+    ("unbalance_mass_kg", 0.43),
+    ("damping_n_s_per_m", 152.0),
+    ("spring_stiffness_n_per_m", 8350.0),
+];
+const FRICTION: [(&str, f64); 5] = [
+    ("unbalance_mass_kg", 0.36),
+    ("damping_n_s_per_m", 25.0),
+    ("spring_stiffness_n_per_m", 7700.0),
+    ("friction_n", 34.0),
+    ("friction_speed_m_per_s", 0.01),
+];
+
+/// A reference file up to a time.
+fn reference(name: &str, end_s: f64) -> Measured {
+    let path = format!("{}/testdata/fit/{name}.csv", env!("CARGO_MANIFEST_DIR"));
+    let mut measured = Measured::read(Path::new(&path)).unwrap();
+    let rows = measured.time_s.partition_point(|time| *time <= end_s);
+    measured.time_s.truncate(rows);
+    measured.speed_rpm.iter_mut().for_each(|speed| speed.truncate(rows));
+    measured.signals.iter_mut().for_each(|signal| signal.values.truncate(rows));
+    measured
+}
+
+fn case_at(numbers: &[(&str, f64)], factor: f64, measured: Measured) -> Case {
+    let at = numbers.iter().map(|(name, value)| format!("{name}={}", value * factor));
+    let at: Vec<String> = at.chain(["friction_linear_speed_m_per_s=0.1".to_owned()]).collect();
+    case(&GridInput::text("reference", GRID.to_owned(), Vec::new()), &at, measured).unwrap()
+}
+
+fn options(free: &[&str]) -> FitOptions {
+    FitOptions {
+        free: free.iter().map(|name| (*name).to_owned()).collect(),
+        own: Vec::new(),
+        linear: false,
+        with_shift: true,
+        starts: 1,
+        bootstrap: 0,
+        draws: 0,
+    }
+}
+
+fn fitted(cases: Vec<Case>, options: &FitOptions) -> Report {
+    let work = Work { stop: &|| false, seen: &|_| {}, journal: None };
+    fit(cases, options, &work).unwrap().unwrap().report
+}
+
+/// How many standard errors each number is from the truth.
+fn off(report: &Report, truth: &[(&str, f64)]) -> Vec<f64> {
+    let off = |fit: &report::Fit| {
+        let (_, truth) = truth.iter().find(|(name, _)| *name == fit.name).unwrap();
+        (fit.value - truth) / fit.standard_error.unwrap()
+    };
+    report.parameters.iter().map(off).collect()
+}
+
+#[test]
+fn the_model_at_the_truth_is_the_exact_record() {
+    for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
+        let cases = vec![case_at(truth, 1.0, reference(name, 8.0))];
+        let method = Problem::method(&cases).unwrap();
+        let (model, simd) = (ModelKind::Nonlinear, simd_from_environment().unwrap());
+        let free = Vec::new();
+        let problem = Problem { cases, free, model, with_shift: false, method, simd };
+        for one in problem.against(&[], &|| false).unwrap() {
+            let values = &problem.cases[0].measured.signals[one.signal].values;
+            let largest =
+                |values: &[f64]| values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+            let share = largest(&one.residual) / largest(values);
+            // Accelerations are second differences over 1 ms.
+            assert!(share < 2e-3, "{name}, signal {}: {share}", one.signal);
+        }
+    }
+}
+
+#[test]
+fn reference_data_lead_to_the_truth() {
+    let names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
+    for factor in [0.7, 1.3] {
+        let cases = vec![case_at(&VISCOUS, factor, reference("viscous", 8.0))];
+        let report = fitted(cases, &options(&names));
+        let off = off(&report, &VISCOUS);
+        assert!(report.follows && report.settled, "{report:?}");
+        assert!(off.iter().all(|off| off.abs() < 3.0), "{off:?}: {}", report.text());
+        assert!(report.evaluations < 25 && report.untold.is_empty(), "{}", report.text());
+        for (noise, known) in report.first.noise.values().zip(NOISE) {
+            assert!((noise / known - 1.0).abs() < 0.2, "{}", report.text());
+        }
+        assert!(report.first.shift_s.unwrap().abs() < 1e-3);
+        assert!(report.first.iso18571.values().all(|rating| rating.phase == 1.0), "{report:?}");
+    }
+}
+
+#[test]
+fn a_model_without_the_friction_says_that_it_does_not_follow() {
+    let start: Vec<(&str, f64)> =
+        vec![("friction_n", 0.0), ("damping_n_s_per_m", 100.0), ("unbalance_mass_kg", 0.4)];
+    let cases = vec![case_at(&start, 1.0, reference("friction", 8.0))];
+    let free = ["unbalance_mass_kg", "damping_n_s_per_m", "spring_stiffness_n_per_m"];
+    let report = fitted(cases, &options(&free));
+    assert!(!report.follows, "{}", report.text());
+    assert!(report.parameters.iter().all(|fit| fit.interval_95.is_none()));
+    assert!(report.text().contains("does not follow"));
+}
+
+#[test]
+#[ignore = "half a minute; run by tests_with_tools"]
+fn friction_is_told_from_viscous_damping() {
+    let names: Vec<&str> = FRICTION.iter().map(|(name, _)| *name).collect();
+    for factor in [0.7, 1.3] {
+        let cases = vec![case_at(&FRICTION, factor, reference("friction", 24.0))];
+        let report = fitted(cases, &options(&names));
+        let off = off(&report, &FRICTION);
+        assert!(report.follows, "{}", report.text());
+        assert!(off.iter().all(|off| off.abs() < 3.0), "{off:?}: {}", report.text());
+    }
+}
+
+#[test]
+#[ignore = "a minute; run by tests_with_tools"]
+fn intervals_hold_the_truth_as_often_as_they_say() {
+    const DRAWS: usize = 50;
+    let normal = Distribution { shape: Shape::Normal { mean: 0.0, sd: 1.0 }, from: -6.0, to: 6.0 };
+    let names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
+    let mut held = vec![0; VISCOUS.len()];
+    for draw in 0..DRAWS {
+        let mut measured = reference("viscous_exact", 8.0);
+        for (s, signal) in measured.signals.iter_mut().enumerate() {
+            let noise = Design::MonteCarlo { points: 0, seed: draw as u64 };
+            for (row, value) in signal.values.iter_mut().enumerate() {
+                *value += NOISE[s] * normal.quantile(noise.place(row as u64, s).unwrap());
+            }
+        }
+        let report = fitted(vec![case_at(&VISCOUS, 0.97, measured)], &options(&names));
+        assert!(report.follows, "draw {draw}: {}", report.text());
+        for ((held, fit), (_, truth)) in held.iter_mut().zip(&report.parameters).zip(VISCOUS) {
+            let [from, to] = fit.interval_95.unwrap();
+            *held += usize::from(from <= truth && truth <= to);
+        }
+    }
+    println!("of {DRAWS} intervals hold the truth: {held:?}");
+    let all: usize = held.iter().sum();
+    let share = all as f64 / (DRAWS * VISCOUS.len()) as f64;
+    assert!((0.90..=0.99).contains(&share), "{held:?}");
+    assert!(held.iter().all(|held| *held >= 43), "{held:?}");
+}
+
+#[test]
+fn what_cannot_be_fitted_is_said() {
+    let wrong = |free: &[&str], measured: Measured| {
+        let work = Work { stop: &|| false, seen: &|_| {}, journal: None };
+        let cases = vec![case_at(&VISCOUS, 1.0, measured)];
+        match fit(cases, &options(free), &work) {
+            Err(error) => error.to_string(),
+            Ok(_) => panic!("{free:?}"),
+        }
+    };
+    let short = || reference("viscous", 1.0);
+    for (free, said) in [
+        (&["dampng_n_s_per_m"][..], "did you mean `damping_n_s_per_m`"),
+        (&["damping_n_s_per_m", "damping_n_s_per_m"], "free twice"),
+        (&["damping_n_s_per_m=200:100"], "is no range"),
+        (&["damping_n_s_per_m=-5:100"], "is no range"),
+        (&["window_from_s"], "no number of the machine"),
+        (&["friction_n"], "no value to start from"),
+        (&["radial_clearance_m"], "does not depend on radial_clearance_m"),
+        (&["spin_ramp_s"], "a spin given as a table"),
+    ] {
+        let text = wrong(free, short());
+        assert!(text.contains(said), "{free:?}: {text}");
+    }
+    let mut few = short();
+    few.time_s.truncate(1);
+    few.speed_rpm = None;
+    few.signals.iter_mut().for_each(|signal| signal.values.truncate(1));
+    assert!(wrong(&["damping_n_s_per_m"], few).contains("6 unknowns for 4 samples"));
+}
+
+#[test]
+fn units_that_are_wrong_and_loads_that_differ_are_seen() {
+    let mut one = reference("viscous", 5.0);
+    // Degrees instead of radians.
+    let degrees = |values: &mut Vec<f64>| values.iter_mut().for_each(|v| *v *= 57.295_78);
+    degrees(&mut one.signals[2].values);
+    let mut other = reference("viscous", 5.0);
+    other.name = "other".to_owned();
+    let mut cases = vec![case_at(&VISCOUS, 1.0, one), case_at(&VISCOUS, 1.0, other)];
+    cases[1].plan.model.machine.unbalance.mass_kg = 0.6;
+    let mut options = options(&["damping_n_s_per_m"]);
+    options.own = vec!["unbalance_mass_kg=0.1:1".to_owned()];
+    let report = fitted(cases, &options);
+    let said: Vec<&String> = report.notes.iter().filter(|it| it.contains("degrees")).collect();
+    assert!(said.len() == 1 && said[0].starts_with("tub_yaw_rad of viscous.csv"), "{report:?}");
+    let [_, first, second] = &report.parameters[..] else { panic!("{report:?}") };
+    assert_eq!(first.file.as_deref(), Some("viscous.csv"));
+    assert_eq!(second.file.as_deref(), Some("other"));
+    assert!((second.value - 0.43).abs() < 0.02, "{}", report.text());
+}
+
+#[test]
+fn an_interrupted_fit_goes_on_to_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let journal = Some(folder.path().join("x.partial"));
+    let cases = || vec![case_at(&VISCOUS, 0.9, reference("viscous", 3.0))];
+    let options = options(&["damping_n_s_per_m", "unbalance_mass_kg"]);
+    let whole = fitted(cases(), &options);
+    let made = AtomicUsize::new(0);
+    let seen = |_| {
+        made.fetch_add(1, Ordering::Relaxed);
+    };
+    let stop = || made.load(Ordering::Relaxed) >= 3;
+    let work = Work { stop: &stop, seen: &seen, journal: journal.clone() };
+    assert!(fit(cases(), &options, &work).unwrap().is_none());
+    assert!(journal.as_ref().unwrap().exists());
+    let work = Work { stop: &|| false, seen: &|_| {}, journal: journal.clone() };
+    let resumed = fit(cases(), &options, &work).unwrap().unwrap().report;
+    assert_eq!(serde_json::json!(resumed), serde_json::json!(whole));
+    assert!(!journal.unwrap().exists());
+}

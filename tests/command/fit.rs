@@ -1,0 +1,113 @@
+//! `sweep fit` as a user meets it: a trace of the program's own is the measurement.
+
+use std::fs;
+
+use arrow_array::cast::AsArray as _;
+use arrow_array::types::Float64Type;
+use serde_json::Value;
+use sweep_files::ParquetFile;
+
+use crate::home::{Home, said};
+
+const GRID: &str = "spin = { profile = \"triangular\", peak_rpm = 300, ramp_s = 3 }\n\
+                    time = { end_s = 3 }\n\
+                    [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100, 140]\n";
+
+/// A home with a run of a machine of 180 N s/m and 0.35 kg in it, as CSV: an acceleration with
+/// gravity, in both senses of a sensor, and an angle with every seventh sample missing.
+fn bench() -> Home {
+    let home = Home::new(GRID);
+    let at = ["--at", "damping_n_s_per_m=180", "--at", "unbalance_mass_kg=0.35"];
+    let words = [&["trace", "g.toml", "--rates", "-o", "t.parquet"], &at[..]].concat();
+    let traced = home.sweep(&words);
+    assert!(traced.status.success(), "{}", said(&traced));
+    let file = ParquetFile::open(&home.path("t.parquet")).expect("it is there");
+    let batches = file.batches(|builder| builder).expect("it is read");
+    let mut text = "time_s,tub_front_y_m_per_s2,tub_yaw_rad,tub_pitch_rad_per_s\n".to_owned();
+    for batch in batches {
+        let batch = batch.expect("it is read");
+        let column = |name: &str| {
+            batch.column_by_name(name).expect(name).as_primitive::<Float64Type>().clone()
+        };
+        let [time, y, yaw, pitch] = [
+            "time_s",
+            "nonlinear_tub_front_y_m_per_s2",
+            "nonlinear_tub_yaw",
+            "nonlinear_tub_pitch_rad_per_s",
+        ]
+        .map(column);
+        for row in 0..batch.num_rows() {
+            // A sawtooth as noise: it correlates with nothing.
+            let noise = (row * 7919 % 1000) as f64 / 1000.0 - 0.5;
+            let yaw = if row % 7 == 0 {
+                String::new()
+            } else {
+                format!("{}", yaw.value(row) + 1e-4 * noise)
+            };
+            let (y, pitch) = (9.81 + y.value(row) + 0.1 * noise, pitch.value(row) + 1e-3 * noise);
+            text += &format!("{},{y},{yaw},{pitch}\n", time.value(row));
+        }
+    }
+    fs::write(home.path("run.csv"), text).expect("it is written");
+    home
+}
+
+#[test]
+fn a_fit_ends_in_a_machine_file_that_runs() {
+    let home = bench();
+    let words = ["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m,unbalance_mass_kg"];
+    let more = ["--json", "--draws", "4", "--out", "bench.toml", "--curves", "fit.parquet"];
+    let done = home.sweep(&[&words[..], &more].concat());
+    assert!(done.status.success(), "{}", said(&done));
+    let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
+    for (parameter, (name, truth)) in found["parameters"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .zip([("damping_n_s_per_m", 180.0), ("unbalance_mass_kg", 0.35)])
+    {
+        assert_eq!(parameter["name"], name);
+        let number = |value: &Value| value.as_f64().expect("a number");
+        let [from, to] = [0, 1].map(|end| number(&parameter["interval_95"][end]));
+        assert!(from < truth && truth < to, "{parameter}");
+        assert!((number(&parameter["value"]) / truth - 1.0).abs() < 0.01, "{parameter}");
+    }
+    let offset = found["offset"]["tub_front_y_m_per_s2"].as_f64().expect("a number");
+    assert!((offset - 9.81).abs() < 0.05, "{found}");
+    for key in ["correlations", "noise", "shift_s", "residual_rms", "iso18571", "verdict"] {
+        assert!(!found[key].is_null(), "{key}: {found}");
+    }
+    // The machine is the fitted one, to the last bit.
+    let grid = format!("machine = \"bench.toml\"\n{GRID}");
+    fs::write(home.path("own.toml"), grid).expect("it is written");
+    let listed = home.sweep(&["parameters", "own.toml", "--json"]);
+    let listed: Value = serde_json::from_slice(&listed.stdout).expect("it is JSON");
+    let mass = listed.as_array().expect("a list").iter();
+    let mut mass = mass.filter(|parameter| parameter["name"] == "unbalance_mass_kg");
+    let value = mass.next().map(|parameter| &parameter["value"]);
+    assert_eq!(value, Some(&found["parameters"][1]["value"]));
+    assert!(!home.path("bench.toml.partial").exists());
+    for (view, picture) in [("time", "t.svg"), ("passages", "p.html"), ("profiles", "c.svg")] {
+        let drawn = home.sweep(&["plot", "fit.parquet", "--view", view, "-o", picture]);
+        assert!(drawn.status.success(), "{view}: {}", said(&drawn));
+    }
+    let again = home.sweep(&[&words[..], &more].concat());
+    assert_eq!(again.status.code(), Some(1), "{}", said(&again));
+    assert!(said(&again).contains("give another name"), "{}", said(&again));
+}
+
+#[test]
+fn what_is_no_measurement_is_refused_with_its_place() {
+    let home = Home::new(GRID);
+    fs::write(home.path("run.csv"), "time_s,tub_front_x_m\n0,1\n1,2\n0.5,3\n").expect("written");
+    let done = home.sweep(&["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m"]);
+    assert_eq!(done.status.code(), Some(2));
+    for said_of in
+        ["run.csv:1:8", "is no channel", "run.csv:4:1", "time goes back: 0.5 s after 1 s"]
+    {
+        assert!(said(&done).contains(said_of), "{said_of}: {}", said(&done));
+    }
+    let gone = home.sweep(&["fit", "g.toml", "gone.csv", "--free", "damping_n_s_per_m"]);
+    assert_eq!(gone.status.code(), Some(2), "{}", said(&gone));
+    assert!(said(&gone).contains("cannot read gone.csv"), "{}", said(&gone));
+}
