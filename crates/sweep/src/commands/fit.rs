@@ -64,7 +64,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=10_000))]
     bootstrap: u32,
-    /// Rows of the map over the fitted distribution, for the verdict's probability; 0 for no verdict
+    /// Rows of the map over the fitted distribution, for the verdict's probability; 0 for none
     #[arg(long, value_name = "N", default_value_t = 64)]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=100_000))]
     draws: u32,

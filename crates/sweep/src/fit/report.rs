@@ -343,8 +343,8 @@ impl Found<'_> {
         })
     }
 
-    /// The fastest growing disturbance of the fitted machine at speeds up to its fastest: its growth
-    /// (1/s), and where (rpm).
+    /// The fastest growing disturbance of the fitted machine at speeds up to its fastest: its
+    /// growth (1/s), and where (rpm).
     fn growth(
         &self,
         case: usize,
