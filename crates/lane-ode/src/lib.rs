@@ -150,7 +150,7 @@ pub use partials::Partials;
 pub use peaks::Peaks;
 pub use quintic::Sample;
 pub use real::Real;
-pub use simd::{Kernel, ScalarKernel, Simd};
+pub use simd::{Kernel, ScalarKernel, Simd, UnsupportedProcessor};
 pub use squares::SquareIntegrals;
 pub use system::{Count, Ended, Failure, Forcing, Leg, Step, System, Task};
 pub use time_above::TimeAbove;

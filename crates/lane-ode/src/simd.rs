@@ -1,12 +1,16 @@
 //! Which instruction set runs, decided when the program runs.
 
-use crate::lane::{Aside, Lane, out_of_line};
+use core::fmt;
+
+#[cfg(not(target_arch = "x86_64"))]
+use crate::lane::out_of_line;
+use crate::lane::{Aside, Lane};
 
 /// An instruction set the integrators can run on. Results are the same bits on all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Simd {
-    /// One lane, with the processor's fused multiply-add where it has one. Without one, the fused
-    /// operations run in software: the same bits, about ten times slower.
+    /// One lane, with the processor's fused multiply-add: on x86-64 that of AVX2's processors.
+    /// Where this is not available, nothing is.
     Scalar,
     /// Four lanes of AVX2 with FMA.
     Avx2,
@@ -18,6 +22,21 @@ pub enum Simd {
     /// `wasm32.rs`).
     Simd128,
 }
+
+/// This processor has no instruction set that work is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnsupportedProcessor;
+
+impl fmt::Display for UnsupportedProcessor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(
+            "this processor lacks AVX2 or FMA: use an x86-64 processor that has them (Intel's \
+             since 2013, AMD's since 2015), or a 64-bit ARM one",
+        )
+    }
+}
+
+impl core::error::Error for UnsupportedProcessor {}
 
 /// Work that is written once and compiled for every instruction set.
 ///
@@ -43,6 +62,14 @@ impl Simd {
     /// Every instruction set, the widest first.
     pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Simd128, Self::Scalar];
 
+    /// Whether anything runs here. A program asks before it begins.
+    ///
+    /// # Errors
+    /// Nothing does.
+    pub fn check() -> Result<(), UnsupportedProcessor> {
+        if Self::Scalar.is_available() { Ok(()) } else { Err(UnsupportedProcessor) }
+    }
+
     /// The best that this processor has.
     #[must_use]
     pub fn best() -> Self {
@@ -62,9 +89,12 @@ impl Simd {
     #[must_use]
     pub fn is_available(self) -> bool {
         match self {
-            Self::Scalar => true,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            Self::Scalar | Self::Avx2 => {
+                is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Scalar => true,
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
                 Self::Avx2.is_available()
@@ -103,55 +133,63 @@ impl Simd {
         }
     }
 
-    /// Runs the kernel on this instruction set, or on one lane without any if this processor lacks
-    /// it: the result is the same.
+    /// Runs the kernel on this instruction set, or on one lane if this processor lacks it: the
+    /// result is the same.
+    ///
+    /// # Panics
+    /// On an [`UnsupportedProcessor`].
     #[inline(never)]
     pub fn dispatch<K: Kernel>(self, kernel: K) -> K::Output {
         match self {
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 if self.is_available() => x86::avx512(kernel),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 if self.is_available() => x86::avx2(kernel),
+            Self::Avx2 => x86::avx2(kernel),
             #[cfg(target_arch = "x86_64")]
-            Self::Scalar if Self::Avx2.is_available() => x86::scalar(kernel),
+            _ => x86::scalar(kernel),
             #[cfg(target_arch = "aarch64")]
             Self::Neon => aarch64::neon(kernel),
             #[cfg(target_arch = "wasm32")]
             Self::Simd128 => wasm32::simd128(kernel),
+            #[cfg(not(target_arch = "x86_64"))]
             _ => kernel.run(0.0_f64),
         }
     }
 
-    /// Runs the work on one lane, with the processor's fused multiply-add where it has one: the
-    /// same bits as in any lane.
+    /// Runs the work on one lane: the same bits as in any lane.
+    ///
+    /// # Panics
+    /// As [`Self::dispatch`].
     #[inline(never)]
     pub fn one_lane<K: ScalarKernel>(kernel: K) -> K::Output {
         #[cfg(target_arch = "x86_64")]
-        if Self::Avx2.is_available() {
-            return x86::one_lane(kernel);
+        {
+            x86::one_lane(kernel)
         }
+        #[cfg(not(target_arch = "x86_64"))]
         kernel.run()
     }
 
-    /// Runs work over `f64` as a function of its own, with the processor's fused multiply-add where
-    /// it has one.
+    /// Runs work over `f64` as a function of its own.
     #[inline(always)]
     pub(crate) fn aside<W: Aside>(work: W) {
         #[cfg(target_arch = "x86_64")]
-        if Self::Avx2.is_available() {
-            return x86::aside(work);
-        }
+        x86::aside(work);
+        #[cfg(not(target_arch = "x86_64"))]
         out_of_line(work);
     }
 
     /// Runs a kernel that follows one trajectory and uses lanes for something else, on a few lanes.
     /// The result is the same on any number of them; few are enough, and the kernel is compiled for
     /// one instruction set instead of all.
+    ///
+    /// # Panics
+    /// As [`Self::dispatch`].
     #[inline(never)]
     pub fn dispatch_narrow<K: Kernel>(kernel: K) -> K::Output {
         #[cfg(target_arch = "x86_64")]
-        if Self::Avx2.is_available() {
-            return x86::avx2(kernel);
+        {
+            x86::avx2(kernel)
         }
         #[cfg(target_arch = "aarch64")]
         {
@@ -161,7 +199,11 @@ impl Simd {
         {
             wasm32::simd128(kernel)
         }
-        #[cfg(not(any(target_arch = "aarch64", target_arch = "wasm32")))]
+        #[cfg(not(any(
+            target_arch = "x86_64",
+            target_arch = "aarch64",
+            target_arch = "wasm32"
+        )))]
         kernel.run(0.0_f64)
     }
 }

@@ -258,6 +258,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
     for Map<O, C, D, P>
 {
     fn engine(plan: &Plan<Self>) -> Result<Box<dyn Engine + '_>, Error> {
+        Simd::check().map_err(Error::model)?;
         Ok(Box::new(Evaluator { plan }))
     }
 

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use lane_ode::Simd;
 use sweep::{Cli, Error, Exit, survive_file_size_limits};
 
 fn main() -> ExitCode {
@@ -14,6 +15,7 @@ fn main() -> ExitCode {
 
 fn run() -> Result<Exit, Error> {
     let cli = Cli::read();
+    Simd::check().map_err(Error::model)?;
     survive_file_size_limits().map_err(Error::signals)?;
     cli.command.run()
 }

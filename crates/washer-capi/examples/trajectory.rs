@@ -1,6 +1,7 @@
 //! This project's own methods on the trajectory of `scripts/peers/trajectory.h`, in the same words:
 //! `trajectory SIMD METHOD SETTINGS`, with rk4 STEP, rk4-mass-scaled ACCURACY, dopri5 RTOL ATOL or
-//! rodas5p RTOL ATOL. Lanes are filled with copies, and the time is that of one of them.
+//! rodas5p RTOL ATOL. Lanes are filled with copies, and the time is that of one of them. It takes
+//! 50 s unless the environment has another `END_S`.
 #![allow(clippy::print_stdout)]
 
 use std::process::ExitCode;
@@ -11,7 +12,6 @@ use washer_model::{
     Cases, Channel, Gear, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate,
 };
 
-const END_S: f64 = 50.0;
 const USAGE: &str = "usage: trajectory scalar|avx2|avx512|neon \
     rk4 STEP | rk4-mass-scaled ACCURACY | dopri5 RTOL ATOL | rodas5p RTOL ATOL";
 
@@ -42,7 +42,12 @@ fn number(word: &str) -> Result<f64, Failed> {
 }
 
 /// The method that the words name, and how the table calls it.
-fn method(words: &[&str], point: &Point, spin: &Spin) -> Result<(Method, &'static str), Failed> {
+fn method(
+    words: &[&str],
+    point: &Point,
+    spin: &Spin,
+    end_s: f64,
+) -> Result<(Method, &'static str), Failed> {
     let tolerance = |relative: &str, absolute: &str| {
         Ok(Tolerance {
             relative: number(relative)?,
@@ -54,7 +59,7 @@ fn method(words: &[&str], point: &Point, spin: &Spin) -> Result<(Method, &'stati
         ["rk4", step] => Ok((Method::Rk4 { step_s: number(step)? }, "RK4")),
         ["rk4-mass-scaled", accuracy] => {
             let geared =
-                Cases::new([(point, spin)], END_S).choose(ModelKind::Nonlinear, number(accuracy)?);
+                Cases::new([(point, spin)], end_s).choose(ModelKind::Nonlinear, number(accuracy)?);
             let geared = geared.map_err(|error| Failed::Because(error.to_string()))?;
             let geared =
                 geared.ok_or_else(|| Failed::Because("plain RK4 is cheaper".to_owned()))?;
@@ -77,11 +82,12 @@ fn run() -> Result<String, Failed> {
     machine.unbalance.mass_kg = 0.4;
     machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 140.0);
     let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
-    let timing = Timing { end_s: END_S, window_s: [30.0, END_S], checkpoints: 0 };
+    let end_s = std::env::var("END_S").map_or(Ok(50.0), |given| number(&given))?;
+    let timing = Timing { end_s, window_s: [0.6 * end_s, end_s], checkpoints: 0 };
     let Some(Ok(point)) = prepare(simd, &[(machine, spin.clone())], &timing).pop() else {
         return Err(Failed::Because("no equilibrium".to_owned()));
     };
-    let (method, name) = method(words, &point, &spin)?;
+    let (method, name) = method(words, &point, &spin, end_s)?;
     // The stiff method uses lanes for its derivatives.
     let copies = if matches!(method, Method::Rodas5p(_)) { 1 } else { simd.lanes() };
 

@@ -19,6 +19,10 @@ use pyo3::pymodule;
 /// What `washer_sweep` is made of.
 #[pymodule]
 mod _native {
+    use lane_ode::Simd;
+    use pyo3::exceptions::PyImportError;
+    use pyo3::prelude::*;
+
     #[pymodule_export]
     use super::functions::{dwell, explain, fit, modes, optimise, parameters, stability};
     #[pymodule_export]
@@ -30,4 +34,9 @@ mod _native {
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "its name in Python")]
     const __version__: &str = sweep::VERSION;
+
+    #[pymodule_init]
+    fn init(_: &Bound<'_, PyModule>) -> PyResult<()> {
+        Simd::check().map_err(|error| PyImportError::new_err(error.to_string()))
+    }
 }

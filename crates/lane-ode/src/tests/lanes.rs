@@ -205,4 +205,5 @@ fn every_instruction_set_has_the_lanes_it_says() {
         absent.into_iter().all(|simd| simd.dispatch(CountLanes) == 1),
         "what is absent runs on one lane"
     );
+    assert_eq!(Simd::check(), Ok(()));
 }
