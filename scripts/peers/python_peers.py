@@ -5,6 +5,7 @@ python_peers.py radau|lsoda|rk45|numbalsoda RTOL ATOL"""
 import ctypes
 import importlib.metadata
 import json
+import os
 import sys
 import time
 
@@ -13,7 +14,8 @@ import numpy as np
 import washer
 
 YAW, YAW_RATE = 4, 14
-END_S, WINDOW_FROM_S, SAMPLES = 50.0, 30.0, 20_000
+END_S, SAMPLES = float(os.environ.get("END_S", "50")), 20_000
+WINDOW_FROM_S = 0.6 * END_S
 FIRST_STEP_S = 1e-5
 
 

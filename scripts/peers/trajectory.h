@@ -10,10 +10,16 @@
 #include "washer.h"
 
 #define DIMENSION 20
-#define END_S 50.0
+/* 50 s unless the environment has other END_S: a check of the programs takes less. */
+#define END_S end_s()
 /* The window's yaw is sampled at these many intervals, by each program's own dense output. */
-#define WINDOW_FROM_S 30.0
+#define WINDOW_FROM_S (0.6 * END_S)
 #define SAMPLES 20000
+
+static inline double end_s(void) {
+    const char *given = getenv("END_S");
+    return given ? atof(given) : 50.0;
+}
 
 enum { YAW = 4, YAW_RATE = 14 };
 
