@@ -171,6 +171,12 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
         let drawn = home.sweep(&["plot", "d.parquet", "-o", "d.svg", "--quantity", quantity]);
         assert_eq!(code(&drawn), Some(0), "{}", said(&drawn));
     }
+    let picture = fs::read_to_string(home.path("d.svg")).expect("it was drawn");
+    assert!(picture.contains(">Least gap of the nonlinear model in B less that in A<"));
+    let shown = parsed(&home.sweep(&["show", "d.parquet", "--json"]));
+    let columns = shown["columns"].as_array().expect("a list").iter();
+    let worse: Vec<_> = columns.filter_map(|column| column["worse"].as_str()).collect();
+    assert_eq!(worse, ["greater", "less"], "of the ratio's change and of the gap's");
     let refused = home.sweep(&["compare", MAP, "d.parquet"]);
     assert_eq!(code(&refused), Some(2), "{}", said(&refused));
 }

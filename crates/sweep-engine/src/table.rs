@@ -20,6 +20,7 @@ use serde_json::{Map, Value, json};
 use crate::build::Build;
 use sweep_files::panics;
 use sweep_files::{CREATED_BY, key, seal};
+use sweep_parameter::Worse;
 
 /// A column's metadata in the Arrow schema.
 pub fn field_metadata(unit: &str, description: &str) -> HashMap<String, String> {
@@ -64,6 +65,16 @@ impl Table {
     ) {
         let array: Float64Array = values.into_iter().collect();
         self.add(name, unit, description, "float64", Arc::new(array));
+    }
+
+    /// Says of the last column which way it is bad.
+    pub fn worse(&mut self, worse: Worse) {
+        if let Some(field) = self.fields.pop() {
+            let mut metadata = field.metadata().clone();
+            metadata.insert(key::WORSE.to_owned(), worse.name().to_owned());
+            self.dictionary[field.name()][key::WORSE] = worse.name().into();
+            self.fields.push(field.with_metadata(metadata));
+        }
     }
 
     /// Adds counts.

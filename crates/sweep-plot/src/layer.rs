@@ -342,7 +342,13 @@ impl Shown {
             ),
             _ => {
                 let (words, _) = label::of_model(self.column());
-                (self.short(), label::with_unit(&words, unit))
+                let told = self.facts.description.split(';').next().unwrap_or_default();
+                let title = match source.kind {
+                    // Which of two files is over which.
+                    Kind::Differences => capitalised(told),
+                    _ => self.short(),
+                };
+                (title, label::with_unit(&words, unit))
             }
         }
     }

@@ -203,6 +203,7 @@ fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, 
         json!({
             "name": column.name,
             "unit": column.unit,
+            "worse": column.worse.map(Worse::name),
             "nulls": column.nulls,
             "least": column.range.map(|(least, _)| least),
             "greatest": column.range.map(|(_, greatest)| greatest),

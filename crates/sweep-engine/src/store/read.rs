@@ -18,7 +18,7 @@ use serde_json::Value;
 use super::error::StoreError;
 use sweep_files::cells;
 use sweep_files::{FileKind, ParquetFile, key};
-use sweep_parameter::RatioLimits;
+use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::ratio_limits;
 
 /// What a finished result says of itself.
@@ -317,6 +317,8 @@ pub struct ColumnRange {
     pub name: String,
     /// Unit from the field's metadata, if it carries one.
     pub unit: Option<String>,
+    /// Which way it is bad, if the file says so.
+    pub worse: Option<Worse>,
     /// Rows without a value.
     pub nulls: u64,
     /// Least and greatest value of a numeric column that has any.
@@ -348,6 +350,7 @@ pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
     let new = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
         name: field.name().clone(),
         unit: field.metadata().get("unit").cloned().filter(|unit| !unit.is_empty()),
+        worse: field.metadata().get(key::WORSE).and_then(|name| Worse::named(name)),
         nulls: 0,
         range: None,
         names: Vec::new(),

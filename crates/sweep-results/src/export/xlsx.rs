@@ -181,6 +181,8 @@ fn collect(value: &Value, path: &mut String, leaves: &mut Vec<(String, Value)>) 
 
 #[cfg(test)]
 mod tests {
+    use std::io::Read as _;
+
     use super::*;
     use crate::sample;
 
@@ -190,6 +192,38 @@ mod tests {
         assert!(first.starts_with(b"PK\x03\x04"));
         std::thread::sleep(std::time::Duration::from_millis(1100));
         assert_eq!(first, bytes(&sample::table()).unwrap());
+    }
+
+    /// A file of the workbook: what follows its local header.
+    fn part(book: &[u8], name: &str) -> String {
+        let at = book.windows(name.len()).position(|part| part == name.as_bytes()).unwrap();
+        let extra = u16::from_le_bytes([book[at - 2], book[at - 1]]);
+        let mut text = String::new();
+        let packed = &book[at + name.len() + usize::from(extra)..];
+        flate2::read::DeflateDecoder::new(packed).read_to_string(&mut text).unwrap();
+        text
+    }
+
+    #[test]
+    fn rows_have_a_filter_wide_columns_and_headings_that_stay() {
+        let sheet = part(&bytes(&sample::table()).unwrap(), "xl/worksheets/sheet1.xml");
+        // Names and units are two rows; below them six rows of eleven columns.
+        for said in ["<pane ySplit=\"2\"", "state=\"frozen\"", "<autoFilter ref=\"A2:K8\""] {
+            assert!(sheet.contains(said), "{said}: {sheet}");
+        }
+        let number = |text: &str, name: &str| -> f64 {
+            let (_, rest) = text.split_once(&format!("{name}=\"")).unwrap();
+            rest.split('"').next().unwrap().parse().unwrap()
+        };
+        // Neighbours of one width share an element.
+        let width = |column: f64| {
+            let mut of = sheet.split("<col ").skip(1);
+            let is_of = |text: &&str| {
+                (number(text, "min")..=number(text, "max")).contains(&column)
+            };
+            number(of.find(is_of).unwrap(), "width")
+        };
+        assert!(width(2.0) > 17.0 && width(1.0) < width(2.0), "unbalance_mass_kg needs more than point");
     }
 
     #[test]

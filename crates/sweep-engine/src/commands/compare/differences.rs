@@ -9,6 +9,7 @@ use super::Args;
 use crate::build::Build;
 use crate::table::Table;
 use sweep_files::key;
+use sweep_parameter::Worse;
 use sweep_results::{Comparison, ResultTable, SharedRow};
 
 /// The file of differences: one row per row that both have.
@@ -30,15 +31,17 @@ pub(super) fn bytes(
     table.numbers(
         "ratio_change",
         "1",
-        "ratio_max of B over that of A; null where either has none",
+        "greatest ratio of B over that of A; null where either has none",
         rows().map(SharedRow::ratio_change),
     );
+    table.worse(Worse::Greater);
     table.numbers(
         "gap_change_m",
         "m",
         "least gap of the nonlinear model in B less that in A; null where either has none",
         rows().map(SharedRow::gap_change_m),
     );
+    table.worse(Worse::Less);
     for (side, which) in ["A", "B"].into_iter().enumerate() {
         let suffix = ["a", "b"][side];
         let values = rows().map(|row| row.ratio[side]);
