@@ -199,11 +199,7 @@ impl Simd {
         {
             wasm32::simd128(kernel)
         }
-        #[cfg(not(any(
-            target_arch = "x86_64",
-            target_arch = "aarch64",
-            target_arch = "wasm32"
-        )))]
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")))]
         kernel.run(0.0_f64)
     }
 }

@@ -2,8 +2,8 @@
 //! number of cells, not of rows.
 //!
 //! A cell of one point has that point's values. A cell of several has the worst of them, column by
-//! column: the greatest, or the least of what is the worse the less it is. It counts its reliable, unreliable and
-//! failed points.
+//! column: the greatest, or the least of what is the worse the less it is. It counts its reliable,
+//! unreliable and failed points.
 
 use std::collections::BTreeMap;
 

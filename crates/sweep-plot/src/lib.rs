@@ -128,8 +128,8 @@ pub struct PlotOptions {
     pub stability: Option<PathBuf>,
     /// Map as a picture: a boundary file over the same axes, whose line is drawn too.
     pub boundary: Option<PathBuf>,
-    /// Trace: another trace file, whose nonlinear model is drawn in place of the linear one. Dwell: a
-    /// trace file whose run passes over the held speeds.
+    /// Trace: another trace file, whose nonlinear model is drawn in place of the linear one. Dwell:
+    /// a trace file whose run passes over the held speeds.
     pub against: Option<PathBuf>,
     /// Map as a page: a folder of trace files; clicking a point that has one shows it.
     pub traces: Option<PathBuf>,

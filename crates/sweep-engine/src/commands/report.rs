@@ -37,7 +37,7 @@ pub struct Args {
     requirements: Vec<String>,
 }
 
-/// The resonances of a plan's model: motion, speed (rpm) and damping ratio of each.
+/// The resonances of a plan's model: motion, speed with its unit, and damping ratio of each.
 pub type Resonances<M> = dyn Fn(&Plan<M>) -> Vec<[String; 3]>;
 
 /// Writes the page.
@@ -115,7 +115,7 @@ pub fn run<M: Swept>(
     let run = GridInput::<M>::of_plan(name, &plan).load();
     if let Ok(run) = &run {
         let found: Vec<_> = resonances(run).into_iter().map(Vec::from).collect();
-        let heads = ["motion", "resonance, rpm", "damping ratio"];
+        let heads = ["motion", "resonance", "damping ratio"];
         rows(&mut body, "Resonances of the machine as given", &heads, &found);
     }
     let about: Vec<_> =

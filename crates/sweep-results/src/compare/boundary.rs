@@ -62,7 +62,8 @@ impl Moved {
         })
     }
 
-    /// How far crossings moved in the mean, with sign: the least and the greatest by their brackets.
+    /// How far crossings moved in the mean, with sign: the least and the greatest by their
+    /// brackets.
     pub fn mean(&self) -> [f64; 2] {
         let count = self.crossings.len().max(1) as f64;
         [0, 1].map(|end| self.crossings.iter().map(|one| one.by()[end]).sum::<f64>() / count)

@@ -218,12 +218,13 @@ mod tests {
         // Neighbours of one width share an element.
         let width = |column: f64| {
             let mut of = sheet.split("<col ").skip(1);
-            let is_of = |text: &&str| {
-                (number(text, "min")..=number(text, "max")).contains(&column)
-            };
+            let is_of = |text: &&str| (number(text, "min")..=number(text, "max")).contains(&column);
             number(of.find(is_of).unwrap(), "width")
         };
-        assert!(width(2.0) > 17.0 && width(1.0) < width(2.0), "unbalance_mass_kg needs more than point");
+        assert!(
+            width(2.0) > 17.0 && width(1.0) < width(2.0),
+            "unbalance_mass_kg needs more than point"
+        );
     }
 
     #[test]

@@ -40,8 +40,8 @@ pub(crate) fn motions(
 
 /// Adds what metrics ask of a point at constant speeds (rpm): the fastest growing disturbance of
 /// the response that a machine is in that runs up, where the first speed wins a tie, and how far
-/// its motions go. Speeds without an answer are left out. Where that response is within the machine's
-/// geometry, what another passes is told.
+/// its motions go. Speeds without an answer are left out. Where that response is within the
+/// machine's geometry, what another passes is told.
 pub(super) fn add(
     outcome: &mut Outcome,
     simd: Simd,

@@ -37,8 +37,8 @@ const CLOSED_BY_PER_S: f64 = 5e-4;
 /// Dampers are not made stronger than this.
 const MOST_DAMPING_FACTOR: f64 = 32.0;
 
-/// Such factors that are tried at once, in lanes, each so many times the last; the one that closes a
-/// tongue is found this closely, relative.
+/// Such factors that are tried at once, in lanes, each so many times the last; the one that closes
+/// a tongue is found this closely, relative.
 const FACTORS: usize = 4;
 const FACTOR_STEP: f64 = 1.55;
 const FACTOR_TOLERANCE: f64 = 5e-4;
