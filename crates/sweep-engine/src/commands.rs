@@ -41,9 +41,9 @@ enum Command {
     Run(run::Args),
     /// Check a grid file and show what it would do, without doing it
     Check(check::Args),
-    /// Trace the curve where a ratio, or any other quantity, is at its limit
+    /// Trace the curve where a ratio, or any number, is at its limit
     Boundary(boundary::Args),
-    /// Find the parameters at which some numbers are least, within limits
+    /// Find parameters at which numbers are least within limits
     Optimise(optimise::Args),
     /// Show what a result file holds: verdicts and extremes
     Show(show::Args),

@@ -74,7 +74,7 @@ pub enum Command {
     Run(run::Args),
     /// Check a grid file and show what it would do, without doing it
     Check(check::Args),
-    /// Trace the curve where a ratio, or any other quantity, is at its limit
+    /// Trace the curve where a ratio, or any number, is at its limit
     Boundary(boundary::Args),
     /// Write time histories of both models at one point
     Trace(trace::Args),
@@ -88,7 +88,7 @@ pub enum Command {
     Explain(explain::Args),
     /// Find the numbers of a machine from measured run-ups
     Fit(fit::Args),
-    /// Find the parameters at which some numbers are least, within limits
+    /// Find parameters at which numbers are least within limits
     Optimise(optimise::Args),
     /// Show what a result file holds: verdicts, extremes, metrics
     Show(show_engine::Args),

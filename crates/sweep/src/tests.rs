@@ -288,7 +288,7 @@ fn every_column_of_numbers_that_is_bad_one_way_has_a_boundary() {
     assert_eq!(names[0], "ratio_max");
     for name in [
         "ratio_min",
-        "ratio_drum_rear_y",
+        "ratio_drum_front_y",
         "nonlinear_tub_yaw",
         "min_gap_linear_m",
         "cabinet_force_nonlinear_n",

@@ -242,6 +242,7 @@ mod tests {
 
     use serde_json::json;
 
+    use super::super::Layout;
     use super::super::synthetic::job;
     use super::*;
     use crate::build::Build;
@@ -331,10 +332,10 @@ mod tests {
     fn a_finished_file_is_known_by_its_plan() {
         let home = tempfile::tempdir().unwrap();
         let output = home.path().join("x.parquet");
-        let [ours, other] = [8, 9].map(|points| Job {
-            version: BUILD.version,
-            numerics: BUILD.numerics,
-            ..job(points)
+        let [ours, other] = [8, 9].map(|points| {
+            let job = job(points);
+            let layout = Layout { kind: FileKind::Boundary, ..job.layout };
+            Job { version: BUILD.version, numerics: BUILD.numerics, layout, ..job }
         });
         let mut table = Table::new(BUILD);
         table.metadata(key::PLAN, &ours.plan);

@@ -3,17 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use super::dwell::SearchArgs;
-use super::held::SpeedArgs;
 use crate::dwell::motions;
 use crate::plan::Plan;
+use crate::speeds::SpeedList;
 use crate::stability::dwells;
 use sweep_engine::store::Job;
 
 /// Which job `status` and `merge` mean, if it is not a run.
 #[derive(Debug, clap::Args)]
 pub(super) struct HeldArgs {
-    #[command(flatten)]
-    held: Option<SpeedArgs>,
+    /// Constant spin speeds in rpm of `sweep stability`, or of `sweep dwell`: as there
+    #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
+    speed: Option<SpeedList>,
     /// Of `sweep dwell` with these speeds, not of `sweep stability`
     #[arg(long, requires = "speed")]
     dwell: bool,
@@ -30,7 +31,7 @@ impl HeldArgs {
         plan: &'a Plan,
         out: Option<&Path>,
     ) -> Option<(Job<'a>, PathBuf, [String; 2])> {
-        let speed = &self.held.as_ref()?.speed;
+        let speed = self.speed.as_ref()?;
         if self.dwell {
             let search = self.search.search();
             let (job, output) = motions(plan, speed.values(), &search, out);

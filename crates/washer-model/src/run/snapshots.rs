@@ -174,7 +174,8 @@ mod tests {
                 }
                 let force = seen.cabinet_force_n(all[1], model);
                 let theirs = known.forces(k).unwrap().cabinet_n;
-                assert!((0..3).all(|i| (force[i] - theirs[i]).abs() < 1e-6), "{k}");
+                let apart_n = (0..3).map(|i| (force[i] - theirs[i]).abs()).fold(0.0, f64::max);
+                assert!(apart_n < 1e-4, "{apart_n} N at {k}");
             }
             assert_eq!(alone[0].snapshots.len(), instants.len());
             let shares = [0, 1, 2].map(|i| apart[i] / largest[i]);

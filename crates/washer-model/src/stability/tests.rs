@@ -579,7 +579,7 @@ fn a_linear_response_takes_friction_at_its_own_speed() {
     let [(slow_m_per_s, slow_m), (fast_m_per_s, fast_m)] = [of(60.0, None), of(300.0, None)];
     assert!((slow_m_per_s / fast_m_per_s - 1.0).abs() > 0.1, "{slow_m_per_s}, {fast_m_per_s}");
     assert!((slow_m / fast_m - 1.0).abs() < 3e-3, "whatever the run: {slow_m}, {fast_m}");
-    let (_, given_m) = of(60.0, Some(slow_m_per_s));
+    let (_, given_m) = of(60.0, Some(fast_m_per_s));
     assert!((given_m / slow_m - 1.0).abs() > 0.01, "{given_m}, {slow_m}");
 }
 
