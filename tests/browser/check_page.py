@@ -433,7 +433,7 @@ def report_and_downloads(page, data):
                 key=lambda row: row["min_gap_nonlinear_m"])
     first = page.driver.execute_script(
         "return document.querySelector('#points tbody tr').innerText")
-    gap = f"{1000 * least['min_gap_nonlinear_m']:.3g}"
+    gap = f"{1000 * least['min_gap_nonlinear_m']:.4g}"
     check(gap in first, f"the least gap, {gap} mm, is not in the first row: {first}")
     page.driver.execute_script("document.getElementById('link').click()")
     view, address = page.figure().get_attribute("data-view"), page.driver.current_url

@@ -36,7 +36,7 @@ mod _native {
     const __version__: &str = sweep::VERSION;
 
     #[pymodule_init]
-    fn init(_: &Bound<'_, PyModule>) -> PyResult<()> {
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
         Simd::check().map_err(|error| PyImportError::new_err(error.to_string()))
     }
 }

@@ -161,7 +161,7 @@ impl<'a> Course<'a> {
         self.held.row.turn_s()
     }
 
-    fn from_rest(&self, state: &[f64; STATES]) -> [f64; STATES] {
+    fn off_rest(&self, state: &[f64; STATES]) -> [f64; STATES] {
         let rest = self.held.row.point.equilibrium();
         core::array::from_fn(|i| state[i] - rest.get(i).copied().unwrap_or(0.0))
     }
@@ -183,7 +183,7 @@ impl<'a> Course<'a> {
             exponent: self.exponent,
             time_s: self.made as f64 * self.turn_s(),
             end: self.held.state,
-            sections: self.turns.iter().map(|turn| self.from_rest(&turn.end)).collect(),
+            sections: self.turns.iter().map(|turn| self.off_rest(&turn.end)).collect(),
             extra: Extra::default(),
         }
     }
