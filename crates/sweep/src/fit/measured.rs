@@ -260,7 +260,7 @@ mod tests {
     fn a_missing_sample_is_not_a_number_and_a_gap_is_seen() {
         let row = |k: usize| {
             let t = if k < 10 { 0.01 * k as f64 } else { 5.0 + 0.01 * k as f64 };
-            (t, if k % 3 == 0 { f64::NAN } else { 1.0 })
+            (t, if k.is_multiple_of(3) { f64::NAN } else { 1.0 })
         };
         let (time_s, yaw) = (0..40).map(row).unzip();
         let columns = vec![("time_s".to_owned(), time_s), ("tub_yaw".to_owned(), yaw)];

@@ -231,7 +231,7 @@ impl Found<'_> {
             start: free.start,
             value,
             standard_error: known.then_some(error),
-            interval_95: known.then(|| [value - REACH * error, value + REACH * error]),
+            interval_95: known.then_some([value - REACH * error, value + REACH * error]),
             bootstrap_95: self.repeated.and_then(quantiles),
             at_bound,
         }

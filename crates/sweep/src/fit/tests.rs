@@ -228,5 +228,5 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     let work = Work { stop: &|| false, seen: &|_| {}, journal: journal.clone() };
     let resumed = fit(cases(), &options, &work).unwrap().unwrap().report;
     assert_eq!(serde_json::json!(resumed), serde_json::json!(whole));
-    assert!(!journal.unwrap().exists());
+    assert!(!journal.expect("it was named").exists());
 }
