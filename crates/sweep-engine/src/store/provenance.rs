@@ -112,7 +112,7 @@ fn recorded(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     Ok(sessions)
 }
 
-/// Whether [`OpenRun::record`] writes files of this name.
+/// Whether `OpenRun::record` writes files of this name.
 pub fn is_session(name: &str) -> bool {
     name.starts_with("session-") && name.ends_with(".json")
 }
