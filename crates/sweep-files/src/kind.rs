@@ -102,7 +102,7 @@ const OWN: [(FileKind<'static>, &str, &str); 8] = [
 pub const EXPORTED_CSV: &str = "# exported by sweep ";
 
 impl FileKind<'_> {
-    /// The kind in words: "the file there is no <name>".
+    /// The kind in words: "the file there is no NAME".
     pub const fn name(self) -> &'static str {
         match self {
             Self::Map => "result of `sweep run`",
