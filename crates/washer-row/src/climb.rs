@@ -63,6 +63,9 @@ struct Climb {
     difference: Option<Difference>,
     /// The error that `run` and the run before it have in common.
     unseen: f64,
+    /// Whether the run before leaves out more than is asked: their difference is not `run`'s error
+    /// times a number that is known.
+    is_beside_what_rings: bool,
     /// What `run` errs by its caps, however alike the runs are.
     of_sag: f64,
     /// What a near twin says, once there was one.
@@ -99,6 +102,7 @@ impl Climb {
             self.run = Some(before);
             return;
         }
+        self.is_beside_what_rings = self.unseen > rule.accuracy;
         self.unseen = unseen(&now, &ladder.rungs[rung], point, rule);
         self.of_sag = of_sag(&now, &ladder.rungs[rung], point, rule);
         self.difference = found;
@@ -119,7 +123,9 @@ impl Climb {
             let share = if is_common { convergence.contraction } else { ROUGHLY };
             return Some((share * found.of_numbers).max(unseen));
         }
-        Some(convergence.error_left(found.greatest(), unseen).max(self.of_sag))
+        let left = convergence.error_left(found.greatest(), unseen);
+        let at_least = if self.is_beside_what_rings { found.greatest() } else { 0.0 };
+        Some(left.max(at_least).max(self.of_sag))
     }
 
     fn error(&self, ladder: &Ladder) -> Option<f64> {

@@ -1,6 +1,8 @@
 //! Points in memory: a table whose columns are parameters and whose rows are points.
 
-use arrow_array::{Float64Array, RecordBatch};
+use arrow_array::cast::AsArray;
+use arrow_array::types::Float64Type;
+use arrow_array::{Array, Float64Array, RecordBatch};
 use arrow_schema::Schema;
 
 use crate::config::{Diagnostics, check_columns, not_numbers};
@@ -27,6 +29,14 @@ impl PointTable {
             let refused = || not_numbers(&names, k, &field.data_type().to_string());
             if !cells::is_number(field.data_type()) {
                 return Err(refused());
+            }
+            // A column in one piece is taken as it is: tables may be of a memory's size.
+            if let [batch] = batches
+                && let Some(whole) = batch.column(k).as_primitive_opt::<Float64Type>()
+                && whole.null_count() == 0
+            {
+                columns.push(whole.clone());
+                continue;
             }
             let parts = batches.iter().map(|batch| cells::numbers(batch.column(k)));
             let parts = parts.collect::<Result<Vec<_>, _>>().map_err(|_| refused())?;

@@ -6,6 +6,7 @@
 //! needed and shrink where many are. The curve depends on the machine alone. So does what is found
 //! of it at a speed: the part of the curve counts up to where it first is [`BEYOND`] times as fast.
 
+use super::monodromy::INSTANTS;
 use super::orbit::{Asked, Square, Turned};
 use super::search::{Search, apart, missing};
 use super::settings::Settings;
@@ -35,6 +36,10 @@ pub(super) const BEYOND: f64 = 1.25;
 const FIRST_STEP: f64 = 1.0;
 const LONGEST_STEP: f64 = 4.0;
 const SHORTEST_STEP: f64 = 1e-3;
+
+/// Once a step is shorter than this, derivatives are taken at all instants of a turn until one is
+/// the longest: those at a few may be what makes it short.
+const SHORT_STEP: f64 = 0.5;
 
 /// A step is longer than the last by as much where it took at most so many corrections,
 const LONGER: f64 = 1.6;
@@ -205,6 +210,8 @@ pub(super) struct Curve<'a> {
     at: Place,
     /// Length of the next step.
     length: f64,
+    /// Whether derivatives are taken at all instants of a turn.
+    is_careful: bool,
     /// The step that is being taken; none once it is over.
     step: Option<Step>,
     /// The stretch in which a fold is being looked for.
@@ -221,6 +228,7 @@ impl<'a> Curve<'a> {
             folds: Vec::new(),
             at: [0.0; PLACE],
             length: FIRST_STEP,
+            is_careful: false,
             step: None,
             turning: None,
         }
@@ -257,6 +265,12 @@ impl<'a> Curve<'a> {
         self.correct(onto, last.tangent);
     }
 
+    /// Makes the next step so many times as long.
+    fn scale(&mut self, by: f64) {
+        self.length = (by * self.length).min(LONGEST_STEP);
+        self.is_careful = self.length < SHORT_STEP || self.is_careful && self.length < LONGEST_STEP;
+    }
+
     fn correct(&mut self, onto: Place, across: Place) {
         self.at = onto;
         let missing = f64::INFINITY;
@@ -269,7 +283,7 @@ impl<'a> Curve<'a> {
             // A fold that cannot be found more closely is where it is.
             Some(Turning { after, rounds }) if rounds > 0 => self.folds.push(after + 1),
             Some(_) => {}
-            None => self.length *= 0.5,
+            None => self.scale(0.5),
         }
         self.advance();
     }
@@ -325,7 +339,7 @@ impl<'a> Curve<'a> {
     /// Arrives at the last node once more, with derivatives of that very place. From a tangent that
     /// is not quite its own, no step would be short enough.
     fn look_again(&mut self) {
-        self.length *= 0.5;
+        self.scale(0.5);
         if let Some(last) = self.nodes.pop() {
             self.correct(last.at, last.tangent);
         }
@@ -367,9 +381,9 @@ impl<'a> Curve<'a> {
         }
         self.nodes.push(node);
         if step.corrections <= FEW {
-            self.length = (LONGER * self.length).min(LONGEST_STEP);
+            self.scale(LONGER);
         } else if step.corrections >= MANY {
-            self.length *= SHORTER;
+            self.scale(SHORTER);
         }
         if turns_back {
             let after = self.nodes.len() - 2;
@@ -475,10 +489,13 @@ impl<'a> Search<'a> for Curve<'a> {
     fn wants(&mut self) -> Vec<Asked<'a>> {
         let Some(step) = &self.step else { return Vec::new() };
         let is_seen = step.seen.is_none();
-        let Ok(row) = self.settings.followed(speed_of(&self.at)) else {
+        let Ok(mut row) = self.settings.followed(speed_of(&self.at)) else {
             self.step = None;
             return Vec::new();
         };
+        if self.is_careful {
+            row.instants = INSTANTS;
+        }
         let start = state_of(&self.at);
         let mut asked = vec![Asked { row, start, is_seen }];
         if is_seen {
