@@ -63,8 +63,8 @@ struct Climb {
     difference: Option<Difference>,
     /// The error that `run` and the run before it have in common.
     unseen: f64,
-    /// Whether the run before leaves out more than is asked: their difference is not `run`'s error
-    /// times a number that is known.
+    /// Whether the run before is capped and rings by more than is asked, and `run` is plain RK4:
+    /// their difference then says nothing of `run`'s error, which may be twice as much.
     is_beside_what_rings: bool,
     /// What `run` errs by its caps, however alike the runs are.
     of_sag: f64,
@@ -102,7 +102,8 @@ impl Climb {
             self.run = Some(before);
             return;
         }
-        self.is_beside_what_rings = self.unseen > rule.accuracy;
+        let levels = [self.rung, rung].map(|rung| ladder.rungs[rung].level.is_capped());
+        self.is_beside_what_rings = levels == [true, false] && self.unseen > rule.accuracy;
         self.unseen = unseen(&now, &ladder.rungs[rung], point, rule);
         self.of_sag = of_sag(&now, &ladder.rungs[rung], point, rule);
         self.difference = found;
@@ -114,7 +115,7 @@ impl Climb {
         if self.is_chaotic() {
             return self.spread().map(|spread| (ROUGHLY * spread).max(unseen));
         }
-        let found = self.difference?;
+        let found = self.difference.filter(|_| !self.is_beside_what_rings)?;
         let convergence = &ladder.rungs[self.rung].convergence;
         // Nothing finer settles the course. Bearings that still ring do so soon in another phase,
         // which the course shows and no number.
@@ -123,9 +124,7 @@ impl Climb {
             let share = if is_common { convergence.contraction } else { ROUGHLY };
             return Some((share * found.of_numbers).max(unseen));
         }
-        let left = convergence.error_left(found.greatest(), unseen);
-        let at_least = if self.is_beside_what_rings { found.greatest() } else { 0.0 };
-        Some(left.max(at_least).max(self.of_sag))
+        Some(convergence.error_left(found.greatest(), unseen).max(self.of_sag))
     }
 
     fn error(&self, ladder: &Ladder) -> Option<f64> {
@@ -295,7 +294,9 @@ impl Climbs {
             let errors = nonlinear.error(&ladders[0]).zip(linear.error(&ladders[1]));
             outcome.error = errors.map(|(nonlinear, linear)| nonlinear.max(linear));
             outcome.converged = Some(outcome.error.is_some_and(|error| error <= rule.accuracy));
-            let disagrees = nonlinear.spread().is_none_or(|spread| spread > rule.accuracy);
+            // A twin that is off where RK4 agrees with itself leaves an error, and no chaos.
+            let of_rk4 = nonlinear.difference.map(|difference| difference.of_numbers);
+            let disagrees = of_rk4.is_none_or(|of_numbers| of_numbers > rule.accuracy);
             outcome.sensitive = Some(nonlinear.is_chaotic() && disagrees);
         }
         Some(outcome)
