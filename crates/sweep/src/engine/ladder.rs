@@ -148,7 +148,9 @@ pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladd
     rungs.extend([longer, plain(reference_step_s, REFERENCE_CONTRACTION, f64::INFINITY)]);
     let halved_s = 0.5 * reference_step_s;
     let halved = plain(halved_s, CONTRACTION_OF_HALVED, f64::INFINITY);
-    let following = plain(following_step_s, CONTRACTION_OF_FOLLOWING, f64::INFINITY);
+    // Two steps that are nearly the same would agree on an error that neither shows.
+    let shorter_s = following_step_s.min(0.5 * halved_s);
+    let following = plain(shorter_s, CONTRACTION_OF_FOLLOWING, f64::INFINITY);
     let is_needed = !halved.follows_bearings;
     let finer = [Some(halved), is_needed.then_some(following)];
     Ladder::checked(rungs, held_back).with_finer(finer.into_iter().flatten())

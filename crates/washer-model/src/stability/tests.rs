@@ -411,7 +411,7 @@ fn random_machines_do_what_is_said() {
             let moved = simulated(machine.clone(), response, 20.0);
             let size = |d: &[f64; COORDINATES]| d[4].abs().max(d[5].abs());
             let most = moved.iter().map(size).fold(0.0, f64::max);
-            let left = moved[moved.len() - 20..].iter().map(size).fold(0.0, f64::max) / most;
+            let left = moved[moved.len() * 4 / 5..].iter().map(size).fold(0.0, f64::max) / most;
             println!("machine {number}, {} rpm: {left:e} left", response.speed_rpm);
             assert!(left < 0.1, "machine {number}: {response:?}");
             decayed[kind] += 1;
