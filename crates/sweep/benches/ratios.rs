@@ -259,8 +259,8 @@ fn dwells(rounds: usize, pair_s: f64) {
     );
 }
 
-/// What a held speed ends in, from eight starts, against eight trajectories with peaks of as many
-/// steps of the same formula.
+/// What a held speed ends in, from eight starts of 100 s, against eight trajectories with peaks: as
+/// many steps of the same formula, and as long by plain RK4.
 fn motions(rounds: usize) {
     const SPEED_RPM: f64 = 250.0;
     const STEPS_A_TURN: f64 = 96.0;
@@ -275,32 +275,51 @@ fn motions(rounds: usize) {
     };
     let dwell = ready(1.0);
     let dwells = [Dwell { point: &dwell[0], speed_rpm: SPEED_RPM }];
-    let starts = Starts { count: TRAJECTORIES, ..Starts::default() };
+    let starts = Starts { count: TRAJECTORIES, longest_s: 100.0, ..Starts::default() };
     let find = || endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0);
+    // Whole windows of turns.
     let followed_s = find().map(|found| found.motions[0].time_s).expect("it has motions");
-    let steps = followed_s * SPEED_RPM / 60.0 * STEPS_A_TURN;
-    let points = ready(steps * STEP_S);
-    let points: Vec<&Point> = points.iter().collect();
-    let mut times = vec![Vec::new(); 2];
-    for _ in 0..rounds {
-        let begin = Instant::now();
-        assert!(find().is_ok());
-        times[0].push(begin.elapsed().as_secs_f64() * 1e3);
-        let begin = Instant::now();
+    let as_many = ready(followed_s * SPEED_RPM / 60.0 * STEPS_A_TURN * STEP_S);
+    let as_long = ready(followed_s);
+    let integrate = |points: &[Point]| {
+        let points: Vec<&Point> = points.iter().collect();
         let method = Method::Rk4 { step_s: STEP_S };
         let records = simulate(Simd::best(), ModelKind::Nonlinear, &method, &points);
-        times[1].push(begin.elapsed().as_secs_f64() * 1e3);
         assert!(records.iter().all(|record| record.failure.is_none()));
+    };
+    let mut times = vec![Vec::new(); 4];
+    for _ in 0..rounds {
+        let works: [&dyn Fn(); 4] = [
+            &|| assert!(find().is_ok()),
+            &|| assert!(respond(&dwells, &|| false)[0].is_ok()),
+            &|| integrate(&as_many),
+            &|| integrate(&as_long),
+        ];
+        for (work, times) in works.iter().zip(&mut times) {
+            let begin = Instant::now();
+            work();
+            times.push(begin.elapsed().as_secs_f64() * 1e3);
+        }
     }
     println!(
-        "One core, what {SPEED_RPM} rpm ends in from {TRAJECTORIES} starts, the first followed for \
+        "One core, what {SPEED_RPM} rpm ends in from {TRAJECTORIES} starts, followed for \
          {followed_s:.0} s:\n"
     );
-    let names = ["responses, starts, settling", "trajectories of as many RK4 steps"];
-    let medians = table("ms", &names.map(str::to_owned), &times);
+    let names = [
+        "responses, starts, settling".to_owned(),
+        "of these, both models' responses".to_owned(),
+        "trajectories of as many RK4 steps".to_owned(),
+        format!("trajectories as long by RK4 at {STEP_S:e} s"),
+    ];
+    let medians = table("ms", &names, &times);
     println!(
-        "| ratio | |\n|---|---|\n| motions against trajectories of as many steps | {:.2} |\n",
-        medians[0] / medians[1]
+        "| ratio | |\n|---|---|\n\
+         | motions against trajectories of as many steps | {:.2} |\n\
+         | motions without responses against these | {:.2} |\n\
+         | motions against trajectories as long by RK4 at {STEP_S:e} s | {:.2} |\n",
+        medians[0] / medians[2],
+        (medians[0] - medians[1]) / medians[2],
+        medians[0] / medians[3]
     );
 }
 

@@ -46,6 +46,16 @@ fn plan(text: &str) -> Plan {
     config::load(&path, &[]).unwrap_or_else(|mistakes| panic!("{mistakes}"))
 }
 
+#[test]
+fn a_held_speed_may_be_a_number() {
+    let held = |speed: &str| {
+        let speeds = format!("[stability]\nspeed_rpm = {speed}\n");
+        plan(&format!("metrics = [\"dwell\"]\n{HEAD}{speeds}{GRID}")).model.held_speeds
+    };
+    assert!(held("250").is_some() && held("250") == held("\"250\""));
+    assert_eq!(held("297.5"), held("\"297.5\""));
+}
+
 fn traced(
     plan: &Plan,
     task: &BoundaryTask,

@@ -182,6 +182,17 @@ impl<'a> Section<'a> {
         text(&quoted(key), self.at.source, value, self.report).map_or(Field::Bad, Field::Given)
     }
 
+    /// A string, or a number alone as it is written.
+    pub fn text_or_number(&self, key: &'static str) -> Field<&'a str> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        let written = match value.get_ref() {
+            DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str(),
+            DeValue::Float(float) => float.as_str(),
+            _ => return self.text(key),
+        };
+        Field::Given(Located { value: written, at: self.place(value.span()) })
+    }
+
     /// Whether a string stands there, where something else may.
     pub fn is_text(&self, key: &'static str) -> bool {
         self.get(key).is_some_and(|value| value.get_ref().is_str())

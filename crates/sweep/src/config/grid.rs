@@ -74,13 +74,12 @@ pub(crate) fn stability(root: &Section<'_>, metrics: &[Metric]) -> Option<SpeedL
     }
     if let (Field::Absent, Some(metric)) = (&field, of_speeds) {
         let title = format!("the metric `{}` needs speeds", metric.name());
-        let expected =
-            "expected a section [stability] with speed_rpm = \"250\" or \"FROM:TO:STEP\"";
+        let expected = "expected a section [stability] with speed_rpm = 250 or \"FROM:TO:STEP\"";
         report.push_missing(Diagnostic::new(title).at(root.at(), expected));
     }
     let section = field.given()?.value;
-    let expected = "constant speeds in rpm, as \"250\", \"240,305\" or \"60:400:1\"";
-    let found = section.require(section.text("speed_rpm"), "speed_rpm", expected);
+    let expected = "constant speeds in rpm, as 250, \"240,305\" or \"60:400:1\"";
+    let found = section.require(section.text_or_number("speed_rpm"), "speed_rpm", expected);
     section.finish();
     let found = found?;
     found.value.parse().map_or_else(

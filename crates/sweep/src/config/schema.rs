@@ -169,8 +169,8 @@ fn metrics() -> Value {
 
 fn stability() -> Value {
     let speeds = json!({
-        "type": "string",
-        "description": "constant spin speeds in rpm, above 0, as \"250\", \"240,305\" or \
+        "type": ["string", "number"],
+        "description": "constant spin speeds in rpm, above 0, as 250, \"240,305\" or \
                         \"60:400:1\": those of the metrics `growth` and `dwell`",
     });
     table([("speed_rpm", speeds)], &["speed_rpm"])
