@@ -1,9 +1,10 @@
 //! Against motions that a program independent of this one found.
 
 use super::*;
+use crate::coordinates::TUB_YAW;
 use crate::tests::elements::machine;
 use crate::tests::reference::reference;
-use crate::{Channel, Spin, Timing, prepare};
+use crate::{Channel, Method, ModelKind, Spin, Start, Timing, history, prepare};
 use serde_json::{Value, json};
 
 const CHANNEL: [(Channel, &str); 4] = [
@@ -13,14 +14,19 @@ const CHANNEL: [(Channel, &str); 4] = [
     (Channel::TubPitch, "tub_pitch_rad"),
 ];
 
+/// A machine of the reference at a constant speed.
+fn at(keys: &Value, speed_rpm: f64, end_s: f64) -> crate::Point {
+    let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![speed_rpm] };
+    let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
+    prepare(Simd::best(), &[(machine(keys), spin)], &timing).remove(0).unwrap()
+}
+
 fn point_of(case: &Value) -> crate::Point {
     let mut keys = case["elements"].clone();
     for name in ["unbalance_mass_kg", "damping_n_s_per_m"] {
         keys[name] = case[name].clone();
     }
-    let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![100.0] };
-    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-    prepare(Simd::best(), &[(machine(&keys), spin)], &timing).remove(0).unwrap()
+    at(&keys, 100.0, 1.0)
 }
 
 /// The greatest difference of a motion from one of the reference, as a share.
@@ -98,7 +104,10 @@ fn check(name: &str, speed_rpm: f64, at: &Value, found: &Endings) {
         }
         let nearest = |a: &&Ending, b: &&Ending| off(a, end).total_cmp(&off(b, end));
         let motion = found.motions.iter().min_by(nearest).unwrap();
-        assert!(off(motion, end) < 5e-3, "{what}: {}", off(motion, end));
+        // Beside its edge the reference errs by its own steps of 2e-4 s: our RK4 at these gives its
+        // 29.34 and 31.75 mrad, at 2.5e-5 s 29.64 and 32.07.
+        let most = if name == "friction_heavy" && speed_rpm == 270.0 { 1.6e-2 } else { 5e-3 };
+        assert!(off(motion, end) < most, "{what}: {}", off(motion, end));
         let same = match motion.settled {
             // The reference looks for no period beyond four turns.
             Some(Settled::Periodic { turns: turns @ 5.. }) => period == 0 && turns < 17,
@@ -118,5 +127,95 @@ fn val_motions_of_held_speeds_match_an_independent_program() {
 #[test]
 #[ignore = "friction takes short steps: a minute"]
 fn val_more_motions_of_held_speeds_match_an_independent_program() {
-    held(|name, speed| name.starts_with("paper") || (name == "friction_heavy" && speed < 265.0));
+    held(|name, _| name.starts_with("paper") || name == "friction_heavy");
+}
+
+/// Motions of random machines, two of three with friction and one of three with stops too, go on
+/// as they are in short steps of plain RK4. SEED and MACHINES choose others.
+#[test]
+#[ignore = "short steps: minutes"]
+fn random_motions_go_on_in_short_steps() {
+    let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
+    let mut numbers = fastrand::Rng::with_seed(given("SEED", 35));
+    let (mut counts, mut worst) = ([0; Ending::KINDS.len()], [0.0_f64; 3]);
+    for number in 0..given("MACHINES", 12) {
+        let kind = (number % 3) as usize;
+        let mut between = |low: f64, high: f64| low + (high - low) * numbers.f64();
+        let mut keys = json!({
+            "unbalance_mass_kg": between(0.1, 0.9),
+            "damping_n_s_per_m": if kind == 0 { between(60.0, 200.0) } else { between(10.0, 40.0) },
+        });
+        if kind > 0 {
+            keys["Ff"] = json!(between(20.0, 80.0));
+        }
+        if kind > 1 {
+            let clearance = between(0.005, 0.02);
+            let side = |side: f64| [0.4, 0.0, 0.28 * side, 0.0, 0.0, side, clearance, 4e4, 100.0];
+            keys["stops"] = json!([side(1.0), side(-1.0)]);
+        }
+        let speed_rpm = between(230.0, 330.0);
+        let point = at(&keys, 100.0, 1.0);
+        let starts = Starts { count: 4, kick_rad_per_s: between(1.0, 6.0), ..Starts::default() };
+        let dwells = [Dwell { point: &point, speed_rpm }];
+        let found = endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0).unwrap();
+        for motion in &found.motions {
+            counts[motion.kind()] += 1;
+            if matches!(motion.settled, None | Some(Settled::Chaotic)) {
+                continue;
+            }
+            let (peaks, states) = in_short_steps(&keys, speed_rpm, motion);
+            let off =
+                motion.peaks.iter().zip(peaks).map(|(said, true_)| (said / true_ - 1.0).abs());
+            let off = off.fold(0.0, f64::max);
+            println!(
+                "{number}: {speed_rpm:.1} rpm {:?} {:.0} s, off {off:.1e} {keys}",
+                motion.settled, motion.time_s
+            );
+            worst[kind] = worst[kind].max(off);
+            if let Some(Settled::Periodic { turns }) = motion.settled {
+                let last = states.len() - 1;
+                let yaw = |back: usize| states[last - back][TUB_YAW] - states[last][TUB_YAW];
+                let yaw_rad = motion.peaks[Channel::TubYaw.index()];
+                assert!(yaw(turns as usize).abs() < 5e-3 * yaw_rad, "{number}: {motion:?}");
+            }
+        }
+    }
+    println!("{:?} {counts:?}, worst {worst:?}", Ending::KINDS);
+    assert!(counts[0] > 0 && counts[1..4].iter().sum::<u32>() > 0);
+    assert!(worst.iter().all(|worst| *worst < 1e-2), "{worst:?}");
+}
+
+/// A motion in 256 further turns by plain RK4: largest deviations in the last half, and the
+/// coordinates once a turn.
+fn in_short_steps(
+    keys: &Value,
+    speed_rpm: f64,
+    motion: &Ending,
+) -> ([f64; CHANNELS], Vec<[f64; COORDINATES]>) {
+    const LOOKS: usize = 128;
+    const STEP_S: f64 = 2.5e-5;
+    const TURNS: usize = 256;
+    let turn_s = 60.0 / speed_rpm;
+    let point = at(keys, speed_rpm, TURNS as f64 * turn_s);
+    let rest = point.equilibrium();
+    let start = Start {
+        deviations: core::array::from_fn(|i| motion.end[i] - rest[i]),
+        speeds: core::array::from_fn(|i| motion.end[COORDINATES + i]),
+    };
+    let method = Method::Rk4 { step_s: STEP_S };
+    let history = history(ModelKind::Nonlinear, &method, &point, &start, turn_s / LOOKS as f64);
+    assert!(history.failure.is_none());
+    let (mut peaks, mut states) = ([0.0_f64; CHANNELS], Vec::new());
+    for k in 0..TURNS * LOOKS {
+        let instant = history.instant(k).unwrap();
+        if k % LOOKS == 0 {
+            states.push(instant.deviations);
+        }
+        if k >= TURNS / 2 * LOOKS {
+            for (peak, at) in peaks.iter_mut().zip(instant.channels) {
+                *peak = peak.max(at.abs());
+            }
+        }
+    }
+    (peaks, states)
 }
