@@ -27,6 +27,12 @@ const ROUGHLY_REPEATS: f64 = 1e-3;
 /// settles.
 const CLEARLY: f64 = 20.0;
 
+/// A motion that repeats has settled where it has less than this share of its size to go.
+/// Changes that shrink by less than the second in [`REPEATING`] / 2 turns are taken to shrink by
+/// that.
+const TO_GO: f64 = 2e-3;
+const SLOWEST: f64 = 1e-3;
+
 /// Windows are alike whose largest deviations differ by less than this share; those of chaotic
 /// motions by less than the second.
 const ALIKE: f64 = 3e-3;
@@ -110,13 +116,16 @@ impl<'a> Course<'a> {
             // It has not left yet.
         } else if let Some(turns) = self.clear_period(REPEATS)
             && self.are_alike(REPEATING, REPEATS)
+            && self.to_go(turns) < TO_GO
         {
             self.settle(Settled::Periodic { turns });
         } else if self.made.is_multiple_of(WINDOW) && self.turns.len() == 2 * WINDOW {
             let may_ask = self.made >= self.asked_from;
             if self.are_alike(WINDOW, ALIKE) {
                 if let Some(turns) = self.clear_period(ROUGHLY_REPEATS) {
-                    self.settle(Settled::Periodic { turns });
+                    if self.to_go(turns) < TO_GO {
+                        self.settle(Settled::Periodic { turns });
+                    }
                 } else if let Some(two) = self.two_frequencies(TWO_LINES) {
                     self.settle(two);
                 } else if may_ask {
@@ -228,6 +237,21 @@ impl<'a> Course<'a> {
     fn clear_period(&self, share: f64) -> Option<u32> {
         let period = self.period(share)?;
         (self.period(CLEARLY * share) == Some(period)).then_some(period)
+    }
+
+    /// How far it is, as a share of its size, from where it comes to if each change between
+    /// stretches of whole periods is as large a part of the last as that was of the one before.
+    fn to_go(&self, period: u32) -> f64 {
+        let stretch = REPEATING / 2 / period as usize * period as usize;
+        let Some(first) = self.turns.len().checked_sub(3 * stretch) else { return f64::INFINITY };
+        let change = |from: usize| {
+            let of =
+                |k: usize| apart(&self.held.row, &self.turns[k].end, &self.turns[k + stretch].end);
+            (from..from + stretch).map(of).fold(0.0, f64::max)
+        };
+        let (then, now) = (change(first), change(first + stretch));
+        let part = (now / then).min(1.0 - SLOWEST);
+        now * part / (1.0 - part) / size(self.held.row.point, &self.held.state)
     }
 
     /// Two frequencies, if their lines leave no more than this share of yaw and pitch once a turn.

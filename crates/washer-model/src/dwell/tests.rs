@@ -130,6 +130,19 @@ fn val_more_motions_of_held_speeds_match_an_independent_program() {
     held(|name, _| name.starts_with("paper") || name == "friction_heavy");
 }
 
+#[test]
+fn what_decays_slowly_is_no_motion_of_every_second_turn() {
+    let point = at(&json!({ "unbalance_mass_kg": 0.4, "damping_n_s_per_m": 140.0 }), 100.0, 1.0);
+    let dwells = [Dwell { point: &point, speed_rpm: 317.0 }];
+    let starts = Starts { longest_s: 120.0, ..Starts::default() };
+    let found = endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0).unwrap();
+    assert!((-2e-3..0.0).contains(&found.responses[0].growth_per_s()));
+    for motion in &found.motions {
+        let settled = motion.settled;
+        assert!(matches!(settled, None | Some(Settled::Periodic { turns: 1 })), "{settled:?}");
+    }
+}
+
 /// Motions of random machines, two of three with friction and one of three with stops too, go on
 /// as they are in short steps of plain RK4. SEED and MACHINES choose others.
 #[test]
