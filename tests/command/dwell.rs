@@ -129,6 +129,7 @@ fn motions_keep_sections_and_metrics_and_are_compared() {
     for column in ["turn", "q5_rad", "u10_rad_per_s", "cabinet_force_nonlinear_n"] {
         assert!(shown.contains(column), "{column}\n{shown}");
     }
+    assert!(shown.contains("rows  128"), "64 states of each of two motions\n{shown}");
     assert!(!shown.contains("clash_time"), "a motion that goes on has no such time");
     let view = ["plot", "a.parquet", "--view", "sections", "-o", "s.html"];
     let drawn = sweep(&folder, &view, None);

@@ -28,8 +28,8 @@ const FORMAT: u32 = 5;
 const HEADER: usize = 8 + 4 + 4 + 32 + 3 * 8;
 const HASH: usize = blake3::OUT_LEN;
 
-/// Rows of a point, at most.
-const MOST_ROWS: u64 = 32;
+/// Rows of a point, at most: 256 states of each of 32 motions.
+const MOST_ROWS: u64 = 32 * 256;
 
 /// What a record holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,10 +111,12 @@ pub(super) fn encode(place: &Place, outcomes: &[Done]) -> Result<Vec<u8>, StoreE
     let shape = &place.shape;
     let mut bytes = Vec::with_capacity(HEADER + outcomes.len() * shape.bytes_a_row() + HASH);
     bytes.extend_from_slice(&header(place));
-    for (point, row) in outcomes
-        .iter()
-        .flat_map(|done| done.rows.iter().take(MOST_ROWS as usize).map(|row| (done.point, row)))
-    {
+    if let Some(done) = outcomes.iter().find(|done| done.rows.len() as u64 > MOST_ROWS) {
+        let reason = format!("point {}: {} rows of {MOST_ROWS}", done.point, done.rows.len());
+        return Err(reject(place, reason));
+    }
+    let rows = outcomes.iter().flat_map(|done| done.rows.iter().map(|row| (done.point, row)));
+    for (point, row) in rows {
         let fits = row.len() == shape.columns.len()
             && shape.columns.iter().zip(row).all(|(column, cell)| column.takes(*cell));
         if !fits {
