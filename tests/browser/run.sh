@@ -1,5 +1,5 @@
 #!/bin/sh
-# The pages of a map, of a trace and of a design, and a page that computes, in a real browser:
+# The pages of a map, of a trace, of a design and of a report, and one that computes, in a browser:
 # tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
 #
 # MAP.parquet is the result of sweeps/quick.toml, or of another grid over the same axes.
@@ -61,3 +61,8 @@ END
 "$sweep" plot "$work/design.parquet" -o "$work/design.html"
 "$venv/bin/python" "$here/check_design.py" "$work/design.parquet" "$work/design.html" \
     ${SHOTS:+--screenshots "$SHOTS"}
+
+# A report with figures beside the map's: one page to print.
+"$sweep" trace "$root/sweeps/quick.toml" --point 40 --out "$work/point.parquet"
+"$sweep" report "$map" "$work/modes.parquet" "$work/point.parquet" -o "$work/report.html"
+"$venv/bin/python" "$here/check_report.py" "$work/report.html" ${SHOTS:+--screenshots "$SHOTS"}

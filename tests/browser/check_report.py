@@ -1,0 +1,64 @@
+"""A report in headless Chromium: one sheet of paper, and nothing clipped on a small screen.
+
+    python check_report.py REPORT.html
+
+Exits with 1 at the first thing that is wrong.
+"""
+
+import argparse
+import base64
+import re
+
+from check_page import Page, check
+from selenium.webdriver.common.by import By
+
+PAPERS_CM = {"A4": (21.0, 29.7), "letter": (21.59, 27.94)}
+
+
+class Report(Page):
+    """A page without scripts."""
+
+    def drawn(self):
+        return self.driver.find_elements(By.CSS_SELECTOR, "figure img")
+
+    def one_page(self):
+        for paper, (width, height) in PAPERS_CM.items():
+            options = {"paperWidth": width / 2.54, "paperHeight": height / 2.54}
+            pdf = base64.b64decode(self.driver.execute_cdp_cmd("Page.printToPDF", options)["data"])
+            pages = len(re.findall(rb"/Type\s*/Page\b", pdf))
+            check(pages == 1, f"{pages} pages of {paper}")
+        return " and ".join(PAPERS_CM)
+
+    def nothing_clipped(self):
+        size = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        outside = self.driver.execute_script(
+            "return [...document.querySelectorAll('body *')]"
+            ".filter((one) => one.getBoundingClientRect().right > 400.5)"
+            ".map((one) => one.outerHTML.slice(0, 80))"
+        )
+        check(not outside, f"beyond 400 px: {outside[:3]}")
+        return "within 400 px"
+
+    def folded(self):
+        fold = self.driver.find_element(By.TAG_NAME, "details")
+        check(fold.get_attribute("open") is None, "the fold of digests is open")
+        check("sweep.digest" not in self.driver.find_element(By.TAG_NAME, "body").text, "digests")
+        return "digests"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("report")
+    parser.add_argument("--screenshots", help="folder for pictures of what was seen")
+    asked = parser.parse_args()
+    page = Report(asked.report, asked.screenshots)
+    page.run([
+        ("printed", page.one_page),
+        ("small", page.nothing_clipped),
+        ("folded", page.folded),
+    ])
+
+
+if __name__ == "__main__":
+    main()
