@@ -1,14 +1,17 @@
-//! Time histories of both models at one point, as a table.
+//! Time histories of both models at one point or at all of a plan, as a table.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use lane_ode::{Failure, Simd};
-use rayon::iter::{IndexedParallelIterator as _, IntoParallelIterator as _, ParallelIterator as _};
+use rayon::iter::{
+    IndexedParallelIterator as _, IntoParallelIterator as _, IntoParallelRefIterator as _,
+    ParallelIterator as _,
+};
 use serde_json::{Value, json};
 use washer_model::{
-    COORDINATES, Cases, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium, Point,
-    Spin, Start, Timing, history_until, prepare,
+    Asked, COORDINATES, Cases, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium,
+    Point, Spin, Start, Timing, histories, instants, prepare, together,
 };
 
 use crate::engine::{ModelEngine, Quick, reference_step_s};
@@ -43,6 +46,8 @@ pub(crate) struct Extras {
     pub states: bool,
     /// Forces of the elements between cabinet and tub, their sum, and what the feet carry.
     pub forces: bool,
+    /// The drum's angle.
+    pub angle: bool,
 }
 
 /// One coordinate or speed at the start.
@@ -92,12 +97,12 @@ pub(crate) fn start_of(values: &[StartValue]) -> Start {
     start
 }
 
-/// The time between instants, if it makes a sensible number of them.
+/// The time between instants, if it makes a sensible number of them at so many points.
 ///
 /// # Errors
 /// [`Error::Option`].
-pub(crate) fn every(every_s: f64, plan: &Plan) -> Result<f64, Error> {
-    let least = plan.end_s / MOST_INSTANTS;
+pub(crate) fn every(every_s: f64, plan: &Plan, points: u64) -> Result<f64, Error> {
+    let least = plan.end_s * points as f64 / MOST_INSTANTS;
     if (least..=plan.end_s).contains(&every_s) {
         return Ok(every_s);
     }
@@ -108,16 +113,11 @@ pub(crate) fn every(every_s: f64, plan: &Plan) -> Result<f64, Error> {
     })
 }
 
-/// How many instants from 0 to the end there are.
-fn instants(plan: &Plan, every_s: f64) -> usize {
-    // The quotient may come out a hair below the whole number that was meant.
-    1 + (plan.end_s / every_s * (1.0 + 1e-12)).floor() as usize
-}
-
 /// What of a point's histories is looked at.
 pub(crate) struct View {
-    /// Time between two instants, s.
-    pub(crate) every_s: f64,
+    /// Time between two instants, s; `None` for one a turn, where the unbalance is up.
+    pub(crate) every_s: Option<f64>,
+    pub(crate) models: Models,
     /// Where both models begin.
     pub(crate) start: Start,
     pub(crate) extras: Extras,
@@ -125,7 +125,26 @@ pub(crate) struct View {
     pub(crate) quick: Option<Quick>,
 }
 
-/// The histories of one point.
+/// Which models are integrated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Models {
+    #[default]
+    Both,
+    Nonlinear,
+    Linear,
+}
+
+impl Models {
+    fn kinds(self) -> &'static [ModelKind] {
+        match self {
+            Self::Both => &[ModelKind::Nonlinear, ModelKind::Linear],
+            Self::Nonlinear => &[ModelKind::Nonlinear],
+            Self::Linear => &[ModelKind::Linear],
+        }
+    }
+}
+
+/// The histories of one point, or of all of a plan one below the other.
 pub(crate) struct Trace {
     table: Table,
     /// Instants.
@@ -134,8 +153,7 @@ pub(crate) struct Trace {
     pub failures: Vec<String>,
 }
 
-/// Integrates both models of a scenario and reads them every `every_s` from 0 to the end; in a
-/// pool, both at once.
+/// Integrates models of a scenario and reads them from 0 to the end; in a pool, both at once.
 ///
 /// `at` names the point: parameters with their values. Once `stop` says so it ends early, and what
 /// it returns means nothing.
@@ -149,62 +167,162 @@ pub(crate) fn trace(
     view: &View,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Trace, NoEquilibrium> {
-    let View { every_s, ref start, extras, quick } = *view;
-    let Scenario { model: Washer { machine, spin, .. }, window_s } = scenario;
-    let checkpoints = quick.map_or(0, |quick| quick.checkpoints);
-    let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
-    let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
-    let ([by_nonlinear, by_linear], method_json) = methods(plan, &point, &spin, quick);
-    let run = |model, method| history_until(model, method, &point, start, every_s, stop);
-    let nonlinear = || run(ModelKind::Nonlinear, &by_nonlinear);
-    let linear = || run(ModelKind::Linear, &by_linear);
-    let (nonlinear, linear) = match rayon::current_thread_index() {
-        Some(_) => rayon::join(nonlinear, linear),
-        // rayon's own pool is not sure to start, and it panics if it does not.
-        None => (nonlinear(), linear()),
-    };
-
-    let instants = instants(plan, every_s);
-    let time = |k: usize| k as f64 * every_s;
+    let run = Run::new(plan, scenario, view)?;
+    let runs = [&run];
+    let models = integrate(&runs, view.models, stop);
     let mut table = Table::new(crate::identity::BUILD);
-    table.numbers("time_s", "s", "time since the start", (0..instants).map(|k| Some(time(k))));
-    let speeds = spin.speeds_rpm((0..instants).map(time)).map(Some);
-    table.numbers("speed_rpm", "rpm", "spin of the shaft", speeds);
-    let models = [
-        Columns::new("nonlinear", &nonlinear, instants),
-        Columns::new("linear", &linear, instants),
-    ];
-    models.iter().for_each(|model| model.channels(&mut table));
-    models.iter().for_each(|model| model.gap(&mut table));
-    if extras.rates {
-        models.iter().for_each(|model| model.rates(&mut table));
-    }
-    if extras.states {
-        models.iter().for_each(|model| model.states(&mut table));
-    }
-    if extras.forces {
-        models.iter().for_each(|model| model.forces(&mut table));
-    }
-    let failures = models.iter().map(Columns::failure).collect::<Vec<_>>();
+    let failures = columns(&mut table, &runs, &models, view.extras);
+    let of = |kind: ModelKind| {
+        let model = view.models.kinds().iter().position(|known| *known == kind);
+        model.and_then(|model| failures[model][0].clone())
+    };
     table.metadata(key::PLAN, &plan.to_json());
     let mut facts = json!({
         "at": at.into_iter().collect::<BTreeMap<_, _>>(),
-        "every_s": every_s,
-        "equilibrium": named('q', point.equilibrium()),
-        "start": {
-            "deviations": named('q', &start.deviations),
-            "speeds": named('u', &start.speeds),
-        },
-        "integrator": method_json,
-        "nonlinear_failure": failures[0],
-        "linear_failure": failures[1],
+        "every_s": view.every_s,
+        "equilibrium": named('q', run.point.equilibrium()),
+        "start": start_json(&view.start),
+        "integrator": run.method_json,
+        "nonlinear_failure": of(ModelKind::Nonlinear),
+        "linear_failure": of(ModelKind::Linear),
     });
-    let taken = friction_speeds(&point);
+    let taken = friction_speeds(&run.point);
     if !taken.is_empty() {
         facts["friction_speeds_m_per_s"] = taken.into();
     }
     table.metadata(key::TRACE, &facts);
-    Ok(Trace { table, instants, failures: failures.into_iter().flatten().collect() })
+    let failures = failures.into_iter().flatten().flatten().collect();
+    Ok(Trace { table, instants: run.times_s.len(), failures })
+}
+
+/// As [`trace`] of every point of a plan, in one table with the points' numbers and axes: so many
+/// at once as there are lanes, each with the bits that it has alone. A point without equilibrium
+/// has no rows, and is among the failures.
+pub(crate) fn trace_all(plan: &Plan, view: &View, stop: &(dyn Fn() -> bool + Sync)) -> Trace {
+    let mut failures = Vec::new();
+    let mut runs = Vec::new();
+    for number in 0..plan.points() {
+        match Run::new(plan, plan.scenario(number), view) {
+            Ok(run) => runs.push((number, run)),
+            Err(none) => failures.push(format!("point {number}: {none}")),
+        }
+    }
+    let each: Vec<&Run> = runs.iter().map(|(_, run)| run).collect();
+    let models = integrate(&each, view.models, stop);
+    let mut table = Table::new(crate::identity::BUILD);
+    let rows = || runs.iter().flat_map(|(number, run)| run.times_s.iter().map(move |_| *number));
+    table.counts("point", "number of the point in its grid", rows());
+    for (k, axis) in plan.axes.iter().enumerate() {
+        let of = &axis.parameter;
+        let values = rows().map(|number| plan.axis_values(number).get(k).copied());
+        table.numbers(of.name(), of.unit(), of.description(), values);
+    }
+    let failed = columns(&mut table, &each, &models, view.extras);
+    for (k, (number, _)) in runs.iter().enumerate() {
+        let of_point = failed.iter().filter_map(|model| model[k].as_deref());
+        failures.extend(of_point.map(|text| format!("point {number}: {text}")));
+    }
+    table.metadata(key::PLAN, &plan.to_json());
+    let facts = json!({ "every_s": view.every_s, "start": start_json(&view.start) });
+    table.metadata(key::TRACE, &facts);
+    Trace { table, instants: each.iter().map(|run| run.times_s.len()).sum(), failures }
+}
+
+/// One point made ready.
+struct Run {
+    point: Point,
+    spin: Spin,
+    start: Start,
+    /// Of the nonlinear model and the linear one.
+    methods: [Method; 2],
+    method_json: Value,
+    times_s: Vec<f64>,
+}
+
+impl Run {
+    fn new(plan: &Plan, scenario: Scenario, view: &View) -> Result<Self, NoEquilibrium> {
+        let Scenario { model: Washer { machine, spin, .. }, window_s } = scenario;
+        let checkpoints = view.quick.map_or(0, |quick| quick.checkpoints);
+        let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
+        let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
+        let (methods, method_json) = methods(plan, &point, &spin, view.quick);
+        let times_s = match view.every_s {
+            Some(every_s) => {
+                (0..instants(plan.end_s, every_s)).map(|k| k as f64 * every_s).collect()
+            }
+            None => spin.whole_turns_s(plan.end_s),
+        };
+        Ok(Self { point, spin, start: view.start, methods, method_json, times_s })
+    }
+}
+
+/// Of each model its histories of the runs; groups that share lanes go to the threads of the pool.
+fn integrate<'a>(
+    runs: &[&'a Run],
+    models: Models,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Vec<(ModelKind, Vec<History<'a>>)> {
+    let kinds = models.kinds();
+    let groups: Vec<(ModelKind, &[&'a Run])> = kinds
+        .iter()
+        .flat_map(|&kind| runs.chunks(together()).map(move |runs| (kind, runs)))
+        .collect();
+    let group = |&(kind, runs): &(ModelKind, &[&'a Run])| {
+        let asked = runs.iter().map(|run| Asked {
+            point: &run.point,
+            method: run.methods[usize::from(kind == ModelKind::Linear)],
+            start: run.start,
+            times_s: run.times_s.clone(),
+        });
+        histories(kind, asked.collect(), stop)
+    };
+    let found: Vec<Vec<History<'a>>> = match rayon::current_thread_index() {
+        Some(_) => groups.par_iter().map(group).collect(),
+        // rayon's own pool is not sure to start, and it panics if it does not.
+        None => groups.iter().map(group).collect(),
+    };
+    let mut found = found.into_iter().flatten();
+    kinds.iter().map(|&kind| (kind, found.by_ref().take(runs.len()).collect())).collect()
+}
+
+/// Adds the columns of histories, one below the other; of each model says how each one failed.
+fn columns(
+    table: &mut Table,
+    runs: &[&Run],
+    models: &[(ModelKind, Vec<History<'_>>)],
+    extras: Extras,
+) -> Vec<Vec<Option<String>>> {
+    let times = runs.iter().flat_map(|run| run.times_s.iter().copied().map(Some));
+    table.numbers("time_s", "s", "time since the start", times);
+    let speeds = runs.iter().flat_map(|run| run.spin.speeds_rpm(run.times_s.iter().copied()));
+    table.numbers("speed_rpm", "rpm", "spin of the shaft", speeds.map(Some));
+    if extras.angle {
+        let angles = runs.iter().flat_map(|run| run.spin.angles_rad(run.times_s.iter().copied()));
+        let what = "angle of the drum, 0 where the unbalance is up";
+        table.numbers("drum_angle_rad", "rad", what, angles.map(Some));
+    }
+    let counts: Vec<usize> = runs.iter().map(|run| run.times_s.len()).collect();
+    let models = models.iter().map(|(kind, histories)| {
+        let name = if *kind == ModelKind::Linear { "linear" } else { "nonlinear" };
+        Columns::new(name, histories, &counts)
+    });
+    let models: Vec<Columns<'_>> = models.collect();
+    models.iter().for_each(|model| model.channels(table));
+    models.iter().for_each(|model| model.gap(table));
+    if extras.rates {
+        models.iter().for_each(|model| model.rates(table));
+    }
+    if extras.states {
+        models.iter().for_each(|model| model.states(table));
+    }
+    if extras.forces {
+        models.iter().for_each(|model| model.forces(table));
+    }
+    models.iter().map(Columns::failures).collect()
+}
+
+fn start_json(start: &Start) -> Value {
+    json!({ "deviations": named('q', &start.deviations), "speeds": named('u', &start.speeds) })
 }
 
 /// Traces of every point of the plan that `engine` made `result` of, one file each
@@ -237,7 +355,8 @@ pub(crate) fn keep(
             let values = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
             let at = values.zip(plan.axis_values(point)).collect();
             let view = View {
-                every_s: plan.end_s / KEPT_INSTANTS,
+                every_s: Some(plan.end_s / KEPT_INSTANTS),
+                models: Models::Both,
                 start: Start::default(),
                 extras: Extras::default(),
                 quick: level.and_then(|level| {
@@ -319,13 +438,17 @@ fn methods(plan: &Plan, point: &Point, spin: &Spin, quick: Option<Quick>) -> ([M
 /// One model's columns.
 struct Columns<'a> {
     model: &'static str,
-    history: &'a History<'a>,
+    histories: &'a [History<'a>],
+    /// Of each history how many instants were asked for.
+    counts: &'a [usize],
     instants: Vec<Option<Instant>>,
 }
 
 impl<'a> Columns<'a> {
-    fn new(model: &'static str, history: &'a History<'a>, instants: usize) -> Self {
-        Self { model, history, instants: (0..instants).map(|k| history.instant(k)).collect() }
+    fn new(model: &'static str, histories: &'a [History<'a>], counts: &'a [usize]) -> Self {
+        let each = histories.iter().zip(counts);
+        let instants = each.flat_map(|(of, &count)| (0..count).map(|k| of.instant(k))).collect();
+        Self { model, histories, counts, instants }
     }
 
     fn column(
@@ -379,8 +502,9 @@ impl<'a> Columns<'a> {
     }
 
     fn forces(&self, table: &mut Table) {
+        let each = self.histories.iter().zip(self.counts);
         let forces: Vec<Option<Forces>> =
-            (0..self.instants.len()).map(|k| self.history.forces(k)).collect();
+            each.flat_map(|(of, &count)| (0..count).map(|k| of.forces(k))).collect();
         let mut add = |what: &str, description: &str, of: &dyn Fn(&Forces) -> f64| {
             let name = format!("{what}_{}_n", self.model);
             let description =
@@ -434,17 +558,21 @@ impl<'a> Columns<'a> {
         }
     }
 
-    fn failure(&self) -> Option<String> {
-        let (reason, time_s) = self.history.failure?;
-        let what = match reason {
-            Failure::Diverged => "diverged",
-            Failure::StepTooSmall => "needs steps too small for double precision",
-            Failure::StepLimit => "used up its allowance of steps",
+    /// Of each history how it failed, if it did.
+    fn failures(&self) -> Vec<Option<String>> {
+        let one = |history: &History<'_>| {
+            let (reason, time_s) = history.failure?;
+            let what = match reason {
+                Failure::Diverged => "diverged",
+                Failure::StepTooSmall => "needs steps too small for double precision",
+                Failure::StepLimit => "used up its allowance of steps",
+            };
+            Some(format!(
+                "the {} model {what} at {time_s:.4} s: its columns are null from there on",
+                self.model
+            ))
         };
-        Some(format!(
-            "the {} model {what} at {time_s:.4} s: its columns are null from there on",
-            self.model
-        ))
+        self.histories.iter().map(one).collect()
     }
 }
 
@@ -494,7 +622,8 @@ mod tests {
             quick_rows += 1;
             assert_eq!(quick.level, row.method);
             let (scenario, extras) = (plan.scenario(row.point), Extras::default());
-            let view = View { every_s, start, extras, quick: Some(quick) };
+            let models = Models::Both;
+            let view = View { every_s: Some(every_s), models, start, extras, quick: Some(quick) };
             let by_row = trace(&plan, scenario, Vec::new(), &view, &|| false);
             let (rows, _) = by_row.unwrap().into_table().finish().unwrap();
             // The row says the nonlinear model's rung; the linear one's may have been another.
@@ -511,5 +640,37 @@ mod tests {
             }
         }
         assert!(quick_rows >= 3, "{quick_rows}");
+    }
+
+    #[test]
+    fn points_side_by_side_have_the_bits_that_each_has_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("grid.toml");
+        // Machines of several steps, more than there are lanes.
+        let grid = "spin = { profile = \"ramp\", peak_rpm = 250, ramp_s = 2 }\n\
+             time = { end_s = 4 }\n\
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.4, 0.7]\n\
+             [[axis]]\nparameter = \"spring_stiffness_n_per_m\"\nvalues = [5e3, 9e3, 4e5]\n";
+        std::fs::write(&path, grid).unwrap();
+        let plan = crate::config::load(&path, &[]).unwrap();
+        for (every_s, models) in [(Some(0.03), Models::Both), (None, Models::Nonlinear)] {
+            let extras = Extras { rates: true, states: true, forces: true, angle: true };
+            let view = View { every_s, models, start: Start::default(), extras, quick: None };
+            let all = trace_all(&plan, &view, &|| false);
+            assert_eq!(every_s.is_none(), all.instants < 9 * 20);
+            let (all, _) = all.into_table().finish().unwrap();
+            let mut from = 0;
+            for point in 0..plan.points() {
+                let one = trace(&plan, plan.scenario(point), Vec::new(), &view, &|| false).unwrap();
+                let (one, _) = one.into_table().finish().unwrap();
+                for (k, field) in one.schema().fields().iter().enumerate() {
+                    let together = all.column_by_name(field.name()).unwrap();
+                    let together = together.slice(from, one.num_rows());
+                    assert_eq!(&together, one.column(k), "{field:?} at point {point}");
+                }
+                from += one.num_rows();
+            }
+            assert_eq!(all.num_rows(), from);
+        }
     }
 }

@@ -99,7 +99,9 @@ pub use point::friction::FrictionSpeed;
 pub use point::{NoEquilibrium, Point, Timing};
 pub use ready::prepare;
 pub use run::equations::{Equations, STATE_LEN};
-pub use run::history::{History, Instant, Start, history, history_until};
+pub use run::history::{
+    Asked, History, Instant, Start, histories, history, history_until, instants, together,
+};
 pub use run::suspension::Forces;
 pub use run::{
     Course, Extra, Method, Record, Snapshot, Stop, StopLoad, Wanted, simulate, simulate_until,

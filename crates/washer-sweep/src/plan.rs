@@ -96,23 +96,29 @@ impl PyPlan {
         ended::file(py, ran, &out)
     }
 
-    /// Time histories of both models at one point.
+    /// Time histories of both models at one point, or at every one.
     #[pyo3(signature = (
-        at=None, *, every=0.01, rates=false, states=false, forces=false, start=None
+        at=None, *, all=false, model=None, every=0.01, turns=false, rates=false, states=false,
+        forces=false, angle=false, start=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn trace(
         &self,
         py: Python<'_>,
         at: Option<&Bound<'_, PyMapping>>,
+        all: bool,
+        model: Option<String>,
         every: f64,
+        turns: bool,
         rates: bool,
         states: bool,
         forces: bool,
+        angle: bool,
         start: Option<&Bound<'_, PyMapping>>,
     ) -> PyResult<PyResultTable> {
         let (at, start) = (assignments(at)?, assignments(start)?);
-        let options = TraceOptions { every_s: every, rates, states, forces, start };
+        let every_s = (!turns).then_some(every);
+        let options = TraceOptions { every_s, model, all, rates, states, forces, angle, start };
         let input = self.input.clone();
         let work = move |interrupt: &_| sweep::trace_point(&input, &at, &options, interrupt);
         let traced = abandonable(py, work)?.map_err(|error| errors::error(py, &error))?;

@@ -33,6 +33,12 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             reason: "a trace needs at least two instants",
         });
     }
+    if table.column("point").is_some() {
+        let path = table.source.path.display();
+        return Err(PlotError::Unfit(format!(
+            "{path} holds traces of many points, and a figure shows one: `sweep trace --point N`"
+        )));
+    }
     let sides = sides(table);
     let found = quantities(table, sides);
     let channels: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();

@@ -1,4 +1,4 @@
-//! `sweep trace GRID.toml`: time histories of both models at one point.
+//! `sweep trace GRID.toml`: time histories of both models at one point, or at every one.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use crate::config;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
-use crate::trace::{Extras, StartValue, View, every, start_of, start_value, trace};
+use crate::trace::{
+    Extras, Models, StartValue, View, every, start_of, start_value, trace, trace_all,
+};
 use sweep_engine::commands::cells::{short, table};
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::quoted;
@@ -27,6 +29,10 @@ pub(super) const EXAMPLES: Examples = &[
         "both models at one point",
     ],
     ["sweep trace my.toml --worst --out worst.parquet", "the greatest ratio of its map"],
+    [
+        "sweep trace my.toml --all --turns --model nonlinear --states --out turns.parquet",
+        "the state once a turn at every point, for a bifurcation diagram",
+    ],
     ["sweep plot rocking.parquet", "drawn over time and spin speed"],
 ];
 
@@ -50,6 +56,18 @@ pub struct Args {
     /// The result that --worst looks into [default: results/NAME.parquet]
     #[arg(long, value_name = "FILE", requires = "worst")]
     result: Option<PathBuf>,
+    /// Every point of the grid, in one table with the points' numbers and axes
+    #[arg(long, conflicts_with_all = ["point", "worst"])]
+    all: bool,
+    /// Which models to integrate
+    #[arg(long, value_enum, default_value_t)]
+    model: Models,
+    /// One instant a turn of the drum, where the unbalance is up
+    #[arg(long, conflicts_with = "every")]
+    turns: bool,
+    /// Add the drum's angle
+    #[arg(long)]
+    angle: bool,
     /// Time between two instants of the file, in s; the integration's steps are its own
     #[arg(long, value_name = "S", default_value_t = 0.01)]
     every: f64,
@@ -78,21 +96,35 @@ pub struct Args {
 /// Mistakes in the grid file or the options, a machine without equilibrium, and a file that cannot
 /// be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let chosen = chosen(args)?;
-    let (mut plan, at) = config::load_point(&args.grid.grid, &args.grid.sets(), &chosen)?;
-    if let Some(name) = &args.grid.name {
-        plan.name.clone_from(name);
-    }
-    args.grid.tell_window(&plan);
-    let every_s = every(args.every, &plan)?;
-    let extras = Extras { rates: args.rates, states: args.states, forces: args.forces };
+    let (plan, at, chosen) = match args.all {
+        true => (args.grid.load()?, Vec::new(), Vec::new()),
+        false => {
+            let chosen = chosen(args)?;
+            let (mut plan, at) = config::load_point(&args.grid.grid, &args.grid.sets(), &chosen)?;
+            if let Some(name) = &args.grid.name {
+                plan.name.clone_from(name);
+            }
+            args.grid.tell_window(&plan);
+            (plan, at, chosen)
+        }
+    };
+    let every_s = match args.turns {
+        true => None,
+        false => Some(every(args.every, &plan, plan.points())?),
+    };
+    let Args { rates, states, forces, angle, model: models, .. } = *args;
+    let extras = Extras { rates, states, forces, angle };
     let start = start_of(&args.start);
     let output = Output::begin(&args.out, FileKind::Trace)?;
-    let view = View { every_s, start, extras, quick: None };
+    let view = View { every_s, models, start, extras, quick: None };
     // A signal ends the process: there is nothing to keep.
-    let work = || trace(&plan, plan.scenario(0), at, &view, &|| false);
+    let work = || match args.all {
+        true => Ok(trace_all(&plan, &view, &|| false)),
+        false => trace(&plan, plan.scenario(0), at, &view, &|| false),
+    };
     // A thread for each model, where there may be two; they write the same bytes as one.
-    let trace = match threads::pool(2).ok() {
+    let wanted = if args.all { threads::cores() } else { 2 };
+    let trace = match threads::pool(wanted).ok() {
         Some(pool) => pool.install(work),
         None => work(),
     }
@@ -100,9 +132,11 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     trace.failures.iter().for_each(|failure| tell(failure));
     let instants = trace.instants;
     output.finish(&trace.into_bytes(&args.out)?)?;
-    tell(&format!("wrote {}: {instants} instants from 0 to {} s", args.out.display(), plan.end_s));
-    // A map's row is of machines that start at rest.
-    if args.start.is_empty() {
+    let of = if args.all { format!(" of {} points", plan.points()) } else { String::new() };
+    let (out, end_s) = (args.out.display(), plan.end_s);
+    tell(&format!("wrote {out}: {instants} instants{of} from 0 to {end_s} s"));
+    // A map's row is of machines that start at rest, and of both models.
+    if args.start.is_empty() && !args.all && models == Models::Both {
         tell(compared(&plan, &chosen)?.trim_end());
     }
     Ok(Exit::Done)

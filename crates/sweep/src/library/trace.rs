@@ -1,8 +1,10 @@
-//! Time histories at one point, in memory.
+//! Time histories at one point or at all of a grid, in memory.
+
+use clap::ValueEnum as _;
 
 use super::result::ResultTable;
 use crate::config::GridInput;
-use crate::trace::{self, Extras, View, every, start_of, start_value};
+use crate::trace::{self, Extras, Models, View, every, start_of, start_value};
 use sweep_engine::exit::Error;
 use sweep_engine::interrupt::Interrupt;
 use sweep_engine::threads;
@@ -11,20 +13,27 @@ use sweep_files::FileKind;
 /// What a trace holds.
 #[derive(Clone, Debug, Default)]
 pub struct TraceOptions {
-    /// Time between two instants, s.
-    pub every_s: f64,
+    /// Time between two instants, s; `None` for one a turn, where the unbalance is up.
+    pub every_s: Option<f64>,
+    /// `nonlinear` or `linear`: that model alone.
+    pub model: Option<String>,
+    /// Every point of the grid, not one.
+    pub all: bool,
     /// Whether rates and accelerations of the channels are there too.
     pub rates: bool,
     /// Whether the ten coordinates and their speeds are there too.
     pub states: bool,
     /// Whether the forces of springs and dampers are there too.
     pub forces: bool,
+    /// Whether the drum's angle is there too.
+    pub angle: bool,
     /// Where both models begin, away from equilibrium: `q5=0.1` (m, rad), `u1=2` (per s).
     pub start: Vec<String>,
 }
 
 /// Time histories of both models at a point of a grid, or of its only one: `at` gives each axis a
-/// value, and any other parameter, as `NAME=VALUE`. Beside them, how each model failed that did;
+/// value, and any other parameter, as `NAME=VALUE`. Of all points it fixes what it names. Beside
+/// them, how each model failed that did;
 /// `None` if it was interrupted.
 ///
 /// # Errors
@@ -35,23 +44,39 @@ pub fn trace_point(
     options: &TraceOptions,
     interrupt: &Interrupt,
 ) -> Result<Option<(ResultTable, Vec<String>)>, Error> {
-    let (plan, at) = grid.load_point(at)?;
-    let every_s = every(options.every_s, &plan)?;
+    let (plan, at) = match options.all {
+        true => (grid.clone().fixing(at).load()?, Vec::new()),
+        false => grid.load_point(at)?,
+    };
+    let every_s =
+        options.every_s.map(|every_s| every(every_s, &plan, plan.points())).transpose()?;
+    let refused = |option: &'static str, given: &str, expected: &str| Error::Option {
+        option,
+        given: given.to_owned(),
+        expected: expected.to_owned(),
+    };
     let start = options.start.iter().map(|text| {
-        start_value(text).map_err(|expected| Error::Option {
-            option: "start",
-            given: text.clone(),
-            expected: expected.trim_start_matches("expected ").to_owned(),
-        })
+        let expected =
+            |expected: String| refused("start", text, expected.trim_start_matches("expected "));
+        start_value(text).map_err(expected)
     });
     let start = start_of(&start.collect::<Result<Vec<_>, _>>()?);
-    let TraceOptions { rates, states, forces, .. } = *options;
-    let extras = Extras { rates, states, forces };
-    let view = View { every_s, start, extras, quick: None };
+    let models = match options.model.as_deref() {
+        None => Models::Both,
+        Some(name) => Models::from_str(name, false)
+            .map_err(|_| refused("model", name, "nonlinear, linear or both"))?,
+    };
+    let TraceOptions { rates, states, forces, angle, .. } = *options;
+    let extras = Extras { rates, states, forces, angle };
+    let view = View { every_s, models, start, extras, quick: None };
     let stop = || interrupt.stopped();
-    let work = || trace::trace(&plan, plan.scenario(0), at, &view, &stop);
+    let work = || match options.all {
+        true => Ok(trace::trace_all(&plan, &view, &stop)),
+        false => trace::trace(&plan, plan.scenario(0), at, &view, &stop),
+    };
     // A thread for each model, where there may be two; they give the same bits as one.
-    let trace = match threads::pool(2) {
+    let wanted = if options.all { threads::cores() } else { 2 };
+    let trace = match threads::pool(wanted) {
         Ok(pool) => pool.install(work),
         Err(_) => work(),
     }
@@ -77,7 +102,7 @@ mod tests {
         let speeds: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
         let interrupt = Interrupt::new();
         interrupt.raise(2);
-        let options = TraceOptions { every_s: 1.0, ..TraceOptions::default() };
+        let options = TraceOptions { every_s: Some(1.0), ..TraceOptions::default() };
         assert!(trace_point(&grid, &[], &options, &interrupt).unwrap().is_none());
         assert!(find_modes(Some(&grid), &[], &speeds, &interrupt).unwrap().is_none());
     }

@@ -149,10 +149,19 @@ impl Spin {
 
     /// Speeds at times (rpm).
     pub fn speeds_rpm(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = f64> {
+        self.at(times_s).map(|spin| spin.speed.0 * 60.0 / TAU)
+    }
+
+    /// Angles of the drum at times, from 0 where the unbalance is up to a turn (rad).
+    pub fn angles_rad(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = f64> {
+        self.at(times_s).map(|spin| spin.sin.0.atan2(spin.cos.0).rem_euclid(TAU))
+    }
+
+    fn at(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = SpinState<f64>> {
         let stretches = self.stretches();
         times_s.into_iter().map(move |t_s| {
-            let current = stretches.get(stretch_at(&stretches, t_s));
-            current.map_or(0.0, |stretch| stretch.speed_rad_per_s(t_s) * 60.0 / TAU)
+            let stretch = &stretches[stretch_at(&stretches, t_s)];
+            SpinLanes::splat(N(0.0), stretch).at(N(t_s))
         })
     }
 }

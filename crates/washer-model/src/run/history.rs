@@ -1,4 +1,4 @@
-//! Time histories: one trajectory at even instants, independent of its steps.
+//! Time histories: trajectories at given instants, independent of their steps.
 //!
 //! It is the trajectory whose peaks [`simulate`](crate::simulate) records, with the same bits in
 //! every step: instants are interpolated, and steps do not end on them. Inside a step the state is
@@ -20,21 +20,21 @@ use crate::run::suspension::{Forces, forces};
 use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, first_step};
 use core::marker::PhantomData;
 use lane_ode::{
-    Dual, Ended, Failure, Leg, N, Sample as Sampled, ScalarKernel, Simd, Step, Task, dop853,
-    dopri5, rk4, rodas,
+    Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, ScalarKernel, Simd,
+    Step, Task, dop853, dopri5, rk4, rodas,
 };
 
 /// An instant this share of a step past its end is its end.
 const SLACK: f64 = 1e-9;
 
-/// One trajectory at even instants.
+/// One trajectory at some instants.
 #[derive(Clone, Debug)]
 pub struct History<'a> {
     /// Why and when (s) it failed, if it did; there are no instants from there on.
     pub failure: Option<(Failure, f64)>,
     point: &'a Point,
     model: ModelKind,
-    every_s: f64,
+    times_s: Vec<f64>,
     states: Vec<[f64; STATES]>,
 }
 
@@ -88,25 +88,86 @@ pub fn history_until<'a>(
     every_s: f64,
     stop: Stop<'_>,
 ) -> History<'a> {
-    let (states, failure) = match model {
-        ModelKind::Nonlinear => Simd::one_lane(Sample::<OfNonlinear> {
-            point,
-            method,
-            start,
-            every_s,
-            stop,
-            family: PhantomData,
-        }),
-        ModelKind::Linear => Simd::one_lane(Sample::<OfLinear> {
-            point,
-            method,
-            start,
-            every_s,
-            stop,
-            family: PhantomData,
-        }),
+    let end_s = point.legs.last().map_or(0.0, |leg| leg.end_s);
+    let times_s = (0..instants(end_s, every_s)).map(|k| k as f64 * every_s).collect();
+    let [history] = sample(model, [Asked { point, method: *method, start: *start, times_s }], stop);
+    history
+}
+
+/// How many instants there are from 0 to an end, so far apart.
+#[must_use]
+pub fn instants(end_s: f64, every_s: f64) -> usize {
+    // The quotient may come out a hair below the whole number that was meant.
+    1 + (end_s / every_s * (1.0 + 1e-12)).floor() as usize
+}
+
+/// One trajectory that is asked for.
+#[derive(Clone, Debug)]
+pub struct Asked<'a> {
+    /// Its machine and spin.
+    pub point: &'a Point,
+    /// What integrates it.
+    pub method: Method,
+    /// Where it starts.
+    pub start: Start,
+    /// Its instants in order, the first at 0.
+    pub times_s: Vec<f64>,
+}
+
+/// Integrates one model at several points. By plain Runge-Kutta, so many points at once as there
+/// are lanes; each history has the same bits alone.
+#[must_use]
+pub fn histories<'a>(model: ModelKind, asked: Vec<Asked<'a>>, stop: Stop<'_>) -> Vec<History<'a>> {
+    let is_plain = asked.iter().all(|one| matches!(one.method, Method::Rk4 { .. }));
+    let mut asked = asked.into_iter();
+    let mut found = Vec::with_capacity(asked.len());
+    loop {
+        let some: Vec<Asked<'a>> = asked.by_ref().take(together()).collect();
+        match some.len() {
+            0 => return found,
+            2.. if is_plain => found.extend(side_by_side(model, some, stop)),
+            _ => found.extend(some.into_iter().flat_map(|one| sample(model, [one], stop))),
+        }
+    }
+}
+
+/// How many points [`histories`] takes at once.
+#[must_use]
+pub fn together() -> usize {
+    Simd::narrow().lanes()
+}
+
+fn sample<'a>(model: ModelKind, asked: [Asked<'a>; 1], stop: Stop<'_>) -> [History<'a>; 1] {
+    let sampled = match model {
+        ModelKind::Nonlinear => {
+            Simd::one_lane(Sample::<OfNonlinear> { asked: &asked, stop, family: PhantomData })
+        }
+        ModelKind::Linear => {
+            Simd::one_lane(Sample::<OfLinear> { asked: &asked, stop, family: PhantomData })
+        }
     };
-    History { failure, point, model, every_s, states }
+    let mut sampled = sampled.into_iter();
+    asked.map(|asked| of(model, asked, sampled.next().unwrap_or_default()))
+}
+
+fn side_by_side<'a>(model: ModelKind, asked: Vec<Asked<'a>>, stop: Stop<'_>) -> Vec<History<'a>> {
+    let sampled = match model {
+        ModelKind::Nonlinear => Simd::dispatch_narrow(Sample::<OfNonlinear> {
+            asked: &asked,
+            stop,
+            family: PhantomData,
+        }),
+        ModelKind::Linear => {
+            Simd::dispatch_narrow(Sample::<OfLinear> { asked: &asked, stop, family: PhantomData })
+        }
+    };
+    asked.into_iter().zip(sampled).map(|(asked, sampled)| of(model, asked, sampled)).collect()
+}
+
+fn of(model: ModelKind, asked: Asked<'_>, sampled: States) -> History<'_> {
+    let Asked { point, times_s, .. } = asked;
+    let States { states, failure } = sampled;
+    History { failure, point, model, times_s, states }
 }
 
 impl History<'_> {
@@ -126,7 +187,7 @@ impl History<'_> {
     #[must_use]
     pub fn instant(&self, k: usize) -> Option<Instant> {
         let state = self.states.get(k)?;
-        let time_s = k as f64 * self.every_s;
+        let time_s = self.times_s[k];
         let ([channels, rates, accelerations], gap_m) = match self.model {
             ModelKind::Nonlinear => observed::<Nonlinear<f64>>(self.point, time_s, state),
             ModelKind::Linear => observed::<Linear<f64>>(self.point, time_s, state),
@@ -170,37 +231,28 @@ fn observed<M: Model<f64>>(
     ([of(|it| it.value), of(|it| it.slope), of(|it| it.curvature)], gap_m)
 }
 
+/// States at the instants, as far as it came.
+#[derive(Default)]
+struct States {
+    states: Vec<[f64; STATES]>,
+    failure: Option<(Failure, f64)>,
+}
+
 struct Sample<'a, F> {
-    point: &'a Point,
-    method: &'a Method,
-    start: &'a Start,
-    every_s: f64,
+    /// No more than there are lanes.
+    asked: &'a [Asked<'a>],
     stop: Stop<'a>,
     family: PhantomData<F>,
 }
 
 impl<F: Family> ScalarKernel for Sample<'_, F> {
-    type Output = (Vec<[f64; STATES]>, Option<(Failure, f64)>);
+    type Output = Vec<States>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let mut start = <F::Over<f64> as Model<f64>>::at_rest(self.point);
-        for i in 0..COORDINATES {
-            start[i] += self.start.deviations[i];
-            start[COORDINATES + i] += self.start.speeds[i];
-        }
-        let mut sampling = Sampling::<F::Over<f64>> {
-            model: Model::splat(N(0.0), self.point, coupling(self.method, N(0.0))),
-            point: self.point,
-            every_s: self.every_s,
-            method: self.method,
-            stop: self.stop,
-            leg: None,
-            start,
-            states: vec![start],
-            failure: None,
-        };
-        match self.method {
+        let mut sampling = Sampling::<f64, F::Over<f64>>::new(N(0.0), self.asked, self.stop);
+        let Asked { point, method, .. } = &self.asked[0];
+        match method {
             Method::Rk4 { .. } => rk4::integrate(0.0, &mut sampling),
             Method::Geared(_) => match F::FORMULA {
                 Formula::Rk4 => rk4::integrate(0.0, &mut sampling),
@@ -208,37 +260,65 @@ impl<F: Family> ScalarKernel for Sample<'_, F> {
             },
             Method::Dopri5(tolerance) => dopri5::integrate(0.0, &mut sampling, tolerance),
             Method::Rodas5p(tolerance) => {
-                let mut task =
-                    StiffTask::<f64, _, F::Over<Dual<f64>>>::new(0.0, sampling, self.point);
+                let mut task = StiffTask::<f64, _, F::Over<Dual<f64>>>::new(0.0, sampling, point);
                 rodas::integrate(&mut task, tolerance);
                 sampling = task.task;
             }
         }
-        (sampling.states, sampling.failure)
+        sampling.found
     }
 }
 
-/// The task: one trajectory, its states kept where instants fall.
-struct Sampling<'a, M> {
+impl<F: Family> Kernel for Sample<'_, F> {
+    type Output = Vec<States>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self, zero: T) -> Self::Output {
+        let mut sampling = Sampling::<T, F::Over<T>>::new(N(zero), self.asked, self.stop);
+        rk4::integrate(zero, &mut sampling);
+        sampling.found
+    }
+}
+
+/// The task: a trajectory in each lane, its states kept where instants fall.
+struct Sampling<'a, T, M> {
     model: M,
-    point: &'a Point,
-    every_s: f64,
-    method: &'a Method,
+    zero: N<T>,
+    asked: &'a [Asked<'a>],
     stop: Stop<'a>,
-    /// Which leg it is on, once it has begun.
-    leg: Option<usize>,
-    start: [f64; STATES],
-    states: Vec<[f64; STATES]>,
-    failure: Option<(Failure, f64)>,
+    /// Which leg each lane is on, once it has begun.
+    legs: [Option<usize>; MAX_LANES],
+    found: Vec<States>,
 }
 
-impl<M: Model<f64>> OnLeg for Sampling<'_, M> {
-    fn place(&self) -> (&Point, usize) {
-        (self.point, self.leg.unwrap_or(0))
+impl<'a, T: Lane, M: Model<T>> Sampling<'a, T, M> {
+    #[inline(always)]
+    fn new(zero: N<T>, asked: &'a [Asked<'a>], stop: Stop<'a>) -> Self {
+        let Asked { point, method, .. } = &asked[0];
+        let mut model = M::splat(zero, point, coupling(method, zero));
+        for (lane, asked) in asked.iter().enumerate().skip(1) {
+            model.set_point(lane, asked.point);
+        }
+        let begun = |asked: &Asked<'_>| {
+            let mut start = M::at_rest(asked.point);
+            for i in 0..COORDINATES {
+                start[i] += asked.start.deviations[i];
+                start[COORDINATES + i] += asked.start.speeds[i];
+            }
+            States { states: vec![start], failure: None }
+        };
+        let found = asked.iter().map(begun).collect();
+        Self { model, zero, asked, stop, legs: [None; MAX_LANES], found }
     }
 }
 
-impl<M: Model<f64>> Task<f64, STATES> for Sampling<'_, M> {
+impl<M: Model<f64>> OnLeg for Sampling<'_, f64, M> {
+    fn place(&self) -> (&Point, usize) {
+        (self.asked[0].point, self.legs[0].unwrap_or(0))
+    }
+}
+
+impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
     type System = M;
 
     #[inline(always)]
@@ -247,45 +327,64 @@ impl<M: Model<f64>> Task<f64, STATES> for Sampling<'_, M> {
     }
 
     #[inline(never)]
-    fn next_leg(&mut self, _: usize, ended: Ended, x: &mut [N<f64>; STATES]) -> Option<Leg> {
+    fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; STATES]) -> Option<Leg> {
+        let place = lane.min(self.asked.len() - 1);
+        let (Asked { point, method, .. }, found) = (&self.asked[place], &mut self.found[place]);
         let next = match ended {
+            Ended::Idle if place < lane => point.legs.len(),
             Ended::Idle => 0,
-            Ended::Arrived(_) => self.leg.map_or(0, |leg| leg + 1),
+            Ended::Arrived(_) => self.legs[lane].map_or(0, |leg| leg + 1),
             Ended::Failed { reason, time_s, .. } => {
-                self.failure = Some((reason, time_s));
-                self.point.legs.len()
+                found.failure = Some((reason, time_s));
+                point.legs.len()
             }
         };
-        if next == 0 {
-            *x = self.start.map(N);
+        let leg = point.legs.get(next);
+        if next == 0 || leg.is_none() {
+            // An idle lane rests where the model is defined.
+            for (x, start) in x.iter_mut().zip(found.states[0]) {
+                x.0.set(lane, start);
+            }
         }
-        self.leg = Some(next);
-        let leg = self.point.legs.get(next)?;
-        let (step_s, caps) = first_step(self.method, leg);
-        self.model.set_spin(0, &self.point.stretches[leg.stretch]);
+        let leg = leg?;
+        self.legs[lane] = Some(next);
+        let (step_s, caps) = first_step(method, leg);
+        self.model.set_spin(lane, &point.stretches[leg.stretch]);
         if let Some(caps) = caps {
-            self.model.set_caps(0, &caps);
+            self.model.set_caps(lane, &caps);
         }
         Some(Leg { start_s: leg.start_s, end_s: leg.end_s, step_s })
     }
 
     #[inline(always)]
-    fn begin(&mut self, _: &M::Forcing, _: &[N<f64>; STATES], _: &[N<f64>; STATES]) {}
+    fn begin(&mut self, _: &M::Forcing, _: &[N<T>; STATES], _: &[N<T>; STATES]) {}
 
     #[inline(always)]
-    fn observe(&mut self, _: &M::Forcing, step: &Step<'_, f64, STATES>) {
-        let (end_s, length_s) = (step.end_s.0, step.length_s.0);
+    fn observe(&mut self, _: &M::Forcing, step: &Step<'_, T, STATES>) {
         // A step that left the model's range is meaningless, also inside.
-        if length_s == 0.0 || !self.model.in_range(step.after) {
-            return;
-        }
+        let in_range = T::bits(self.model.in_range(step.after));
         loop {
-            let time_s = self.states.len() as f64 * self.every_s;
-            if time_s > end_s + SLACK * length_s {
+            let mut share = self.zero;
+            let mut reached = [false; MAX_LANES];
+            for (lane, asked) in self.asked.iter().enumerate() {
+                let (end_s, length_s) = (step.end_s.0.get(lane), step.length_s.0.get(lane));
+                let next = asked.times_s.get(self.found[lane].states.len());
+                if let Some(time_s) = next
+                    && length_s != 0.0
+                    && in_range >> lane & 1 == 1
+                    && *time_s <= end_s + SLACK * length_s
+                {
+                    reached[lane] = true;
+                    share.0.set(lane, (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0));
+                }
+            }
+            if reached == [false; MAX_LANES] {
                 return;
             }
-            let share = (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0);
-            self.states.push(step.at(N(share)).map(|x| x.0));
+            let states = step.at(share);
+            for lane in (0..self.asked.len()).filter(|&lane| reached[lane]) {
+                self.found[lane].states.push(states.map(|x| x.0.get(lane)));
+            }
         }
     }
 

@@ -92,17 +92,23 @@ class Plan:
         self,
         at: Mapping[str, float] | None = None,
         *,
+        all: bool = False,
+        model: str | None = None,
         every: float = 0.01,
+        turns: bool = False,
         rates: bool = False,
         states: bool = False,
         forces: bool = False,
+        angle: bool = False,
         start: Mapping[str, float] | None = None,
     ) -> Result:
-        """Time histories of both models at one point, every `every` s.
+        """Time histories of both models at one point, every `every` s, or by `turns` once a turn.
 
-        `at` gives a value to each axis, and to any other parameter. `rates` adds rates and
-        accelerations of the channels, `states` the ten coordinates and their speeds, `forces` those of springs, dampers, stops and bushings, and
-        what the feet carry. `start` begins away from equilibrium: q1 to q10 (m, rad), u1 to u10
+        `at` gives a value to each axis, and to any other parameter. `all` traces every point that
+        it leaves, in one table with columns `point` and the axes. `model` names the one to
+        integrate, `nonlinear` or `linear`. `rates` adds rates and accelerations of the channels,
+        `states` the ten coordinates and their speeds, `forces` those of springs, dampers, stops
+        and bushings, and what the feet carry, `angle` the drum's. `start` begins away from equilibrium: q1 to q10 (m, rad), u1 to u10
         (per s). Warns of a model that failed; its values are null from there on.
         """
 

@@ -23,6 +23,12 @@ impl Spin {
         let pieces = pieces(&stretches, window_s);
         pieces.iter().filter(|piece| piece.start_s() >= window_s[0]).map(Piece::turns).sum()
     }
+
+    /// The times from 0 to `end_s` at which the drum has made a whole number of turns; at least 0.
+    #[must_use]
+    pub fn whole_turns_s(&self, end_s: f64) -> Vec<f64> {
+        whole_turns_s(&self.stretches(), [0.0, end_s])
+    }
 }
 
 /// Where a window is cut so that every part holds one whole turn of the drum, counted from the
