@@ -84,9 +84,9 @@ pub(crate) struct Map {
     pub(crate) table: Table,
     /// Where the cells are.
     pub(crate) grid: Grid,
-    /// Of each cell.
+    /// How many points of each cell are what.
     pub(crate) counts: Vec<Counts>,
-    /// Of each column of numbers.
+    /// The range of each column of numbers.
     pub(crate) extents: BTreeMap<String, Extent>,
     /// On which sides of its limit the points of a cell lie, by column. Columns without a limit are
     /// left out, and so are all where each cell is one point.

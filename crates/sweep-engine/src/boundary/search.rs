@@ -208,7 +208,7 @@ impl<'a, M: Model> Models<'a, M> {
     }
 }
 
-/// Why the evaluator stopped. What it was asked is kept as far as it was answered.
+/// Why the evaluator stopped. The answers that it has given are kept.
 #[derive(Debug)]
 pub enum Stopped {
     /// The interrupt stopped it.
@@ -256,7 +256,7 @@ impl<M: Model> Evaluate for Models<'_, M> {
     }
 }
 
-/// What a trial is kept by.
+/// The key under which a trial is stored.
 const fn key(trial: &Trial) -> Key {
     [trial.curve as u64, trial.first.to_bits(), trial.second.to_bits()]
 }

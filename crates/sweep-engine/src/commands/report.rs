@@ -157,7 +157,7 @@ fn rows(body: &mut String, title: &str, heads: &[&str], rows: &[Vec<String>]) {
     );
 }
 
-/// Of every quantity of the nonlinear model its worst value, its limit and where it is.
+/// The worst value, its limit and its place, for every quantity of the nonlinear model.
 fn worst(file: &ResultTable, ratio_limit: Option<f64>) -> Result<Vec<Vec<String>>, Error> {
     let axes = file.axes();
     let mut found = Vec::new();

@@ -106,7 +106,7 @@ impl Report {
         self.places.borrow().get(key).cloned()
     }
 
-    /// Of each parameter that was written, the text in which it stands last.
+    /// The text in which each parameter that was written stands last.
     pub fn written(&self) -> BTreeMap<String, String> {
         let (places, sources) = (self.places.borrow(), self.sources.borrow());
         let parameters = places.iter().filter(|(key, _)| !key.contains(['.', '[']));

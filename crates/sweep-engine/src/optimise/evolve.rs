@@ -148,7 +148,7 @@ pub fn front(tried: &[Candidate], objectives: usize) -> Vec<usize> {
 struct Ranks<'a> {
     tried: &'a [Candidate],
     objectives: usize,
-    /// Of each candidate the sum of its excesses, each over the greatest of all.
+    /// The sum of each candidate's excesses, each over the greatest of all.
     broken: Vec<f64>,
 }
 

@@ -138,7 +138,7 @@ pub struct DwellCounts {
     pub stable: u64,
     /// Rows with one that grows.
     pub unstable: u64,
-    /// Of the stable ones those that pass what no machine can.
+    /// Stable rows whose motion no machine can make.
     pub beyond: u64,
     /// Rows without a response.
     pub unknown: u64,

@@ -33,7 +33,7 @@ pub(super) struct Swept {
     speed: Vec<f64>,
     /// NaN where there is no response.
     growth: Vec<f64>,
-    /// Of each column asked for.
+    /// Values of each column asked for.
     columns: Vec<Vec<f64>>,
 }
 

@@ -37,7 +37,7 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, S
             let numbers = |name: &str| cells::numbers(column(name)?);
             let (kind, status) = (cells::texts(column("kind")?)?, cells::texts(column("status")?)?);
             let motion = numbers("motion")?;
-            // Of each motion the first of its turns, if these were kept.
+            // A motion counts by the first of its turns, if these were kept.
             let turn = batch.column_by_name("turn").map(|turn| cells::numbers(turn)).transpose()?;
             let at = axes.iter().map(|axis| numbers(axis)).collect::<Result<Vec<_>, _>>()?;
             let told = TOLD.map(|name| numbers(&format!("nonlinear_{name}")).unwrap_or_default());
