@@ -167,7 +167,7 @@ impl<M: Swept> Asked<'_, M> {
     }
 }
 
-/// The key under which an answer is stored: the candidate's number, the answer's, and the candidate.
+/// The key under which an answer is stored: the candidate's number, the answer's, the candidate.
 fn key(number: u64, answer: usize, values: &[f64]) -> Key {
     let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
     let hash = blake3::hash(&bytes);

@@ -71,8 +71,8 @@ pub(crate) fn of_plan(plan: Plan) -> (String, Machine, Spin, Timing) {
 pub(crate) struct Analysis {
     pub(crate) speeds_rpm: Vec<f64>,
     pub(crate) modes: Vec<ModeOverSpeed>,
-    /// The exact motion of each mode at each speed, if it was asked for. There is none at standstill,
-    /// where theta is frozen, and where a mode was not found at theta = 0.
+    /// The exact motion of each mode at each speed, if it was asked for. There is none at
+    /// standstill, where theta is frozen, and where a mode was not found at theta = 0.
     pub(crate) exact: Option<Vec<Vec<Option<Exact>>>>,
     /// At which speeds (m/s) friction is taken, by damper.
     pub(crate) friction_speeds: Map<String, Value>,
