@@ -266,6 +266,9 @@ pub(crate) fn fit(
     }
     let evaluations = made.load(Ordering::Relaxed);
     let Some(against) = problem.against(&best.x, work.stop) else { return Ok(None) };
+    // A wrong unit may lead numbers so far away that only the start shows it.
+    let at_start = problem.against(&problem.start(), work.stop);
+    let at_start = at_start.unwrap_or_else(|| against.clone());
     let statistics = Statistics::of(&problem, &against, &best.summary);
     let repeated = match options.bootstrap {
         0 => None,
@@ -278,6 +281,7 @@ pub(crate) fn fit(
         problem: &problem,
         minima: &minima,
         against: &against,
+        at_start: &at_start,
         statistics: &statistics,
         evaluations,
         step_effect,

@@ -140,6 +140,7 @@ pub(super) struct Found<'a> {
     pub(super) problem: &'a Problem,
     pub(super) minima: &'a [Descent],
     pub(super) against: &'a [Against],
+    pub(super) at_start: &'a [Against],
     pub(super) statistics: &'a Statistics,
     pub(super) evaluations: usize,
     pub(super) step_effect: Option<f64>,
@@ -371,14 +372,18 @@ impl Found<'_> {
     /// What else a reader should know.
     fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
-        for ((case, _, signal), one) in self.problem.signals().zip(self.against) {
+        let signals = self.problem.signals().zip(self.against.iter().zip(self.at_start));
+        for ((case, _, signal), (end, start)) in signals {
             let (unit, mistaken) = signal.quantity.units();
             let Some((other, factor)) = mistaken else { continue };
             let (swing, _) = super::model::centred(signal.samples().map(|(_, v)| v).collect());
-            let (moves, _) =
-                super::model::centred(signal.samples().map(|(row, _)| one.model[row]).collect());
-            let size = (dot(&swing, &swing) / dot(&moves, &moves)).sqrt();
-            if (1.0 / UNIT_SLACK..UNIT_SLACK).contains(&(size / factor)) {
+            let size = |one: &Against| {
+                let moves = signal.samples().map(|(row, _)| one.model[row]).collect();
+                let (moves, _) = super::model::centred(moves);
+                (dot(&swing, &swing) / dot(&moves, &moves)).sqrt()
+            };
+            let fits = |size: &f64| (1.0 / UNIT_SLACK..UNIT_SLACK).contains(&(size / factor));
+            if let Some(size) = [size(end), size(start)].into_iter().find(fits) {
                 notes.push(format!(
                     "{} of {} is {size:.3} times as large as the model's: it seems to be in \
                      {other} ({factor:.4}), expected {unit}",

@@ -211,6 +211,20 @@ fn units_that_are_wrong_and_loads_that_differ_are_seen() {
 }
 
 #[test]
+fn records_in_g_are_seen_where_the_search_starts() {
+    let mut measured = reference("viscous_exact", 8.0);
+    // Without angles nothing keeps the damping from growing until the model is as small.
+    measured.signals.truncate(2);
+    for signal in &mut measured.signals {
+        signal.values.iter_mut().for_each(|value| *value /= 9.806_65);
+    }
+    let case = case_at(&VISCOUS, 1.0, measured);
+    let report = fitted(vec![case], &options(&["damping_n_s_per_m"]));
+    let said = report.notes.iter().filter(|note| note.contains("seems to be in g"));
+    assert_eq!(said.count(), 2, "{report:?}");
+}
+
+#[test]
 fn an_interrupted_fit_goes_on_to_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
     let journal = folder.path().join("x.partial");
