@@ -247,10 +247,9 @@ pub(crate) fn fit(
     for _ in 0..=HALVINGS {
         let Method::Rk4 { step_s } = problem.method else { break };
         let Some(against) = problem.against(&best.x, work.stop) else { return Ok(None) };
-        let bread = algebra::inverse(&best.summary.normal);
         problem.method = Method::Rk4 { step_s: 0.5 * step_s };
         let Some(finer) = problem.against(&best.x, work.stop) else { return Ok(None) };
-        let moved = effect(&best.summary, &against, &finer, &bread);
+        let moved = effect(&best.summary, &against, &finer);
         step_effect = Some(moved);
         if moved < STEP_EFFECT {
             problem.method = Method::Rk4 { step_s };
@@ -269,7 +268,9 @@ pub(crate) fn fit(
     // A wrong unit may lead numbers so far away that only the start shows it.
     let at_start = problem.against(&problem.start(), work.stop);
     let at_start = at_start.unwrap_or_else(|| against.clone());
-    let statistics = Statistics::of(&problem, &against, &best.summary);
+    let mut statistics = Statistics::of(&problem, &against, &best.summary);
+    let further = by_tachometer(&problem, &best, &against, work.stop);
+    statistics::add(&mut statistics.covariance, &further, 1.0);
     let repeated = match options.bootstrap {
         0 => None,
         count => match bootstrap(&mut problem, &best.x, &against, count, work) {
@@ -315,19 +316,55 @@ fn open(path: &Path, problem: &Problem) -> Result<Journal, Error> {
     Ok(journal)
 }
 
-/// By how many standard errors a finer integration would move the number that it moves most.
-fn effect(summary: &Summary, rough: &[Against], fine: &[Against], bread: &[Vec<f64>]) -> f64 {
-    let n = bread.len();
-    let mut pull = vec![0.0; n];
-    for ((rough, fine), sigma) in rough.iter().zip(fine).zip(&summary.sigma) {
-        let apart: Vec<f64> =
-            fine.residual.iter().zip(&rough.residual).map(|(fine, rough)| fine - rough).collect();
-        for (pull, slope) in pull.iter_mut().zip(&rough.slopes) {
-            *pull += algebra::dot(slope, &apart) / (sigma * sigma);
+/// By how much the unknowns would move if signals of the model were other by so much.
+fn moved<'a>(
+    summary: &Summary,
+    apart: impl Iterator<Item = (&'a Against, f64, Vec<f64>)>,
+) -> Vec<f64> {
+    let bread = algebra::inverse(&summary.normal);
+    let mut pull = vec![0.0; bread.len()];
+    for (at, sigma, apart) in apart {
+        for (pull, slope) in pull.iter_mut().zip(&at.slopes) {
+            *pull -= algebra::dot(slope, &apart) / (sigma * sigma);
         }
     }
-    let moved = |k: usize| algebra::dot(&bread[k], &pull).abs() / bread[k][k].sqrt();
-    (0..n).filter(|&k| bread[k][k] > 0.0).map(moved).fold(0.0, f64::max)
+    bread.iter().map(|row| algebra::dot(row, &pull)).collect()
+}
+
+/// By how many standard errors a finer integration would move the number that it moves most.
+fn effect(summary: &Summary, rough: &[Against], fine: &[Against]) -> f64 {
+    let apart = rough.iter().zip(fine).zip(&summary.sigma).map(|((rough, fine), sigma)| {
+        let pairs = rough.residual.iter().zip(&fine.residual);
+        (rough, *sigma, pairs.map(|(rough, fine)| rough - fine).collect::<Vec<f64>>())
+    });
+    let moved = moved(summary, apart);
+    let bread = algebra::inverse(&summary.normal);
+    let share = |k: usize| moved[k].abs() / bread[k][k].sqrt();
+    (0..moved.len()).filter(|&k| bread[k][k] > 0.0).map(share).fold(0.0, f64::max)
+}
+
+/// The covariance that noise of the tachometers gives the unknowns.
+fn by_tachometer(
+    problem: &Problem,
+    best: &Descent,
+    against: &[Against],
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Vec<Vec<f64>> {
+    let n = problem.unknowns();
+    let mut covariance = vec![vec![0.0; n]; n];
+    for case in 0..problem.cases.len() {
+        let drawn = problem.by_spin(case, &best.x, against, stop);
+        for signals in &drawn {
+            let own = against.iter().zip(&best.summary.sigma).filter(|(one, _)| one.case == case);
+            let apart = own.zip(signals).map(|((one, sigma), apart)| (one, *sigma, apart.clone()));
+            let moved = moved(&best.summary, apart);
+            for (row, a) in covariance.iter_mut().zip(&moved) {
+                let share = a / drawn.len() as f64;
+                row.iter_mut().zip(&moved).for_each(|(sum, b)| *sum += share * b);
+            }
+        }
+    }
+    covariance
 }
 
 /// The fit again and again, with its residuals resampled in blocks longer than they are correlated:

@@ -182,9 +182,20 @@ impl Problem {
         sets: &[Vec<f64>],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Vec<Option<Vec<Vec<f64>>>> {
+        let machines: Vec<_> = sets.iter().map(|x| self.machine(case, x)).collect();
+        self.seen_of(case, sets, &machines, stop)
+    }
+
+    /// The same of machines and spins that are there; of the unknowns, the clock's shift counts.
+    fn seen_of(
+        &self,
+        case: usize,
+        sets: &[Vec<f64>],
+        machines: &[(Machine, Spin)],
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Vec<Option<Vec<Vec<f64>>>> {
         let mut found = vec![None; sets.len()];
         let (measured, end_s) = (&self.cases[case].measured, self.cases[case].end_s());
-        let machines: Vec<(Machine, Spin)> = sets.iter().map(|x| self.machine(case, x)).collect();
         let sound: Vec<usize> =
             (0..sets.len()).filter(|&k| machines[k].0.violations().is_empty()).collect();
         let chosen: Vec<(Machine, Spin)> = sound.iter().map(|&k| machines[k].clone()).collect();
@@ -274,6 +285,35 @@ impl Problem {
             Some(Against { case, signal: s, model, offset, residual, slopes })
         };
         self.signals().map(of).collect()
+    }
+
+    /// By how much each signal of a case would differ with each spin that noise of the tachometer
+    /// might have made, at the samples that there are.
+    pub(crate) fn by_spin(
+        &self,
+        case: usize,
+        x: &[f64],
+        against: &[Against],
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Vec<Vec<Vec<f64>>> {
+        let drawn = self.cases[case].smoothed.as_ref().map(|it| &it.drawn[..]).unwrap_or_default();
+        let (machine, _) = self.machine(case, x);
+        let of_group = |spins: &[Spin]| {
+            let machines: Vec<_> =
+                spins.iter().map(|spin| (machine.clone(), spin.clone())).collect();
+            self.seen_of(case, &vec![x.to_vec(); spins.len()], &machines, stop)
+        };
+        let groups: Vec<&[Spin]> = drawn.chunks(self.simd.lanes().max(2)).collect();
+        let found: Vec<_> = groups.par_iter().map(|spins| of_group(spins)).collect();
+        let signals = || against.iter().filter(|one| one.case == case);
+        let apart = |values: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+            let of = |(values, one): (&Vec<f64>, &Against)| -> Vec<f64> {
+                let signal = &self.cases[case].measured.signals[one.signal];
+                signal.samples().map(|(row, _)| values[row] - one.model[row]).collect()
+            };
+            values.iter().zip(signals()).map(of).collect()
+        };
+        found.into_iter().flatten().flatten().map(apart).collect()
     }
 
     /// The cost of many sets of unknowns, without derivatives; infinite where there is no answer.

@@ -1,11 +1,14 @@
 //! The spin from a tachometer: a spline of first degree, which is a table of the spin's.
 
+use sweep_engine::design::{Design, Distribution, Shape};
 use washer_model::Spin;
 
 /// Noise of a tachometer at least, as a share of its greatest speed: rounded digits are no noise.
 const LEAST_NOISE: f64 = 1e-5;
 /// Places of a span at which a further knot is tried.
 const TRIED: usize = 31;
+/// Draws of the spline: standard errors are theirs to a sixth.
+const DRAWN: u64 = 16;
 /// Most knots.
 const MOST_KNOTS: usize = 1000;
 
@@ -17,6 +20,8 @@ pub(crate) struct Smoothed {
     pub(crate) noise_rpm: f64,
     /// Of the spline.
     pub(crate) knots: usize,
+    /// Splines that noise might have made as well.
+    pub(crate) drawn: Vec<Spin>,
 }
 
 /// The least-squares spline of first degree, with a knot wherever one more explains what noise does
@@ -44,20 +49,30 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
         knots.sort_by(f64::total_cmp);
         speeds = fitted(&samples, &knots)?;
     }
-    let noise_free = knots.len();
-    if *first > 0.0 {
-        // Back to the start of the run, along the first span but not through zero.
-        let slope = (speeds[1] - speeds[0]) / (knots[1] - knots[0]);
-        let start = speeds[0] - slope * first;
-        let [low, high] = [speeds[0].min(0.0), speeds[0].max(0.0)];
-        knots.insert(0, 0.0);
-        speeds.insert(0, start.clamp(low, high));
-    }
-    Some(Smoothed {
-        spin: Spin::Table { time_s: knots, speed_rpm: speeds },
-        noise_rpm,
-        knots: noise_free,
-    })
+    let spin = |mut speeds: Vec<f64>| {
+        let mut times = knots.clone();
+        if *first > 0.0 {
+            // Back to the start of the run, along the first span but not through zero.
+            let slope = (speeds[1] - speeds[0]) / (knots[1] - knots[0]);
+            let start = speeds[0] - slope * first;
+            let [low, high] = [speeds[0].min(0.0), speeds[0].max(0.0)];
+            times.insert(0, 0.0);
+            speeds.insert(0, start.clamp(low, high));
+        }
+        Spin::Table { time_s: times, speed_rpm: speeds }
+    };
+    let (normal, _) = Normal::of(&samples, &knots);
+    let design = Design::LatinHypercube { points: DRAWN, seed: 1 };
+    let shape = Shape::Normal { mean: 0.0, sd: 1.0 };
+    let usual = Distribution { shape, from: -6.0, to: 6.0 };
+    let draw = |point: u64| {
+        let place = |k: usize| design.place(point, k).unwrap_or(0.5);
+        let even: Vec<f64> = (0..knots.len()).map(|k| usual.quantile(place(k))).collect();
+        let moved = normal.drawn(&even);
+        spin(speeds.iter().zip(&moved).map(|(speed, moved)| speed + noise_rpm * moved).collect())
+    };
+    let drawn = (0..DRAWN).map(draw).collect();
+    Some(Smoothed { spin: spin(speeds), noise_rpm, knots: knots.len(), drawn })
 }
 
 /// Standard deviation of white noise about a smooth course, from the distance of every sample to
@@ -83,31 +98,55 @@ fn place(knots: &[f64], time_s: f64) -> (usize, f64) {
     (span, (time_s - knots[span]) / (knots[span + 1] - knots[span]))
 }
 
+/// A spline's normal equations, a tridiagonal matrix, eliminated: the diagonal, and each row's
+/// factor of the next.
+struct Normal {
+    diagonal: Vec<f64>,
+    factors: Vec<f64>,
+}
+
+impl Normal {
+    /// Of the splines with these knots; and their right side.
+    fn of(samples: &[[f64; 2]], knots: &[f64]) -> (Self, Vec<f64>) {
+        let (mut diagonal, mut beside, mut right) =
+            (vec![0.0; knots.len()], vec![0.0; knots.len()], vec![0.0; knots.len()]);
+        for &[time, speed] in samples {
+            let (k, share) = place(knots, time);
+            let rest = 1.0 - share;
+            diagonal[k] += rest * rest;
+            diagonal[k + 1] += share * share;
+            beside[k] += rest * share;
+            right[k] += rest * speed;
+            right[k + 1] += share * speed;
+        }
+        let mut factors = vec![0.0; knots.len()];
+        for k in 1..knots.len() {
+            factors[k - 1] = beside[k - 1] / diagonal[k - 1];
+            diagonal[k] -= factors[k - 1] * beside[k - 1];
+            right[k] -= factors[k - 1] * right[k - 1];
+        }
+        right.iter_mut().zip(&diagonal).for_each(|(right, size)| *right /= size);
+        (Self { diagonal, factors }, right)
+    }
+
+    fn back(&self, mut right: Vec<f64>) -> Vec<f64> {
+        for k in (1..right.len()).rev() {
+            right[k - 1] -= self.factors[k - 1] * right[k];
+        }
+        right
+    }
+
+    /// Independent numbers of one variance as numbers whose covariance is the inverse's.
+    fn drawn(&self, even: &[f64]) -> Vec<f64> {
+        self.back(even.iter().zip(&self.diagonal).map(|(even, size)| even / size.sqrt()).collect())
+    }
+}
+
 /// The spline's values at its knots, by least squares. `None` if they are not all determined.
 fn fitted(samples: &[[f64; 2]], knots: &[f64]) -> Option<Vec<f64>> {
-    let (mut diagonal, mut beside, mut right) =
-        (vec![0.0; knots.len()], vec![0.0; knots.len()], vec![0.0; knots.len()]);
-    for &[time, speed] in samples {
-        let (k, share) = place(knots, time);
-        let rest = 1.0 - share;
-        diagonal[k] += rest * rest;
-        diagonal[k + 1] += share * share;
-        beside[k] += rest * share;
-        right[k] += rest * speed;
-        right[k + 1] += share * speed;
-    }
-    for k in 1..knots.len() {
-        let factor = beside[k - 1] / diagonal[k - 1];
-        diagonal[k] -= factor * beside[k - 1];
-        right[k] -= factor * right[k - 1];
-    }
-    for k in (0..knots.len()).rev() {
-        if k + 1 < knots.len() {
-            right[k] -= beside[k] * right[k + 1];
-        }
-        right[k] /= diagonal[k];
-    }
-    right.iter().all(|speed| speed.is_finite()).then_some(right)
+    let (normal, right) = Normal::of(samples, knots);
+    let speeds = normal.back(right);
+    speeds.iter().all(|speed| speed.is_finite()).then_some(speeds)
 }
 
 /// The best further knot of each span that is worth one.
@@ -149,8 +188,6 @@ fn further(samples: &[[f64; 2]], knots: &[f64], speeds: &[f64], worth: f64) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sweep_engine::design::Design;
-    use sweep_engine::design::{Distribution, Shape};
 
     #[test]
     fn a_noisy_course_with_kinks_keeps_its_angle() {
@@ -167,6 +204,14 @@ mod tests {
         let found = smoothed(&time_s, &speed).unwrap();
         assert!((found.noise_rpm - 1.5).abs() < 0.1, "{found:?}");
         assert!((3..12).contains(&found.knots), "{found:?}");
+        // At the end of a straight span of n samples: a variance of 4 / n.
+        let Spin::Table { time_s: knots, .. } = &found.spin else { panic!("{found:?}") };
+        let span = (knots[knots.len() - 1] - knots[knots.len() - 2]) / 0.004;
+        let end = |spin: &Spin| spin.speeds_rpm([time_s[2999]]).next().unwrap();
+        let middle = end(&found.spin);
+        let square: f64 = found.drawn.iter().map(|spin| (end(spin) - middle).powi(2)).sum();
+        let error = (square / found.drawn.len() as f64).sqrt() / (1.5 * (4.0 / span).sqrt());
+        assert!((0.5..2.0).contains(&error), "{error}");
         let mut angle = 0.0_f64;
         let mut worst = 0.0_f64;
         for (t, ours) in time_s.iter().zip(found.spin.speeds_rpm(time_s.iter().copied())) {

@@ -194,7 +194,7 @@ impl Statistics {
     }
 }
 
-fn add(sum: &mut [Vec<f64>], part: &[Vec<f64>], factor: f64) {
+pub(super) fn add(sum: &mut [Vec<f64>], part: &[Vec<f64>], factor: f64) {
     for (sum, part) in sum.iter_mut().zip(part) {
         sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += factor * part);
     }
