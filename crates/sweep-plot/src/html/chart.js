@@ -2,6 +2,21 @@
 
 const CHART = { left: 84, right: 16, top: 12, gap: 14, bottom: 46 };
 
+// A line, a panel and a chart of what the page itself finds: linear axes, one grid, no marks.
+function plainLine(name, colour, y, alpha = 1) {
+  return { name, colour, alpha, grid: 0, width: 1.3, dashed: false, y };
+}
+
+function plainPanel(name, words, unit, shown, series, height = 150) {
+  return { name, words, unit, shown, log: false, ticks: null, range: null, height, series,
+    levels: [], stars: [], mixed: [] };
+}
+
+function plainChart(xWords, xUnit, grid, panels) {
+  return { xWords, xUnit, xLog: false, xTicks: null, grids: [grid], panels, marks: [],
+    markMeaning: "", shades: [], shadeMeaning: "" };
+}
+
 // `spec` as the page's data has it, with decoded arrays: { xWords, xUnit, xLog, xTicks, grids,
 // panels, marks, markMeaning, shades, shadeMeaning }.
 // `pick` hears of the x of a click, and of Enter.

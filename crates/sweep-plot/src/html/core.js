@@ -89,6 +89,12 @@ function element(tag, attributes = {}, ...children) {
   return node;
 }
 
+// The head of a table, a column a text.
+function tableHead(texts) {
+  const cells = texts.map((text) => element("th", { scope: "col" }, text));
+  return element("thead", {}, element("tr", {}, ...cells));
+}
+
 function themed(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
@@ -187,8 +193,7 @@ function createAbout(data) {
   const heads = ["Motion", "Resonance (rpm)", "Damping ratio"];
   return [...parts, element("h2", {}, "Resonances of the machine as given"),
     element("table", { class: "modes" },
-      element("thead", {}, element("tr", {}, ...heads.map((text) => element("th",
-        { scope: "col" }, text)))),
+      tableHead(heads),
       element("tbody", {}, ...data.resonances.map(([motion, speed, damping]) => element("tr", {},
         element("th", { scope: "row" }, motion), element("td", {}, speed),
         element("td", {}, damping)))))];

@@ -14,20 +14,15 @@ function createCurves(host, live) {
   const frequencies = Float32Array.from({ length: bins }, (_, k) => k * perBin);
   // Of the motions that are there.
   let version = 0;
-  const line = (name, colour, count, alpha = 1) => ({
-    name, colour, alpha, grid: 0, width: 1.3, dashed: false, y: new Float32Array(count).fill(NaN),
-  });
+  const line = (name, colour, count, alpha) => plainLine(name, colour,
+    new Float32Array(count).fill(NaN), alpha);
   const both = (count) => [line("nonlinear model", "#0072b2", count),
     line("linear model", "#d55e00", count, 0.65)];
-  const panel = (name, words, unit, shown, series, height = 150) => ({
-    name, words, unit, shown, log: false, ticks: null, range: null, height, series, levels: [],
-    stars: [], mixed: [],
-  });
   const first = live.compared[Math.max(live.compared.length - 2, 0)];
-  const motion = live.channels.map((channel, k) => panel(channel.name, capitalised(channel.words),
-    channel.unit, k === first, both(instants)));
-  const gap = panel("gap", "Gap, drum to tub", "mm", false, both(instants));
-  const speed = panel("speed", "Spin", "rpm", true, [line("", "ink", instants)], 80);
+  const motion = live.channels.map((channel, k) => plainPanel(channel.name,
+    capitalised(channel.words), channel.unit, k === first, both(instants)));
+  const gap = plainPanel("gap", "Gap, drum to tub", "mm", false, both(instants));
+  const speed = plainPanel("speed", "Spin", "rpm", true, [line("", "ink", instants)], 80);
   // Spectra are found when they are drawn.
   const ofWindow = (one, source) => {
     const [y, found] = [new Float32Array(bins).fill(NaN), { version: -1 }];
@@ -38,20 +33,17 @@ function createCurves(host, live) {
       return y;
     } });
   };
-  const spectra = live.channels.map((channel, k) => panel(channel.name,
+  const spectra = live.channels.map((channel, k) => plainPanel(channel.name,
     capitalised(channel.words), channel.unit, k === first,
     both(bins).map((one, model) => ofWindow(one, motion[k].series[model]))));
-  const spec = (xWords, xUnit, grid, panels) => ({
-    xWords, xUnit, xLog: false, xTicks: null, grids: [grid], panels, marks: [], markMeaning: "",
-    shades: [], shadeMeaning: "",
-  });
   const histories = element("div", { id: "live-histories" });
   const spectrumHost = element("div", { id: "live-spectrum" });
   host.append(element("h2", {}, "Time histories"), histories,
     element("h2", {}, `Spectrum from ${live.windowS[0]} to ${live.windowS[1]} s`), spectrumHost);
   const charts = [
-    createChart(histories, spec("Time", "s", times, [...motion, gap, speed]), "Time histories"),
-    createChart(spectrumHost, spec("Frequency", "Hz", frequencies, spectra), "Spectrum"),
+    createChart(histories, plainChart("Time", "s", times, [...motion, gap, speed]),
+      "Time histories"),
+    createChart(spectrumHost, plainChart("Frequency", "Hz", frequencies, spectra), "Spectrum"),
   ];
   const columns = live.channels.length + 1;
 

@@ -157,10 +157,7 @@ function showInfluence(host, data) {
   const head = ["Parameter", "Rank correlation (Spearman)",
     "Rising and falling alike (root of the correlation ratio)", "from −1 to 1"];
   host.append(element("h2", {}, data.title), element("p", { class: "help" }, data.subtitle),
-    element("table", { class: "influence" },
-      element("thead", {}, element("tr", {},
-        ...head.map((text) => element("th", { scope: "col" }, text)))),
-      element("tbody", {}, ...rows)),
+    element("table", { class: "influence" }, tableHead(head), element("tbody", {}, ...rows)),
     element("p", { class: "help" }, "In the grey, up to a magnitude of "
       + `${significant(data.chance, 2)}, a rank correlation may be chance (95 %).`));
 }

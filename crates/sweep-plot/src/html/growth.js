@@ -29,21 +29,12 @@ function createGrowth(host, live, pool) {
 
   function drawOver(speeds) {
     const empty = () => new Float32Array(speeds.length).fill(NaN);
-    const line = () => ({
-      name: "", colour: "#0072b2", alpha: 1, grid: 0, width: 1.6, dashed: false, y: empty(),
-    });
-    const panel = (name, words, unit, levels, height) => ({
-      name, words, unit, shown: true, log: false, ticks: null, range: null, height,
-      series: [line()], levels, stars: [], mixed: [],
-    });
-    spec = {
-      xWords: "Spin speed", xUnit: "rpm", xLog: false, xTicks: null, grids: [speeds],
-      panels: [
-        panel("growth", "Growth", "1/s", [[0, "neither growth nor decay"]], 200),
-        panel("frequency", "Frequency", "cycles/min", [], 110),
-      ],
-      marks: [], markMeaning: "", shades: [], shadeMeaning: "disturbances grow",
-    };
+    const line = () => [{ ...plainLine("", "#0072b2", empty()), width: 1.6 }];
+    const growth = plainPanel("growth", "Growth", "1/s", true, line(), 200);
+    growth.levels = [[0, "neither growth nor decay"]];
+    const frequency = plainPanel("frequency", "Frequency", "cycles/min", true, line(), 110);
+    spec = plainChart("Spin speed", "rpm", speeds, [growth, frequency]);
+    spec.shadeMeaning = "disturbances grow";
     chartHost.replaceChildren();
     chart = createChart(chartHost, spec, "Growth of disturbances over speed");
   }

@@ -6,13 +6,8 @@ function createHistories(host, trace, channel) {
     const { data: text, unit, factor } = trace.series[name];
     return quantised(text, unit * factor);
   };
-  const series = (name, title, colour, alpha = 1) => ({
-    name: title, colour, alpha, grid: 0, width: 1.3, dashed: false, y: values(name),
-  });
-  const panel = (name, words, unit, lines) => ({
-    name, words, unit, shown: true, log: false, ticks: null, range: null, height: 150,
-    series: lines, levels: [], stars: [], mixed: [],
-  });
+  const series = (name, title, colour, alpha) => plainLine(title, colour, values(name), alpha);
+  const panel = (name, words, unit, lines) => plainPanel(name, words, unit, true, lines);
   const both = (name, [nonlinear, linear], words) => {
     const lines = [[nonlinear, "nonlinear model", "#0072b2"],
       [linear, "linear model", "#d55e00", 0.65]].filter(([column]) => names.includes(column));
@@ -37,9 +32,5 @@ function createHistories(host, trace, channel) {
   if (names.includes("speed_rpm")) {
     panels.push(panel("speed", "Spin", "rpm", [series("speed_rpm", "", "ink")]));
   }
-  const spec = {
-    xWords: "Time", xUnit: "s", xLog: false, xTicks: null, grids: [floats(trace.time_s)], panels,
-    marks: [], markMeaning: "", shades: [], shadeMeaning: "",
-  };
-  createChart(host, spec, "Time histories");
+  createChart(host, plainChart("Time", "s", floats(trace.time_s), panels), "Time histories");
 }

@@ -216,8 +216,6 @@ function createLive(host, data) {
       (record) => record.metrics[k] * metric.factor)));
     const sag = live.staticSag
       ? [element("p", {}, `Static sag of the tub ${significant(answer.sag * 1e3)} mm`)] : [];
-    const heads = ["", "nonlinear", "linear", "ratio"]
-      .map((text) => element("th", { scope: "col" }, text));
     const largest = greatest && `Largest ratio ${significant(greatest.ratio)} `
       + `(${live.channels[greatest.channel].words}), the limit is ${live.ratioLimit}`;
     told.replaceChildren(
@@ -228,7 +226,7 @@ function createLive(host, data) {
         + "exponentially. The digits are those of one trajectory.")] : []),
       element("table", {},
         element("caption", {}, `${capitalised(live.criterion[0])}. Ratio: ${live.criterion[1]}.`),
-        element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)),
+        tableHead(["", "nonlinear", "linear", "ratio"]), element("tbody", {}, ...rows)),
       ...sag);
     const took = `${answer.took.toFixed(answer.took < 10 ? 1 : 0)} ms`;
     status.textContent = answer.isChecked

@@ -379,9 +379,8 @@ function createMap(host, data, panel) {
       column === null ? "" : shownValue(column, point));
     const rows = data.rows.map((row) => element("tr", { "data-channel": row.name },
       element("th", { scope: "row" }, withUnit(row.words, row.unit)), ...row.columns.map(cell)));
-    const heads = ["", ...kinds].map((text) => element("th", { scope: "col" }, text));
-    readout.append(element("table", {},
-      element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)));
+    readout.append(element("table", {}, tableHead(["", ...kinds]),
+      element("tbody", {}, ...rows)));
     if (data.traces) {
       readout.append(element("p", { class: "help" }, data.traces[point]
         ? "Click or press Enter for its time histories." : "No time history kept for this point."));
@@ -531,7 +530,7 @@ function createMap(host, data, panel) {
   changed();
   panel?.connect(connected());
   return {
-    cells: { columns, counts, filled, word, verdict, shownValue },
+    cells: { columns, counts, filled, failed, word, verdict, shownValue },
     layer: currentLayer,
     onChange: (listener) => listeners.push(listener),
     // The parts of the picture, from below.

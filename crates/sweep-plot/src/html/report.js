@@ -5,7 +5,7 @@
 const ROWS_AT_ONCE = 20;
 
 function createReport(host, data, map, panel) {
-  const { columns, counts, filled, word, verdict, shownValue } = map.cells;
+  const { columns, counts, filled, failed, word, verdict, shownValue } = map.cells;
   const all = Array.from({ length: columns.point.values.length }, (_, cell) => cell)
     .filter(filled);
 
@@ -31,9 +31,8 @@ function createReport(host, data, map, panel) {
       found.push(`${share(chaotic, "are sensitive")}: the motion is chaotic, and its digits are `
         + "those of one trajectory.");
     }
-    const failed = all.filter((cell) => (counts ? counts.failed[cell] > 0
-      : word("status", cell) !== "ok")).length;
-    if (failed) found.push(`${share(failed, "failed")}; the map hatches them.`);
+    const lost = all.filter(failed).length;
+    if (lost) found.push(`${share(lost, "failed")}; the map hatches them.`);
     if (counts) {
       found.push("A cell holds several points and shows the worst of them. The file has all.");
     }
