@@ -271,7 +271,7 @@ def fit(
     table: ArrowStream | Mapping[str, ArrayLike] | list[ArrowStream | Mapping[str, ArrayLike]],
     free: Sequence[str],
     *,
-    own: Sequence[str] = (),
+    own: Sequence[str] = ...,
     at: Mapping[str, float] | list[Mapping[str, float]] | None = None,
     linear: bool = False,
     shift: bool = True,
