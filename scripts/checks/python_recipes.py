@@ -3,8 +3,9 @@ docs/python, and holds what these print against their pages.
 
     python scripts/checks/python_recipes.py [--write]
 
-The blocks of a document are one program, in a folder with `sweeps/`. The first `text` block of a
-page holds what its script prints. --write renews these blocks and the pictures beside them.
+The blocks of a document are one program, in a folder with `sweeps/` and `crates/`. The first `text`
+block of a page holds what its script prints. --write renews these blocks and the pictures beside
+them.
 """
 
 import pathlib
@@ -27,7 +28,8 @@ def run_blocks(document):
     if not program:
         return [f"{document.name} has no `python` block"]
     with tempfile.TemporaryDirectory() as folder:
-        pathlib.Path(folder, "sweeps").symlink_to(ROOT / "sweeps")
+        for name in ["sweeps", "crates"]:
+            pathlib.Path(folder, name).symlink_to(ROOT / name)
         told = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True,
                               text=True, check=False)
     return [f"{document.name} fails:\n{told.stderr}"] if told.returncode != 0 else []
