@@ -318,10 +318,9 @@ fn open(path: &Path, problem: &Problem) -> Result<Journal, Error> {
 
 /// By how much the unknowns would move if signals of the model were other by so much.
 fn moved<'a>(
-    summary: &Summary,
+    bread: &[Vec<f64>],
     apart: impl Iterator<Item = (&'a Against, f64, Vec<f64>)>,
 ) -> Vec<f64> {
-    let bread = algebra::inverse(&summary.normal);
     let mut pull = vec![0.0; bread.len()];
     for (at, sigma, apart) in apart {
         for (pull, slope) in pull.iter_mut().zip(&at.slopes) {
@@ -337,8 +336,8 @@ fn effect(summary: &Summary, rough: &[Against], fine: &[Against]) -> f64 {
         let pairs = rough.residual.iter().zip(&fine.residual);
         (rough, *sigma, pairs.map(|(rough, fine)| rough - fine).collect::<Vec<f64>>())
     });
-    let moved = moved(summary, apart);
     let bread = algebra::inverse(&summary.normal);
+    let moved = moved(&bread, apart);
     let share = |k: usize| moved[k].abs() / bread[k][k].sqrt();
     (0..moved.len()).filter(|&k| bread[k][k] > 0.0).map(share).fold(0.0, f64::max)
 }
@@ -351,13 +350,14 @@ fn by_tachometer(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Vec<f64>> {
     let n = problem.unknowns();
+    let bread = algebra::inverse(&best.summary.normal);
     let mut covariance = vec![vec![0.0; n]; n];
     for case in 0..problem.cases.len() {
         let drawn = problem.by_spin(case, &best.x, against, stop);
         for signals in &drawn {
             let own = against.iter().zip(&best.summary.sigma).filter(|(one, _)| one.case == case);
             let apart = own.zip(signals).map(|((one, sigma), apart)| (one, *sigma, apart.clone()));
-            let moved = moved(&best.summary, apart);
+            let moved = moved(&bread, apart);
             for (row, a) in covariance.iter_mut().zip(&moved) {
                 let share = a / drawn.len() as f64;
                 row.iter_mut().zip(&moved).for_each(|(sum, b)| *sum += share * b);

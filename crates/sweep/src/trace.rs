@@ -1,6 +1,7 @@
 //! Time histories of both models at one point or at all of a plan, as a table.
 
 use std::collections::BTreeMap;
+use std::iter::repeat_n;
 use std::path::Path;
 
 use lane_ode::{Failure, Simd};
@@ -153,6 +154,29 @@ pub(crate) struct Trace {
     pub failures: Vec<String>,
 }
 
+/// Histories of a plan's only point, which `at` names, or of all of its points, in a pool of their
+/// own where the system has threads; the bits are those of one thread.
+///
+/// # Errors
+/// [`NoEquilibrium`] of the only point.
+pub(crate) fn in_pool(
+    plan: &Plan,
+    at: Option<Vec<(String, f64)>>,
+    view: &View,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Trace, NoEquilibrium> {
+    // A thread for each model, where there may be two.
+    let wanted = if at.is_some() { 2 } else { threads::cores() };
+    let work = || match at {
+        Some(at) => trace(plan, plan.scenario(0), at, view, stop),
+        None => Ok(trace_all(plan, view, stop)),
+    };
+    match threads::pool(wanted) {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }
+}
+
 /// Integrates models of a scenario and reads them from 0 to the end; in a pool, both at once.
 ///
 /// `at` names the point: parameters with their values. Once `stop` says so it ends early, and what
@@ -210,11 +234,13 @@ pub(crate) fn trace_all(plan: &Plan, view: &View, stop: &(dyn Fn() -> bool + Syn
     let each: Vec<&Run> = runs.iter().map(|(_, run)| run).collect();
     let models = integrate(&each, view.models, stop);
     let mut table = Table::new(crate::identity::BUILD);
-    let rows = || runs.iter().flat_map(|(number, run)| run.times_s.iter().map(move |_| *number));
-    table.counts("point", "number of the point in its grid", rows());
+    let rows = || runs.iter().map(|(number, run)| (*number, run.times_s.len()));
+    let numbers = rows().flat_map(|(number, count)| repeat_n(number, count));
+    table.counts("point", "number of the point in its grid", numbers);
     for (k, axis) in plan.axes.iter().enumerate() {
         let of = &axis.parameter;
-        let values = rows().map(|number| plan.axis_values(number).get(k).copied());
+        let values = rows()
+            .flat_map(|(number, count)| repeat_n(plan.axis_values(number).get(k).copied(), count));
         table.numbers(of.name(), of.unit(), of.description(), values);
     }
     let failed = columns(&mut table, &each, &models, view.extras);

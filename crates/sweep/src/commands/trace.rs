@@ -6,16 +6,13 @@ use std::path::PathBuf;
 use crate::config;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
-use crate::trace::{
-    Extras, Models, StartValue, View, every, start_of, start_value, trace, trace_all,
-};
+use crate::trace::{Extras, Models, StartValue, View, every, in_pool, start_of, start_value};
 use sweep_engine::commands::cells::{short, table};
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::quoted;
 use sweep_engine::commands::run::line;
 use sweep_engine::exit::{Error, Exit, tell};
 use sweep_engine::store::Job;
-use sweep_engine::threads;
 use sweep_files::{FileKind, Output, key};
 use sweep_parameter::Worse;
 use sweep_results::{Cell, ResultTable, top};
@@ -97,7 +94,7 @@ pub struct Args {
 /// be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let (plan, at, chosen) = match args.all {
-        true => (args.grid.load()?, Vec::new(), Vec::new()),
+        true => (args.grid.load()?, None, Vec::new()),
         false => {
             let chosen = chosen(args)?;
             let (mut plan, at) = config::load_point(&args.grid.grid, &args.grid.sets(), &chosen)?;
@@ -105,7 +102,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
                 plan.name.clone_from(name);
             }
             args.grid.tell_window(&plan);
-            (plan, at, chosen)
+            (plan, Some(at), chosen)
         }
     };
     let every_s = match args.turns {
@@ -118,17 +115,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let output = Output::begin(&args.out, FileKind::Trace)?;
     let view = View { every_s, models, start, extras, quick: None };
     // A signal ends the process: there is nothing to keep.
-    let work = || match args.all {
-        true => Ok(trace_all(&plan, &view, &|| false)),
-        false => trace(&plan, plan.scenario(0), at, &view, &|| false),
-    };
-    // A thread for each model, where there may be two; they write the same bytes as one.
-    let wanted = if args.all { threads::cores() } else { 2 };
-    let trace = match threads::pool(wanted).ok() {
-        Some(pool) => pool.install(work),
-        None => work(),
-    }
-    .map_err(Error::model)?;
+    let trace = in_pool(&plan, at, &view, &|| false).map_err(Error::model)?;
     trace.failures.iter().for_each(|failure| tell(failure));
     let instants = trace.instants;
     output.finish(&trace.into_bytes(&args.out)?)?;

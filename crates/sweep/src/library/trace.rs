@@ -7,7 +7,6 @@ use crate::config::GridInput;
 use crate::trace::{self, Extras, Models, View, every, start_of, start_value};
 use sweep_engine::exit::Error;
 use sweep_engine::interrupt::Interrupt;
-use sweep_engine::threads;
 use sweep_files::FileKind;
 
 /// What a trace holds.
@@ -45,8 +44,8 @@ pub fn trace_point(
     interrupt: &Interrupt,
 ) -> Result<Option<(ResultTable, Vec<String>)>, Error> {
     let (plan, at) = match options.all {
-        true => (grid.clone().fixing(at).load()?, Vec::new()),
-        false => grid.load_point(at)?,
+        true => (grid.clone().fixing(at).load()?, None),
+        false => grid.load_point(at).map(|(plan, at)| (plan, Some(at)))?,
     };
     let every_s =
         options.every_s.map(|every_s| every(every_s, &plan, plan.points())).transpose()?;
@@ -70,17 +69,7 @@ pub fn trace_point(
     let extras = Extras { rates, states, forces, angle };
     let view = View { every_s, models, start, extras, quick: None };
     let stop = || interrupt.stopped();
-    let work = || match options.all {
-        true => Ok(trace::trace_all(&plan, &view, &stop)),
-        false => trace::trace(&plan, plan.scenario(0), at, &view, &stop),
-    };
-    // A thread for each model, where there may be two; they give the same bits as one.
-    let wanted = if options.all { threads::cores() } else { 2 };
-    let trace = match threads::pool(wanted) {
-        Ok(pool) => pool.install(work),
-        Err(_) => work(),
-    }
-    .map_err(Error::model)?;
+    let trace = trace::in_pool(&plan, at, &view, &stop).map_err(Error::model)?;
     if interrupt.stopped() {
         return Ok(None);
     }

@@ -108,8 +108,9 @@ class Plan:
         it leaves, in one table with columns `point` and the axes. `model` names the one to
         integrate, `nonlinear` or `linear`. `rates` adds rates and accelerations of the channels,
         `states` the ten coordinates and their speeds, `forces` those of springs, dampers, stops
-        and bushings, and what the feet carry, `angle` the drum's. `start` begins away from equilibrium: q1 to q10 (m, rad), u1 to u10
-        (per s). Warns of a model that failed; its values are null from there on.
+        and bushings, and what the feet carry, `angle` the drum's. `start` begins away from
+        equilibrium: q1 to q10 (m, rad), u1 to u10 (per s). Warns of a model that
+        failed; its values are null from there on.
         """
 
     def boundary(
@@ -248,7 +249,8 @@ def dwell(
 
     `starts` a speed, kicks of up to `kick` rad/s among them, or with `carry` the motion of the
     speed before; `threshold` asks for the smallest kick that does not come back; `longest` seconds
-    at most; `sections` keeps so many states once a turn, a row each. With `out` it writes that Parquet file, byte for byte as `sweep dwell` does.
+    at most; `sections` keeps so many states once a turn, a row each. With `out` it writes that
+    Parquet file, byte for byte as `sweep dwell` does.
     """
 
 def explain(
