@@ -260,7 +260,7 @@ impl LinearPoint {
             damping: [[0.0; COORDINATES]; COORDINATES],
             stiffness: self.bearing_stiffness(bodies),
             force: about_midpoint([SHAFT_Y, SHAFT_Z], &ROTOR_TURNS, &rotor_arm, |row| {
-                e[entry::force(row)][0]
+                e[entry::force(row)]
             }),
         };
         let mut add = |j: usize, stiffness: [f64; COORDINATES], damping: [f64; COORDINATES]| {
@@ -282,10 +282,10 @@ impl LinearPoint {
             add(
                 ROTOR_TURNS[column],
                 about_midpoint([SHAFT_Y, SHAFT_Z], &ROTOR_TURNS, &rotor_arm, |row| {
-                    e[entry::stiffness(row, column)][0]
+                    e[entry::stiffness(row, column)]
                 }),
                 about_midpoint([SHAFT_Y, SHAFT_Z], &ROTOR_TURNS, &rotor_arm, |row| {
-                    e[entry::damping(row, column)][0]
+                    e[entry::damping(row, column)]
                 }),
             );
         }
@@ -303,7 +303,7 @@ impl LinearPoint {
             &ROTOR_TURNS,
             c.rotor_per_mass,
             &rotor_arm,
-            |r, s| inertia[entry::inertia(r, s)][0].0,
+            |r, s| inertia[entry::inertia(r, s)].0,
         );
         matrices
     }

@@ -202,11 +202,10 @@ impl Point {
 /// # Errors
 /// Per point: [`NoEquilibrium`].
 pub(crate) fn prepare(
-    simd: Simd,
     points: &[(Machine, Spin)],
     timing: &Timing,
 ) -> Vec<Result<Point, NoEquilibrium>> {
-    simd.dispatch(Prepare { points, courses: courses(points, timing) })
+    Simd::dispatch_narrow(Prepare { points, courses: courses(points, timing) })
 }
 
 struct Prepare<'a> {

@@ -156,7 +156,7 @@ pub fn prepare(
     points: &[(Machine, Spin)],
     timing: &Timing,
 ) -> Vec<Result<Point, NoEquilibrium>> {
-    let mut ready = point::prepare(simd, points, timing);
+    let mut ready = point::prepare(points, timing);
     let to_window = Timing { end_s: timing.window_s[1], checkpoints: 0, ..*timing };
     let open = |(place, point): (usize, &Result<Point, NoEquilibrium>)| {
         let point = point.as_ref().ok()?;

@@ -53,24 +53,24 @@ pub(crate) const FUNCTIONS: usize = 16;
 /// All functions at one instant. The model page (section 5) says why theta'^2 and theta'' come in
 /// pairs.
 #[inline(always)]
-pub(crate) fn functions<T: Real>(spin: &SpinState<T>) -> [[N<T>; 1]; FUNCTIONS] {
+pub(crate) fn functions<T: Real>(spin: &SpinState<T>) -> [N<T>; FUNCTIONS] {
     let SpinState { sin, cos, sin_2, cos_2, speed, acceleration, .. } = *spin;
     let squared = (speed * speed).v();
-    let mut f = [[sin.lit(1.0)]; FUNCTIONS];
-    f[COS] = [cos];
-    f[SIN] = [sin];
-    f[COS_2] = [cos_2];
-    f[SIN_2] = [sin_2];
-    f[SPEED] = [speed];
-    f[SPEED_COS] = [(speed * cos).v()];
-    f[SPEED_SIN] = [(speed * sin).v()];
-    f[SPEED_COS_2] = [(speed * cos_2).v()];
-    f[SPEED_SIN_2] = [(speed * sin_2).v()];
-    f[SPIN] = [squared];
-    f[SPIN_COS] = [squared * cos + acceleration * sin];
-    f[SPIN_SIN] = [squared * sin - acceleration * cos];
-    f[SPIN_COS_2] = [squared * cos_2 + acceleration * sin_2];
-    f[SPIN_SIN_2] = [squared * sin_2 - acceleration * cos_2];
-    f[ACCELERATION] = [acceleration];
+    let mut f = [sin.lit(1.0); FUNCTIONS];
+    f[COS] = cos;
+    f[SIN] = sin;
+    f[COS_2] = cos_2;
+    f[SIN_2] = sin_2;
+    f[SPEED] = speed;
+    f[SPEED_COS] = (speed * cos).v();
+    f[SPEED_SIN] = (speed * sin).v();
+    f[SPEED_COS_2] = (speed * cos_2).v();
+    f[SPEED_SIN_2] = (speed * sin_2).v();
+    f[SPIN] = squared;
+    f[SPIN_COS] = squared * cos + acceleration * sin;
+    f[SPIN_SIN] = squared * sin - acceleration * cos;
+    f[SPIN_COS_2] = squared * cos_2 + acceleration * sin_2;
+    f[SPIN_SIN_2] = squared * sin_2 - acceleration * cos_2;
+    f[ACCELERATION] = acceleration;
     f
 }

@@ -70,9 +70,9 @@ impl Terms<f64> {
     /// The inertia's entries and all others, at the functions of an instant.
     pub(crate) fn at(
         &self,
-        functions: &[[N<f64>; 1]; FUNCTIONS],
-    ) -> ([[N<f64>; 1]; INERTIA_ENTRIES], [[N<f64>; 1]; ENTRIES]) {
-        let (mut inertia, mut others) = ([[N(0.0)]; INERTIA_ENTRIES], [[N(0.0)]; ENTRIES]);
+        functions: &[N<f64>; FUNCTIONS],
+    ) -> ([N<f64>; INERTIA_ENTRIES], [N<f64>; ENTRIES]) {
+        let (mut inertia, mut others) = ([N(0.0); INERTIA_ENTRIES], [N(0.0); ENTRIES]);
         self.inertia.sum(functions, &mut inertia);
         self.others.sum(functions, &mut others);
         (inertia, others)
@@ -81,10 +81,10 @@ impl Terms<f64> {
 
 /// Partial velocities of the mass centre, among all entries.
 #[inline(always)]
-pub(crate) fn arms<T: Copy>(entries: &[[N<T>; 1]; ENTRIES]) -> [[N<T>; 2]; TURNS] {
-    let mut arms = [[entries[0][0]; 2]; TURNS];
+pub(crate) fn arms<T: Copy>(entries: &[N<T>; ENTRIES]) -> [[N<T>; 2]; TURNS] {
+    let mut arms = [[entries[0]; 2]; TURNS];
     for r in 0..TURNS {
-        arms[r] = [entries[arm(r, 0)][0], entries[arm(r, 1)][0]];
+        arms[r] = [entries[arm(r, 0)], entries[arm(r, 1)]];
     }
     arms
 }

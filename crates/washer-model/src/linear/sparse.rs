@@ -3,13 +3,13 @@
 //! Most coefficients of the linear model vanish for every machine. A table in the source names the
 //! others and compiles to code without loops, indices or branches: one multiplication per term.
 
-use lane_ode::{N, Real};
-
 /// Declares a set of coefficients, and the entries as sums of coefficients times functions:
 /// `entry => function function ...;`.
 ///
 /// Entries that are not named keep their values. `Name<f64>` holds the coefficients of one machine,
 /// `Name<T>` those of one machine per lane.
+use lane_ode::{N, Real};
+
 macro_rules! sparse_sums {
     (
         $(#[$doc:meta])*
@@ -38,20 +38,20 @@ macro_rules! sparse_sums {
         }
 
         impl<T: lane_ode::Lane> $name<T> {
-            /// The sums, of each of `W` sets of functions.
+            /// The sums.
             #[inline(always)]
-            pub(crate) fn sum<const W: usize>(
+            pub(crate) fn sum<V: $crate::linear::sparse::Summand<T>>(
                 &self,
-                functions: &[[lane_ode::N<T>; W]; $functions],
-                sums: &mut [[lane_ode::N<T>; W]; $entries],
+                functions: &[V; $functions],
+                sums: &mut [V; $entries],
             ) {
-                use $crate::linear::sparse;
-                let mut next = 0;
+                use $crate::linear::sparse::next;
+                let mut place = 0;
                 $(
-                    let sum = sparse::scaled(&self.terms, &mut next, &functions[$first]);
+                    let sum = functions[$first].scaled(next(&self.terms, &mut place));
                     $(
-                        let function = &functions[$other];
-                        let sum = sparse::plus_scaled(sum, &self.terms, &mut next, function);
+                        let coefficient = next(&self.terms, &mut place);
+                        let sum = sum.plus_scaled(coefficient, functions[$other]);
                     )*
                     // Found when compiling, whatever expression it is.
                     sums[const { $entry }] = sum;
@@ -62,32 +62,46 @@ macro_rules! sparse_sums {
 }
 pub(crate) use sparse_sums;
 
-/// The next coefficient times a function.
+/// The next coefficient.
 #[inline(always)]
-pub(crate) fn scaled<T: Real, const W: usize>(
-    coefficients: &[N<T>],
-    next: &mut usize,
-    function: &[N<T>; W],
-) -> [N<T>; W] {
-    let mut product = *function;
-    for w in 0..W {
-        product[w] = (coefficients[*next] * function[w]).v();
-    }
-    *next += 1;
-    product
+pub(crate) fn next<T: Copy>(coefficients: &[N<T>], place: &mut usize) -> N<T> {
+    *place += 1;
+    coefficients[*place - 1]
 }
 
-/// A sum plus the next coefficient times a function.
-#[inline(always)]
-pub(crate) fn plus_scaled<T: Real, const W: usize>(
-    mut sum: [N<T>; W],
-    coefficients: &[N<T>],
-    next: &mut usize,
-    function: &[N<T>; W],
-) -> [N<T>; W] {
-    for w in 0..W {
-        sum[w] += coefficients[*next] * function[w];
+/// What is summed: a number, or one with its first two derivatives. No loops: a model has
+/// hundreds of terms, and each loop costs the compiler more than the term.
+pub(crate) trait Summand<T>: Copy {
+    /// A coefficient times this.
+    fn scaled(self, coefficient: N<T>) -> Self;
+    /// This plus a coefficient times another.
+    fn plus_scaled(self, coefficient: N<T>, other: Self) -> Self;
+}
+
+impl<T: Real> Summand<T> for N<T> {
+    #[inline(always)]
+    fn scaled(self, coefficient: N<T>) -> Self {
+        (coefficient * self).v()
     }
-    *next += 1;
-    sum
+    #[inline(always)]
+    fn plus_scaled(self, coefficient: N<T>, other: Self) -> Self {
+        self + coefficient * other
+    }
+}
+
+impl<T: Real> Summand<T> for [N<T>; 3] {
+    #[inline(always)]
+    fn scaled(self, coefficient: N<T>) -> Self {
+        let [value, first, second] = self;
+        [value.scaled(coefficient), first.scaled(coefficient), second.scaled(coefficient)]
+    }
+    #[inline(always)]
+    fn plus_scaled(self, coefficient: N<T>, other: Self) -> Self {
+        let ([value, first, second], [by_value, by_first, by_second]) = (self, other);
+        [
+            value.plus_scaled(coefficient, by_value),
+            first.plus_scaled(coefficient, by_first),
+            second.plus_scaled(coefficient, by_second),
+        ]
+    }
 }

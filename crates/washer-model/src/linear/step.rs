@@ -128,7 +128,7 @@ impl<T: Lane> StepConstants<T> {
 /// The rotor's arrays at one instant.
 #[derive(Clone, Copy)]
 pub(crate) struct RotorAt<T> {
-    entries: [[N<T>; 1]; ENTRIES],
+    entries: [N<T>; ENTRIES],
     /// Of the inertia about the mass centre.
     inverse: Symmetric4<T>,
     bearings: BearingsAt<T>,
@@ -165,7 +165,7 @@ impl<T: Lane> RotorAt<T> {
             translation_per_load: [[zero; 4]; 2],
             rotation_per_load: [[zero; 4]; 4],
         };
-        let mut rotor = Self { entries: [[zero]; ENTRIES], inverse: nothing, bearings };
+        let mut rotor = Self { entries: [zero; ENTRIES], inverse: nothing, bearings };
         rotor.renew(constants, coupling, terms, spin, hinge_mass);
         rotor
     }
@@ -185,21 +185,21 @@ impl<T: Lane> RotorAt<T> {
         terms.others.sum(&functions, &mut self.entries);
         // The inverse comes last: it is a long chain of operations, and a stage begins with
         // operations that do not need it.
-        let mut sums = [[zero]; INERTIA_ENTRIES];
+        let mut sums = [zero; INERTIA_ENTRIES];
         terms.inertia.sum(&functions, &mut sums);
         let mut inertia = [[zero; 4]; 4];
         for row in 0..4 {
             for column in 0..=row {
-                [inertia[row][column]] = sums[entry::inertia(row, column)];
+                inertia[row][column] = sums[entry::inertia(row, column)];
             }
         }
         if let Some(mass) = hinge_mass {
             for (place, r) in [2, 3].into_iter().enumerate() {
                 inertia[r][r] += mass.inertia;
-                self.entries[entry::force(2 + r)][0] += mass.torque[place];
+                self.entries[entry::force(2 + r)] += mass.torque[place];
             }
-            self.entries[entry::damping(4, 3)][0] -= mass.torque_per_speed;
-            self.entries[entry::damping(5, 2)][0] += mass.torque_per_speed;
+            self.entries[entry::damping(4, 3)] -= mass.torque_per_speed;
+            self.entries[entry::damping(5, 2)] += mass.torque_per_speed;
         }
         self.inverse = Symmetric4(inertia).inverse();
         if let Coupling::MassScaled(scaling) = coupling {
@@ -305,11 +305,10 @@ pub(crate) fn accelerations<T: Lane>(
     let arm = entry::arms(e);
     let mut rotor = [q[0]; ROWS];
     for row in 0..ROWS {
-        [rotor[row]] = e[entry::force(row)];
+        rotor[row] = e[entry::force(row)];
         for column in 0..4 {
             if entry::moves(row, column) {
-                let [stiffness] = e[entry::stiffness(row, column)];
-                rotor[row] -= stiffness * q[ROTOR_TURNS[column]];
+                rotor[row] -= e[entry::stiffness(row, column)] * q[ROTOR_TURNS[column]];
             }
         }
     }
@@ -341,8 +340,7 @@ pub(crate) fn accelerations<T: Lane>(
     for row in 0..ROWS {
         for column in 0..4 {
             if entry::moves(row, column) {
-                let [damping] = e[entry::damping(row, column)];
-                rotor[row] -= damping * u[ROTOR_TURNS[column]];
+                rotor[row] -= e[entry::damping(row, column)] * u[ROTOR_TURNS[column]];
             }
         }
     }
