@@ -167,12 +167,20 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
     assert!(markdown.starts_with("### `results/light.parquet` compared with"), "{markdown}");
     let written = home.sweep(&[&arguments[..], &["--out", "d.parquet"]].concat());
     assert_eq!(code(&written), Some(0), "{}", said(&written));
-    for quantity in ["ratio_change", "gap_change_m"] {
-        let drawn = home.sweep(&["plot", "d.parquet", "-o", "d.svg", "--quantity", quantity]);
+    for (quantity, title) in [
+        (None, "Greatest ratio of B over that of A"),
+        (Some("gap_change_m"), "Least gap of the nonlinear model in B less that in A"),
+        (Some("ratio_max_b"), "Greatest ratio of B"),
+    ] {
+        let option = quantity.map(|column| ["--quantity", column]);
+        let asked = option.as_ref().map_or(&[][..], |option| option);
+        let drawn = home.sweep(&[&["plot", "d.parquet", "-o", "d.svg"], asked].concat());
         assert_eq!(code(&drawn), Some(0), "{}", said(&drawn));
+        let picture = fs::read_to_string(home.path("d.svg")).expect("it was drawn");
+        assert!(picture.contains(&format!(">{title}<")), "{quantity:?}");
+        // Neither file's limit is known.
+        assert!(!picture.contains("boundary: "), "{quantity:?}");
     }
-    let picture = fs::read_to_string(home.path("d.svg")).expect("it was drawn");
-    assert!(picture.contains(">Least gap of the nonlinear model in B less that in A<"));
     let shown = parsed(&home.sweep(&["show", "d.parquet", "--json"]));
     let columns = shown["columns"].as_array().expect("a list").iter();
     let worse: Vec<_> = columns.filter_map(|column| column["worse"].as_str()).collect();

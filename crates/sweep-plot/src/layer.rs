@@ -218,8 +218,10 @@ pub(crate) fn all(source: &Source) -> Vec<Shown> {
         !axes.contains(column) && !is_count.iter().any(|start| column.name.starts_with(start))
     });
     let mut all: Vec<Shown> = numbers.map(Shown::new).collect();
-    let first = |shown: &Shown| !["ratio_max", "ratio_change"].contains(&shown.column());
-    all.sort_by_key(|shown| (shown.group as usize, first(shown), shown.channel.is_some()));
+    all.sort_by_key(|shown| {
+        let is = |column| shown.column() == column;
+        (!is("ratio_change"), shown.group as usize, !is("ratio_max"), shown.channel.is_some())
+    });
     all
 }
 
@@ -237,7 +239,9 @@ impl Shown {
             |group: &Group| Some((*group, name.strip_prefix(group.name())?.strip_prefix('_')?));
         let found = Group::ALL.iter().find_map(of).filter(|(_, rest)| *rest != "change");
         let (group, channel) = found.map_or((Group::Other, None), |(group, rest)| {
-            (group, (!["max", "min"].contains(&rest)).then(|| rest.to_owned()))
+            // Of two files: max_a and max_b.
+            let of_all = ["max", "min", "max_a", "max_b"];
+            (group, (!of_all.contains(&rest)).then(|| rest.to_owned()))
         });
         Self { facts: facts.clone(), group, channel }
     }
@@ -257,9 +261,11 @@ impl Shown {
         self.column() == "ratio_max" && source.column("ratio_min").is_none()
     }
 
-    /// Up to where it is good, in the column's unit: its own limit, or the run's of ratios.
+    /// Up to where it is good, in the column's unit: its own limit, or the run's of ratios. Two
+    /// files may have two.
     fn limit(&self, source: &Source) -> Option<f64> {
-        let of_run = || (self.group == Group::Ratio).then(|| source.ratio_limit());
+        let is_of_run = self.group == Group::Ratio && source.kind != Kind::Differences;
+        let of_run = || is_of_run.then(|| source.ratio_limit());
         self.facts.limit.or_else(of_run)
     }
 
@@ -284,7 +290,7 @@ impl Shown {
             (Kind::Differences, _) if self.column() == "ratio_change" => {
                 ColourScale::factor(extent)
             }
-            (Kind::Differences, _) => ColourScale::difference(extent, is_less_worse),
+            (Kind::Differences, _) if !ratio => ColourScale::difference(extent, is_less_worse),
             (_, Some(limit)) if ratio => ColourScale::ratio(extent, limit, is_less_worse),
             (_, Some(limit)) => ColourScale::about(extent, limit * factor, is_less_worse),
             (_, None) => ColourScale::amplitude(extent),
@@ -321,7 +327,12 @@ impl Shown {
     /// For the heading, and beside the colours.
     pub(crate) fn words(&self, source: &Source, unit: &str) -> (String, String) {
         let compared = source.compared();
+        // Which of two files is over which.
+        let told = self.facts.description.split(';').next().unwrap_or_default();
         match (self.group, self.channel.as_deref().map(label::channel)) {
+            (Group::Ratio, None) if source.kind == Kind::Differences => {
+                (capitalised(told), format!("largest ratio of {compared}, nonlinear / linear"))
+            }
             (Group::Ratio, None) => {
                 let (title, which) = match self.worse() {
                     Some(Worse::Less) => ("Where the linear model over-estimates", "least"),
@@ -342,9 +353,7 @@ impl Shown {
             ),
             _ => {
                 let (words, _) = label::of_model(self.column());
-                let told = self.facts.description.split(';').next().unwrap_or_default();
                 let title = match source.kind {
-                    // Which of two files is over which.
                     Kind::Differences => capitalised(told),
                     _ => self.short(),
                 };

@@ -48,7 +48,7 @@ pub(super) fn bytes(
         table.numbers(
             &format!("ratio_max_{suffix}"),
             "1",
-            &format!("ratio_max of {which}"),
+            &format!("greatest ratio of {which}"),
             values,
         );
     }
