@@ -1,6 +1,7 @@
 //! Time histories of both models at one point or at all of a plan, as a table.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::iter::repeat_n;
 use std::path::Path;
 
@@ -31,6 +32,9 @@ use washer_row::Level;
 /// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as
 /// many.
 const MOST_INSTANTS: f64 = 2e6;
+
+/// So near to a whole turn an angle is one: some ten times what rounding leaves of the most turns.
+const WHOLE_TURN_RAD: f64 = 1e-7;
 
 /// Most points whose traces a run keeps: at some 300 kB each.
 pub(crate) const MOST_KEPT: u64 = 10_000;
@@ -98,14 +102,34 @@ pub(crate) fn start_of(values: &[StartValue]) -> Start {
     start
 }
 
-/// The time between instants, if it makes a sensible number of them at so many points.
+/// The time between instants, or none for one a turn, if it makes a sensible number of them at the
+/// points of a plan.
 ///
 /// # Errors
 /// [`Error::Option`].
-pub(crate) fn every(every_s: f64, plan: &Plan, points: u64) -> Result<f64, Error> {
+pub(crate) fn every(every_s: Option<f64>, plan: &Plan) -> Result<Option<f64>, Error> {
+    let points = plan.points();
+    let Some(every_s) = every_s else {
+        let mut count = 0.0;
+        for point in 0..points {
+            // The start is an instant too.
+            count += 1.0 + plan.scenario(point).model.spin.turns_within([0.0, plan.end_s]);
+            if count > MOST_INSTANTS {
+                return Err(Error::Option {
+                    option: "--turns",
+                    given: format!("to {} s", plan.end_s),
+                    expected: format!(
+                        "at most {MOST_INSTANTS} turns of the drum, over all points: an earlier \
+                         end_s, or fewer points"
+                    ),
+                });
+            }
+        }
+        return Ok(None);
+    };
     let least = plan.end_s * points as f64 / MOST_INSTANTS;
     if (least..=plan.end_s).contains(&every_s) {
-        return Ok(every_s);
+        return Ok(Some(every_s));
     }
     Err(Error::Option {
         option: "--every",
@@ -324,6 +348,9 @@ fn columns(
     table.numbers("speed_rpm", "rpm", "spin of the shaft", speeds.map(Some));
     if extras.angle {
         let angles = runs.iter().flat_map(|run| run.spin.angles_rad(run.times_s.iter().copied()));
+        // Times are rounded: a turn is whole within that, and not a whole one short of it.
+        let is_whole = |angle: f64| angle.min(TAU - angle) < WHOLE_TURN_RAD;
+        let angles = angles.map(|angle| if is_whole(angle) { 0.0 } else { angle });
         let what = "angle of the drum, 0 where the unbalance is up";
         table.numbers("drum_angle_rad", "rad", what, angles.map(Some));
     }
@@ -698,5 +725,38 @@ mod tests {
             }
             assert_eq!(all.num_rows(), from);
         }
+    }
+
+    /// Two points that turn by ten a second from the end of a ramp of 2 s.
+    fn turning(end_s: f64) -> Plan {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("grid.toml");
+        let grid = format!(
+            "spin = {{ profile = \"ramp\", peak_rpm = 600, ramp_s = 2 }}\n\
+             time = {{ end_s = {end_s} }}\n\
+             [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.4]\n"
+        );
+        std::fs::write(&path, grid).unwrap();
+        crate::config::load(&path, &[]).unwrap()
+    }
+
+    #[test]
+    fn more_turns_than_are_kept_are_refused_before_any_work() {
+        assert_eq!(every(None, &turning(90_000.0)).unwrap(), None);
+        let refused = every(None, &turning(110_000.0)).unwrap_err().to_string();
+        for word in ["--turns to 110000 s", "at most 2000000 turns", "end_s"] {
+            assert!(refused.contains(word), "{refused}");
+        }
+    }
+
+    #[test]
+    fn the_angle_of_a_whole_turn_is_zero() {
+        let extras = Extras { angle: true, ..Extras::default() };
+        let (models, start) = (Models::Linear, Start::default());
+        let view = View { every_s: None, models, start, extras, quick: None };
+        let all = trace_all(&turning(4.05), &view, &|| false);
+        assert_eq!(all.instants, 2 * 31);
+        let (rows, _) = all.into_table().finish().unwrap();
+        assert_eq!(peak(&rows, "drum_angle_rad", 0), 0.0);
     }
 }

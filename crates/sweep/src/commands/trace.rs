@@ -105,10 +105,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
             (plan, Some(at), chosen)
         }
     };
-    let every_s = match args.turns {
-        true => None,
-        false => Some(every(args.every, &plan, plan.points())?),
-    };
+    let every_s = every((!args.turns).then_some(args.every), &plan)?;
     let Args { rates, states, forces, angle, model: models, .. } = *args;
     let extras = Extras { rates, states, forces, angle };
     let start = start_of(&args.start);

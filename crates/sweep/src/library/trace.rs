@@ -47,8 +47,7 @@ pub fn trace_point(
         true => (grid.clone().fixing(at).load()?, None),
         false => grid.load_point(at).map(|(plan, at)| (plan, Some(at)))?,
     };
-    let every_s =
-        options.every_s.map(|every_s| every(every_s, &plan, plan.points())).transpose()?;
+    let every_s = every(options.every_s, &plan)?;
     let refused = |option: &'static str, given: &str, expected: &str| Error::Option {
         option,
         given: given.to_owned(),
