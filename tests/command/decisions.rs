@@ -190,6 +190,24 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
 }
 
 #[test]
+fn a_report_names_quantities_in_words_and_both_limits() {
+    let grid = grid(3, 2).replace("ratio_limit = 2.0", "ratio_limit = 2.0\nratio_min = 0.999");
+    let home = Home::new(&format!("metrics = [\"damper_speed\"]\n{grid}"));
+    let done = home.sweep(&["run", "g.toml", "--progress", "none"]);
+    assert_eq!(code(&done), Some(0), "{}", said(&done));
+    let written = home.sweep(&["report", MAP, "-o", "r.html"]);
+    assert_eq!(code(&written), Some(0), "{}", said(&written));
+    let page = fs::read_to_string(home.path("r.html")).expect("it was written");
+    for text in ["is between 0.999 and 2", "Ratio min", "Damper speed nonlinear", "Unbalance mass "]
+    {
+        assert!(page.contains(text), "{text}");
+    }
+    // Each damper's are among those of all, and numbers stay with their units.
+    assert!(!page.contains("Damper 1 speed"), "numbered");
+    assert!(page.contains("\u{a0}N\u{a0}s/m") && page.contains("\u{a0}m/s"), "units");
+}
+
+#[test]
 fn exports_open_with_their_kind_and_nothing_else_is_overwritten() {
     let home = mapped();
     for (name, begins) in [("m.csv", &b"# exported by sweep "[..]), ("m.xlsx", b"PK\x03\x04")] {

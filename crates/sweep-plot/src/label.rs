@@ -58,7 +58,8 @@ pub(crate) fn unit_of_name(name: &str) -> String {
 
 /// A parameter's or column's name in words, without its unit: `unbalance_mass_kg` is "Unbalance
 /// mass".
-pub(crate) fn words(name: &str) -> String {
+#[must_use]
+pub fn words(name: &str) -> String {
     capitalised(&parted(name).0.join(" "))
 }
 
@@ -139,7 +140,8 @@ pub(crate) fn shown(unit: &str) -> (&str, f64) {
 }
 
 /// A number to `digits` significant digits, without trailing zeros.
-pub(crate) fn significant(value: f64, digits: usize) -> String {
+#[must_use]
+pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".to_owned() } else { "–".to_owned() };
     }

@@ -13,9 +13,9 @@ use crate::plan::Plan;
 use crate::store::read::tally;
 use crate::swept::Swept;
 use sweep_files::{FileKind, Output, ParquetFile, key};
-use sweep_parameter::Parameter as _;
-use sweep_plot::{described, escape, sheet};
-use sweep_results::{Cell, ResultTable, check, top};
+use sweep_parameter::{Parameter as _, RatioLimits};
+use sweep_plot::{described, escape, sheet, significant, words};
+use sweep_results::{Cell, ResultTable, check, ratio_limits, top};
 
 /// Arguments of `sweep report`.
 #[derive(Debug, clap::Args)]
@@ -72,19 +72,24 @@ pub fn run<M: Swept>(
         escape(name)
     );
     let tally = tally(file.file())?;
-    let limit = plan["reliability"]["ratio_limit"].as_f64();
+    let limits = ratio_limits(&plan);
     let share = 100.0 * tally.reliable as f64 / (tally.points as f64).max(1.0);
     let _ = writeln!(
         body,
-        "<p class=\"share\">{share:.1} %</p>\n<p>{} of {} points are reliable: both models \
-         differ by less than the factor {}. {} are chaotic, {} have no verdict.</p>",
+        "<p class=\"share\">{share:.1} %</p>\n<p>{} of {} points are reliable: every ratio of the \
+         nonlinear model to the linear one is {}. {} are chaotic, {} have no verdict.{}</p>",
         tally.reliable,
         tally.points,
-        limit.map_or_else(String::new, short),
+        limits.map_or_else(String::new, within),
         tally.sensitive,
-        tally.undefined
+        tally.undefined,
+        limits.filter(|_| tally.over_estimated > 0).map_or_else(String::new, |limits| format!(
+            " At {}, the linear model over-estimates: a ratio is below {}.",
+            tally.over_estimated,
+            short(limits.over_estimate())
+        ))
     );
-    rows(&mut body, "The worst of it", &["", "worst", "limit", "at"], &worst(&file, limit)?);
+    rows(&mut body, "The worst of it", &["", "worst", "limit", "at"], &worst(&file, limits)?);
     let mut held = true;
     let mut claims = Vec::new();
     for condition in &requirements {
@@ -157,26 +162,50 @@ fn rows(body: &mut String, title: &str, heads: &[&str], rows: &[Vec<String>]) {
     );
 }
 
-/// The worst value, its limit and its place, for every quantity of the nonlinear model.
-fn worst(file: &ResultTable, ratio_limit: Option<f64>) -> Result<Vec<Vec<String>>, Error> {
+/// What a reliable ratio is.
+fn within(limits: RatioLimits) -> String {
+    let most = short(limits.most);
+    limits.least.map_or_else(
+        || format!("below {most}"),
+        |least| format!("between {} and {most}", short(least)),
+    )
+}
+
+/// The worst value, its limit and its place, for every quantity of the nonlinear model. What has
+/// numbers, as of the second foot, is among those of all.
+fn worst(file: &ResultTable, limits: Option<RatioLimits>) -> Result<Vec<Vec<String>>, Error> {
     let axes = file.axes();
+    let unit_of = |name: &str| file.column(name).map_or("", |column| column.unit.as_str());
     let mut found = Vec::new();
     for column in &file.columns {
         let name = column.name.as_str();
-        let is_shown = name == "ratio_max" || name.contains("nonlinear") || name.contains("growth");
-        let Some(worse) = column.worse.filter(|_| is_shown) else { continue };
-        let limit = if name == "ratio_max" { ratio_limit } else { column.limit };
+        let limit = match name {
+            "ratio_max" => limits.map(|limits| limits.most),
+            "ratio_min" => limits.and_then(|limits| limits.least),
+            _ => column.limit,
+        };
+        let is_ratio = ["ratio_max", "ratio_min"].contains(&name);
+        let is_numbered =
+            name.split('_').nth(1).is_some_and(|word| word.chars().all(|c| c.is_ascii_digit()));
+        let is_shown = is_ratio || name.contains("nonlinear") || name.contains("growth");
+        let Some(worse) = column.worse.filter(|_| is_shown && !is_numbered) else { continue };
         let columns: Vec<&str> = [name].into_iter().chain(axes.iter().copied()).collect();
         let rows = top(file, &columns, None, Some((name, worse)), 1)?;
         let Some([value, at @ ..]) = rows.first().map(Vec::as_slice) else { continue };
         let Cell::Number(number) = value else { continue };
-        let places = axes.iter().zip(at).map(|(axis, value)| format!("{axis} {}", word(value)));
-        let with_unit =
-            |value: f64| format!("{} {}", short(value), column.unit).trim_end().to_owned();
+        // A number stays with its unit on one line.
+        let with_unit = |text: String, unit: &str| match unit {
+            "" => text,
+            unit => format!("{text} {unit}").replace(' ', "\u{a0}"),
+        };
+        let places = axes.iter().zip(at).map(|(axis, value)| {
+            format!("{} {}", words(axis), with_unit(word(value), unit_of(axis)))
+        });
+        let shown = |value: f64| with_unit(significant(value, 4), &column.unit);
         found.push(vec![
-            name.replace('_', " "),
-            with_unit(*number),
-            limit.map_or_else(String::new, with_unit),
+            words(name),
+            shown(*number),
+            limit.map_or_else(String::new, shown),
             places.collect::<Vec<_>>().join(", "),
         ]);
     }
