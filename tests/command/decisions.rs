@@ -190,6 +190,21 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
 }
 
 #[test]
+fn a_trace_says_which_limit_its_point_breaks() {
+    let home = Home::new(&grid(3, 2));
+    let told = |sets: &[&str]| {
+        let trace = ["trace", "g.toml", "--point", "1", "--out", "t.parquet"];
+        said(&home.sweep(&[&trace[..], sets].concat()))
+    };
+    let high = told(&[]);
+    assert!(high.contains("the greatest ratio is ") && high.contains("the limit 2"), "{high}");
+    // So short a run has ratios next to 1, and one of this point is below.
+    let low = told(&["--set", "ratio_min=1"]);
+    let expected = "not reliable: the least ratio is 1 (tub_yaw), the limit 1";
+    assert!(low.contains(expected), "{low}");
+}
+
+#[test]
 fn a_report_names_quantities_in_words_and_both_limits() {
     let grid = grid(3, 2).replace("ratio_limit = 2.0", "ratio_limit = 2.0\nratio_min = 0.999");
     let home = Home::new(&format!("metrics = [\"damper_speed\"]\n{grid}"));

@@ -14,7 +14,7 @@ use sweep_engine::commands::run::line;
 use sweep_engine::exit::{Error, Exit, tell};
 use sweep_engine::store::Job;
 use sweep_files::{FileKind, Output, key};
-use sweep_parameter::Worse;
+use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::{Cell, ResultTable, top};
 use washer_row::{Trajectory, Verdict};
 
@@ -216,13 +216,22 @@ fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{what}, {} to {} s{place}:", short(from), short(to));
         text.push_str(&table(&headings, &rows, ""));
-        let said = match (verdict.reliable, verdict.greatest) {
-            (Some(reliable), Some((channel, ratio))) => format!(
-                "{}: the greatest ratio is {} ({}), the limit {}",
+        let RatioLimits { most, least } = plan.reliability.limits;
+        // The ratio that is beyond its limit, or the greatest.
+        let too_low = least.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
+        let told = match (verdict.greatest, too_low) {
+            (Some((_, ratio)), Some((limit, least))) if ratio < most => {
+                Some((least, "least", limit))
+            }
+            (greatest, _) => greatest.map(|greatest| (greatest, "greatest", most)),
+        };
+        let said = match (verdict.reliable, told) {
+            (Some(reliable), Some(((channel, ratio), which, limit))) => format!(
+                "{}: the {which} ratio is {} ({}), the limit {}",
                 if reliable { "reliable" } else { "not reliable" },
                 short(ratio),
                 channels.get(channel).map_or("", |channel| channel.name()),
-                short(plan.reliability.limits.most),
+                short(limit),
             ),
             _ => "undefined: no ratio is".to_owned(),
         };
