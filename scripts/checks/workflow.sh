@@ -59,6 +59,13 @@ grep -q FAILS out/summary.md || fails "the gate is not told"
 sed 's/0.5/0.6/' grids/my.toml > grids/new.toml
 sh "$kit/compare.sh" HEAD grids/new.toml out > /dev/null 2>&1 || fails "a new grid"
 
+# Differences over one axis have no picture; the gate is checked all the same.
+head -n 6 grids/my.toml > grids/one.toml
+git add grids/one.toml && git commit -qm "One axis"
+code=0
+GATE='ratio_max < 0' sh "$kit/compare.sh" HEAD grids/one.toml out > /dev/null 2>&1 || code=$?
+[ "$code" = 4 ] && grep -q FAILS out/summary.md || fails "a grid of one axis: exit code $code"
+
 # `gh` keeps one comment a file: posting twice leaves one, with the later text.
 mkdir -p "$home/bin" "$home/comments"
 cat > "$home/bin/gh" << 'GH'

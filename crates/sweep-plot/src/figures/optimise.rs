@@ -65,7 +65,7 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
             style: Style::Dots,
         };
         let drawn = (0..KINDS.len()).filter(|&kind| !grids[kind].is_empty());
-        let words = label::capitalised(&column.name.replace('_', " "));
+        let words = label::words(&column.name);
         ChartPanel {
             shown: *is_shown,
             height: 300.0,
@@ -77,7 +77,7 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
         }
     });
     let panels = panels.collect();
-    let words = label::capitalised(&x.name.replace('_', " "));
+    let words = label::words(&x.name);
     Ok(Chart {
         title: if further.is_empty() { "What was tried" } else { "What no other choice beats" }
             .to_owned(),
