@@ -107,9 +107,10 @@ impl Step {
         f64::from(self.mantissa) * 10_f64.powi(self.power)
     }
 
-    /// Decimals of the numbers at such ticks.
-    pub(crate) fn decimals(self) -> usize {
-        usize::try_from(-self.power).unwrap_or_default()
+    /// Decimals of the numbers at such ticks; none where they would be long, and are written in
+    /// powers of ten.
+    pub(crate) fn decimals(self) -> Option<usize> {
+        (self.power < 6).then(|| usize::try_from(-self.power).unwrap_or_default())
     }
 }
 
@@ -127,7 +128,11 @@ fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
         if last - first + 1 >= LEAST_TICKS {
             let tick = |k: i64| {
                 let value = k as f64 * length;
-                Tick { value, label: format!("{value:.decimals$}") }
+                let label = match decimals {
+                    None if value != 0.0 => format!("{value:e}"),
+                    _ => format!("{value:.*}", decimals.unwrap_or_default()),
+                };
+                Tick { value, label }
             };
             return (first..=last).map(tick).collect();
         }
@@ -205,6 +210,7 @@ mod tests {
         );
         assert_eq!(labels(Scale::linear(-0.3, 0.3), 3), ["-0.2", "0.0", "0.2"]);
         assert_eq!(labels(Scale::linear(-48.0, 48.0), 3), ["-40", "-20", "0", "20", "40"]);
+        assert_eq!(labels(Scale::linear(-1.1e15, 0.0), 3), ["-1e15", "-5e14", "0"]);
         assert_eq!(labels(Scale::log(1.0, 1000.0), 4), ["1", "10", "100", "1000"]);
         assert_eq!(labels(Scale::log(1.0, 9.0), 4), ["1", "2", "5"]);
         assert!(labels(Scale::linear(1.0, 1.0), 5).is_empty());

@@ -62,8 +62,10 @@ function ticks(low, high, count, sets) {
     const [first, last] = [Math.ceil(low / step - 1e-9), Math.floor(high / step + 1e-9)];
     if (last - first + 1 < least) continue;
     return Array.from({ length: last - first + 1 }, (_, k) => {
-      const value = (first + k) * step;
-      return [value, (value || 0).toFixed(decimals)];
+      const value = (first + k) * step || 0;
+      const isLong = decimals === null && value !== 0;
+      const powers = () => value.toExponential().replace("e+", "e");
+      return [value, isLong ? powers() : value.toFixed(decimals ?? 0)];
     });
   }
   return [];
