@@ -27,7 +27,7 @@ if [ -e "$before/$grid" ]; then
     "$sweep" compare "$out/before.parquet" "$out/after.parquet" --markdown \
         --fail-on "${FAIL_ON:-flips}" --out "$out/differences.parquet" >> "$out/summary.md" ||
         code=$?
-    # Over one axis, and of scattered points, there is no such picture.
+    # Over one axis there is no such picture.
     "$sweep" plot "$out/differences.parquet" -o "$out/differences.svg" || :
 else
     echo "The grid is new: there is nothing to compare it with." >> "$out/summary.md"

@@ -351,6 +351,7 @@ function createMap(host, data, panel) {
   function tell() {
     const place = hovered ?? pinned;
     readout.replaceChildren();
+    readout.classList.toggle("empty", !place);
     if (!place) {
       readout.append(element("h2", {}, "No point chosen"),
         element("p", {}, "Hover over the map, or focus it and use the arrow keys."));

@@ -8,7 +8,7 @@ const STEP_S: f64 = 2e-4;
 
 fn point(spin: Spin) -> Point {
     let timing = Timing { end_s: 4.0, window_s: [0.0, 4.0], checkpoints: 0 };
-    prepare(Simd::best(), &[(Machine::paper(), spin)], &timing).remove(0).unwrap()
+    prepare(&[(Machine::paper(), spin)], &timing).remove(0).unwrap()
 }
 
 /// A run that gains speed until 2 s, and is held from there.
