@@ -52,10 +52,11 @@ impl Progress {
         Self::shown(mode, BAR, total, start, start)
     }
 
-    /// Of a search, whose points nobody can count beforehand: rows of this total are done. `start`
-    /// points were there at the start.
+    /// Of a search, whose points nobody can count beforehand: rows of this total are done, if it
+    /// has rows. `start` points were there at the start.
     pub fn of_search(mode: ProgressMode, rows: u64, start: u64) -> Self {
-        Self::shown(mode, ROWS, rows, 0, start)
+        let template = if rows == 0 { POINTS } else { ROWS };
+        Self::shown(mode, template, rows, 0, start)
     }
 
     fn shown(mode: ProgressMode, template: &str, total: u64, position: u64, start: u64) -> Self {
@@ -98,7 +99,11 @@ impl Progress {
                 bar.set_message(self.points(points));
             }
             Shown::Lines { next, .. } if Instant::now() >= *next => {
-                self.say(&format!("{rows} of {} rows, {}", self.total, self.points(points)));
+                let rows = match self.total {
+                    0 => String::new(),
+                    total => format!("{rows} of {total} rows, "),
+                };
+                self.say(&format!("{rows}{}", self.points(points)));
             }
             _ => {}
         }
@@ -156,6 +161,9 @@ const BAR: &str = "{wide_bar} {msg}";
 
 /// The bar of a search.
 const ROWS: &str = "{wide_bar} {human_pos}/{human_len} rows  {msg}";
+
+/// Of one without rows.
+const POINTS: &str = "{spinner} {msg}";
 
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())

@@ -130,7 +130,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         files::judge(path, FileKind::Fit)?;
     }
     let interrupt = Interrupt::install().map_err(Error::signals)?;
-    let progress = Mutex::new(Progress::of_search(args.progress, 1, 0));
+    let progress = Mutex::new(Progress::of_search(args.progress, 0, 0));
     let seen = |made: usize| {
         progress.lock().unwrap_or_else(PoisonError::into_inner).show_search(0, made as u64);
     };
