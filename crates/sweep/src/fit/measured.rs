@@ -9,6 +9,8 @@ use washer_model::Channel;
 
 /// Fewest samples of a column: fewer say nothing of their noise.
 const FEWEST: usize = 16;
+/// Rows that are usually farther apart (s) show no turn of a drum.
+const SLOWEST_S: f64 = 0.2;
 
 /// What a column measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,6 +158,10 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
                 times(&table, k, report);
             }
             ("speed_rpm", _) => measured.speed_rpm = Some(column.values.clone()),
+            (_, Some(_)) if samples >= FEWEST && is_still(&column.values) => {
+                let title = format!("the column `{name}` never changes");
+                report.push(Diagnostic::new(title).at(at, "expected what a sensor measured"));
+            }
             (_, Some(quantity)) if samples >= FEWEST => {
                 measured.signals.push(Signal { quantity, values: column.values.clone() });
             }
@@ -188,19 +194,34 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
     measured
 }
 
-/// Judges the column of times.
+/// Whether all samples are one number.
+fn is_still(values: &[f64]) -> bool {
+    let mut known = values.iter().filter(|value| !value.is_nan());
+    let first = known.next();
+    known.all(|value| Some(value) == first)
+}
+
+/// Judges the column of times. Of each mistake the first row is shown: often all rows have it.
 fn times(table: &NumberTable, column: usize, report: &Report) {
+    let values = &table.columns[column].values;
     let mut last = f64::NEG_INFINITY;
-    for (row, &time_s) in table.columns[column].values.iter().enumerate() {
-        let said = match time_s {
-            _ if time_s.is_nan() => "a row without its time".to_owned(),
-            _ if time_s < 0.0 => format!("time_s = {time_s} s: the run begins at 0, at rest"),
-            _ if time_s <= last => format!("time goes back: {time_s} s after {last} s"),
+    let mut seen = [false; 4];
+    let usual = usual_step(values).unwrap_or_default();
+    for (row, &time_s) in values.iter().enumerate() {
+        let (mistake, said) = match time_s {
+            _ if time_s.is_nan() => (0, "a row without its time".to_owned()),
+            _ if time_s < 0.0 => (1, format!("time_s = {time_s} s: the run begins at 0, at rest")),
+            _ if time_s <= last => (2, format!("time goes back: {time_s} s after {last} s")),
+            _ if usual > SLOWEST_S => (3, format!("rows are {usual} s apart: are these ms?")),
             _ => {
                 last = time_s;
                 continue;
             }
         };
+        last = last.max(time_s);
+        if std::mem::replace(&mut seen[mistake], true) {
+            continue;
+        }
         report.push_with(|sources| {
             let expected = "expected times in s that rise from row to row, 0 where the run begins";
             Diagnostic::new(said).at(&table.place(sources, column, row), expected)
@@ -208,11 +229,16 @@ fn times(table: &NumberTable, column: usize, report: &Report) {
     }
 }
 
-/// Stretches of time without rows: longer than twenty of the usual distance.
-fn gaps(time_s: &[f64]) -> Vec<[f64; 2]> {
+/// The usual distance of two rows: the median.
+fn usual_step(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
-    let Some(&usual) = steps.get(steps.len() / 2) else { return Vec::new() };
+    steps.get(steps.len() / 2).copied()
+}
+
+/// Stretches of time without rows: longer than twenty of the usual distance.
+fn gaps(time_s: &[f64]) -> Vec<[f64; 2]> {
+    let Some(usual) = usual_step(time_s) else { return Vec::new() };
     let gaps = time_s.windows(2).filter(|pair| pair[1] - pair[0] > 20.0 * usual);
     gaps.map(|pair| [pair[0], pair[1]]).collect()
 }
@@ -254,13 +280,21 @@ mod tests {
         assert!(refused(&format!("time_s,tub_yaw\n{rows}")).contains("has 0 samples"));
         assert!(refused("time_s\n1\n2\n").contains("no column of any channel"));
         assert!(refused("time_s,tub_yaw\n0,inf\n").contains("is infinite"));
+        let rows: String = (0..20).map(|k| format!("{},1\n", 0.01 * f64::from(k))).collect();
+        assert!(refused(&format!("time_s,tub_yaw\n{rows}")).contains("never changes"));
+        // Milliseconds, and a clock whose zero is elsewhere: once, not once a row.
+        for (from, said) in [(0, "rows are 2 s apart: are these ms?"), (-30, "begins at 0")] {
+            let rows: String = (0..20).map(|k| format!("{},{k}\n", from + 2 * k)).collect();
+            let text = refused(&format!("time_s,tub_yaw\n{rows}"));
+            assert_eq!(text.matches(said).count(), 1, "{text}");
+        }
     }
 
     #[test]
     fn a_missing_sample_is_not_a_number_and_a_gap_is_seen() {
         let row = |k: usize| {
             let t = if k < 10 { 0.01 * k as f64 } else { 5.0 + 0.01 * k as f64 };
-            (t, if k.is_multiple_of(3) { f64::NAN } else { 1.0 })
+            (t, if k.is_multiple_of(3) { f64::NAN } else { k as f64 })
         };
         let (time_s, yaw) = (0..40).map(row).unzip();
         let columns = vec![("time_s".to_owned(), time_s), ("tub_yaw".to_owned(), yaw)];
