@@ -50,6 +50,8 @@ const SEED: u64 = 1;
 const STEP_EFFECT: f64 = 0.3;
 /// How often the step is halved.
 const HALVINGS: usize = 2;
+/// The greatest share of its greatest speed at which a record may begin.
+const MOST_AT_START: f64 = 0.1;
 
 /// What is asked of a fit.
 #[derive(Clone, Debug)]
@@ -71,7 +73,7 @@ pub struct FitOptions {
 }
 
 /// Why there is no fit.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 enum FitError {
     #[error("{unknowns} unknowns for {samples} samples: expected more samples, or fewer `--free`")]
     TooFew { unknowns: usize, samples: usize },
@@ -80,6 +82,11 @@ enum FitError {
          `--free`"
     )]
     NoInfluence(String),
+    #[error(
+        "{name} begins at {rpm:.0} rpm, and where its unbalance was then is not known: expected \
+         the record from rest on"
+    )]
+    Moving { name: String, rpm: f64 },
     #[error(
         "the model does not get through the record at the starting values: expected a start from \
          which it does (`--set NAME=VALUE`)"
@@ -232,6 +239,13 @@ pub(crate) fn fit(
     if unknowns >= samples {
         return Err(Error::model(FitError::TooFew { unknowns, samples }));
     }
+    for case in &problem.cases {
+        let rpm = case.first_rpm().unwrap_or_default();
+        if rpm.abs() > MOST_AT_START * case.greatest_rpm() {
+            let name = case.measured.name.clone();
+            return Err(Error::model(FitError::Moving { name, rpm }));
+        }
+    }
     let journal = work.journal.as_deref();
     let journal = journal.map(|path| open(path, &problem)).transpose()?;
     let made = AtomicUsize::new(0);
@@ -246,6 +260,9 @@ pub(crate) fn fit(
     // A step too long for the forces' corners shows in the numbers: then it is halved.
     for _ in 0..=HALVINGS {
         let Method::Rk4 { step_s } = problem.method else { break };
+        if !best.is_settled {
+            break;
+        }
         let Some(against) = problem.against(&best.x, work.stop) else { return Ok(None) };
         problem.method = Method::Rk4 { step_s: 0.5 * step_s };
         let Some(finer) = problem.against(&best.x, work.stop) else { return Ok(None) };

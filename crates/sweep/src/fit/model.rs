@@ -39,6 +39,17 @@ impl Case {
         self.smoothed.as_ref().map_or(&self.plan.model.spin, |smoothed| &smoothed.spin)
     }
 
+    /// The measured spin at time 0 (rpm).
+    pub(crate) fn first_rpm(&self) -> Option<f64> {
+        self.smoothed.as_ref()?.spin.speeds_rpm([0.0]).next()
+    }
+
+    /// The greatest measured speed (rpm).
+    pub(crate) fn greatest_rpm(&self) -> f64 {
+        let speeds = self.measured.speed_rpm.iter().flatten();
+        speeds.fold(0.0, |most, speed| most.max(speed.abs()))
+    }
+
     /// When its run ends: late enough for a late clock.
     fn end_s(&self) -> f64 {
         self.measured.time_s.last().copied().unwrap_or_default() + MOST_SHIFT_S

@@ -382,11 +382,19 @@ impl Found<'_> {
                 let (moves, _) = super::model::centred(moves);
                 (dot(&swing, &swing) / dot(&moves, &moves)).sqrt()
             };
-            let fits = |size: &f64| (1.0 / UNIT_SLACK..UNIT_SLACK).contains(&(size / factor));
-            if let Some(size) = [size(end), size(start)].into_iter().find(fits) {
+            let sizes = [size(end), size(start)];
+            let fits =
+                |size: f64, factor: f64| (1.0 / UNIT_SLACK..UNIT_SLACK).contains(&(size / factor));
+            let not_turned = (factor, format!("be in {other}"));
+            let turned_twice =
+                (1.0 / factor, format!("have been converted from {other} once too often"));
+            for (factor, seems) in [not_turned, turned_twice] {
+                let Some(size) = sizes.into_iter().find(|size| fits(*size, factor)) else {
+                    continue;
+                };
                 notes.push(format!(
-                    "{} of {} is {size:.3} times as large as the model's: it seems to be in \
-                     {other} ({factor:.4}), expected {unit}",
+                    "{} of {} is {size:.3} times as large as the model's: it seems to {seems} \
+                     ({factor:.4}), expected {unit}",
                     signal.quantity.column(),
                     self.problem.cases[case].measured.name
                 ));
@@ -397,8 +405,7 @@ impl Found<'_> {
             for [from, to] in &measured.gaps_s {
                 notes.push(format!("{} has no rows from {from} to {to} s", measured.name));
             }
-            let first = case.smoothed.as_ref().and_then(|_| case.spin().speeds_rpm([0.0]).next());
-            if let Some(first) = first.filter(|first| first.abs() > 5.0) {
+            if let Some(first) = case.first_rpm().filter(|first| first.abs() > 5.0) {
                 notes.push(format!(
                     "{} begins at {first:.1} rpm: the model starts at rest there, and is not the \
                      machine's before its start has died away",

@@ -182,6 +182,13 @@ fn what_cannot_be_fitted_is_said() {
         let text = wrong(free, short());
         assert!(text.contains(said), "{free:?}: {text}");
     }
+    let mut late = reference("viscous", 8.0);
+    let from = late.time_s.partition_point(|time| *time < 4.0);
+    let columns = late.signals.iter_mut().map(|signal| &mut signal.values);
+    columns.chain(&mut late.speed_rpm).for_each(|values| drop(values.drain(..from)));
+    late.time_s = late.time_s[from..].iter().map(|time| time - 4.0).collect();
+    let text = wrong(&["damping_n_s_per_m"], late);
+    assert!(text.contains("viscous.csv begins at 117 rpm"), "{text}");
     let mut few = short();
     few.time_s.truncate(1);
     few.speed_rpm = None;
@@ -212,16 +219,19 @@ fn units_that_are_wrong_and_loads_that_differ_are_seen() {
 
 #[test]
 fn records_in_g_are_seen_where_the_search_starts() {
-    let mut measured = reference("viscous_exact", 8.0);
-    // Without angles nothing keeps the damping from growing until the model is as small.
-    measured.signals.truncate(2);
-    for signal in &mut measured.signals {
-        signal.values.iter_mut().for_each(|value| *value /= 9.806_65);
+    const G: f64 = 9.806_65;
+    for (factor, known) in [(1.0 / G, "seems to be in g"), (G, "from g once too often (9.8067)")] {
+        let mut measured = reference("viscous_exact", 8.0);
+        // Without angles nothing keeps the damping from growing until the model is as small.
+        measured.signals.truncate(2);
+        for signal in &mut measured.signals {
+            signal.values.iter_mut().for_each(|value| *value *= factor);
+        }
+        let case = case_at(&VISCOUS, 1.0, measured);
+        let report = fitted(vec![case], &options(&["damping_n_s_per_m"]));
+        let said = report.notes.iter().filter(|note| note.contains(known));
+        assert_eq!(said.count(), 2, "{report:?}");
     }
-    let case = case_at(&VISCOUS, 1.0, measured);
-    let report = fitted(vec![case], &options(&["damping_n_s_per_m"]));
-    let said = report.notes.iter().filter(|note| note.contains("seems to be in g"));
-    assert_eq!(said.count(), 2, "{report:?}");
 }
 
 #[test]
