@@ -35,9 +35,11 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
         .collect();
     let ([first, _], [last, _]) = (samples.first()?, samples.last()?);
     let greatest = samples.iter().fold(0.0_f64, |most, [_, speed]| most.max(speed.abs()));
-    let noise_rpm = noise(&samples).max(LEAST_NOISE * greatest);
-    // As the Bayesian information criterion weighs a knot, whose place counts too.
-    let worth = 3.0 * libm::log(samples.len() as f64) * noise_rpm * noise_rpm;
+    let (rounding_rpm, held) = stairs(&samples).unwrap_or((0.0, 0.0));
+    let noise_rpm = noise(&samples).max(LEAST_NOISE * greatest).max(rounding_rpm);
+    // As the Bayesian information criterion weighs a knot, whose place counts too; and no stair is
+    // worth one.
+    let worth = (3.0 * libm::log(samples.len() as f64)).max(2.0 * held) * noise_rpm * noise_rpm;
     let mut knots = vec![*first, *last];
     let mut speeds = fitted(&samples, &knots)?;
     while knots.len() < MOST_KNOTS {
@@ -90,6 +92,16 @@ fn noise(samples: &[[f64; 2]]) -> f64 {
     distances.sort_by(f64::total_cmp);
     // The median of |x| of a normal distribution.
     distances.get(distances.len() / 2).map_or(0.0, |median| median / 0.674_489_75)
+}
+
+/// Of a tachometer whose digits are coarser than its noise: the error of rounding, and how many
+/// samples a digit usually stays. Neighbours say nothing of its noise: most are equal.
+fn stairs(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
+    let steps = samples.windows(2).map(|pair| (pair[1][1] - pair[0][1]).abs());
+    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    let step = steps.get(steps.len() / 2).filter(|_| 2 * steps.len() <= samples.len())?;
+    Some((step / 12.0_f64.sqrt(), samples.len() as f64 / steps.len() as f64))
 }
 
 /// Between which knots a time lies, and its share of the way.
@@ -227,5 +239,13 @@ mod tests {
             .zip(found.spin.speeds_rpm(time_s.iter().copied()))
             .fold(0.0_f64, |most, (t, ours)| most.max((ours - course(*t)).abs()));
         assert!(apart < 0.2, "{apart}: {found:?}");
+        // Stairs of whole digits are no course.
+        for digit in [1.0, 5.0] {
+            let rounded: Vec<f64> =
+                time_s.iter().map(|t| (course(*t) / digit).round() * digit).collect();
+            let found = smoothed(&time_s, &rounded).unwrap();
+            assert!((found.noise_rpm / digit - 12.0_f64.sqrt().recip()).abs() < 1e-9, "{found:?}");
+            assert!(found.knots < 12, "{digit}: {found:?}");
+        }
     }
 }
