@@ -87,7 +87,9 @@ fn a_fit_ends_in_a_machine_file_that_runs() {
     let value = mass.next().map(|parameter| &parameter["value"]);
     assert_eq!(value, Some(&found["parameters"][1]["value"]));
     assert!(!home.path("bench.toml.partial").exists());
-    for (view, picture) in [("time", "t.svg"), ("passages", "p.html"), ("profiles", "c.svg")] {
+    for (view, picture) in
+        [("time", "t.svg"), ("passages", "p.html"), ("profiles", "c.svg"), ("spectrum", "s.svg")]
+    {
         let drawn = home.sweep(&["plot", "fit.parquet", "--view", view, "-o", picture]);
         assert!(drawn.status.success(), "{view}: {}", said(&drawn));
     }

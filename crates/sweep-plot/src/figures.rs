@@ -13,6 +13,7 @@ pub(crate) mod optimise;
 pub(crate) mod passages;
 pub(crate) mod profiles;
 pub(crate) mod shapes;
+pub(crate) mod spectrum;
 pub(crate) mod stability;
 pub(crate) mod trace;
 pub(crate) mod turn;

@@ -80,6 +80,8 @@ pub enum View {
     Passages,
     /// Curves of a fit: how the cost rises beside each fitted number
     Profiles,
+    /// Curves of a fit: what was measured and what is left over, by frequency
+    Spectrum,
     /// Design: points over every pair of parameters, and the quantity over each
     Scatter,
     /// Design: how the quantity is distributed, and the share of reliable points
@@ -99,7 +101,7 @@ impl View {
     const fn of(self) -> Kind {
         match self {
             Self::Frequencies | Self::Variation | Self::Shapes => Kind::Modes,
-            Self::Time | Self::Passages | Self::Profiles => Kind::Trace,
+            Self::Time | Self::Passages | Self::Profiles | Self::Spectrum => Kind::Trace,
             Self::Scatter | Self::Histogram | Self::Influence => Kind::Design,
             Self::Growth | Self::Responses => Kind::Stability,
             Self::Sections => Kind::Dwell,
@@ -382,6 +384,7 @@ fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>
     let chart = match (table.source.kind, options.view) {
         (Kind::Trace, Some(View::Passages)) => figures::passages::chart(table, options)?,
         (Kind::Trace, Some(View::Profiles)) => figures::profiles::chart(table)?,
+        (Kind::Trace, Some(View::Spectrum)) => figures::spectrum::chart(table)?,
         (Kind::Trace, _) => figures::trace::chart(table, options)?,
         (Kind::Modes, Some(View::Variation)) => figures::turn::chart(table)?,
         (Kind::Modes, Some(View::Shapes)) => figures::shapes::chart(table)?,

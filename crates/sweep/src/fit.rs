@@ -13,6 +13,7 @@ mod measured;
 mod model;
 mod report;
 mod search;
+mod spectrum;
 mod speed;
 mod statistics;
 #[cfg(test)]

@@ -21,9 +21,6 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         path: table.source.path.clone(),
         reason: "it has no profiles: they are in the curves of `sweep fit`, if the model follows",
     };
-    let numbers = |of: &Value| -> Vec<f64> {
-        of.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
-    };
     let profiles = table.source.find("profiles").and_then(Value::as_array).ok_or_else(empty)?;
     let grid = profiles.first().map(|profile| numbers(&profile["deviations"]));
     let grid = grid.filter(|grid| grid.len() > 1).ok_or_else(empty)?;
@@ -57,4 +54,9 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         shades: Vec::new(),
         shade_meaning: String::new(),
     })
+}
+
+/// A list's numbers.
+pub(super) fn numbers(list: &Value) -> Vec<f64> {
+    list.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
 }

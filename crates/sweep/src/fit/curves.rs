@@ -5,7 +5,9 @@ use sweep_engine::table::Table;
 use sweep_files::key;
 
 use super::algebra::inverse;
-use super::model::Against;
+use super::measured::usual_step;
+use super::model::{Against, centred};
+use super::spectrum::spectrum;
 use super::{Fitted, Problem};
 
 /// Standard errors to which profiles reach on both sides.
@@ -45,6 +47,34 @@ impl Fitted {
         (0..free.len()).map(of).collect()
     }
 
+    /// What was measured in a case and what is left over, by frequency; a missing sample is as
+    /// good as none.
+    fn spectra(&self, case: usize) -> Value {
+        let measured = &self.problem.cases[case].measured;
+        let step_s = usual_step(&measured.time_s).unwrap_or(1.0);
+        let mut hz = Vec::new();
+        let mut column = |one: &Against| {
+            let signal = &measured.signals[one.signal];
+            let mut of = |values: &[f64]| {
+                let mut all = vec![0.0; measured.time_s.len()];
+                signal.samples().zip(values).for_each(|((row, _), value)| all[row] = *value);
+                let density;
+                (hz, density) = spectrum(&all, step_s);
+                density
+            };
+            let (swing, _) = centred(signal.samples().map(|(_, value)| value).collect());
+            json!({
+                "name": signal.quantity.column(),
+                "unit": signal.quantity.units().0,
+                "measured": of(&swing),
+                "residual": of(&one.residual),
+            })
+        };
+        let own = self.against.iter().filter(|one| one.case == case);
+        let columns: Vec<Value> = own.map(&mut column).collect();
+        json!({ "hz": hz, "columns": columns })
+    }
+
     /// The curves of one case.
     pub(crate) fn curves(&self, case: usize, stop: &(dyn Fn() -> bool + Sync)) -> Table {
         let at = &self.problem.cases[case];
@@ -73,7 +103,7 @@ impl Fitted {
         }
         let plan = at.plan.to_json();
         table.metadata(key::PLAN, &plan);
-        let mut found = json!({ "report": self.report });
+        let mut found = json!({ "report": self.report, "spectra": self.spectra(case) });
         if self.report.follows {
             found["profiles"] = self.profiles(stop);
         }

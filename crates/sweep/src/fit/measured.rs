@@ -230,7 +230,7 @@ fn times(table: &NumberTable, column: usize, report: &Report) {
 }
 
 /// The usual distance of two rows: the median.
-fn usual_step(time_s: &[f64]) -> Option<f64> {
+pub(super) fn usual_step(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied()
