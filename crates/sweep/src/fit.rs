@@ -525,16 +525,21 @@ impl Search<'_> {
     }
 }
 
-/// Free numbers drawn from the fitted distribution, evenly spread, each within its range.
-fn draws(problem: &Problem, x: &[f64], covariance: &[Vec<f64>], count: u64) -> Vec<Vec<f64>> {
+/// So many draws from the standard normal distribution, evenly spread: of a draw the k-th number.
+fn evenly(count: u64) -> impl Fn(u64, usize) -> f64 {
     let design = Design::LatinHypercube { points: count, seed: SEED };
     let shape = Shape::Normal { mean: 0.0, sd: 1.0 };
     let normal = Distribution { shape, from: -6.0, to: 6.0 };
+    move |point, k| normal.quantile(design.place(point, k).unwrap_or(0.5))
+}
+
+/// Free numbers drawn from the fitted distribution, evenly spread, each within its range.
+fn draws(problem: &Problem, x: &[f64], covariance: &[Vec<f64>], count: u64) -> Vec<Vec<f64>> {
+    let normal = evenly(count);
     let (unit, scale) = algebra::scaled(covariance);
     let eigen = Symmetric::of(&unit);
     let draw = |point: u64| {
-        let places = (0..scale.len()).map(|k| design.place(point, k).unwrap_or(0.5));
-        let even: Vec<f64> = places.map(|place| normal.quantile(place)).collect();
+        let even: Vec<f64> = (0..scale.len()).map(|k| normal(point, k)).collect();
         let moved = eigen.apply(&even, |value| value.max(0.0).sqrt());
         let value = |k: usize| {
             let [from, to] = problem.range(k);

@@ -219,12 +219,6 @@ impl Found<'_> {
         let value = self.minima[0].x[k];
         let at_bound = free.range.contains(&value);
         let known = follows && !at_bound && error > 0.0;
-        let quantiles = |repeated: &[Vec<f64>]| {
-            let mut values: Vec<f64> = repeated.iter().map(|x| x[k]).collect();
-            values.sort_by(f64::total_cmp);
-            let at = |part: f64| values.get((part * (values.len() as f64 - 1.0)).round() as usize);
-            Some([*at(0.025)?, *at(0.975)?])
-        };
         Fit {
             name: free.parameter.name().to_owned(),
             unit: free.parameter.unit().to_owned(),
@@ -233,7 +227,7 @@ impl Found<'_> {
             value,
             standard_error: known.then_some(error),
             interval_95: known.then_some([value - REACH * error, value + REACH * error]),
-            bootstrap_95: self.repeated.and_then(quantiles),
+            bootstrap_95: self.repeated.and_then(|sets| middle_95(sets.iter().map(|x| x[k]))),
             at_bound,
         }
     }
@@ -327,9 +321,6 @@ impl Found<'_> {
             .collect();
         let ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
         let drawn = verdicts.get(1..).unwrap_or_default();
-        let mut ratios: Vec<f64> = drawn.iter().filter_map(ratio).collect();
-        ratios.sort_by(f64::total_cmp);
-        let at = |part: f64| ratios.get((part * (ratios.len() as f64 - 1.0)).round() as usize);
         let reliable = drawn.iter().filter(|it| it.reliable == Some(true)).count();
         let growth = self.growth(case, &plan, stop);
         Ok(Verdict {
@@ -337,7 +328,7 @@ impl Found<'_> {
             ratio_max: verdicts.first().and_then(ratio),
             ratio_limit: limits.most,
             probability_reliable: (!drawn.is_empty()).then(|| reliable as f64 / drawn.len() as f64),
-            ratio_max_95: at(0.025).zip(at(0.975)).map(|(from, to)| [*from, *to]),
+            ratio_max_95: middle_95(drawn.iter().filter_map(ratio)),
             draws: drawn.len(),
             growth_per_s: growth.map(|[growth, _]| growth),
             growth_at_rpm: growth.map(|[_, speed]| speed),
@@ -418,6 +409,14 @@ impl Found<'_> {
         }
         notes
     }
+}
+
+/// Between which 95 % of some numbers lie; `None` of none.
+fn middle_95(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let at = |part: f64| values.get((part * (values.len() as f64 - 1.0)).round() as usize);
+    Some([*at(0.025)?, *at(0.975)?])
 }
 
 impl Report {

@@ -1,7 +1,8 @@
 //! The spin from a tachometer: a spline of first degree, which is a table of the spin's.
 
-use sweep_engine::design::{Design, Distribution, Shape};
 use washer_model::Spin;
+
+use super::evenly;
 
 /// Noise of a tachometer at least, as a share of its greatest speed: rounded digits are no noise.
 const LEAST_NOISE: f64 = 1e-5;
@@ -64,12 +65,9 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
         Spin::Table { time_s: times, speed_rpm: speeds }
     };
     let (normal, _) = Normal::of(&samples, &knots);
-    let design = Design::LatinHypercube { points: DRAWN, seed: 1 };
-    let shape = Shape::Normal { mean: 0.0, sd: 1.0 };
-    let usual = Distribution { shape, from: -6.0, to: 6.0 };
+    let usual = evenly(DRAWN);
     let draw = |point: u64| {
-        let place = |k: usize| design.place(point, k).unwrap_or(0.5);
-        let even: Vec<f64> = (0..knots.len()).map(|k| usual.quantile(place(k))).collect();
+        let even: Vec<f64> = (0..knots.len()).map(|k| usual(point, k)).collect();
         let moved = normal.drawn(&even);
         spin(speeds.iter().zip(&moved).map(|(speed, moved)| speed + noise_rpm * moved).collect())
     };
@@ -200,6 +198,7 @@ fn further(samples: &[[f64; 2]], knots: &[f64], speeds: &[f64], worth: f64) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sweep_engine::design::{Design, Distribution, Shape};
 
     #[test]
     fn a_noisy_course_with_kinks_keeps_its_angle() {
