@@ -363,6 +363,11 @@ impl Found<'_> {
     /// What else a reader should know.
     fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
+        // The start may be wrong by as much as a unit. Where channels of several units follow, it
+        // was: no number of the machine makes up for the unit of some.
+        let units = || self.problem.signals().map(|(.., signal)| signal.quantity.units().1);
+        let is_one = units().all(|unit| Some(unit) == units().next());
+        let by_start = is_one || self.statistics.objection(self.problem).is_some();
         let signals = self.problem.signals().zip(self.against.iter().zip(self.at_start));
         for ((case, _, signal), (end, start)) in signals {
             let (unit, mistaken) = signal.quantity.units();
@@ -373,14 +378,15 @@ impl Found<'_> {
                 let (moves, _) = super::model::centred(moves);
                 (dot(&swing, &swing) / dot(&moves, &moves)).sqrt()
             };
-            let sizes = [size(end), size(start)];
+            let sizes = [Some(size(end)), by_start.then(|| size(start))];
             let fits =
                 |size: f64, factor: f64| (1.0 / UNIT_SLACK..UNIT_SLACK).contains(&(size / factor));
             let not_turned = (factor, format!("be in {other}"));
             let turned_twice =
                 (1.0 / factor, format!("have been converted from {other} once too often"));
             for (factor, seems) in [not_turned, turned_twice] {
-                let Some(size) = sizes.into_iter().find(|size| fits(*size, factor)) else {
+                let Some(size) = sizes.into_iter().flatten().find(|size| fits(*size, factor))
+                else {
                     continue;
                 };
                 notes.push(format!(
