@@ -79,8 +79,8 @@ enum FitError {
     #[error("{unknowns} unknowns for {samples} samples: expected more samples, or fewer `--free`")]
     TooFew { unknowns: usize, samples: usize },
     #[error(
-        "the measurement does not depend on {0}: expected another channel, or to leave it out of \
-         `--free`"
+        "the measurement does not depend on {0}: expected another channel, another start \
+         (`--set NAME=VALUE`), or to leave it out of `--free`"
     )]
     NoInfluence(String),
     #[error(
@@ -464,15 +464,15 @@ impl Search<'_> {
     /// Every minimum that is found from so many starts, the least first.
     fn minima(&self, starts: usize) -> Result<Result<Vec<Descent>, FitError>, Stopped> {
         let start = self.problem.start();
-        if let Some(summary) = self.evaluate(&start)? {
+        let dead = |summary: &Summary| {
             let dead = |k: &usize| summary.normal[*k][*k] == 0.0;
-            let dead: Vec<&str> = (0..self.problem.free.len())
-                .filter(dead)
-                .map(|k| self.problem.free[k].parameter.name())
-                .collect();
-            if !dead.is_empty() {
-                return Ok(Err(FitError::NoInfluence(dead.join(", "))));
-            }
+            let dead = (0..self.problem.free.len()).filter(dead);
+            let names: Vec<&str> = dead.map(|k| self.problem.free[k].parameter.name()).collect();
+            (!names.is_empty()).then(|| FitError::NoInfluence(names.join(", ")))
+        };
+        let dead_at_start = self.evaluate(&start)?.as_ref().and_then(dead);
+        if let (Some(error), 1) = (&dead_at_start, starts) {
+            return Ok(Err(error.clone()));
         }
         let mut chosen = vec![start.clone()];
         if starts > 1 {
@@ -506,6 +506,11 @@ impl Search<'_> {
             minima.extend(descent?);
         }
         minima.sort_by(|a, b| a.summary.cost.total_cmp(&b.summary.cost));
+        // Of several starts another may be where all count.
+        let is_dead = |minimum: &Descent| dead(&minimum.summary).is_some();
+        if let Some(error) = dead_at_start.filter(|_| minima.iter().all(is_dead)) {
+            return Ok(Err(error));
+        }
         let mut apart: Vec<Descent> = Vec::new();
         for minimum in minima {
             if !apart.iter().any(|other| self.is_same(other, &minimum)) {

@@ -235,6 +235,20 @@ fn records_in_g_are_seen_where_the_search_starts() {
 }
 
 #[test]
+fn a_number_that_does_not_count_at_the_start_is_found_from_others() {
+    // Without friction, its speed says nothing.
+    let start = [("friction_n", 0.0), FRICTION[0], FRICTION[1], FRICTION[2]];
+    let cases = || vec![case_at(&start, 1.0, reference("friction", 8.0))];
+    let mut options = options(&["friction_n=0:60", "friction_speed_m_per_s=0.005:0.02"]);
+    let work = Work { stop: &|| false, seen: &|_| {}, journal: None };
+    let error = fit(cases(), &options, &work).err().unwrap().to_string();
+    assert!(error.contains("does not depend on friction_speed_m_per_s"), "{error}");
+    options.starts = 6;
+    let report = fitted(cases(), &options);
+    assert!((report.parameters[0].value / 34.0 - 1.0).abs() < 0.1, "{}", report.text());
+}
+
+#[test]
 fn a_start_that_is_far_off_is_no_wrong_unit() {
     let start = [("unbalance_mass_kg", 0.043), VISCOUS[1], VISCOUS[2]];
     let cases = vec![case_at(&start, 1.0, reference("viscous", 8.0))];
