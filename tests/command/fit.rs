@@ -93,6 +93,9 @@ fn a_fit_ends_in_a_machine_file_that_runs() {
         let drawn = home.sweep(&["plot", "fit.parquet", "--view", view, "-o", picture]);
         assert!(drawn.status.success(), "{view}: {}", said(&drawn));
     }
+    // The picture names the fitted machine, and not the middle of the axis, where the fit began.
+    let picture = fs::read_to_string(home.path("t.svg")).expect("it is text");
+    assert!(picture.contains("damping 1") && !picture.contains("damping 120 N s/m"));
     let again = home.sweep(&[&words[..], &more].concat());
     assert_eq!(again.status.code(), Some(1), "{}", said(&again));
     assert!(said(&again).contains("give another name"), "{}", said(&again));

@@ -101,8 +101,9 @@ impl Fitted {
             let left = values.zip(shown()).map(|(measured, model)| known(measured - model));
             add("residual", "measured less model", &mut { left });
         }
-        let plan = at.plan.to_json();
-        table.metadata(key::PLAN, &plan);
+        let mut plan = at.plan.clone();
+        plan.model.machine = self.problem.machine(case, &self.x).0;
+        table.metadata(key::PLAN, &plan.to_json());
         let mut found = json!({ "report": self.report, "spectra": self.spectra(case) });
         if self.report.follows {
             found["profiles"] = self.profiles(stop);
