@@ -1,15 +1,17 @@
 //! The cost of a run: time, from a few points integrated on the spot; memory and disk, from what is
 //! held at once.
 
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
 use washer_model::ModelKind;
-use washer_row::{Deviations, Ladder, Outcome};
+use washer_row::{Demand, Deviations, Ladder, Outcome};
 
-use crate::engine::{Engine, EngineError, MOST_WAITING, ModelEngine, ROWS_A_THREAD};
+use crate::engine::{Engine, EngineError, MOST_WAITING, ModelEngine, ROWS_A_THREAD, Watch};
 use crate::plan::Plan;
 use sweep_engine::estimate::Estimate;
+use sweep_engine::interrupt::Interrupt;
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::plan::shortest_step_s;
 use sweep_engine::store::{Job, Shape, chunk_points};
@@ -19,6 +21,9 @@ const LONG_ENOUGH: Duration = Duration::from_millis(60);
 
 /// No further place of the grid is tried after this.
 const BUDGET: Duration = Duration::from_millis(350);
+
+/// Whole trajectories are given up after this.
+const WHOLE: Duration = Duration::from_secs(1);
 
 /// The first beginning that is tried by a method that chooses its steps: at most [`FIRST_STEPS`] of
 /// them.
@@ -50,17 +55,22 @@ const RESULT_COLUMN_BYTES: f64 = 800.0;
 /// # Errors
 /// What keeps a run from having an engine.
 pub(crate) fn of(plan: &Plan, threads: usize) -> Result<Estimate, EngineError> {
+    reckoned(plan, threads, WHOLE)
+}
+
+/// As [`of`], where whole trajectories are given up after a time.
+fn reckoned(plan: &Plan, threads: usize, whole: Duration) -> Result<Estimate, EngineError> {
     let engine = ModelEngine::new(plan)?;
     let ladders = engine.ladders();
     let began = Instant::now();
-    let first = Measured::take(plan, ladders, PLACES[0])?;
+    let first = Measured::take(plan, ladders, PLACES[0], whole)?;
     let mut samples = match Measured::spread(plan, ladders, &first)? {
         Some(spread) => vec![spread],
         None => vec![first],
     };
     for place in &PLACES[1..] {
         if samples[0].integrated_s < plan.end_s && began.elapsed() < BUDGET {
-            samples.push(Measured::take(plan, ladders, *place)?);
+            samples.push(Measured::take(plan, ladders, *place, whole)?);
         }
     }
     let core_s_per_point =
@@ -94,9 +104,21 @@ struct Measured {
 }
 
 impl Measured {
-    fn take(plan: &Plan, ladders: &[Ladder; 2], place: f64) -> Result<Self, EngineError> {
+    fn take(
+        plan: &Plan,
+        ladders: &[Ladder; 2],
+        place: f64,
+        whole: Duration,
+    ) -> Result<Self, EngineError> {
         let points = plan.points().min(MAX_LANES as u64);
         let first = (plan.points().saturating_sub(points) as f64 * place) as u64;
+        // What checks itself costs most where little moves, so that a beginning says too much.
+        if let Steps::Checked(_) = plan.integrator.steps()
+            && let Some(cost_s) = cost_within(whole, plan, ladders, &mut (first..first + points))?
+        {
+            let core_s_per_point = cost_s / points as f64;
+            return Ok(Self { core_s_per_point, points, integrated_s: plan.end_s });
+        }
         let mut shorter: Option<(f64, f64)> = None;
         let mut end_s = first_end_s(plan);
         let mut cut = plan.clone();
@@ -160,14 +182,35 @@ fn cost_s(
     ladders: &[Ladder; 2],
     points: &mut dyn Iterator<Item = u64>,
 ) -> Result<f64, EngineError> {
+    Ok(cost_within(Duration::MAX, cut, ladders, points)?.unwrap_or(f64::INFINITY))
+}
+
+/// The same, if they are done by then.
+fn cost_within(
+    most: Duration,
+    cut: &Plan,
+    ladders: &[Ladder; 2],
+    points: &mut dyn Iterator<Item = u64>,
+) -> Result<Option<f64>, EngineError> {
     // A shorter run alone would be slower spin, and longer steps.
     let engine = ModelEngine::with_ladders(cut, ladders.clone())?;
     let axis_values: Vec<Vec<f64>> = points.map(|point| cut.axis_values(point)).collect();
-    let began_s = busy_s();
-    let outcomes = engine.evaluate_at(&axis_values);
-    let cost_s = busy_s() - began_s;
-    drop(outcomes);
-    Ok(cost_s)
+    let interrupt = Interrupt::new();
+    let watch = Watch::new(&interrupt);
+    Ok(std::thread::scope(|scope| {
+        let (done, is_done) = mpsc::channel::<()>();
+        let watch = &watch;
+        scope.spawn(move || {
+            if is_done.recv_timeout(most) == Err(RecvTimeoutError::Timeout) {
+                watch.abort();
+            }
+        });
+        let began_s = busy_s();
+        let outcomes = engine.evaluate_for(&axis_values, Demand::Row, &|_| {}, watch);
+        let cost_s = busy_s() - began_s;
+        drop(done);
+        outcomes.map(|_| cost_s)
+    }))
 }
 
 /// Time that this thread has had a core for: what others do on the machine meanwhile is no cost of
@@ -239,12 +282,16 @@ mod tests {
 
     /// A grid of `count` points over `end_s`.
     fn plan(count: u64, end_s: f64) -> Plan {
+        plan_by("\"rk4\"\nstep_s = 2e-4", count, end_s)
+    }
+
+    fn plan_by(method: &str, count: u64, end_s: f64) -> Plan {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("grid.toml");
         let grid = format!(
             "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = \
              {end_s}\n\
-             [integrator]\nmethod = \"rk4\"\nstep_s = 2e-4\n\
+             [integrator]\nmethod = {method}\n\
              [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.0, count \
              = {count} }}\n"
         );
@@ -262,6 +309,14 @@ mod tests {
             assert_eq!(estimate.sampled_s >= end_s, sampled_whole, "{estimate:?}");
             assert_eq!(estimate.threads, 1);
         }
+    }
+
+    #[test]
+    fn checked_rows_are_measured_whole_where_there_is_time() {
+        let plan = plan_by("\"rk4-mass-scaled\"", 16, 50.0);
+        let sampled_s = |whole| reckoned(&plan, 1, whole).unwrap().sampled_s;
+        assert_eq!(sampled_s(Duration::MAX), plan.end_s);
+        assert!(sampled_s(Duration::ZERO) < plan.end_s);
     }
 
     #[test]

@@ -19,8 +19,17 @@ pub fn word(cell: &Cell) -> String {
     match cell {
         Cell::Null => "null".to_owned(),
         Cell::Number(number) => short(*number),
-        Cell::Text(text) => text.clone(),
+        Cell::Text(text) => clipped(text),
         Cell::Flag(flag) => flag.to_string(),
+    }
+}
+
+/// A word as a line has room for it: somebody's file may hold one of a megabyte.
+pub fn clipped(text: &str) -> String {
+    const LONGEST: usize = 80;
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}... ({} characters)", &text[..end], text.chars().count()),
+        None => text.to_owned(),
     }
 }
 
@@ -54,6 +63,13 @@ mod tests {
         let expected =
             ["0", "0.05", "300", "-1.50000e-7", "2.00000e12", "0.333333", "0.55", "0.00123457"];
         assert_eq!(shown, expected);
+    }
+
+    #[test]
+    fn long_words_are_clipped_between_characters() {
+        assert_eq!(word(&Cell::Text("\u{e4}".repeat(80))), "\u{e4}".repeat(80));
+        let said = word(&Cell::Text("\u{e4}".repeat(1000)));
+        assert_eq!(said, format!("{}... (1000 characters)", "\u{e4}".repeat(80)));
     }
 
     #[test]

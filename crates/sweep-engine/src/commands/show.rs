@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 
-use super::cells::{short, table, word};
+use super::cells::{clipped, short, table, word};
 use super::conditions;
 use super::run::{counts, line};
 use crate::exit::{Error, Exit, show};
@@ -337,7 +337,10 @@ fn range(column: &ColumnRange) -> String {
             .unwrap_or_default();
         parts.push(format!("{} to {}{unit}", short(least), short(greatest)));
     }
-    parts.extend(column.names.iter().map(|(name, count)| format!("{count} {name}")));
+    parts.extend(column.names.iter().map(|(name, count)| {
+        let name = clipped(name);
+        format!("{count} {name}")
+    }));
     if column.nulls > 0 {
         parts.push(format!("{} null", column.nulls));
     }
