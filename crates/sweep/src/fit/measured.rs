@@ -278,7 +278,7 @@ mod tests {
         assert!(refused("tub_yaw_rad\n1\n").contains("has 1 samples"));
         let rows: String = (0..20).map(|k| format!("{k},\n")).collect();
         assert!(refused(&format!("time_s,tub_yaw\n{rows}")).contains("has 0 samples"));
-        assert!(refused("time_s\n1\n2\n").contains("no column of any channel"));
+        assert!(refused("time_s\n0.1\n0.2\n").contains("no column of any channel"));
         assert!(refused("time_s,tub_yaw\n0,inf\n").contains("is infinite"));
         let rows: String = (0..20).map(|k| format!("{},1\n", 0.01 * f64::from(k))).collect();
         assert!(refused(&format!("time_s,tub_yaw\n{rows}")).contains("never changes"));
