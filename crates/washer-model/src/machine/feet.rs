@@ -15,6 +15,10 @@ pub(crate) const LOAD: usize = 6;
 /// Added to the sum of the feet's loads (N), which may be none.
 const LEAST_N: f64 = 1e-9;
 
+/// Arm at which the floor takes a moment at least (m): about the radius of a foot's pad. A foot that
+/// carries alone has no other.
+const LEAST_ARM_M: f64 = 0.01;
+
 /// Feet closer to one line than this share of their distances hold no cabinet upright.
 const IN_LINE: f64 = 1e-6;
 
@@ -162,8 +166,10 @@ pub(crate) fn turning_n<T: Real>(
         second += loaded[k] * squared;
         farthest = farthest.where_less(squared, squared, farthest);
     }
+    let farthest_m = farthest.sqrt();
+    let least = (load[0].lit(LEAST_ARM_M) * farthest_m * sum).v();
     let moment = load[4] - (z * load[0] - x * load[2]);
-    moment.abs() * farthest.sqrt() * sum / second
+    moment.abs() * farthest_m * sum / second.where_less(least, least, second)
 }
 
 #[cfg(test)]
@@ -269,6 +275,20 @@ mod tests {
             }
         }
         assert!(decided > 20, "{decided} turn before they slip");
+    }
+
+    #[test]
+    fn a_foot_that_carries_alone_takes_a_moment_at_the_radius_of_its_pad() {
+        let feet = Feet::new(&on(&CORNERS)).unwrap();
+        let mut alone = 0;
+        for tilt_n_m in (0..200).map(f64::from) {
+            let load = [20.0, 150.0, 30.0, -tilt_n_m, 25.0, -2.0 * tilt_n_m];
+            let carrying = feet.loads_n(&load).iter().filter(|n| **n > 0.0).count();
+            let taken_n = feet.slip_margin_n(&load) - feet.walk_margin_n(&load);
+            assert!((0.0..1e4).contains(&taken_n), "{taken_n} N with {carrying} feet");
+            alone += i32::from(carrying == 1);
+        }
+        assert!(alone > 0);
     }
 
     #[test]
