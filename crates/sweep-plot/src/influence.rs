@@ -55,7 +55,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// Of what does not vary there is none.
+/// The correlation of two lists of ranks; none if either does not vary.
 fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     let mean = (x.len() + 1) as f64 / 2.0;
     let sum = |of: &dyn Fn(usize) -> f64| (0..x.len()).map(of).sum::<f64>();

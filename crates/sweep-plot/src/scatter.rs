@@ -41,7 +41,7 @@ pub(crate) struct Spread {
     pub(crate) log: bool,
     /// One per kept point.
     pub(crate) values: Vec<f64>,
-    /// Of the parameter on the quantity; none of a quantity that is the same everywhere.
+    /// The parameter's influence on the quantity; none if that is the same everywhere.
     pub(crate) influence: Option<Influence>,
 }
 

@@ -262,8 +262,7 @@ impl Climbs {
                     // By way of its first step: only RK4 against RK4 tells chaos from a coarse
                     // rung.
                     Demand::Row => runs.push((model, (climb.rung + 1).max(reference - 1))),
-                    // Of the side alone, the next rung may make sure: where it cannot, the one
-                    // after.
+                    // The next rung may settle the side; where it cannot, the one after does.
                     Demand::Side if errors[model].is_some_and(|error| SHARE * error > margin) => {
                         runs.push((model, climb.rung + 1));
                     }

@@ -78,7 +78,7 @@ pub struct Trajectory {
     pub turns: Vec<Deviations>,
 }
 
-/// Of every channel, in the order of `Channel::ALL` (m, rad).
+/// Every channel's deviation, in the order of `Channel::ALL` (m, rad).
 pub type Deviations = [f64; Channel::ALL.len()];
 
 impl Trajectory {

@@ -130,7 +130,7 @@ pub(crate) struct Resonance {
     pub(crate) modes: [usize; 2],
     /// Their frequencies (cycles per minute).
     pub(crate) frequencies_cpm: [f64; 2],
-    /// Of the second frequency: 1 in a sum, -1 in a difference.
+    /// The sign of the second frequency: 1 in a sum, -1 in a difference.
     pub(crate) sign: f64,
     /// Turns of the drum to which the sum belongs.
     pub(crate) order: u32,
