@@ -21,7 +21,7 @@ pub(crate) struct Influence {
 }
 
 impl Influence {
-    /// Of `x` on `y`, in pairs that have both values.
+    /// The influence of `x` on `y`, over pairs that have both values.
     pub(crate) fn of(x: &[f64], y: &[f64]) -> Option<Self> {
         let both = x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite());
         let (x, y): (Vec<f64>, Vec<f64>) = both.unzip();

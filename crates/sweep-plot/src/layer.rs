@@ -148,7 +148,7 @@ pub(crate) struct Family<'a> {
     pub(crate) name: String,
     /// In words.
     pub(crate) words: String,
-    /// By model; the empty one where no model is named.
+    /// The columns by model; the empty one where no model is named.
     pub(crate) columns: Vec<(&'static str, &'a ColumnFacts)>,
 }
 

@@ -33,7 +33,7 @@ use washer_row::Level;
 /// many.
 const MOST_INSTANTS: f64 = 2e6;
 
-/// So near to a whole turn an angle is one: some ten times what rounding leaves of the most turns.
+/// An angle so near to a whole turn is one: some ten times what rounding leaves of the most turns.
 const WHOLE_TURN_RAD: f64 = 1e-7;
 
 /// Most points whose traces a run keeps: at some 300 kB each.

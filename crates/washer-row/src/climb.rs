@@ -14,7 +14,7 @@ use crate::verdict::Verdict;
 pub enum Demand {
     /// A row: every number within the accuracy, and the verdict.
     Row,
-    /// On which side of the limit the ratio is, and near the limit the ratio.
+    /// The side of the limit on which the ratio is, and the ratio if it is near the limit.
     Side,
     /// How fast disturbances grow at constant speeds, and nothing of the run.
     Growth,

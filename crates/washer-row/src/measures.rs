@@ -198,7 +198,7 @@ impl Part {
 /// nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Floor {
-    /// By themselves.
+    /// They are compared by themselves.
     None,
     /// A part of the window: a clash that just happens is a time that just is not zero.
     PartOfWindow,

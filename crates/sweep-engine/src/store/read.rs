@@ -106,7 +106,7 @@ pub struct Tally {
     /// Rows with a ratio so low that the linear model over-estimates as much as a reliable one may
     /// under-estimate.
     pub over_estimated: u64,
-    /// Of these the reliable ones.
+    /// How many of these are reliable.
     pub over_estimated_reliable: u64,
     /// Rows known to be chaotic.
     pub sensitive: u64,
