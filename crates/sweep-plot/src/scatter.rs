@@ -27,7 +27,7 @@ pub(crate) enum Side {
 }
 
 impl Side {
-    /// All, as they are drawn: what is rare over what is frequent.
+    /// All, in drawing order: rare ones over frequent ones.
     pub(crate) const ALL: [Self; 4] = [Self::Good, Self::Bad, Self::Undefined, Self::Failed];
 }
 
