@@ -111,7 +111,7 @@ pub(crate) trait Side<T: Real, const C: usize, const P: usize>: Sized {
 }
 
 impl<const C: usize> Tangent<f64, C> {
-    /// By coordinates, by speeds.
+    /// The derivatives by coordinates, and those by speeds.
     pub(crate) const fn parts(self) -> [[[N<f64>; C]; C]; 2] {
         [self.by_coordinate, self.by_speed]
     }

@@ -87,7 +87,7 @@ impl Design {
 
 /// A number strictly between 0 and 1 that belongs to a point and an axis.
 fn at_random(point: u64, axis: usize, seed: u64) -> f64 {
-    // Of 52 bits the middle of each step, so that neither 0 nor 1 comes up.
+    // The middle of each of 2^52 steps, so that neither 0 nor 1 comes up.
     let bits = mixed(mixed(point) ^ axis_key(seed, axis)) >> 12;
     (bits as f64 + 0.5) / (1_u64 << 52) as f64
 }

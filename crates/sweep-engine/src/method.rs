@@ -21,21 +21,21 @@ pub struct Setting {
 /// Fixed steps (s).
 pub const STEP_S: Setting =
     Setting { key: "step_s", range: Range::Positive, default: 2e-4, description: "fixed step, s" };
-/// Of adaptive methods.
+/// The relative tolerance of adaptive methods.
 pub const RTOL: Setting = Setting {
     key: "rtol",
     range: Range::Within(1e-14, 1e-1),
     default: 1e-6,
     description: "relative tolerance per component",
 };
-/// Of adaptive methods.
+/// The absolute tolerance of adaptive methods.
 pub const ATOL: Setting = Setting {
     key: "atol",
     range: Range::Within(1e-18, 1e-1),
     default: 1e-9,
     description: "absolute tolerance per component",
 };
-/// Of methods whose rungs check one another.
+/// The accuracy of methods whose rungs check one another.
 pub const ACCURACY: Setting = Setting {
     key: "accuracy",
     range: Range::Within(1e-9, 1e-1),
@@ -60,11 +60,11 @@ pub struct Entry<I: 'static> {
 pub enum Steps {
     /// All of this length, but for those that end at an edge of the window (s).
     Fixed(f64),
-    /// By the error; stability bounds them.
+    /// Chosen by the error; stability bounds them.
     Explicit,
-    /// By the error alone; one trajectory at a time, not in lanes.
+    /// Chosen by the error alone; one trajectory at a time, not in lanes.
     Implicit,
-    /// By rungs that check one another, until two agree to this relative accuracy.
+    /// Taken by rungs that check one another, until two agree to this relative accuracy.
     Checked(f64),
 }
 

@@ -47,13 +47,13 @@ enum Shown {
 }
 
 impl Progress {
-    /// Of a run.
+    /// The progress of a run.
     pub fn new(mode: ProgressMode, total: u64, start: u64) -> Self {
         Self::shown(mode, BAR, total, start, start)
     }
 
-    /// Of a search, whose points nobody can count beforehand: rows of this total are done, if it
-    /// has rows. `start` points were there at the start.
+    /// The progress of a search, whose points nobody can count beforehand. It counts rows up to
+    /// this total, if there are rows. `start` points were there at the start.
     pub fn of_search(mode: ProgressMode, rows: u64, start: u64) -> Self {
         let template = if rows == 0 { POINTS } else { ROWS };
         Self::shown(mode, template, rows, 0, start)
@@ -162,7 +162,7 @@ const BAR: &str = "{wide_bar} {msg}";
 /// The bar of a search.
 const ROWS: &str = "{wide_bar} {human_pos}/{human_len} rows  {msg}";
 
-/// Of one without rows.
+/// The bar of a search without rows.
 const POINTS: &str = "{spinner} {msg}";
 
 fn style(template: &str) -> ProgressStyle {

@@ -54,7 +54,7 @@ pub enum Ended {
         signal: u8,
         /// Points that are there.
         kept: u64,
-        /// Of how many.
+        /// Points in all.
         points: u64,
     },
 }

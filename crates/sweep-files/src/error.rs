@@ -12,7 +12,7 @@ pub enum FileError {
     Io {
         /// What was being done, in the infinitive.
         action: &'static str,
-        /// To which file or folder.
+        /// The file or folder it was done to.
         path: PathBuf,
         /// What the system answered.
         source: io::Error,

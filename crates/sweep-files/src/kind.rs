@@ -17,12 +17,12 @@ pub mod key {
     pub const VERSION: &str = "sweep.version";
     /// Version of the program's numerics: what decides the numbers besides the plan.
     pub const NUMERICS: &str = "sweep.numerics";
-    /// JSON object: column name to `type`, `unit`, `description`, and of a number that can be bad
-    /// to [`WORSE`] and [`LIMIT`].
+    /// JSON object: column name to `type`, `unit`, `description`, and [`WORSE`] and [`LIMIT`] if
+    /// the column can be bad.
     pub const COLUMNS: &str = "sweep.columns";
-    /// Of a column: `greater` or `less`, which way it is bad.
+    /// Which way a column is bad: `greater` or `less`.
     pub const WORSE: &str = "worse";
-    /// Of a column: the value up to which it is good, if that has a meaning of its own.
+    /// The value up to which a column is good, if that has a meaning of its own.
     pub const LIMIT: &str = "limit";
     /// What was traced: quantity, limit, tolerance, lattice, trials, rounds. In boundary files
     /// alone.

@@ -45,7 +45,7 @@ struct Header {
 /// Sizes of a column chunk, unpacked (bytes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Unpacked {
-    /// Of all its pages.
+    /// All its pages together.
     pub total: u64,
     /// The dictionary and the largest page together: what a reader holds at once.
     pub at_once: u64,

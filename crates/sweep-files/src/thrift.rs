@@ -30,7 +30,7 @@ const UUID: u8 = 13;
 pub(crate) enum Kind {
     Bool,
     Byte,
-    /// Of any width: all are read alike.
+    /// A number of any width: all are read alike.
     Number,
     Double,
     Binary,

@@ -44,7 +44,7 @@ pub(crate) struct ChartPanel {
     pub(crate) label: Label,
     /// Shown in a picture, and at first in a page.
     pub(crate) shown: bool,
-    /// By the logarithm.
+    /// Whether the axis is logarithmic.
     pub(crate) log: bool,
     /// y values between which the panel extends; by default what its series need.
     pub(crate) range: Option<(f64, f64)>,

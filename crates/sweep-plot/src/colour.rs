@@ -61,7 +61,7 @@ pub(crate) const LEVELS: usize = 64;
 pub(crate) enum ColourScale {
     /// Both sides of a centre have half the colours each, whatever their extent.
     Diverging {
-        /// By the logarithm.
+        /// Whether the scale is logarithmic.
         log: bool,
         /// Value of the first colour.
         low: f64,

@@ -18,7 +18,7 @@ const LEAST_SIDE: usize = 64;
 /// The cuts that are shown.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Cuts {
-    /// Of each axis after the second, the values that are shown, by their place among all.
+    /// The values that are shown of each axis after the second, by their place among all.
     pub(crate) picks: Vec<Vec<usize>>,
     /// In the order in which they are shown; a page opens with the first.
     pub(crate) cuts: Vec<Cut>,

@@ -62,7 +62,7 @@ pub(crate) struct Counts {
 pub(crate) struct Divide {
     /// In the column's own unit.
     pub(crate) value: f64,
-    /// By the logarithm.
+    /// Whether the axis is logarithmic.
     pub(crate) log: bool,
 }
 
@@ -88,8 +88,8 @@ pub(crate) struct Map {
     pub(crate) counts: Vec<Counts>,
     /// The range of each column of numbers.
     pub(crate) extents: BTreeMap<String, Extent>,
-    /// On which sides of its limit the points of a cell lie, by column. Columns without a limit are
-    /// left out, and so are all where each cell is one point.
+    /// The sides of its limit on which the points of a cell lie, by column. Columns without a limit
+    /// are left out, and so are all where each cell is one point.
     pub(crate) sides: BTreeMap<String, Sides>,
     /// Rows of the whole file by their status.
     pub(crate) statuses: BTreeMap<String, usize>,

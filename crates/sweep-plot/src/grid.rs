@@ -32,7 +32,7 @@ enum Places {
     Blocks { values: Vec<f64>, size: usize },
     /// These values have a place, and no others.
     Picked(Vec<f64>),
-    /// By the borders: of an axis that is known by its range alone.
+    /// The borders place a value, where an axis is known by its range alone.
     Borders,
 }
 

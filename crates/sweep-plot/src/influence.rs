@@ -21,7 +21,7 @@ pub(crate) struct Influence {
 }
 
 impl Influence {
-    /// Of `x` on `y`, in pairs that have both values.
+    /// The influence of `x` on `y`, over pairs that have both values.
     pub(crate) fn of(x: &[f64], y: &[f64]) -> Option<Self> {
         let both = x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite());
         let (x, y): (Vec<f64>, Vec<f64>) = both.unzip();
@@ -55,7 +55,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// Of what does not vary there is none.
+/// The correlation of two lists of ranks; none if either does not vary.
 fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     let mean = (x.len() + 1) as f64 / 2.0;
     let sum = |of: &dyn Fn(usize) -> f64| (0..x.len()).map(of).sum::<f64>();

@@ -148,7 +148,7 @@ pub(crate) struct Family<'a> {
     pub(crate) name: String,
     /// In words.
     pub(crate) words: String,
-    /// By model; the empty one where no model is named.
+    /// The columns by model; the empty one where no model is named.
     pub(crate) columns: Vec<(&'static str, &'a ColumnFacts)>,
 }
 
@@ -239,7 +239,7 @@ impl Shown {
             |group: &Group| Some((*group, name.strip_prefix(group.name())?.strip_prefix('_')?));
         let found = Group::ALL.iter().find_map(of).filter(|(_, rest)| *rest != "change");
         let (group, channel) = found.map_or((Group::Other, None), |(group, rest)| {
-            // Of two files: max_a and max_b.
+            // Differences of two files have max_a and max_b.
             let of_all = ["max", "min", "max_a", "max_b"];
             (group, (!of_all.contains(&rest)).then(|| rest.to_owned()))
         });

@@ -178,9 +178,9 @@ pub struct Live {
     pub ratio_min: Option<f64>,
     /// The rungs of the nonlinear and of the linear model, in words.
     pub rungs: [Vec<String>; 2],
-    /// Of the program that chose them.
+    /// The version of the program that chose the rungs.
     pub version: String,
-    /// Of each resonance of the linear model: motion, speed (rpm), damping ratio.
+    /// Resonances of the linear model: motion, speed (rpm), damping ratio.
     pub resonances: Vec<[String; 3]>,
 }
 

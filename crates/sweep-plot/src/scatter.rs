@@ -27,7 +27,7 @@ pub(crate) enum Side {
 }
 
 impl Side {
-    /// All, as they are drawn: what is rare over what is frequent.
+    /// All, in drawing order: rare ones over frequent ones.
     pub(crate) const ALL: [Self; 4] = [Self::Good, Self::Bad, Self::Undefined, Self::Failed];
 }
 
@@ -41,7 +41,7 @@ pub(crate) struct Spread {
     pub(crate) log: bool,
     /// One per kept point.
     pub(crate) values: Vec<f64>,
-    /// Of the parameter on the quantity; none of a quantity that is the same everywhere.
+    /// The parameter's influence on the quantity; none if that is the same everywhere.
     pub(crate) influence: Option<Influence>,
 }
 

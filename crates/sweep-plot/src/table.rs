@@ -19,7 +19,7 @@ pub(crate) enum Values {
     Words(Words),
 }
 
-/// Words of which few differ.
+/// Words among which few are different.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Words {
     /// The words that occur.

@@ -199,9 +199,9 @@ impl Comparison {
 /// What rows are folded into.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Folded {
-    /// Of the rows that have a value.
+    /// The function over the rows that have a value.
     pub(crate) value: Cell,
-    /// How many those are.
+    /// How many rows have one.
     pub(crate) over: u64,
     /// Whether those are all rows.
     pub(crate) whole: bool,
@@ -216,7 +216,7 @@ pub(crate) struct Folding {
     sum: f64,
     least: Option<f64>,
     greatest: Option<f64>,
-    /// Of a quantile alone.
+    /// All numbers, kept for a quantile alone.
     numbers: Vec<f64>,
 }
 

@@ -264,7 +264,7 @@ fn decode(array: &ArrayRef, kind: CellKind) -> Result<Decoded, ArrowError> {
         CellKind::Flag => Decoded::Flags(cells::flags(array)?.iter().collect()),
         CellKind::Text => {
             let mut names: Vec<String> = Vec::new();
-            // By place: the words of a batch lie there once, and may be long.
+            // Keyed by place: the words of a batch lie there once, and may be long.
             let mut places = HashMap::new();
             let mut code = |word: &str| {
                 *places.entry((word.as_ptr(), word.len())).or_insert_with(|| {

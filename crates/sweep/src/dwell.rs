@@ -150,7 +150,7 @@ pub(crate) struct Motions {
 
 impl Motions {
     pub(crate) fn new(plan: &Plan, mut search: Search) -> Self {
-        // Of a motion that goes on for ever there are no times and no windows.
+        // A motion that goes on for ever has no times and no windows.
         search.starts.wanted = Wanted {
             root_mean_squares: false,
             turns: false,

@@ -58,7 +58,7 @@ pub struct ModelEngine<'a> {
     forced: Option<Simd>,
     timing: Timing,
     rule: Rule,
-    /// Of both models; found when first asked for.
+    /// The ladders of both models; found when first asked for.
     ladders: OnceLock<[Ladder; 2]>,
     /// Held by the thread that finds them.
     finding: Mutex<()>,
@@ -270,7 +270,7 @@ impl<'a> ModelEngine<'a> {
 pub(crate) fn rule(plan: &Plan) -> Rule {
     let accuracy = match plan.integrator.steps() {
         Steps::Checked(accuracy) => accuracy,
-        // Of one method alone nothing is asked.
+        // A single method has no accuracy to reach.
         Steps::Fixed(_) | Steps::Explicit | Steps::Implicit => f64::INFINITY,
     };
     Rule {

@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn work_beside_it_is_not_counted() {
-        // Of beginnings, and of whole trajectories.
+        // Estimates of beginnings, then of whole trajectories.
         for end_s in [1e5, 5.0] {
             let plan = plan(16, end_s);
             // The least of some, because others are at work in any case.

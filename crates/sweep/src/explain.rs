@@ -46,7 +46,7 @@ pub(crate) struct Explanation {
     pub(crate) without_response: usize,
     /// Speeds (rpm) at which a machine that runs up leaves its branch of responses.
     pub(crate) jumps_rpm: Vec<f64>,
-    /// Speeds (rpm) at which the response passes what of the machine's geometry.
+    /// Speeds (rpm) at which the response passes the machine's geometry, and what of it.
     pub(crate) beyond: Vec<(f64, Beyond)>,
     /// From lowest to fastest speed of the profile within the run (rpm).
     pub(crate) profile_rpm: [f64; 2],

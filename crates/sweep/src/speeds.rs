@@ -55,7 +55,7 @@ impl Speeds {
         Self { from, to, step }
     }
 
-    /// Those of which [`Self::values`] gives these speeds, but for rounding.
+    /// The even speeds whose [`Self::values`] are these, but for rounding.
     pub(crate) fn of_values(speeds_rpm: &[f64]) -> Option<Self> {
         let (&[from, second, ..], &[.., to]) = (speeds_rpm, speeds_rpm) else { return None };
         let speeds = Self::new(from, to, second - from);

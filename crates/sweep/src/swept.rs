@@ -92,7 +92,7 @@ fn rows(
             Target::Window(edge) => window_s.map(|window_s| window_s[edge]),
             _ => parameter.get(machine, spin).filter(|_| window_s.is_some() || !of_grid),
         };
-        // Of several numbers at once each may have been written elsewhere.
+        // A parameter of several numbers: each may have been written elsewhere.
         let mut places: Vec<&str> = Vec::new();
         for part in parameter.parts(machine) {
             places.extend(written.get(part.as_ref()).map(String::as_str));

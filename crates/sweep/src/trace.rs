@@ -33,7 +33,7 @@ use washer_row::Level;
 /// many.
 const MOST_INSTANTS: f64 = 2e6;
 
-/// So near to a whole turn an angle is one: some ten times what rounding leaves of the most turns.
+/// An angle so near to a whole turn is one: some ten times what rounding leaves of the most turns.
 const WHOLE_TURN_RAD: f64 = 1e-7;
 
 /// Most points whose traces a run keeps: at some 300 kB each.
@@ -283,7 +283,7 @@ struct Run {
     point: Point,
     spin: Spin,
     start: Start,
-    /// Of the nonlinear model and the linear one.
+    /// The method of the nonlinear model, and that of the linear one.
     methods: [Method; 2],
     method_json: Value,
     times_s: Vec<f64>,
@@ -306,7 +306,7 @@ impl Run {
     }
 }
 
-/// Of each model its histories of the runs; groups that share lanes go to the threads of the pool.
+/// Each model's histories of the runs. Groups that share lanes go to the threads of the pool.
 fn integrate<'a>(
     runs: &[&'a Run],
     models: Models,
@@ -492,7 +492,7 @@ fn methods(plan: &Plan, point: &Point, spin: &Spin, quick: Option<Quick>) -> ([M
 struct Columns<'a> {
     model: &'static str,
     histories: &'a [History<'a>],
-    /// Of each history how many instants were asked for.
+    /// How many instants were asked for, by history.
     counts: &'a [usize],
     instants: Vec<Option<Instant>>,
 }
@@ -611,7 +611,7 @@ impl<'a> Columns<'a> {
         }
     }
 
-    /// Of each history how it failed, if it did.
+    /// How each history failed, if it did.
     fn failures(&self) -> Vec<Option<String>> {
         let one = |history: &History<'_>| {
             let (reason, time_s) = history.failure?;

@@ -14,7 +14,7 @@ use crate::verdict::Verdict;
 pub enum Demand {
     /// A row: every number within the accuracy, and the verdict.
     Row,
-    /// On which side of the limit the ratio is, and near the limit the ratio.
+    /// The side of the limit on which the ratio is, and the ratio if it is near the limit.
     Side,
     /// How fast disturbances grow at constant speeds, and nothing of the run.
     Growth,
@@ -262,8 +262,7 @@ impl Climbs {
                     // By way of its first step: only RK4 against RK4 tells chaos from a coarse
                     // rung.
                     Demand::Row => runs.push((model, (climb.rung + 1).max(reference - 1))),
-                    // Of the side alone, the next rung may make sure: where it cannot, the one
-                    // after.
+                    // The next rung may settle the side; where it cannot, the one after does.
                     Demand::Side if errors[model].is_some_and(|error| SHARE * error > margin) => {
                         runs.push((model, climb.rung + 1));
                     }

@@ -24,7 +24,7 @@ pub struct Convergence {
 }
 
 impl Convergence {
-    /// Of a run that is compared with nothing.
+    /// The convergence of a run that is compared with nothing.
     pub const NONE: Self =
         Self { contraction: 1.0, believed_to: 0.0, own_error: 0.0, expected: f64::INFINITY };
 

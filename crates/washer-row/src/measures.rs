@@ -198,7 +198,7 @@ impl Part {
 /// nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Floor {
-    /// By themselves.
+    /// They are compared by themselves.
     None,
     /// A part of the window: a clash that just happens is a time that just is not zero.
     PartOfWindow,
@@ -228,7 +228,7 @@ struct Facts {
     limit: Option<Limit>,
 }
 
-/// Of the whole machine, and always known.
+/// The facts of a metric of the whole machine that is always known.
 const PLAIN: Facts = Facts {
     name: "",
     unit: "",
@@ -371,7 +371,7 @@ const METRICS: [Facts; Metric::ALL.len()] = [
 /// has of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Measured {
-    /// Of all parts together, or of one.
+    /// The metric, of all parts together or of one.
     pub metric: Metric,
     /// Which part, from 0; none for all together.
     pub part: Option<usize>,

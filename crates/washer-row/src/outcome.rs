@@ -70,15 +70,15 @@ pub struct Trajectory {
     pub rejected: u64,
     /// The model's metrics that the plan asks for, in column order; empty if the model failed.
     pub metrics: Vec<f64>,
-    /// By what factor the speeds at which the linear model takes friction are off from those of its
-    /// motion. `None` without friction, and of the nonlinear model.
+    /// The factor by which the speeds at which the linear model takes friction are off from those
+    /// of its motion. `None` without friction, and for the nonlinear model.
     pub friction_speed_off: Option<f64>,
     /// Largest deviations by turn of the drum, in the order of `Channel::ALL`: while the two models
     /// are being compared by them.
     pub turns: Vec<Deviations>,
 }
 
-/// Of every channel, in the order of `Channel::ALL` (m, rad).
+/// Every channel's deviation, in the order of `Channel::ALL` (m, rad).
 pub type Deviations = [f64; Channel::ALL.len()];
 
 impl Trajectory {
@@ -156,7 +156,7 @@ pub struct Dwelt {
 }
 
 impl Dwelt {
-    /// Of these motions, each with its speed (rpm); the first of equals counts.
+    /// The farthest of these motions, each with its speed (rpm); the first of equals counts.
     pub fn of<'a>(motions: impl IntoIterator<Item = (f64, &'a Ending)>) -> Option<Self> {
         let turned = |of: &Deviations| {
             [Channel::TubYaw, Channel::TubPitch].map(|channel| of[channel.index()])

@@ -42,7 +42,7 @@ pub struct RungRun {
     pub amplitudes: Deviations,
     /// The motion at the ends of the run's parts, if anything is compared.
     pub course: Course,
-    /// By how much the time of clash may be off for what capped rungs leave out (s).
+    /// How far the time of clash may be off for what capped rungs leave out (s).
     pub clash_doubt_s: Option<f64>,
 }
 

@@ -21,7 +21,7 @@ pub(crate) struct Departure {
 }
 
 impl Departure {
-    /// Of distances at instants (s, share of the motion).
+    /// The departure that distances at instants show (s, share of the motion).
     pub(crate) fn new(distances: &[(f64, f64)]) -> Self {
         let apart = distances.iter().filter(|(_, distance)| *distance > 0.0);
         let mut least: Option<(f64, f64)> = None;

@@ -143,8 +143,8 @@ pub(super) fn missing<'a>(
     runs.iter().filter(move |run| partner(run, runs, other, span).is_none())
 }
 
-/// The run of another row in which a run goes on: one that it lies beside for the most part, or
-/// else the nearest, if that is not far and it is the nearest to that one too.
+/// The run of another row that continues this run: one that lies beside most of it, or else the
+/// nearest, if that is not far and this run is the nearest to it too.
 fn partner(
     run: &SideRange,
     runs: &[SideRange],

@@ -57,7 +57,7 @@ pub fn trace<E: Evaluate>(
 
 /// A row's place: its curve within the block, its rank along the first axis.
 type Place = (usize, usize);
-/// A trial, whose it is, and its position.
+/// A trial, the place that asked for it, and its position.
 type Asked = (Trial, Place, f64);
 
 /// Curves that are traced together.

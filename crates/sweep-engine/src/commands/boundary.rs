@@ -222,7 +222,7 @@ fn summary<M: Swept>(
         "brackets",
         &format!("at most {widest:.3} {unit} wide (asked: {})", task.search.tolerance),
     );
-    // By the logarithm cells grow: the largest counts.
+    // Cells of a logarithmic axis grow: the largest counts.
     let cells: Vec<String> = plan
         .axes
         .iter()

@@ -19,7 +19,7 @@ pub struct Draft<'a, M: Read> {
 
 /// A constant that was put in place.
 pub struct WrittenConstant {
-    /// Of the parameter.
+    /// The parameter's name, and where it stands.
     pub name: Located<String>,
     /// The numbers that it writes.
     pub parts: Vec<Cow<'static, str>>,

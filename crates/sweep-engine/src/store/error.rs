@@ -73,7 +73,7 @@ pub enum StoreError {
         folder: PathBuf,
         /// How many chunks are missing.
         missing: u64,
-        /// Of how many.
+        /// How many chunks there should be.
         chunks: u64,
         /// The shards they belong to, as a list such as `2,5-7`, if the run was sharded.
         missing_shards: Option<String>,
@@ -106,7 +106,7 @@ pub enum StoreError {
     Parquet {
         /// What was being done, in the infinitive.
         action: &'static str,
-        /// To which file.
+        /// The file it was done to.
         path: PathBuf,
         /// What the library answered.
         source: parquet::errors::ParquetError,

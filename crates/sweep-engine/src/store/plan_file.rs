@@ -67,7 +67,7 @@ impl PlanFile {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
             Err(error) => return Err(StoreError::io("read", &path)(error)),
         };
-        // Of another format it is enough that it is one: the run is refused with what differs.
+        // A file of another format need not match its hash: the run is refused with what differs.
         let whole = |found: &Self| {
             let hash = plan_hash(&found.version, found.numerics, &found.plan);
             found.format != FORMAT || hash.to_hex().as_str() == found.plan_hash

@@ -106,7 +106,7 @@ pub struct Tally {
     /// Rows with a ratio so low that the linear model over-estimates as much as a reliable one may
     /// under-estimate.
     pub over_estimated: u64,
-    /// Of these the reliable ones.
+    /// How many of these are reliable.
     pub over_estimated_reliable: u64,
     /// Rows known to be chaotic.
     pub sensitive: u64,
@@ -123,10 +123,10 @@ pub struct Tally {
     /// Rows whose linear model takes friction at a speed off by more than [`FAR_OFF`].
     #[serde(skip_serializing_if = "is_none")]
     pub far_off: u64,
-    /// By what factor a speed is off at most, where there is friction.
+    /// The greatest factor by which a speed is off, where there is friction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub greatest_off: Option<Extreme>,
-    /// Of a result of `sweep stability`, which has none of the verdicts above.
+    /// The counts of a `sweep stability` result, which has none of the verdicts above.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dwells: Option<DwellCounts>,
 }

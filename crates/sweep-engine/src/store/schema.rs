@@ -253,7 +253,7 @@ pub struct ResultRows<'a> {
 }
 
 impl<'a> ResultRows<'a> {
-    /// Of a layout.
+    /// The rows of a layout.
     pub fn new(layout: &'a Layout) -> Self {
         Self::sharing(layout, layout.schema())
     }

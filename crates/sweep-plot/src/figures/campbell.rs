@@ -146,7 +146,7 @@ fn sums(modes: &[Mode], unstable: &Unstable) -> Vec<Mode> {
             let places = 0..modes.len();
             places.min_by(|&a, &b| apart(&modes[a]).total_cmp(&apart(&modes[b])))
         };
-        // Of the pairs that could be meant, the one whose sum is nearest to the speed.
+        // The pair whose sum is nearest to the speed, among those that could be meant.
         let named: Vec<usize> =
             frequencies.iter().filter(|f| f.is_finite()).filter_map(|f| nearest(*f)).collect();
         let all = named.iter().flat_map(|&a| named.iter().map(move |&b| [a.min(b), a.max(b)]));

@@ -43,9 +43,9 @@ const PITCH: &str = "q6_rad";
 struct Held {
     speed: Vec<f64>,
     growth: Vec<f64>,
-    /// Of each channel by the linear model, and of the periodic response.
+    /// Each channel's deviations in the linear model and in the periodic response.
     lines: Vec<[Vec<f64>; 2]>,
-    /// Of each motion its speed and kind, and of each channel its deviation.
+    /// Each motion's speed, kind, and deviation by channel.
     motions: Vec<(f64, usize, Vec<f64>)>,
 }
 
@@ -192,7 +192,7 @@ fn read(
         let values: Vec<Vec<f64>> =
             columns.iter().map(|name| batch.numbers(name)).collect::<Result<_, _>>()?;
         let turns = if has_turns { batch.numbers(TURN)? } else { Vec::new() };
-        // Of each motion the first of its turns.
+        // The first turn of each motion.
         let is_shown = |row: &usize| {
             row_values(&of_axes, *row) == point && turns.get(*row).is_none_or(|t| *t <= 0.0)
         };
@@ -228,7 +228,7 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
     let point = one_point(source, &axes, &options.at, "--at")?;
     let mut names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
     names.extend(["speed_rpm", "motion", "kind", YAW, PITCH]);
-    // Of each speed and motion its kind, and states by yaw.
+    // Speed, motion, its kind, and its states by yaw.
     let mut found: Vec<(f64, f64, usize, Vec<[f64; 2]>)> = Vec::new();
     for batch in source.batches(&names)? {
         let batch = batch?;

@@ -71,7 +71,7 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
 /// What share of the points is on the good side.
 fn title(scatter: &Scatter) -> String {
     let words = match scatter.words(Side::Good) {
-        // Of "reliable: below 2" the first word.
+        // The first word of "reliable: below 2".
         words if words.starts_with("reliable") => "reliable".to_owned(),
         words => format!("with {words}"),
     };

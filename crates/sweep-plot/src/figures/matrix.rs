@@ -85,8 +85,8 @@ pub(crate) fn directions(scatter: &Scatter) -> Vec<Direction<'_>> {
     all.map(direction).collect()
 }
 
-/// Of each panel what is along it and what up it, as numbers of directions, and where it is: left,
-/// top, width and height.
+/// A panel each: the directions along it and up it, by their numbers, and its place: left, top,
+/// width and height.
 pub(crate) type Places = Vec<(usize, usize, f64, f64, f64, f64)>;
 
 /// The matrix: below its diagonal every pair of parameters, and in its last row the quantity.

@@ -135,7 +135,7 @@ fn series(places: &Places, q: &[Phasor]) -> Vec<Series> {
         let tub_line: Vec<Phasor> = tub[k].iter().copied().map(turned).collect();
         let drum_line: Vec<Phasor> = drum[k].iter().copied().map(turned).collect();
         let mut add = |body: &str, grid: usize, line: &[Phasor], colour: usize| {
-            // Of exp(i w t) the real part, a quarter of a period on less the imaginary one.
+            // The real part of exp(i w t); a quarter of a period later, less its imaginary part.
             for (part, sign, style, when) in [
                 (0, 1.0, Style::Solid(2.6), ""),
                 (1, -1.0, Style::Dashed, ", a quarter of a period later"),

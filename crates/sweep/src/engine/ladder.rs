@@ -66,7 +66,7 @@ const fn aims(model: ModelKind) -> &'static [f64] {
     }
 }
 
-/// By how much the finest capped rung's steps are shorter than those of the rung before.
+/// How many times shorter the finest capped rung's steps are than those of the rung before.
 const FINEST_STEP: f64 = 2.5;
 
 /// Its step times its bearings' cap, rad: nearly as high as the formula is stable.
@@ -240,15 +240,15 @@ fn expected_share(cases: &Cases<'_>, model: ModelKind, coarser: &Geared, finer: 
     if finer.is_finite() { finer / coarser } else { 1.0 }
 }
 
-/// By how much the share of an error that is left may be greater than reckoned. Where caps are as
-/// low as the first rung's, a mode's shift is less than proportional to it.
+/// How many times greater than reckoned the share of an error that is left may be. Where caps are
+/// as low as the first rung's, a mode's shift is less than proportional to it.
 const fn reserve(rung: usize) -> f64 {
     if rung == 1 { 2.0 } else { 1.5 }
 }
 
-/// By how much the hinge must be faster than the drum for runs with capped modes. Of its ringing
-/// after a harmonic of the drum's speed has passed its whirl, two of these may differ much or
-/// little, so what rings must be less than the accuracy.
+/// How many times faster than the drum the hinge must be for runs with capped modes. After a
+/// harmonic of the drum's speed has passed its whirl, the hinge rings, and two such runs may differ
+/// in that much or little. So what rings must be less than the accuracy.
 ///
 /// The linear model has no harmonics beyond the second. But where its hinge is slower than this, a
 /// short run-up was seen to be off by ten times what the rule expects of the caps.

@@ -130,7 +130,7 @@ pub(crate) struct Resonance {
     pub(crate) modes: [usize; 2],
     /// Their frequencies (cycles per minute).
     pub(crate) frequencies_cpm: [f64; 2],
-    /// Of the second frequency: 1 in a sum, -1 in a difference.
+    /// The sign of the second frequency: 1 in a sum, -1 in a difference.
     pub(crate) sign: f64,
     /// Turns of the drum to which the sum belongs.
     pub(crate) order: u32,
@@ -152,7 +152,7 @@ pub(crate) enum Closing {
         factor: f64,
         /// What each damper then has, if all have the same.
         damping_n_s_per_m: Option<f64>,
-        /// From and to which speed (rpm) nothing grew.
+        /// The speeds (rpm) between which nothing grew.
         looked_rpm: [f64; 2],
     },
     /// Not up to this many times.
@@ -169,7 +169,7 @@ pub(crate) struct Seen {
     pub(crate) without_response: usize,
     /// Speeds (rpm) at which a machine that runs up leaves its branch of responses.
     pub(crate) jumps_rpm: Vec<f64>,
-    /// Speeds (rpm) at which the response passes what of the machine's geometry.
+    /// Speeds (rpm) at which the response passes the machine's geometry, and what of it.
     pub(crate) beyond: Vec<(f64, Beyond)>,
 }
 

@@ -148,7 +148,7 @@ fn defect(job: &Job<'_>) -> impl Fn(ArrowError) -> StoreError {
 /// Outcomes as they come, and the batches that are whole.
 struct Gathered<'a> {
     job: &'a Job<'a>,
-    /// Of every batch.
+    /// The schema of every batch.
     schema: SchemaRef,
     parts: Mutex<BTreeMap<u64, Vec<Done>>>,
     batches: Mutex<BTreeMap<u64, Result<RecordBatch, ArrowError>>>,

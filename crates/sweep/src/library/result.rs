@@ -170,7 +170,7 @@ impl MapPlan {
             numerics: identity::NUMERICS_VERSION,
             points: self.points,
             layout: self.layout.clone(),
-            // Of tables and progress alone.
+            // Tables and progress alone need these.
             limits: f64::NAN.into(),
             axis_values: Box::new(|_| Vec::new()),
         };

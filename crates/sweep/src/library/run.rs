@@ -19,7 +19,7 @@ pub enum RanToFile {
     Interrupted {
         /// Rows that are there.
         kept: u64,
-        /// Of how many.
+        /// Points in all.
         points: u64,
     },
 }

@@ -54,7 +54,7 @@ pub(crate) struct Summary {
     /// Rows behind another of the same point and speed, which all else leaves out.
     coexisting: u64,
     tongues: Vec<Tongue>,
-    /// Points and speeds (rpm) at which a branch ends that a machine runs up on.
+    /// Points and speeds (rpm) at which a machine that runs up comes to the end of its branch.
     jumps: Vec<(Row, f64)>,
     last: Option<Row>,
 }

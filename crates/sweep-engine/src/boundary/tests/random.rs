@@ -111,7 +111,7 @@ impl Field {
     }
 }
 
-/// From the side at the least value, and where it changes to which.
+/// The stretches by the side at the least value and the changes of side behind it.
 fn stretches(first: bool, changes: impl Iterator<Item = (f64, bool)>) -> Vec<Stretch> {
     let mut found = vec![Stretch { from: SEARCH.least, to: SEARCH.greatest, is_reliable: first }];
     for (at, is_reliable) in changes {
