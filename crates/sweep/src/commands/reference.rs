@@ -133,7 +133,7 @@ fn parameters() -> String {
 
 /// Whether a name is that of the second or a later one of several parts.
 fn is_a_further_one(name: &str) -> bool {
-    ["spring_", "damper_", "stop_", "foot_"].into_iter().any(|kind| {
+    ["spring_", "damper_", "stop_", "foot_", "growth_mode_"].into_iter().any(|kind| {
         let number = name.strip_prefix(kind).and_then(|rest| rest.split('_').next());
         number.and_then(|number| number.parse::<usize>().ok()).is_some_and(|number| number > 1)
     })
@@ -256,7 +256,8 @@ fn columns() -> String {
         text,
         "\nThe columns of a metric ({}) are there only where the grid file's `metrics` names it, \
          in its order. Machines with two stops or more have those of `stop_1` for each of them \
-         (`stop_2_force_nonlinear_n`), and so have feet and dampers.",
+         (`stop_2_force_nonlinear_n`), and so have feet and dampers. `growth_mode_2` is the mode \
+         that takes part next to the first.",
         metrics.join(", ")
     );
     let statuses: Vec<String> = ROW_STATUSES.iter().map(|status| format!("`{status}`")).collect();
