@@ -15,7 +15,7 @@ pub(super) struct HeldArgs {
     /// Constant spin speeds in rpm of `sweep stability`, or of `sweep dwell`: as there
     #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
     speed: Option<SpeedList>,
-    /// Of `sweep dwell` with these speeds, not of `sweep stability`
+    /// The run is of `sweep dwell`, not of `sweep stability`
     #[arg(long, requires = "speed")]
     dwell: bool,
     /// How it looks for motions.

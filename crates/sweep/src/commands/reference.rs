@@ -63,6 +63,9 @@ fn row(text: &mut String, cells: &[&str]) {
     let _ = writeln!(text, "| {} |", cells.join(" | "));
 }
 
+/// The source that the page's head tells once.
+const DERIVED: &str = "derived: the drum of Tables 2 and 3 less its 0.4 kg unbalance";
+
 fn parameters() -> String {
     let mut text = head("Parameters", "parameters");
     text.push_str(
@@ -70,7 +73,8 @@ fn parameters() -> String {
          NAME=VALUE` and as\n\
          the `parameter` of an `[[axis]]`. Values are the built-in machine's. *Paper* means \
          printed there,\n\
-         *derived* follows from what is printed, *assumed* is this project's choice.\n\n\
+         *derived* is the drum of Tables 2 and 3 less its 0.4 kg unbalance, *assumed* is this \
+         project's choice.\n\n\
          Springs, dampers, stops, bushings, unbalances and feet are numbered in the order of the \
          machine file.\n\
          The table shows the first of each, without a source where the built-in machine has none, \
@@ -101,6 +105,7 @@ fn parameters() -> String {
         let none = if of_grid { "as the grid file says" } else { "none" };
         let has_source = value_of(name).is_some() || of_grid;
         let source = if has_source { parameter.source().to_string() } else { String::new() };
+        let source = if source == DERIVED { "derived" } else { &source };
         // The first of three coordinates tells of all.
         let of_three = description.strip_suffix("towards the door");
         let axes: &[&str] = if of_three.is_some() { &["_x", "_y", "_z"] } else { &["_x"] };
@@ -119,7 +124,7 @@ fn parameters() -> String {
                 parameter.unit(),
                 of_three.unwrap_or(description).trim_end_matches([',', ' ']),
                 &allowed(parameter.range()),
-                &source,
+                source,
             ],
         );
     }
@@ -128,7 +133,7 @@ fn parameters() -> String {
 
 /// Whether a name is that of the second or a later one of several parts.
 fn is_a_further_one(name: &str) -> bool {
-    ["spring_", "damper_", "stop_", "foot_"].into_iter().any(|kind| {
+    ["spring_", "damper_", "stop_", "foot_", "growth_mode_"].into_iter().any(|kind| {
         let number = name.strip_prefix(kind).and_then(|rest| rest.split('_').next());
         number.and_then(|number| number.parse::<usize>().ok()).is_some_and(|number| number > 1)
     })
@@ -173,7 +178,7 @@ fn columns() -> String {
          named as its\n\
          parameter: here the two axes of `sweeps/fig12.toml`. MODEL is `nonlinear` or `linear`, \
          CHANNEL a\n\
-         channel of `[reliability]`.\n\n\
+         channel of `[reliability]`. What a model gives is null if that model failed.\n\n\
          The file holds each column's unit and description, which way it is bad and up to where it \
          is good,\n\
          in the Arrow metadata of its field (`unit`, `description`, `worse`, `limit`) and as JSON \
@@ -218,7 +223,11 @@ fn columns() -> String {
             &[
                 &format!("`{name}`"),
                 &data_type,
-                if name == "MODEL_CHANNEL" { "the channel's" } else { told("unit") },
+                if name.ends_with("CHANNEL") && told("unit") != "1" {
+                    "the channel's"
+                } else {
+                    told("unit")
+                },
                 told(key::WORSE),
                 told(key::LIMIT),
                 &of_any_model(told("description")),
@@ -247,7 +256,8 @@ fn columns() -> String {
         text,
         "\nThe columns of a metric ({}) are there only where the grid file's `metrics` names it, \
          in its order. Machines with two stops or more have those of `stop_1` for each of them \
-         (`stop_2_force_nonlinear_n`), and so have feet and dampers.",
+         (`stop_2_force_nonlinear_n`), and so have feet and dampers. `growth_mode_2` is the mode \
+         that takes part next to the first.",
         metrics.join(", ")
     );
     let statuses: Vec<String> = ROW_STATUSES.iter().map(|status| format!("`{status}`")).collect();
@@ -259,7 +269,7 @@ fn columns() -> String {
 /// A column's name, with CHANNEL and MODEL in place of one channel's and one model's.
 fn of_any(name: &str) -> String {
     let of_channel = Channel::ALL.iter().find_map(|channel| {
-        ["nonlinear_", "linear_", "ratio_"].into_iter().find_map(|before| {
+        ["nonlinear_", "linear_", "ratio_", "dwell_"].into_iter().find_map(|before| {
             (name.strip_prefix(before)? == channel.name()).then(|| format!("{before}CHANNEL"))
         })
     });
@@ -269,16 +279,18 @@ fn of_any(name: &str) -> String {
         .replace("linear", "MODEL")
 }
 
-/// A column's description, with that of any channel and model.
+/// A column's description, with that of any channel; the column's name says MODEL.
 fn of_any_model(description: &str) -> String {
     let first = Channel::ALL
         .iter()
         .find_map(|channel| description.strip_prefix(channel.description())?.strip_prefix(": "));
-    first.unwrap_or(description).replace(", nonlinear model", ", MODEL model")
+    let of_all = first.unwrap_or(description).replace(", nonlinear model", "");
+    of_all.replace("; null if it failed", "")
 }
 
 fn commands(program: clap::Command) -> String {
     let mut text = head("Commands", "commands");
+    text.push_str("`sweep COMMAND --help` begins with examples of the command.\n\n");
     // The width of a terminal must not show in a file.
     let mut program = program.term_width(100);
     program.build();
@@ -306,8 +318,10 @@ fn commands(program: clap::Command) -> String {
         } else {
             format!("\nAlso {}: [above](#options-of-several-commands).\n", longs.join(", "))
         };
-        let mut alone =
-            command.clone().mut_args(|arg| if is_shared(&arg) { arg.hide(true) } else { arg });
+        // Examples and the flag that shows them are for a terminal.
+        let is_hidden = |arg: &clap::Arg| is_shared(arg) || arg.get_long() == Some("help");
+        let mut alone = command.clone().before_help(None::<&'static str>);
+        alone = alone.mut_args(|arg| if is_hidden(&arg) { arg.hide(true) } else { arg });
         part(&format!("sweep {}", command.get_name()), alone.render_help().to_string(), &more);
     }
     text.truncate(text.trim_end().len());
