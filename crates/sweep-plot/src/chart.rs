@@ -179,8 +179,12 @@ pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
     scene
 }
 
-/// The scale of the x axis: all that the grids hold.
+/// The scale of the x axis: all that the grids hold, with room for dots where there is nothing else.
 pub(crate) fn x_scale(chart: &Chart) -> Scale {
+    let mut series = chart.panels.iter().flat_map(|panel| &panel.series);
+    if !chart.x_log && series.all(|series| series.style == Style::Dots) {
+        return Scale::around(chart.grids.iter().flatten().copied());
+    }
     let (low, high) = extremes(chart.grids.iter().flatten().copied()).unwrap_or((0.0, 1.0));
     let high = if high > low { high } else { low + 1.0 };
     if chart.x_log { Scale::log(low, high) } else { Scale::linear(low, high) }
