@@ -86,15 +86,15 @@ def keys_go_from_point_to_point(page, rows):
 
 
 def counts_are_the_files(page, rows):
-    """The legend counts every point, and the table has every parameter."""
+    """The legend counts every point, and the influences are of every parameter."""
     items = page.driver.find_elements(By.CSS_SELECTOR, "#scatter svg text")
     text = " ".join(item.text for item in items)
     for verdict, value in [("reliable: below", True), ("unreliable: ratio", False)]:
         count = rows["reliable"].count(value)
         check(count == 0 or f"({count})" in text and verdict in text, f"{count} {verdict}: {text}")
-    names = page.driver.find_elements(By.CSS_SELECTOR, "#influence tbody th")
+    names = page.driver.find_elements(By.CSS_SELECTOR, "#influence svg text")
     names = {name.text for name in names}
-    check(names == SHOWN.keys() - {"Greatest ratio"}, f"influence of {names}")
+    check(SHOWN.keys() - {"Greatest ratio"} <= names, f"influence of {names}")
     return text
 
 

@@ -8,23 +8,24 @@ mod live;
 mod report;
 
 pub(crate) use design::page_of as design_page;
-pub(crate) use report::about;
+pub(crate) use report::told;
 
 use serde_json::{Map as Object, Value, json};
 
 use super::axis::{LEAST_TICKS, SLACK, Scale, Step, Tick, log_sets};
 use super::chart::{Chart, ChartPanel, Series, Style, x_scale, y_scale};
-use super::colour::{BOTH, ColourScale, DISTINCT, FAILED, LEVELS, SHADE};
+use super::colour::{BOTH, ColourScale, FAILED, LEVELS, SHADE};
 use super::contour::{MOST_POINTS, leave_out_shortest, zero_lines};
 use super::cuts::Cuts;
 use super::error::PlotError;
 use super::figures;
+use super::frame::{Sign, failed_hatch};
 use super::gather::{Counts, Map};
 use super::grid::GridAxis;
 use super::label;
 use super::layer::{self, Group, Layer, Level, Shown};
 use super::read::Source;
-use super::scene::{Colour, INK};
+use super::scene::{Colour, Hatch, INK, PAPER};
 use super::svg::escape;
 use super::swept::SweptAxis;
 use super::table::{Column, Table};
@@ -32,12 +33,12 @@ use super::{Live, PlotOptions};
 use sweep_parameter::Worse;
 
 const PAGE: &str = include_str!("html/page.html");
+const PARTS: &str = include_str!("html/parts.html");
 const SHEET: &str = include_str!("html/sheet.html");
 const STYLE: &str = include_str!("html/style.css");
 const CORE: &str = include_str!("html/core.js");
 const CHART: &str = include_str!("html/chart.js");
 const BAR: &str = include_str!("html/bar.js");
-const HISTORIES: &str = include_str!("html/histories.js");
 const CELLS: &str = include_str!("html/cells.js");
 const MAP: &str = include_str!("html/map.js");
 const DESIGN: &str = include_str!("html/design.js");
@@ -79,11 +80,8 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
     let first = layer::chosen(source, options)?;
     let all = layer::all(source);
     let room = MOST_POINTS / all.len();
-    let layers = all.iter().map(|shown| Ok(layer_json(map, shown, &shown.layer(map)?, room)));
+    let layers = all.iter().map(|shown| Ok(layer_json(map, shown, shown.layer(map)?, room)));
     let layers = layers.collect::<Result<Vec<Value>, PlotError>>()?;
-    let palette = |scale: &ColourScale| -> Vec<String> {
-        (0..LEVELS).map(|k| scale.colour(k).css()).collect()
-    };
     let traces = match &options.traces {
         Some(folder) => histories::read(folder, map)?,
         None => Value::Null,
@@ -104,52 +102,55 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
             "rest": cuts.cuts.first().map_or(&[][..], |cut| &cut.rest),
         },
         "palettes": {
-            "diverging": palette(&ColourScale::ratio(std::iter::empty(), 2.0, false)),
-            "sequential": palette(&ColourScale::amplitude(std::iter::empty())),
-            "kinds": DISTINCT.map(Colour::css),
+            "kinds": figures::map::kinds(map),
             "failed": FAILED.css(),
         },
-        "statuses": map.statuses,
+        "legend": legend_json(&figures::map::legend(map, None)),
         "traces": traces,
-        "about": json!(about(source)),
-        "provenance": provenance(source),
     });
     if map.grid.merged() {
         data["counts"] = counts_json(map);
     }
     let axes = map.grid.axes.iter().map(|axis| (axis.name.as_str(), axis.log)).collect::<Vec<_>>();
-    let computing = computing(&mut data, options.live.as_ref(), source, &axes);
-    let scripts = [&[CORE, CHART, BAR, HISTORIES, CELLS, MAP][..], computing, &[REPORT, START]];
-    Ok(page(title, data, &scripts.concat()))
+    let computing = computing(&mut data, options.live.as_ref(), &axes);
+    let scripts = [&[CORE, CHART, BAR, CELLS, MAP][..], computing, &[REPORT, START]].concat();
+    let told = report::told(source, options.live.as_ref()) + &report::caveats(map);
+    Ok(page(title, data, &scripts, source, &told))
 }
 
-/// Adds what a page computes with, if it does, and the run in words. The scripts that it takes;
-/// `axes` by name, and whether they are logarithmic.
+/// Adds what a page computes with, if it does. The scripts that it takes; `axes` by name, and
+/// whether they are logarithmic.
 fn computing(
     data: &mut Value,
     live: Option<&Live>,
-    source: &Source,
     axes: &[(&str, bool)],
 ) -> &'static [&'static str] {
     let Some(live) = live else { return &[] };
-    data["about"] = json!(report::about(source));
     data["live"] = live::json(live, axes);
-    data["resonances"] = json!(live.resonances);
     &[SPECTRUM, POOL, CURVES, GROWTH, LIVE]
 }
 
 /// The file's own word about itself, without what would fill the page: a list of a million values,
 /// say.
-fn provenance(source: &Source) -> Value {
+fn provenance(source: &Source) -> String {
     let entry = |(key, value): &(String, Value)| {
-        let text = value.to_string();
-        if text.len() <= MOST_PROVENANCE {
-            return json!([key, value]);
+        let text = value.as_str().map_or_else(|| format!("{value:#}"), str::to_owned);
+        let mut lines: Vec<String> = text.lines().map(escape).collect();
+        if text.len() > MOST_PROVENANCE {
+            let head: String = text.chars().take(MOST_PROVENANCE / 8).collect();
+            let length = text.len();
+            lines = vec![format!(
+                "{} ... ({length} characters in all; the file has them)",
+                escape(&head)
+            )];
         }
-        let head: String = text.chars().take(MOST_PROVENANCE / 8).collect();
-        json!([key, format!("{head} ... ({} characters in all; the file has them)", text.len())])
+        format!("<dt>{}</dt><dd><pre tabindex=\"0\">{}</pre></dd>\n", escape(key), lines.join("\n"))
     };
-    source.provenance.iter().map(entry).collect()
+    if source.provenance.is_empty() {
+        return "The file says nothing about its origin.\n".to_owned();
+    }
+    let list: String = source.provenance.iter().map(entry).collect();
+    format!("<details><summary>digests, versions, the plan</summary><dl>\n{list}</dl></details>\n")
 }
 
 /// Longest entry of a file's metadata that a page carries whole, characters.
@@ -162,13 +163,14 @@ pub(crate) fn chart_page(source: &Source, chart: &Chart, live: Option<(&Live, &s
         "kind": "chart",
         "title": chart.title,
         "subtitle": chart.subtitle,
-        "chart": chart_json(chart),
-        "provenance": provenance(source),
+        "chart": chart_json(chart, curve),
     });
     let axis = live.map_or("", |(_, axis)| axis);
     let live = live.map(|(live, _)| live);
-    let computing = computing(&mut data, live, source, &[(axis, chart.x_log)]);
-    page(&chart.title, data, &[&[CORE, CHART][..], computing, &[START]].concat())
+    let computing = computing(&mut data, live, &[(axis, chart.x_log)]);
+    let told = live.map_or_else(String::new, |live| report::told(source, Some(live)));
+    let scripts = [&[CORE, CHART][..], computing, &[START]].concat();
+    page(&chart.title, data, &scripts, source, &told)
 }
 
 /// A page with the picture that it shows where scripts are switched off.
@@ -184,21 +186,46 @@ pub fn sheet(title: &str, body: &str) -> String {
     SHEET.replace("{{title}}", &escape(title)).replace("{{style}}", STYLE).replace("{{body}}", body)
 }
 
+/// A table under a heading; nothing without rows.
+#[must_use]
+pub fn table(title: &str, heads: &[&str], rows: &[Vec<String>]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let row = |cells: &[String], cell: &str| {
+        let cells = cells.iter().map(|text| format!("<{cell}>{}</{cell}>", escape(text)));
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
+    };
+    let heads: Vec<String> = heads.iter().map(|head| (*head).to_owned()).collect();
+    let all: String = rows.iter().map(|cells| row(cells, "td")).collect();
+    let head = if heads.iter().all(String::is_empty) { String::new() } else { row(&heads, "th") };
+    format!(
+        "<h2>{}</h2>\n<table><thead>{head}</thead><tbody>\n{all}</tbody></table>\n",
+        escape(title)
+    )
+}
+
 /// An SVG picture as an element: names within it are its own.
 pub(crate) fn picture(svg: &[u8]) -> String {
     let data = embed::bytes(svg.iter().copied());
     format!("<img alt=\"figure\" src=\"data:image/svg+xml;base64,{data}\">")
 }
 
-fn page(title: &str, mut data: Value, scripts: &[&str]) -> String {
+/// A page of these data, and of what is `told` of the run in HTML.
+fn page(title: &str, mut data: Value, scripts: &[&str], source: &Source, told: &str) -> String {
     data["ticks"] = ticks_json();
     data["both"] = json!(BOTH.css());
     data["shade"] = json!(format!("{}{:02x}", SHADE.css(), SHADE.alpha));
     let worker = if data.get("live").is_some() { live::WORKER } else { "" };
+    // What a file says is no place for what follows it.
+    let told = [told, &provenance(source)].map(|text| text.replace('{', "&#123;"));
     // Within a script element only `<` could end it, or start a comment.
     let data = data.to_string().replace('<', "\\u003c");
     PAGE.replace("{{title}}", &escape(title))
         .replace("{{style}}", STYLE)
+        .replace("{{about}}", &told[0])
+        .replace("{{provenance}}", &told[1])
+        .replace("{{parts}}", PARTS)
         .replace("{{worker}}", worker)
         .replace("{{script}}", &scripts.concat())
         .replace("{{data}}", &data)
@@ -299,15 +326,45 @@ fn counts_json(map: &Map) -> Value {
     })
 }
 
-fn layer_json(map: &Map, shown: &Shown, layer: &Layer, room: usize) -> Value {
-    let scale = match layer.scale {
-        ColourScale::Diverging { log, low, centre, high, reversed, .. } => {
-            json!({ "log": log, "low": low, "centre": centre, "high": high, "reversed": reversed })
-        }
-        ColourScale::Sequential(scale) => {
-            json!({ "log": scale.log, "low": scale.from, "high": scale.to })
+/// Entries of a legend, each the style of its sign and its words.
+fn legend_json(entries: &[(Sign, String)]) -> Value {
+    let lines = |hatch: &Hatch| {
+        let [ink, paper] = [INK, PAPER].map(Colour::css);
+        match hatch.strokes.len() {
+            1 => format!("135deg,{ink} 0 1px,transparent 1px 6px"),
+            _ => format!("45deg,{ink} 0 1px,{paper} 1px 2px,{ink} 2px 3px,transparent 3px 7px"),
         }
     };
+    let style = |sign: &Sign| match sign {
+        // As it is drawn: dark between light, on any ground.
+        Sign::Line(_) => {
+            "height:6px;background:#1b1f24;border:solid #ffffff;border-width:1.5px 0".to_owned()
+        }
+        Sign::Area(colour) => format!("background:{}", colour.css()),
+        Sign::Failed => format!(
+            "background:repeating-linear-gradient({}) {}",
+            lines(&failed_hatch()),
+            FAILED.css()
+        ),
+        Sign::Hatched(hatch) => format!("background:repeating-linear-gradient({})", lines(hatch)),
+        _ => "background:radial-gradient(circle,var(--muted) 2px,var(--paper) 2.5px);\
+              outline:1px solid var(--faint)"
+            .to_owned(),
+    };
+    entries.iter().map(|(sign, words)| json!([style(sign), words])).collect()
+}
+
+fn layer_json(map: &Map, shown: &Shown, layer: Layer, room: usize) -> Value {
+    let (log, stops, limit) = match layer.scale {
+        ColourScale::Diverging { log, low, centre, high, .. } => {
+            (log, [low, centre, high], Some(centre))
+        }
+        ColourScale::Sequential(Scale { log, from, to }) => {
+            let middle = if log { (from * to).sqrt() } else { 0.5 * (from + to) };
+            (log, [from, middle, to], None)
+        }
+    };
+    let colours = (0..LEVELS).map(|level| layer.scale.colour(level).css());
     let ticks: Vec<Value> = layer
         .scale
         .ticks()
@@ -323,20 +380,22 @@ fn layer_json(map: &Map, shown: &Shown, layer: &Layer, room: usize) -> Value {
         "title": layer.title,
         "label": layer.label,
         "column": shown.column(),
-        "scale": scale,
+        "scale": { "log": log, "stops": stops, "limit": limit },
+        "colours": colours.collect::<Value>(),
         "ticks": ticks,
         "nonlinear": layer.nonlinear,
-        "level": layer.level.as_ref().map(|level| level_json(map, layer, level, room)),
+        "lines": layer.level.as_ref().map(|level| level_json(map, &layer, level, room)),
     });
     if let Some([both, undefined]) = layer.mixed() {
         data["both"] = json!(embed::bits(both));
         data["undefined"] = json!(embed::bits(undefined));
     }
+    data["legend"] = legend_json(&figures::map::legend(map, Some(layer)));
     data
 }
 
-/// The level, and its lines in data coordinates for each cut through the axes after the second, in
-/// grid order. Where a ragged boundary has more than `room` points, its shortest lines are left
+/// The level's lines in data coordinates for each cut through the axes after the second, in grid
+/// order. Where a ragged boundary has more than `room` points, its shortest lines are left
 /// out: the cells on either side show them.
 fn level_json(map: &Map, layer: &Layer, level: &Level, room: usize) -> Value {
     let [x_axis, y_axis] = [&map.grid.axes[0], &map.grid.axes[1]];
@@ -355,19 +414,16 @@ fn level_json(map: &Map, layer: &Layer, level: &Level, room: usize) -> Value {
     let flat = |line: &Vec<[f64; 2]>| -> Vec<f64> {
         line.iter().flat_map(|[x, y]| [back(x_axis, *x), back(y_axis, *y)]).collect()
     };
-    let lines: Vec<Vec<Vec<f64>>> =
-        lines.iter().map(|cut| cut.iter().map(flat).collect()).collect();
-    json!({
-        "value": level.value,
-        "line": level.line,
-        "above": level.above[1],
-        "below": level.below[1],
-        "both": level.both,
-        "lines": lines,
-    })
+    lines.iter().map(|cut| cut.iter().map(flat).collect::<Value>()).collect()
 }
 
-fn chart_json(chart: &Chart) -> Value {
+/// A curve's values, to seven digits.
+fn curve(values: &[f64]) -> Value {
+    json!(embed::floats(values.iter().copied()))
+}
+
+/// A chart, its curves by `curve`.
+fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
     let grids = chart.grids.iter().map(|grid| embed::floats(grid.iter().copied()));
     let marks = chart.marks.iter().map(|mark| json!([embed::short(mark.x), mark.label]));
     json!({
@@ -376,7 +432,7 @@ fn chart_json(chart: &Chart) -> Value {
         "xLog": chart.x_log,
         "xTicks": log_ticks_json(x_scale(chart)),
         "grids": grids.collect::<Vec<_>>(),
-        "panels": chart.panels.iter().map(panel_json).collect::<Vec<_>>(),
+        "panels": chart.panels.iter().map(|panel| panel_json(panel, curve)).collect::<Vec<_>>(),
         "marks": marks.collect::<Vec<_>>(),
         "markMeaning": chart.mark_meaning,
         "shades": chart.shades,
@@ -384,7 +440,7 @@ fn chart_json(chart: &Chart) -> Value {
     })
 }
 
-fn panel_json(panel: &ChartPanel) -> Value {
+fn panel_json(panel: &ChartPanel, curve: fn(&[f64]) -> Value) -> Value {
     let stars =
         panel.stars.iter().map(|(x, y, label)| json!([embed::short(*x), embed::short(*y), label]));
     json!({
@@ -396,20 +452,19 @@ fn panel_json(panel: &ChartPanel) -> Value {
         "ticks": log_ticks_json(y_scale(panel)),
         "range": panel.range.map(|(low, high)| [low, high]),
         "height": panel.height,
-        "series": panel.series.iter().map(series_json).collect::<Vec<_>>(),
+        "series": panel.series.iter().map(|series| series_json(series, curve)).collect::<Vec<_>>(),
         "levels": panel.levels,
         "stars": stars.collect::<Vec<_>>(),
         "mixed": panel.mixed,
     })
 }
 
-fn series_json(series: &Series) -> Value {
-    let data = |values: &[f64]| embed::floats(values.iter().copied());
+fn series_json(series: &Series, curve: fn(&[f64]) -> Value) -> Value {
     let (width, dashed, low, high) = match &series.style {
         Style::Solid(width) => (*width, false, None, None),
         Style::Dashed => (1.8, true, None, None),
         Style::Dots => (5.6, false, None, None),
-        Style::Band(low, high) => (2.2, false, Some(data(low)), Some(data(high))),
+        Style::Band(low, high) => (2.2, false, Some(curve(low)), Some(curve(high))),
     };
     json!({
         "name": series.name,
@@ -419,7 +474,7 @@ fn series_json(series: &Series) -> Value {
         "width": width,
         "dashed": dashed,
         "dots": series.style == Style::Dots,
-        "y": data(&series.y),
+        "y": curve(&series.y),
         "low": low,
         "high": high,
     })

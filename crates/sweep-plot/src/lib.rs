@@ -41,7 +41,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub use error::PlotError;
-pub use html::sheet;
+pub use html::{sheet, table};
 pub use label::{significant, words};
 pub use share::Share;
 pub use svg::escape;
@@ -165,6 +165,10 @@ pub struct Live {
     pub has_static_sag: bool,
     /// The constant speeds (rpm) that the map's growth is about; none if it has none.
     pub growth_speeds_rpm: Vec<f64>,
+    /// Whether a constant speed takes long: with friction or stops.
+    pub has_slow_growth: bool,
+    /// What the map has and a page does not compute, in a sentence; empty if there is nothing.
+    pub left_out: String,
     /// Ways in which a response at a constant speed can lose its stability, in the module's order;
     /// none where that cannot be asked of the machine.
     pub kinds: Vec<String>,
@@ -244,15 +248,13 @@ pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), 
     Ok(file.finish(&bytes)?)
 }
 
-/// A file's figure as an SVG picture of its own within HTML, and what its plan says in words, each
-/// with a title.
+/// A file's figure as an SVG picture of its own, and what its plan says in words, both HTML.
 ///
 /// # Errors
 /// As [`render`].
-pub fn described(input: &Path) -> Result<(String, Vec<(&'static str, String)>), PlotError> {
+pub fn described(input: &Path) -> Result<(String, String), PlotError> {
     let svg = figure(input, &PlotOptions::default(), Format::Svg)?;
-    let about = html::about(&Source::open(input)?);
-    Ok((html::picture(&svg), about))
+    Ok((html::picture(&svg), html::told(&Source::open(input)?, None)))
 }
 
 fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {

@@ -15,10 +15,16 @@ use crate::config::GridInput;
 use crate::engine::{CHECKPOINTS, ModelEngine, rule};
 use crate::method::Integrator;
 use crate::model::Washer;
-use crate::plan::{Axis, AxisValues, Plan, timing};
+use crate::plan::{Axis, AxisValues, Plan, corners_of_forces, timing};
 use sweep_engine::exit::Error;
 use sweep_engine::method::{ACCURACY, Integrator as _, Steps};
 use sweep_engine::store::read::overview;
+
+/// What a page says of the metric dwell, and of growth with friction or stops.
+const DWELLS: &str = "The page does not compute the motions that held speeds end in (the metric \
+                      dwell): each takes minutes. The file has them at its own points. ";
+const GROWTH: &str = "With friction or stops the growth at a constant speed takes up to a minute: \
+                      the file has it at its own points.";
 
 /// Parameters that a page offers beside the axes, where the machine has them.
 const OFFERED: [&str; 6] = [
@@ -77,6 +83,11 @@ pub(crate) fn slider_range(text: &str) -> Result<SliderRange, String> {
 /// A file that is not the map of a grid with its plan; ranges that no machine can have.
 pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     let mut plan = plan_of(file)?;
+    let has_slow_growth = corners_of_forces(&plan).is_some();
+    let has = |metric| plan.model.measures.metrics.contains(&metric);
+    let left_out = [(has(Metric::Dwell), DWELLS), (has(Metric::Growth) && has_slow_growth, GROWTH)];
+    let left_out: String =
+        left_out.iter().filter(|(is_so, _)| *is_so).map(|(_, said)| *said).collect();
     let growth_speeds_rpm = take_growth(&mut plan);
     let sliders = match ranges {
         [] => usual(&plan),
@@ -106,6 +117,8 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         },
         metrics: plan.model.measures.of_model().map(columns).collect(),
         growth_speeds_rpm,
+        has_slow_growth,
+        left_out,
         has_static_sag: plan.model.measures.metrics.contains(&Metric::StaticSag),
         kinds: Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
         compared: plan.reliability.channels.iter().map(|channel| channel.index()).collect(),

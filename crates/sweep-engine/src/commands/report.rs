@@ -14,7 +14,7 @@ use crate::store::read::tally;
 use crate::swept::Swept;
 use sweep_files::{FileKind, Output, ParquetFile, key};
 use sweep_parameter::{Parameter as _, RatioLimits};
-use sweep_plot::{described, escape, sheet, significant, words};
+use sweep_plot::{described, escape, sheet, significant, table, words};
 use sweep_results::{Cell, ResultTable, check, ratio_limits, top};
 
 /// Arguments of `sweep report`.
@@ -89,7 +89,7 @@ pub fn run<M: Swept>(
             short(limits.over_estimate())
         ))
     );
-    rows(&mut body, "The worst of it", &["", "worst", "limit", "at"], &worst(&file, limits)?);
+    body += &table("The worst of it", &["", "worst", "limit", "at"], &worst(&file, limits)?);
     let mut held = true;
     let mut claims = Vec::new();
     for condition in &requirements {
@@ -105,7 +105,7 @@ pub fn run<M: Swept>(
         let verdict = if checked.holds { "holds" } else { "FAILS" };
         claims.push(vec![checked.expression, found, verdict.to_owned()]);
     }
-    rows(&mut body, "What is required", &["", "found", ""], &claims);
+    body += &table("What is required", &["", "found", ""], &claims);
     let _ = writeln!(body, "<figure>{picture}</figure>");
     for path in &args.further {
         let opened = ParquetFile::open(path)?;
@@ -114,20 +114,18 @@ pub fn run<M: Swept>(
         let lines: Vec<_> =
             lines.into_iter().map(|(name, text)| vec![name.to_owned(), text]).collect();
         let shown = path.file_stem().unwrap_or_default().to_string_lossy();
-        rows(&mut body, &shown, &["", ""], &lines);
+        body += &table(&shown, &["", ""], &lines);
         let _ = writeln!(body, "<figure>{picture}</figure>");
     }
     let run = GridInput::<M>::of_plan(name, &plan).load();
     if let Ok(run) = &run {
         let found: Vec<_> = resonances(run).into_iter().map(Vec::from).collect();
         let heads = ["motion", "resonance", "damping ratio"];
-        rows(&mut body, "Resonances of the machine as given", &heads, &found);
+        body += &table("Resonances of the machine as given", &heads, &found);
     }
-    let about: Vec<_> =
-        about.into_iter().map(|(title, text)| vec![title.to_owned(), text]).collect();
-    rows(&mut body, "What was run", &["", ""], &about);
+    body += &about;
     if let Ok(run) = &run {
-        rows(&mut body, "Where the machine's numbers are from", &["", ""], &sources(run));
+        body += &table("Where the machine's numbers are from", &["", ""], &sources(run));
     }
     let hashes = [key::PLAN_HASH, key::VERSION, key::NUMERICS, key::DIGEST].into_iter();
     let hashes = hashes.filter_map(|key| Some((key, file.file().value(key)?)));
@@ -141,25 +139,6 @@ pub fn run<M: Swept>(
     page.finish(sheet(&args.question, &body).as_bytes())?;
     tell(&format!("wrote {}", output.display()));
     Ok(if held { Exit::Done } else { Exit::NotHeld })
-}
-
-/// A table under a heading; nothing without rows.
-fn rows(body: &mut String, title: &str, heads: &[&str], rows: &[Vec<String>]) {
-    if rows.is_empty() {
-        return;
-    }
-    let row = |cells: &[String], cell: &str| {
-        let cells = cells.iter().map(|text| format!("<{cell}>{}</{cell}>", escape(text)));
-        format!("<tr>{}</tr>\n", cells.collect::<String>())
-    };
-    let heads: Vec<String> = heads.iter().map(|head| (*head).to_owned()).collect();
-    let all: String = rows.iter().map(|cells| row(cells, "td")).collect();
-    let head = if heads.iter().all(String::is_empty) { String::new() } else { row(&heads, "th") };
-    let _ = writeln!(
-        body,
-        "<h2>{}</h2>\n<table><thead>{head}</thead><tbody>\n{all}</tbody></table>",
-        escape(title)
-    );
 }
 
 /// What a reliable ratio is.

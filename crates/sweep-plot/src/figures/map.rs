@@ -9,8 +9,8 @@ use crate::cuts::Cuts;
 use crate::error::PlotError;
 use crate::figures::boundary::Overlay;
 use crate::frame::{
-    HEADING_HEIGHT, LABEL_SIZE, LEGEND_ROW, Panel, Sign, TICK_SIZE, failed, failed_hatch, heading,
-    legend, legend_rows, sensitive_hatch, undefined,
+    self, HEADING_HEIGHT, LABEL_SIZE, LEGEND_ROW, Panel, Sign, TICK_SIZE, failed, failed_hatch,
+    heading, legend_rows, sensitive_hatch, undefined,
 };
 use crate::gather::{Map, OK};
 use crate::grid::GridAxis;
@@ -61,7 +61,10 @@ pub(crate) fn draw(
     let width = (WIDTH - LEFT - bar - gap * (columns - 1) as f64) / columns as f64;
     let height = if single { 440.0 } else { 0.78 * width };
     cells.refine_hatches([width, height]);
-    let mut entries = cells.legend(cuts);
+    let [xs, ys] = [0, 1].map(|k| grid.axes[k].values.len());
+    let all = || (0..xs).flat_map(|x| (0..ys).map(move |y| (x, y)));
+    let drawn = cuts.cuts.iter().flat_map(|cut| all().map(|(x, y)| grid.cell(x, y, &cut.rest)));
+    let mut entries = cells.legend(&drawn.collect::<Vec<_>>());
     if let Some(overlay) = overlay {
         entries.push((Sign::Line(overlay_stroke()), overlay.name.clone()));
     }
@@ -116,7 +119,7 @@ pub(crate) fn draw(
         colour_bar(&mut scene, layer, area);
     }
     let y = HEADING_HEIGHT + panels_height + BELOW + LEGEND_ROW / 2.0;
-    legend(&mut scene, typeface, &entries, LEFT, y, WIDTH - LEFT - 20.0);
+    frame::legend(&mut scene, typeface, &entries, LEFT, y, WIDTH - LEFT - 20.0);
     Ok(scene)
 }
 
@@ -161,6 +164,19 @@ pub(crate) fn subtitle(map: &Map, notes: &[String]) -> String {
     parts.extend(notes.iter().cloned());
     parts.extend(map.grid.note());
     parts.join(" · ")
+}
+
+/// The legend of all cells by a layer, or else by how points ended.
+pub(crate) fn legend(map: &Map, layer: Option<Layer>) -> Vec<(Sign, String)> {
+    let cells = layer.map_or_else(|| Cells::by_status(map), |layer| Cells::by_value(map, layer));
+    cells.legend(&(0..map.counts.len()).collect::<Vec<_>>())
+}
+
+/// The colours of how points ended.
+pub(crate) fn kinds(map: &Map) -> BTreeMap<String, String> {
+    let cells = Cells::by_status(map);
+    let colour = |kind: usize| (cells.kinds[kind].0.clone(), cells.kind_colour(kind).css());
+    (0..cells.kinds.len()).map(colour).collect()
 }
 
 /// What is drawn in a cell.
@@ -387,15 +403,10 @@ impl<'a> Cells<'a> {
         }
     }
 
-    fn legend(&self, cuts: &Cuts) -> Vec<(Sign, String)> {
+    /// Of the cells that are drawn.
+    fn legend(&self, drawn: &[usize]) -> Vec<(Sign, String)> {
         let mut entries = Vec::new();
-        let shown = |wanted: &dyn Fn(usize) -> bool| {
-            let [xs, ys] = [0, 1].map(|k| self.map.grid.axes[k].values.len());
-            cuts.cuts.iter().any(|cut| {
-                let mut places = (0..xs).flat_map(|x| (0..ys).map(move |y| (x, y)));
-                places.any(|(x, y)| wanted(self.map.grid.cell(x, y, &cut.rest)))
-            })
-        };
+        let shown = |wanted: &dyn Fn(usize) -> bool| drawn.iter().any(|&cell| wanted(cell));
         let filled = |fill: Fill| shown(&|cell| self.fills[cell] == Some(fill));
         if let Some(Layer { level: Some(level), scale, .. }) = &self.layer {
             let quarter = |part: usize| scale.colour(part * LEVELS / 4);

@@ -8,13 +8,11 @@ function plainLine(name, colour, y, alpha = 1) {
 }
 
 function plainPanel(name, words, unit, shown, series, height = 150) {
-  return { name, words, unit, shown, log: false, ticks: null, range: null, height, series,
-    levels: [], stars: [], mixed: [] };
+  return { name, words, unit, shown, log: false, height, series, levels: [], stars: [], mixed: [] };
 }
 
 function plainChart(xWords, xUnit, grid, panels) {
-  return { xWords, xUnit, xLog: false, xTicks: null, grids: [grid], panels, marks: [],
-    markMeaning: "", shades: [], shadeMeaning: "" };
+  return { xWords, xUnit, xLog: false, grids: [grid], panels, marks: [], shades: [] };
 }
 
 // `spec` as the page's data has it, with decoded arrays: { xWords, xUnit, xLog, xTicks, grids,
@@ -24,39 +22,26 @@ function createChart(host, spec, name, pick = () => {}) {
   const even = (x) => (spec.xLog ? Math.log(x) : x);
   const back = (x) => (spec.xLog ? Math.exp(x) : x);
   const ends = spec.grids.flatMap((grid) => [grid[0], grid[grid.length - 1]]);
-  const all = extremes(ends).map(even);
+  const all = [Math.min(...ends), Math.max(...ends)].map(even);
   if (!(all[1] > all[0])) all[1] = all[0] + 1;
   let view = [...all];
   let cursor = null;
   // Where the pointer reads, px from the figure's top; null where keys do.
   let readAt = null;
 
-  const zoomBy = (factor, centre) => setView(zoomed(view, factor, centre, all));
-  const centre = () => (cursor === null ? (view[0] + view[1]) / 2 : even(cursor));
-  const picker = element("fieldset", { class: "controls" }, element("legend", {}, "Show"));
+  const find = furnish(host, "chart");
+  const [picker, figure, tip, legend, said] = [".controls", ".figure", ".tip", ".legend", ".unseen"]
+    .map(find);
+  figure.ariaLabel = `${name}. Arrow keys read values, plus and minus zoom, 0 resets.`;
   if (spec.panels.length > 1) {
-    for (const panel of spec.panels) {
+    picker.append(element("legend", {}, "Show"), ...spec.panels.map((panel) => {
       const box = element("input", { type: "checkbox", checked: panel.shown, onchange: () => {
         panel.shown = box.checked;
         changed();
       } });
-      picker.append(element("label", {}, box, capitalised(panel.words)));
-    }
-  } else {
-    picker.firstChild.remove();
+      return element("label", {}, box, capitalised(panel.words));
+    }));
   }
-  picker.append(zoomButtons((factor) => zoomBy(factor, centre()), () => setView([...all])));
-  const figure = element("div", {
-    class: "figure", tabindex: "0", role: "application",
-    "aria-label": `${name}. Arrow keys read values, plus and minus zoom, 0 resets.`,
-  });
-  const tip = element("div", { class: "tip", hidden: true });
-  const legend = element("ul", { class: "legend" });
-  const said = element("p", { class: "unseen", "aria-live": "polite" });
-  const help = element("p", { class: "help" }, "Hover or tap to read values; zoom by the buttons, "
-    + "or by the wheel with Ctrl held; drag to move; double-click to reset. Or focus the figure "
-    + "and use the arrow keys, + and -.");
-  host.append(picker, figure, legend, said, help);
 
   // Labels of marks stand above the panels, not on the curves.
   const strip = spec.marks.length ? 66 : 0;
@@ -64,7 +49,6 @@ function createChart(host, spec, name, pick = () => {}) {
   const heights = () => shown().reduce((sum, panel) => sum + panel.height + CHART.gap, 0);
   const height = () => CHART.top + strip + heights() + CHART.bottom;
   const { request, canvas } = surface(figure, height, paint);
-  figure.append(tip);
   const area = () => ({
     left: CHART.left, width: figure.clientWidth - CHART.left - CHART.right,
   });
@@ -83,8 +67,6 @@ function createChart(host, spec, name, pick = () => {}) {
     changed();
   }
 
-  const isWhole = () => view[0] <= all[0] && view[1] >= all[1];
-
   // Indices of a grid's points within the view and one beyond on each side.
   function visible(grid) {
     const from = Math.max(lowerBound(grid, back(view[0])) - 1, 0);
@@ -93,39 +75,40 @@ function createChart(host, spec, name, pick = () => {}) {
 
   function yRange(panel) {
     if (panel.range) return panel.range;
-    let low = Infinity, high = -Infinity;
+    let [low, high] = [Infinity, -Infinity];
     const take = (value) => {
-      if (Number.isFinite(value) && (!panel.log || value > 0)) {
-        low = Math.min(low, value);
-        high = Math.max(high, value);
-      }
+      if (!Number.isFinite(value) || (panel.log && value <= 0)) return;
+      [low, high] = [Math.min(low, value), Math.max(high, value)];
     };
     for (const series of panel.series) {
       const [from, to] = visible(spec.grids[series.grid]);
       for (const values of [series.y, series.low, series.high]) {
-        if (values) for (let k = from; k <= to; k++) take(values[k]);
+        values?.subarray(from, to + 1).forEach(take);
       }
     }
-    for (const [value] of panel.levels) take(value);
+    panel.levels.forEach(([value]) => take(value));
     if (!(low <= high)) [low, high] = panel.log ? [1, 10] : [0, 1];
     if (panel.log) return [low / 1.15, high * 1.15];
     const room = high > low ? 0.05 * (high - low) : 0.05 * Math.max(Math.abs(high), 1);
     return [low - room, high + room];
   }
 
-  function paint(context, width) {
-    const box = area();
-    let top = CHART.top + strip;
-    drawMarkLabels(context, box, top);
+  function paint(context) {
+    const box = { ...area(), top: CHART.top + strip };
+    drawMarkLabels(context, box);
     context.lineJoin = "round";
     const panels = shown();
-    panels.forEach((panel, index) => {
+    for (const panel of panels) {
+      box.height = panel.height;
       const [low, high] = yRange(panel);
       const scale = (y) => (panel.log ? Math.log(y) : y);
       const part = (y) => (scale(y) - scale(low)) / (scale(high) - scale(low));
+      const { top } = box;
       const atY = (y) => top + panel.height * (1 - part(y));
       const [right, bottom] = [box.left + box.width, top + panel.height];
-      drawFrame(context, panel, box, top, low, high, atY, index === panels.length - 1);
+      const words = panel === panels.at(-1) && { words: spec.xWords, unit: spec.xUnit };
+      drawAxes(context, box, { range: view.map(back), at: atX, ticks: spec.xTicks, ...words },
+        { ...panel, range: [low, high], at: atY }, true);
       context.save();
       context.beginPath();
       context.rect(box.left, top, box.width, panel.height);
@@ -143,63 +126,29 @@ function createChart(host, spec, name, pick = () => {}) {
       for (const [x] of spec.marks) {
         drawLine(context, atX(x), top, atX(x), bottom, [6, 4], themed("muted"));
       }
-      context.restore();
       for (const [x, y, label] of panel.stars) {
-        drawStar(context, atX(x), atY(y), label, box, top, panel.height);
+        write(context, "★", atX(x), atY(y) + 6, { size: 20 });
+        write(context, label, atX(x) - 12, atY(y) - 5, { align: "right" });
       }
+      context.restore();
       if (cursor !== null) {
         drawLine(context, atX(cursor), top, atX(cursor), bottom, [], themed("accent"));
       }
-      top += panel.height + CHART.gap;
-    });
-    context.fillStyle = themed("ink");
-    context.font = `15px ${FONT}`;
-    context.textAlign = "center";
-    const at = [box.left + box.width / 2, top - CHART.gap + 40];
-    context.fillText(withUnit(spec.xWords, spec.xUnit), ...at, width);
+      box.top += panel.height + CHART.gap;
+    }
   }
 
   // Moved aside where they would cover each other.
-  function drawMarkLabels(context, box, top) {
+  function drawMarkLabels(context, { left, top, width }) {
     let free = -Infinity;
     for (const [x, label] of spec.marks) {
       const at = atX(x);
-      if (at < box.left || at > box.left + box.width) continue;
+      if (at < left || at > left + width) continue;
       const aside = Math.max(at, free);
       free = aside + 15;
       drawLine(context, at, top, aside, top - 8, [], themed("muted"));
-      upright(context, label, aside + 4, top - 11);
+      write(context, label, aside + 4, top - 11, { align: "left", size: 12, stands: true });
     }
-  }
-
-  function drawFrame(context, panel, box, top, low, high, atY, last) {
-    const bottom = top + panel.height;
-    context.font = `13px ${FONT}`;
-    context.lineWidth = 1;
-    const range = view.map(back);
-    for (const [value, label] of ticks(...range, box.width / 90, spec.xTicks)) {
-      const x = atX(value);
-      drawLine(context, x, top, x, bottom, [], themed("faint"));
-      context.fillStyle = themed("ink");
-      context.textAlign = "center";
-      if (last) context.fillText(label, x, bottom + 17);
-    }
-    for (const [value, label] of ticks(low, high, Math.max(3, panel.height / 40), panel.ticks)) {
-      const y = atY(value);
-      drawLine(context, box.left, y, box.left + box.width, y, [], themed("faint"));
-      context.fillStyle = themed("ink");
-      context.textAlign = "right";
-      context.fillText(label, box.left - 7, y + 4.5);
-    }
-    context.strokeStyle = themed("ink");
-    context.strokeRect(box.left, top, box.width, panel.height);
-    context.save();
-    context.translate(0, top + panel.height / 2);
-    context.rotate(-Math.PI / 2);
-    context.textAlign = "center";
-    const lines = wrapped(context, withUnit(panel.words, panel.unit), panel.height);
-    lines.forEach((line, k) => context.fillText(line, 0, 16 + 16 * k));
-    context.restore();
   }
 
   function drawSeries(context, series, atY, box) {
@@ -212,115 +161,74 @@ function createChart(host, spec, name, pick = () => {}) {
       for (let k = to; k >= from; k--) context.lineTo(atX(grid[k]), atY(series.low[k]));
       context.globalAlpha = 0.35;
       context.fill();
-      context.globalAlpha = 1;
     }
-    if (series.dots) {
-      for (let k = from; k <= to; k++) {
-        if (!Number.isFinite(series.y[k])) continue;
-        context.beginPath();
-        context.arc(atX(grid[k]), atY(series.y[k]), series.width / 2, 0, 2 * Math.PI);
-        context.fill();
-      }
-      return;
-    }
-    context.globalAlpha = series.alpha ?? 1;
+    context.globalAlpha = series.alpha;
     context.lineWidth = series.width;
     context.setLineDash(series.dashed ? [8, 5] : []);
-    context.beginPath();
-    const crowded = to - from > 4 * box.width;
-    let open = false;
-    const dots = [];
-    for (let k = from; k <= to;) {
+    const dot = (x, y, radius) => {
+      context.beginPath();
+      context.arc(x, y, radius, 0, 2 * Math.PI);
+      context.fill();
+    };
+    // Of the points in one pixel column, the first, the extremes and the last make the same
+    // picture as all.
+    const isCrowded = to - from > 4 * box.width;
+    const runs = [[]];
+    for (let k = from; k <= to; k++) {
+      const [run, x, y] = [runs.at(-1), atX(grid[k]), atY(series.y[k])];
       if (!Number.isFinite(series.y[k])) {
-        open = false;
-        k++;
+        if (run.length) runs.push([]);
         continue;
       }
-      // Of the points in one pixel column, the first, the extremes and the last make the same
-      // picture as all.
-      let end = k + 1;
-      const x = atX(grid[k]);
-      let low = series.y[k], high = low, final = low;
-      if (crowded) {
-        const column = Math.floor(x);
-        const alike = (at) => Number.isFinite(series.y[at]) && Math.floor(atX(grid[at])) === column;
-        for (; end <= to && alike(end); end++) {
-          final = series.y[end];
-          low = Math.min(low, final);
-          high = Math.max(high, final);
-        }
-      }
-      const alone = !open && !(end <= to && Number.isFinite(series.y[end]));
-      if (open) context.lineTo(x, atY(series.y[k]));
-      else context.moveTo(x, atY(series.y[k]));
-      // No line runs to it.
-      if (alone) dots.push([x, atY(series.y[k])]);
-      open = true;
-      if (end > k + 1) {
-        for (const value of [low, high, final]) context.lineTo(x, atY(value));
-      }
-      k = end;
+      const last = isCrowded ? run.at(-1) : null;
+      if (last && Math.floor(last[0]) === Math.floor(x)) {
+        last[1].splice(1, 3, Math.min(...last[1], y), Math.max(...last[1], y), y);
+      } else run.push([x, [y]]);
     }
-    context.stroke();
-    context.setLineDash([]);
-    for (const [x, y] of dots) {
+    for (const run of runs) {
+      if (series.dots) {
+        for (const [x, ys] of run) ys.forEach((y) => dot(x, y, series.width / 2));
+        continue;
+      }
       context.beginPath();
-      context.arc(x, y, 3, 0, 2 * Math.PI);
-      context.fill();
+      for (const [x, ys] of run) ys.forEach((y) => context.lineTo(x, y));
+      context.stroke();
+      // No line runs to it.
+      if (run.length === 1) dot(run[0][0], run[0][1][0], 3);
     }
+    context.setLineDash([]);
     context.globalAlpha = 1;
   }
 
-  function drawStar(context, x, y, label, box, top, height) {
-    if (x < box.left || x > box.left + box.width || y < top || y > top + height) return;
-    context.beginPath();
-    for (let k = 0; k < 10; k++) {
-      const [reach, angle] = [k % 2 ? 4 : 9.5, (Math.PI * k) / 5];
-      context.lineTo(x + reach * Math.sin(angle), y - reach * Math.cos(angle));
-    }
-    context.fillStyle = themed("ink");
-    context.fill();
-    context.textAlign = "right";
-    context.font = `bold 13px ${FONT}`;
-    context.fillText(label, x - 12, y - 5);
-  }
-
-  const swatch = (style) => {
-    const made = element("i");
-    made.style.cssText = style;
-    return made;
-  };
-  const lineSign = (series) => swatch(series.dots
+  const signOf = (series) => (series.dots
     ? `width:9px;height:9px;border-radius:5px;margin:0 9px;background:${lineColour(series.colour)}`
     : `height:0;border-top:3px ${series.dashed ? "dashed" : "solid"} ${lineColour(series.colour)}`);
 
   // What lines and marks are.
   function tellLegend() {
     const entries = new Map();
-    const add = (text, sign) => {
-      if (!entries.has(text)) entries.set(text, element("li", {}, ...(sign ? [sign] : []), text));
+    const add = (words, style = null) => {
+      if (!entries.has(words)) entries.set(words, legendEntry([style, words]));
     };
     for (const panel of shown()) {
-      for (const series of panel.series) add(series.name || panel.words, lineSign(series));
+      for (const series of panel.series) add(series.name || panel.words, signOf(series));
     }
-    const over = shown().map((panel) => panel.series.at(-1)).find((series) => series?.alpha < 1);
-    if (over) {
-      const under = shown().find((panel) => panel.series.includes(over)).series.at(-2) ?? over;
-      const part = `${100 * over.alpha}%`;
-      const mixed = `${lineColour(over.colour)} ${part}, ${lineColour(under.colour)}`;
+    const pair = shown().map((panel) => panel.series.slice(-2))
+      .find((series) => series.at(-1)?.alpha < 1);
+    if (pair) {
+      const [under, over] = [pair[0], pair.at(-1)].map((series) => lineColour(series.colour));
+      const mixed = `${over} ${100 * pair.at(-1).alpha}%, ${under}`;
       const line = `height:0;border-top:3px solid color-mix(in srgb, ${mixed})`;
-      add("both, one over the other", swatch(line));
+      add("both, one over the other", line);
     }
     for (const [, meaning] of shown().flatMap((panel) => panel.levels)) {
-      add(meaning, swatch("height:0;border-top:2px dotted currentColor"));
+      add(meaning, "height:0;border-top:2px dotted currentColor");
     }
     if (shown().some((panel) => panel.mixed.length)) {
-      add("both: reliable and unreliable points", swatch(`background:${MIXED}`));
+      add("both: reliable and unreliable points", `background:${MIXED}`);
     }
-    if (spec.marks.length) {
-      add(spec.markMeaning, swatch("height:0;border-top:2px dashed currentColor"));
-    }
-    if (spec.shades.length) add(spec.shadeMeaning, swatch(`background:${SHADE}`));
+    if (spec.marks.length) add(spec.markMeaning, "height:0;border-top:2px dashed currentColor");
+    if (spec.shades.length) add(spec.shadeMeaning, `background:${SHADE}`);
     if (shown().some((panel) => panel.stars.length)) add("★ resonance speed");
     legend.replaceChildren(...entries.values());
   }
@@ -333,7 +241,7 @@ function createChart(host, spec, name, pick = () => {}) {
       return;
     }
     const x = `${spec.xWords} ${significant(cursor)} ${spec.xUnit}`.trim();
-    const rows = element("tbody");
+    const rows = [];
     const words = [x];
     for (const panel of shown()) {
       // Two curves of a panel share a row; the legend says which is which.
@@ -345,29 +253,18 @@ function createChart(host, spec, name, pick = () => {}) {
           const name = together && series.name ? `${title}, ${series.name}` : title;
           words.push(`${name}: ${value} ${panel.unit}`.trim());
           const wide = together && group.length === 1 ? 2 : null;
-          return element("td", { "data-name": name, colspan: wide }, lineSign(series), value);
+          return element("td", { "data-name": name, colspan: wide }, swatch(signOf(series)), value);
         });
-        rows.append(element("tr", {}, element("th", { scope: "row" }, title), ...cells,
-          element("td", {}, panel.unit)));
+        rows.push(tableRow(title, [...cells, panel.unit]));
       }
     }
     tip.dataset.x = cursor;
-    tip.replaceChildren(element("p", {}, x), element("table", {}, rows));
+    tip.replaceChildren(element("p", {}, x), table([], rows));
     said.textContent = words.join("; ");
-    placeTip();
-  }
-
-  function placeTip() {
-    const at = atX(cursor);
-    const [right, left] = [at + 12, at - 12 - tip.offsetWidth];
-    const room = figure.clientWidth - tip.offsetWidth;
-    const fits = right <= room || left < 0;
-    tip.style.left = `${Math.max(0, fits ? Math.min(right, room) : left)}px`;
     // Within what is seen of a figure that is higher than the window.
     const bounds = figure.getBoundingClientRect();
     const seen = [Math.max(0, -bounds.top), Math.min(bounds.height, innerHeight - bounds.top)];
-    const wanted = (readAt ?? seen[0]) + 14;
-    tip.style.top = `${Math.max(seen[0], Math.min(wanted, seen[1] - tip.offsetHeight))}px`;
+    placeTip(tip, [atX(cursor) - 12, atX(cursor) + 12], (readAt ?? seen[0]) + 14, seen);
   }
 
   function setCursor(x, y = null) {
@@ -377,110 +274,46 @@ function createChart(host, spec, name, pick = () => {}) {
   }
 
   const mainGrid = () => spec.grids[shown()[0]?.series[0]?.grid ?? 0];
+  const pxOf = (event) => event.clientX - canvas.getBoundingClientRect().left;
   function read(event) {
-    const bounds = canvas.getBoundingClientRect();
-    const px = event.clientX - bounds.left;
+    const px = pxOf(event);
     if (px < area().left || px > area().left + area().width) return;
     const grid = mainGrid();
-    setCursor(grid[nearest(grid, toX(px))], event.clientY - bounds.top);
+    setCursor(grid[nearest(grid, toX(px))], event.clientY - canvas.getBoundingClientRect().top);
   }
 
-  let drag = null;
-  figure.addEventListener("pointermove", (event) => {
-    if (!drag || isWhole()) {
-      read(event);
-      return;
-    }
-    const px = event.clientX - canvas.getBoundingClientRect().left;
-    const by = ((drag.px - px) / area().width) * (drag.view[1] - drag.view[0]);
-    drag.far ||= Math.abs(drag.px - px) > 4;
-    if (drag.far) setView(moved(drag.view, by, all));
-  });
-  figure.addEventListener("pointerdown", (event) => {
-    drag = { px: event.clientX - canvas.getBoundingClientRect().left, view, far: false };
-    figure.setPointerCapture(event.pointerId);
-  });
-  figure.addEventListener("pointerup", (event) => {
-    if (drag && !drag.far) {
+  const centre = () => (cursor === null ? (view[0] + view[1]) / 2 : even(cursor));
+  picker.append(interact(figure, {
+    view: () => view,
+    isZoomed: () => view[0] > all[0] || view[1] < all[1],
+    reset: () => setView([...all]),
+    move: (from, [by]) => {
+      setView(moved(from, (-by / area().width) * (from[1] - from[0]), all));
+    },
+    zoom: (factor, event) => {
+      setView(zoomed(view, factor, event ? even(toX(pxOf(event))) : centre(), all));
+    },
+    read,
+    letGo: () => setCursor(null),
+    pick(event) {
       read(event);
       if (cursor !== null) pick(cursor);
-    }
-    drag = null;
-  });
-  figure.addEventListener("pointercancel", () => { drag = null; });
-  // A finger that is lifted leaves what it has read.
-  figure.addEventListener("pointerleave", (event) => {
-    if (event.pointerType === "mouse") setCursor(null);
-  });
-  figure.addEventListener("blur", () => setCursor(null));
-  figure.addEventListener("dblclick", () => setView([...all]));
-  zoomByWheel(figure, (event, factor) => {
-    zoomBy(factor, even(toX(event.clientX - canvas.getBoundingClientRect().left)));
-  });
-  figure.addEventListener("keydown", (event) => {
-    const grid = mainGrid();
-    const [from, to] = visible(grid);
-    const stride = (event.shiftKey ? 10 : 1) * Math.max(1, Math.round((to - from) / 200));
-    const here = cursor === null ? Math.round((from + to) / 2) : nearest(grid, cursor);
-    const step = { ArrowLeft: -stride, ArrowRight: stride }[event.key];
-    if (step) setCursor(grid[Math.min(Math.max(here + step, 0), grid.length - 1)]);
-    else if (event.key === "+" || event.key === "=") zoomBy(0.7, centre());
-    else if (event.key === "-") zoomBy(1 / 0.7, centre());
-    else if (event.key === "0") setView([...all]);
-    else if (event.key === "Escape") setCursor(null);
-    else if (event.key === "Enter" && cursor !== null) pick(cursor);
-    else return;
-    event.preventDefault();
-  });
+    },
+    key(event) {
+      const grid = mainGrid();
+      const [from, to] = visible(grid);
+      const stride = (event.shiftKey ? 10 : 1) * Math.max(1, Math.round((to - from) / 200));
+      const here = cursor === null ? Math.round((from + to) / 2) : nearest(grid, cursor);
+      const step = { ArrowLeft: -stride, ArrowRight: stride }[event.key];
+      if (step) setCursor(grid[Math.min(Math.max(here + step, 0), grid.length - 1)]);
+      else if (event.key === "Enter" && cursor !== null) pick(cursor);
+      else return false;
+      return true;
+    },
+  }));
   darkTheme.addEventListener("change", changed);
   changed();
   return { changed };
-}
-
-function drawLine(context, x0, y0, x1, y1, dash, colour) {
-  context.beginPath();
-  context.setLineDash(dash);
-  context.strokeStyle = colour;
-  context.lineWidth = 1;
-  context.moveTo(x0, y0);
-  context.lineTo(x1, y1);
-  context.stroke();
-  context.setLineDash([]);
-}
-
-function upright(context, text, x, y) {
-  context.save();
-  context.translate(x, y);
-  context.rotate(-Math.PI / 2);
-  context.font = `12px ${FONT}`;
-  context.textAlign = "left";
-  context.fillStyle = themed("ink");
-  context.fillText(text, 0, 0);
-  context.restore();
-}
-
-// At most two lines that fit `room` px if any break does.
-function wrapped(context, text, room) {
-  const fits = (part) => context.measureText(part).width <= room;
-  if (fits(text)) return [text];
-  for (let k = text.length; k > 0; k--) {
-    if (text[k] === " " && fits(text.slice(0, k))) return [text.slice(0, k), text.slice(k + 1)];
-  }
-  return [text];
-}
-
-function extremes(values) {
-  return [Math.min(...values), Math.max(...values)];
-}
-
-function lowerBound(sorted, value) {
-  let low = 0, high = sorted.length;
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (sorted[middle] < value) low = middle + 1;
-    else high = middle;
-  }
-  return low;
 }
 
 function nearest(sorted, value) {
@@ -489,14 +322,13 @@ function nearest(sorted, value) {
   return value - sorted[before] < sorted[after] - value ? before : after;
 }
 
-// The page's chart with its arrays decoded.
+// The page's chart with its arrays decoded; curves of time histories are quantised.
 function decodedChart(chart) {
-  const series = (one) => ({
-    ...one, y: floats(one.y), low: one.low && floats(one.low), high: one.high && floats(one.high),
-  });
+  const curve = (given) => given && (typeof given === "string" ? floats : quantised)(given);
+  const series = (one) => ({ ...one, y: curve(one.y), low: curve(one.low), high: curve(one.high) });
   return {
     ...chart,
-    grids: chart.grids.map(floats),
+    grids: chart.grids.map(curve),
     panels: chart.panels.map((panel) => ({ ...panel, series: panel.series.map(series) })),
   };
 }

@@ -1,5 +1,6 @@
 "use strict";
-// What the map and the charts share: decoding, numbers, ticks, canvases that follow size and theme.
+// What the map and the charts share: decoding, numbers, axes, canvases that follow size and theme,
+// pointer and keys.
 
 function decode(text) {
   const raw = atob(text);
@@ -14,22 +15,13 @@ function unpacked(text) {
   return new Response(stream).arrayBuffer();
 }
 
-function floats(text) {
-  const view = new DataView(decode(text).buffer);
-  return Float32Array.from({ length: view.byteLength / 4 }, (_, k) => view.getFloat32(4 * k, true));
-}
-
-function doubles(text) {
-  return new Float64Array(decode(text).buffer);
-}
+const floats = (text) => new Float32Array(decode(text).buffer);
+const doubles = (text) => new Float64Array(decode(text).buffer);
 
 // Integers of 16 bits times their unit; the least integer means no value.
-function quantised(text, unit) {
-  const view = new DataView(decode(text).buffer);
-  return Float32Array.from({ length: view.byteLength / 2 }, (_, k) => {
-    const value = view.getInt16(2 * k, true);
-    return value === -32768 ? NaN : value * unit;
-  });
+function quantised([text, unit]) {
+  const whole = new Int16Array(decode(text).buffer);
+  return Float32Array.from(whole, (value) => (value === -32768 ? NaN : value * unit));
 }
 
 function significant(value, digits = 4) {
@@ -63,9 +55,8 @@ function ticks(low, high, count, sets) {
     if (last - first + 1 < least) continue;
     return Array.from({ length: last - first + 1 }, (_, k) => {
       const value = (first + k) * step || 0;
-      const isLong = decimals === null && value !== 0;
-      const powers = () => value.toExponential().replace("e+", "e");
-      return [value, isLong ? powers() : value.toFixed(decimals ?? 0)];
+      const power = decimals === null && value !== 0 && value.toExponential().replace("e+", "e");
+      return [value, power || value.toFixed(decimals ?? 0)];
     });
   }
   return [];
@@ -91,10 +82,35 @@ function element(tag, attributes = {}, ...children) {
   return node;
 }
 
-// The head of a table, a column a text.
-function tableHead(texts) {
-  const cells = texts.map((text) => element("th", { scope: "col" }, text));
-  return element("thead", {}, element("tr", {}, ...cells));
+// Puts a template's elements into a host, and gives what finds them there.
+function furnish(host, name) {
+  host.append(document.getElementById(`${name}-parts`).content.cloneNode(true));
+  return (selector) => host.querySelector(selector);
+}
+
+// A table's row: what it is of, and cells or their texts.
+function tableRow(title, cells) {
+  return element("tr", {}, element("th", { scope: "row" }, title),
+    ...cells.map((cell) => (cell instanceof Element ? cell : element("td", {}, cell))));
+}
+
+// A table under heads, a column a text, if there are any.
+function table(heads, rows, attributes = {}) {
+  const cells = heads.map((text) => element("th", { scope: "col" }, text));
+  const head = heads.length ? [element("thead", {}, element("tr", {}, ...cells))] : [];
+  return element("table", attributes, ...head, element("tbody", {}, ...rows));
+}
+
+// A sign of a legend, and an entry of it.
+const swatch = (style) => element("i", { style });
+const legendEntry = ([style, words]) => element("li", {}, ...(style ? [swatch(style)] : []), words);
+
+// A tip beside what lies from left to right, px, within a figure; its top at y, within the bounds.
+function placeTip(tip, [left, right], y, [top, bottom]) {
+  const room = tip.parentElement.clientWidth - tip.offsetWidth;
+  const fits = right <= room || left < tip.offsetWidth;
+  tip.style.left = `${Math.max(0, fits ? Math.min(right, room) : left - tip.offsetWidth)}px`;
+  tip.style.top = `${Math.max(top, Math.min(y, bottom - tip.offsetHeight))}px`;
 }
 
 function themed(name) {
@@ -104,19 +120,14 @@ function themed(name) {
 const darkTheme = matchMedia("(prefers-color-scheme: dark)");
 
 // The same hues, lighter, for lines on a dark ground.
-const onDark = {
-  "#0072b2": "#4fa9e2",
-  "#d55e00": "#f5893d",
-  "#009e73": "#2cc79a",
-  "#cc79a7": "#e3a0c6",
-};
-
 function lineColour(colour) {
   if (colour === "ink") return themed("ink");
-  return darkTheme.matches ? onDark[colour] || colour : colour;
+  return darkTheme.matches ? `color-mix(in srgb, ${colour} 65%, white)` : colour;
 }
 
 const FONT = '"Noto Sans", "Segoe UI", "Helvetica Neue", Arial, sans-serif';
+// What shows on every ground: dark on light.
+const [DARK, LIGHT] = ["#1b1f24", "#ffffff"];
 
 // A canvas as wide as its host and `height` px high; `draw(context, width, height)` whenever either
 // changes.
@@ -148,28 +159,125 @@ function surface(host, height, draw) {
   return { canvas, request };
 }
 
+function drawLine(context, x0, y0, x1, y1, dash, colour) {
+  context.beginPath();
+  context.setLineDash(dash);
+  context.strokeStyle = colour;
+  context.lineWidth = 1;
+  context.moveTo(x0, y0);
+  context.lineTo(x1, y1);
+  context.stroke();
+  context.setLineDash([]);
+}
+
+// The path so far, dark within light of these widths.
+function outlined(context, [light, dark], dash = []) {
+  for (const [colour, width, dashed] of [[LIGHT, light, []], [DARK, dark, dash]]) {
+    context.strokeStyle = colour;
+    context.lineWidth = width;
+    context.setLineDash(dashed);
+    context.stroke();
+  }
+  context.setLineDash([]);
+}
+
+// Text in ink, at most `room` px wide; upright if it `stands`.
+function write(context, text, x, y, how = {}) {
+  const { align = "center", size = 13, room, stands = false, bold = "" } = how;
+  context.save();
+  context.translate(x, y);
+  if (stands) context.rotate(-Math.PI / 2);
+  context.font = `${bold} ${size}px ${FONT}`;
+  context.textAlign = align;
+  context.fillStyle = themed("ink");
+  context.fillText(text, 0, 0, room);
+  context.restore();
+}
+
+// Frame, ticks and numbers of a box, and the words of its axes. An axis is its { range, at, words,
+// unit, ticks }, `at` the place of a value on the screen; an x axis without words has no numbers.
+// Ticks are lines through the box if it is `ruled`.
+function drawAxes(context, { left, top, width, height }, x, y, ruled) {
+  const [bottom, middle] = [top + height, left + width / 2];
+  const [ink, ruling] = [themed("ink"), themed("faint")];
+  for (const [value, label] of ticks(...x.range, width / 90, x.ticks)) {
+    const at = x.at(value);
+    if (ruled) drawLine(context, at, top, at, bottom, [], ruling);
+    else drawLine(context, at, bottom, at, bottom + 5, [], ink);
+    if (x.words) write(context, label, at, bottom + 18);
+  }
+  for (const [value, label] of ticks(...y.range, Math.max(3, height / 45), y.ticks)) {
+    const at = y.at(value);
+    if (ruled) drawLine(context, left, at, left + width, at, [], ruling);
+    else drawLine(context, left - 5, at, left, at, [], ink);
+    write(context, label, left - 8, at + 4.5, { align: "right" });
+  }
+  context.strokeStyle = ink;
+  context.lineWidth = 1;
+  context.strokeRect(left, top, width, height);
+  const size = 15;
+  if (x.words) write(context, withUnit(x.words, x.unit), middle, bottom + 40, { size });
+  write(context, withUnit(y.words, y.unit), 17, top + height / 2, {
+    size: height < 300 ? 13 : size, room: height, stands: true,
+  });
+}
+
 // Cells or ranges with points on both sides of a limit.
 const MIXED = DATA.both;
 const SHADE = DATA.shade;
 
-// Buttons for those who have no wheel; `zoom` takes the factor by which the view grows.
-function zoomButtons(zoom, reset) {
-  const button = (text, label, onclick) => element("button", {
-    type: "button", "aria-label": label, title: label, onclick,
-  }, text);
-  const whole = element("button", { type: "button", onclick: reset }, "Reset zoom");
-  return element("span", { class: "zoom" }, button("+", "Zoom in", () => zoom(0.7)),
-    button("−", "Zoom out", () => zoom(1 / 0.7)), whole);
-}
-
-// The wheel alone scrolls the page. With Ctrl or Command it zooms, and so does a pinch on a
-// trackpad, which browsers report as such a wheel.
-function zoomByWheel(figure, zoom) {
+// What pointer and keys do on a figure, and buttons for those who have no wheel. `does` has
+// view(), isZoomed() and reset(); move(view, [x, y]) from an earlier view by px; zoom(factor,
+// event), by which the view grows about the event's place or, without one, about what is read;
+// read(event) and letGo(); pick(event), a click; key(event), which says whether the key is one.
+function interact(figure, does) {
+  const on = (kind, heard) => figure.addEventListener(kind, heard);
+  let drag = null;
+  on("pointermove", (event) => {
+    const by = drag ? [event.clientX - drag.at[0], event.clientY - drag.at[1]] : [0, 0];
+    if (drag) drag.far ||= Math.hypot(...by) > 4;
+    if (!drag?.far || !does.isZoomed()) does.read(event);
+    else {
+      does.letGo();
+      does.move(drag.view, by);
+    }
+  });
+  on("pointerdown", (event) => {
+    drag = { at: [event.clientX, event.clientY], view: does.view(), far: false };
+    figure.setPointerCapture(event.pointerId);
+  });
+  on("pointerup", (event) => {
+    const isClick = drag && !drag.far;
+    drag = null;
+    if (isClick) does.pick(event);
+  });
+  on("pointercancel", () => { drag = null; });
+  // A finger that is lifted leaves what it has read.
+  on("pointerleave", (event) => { if (event.pointerType === "mouse") does.letGo(); });
+  on("blur", does.letGo);
+  on("dblclick", does.reset);
+  // The wheel alone scrolls the page. With Ctrl or Command it zooms, and so does a pinch on a
+  // trackpad, which browsers report as such a wheel.
   figure.addEventListener("wheel", (event) => {
     if (!event.ctrlKey && !event.metaKey) return;
     event.preventDefault();
-    zoom(event, Math.exp(0.0015 * Math.min(Math.max(event.deltaY, -900), 900)));
+    does.zoom(Math.exp(0.0015 * Math.min(Math.max(event.deltaY, -900), 900)), event);
   }, { passive: false });
+  const closer = () => does.zoom(0.7);
+  const farther = () => does.zoom(1 / 0.7);
+  const keys = { "+": closer, "=": closer, "-": farther, 0: does.reset, Escape: does.letGo };
+  on("keydown", (event) => {
+    if (does.key(event)) event.preventDefault();
+    else if (event.key in keys) {
+      keys[event.key]();
+      event.preventDefault();
+    }
+  });
+  const button = (text, label, onclick) => element("button", {
+    type: "button", "aria-label": label, title: label, onclick,
+  }, text);
+  return element("span", { class: "zoom" }, button("+", "Zoom in", closer),
+    button("−", "Zoom out", farther), button("Reset zoom", null, does.reset));
 }
 
 // A view [low, high] zoomed by `factor` about `centre`, kept within [least, greatest].
@@ -184,34 +292,12 @@ function moved([low, high], by, [least, greatest]) {
   return [low + shift, high + shift];
 }
 
-// What was run, in words, and the modes of its machine.
-function createAbout(data) {
-  const about = element("dl", { class: "about" });
-  for (const [title, text] of data.about) {
-    about.append(element("dt", {}, title), element("dd", {}, text));
+function lowerBound(sorted, value) {
+  let low = 0, high = sorted.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (sorted[middle] < value) low = middle + 1;
+    else high = middle;
   }
-  const parts = data.about.length ? [element("h2", {}, "What was run"), about] : [];
-  if (!data.resonances?.length) return parts;
-  const heads = ["Motion", "Resonance (rpm)", "Damping ratio"];
-  return [...parts, element("h2", {}, "Resonances of the machine as given"),
-    element("table", { class: "modes" },
-      tableHead(heads),
-      element("tbody", {}, ...data.resonances.map(([motion, speed, damping]) => element("tr", {},
-        element("th", { scope: "row" }, motion), element("td", {}, speed),
-        element("td", {}, damping)))))];
-}
-
-function showProvenance(entries) {
-  const list = element("dl");
-  for (const [key, value] of entries) {
-    const body = typeof value === "object" && value !== null
-      ? element("details", { open: JSON.stringify(value).length < 600 },
-        element("summary", {}, "show"),
-        element("pre", { tabindex: "0" }, JSON.stringify(value, null, 2)))
-      : document.createTextNode(String(value));
-    list.append(element("dt", {}, key), element("dd", {}, body));
-  }
-  const host = document.getElementById("provenance");
-  const fold = element("details", {}, element("summary", {}, "digests, versions, the plan"), list);
-  host.append(entries.length ? fold : "The file says nothing about its origin.");
+  return low;
 }

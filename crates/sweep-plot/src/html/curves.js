@@ -51,15 +51,12 @@ function createCurves(host, live) {
     show(models, speeds) {
       models.forEach((numbers, model) => {
         const count = numbers[0] === 1 ? numbers[3] : 0;
-        const column = (k, factor, into) => {
-          for (let i = 0; i < into.length; i++) {
-            into[i] = i < count ? numbers[4 + i * columns + k] * factor : NaN;
-          }
-        };
-        live.channels.forEach((channel, k) => {
-          column(k, channel.factor, motion[k].series[model].y);
+        [...live.channels, { factor: 1e3 }].forEach(({ factor }, k) => {
+          const { y } = (motion[k] ?? gap).series[model];
+          y.forEach((_, i) => {
+            y[i] = i < count ? numbers[4 + i * columns + k] * factor : NaN;
+          });
         });
-        column(columns - 1, 1e3, gap.series[model].y);
       });
       version += 1;
       speed.series[0].y.set(speeds.subarray(0, instants));

@@ -1,5 +1,5 @@
 // A design's page: points over every pair of parameters with their values under the pointer, the
-// histogram, and a table of what the quantity depends on.
+// histogram, and what the quantity depends on.
 
 // Pixels within which the pointer finds a point.
 const REACH = 12;
@@ -13,7 +13,10 @@ function createDesign(main, data, panel) {
       host.append(element("h2", {}, title), element("p", { class: "help" }, subtitle));
       createChart(host, decodedChart(chart), title);
     },
-    influence: (host) => showInfluence(host, data.influence),
+    influence: (host) => {
+      host.append(element("div", { class: "figure drawn" }));
+      host.firstChild.innerHTML = data.influence;
+    },
   };
   const names = [data.first, ...Object.keys(parts).filter((name) => name !== data.first)];
   for (const name of names) {
@@ -25,26 +28,18 @@ function createDesign(main, data, panel) {
 
 // The picture is the program's own; the page finds points in it and marks them.
 function createMatrix(host, data, choose = () => {}) {
-  const decoded = (one) => ({ ...one, values: floats(one.values) });
-  const directions = data.directions.map(decoded);
+  const directions = data.directions.map((one) => ({ ...one, values: floats(one.values) }));
   let found = null;
 
-  const figure = element("div", {
-    class: "figure drawn", tabindex: "0", role: "application",
-    "aria-label": "Scatter matrix. Arrow keys go from point to point, Escape lets go.",
-  });
-  figure.innerHTML = data.picture;
+  const find = furnish(host, "design");
+  const [figure, tip, said] = [".figure", ".tip", ".unseen"].map(find);
+  if (data.note) find(".help").append(` Shown: ${data.note}.`);
+  figure.insertAdjacentHTML("afterbegin", data.picture);
   const picture = figure.firstElementChild;
   picture.setAttribute("viewBox", data.view.join(" "));
   for (const size of ["width", "height"]) picture.removeAttribute(size);
   const marks = document.createElementNS(picture.namespaceURI, "g");
   picture.append(marks);
-  const tip = element("div", { class: "tip", hidden: true });
-  const said = element("p", { class: "unseen", "aria-live": "polite" });
-  figure.append(tip);
-  host.append(figure, said, element("p", { class: "help" }, "Hover or tap to read a point, "
-    + "which is marked in every panel. Or focus the figure and use the arrow keys."
-    + (data.note ? ` Shown: ${data.note}.` : "")));
 
   const part = (one, value) => {
     const even = one.log ? Math.log : (x) => x;
@@ -74,19 +69,13 @@ function createMatrix(host, data, choose = () => {}) {
     }
     const head = `Point ${data.points[found]}: ${data.sides[data.of[found]]}`;
     const rows = directions.map((one) => [one.words, significant(one.values[found]), one.unit]);
-    tip.replaceChildren(element("p", {}, head), element("table", {}, element("tbody", {},
-      ...rows.map(([words, value, unit]) => element("tr", {},
-        element("th", { scope: "row" }, words), element("td", {}, value),
-        element("td", {}, unit))))));
+    tip.replaceChildren(element("p", {}, head),
+      table([], rows.map(([words, ...cells]) => tableRow(words, cells))));
     tip.dataset.point = data.points[found];
     said.textContent = [head, ...rows.map((row) => row.join(" ").trim())].join("; ");
     const [x, y] = (place ?? at(panels.at(-1), found))
       .map((value, k) => (value - data.view[k]) / scale());
-    const room = figure.clientWidth - tip.offsetWidth;
-    const left = x + 16 > room ? x - 16 - tip.offsetWidth : x + 16;
-    tip.style.left = `${Math.max(0, Math.min(left, room))}px`;
-    const lowest = picture.clientHeight - tip.offsetHeight;
-    tip.style.top = `${Math.max(0, Math.min(y + 12, lowest))}px`;
+    placeTip(tip, [x - 16, x + 16], y + 12, [0, picture.clientHeight]);
   }
 
   function read(event) {
@@ -136,28 +125,4 @@ function createMatrix(host, data, choose = () => {}) {
     } else return;
     event.preventDefault();
   });
-}
-
-function showInfluence(host, data) {
-  const rows = data.rows.map(([words, rank, any]) => {
-    const bar = element("div", { class: "bar", "aria-hidden": "true" });
-    const span = (from, to, name) => {
-      const piece = element("i", { class: name });
-      piece.style.left = `${50 + 50 * Math.min(from, to)}%`;
-      piece.style.width = `${50 * Math.abs(to - from)}%`;
-      bar.append(piece);
-    };
-    span(-data.chance, data.chance, "chance");
-    if (rank !== null) span(0, rank, "rank");
-    if (any !== null && any > Math.abs(rank)) span(0, rank < 0 ? -any : any, "any");
-    return element("tr", {}, element("th", { scope: "row" }, words),
-      element("td", {}, significant(rank, 2)), element("td", {}, significant(any, 2)),
-      element("td", { class: "wide" }, bar));
-  });
-  const head = ["Parameter", "Rank correlation (Spearman)",
-    "Rising and falling alike (root of the correlation ratio)", "from −1 to 1"];
-  host.append(element("h2", {}, data.title), element("p", { class: "help" }, data.subtitle),
-    element("table", { class: "influence" }, tableHead(head), element("tbody", {}, ...rows)),
-    element("p", { class: "help" }, "In the grey, up to a magnitude of "
-      + `${significant(data.chance, 2)}, a rank correlation may be chance (95 %).`));
 }

@@ -2,10 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::{CHART, CORE, DESIGN, START, chart_json, computing, embed, page, provenance};
+use super::{CHART, CORE, DESIGN, START, chart_json, computing, curve, embed, page, report};
 use crate::figures::{histogram, influence, matrix};
 use crate::frame::HEADING_HEIGHT;
-use crate::influence::chance;
 use crate::raster::Typeface;
 use crate::scatter::{Scatter, Side};
 use crate::svg;
@@ -30,11 +29,6 @@ pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions, typeface: &Typef
     let (picture, panels) = matrix::draw(scatter, typeface);
     let [top, width, height] = [HEADING_HEIGHT, picture.width, picture.height - HEADING_HEIGHT];
     let sides = Side::ALL.map(|side| scatter.words(side));
-    let influences = scatter.by_influence().into_iter().map(|k| {
-        let one = &scatter.parameters[k];
-        let found = one.influence;
-        json!([one.label.words, found.map(|found| found.rank), found.and_then(|found| found.any)])
-    });
     let mut data = json!({
         "kind": "design",
         "title": title,
@@ -55,18 +49,15 @@ pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions, typeface: &Typef
             "note": matrix::notes(scatter).join("; "),
         },
         "histogram": {
-            "title": chart.title, "subtitle": chart.subtitle, "chart": chart_json(&chart),
+            "title": chart.title, "subtitle": chart.subtitle, "chart": chart_json(&chart, curve),
         },
-        "influence": {
-            "title": influence::title(scatter),
-            "subtitle": influence::subtitle(scatter),
-            "chance": chance(scatter.valued()),
-            "rows": influences.collect::<Value>(),
-        },
-        "provenance": provenance(&scatter.source),
+        "influence": svg::write(&influence::draw(scatter, typeface)),
     });
     let axes: Vec<(&str, bool)> =
         scatter.parameters.iter().map(|one| (one.name.as_str(), one.log)).collect();
-    let computing = computing(&mut data, options.live.as_ref(), &scatter.source, &axes);
-    page(title, data, &[&[CORE, CHART, DESIGN][..], computing, &[START]].concat())
+    let live = options.live.as_ref();
+    let computing = computing(&mut data, live, &axes);
+    let told = live.map_or_else(String::new, |_| report::told(&scatter.source, live));
+    let scripts = [&[CORE, CHART, DESIGN][..], computing, &[START]].concat();
+    page(title, data, &scripts, &scatter.source, &told)
 }

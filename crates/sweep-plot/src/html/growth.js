@@ -1,60 +1,33 @@
 // How fast small disturbances grow while the drum turns at constant speeds, of the panel's point.
 
-// The least speed that is asked for, rpm; about how many are; how many a call takes.
-const GROWTH = { from: 50, speeds: 300, together: 10 };
+// The least speed that is asked for, rpm; about how many are, and how many a call takes: of a
+// machine whose growth is slow, and of another one.
+const GROWTH = { from: 50, slow: [24, 1], quick: [300, 10] };
+
+// Of the fastest disturbance at each speed: growth (1/s), frequency (cycles per minute), kind.
+async function growthAt(pool, kind, values, speeds) {
+  const urgency = kind === "check" ? 1 : 0;
+  const { numbers } = await pool.ask(kind, urgency, "growth", [...values, ...speeds],
+    [values.length]);
+  return Array.from(speeds, (_, k) => numbers.slice(1 + 3 * k, 4 + 3 * k));
+}
 
 function createGrowth(host, live, pool) {
-  const about = element("p", { id: "growth-status", role: "status" });
-  const chartHost = element("div", { id: "live-growth-chart" });
-  const box = element("details", { id: "live-growth", ontoggle: () => compute() },
-    element("summary", {}, "Growth of disturbances at constant speeds"),
-    element("p", {}, "At a constant speed the nonlinear model has a motion that repeats with each "
-      + "turn of the drum. Where small disturbances of this motion grow (above zero), it does not "
-      + "last, and the linear model fails."),
-    about, chartHost);
-  host.append(box);
+  const find = furnish(host, "growth");
+  const [box, about, chartHost] = ["#live-growth", "#growth-status", "#live-growth-chart"]
+    .map(find);
+  box.addEventListener("toggle", compute);
+  const [count, together] = live.hasSlowGrowth ? GROWTH.slow : GROWTH.quick;
   let point = null;
   let isDone = true;
   let asked = 0;
-  let chart = null;
-  let spec = null;
 
   // Speeds up to the fastest of the spin, in whole steps.
   function speedsUpTo(peak) {
     const from = Math.min(GROWTH.from, peak / 4);
-    const step = Math.max(1, Math.round((peak - from) / GROWTH.speeds));
-    const count = Math.max(2, 1 + Math.floor((peak - from) / step + 1e-6));
-    return Float32Array.from({ length: count }, (_, k) => from + step * k);
-  }
-
-  function drawOver(speeds) {
-    const empty = () => new Float32Array(speeds.length).fill(NaN);
-    const line = () => [{ ...plainLine("", "#0072b2", empty()), width: 1.6 }];
-    const growth = plainPanel("growth", "Growth", "1/s", true, line(), 200);
-    growth.levels = [[0, "neither growth nor decay"]];
-    const frequency = plainPanel("frequency", "Frequency", "cycles/min", true, line(), 110);
-    spec = plainChart("Spin speed", "rpm", speeds, [growth, frequency]);
-    spec.shadeMeaning = "disturbances grow";
-    chartHost.replaceChildren();
-    chart = createChart(chartHost, spec, "Growth of disturbances over speed");
-  }
-
-  // Runs of speeds at which disturbances grow, in words.
-  function tongues(speeds, kinds) {
-    const { y } = spec.panels[0].series[0];
-    const found = [];
-    for (let k = 0; k < speeds.length; k++) {
-      if (!(y[k] > 0)) continue;
-      const last = found.at(-1);
-      if (last?.to === k - 1) last.to = k;
-      else found.push({ from: k, to: k, most: k });
-      const now = found.at(-1);
-      if (y[k] > y[now.most]) now.most = k;
-    }
-    spec.shades = found.map(({ from, to }) => [speeds[from], speeds[to]]);
-    return found.map(({ from, to, most }) => `from ${significant(speeds[from])} to `
-      + `${significant(speeds[to])} rpm (${live.kinds[kinds[most]]}, at most `
-      + `${significant(y[most], 3)}/s at ${significant(speeds[most])} rpm)`);
+    const step = Math.max(1, Math.round((peak - from) / count));
+    const length = Math.max(2, 1 + Math.floor((peak - from) / step + 1e-6));
+    return Float32Array.from({ length }, (_, k) => from + step * k);
   }
 
   async function compute() {
@@ -63,42 +36,56 @@ function createGrowth(host, live, pool) {
     asked += 1;
     const of = asked;
     const speeds = speedsUpTo(point.peak);
-    const kinds = new Uint8Array(speeds.length);
     const started = performance.now();
-    drawOver(speeds);
-    about.textContent = "Computing.";
-    const parts = [];
-    for (let k = 0; k < speeds.length; k += GROWTH.together) {
-      const part = speeds.subarray(k, k + GROWTH.together);
-      const numbers = [...point.values, ...part];
-      const answer = pool.ask("growth", 0, "growth", numbers, [point.values.length]);
-      parts.push(answer.then((given) => {
-        if (of !== asked) return;
-        const [, ...rest] = given.numbers;
-        part.forEach((_, at) => {
-          const [growth, frequency, kind] = rest.slice(3 * at, 3 * at + 3);
-          spec.panels[0].series[0].y[k + at] = growth;
-          spec.panels[1].series[0].y[k + at] = frequency;
-          kinds[k + at] = kind;
-        });
-        chart.changed();
-      }));
-    }
+    const [y, frequencies] = [0, 1].map(() => new Float32Array(speeds.length).fill(NaN));
+    const line = (values) => [{ ...plainLine("", "#0072b2", values), width: 1.6 }];
+    const panels = [plainPanel("growth", "Growth", "1/s", true, line(y), 200),
+      plainPanel("frequency", "Frequency", "cycles/min", true, line(frequencies), 110)];
+    panels[0].levels = [[0, "neither growth nor decay"]];
+    const spec = plainChart("Spin speed", "rpm", speeds, panels);
+    spec.shadeMeaning = "disturbances grow";
+    chartHost.replaceChildren();
+    const chart = createChart(chartHost, spec, "Growth of disturbances over speed");
+    const kinds = [];
+    let left = speeds.length;
+    const part = async (k) => {
+      const some = speeds.subarray(k, k + together);
+      const found = await growthAt(pool, "growth", point.values, some);
+      if (of !== asked) return;
+      found.forEach((one, at) => { [y[k + at], frequencies[k + at], kinds[k + at]] = one; });
+      left -= some.length;
+      about.textContent = `Computing: ${left} of ${speeds.length} speeds are left.`;
+      chart.changed();
+    };
     try {
-      await Promise.all(parts);
+      const starts = Array.from({ length: Math.ceil(left / together) }, (_, k) => k * together);
+      await Promise.all(starts.map(part));
     } catch (error) {
       if (error && of === asked) about.textContent = `It could not be computed: ${error.message}.`;
       return;
     }
     if (of !== asked) return;
-    const seconds = ((performance.now() - started) / 1000).toFixed(1);
-    const found = tongues(speeds, kinds);
+    // Runs of speeds at which disturbances grow.
+    const runs = [];
+    speeds.forEach((_, k) => {
+      if (!(y[k] > 0)) return;
+      if (runs.at(-1)?.at(-1) === k - 1) runs.at(-1).push(k);
+      else runs.push([k]);
+    });
+    spec.shades = runs.map((run) => [speeds[run[0]], speeds[run.at(-1)]]);
     chart.changed();
-    const said = found.length ? `Disturbances grow ${found.join(", and ")}.`
+    const grow = runs.map((run) => {
+      const most = run.reduce((a, b) => (y[b] > y[a] ? b : a));
+      return `from ${significant(speeds[run[0]])} to ${significant(speeds[run.at(-1)])} rpm (`
+        + `${live.kinds[kinds[most]]}, at most ${significant(y[most], 3)}/s at `
+        + `${significant(speeds[most])} rpm)`;
+    });
+    const said = grow.length ? `Disturbances grow ${grow.join(", and ")}.`
       : "Disturbances decay at every speed.";
+    const seconds = ((performance.now() - started) / 1000).toFixed(1);
     about.textContent = `${said} ${speeds.length} speeds in ${seconds} s.`;
     box.dataset.speeds = speeds.join(" ");
-    box.dataset.growth = spec.panels[0].series[0].y.join(" ");
+    box.dataset.growth = y.join(" ");
     box.dataset.point = point.values.join(" ");
   }
 

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map as Object, Value, json};
 
-use super::embed;
+use super::{chart_json, embed};
+use crate::PlotOptions;
 use crate::error::PlotError;
+use crate::figures::trace;
 use crate::gather::Map;
-use crate::label;
 use crate::read::{Kind, Source};
 use crate::table::Table;
 use crate::together::{self, At};
@@ -18,22 +19,11 @@ use sweep_files::{FileError, regular};
 /// kept.
 const STRETCHES: usize = 500;
 
-/// The trace files of a folder, by the place of their point in the grid:
-///
-/// ```text
-/// { "<place>": {
-///     "time_s": floats,
-///     "series": { "<column>": {
-///         "data": 16 bit integers, "unit": size of their unit, "shown": "mm", "factor": 1000,
-///         "words": "tub front, vertical" (of the nonlinear model's channels)
-///     } }
-/// } }
-/// ```
-///
-/// A file belongs to the point that its metadata names (`at`: axis to value), or else to the one
-/// whose index (column `point`) ends its name, as in `point-123.parquet`. Histories are cut into
-/// 500 stretches with two values each, the least and the greatest in the order in which they occur,
-/// at the stretch's first and middle instant.
+/// The charts of a folder's trace files, by the place of their point in the grid, their curves
+/// quantised. A file belongs to the point that its metadata names (`at`: axis to value), or else to
+/// the one whose index (column `point`) ends its name, as in `point-123.parquet`. Histories are cut
+/// into 500 stretches with two values each, the least and the greatest in the order in which they
+/// occur, at the stretch's first and middle instant.
 ///
 /// # Errors
 /// [`PlotError::File`] for the folder; as [`Table::open`] for its files; [`PlotError::Unfit`] for a
@@ -102,18 +92,8 @@ fn point(at: &At, cell: usize, map: &Map) -> At {
     point
 }
 
+/// The figure of one point's trace, in its page's form.
 fn history(table: &Table) -> Result<Value, PlotError> {
-    let mut series = Object::new();
-    for column in &table.columns {
-        let Some(numbers) = column.numbers().filter(|_| column.name != "time_s") else { continue };
-        let (unit, factor) = label::shown(&column.unit);
-        let (data, size) = embed::quantised(numbers);
-        let mut facts = json!({ "data": data, "unit": size, "shown": unit, "factor": factor });
-        if let Some(channel) = column.name.strip_prefix("nonlinear_") {
-            facts["words"] = json!(label::channel(channel));
-        }
-        series.insert(column.name.clone(), facts);
-    }
-    let time = embed::floats(table.numbers("time_s")?.iter().copied());
-    Ok(json!({ "time_s": time, "series": series }))
+    let chart = trace::chart(table, &PlotOptions::default())?;
+    Ok(chart_json(&chart, |values| json!(embed::quantised(values))))
 }

@@ -21,28 +21,26 @@ function createLive(host, data) {
   // Its ends along both axes, as the map spaces them.
   let fineEdges = null;
 
-  const status = element("p", { id: "live-status", role: "status" }, "Starting.");
+  const find = furnish(host, "live");
+  const [panel, status, reset, refine, told, charts] = ["#live", "#live-status", "#live-reset",
+    "#refine", "#live-values", "#live-charts"].map(find);
   const inputs = live.sliders.map((slider, k) => createSlider(slider, k));
-  const reset = element("button", { type: "button", id: "live-reset", onclick: () => {
-    live.sliders.forEach((slider, k) => { if (!slider.axis) set(k, slider.value); });
-    changed();
-  } }, "Other numbers as in the map");
-  const refine = element("button", { type: "button", id: "refine", onclick: refineMap },
-    "Finer map around this point");
-  const told = element("div", { class: "readout", id: "live-values" });
-  const charts = element("div");
-  host.append(element("section", { id: "live", "aria-labelledby": "live-title" },
-    element("h2", { id: "live-title" }, "Any point, computed in this page"),
-    element("div", { class: "columns" },
-      element("div", {}, element("div", { class: "sliders" }, ...inputs.map((one) => one.row)),
-        element("div", { class: "controls" }, reset, refine), status),
-      told),
-    charts, computedWith()));
+  find(".sliders").append(...inputs.map((one) => one.row));
+  values.forEach((value, k) => set(k, value));
+  reset.addEventListener("click", () => {
+    put(live.sliders.flatMap(({ axis, value }, k) => (axis ? [] : [[k, value]])));
+  });
+  refine.addEventListener("click", refineMap);
+  const facts = { ...live, window: live.windowS.join(" to ") };
+  for (const at of panel.querySelectorAll("[data-said]")) at.textContent = facts[at.dataset.said];
+  panel.querySelectorAll("#computed-with ul").forEach((list, model) => {
+    list.append(...live.rungs[model].map((text) => element("li", {}, text)));
+  });
 
   const pool = createPool(unpacked(live.module), doubles(live.setup), (state) => {
     if (state.error) status.textContent = `This browser cannot compute here: ${state.error}.`;
-    host.querySelector("#live").dataset.ready = `${state.ready} of ${state.workers}`;
-    host.querySelector("#live-workers").textContent = `${state.ready} workers, each with a module `
+    panel.dataset.ready = `${state.ready} of ${state.workers}`;
+    find("#live-workers").textContent = `${state.ready} workers, each with a module `
       + `of its own: WebAssembly with simd128, ${state.lanes} trajectories side by side.`;
   });
   const curves = createCurves(charts, live);
@@ -54,7 +52,7 @@ function createLive(host, data) {
     const [scaled, back] = slider.log ? [Math.log10, (x) => 10 ** x] : [(x) => x, (x) => x];
     const bounded = (value) => Math.min(Math.max(value, from), to);
     const number = element("input", {
-      type: "number", step: "any", min: from, max: to, value: slider.value,
+      type: "number", step: "any", min: from, max: to,
       "aria-label": withUnit(slider.words, slider.unit), "data-number": slider.name,
       onchange: () => {
         const typed = Number(number.value);
@@ -63,14 +61,13 @@ function createLive(host, data) {
       },
     });
     const range = element("input", {
-      type: "range", step: "any", min: scaled(from), max: scaled(to), value: scaled(slider.value),
+      type: "range", step: "any", min: scaled(from), max: scaled(to),
       "aria-label": slider.words, "data-slider": slider.name, title: slider.description,
       oninput: () => {
         set(k, bounded(Number(back(Number(range.value)).toPrecision(4))));
         changed();
       },
     });
-    if (slider.log) range.setAttribute("aria-valuetext", slider.value);
     return { number, range, scaled, row: element("label", { title: slider.description },
       element("span", {}, slider.words), range, number, element("span", {}, slider.unit)) };
   }
@@ -81,6 +78,12 @@ function createLive(host, data) {
     number.value = value;
     range.value = scaled(value);
     if (live.sliders[k].log) range.setAttribute("aria-valuetext", value);
+  }
+
+  // Values of some sliders, each its number and the value.
+  function put(some) {
+    for (const [k, value] of some) set(k, value);
+    changed();
   }
 
   function changed() {
@@ -104,10 +107,9 @@ function createLive(host, data) {
       isMoved = false;
       const started = performance.now();
       try {
-        const calls = [ask("preview", 4, "quick", [values.length]),
-          ...motions("preview", [QUICK_RUNG, QUICK_RUNG])];
         const speeds = ask("preview", 3, "speeds", [live.everyS]);
-        const [peaks, ...found] = await Promise.all(calls);
+        const [peaks, ...found] = await Promise.all([ask("preview", 4, "quick", [values.length]),
+          ...motions("preview", [QUICK_RUNG, QUICK_RUNG])]);
         const took = performance.now() - started;
         const ms = [peaks, ...found].map((one) => one.ms);
         show({ ...parsedAnswer(peaks.numbers, live), isChecked: false, took, ms });
@@ -146,18 +148,14 @@ function createLive(host, data) {
   async function tellGrowth(of) {
     const line = element("p", { id: "growth-metric" }, "Growth at constant speeds: computing.");
     told.append(line);
-    const { numbers } = await pool.ask("check", 1, "growth", [...values, ...live.growthSpeeds],
-      [values.length]);
+    const found = await growthAt(pool, "check", values, live.growthSpeeds);
     if (of !== latest) return;
-    let most = null;
-    live.growthSpeeds.forEach((speed, k) => {
-      const growth = numbers[1 + 3 * k];
-      if (growth > (most?.growth ?? -Infinity)) most = { growth, speed };
-    });
-    line.textContent = most ? `Growth at most ${significant(most.growth, 3)} /s, at `
-      + `${significant(most.speed)} rpm of ${live.growthSpeeds.length} constant speeds`
-      : "No response at any of the map's constant speeds";
-    line.dataset.growth = most?.growth;
+    const growth = found.map((one) => one[0]);
+    const most = Math.max(...growth.filter(Number.isFinite));
+    line.dataset.growth = most;
+    line.textContent = Number.isFinite(most) ? `Growth at most ${significant(most, 3)} /s, at `
+      + `${significant(live.growthSpeeds[growth.indexOf(most)])} rpm of ${growth.length} constant `
+      + "speeds" : "No response at any of the map's constant speeds";
   }
 
   // Work that was let go fails without an error.
@@ -166,22 +164,14 @@ function createLive(host, data) {
     status.textContent = `This point could not be computed: ${error.message}. It is a defect.`;
   }
 
-  function greatestOf(ratios) {
-    let greatest = null;
-    for (const channel of live.compared) {
-      const ratio = ratios[channel];
-      if (ratio > (greatest?.ratio ?? -Infinity)) greatest = { ratio, channel };
-    }
-    return greatest;
-  }
-
-  const leastOf = (ratios) => Math.min(...live.compared.map((channel) => ratios[channel])
-    .filter(Number.isFinite));
-  const isTrusted = (ratios) => greatestOf(ratios).ratio < live.ratioLimit
+  const compared = (ratios) => live.compared.map((channel) => ratios[channel])
+    .filter(Number.isFinite);
+  const greatestOf = (ratios) => Math.max(...compared(ratios));
+  const leastOf = (ratios) => Math.min(...compared(ratios));
+  const isTrusted = (ratios) => greatestOf(ratios) < live.ratioLimit
     && (live.ratioMin === null || leastOf(ratios) > live.ratioMin);
 
   function show(answer) {
-    const panel = host.querySelector("#live");
     panel.dataset.kind = answer.isChecked ? "checked" : "preview";
     panel.dataset.point = values.join(" ");
     panel.dataset.ms = answer.ms.join(" ");
@@ -198,17 +188,15 @@ function createLive(host, data) {
     panel.dataset.ratios = ratios.join(" ");
     panel.dataset.sag = answer.sag;
     const greatest = greatestOf(ratios);
+    const channel = live.compared.find((of) => ratios[of] === greatest);
     const failed = records.findIndex((record) => record.failure !== 0);
     const verdict = failed >= 0
       ? `The ${["nonlinear", "linear"][failed]} model ${FAILURES[records[failed].failure]} at `
         + `${significant(records[failed].failTime)} s`
-      : !greatest ? "Undefined: no excitation"
+      : channel === undefined ? "Undefined: no excitation"
         : `Linear model ${isTrusted(ratios) ? "" : "un"}reliable here`;
-    const kind = answer.isChecked ? "Checked" : "Preview, not checked";
-    const row = (words, unit, of, beside = "") => element("tr", {},
-      element("th", { scope: "row" }, withUnit(words, unit)),
-      ...records.map((record) => element("td", {}, significant(of(record)))),
-      element("td", {}, beside));
+    const row = (words, unit, of, beside = "") => tableRow(withUnit(words, unit),
+      [...records.map((record) => significant(of(record))), beside]);
     const rows = live.channels.map((channel, k) => row(channel.words, channel.unit,
       (record) => record.amplitudes[k] * channel.factor, significant(ratios[k])));
     rows.push(row("Least gap, whole run", "mm", (record) => record.gap * 1e3));
@@ -216,18 +204,18 @@ function createLive(host, data) {
       (record) => record.metrics[k] * metric.factor)));
     const sag = live.staticSag
       ? [element("p", {}, `Static sag of the tub ${significant(answer.sag * 1e3)} mm`)] : [];
-    const largest = greatest && `Largest ratio ${significant(greatest.ratio)} `
-      + `(${live.channels[greatest.channel].words}), the limit is ${live.ratioLimit}`;
+    const largest = channel !== undefined && `Largest ratio ${significant(greatest)} `
+      + `(${live.channels[channel].words}), the limit is ${live.ratioLimit}`;
+    const numbers = table(["", "nonlinear", "linear", "ratio"], rows);
+    numbers.prepend(element("caption", {},
+      `${capitalised(live.criterion[0])}. Ratio: ${live.criterion[1]}.`));
     told.replaceChildren(
-      element("p", { class: "kind" }, kind),
+      element("p", { class: "kind" }, answer.isChecked ? "Checked" : "Preview, not checked"),
       element("p", { class: "verdict" }, answer.isChecked ? verdict : `${verdict}?`),
       ...(largest ? [element("p", {}, largest)] : []),
       ...(answer.sensitive ? [element("p", {}, "The motion is chaotic: a near twin departs "
         + "exponentially. The digits are those of one trajectory.")] : []),
-      element("table", {},
-        element("caption", {}, `${capitalised(live.criterion[0])}. Ratio: ${live.criterion[1]}.`),
-        tableHead(["", "nonlinear", "linear", "ratio"]), element("tbody", {}, ...rows)),
-      ...sag);
+      numbers, ...sag);
     const took = `${answer.took.toFixed(answer.took < 10 ? 1 : 0)} ms`;
     status.textContent = answer.isChecked
       ? `Checked in ${took}: numbers within `
@@ -240,23 +228,18 @@ function createLive(host, data) {
   // A finer map: quick answers around the point, from the middle outwards.
   function refineMap() {
     pool.drop("fine");
-    const edges = map.region([values[map.sliders[0]], values[map.sliders[1]]], FINE.cells);
-    fineEdges = edges;
-    const step = edges.map(([low, high]) => (high - low) / FINE.points);
-    const places = [];
-    for (let i = 0; i < FINE.points; i++) {
-      for (let j = 0; j < FINE.points; j++) places.push([i, j]);
-    }
-    const middle = (FINE.points - 1) / 2;
-    const far = ([i, j]) => Math.hypot(i - middle, j - middle);
-    places.sort((a, b) => far(a) - far(b));
+    fineEdges = map.region(map.sliders.slice(0, 2).map((k) => values[k]), FINE.cells);
+    const step = fineEdges.map(([low, high]) => (high - low) / FINE.points);
+    const far = (place) => Math.hypot(...place.map((at) => at - (FINE.points - 1) / 2));
+    const places = Array.from({ length: FINE.points ** 2 },
+      (_, k) => [Math.floor(k / FINE.points), k % FINE.points]).sort((a, b) => far(a) - far(b));
     [fine, fineLeft] = [[], places.length];
     map.mark();
     map.request();
     for (let k = 0; k < places.length; k += FINE.together) {
       const part = places.slice(k, k + FINE.together).map((place) => {
-        const cell = place.map((at, axis) => edges[axis][0] + at * step[axis]);
-        return { from: cell, to: cell.map((at, axis) => at + step[axis]) };
+        const from = place.map((at, axis) => fineEdges[axis][0] + at * step[axis]);
+        return { from, to: from.map((at, axis) => at + step[axis]) };
       });
       const points = part.flatMap(({ from }) => {
         const point = [...values];
@@ -266,52 +249,23 @@ function createLive(host, data) {
         return point;
       });
       pool.ask("fine", 1, "quick", points, [values.length]).then(({ numbers }) => {
+        const width = numbers.length / part.length;
         part.forEach((cell, at) => {
-          const width = numbers.length / part.length;
           const answer = parsedAnswer(numbers.slice(at * width, (at + 1) * width), live);
           if (answer.is === 1) fine.push({ ...cell, answer });
         });
         fineLeft -= part.length;
-        host.querySelector("#live").dataset.fine = `${fine.length} ${fineLeft}`;
+        panel.dataset.fine = `${fine.length} ${fineLeft}`;
         map.request();
       }, tellError);
     }
   }
 
   // What a layer of the map shows of a finer cell; NaN where it shows something else.
-  function layerValue(layer, { records, ratios, sag }) {
-    if (layer.column === "ratio_max") return greatestOf(ratios)?.ratio ?? NaN;
-    if (layer.column === "ratio_min") return leastOf(ratios);
-    const model = { nonlinear: 0, linear: 1 };
-    if (layer.group in model || layer.group === "ratio") {
-      const channel = live.channels.findIndex((one) => one.name === layer.channel);
-      if (channel < 0) return NaN;
-      if (layer.group === "ratio") return ratios[channel];
-      return records[model[layer.group]].amplitudes[channel] * live.channels[channel].factor;
-    }
-    const gap = ["min_gap_nonlinear_m", "min_gap_linear_m"].indexOf(layer.column);
-    if (gap >= 0) return records[gap].gap * 1e3;
-    if (layer.column === "static_sag_m") return sag * 1e3;
-    for (const [k, { columns, factor }] of live.metrics.entries()) {
-      const of = columns.indexOf(layer.column);
-      if (of >= 0) return records[of].metrics[k] * factor;
-    }
-    return NaN;
-  }
-
-  function computedWith() {
-    const list = (texts) => element("ul", {}, ...texts.map((text) => element("li", {}, text)));
-    return element("details", { id: "computed-with" },
-      element("summary", {}, "What this page computes with"),
-      element("p", {}, `The models and integrators of sweep ${live.version}, as a WebAssembly `
-        + "module in this file. Nothing is fetched. WebAssembly has no fused multiply-add, so the "
-        + "last digits differ from the program's; at reliable points by less than 1e-9 of a peak."),
-      element("p", { id: "live-workers" }),
-      element("p", {}, `A preview is one run of each model. A checked point is run in finer and `
-        + `finer steps until two runs agree within ${live.accuracy}, as a row of the map. `
-        + `Amplitudes are taken from ${live.windowS[0]} to ${live.windowS[1]} s.`),
-      element("p", {}, "Nonlinear model, while only axes move:"), list(live.rungs[0]),
-      element("p", {}, "Linear model:"), list(live.rungs[1]));
+  function layerValue({ column }, answer) {
+    if (column === "ratio_max") return greatestOf(answer.ratios);
+    if (column === "ratio_min") return leastOf(answer.ratios);
+    return answer.byColumn[column] ?? NaN;
   }
 
   // The sliders of axes, and the middles of their ranges.
@@ -321,30 +275,20 @@ function createLive(host, data) {
     return { sliders, start: sliders.map((k) => Number(middle(live.sliders[k]).toPrecision(4))) };
   }
 
+  const ofAxes = (place) => place.map((value, k) => [map.sliders[k], value]);
   return {
     // The figure calls these; `connect` gives what a map lets this panel do.
     connect(given = alone()) {
       map = given;
       refine.hidden = !map.region;
-      map.start.forEach((value, k) => set(map.sliders[k], value));
-      changed();
+      put(ofAxes(map.start));
     },
-    pinned(place) {
-      place.forEach((value, k) => set(map.sliders[k], value));
-      changed();
-    },
+    pinned: (place) => put(ofAxes(place)),
     // By name; as a file's numbers of 32 bits.
-    chosen(point) {
-      live.sliders.forEach(({ name }, k) => {
-        if (name in point) set(k, Number(point[name].toPrecision(7)));
-      });
-      changed();
-    },
+    chosen: (point) => put(live.sliders.flatMap(({ name }, k) => (name in point
+      ? [[k, Number(point[name].toPrecision(7))]] : []))),
     values: () => [...values],
-    restore(given) {
-      given.forEach((value, k) => { if (Number.isFinite(value)) set(k, value); });
-      changed();
-    },
+    restore: (given) => put([...given.entries()].filter(([, value]) => Number.isFinite(value))),
     hasFine: () => fine.length > 0,
     cells(context, layer, at, colour) {
       if (!layer) return;
@@ -361,30 +305,23 @@ function createLive(host, data) {
       if (fineEdges) {
         const [[left, low], [right, high]] = [0, 1].map((end) => at(...fineEdges
           .map((ends) => ends[end])));
-        for (const [colour, dash] of [["#ffffff", []], ["#1b1f24", [5, 4]]]) {
-          context.strokeStyle = colour;
-          context.lineWidth = 1.5;
-          context.setLineDash(dash);
-          context.strokeRect(left, high, right - left, low - high);
-        }
-        context.setLineDash([]);
+        context.beginPath();
+        context.rect(left, high, right - left, low - high);
+        outlined(context, [1.5, 1.5], [5, 4]);
       }
       const [x, y] = at(...map.sliders.slice(0, 2).map((k, axis) => map.even(axis, values[k])));
-      for (const [colour, thick] of [["#ffffff", 5], ["#1b1f24", 2]]) {
-        context.strokeStyle = colour;
-        context.lineWidth = thick;
-        context.beginPath();
-        for (const [dx, dy] of [[1, 0], [0, 1]]) {
-          context.moveTo(x - 9 * dx, y - 9 * dy);
-          context.lineTo(x + 9 * dx, y + 9 * dy);
-        }
-        context.stroke();
+      context.beginPath();
+      for (const [dx, dy] of [[9, 0], [0, 9]]) {
+        context.moveTo(x - dx, y - dy);
+        context.lineTo(x + dx, y + dy);
       }
+      outlined(context, [5, 2]);
     },
   };
 }
 
-// What the module answers of a point, by name (`exports.rs` of washer-live).
+// What the module answers of a point, by name (`exports.rs` of washer-live), and in shown units
+// under the names of a map's columns.
 function parsedAnswer(numbers, live) {
   const rest = [...numbers];
   const take = (count) => rest.splice(0, count);
@@ -397,5 +334,17 @@ function parsedAnswer(numbers, live) {
     };
   });
   const ratios = take(live.channels.length);
-  return { is, sensitive: sensitive === 1, records, ratios, sag: rest[0] };
+  const byColumn = { static_sag_m: rest[0] * 1e3 };
+  live.channels.forEach(({ name }, k) => { byColumn[`ratio_${name}`] = ratios[k]; });
+  ["nonlinear", "linear"].forEach((model, of) => {
+    const { gap, amplitudes, metrics } = records[of];
+    byColumn[`min_gap_${model}_m`] = gap * 1e3;
+    live.channels.forEach(({ name, factor }, k) => {
+      byColumn[`${model}_${name}`] = amplitudes[k] * factor;
+    });
+    live.metrics.forEach(({ columns, factor }, k) => {
+      byColumn[columns[of]] = metrics[k] * factor;
+    });
+  });
+  return { is, sensitive: sensitive === 1, records, ratios, sag: rest[0], byColumn };
 }

@@ -31,6 +31,8 @@ pub(crate) fn json(live: &Live, axes: &[(&str, bool)]) -> Value {
         "metrics": live.metrics.iter().map(metric).collect::<Vec<_>>(),
         "staticSag": live.has_static_sag,
         "growthSpeeds": live.growth_speeds_rpm,
+        "hasSlowGrowth": live.has_slow_growth,
+        "leftOut": live.left_out,
         "kinds": live.kinds.iter().map(|kind| kind.replace('_', " ")).collect::<Vec<_>>(),
         "levels": live.levels,
         "accuracy": live.accuracy,

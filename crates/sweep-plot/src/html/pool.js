@@ -17,6 +17,11 @@ function createPool(module, setup, tell) {
   let next = 0;
   let compiled = null;
 
+  function failed(error) {
+    state.error = error;
+    tell(state);
+  }
+
   function hire(member) {
     member.worker = new Worker(url);
     member.task = null;
@@ -36,10 +41,7 @@ function createPool(module, setup, tell) {
       }
       feed();
     };
-    member.worker.onerror = (event) => {
-      state.error = event.message || "a worker did not start";
-      tell(state);
-    };
+    member.worker.onerror = (event) => failed(event.message || "a worker did not start");
     member.worker.postMessage({ module: compiled, setup });
   }
 
@@ -47,9 +49,8 @@ function createPool(module, setup, tell) {
     for (const member of members) {
       if (!member.isReady || member.task || queue.length === 0) continue;
       // The most urgent first, of equals the oldest.
-      let best = 0;
-      queue.forEach((task, k) => { if (task.urgency > queue[best].urgency) best = k; });
-      const [task] = queue.splice(best, 1);
+      queue.sort((a, b) => b.urgency - a.urgency || a.id - b.id);
+      const task = queue.shift();
       member.task = task;
       task.started = performance.now();
       const { id, call, numbers, rest } = task;
@@ -67,8 +68,8 @@ function createPool(module, setup, tell) {
   }
 
   // Lets go of what is not wanted any more, also where it is being worked on.
-  function drop(...kinds) {
-    const isDropped = (task) => kinds.includes(task.kind);
+  function drop(kind) {
+    const isDropped = (task) => task.kind === kind;
     for (const task of queue.filter(isDropped)) task.fail(null);
     queue = queue.filter((task) => !isDropped(task));
     for (const member of members) {
@@ -89,9 +90,6 @@ function createPool(module, setup, tell) {
       members.push({});
       hire(members[k]);
     }
-  }, (error) => {
-    state.error = String(error);
-    tell(state);
-  });
-  return { ask, drop, state };
+  }, (error) => failed(String(error)));
+  return { ask, drop };
 }

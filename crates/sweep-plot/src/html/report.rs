@@ -2,12 +2,15 @@
 
 use serde_json::Value;
 
+use super::table;
+use crate::Live;
+use crate::gather::{Counts, Map};
 use crate::label::{significant, unit_of_name, words};
 use crate::read::Source;
 use sweep_files::key;
 
 /// Title and text of what was run, from the plan in the file; empty if it carries none.
-pub(crate) fn about(source: &Source) -> Vec<(&'static str, String)> {
+fn about(source: &Source) -> Vec<(&'static str, String)> {
     let Some(plan) = source.find(key::PLAN) else { return Vec::new() };
     let lines = [
         ("Machine", machine(&plan["machine"])),
@@ -18,6 +21,50 @@ pub(crate) fn about(source: &Source) -> Vec<(&'static str, String)> {
     ];
     lines.into_iter().filter_map(|(title, text)| Some((title, text?))).collect()
 }
+
+/// The run as HTML: what was run, and what a live page knows of the machine's resonances.
+pub(crate) fn told(source: &Source, live: Option<&Live>) -> String {
+    let run: Vec<_> =
+        about(source).into_iter().map(|(title, text)| vec![title.to_owned(), text]).collect();
+    let resonances: Vec<_> =
+        live.into_iter().flat_map(|live| live.resonances.iter().cloned().map(Vec::from)).collect();
+    let heads = ["Motion", "Resonance (rpm)", "Damping ratio"];
+    table("What was run", &["", ""], &run)
+        + &table("Resonances of the machine as given", &heads, &resonances)
+}
+
+/// What to be careful about, of a map.
+pub(crate) fn caveats(map: &Map) -> String {
+    let what = if map.grid.merged() { "cells" } else { "points" };
+    let count = |has: fn(&Counts) -> bool| map.counts.iter().filter(|cell| has(cell)).count();
+    let all = count(|cell| cell.points > 0);
+    let [chaotic, failed] = [count(|cell| cell.sensitive > 0), count(|cell| cell.failed > 0)];
+    let mut found = Vec::new();
+    if chaotic > 0 {
+        found.push(format!(
+            "{chaotic} of {all} {what} are sensitive: the motion is chaotic, and its digits are \
+             those of one trajectory."
+        ));
+    }
+    if failed > 0 {
+        found.push(format!("{failed} of {all} {what} failed; the map hatches them."));
+    }
+    if map.grid.merged() {
+        let said = "A cell holds several points and shows the worst of them. The file has all.";
+        found.push(said.to_owned());
+    }
+    found.extend(ALWAYS.map(str::to_owned));
+    let items: String = found.iter().map(|text| format!("<li>{text}</li>\n")).collect();
+    format!("<h2>What to be careful about</h2>\n<ul>\n{items}</ul>\n")
+}
+
+/// What is true of every map.
+const ALWAYS: [&str; 2] = [
+    "A map shows one course of speeds. Whether the machine may stay at a speed is another \
+     question; the command sweep stability answers it.",
+    "Numbers that nobody gave are assumed. The command sweep parameters says of each where it is \
+     from.",
+];
 
 /// A number under a key, with the unit that the key's end says.
 fn quantity(of: &Value, key: &str) -> Option<String> {

@@ -14,7 +14,5 @@
       createChart(figureHost, chart, DATA.title, (x) => panel?.pinned([x]));
     }
     panel?.connect();
-    if (panel) reportHost.append(...createAbout(DATA));
   }
-  showProvenance(DATA.provenance);
 })();
