@@ -267,7 +267,9 @@ pub(crate) fn fit(
         let Some(against) = problem.against(&best.x, work.stop) else { return Ok(None) };
         problem.method = Method::Rk4 { step_s: 0.5 * step_s };
         let Some(finer) = problem.against(&best.x, work.stop) else { return Ok(None) };
-        let moved = effect(&best.summary, &against, &finer);
+        let bread = algebra::inverse(&best.summary.normal);
+        let moved = effect(&bread, &best.summary, &against, &finer);
+        let moved = moved.into_iter().fold(0.0, f64::max);
         step_effect = Some(moved);
         if moved < STEP_EFFECT {
             problem.method = Method::Rk4 { step_s };
@@ -289,6 +291,14 @@ pub(crate) fn fit(
     let mut statistics = Statistics::of(&problem, &against, &best.summary);
     let further = by_tachometer(&problem, &best, &against, work.stop);
     statistics::add(&mut statistics.covariance, &further, 1.0);
+    if problem.model == ModelKind::Linear {
+        // What the linear model does not have may hide in the numbers and leave no residual.
+        problem.model = ModelKind::Nonlinear;
+        statistics.bias = problem
+            .against(&best.x, work.stop)
+            .map(|nonlinear| effect(&statistics.covariance, &best.summary, &against, &nonlinear));
+        problem.model = ModelKind::Linear;
+    }
     let repeated = match options.bootstrap {
         0 => None,
         count => match bootstrap(&mut problem, &best.x, &against, count, work) {
@@ -348,16 +358,23 @@ fn moved<'a>(
     bread.iter().map(|row| algebra::dot(row, &pull)).collect()
 }
 
-/// By how many standard errors a finer integration would move the number that it moves most.
-fn effect(summary: &Summary, rough: &[Against], fine: &[Against]) -> f64 {
-    let apart = rough.iter().zip(fine).zip(&summary.sigma).map(|((rough, fine), sigma)| {
-        let pairs = rough.residual.iter().zip(&fine.residual);
-        (rough, *sigma, pairs.map(|(rough, fine)| rough - fine).collect::<Vec<f64>>())
+/// By how many standard errors another model would move each unknown.
+fn effect(
+    covariance: &[Vec<f64>],
+    summary: &Summary,
+    model: &[Against],
+    other: &[Against],
+) -> Vec<f64> {
+    let apart = model.iter().zip(other).zip(&summary.sigma).map(|((model, other), sigma)| {
+        let pairs = model.residual.iter().zip(&other.residual);
+        (model, *sigma, pairs.map(|(model, other)| model - other).collect::<Vec<f64>>())
     });
-    let bread = algebra::inverse(&summary.normal);
-    let moved = moved(&bread, apart);
-    let share = |k: usize| moved[k].abs() / bread[k][k].sqrt();
-    (0..moved.len()).filter(|&k| bread[k][k] > 0.0).map(share).fold(0.0, f64::max)
+    let moved = moved(&algebra::inverse(&summary.normal), apart);
+    let share = |k: usize| {
+        let size = covariance[k][k];
+        if size > 0.0 { moved[k].abs() / size.sqrt() } else { 0.0 }
+    };
+    (0..moved.len()).map(share).collect()
 }
 
 /// The covariance that noise of the tachometers gives the unknowns.

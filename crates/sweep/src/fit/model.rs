@@ -1,6 +1,7 @@
 //! What is fitted, and what the model says of it: trajectories of a point and its neighbours side
 //! by side in lanes.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use lane_ode::Simd;
@@ -44,10 +45,15 @@ impl Case {
         self.smoothed.as_ref()?.spin.speeds_rpm([0.0]).next()
     }
 
-    /// The greatest measured speed (rpm).
+    /// The run's greatest speed (rpm).
     pub(crate) fn greatest_rpm(&self) -> f64 {
-        let speeds = self.measured.speed_rpm.iter().flatten();
-        speeds.fold(0.0, |most, speed| most.max(speed.abs()))
+        self.spin().greatest_speed_rad_per_s(self.end_s()) * 60.0 / TAU
+    }
+
+    /// How many samples a signal has in a second, on average.
+    pub(crate) fn rate_hz(&self, signal: &Signal) -> f64 {
+        let times = &self.measured.time_s;
+        signal.samples().count() as f64 / (times[times.len() - 1] - times[0])
     }
 
     /// When its run ends: late enough for a late clock.

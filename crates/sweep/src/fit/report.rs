@@ -1,6 +1,7 @@
 //! What a fit has to say: one structure, as text and as JSON.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 use lane_ode::Simd;
 use serde::Serialize;
@@ -256,7 +257,7 @@ impl Found<'_> {
         Ok(OfFile {
             file: measured.name.clone(),
             samples: measured.count(),
-            noise: by(&|k, one| rms(one) * (1.0 - rho[k].max(0.0)).sqrt()),
+            noise: by(&|k, one| rms(one) * (1.0 - self.statistics.motion[k][0]).sqrt()),
             offset: by(&|_, one| one.offset),
             shift_s: problem.with_shift.then(|| problem.shift_s(case, x)),
             residual_rms: by(&|_, one| rms(one)),
@@ -344,8 +345,7 @@ impl Found<'_> {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<[f64; 2]> {
         let (machine, spin) = self.problem.machine(case, &self.minima[0].x);
-        let times = (0..=1000).map(|k| plan.end_s * f64::from(k) / 1000.0);
-        let fastest = spin.speeds_rpm(times).fold(0.0, f64::max);
+        let fastest = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
         let point = prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).ok()?;
         let speeds: Vec<f64> = (SPEEDS / 5..=SPEEDS)
