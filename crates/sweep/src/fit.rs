@@ -412,12 +412,12 @@ fn bootstrap(
     work: &Work<'_>,
 ) -> Option<Vec<Vec<f64>>> {
     const BLOCK: usize = 100;
-    let measured: Vec<Vec<f64>> = problem.signals().map(|(.., it)| it.values.clone()).collect();
+    let measured = problem.cases.clone();
     let draw = Design::MonteCarlo { points: 0, seed: SEED };
     let mut drawn = 0;
     let mut found = Vec::with_capacity(count);
     for _ in 0..count {
-        for (k, one) in against.iter().enumerate() {
+        for one in against {
             let residual = &one.residual;
             let mut resampled = Vec::with_capacity(residual.len() + BLOCK);
             while resampled.len() < residual.len() {
@@ -431,17 +431,13 @@ fn bootstrap(
             for (row, residual) in rows.into_iter().zip(resampled) {
                 signal.values[row] = one.model[row] + one.offset + residual;
             }
-            debug_assert_eq!(measured[k].len(), one.model.len());
         }
         let made = AtomicUsize::new(0);
         let search = Search { problem, journal: None, work, made: &made };
         let again = search.from(x).ok()?;
         found.extend(again.map(|again| again.x[..problem.free.len()].to_vec()));
     }
-    let places: Vec<(usize, usize)> = against.iter().map(|one| (one.case, one.signal)).collect();
-    for ((case, signal), values) in places.into_iter().zip(measured) {
-        problem.cases[case].measured.signals[signal].values = values;
-    }
+    problem.cases = measured;
     Some(found)
 }
 

@@ -14,6 +14,7 @@ use washer_model::{
 use super::algebra::dot;
 use super::measured::{Measured, Quantity, Signal};
 use super::speed::Smoothed;
+use super::statistics::centred;
 use crate::engine::reference_step_s;
 use crate::plan::Plan;
 
@@ -74,7 +75,7 @@ pub(crate) struct Free {
 }
 
 impl Free {
-    fn is_of(&self, case: usize) -> bool {
+    pub(crate) fn is_of(&self, case: usize) -> bool {
         self.case.is_none_or(|own| own == case)
     }
 }
@@ -394,17 +395,10 @@ impl Problem {
     }
 }
 
-/// Numbers less their mean, and the mean.
-pub(super) fn centred(mut values: Vec<f64>) -> (Vec<f64>, f64) {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.iter_mut().for_each(|value| *value -= mean);
-    (values, mean)
-}
-
 /// A signal's share of the cost, and its noise: the residual's, and of one that is exact a
 /// millionth of the signal.
 fn likelihood(residual: &[f64], signal: &Signal) -> (f64, f64) {
-    let (swing, _) = centred(signal.samples().map(|(_, value)| value).collect());
+    let swing = signal.swing();
     let count = residual.len() as f64;
     let least = 1e-12 * dot(&swing, &swing) + f64::MIN_POSITIVE;
     let mean_square = (dot(residual, residual) + least) / count;

@@ -1,7 +1,7 @@
 //! How well numbers are known, and whether the model follows the data at all.
 
 use super::algebra::{Symmetric, dot, inverse, scaled};
-use super::model::{Against, Problem, Summary, centred};
+use super::model::{Against, Problem, Summary};
 
 /// Most lags of a residual's autocorrelation that are looked at.
 const MOST_LAGS: usize = 400;
@@ -68,7 +68,7 @@ impl Statistics {
             let own = if narrower { &plain } else { &of_signal };
             add(&mut meat, own, if narrower { wider } else { 1.0 });
             let square = dot(&one.residual, &one.residual);
-            let (swing, _) = centred(signal.samples().map(|(_, v)| v).collect());
+            let swing = signal.swing();
             let case = &problem.cases[one.case];
             let share = swinging(&one.residual, case.rate_hz(signal), 60.0 / case.greatest_rpm());
             motion.push([share, share * square / dot(&swing, &swing)]);
@@ -214,6 +214,20 @@ impl Statistics {
         }
         said
     }
+}
+
+/// Numbers less their mean, and the mean.
+pub(super) fn centred(mut values: Vec<f64>) -> (Vec<f64>, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter_mut().for_each(|value| *value -= mean);
+    (values, mean)
+}
+
+/// The value below which such a part of some numbers lies; `None` of none.
+pub(super) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get((part * (values.len() as f64 - 1.0)).round() as usize).copied()
 }
 
 pub(super) fn add(sum: &mut [Vec<f64>], part: &[Vec<f64>], factor: f64) {
