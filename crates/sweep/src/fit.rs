@@ -267,7 +267,9 @@ pub(crate) fn fit(
         let Some(against) = problem.against(&best.x, work.stop) else { return Ok(None) };
         problem.method = Method::Rk4 { step_s: 0.5 * step_s };
         let Some(finer) = problem.against(&best.x, work.stop) else { return Ok(None) };
-        let moved = effect(&best.summary, &against, &finer);
+        let bread = algebra::inverse(&best.summary.normal);
+        let moved = effect(&bread, &best.summary, &against, &finer);
+        let moved = moved.into_iter().fold(0.0, f64::max);
         step_effect = Some(moved);
         if moved < STEP_EFFECT {
             problem.method = Method::Rk4 { step_s };
@@ -289,6 +291,14 @@ pub(crate) fn fit(
     let mut statistics = Statistics::of(&problem, &against, &best.summary);
     let further = by_tachometer(&problem, &best, &against, work.stop);
     statistics::add(&mut statistics.covariance, &further, 1.0);
+    if problem.model == ModelKind::Linear {
+        // What the linear model does not have may hide in the numbers and leave no residual.
+        problem.model = ModelKind::Nonlinear;
+        statistics.bias = problem
+            .against(&best.x, work.stop)
+            .map(|nonlinear| effect(&statistics.covariance, &best.summary, &against, &nonlinear));
+        problem.model = ModelKind::Linear;
+    }
     let repeated = match options.bootstrap {
         0 => None,
         count => match bootstrap(&mut problem, &best.x, &against, count, work) {
@@ -348,16 +358,23 @@ fn moved<'a>(
     bread.iter().map(|row| algebra::dot(row, &pull)).collect()
 }
 
-/// By how many standard errors a finer integration would move the number that it moves most.
-fn effect(summary: &Summary, rough: &[Against], fine: &[Against]) -> f64 {
-    let apart = rough.iter().zip(fine).zip(&summary.sigma).map(|((rough, fine), sigma)| {
-        let pairs = rough.residual.iter().zip(&fine.residual);
-        (rough, *sigma, pairs.map(|(rough, fine)| rough - fine).collect::<Vec<f64>>())
+/// By how many standard errors another model would move each unknown.
+fn effect(
+    covariance: &[Vec<f64>],
+    summary: &Summary,
+    model: &[Against],
+    other: &[Against],
+) -> Vec<f64> {
+    let apart = model.iter().zip(other).zip(&summary.sigma).map(|((model, other), sigma)| {
+        let pairs = model.residual.iter().zip(&other.residual);
+        (model, *sigma, pairs.map(|(model, other)| model - other).collect::<Vec<f64>>())
     });
-    let bread = algebra::inverse(&summary.normal);
-    let moved = moved(&bread, apart);
-    let share = |k: usize| moved[k].abs() / bread[k][k].sqrt();
-    (0..moved.len()).filter(|&k| bread[k][k] > 0.0).map(share).fold(0.0, f64::max)
+    let moved = moved(&algebra::inverse(&summary.normal), apart);
+    let share = |k: usize| {
+        let size = covariance[k][k];
+        if size > 0.0 { moved[k].abs() / size.sqrt() } else { 0.0 }
+    };
+    (0..moved.len()).map(share).collect()
 }
 
 /// The covariance that noise of the tachometers gives the unknowns.
@@ -395,12 +412,12 @@ fn bootstrap(
     work: &Work<'_>,
 ) -> Option<Vec<Vec<f64>>> {
     const BLOCK: usize = 100;
-    let measured: Vec<Vec<f64>> = problem.signals().map(|(.., it)| it.values.clone()).collect();
+    let measured = problem.cases.clone();
     let draw = Design::MonteCarlo { points: 0, seed: SEED };
     let mut drawn = 0;
     let mut found = Vec::with_capacity(count);
     for _ in 0..count {
-        for (k, one) in against.iter().enumerate() {
+        for one in against {
             let residual = &one.residual;
             let mut resampled = Vec::with_capacity(residual.len() + BLOCK);
             while resampled.len() < residual.len() {
@@ -414,17 +431,13 @@ fn bootstrap(
             for (row, residual) in rows.into_iter().zip(resampled) {
                 signal.values[row] = one.model[row] + one.offset + residual;
             }
-            debug_assert_eq!(measured[k].len(), one.model.len());
         }
         let made = AtomicUsize::new(0);
         let search = Search { problem, journal: None, work, made: &made };
         let again = search.from(x).ok()?;
         found.extend(again.map(|again| again.x[..problem.free.len()].to_vec()));
     }
-    let places: Vec<(usize, usize)> = against.iter().map(|one| (one.case, one.signal)).collect();
-    for ((case, signal), values) in places.into_iter().zip(measured) {
-        problem.cases[case].measured.signals[signal].values = values;
-    }
+    problem.cases = measured;
     Some(found)
 }
 

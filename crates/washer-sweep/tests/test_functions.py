@@ -6,6 +6,7 @@ import subprocess
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.csv
 import pytest
 from conftest import ROOT, rows
 from conftest_grid import SHORT
@@ -67,6 +68,31 @@ def test_an_explanation_is_the_commands(sweep):
     assert str(found) == found.text == told(*words)
     again = pickle.loads(pickle.dumps(found))
     assert (again, again.text) == (found, found.text)
+
+
+def test_a_fit_is_the_commands(sweep, tmp_path):
+    bench = ROOT / "sweeps/bench.toml"
+    table = pyarrow.csv.read_csv(ROOT / "crates/sweep/testdata/fit/viscous.csv").slice(0, 250)
+    measured = tmp_path / "table"
+    pyarrow.csv.write_csv(table, measured)
+    free, own = ["damping_n_s_per_m=50:500"], ["unbalance_mass_kg"]
+    words = [sweep, "fit", bench, measured, f"{measured}@spring_stiffness_n_per_m=8350",
+             "--free", free[0], "--own", own[0], "--draws", "4", "--progress", "none"]
+    at = [{}, {"spring_stiffness_n_per_m": 8350}]
+    found = washer_sweep.fit(Plan.from_toml(bench), [table, table], free, own=own, at=at, draws=4)
+    by_command = json.loads(told(*words, "--json"))
+    # The second table has no name of its own.
+    assert found["files"][1].pop("file") == "table 2"
+    assert by_command["files"][1].pop("file") == "table"
+    for report in (found, by_command):
+        assert report["parameters"][2].pop("file") in ("table", "table 2")
+    assert found.keys() == by_command.keys()
+    for key in found.keys() - {"minima"}:
+        assert found[key] == by_command[key], key
+    assert [fit["name"] for fit in found["parameters"]] == [*free[0].split("=")[:1], *own, *own]
+    assert found["verdict"]["draws"] == 4
+    with pytest.raises(PlanError, match="did you mean `damping_n_s_per_m`"):
+        washer_sweep.fit(Plan.from_toml(bench), table, ["dampin_n_s_per_m"])
 
 
 def test_growth_is_a_metric_of_a_table_too(tmp_path):

@@ -90,7 +90,7 @@ pub struct ListColumn {
 /// The places of rows.
 enum Rows {
     /// In lines of a text that begin at these bytes.
-    Lines { source: SourceId, starts: Vec<u32> },
+    Lines { source: SourceId, starts: Vec<u32>, separator: char },
     /// In no text; the file is named here.
     Binary(Location),
 }
@@ -136,9 +136,9 @@ impl Rows {
     fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
         match self {
             Self::Binary(at) => at.clone(),
-            Self::Lines { source, starts } => {
+            Self::Lines { source, starts, separator } => {
                 let start = starts.get(row).map_or(0, |&start| start as usize);
-                let span = csv::cell_span(sources.text(*source), start, column);
+                let span = csv::cell_span(sources.text(*source), start, *separator, column);
                 Location::new(*source, span)
             }
         }
@@ -173,7 +173,9 @@ fn columns(
     let source = report.add(shown(path), String::new());
     let read = csv::read(&text, source, gaps, report);
     report.fill(source, text);
-    Ok(read?.map(|(columns, starts)| (columns, Rows::Lines { source, starts }, hash)))
+    let lines =
+        |(columns, starts, separator)| (columns, Rows::Lines { source, starts, separator }, hash);
+    Ok(read?.map(lines))
 }
 
 /// Reads the listed points.

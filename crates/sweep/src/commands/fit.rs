@@ -118,9 +118,13 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         bootstrap: args.bootstrap as usize,
         draws: u64::from(args.draws),
     };
+    let taken = |path: &PathBuf| Error::File {
+        action: "write",
+        path: path.clone(),
+        source: ErrorKind::AlreadyExists.into(),
+    };
     if let Some(path) = args.out.as_ref().filter(|path| path.exists()) {
-        let source = ErrorKind::AlreadyExists.into();
-        return Err(Error::File { action: "write", path: path.clone(), source });
+        return Err(taken(path));
     }
     let count = if args.curves.is_some() { cases.len() } else { 0 };
     let curves: Vec<PathBuf> =
@@ -152,8 +156,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         let (machine, _) = fitted.problem.machine(0, &fitted.x);
         let text = config::machine_file(&machine);
         if !atomic::create(atomic::parent(path), path, text.as_bytes())? {
-            let source = ErrorKind::AlreadyExists.into();
-            return Err(Error::File { action: "write", path: path.clone(), source });
+            return Err(taken(path));
         }
         tell(&format!("wrote {}", path.display()));
     }

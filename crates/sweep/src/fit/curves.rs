@@ -6,12 +6,12 @@ use sweep_files::key;
 
 use super::algebra::inverse;
 use super::measured::usual_step;
-use super::model::{Against, centred};
+use super::model::Against;
 use super::spectrum::spectrum;
 use super::{Fitted, Problem};
 
-/// Standard errors to which profiles reach on both sides.
-const REACH: i32 = 3;
+/// Half standard errors to which profiles reach on both sides.
+const REACH: i32 = 6;
 
 impl Fitted {
     /// How the cost rises beside each free number, the others fitted again as far as they go along
@@ -20,7 +20,7 @@ impl Fitted {
         let Problem { free, .. } = &self.problem;
         let summary = self.problem.summary(&self.against);
         let bread = inverse(&summary.normal);
-        let deviations: Vec<f64> = (-REACH..=REACH).map(f64::from).collect();
+        let deviations: Vec<f64> = (-REACH..=REACH).map(|k| 0.5 * f64::from(k)).collect();
         let set = |k: usize, deviation: f64| -> Vec<f64> {
             let along = deviation / bread[k][k].max(f64::MIN_POSITIVE).sqrt();
             (0..self.x.len())
@@ -62,11 +62,10 @@ impl Fitted {
                 (hz, density) = spectrum(&all, step_s);
                 density
             };
-            let (swing, _) = centred(signal.samples().map(|(_, value)| value).collect());
             json!({
                 "name": signal.quantity.column(),
                 "unit": signal.quantity.units().0,
-                "measured": of(&swing),
+                "measured": of(&signal.swing()),
                 "residual": of(&one.residual),
             })
         };
@@ -103,6 +102,9 @@ impl Fitted {
         }
         let mut plan = at.plan.clone();
         plan.model.machine = self.problem.machine(case, &self.x).0;
+        // Constants at which the search began are not the fitted machine's.
+        let free: Vec<&str> = self.problem.free.iter().map(|it| it.parameter.name()).collect();
+        plan.set.retain(|(name, _)| !free.contains(&name.as_str()));
         table.metadata(key::PLAN, &plan.to_json());
         let mut found = json!({ "report": self.report, "spectra": self.spectra(case) });
         if self.report.follows {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::statistics::{centred, quantile};
 use sweep_engine::config::Diagnostics;
 use sweep_engine::config::list::NumberTable;
 use sweep_engine::config::report::{Diagnostic, Report};
@@ -77,6 +78,11 @@ impl Signal {
     /// The samples that there are, with their places in time.
     pub(crate) fn samples(&self) -> impl Iterator<Item = (usize, f64)> {
         self.values.iter().copied().enumerate().filter(|(_, value)| !value.is_nan())
+    }
+
+    /// The samples less their mean.
+    pub(crate) fn swing(&self) -> Vec<f64> {
+        centred(self.samples().map(|(_, value)| value).collect()).0
     }
 }
 
@@ -231,9 +237,7 @@ fn times(table: &NumberTable, column: usize, report: &Report) {
 
 /// The usual distance of two rows: the median.
 pub(super) fn usual_step(time_s: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied()
+    quantile(time_s.windows(2).map(|pair| pair[1] - pair[0]), 0.5)
 }
 
 /// Stretches of time without rows: longer than twenty of the usual distance.

@@ -1,6 +1,7 @@
 //! What is fitted, and what the model says of it: trajectories of a point and its neighbours side
 //! by side in lanes.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use lane_ode::Simd;
@@ -13,6 +14,7 @@ use washer_model::{
 use super::algebra::dot;
 use super::measured::{Measured, Quantity, Signal};
 use super::speed::Smoothed;
+use super::statistics::centred;
 use crate::engine::reference_step_s;
 use crate::plan::Plan;
 
@@ -44,10 +46,15 @@ impl Case {
         self.smoothed.as_ref()?.spin.speeds_rpm([0.0]).next()
     }
 
-    /// The greatest measured speed (rpm).
+    /// The run's greatest speed (rpm).
     pub(crate) fn greatest_rpm(&self) -> f64 {
-        let speeds = self.measured.speed_rpm.iter().flatten();
-        speeds.fold(0.0, |most, speed| most.max(speed.abs()))
+        self.spin().greatest_speed_rad_per_s(self.end_s()) * 60.0 / TAU
+    }
+
+    /// How many samples a signal has in a second, on average.
+    pub(crate) fn rate_hz(&self, signal: &Signal) -> f64 {
+        let times = &self.measured.time_s;
+        signal.samples().count() as f64 / (times[times.len() - 1] - times[0])
     }
 
     /// When its run ends: late enough for a late clock.
@@ -68,7 +75,7 @@ pub(crate) struct Free {
 }
 
 impl Free {
-    fn is_of(&self, case: usize) -> bool {
+    pub(crate) fn is_of(&self, case: usize) -> bool {
         self.case.is_none_or(|own| own == case)
     }
 }
@@ -388,17 +395,10 @@ impl Problem {
     }
 }
 
-/// Numbers less their mean, and the mean.
-pub(super) fn centred(mut values: Vec<f64>) -> (Vec<f64>, f64) {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.iter_mut().for_each(|value| *value -= mean);
-    (values, mean)
-}
-
 /// A signal's share of the cost, and its noise: the residual's, and of one that is exact a
 /// millionth of the signal.
 fn likelihood(residual: &[f64], signal: &Signal) -> (f64, f64) {
-    let (swing, _) = centred(signal.samples().map(|(_, value)| value).collect());
+    let swing = signal.swing();
     let count = residual.len() as f64;
     let least = 1e-12 * dot(&swing, &swing) + f64::MIN_POSITIVE;
     let mean_square = (dot(residual, residual) + least) / count;

@@ -1,6 +1,7 @@
 //! What a fit has to say: one structure, as text and as JSON.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 use lane_ode::Simd;
 use serde::Serialize;
@@ -12,7 +13,7 @@ use super::algebra::dot;
 use super::iso18571::{Rating, rate};
 use super::model::{Against, Problem};
 use super::search::Descent;
-use super::statistics::Statistics;
+use super::statistics::{Statistics, centred, quantile};
 use crate::config;
 use crate::engine::{ModelEngine, responses};
 use crate::plan::{Axis, AxisValues, Plan};
@@ -256,7 +257,7 @@ impl Found<'_> {
         Ok(OfFile {
             file: measured.name.clone(),
             samples: measured.count(),
-            noise: by(&|k, one| rms(one) * (1.0 - rho[k].max(0.0)).sqrt()),
+            noise: by(&|k, one| rms(one) * (1.0 - self.statistics.motion[k][0]).sqrt()),
             offset: by(&|_, one| one.offset),
             shift_s: problem.with_shift.then(|| problem.shift_s(case, x)),
             residual_rms: by(&|_, one| rms(one)),
@@ -292,9 +293,8 @@ impl Found<'_> {
         let x = &self.minima[0].x;
         // The map's spin is the grid's, of which a measured one has no numbers.
         let mut plan = Plan { axes: Vec::new(), design: None, ..problem.cases[case].plan.clone() };
-        let own: Vec<usize> = (0..problem.free.len())
-            .filter(|&k| problem.free[k].case.is_none_or(|own| own == case))
-            .collect();
+        let own: Vec<usize> =
+            (0..problem.free.len()).filter(|&k| problem.free[k].is_of(case)).collect();
         let sets = if follows { super::draws(problem, x, covariance, draws) } else { Vec::new() };
         let sets: Vec<&[f64]> =
             std::iter::once(&x[..]).chain(sets.iter().map(Vec::as_slice)).collect();
@@ -344,8 +344,7 @@ impl Found<'_> {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<[f64; 2]> {
         let (machine, spin) = self.problem.machine(case, &self.minima[0].x);
-        let times = (0..=1000).map(|k| plan.end_s * f64::from(k) / 1000.0);
-        let fastest = spin.speeds_rpm(times).fold(0.0, f64::max);
+        let fastest = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
         let point = prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).ok()?;
         let speeds: Vec<f64> = (SPEEDS / 5..=SPEEDS)
@@ -372,10 +371,10 @@ impl Found<'_> {
         for ((case, _, signal), (end, start)) in signals {
             let (unit, mistaken) = signal.quantity.units();
             let Some((other, factor)) = mistaken else { continue };
-            let (swing, _) = super::model::centred(signal.samples().map(|(_, v)| v).collect());
+            let swing = signal.swing();
             let size = |one: &Against| {
                 let moves = signal.samples().map(|(row, _)| one.model[row]).collect();
-                let (moves, _) = super::model::centred(moves);
+                let (moves, _) = centred(moves);
                 (dot(&swing, &swing) / dot(&moves, &moves)).sqrt()
             };
             let sizes = [Some(size(end)), by_start.then(|| size(start))];
@@ -418,11 +417,8 @@ impl Found<'_> {
 }
 
 /// Between which 95 % of some numbers lie; `None` of none.
-fn middle_95(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    let at = |part: f64| values.get((part * (values.len() as f64 - 1.0)).round() as usize);
-    Some([*at(0.025)?, *at(0.975)?])
+fn middle_95(values: impl Iterator<Item = f64> + Clone) -> Option<[f64; 2]> {
+    Some([quantile(values.clone(), 0.025)?, quantile(values, 0.975)?])
 }
 
 impl Report {
@@ -464,7 +460,8 @@ impl Report {
         if self.parameters.iter().any(|fit| fit.bootstrap_95.is_some()) {
             headings.push("by bootstrap".to_owned());
         }
-        let mut text = table(&headings, &rows, "");
+        // Without a free number the model is compared alone.
+        let mut text = if rows.is_empty() { String::new() } else { table(&headings, &rows, "") };
         let mut say = |what: &str, said: &str| line(&mut text, what, said);
         match &self.objection {
             None => say("model", "follows the measurement within its noise"),

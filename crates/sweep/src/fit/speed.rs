@@ -3,6 +3,7 @@
 use washer_model::Spin;
 
 use super::evenly;
+use super::statistics::quantile;
 
 /// Noise of a tachometer at least, as a share of its greatest speed: rounded digits are no noise.
 const LEAST_NOISE: f64 = 1e-5;
@@ -78,28 +79,24 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
 /// Standard deviation of white noise about a smooth course, from the distance of every sample to
 /// the line through its neighbours; the median, which jumps do not move.
 fn noise(samples: &[[f64; 2]]) -> f64 {
-    let mut distances: Vec<f64> = samples
-        .windows(3)
-        .map(|three| {
-            let share = (three[1][0] - three[0][0]) / (three[2][0] - three[0][0]);
-            let [before, after] = [1.0 - share, share];
-            let apart = three[1][1] - before * three[0][1] - after * three[2][1];
-            apart.abs() / (1.0 + before * before + after * after).sqrt()
-        })
-        .collect();
-    distances.sort_by(f64::total_cmp);
+    let distances = samples.windows(3).map(|three| {
+        let share = (three[1][0] - three[0][0]) / (three[2][0] - three[0][0]);
+        let [before, after] = [1.0 - share, share];
+        let apart = three[1][1] - before * three[0][1] - after * three[2][1];
+        apart.abs() / (1.0 + before * before + after * after).sqrt()
+    });
     // The median of |x| of a normal distribution.
-    distances.get(distances.len() / 2).map_or(0.0, |median| median / 0.674_489_75)
+    quantile(distances, 0.5).map_or(0.0, |median| median / 0.674_489_75)
 }
 
 /// Of a tachometer whose digits are coarser than its noise: the error of rounding, and how many
 /// samples a digit usually stays. Neighbours say nothing of its noise: most are equal.
 fn stairs(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
     let steps = samples.windows(2).map(|pair| (pair[1][1] - pair[0][1]).abs());
-    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    let step = steps.get(steps.len() / 2).filter(|_| 2 * steps.len() <= samples.len())?;
-    Some((step / 12.0_f64.sqrt(), samples.len() as f64 / steps.len() as f64))
+    let steps = steps.filter(|step| *step > 0.0);
+    let count = steps.clone().count();
+    let step = quantile(steps, 0.5).filter(|_| 2 * count <= samples.len())?;
+    Some((step / 12.0_f64.sqrt(), samples.len() as f64 / count as f64))
 }
 
 /// Between which knots a time lies, and its share of the way.

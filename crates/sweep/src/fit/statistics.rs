@@ -5,13 +5,21 @@ use super::model::{Against, Problem, Summary};
 
 /// Most lags of a residual's autocorrelation that are looked at.
 const MOST_LAGS: usize = 400;
+/// No motion of a suspension is faster than this share of the drum's fastest turn.
+const FASTEST: f64 = 0.25;
+/// Within this time every motion of a suspension swings back (s).
+const SLOWEST_S: f64 = 1.0;
+/// Standard deviations of a correlation that chance makes.
+const CHANCE: f64 = 4.0;
 /// Into how many parts each record is cut.
 const PARTS: usize = 24;
 /// By how much more parts of the record may disagree than noise makes them, before the model is
 /// said not to follow.
 const DISAGREEMENT: f64 = 4.0;
-/// How large a smooth residual may be, as a share of the signal.
-const SMOOTH: f64 = 0.15;
+/// How large a motion may be left over, as a share of the signal.
+const MOTION: f64 = 0.1;
+/// By how many standard errors the nonlinear model may move a number of the linear one.
+const BIAS: f64 = 1.0;
 /// A direction is unknown along which numbers may move by more than this share (95 %).
 const UNKNOWN: f64 = 0.5;
 /// Numbers with a correlation beyond this are known together rather than each.
@@ -28,10 +36,13 @@ pub(crate) struct Statistics {
     pub(crate) neighbours: Vec<f64>,
     /// How much more the parts of the records disagree on the unknowns than noise makes them.
     pub(crate) disagreement: f64,
-    /// Of each signal: the smooth part of the residual over the signal, root mean squares.
-    pub(crate) smooth: Vec<f64>,
+    /// Of each signal: the residual that is a motion, as a share of the residual and of the signal,
+    /// mean squares.
+    pub(crate) motion: Vec<[f64; 2]>,
     /// Of the signal that is worst off in it: signal, and the time (s) around which it is.
     pub(crate) worst: (usize, [f64; 2]),
+    /// By how many standard errors the nonlinear model would move each unknown of the linear one.
+    pub(crate) bias: Option<Vec<f64>>,
 }
 
 impl Statistics {
@@ -40,7 +51,7 @@ impl Statistics {
         let n = problem.unknowns();
         let bread = inverse(&summary.normal);
         let mut meat = vec![vec![0.0; n]; n];
-        let (mut widening, mut neighbours, mut smooth) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut widening, mut neighbours, mut motion) = (Vec::new(), Vec::new(), Vec::new());
         let (mut disagreement, mut freedom) = (0.0, 0.0);
         let mut worst = (0, [0.0; 2], 0.0);
         for (k, (((_, _, signal), one), sigma)) in
@@ -57,10 +68,11 @@ impl Statistics {
             let own = if narrower { &plain } else { &of_signal };
             add(&mut meat, own, if narrower { wider } else { 1.0 });
             let square = dot(&one.residual, &one.residual);
-            let first = rho.get(1).copied().unwrap_or(0.0);
-            let (swing, _) = super::model::centred(signal.samples().map(|(_, v)| v).collect());
-            smooth.push((first.max(0.0) * square / dot(&swing, &swing)).sqrt());
-            neighbours.push(first);
+            let swing = signal.swing();
+            let case = &problem.cases[one.case];
+            let share = swinging(&one.residual, case.rate_hz(signal), 60.0 / case.greatest_rpm());
+            motion.push([share, share * square / dot(&swing, &swing)]);
+            neighbours.push(correlation(&one.residual, 1));
             widening.push(wider);
             // What each part of the record alone would pull at the unknowns.
             let count = one.residual.len();
@@ -98,7 +110,7 @@ impl Statistics {
             .map(|row| row.iter().map(|x| x * disagreement.max(1.0)).collect())
             .collect();
         let worst = (worst.0, worst.1);
-        Self { covariance, widening, neighbours, disagreement, smooth, worst }
+        Self { covariance, widening, neighbours, disagreement, motion, worst, bias: None }
     }
 
     /// Why the model does not follow, if it does not.
@@ -107,8 +119,9 @@ impl Statistics {
         let named = |k: usize| {
             problem.signals().nth(k).map_or_else(String::new, |(.., it)| it.quantity.column())
         };
-        if let Some((k, share)) = self.smooth.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))
-            && *share > SMOOTH
+        let shares = self.motion.iter().map(|[_, of_signal]| of_signal.sqrt()).enumerate();
+        if let Some((k, share)) = shares.max_by(|a, b| a.1.total_cmp(&b.1))
+            && share > MOTION
         {
             reasons.push(format!(
                 "{:.0} % of {} are left over as a motion, not as noise",
@@ -120,6 +133,15 @@ impl Statistics {
             reasons.push(format!(
                 "parts of the record ask for values {:.1} times as far apart as noise makes them",
                 self.disagreement.sqrt()
+            ));
+        }
+        let bias = self.bias.iter().flatten().zip(&problem.free);
+        if let Some((bias, free)) = bias.max_by(|a, b| a.0.total_cmp(b.0))
+            && *bias > BIAS
+        {
+            reasons.push(format!(
+                "the nonlinear model would move {} by {bias:.1} standard errors",
+                free.parameter.name()
             ));
         }
         if reasons.is_empty() {
@@ -194,6 +216,20 @@ impl Statistics {
     }
 }
 
+/// Numbers less their mean, and the mean.
+pub(super) fn centred(mut values: Vec<f64>) -> (Vec<f64>, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter_mut().for_each(|value| *value -= mean);
+    (values, mean)
+}
+
+/// The value below which such a part of some numbers lies; `None` of none.
+pub(super) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get((part * (values.len() as f64 - 1.0)).round() as usize).copied()
+}
+
 pub(super) fn add(sum: &mut [Vec<f64>], part: &[Vec<f64>], factor: f64) {
     for (sum, part) in sum.iter_mut().zip(part) {
         sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += factor * part);
@@ -224,50 +260,80 @@ fn correlated(slopes: &[Vec<f64>], rho: &[f64], weight: f64) -> Vec<Vec<f64>> {
     sum
 }
 
-/// The autocorrelation by lag, tapered to nothing where it is no more than chance; as if the
-/// samples were even in time, which gaps only interrupt.
+/// The correlation of values with those so many places later; as if they were even in time, which
+/// gaps only interrupt.
+fn correlation(values: &[f64], lag: usize) -> f64 {
+    dot(values, &values[lag..]) / dot(values, values).max(f64::MIN_POSITIVE)
+}
+
+/// The autocorrelation by lag, tapered to nothing where it is no more than chance. The taper's flat
+/// top keeps what slow noise has: Bartlett's would take a third.
+///
+/// D. N. Politis, J. P. Romano, Journal of Time Series Analysis 16 (1995), 67-103.
 fn autocorrelation(residual: &[f64]) -> Vec<f64> {
-    let count = residual.len();
-    let square = dot(residual, residual);
-    let chance = 2.0 / (count as f64).sqrt();
-    let mut rho = vec![1.0];
-    let mut quiet = 0;
-    while rho.len() < MOST_LAGS.min(count / 4) && quiet < 5 && square > 0.0 {
-        let next = dot(residual, &residual[rho.len()..]) / square;
-        quiet = if next.abs() < chance { quiet + 1 } else { 0 };
-        rho.push(next);
+    let chance = 2.0 / (residual.len() as f64).sqrt();
+    let most = MOST_LAGS.min(residual.len() / 4);
+    let (mut last, mut lag) = (0, 1);
+    while lag < most && lag <= last + 5 {
+        if correlation(residual, lag).abs() > chance {
+            last = lag;
+        }
+        lag += 1;
     }
-    rho.truncate(rho.len() - quiet);
-    let length = rho.len() as f64;
-    // Bartlett's taper keeps variances positive.
-    rho.iter_mut().enumerate().for_each(|(lag, rho)| *rho *= 1.0 - lag as f64 / length);
-    rho
+    let tapered =
+        |lag: usize| correlation(residual, lag) * (2.0 - lag as f64 / last as f64).min(1.0);
+    std::iter::once(1.0).chain((1..most.min(2 * last)).map(tapered)).collect()
+}
+
+/// The share of a residual's mean square that is a motion: as much as it swings back, if that is
+/// more than chance. Noise may be slow, but does not swing; and hum is faster than a suspension.
+fn swinging(residual: &[f64], rate_hz: f64, turn_s: f64) -> f64 {
+    let block = ((FASTEST * turn_s * rate_hz) as usize).clamp(1, residual.len());
+    let mean = |some: &[f64]| some.iter().sum::<f64>() / block as f64;
+    let (means, _) = centred(residual.chunks_exact(block).map(mean).collect());
+    let most = ((SLOWEST_S * rate_hz) as usize / block).min(means.len() / 4);
+    let rho: Vec<f64> = (1..most).map(|lag| correlation(&means, lag)).collect();
+    let least = rho.iter().copied().fold(0.0, f64::min);
+    // Bartlett's variance of a correlation, for noise that is as slow as this.
+    let slow: f64 = rho.iter().take_while(|rho| **rho > 0.0).map(|rho| rho * rho).sum();
+    let chance = CHANCE * ((1.0 + 2.0 * slow) / means.len() as f64).sqrt();
+    let share = block as f64 * dot(&means, &means) / dot(residual, residual).max(f64::MIN_POSITIVE);
+    if -least > chance { -least * share } else { 0.0 }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::noise;
     use super::*;
-    use sweep_engine::design::{Design, Distribution, Shape};
+    use std::f64::consts::TAU;
 
     #[test]
     fn correlated_noise_widens_an_interval_by_what_it_does_to_a_mean() {
-        let noise = Design::MonteCarlo { points: 0, seed: 11 };
-        let shape = Shape::Normal { mean: 0.0, sd: 1.0 };
-        let normal = Distribution { shape, from: -6.0, to: 6.0 };
-        let mut last = 0.0;
-        let residual: Vec<f64> = (0..20_000)
-            .map(|k| {
-                last = 0.8 * last + normal.quantile(noise.place(k, 0).unwrap());
-                last
-            })
-            .collect();
-        let rho = autocorrelation(&residual);
-        let slopes = vec![vec![1.0; residual.len()]];
-        let wider = correlated(&slopes, &rho, 1.0)[0][0] / residual.len() as f64;
-        // (1 + 0.8) / (1 - 0.8) for an endless record; the taper takes some.
-        assert!((5.0..10.0).contains(&wider), "{wider}: {}", rho.len());
-        let white: Vec<f64> =
-            (0..20_000).map(|k| normal.quantile(noise.place(k, 1).unwrap())).collect();
-        assert_eq!(autocorrelation(&white), [1.0]);
+        for correlation in [0.6, 0.8, 0.9] {
+            let residual = noise(11, 0, 20_000, correlation);
+            let rho = autocorrelation(&residual);
+            let slopes = vec![vec![1.0; residual.len()]];
+            let wider = correlated(&slopes, &rho, 1.0)[0][0] / residual.len() as f64;
+            let endless = (1.0 + correlation) / (1.0 - correlation);
+            assert!((wider / endless - 1.0).abs() < 0.2, "{correlation}: {wider}, not {endless}");
+        }
+        assert_eq!(autocorrelation(&noise(11, 1, 20_000, 0.0)), [1.0]);
+    }
+
+    #[test]
+    fn a_motion_is_told_from_noise_and_hum() {
+        let (rate_hz, turn_s) = (500.0, 60.0 / 350.0);
+        let tone = |hz: f64| move |k: usize| (TAU * hz * k as f64 / rate_hz).sin();
+        for correlation in [0.0, 0.6, 0.9, 0.97] {
+            let noise = noise(5, 0, 12_000, correlation);
+            assert_eq!(swinging(&noise, rate_hz, turn_s), 0.0, "{correlation}");
+            for (hz, expected) in [(1.5, 0.5), (5.0, 0.5), (50.0, 0.0)] {
+                let motion = (0..12_000).map(tone(hz));
+                let both: Vec<f64> =
+                    motion.zip(&noise).map(|(tone, noise)| tone + 0.5_f64.sqrt() * noise).collect();
+                let found = swinging(&both, rate_hz, turn_s);
+                assert!((found - expected).abs() < 0.15, "{correlation}, {hz} Hz: {found}");
+            }
+        }
     }
 }

@@ -67,6 +67,20 @@ fn off(report: &Report, truth: &[(&str, f64)]) -> Vec<f64> {
     report.parameters.iter().map(off).collect()
 }
 
+/// Noise of standard deviation 1 in which neighbours correlate by so much.
+pub(super) fn noise(seed: u64, signal: usize, count: usize, correlation: f64) -> Vec<f64> {
+    const SETTLED: usize = 200;
+    let normal = Distribution { shape: Shape::Normal { mean: 0.0, sd: 1.0 }, from: -6.0, to: 6.0 };
+    let draw = Design::MonteCarlo { points: 0, seed };
+    let mut last = 0.0;
+    let values = (0..(count + SETTLED) as u64).map(|row| {
+        let fresh = normal.quantile(draw.place(row, signal).unwrap());
+        last = correlation * last + (1.0 - correlation * correlation).sqrt() * fresh;
+        last
+    });
+    values.skip(SETTLED).collect()
+}
+
 #[test]
 fn the_model_at_the_truth_is_the_exact_record() {
     for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
@@ -133,16 +147,13 @@ fn friction_is_told_from_viscous_damping() {
 #[ignore = "a minute; run by tests_with_tools"]
 fn intervals_hold_the_truth_as_often_as_they_say() {
     const DRAWS: usize = 50;
-    let normal = Distribution { shape: Shape::Normal { mean: 0.0, sd: 1.0 }, from: -6.0, to: 6.0 };
     let names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
     let mut held = vec![0; VISCOUS.len()];
     for draw in 0..DRAWS {
         let mut measured = reference("viscous_exact", 8.0);
         for (s, signal) in measured.signals.iter_mut().enumerate() {
-            let noise = Design::MonteCarlo { points: 0, seed: draw as u64 };
-            for (row, value) in signal.values.iter_mut().enumerate() {
-                *value += NOISE[s] * normal.quantile(noise.place(row as u64, s).unwrap());
-            }
+            let noise = noise(draw as u64, s, signal.values.len(), 0.0);
+            signal.values.iter_mut().zip(noise).for_each(|(value, z)| *value += NOISE[s] * z);
         }
         let report = fitted(vec![case_at(&VISCOUS, 0.97, measured)], &options(&names));
         assert!(report.follows, "draw {draw}: {}", report.text());
@@ -156,6 +167,59 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     let share = all as f64 / (DRAWS * VISCOUS.len()) as f64;
     assert!((0.90..=0.99).contains(&share), "{held:?}");
     assert!(held.iter().all(|held| *held >= 43), "{held:?}");
+}
+
+#[test]
+fn intervals_know_that_noise_is_correlated() {
+    const DRAWS: u64 = 50;
+    for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
+        let names: Vec<&str> = truth.iter().map(|(name, _)| *name).collect();
+        let cases = vec![case_at(truth, 1.0, reference(name, 24.0))];
+        let method = Problem::method(&cases).unwrap();
+        let (model, simd) = (ModelKind::Nonlinear, simd_from_environment().unwrap());
+        let free = free(&options(&names), &cases).unwrap();
+        let problem = Problem { cases, free, model, with_shift: true, method, simd };
+        let exact = problem.against(&problem.start(), &|| false).unwrap();
+        for correlation in [0.0, 0.6, 0.9] {
+            let mut held = vec![0; truth.len()];
+            for draw in 0..DRAWS {
+                let mut against = exact.clone();
+                for one in &mut against {
+                    let noise = noise(draw, one.signal, one.residual.len(), correlation);
+                    let noise = noise.iter().map(|noise| NOISE[one.signal] * noise).collect();
+                    one.residual = statistics::centred(noise).0;
+                }
+                // So close to the truth the model is straight: one step of Gauss and Newton's.
+                let summary = problem.summary(&against);
+                let bread = algebra::inverse(&summary.normal);
+                let moved: Vec<f64> =
+                    bread.iter().map(|row| algebra::dot(row, &summary.pull)).collect();
+                for Against { residual, slopes, .. } in &mut against {
+                    for (slope, moved) in slopes.iter().zip(&moved) {
+                        residual.iter_mut().zip(slope).for_each(|(left, s)| *left -= moved * s);
+                    }
+                }
+                let summary = problem.summary(&against);
+                let statistics = Statistics::of(&problem, &against, &summary);
+                assert_eq!(statistics.objection(&problem), None, "{name}, {correlation}: {draw}");
+                for (k, held) in held.iter_mut().enumerate() {
+                    *held += u64::from(moved[k].abs() < 1.96 * statistics.covariance[k][k].sqrt());
+                }
+            }
+            let share = held.iter().sum::<u64>() as f64 / (DRAWS * truth.len() as u64) as f64;
+            println!("{name}, {correlation}: {held:?} of {DRAWS} intervals hold the truth");
+            assert!((0.90..=0.99).contains(&share), "{name}, {correlation}: {held:?}");
+        }
+    }
+}
+
+#[test]
+fn a_linear_model_says_what_the_nonlinear_one_would_have() {
+    let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 8.0))];
+    let linear = FitOptions { linear: true, ..options(&["spring_stiffness_n_per_m"]) };
+    let report = fitted(cases, &linear);
+    let said = "the nonlinear model would move spring_stiffness_n_per_m by";
+    assert!(report.objection.as_ref().is_some_and(|why| why.contains(said)), "{report:?}");
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! Comma-separated numbers under a line of names. Lines that are empty or begin with `#` do not
-//! count.
+//! Numbers under a line of names, separated by commas; or by semicolons or tabs, beside which a
+//! comma is a decimal point. Lines that are empty or begin with `#` do not count.
 
 use std::ops::Range;
 
@@ -8,14 +8,17 @@ use super::super::section::short;
 use super::super::source::{Located, Location, SourceId};
 use super::{ID, ListColumn, MOST_COLUMNS, Unreadable, fits};
 
-/// The columns, and the byte at which each row's line begins; `None` after mistakes, which are
-/// reported.
+/// Columns, the byte at which each row's line begins, and what separates cells.
+pub(super) type Read = (Vec<ListColumn>, Vec<u32>, char);
+
+/// Reads a text; `None` after mistakes, which are reported.
 pub(super) fn read(
     text: &str,
     source: SourceId,
     gaps: bool,
     report: &Report,
-) -> Result<Option<(Vec<ListColumn>, Vec<u32>)>, Unreadable> {
+) -> Result<Option<Read>, Unreadable> {
+    let mut separator = ',';
     let mut columns: Vec<ListColumn> = Vec::new();
     let mut starts: Vec<u32> = Vec::new();
     let mut sound = true;
@@ -27,7 +30,10 @@ pub(super) fn read(
         if line.trim().is_empty() || line.trim_start().starts_with('#') {
             continue;
         }
-        let count = 1 + line.bytes().filter(|&byte| byte == b',').count();
+        if columns.is_empty() {
+            separator = [';', '\t'].into_iter().find(|&other| line.contains(other)).unwrap_or(',');
+        }
+        let count = 1 + line.matches(separator).count();
         if columns.is_empty() {
             if count > MOST_COLUMNS {
                 return Err(Unreadable::TooManyColumns(count));
@@ -36,7 +42,7 @@ pub(super) fn read(
                 name: Located { value: name.to_owned(), at: Location::new(source, at) },
                 values: Vec::new(),
             };
-            columns = cells(line, offset).map(column).collect();
+            columns = cells(line, separator, offset).map(column).collect();
             continue;
         }
         if count != columns.len() {
@@ -49,7 +55,12 @@ pub(super) fn read(
                 };
                 let (names, numbers) = (of(columns.len(), "name"), of(columns.len(), "number"));
                 let title = format!("a row of {} under {names}", of(count, "number"));
-                let expected = format!("expected {numbers}, separated by commas");
+                let by = match separator {
+                    ';' => "semicolons",
+                    '\t' => "tabs",
+                    _ => "commas",
+                };
+                let expected = format!("expected {numbers}, separated by {by}");
                 Diagnostic::new(title).at(&at, expected)
             });
             continue;
@@ -57,7 +68,7 @@ pub(super) fn read(
         fits(starts.len() as u64 + 1, count)?;
         // Fits: no list is as long as 4 GiB.
         starts.push(start as u32);
-        for ((cell, at), column) in cells(line, offset).zip(&mut columns) {
+        for ((cell, at), column) in cells(line, separator, offset).zip(&mut columns) {
             if column.name.value == ID {
                 // Whatever it says; a number holds its place.
                 column.values.push(0.0);
@@ -67,7 +78,11 @@ pub(super) fn read(
                 column.values.push(f64::NAN);
                 continue;
             }
-            if let Ok(value) = cell.parse::<f64>() {
+            let number = match separator {
+                ',' => cell.parse::<f64>(),
+                _ => cell.replace(',', ".").parse(),
+            };
+            if let Ok(value) = number {
                 column.values.push(value);
                 continue;
             }
@@ -79,15 +94,15 @@ pub(super) fn read(
             });
         }
     }
-    Ok(sound.then_some((columns, starts)))
+    Ok(sound.then_some((columns, starts, separator)))
 }
 
 /// The place of a cell in the line that begins at a byte of a text.
-pub(super) fn cell_span(text: &str, start: usize, column: usize) -> Range<usize> {
+pub(super) fn cell_span(text: &str, start: usize, separator: char, column: usize) -> Range<usize> {
     let line = text.get(start..).unwrap_or_default();
     let line = line.split_inclusive('\n').next().unwrap_or_default();
     let (line, offset) = body(line, start);
-    cells(line, offset).nth(column).map_or(start..start, |(_, at)| at)
+    cells(line, separator, offset).nth(column).map_or(start..start, |(_, at)| at)
 }
 
 /// A line that begins at byte `start`, without byte order mark and line end, and where that begins.
@@ -98,9 +113,9 @@ fn body(line: &str, start: usize) -> (&str, usize) {
 }
 
 /// The cells of a line without white space and quotation marks, and their places.
-fn cells(line: &str, offset: usize) -> impl Iterator<Item = (&str, Range<usize>)> {
+fn cells(line: &str, separator: char, offset: usize) -> impl Iterator<Item = (&str, Range<usize>)> {
     let mut next = offset;
-    line.split(',').map(move |cell| {
+    line.split(separator).map(move |cell| {
         let start = next + (cell.len() - cell.trim_start().len());
         next += cell.len() + 1;
         let trimmed = cell.trim();
