@@ -179,7 +179,7 @@ pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
     scene
 }
 
-/// The scale of the x axis: all that the grids hold, with room for dots where there is nothing else.
+/// The scale of the x axis: all that the grids hold, with room for dots where there are no lines.
 pub(crate) fn x_scale(chart: &Chart) -> Scale {
     let mut series = chart.panels.iter().flat_map(|panel| &panel.series);
     if !chart.x_log && series.all(|series| series.style == Style::Dots) {

@@ -93,6 +93,20 @@ pub(crate) fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
     (0..matrix.len()).map(column).collect()
 }
 
+/// Numbers less their mean, and the mean.
+pub(super) fn centred(mut values: Vec<f64>) -> (Vec<f64>, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter_mut().for_each(|value| *value -= mean);
+    (values, mean)
+}
+
+/// The value below which such a part of some numbers lies; `None` of none.
+pub(super) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get((part * (values.len() as f64 - 1.0)).round() as usize).copied()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::statistics::{centred, quantile};
+use super::algebra::{centred, quantile};
 use sweep_engine::config::Diagnostics;
 use sweep_engine::config::list::NumberTable;
 use sweep_engine::config::report::{Diagnostic, Report};

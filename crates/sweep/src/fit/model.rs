@@ -11,10 +11,9 @@ use washer_model::{
     simulate_until,
 };
 
-use super::algebra::dot;
+use super::algebra::{centred, dot};
 use super::measured::{Measured, Quantity, Signal};
 use super::speed::Smoothed;
-use super::statistics::centred;
 use crate::engine::reference_step_s;
 use crate::plan::Plan;
 

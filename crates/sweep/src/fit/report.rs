@@ -9,11 +9,11 @@ use serde_json::Value;
 use washer_model::{Dwell, Method, Timing, prepare};
 use washer_row::Verdict as RowVerdict;
 
-use super::algebra::dot;
+use super::algebra::{centred, dot, quantile};
 use super::iso18571::{Rating, rate};
 use super::model::{Against, Problem};
 use super::search::Descent;
-use super::statistics::{Statistics, centred, quantile};
+use super::statistics::Statistics;
 use crate::config;
 use crate::engine::{ModelEngine, responses};
 use crate::plan::{Axis, AxisValues, Plan};

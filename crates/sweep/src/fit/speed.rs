@@ -2,8 +2,8 @@
 
 use washer_model::Spin;
 
+use super::algebra::quantile;
 use super::evenly;
-use super::statistics::quantile;
 
 /// Noise of a tachometer at least, as a share of its greatest speed: rounded digits are no noise.
 const LEAST_NOISE: f64 = 1e-5;

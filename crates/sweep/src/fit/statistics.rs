@@ -1,6 +1,6 @@
 //! How well numbers are known, and whether the model follows the data at all.
 
-use super::algebra::{Symmetric, dot, inverse, scaled};
+use super::algebra::{Symmetric, centred, dot, inverse, scaled};
 use super::model::{Against, Problem, Summary};
 
 /// Most lags of a residual's autocorrelation that are looked at.
@@ -214,20 +214,6 @@ impl Statistics {
         }
         said
     }
-}
-
-/// Numbers less their mean, and the mean.
-pub(super) fn centred(mut values: Vec<f64>) -> (Vec<f64>, f64) {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.iter_mut().for_each(|value| *value -= mean);
-    (values, mean)
-}
-
-/// The value below which such a part of some numbers lies; `None` of none.
-pub(super) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get((part * (values.len() as f64 - 1.0)).round() as usize).copied()
 }
 
 pub(super) fn add(sum: &mut [Vec<f64>], part: &[Vec<f64>], factor: f64) {

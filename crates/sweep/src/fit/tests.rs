@@ -187,7 +187,7 @@ fn intervals_know_that_noise_is_correlated() {
                 for one in &mut against {
                     let noise = noise(draw, one.signal, one.residual.len(), correlation);
                     let noise = noise.iter().map(|noise| NOISE[one.signal] * noise).collect();
-                    one.residual = statistics::centred(noise).0;
+                    one.residual = algebra::centred(noise).0;
                 }
                 // So close to the truth the model is straight: one step of Gauss and Newton's.
                 let summary = problem.summary(&against);

@@ -15,8 +15,8 @@ pub(crate) const LOAD: usize = 6;
 /// Added to the sum of the feet's loads (N), which may be none.
 const LEAST_N: f64 = 1e-9;
 
-/// Arm at which the floor takes a moment at least (m): about the radius of a foot's pad. A foot that
-/// carries alone has no other.
+/// Arm at which the floor takes a moment at least (m): about the radius of a foot's pad. A foot
+/// that carries alone has no other.
 const LEAST_ARM_M: f64 = 0.01;
 
 /// Feet closer to one line than this share of their distances hold no cabinet upright.
