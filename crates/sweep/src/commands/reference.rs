@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::iter;
 
-use washer_model::{Channel, Machine, Parameter, Range, Spin, Target};
+use washer_model::{Channel, Machine, Parameter, Range, Source, Spin, Target};
 use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 
 use crate::method::Integrator;
@@ -63,17 +63,23 @@ fn row(text: &mut String, cells: &[&str]) {
     let _ = writeln!(text, "| {} |", cells.join(" | "));
 }
 
-/// The source that the page's head tells once.
-const DERIVED: &str = "derived: the drum of Tables 2 and 3 less its 0.4 kg unbalance";
-
 fn parameters() -> String {
     let mut text = head("Parameters", "parameters");
-    text.push_str(
+    let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
+    let all = Parameter::all(&config::with_one_of_each(), &spin);
+    // Told once, before the table.
+    let told = all.iter().find_map(|parameter| match parameter.source() {
+        Source::Derived(how) => Some(how),
+        _ => None,
+    });
+    let how = told.unwrap_or_default();
+    let _ = writeln!(
+        text,
         "Every number of the machine and of the spin has one name, in `[set]`, in `--set \
          NAME=VALUE` and as\n\
          the `parameter` of an `[[axis]]`. Values are the built-in machine's. *Paper* means \
          printed there,\n\
-         *derived* is the drum of Tables 2 and 3 less its 0.4 kg unbalance, *assumed* is this \
+         *derived* is {how}, *assumed* is this \
          project's choice.\n\n\
          Springs, dampers, stops, bushings, unbalances and feet are numbered in the order of the \
          machine file.\n\
@@ -81,13 +87,11 @@ fn parameters() -> String {
          and one\n\
          row for x (towards the door), y (upwards) and z (sideways). `end_s` and the integrator's \
          settings are\n\
-         not parameters, because rows of different length or method would not compare.\n\n",
+         not parameters, because rows of different length or method would not compare.\n"
     );
     row(&mut text, &["name", "built in", "unit", "meaning", "values", "source"]);
     row(&mut text, &["---"; 6]);
     let machine = Machine::paper();
-    let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
-    let all = Parameter::all(&config::with_one_of_each(), &spin);
     let value_of = |name: &str| {
         let parameter = all.iter().find(|parameter| parameter.name() == name)?;
         let value = parameter.get(&machine, &spin).filter(|_| !name.starts_with("spin_"))?;
@@ -104,8 +108,11 @@ fn parameters() -> String {
         let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
         let none = if of_grid { "as the grid file says" } else { "none" };
         let has_source = value_of(name).is_some() || of_grid;
-        let source = if has_source { parameter.source().to_string() } else { String::new() };
-        let source = if source == DERIVED { "derived" } else { &source };
+        let source = match parameter.source() {
+            _ if !has_source => String::new(),
+            Source::Derived(how) if Some(how) == told => "derived".to_owned(),
+            source => source.to_string(),
+        };
         // The first of three coordinates tells of all.
         let of_three = description.strip_suffix("towards the door");
         let axes: &[&str] = if of_three.is_some() { &["_x", "_y", "_z"] } else { &["_x"] };
@@ -124,7 +131,7 @@ fn parameters() -> String {
                 parameter.unit(),
                 of_three.unwrap_or(description).trim_end_matches([',', ' ']),
                 &allowed(parameter.range()),
-                source,
+                &source,
             ],
         );
     }
