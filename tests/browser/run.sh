@@ -1,5 +1,5 @@
 #!/bin/sh
-# The pages of a map, of a trace, of a design and of a report, and one that computes, in a browser:
+# The pages of a map, of a trace, of a design, of dwells and of a report, and one that computes, in a browser:
 # tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
 #
 # MAP.parquet is the result of sweeps/quick.toml, or of another grid over the same axes.
@@ -61,6 +61,12 @@ END
 "$sweep" plot "$work/design.parquet" -o "$work/design.html"
 "$venv/bin/python" "$here/check_design.py" "$work/design.parquet" "$work/design.html" \
     ${SHOTS:+--screenshots "$SHOTS"}
+
+# The page of dwells: dots over the speed, at its least and greatest too.
+"$sweep" dwell "$root/sweeps/quick.toml" --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=130 \
+    --speed 200:300:25 --starts 4 --out "$work/dwell.parquet" --progress none
+"$sweep" plot "$work/dwell.parquet" -o "$work/dwell.html"
+"$venv/bin/python" "$here/check_dots.py" "$work/dwell.html" ${SHOTS:+--screenshots "$SHOTS"}
 
 # A report with figures beside the map's: one page to print.
 "$sweep" trace "$root/sweeps/quick.toml" --point 40 --out "$work/point.parquet"

@@ -156,9 +156,9 @@ pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
     for (index, &content) in panels.iter().enumerate() {
         let panel = Panel { x: LEFT, y, width, height: content.height, xs, ys: y_scale(content) };
         panel.rules(&mut scene);
-        let mut alone = Vec::new();
+        let mut dots = Vec::new();
         scene.clipped(panel.outline(), |scene| {
-            alone = draw_panel(scene, chart, content, &panel);
+            dots = draw_panel(scene, chart, content, &panel);
         });
         draw_marks(&mut scene, chart, &panel, index == 0);
         draw_stars(&mut scene, typeface, (chart, content), &panel);
@@ -166,8 +166,8 @@ pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
         panel.frame(&mut scene, last, true);
         // Whole at the panel's edge too.
         let within = |y: f64| (panel.y..=panel.y + panel.height).contains(&y);
-        for (place, colour) in alone.into_iter().filter(|([_, y], _)| within(*y)) {
-            scene.fill(Outline::circle(place, ALONE), colour);
+        for (place, radius, colour) in dots.into_iter().filter(|([_, y], ..)| within(*y)) {
+            scene.fill(Outline::circle(place, radius), colour);
         }
         panel.y_label(&mut scene, typeface, &content.label.to_string(), 62.0);
         if last {
@@ -208,14 +208,15 @@ pub(crate) fn y_scale(panel: &ChartPanel) -> Scale {
     }
 }
 
-/// Draws shades, curves and levels; gives the places that stand alone, which no line shows.
+/// Draws shades, curves and levels; gives the dots: of series of dots, and of places that stand
+/// alone, which no line shows.
 fn draw_panel(
     scene: &mut Scene,
     chart: &Chart,
     content: &ChartPanel,
     panel: &Panel,
-) -> Vec<([f64; 2], Colour)> {
-    let mut all_alone = Vec::new();
+) -> Vec<([f64; 2], f64, Colour)> {
+    let mut dots = Vec::new();
     for (ranges, colour) in [(&chart.shades, SHADE), (&content.mixed, BOTH_SIDES)] {
         if ranges.is_empty() {
             continue;
@@ -251,9 +252,8 @@ fn draw_panel(
             scene.fill(outline, series.colour.with_alpha(90));
         }
         if series.style == Style::Dots {
-            for dot in (0..xs.len()).filter_map(|k| at(&series.y, k)) {
-                scene.fill(Outline::circle(dot, DOT), series.colour);
-            }
+            let places = (0..xs.len()).filter_map(|k| at(&series.y, k));
+            dots.extend(places.map(|place| (place, DOT, series.colour)));
             continue;
         }
         let kept = envelope(xs, &series.y, panel.xs.from, panel.xs.to, panel.width as usize);
@@ -261,13 +261,13 @@ fn draw_panel(
         let mut outline = Outline::default();
         let alone = outline.add_runs(&places);
         scene.line(outline, stroke(series));
-        all_alone.extend(alone.into_iter().map(|place| (place, series.colour)));
+        dots.extend(alone.into_iter().map(|place| (place, ALONE, series.colour)));
     }
     for (value, _) in &content.levels {
         let y = panel.at_y(*value);
         scene.line(Outline::line(&[[panel.x, y], [panel.x + panel.width, y]]), level_stroke());
     }
-    all_alone
+    dots
 }
 
 fn stroke(series: &Series) -> Stroke {

@@ -426,11 +426,13 @@ fn curve(values: &[f64]) -> Value {
 fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
     let grids = chart.grids.iter().map(|grid| embed::floats(grid.iter().copied()));
     let marks = chart.marks.iter().map(|mark| json!([embed::short(mark.x), mark.label]));
+    let xs = x_scale(chart);
     json!({
         "xWords": chart.x_label.words,
         "xUnit": chart.x_label.unit,
         "xLog": chart.x_log,
-        "xTicks": log_ticks_json(x_scale(chart)),
+        "xRange": [xs.from, xs.to],
+        "xTicks": log_ticks_json(xs),
         "grids": grids.collect::<Vec<_>>(),
         "panels": chart.panels.iter().map(|panel| panel_json(panel, curve)).collect::<Vec<_>>(),
         "marks": marks.collect::<Vec<_>>(),

@@ -12,18 +12,17 @@ function plainPanel(name, words, unit, shown, series, height = 150) {
 }
 
 function plainChart(xWords, xUnit, grid, panels) {
-  return { xWords, xUnit, xLog: false, grids: [grid], panels, marks: [], shades: [] };
+  const xRange = [grid[0], grid.at(-1) || 1];
+  return { xWords, xUnit, xLog: false, xRange, grids: [grid], panels, marks: [], shades: [] };
 }
 
-// `spec` as the page's data has it, with decoded arrays: { xWords, xUnit, xLog, xTicks, grids,
-// panels, marks, markMeaning, shades, shadeMeaning }.
+// `spec` as the page's data has it, with decoded arrays: { xWords, xUnit, xLog, xRange, xTicks,
+// grids, panels, marks, markMeaning, shades, shadeMeaning }.
 // `pick` hears of the x of a click, and of Enter.
 function createChart(host, spec, name, pick = () => {}) {
   const even = (x) => (spec.xLog ? Math.log(x) : x);
   const back = (x) => (spec.xLog ? Math.exp(x) : x);
-  const ends = spec.grids.flatMap((grid) => [grid[0], grid[grid.length - 1]]);
-  const all = [Math.min(...ends), Math.max(...ends)].map(even);
-  if (!(all[1] > all[0])) all[1] = all[0] + 1;
+  const all = spec.xRange.map(even);
   let view = [...all];
   let cursor = null;
   // Where the pointer reads, px from the figure's top; null where keys do.
@@ -119,7 +118,7 @@ function createChart(host, spec, name, pick = () => {}) {
           context.fillRect(atX(from), top, Math.max(atX(to) - atX(from), 1), panel.height);
         }
       }
-      for (const series of panel.series) drawSeries(context, series, atY, box);
+      const dots = panel.series.map((series) => drawSeries(context, series, atY, box));
       for (const [value] of panel.levels) {
         drawLine(context, box.left, atY(value), right, atY(value), [3, 3], themed("ink"));
       }
@@ -131,6 +130,11 @@ function createChart(host, spec, name, pick = () => {}) {
         write(context, label, atX(x) - 12, atY(y) - 5, { align: "right" });
       }
       context.restore();
+      // Whole at the frame too.
+      dots.forEach((path, k) => {
+        context.fillStyle = lineColour(panel.series[k].colour);
+        context.fill(path);
+      });
       if (cursor !== null) {
         drawLine(context, atX(cursor), top, atX(cursor), bottom, [], themed("accent"));
       }
@@ -151,7 +155,9 @@ function createChart(host, spec, name, pick = () => {}) {
     }
   }
 
+  // Gives the dots within the box: those of a series of dots, and places to which no line runs.
   function drawSeries(context, series, atY, box) {
+    const dots = new Path2D();
     const grid = spec.grids[series.grid];
     const [from, to] = visible(grid);
     context.strokeStyle = context.fillStyle = lineColour(series.colour);
@@ -165,11 +171,6 @@ function createChart(host, spec, name, pick = () => {}) {
     context.globalAlpha = series.alpha;
     context.lineWidth = series.width;
     context.setLineDash(series.dashed ? [8, 5] : []);
-    const dot = (x, y, radius) => {
-      context.beginPath();
-      context.arc(x, y, radius, 0, 2 * Math.PI);
-      context.fill();
-    };
     // Of the points in one pixel column, the first, the extremes and the last make the same
     // picture as all.
     const isCrowded = to - from > 4 * box.width;
@@ -186,18 +187,22 @@ function createChart(host, spec, name, pick = () => {}) {
       } else run.push([x, [y]]);
     }
     for (const run of runs) {
-      if (series.dots) {
-        for (const [x, ys] of run) ys.forEach((y) => dot(x, y, series.width / 2));
-        continue;
+      if (!series.dots) {
+        context.beginPath();
+        for (const [x, ys] of run) ys.forEach((y) => context.lineTo(x, y));
+        context.stroke();
+        if (run.length > 1) continue;
       }
-      context.beginPath();
-      for (const [x, ys] of run) ys.forEach((y) => context.lineTo(x, y));
-      context.stroke();
-      // No line runs to it.
-      if (run.length === 1) dot(run[0][0], run[0][1][0], 3);
+      for (const [x, ys] of run) ys.forEach((y) => {
+        const part = [(x - box.left) / box.width, (y - box.top) / box.height];
+        if (!part.every((at) => at >= 0 && at <= 1)) return;
+        dots.moveTo(x, y);
+        dots.arc(x, y, series.dots ? series.width / 2 : 3, 0, 2 * Math.PI);
+      });
     }
     context.setLineDash([]);
     context.globalAlpha = 1;
+    return dots;
   }
 
   const signOf = (series) => (series.dots

@@ -63,13 +63,9 @@ function ticks(low, high, count, sets) {
 }
 
 // Words with their unit, if they have one.
-function withUnit(words, unit) {
-  return unit ? `${words} (${unit})` : words;
-}
+const withUnit = (words, unit) => (unit ? `${words} (${unit})` : words);
 
-function capitalised(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
-}
+const capitalised = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 function element(tag, attributes = {}, ...children) {
   const node = document.createElement(tag);
