@@ -16,7 +16,7 @@ from check_page import check, stands_alone
 HUED = """
     const canvas = document.querySelector("#main .figure canvas");
     const { width, height } = canvas;
-    const copy = element("canvas", { width, height }).getContext("2d", { willReadFrequently: true });
+    const copy = new OffscreenCanvas(width, height).getContext("2d");
     copy.drawImage(canvas, 0, 0);
     const { data } = copy.getImageData(0, 0, width, height);
     const column = (x) => {

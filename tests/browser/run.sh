@@ -1,5 +1,6 @@
 #!/bin/sh
-# The pages of a map, of a trace, of a design, of dwells and of a report, and one that computes, in a browser:
+# The pages of a map, of a trace, of a design, of dwells and of a report, and one that computes, in
+# a browser:
 # tests/browser/run.sh MAP.parquet [TRACES_FOLDER]
 #
 # MAP.parquet is the result of sweeps/quick.toml, or of another grid over the same axes.
