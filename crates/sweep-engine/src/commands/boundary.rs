@@ -212,16 +212,12 @@ fn summary<M: Swept>(
             &format!("{several} values of the first axis have several crossings"),
         );
     }
-    let widest = rows()
-        .flat_map(|row| &row.edges)
-        .filter_map(|edge| edge.bracket.map(|[low, high]| high - low))
-        .fold(0.0, f64::max);
-    let unit = plan.axes.get(1).map_or("", |axis| axis.parameter.unit());
-    line(
-        &mut text,
-        "brackets",
-        &format!("at most {widest:.3} {unit} wide (asked: {})", task.search.tolerance),
-    );
+    let brackets = rows().flat_map(|row| &row.edges).filter_map(|edge| edge.bracket);
+    if let Some(widest) = brackets.map(|[low, high]| high - low).reduce(f64::max) {
+        let unit = plan.axes.get(1).map_or("", |axis| axis.parameter.unit());
+        let told = format!("at most {widest:.3} {unit} wide (asked: {})", task.search.tolerance);
+        line(&mut text, "brackets", &told);
+    }
     // Cells of a logarithmic axis grow: the largest counts.
     let cells: Vec<String> = plan
         .axes
