@@ -104,6 +104,8 @@ fn the_machine_file_of_the_best_has_the_force_that_the_study_says() {
     let checked = checked.expect("it starts");
     assert_eq!(checked.status.code(), Some(0), "{}", said(&checked));
     does(&folder, &format!("plot {file} -o study.svg"));
+    let picture = fs::read_to_string(folder.path().join("study.svg")).expect("it was drawn");
+    assert!(picture.contains(">max(cabinet_force_nonlinear_n) (N)<"), "the study's own words");
     does(&folder, &format!("plot {file} -o study.html"));
     does(&folder, &format!("export {file} study.csv"));
     assert!(does(&folder, "optimise study.toml").contains("it is there already"));

@@ -69,12 +69,22 @@ pub(crate) fn of_model(name: &str) -> (String, &'static str) {
     let (mut words, _) = parted(name);
     let model = ["nonlinear", "linear"].into_iter().find(|model| words.contains(model));
     words.retain(|word| Some(*word) != model);
+    if matches!(words[..], [_, .., "min" | "max"]) {
+        words.rotate_right(1);
+    }
     match words.first_mut() {
         Some(first) if *first == "min" => *first = "least",
         Some(first) if *first == "max" => *first = "greatest",
         _ => {}
     }
     (words.join(" "), model.unwrap_or(""))
+}
+
+/// A result's column in words, without unit and model: `nonlinear_tub_front_y` is "Tub front,
+/// vertical".
+#[must_use]
+pub fn quantity(name: &str) -> String {
+    capitalised(&channel(&of_model(name).0.replace(' ', "_")))
 }
 
 /// A channel's name in words: `tub_front_y` is "tub front, vertical".
@@ -188,6 +198,13 @@ mod tests {
         assert_eq!(channel("drum_front_z"), "drum front, horizontal");
         assert_eq!(of_model("min_gap_linear_m"), ("least gap".to_owned(), "linear"));
         assert_eq!(of_model("stop_2_force_nonlinear_n"), ("stop 2 force".to_owned(), "nonlinear"));
+        for (name, words) in [
+            ("nonlinear_tub_front_y", "Tub front, vertical"),
+            ("ratio_max", "Greatest ratio"),
+            ("min_gap_nonlinear_m", "Least gap"),
+        ] {
+            assert_eq!(quantity(name), words);
+        }
         assert_eq!(of_model("static_sag_m"), ("static sag".to_owned(), ""));
     }
 

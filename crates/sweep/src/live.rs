@@ -146,7 +146,7 @@ pub(crate) fn resonances(plan: &Plan) -> Vec<[String; 3]> {
         let motion = mode.motion.to_string();
         let resonances = mode.resonances.into_iter().map(move |at| {
             let (speed, damping) = (at.speed_rpm, at.mode.damping_ratio);
-            [motion.clone(), format!("{speed:.1}"), format!("{damping:.4}")]
+            [motion.clone(), format!("{speed:.1} rpm"), format!("{damping:.4}")]
         });
         resonances.collect::<Vec<_>>()
     };

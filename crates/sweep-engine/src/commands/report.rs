@@ -14,7 +14,7 @@ use crate::store::read::tally;
 use crate::swept::Swept;
 use sweep_files::{FileKind, Output, ParquetFile, key};
 use sweep_parameter::{Parameter as _, RatioLimits};
-use sweep_plot::{described, escape, sheet, significant, table, words};
+use sweep_plot::{described, escape, quantity, sheet, significant, table, words};
 use sweep_results::{Cell, ResultTable, check, ratio_limits, top};
 
 /// Arguments of `sweep report`.
@@ -89,17 +89,17 @@ pub fn run<M: Swept>(
             short(limits.over_estimate())
         ))
     );
-    body += &table("The worst of it", &["", "worst", "limit", "at"], &worst(&file, limits)?);
+    let heads = ["nonlinear model", "worst", "limit", "at"];
+    body += &table("The worst of it", &heads, &worst(&file, limits)?);
     let mut held = true;
     let mut claims = Vec::new();
     for condition in &requirements {
         let checked = check(&file, condition, None, false, 1)?;
         held &= checked.holds;
         let folded: Vec<String> = checked.folded.iter().map(word).collect();
+        let broken = checked.failing + checked.undefined;
         let found = match checked.by_row {
-            true => {
-                format!("{} of {} rows break it", checked.failing + checked.undefined, checked.rows)
-            }
+            true => format!("{broken} of {} rows break it", checked.rows),
             false => folded.join(", "),
         };
         let verdict = if checked.holds { "holds" } else { "FAILS" };
@@ -182,7 +182,7 @@ fn worst(file: &ResultTable, limits: Option<RatioLimits>) -> Result<Vec<Vec<Stri
         });
         let shown = |value: f64| with_unit(significant(value, 4), &column.unit);
         found.push(vec![
-            words(name),
+            quantity(name),
             shown(*number),
             limit.map_or_else(String::new, shown),
             places.collect::<Vec<_>>().join(", "),

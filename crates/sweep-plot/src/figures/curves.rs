@@ -85,7 +85,7 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
     Ok(Chart {
         title: match asked.first().map(|shown| (shown.group, shown)) {
             Some((Group::Nonlinear | Group::Linear, _)) => "Amplitudes of both models".to_owned(),
-            Some((Group::Other, of)) => label::capitalised(&label::of_model(of.column()).0),
+            Some((Group::Other, of)) => label::quantity(of.column()),
             _ => "Where the linear model can be trusted".to_owned(),
         },
         subtitle: super::map::subtitle(map, &[]),

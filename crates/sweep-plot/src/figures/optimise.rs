@@ -10,26 +10,38 @@ use crate::read::{ColumnFacts, Source};
 /// The candidates by what became of them, their words and colours; the last are drawn on top.
 const KINDS: [&str; 3] = ["breaks a condition", "tried", "on the front"];
 
+/// A column with its name in words.
+fn in_words(column: &ColumnFacts) -> (&ColumnFacts, String) {
+    (column, label::words(&column.name))
+}
+
 /// The chart of a study's file.
 ///
 /// # Errors
 /// A file without objectives.
 pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
     let named = source.find("objective").and_then(|all| all.as_array()).into_iter().flatten();
-    let objectives: Vec<&ColumnFacts> =
-        named.filter_map(|one| source.column(one["name"].as_str()?)).collect();
+    // In the study's own words: a name says no quantile.
+    let objectives: Vec<(&ColumnFacts, String)> = named
+        .filter_map(|one| {
+            let text = one.get("minimise").or_else(|| one.get("maximise"))?.as_str()?;
+            Some((source.column(one["name"].as_str()?)?, text.to_owned()))
+        })
+        .collect();
     let [first, further @ ..] = objectives.as_slice() else {
         return Err(source.lacks("an objective", "written by `sweep optimise`"));
     };
     let number =
         source.column("candidate").ok_or_else(|| source.lacks("candidate", "its index"))?;
-    let (x, ys) = if further.is_empty() { (number, &objectives[..]) } else { (*first, further) };
+    let (x, ys) = match further {
+        [] => (in_words(number), &objectives[..]),
+        _ => (first.clone(), further),
+    };
     // Parameters stand between the generation and the first objective.
     let own = source.numeric().skip_while(|column| column.name != "generation").skip(1);
-    let own = own.take_while(|column| column.name != first.name);
-    let shown: Vec<(&ColumnFacts, bool)> =
-        ys.iter().map(|column| (*column, true)).chain(own.map(|column| (column, false))).collect();
-    let mut names = vec!["feasible", "on_front", x.name.as_str()];
+    let own = own.take_while(|column| column.name != first.0.name).map(in_words);
+    let shown: Vec<(&ColumnFacts, String)> = ys.iter().cloned().chain(own).collect();
+    let mut names = vec!["feasible", "on_front", x.0.name.as_str()];
     names.extend(shown.iter().map(|(column, _)| column.name.as_str()));
     let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
     for batch in source.batches(&names)? {
@@ -46,16 +58,14 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
         }));
     }
     rows.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
-    let units: Vec<(&str, f64)> = std::iter::once(x)
-        .chain(shown.iter().map(|(column, _)| *column))
-        .map(|column| label::shown(&column.unit))
-        .collect();
+    let units: Vec<(&str, f64)> =
+        std::iter::once(&x).chain(&shown).map(|(column, _)| label::shown(&column.unit)).collect();
     let of = |kind: usize, k: usize| -> Vec<f64> {
         let own = rows.iter().filter(|(of, values)| *of == kind && values[0].is_finite());
         own.map(|(_, values)| values[k] * units[k].1).collect()
     };
     let grids: Vec<Vec<f64>> = (0..KINDS.len()).map(|kind| of(kind, 0)).collect();
-    let panels = shown.iter().enumerate().map(|(k, (column, is_shown))| {
+    let panels = shown.iter().enumerate().map(|(k, (column, words))| {
         let colours = [FAILED, DISTINCT[5], NONLINEAR];
         let dots = |kind: usize| Series {
             name: KINDS[kind].to_owned(),
@@ -65,29 +75,23 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
             style: Style::Dots,
         };
         let drawn = (0..KINDS.len()).filter(|&kind| !grids[kind].is_empty());
-        let words = label::words(&column.name);
+        let label = Label::new(words, units[k + 1].0);
         ChartPanel {
-            shown: *is_shown,
+            shown: k < ys.len(),
             height: 300.0,
-            ..ChartPanel::new(
-                &column.name,
-                Label::new(&words, units[k + 1].0),
-                drawn.map(dots).collect(),
-            )
+            ..ChartPanel::new(&column.name, label, drawn.map(dots).collect())
         }
     });
-    let panels = panels.collect();
-    let words = label::words(&x.name);
     Ok(Chart {
         title: if further.is_empty() { "What was tried" } else { "What no other choice beats" }
             .to_owned(),
         subtitle: source.subtitle(&format!("{} candidates", source.rows)),
-        x_label: Label::new(&words, units[0].0),
+        x_label: Label::new(&x.1, units[0].0),
         x_log: false,
         shades: Vec::new(),
         shade_meaning: String::new(),
+        panels: panels.collect(),
         grids,
-        panels,
         marks: Vec::new(),
         mark_meaning: String::new(),
     })

@@ -46,7 +46,7 @@ pub(crate) fn json(live: &Live, axes: &[(&str, bool)]) -> Value {
 fn metric(columns: &[String; 2]) -> Value {
     let unit = label::unit_of_name(&columns[0]);
     let (unit, factor) = label::shown(&unit);
-    let words = label::capitalised(&label::of_model(&columns[0]).0);
+    let words = label::quantity(&columns[0]);
     json!({ "columns": columns, "words": words, "unit": unit, "factor": factor })
 }
 

@@ -28,7 +28,7 @@ pub(crate) fn told(source: &Source, live: Option<&Live>) -> String {
         about(source).into_iter().map(|(title, text)| vec![title.to_owned(), text]).collect();
     let resonances: Vec<_> =
         live.into_iter().flat_map(|live| live.resonances.iter().cloned().map(Vec::from)).collect();
-    let heads = ["Motion", "Resonance (rpm)", "Damping ratio"];
+    let heads = ["Motion", "Resonance", "Damping ratio"];
     table("What was run", &["", ""], &run)
         + &table("Resonances of the machine as given", &heads, &resonances)
 }
