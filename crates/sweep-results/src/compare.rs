@@ -206,8 +206,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     };
     let kinds = [kind(first), kind(second)];
     if kinds[0] != kinds[1] {
-        let reason = format!("the first is a {} file, the second a {} file", kinds[0], kinds[1]);
-        return Err(refuse(reason));
+        return Err(refuse(format!("the kinds of file are {} and {}", kinds[0], kinds[1])));
     }
     let is_boundary = kinds[0] == "boundary";
     let tables = [first, second];

@@ -142,6 +142,9 @@ fn verdict(row: &SharedRow, limit_side: usize) -> &'static str {
     }
 }
 
+/// What both files have, and how it changed if that is told.
+type Cells = ([String; 2], Option<String>);
+
 /// A heading with rows beneath: what every kind of output shows.
 struct Listed {
     title: String,
@@ -153,62 +156,51 @@ struct Listed {
 fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
     let most = usize::from(args.rows);
     let mut lists = Vec::new();
-    let place = |row: &SharedRow| row.place.iter().map(|value| short(*value)).collect::<Vec<_>>();
-    for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
-        let count = found.flips(sensitive).count();
-        if count > 0 {
-            let rows = found.flips(sensitive).take(most).map(|row| {
-                let mut cells = place(row);
-                cells.extend([0, 1].map(|side| match row.flip {
-                    Flip::Defined => number(row.ratio[side]),
-                    _ => format!("{} {}", number(row.ratio[side]), verdict(row, side)),
-                }));
-                cells
-            });
-            lists.push(Listed {
-                title: format!("verdicts that flipped{which}: {count}"),
-                headings: headings(found, &["A", "B"]),
-                rows: rows.collect(),
-            });
+    let mut list = |title: String, rows: Vec<&SharedRow>, cells: &dyn Fn(&SharedRow) -> Cells| {
+        if rows.is_empty() {
+            return;
         }
+        let whole = |row: &SharedRow| -> Vec<String> {
+            let (sides, change) = cells(row);
+            row.place.iter().map(|value| short(*value)).chain(sides).chain(change).collect()
+        };
+        let rows: Vec<_> = rows.into_iter().map(whole).collect();
+        let headings = found.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
+        let headings = headings.take(rows[0].len()).map(str::to_owned).collect();
+        lists.push(Listed { title, headings, rows });
+    };
+    // Where a ratio can be too small, the least decides too.
+    let two_sided = found.columns.iter().any(|column| column.name == "ratio_min");
+    let of_verdict = |row: &SharedRow, side: usize| {
+        let ratio = match two_sided {
+            true => format!("{} to {}", number(row.least_ratio[side]), number(row.ratio[side])),
+            false => number(row.ratio[side]),
+        };
+        match row.flip {
+            Flip::Defined => ratio,
+            _ => format!("{ratio} {}", verdict(row, side)),
+        }
+    };
+    for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
+        let title = format!("verdicts that flipped{which}: {}", found.flips(sensitive).count());
+        let rows = found.flips(sensitive).take(most).collect();
+        list(title, rows, &|row| ([0, 1].map(|side| of_verdict(row, side)), None));
     }
     for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
-        let ratios = found.greatest(most, sensitive, SharedRow::ratio_by);
-        if !ratios.is_empty() {
-            let rows = ratios.into_iter().map(|row| {
-                let mut cells = place(row);
-                cells.extend(row.ratio.map(number));
-                let change = row.ratio_change().map(|change| 100.0 * (change - 1.0));
-                cells.push(change.map_or_else(|| number(None), |change| format!("{change:+.3} %")));
-                cells
-            });
-            lists.push(Listed {
-                title: format!("greatest changes of the ratio{which}"),
-                headings: headings(found, &["A", "B", "change"]),
-                rows: rows.collect(),
-            });
-        }
-        let gaps = found.greatest(most, sensitive, SharedRow::gap_by_m);
-        if !gaps.is_empty() {
-            let rows = gaps.into_iter().map(|row| {
-                let mut cells = place(row);
-                cells.extend(row.gap_m.map(number));
-                let sign = if row.gap_change_m() > Some(0.0) { "+" } else { "" };
-                cells.push(format!("{sign}{}", number(row.gap_change_m())));
-                cells
-            });
-            lists.push(Listed {
-                title: format!("greatest changes of the least gap{which}, m"),
-                headings: headings(found, &["A", "B", "change"]),
-                rows: rows.collect(),
-            });
-        }
+        let rows = found.greatest(most, sensitive, SharedRow::ratio_by);
+        list(format!("greatest changes of the ratio{which}"), rows, &|row| {
+            let change = row.ratio_change().map(|change| 100.0 * (change - 1.0));
+            let change = change.map_or_else(|| number(None), |change| format!("{change:+.3} %"));
+            (row.ratio.map(number), Some(change))
+        });
+        let rows = found.greatest(most, sensitive, SharedRow::gap_by_m);
+        list(format!("greatest changes of the least gap{which}, m"), rows, &|row| {
+            let sign = if row.gap_change_m() > Some(0.0) { "+" } else { "" };
+            let change = format!("{sign}{}", number(row.gap_change_m()));
+            (row.gap_m.map(number), Some(change))
+        });
     }
     lists
-}
-
-fn headings(found: &Comparison, further: &[&str]) -> Vec<String> {
-    found.keys.iter().cloned().chain(further.iter().map(|name| (*name).to_owned())).collect()
 }
 
 /// How many rows and verdicts are shared.

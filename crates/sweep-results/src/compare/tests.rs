@@ -136,7 +136,7 @@ fn what_shares_nothing_is_refused_with_the_reason() {
     let refused = compare(&map(&RATIOS), &second).unwrap_err().to_string();
     assert!(refused.contains("share no row"), "{refused}");
     let refused = compare(&map(&RATIOS), &boundary(&[Some(100.0)])).unwrap_err().to_string();
-    assert!(refused.contains("a map file, the second a boundary file"), "{refused}");
+    assert!(refused.contains("are map and boundary"), "{refused}");
 }
 
 #[test]
