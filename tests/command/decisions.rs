@@ -118,6 +118,12 @@ fn mistakes_in_a_gate_are_pointed_at_all_of_them() {
     assert_eq!(code(&folded), Some(2), "{}", said(&folded));
     let absent = home.sweep(&["require", "no.parquet", "reliable"]);
     assert_eq!(code(&absent), Some(1), "{}", said(&absent));
+    for wrong in ["short.parquet", "resluts/short.parquet", "results/short"] {
+        let absent = home.sweep(&["show", wrong]);
+        assert!(said(&absent).contains("results/short.parquet is there"), "{}", said(&absent));
+    }
+    let no_grid = home.sweep(&["check", MAP]);
+    assert!(said(&no_grid).contains("it is a Parquet file, not text"), "{}", said(&no_grid));
 }
 
 #[test]
@@ -190,6 +196,22 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
 }
 
 #[test]
+fn a_verdict_that_flipped_shows_both_of_its_ratios() {
+    let home = Home::new(&grid(3, 2));
+    for (name, least, mass) in [("a", "ratio_min=0.5", "20"), ("b", "ratio_min=1", "22")] {
+        let mass = format!("tub_mass_kg={mass}");
+        let run = ["run", "g.toml", "--name", name, "--set", least, "--set", &mass];
+        let done = home.sweep(&[&run[..], &["--progress", "none"]].concat());
+        assert_eq!(code(&done), Some(0), "{}", said(&done));
+    }
+    let told = printed(&home.sweep(&["compare", "results/a.parquet", "results/b.parquet"]));
+    let flips = told.split("verdicts that flipped").nth(1).expect("some");
+    let row = flips.lines().nth(2).expect("a row");
+    assert_eq!(row.matches(" to ").count(), 2, "{told}");
+    assert!(row.contains(" reliable") && row.ends_with(" not"), "{told}");
+}
+
+#[test]
 fn a_trace_says_which_limit_its_point_breaks() {
     let home = Home::new(&grid(3, 2));
     let told = |sets: &[&str]| {
@@ -213,8 +235,14 @@ fn a_report_names_quantities_in_words_and_both_limits() {
     let written = home.sweep(&["report", MAP, "-o", "r.html"]);
     assert_eq!(code(&written), Some(0), "{}", said(&written));
     let page = fs::read_to_string(home.path("r.html")).expect("it was written");
-    for text in ["is between 0.999 and 2", "Ratio min", "Damper speed nonlinear", "Unbalance mass "]
-    {
+    for text in [
+        "is between 0.999 and 2",
+        ">Tub front, vertical<",
+        ">Least ratio<",
+        ">Damper speed<",
+        "Unbalance mass ",
+        " rpm<",
+    ] {
         assert!(page.contains(text), "{text}");
     }
     // Each damper's are among those of all, and numbers stay with their units.

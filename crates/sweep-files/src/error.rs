@@ -108,8 +108,9 @@ fn near(path: &Path) -> Option<PathBuf> {
     if path.extension().is_none_or(|ending| ending != "parquet") {
         whole.push(".parquet");
     }
-    let places = [path.with_file_name(&whole), path.with_file_name("results").join(&whole)];
-    places.into_iter().find(|place| place.is_file())
+    let folders = [path.with_file_name(""), path.with_file_name("results"), "results".into()];
+    let mut places = folders.map(|folder: PathBuf| folder.join(&whole)).into_iter();
+    places.find(|place| place.is_file())
 }
 
 /// Why a Parquet file is not read, found before the library would fail at it.

@@ -58,6 +58,8 @@ pub enum ReadError {
     Io(std::io::Error),
     /// Longer than any file of ours.
     TooLong,
+    /// A result, which begins as Parquet files do.
+    Parquet,
     /// No text.
     NotUtf8 {
         /// From 0.
@@ -77,6 +79,7 @@ impl fmt::Display for ReadError {
                  of their own",
                 LONGEST_BYTES >> 10
             ),
+            Self::Parquet => f.write_str("it is a Parquet file, not text: `sweep show` reads it"),
             Self::NotUtf8 { utf16: true, .. } => {
                 f.write_str("it is UTF-16, not UTF-8: save it as UTF-8")
             }
@@ -96,6 +99,9 @@ pub fn read(path: &Path) -> Result<String, ReadError> {
     let mut bytes = Vec::new();
     let file = std::fs::File::open(path).map_err(ReadError::Io)?;
     file.take(LONGEST_BYTES + 1).read_to_end(&mut bytes).map_err(ReadError::Io)?;
+    if bytes.starts_with(b"PAR1") {
+        return Err(ReadError::Parquet);
+    }
     if bytes.len() as u64 > LONGEST_BYTES {
         return Err(ReadError::TooLong);
     }
@@ -206,6 +212,7 @@ mod tests {
             Err(ReadError::NotUtf8 { first_bad_byte: 2, utf16: false })
         ));
         assert!(matches!(file(b"\xff\xfen\0"), Err(ReadError::NotUtf8 { utf16: true, .. })));
+        assert!(matches!(file(b"PAR1\xff"), Err(ReadError::Parquet)));
         assert!(matches!(file(&vec![b' '; LONGEST_BYTES as usize + 1]), Err(ReadError::TooLong)));
         assert!(file(&vec![b' '; LONGEST_BYTES as usize]).is_ok());
         assert!(matches!(read(folder.path()), Err(ReadError::Io(_))));
