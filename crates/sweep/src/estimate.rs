@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
 use washer_model::ModelKind;
-use washer_row::{Demand, Deviations, Ladder, Outcome};
+use washer_row::{Demand, Deviations, Ladder, Metric, Outcome};
 
 use crate::engine::{Engine, EngineError, MOST_WAITING, ModelEngine, ROWS_A_THREAD, Watch};
 use crate::plan::Plan;
@@ -122,15 +122,23 @@ impl Measured {
         let mut shorter: Option<(f64, f64)> = None;
         let mut end_s = first_end_s(plan);
         let mut cut = plan.clone();
+        // What held speeds cost does not grow with the length either, and drowns what does.
+        let mut held_s = 0.0;
         loop {
             cut.end_s = end_s;
             cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
             let cost_s = cost_s(&cut, ladders, &mut (first..first + points))?;
+            let of_length = |metric: &Metric| !matches!(metric, Metric::Growth | Metric::Dwell);
+            if !cut.model.measures.metrics.iter().all(of_length) {
+                cut.model.measures.metrics.retain(of_length);
+                held_s = cost_s;
+                continue;
+            }
             if end_s >= plan.end_s || cost_s >= LONG_ENOUGH.as_secs_f64() {
                 // What does not grow with the length (the equilibrium) must not be multiplied.
                 let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
                 let rate = ((cost_s - base_s) / (end_s - base_end_s)).max(0.0);
-                let whole_s = cost_s + rate * (plan.end_s - end_s);
+                let whole_s = held_s + cost_s + rate * (plan.end_s - end_s);
                 return Ok(Self {
                     core_s_per_point: whole_s / points as f64,
                     points,
@@ -141,9 +149,7 @@ impl Measured {
             end_s = (4.0 * end_s).min(plan.end_s);
         }
     }
-}
 
-impl Measured {
     /// Whole trajectories of points from all over the grid, integrated together: the rows that are
     /// left to a slower rung then share its lanes, as in the run. Few points leave such lanes
     /// empty, and cost several times as much each.
@@ -262,12 +268,8 @@ fn method(plan: &Plan, ladder: &Ladder) -> String {
         Steps::Explicit => ": steps as it needs".to_owned(),
         Steps::Implicit => ": steps as it needs, one trajectory at a time".to_owned(),
         Steps::Checked(_) => {
-            let rungs: Vec<String> = ladder
-                .rungs
-                .iter()
-                .skip(1)
-                .map(|rung| rung.describe(ModelKind::Nonlinear))
-                .collect();
+            let rungs = ladder.rungs.iter().skip(1);
+            let rungs: Vec<_> = rungs.map(|rung| rung.describe(ModelKind::Nonlinear)).collect();
             let why = ladder.held_back.as_ref().map(|why| format!("\n            {why}"));
             let rungs = rungs.join("\n            then ");
             format!(", until two rungs agree: {rungs}{}", why.unwrap_or_default())
@@ -282,14 +284,14 @@ mod tests {
 
     /// A grid of `count` points over `end_s`.
     fn plan(count: u64, end_s: f64) -> Plan {
-        plan_by("\"rk4\"\nstep_s = 2e-4", count, end_s)
+        plan_by("", "\"rk4\"\nstep_s = 2e-4", count, end_s)
     }
 
-    fn plan_by(method: &str, count: u64, end_s: f64) -> Plan {
+    fn plan_by(top: &str, method: &str, count: u64, end_s: f64) -> Plan {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("grid.toml");
         let grid = format!(
-            "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = \
+            "{top}[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = \
              {end_s}\n\
              [integrator]\nmethod = {method}\n\
              [[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = {{ from = 0.1, to = 1.0, count \
@@ -313,10 +315,21 @@ mod tests {
 
     #[test]
     fn checked_rows_are_measured_whole_where_there_is_time() {
-        let plan = plan_by("\"rk4-mass-scaled\"", 16, 50.0);
+        let plan = plan_by("", "\"rk4-mass-scaled\"", 16, 50.0);
         let sampled_s = |whole| reckoned(&plan, 1, whole).unwrap().sampled_s;
         assert_eq!(sampled_s(Duration::MAX), plan.end_s);
         assert!(sampled_s(Duration::ZERO) < plan.end_s);
+    }
+
+    #[test]
+    fn held_speeds_cost_the_same_however_long_the_run_is() {
+        let top = "metrics = [\"growth\"]\nstability = { speed_rpm = \"250,300\" }\n";
+        let plan = plan_by(top, "\"rk4-mass-scaled\"", 16, 50.0);
+        let [whole, begun] = [Duration::MAX, Duration::ZERO]
+            .map(|whole| reckoned(&plan, 1, whole).unwrap().core_s_per_point);
+        // Checked rows cost most where little moves, some 20 times as much; held speeds that are
+        // multiplied with the length are 100,000 times too dear.
+        assert!(begun < 300.0 * whole, "{begun} s a point from a beginning, {whole} s in truth");
     }
 
     #[test]
