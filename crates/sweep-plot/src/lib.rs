@@ -184,7 +184,7 @@ pub struct Live {
     pub rungs: [Vec<String>; 2],
     /// The version of the program that chose the rungs.
     pub version: String,
-    /// Resonances of the linear model: motion, speed (rpm), damping ratio.
+    /// Resonances of the linear model: motion, speed with its unit, damping ratio.
     pub resonances: Vec<[String; 3]>,
 }
 
