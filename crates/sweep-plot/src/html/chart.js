@@ -21,7 +21,7 @@ function plainChart(xWords, xUnit, grid, panels) {
 function createChart(host, spec, name, pick = () => {}) {
   const even = (x) => (spec.xLog ? Math.log(x) : x);
   const back = (x) => (spec.xLog ? Math.exp(x) : x);
-  const ends = spec.grids.flatMap((grid) => [grid[0], grid[grid.length - 1]]);
+  const ends = spec.grids.flatMap((grid) => [...grid.slice(0, 1), ...grid.slice(-1)]);
   const all = [Math.min(...ends), Math.max(...ends)].map(even);
   if (!(all[1] > all[0])) all[1] = all[0] + 1;
   let view = [...all];
