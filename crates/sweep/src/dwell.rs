@@ -25,7 +25,7 @@ use sweep_files::{FileKind, key};
 /// Rows that a thread takes at once, at most: their starts fill lanes. Where rows have more starts
 /// than these, they are fewer: what is kept of a trajectory is 0.1 MB.
 const MOST_AT_ONCE: u64 = 16;
-const MOST_STARTS_AT_ONCE: u64 = 128;
+const STARTS_AT_ONCE: u64 = 128;
 
 /// Which way the last motion is taken along from speed to speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,8 +168,7 @@ impl Motions {
             // The motion goes through all speeds of its point.
             Some(_) => speeds * (share / speeds).clamp(1, MOST_AT_ONCE),
             None => {
-                let most = MOST_STARTS_AT_ONCE / self.search.starts.count as u64;
-                share.clamp(1, most.clamp(1, MOST_AT_ONCE))
+                share.min(STARTS_AT_ONCE / self.search.starts.count as u64).clamp(1, MOST_AT_ONCE)
             }
         }
     }
