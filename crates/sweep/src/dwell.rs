@@ -22,8 +22,10 @@ use sweep_engine::columns::row;
 use sweep_engine::store::{Column, Done, Job, Kind as Cells, Layout, axis_columns};
 use sweep_files::{FileKind, key};
 
-/// Rows that a thread takes at once, at most: their starts fill lanes.
+/// Rows that a thread takes at once, at most: their starts fill lanes. Where rows have more starts
+/// than these, they are fewer: what is kept of a trajectory is 0.1 MB.
 const MOST_AT_ONCE: u64 = 16;
+const STARTS_AT_ONCE: u64 = 128;
 
 /// Which way the last motion is taken along from speed to speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -165,7 +167,9 @@ impl Motions {
         match self.search.carry {
             // The motion goes through all speeds of its point.
             Some(_) => speeds * (share / speeds).clamp(1, MOST_AT_ONCE),
-            None => share.clamp(1, MOST_AT_ONCE),
+            None => {
+                share.min(STARTS_AT_ONCE / self.search.starts.count as u64).clamp(1, MOST_AT_ONCE)
+            }
         }
     }
 

@@ -29,8 +29,8 @@ pub enum BoundaryError {
     /// Fewer than two axes.
     #[error(
         "a boundary runs over two axes, and this grid has {0}: give [[axis]] twice, first the one \
-         along which the \
-         curve is wanted, then the one that is searched"
+         along which the curve is wanted, then the one that is searched; one that --at gives a \
+         value is no axis, one with `values` of one number is"
     )]
     Axes(usize),
     /// The points come from a design.

@@ -151,13 +151,12 @@ impl Summary {
     fn words(&self, tongue: &Tongue) -> String {
         let Tongue { at, from_to_rpm: [from, to] } = tongue;
         let mut text = self.of_point(at);
-        let speed = decimal(at.speed_rpm);
+        let [speed, first, last] = [at.speed_rpm, *from, *to].map(decimal);
+        let to = if first == last { String::new() } else { format!(" to {last}") };
         // Writing to a String cannot fail.
         let _ = write!(
             text,
-            "{} to {} rpm, {}, up to {:.4} /s at {speed} rpm ({:.1} and {:.1} per minute)",
-            decimal(*from),
-            decimal(*to),
+            "{first}{to} rpm, {}, up to {:.4} /s at {speed} rpm ({:.1} and {:.1} per minute)",
             at.kind.replace('_', " "),
             at.growth_per_s,
             at.frequency_cpm,
@@ -265,5 +264,6 @@ mod tests {
         assert!(lines[2].1.starts_with(
             "unbalance_mass_kg 0.1: 2 to 3 rpm, quasi periodic, up to 0.3000 /s at 3"
         ));
+        assert!(lines[3].1.starts_with("unbalance_mass_kg 0.1: 4 rpm, period doubling, up to"));
     }
 }

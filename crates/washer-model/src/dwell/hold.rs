@@ -106,7 +106,7 @@ fn hold_lanes<T: Lane>(
     let first = found.len();
     found.extend(held.iter().map(|_| (Vec::with_capacity(turns), Extra::default())));
     let mut watched = Watched::new(zero, &model, &clock);
-    (watched.with_outputs, watched.with_states) = (true, false);
+    watched.with_states = false;
     let of = (ModelKind::Nonlinear, Instants::of_steps(rows[0].caps.is_none()));
     watched.extras = Extras::new(zero, wanted, of, rows[0].point, held.len());
     if let Some(extras) = &mut watched.extras {

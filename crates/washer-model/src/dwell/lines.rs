@@ -1,9 +1,13 @@
 //! Lines in the spectrum of states once a turn.
 
+use core::array::from_fn;
 use core::f64::consts::TAU;
 
 /// Trials of a frequency for every sample.
 const TRIALS: usize = 2;
+
+/// Frequencies tried side by side.
+const AT_ONCE: usize = 8;
 
 /// Rounds in which the interval around a line shrinks to two thirds.
 const ROUNDS: usize = 40;
@@ -27,18 +31,37 @@ fn window(n: usize, count: usize) -> f64 {
     sin * sin
 }
 
-/// The mean of a signal times exp(-2 pi i f n), through the window.
-fn part(signal: &[f64], windows: &[f64], frequency: f64) -> [f64; 2] {
-    let (sin, cos) = (libm::sin(TAU * frequency), libm::cos(TAU * frequency));
-    let (mut re, mut im) = (1.0_f64, 0.0_f64);
-    let mut sum = [0.0; 3];
+/// The means of a signal times exp(-2 pi i f n), through the window, at some frequencies.
+fn parts<const M: usize>(signal: &[f64], windows: &[f64], frequencies: [f64; M]) -> [[f64; 2]; M] {
+    let sin = frequencies.map(|frequency| libm::sin(TAU * frequency));
+    let cos = frequencies.map(|frequency| libm::cos(TAU * frequency));
+    let (mut re, mut im) = ([1.0_f64; M], [0.0_f64; M]);
+    let (mut sums, mut whole) = ([[0.0; 2]; M], 0.0);
     for (value, window) in signal.iter().zip(windows) {
-        sum[0] += window * value * re;
-        sum[1] -= window * value * im;
-        sum[2] += window;
-        (re, im) = (re * cos - im * sin, re * sin + im * cos);
+        let seen = window * value;
+        whole += window;
+        for k in 0..M {
+            sums[k][0] += seen * re[k];
+            sums[k][1] -= seen * im[k];
+            (re[k], im[k]) = (re[k] * cos[k] - im[k] * sin[k], re[k] * sin[k] + im[k] * cos[k]);
+        }
     }
-    [sum[0] / sum[2], sum[1] / sum[2]]
+    sums.map(|sum| sum.map(|part| part / whole))
+}
+
+/// The power of signals at some frequencies.
+fn powers<const M: usize>(
+    signals: &[Vec<f64>],
+    windows: &[f64],
+    frequencies: [f64; M],
+) -> [f64; M] {
+    let mut powers = [0.0; M];
+    for signal in signals {
+        for (power, [re, im]) in powers.iter_mut().zip(parts(signal, windows, frequencies)) {
+            *power += re * re + im * im;
+        }
+    }
+    powers
 }
 
 /// The strongest line of signals of one length.
@@ -47,7 +70,7 @@ pub(super) fn strongest(signals: &[Vec<f64>]) -> Option<Line> {
     let windows: Vec<f64> = (0..count).map(|n| window(n, count)).collect();
     let mut rests = signals.to_vec();
     for signal in &mut rests {
-        let [mean, _] = part(signal, &windows, 0.0);
+        let [[mean, _]] = parts(signal, &windows, [0.0]);
         signal.iter_mut().for_each(|value| *value -= mean);
     }
     let squares = |signals: &[Vec<f64>]| -> f64 {
@@ -57,32 +80,34 @@ pub(super) fn strongest(signals: &[Vec<f64>]) -> Option<Line> {
         signals.iter().map(square).sum()
     };
     let whole = squares(&rests);
-    let power = |frequency: f64| -> f64 {
-        let of = |signal: &Vec<f64>| {
-            let [re, im] = part(signal, &windows, frequency);
-            re * re + im * im
-        };
-        rests.iter().map(of).sum()
-    };
+    let at = |trial: usize| 0.5 * trial as f64 / (TRIALS * count) as f64;
     // Two samples of the mean's own line are left out.
-    let trials = TRIALS * count;
-    let at = |trial: usize| 0.5 * trial as f64 / trials as f64;
-    let best = (2 * TRIALS * 2..=trials).max_by(|&a, &b| power(at(a)).total_cmp(&power(at(b))))?;
+    let trials: Vec<usize> = (2 * TRIALS * 2..=TRIALS * count).collect();
+    let mut best = (0.0, *trials.first()?);
+    for trials in trials.chunks(AT_ONCE) {
+        let frequencies = from_fn::<_, AT_ONCE, _>(|k| at(trials[k.min(trials.len() - 1)]));
+        let powers = powers(&rests, &windows, frequencies);
+        let found = powers.into_iter().zip(trials.iter().copied());
+        best = found.fold(best, |best, found| if found.0 < best.0 { best } else { found });
+    }
+    let (_, best) = best;
     let (mut low, mut high) = (at(best - 1), at(best + 1).min(0.5));
     for _ in 0..ROUNDS {
         let third = (high - low) / 3.0;
-        if power(low + third) < power(high - third) {
+        let [below, above] = powers(&rests, &windows, [low + third, high - third]);
+        if below < above {
             low += third;
         } else {
             high -= third;
         }
     }
     let frequency = 0.5 * (low + high);
+    let multiples: Vec<Multiple> =
+        (0..=HARMONICS).map(|k| Multiple::new((k as f64 * frequency).fract(), count)).collect();
     for _ in 0..SWEEPS {
-        for harmonic in 0..=HARMONICS {
-            let of = (harmonic as f64 * frequency).fract();
+        for multiple in &multiples {
             for signal in &mut rests {
-                take_out(signal, &windows, of);
+                multiple.take_out(signal, &windows);
             }
         }
     }
@@ -90,15 +115,28 @@ pub(super) fn strongest(signals: &[Vec<f64>]) -> Option<Line> {
     (rest.is_finite()).then_some(Line { frequency, rest })
 }
 
-/// Takes a line out of a signal.
-fn take_out(signal: &mut [f64], windows: &[f64], frequency: f64) {
-    let [re, im] = part(signal, windows, frequency);
-    // At 0 and at a half the line is its own mirror image.
-    let away = frequency.min((frequency - 0.5).abs()).min(1.0 - frequency);
-    let twice = if away < 1.0 / signal.len() as f64 { 1.0 } else { 2.0 };
-    for (n, value) in signal.iter_mut().enumerate() {
-        let phase = TAU * (frequency * n as f64).fract();
-        *value -= twice * (re * libm::cos(phase) - im * libm::sin(phase));
+/// A line of given frequency.
+struct Multiple {
+    frequency: f64,
+    /// Cosine and sine of its phase at every sample.
+    wave: Vec<[f64; 2]>,
+}
+
+impl Multiple {
+    fn new(frequency: f64, count: usize) -> Self {
+        let phase = |n: usize| TAU * (frequency * n as f64).fract();
+        let wave = (0..count).map(phase).map(|phase| [libm::cos(phase), libm::sin(phase)]);
+        Self { frequency, wave: wave.collect() }
+    }
+
+    fn take_out(&self, signal: &mut [f64], windows: &[f64]) {
+        let [[re, im]] = parts(signal, windows, [self.frequency]);
+        // At 0 and at a half the line is its own mirror image.
+        let away = self.frequency.min((self.frequency - 0.5).abs()).min(1.0 - self.frequency);
+        let twice = if away < 1.0 / signal.len() as f64 { 1.0 } else { 2.0 };
+        for (value, [cos, sin]) in signal.iter_mut().zip(&self.wave) {
+            *value -= twice * (re * cos - im * sin);
+        }
     }
 }
 

@@ -80,6 +80,11 @@ fn held(takes: impl Fn(&str, f64) -> bool) {
 }
 
 fn check(name: &str, speed_rpm: f64, at: &Value, found: &Endings) {
+    // The reference's starts all come back to the response there.
+    if name == "friction_stops" && speed_rpm > 300.0 {
+        let yaw_rad = |motion: &Ending| motion.peaks[Channel::TubYaw.index()];
+        assert!(found.motions.iter().any(|motion| yaw_rad(motion) > 0.13), "{speed_rpm}");
+    }
     let ends = at["ends"].as_array().unwrap();
     for end in ends {
         let period = end["period_turns"].as_u64().unwrap();
@@ -125,9 +130,9 @@ fn val_motions_of_held_speeds_match_an_independent_program() {
 }
 
 #[test]
-#[ignore = "friction takes short steps: a minute"]
+#[ignore = "friction takes short steps: minutes"]
 fn val_more_motions_of_held_speeds_match_an_independent_program() {
-    held(|name, _| name.starts_with("paper") || name == "friction_heavy");
+    held(|_, _| true);
 }
 
 #[test]
@@ -143,32 +148,72 @@ fn what_decays_slowly_is_no_motion_of_every_second_turn() {
     }
 }
 
-/// Motions of random machines, two of three with friction and one of three with stops too, go on
-/// as they are in short steps of plain RK4. SEED and MACHINES choose others.
+/// A random machine, two of three with friction and one of three with stops too, and a speed
+/// (rpm).
+fn random(number: u64, numbers: &mut fastrand::Rng) -> (Value, f64) {
+    let kind = number % 3;
+    let mut between = |low: f64, high: f64| low + (high - low) * numbers.f64();
+    let mut keys = json!({
+        "unbalance_mass_kg": between(0.1, 0.9),
+        "damping_n_s_per_m": if kind == 0 { between(60.0, 200.0) } else { between(10.0, 40.0) },
+    });
+    if kind > 0 {
+        keys["Ff"] = json!(between(20.0, 80.0));
+    }
+    if kind > 1 {
+        let clearance = between(0.005, 0.02);
+        let side = |side: f64| [0.4, 0.0, 0.28 * side, 0.0, 0.0, side, clearance, 4e4, 100.0];
+        keys["stops"] = json!([side(1.0), side(-1.0)]);
+    }
+    (keys, between(230.0, 330.0))
+}
+
+/// What SEED or MACHINES says.
+fn given(name: &str, or: u64) -> u64 {
+    std::env::var(name).map_or(or, |given| given.parse().unwrap())
+}
+
+/// What starts that are more and other than the usual ones lead to is rarely new. SEED and
+/// MACHINES choose other machines.
+#[test]
+#[ignore = "friction takes short steps: minutes"]
+fn a_second_search_finds_little_that_is_new() {
+    let mut numbers = fastrand::Rng::with_seed(given("SEED", 35));
+    let (mut new, mut all) = ([0; 3], [0; 3]);
+    for number in 0..given("MACHINES", 12) {
+        let (keys, speed_rpm) = random(number, &mut numbers);
+        let point = at(&keys, 100.0, 1.0);
+        let dwells = [Dwell { point: &point, speed_rpm }];
+        let search = |starts: &Starts| {
+            endings(Simd::best(), &dwells, &[], starts, &|| false).remove(0).unwrap().motions
+        };
+        let usual = Starts { longest_s: 100.0, ..Starts::default() };
+        let first = search(&usual);
+        let others = Starts { count: 14, kick_rad_per_s: 4.3, ..usual };
+        for motion in search(&others) {
+            let is_new = !first.iter().any(|known| are_same(known, &motion));
+            println!("{number}: {speed_rpm:.1} rpm {:?} {is_new} {keys}", motion.settled);
+            all[(number % 3) as usize] += 1;
+            new[(number % 3) as usize] += usize::from(is_new);
+        }
+    }
+    println!("smooth, with friction, with stops too: {new:?} of {all:?} are new");
+    assert!(new.iter().sum::<usize>() * 10 <= all.iter().sum());
+}
+
+/// Motions of random machines go on as they are in short steps of plain RK4. SEED and MACHINES
+/// choose others.
 #[test]
 #[ignore = "short steps: minutes"]
 fn random_motions_go_on_in_short_steps() {
-    let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
     let mut numbers = fastrand::Rng::with_seed(given("SEED", 35));
     let (mut counts, mut worst) = ([0; Ending::KINDS.len()], [0.0_f64; 3]);
     for number in 0..given("MACHINES", 12) {
         let kind = (number % 3) as usize;
-        let mut between = |low: f64, high: f64| low + (high - low) * numbers.f64();
-        let mut keys = json!({
-            "unbalance_mass_kg": between(0.1, 0.9),
-            "damping_n_s_per_m": if kind == 0 { between(60.0, 200.0) } else { between(10.0, 40.0) },
-        });
-        if kind > 0 {
-            keys["Ff"] = json!(between(20.0, 80.0));
-        }
-        if kind > 1 {
-            let clearance = between(0.005, 0.02);
-            let side = |side: f64| [0.4, 0.0, 0.28 * side, 0.0, 0.0, side, clearance, 4e4, 100.0];
-            keys["stops"] = json!([side(1.0), side(-1.0)]);
-        }
-        let speed_rpm = between(230.0, 330.0);
+        let (keys, speed_rpm) = random(number, &mut numbers);
+        let kick_rad_per_s = 1.0 + 5.0 * numbers.f64();
         let point = at(&keys, 100.0, 1.0);
-        let starts = Starts { count: 4, kick_rad_per_s: between(1.0, 6.0), ..Starts::default() };
+        let starts = Starts { count: 4, kick_rad_per_s, ..Starts::default() };
         let dwells = [Dwell { point: &point, speed_rpm }];
         let found = endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0).unwrap();
         for motion in &found.motions {

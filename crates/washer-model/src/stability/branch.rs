@@ -6,8 +6,8 @@
 //! needed and shrink where many are. The curve depends on the machine alone. So does what is found
 //! of it at a speed: the part of the curve counts up to where it first is [`BEYOND`] times as fast.
 
-use super::monodromy::INSTANTS;
-use super::orbit::{Asked, Square, Turned};
+use super::monodromy::{INSTANTS, Square};
+use super::orbit::{Asked, Turned};
 use super::search::{Search, apart, missing};
 use super::settings::Settings;
 use crate::coordinates::{COORDINATES, STATES};

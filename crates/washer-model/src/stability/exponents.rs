@@ -1,8 +1,8 @@
 //! The linear model exactly: it is periodic in theta, and its Floquet exponents are its true
 //! frequencies and dampings, where modal analysis freezes theta.
 
-use super::monodromy::INSTANTS;
-use super::orbit::{Row, Square, model};
+use super::monodromy::{INSTANTS, Square};
+use super::orbit::{Row, model};
 use super::participants::energies;
 use super::turn::{Clock, Unwatched, turn};
 use super::{NoAnswer, rounded};

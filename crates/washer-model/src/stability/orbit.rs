@@ -4,7 +4,7 @@
 //! (`coupling.rs`), by classical Runge-Kutta in few steps. What returns to itself is looked for by
 //! `search.rs` at one speed, and followed over speed by `branch.rs`.
 
-use super::monodromy::{INSTANTS, along_every_step, monodromy, slopes_along, weights};
+use super::monodromy::{Along, INSTANTS, Square, weights};
 use super::turn::{Clock, Watch, turn};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -18,10 +18,7 @@ use crate::run::loads::damper_speeds_m_per_s;
 use crate::run::model::{Linear, Model, Nonlinear};
 use core::array::from_fn;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
-use lane_ode::{Dual, Kernel, Lane, Lu, N, Peaks, Simd};
-
-/// Rows and columns of a state's disturbance.
-pub(super) type Square = [[N<f64>; STATES]; STATES];
+use lane_ode::{Kernel, Lane, Lu, N, Peaks, Simd};
 
 /// Step times cap, as a share of the formula's limit. Gyroscopic effects may make whirls of the
 /// capped hinge faster than its cap.
@@ -105,9 +102,10 @@ pub(super) struct Seen {
 /// Takes turns, in lanes, those of a kind together. What is found of one does not depend on the
 /// others. Once `is_stopped` says so, some are missing.
 pub(super) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<Turned> {
-    let kind = |k: usize| (asked[k].row.kind(), asked[k].is_seen);
+    // Of a kind, what is seen comes first.
+    let kind = |k: usize| asked[k].row.kind();
     let mut order: Vec<usize> = (0..asked.len()).collect();
-    order.sort_by_key(|&k| kind(k));
+    order.sort_by_key(|&k| (kind(k), !asked[k].is_seen));
     let mut turned: Vec<Option<Turned>> = asked.iter().map(|_| None).collect();
     for places in order.chunk_by(|&a, &b| kind(a) == kind(b)) {
         let together: Vec<Asked<'_>> = places.iter().map(|&k| asked[k]).collect();
@@ -188,30 +186,23 @@ fn see<T: Lane>(zero: N<T>, asked: &[Asked<'_>], weights: &[Vec<f64>], turned: &
             ends[0][i].0.set(lane, asked[lane.min(asked.len() - 1)].start[i]);
         }
     }
+    let seen = asked.iter().filter(|asked| asked.is_seen).count();
     let mut watched = Watched::new(zero, &model, &clock);
-    watched.with_outputs = asked[0].is_seen;
-    watched.with_path = asked[0].is_seen && rows[0].has_corners();
-    turn(&model, &clock, &mut ends, Some(&mut watched));
-    // Of each row what its turn makes of disturbances.
+    let has_corners = rows[0].has_corners();
+    watched.with_path = has_corners;
+    turn(&model, &clock, &mut ends, if seen > 0 { Some(&mut watched) } else { None });
     let mut monodromies: Vec<Square> = Vec::new();
-    if asked[0].is_seen && rows[0].has_corners() {
-        let spread: Vec<Row<'_>> = rows.iter().copied().cycle().take(T::LANES).collect();
-        let tangent: Nonlinear<Dual<T>> = self::model(zero.constant(), &spread);
-        let clock = self::clock(zero, &spread);
-        let columns = along_every_step(zero, &tangent, &clock, &watched.path, rows.len());
-        let entry = |of_row: &[[N<T>; STATES]], i: usize, j: usize| {
-            N(of_row[j / T::LANES][i].0.get(j % T::LANES))
+    if seen > 0 {
+        let Row { steps, instants, .. } = rows[0];
+        let spread: Vec<Row<'_>> = rows[..seen].iter().copied().cycle().take(T::LANES).collect();
+        let along = Along {
+            model: self::model(zero.constant(), &spread),
+            clock: self::clock(zero, &spread),
+            rows: seen,
+            places: if has_corners { steps } else { instants },
+            path: if has_corners { &watched.path } else { &watched.states },
         };
-        let square = |of_row: &Vec<[N<T>; STATES]>| -> Square {
-            from_fn(|i| from_fn(|j| entry(of_row, i, j)))
-        };
-        monodromies.extend(columns.iter().map(square));
-    } else if asked[0].is_seen {
-        let tangent: Nonlinear<Dual<T>> = self::model(zero.constant(), &rows);
-        let slopes = slopes_along(zero, &tangent, &clock, &watched.states, rows[0].instants);
-        let columns = monodromy(zero, &slopes, weights, &clock);
-        let in_lane = |lane| -> Square { from_fn(|i| from_fn(|j| N(columns[j][i].0.get(lane)))) };
-        monodromies.extend((0..rows.len()).map(in_lane));
+        monodromies = along.monodromies(zero, weights);
     }
     let in_lane = |state: &[N<T>; STATES], lane: usize| -> [f64; STATES] {
         from_fn(|i| state[i].0.get(lane))
@@ -334,7 +325,6 @@ fn linear<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<LinearResponse>
             ends[0] = start;
         }
         let mut watched = Watched::new(zero, &model, &clock);
-        watched.with_outputs = is_known;
         turn(&model, &clock, &mut ends, if is_known { Some(&mut watched) } else { None });
         for lane in 0..rows.len() {
             if is_known {
@@ -366,8 +356,7 @@ fn linear<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<LinearResponse>
 pub(crate) struct Watched<'m, T, M> {
     model: &'m M,
     clock: &'m Clock<T>,
-    pub(crate) with_outputs: bool,
-    /// Whether to keep states at even instants of what has outputs.
+    /// Whether to keep states at even instants.
     pub(crate) with_states: bool,
     /// Above 0 in every lane.
     windows: N<T>,
@@ -379,7 +368,7 @@ pub(crate) struct Watched<'m, T, M> {
     /// At the start and the ends of all steps, if that is wanted.
     path: Vec<[N<T>; STATES]>,
     with_path: bool,
-    /// Further records of what has outputs.
+    /// Further records.
     pub(crate) extras: Option<Extras<T>>,
 }
 
@@ -390,7 +379,6 @@ impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
         Self {
             model,
             clock,
-            with_outputs: false,
             with_states: true,
             windows,
             peaks,
@@ -406,9 +394,6 @@ impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
 impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
     #[inline(always)]
     fn see(&mut self, k: usize, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
-        if !self.with_outputs {
-            return;
-        }
         if self.with_states && k.is_multiple_of(self.clock.steps / INSTANTS) {
             self.states.push(*x);
         }

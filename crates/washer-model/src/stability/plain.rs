@@ -1,7 +1,8 @@
 //! The same question put to the machine as it is, by classical Runge-Kutta in steps that follow its
 //! bearings: slow, and without anything that the fast answer rests on.
 
-use super::orbit::{Row, Square, model};
+use super::monodromy::Square;
+use super::orbit::{Row, model};
 use super::turn::{Clock, Unwatched, Watch, turn};
 use crate::coordinates::STATES;
 use crate::modes::{NoModes, highest_frequency_rad_per_s};

@@ -1,7 +1,8 @@
 //! Searches that live on turns: many of them side by side, and the one for a periodic response at
 //! one speed.
 
-use super::orbit::{Asked, Row, Seen, Square, Turned, turns};
+use super::monodromy::Square;
+use super::orbit::{Asked, Row, Seen, Turned, turns};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::point::Point;
 use core::f64::consts::TAU;

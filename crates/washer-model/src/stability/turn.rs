@@ -56,29 +56,47 @@ fn next<T: Lane, S: System<T, STATES>>(
     system.renew(clock.time_s(k + 1.0), &mut forcings[2]);
 }
 
-/// One step; gives the slope at its start.
+/// One step.
 #[inline(always)]
 pub(super) fn step<T: Lane, S: System<T, STATES>>(
     system: &S,
     h: N<T>,
     forcings: &Forcings<S::Forcing>,
     x: &mut [N<T>; STATES],
-) -> [N<T>; STATES] {
-    let start = *x;
-    let mut along = start;
-    let mut first = start;
-    for stage in 0..4 {
+) {
+    stages(system, h, forcings, x, AT.len(), None::<(usize, &mut Unwatched)>);
+}
+
+/// The first stages of a step, which all of them take. Its start is seen.
+#[inline(always)]
+fn stages<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
+    system: &S,
+    h: N<T>,
+    forcings: &Forcings<S::Forcing>,
+    x: &mut [N<T>; STATES],
+    count: usize,
+    mut watch: Option<(usize, &mut W)>,
+) {
+    let (mut along, mut end) = (*x, *x);
+    for stage in 0..count {
         let slope = system.derivative(&forcings[AT[stage]], &along);
-        if stage == 0 {
-            first = slope;
+        if stage == 0
+            && let Some((k, watch)) = &mut watch
+        {
+            watch.see(*k, &forcings[0], x, &slope);
         }
         let (reach, weight) = ((h * REACH[stage]).v(), (h * WEIGHT[stage]).v());
+        if stage == AT.len() - 1 {
+            for i in 0..STATES {
+                x[i] = end[i] + weight * slope[i];
+            }
+            return;
+        }
         for i in 0..STATES {
-            along[i] = start[i] + reach * slope[i];
-            x[i] += weight * slope[i];
+            along[i] = x[i] + reach * slope[i];
+            end[i] += weight * slope[i];
         }
     }
-    first
 }
 
 /// Takes what is to be seen of a turn.
@@ -110,18 +128,13 @@ pub(crate) fn turn<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
         if k > 0 {
             next(system, clock, k, &mut forcings);
         }
-        let is_over = k == clock.steps;
+        let count = if k < clock.steps { AT.len() } else { 1 };
         for (place, x) in states.iter_mut().enumerate() {
-            let at = *x;
-            let slope = step(system, clock.step_s, &forcings, x);
-            if place == 0
-                && let Some(watch) = &mut watch
-            {
-                watch.see(k, &forcings[0], &at, &slope);
-            }
-            if is_over {
-                *x = at;
-            }
+            let watch = match &mut watch {
+                Some(watch) if place == 0 => Some((k, &mut **watch)),
+                _ => None,
+            };
+            stages(system, clock.step_s, &forcings, x, count, watch);
         }
     }
 }
