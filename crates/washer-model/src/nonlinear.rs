@@ -14,7 +14,8 @@ pub(crate) mod frame;
 pub(crate) mod outputs;
 
 use crate::coordinates::{
-    COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_YAW, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z,
+    COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_YAW, TUB, TUB_PITCH, TUB_Y, TUB_YAW,
+    TUB_Z,
 };
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};
@@ -66,6 +67,64 @@ pub(crate) fn accelerations<T: Lane>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
+    let (tub, rotor) = apart(machine, coupling, sag, spin, q, u);
+    coupling.accelerations(
+        &machine.bodies,
+        spin.speed,
+        &Deflection::new(q, &tub.tilt, &rotor.tilt),
+        &sag.bearings,
+        (&tub.floating, &Factors::new(tub.inertia)),
+        (&rotor.floating, &Factors::new(rotor.inertia)),
+    )
+}
+
+/// What a unit of generalised force on each of the tub's coordinates adds to the accelerations.
+#[inline(always)]
+pub(crate) fn by_load<T: Lane>(
+    machine: &Coefficients<T>,
+    coupling: &Coupling<T>,
+    sag: &Sag<T>,
+    spin: &SpinState<T>,
+    q: &[N<T>; COORDINATES],
+    u: &[N<T>; COORDINATES],
+) -> [[N<T>; COORDINATES]; TUB.len()] {
+    let (tub, rotor) = apart(machine, coupling, sag, spin, q, u);
+    let (of_tub, of_rotor) = (Factors::new(tub.inertia), Factors::new(rotor.inertia));
+    let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
+    let (mut free, mut by_load) = ([spin.speed; COORDINATES], [[spin.speed; COORDINATES]; 4]);
+    // Without a load, then with each: a loop, for one copy of the code.
+    for loaded in 0..=TUB.len() {
+        let mut floating = tub.floating;
+        if loaded > 0 {
+            floating.push(loaded - 1);
+        }
+        let found = coupling.accelerations(
+            &machine.bodies,
+            spin.speed,
+            &deflection,
+            &sag.bearings,
+            (&floating, &of_tub),
+            (&rotor.floating, &of_rotor),
+        );
+        if loaded == 0 {
+            free = found;
+        } else {
+            by_load[loaded - 1] = difference(found, &free);
+        }
+    }
+    by_load
+}
+
+/// Both halves without the bearings' forces; the hinge has the mass that caps it, if it is capped.
+#[inline(always)]
+fn apart<T: Lane>(
+    machine: &Coefficients<T>,
+    coupling: &Coupling<T>,
+    sag: &Sag<T>,
+    spin: &SpinState<T>,
+    q: &[N<T>; COORDINATES],
+    u: &[N<T>; COORDINATES],
+) -> (Half<T, 2>, Half<T, 4>) {
     let tub = tub(machine, q, u);
     let mut rotor = rotor(&machine.bodies, spin, q, u);
     if let Some(mass) = coupling.hinge_mass(machine.bodies.flexure_stiffness, spin, sag.hinge) {
@@ -76,14 +135,7 @@ pub(crate) fn accelerations<T: Lane>(
         rotor.floating.torque[2] += mass.torque_per_speed * u[HINGE_PITCH];
         rotor.floating.torque[3] -= mass.torque_per_speed * u[HINGE_YAW];
     }
-    coupling.accelerations(
-        &machine.bodies,
-        spin.speed,
-        &Deflection::new(q, &tub.tilt, &rotor.tilt),
-        &sag.bearings,
-        (&tub.floating, &Factors::new(tub.inertia)),
-        (&rotor.floating, &Factors::new(rotor.inertia)),
-    )
+    (tub, rotor)
 }
 
 /// Body T about its mass centre.

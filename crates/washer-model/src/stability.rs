@@ -1,6 +1,7 @@
 //! The machine at constant speeds: its periodic response, and whether that is stable.
 
 mod branch;
+mod corners;
 mod crossing;
 mod exponents;
 mod monodromy;

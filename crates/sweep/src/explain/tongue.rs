@@ -43,8 +43,8 @@ const FACTORS: usize = 4;
 const FACTOR_STEP: f64 = 1.55;
 const FACTOR_TOLERANCE: f64 = 5e-4;
 
-/// Where such factors are tried once two are known between which one closes it: by how many
-/// tolerances about where growth ends if it falls evenly.
+/// Where growth ends is looked for, once it is between two places: by how many tolerances about
+/// where that is if growth falls evenly.
 const ABOUT_ROOT: [f64; 4] = [-8.0, -0.4, 0.4, 8.0];
 
 /// Modes that may take part.
@@ -193,17 +193,18 @@ pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> Seen {
         let last = last.unwrap_or(first);
         let run: Vec<&Response> = responses[first..=last].iter().flatten().collect();
         let beyond = [first.checked_sub(1), Some(last + 1).filter(|&next| next < speeds.len())];
-        let edge = |side: usize, inside: usize| match beyond[side] {
-            None => (speeds[inside], End::Range),
-            Some(k) => match kind(k) {
-                None => (speeds[inside], End::NoResponse),
+        let edge = |side: usize, inside: &Response| match beyond[side] {
+            None => (inside.speed_rpm, End::Range),
+            Some(k) => match &responses[k] {
+                None => (inside.speed_rpm, End::NoResponse),
                 Some(other) => {
-                    let rpm = edge_rpm(asker, of_run, speeds[inside], speeds[k]);
-                    (rpm, if other == Kind::Stable { End::Edge } else { End::OtherKind })
+                    let is_stable = other.kind() == Kind::Stable;
+                    let rpm = edge_rpm(asker, of_run, at(inside), at(other));
+                    (rpm, if is_stable { End::Edge } else { End::OtherKind })
                 }
             },
         };
-        let (from, to) = (edge(0, first), edge(1, last));
+        let (from, to) = (edge(0, run[0]), edge(1, run[run.len() - 1]));
         tongues.push(tongue(asker, of_run, &run, [from, to]));
         first = last + 1;
     }
@@ -257,22 +258,45 @@ fn between(low: f64, high: f64, count: usize) -> Vec<f64> {
     (1..=count).map(|k| low + (high - low) * (k as f64 / (count + 1) as f64)).collect()
 }
 
-/// Where a kind of instability ends between a speed at which it is there and one at which it is
-/// not.
-fn edge_rpm(asker: &Asker<'_>, kind: Kind, mut inside: f64, mut outside: f64) -> f64 {
-    while (outside - inside).abs() > EDGE_RPM {
-        let trials = between(inside, outside, BETWEEN);
-        let responses = asker.responses(&trials);
-        let is_there = |k: usize| responses[k].as_ref().is_some_and(|it| it.kind() == kind);
-        let first_out = (0..trials.len()).find(|&k| !is_there(k));
-        let (before, after) = match first_out {
-            Some(0) => (inside, trials[0]),
-            Some(k) => (trials[k - 1], trials[k]),
-            None => (trials[trials.len() - 1], outside),
-        };
-        (inside, outside) = (before, after);
+/// The speed (rpm) of a response, and growth there (1/s).
+fn at(response: &Response) -> [f64; 2] {
+    [response.speed_rpm, response.growth_per_s()]
+}
+
+/// Places from `open` to `closed` about where growth ends if it falls evenly between them, as it
+/// does over short ways; each is given with the growth there. In their order.
+fn about_root(open: [f64; 2], closed: [f64; 2], tolerance: f64) -> Vec<f64> {
+    let fall = (open[1] / (open[1] - closed[1])).clamp(0.0, 1.0);
+    let share = if fall.is_nan() { 0.5 } else { fall };
+    let way = closed[0] - open[0];
+    let about = ABOUT_ROOT.map(|by| share + by * tolerance / way.abs());
+    let mut shares: Vec<f64> = about.into_iter().filter(|it| *it > 0.0 && *it < 1.0).collect();
+    if shares.len() < ABOUT_ROOT.len() {
+        shares.push(0.5);
+        shares.sort_by(f64::total_cmp);
     }
-    0.5 * (inside + outside)
+    shares.into_iter().map(|share| open[0] + share * way).collect()
+}
+
+/// Where a kind of instability ends between a speed at which it is there and one at which it is
+/// not, each given with the growth there.
+fn edge_rpm(asker: &Asker<'_>, kind: Kind, mut inside: [f64; 2], mut outside: [f64; 2]) -> f64 {
+    while (outside[0] - inside[0]).abs() > EDGE_RPM {
+        let trials = match outside[1] < 0.0 {
+            true => about_root(inside, outside, EDGE_RPM),
+            false => between(inside[0], outside[0], BETWEEN),
+        };
+        for (rpm, response) in trials.iter().zip(asker.responses(&trials)) {
+            let is_there = response.as_ref().is_some_and(|it| it.kind() == kind);
+            let found = response.as_ref().map_or([*rpm, f64::NAN], at);
+            if !is_there {
+                outside = found;
+                break;
+            }
+            inside = found;
+        }
+    }
+    0.5 * (inside[0] + outside[0])
 }
 
 /// The response of a run that grows most, between its speeds too.
@@ -364,21 +388,11 @@ fn resonance(point: &Point, at: &Response) -> Option<Resonance> {
 /// Factors to try next, between one that leaves growth and one that does not if that is known, each
 /// given with the growth that it leaves.
 fn trials(open: [f64; 2], closed: Option<[f64; 2]>) -> Vec<f64> {
-    let Some(closed) = closed else {
-        return (1..=FACTORS).map(|k| open[0] * FACTOR_STEP.powi(k as i32)).collect();
-    };
-    // Growth falls evenly over short ways.
-    let fall = ((open[1] + CLOSED_BY_PER_S) / (open[1] - closed[1])).clamp(0.0, 1.0);
-    let share = if fall.is_nan() { 0.5 } else { fall };
-    let root = open[0] + share * (closed[0] - open[0]);
-    let about = ABOUT_ROOT.map(|by| root * (1.0 + by * FACTOR_TOLERANCE));
-    let mut factors: Vec<f64> =
-        about.into_iter().filter(|&factor| open[0] < factor && factor < closed[0]).collect();
-    if factors.len() < ABOUT_ROOT.len() {
-        factors.push(0.5 * (open[0] + closed[0]));
-        factors.sort_by(f64::total_cmp);
+    let beyond = |[factor, growth]: [f64; 2]| [factor, growth + CLOSED_BY_PER_S];
+    match closed {
+        None => (1..=FACTORS).map(|k| open[0] * FACTOR_STEP.powi(k as i32)).collect(),
+        Some(closed) => about_root(beyond(open), beyond(closed), FACTOR_TOLERANCE * open[0]),
     }
-    factors
 }
 
 impl Tongue {

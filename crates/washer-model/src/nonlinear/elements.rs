@@ -7,6 +7,7 @@
 //! structure with a law, a field of [`Elements`], and a line in [`Further`].
 
 pub(crate) mod bounds;
+pub(crate) mod corners;
 
 use crate::lanes::{InAnyLane, lane_struct};
 use crate::machine::{BumpStop, Bushing, Damper, Machine, Spring};
@@ -279,8 +280,18 @@ impl<T: Real> StopOf<T> {
     /// sqrt(delta^2 + s^2) and the speed v along the direction, (1 + delta / w) / 2 (k w + c v).
     #[inline(always)]
     pub(crate) fn push(&self, point: &PointMotion<T>) -> N<T> {
-        let depth = self.depth(point);
-        let speed = dot(&point.velocity, &self.direction);
+        self.push_at(self.depth(point), self.speed(point))
+    }
+
+    /// The speed (m/s) at which the tub point goes along the stop's direction.
+    #[inline(always)]
+    fn speed(&self, point: &PointMotion<T>) -> N<T> {
+        dot(&point.velocity, &self.direction)
+    }
+
+    /// The push (N) at this depth (m) and speed (m/s).
+    #[inline(always)]
+    fn push_at(&self, depth: N<T>, speed: N<T>) -> N<T> {
         let soft = (depth * depth + self.softness_squared).sqrt();
         let closed = (0.5 * (1.0 + depth / soft)).v();
         (closed * (self.stiffness * soft + self.damping * speed)).v()

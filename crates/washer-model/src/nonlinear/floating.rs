@@ -17,6 +17,7 @@ pub(crate) struct Response<T> {
 
 /// Equations of motion of one half of the machine, with `R` rotations. The first is the axis's yaw
 /// about c2, so that its partial velocities have no y component; the second is the axis's pitch.
+#[derive(Clone, Copy)]
 pub(crate) struct Floating<T, const R: usize> {
     /// Reciprocal of the chain's mass.
     pub(crate) per_mass: N<T>,
@@ -40,6 +41,19 @@ impl<T: Real, const R: usize> Floating<T, R> {
     #[inline(always)]
     pub(crate) fn apply(&mut self, load: &AxisLoad<T>) {
         (self.force, self.torque) = self.under(load);
+    }
+
+    /// Adds a unit of generalised force on a coordinate: y, z, then the rotations.
+    #[inline(always)]
+    pub(crate) fn push(&mut self, coordinate: usize) {
+        if coordinate < 2 {
+            self.force[coordinate] = self.force[coordinate] + 1.0;
+            for r in 0..R {
+                self.torque[r] -= self.arm[r][coordinate];
+            }
+        } else {
+            self.torque[coordinate - 2] = self.torque[coordinate - 2] + 1.0;
+        }
     }
 
     /// Force and torques with forces on the axis.

@@ -1,7 +1,7 @@
 //! The two models as systems over lanes, and what they have in common.
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, FIRST_ANGLE, STATES};
+use crate::coordinates::{COORDINATES, FIRST_ANGLE, STATES, TUB, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z};
 use crate::lanes::InLanes;
 use crate::linear::outputs::{LinearMotion, LinearOutputs};
 use crate::linear::rotor_terms::Terms;
@@ -10,6 +10,9 @@ use crate::machine::spin::{SpinLanes, SpinState, SpinStretch};
 use crate::nonlinear;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Caps, Coupling, Sag};
+use crate::nonlinear::elements::TubMotion;
+use crate::nonlinear::elements::corners::CornerForce;
+use crate::nonlinear::frame::Tilt;
 use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
 use crate::point::Point;
 use core::f64::consts::FRAC_PI_2;
@@ -30,6 +33,8 @@ pub(crate) trait Model<T: Lane>: System<T, STATES> {
     fn set_caps(&mut self, lane: usize, caps: &Caps);
     /// State at rest.
     fn at_rest(point: &Point) -> [f64; STATES];
+    /// Adds the forces with corners at a state to a list, if the model has any.
+    fn corner_forces(&self, _x: &[N<T>; STATES], _forces: &mut Vec<CornerForce<T>>) {}
     /// Position of the drum's front centre relative to the tub axis, and the channels' deviations
     /// from equilibrium; the latter only `with_channels`. `dx` is the state's derivative.
     fn observe(
@@ -106,6 +111,33 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
     }
 }
 
+impl<T: Lane> Nonlinear<T> {
+    /// The motions that forces with corners hang on, depth (m) and speed (m/s) of each.
+    #[inline(always)]
+    pub(crate) fn at_corners(&self, x: &[N<T>; STATES]) -> Vec<[N<T>; 2]> {
+        let (q, u) = split(x);
+        let tilt = Tilt::of_tub(&q);
+        let rate = tilt.motion(u[TUB_YAW], u[TUB_PITCH]).rate;
+        self.machine.elements.at_corners(&TubMotion {
+            tilt: &tilt,
+            midpoint: [q[TUB_Y], q[TUB_Z]],
+            midpoint_velocity: [u[TUB_Y], u[TUB_Z]],
+            rate: &rate,
+        })
+    }
+
+    /// What a unit of generalised force on each of the tub's coordinates adds to the accelerations.
+    #[inline(always)]
+    pub(crate) fn by_load(
+        &self,
+        spin: &SpinState<T>,
+        x: &[N<T>; STATES],
+    ) -> [[N<T>; COORDINATES]; TUB.len()] {
+        let (q, u) = split(x);
+        nonlinear::by_load(&self.machine, &self.coupling, &self.sag, spin, &q, &u)
+    }
+}
+
 impl<T: Lane> Model<T> for Nonlinear<T> {
     #[inline(always)]
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
@@ -135,6 +167,11 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
     fn at_rest(point: &Point) -> [f64; STATES] {
         let nudged = |i: usize| point.equilibrium[i] + point.nudge;
         core::array::from_fn(|i| if i < COORDINATES { nudged(i) } else { 0.0 })
+    }
+
+    #[inline(always)]
+    fn corner_forces(&self, x: &[N<T>; STATES], forces: &mut Vec<CornerForce<T>>) {
+        self.machine.elements.corner_forces(&self.at_corners(x), forces);
     }
 
     #[inline(always)]

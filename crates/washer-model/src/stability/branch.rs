@@ -494,7 +494,7 @@ impl<'a> Search<'a> for Curve<'a> {
             return Vec::new();
         };
         if self.is_careful {
-            row.instants = INSTANTS;
+            row.instants = row.instants.max(INSTANTS);
         }
         let start = state_of(&self.at);
         let mut asked = vec![Asked { row, start, is_seen }];

@@ -1,21 +1,25 @@
 //! What a turn does to small disturbances of a response.
 //!
 //! A disturbance d obeys d'' = K(t) d + C(t) d', with the partial derivatives of the accelerations
-//! along the response, which dual numbers give. Over a turn these are smooth and periodic, so that
-//! they are taken at a few even instants, and from the trigonometric polynomial through those at
-//! all others. Where forces have corners, they are taken at every stage of every step, so that what
-//! is found is the derivative of what the steps do. Classical Runge-Kutta takes all disturbances
-//! through the turn together. Lanes share a row's instants, then its disturbances.
+//! along the response, which dual numbers give. Over a turn these are smooth and periodic but for
+//! what forces with corners do (`corners.rs`), so that they are taken at a few even instants, and
+//! from the trigonometric polynomial through those at all others. Classical Runge-Kutta takes all
+//! disturbances through the turn together. Lanes share a row's instants, then its disturbances.
 
-use super::turn::{Clock, REACH, WEIGHT, WHEN};
+use super::corners::Corner;
+use super::turn::{Clock, REACH, WEIGHT};
 use crate::coordinates::{COORDINATES, STATES};
+use crate::lanes::InLanes as _;
+use crate::nonlinear::elements::corners::CornerForce;
 use crate::run::model::Nonlinear;
-use core::ops::Range;
 use lane_ode::{Dual, Lane, MAX_LANES, N, System, trig};
 
 /// Instants a turn at which the derivatives are taken, at most: harmonics of the turn up to the
 /// seventh.
 pub(super) const INSTANTS: usize = 16;
+
+/// The same where forces have corners, which give motions more harmonics.
+pub(super) const INSTANTS_AT_CORNERS: usize = 32;
 
 /// Rows and columns of a state's disturbance.
 pub(super) type Square = [[N<f64>; STATES]; STATES];
@@ -26,8 +30,12 @@ const BLOCK: usize = 5;
 /// Steps whose derivatives are kept at once: as many for every turn.
 const AT_ONCE: usize = 8;
 
+/// Starts, middles and ends of these. Where forces have corners, steps are so short that what is
+/// smooth is a parabola through the first, the middle and the last.
+const PLACES: usize = 2 * AT_ONCE + 1;
+
 /// Of every acceleration, its derivative by each coordinate, then by each speed.
-type Slopes = [[N<f64>; STATES]; COORDINATES];
+pub(super) type Slopes = [[N<f64>; STATES]; COORDINATES];
 
 /// Rows along their turns.
 pub(super) struct Along<'a, T> {
@@ -35,23 +43,55 @@ pub(super) struct Along<'a, T> {
     pub(super) model: Nonlinear<Dual<T>>,
     pub(super) clock: Clock<T>,
     pub(super) rows: usize,
-    /// At how many even places of a turn derivatives are taken: of every step where forces have
-    /// corners.
-    pub(super) places: usize,
-    /// States in the rows' lanes, at so many places of the turn or at a multiple of them.
+    /// At how many even instants of a turn derivatives are taken.
+    pub(super) instants: usize,
+    /// States in the rows' lanes, at so many instants of the turn or at a multiple of them.
     pub(super) path: &'a [[N<T>; STATES]],
+    /// Forces with corners in the rows' lanes, at the start, middle and end of all steps.
+    pub(super) forces: &'a [CornerForce<T>],
+}
+
+/// What is smooth over a turn of a row.
+#[derive(Clone)]
+struct Smooth {
+    /// Derivatives, less those of forces with corners.
+    slopes: Slopes,
+    /// These forces' motions.
+    corners: Vec<Corner<f64>>,
+}
+
+impl Smooth {
+    const NONE: Self = Self { slopes: [[N(0.0); STATES]; COORDINATES], corners: Vec::new() };
+
+    /// Becomes the sum of some, so many times each.
+    #[inline(always)]
+    fn sum(&mut self, of: &[Self], times: &[f64]) {
+        for i in 0..COORDINATES {
+            let mut sums = [N(0.0); STATES];
+            for k in 0..of.len() {
+                for j in 0..STATES {
+                    sums[j] += of[k].slopes[i][j] * times[k];
+                }
+            }
+            self.slopes[i] = sums;
+        }
+        self.corners.clear();
+        for m in 0..of[0].corners.len() {
+            let mut corner = Corner::none(N(0.0));
+            for k in 0..of.len() {
+                corner.add(&of[k].corners[m], times[k]);
+            }
+            self.corners.push(corner);
+        }
+    }
 }
 
 impl<T: Lane> Along<'_, T> {
     /// Of each row what its turn makes of disturbances of its start. The weights are those of
-    /// [`weights`]; none where forces have corners.
+    /// [`weights`].
     #[inline(always)]
     pub(super) fn monodromies(&self, zero: N<T>, weights: &[Vec<f64>]) -> Vec<Square> {
-        let has_corners = weights.is_empty();
-        let mut taken: Vec<Vec<Slopes>> = vec![Vec::new(); self.rows];
-        if !has_corners {
-            self.take(zero, 0..self.places, 1, &mut taken);
-        }
+        let taken = self.take(zero);
         let vectors = STATES.div_ceil(BLOCK * T::LANES) * BLOCK;
         let mut columns = vec![vec![[zero; STATES]; vectors]; self.rows];
         for columns in &mut columns {
@@ -59,26 +99,30 @@ impl<T: Lane> Along<'_, T> {
                 columns[j / T::LANES][j].0.set(j % T::LANES, 1.0);
             }
         }
-        let mut between = [[[N(0.0); STATES]; COORDINATES]; 2 * AT_ONCE + 1];
+        let mut at = vec![Smooth::NONE; PLACES];
+        let mut three = [Smooth::NONE; 3];
         for first in (0..self.clock.steps).step_by(AT_ONCE) {
-            if has_corners {
-                self.take(zero, first..first + AT_ONCE, WHEN.len(), &mut taken);
-            }
             for (row, columns) in columns.iter_mut().enumerate() {
-                if !has_corners {
-                    for (k, slopes) in between.iter_mut().enumerate() {
-                        interpolate(&taken[row], weights, 2 * first + k, slopes);
+                if self.forces.is_empty() {
+                    for k in 0..PLACES {
+                        interpolate(&taken[row], weights, 2 * first + k, &mut at[k]);
+                    }
+                } else {
+                    for k in 0..three.len() {
+                        interpolate(&taken[row], weights, 2 * first + k * AT_ONCE, &mut three[k]);
+                    }
+                    for k in 0..PLACES {
+                        let t = k as f64 / AT_ONCE as f64 - 1.0;
+                        at[k].sum(&three, &[0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)]);
+                        self.apply(row, 2 * first + k, 1.0, &mut at[k]);
                     }
                 }
                 let step_s = zero.lit(self.clock.step_s.0.get(row));
                 for k in 0..AT_ONCE {
-                    let (of, [b, c, d]) = if has_corners {
-                        (&taken[row][WHEN.len() * k..], [1, 2, 3])
-                    } else {
-                        (&between[2 * k..], [1, 1, 2])
-                    };
+                    let (start, middle) = (&at[2 * k].slopes, &at[2 * k + 1].slopes);
+                    let end = &at[2 * k + 2].slopes;
                     for block in columns.chunks_exact_mut(BLOCK) {
-                        step(zero, step_s, [&of[0], &of[b], &of[c], &of[d]], block);
+                        step(zero, step_s, [start, middle, middle, end], block);
                     }
                 }
             }
@@ -94,72 +138,75 @@ impl<T: Lane> Along<'_, T> {
         found
     }
 
-    /// Of each row the derivatives at the first stages of steps that begin at some places.
+    /// Of each row what is taken at its instants.
     #[inline(always)]
-    fn take(&self, zero: N<T>, places: Range<usize>, stages: usize, taken: &mut [Vec<Slopes>]) {
-        let (shares, last) = (T::LANES / self.rows, places.end - 1);
-        let (every, steps) = (self.path.len() / self.places, self.clock.steps / self.places);
-        for taken in &mut *taken {
-            taken.resize(stages * places.len(), [[N(0.0); STATES]; COORDINATES]);
-        }
+    fn take(&self, zero: N<T>) -> Vec<Vec<Smooth>> {
+        let (shares, last) = (T::LANES / self.rows, self.instants - 1);
+        let (every, steps) = (self.path.len() / self.instants, self.clock.steps / self.instants);
+        let mut taken = vec![vec![Smooth::NONE; self.instants]; self.rows];
         let mut at = [0; MAX_LANES];
         let mut found = [[zero; STATES]; COORDINATES];
-        for place in places.clone().step_by(shares) {
-            let (mut step, mut start) = (zero, [zero; STATES]);
+        for instant in (0..self.instants).step_by(shares) {
+            let (mut step, mut state) = (zero, [zero; STATES]);
             for lane in 0..T::LANES {
-                at[lane] = (place + (lane / self.rows).min(shares - 1)).min(last);
+                at[lane] = (instant + (lane / self.rows).min(shares - 1)).min(last);
                 step.0.set(lane, (at[lane] * steps) as f64);
                 for i in 0..STATES {
-                    start[i].0.set(lane, self.path[at[lane] * every][i].0.get(lane % self.rows));
+                    state[i].0.set(lane, self.path[at[lane] * every][i].0.get(lane % self.rows));
                 }
             }
-            let mut along = start;
-            for stage in 0..stages {
-                let time_s = (self.clock.step_s * (step + WHEN[stage])).v();
-                let rate = self.slopes(zero, time_s, &along, &mut found);
-                let reach = (self.clock.step_s * REACH[stage]).v();
-                for i in 0..STATES {
-                    along[i] = start[i] + reach * rate[i];
-                }
-                for lane in 0..T::LANES {
-                    let place = stages * (at[lane] - places.start) + stage;
-                    let taken = &mut taken[lane % self.rows][place];
-                    for i in 0..COORDINATES {
-                        for j in 0..STATES {
-                            taken[i][j] = N(found[i][j].0.get(lane));
-                        }
+            let spin = self.model.forcing((self.clock.step_s * step).v().constant());
+            self.slopes(zero, &spin, &state, &mut found);
+            let mut corners = Vec::new();
+            if !self.forces.is_empty() {
+                corners = Corner::all(&self.model, &spin, &state);
+            }
+            for lane in 0..T::LANES {
+                let row = lane % self.rows;
+                let smooth = &mut taken[row][at[lane]];
+                for i in 0..COORDINATES {
+                    for j in 0..STATES {
+                        smooth.slopes[i][j] = N(found[i][j].0.get(lane));
                     }
                 }
+                smooth.corners = corners.iter().map(|corner| corner.get_lane(lane)).collect();
+                self.apply(row, 2 * at[lane] * steps, -1.0, smooth);
             }
+        }
+        taken
+    }
+
+    /// Adds to a row's derivatives at a place of the list of forces what these add, so many times.
+    #[inline(always)]
+    fn apply(&self, row: usize, place: usize, times: f64, to: &mut Smooth) {
+        let count = to.corners.len();
+        for m in 0..count {
+            let force = self.forces[place * count + m].get_lane(row);
+            to.corners[m].apply(&force, times, &mut to.slopes);
         }
     }
 
-    /// The derivatives at a state; gives the state's derivative by time.
+    /// The derivatives at a state.
     #[inline(always)]
     fn slopes(
         &self,
         zero: N<T>,
-        time_s: N<T>,
+        forcing: &<Nonlinear<Dual<T>> as System<Dual<T>, STATES>>::Forcing,
         at: &[N<T>; STATES],
         slopes: &mut [[N<T>; STATES]; COORDINATES],
-    ) -> [N<T>; STATES] {
-        let forcing = self.model.forcing(time_s.constant());
-        let (mut state, mut rate) = ([zero.constant(); STATES], [zero; STATES]);
+    ) {
+        let mut state = [zero.constant(); STATES];
         for i in 0..STATES {
             state[i] = at[i].constant();
         }
         for j in 0..STATES {
             state[j].0.slope = zero.lit(1.0).0;
-            let derivative = self.model.derivative(&forcing, &state);
+            let derivative = self.model.derivative(forcing, &state);
             state[j].0.slope = zero.0;
             for i in 0..COORDINATES {
                 slopes[i][j] = N(derivative[COORDINATES + i].0.slope);
             }
-            for i in 0..STATES {
-                rate[i] = N(derivative[i].0.value);
-            }
         }
-        rate
     }
 }
 
@@ -185,27 +232,15 @@ pub(super) fn weights(steps: usize, instants: usize) -> Vec<Vec<f64>> {
     weights
 }
 
-/// The derivatives at one of the places of [`weights`], counted through the turn.
+/// What is smooth at one of the places of [`weights`], counted through the turn.
 #[inline(always)]
-fn interpolate(taken: &[Slopes], weights: &[Vec<f64>], place: usize, slopes: &mut Slopes) {
+fn interpolate(taken: &[Smooth], weights: &[Vec<f64>], place: usize, at: &mut Smooth) {
     let (first, part) = (place / weights.len(), place % weights.len());
-    if part == 0 {
-        *slopes = taken[first % taken.len()];
-        return;
-    }
-    let mut factors = [0.0; INSTANTS];
+    let mut factors = [0.0; INSTANTS_AT_CORNERS];
     for (instant, weight) in weights[part].iter().enumerate() {
         factors[(first + instant) % taken.len()] = *weight;
     }
-    for i in 0..COORDINATES {
-        let mut sums = [N(0.0); STATES];
-        for instant in 0..taken.len() {
-            for j in 0..STATES {
-                sums[j] += taken[instant][i][j] * factors[instant];
-            }
-        }
-        slopes[i] = sums;
-    }
+    at.sum(taken, &factors);
 }
 
 /// One step of some disturbances; the derivatives are those at its stages.

@@ -10,6 +10,7 @@ use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::machine::spin::SpinStretch;
 use crate::nonlinear::coupling::{Caps, Coupling};
+use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::outputs::squared;
 use crate::point::Point;
 use crate::ready::{MOST_MOTIONS, Search, own};
@@ -31,7 +32,7 @@ pub(crate) struct Row<'a> {
     pub(crate) speed_rpm: f64,
     /// Steps of a turn.
     pub(crate) steps: usize,
-    /// Even instants of it at which derivatives are taken, where forces have no corners.
+    /// Even instants of it at which derivatives are taken.
     pub(crate) instants: usize,
     /// On the modes of bearings and hinge; none if the steps follow these.
     pub(crate) caps: Option<Caps>,
@@ -58,7 +59,7 @@ impl Row<'_> {
         1.0 / self.step_s()
     }
 
-    /// Whether forces have corners, between which derivatives at a few instants say nothing.
+    /// Whether forces have corners.
     pub(super) fn has_corners(&self) -> bool {
         self.point.machine.elements.are_nonsmooth()
     }
@@ -130,9 +131,8 @@ impl Kernel for Turns<'_> {
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut turned = Vec::with_capacity(self.asked.len());
         let Some(first) = self.asked.first() else { return turned };
-        let with_weights = first.is_seen && !first.row.has_corners();
         let Row { steps, instants, .. } = first.row;
-        let weights = if with_weights { weights(steps, instants) } else { Vec::new() };
+        let weights = if first.is_seen { weights(steps, instants) } else { Vec::new() };
         for asked in self.asked.chunks(T::LANES) {
             if (self.is_stopped)() {
                 break;
@@ -188,19 +188,19 @@ fn see<T: Lane>(zero: N<T>, asked: &[Asked<'_>], weights: &[Vec<f64>], turned: &
     }
     let seen = asked.iter().filter(|asked| asked.is_seen).count();
     let mut watched = Watched::new(zero, &model, &clock);
-    let has_corners = rows[0].has_corners();
-    watched.with_path = has_corners;
+    watched.with_corners = rows[0].has_corners();
+    watched.instants = rows[0].instants.max(INSTANTS);
     turn(&model, &clock, &mut ends, if seen > 0 { Some(&mut watched) } else { None });
     let mut monodromies: Vec<Square> = Vec::new();
     if seen > 0 {
-        let Row { steps, instants, .. } = rows[0];
         let spread: Vec<Row<'_>> = rows[..seen].iter().copied().cycle().take(T::LANES).collect();
         let along = Along {
             model: self::model(zero.constant(), &spread),
             clock: self::clock(zero, &spread),
             rows: seen,
-            places: if has_corners { steps } else { instants },
-            path: if has_corners { &watched.path } else { &watched.states },
+            instants: rows[0].instants,
+            path: &watched.states[..watched.instants],
+            forces: &watched.forces,
         };
         monodromies = along.monodromies(zero, weights);
     }
@@ -356,7 +356,9 @@ fn linear<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<LinearResponse>
 pub(crate) struct Watched<'m, T, M> {
     model: &'m M,
     clock: &'m Clock<T>,
-    /// Whether to keep states at even instants.
+    /// How many even instants there are in a turn.
+    instants: usize,
+    /// Whether to keep states at these.
     pub(crate) with_states: bool,
     /// Above 0 in every lane.
     windows: N<T>,
@@ -365,9 +367,11 @@ pub(crate) struct Watched<'m, T, M> {
     pub(crate) radial_squared: N<T>,
     /// At even instants, the first at the turn's start.
     states: Vec<[N<T>; STATES]>,
-    /// At the start and the ends of all steps, if that is wanted.
-    path: Vec<[N<T>; STATES]>,
-    with_path: bool,
+    /// Forces with corners at the start, middle and end of all steps, if these are wanted.
+    forces: Vec<CornerForce<T>>,
+    with_corners: bool,
+    /// The last state seen, and its slope.
+    before: [[N<T>; STATES]; 2],
     /// Further records.
     pub(crate) extras: Option<Extras<T>>,
 }
@@ -379,13 +383,15 @@ impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
         Self {
             model,
             clock,
+            instants: INSTANTS,
             with_states: true,
             windows,
             peaks,
             radial_squared: zero,
-            states: Vec::with_capacity(INSTANTS + 1),
-            path: Vec::new(),
-            with_path: false,
+            states: Vec::new(),
+            forces: Vec::new(),
+            with_corners: false,
+            before: [[zero; STATES]; 2],
             extras: None,
         }
     }
@@ -394,11 +400,20 @@ impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
 impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
     #[inline(always)]
     fn see(&mut self, k: usize, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
-        if self.with_states && k.is_multiple_of(self.clock.steps / INSTANTS) {
+        if self.with_states && k.is_multiple_of(self.clock.steps / self.instants) {
             self.states.push(*x);
         }
-        if self.with_path {
-            self.path.push(*x);
+        if self.with_corners {
+            if k > 0 {
+                let ([start, rate], eighth) = (&self.before, (self.clock.step_s * 0.125).v());
+                let mut middle = *x;
+                for i in 0..STATES {
+                    middle[i] = (0.5 * (start[i] + x[i])).v() + eighth * (rate[i] - dx[i]);
+                }
+                self.model.corner_forces(&middle, &mut self.forces);
+            }
+            self.model.corner_forces(x, &mut self.forces);
+            self.before = [*x, *dx];
         }
         let everywhere = self.windows.lit(0.0).0.less(self.windows.0);
         if let (radial, Some(channels)) = self.model.observe(forcing, x, dx, true) {

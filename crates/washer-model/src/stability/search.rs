@@ -51,10 +51,8 @@ const CLOSE_AT_LAST: f64 = 1e-8;
 /// Smaller deviations (m, rad) count as this: without unbalance there is none but rounding.
 const LEAST_SIZE: f64 = 1e-4;
 
-/// The matrix is taken anew where a correction leaves more than this share of what was missing; and
-/// where forces have corners, which make the matrix dear beside turns.
+/// The matrix is taken anew where a correction leaves more than this share of what was missing.
 const FAST_ENOUGH: f64 = 0.2;
-const FAST_ENOUGH_AT_CORNERS: f64 = 0.6;
 
 /// How far a turn is from closing, as a share of its deviation; not finite if it left the model's
 /// range.
@@ -139,14 +137,12 @@ impl<'a> Search<'a> for Solve<'a> {
             (self.is_over, self.found) = (true, seen);
             return;
         }
-        let corners = self.row.has_corners();
-        let enough = if corners { FAST_ENOUGH_AT_CORNERS } else { FAST_ENOUGH };
         match seen {
             Some(seen) => {
                 self.factors = apart(&seen.monodromy);
                 self.is_over = self.factors.is_none();
             }
-            None if missing > enough * self.missing => self.factors = None,
+            None if missing > FAST_ENOUGH * self.missing => self.factors = None,
             None => {}
         }
         self.is_over |= !missing.is_finite() || self.turns == MOST_TURNS;

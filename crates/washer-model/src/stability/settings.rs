@@ -1,7 +1,7 @@
 //! Steps and caps at constant speeds, and what of a machine's motion they leave right.
 
 use super::NoAnswer;
-use super::monodromy::INSTANTS;
+use super::monodromy::{INSTANTS, INSTANTS_AT_CORNERS};
 use super::orbit::{Row, caps};
 use crate::coordinates::COORDINATES;
 use crate::fast::{HINGE_TO_DRUM, SUSPENSION_MODES, hinge_shift};
@@ -11,9 +11,6 @@ use crate::point::Point;
 use core::f64::consts::TAU;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// What numbers of steps are multiples of.
-const STEPS: usize = 16;
 
 /// By how much there are more steps where so many are not enough.
 const MORE_STEPS: f64 = 1.5;
@@ -80,7 +77,7 @@ impl<'a> Case<'a> {
     /// The same for the machine as it is.
     pub(crate) fn without_caps(&self) -> Result<Self, NoAnswer> {
         let steps = plain_steps(self.row.point, self.row.speed_rpm, self.row.turn_s())?;
-        let row = Row { steps, caps: None, instants: INSTANTS, ..self.row };
+        let row = Row { steps, caps: None, ..self.row };
         Ok(Self { row, frozen: Arc::clone(&self.frozen), judged: self.judged })
     }
 }
@@ -89,12 +86,18 @@ impl<'a> Case<'a> {
 fn plain_steps(point: &Point, speed_rpm: f64, turn_s: f64) -> Result<usize, NoAnswer> {
     let highest = highest_frequency_rad_per_s(point, speed_rpm * TAU / 60.0)
         .map_err(|_| NoAnswer::Eigenvalues)?;
-    whole(highest * turn_s / PLAIN_PHASE)
+    whole(point, highest * turn_s / PLAIN_PHASE)
 }
 
-/// At least so many steps, a multiple of [`STEPS`].
-fn whole(steps: f64) -> Result<usize, NoAnswer> {
-    let steps = STEPS as f64 * (steps / STEPS as f64).ceil().max(1.0);
+/// At how many instants of a machine's turn derivatives are taken, at most.
+fn most_instants(point: &Point) -> usize {
+    if point.machine.elements.are_nonsmooth() { INSTANTS_AT_CORNERS } else { INSTANTS }
+}
+
+/// At least so many steps, a multiple of [`most_instants`].
+fn whole(point: &Point, steps: f64) -> Result<usize, NoAnswer> {
+    let of = most_instants(point) as f64;
+    let steps = of * (steps / of).ceil().max(1.0);
     if steps > MOST_STEPS as f64 { Err(NoAnswer::TooSlow) } else { Ok(steps as usize) }
 }
 
@@ -171,7 +174,8 @@ impl<'a> Settings<'a> {
         });
         let (Setting { frozen, steps, is_capped }, point) = (setting?, self.point);
         let caps = is_capped.then(|| caps(steps, 60.0 / speed_rpm));
-        let row = Row { point, speed_rpm, steps, instants: care.instants, caps };
+        let instants = care.instants * most_instants(point) / INSTANTS;
+        let row = Row { point, speed_rpm, steps, instants, caps };
         let judged = if is_capped { SUSPENSION_MODES } else { SUSPENSION_MODES + 2 };
         Ok(Case { row, frozen, judged })
     }
@@ -193,9 +197,9 @@ impl<'a> Settings<'a> {
         let rest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?;
         let turn_s = 60.0 / ends_rpm[0];
         let fastest = rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
-        let mut steps = whole(fastest * turn_s / care.phase)?.max(care.steps);
+        let mut steps = whole(point, fastest * turn_s / care.phase)?.max(care.steps);
         if point.machine.elements.are_nonsmooth() {
-            steps = steps.max(whole(turn_s / care.at_corners_s)?);
+            steps = steps.max(whole(point, turn_s / care.at_corners_s)?);
         }
         let mut is_capped = false;
         let top_rad_per_s = ends_rpm[1] * TAU / 60.0;
@@ -209,7 +213,7 @@ impl<'a> Settings<'a> {
                 };
                 is_capped = shift(0)?.max(shift(1)?) <= care.shift_per_s;
                 if !is_capped {
-                    steps = whole(MORE_STEPS * steps as f64)?;
+                    steps = whole(point, MORE_STEPS * steps as f64)?;
                 }
             }
         }

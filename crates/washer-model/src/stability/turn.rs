@@ -22,8 +22,6 @@ impl<T: Lane> Clock<T> {
 
 /// Of each stage of the formula which of start, middle and end of a step it is evaluated at,
 const AT: [usize; 4] = [0, 1, 1, 2];
-/// when that is, as a share of the step,
-pub(super) const WHEN: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
 /// how far along its slope the next stage is, as a share of the step,
 pub(super) const REACH: [f64; 4] = [0.5, 0.5, 1.0, 0.0];
 /// and what its slope has in the step.
