@@ -17,10 +17,9 @@ impl Effort<'_> {
     /// # Errors
     /// A number that is none, asked for or of a scheduler.
     pub fn threads(&self) -> Result<usize, crate::threads::ThreadsError> {
-        let environment = |name: &str| std::env::var(name).ok();
         match self.threads {
             Some(threads) => crate::threads::checked(threads),
-            None => crate::threads::count(None, &environment),
+            None => crate::threads::count(None, &crate::threads::process),
         }
     }
 }

@@ -5,7 +5,6 @@ mod dwell;
 mod explain;
 mod fit;
 mod held;
-mod held_args;
 mod init;
 mod lines;
 mod man;

@@ -100,7 +100,7 @@ impl<'a> DwellEngine<'a> {
     /// # Errors
     /// An instruction set that is not there.
     pub(crate) fn new(plan: &'a Plan, speeds_rpm: &'a [f64]) -> Result<Self, EngineError> {
-        Self::asking(plan, speeds_rpm, Asked::Responses(Columns::of_dwells(plan, speeds_rpm)))
+        Self::asking(plan, speeds_rpm, Asked::Responses(Columns::of_dwells(plan)))
     }
 
     /// As [`Self::new`], of anything.

@@ -8,9 +8,8 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::cells::{short, table};
+use super::cells::{Lines as _, short, table};
 use super::grid::quoted;
-use super::run::line;
 use crate::build::Build;
 use crate::exit::{Error, Exit, show, tell};
 use crate::store::StoreError;
@@ -310,20 +309,20 @@ fn boundary(moved: &Moved) -> String {
 /// What differs, for people.
 fn text(args: &Args, found: &Comparison) -> String {
     let mut text = String::new();
-    line(&mut text, "A", &args.first.display().to_string());
-    line(&mut text, "B", &args.second.display().to_string());
+    text.line("A", args.first.display());
+    text.line("B", args.second.display());
     if found.is_empty() {
-        line(&mut text, "differ", "not at all");
+        text.line("differ", "not at all");
         return text;
     }
     for PlanChange { path, first, second } in found.plan.iter().take(PLAN_SHOWN) {
-        line(&mut text, "plan", &format!("{path}: {} -> {}", brief(first), brief(second)));
+        text.line("plan", format!("{path}: {} -> {}", brief(first), brief(second)));
     }
     if found.plan.len() > PLAN_SHOWN {
-        line(&mut text, "", &format!("and {} more (--json)", found.plan.len() - PLAN_SHOWN));
+        text.line("", format!("and {} more (--json)", found.plan.len() - PLAN_SHOWN));
     }
     for (name, told) in facts(found) {
-        line(&mut text, name, &told);
+        text.line(name, &told);
     }
     for Listed { title, headings, rows } in lists(args, found) {
         // Writing to a String cannot fail.

@@ -3,17 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::cells::{table as text_table, word};
-use super::grid::quoted;
-use super::run::line;
+use super::cells::{Lines as _, table as text_table, word};
+use super::run::installed;
 use crate::boundary::search::Stopped;
 use crate::effort::Effort;
 use crate::exit::{Error, Exit, tell};
-use crate::interrupt::Interrupt;
 use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
-use crate::program::program;
 use crate::progress::{ProgressMode, duration};
 use crate::store::{OpenedTrials, StoreError, Trials};
 use crate::swept::Swept;
@@ -77,11 +74,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let default = || PathBuf::from(format!("results/{}.parquet", study.name));
     let output = args.out.clone().unwrap_or_else(default);
     let file = Output::begin(&output, FileKind::Optimise)?;
-    let interrupt = Interrupt::install().map_err(|source| Error::File {
-        action: "install signal handlers for",
-        path: PathBuf::from("this process"),
-        source,
-    })?;
+    let interrupt = installed()?;
     let mut trials = match Trials::open(&output, &study.job(), args.fresh)? {
         OpenedTrials::Open(trials) => *trials,
         OpenedTrials::Finished => {
@@ -99,10 +92,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         Err(Stopped::Interrupted) => {
             let wall = duration(wall_s);
             tell(&format!("{}: interrupted after {wall}; the same command goes on", study.name));
-            return Ok(match interrupt.signal() {
-                Some(15) => Exit::Terminated,
-                _ => Exit::Interrupted,
-            });
+            return Ok(Exit::interrupted(interrupt.signal()));
         }
     };
     let bytes = table(&study, &tried).into_bytes();
@@ -149,9 +139,9 @@ fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Re
         }
     }
     let all = file.rows();
-    line(&mut text, "feasible", &format!("{feasible} of {all}, {} on the front", front.len()));
+    text.line("feasible", format!("{feasible} of {all}, {} on the front", front.len()));
     if let Some(best) = about["best"].as_u64() {
-        line(&mut text, "best", &format!("candidate {best}"));
+        text.line("best", format!("candidate {best}"));
     }
     front.sort_by(|a, b| {
         let of = |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);
@@ -178,11 +168,10 @@ fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Re
         let own = format!("# Candidate {} of {}.\n{own}", chosen.unwrap_or_default(), study.name);
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         atomic::write(folder.unwrap_or(Path::new(".")), path, own.as_bytes())?;
-        line(&mut text, "wrote", &path.display().to_string());
+        text.line("wrote", path.display());
     }
-    let shown = output.display().to_string();
-    line(&mut text, "file", &shown);
-    line(&mut text, "next", &format!("{} plot {}", program(), quoted(&shown)));
+    text.line("file", output.display());
+    text.next("plot", output);
     tell(text.trim_end());
     // Nothing that keeps the conditions was found.
     Ok(if front.is_empty() { Exit::NotHeld } else { Exit::Done })

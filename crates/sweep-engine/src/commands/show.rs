@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 
-use super::cells::{clipped, short, table, word};
+use super::cells::{Lines as _, clipped, short, table, word};
 use super::conditions;
-use super::run::{counts, line};
+use super::run::counts;
 use crate::exit::{Error, Exit, show};
 use crate::nearest::nearest;
 use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, Tally, overview, row, tally};
@@ -82,16 +82,12 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
         return show(&format!("{:#}\n", in_json(args, &opened, &file)?));
     }
     let mut text = String::new();
-    line(&mut text, "file", &args.file.display().to_string());
+    text.line("file", args.file.display());
     match &file.result {
         Some(result) => {
             provenance(&mut text, result);
             if !opened.is_sealed() {
-                line(
-                    &mut text,
-                    "checked",
-                    "no: it carries no digest, as files of older builds do not",
-                );
+                text.line("checked", "no: it carries no digest, as files of older builds do not");
             }
             let tally = tally(&opened)?;
             let limits = ratio_limits(&result.plan).unwrap_or(f64::NAN.into());
@@ -107,14 +103,14 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
             text.push_str(&counts(&tally, limits, &at));
         }
         None => {
-            line(&mut text, "made by", opened.created_by().unwrap_or("unknown"));
+            text.line("made by", opened.created_by().unwrap_or("unknown"));
             for (name, words) in (further.lines)(&opened)? {
-                line(&mut text, name, &words);
+                text.line(name, &words);
             }
             if let Some(traced) = own_json(&opened, key::BOUNDARY) {
                 let quantity = traced["quantity"].as_str().unwrap_or("unknown");
                 let limit = traced["limit"].as_f64().map_or("unknown".to_owned(), short);
-                line(&mut text, "boundary", &format!("where {quantity} = {limit}"));
+                text.line("boundary", format!("where {quantity} = {limit}"));
             }
         }
     }
@@ -255,19 +251,19 @@ fn extremes_at(
 
 fn provenance(text: &mut String, result: &ResultFile) {
     let plan = &result.plan;
-    line(text, "name", plan["name"].as_str().unwrap_or_default());
+    text.line("name", plan["name"].as_str().unwrap_or_default());
     let build = crate::build::words(&result.version, result.numerics);
-    line(text, "made by", &format!("{build}, plan {}", &result.plan_hash));
+    text.line("made by", format!("{build}, plan {}", &result.plan_hash));
     let told =
         [("spin", "spin"), ("values", "parameters"), ("time", "time"), ("method", "integrator")];
     for (name, key) in told.into_iter().filter(|(_, key)| !plan[*key].is_null()) {
-        line(text, name, &brief(&plan[key]));
+        text.line(name, &brief(&plan[key]));
     }
     if let Some(criterion) = plan["reliability"]["criterion"].as_str() {
-        line(text, "criterion", criterion);
+        text.line("criterion", criterion);
     }
     if let Some(design) = plan.get("design") {
-        line(text, "design", &brief(design));
+        text.line("design", &brief(design));
     }
     for axis in axes(plan) {
         let name = axis["parameter"].as_str().unwrap_or_default();
@@ -275,11 +271,11 @@ fn provenance(text: &mut String, result: &ResultFile) {
         let values = ["range", "values", "distribution"].iter().find_map(|key| axis.get(key));
         let values = values.map(brief);
         let values = values.map_or(String::new(), |values| format!(": {values}"));
-        line(text, "axis", &format!("{name}{values}"));
+        text.line("axis", format!("{name}{values}"));
     }
     if let Some(set) = plan["set"].as_object() {
         let told = set.iter().map(|(name, value)| format!("{name} = {}", brief(value)));
-        line(text, "--set", &told.collect::<Vec<_>>().join(", "));
+        text.line("--set", &told.collect::<Vec<_>>().join(", "));
     }
 }
 
@@ -312,7 +308,7 @@ fn axes(plan: &Value) -> &[Value] {
 
 /// All columns with their units and ranges, or those of metrics and how many others there are.
 fn columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> bool) {
-    line(text, "rows", &file.rows.to_string());
+    text.line("rows", file.rows);
     let shown: Vec<&ColumnRange> =
         file.columns.iter().filter(|column| all || is_shown(&column.name)).collect();
     let width = shown.iter().map(|column| column.name.len()).max().unwrap_or(0);
@@ -322,7 +318,7 @@ fn columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> 
     }
     let others = file.columns.len() - shown.len();
     if others > 0 {
-        line(text, "columns", &format!("{others} more, shown by --all"));
+        text.line("columns", format!("{others} more, shown by --all"));
     }
 }
 

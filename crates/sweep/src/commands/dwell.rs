@@ -4,13 +4,13 @@ use std::fmt;
 
 use washer_model::{Starts, decimal};
 
-use super::held::{Held, SpeedArgs};
+use super::held::{SpeedArgs, carry_out};
 use crate::dwell::{Carry, Motions, POSITIVE, Search, is_positive, motions, summary};
 use crate::plan::Plan;
 use crate::stability::{Asked, DwellEngine, check};
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::ResultArgs;
-use sweep_engine::commands::run::WorkArgs;
+use sweep_engine::commands::run::{RunCommand, WorkArgs};
 use sweep_engine::exit::{Error, Exit};
 
 /// Shown by `--help`.
@@ -134,14 +134,14 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let engine =
         DwellEngine::asking(&plan, speeds_rpm, Asked::Motions(Motions::new(&plan, search)))?;
     let (job, output) = motions(&plan, speeds_rpm, &search, args.target.out.as_deref());
-    let options = format!("--speed {}{}", args.held.speed, args.search);
-    let held = Held {
+    let options = format!(" --speed {}{}", args.held.speed, args.search);
+    let command = RunCommand {
+        name: &plan.name,
         verb: "dwell",
+        rows: "rows",
         target: &args.target,
         work: &args.work,
-        options: [options.clone(), format!("--dwell {options}")],
-        fail_on_error: args.fail_on_error,
-        lines: summary::lines,
+        options: [&options, &format!(" --dwell{options}")],
     };
-    held.carry_out(&plan.name, &engine, &job, &output)
+    carry_out(&command, &engine, (&job, &output), summary::lines, args.fail_on_error)
 }

@@ -53,7 +53,7 @@ disturbance is measured by its energy. docs/stability.md explains every line.";
 /// without equilibrium or modes.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let (plan, at) = config::load_point(&args.grid.grid, &args.grid.sets, &args.grid.at)?;
-    let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
+    let threads = threads::count(args.threads, &threads::process)?;
     let simd = simd_from_environment()?;
     // A signal ends the process: there is nothing to keep.
     let interrupt = Interrupt::new();

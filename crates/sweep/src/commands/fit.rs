@@ -145,7 +145,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     });
     let stop = || interrupt.stopped();
     let work = Work { stop: &stop, seen: &seen, journal };
-    let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
+    let threads = threads::count(args.threads, &threads::process)?;
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &options, &work))?;
     progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
     let Some(fitted) = found else {

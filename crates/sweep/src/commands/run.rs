@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let report = execute(&args.run, &plan, &engine, &interrupt, options)?;
     let output = args.run.target.output(&plan);
     if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
-        let threads = threads::count(args.run.work.threads, &|name| std::env::var(name).ok())?;
+        let threads = threads::count(args.run.work.threads, &threads::process)?;
         let folder = files::beside(&output, "traces");
         tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
         let progress = Mutex::new(Progress::new(args.run.work.progress, plan.points(), 0));

@@ -7,10 +7,9 @@ use crate::config;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use crate::trace::{Extras, Models, StartValue, View, every, in_pool, start_of, start_value};
-use sweep_engine::commands::cells::{short, table};
+use sweep_engine::commands::cells::{Lines as _, short, table};
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::quoted;
-use sweep_engine::commands::run::line;
 use sweep_engine::exit::{Error, Exit, tell};
 use sweep_engine::store::Job;
 use sweep_files::{FileKind, Output, key};
@@ -235,13 +234,13 @@ fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
             ),
             _ => "undefined: no ratio is".to_owned(),
         };
-        line(&mut text, "verdict", &said);
+        text.line("verdict", &said);
         if outcome.sensitive == Some(true) {
-            line(&mut text, "sensitive", "chaotic: the digits are those of one trajectory");
+            text.line("sensitive", "chaotic: the digits are those of one trajectory");
         }
         let gaps = [&outcome.nonlinear, &outcome.linear].map(|model| number(model.min_gap_m));
         let told = format!("{} m nonlinear, {} m linear, over the whole run", gaps[0], gaps[1]);
-        line(&mut text, "least gap", &told);
+        text.line("least gap", &told);
     }
     Ok(text)
 }

@@ -17,8 +17,7 @@ use super::statistics::Statistics;
 use crate::config;
 use crate::engine::{ModelEngine, responses};
 use crate::plan::{Axis, AxisValues, Plan};
-use sweep_engine::commands::cells::table;
-use sweep_engine::commands::run::line;
+use sweep_engine::commands::cells::{Lines as _, table};
 use sweep_engine::exit::Error;
 
 /// Standard errors to either end of a 95 % interval.
@@ -462,7 +461,7 @@ impl Report {
         }
         // Without a free number the model is compared alone.
         let mut text = if rows.is_empty() { String::new() } else { table(&headings, &rows, "") };
-        let mut say = |what: &str, said: &str| line(&mut text, what, said);
+        let mut say = |what: &str, said: &str| text.line(what, said);
         match &self.objection {
             None => say("model", "follows the measurement within its noise"),
             Some(reason) => say("model", &format!("does not follow: {reason}; so no intervals")),
