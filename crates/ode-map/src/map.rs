@@ -25,6 +25,7 @@ use sweep_parameter::{Channel, Range};
 use crate::equations::Case;
 use crate::run::{Method, Model, Run, runs};
 use crate::{Coordinate, Oscillator, Parameter};
+use sweep_files::panics::{lock, unlocked};
 
 methods! {
     Rk4 = "rk4", "classical Runge-Kutta of order 4, in fixed steps" { step_s: STEP_S }
@@ -551,11 +552,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Val
                 }
             }
         });
-        let found = found.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let found = unlocked(found);
         (!watch.stopped()).then_some(found)
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

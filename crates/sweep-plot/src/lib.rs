@@ -141,11 +141,14 @@ pub struct PlotOptions {
 }
 
 /// What a page computes with, beside the module that every such page has.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+#[serde(rename_all = "camelCase")]
 pub struct Live {
     /// What the module is set up with, in its own terms.
+    #[serde(skip)]
     pub setup: Vec<f64>,
     /// What can be moved, the map's axes first.
+    #[serde(skip)]
     pub sliders: Vec<Slider>,
     /// Time between two instants of a history (s).
     pub every_s: f64,
@@ -162,8 +165,10 @@ pub struct Live {
     /// The columns of each model's metrics in the module's records, in their order.
     pub metrics: Vec<[String; 2]>,
     /// Whether the map has the static sag.
+    #[serde(rename = "staticSag")]
     pub has_static_sag: bool,
     /// The constant speeds (rpm) that the map's growth is about; none if it has none.
+    #[serde(rename = "growthSpeeds")]
     pub growth_speeds_rpm: Vec<f64>,
     /// Whether a constant speed takes long: with friction or stops.
     pub has_slow_growth: bool,
@@ -185,6 +190,7 @@ pub struct Live {
     /// The version of the program that chose the rungs.
     pub version: String,
     /// Resonances of the linear model: motion, speed (rpm), damping ratio.
+    #[serde(skip)]
     pub resonances: Vec<[String; 3]>,
 }
 

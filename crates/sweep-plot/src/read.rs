@@ -186,6 +186,11 @@ impl Source {
         PlotError::NotThere { option, given, path: self.path.clone(), what, known }
     }
 
+    /// Nothing in it can be drawn.
+    pub(crate) fn empty(&self, reason: &'static str) -> PlotError {
+        PlotError::Empty { path: self.path.clone(), reason }
+    }
+
     /// A column that this kind of file must have is missing.
     pub(crate) fn lacks(&self, column: &str, expected: &'static str) -> PlotError {
         PlotError::Column {

@@ -112,8 +112,6 @@ impl Scatter {
     /// As [`Source::batches`] and [`layer::chosen`]; [`PlotError::Empty`] without points or
     /// parameters that vary; [`PlotError::Unfit`] for a quantity that is no number.
     pub(crate) fn read(source: Source, options: &PlotOptions) -> Result<Self, PlotError> {
-        let empty =
-            |source: &Source, reason| PlotError::Empty { path: source.path.clone(), reason };
         let Some(shown) = layer::chosen(&source, options)? else {
             return Err(PlotError::Unfit(
                 "status is no number, and figures of designs mark failed points in any case"
@@ -165,7 +163,7 @@ impl Scatter {
             }
         }
         if points.is_empty() {
-            return Err(empty(&source, "the design has no points"));
+            return Err(source.empty("the design has no points"));
         }
         let spread = wanted.axes.iter().zip(values).filter_map(|(name, values)| {
             let facts = source.column(name)?;
@@ -181,7 +179,7 @@ impl Scatter {
         let parameters: Vec<Spread> = spread.collect();
         let Wanted { level, shown, .. } = wanted;
         if parameters.is_empty() {
-            return Err(empty(&source, "no parameter varies from point to point"));
+            return Err(source.empty("no parameter varies from point to point"));
         }
         let spans = || crate::chart::spans_decades(quantity.iter().copied());
         let log = ratio || (level.is_none() && spans());

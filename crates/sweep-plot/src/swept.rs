@@ -127,14 +127,13 @@ pub(crate) fn is_whole(source: &Source) -> Result<bool, PlotError> {
 /// As [`Source::batches`]; [`PlotError::Empty`] without rows or axes; [`PlotError::NotAGrid`] for
 /// an axis value that is not a number, or rows that do not lie on a grid.
 pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
-    let empty = |reason| PlotError::Empty { path: source.path.clone(), reason };
     if source.rows == 0 {
-        return Err(empty("the map has no rows"));
+        return Err(source.empty("the map has no rows"));
     }
     let no_grid = |reason: String| PlotError::NotAGrid { path: source.path.clone(), reason };
     let columns = columns(source);
     if columns.is_empty() {
-        return Err(empty("the map has no axis"));
+        return Err(source.empty("the map has no axis"));
     }
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
     let mut gathered: Vec<Gathered> = names.iter().map(|_| Gathered::new()).collect();
@@ -157,7 +156,7 @@ pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
     }
     // What the file says of its rows need not be so.
     if gathered.iter().any(|axis| axis.seen.is_empty()) {
-        return Err(empty("the map has no rows"));
+        return Err(source.empty("the map has no rows"));
     }
     Ok(columns.iter().zip(gathered).map(|(column, gathered)| gathered.axis(column)).collect())
 }

@@ -121,7 +121,7 @@ impl ResultTable {
     /// The columns of an open file.
     pub fn of(file: ParquetFile) -> Self {
         let columns = columns(file.schema());
-        let plan = file.value(key::PLAN).and_then(|plan| serde_json::from_str(plan).ok());
+        let plan = file.json(key::PLAN);
         Self { columns, plan, file }
     }
 

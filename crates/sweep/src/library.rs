@@ -33,6 +33,5 @@ pub use sweep_engine::effort::Effort;
 
 /// Speeds that make no sense.
 fn refused_speeds(count: usize, expected: String) -> sweep_engine::exit::Error {
-    let given = format!("with {count} values");
-    sweep_engine::exit::Error::Option { option: "speeds", given, expected }
+    sweep_engine::exit::Error::option("speeds", format!("with {count} values"), expected)
 }

@@ -32,8 +32,7 @@ const AT_ONCE: [u64; 2] = [32, 2048];
 /// # Errors
 /// [`Error::Option`].
 pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<(), Error> {
-    let refuse =
-        |expected: String| Err(Error::Option { option, given: given.to_owned(), expected });
+    let refuse = |expected: String| Err(Error::option(option, given, expected));
     for axis in &plan.axes {
         let name = axis.parameter.name();
         match axis.parameter.target() {

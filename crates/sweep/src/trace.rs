@@ -115,14 +115,11 @@ pub(crate) fn every(every_s: Option<f64>, plan: &Plan) -> Result<Option<f64>, Er
             // The start is an instant too.
             count += 1.0 + plan.scenario(point).model.spin.turns_within([0.0, plan.end_s]);
             if count > MOST_INSTANTS {
-                return Err(Error::Option {
-                    option: "--turns",
-                    given: format!("to {} s", plan.end_s),
-                    expected: format!(
-                        "at most {MOST_INSTANTS} turns of the drum, over all points: an earlier \
-                         end_s, or fewer points"
-                    ),
-                });
+                let expected = format!(
+                    "at most {MOST_INSTANTS} turns of the drum, over all points: an earlier end_s, \
+                     or fewer points"
+                );
+                return Err(Error::option("--turns", format!("to {} s", plan.end_s), expected));
             }
         }
         return Ok(None);
@@ -131,11 +128,7 @@ pub(crate) fn every(every_s: Option<f64>, plan: &Plan) -> Result<Option<f64>, Er
     if (least..=plan.end_s).contains(&every_s) {
         return Ok(Some(every_s));
     }
-    Err(Error::Option {
-        option: "--every",
-        given: every_s.to_string(),
-        expected: format!("from {least:e} to {} s", plan.end_s),
-    })
+    Err(Error::option("--every", every_s, format!("from {least:e} to {} s", plan.end_s)))
 }
 
 /// What of a point's histories is looked at.
@@ -262,10 +255,9 @@ pub(crate) fn trace_all(plan: &Plan, view: &View, stop: &(dyn Fn() -> bool + Syn
     let numbers = rows().flat_map(|(number, count)| repeat_n(number, count));
     table.counts("point", "number of the point in its grid", numbers);
     for (k, axis) in plan.axes.iter().enumerate() {
-        let of = &axis.parameter;
         let values = rows()
             .flat_map(|(number, count)| repeat_n(plan.axis_values(number).get(k).copied(), count));
-        table.numbers(of.name(), of.unit(), of.description(), values);
+        table.parameter(&axis.parameter, values);
     }
     let failed = columns(&mut table, &each, &models, view.extras);
     for (k, (number, _)) in runs.iter().enumerate() {

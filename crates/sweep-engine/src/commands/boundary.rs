@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use super::cells::{Lines as _, short};
@@ -22,6 +22,7 @@ use crate::progress::{Progress, ProgressMode, duration};
 use crate::store::{Column, OpenedTrials, StoreError, Trials};
 use crate::swept::Swept;
 use crate::threads;
+use sweep_files::panics::lock;
 use sweep_files::{FileKind, Output};
 use sweep_parameter::{Parameter as _, Worse};
 
@@ -193,7 +194,7 @@ fn summary<M: Swept>(
         .filter(|(_, count)| *count > 0)
         .map(|(kind, count)| format!("{count} {}", kind.name()))
         .collect();
-    text.line("found", &counts.join(", "));
+    text.line("found", counts.join(", "));
     let several = rows().filter(|row| row.edges.len() > 1).count();
     if several > 0 {
         text.line("folds", format!("{several} values of the first axis have several crossings"));
@@ -257,6 +258,6 @@ pub fn search<M: Swept>(
     let mut standing =
         |standing: &Standing| rows_done.store(standing.rows as u64, Ordering::Relaxed);
     let found = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
-    progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+    lock(&progress).finish();
     Ok((found, models.into_kept()))
 }

@@ -77,16 +77,12 @@ pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
     let tables = [ResultTable::open(files[0])?, ResultTable::open(files[1])?];
     let found = compare(&tables[0], &tables[1])?;
     if let Some([given, of]) = args.fail_on.iter().find_map(|fail_on| fail_on.lacks(&found)) {
-        let (given, expected) = (given.to_owned(), of.to_owned());
-        return Err(Error::Option { option: "--fail-on", given, expected });
+        return Err(Error::option("--fail-on", given, of));
     }
     if let (Some(output), Some(path)) = (output, &args.out) {
         if !found.has_verdicts {
-            return Err(Error::Option {
-                option: "--out",
-                given: path.display().to_string(),
-                expected: "two maps: other files have no differences row by row".to_owned(),
-            });
+            let expected = "two maps: other files have no differences row by row";
+            return Err(Error::option("--out", path.display(), expected));
         }
         let bytes = differences::bytes(args, &found, &tables, build)
             .map_err(StoreError::parquet("write", path))?;

@@ -113,11 +113,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
 fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Result<Exit, Error> {
     let mut text = format!("{}: {how}\n", study.name);
     let file = ResultTable::open(output)?;
-    let about: serde_json::Value = file
-        .file()
-        .value(key::OPTIMISE)
-        .and_then(|text| serde_json::from_str(text).ok())
-        .unwrap_or_default();
+    let about = file.file().json(key::OPTIMISE).unwrap_or_default();
     let own = parameters(study).iter().map(|axis| axis.parameter.name());
     let objectives = study.objectives.iter().map(|one| one.name.as_str());
     let names: Vec<&str> =
@@ -155,19 +151,15 @@ fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Re
     text.push_str(&text_table(&headings, &listed, "  "));
     if let Some(path) = &args.best {
         let own = values.as_deref().and_then(|values| own_file(study, values));
-        let own = own.ok_or_else(|| Error::Option {
-            option: "--best",
-            given: path.display().to_string(),
-            expected: match chosen {
-                None => "a study with a feasible candidate; this one has none".to_owned(),
-                Some(chosen) => {
-                    format!("a model with a file of its own, and candidate {chosen} of {all}")
-                }
-            },
-        })?;
+        let expected = match chosen {
+            None => "a study with a feasible candidate; this one has none".to_owned(),
+            Some(chosen) => {
+                format!("a model with a file of its own, and candidate {chosen} of {all}")
+            }
+        };
+        let own = own.ok_or_else(|| Error::option("--best", path.display(), expected))?;
         let own = format!("# Candidate {} of {}.\n{own}", chosen.unwrap_or_default(), study.name);
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        atomic::write(folder.unwrap_or(Path::new(".")), path, own.as_bytes())?;
+        atomic::write(atomic::parent(path), path, own.as_bytes())?;
         text.line("wrote", path.display());
     }
     text.line("file", output.display());

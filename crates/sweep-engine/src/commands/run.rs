@@ -294,7 +294,7 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         let by_status = tally.by_status.iter().filter(|(status, _)| *status != "ok");
         let list: Vec<String> =
             by_status.map(|(status, count)| format!("{count} {status}")).collect();
-        text.line("failed", &list.join(", "));
+        text.line("failed", list.join(", "));
     }
     if tally.sensitive > 0 {
         let told = format!("{}: chaotic, a near twin departs exponentially", tally.sensitive);

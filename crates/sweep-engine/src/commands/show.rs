@@ -107,7 +107,7 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
             for (name, words) in (further.lines)(&opened)? {
                 text.line(name, &words);
             }
-            if let Some(traced) = own_json(&opened, key::BOUNDARY) {
+            if let Some(traced) = opened.json(key::BOUNDARY) {
                 let quantity = traced["quantity"].as_str().unwrap_or("unknown");
                 let limit = traced["limit"].as_f64().map_or("unknown".to_owned(), short);
                 text.line("boundary", format!("where {quantity} = {limit}"));
@@ -116,11 +116,6 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
     }
     columns(&mut text, &file, args.all || file.result.is_none(), further.is_of_a_metric);
     show(&text)
-}
-
-/// One JSON value of the file's metadata.
-fn own_json(file: &ParquetFile, key: &str) -> Option<Value> {
-    serde_json::from_str(file.value(key)?).ok()
 }
 
 /// Some rows of the file.
@@ -212,8 +207,8 @@ fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, 
         "made_by": opened.created_by(),
         "is_sealed": opened.is_sealed(),
         "columns": file.columns.iter().map(column).collect::<Value>(),
-        "boundary": own_json(opened, key::BOUNDARY),
-        "plan": own_json(opened, key::PLAN),
+        "boundary": opened.json(key::BOUNDARY),
+        "plan": opened.json(key::PLAN),
     });
     if let Some(result) = &file.result {
         let tally = tally(opened)?;
@@ -257,13 +252,13 @@ fn provenance(text: &mut String, result: &ResultFile) {
     let told =
         [("spin", "spin"), ("values", "parameters"), ("time", "time"), ("method", "integrator")];
     for (name, key) in told.into_iter().filter(|(_, key)| !plan[*key].is_null()) {
-        text.line(name, &brief(&plan[key]));
+        text.line(name, brief(&plan[key]));
     }
     if let Some(criterion) = plan["reliability"]["criterion"].as_str() {
         text.line("criterion", criterion);
     }
     if let Some(design) = plan.get("design") {
-        text.line("design", &brief(design));
+        text.line("design", brief(design));
     }
     for axis in axes(plan) {
         let name = axis["parameter"].as_str().unwrap_or_default();
@@ -275,7 +270,7 @@ fn provenance(text: &mut String, result: &ResultFile) {
     }
     if let Some(set) = plan["set"].as_object() {
         let told = set.iter().map(|(name, value)| format!("{name} = {}", brief(value)));
-        text.line("--set", &told.collect::<Vec<_>>().join(", "));
+        text.line("--set", told.collect::<Vec<_>>().join(", "));
     }
 }
 

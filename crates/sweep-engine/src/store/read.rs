@@ -43,19 +43,19 @@ impl ResultFile {
     /// [`StoreError::Parquet`] for a file that is not the result of a run.
     pub fn of(file: &ParquetFile, kind: FileKind<'_>) -> Result<Self, StoreError> {
         own_word(file, kind).ok_or_else(|| {
-            let reason = "its metadata is not that of a result of this command";
-            StoreError::parquet("read", file.path())(ParquetError::General(reason.into()))
+            let reason = format!("its metadata is not that of a {}", kind.name());
+            StoreError::parquet("read", file.path())(ParquetError::General(reason))
         })
     }
 }
 
 fn own_word(file: &ParquetFile, kind: FileKind<'_>) -> Option<ResultFile> {
     // Other files of this program carry the plan too: a boundary's rows are not points.
-    if !kind.has_keys(&|key| file.value(key).is_some()) {
+    if file.kind() != Some(kind) {
         return None;
     }
     Some(ResultFile {
-        plan: serde_json::from_str(file.value(key::PLAN)?).ok()?,
+        plan: file.json(key::PLAN)?,
         plan_hash: file.value(key::PLAN_HASH)?.to_owned(),
         version: file.value(key::VERSION)?.to_owned(),
         numerics: file.value(key::NUMERICS).and_then(|numerics| numerics.parse().ok()).unwrap_or(0),
@@ -193,8 +193,7 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         let mask = ProjectionMask::columns(builder.parquet_schema(), columns);
         builder.with_projection(mask)
     })?;
-    let limits =
-        file.value(key::PLAN).and_then(|plan| ratio_limits(&serde_json::from_str(plan).ok()?));
+    let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
     for batch in batches {
         count(&batch?, &ratios, limits, &mut tally).map_err(&failed)?;
     }

@@ -35,10 +35,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let columns: Vec<&Column> =
         table.columns.iter().filter(|column| column.numbers().is_some()).collect();
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-    let empty = || PlotError::Empty {
-        path: table.source.path.clone(),
-        reason: "a curve needs at least two points",
-    };
+    let empty = || table.source.empty("a curve needs at least two points");
     let (low, high) = bracket(&names).ok_or_else(empty)?;
     let (x, y) = (columns[0], columns[1]);
     let [xs, ys, lows, highs] = [
@@ -81,7 +78,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         series.extend(branches(&grid, places).into_iter().map(|branch| {
             let pick = |of: fn(&Place) -> f64| branch.iter().map(of).collect::<Vec<f64>>();
             let style = Style::Band(pick(|place| place.low), pick(|place| place.high));
-            Series { name: name.clone(), colour, grid: 0, y: pick(|place| place.y), style }
+            Series::new(name.clone(), colour, 0, pick(|place| place.y), style)
         }));
     }
     let side = far_side(&curves, side_words(table));

@@ -33,10 +33,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let modes = modes(table)?;
     let top = modes.iter().flat_map(|mode| &mode.speed).fold(0.0_f64, |top, &speed| top.max(speed));
     if top <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
-        return Err(PlotError::Empty {
-            path: table.source.path.clone(),
-            reason: "the modes are given at one speed only",
-        });
+        return Err(table.source.empty("the modes are given at one speed only"));
     }
     let (near, far): (Vec<Mode>, Vec<Mode>) = modes
         .into_iter()
@@ -55,38 +52,19 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         for speed in crossings(&mode) {
             stars.push((speed, speed, format!("{speed:.1} rpm")));
         }
-        series.push(Series {
-            name: mode.name,
-            colour: DISTINCT[k % DISTINCT.len()],
-            grid: grids.len(),
-            y: mode.frequency,
-            style: match mode.band {
-                Some((low, high)) => Style::Band(low, high),
-                None => Style::Solid(2.2),
-            },
-        });
+        let style = mode.band.map_or(Style::Solid(2.2), |(low, high)| Style::Band(low, high));
+        let colour = DISTINCT[k % DISTINCT.len()];
+        series.push(Series::new(mode.name, colour, grids.len(), mode.frequency, style));
         grids.push(mode.speed);
     }
     for sum in sums {
         for speed in crossings(&sum) {
             stars.push((speed, speed, format!("{speed:.1} rpm")));
         }
-        series.push(Series {
-            name: sum.name,
-            colour: MUTED,
-            grid: grids.len(),
-            y: sum.frequency,
-            style: Style::Dashed,
-        });
+        series.push(Series::new(sum.name, MUTED, grids.len(), sum.frequency, Style::Dashed));
         grids.push(sum.speed);
     }
-    let line = Series {
-        name: "frequency = spin speed".to_owned(),
-        colour: INK,
-        grid: 0,
-        y: vec![0.0, top],
-        style: Style::Dashed,
-    };
+    let line = Series::new("frequency = spin speed", INK, 0, vec![0.0, top], Style::Dashed);
     series.push(line);
     let mut notes: Vec<String> = table.source.run_name().map(str::to_owned).into_iter().collect();
     if series.iter().any(|series| matches!(series.style, Style::Band(..))) {

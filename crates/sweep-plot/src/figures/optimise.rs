@@ -57,12 +57,8 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
     let grids: Vec<Vec<f64>> = (0..KINDS.len()).map(|kind| of(kind, 0)).collect();
     let panels = shown.iter().enumerate().map(|(k, (column, is_shown))| {
         let colours = [FAILED, DISTINCT[5], NONLINEAR];
-        let dots = |kind: usize| Series {
-            name: KINDS[kind].to_owned(),
-            colour: colours[kind],
-            grid: kind,
-            y: of(kind, k + 1),
-            style: Style::Dots,
+        let dots = |kind: usize| {
+            Series::new(KINDS[kind], colours[kind], kind, of(kind, k + 1), Style::Dots)
         };
         let drawn = (0..KINDS.len()).filter(|&kind| !grids[kind].is_empty());
         let words = label::words(&column.name);
@@ -83,12 +79,8 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
             .to_owned(),
         subtitle: source.subtitle(&format!("{} candidates", source.rows)),
         x_label: Label::new(&words, units[0].0),
-        x_log: false,
-        shades: Vec::new(),
-        shade_meaning: String::new(),
         grids,
         panels,
-        marks: Vec::new(),
-        mark_meaning: String::new(),
+        ..Chart::default()
     })
 }

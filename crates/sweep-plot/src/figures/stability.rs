@@ -66,12 +66,8 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
         let named: Vec<String> = named.map(|(_, (axis, value))| said(axis, *value)).collect();
         if named.is_empty() { "growth".to_owned() } else { named.join(", ") }
     };
-    let series = swept.iter().enumerate().map(|(k, point)| Series {
-        name: name(&point.values),
-        colour: DISTINCT[k],
-        grid: k,
-        y: point.growth.clone(),
-        style: Style::Solid(2.2),
+    let series = swept.iter().enumerate().map(|(k, point)| {
+        Series::new(name(&point.values), DISTINCT[k], k, point.growth.clone(), Style::Solid(2.2))
     });
     let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
     let common = axes.iter().zip(&shown[0]).enumerate().filter(|(k, _)| !differs(*k));
@@ -118,8 +114,8 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         .into_iter()
         .filter(|(name, _)| source.column(&format!("linear_{name}")).is_some())
         .collect();
-    let is_shown = shown(source, &channels, &options.channels)?;
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
+    let is_shown = shown(source, &names, &options.channels)?;
     let columns: Vec<String> = names
         .iter()
         .flat_map(|name| ["nonlinear", "linear"].map(|model| format!("{model}_{name}")))
@@ -135,13 +131,7 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         };
         let nonlinear = scaled(2 * k);
         let of = |wanted: bool| part(&nonlinear, &one.growth, wanted);
-        let series = |name: &str, colour, y, style| Series {
-            name: name.to_owned(),
-            colour,
-            grid: 0,
-            y,
-            style,
-        };
+        let series = |name: &str, colour, y, style| Series::new(name, colour, 0, y, style);
         let lines = vec![
             series("linear model", LINEAR, scaled(2 * k + 1), Style::Solid(1.6)),
             series("nonlinear model, stable", NONLINEAR, of(false), Style::Solid(2.2)),
@@ -185,10 +175,9 @@ pub(super) fn part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
 /// [`PlotError::NotThere`] for an unknown channel.
 pub(super) fn shown(
     source: &Source,
-    channels: &[(&str, &ColumnFacts)],
+    names: &[&str],
     asked: &[String],
 ) -> Result<Vec<bool>, PlotError> {
-    let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     if let Some(unknown) = asked.iter().find(|asked| !names.contains(&asked.as_str())) {
         return Err(source.not_there("--channel", unknown, "channel", names.join(", ")));
     }
@@ -321,8 +310,7 @@ fn points(
         }
     }
     if !seen_rows {
-        let reason = "it has no rows";
-        return Err(PlotError::Empty { path: source.path.clone(), reason });
+        return Err(source.empty("it has no rows"));
     }
     if found.is_empty() {
         let given: Vec<String> = at.iter().map(|(name, value)| format!("{name}={value}")).collect();

@@ -17,9 +17,6 @@ use crate::scene::INK;
 use crate::table::Table;
 use crate::together::{self, At};
 
-/// Channels that a picture shows by default: one for each way in which the tub can move.
-const USUAL: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
-
 /// The chart of a trace file.
 ///
 /// # Errors
@@ -28,10 +25,7 @@ const USUAL: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
 pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
     let time = table.numbers("time_s")?.to_vec();
     if time.len() < 2 {
-        return Err(PlotError::Empty {
-            path: table.source.path.clone(),
-            reason: "a trace needs at least two instants",
-        });
+        return Err(table.source.empty("a trace needs at least two instants"));
     }
     if table.column("point").is_some() {
         let path = table.source.path.display();
@@ -41,20 +35,13 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     }
     let sides = sides(table);
     let found = quantities(table, sides);
-    let channels: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
-    if let Some(unknown) = options.channels.iter().find(|asked| !channels.contains(&asked.as_str()))
-    {
-        return Err(table.source.not_there("--channel", unknown, "channel", channels.join(", ")));
-    }
-    let usual: Vec<&str> = USUAL.into_iter().filter(|name| channels.contains(name)).collect();
-    let shown: Vec<&str> = match (&options.channels[..], &usual[..]) {
-        ([], []) => {
-            found.iter().filter(|quantity| quantity.channel).map(|quantity| quantity.name).collect()
-        }
-        ([], usual) => usual.to_vec(),
-        (asked, _) => asked.iter().map(String::as_str).collect(),
-    };
-
+    let names: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
+    let is_shown = stability::shown(&table.source, &names, &options.channels)?;
+    // Where no channel is usual, all are, and nothing else that is in the file.
+    let any = !options.channels.is_empty();
+    let shown =
+        found.iter().zip(is_shown).filter(|(of, is_shown)| *is_shown && (any || of.channel));
+    let shown: Vec<&str> = shown.map(|(quantity, _)| quantity.name).collect();
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
     let names = other.as_ref().map(|other| told_apart(table, other));
     let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
@@ -76,7 +63,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             .filter_map(|(table, column, name, colour, grid)| {
                 let y =
                     table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
-                Some(Series { name, colour, grid, y, style: Style::Solid(1.3) })
+                Some(Series::new(name, colour, grid, y, Style::Solid(1.3)))
             })
             .collect()
     };
@@ -103,8 +90,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     for (name, column) in table.with_prefix("residual_") {
         let (unit, factor) = label::shown(&column.unit);
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
-        let residual =
-            Series { name: "residual".to_owned(), colour: INK, grid: 0, y, style: Style::Dots };
+        let residual = Series::new("residual", INK, 0, y, Style::Dots);
         let words = format!("residual, {}", label::words(name));
         let shown = shown.contains(&name);
         let label = Label::new(&words, unit);
@@ -136,8 +122,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         }
         shades = stability::stretches_within(&time, speed, &unstable);
         let y = speed.to_vec();
-        let series =
-            Series { name: String::new(), colour: INK, grid: 0, y, style: Style::Solid(2.0) };
+        let series = Series::new(String::new(), INK, 0, y, Style::Solid(2.0));
         let height = 130.0;
         panels.push(ChartPanel {
             height,

@@ -4,23 +4,10 @@ use crate::config;
 use crate::engine::simd_from_environment;
 use crate::explain::{explain, json, words};
 use crate::speeds::{Speeds, turning};
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::GridArgs;
 use sweep_engine::exit::{Error, Exit, show};
 use sweep_engine::interrupt::Interrupt;
 use sweep_engine::threads;
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    [
-        "sweep explain my.toml --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=100",
-        "why the linear model fails there, and what would help",
-    ],
-    [
-        "sweep explain my.toml --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=100 --json",
-        "the same for programs",
-    ],
-];
 
 /// Arguments of `sweep explain`.
 #[derive(Debug, clap::Args)]

@@ -4,34 +4,17 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::PoisonError;
 
 use crate::config::{self, GridInput};
 use crate::fit::{self, FitOptions, Measured, Work};
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::GridArgs;
 use sweep_engine::exit::{Error, Exit, show, tell};
 use sweep_engine::interrupt::Interrupt;
 use sweep_engine::progress::{Progress, ProgressMode};
 use sweep_engine::store::StoreError;
 use sweep_engine::threads;
+use sweep_files::panics::lock;
 use sweep_files::{self as files, FileKind, atomic};
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    [
-        "sweep fit my.toml run.csv --free unbalance_mass_kg,damping_n_s_per_m --out bench.toml",
-        "the machine on the bench, as a machine file",
-    ],
-    [
-        "sweep fit my.toml a.csv b.csv@unbalance_mass_kg=0.6 --free damping_n_s_per_m",
-        "two runs with loads of their own",
-    ],
-    [
-        "sweep fit my.toml run.csv --free damping_n_s_per_m,friction_n=0:100 --starts 24 --json",
-        "every minimum that two dozen starts lead to, for programs",
-    ],
-];
 
 /// Arguments of `sweep fit`.
 #[derive(Debug, clap::Args)]
@@ -136,7 +119,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let interrupt = Interrupt::install().map_err(Error::signals)?;
     let progress = Mutex::new(Progress::of_search(args.progress, 0, 0));
     let seen = |made: usize| {
-        progress.lock().unwrap_or_else(PoisonError::into_inner).show_search(0, made as u64);
+        lock(&progress).show_search(0, made as u64);
     };
     let journal = args.out.as_ref().map(|out| {
         let mut name = out.as_os_str().to_owned();
@@ -147,7 +130,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let work = Work { stop: &stop, seen: &seen, journal };
     let threads = threads::count(args.threads, &threads::process)?;
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &options, &work))?;
-    progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+    lock(&progress).finish();
     let Some(fitted) = found else {
         tell("interrupted: with --out, what was found out is kept, and the same command goes on");
         return Ok(Exit::interrupted(interrupt.signal()));

@@ -1,9 +1,11 @@
 //! What commands about held speeds have in common: doing it, what came of it, and which job it is.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
-use super::dwell::SearchArgs;
-use crate::dwell::motions;
+use washer_model::{Starts, decimal};
+
+use crate::dwell::{Carry, POSITIVE, Search, is_positive, motions};
 use crate::engine::Engine;
 use crate::plan::Plan;
 use crate::speeds::SpeedList;
@@ -21,6 +23,73 @@ pub(super) struct SpeedArgs {
     /// Constant spin speeds in rpm, above 0: one, several with commas, FROM:TO:STEP
     #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
     pub(super) speed: SpeedList,
+}
+
+/// How motions are looked for, as `dwell`, `status` and `merge` take it.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct SearchArgs {
+    /// Starts a speed, the disturbed periodic response among them
+    #[arg(long, value_name = "N", default_value_t = 8,
+          value_parser = clap::value_parser!(u16).range(1..=Search::MOST_STARTS))]
+    starts: u16,
+    /// Hardest kick, in rad/s of the tub's rocking
+    #[arg(long, value_name = "RAD/S", default_value_t = 6.0, value_parser = positive)]
+    kick: f64,
+    /// Take the motion along from speed to speed, up or down, instead of starts at each
+    #[arg(long, value_name = "up|down", conflicts_with_all = ["starts", "kick", "threshold"])]
+    carry: Option<Carry>,
+    /// Look for the smallest kick that does not come back, where there are several motions
+    #[arg(long)]
+    threshold: bool,
+    /// Keep so many states of each motion, once a turn: a row each, with its coordinates
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true,
+          value_parser = clap::value_parser!(u16).range(..=256))]
+    sections: u16,
+    /// Follow a motion that does not settle for at most this long, in s
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0, value_parser = positive)]
+    longest: f64,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value| is_positive(*value));
+    value.ok_or_else(|| format!("expected {POSITIVE}"))
+}
+
+impl fmt::Display for SearchArgs {
+    /// What differs from the defaults, as it is written on a command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let usual = Starts::default();
+        let starts = self.search().starts;
+        if let Some(carry) = self.carry {
+            write!(f, " --carry {}", carry.name())?;
+        }
+        if starts.count != usual.count {
+            write!(f, " --starts {}", starts.count)?;
+        }
+        if starts.kick_rad_per_s != usual.kick_rad_per_s {
+            write!(f, " --kick {}", decimal(starts.kick_rad_per_s))?;
+        }
+        if starts.longest_s != usual.longest_s {
+            write!(f, " --longest {}", decimal(starts.longest_s))?;
+        }
+        if self.sections > 0 {
+            write!(f, " --sections {}", self.sections)?;
+        }
+        if self.threshold { f.write_str(" --threshold") } else { Ok(()) }
+    }
+}
+
+impl SearchArgs {
+    pub(super) fn search(&self) -> Search {
+        let starts = Starts {
+            count: usize::from(self.starts),
+            kick_rad_per_s: self.kick,
+            longest_s: self.longest,
+            with_threshold: self.threshold,
+            ..Starts::default()
+        };
+        Search { starts, carry: self.carry, sections: usize::from(self.sections) }
+    }
 }
 
 /// Does it, says what came of it by the `lines` of the file, and how the program ends.

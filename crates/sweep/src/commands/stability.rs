@@ -4,19 +4,9 @@
 use super::held::{SpeedArgs, carry_out};
 use crate::plan::Plan;
 use crate::stability::{DwellEngine, check, dwells, tongues};
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::ResultArgs;
 use sweep_engine::commands::run::{RunCommand, WorkArgs};
 use sweep_engine::exit::{Error, Exit};
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    [
-        "sweep stability my.toml --speed 60:400:1",
-        "where a dwell at constant speed would shake itself up",
-    ],
-    ["sweep show results/first-stability.parquet", "the unstable speeds, and why"],
-];
 
 /// Arguments of `sweep stability`.
 #[derive(Debug, clap::Args)]

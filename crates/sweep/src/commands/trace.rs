@@ -8,7 +8,6 @@ use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use crate::trace::{Extras, Models, StartValue, View, every, in_pool, start_of, start_value};
 use sweep_engine::commands::cells::{Lines as _, short, table};
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::quoted;
 use sweep_engine::exit::{Error, Exit, tell};
 use sweep_engine::store::Job;
@@ -16,21 +15,6 @@ use sweep_files::{FileKind, Output, key};
 use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::{Cell, ResultTable, top};
 use washer_row::{Trajectory, Verdict};
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    [
-        "sweep trace my.toml --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=100 --out \
-                 rocking.parquet",
-        "both models at one point",
-    ],
-    ["sweep trace my.toml --worst --out worst.parquet", "the greatest ratio of its map"],
-    [
-        "sweep trace my.toml --all --turns --model nonlinear --states --out turns.parquet",
-        "the state once a turn at every point, for a bifurcation diagram",
-    ],
-    ["sweep plot rocking.parquet", "drawn over time and spin speed"],
-];
 
 /// Arguments of `sweep trace`.
 #[derive(Debug, clap::Args)]
@@ -140,11 +124,7 @@ fn chosen(args: &Args) -> Result<Vec<String>, Error> {
         (None, point) => point.unwrap_or_default(),
     };
     if point >= plan.points() {
-        return Err(Error::Option {
-            option: "--point",
-            given: point.to_string(),
-            expected: format!("from 0 to {}", plan.points() - 1),
-        });
+        return Err(Error::option("--point", point, format!("from 0 to {}", plan.points() - 1)));
     }
     let names = plan.axes.iter().map(|axis| axis.parameter.name());
     // The shortest decimals read back to the same values.
@@ -155,8 +135,7 @@ fn chosen(args: &Args) -> Result<Vec<String>, Error> {
 fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> {
     let default = || PathBuf::from(format!("results/{}.parquet", plan.name));
     let path = args.result.clone().unwrap_or_else(default);
-    let refused =
-        |expected: String| Error::Option { option: "--worst", given: column.to_owned(), expected };
+    let refused = |expected: String| Error::option("--worst", column, expected);
     if !path.exists() {
         let run = format!("`sweep run {}`", quoted(&args.grid.grid.display().to_string()));
         let expected = format!("a result at {} (--result); {run} makes it", path.display());
