@@ -480,6 +480,9 @@ fn methods(plan: &Plan, point: &Point, spin: &Spin, quick: Option<Quick>) -> ([M
     }
 }
 
+/// The forces of all elements of a kind (N).
+type ForcesOfEach = fn(&Forces) -> &[f64];
+
 /// One model's columns.
 struct Columns<'a> {
     model: &'static str,
@@ -557,20 +560,16 @@ impl<'a> Columns<'a> {
             table.numbers(&name, "N", &description, forces.iter().map(|at| at.as_ref().map(of)));
         };
         let Some(first) = forces.first().and_then(Option::as_ref) else { return };
-        for k in 0..first.springs_n.len() {
-            let what = format!("spring_{}_tension", k + 1);
-            add(&what, "tension of the spring, negative where it pushes", &|at| at.springs_n[k]);
-        }
-        for k in 0..first.dampers_n.len() {
-            let what = format!("damper_{}_tension", k + 1);
-            add(&what, "tension of the damper, positive while it is drawn out", &|at| {
-                at.dampers_n[k]
-            });
-        }
-        for k in 0..first.stops_n.len() {
-            let what = format!("stop_{}_force", k + 1);
-            add(&what, "push between the tub and the stop", &|at| at.stops_n[k]);
-        }
+        let mut add_each = |part: &str, what: &str, description: &str, of: ForcesOfEach| {
+            for k in 0..of(first).len() {
+                add(&format!("{part}_{}_{what}", k + 1), description, &|at| of(at)[k]);
+            }
+        };
+        let pushes = "tension of the spring, negative where it pushes";
+        add_each("spring", "tension", pushes, |at| &at.springs_n);
+        let drawn = "tension of the damper, positive while it is drawn out";
+        add_each("damper", "tension", drawn, |at| &at.dampers_n);
+        add_each("stop", "force", "push between the tub and the stop", |at| &at.stops_n);
         let axes = ["x", "y", "z"];
         for k in 0..first.bushings_n.len() {
             for (i, axis) in axes.into_iter().enumerate() {
@@ -588,10 +587,8 @@ impl<'a> Columns<'a> {
             add(&format!("cabinet_force_{axis}"), &description, &|at| at.cabinet_n[k]);
         }
         for k in 0..first.feet_n.len() {
-            let what = format!("foot_{}_load", k + 1);
-            add(&what, "vertical load of the foot, negative where it would lift", &|at| {
-                at.feet_n[k]
-            });
+            let description = "vertical load of the foot, negative where it would lift";
+            add(&format!("foot_{}_load", k + 1), description, &|at| at.feet_n[k]);
         }
         if first.slip_margin_n.is_some() {
             let description = "margin of the cabinet against slipping, friction on all feet \

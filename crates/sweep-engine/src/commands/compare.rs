@@ -148,62 +148,45 @@ struct Listed {
 fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
     let most = usize::from(args.rows);
     let mut lists = Vec::new();
-    let place = |row: &SharedRow| row.place.iter().map(|value| short(*value)).collect::<Vec<_>>();
+    let mut add = |title: String, further: &[&str], rows: Vec<(&SharedRow, Vec<String>)>| {
+        let headings = found.keys.iter().map(String::as_str).chain(further.iter().copied());
+        let headings = headings.map(str::to_owned).collect();
+        let place = |row: &SharedRow| row.place.iter().map(|value| short(*value)).collect();
+        let rows = rows.into_iter().map(|(row, cells)| [place(row), cells].concat());
+        let rows: Vec<Vec<String>> = rows.collect();
+        if !rows.is_empty() {
+            lists.push(Listed { title, headings, rows });
+        }
+    };
     for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
         let count = found.flips(sensitive).count();
-        if count > 0 {
-            let rows = found.flips(sensitive).take(most).map(|row| {
-                let mut cells = place(row);
-                cells.extend([0, 1].map(|side| match row.flip {
-                    Flip::Defined => number(row.ratio[side]),
-                    _ => format!("{} {}", number(row.ratio[side]), verdict(row, side)),
-                }));
-                cells
-            });
-            lists.push(Listed {
-                title: format!("verdicts that flipped{which}: {count}"),
-                headings: headings(found, &["A", "B"]),
-                rows: rows.collect(),
-            });
-        }
+        let cells = |row: &SharedRow| match row.flip {
+            Flip::Defined => row.ratio.map(number).to_vec(),
+            _ => [0, 1]
+                .map(|side| format!("{} {}", number(row.ratio[side]), verdict(row, side)))
+                .to_vec(),
+        };
+        let rows = found.flips(sensitive).take(most).map(|row| (row, cells(row)));
+        add(format!("verdicts that flipped{which}: {count}"), &["A", "B"], rows.collect());
     }
     for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
-        let ratios = found.greatest(most, sensitive, SharedRow::ratio_by);
-        if !ratios.is_empty() {
-            let rows = ratios.into_iter().map(|row| {
-                let mut cells = place(row);
-                cells.extend(row.ratio.map(number));
-                let change = row.ratio_change().map(|change| 100.0 * (change - 1.0));
-                cells.push(change.map_or_else(|| number(None), |change| format!("{change:+.3} %")));
-                cells
-            });
-            lists.push(Listed {
-                title: format!("greatest changes of the ratio{which}"),
-                headings: headings(found, &["A", "B", "change"]),
-                rows: rows.collect(),
-            });
-        }
-        let gaps = found.greatest(most, sensitive, SharedRow::gap_by_m);
-        if !gaps.is_empty() {
-            let rows = gaps.into_iter().map(|row| {
-                let mut cells = place(row);
-                cells.extend(row.gap_m.map(number));
-                let sign = if row.gap_change_m() > Some(0.0) { "+" } else { "" };
-                cells.push(format!("{sign}{}", number(row.gap_change_m())));
-                cells
-            });
-            lists.push(Listed {
-                title: format!("greatest changes of the least gap{which}, m"),
-                headings: headings(found, &["A", "B", "change"]),
-                rows: rows.collect(),
-            });
-        }
+        let greatest = |of: fn(&SharedRow) -> f64| found.greatest(most, sensitive, of).into_iter();
+        let heads = ["A", "B", "change"];
+        let ratios = greatest(SharedRow::ratio_by).map(|row| {
+            let change = row.ratio_change().map(|change| 100.0 * (change - 1.0));
+            let change = change.map_or_else(|| number(None), |change| format!("{change:+.3} %"));
+            let [first, second] = row.ratio.map(number);
+            (row, vec![first, second, change])
+        });
+        add(format!("greatest changes of the ratio{which}"), &heads, ratios.collect());
+        let gaps = greatest(SharedRow::gap_by_m).map(|row| {
+            let sign = if row.gap_change_m() > Some(0.0) { "+" } else { "" };
+            let [first, second] = row.gap_m.map(number);
+            (row, vec![first, second, format!("{sign}{}", number(row.gap_change_m()))])
+        });
+        add(format!("greatest changes of the least gap{which}, m"), &heads, gaps.collect());
     }
     lists
-}
-
-fn headings(found: &Comparison, further: &[&str]) -> Vec<String> {
-    found.keys.iter().cloned().chain(further.iter().map(|name| (*name).to_owned())).collect()
 }
 
 /// How many rows and verdicts are shared.
