@@ -130,6 +130,11 @@ pub(crate) fn with_unit(words: &str, unit: &str) -> String {
     if unit.is_empty() { words.to_owned() } else { format!("{words} ({unit})") }
 }
 
+/// A name's words, its value to four digits and the unit: "damping 140 N s/m".
+pub(crate) fn valued(words: &str, value: f64, unit: &str) -> String {
+    format!("{words} {} {unit}", significant(value, 4)).trim().to_owned()
+}
+
 /// The unit in which small motions are shown, and how many of it one of `unit` is.
 pub(crate) fn shown(unit: &str) -> (&str, f64) {
     match unit {

@@ -357,7 +357,7 @@ impl Shown {
         let (limit, worse) = (self.limit(source)?, self.worse().unwrap_or(Worse::Greater));
         let (unit, factor) = label::shown(&self.facts.unit);
         let (value, log) = (limit * factor, self.group == Group::Ratio);
-        let said = format!("{} {unit}", label::significant(value, 4)).trim_end().to_owned();
+        let said = label::valued("", value, unit);
         let what = if log { "ratio".to_owned() } else { label::of_model(self.column()).0 };
         let [above, below] = [format!("{what} above {said}"), format!("{what} below {said}")];
         let mut level = Level {

@@ -224,14 +224,12 @@ impl Scatter {
     /// Name of the run, its points and how they were placed, and what is not shown of them.
     pub(crate) fn subtitle(&self, rest: &[String]) -> String {
         let all: u64 = self.counts.iter().sum();
-        let mut parts: Vec<String> =
-            self.source.run_name().map(str::to_owned).into_iter().collect();
-        parts.push(match self.source.design_method() {
+        let mut parts = self.source.notes([match self.source.design_method() {
             Some("latin_hypercube") => format!("Latin hypercube of {all} points"),
             Some("sobol") => format!("Sobol sequence of {all} points"),
             Some("monte_carlo") => format!("{all} points at random"),
             _ => format!("list of {all} points"),
-        });
+        }]);
         if (self.points.len() as u64) < all {
             parts.push(format!("{} of them picked at random", self.points.len()));
         }

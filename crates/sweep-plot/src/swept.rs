@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::axis::evenly_by_log;
 use super::error::PlotError;
 use super::label;
-use super::read::{Cells, ColumnFacts, Source};
+use super::read::{ColumnFacts, Source};
 
 /// Most different values of an axis that are kept. An axis of more is known by its range alone.
 pub(crate) const MOST_VALUES: usize = 1 << 18;
@@ -36,8 +36,7 @@ impl SweptAxis {
 
     /// A value of the axis, with its name and unit: "Damping 140 N s/m".
     pub(crate) fn said(&self, value: f64) -> String {
-        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
-        format!("{} {}{unit}", self.words, label::significant(value, 4))
+        label::valued(&self.words, value, &self.unit)
     }
 }
 
@@ -102,7 +101,7 @@ pub(crate) fn columns(source: &Source) -> Vec<&ColumnFacts> {
     let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
     let is_result = |name: &str| of_model(name) || name == "ratio_change";
     let before = source.columns.iter().take_while(|column| !is_result(&column.name));
-    before.filter(|column| column.cells == Cells::Numbers && column.name != "point").collect()
+    before.filter(|column| column.is_number() && column.name != "point").collect()
 }
 
 /// Whether a map file's rows are a whole grid over two axes or more, or a curve over one.

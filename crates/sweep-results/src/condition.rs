@@ -4,7 +4,8 @@
 use std::ops::Range;
 
 use crate::error::ResultsError;
-use crate::rows::{Cell, CellKind, ResultTable, Rows};
+use crate::rows::{Cell, ResultTable, Rows};
+use sweep_files::CellKind;
 
 /// A mistake in the text of a condition.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -25,7 +25,7 @@ use sweep_engine::exit::Error;
 use sweep_engine::method::Integrator as _;
 use sweep_engine::store::{StoreError, read};
 use sweep_engine::table::Table;
-use sweep_engine::threads;
+use sweep_engine::threads::{self, Stop};
 use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
 use washer_row::Level;
 
@@ -180,7 +180,7 @@ pub(crate) fn in_pool(
     plan: &Plan,
     at: Option<Vec<(String, f64)>>,
     view: &View,
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop<'_>,
 ) -> Result<Trace, NoEquilibrium> {
     // A thread for each model, where there may be two.
     let wanted = if at.is_some() { 2 } else { threads::cores() };
@@ -206,7 +206,7 @@ pub(crate) fn trace(
     scenario: Scenario,
     at: NamedValues,
     view: &View,
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop<'_>,
 ) -> Result<Trace, NoEquilibrium> {
     let run = Run::new(plan, scenario, view)?;
     let runs = [&run];
@@ -239,7 +239,7 @@ pub(crate) fn trace(
 /// As [`trace`] of every point of a plan, in one table with the points' numbers and axes: so many
 /// at once as there are lanes, each with the bits that it has alone. A point without equilibrium
 /// has no rows, and is among the failures.
-pub(crate) fn trace_all(plan: &Plan, view: &View, stop: &(dyn Fn() -> bool + Sync)) -> Trace {
+pub(crate) fn trace_all(plan: &Plan, view: &View, stop: Stop<'_>) -> Trace {
     let mut failures = Vec::new();
     let mut runs = Vec::new();
     for number in 0..plan.points() {
@@ -302,7 +302,7 @@ impl Run {
 fn integrate<'a>(
     runs: &[&'a Run],
     models: Models,
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop<'_>,
 ) -> Vec<(ModelKind, Vec<History<'a>>)> {
     let kinds = models.kinds();
     let groups: Vec<(ModelKind, &[&'a Run])> = kinds
@@ -384,7 +384,7 @@ pub(crate) fn keep(
     result: &ParquetFile,
     folder: &Path,
     threads: usize,
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop<'_>,
     done: &(dyn Fn() + Sync),
 ) -> Result<(), StoreError> {
     let plan = engine.plan();

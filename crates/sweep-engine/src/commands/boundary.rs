@@ -15,13 +15,12 @@ use crate::boundary::file::{self, job};
 use crate::boundary::quantity::{offered, traced};
 use crate::boundary::search::{BoundaryTask, Models, Stopped};
 use crate::boundary::{EdgeKind, Standing, Traced, trace};
-use crate::effort::Effort;
+use crate::effort::{Effort, EffortArgs};
 use crate::exit::{Error, Exit, show, tell};
 use crate::plan::Plan;
-use crate::progress::{Progress, ProgressMode, duration};
+use crate::progress::{Progress, duration};
 use crate::store::{Column, OpenedTrials, StoreError, Trials};
 use crate::swept::Swept;
-use crate::threads;
 use sweep_files::panics::lock;
 use sweep_files::{FileKind, Output};
 use sweep_parameter::{Parameter as _, Worse};
@@ -63,16 +62,12 @@ pub struct Args {
         value_parser = clap::value_parser!(u16).range(1..=1000)
     )]
     pub lattice: u16,
-    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
-    pub threads: Option<usize>,
+    /// How it goes about it.
+    #[command(flatten)]
+    pub effort: EffortArgs,
     /// Start over, even if the boundary is there or another plan was begun
     #[arg(long)]
     pub fresh: bool,
-    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
-    /// 5 s) or none
-    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
-    pub progress: ProgressMode,
 }
 
 /// What `--help` adds.
@@ -119,7 +114,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         tell(&format!("going on: {there} points are there"));
     }
     let began = Instant::now();
-    let effort = Effort { threads: args.threads, progress: args.progress, interrupt: &interrupt };
+    let effort = args.effort.with(&interrupt);
     let (found, trials) = search(&plan, &quantity, &task, Some(trials), effort)?;
     let found = match found {
         Ok(found) => found,

@@ -6,15 +6,14 @@ use std::time::Instant;
 use super::cells::{Lines as _, table as text_table, word};
 use super::run::installed;
 use crate::boundary::search::Stopped;
-use crate::effort::Effort;
+use crate::effort::EffortArgs;
 use crate::exit::{Error, Exit, tell};
 use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
-use crate::progress::{ProgressMode, duration};
+use crate::progress::duration;
 use crate::store::{OpenedTrials, StoreError, Trials};
 use crate::swept::Swept;
-use crate::threads;
 use sweep_files::{FileKind, Output, atomic, key};
 use sweep_parameter::Parameter as _;
 use sweep_results::{Cell, ResultTable};
@@ -38,16 +37,11 @@ pub struct Args {
     /// With --best: of this candidate instead
     #[arg(long, value_name = "N", requires = "best")]
     candidate: Option<u64>,
-    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
-    threads: Option<usize>,
+    #[command(flatten)]
+    effort: EffortArgs,
     /// Start over, even if the file is there or another study was begun
     #[arg(long)]
     fresh: bool,
-    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
-    /// 5 s) or none
-    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
-    progress: ProgressMode,
 }
 
 /// What `--help` adds.
@@ -83,7 +77,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     };
     trials.take_notes().iter().for_each(|note| tell(note));
     let began = Instant::now();
-    let effort = Effort { threads: args.threads, progress: args.progress, interrupt: &interrupt };
+    let effort = args.effort.with(&interrupt);
     let (tried, trials) = search(&study, Some(trials), effort)?;
     let wall_s = began.elapsed().as_secs_f64();
     let tried = match tried {

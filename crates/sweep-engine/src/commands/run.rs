@@ -5,10 +5,11 @@ use std::path::Path;
 
 use super::cells::{Lines as _, short};
 use super::grid::ResultArgs;
+use crate::effort::EffortArgs;
 use crate::exit::{Error, Exit, tell};
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
-use crate::progress::{ProgressMode, duration, per_second};
+use crate::progress::{duration, per_second};
 use crate::run::{self as runner, Ended, RunOptions, RunReport};
 use crate::store::provenance::Session;
 use crate::store::read::{FAR_OFF, Tally};
@@ -36,9 +37,9 @@ pub struct Args {
 /// How a run is done, by whichever engine.
 #[derive(Debug, clap::Args)]
 pub struct WorkArgs {
-    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
-    pub threads: Option<usize>,
+    /// Its threads and progress.
+    #[command(flatten)]
+    pub effort: EffortArgs,
     /// Compute one of N equal shards only, to be joined by `sweep merge`; `auto/N` takes the place
     /// from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX. In a Slurm array the default is that
     /// array's task and count (--shard 1/1 is the whole)
@@ -47,20 +48,16 @@ pub struct WorkArgs {
     /// Start over, even if the result is there or another plan was begun
     #[arg(long)]
     pub fresh: bool,
-    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
-    /// 5 s) or none
-    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
-    pub progress: ProgressMode,
 }
 
 impl WorkArgs {
     /// As the runner takes them.
     fn options(&self) -> Result<RunOptions<'static>, Error> {
         Ok(RunOptions {
-            threads: threads::count(self.threads, &threads::process)?,
+            threads: threads::count(self.effort.threads, &threads::process)?,
             fresh: self.fresh,
             shard: self.shard,
-            progress: self.progress,
+            progress: self.effort.progress,
             environment: &threads::process,
             tell: &tell,
         })

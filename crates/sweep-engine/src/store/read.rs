@@ -188,11 +188,8 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
     let mut tally = Tally::default();
     let fields = file.schema().fields().iter().map(|field| field.name().clone());
     let ratios: Vec<String> = fields.filter(|name| name.starts_with("ratio_")).collect();
-    let batches = file.batches(|builder| {
-        let columns = COLUMNS.into_iter().chain(ratios.iter().map(String::as_str));
-        let mask = ProjectionMask::columns(builder.parquet_schema(), columns);
-        builder.with_projection(mask)
-    })?;
+    let columns = COLUMNS.into_iter().chain(ratios.iter().map(String::as_str));
+    let batches = file.batches_of(columns)?;
     let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
     for batch in batches {
         count(&batch?, &ratios, limits, &mut tally).map_err(&failed)?;
@@ -296,11 +293,7 @@ pub fn levels(file: &ParquetFile) -> Result<Vec<Option<String>>, StoreError> {
     let failed = StoreError::parquet("read", file.path());
     let absent = || ParquetError::General("there is no column `method`".to_owned());
     let mut levels = Vec::new();
-    let batches = file.batches(|builder| {
-        let mask = ProjectionMask::columns(builder.parquet_schema(), ["method"]);
-        builder.with_projection(mask)
-    })?;
-    for batch in batches {
+    for batch in file.batches_of(["method"])? {
         let batch = batch?;
         let names = batch.column_by_name("method").ok_or_else(absent).map_err(&failed)?;
         let names = cells::texts(names).map_err(|error| failed(error.into()))?;

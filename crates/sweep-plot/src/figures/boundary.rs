@@ -214,7 +214,7 @@ fn limit(table: &Table) -> String {
     let unit = table.column("quantity_low").map_or("", |column| &column.unit);
     let (unit, factor) = label::shown(unit);
     let limit = told.map_or(table.source.ratio_limit(), |limit| limit * factor);
-    let limit = format!("{} {unit}", label::significant(limit, 4)).trim_end().to_owned();
+    let limit = label::valued("", limit, unit);
     match quantity(table) {
         "ratio_max" => format!("ratio {limit}"),
         growth if is_growth(growth) && told.is_none_or(|limit| limit == 0.0) => {
@@ -231,10 +231,10 @@ fn further(table: &Table, row: usize) -> String {
         axes.into_iter().flatten().skip(2).filter_map(|axis| axis.get("parameter")?.as_str());
     let said = names.filter_map(|name| {
         let column = table.column(name)?;
-        let value = label::significant(*column.numbers()?.get(row)?, 4);
-        Some(format!("{} {value} {}", label::words(name), column.unit))
+        let value = *column.numbers()?.get(row)?;
+        Some(label::valued(&label::words(name), value, &column.unit))
     });
-    said.collect::<Vec<_>>().join(", ").trim_end().to_owned()
+    said.collect::<Vec<_>>().join(", ")
 }
 
 /// A curve's places as lines that have one each along the grid: where there are several, each goes

@@ -66,7 +66,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     }
     let line = Series::new("frequency = spin speed", INK, 0, vec![0.0, top], Style::Dashed);
     series.push(line);
-    let mut notes: Vec<String> = table.source.run_name().map(str::to_owned).into_iter().collect();
+    let mut notes = table.source.notes([]);
     if series.iter().any(|series| matches!(series.style, Style::Band(..))) {
         notes.push("shaded: least to greatest over a turn of the drum".to_owned());
     }
@@ -102,13 +102,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
 /// [`PlotError::Unfit`] when the file is not a modes file, [`PlotError::Column`] when it lacks a
 /// column.
 pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
-    if table.source.kind != Kind::Modes {
-        return Err(PlotError::Unfit(format!(
-            "`--modes {}`: this is a {} file; `sweep modes --out FILE` writes a modes file",
-            table.source.path.display(),
-            table.source.kind.name()
-        )));
-    }
+    table.source.expect(Kind::Modes, "--modes", "`sweep modes --out FILE` writes a modes file")?;
     let mut speeds: Vec<f64> = modes(table)?.iter().flat_map(crossings).collect();
     speeds.sort_by(f64::total_cmp);
     Ok(speeds)

@@ -9,7 +9,7 @@ use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, LINEAR, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::stability::{
-    UNSTABLE, axes, axis_columns, one_point, part, row_values, said_within, shown, unstable,
+    UNSTABLE, axes, axis_columns, notes_at, one_point, part, row_values, shown, unstable,
 };
 use crate::figures::{passages, trace};
 use crate::label::{self, Label};
@@ -115,7 +115,7 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         }
     });
     let panels = panels.collect();
-    let mut notes = notes(source, &axes, &point);
+    let mut notes = notes_at(source, &axes, &point);
     notes.push("largest deviation from equilibrium".to_owned());
     Ok(Chart {
         title: "What a held speed ends in".to_owned(),
@@ -250,16 +250,10 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
     }
     Ok(Chart {
         title: "States once a turn, where the unbalance is up".to_owned(),
-        subtitle: notes(source, &axes, &point).join(" · "),
+        subtitle: notes_at(source, &axes, &point).join(" · "),
         x_label: Label::new("Yaw of the tub from equilibrium", "mrad"),
         grids,
         panels,
         ..Chart::default()
     })
-}
-
-/// The run and the point.
-fn notes(source: &Source, axes: &[&ColumnFacts], point: &[f64]) -> Vec<String> {
-    let run = source.run_name().map(str::to_owned).into_iter();
-    run.chain(axes.iter().zip(point).map(|(axis, value)| said_within(axis, *value))).collect()
 }

@@ -9,7 +9,7 @@ use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::machine::machine;
 use crate::label::{self, Label};
-use crate::read::{Batch, Cells, ColumnFacts, Kind, Source};
+use crate::read::{Batch, ColumnFacts, Kind, Source};
 use crate::swept::SweptAxis;
 use crate::table::Table;
 use crate::together;
@@ -43,7 +43,7 @@ type Points = Vec<Vec<f64>>;
 /// The columns of numbers between the point's index and the speed.
 pub(super) fn axes(source: &Source) -> Vec<&ColumnFacts> {
     let before = source.columns.iter().take_while(|column| column.name != "speed_rpm");
-    before.filter(|column| column.cells == Cells::Numbers && column.name != "point").collect()
+    before.filter(|column| column.is_number() && column.name != "point").collect()
 }
 
 /// The chart of a stability file: growth over speed.
@@ -69,9 +69,8 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
     let series = swept.iter().enumerate().map(|(k, point)| {
         Series::new(name(&point.values), DISTINCT[k], k, point.growth.clone(), Style::Solid(2.2))
     });
-    let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
     let common = axes.iter().zip(&shown[0]).enumerate().filter(|(k, _)| !differs(*k));
-    notes.extend(common.map(|(_, (axis, value))| said_within(axis, *value)));
+    let mut notes = source.notes(common.map(|(_, (axis, value))| said_within(axis, *value)));
     if shown.len() < all.len() {
         notes.push(format!("{} of {} points", shown.len(), all.len()));
     }
@@ -145,9 +144,7 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         }
     });
     let panels = panels.collect();
-    let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
-    let named = axes.iter().zip(&one.values);
-    notes.extend(named.map(|(axis, value)| said_within(axis, *value)));
+    let mut notes = notes_at(source, &axes, &one.values);
     notes.push("largest deviation from equilibrium over a turn".to_owned());
     Ok(Chart {
         title: "Periodic responses at constant speed".to_owned(),
@@ -190,22 +187,6 @@ pub(super) fn shown(
     Ok(names.iter().map(is_shown).collect())
 }
 
-/// A file of `--stability`.
-///
-/// # Errors
-/// As [`Source::open`]; [`PlotError::Unfit`] for a file of another kind.
-fn open(path: &Path) -> Result<Source, PlotError> {
-    let source = Source::open(path)?;
-    if source.kind == Kind::Stability {
-        return Ok(source);
-    }
-    Err(PlotError::Unfit(format!(
-        "`--stability {}`: this is a {} file; `sweep stability` writes a stability file",
-        path.display(),
-        source.kind.name()
-    )))
-}
-
 /// What a stability file says of another file's machine.
 pub(super) struct Unstable {
     /// Ranges of unstable speeds (rpm).
@@ -218,10 +199,11 @@ pub(super) struct Unstable {
 /// The unstable speeds of the machine that a trace or a modes file is of.
 ///
 /// # Errors
-/// As [`open`]; [`PlotError::Unfit`] or [`PlotError::NotThere`] where the stability file does not
+/// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] or [`PlotError::NotThere`] where the stability file does not
 /// have this machine.
 pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
-    let source = open(path)?;
+    let source = Source::open(path)?;
+    source.expect(Kind::Stability, "--stability", "`sweep stability` writes a stability file")?;
     let axes = axes(&source);
     let mut at: Vec<(String, f64)> =
         machine(table).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
@@ -247,14 +229,17 @@ pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotEr
 }
 
 fn said(axis: &ColumnFacts, value: f64) -> String {
-    let unit = if axis.unit.is_empty() { String::new() } else { format!(" {}", axis.unit) };
-    format!("{} {}{unit}", label::words(&axis.name), label::significant(value, 4))
+    label::valued(&label::words(&axis.name), value, &axis.unit)
 }
 
 /// As [`said`], within a sentence: the words are small, the unit keeps its letters.
-pub(super) fn said_within(axis: &ColumnFacts, value: f64) -> String {
-    let words = label::words(&axis.name);
-    said(axis, value).replacen(&words, &words.to_lowercase(), 1)
+fn said_within(axis: &ColumnFacts, value: f64) -> String {
+    label::valued(&label::words(&axis.name).to_lowercase(), value, &axis.unit)
+}
+
+/// The run and the point.
+pub(super) fn notes_at(source: &Source, axes: &[&ColumnFacts], point: &[f64]) -> Vec<String> {
+    source.notes(axes.iter().zip(point).map(|(axis, value)| said_within(axis, *value)))
 }
 
 /// The values of a row's axes, and whether it is at the values asked for.

@@ -2,7 +2,8 @@
 
 use super::{Flip, SharedRow, is_compared};
 use crate::error::ResultsError;
-use crate::rows::{Cell, CellKind, Column, ResultTable};
+use crate::rows::{Cell, ResultTable};
+use sweep_files::{CellKind, Column};
 
 /// Most cells of a file that are kept: two files of so many take some gigabytes.
 const MOST_CELLS: u64 = 100_000_000;

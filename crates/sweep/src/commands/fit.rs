@@ -8,9 +8,10 @@ use std::sync::Mutex;
 use crate::config::{self, GridInput};
 use crate::fit::{self, FitOptions, Measured, Work};
 use sweep_engine::commands::grid::GridArgs;
+use sweep_engine::effort::EffortArgs;
 use sweep_engine::exit::{Error, Exit, show, tell};
 use sweep_engine::interrupt::Interrupt;
-use sweep_engine::progress::{Progress, ProgressMode};
+use sweep_engine::progress::Progress;
 use sweep_engine::store::StoreError;
 use sweep_engine::threads;
 use sweep_files::panics::lock;
@@ -61,13 +62,8 @@ pub struct Args {
     /// Print everything as JSON
     #[arg(long)]
     json: bool,
-    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
-    threads: Option<usize>,
-    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
-    /// 5 s) or none
-    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
-    progress: ProgressMode,
+    #[command(flatten)]
+    effort: EffortArgs,
 }
 
 /// What `--help` adds.
@@ -117,7 +113,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         files::judge(path, FileKind::Fit)?;
     }
     let interrupt = Interrupt::install().map_err(Error::signals)?;
-    let progress = Mutex::new(Progress::of_search(args.progress, 0, 0));
+    let progress = Mutex::new(Progress::of_search(args.effort.progress, 0, 0));
     let seen = |made: usize| {
         lock(&progress).show_search(0, made as u64);
     };
@@ -128,7 +124,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     });
     let stop = || interrupt.stopped();
     let work = Work { stop: &stop, seen: &seen, journal };
-    let threads = threads::count(args.threads, &threads::process)?;
+    let threads = threads::count(args.effort.threads, &threads::process)?;
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &options, &work))?;
     lock(&progress).finish();
     let Some(fitted) = found else {

@@ -43,10 +43,10 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let report = execute(&args.run, &plan, &engine, &interrupt, options)?;
     let output = args.run.target.output(&plan);
     if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
-        let threads = threads::count(args.run.work.threads, &threads::process)?;
+        let threads = threads::count(args.run.work.effort.threads, &threads::process)?;
         let folder = files::beside(&output, "traces");
         tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
-        let progress = Mutex::new(Progress::new(args.run.work.progress, plan.points(), 0));
+        let progress = Mutex::new(Progress::new(args.run.work.effort.progress, plan.points(), 0));
         let kept = AtomicU64::new(0);
         let done = || {
             let kept = kept.fetch_add(1, Ordering::Relaxed) + 1;

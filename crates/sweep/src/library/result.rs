@@ -87,10 +87,7 @@ impl ResultTable {
         let schema = SchemaRef::new(Schema::new(file.schema().fields().clone()));
         let alike = |batch: RecordBatch| batch.with_schema(SchemaRef::clone(&schema));
         let batches = batches.into_iter().map(alike).collect::<Result<Vec<_>, _>>();
-        let batches = batches.map_err(|error| FileError::NotParquet {
-            path: path.to_path_buf(),
-            reason: error.to_string(),
-        })?;
+        let batches = batches.map_err(FileError::cells(path))?;
         let file = FileContent::Bytes(file.bytes()?);
         Ok(Self { kind, plan, schema, batches, file })
     }
