@@ -98,7 +98,8 @@ pub(crate) fn unit_of_channel(name: &str) -> &'static str {
 }
 
 /// With a capital first letter.
-pub(crate) fn capitalised(text: &str) -> String {
+#[must_use]
+pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }

@@ -42,7 +42,7 @@ use std::path::{Path, PathBuf};
 
 pub use error::PlotError;
 pub use html::{sheet, table};
-pub use label::{significant, words};
+pub use label::{capitalised, significant, words};
 pub use share::Share;
 pub use svg::escape;
 

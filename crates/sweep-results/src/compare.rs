@@ -111,6 +111,7 @@ pub struct ColumnChange {
     /// The greatest difference of numbers.
     pub greatest: f64,
     /// Where that is, as a place among the shared rows.
+    #[serde(skip)]
     pub at: usize,
 }
 

@@ -143,10 +143,7 @@ impl Node {
             Self::Compare(comparison, left, right) => {
                 comparison.of(&left.value(at), &right.value(at))
             }
-            other => match other.value(at) {
-                Cell::Flag(flag) => Some(flag),
-                _ => None,
-            },
+            other => other.value(at).flag(),
         }
     }
 }

@@ -26,6 +26,14 @@ pub enum Cell {
 }
 
 impl Cell {
+    /// Whether it is true or false, if it is either.
+    pub const fn flag(&self) -> Option<bool> {
+        match self {
+            Self::Flag(flag) => Some(*flag),
+            _ => None,
+        }
+    }
+
     /// The number, if it is one.
     pub const fn number(&self) -> Option<f64> {
         match self {

@@ -15,6 +15,7 @@ use crate::exit::{Error, Exit, show, tell};
 use crate::store::StoreError;
 use fail_on::FailOn;
 use sweep_files::{FileKind, Output};
+use sweep_plot::capitalised;
 use sweep_results::{Comparison, Flip, Moved, PlanChange, ResultTable, SharedRow, compare};
 
 /// Arguments of `sweep compare`.
@@ -341,7 +342,7 @@ fn markdown(args: &Args, found: &Comparison, broken: &[String]) -> String {
             let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
             format!("| {} |\n", cells.join(" | "))
         };
-        let _ = writeln!(text, "\n#### {}\n", capital(&escaped(&title)));
+        let _ = writeln!(text, "\n#### {}\n", capitalised(&escaped(&title)));
         text.push_str(&row(&headings));
         let _ = writeln!(text, "|{}", "---:|".repeat(headings.len()));
         rows.iter().for_each(|cells| text.push_str(&row(cells)));
@@ -364,11 +365,6 @@ fn escaped(text: &str) -> String {
         escaped.push(c);
     }
     escaped
-}
-
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or(String::new(), |first| first.to_uppercase().chain(chars).collect())
 }
 
 /// What differs, for programs.
@@ -406,10 +402,7 @@ fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
         "axes_left_out": found.fixed.iter().map(|(place, name, value)| json!({
             "file": (["first", "second"][*place]), "parameter": name, "value": value,
         })).collect::<Value>(),
-        "columns": found.columns.iter().map(|column| json!({
-            "name": column.name, "unit": column.unit, "rows": column.rows,
-            "greatest": column.greatest,
-        })).collect::<Value>(),
+        "columns": found.columns,
         "columns_only_in": { "first": found.columns_alone[0], "second": found.columns_alone[1] },
         "flips": found.flips(false).map(row).collect::<Value>(),
         "greatest": greatest(false),

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::cells::{Lines as _, clipped, short, table, word};
 use super::conditions;
@@ -136,12 +136,10 @@ fn rows(args: &Args) -> Result<Exit, Error> {
     let rows = top(&file, &names, keep.as_ref(), by, count);
     let rows = rows.map_err(|error| with_nearest(error, &file))?;
     if args.json {
-        let object = |row: &Vec<Cell>| {
-            let cells = columns.iter().zip(row).map(|(name, cell)| (name.clone(), json!(cell)));
-            Value::Object(cells.collect::<Map<_, _>>())
+        let object = |row: &Vec<Cell>| -> Value {
+            columns.iter().zip(row).map(|(name, cell)| (name.as_str(), json!(cell))).collect()
         };
-        let rows: Vec<Value> = rows.iter().map(object).collect();
-        return show(&format!("{:#}\n", json!(rows)));
+        return show(&format!("{:#}\n", rows.iter().map(object).collect::<Value>()));
     }
     let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(word).collect()).collect();
     if rows.is_empty() {
@@ -189,8 +187,7 @@ fn shown_columns(args: &Args, file: &ResultTable, keep: Option<&Condition>) -> V
 /// Everything that the text says, and the whole plan.
 fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, Error> {
     let column = |column: &ColumnRange| {
-        let names: Map<String, Value> =
-            column.names.iter().map(|(name, count)| (name.clone(), json!(count))).collect();
+        let counts = || column.names.iter().cloned().collect::<Value>();
         json!({
             "name": column.name,
             "unit": column.unit,
@@ -198,7 +195,7 @@ fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, 
             "nulls": column.nulls,
             "least": column.range.map(|(least, _)| least),
             "greatest": column.range.map(|(_, greatest)| greatest),
-            "counts": if names.is_empty() { Value::Null } else { Value::Object(names) },
+            "counts": (!column.names.is_empty()).then(counts),
         })
     };
     let mut said = json!({
@@ -213,16 +210,14 @@ fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, 
     if let Some(result) = &file.result {
         let tally = tally(opened)?;
         let places = extremes_at(opened, result, &tally)?;
-        let places = places.into_iter().map(|(point, values)| {
-            let values: Map<String, Value> =
-                values.into_iter().map(|(axis, value)| (axis, json!(value))).collect();
-            (point.to_string(), Value::Object(values))
-        });
+        let places = places
+            .into_iter()
+            .map(|(point, values)| (point.to_string(), values.into_iter().collect::<Value>()));
         said["version"] = json!(result.version);
         said["numerics"] = json!(result.numerics);
         said["plan_hash"] = json!(result.plan_hash);
         said["summary"] = json!(tally);
-        said["points"] = Value::Object(places.collect());
+        said["points"] = places.collect();
     }
     Ok(said)
 }

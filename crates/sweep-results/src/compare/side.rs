@@ -36,10 +36,7 @@ impl Cells {
     fn push(&mut self, cell: Cell) {
         match self {
             Self::Numbers(cells) => cells.push(cell.number().unwrap_or(f64::NAN)),
-            Self::Flags(cells) => cells.push(match cell {
-                Cell::Flag(flag) => Some(flag),
-                _ => None,
-            }),
+            Self::Flags(cells) => cells.push(cell.flag()),
             Self::Texts { names, codes } => codes.push(match cell {
                 Cell::Text(text) => {
                     let known = names.iter().position(|name| *name == text);
@@ -175,12 +172,7 @@ impl Side {
     pub(super) fn shared(&self, other: &Self, pair: [usize; 2]) -> SharedRow {
         let cells = |name: &str| [self.cell(name, pair[0]), other.cell(name, pair[1])];
         let numbers = |name: &str| cells(name).map(|cell| cell.number());
-        let flags = |name: &str| {
-            cells(name).map(|cell| match cell {
-                Cell::Flag(flag) => Some(flag),
-                _ => None,
-            })
-        };
+        let flags = |name: &str| cells(name).map(|cell| cell.flag());
         let verdicts = flags("reliable");
         let flip = match verdicts {
             [first, second] if first == second => Flip::None,
