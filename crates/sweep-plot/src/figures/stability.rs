@@ -199,8 +199,8 @@ pub(super) struct Unstable {
 /// The unstable speeds of the machine that a trace or a modes file is of.
 ///
 /// # Errors
-/// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] or [`PlotError::NotThere`] where
-/// the stability file does not have this machine.
+/// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] or [`PlotError::NotThere`]
+/// where the stability file does not have this machine.
 pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
     let source = Source::open(path)?;
     source.expect(Kind::Stability, "--stability", "`sweep stability` writes a stability file")?;
