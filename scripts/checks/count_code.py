@@ -14,6 +14,7 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent.parent.parent
 TEST_FILE = re.compile(r"(^|_)(tests?|plain)(_\w+)?$")
+ROOTS = ["lib", "main", "mod"]
 TEST_MODULE = re.compile(
     r"#\[cfg\(test\)\]\s*(pub(\(crate\))? )?mod (?P<name>\w+)\s*(?P<kind>[;{])"
 )
@@ -22,7 +23,13 @@ LEAST = 100
 
 
 def is_test(file, root):
-    """Whether a file holds tests alone: by its name or that of a folder."""
+    """Whether a file holds tests alone: by its name or that of a folder, or as a test's module."""
+    parent = file.parent.with_suffix(".rs")
+    above = [parent] if parent.exists() else [file.parent / f"{name}.rs" for name in ROOTS]
+    texts = [one.read_text() for one in above if one.exists() and one != file]
+    modules = [match for text in texts for match in TEST_MODULE.finditer(text)]
+    if any(match["name"] == file.stem and match["kind"] == ";" for match in modules):
+        return True
     return any(TEST_FILE.search(part.removesuffix(".rs")) for part in file.relative_to(root).parts)
 
 

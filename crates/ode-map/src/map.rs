@@ -8,7 +8,7 @@ use lane_ode::{Failure, MAX_LANES, Simd};
 use serde_json::{Map as JsonMap, Value};
 use sweep_engine::boundary::search::Values;
 use sweep_engine::columns::{
-    Compared, ResultColumn, amplitude_columns, row, run_columns, verdict_columns,
+    Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
 use sweep_engine::config::Read;
 use sweep_engine::config::schema::set;
@@ -20,12 +20,12 @@ use sweep_engine::{
     Build, Engine, Error, GridInput, Listed, Model as EngineModel, Plan, Scenario, Schema, Swept,
     UnknownParameter, Watch, methods,
 };
-use sweep_files::FileKind;
-use sweep_parameter::{Channel, Range, RatioLimits};
+use sweep_parameter::{Channel, Range};
 
 use crate::equations::Case;
 use crate::run::{Method, Model, Run, runs};
 use crate::{Coordinate, Oscillator, Parameter};
+use sweep_files::panics::{lock, unlocked};
 
 methods! {
     Rk4 = "rk4", "classical Runge-Kutta of order 4, in fixed steps" { step_s: STEP_S }
@@ -243,14 +243,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Row
     for Map<O, C, D, P>
 {
     fn layout(plan: &Plan<Self>) -> Layout {
-        Layout {
-            axes: axis_columns(plan),
-            columns: columns(plan).into_iter().map(|column| column.declared).collect(),
-            kind: FileKind::Map,
-            rows_a_point: 1,
-            has_several: false,
-            metadata: Vec::new(),
-        }
+        Layout::of_map(axis_columns(plan), declared(columns(plan)))
     }
 }
 
@@ -312,68 +305,15 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
 }
 
 /// A row as it is computed.
+#[derive(Clone)]
 struct Row<const C: usize> {
     /// None without an equilibrium.
     runs: Option<[Run<C>; 2]>,
-    /// Coordinates that the plan compares.
-    channels: Vec<usize>,
-    limits: RatioLimits,
-    method: usize,
     error: Option<f64>,
     converged: Option<bool>,
 }
 
 impl<const C: usize> Row<C> {
-    fn run(&self, model: usize) -> Option<&Run<C>> {
-        self.runs.as_ref().map(|runs| &runs[model])
-    }
-
-    /// The defined ratios with their channels.
-    fn defined(&self) -> impl Iterator<Item = (usize, f64)> {
-        (0..self.channels.len()).filter_map(|k| Some((k, self.ratio(k)?)))
-    }
-}
-
-impl<const C: usize> Compared for Row<C> {
-    fn amplitude(&self, model: usize, channel: usize) -> Option<f64> {
-        let run = self.run(model).filter(|run| run.failure.is_none())?;
-        Some(run.peaks[self.channels[channel]])
-    }
-
-    fn ratio(&self, channel: usize) -> Option<f64> {
-        let linear = self.amplitude(1, channel).filter(|linear| *linear != 0.0)?;
-        Some(self.amplitude(0, channel)? / linear)
-    }
-
-    fn greatest(&self) -> Option<(usize, f64)> {
-        self.defined().reduce(|most, next| if next.1 > most.1 { next } else { most })
-    }
-
-    fn least(&self) -> Option<(usize, f64)> {
-        self.defined().reduce(|least, next| if next.1 < least.1 { next } else { least })
-    }
-
-    fn reliable(&self) -> Option<bool> {
-        self.least().zip(self.greatest()).map(|(least, most)| self.limits.trust(least.1, most.1))
-    }
-
-    fn converged(&self) -> Option<bool> {
-        self.converged
-    }
-
-    fn sensitive(&self) -> Option<bool> {
-        // No twin is run.
-        None
-    }
-
-    fn method(&self) -> usize {
-        self.method
-    }
-
-    fn error(&self) -> Option<f64> {
-        self.error
-    }
-
     fn status(&self) -> usize {
         let Some(runs) = &self.runs else { return NO_EQUILIBRIUM };
         let code = |run: &Run<C>| match run.failure.map(|(reason, _)| reason) {
@@ -388,23 +328,11 @@ impl<const C: usize> Compared for Row<C> {
             (nonlinear, _) => nonlinear,
         }
     }
-
-    fn fail_time_s(&self) -> Option<f64> {
-        self.runs.as_ref()?.iter().find_map(|run| run.failure).map(|(_, time_s)| time_s)
-    }
-
-    fn steps(&self, model: usize) -> u64 {
-        self.run(model).map_or(0, |run| run.steps)
-    }
-
-    fn rejected(&self, model: usize) -> u64 {
-        self.run(model).map_or(0, |run| run.rejected)
-    }
 }
 
 fn columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
     plan: &Plan<Map<O, C, D, P>>,
-) -> Vec<ResultColumn<Row<C>>> {
+) -> Vec<ResultColumn<Compared>> {
     let reliability = &plan.reliability;
     let amplitude = "largest deviation from equilibrium in the window";
     let ratio = "nonlinear over linear amplitude; null where the linear one is zero or a model \
@@ -425,7 +353,61 @@ struct Evaluator<'a, O: Oscillator<C, D, P>, const C: usize, const D: usize, con
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     Evaluator<'_, O, C, D, P>
 {
-    /// Rows of points given by the values of the axes, a lane each.
+    /// Points given by the values of the axes, a lane each, as results tell of them.
+    fn compared(&self, axis_values: &[Vec<f64>], is_stopped: &dyn Fn() -> bool) -> Vec<Compared> {
+        let channels = self.channels();
+        let limits = self.plan.reliability.limits;
+        let method = self.direct().1;
+        let compared = |row: Row<C>| {
+            let run = |model: usize| row.runs.as_ref().map(|runs| &runs[model]);
+            let amplitudes = [0, 1].map(|model| {
+                let sound = run(model).filter(|run| run.failure.is_none());
+                let peaks = |run: &Run<C>| channels.iter().map(|k| run.peaks[*k]).collect();
+                sound.map_or_else(Vec::new, peaks)
+            });
+            let ratio = |k: usize| {
+                let linear = amplitudes[1].get(k).filter(|linear| **linear != 0.0)?;
+                Some(amplitudes[0].get(k)? / linear)
+            };
+            let ratios: Vec<Option<f64>> = (0..channels.len()).map(ratio).collect();
+            let defined = || ratios.iter().enumerate().filter_map(|(k, of)| Some((k, (*of)?)));
+            let greatest = defined().reduce(|most, next| if next.1 > most.1 { next } else { most });
+            let least = defined().reduce(|least, next| if next.1 < least.1 { next } else { least });
+            Compared {
+                reliable: least.zip(greatest).map(|(least, most)| limits.trust(least.1, most.1)),
+                greatest,
+                least,
+                converged: row.converged,
+                // No twin is run.
+                sensitive: None,
+                method,
+                error: row.error,
+                status: row.status(),
+                fail_time_s: [0, 1].into_iter().find_map(|k| run(k)?.failure).map(|(_, at)| at),
+                steps: [0, 1].map(|model| run(model).map_or(0, |run| run.steps)),
+                rejected: [0, 1].map(|model| run(model).map_or(0, |run| run.rejected)),
+                amplitudes,
+                ratios,
+            }
+        };
+        self.rows(axis_values, is_stopped).into_iter().map(compared).collect()
+    }
+
+    /// Coordinates that the plan compares.
+    fn channels(&self) -> Vec<usize> {
+        self.plan.reliability.channels.iter().map(|channel| channel.place).collect()
+    }
+
+    /// The method of all rows, if it is one, and its name's position.
+    fn direct(&self) -> (Option<Method>, usize) {
+        match self.plan.integrator {
+            Integrator::Rk4 { step_s } => (Some(Method::Rk4(step_s)), 0),
+            Integrator::Dopri5 { rtol, atol } => (Some(Method::Dopri5(rtol, atol)), 1),
+            Integrator::Rodas5p { rtol, atol } => (Some(Method::Rodas5p(rtol, atol)), 2),
+            Integrator::Rk4Halved { .. } => (None, 0),
+        }
+    }
+
     fn rows(&self, axis_values: &[Vec<f64>], is_stopped: &dyn Fn() -> bool) -> Vec<Row<C>> {
         let ready = |values: &Vec<f64>| {
             let Scenario { model, window_s } = self.plan.scenario_at(values);
@@ -434,19 +416,12 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         let cases: Vec<Option<Case<C, P>>> = axis_values.iter().map(ready).collect();
         let places: Vec<usize> = (0..cases.len()).filter(|k| cases[*k].is_some()).collect();
         let there: Vec<&Case<C, P>> = cases.iter().flatten().collect();
-        let mut rows: Vec<Row<C>> = cases.iter().map(|_| self.row()).collect();
+        let mut rows = vec![Row { runs: None, error: None, converged: None }; cases.len()];
         let both = |method: Method, cases: &[&Case<C, P>]| {
             [Model::Nonlinear, Model::Linear]
                 .map(|model| runs::<O, C, D, P>(model, method, cases, self.plan.end_s, is_stopped))
         };
-        let (direct, name) = match self.plan.integrator {
-            Integrator::Rk4 { step_s } => (Some(Method::Rk4(step_s)), 0),
-            Integrator::Dopri5 { rtol, atol } => (Some(Method::Dopri5(rtol, atol)), 1),
-            Integrator::Rodas5p { rtol, atol } => (Some(Method::Rodas5p(rtol, atol)), 2),
-            Integrator::Rk4Halved { .. } => (None, 0),
-        };
-        rows.iter_mut().for_each(|row| row.method = name);
-        if let Some(method) = direct {
+        if let (Some(method), _) = self.direct() {
             let [nonlinear, linear] = both(method, &there);
             for (k, place) in places.into_iter().enumerate() {
                 rows[place].runs = Some([nonlinear[k], linear[k]]);
@@ -471,12 +446,13 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         both: &dyn Fn(Method, &[&Case<C, P>]) -> [Vec<Run<C>>; 2],
     ) {
         let Steps::Checked(accuracy) = self.plan.integrator.steps() else { return };
+        let channels = self.channels();
         let mut step_s = (FIRST_STEP_RAD / case.fastest_rad_per_s()).min(self.plan.end_s / 8.0);
         let mut before: Option<[Run<C>; 2]> = None;
         for _ in 0..MOST_RUNGS {
             let [nonlinear, linear] = both(Method::Rk4(step_s), &[case]);
             let now = [nonlinear[0], linear[0]];
-            let error = before.and_then(|before| error_left(&before, &now, &row.channels));
+            let error = before.and_then(|before| error_left(&before, &now, &channels));
             (row.runs, row.error) = (Some(now), error);
             row.converged = Some(error.is_some_and(|error| error <= accuracy));
             if row.converged == Some(true) {
@@ -484,18 +460,6 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             }
             before = Some(now);
             step_s *= 0.5;
-        }
-    }
-
-    fn row(&self) -> Row<C> {
-        let reliability = &self.plan.reliability;
-        Row {
-            runs: None,
-            channels: reliability.channels.iter().map(|channel| channel.place).collect(),
-            limits: reliability.limits,
-            method: 0,
-            error: None,
-            converged: None,
         }
     }
 }
@@ -539,7 +503,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
                 if points.is_empty() {
                     break;
                 }
-                let rows = self.rows(&at, &|| watch.stopped());
+                let rows = self.compared(&at, &|| watch.stopped());
                 // They may have been cut short.
                 if watch.stopped() {
                     break;
@@ -559,7 +523,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
 /// The numbers of a column.
 struct Searched<'a, O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> {
     rows: Evaluator<'a, O, C, D, P>,
-    column: Option<ResultColumn<Row<C>>>,
+    column: Option<ResultColumn<Compared>>,
 }
 
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Values
@@ -577,7 +541,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Val
             while !watch.stopped() {
                 let Some(first) = lock(&next).next() else { break };
                 let last = (first + MAX_LANES).min(axis_values.len());
-                let rows = self.rows.rows(&axis_values[first..last], &|| watch.stopped());
+                let rows = self.rows.compared(&axis_values[first..last], &|| watch.stopped());
                 if watch.stopped() {
                     break;
                 }
@@ -588,11 +552,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Val
                 }
             }
         });
-        let found = found.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let found = unlocked(found);
         (!watch.stopped()).then_some(found)
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

@@ -8,34 +8,42 @@ use crate::store::{Column, Kind, Row};
 /// The two models by name.
 pub const MODELS: [&str; 2] = ["nonlinear", "linear"];
 
-/// A point at which both models have run.
-pub trait Compared: 'static {
-    /// The amplitude of a channel of the plan by a model; none if it failed.
-    fn amplitude(&self, model: usize, channel: usize) -> Option<f64>;
-    /// The ratio of a channel of the plan, where there is one.
-    fn ratio(&self, channel: usize) -> Option<f64>;
+/// A point at which both models have run, as every result tells of it. By channel of the plan, and
+/// by model.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// The amplitudes of each model; empty if it failed.
+    pub amplitudes: [Vec<f64>; 2],
+    /// The ratios, where there are any.
+    pub ratios: Vec<Option<f64>>,
     /// The greatest ratio with its channel; the first wins a tie.
-    fn greatest(&self) -> Option<(usize, f64)>;
+    pub greatest: Option<(usize, f64)>,
     /// The least ratio with its channel; the first wins a tie.
-    fn least(&self) -> Option<(usize, f64)>;
+    pub least: Option<(usize, f64)>,
     /// Whether the ratios are within the limits.
-    fn reliable(&self) -> Option<bool>;
+    pub reliable: Option<bool>,
     /// Whether the error left is within the accuracy asked for.
-    fn converged(&self) -> Option<bool>;
+    pub converged: Option<bool>,
     /// Whether the motion is chaotic.
-    fn sensitive(&self) -> Option<bool>;
+    pub sensitive: Option<bool>,
     /// The position of the method's name.
-    fn method(&self) -> usize;
+    pub method: usize,
     /// The relative error left.
-    fn error(&self) -> Option<f64>;
+    pub error: Option<f64>,
     /// The position of the status.
-    fn status(&self) -> usize;
+    pub status: usize,
     /// When a model failed.
-    fn fail_time_s(&self) -> Option<f64>;
-    /// Accepted steps of a model.
-    fn steps(&self, model: usize) -> u64;
-    /// Rejected steps of a model.
-    fn rejected(&self, model: usize) -> u64;
+    pub fail_time_s: Option<f64>,
+    /// Accepted steps.
+    pub steps: [u64; 2],
+    /// Rejected steps.
+    pub rejected: [u64; 2],
+}
+
+impl AsRef<Self> for Compared {
+    fn as_ref(&self) -> &Self {
+        self
+    }
 }
 
 type Get<R, T> = Box<dyn Fn(&R) -> T + Send + Sync>;
@@ -82,6 +90,35 @@ impl<R> ResultColumn<R> {
         Self { declared: Column::new(name, unit, description, kind), cell }
     }
 
+    /// A column of numbers that hardly ever repeat, null where there is none.
+    pub fn measured(
+        name: impl Into<String>,
+        unit: &str,
+        description: impl Into<String>,
+        get: impl Fn(&R) -> Option<f64> + Send + Sync + 'static,
+    ) -> Self {
+        Self::new(name, unit, description, Cell::Measured(Box::new(get)))
+    }
+
+    /// A column of names, null where there is none.
+    pub fn name(
+        name: impl Into<String>,
+        description: impl Into<String>,
+        names: Vec<&'static str>,
+        get: impl Fn(&R) -> Option<usize> + Send + Sync + 'static,
+    ) -> Self {
+        Self::new(name, "", description, Cell::Name(names, Box::new(get)))
+    }
+
+    /// A column of truths, null where they are not known.
+    pub fn flag(
+        name: impl Into<String>,
+        description: impl Into<String>,
+        get: impl Fn(&R) -> Option<bool> + Send + Sync + 'static,
+    ) -> Self {
+        Self::new(name, "", description, Cell::Flag(Box::new(get)))
+    }
+
     /// The same, with which way it is bad.
     pub fn worse(mut self, worse: Worse) -> Self {
         self.declared.worse = Some(worse);
@@ -121,8 +158,13 @@ pub fn row<R>(columns: &[ResultColumn<R>], of: &R) -> Row {
     columns.iter().map(|column| column.cell(of)).collect()
 }
 
+/// What the file says of these columns.
+pub fn declared<R>(columns: Vec<ResultColumn<R>>) -> Vec<Column> {
+    columns.into_iter().map(|column| column.declared).collect()
+}
+
 /// Amplitudes of both models and ratios. `amplitude` and `ratio` are what these are of.
-pub fn amplitude_columns<R: Compared, C: Channel>(
+pub fn amplitude_columns<R: AsRef<Compared>, C: Channel>(
     channels: &[C],
     limits: RatioLimits,
     amplitude: &str,
@@ -133,121 +175,93 @@ pub fn amplitude_columns<R: Compared, C: Channel>(
         for (i, channel) in channels.iter().enumerate() {
             let what = channel.description();
             let text = format!("{what}: {amplitude}, {model} model; null if it failed");
-            let cell = Cell::Measured(Box::new(move |row: &R| row.amplitude(k, i)));
             let name = format!("{model}_{}", channel.name());
-            let column = ResultColumn::new(name, channel.unit(), text, cell);
+            let of = move |row: &R| row.as_ref().amplitudes[k].get(i).copied();
+            let column = ResultColumn::measured(name, channel.unit(), text, of);
             columns.push(column.worse(Worse::Greater));
         }
     }
     for (i, channel) in channels.iter().enumerate() {
         let text = format!("{}: {ratio}", channel.description());
-        let cell = Cell::Measured(Box::new(move |row: &R| row.ratio(i)));
-        let column = ResultColumn::new(format!("ratio_{}", channel.name()), "1", text, cell);
+        let name = format!("ratio_{}", channel.name());
+        let of = move |row: &R| row.as_ref().ratios.get(i).copied().flatten();
+        let column = ResultColumn::measured(name, "1", text, of);
         columns.push(column.worse(Worse::Greater).limit(limits.most, 1.0));
     }
     columns
 }
 
 /// The verdict, and how far it can be trusted; the greatest ratio and its channel come first.
-/// `methods` are the names of methods, `told` what they
-/// are.
-pub fn verdict_columns<R: Compared, C: Channel>(
+/// `methods` are the names of methods, `told` what they are.
+pub fn verdict_columns<R: AsRef<Compared>, C: Channel>(
     channels: &[C],
     limits: RatioLimits,
     methods: Vec<&'static str>,
     told: &str,
 ) -> Vec<ResultColumn<R>> {
-    let mut columns = extreme_ratio(channels, "max", R::greatest, Worse::Greater, limits.most);
-    let mut rule = format!("ratio_max below {}", limits.most);
-    if let Some(least) = limits.least {
-        columns.extend(extreme_ratio(channels, "min", R::least, Worse::Less, least));
-        rule.push_str(&format!(" and ratio_min above {least}"));
+    let (greatest, most) = (|row: &Compared| row.greatest, limits.most);
+    let mut columns = extreme_ratio(channels, "max", greatest, Worse::Greater, most);
+    let mut rule = format!("ratio_max below {most}");
+    if let Some(limit) = limits.least {
+        columns.extend(extreme_ratio(channels, "min", |row| row.least, Worse::Less, limit));
+        rule.push_str(&format!(" and ratio_min above {limit}"));
     }
+    let rule = format!("{rule}; null where ratio_max is");
+    let sensitive = "true where the motion is chaotic, and the row's digits are those of one \
+                     trajectory: plain rk4 does not agree with itself at two steps, and a near \
+                     twin departs exponentially; null where nothing was compared";
+    let error = "greatest relative error left in the row's numbers, from comparing two rungs of \
+                 its method; null where nothing was compared";
+    let converged =
+        "true where error is within the accuracy asked for; null where nothing was compared";
     columns.extend([
-        ResultColumn::new(
-            "reliable",
-            "",
-            format!("{rule}; null where ratio_max is"),
-            Cell::Flag(Box::new(|row: &R| row.reliable())),
-        ),
-        ResultColumn::new(
-            "sensitive",
-            "",
-            "true where the motion is chaotic, and the row's digits are those of one trajectory: \
-             plain rk4 does not agree with itself at two steps, and a near twin departs \
-             exponentially; null where nothing was compared",
-            Cell::Flag(Box::new(|row: &R| row.sensitive())),
-        ),
-        ResultColumn::new(
-            "method",
-            "",
-            told,
-            Cell::Name(methods, Box::new(|row: &R| Some(row.method()))),
-        ),
-        ResultColumn::new(
-            "error",
-            "1",
-            "greatest relative error left in the row's numbers, from comparing two rungs of \
-                 its method; null where \
-                 nothing was compared",
-            Cell::Measured(Box::new(|row: &R| row.error())),
-        )
-        .worse(Worse::Greater),
-        ResultColumn::new(
-            "converged",
-            "",
-            "true where error is within the accuracy asked for; null where nothing was compared",
-            Cell::Flag(Box::new(|row: &R| row.converged())),
-        ),
+        ResultColumn::flag("reliable", rule, |row: &R| row.as_ref().reliable),
+        ResultColumn::flag("sensitive", sensitive, |row: &R| row.as_ref().sensitive),
+        ResultColumn::name("method", told, methods, |row: &R| Some(row.as_ref().method)),
+        ResultColumn::measured("error", "1", error, |row: &R| row.as_ref().error)
+            .worse(Worse::Greater),
+        ResultColumn::flag("converged", converged, |row: &R| row.as_ref().converged),
     ]);
     columns
 }
 
 /// The greatest or the least ratio, and its channel.
-pub fn extreme_ratio<R: Compared, C: Channel>(
+fn extreme_ratio<R: AsRef<Compared>, C: Channel>(
     channels: &[C],
     name: &str,
-    of: fn(&R) -> Option<(usize, f64)>,
+    of: fn(&Compared) -> Option<(usize, f64)>,
     worse: Worse,
     limit: f64,
 ) -> Vec<ResultColumn<R>> {
     let names = channels.iter().map(|channel| channel.name()).collect();
-    let number = Cell::Measured(Box::new(move |row: &R| of(row).map(|(_, ratio)| ratio)));
-    let channel = Cell::Name(names, Box::new(move |row: &R| of(row).map(|(channel, _)| channel)));
+    let ratio = move |row: &R| of(row.as_ref()).map(|(_, ratio)| ratio);
+    let channel = move |row: &R| of(row.as_ref()).map(|(channel, _)| channel);
     let text = format!("{} of the defined ratios; null if none is", worse.extreme());
     let tie = format!("channel of ratio_{name}; the first of the plan's channels wins a tie");
     vec![
-        ResultColumn::new(format!("ratio_{name}"), "1", text, number)
+        ResultColumn::measured(format!("ratio_{name}"), "1", text, ratio)
             .worse(worse)
             .limit(limit, 1.0),
-        ResultColumn::new(format!("ratio_{name}_channel"), "", tie, channel),
+        ResultColumn::name(format!("ratio_{name}_channel"), tie, names, channel),
     ]
 }
 
 /// Columns about the two integrations, the same for every plan.
-pub fn run_columns<R: Compared>(statuses: Vec<&'static str>) -> Vec<ResultColumn<R>> {
-    let mut columns = Vec::new();
-    columns.push(ResultColumn::new(
-        "status",
-        "",
-        "ok, or why the nonlinear model failed, or behind linear_ why the linear model alone did",
-        Cell::Name(statuses, Box::new(|row: &R| Some(row.status()))),
-    ));
-    columns.push(
-        ResultColumn::new(
-            "fail_time_s",
-            "s",
-            "when the model named by status failed; null if none did or it never started",
-            Cell::Time(Box::new(|row: &R| row.fail_time_s())),
-        )
-        .worse(Worse::Less),
-    );
-    let counts: [(&str, &str, fn(&R, usize) -> u64); 2] =
-        [("steps", "accepted", R::steps), ("rejected", "rejected", R::rejected)];
+pub fn run_columns<R: AsRef<Compared>>(statuses: Vec<&'static str>) -> Vec<ResultColumn<R>> {
+    let status =
+        "ok, or why the nonlinear model failed, or behind linear_ why the linear model alone did";
+    let fail_time = "when the model named by status failed; null if none did or it never started";
+    let of_fail_time = Cell::Time(Box::new(|row: &R| row.as_ref().fail_time_s));
+    let mut columns = vec![
+        ResultColumn::name("status", status, statuses, |row: &R| Some(row.as_ref().status)),
+        ResultColumn::new("fail_time_s", "s", fail_time, of_fail_time).worse(Worse::Less),
+    ];
+    let counts: [(&str, &str, fn(&Compared) -> [u64; 2]); 2] =
+        [("steps", "accepted", |row| row.steps), ("rejected", "rejected", |row| row.rejected)];
     for (name, kind, count) in counts {
         for (k, model) in MODELS.into_iter().enumerate() {
             let text = format!("{kind} integration steps, {model} model");
-            let cell = Cell::Count(Box::new(move |row: &R| count(row, k)));
+            let cell = Cell::Count(Box::new(move |row: &R| count(row.as_ref())[k]));
             columns.push(ResultColumn::new(format!("{name}_{model}"), "1", text, cell));
         }
     }

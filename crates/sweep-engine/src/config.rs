@@ -45,6 +45,7 @@ use std::marker::PhantomData;
 use std::path::PathBuf;
 
 pub use draft::Draft;
+pub use grid::plain_name;
 pub use points::{check_columns, not_numbers, other_length};
 pub use read::{Read, Schema};
 pub use report::{Diagnostics, Mistake};
@@ -125,14 +126,6 @@ impl<M: Read> GridInput<M> {
     pub fn load_point(&self, at: &[String]) -> Result<(Plan<M>, NamedValues), Diagnostics> {
         resolve(self, |draft| parameters::point(at, draft))
     }
-}
-
-/// The name of a run as the command line gives it, or what it should have been.
-///
-/// # Errors
-/// In words.
-pub fn plain_name(text: &str) -> Result<String, String> {
-    grid::plain_name(text)
 }
 
 /// Parameters by name, with a value each.

@@ -137,6 +137,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// An option whose value makes no sense here.
+    pub fn option(option: &'static str, given: impl ToString, expected: impl Into<String>) -> Self {
+        Self::Option { option, given: given.to_string(), expected: expected.into() }
+    }
+
     /// The process cannot listen to signals.
     pub fn signals(source: std::io::Error) -> Self {
         Self::File { action: "install signal handlers for", path: "this process".into(), source }

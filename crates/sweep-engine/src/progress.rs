@@ -1,13 +1,12 @@
 //! Progress of a run: a bar on a terminal, a line now and then elsewhere, or nothing.
 
 use std::io::{IsTerminal, Write};
-use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// What `--progress` said.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ProgressMode {
     /// A bar on a terminal; elsewhere a line a minute, which suits the log of a batch job.
     #[default]
@@ -16,19 +15,6 @@ pub enum ProgressMode {
     Plain,
     /// Nothing.
     None,
-}
-
-impl FromStr for ProgressMode {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            "plain" => Ok(Self::Plain),
-            "none" => Ok(Self::None),
-            _ => Err(format!("expected auto, plain or none; got `{text}`")),
-        }
-    }
 }
 
 /// Something that shows how far the run is, on stderr.
@@ -197,14 +183,6 @@ pub fn per_second(rate: f64) -> String {
     if rate >= 100.0 { format!("{rate:.0} points/s") } else { format!("{rate:.3} points/s") }
 }
 
-impl clap::builder::ValueParserFactory for ProgressMode {
-    type Parser = clap::builder::ValueParser;
-
-    fn value_parser() -> Self::Parser {
-        clap::builder::ValueParser::new(|text: &str| text.parse::<ProgressMode>())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -239,13 +217,5 @@ mod tests {
         let points = progress.points(200);
         assert!(points.starts_with("200 points, ") && points.ends_with(" points/s"), "{points}");
         assert!((9.0..=10.0).contains(&progress.rate(200)), "{points}");
-    }
-
-    #[test]
-    fn modes_read_as_written() {
-        assert_eq!("plain".parse(), Ok(ProgressMode::Plain));
-        assert!(
-            "loud".parse::<ProgressMode>().unwrap_err().contains("expected auto, plain or none")
-        );
     }
 }

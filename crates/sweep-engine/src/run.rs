@@ -9,8 +9,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::Mutex;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::interrupt::Interrupt;
@@ -20,7 +20,7 @@ use crate::store::read::{ResultFile, Tally};
 use crate::store::{Done, Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, StoreError};
 use crate::threads::{self, Environment, ThreadsError};
 use crate::watch::{Engine, Watch};
-use sweep_files::panics;
+use sweep_files::panics::{self, lock};
 
 /// How to run.
 #[derive(Clone, Copy)]
@@ -286,10 +286,6 @@ impl<'a> Hand<'a> {
         // The receiver outlives the engine's work.
         let _ = self.whole.send((chunk, outcomes));
     }
-}
-
-fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What a session is made of, besides what the engine knows.

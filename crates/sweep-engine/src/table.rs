@@ -20,7 +20,7 @@ use serde_json::{Map, Value, json};
 use crate::build::Build;
 use sweep_files::panics;
 use sweep_files::{CREATED_BY, key, seal};
-use sweep_parameter::Worse;
+use sweep_parameter::{Parameter, Worse};
 
 /// A column's metadata in the Arrow schema.
 pub fn field_metadata(unit: &str, description: &str) -> HashMap<String, String> {
@@ -65,6 +65,15 @@ impl Table {
     ) {
         let array: Float64Array = values.into_iter().collect();
         self.add(name, unit, description, "float64", Arc::new(array));
+    }
+
+    /// Adds values of a parameter.
+    pub fn parameter(
+        &mut self,
+        of: &impl Parameter,
+        values: impl IntoIterator<Item = Option<f64>>,
+    ) {
+        self.numbers(of.name(), of.unit(), of.description(), values);
     }
 
     /// Says of the last column which way it is bad.

@@ -5,6 +5,14 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 /// Looks up a variable of a scheduler; the process environment outside tests.
 pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
 
+/// Whether to end early, asked by any thread.
+pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
+
+/// Looks up a variable of this process.
+pub fn process(name: &str) -> Option<String> {
+    std::env::var(name).ok()
+}
+
 /// As many threads as a process can sensibly ask for.
 const MOST: usize = 4096;
 

@@ -4,6 +4,8 @@ use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use arrow_schema::ArrowError;
+
 /// A failure to read or write a file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
@@ -55,6 +57,12 @@ impl FileError {
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_path_buf();
         move |source| Self::Io { action, path, source }
+    }
+
+    /// The cells of a file are not what its schema says.
+    pub fn cells(path: &Path) -> impl FnOnce(ArrowError) -> Self {
+        let path = path.to_path_buf();
+        move |error| Self::NotParquet { path, reason: error.to_string() }
     }
 
     /// Whether the request is at fault, and nothing was done.

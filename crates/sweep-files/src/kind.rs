@@ -68,7 +68,7 @@ pub enum FileKind<'a> {
     Differences,
     /// A table that `sweep export` wrote.
     Exported {
-        /// Its ending: `csv`, `xlsx` or `nc`.
+        /// Its ending: `csv` or `xlsx`.
         ending: &'static str,
     },
     /// The JSON file beside a map that says how the run went.
@@ -140,7 +140,7 @@ impl FileKind<'_> {
             Self::Html => begins(b"<!doctype html>\n")?,
             Self::ManPage => begins(b".ie \\n(.g ")?,
             _ => match ParquetFile::look(path) {
-                Ok(file) if self.has_keys(&|key| file.value(key).is_some()) => true,
+                Ok(file) if file.kind() == Some(self) => true,
                 Ok(_) => {
                     // A damaged key makes one of ours look like another's.
                     ParquetFile::open(path)?;
@@ -158,20 +158,18 @@ impl FileKind<'_> {
         Ok(if is_ours { None } else { Some(format!("the file there is no {}", self.name())) })
     }
 
-    /// Whether the metadata of one of our Parquet files says that it is of this kind.
-    pub fn has_keys(self, has: &dyn Fn(&str) -> bool) -> bool {
-        FileKind::of_result(has) == Some(self)
-    }
-
-    /// The kind of result that the metadata of one of our Parquet files speaks of, if of any.
-    pub fn of_result(has: &dyn Fn(&str) -> bool) -> Option<Self> {
-        let map = has(key::PLAN).then_some(Self::Map);
-        OWN.iter().find(|(.., own)| has(own)).map(|(kind, ..)| *kind).or(map)
-    }
-
     /// A kind of result in one word.
     pub fn word(self) -> &'static str {
         OWN.iter().find(|(kind, ..)| *kind == self).map_or("map", |(_, word, _)| word)
+    }
+}
+
+impl ParquetFile {
+    /// The kind of result that the metadata speaks of, if of any.
+    pub fn kind(&self) -> Option<FileKind<'static>> {
+        let has = |key: &str| self.value(key).is_some();
+        let own = OWN.iter().find(|(.., key)| has(key)).map(|(kind, ..)| *kind);
+        own.or_else(|| has(key::PLAN).then_some(FileKind::Map))
     }
 }
 

@@ -18,6 +18,7 @@
 
 pub mod atomic;
 pub mod cells;
+mod columns;
 mod error;
 pub mod footer;
 mod kind;
@@ -29,6 +30,7 @@ pub mod regular;
 pub mod seal;
 mod thrift;
 
+pub use columns::{CellKind, Column, columns};
 pub use error::{FileError, Refused};
 pub use kind::{EXPORTED_CSV, FileKind, key};
 pub use output::{Output, beside, judge, ready, write};

@@ -14,6 +14,7 @@ use parquet::arrow::arrow_reader::{
 use parquet::basic::Type;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{FileMetaData, KeyValue};
+use serde_json::Value;
 
 use crate::pages::{self, Unpacked};
 use crate::seal::{self, Seal};
@@ -163,6 +164,11 @@ impl ParquetFile {
     /// One value of them.
     pub fn value(&self, key: &str) -> Option<&str> {
         self.pairs().find(|pair| pair.key == key)?.value.as_deref()
+    }
+
+    /// One value of them, which is JSON.
+    pub fn json(&self, key: &str) -> Option<Value> {
+        serde_json::from_str(self.value(key)?).ok()
     }
 
     /// The rows, of the columns and in the portions that `choose` asks for.

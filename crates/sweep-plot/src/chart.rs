@@ -114,6 +114,19 @@ pub(crate) struct Series {
     pub(crate) style: Style,
 }
 
+impl Series {
+    /// A series over one of the chart's grids.
+    pub(crate) fn new(
+        name: impl Into<String>,
+        colour: Colour,
+        grid: usize,
+        y: Vec<f64>,
+        style: Style,
+    ) -> Self {
+        Self { name: name.into(), colour, grid, y, style }
+    }
+}
+
 /// An upright line.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Mark {
@@ -443,13 +456,7 @@ mod tests {
     #[test]
     fn labels_of_stars_stand_off_the_curves() {
         let speeds: Vec<f64> = (0..=30).map(|k| 10.0 * f64::from(k)).collect();
-        let flat = |y: f64| Series {
-            name: String::new(),
-            colour: INK,
-            grid: 0,
-            y: vec![y; 31],
-            style: Style::Solid(2.0),
-        };
+        let flat = |y: f64| Series::new(String::new(), INK, 0, vec![y; 31], Style::Solid(2.0));
         // The second curve is where the first one's label would stand.
         let mut series = vec![flat(147.8), flat(154.0), flat(162.1)];
         series.push(Series { y: speeds.clone(), ..flat(0.0) });

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use super::error::PlotError;
 use super::grid::{Grid, GridAxis};
-use super::read::{Batch, Cells, ColumnFacts, Source};
+use super::read::{Batch, ColumnFacts, Source};
 use super::table::{Column, NONE, SEVERAL, Table, Values, Words};
 use sweep_parameter::Worse;
 
@@ -129,7 +129,7 @@ impl Map {
         let mut kept = Vec::with_capacity(columns.len());
         for column in columns {
             let name = column.facts.name.clone();
-            if column.facts.cells == Cells::Numbers {
+            if column.facts.is_number() {
                 extents.insert(name.clone(), column.extent);
             }
             if let Some(dividing) = column.dividing {
@@ -184,9 +184,9 @@ enum Rule {
 
 impl Rule {
     fn of(column: &ColumnFacts) -> Self {
-        match (column.name.as_str(), column.cells) {
-            ("point" | "ratio_max_channel", _) => Self::OfGreatestRatio,
-            (_, Cells::Words) => Self::Common,
+        match column.name.as_str() {
+            "point" | "ratio_max_channel" => Self::OfGreatestRatio,
+            _ if !column.is_number() => Self::Common,
             _ if column.worse == Some(Worse::Less) => Self::Least,
             _ => Self::Greatest,
         }
@@ -278,9 +278,9 @@ impl<'a> Gather<'a> {
         let columns = wanted.map(|facts| Gathered {
             facts,
             rule: Rule::of(facts),
-            values: match facts.cells {
-                Cells::Numbers => Values::Numbers(vec![f64::NAN; cells]),
-                Cells::Words => Values::Words(Words::none(cells)),
+            values: match facts.is_number() {
+                true => Values::Numbers(vec![f64::NAN; cells]),
+                false => Values::Words(Words::none(cells)),
             },
             extent: Extent::NONE,
             // A cell of one point lies on one side, and its value is its mean.

@@ -10,7 +10,7 @@ mod report;
 pub(crate) use design::page_of as design_page;
 pub(crate) use report::told;
 
-use serde_json::{Map as Object, Value, json};
+use serde_json::{Value, json};
 
 use super::axis::{LEAST_TICKS, SLACK, Scale, Step, Tick, log_sets};
 use super::chart::{Chart, ChartPanel, Series, Style, x_scale, y_scale};
@@ -297,7 +297,7 @@ fn columns_json(table: &Table) -> Value {
         });
         Some((column.name.clone(), data))
     };
-    Value::Object(table.columns.iter().filter_map(numbers).collect::<Object<_, _>>())
+    table.columns.iter().filter_map(numbers).collect()
 }
 
 /// Columns of few distinct words, as their numbers in grid order; 255 where the file has none, 254
@@ -309,7 +309,7 @@ fn codes_json(table: &Table) -> Value {
             json!({ "data": embed::bytes(words.codes.iter().copied()), "words": words.names });
         Some((column.name.clone(), data))
     };
-    Value::Object(table.columns.iter().filter_map(words).collect::<Object<_, _>>())
+    table.columns.iter().filter_map(words).collect()
 }
 
 /// How many of each cell's points are what.

@@ -108,7 +108,8 @@ pub(crate) fn unit_of_channel(name: &str) -> &'static str {
 }
 
 /// With a capital first letter.
-pub(crate) fn capitalised(text: &str) -> String {
+#[must_use]
+pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
@@ -138,6 +139,11 @@ impl fmt::Display for Label {
 /// Words and unit as an axis label.
 pub(crate) fn with_unit(words: &str, unit: &str) -> String {
     if unit.is_empty() { words.to_owned() } else { format!("{words} ({unit})") }
+}
+
+/// A name's words, its value to four digits and the unit: "damping 140 N s/m".
+pub(crate) fn valued(words: &str, value: f64, unit: &str) -> String {
+    format!("{words} {} {unit}", significant(value, 4)).trim().to_owned()
 }
 
 /// The unit in which small motions are shown, and how many of it one of `unit` is.

@@ -5,7 +5,7 @@ use sweep_parameter::Worse;
 use super::PlotOptions;
 use super::colour::ColourScale;
 use super::error::PlotError;
-use super::gather::{Divide, Map};
+use super::gather::{Divide, Map, Sides};
 use super::label::{self, capitalised};
 use super::read::{ColumnFacts, Kind, Source};
 
@@ -73,16 +73,7 @@ pub(crate) struct Layer {
     /// The level whose line is drawn, if one has a meaning.
     pub(crate) level: Option<Level>,
     /// The value that the line follows, in cells of several points.
-    divided: Option<Divided>,
-}
-
-/// How the points of a map's cells lie about the level.
-#[derive(Clone, Debug, PartialEq)]
-struct Divided {
-    both: Vec<bool>,
-    undefined: Vec<bool>,
-    /// In shown units.
-    mean: Vec<f64>,
+    divided: Option<Sides>,
 }
 
 /// A level that divides the map.
@@ -304,10 +295,9 @@ impl Shown {
             values: numbers.iter().map(|number| value(number * factor)).collect(),
             level: level.filter(|_| matches!(scale, ColourScale::Diverging { .. })),
             scale,
-            divided: map.sides.get(self.column()).map(|sides| Divided {
-                both: sides.both.clone(),
-                undefined: sides.undefined.clone(),
+            divided: map.sides.get(self.column()).map(|sides| Sides {
                 mean: sides.mean.iter().map(|mean| mean * factor).collect(),
+                ..sides.clone()
             }),
         })
     }
@@ -367,7 +357,7 @@ impl Shown {
         let (limit, worse) = (self.limit(source)?, self.worse().unwrap_or(Worse::Greater));
         let (unit, factor) = label::shown(&self.facts.unit);
         let (value, log) = (limit * factor, self.group == Group::Ratio);
-        let said = format!("{} {unit}", label::significant(value, 4)).trim_end().to_owned();
+        let said = label::valued("", value, unit);
         let what = if log { "ratio".to_owned() } else { label::of_model(self.column()).0 };
         let [above, below] = [format!("{what} above {said}"), format!("{what} below {said}")];
         let mut level = Level {

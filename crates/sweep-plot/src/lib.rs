@@ -42,7 +42,7 @@ use std::path::{Path, PathBuf};
 
 pub use error::PlotError;
 pub use html::{sheet, table};
-pub use label::{quantity, significant, words};
+pub use label::{capitalised, quantity, significant, words};
 pub use share::Share;
 pub use svg::escape;
 
@@ -141,11 +141,14 @@ pub struct PlotOptions {
 }
 
 /// What a page computes with, beside the module that every such page has.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+#[serde(rename_all = "camelCase")]
 pub struct Live {
     /// What the module is set up with, in its own terms.
+    #[serde(skip)]
     pub setup: Vec<f64>,
     /// What can be moved, the map's axes first.
+    #[serde(skip)]
     pub sliders: Vec<Slider>,
     /// Time between two instants of a history (s).
     pub every_s: f64,
@@ -162,8 +165,10 @@ pub struct Live {
     /// The columns of each model's metrics in the module's records, in their order.
     pub metrics: Vec<[String; 2]>,
     /// Whether the map has the static sag.
+    #[serde(rename = "staticSag")]
     pub has_static_sag: bool,
     /// The constant speeds (rpm) that the map's growth is about; none if it has none.
+    #[serde(rename = "growthSpeeds")]
     pub growth_speeds_rpm: Vec<f64>,
     /// Whether a constant speed takes long: with friction or stops.
     pub has_slow_growth: bool,
@@ -185,6 +190,7 @@ pub struct Live {
     /// The version of the program that chose the rungs.
     pub version: String,
     /// Resonances of the linear model: motion, speed with its unit, damping ratio.
+    #[serde(skip)]
     pub resonances: Vec<[String; 3]>,
 }
 
@@ -267,10 +273,7 @@ fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>
         Kind::Map => map(source, options, format),
         Kind::Design => design(source, options, format),
         Kind::Differences => differences(source, options, format),
-        Kind::Stability => stability(&source, options, format),
-        Kind::Dwell => dwell(&source, options, format),
-        Kind::Optimise => written(&source, &figures::optimise::chart(&source)?, format),
-        Kind::Trace | Kind::Modes | Kind::Boundary => chart(&Table::read(source)?, options, format),
+        _ => curves(source, options, format),
     }
 }
 
@@ -352,13 +355,7 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
 /// The boundary file beside a map of these axes.
 fn overlay(path: &Path, axes: &[SweptAxis], map: &Source) -> Result<Overlay, PlotError> {
     let source = Source::open(path)?;
-    if source.kind != Kind::Boundary {
-        return Err(PlotError::Unfit(format!(
-            "`--boundary` takes a boundary file; {} is a {} file",
-            path.display(),
-            source.kind.name()
-        )));
-    }
+    source.expect(Kind::Boundary, "--boundary", "`sweep boundary` writes a boundary file")?;
     let table = Table::read(source)?;
     let line = figures::boundary::overlay(&table, [&axes[0].name, &axes[1].name])?;
     let moved: At = axes.iter().map(|axis| (axis.name.clone(), 0.0)).collect();
@@ -382,34 +379,33 @@ fn differences(
     map(source, options, format)
 }
 
-fn chart(table: &Table, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+/// A file's curves.
+fn curves(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+    use figures::{boundary, campbell, dwell, optimise, passages, profiles};
+    use figures::{shapes, spectrum, stability, trace, turn};
+    let of_rows = match (source.kind, options.view) {
+        (Kind::Optimise, _) => Some(optimise::chart(&source)?),
+        (Kind::Stability, Some(View::Responses)) => Some(stability::responses(&source, options)?),
+        (Kind::Stability, _) => Some(stability::growth(&source, options)?),
+        (Kind::Dwell, Some(View::Sections)) => Some(dwell::sections(&source, options)?),
+        (Kind::Dwell, _) => Some(dwell::chart(&source, options)?),
+        _ => None,
+    };
+    if let Some(chart) = of_rows {
+        return written(&source, &chart, format);
+    }
+    let table = &Table::read(source)?;
     let chart = match (table.source.kind, options.view) {
-        (Kind::Trace, Some(View::Passages)) => figures::passages::chart(table, options)?,
-        (Kind::Trace, Some(View::Profiles)) => figures::profiles::chart(table)?,
-        (Kind::Trace, Some(View::Spectrum)) => figures::spectrum::chart(table)?,
-        (Kind::Trace, _) => figures::trace::chart(table, options)?,
-        (Kind::Modes, Some(View::Variation)) => figures::turn::chart(table)?,
-        (Kind::Modes, Some(View::Shapes)) => figures::shapes::chart(table)?,
-        (Kind::Modes, _) => figures::campbell::chart(table, options)?,
-        _ => figures::boundary::chart(table)?,
+        (Kind::Trace, Some(View::Passages)) => passages::chart(table, options)?,
+        (Kind::Trace, Some(View::Profiles)) => profiles::chart(table)?,
+        (Kind::Trace, Some(View::Spectrum)) => spectrum::chart(table)?,
+        (Kind::Trace, _) => trace::chart(table, options)?,
+        (Kind::Modes, Some(View::Variation)) => turn::chart(table)?,
+        (Kind::Modes, Some(View::Shapes)) => shapes::chart(table)?,
+        (Kind::Modes, _) => campbell::chart(table, options)?,
+        _ => boundary::chart(table)?,
     };
     written(&table.source, &chart, format)
-}
-
-fn stability(source: &Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
-    let chart = match options.view {
-        Some(View::Responses) => figures::stability::responses(source, options)?,
-        _ => figures::stability::growth(source, options)?,
-    };
-    written(source, &chart, format)
-}
-
-fn dwell(source: &Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
-    let chart = match options.view {
-        Some(View::Sections) => figures::dwell::sections(source, options)?,
-        _ => figures::dwell::chart(source, options)?,
-    };
-    written(source, &chart, format)
 }
 
 fn written(source: &Source, chart: &Chart, format: Format) -> Result<Vec<u8>, PlotError> {

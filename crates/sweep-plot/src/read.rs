@@ -6,13 +6,15 @@
 use std::path::{Path, PathBuf};
 
 use arrow_array::ArrayRef;
-use arrow_schema::{ArrowError, DataType, Field};
-use parquet::arrow::ProjectionMask;
+use arrow_schema::{DataType, Schema};
 use serde_json::Value;
 
 use super::error::PlotError;
 use super::label;
-use sweep_files::{self as files, FileError, ParquetFile, cells, key};
+use sweep_files::{self as files, FileError, ParquetFile, cells};
+
+/// A column without its rows, which [`super::table::Column`] has.
+pub(crate) use sweep_files::Column as ColumnFacts;
 use sweep_parameter::Worse;
 
 /// What a file holds. Its columns show which.
@@ -55,35 +57,6 @@ impl Kind {
     }
 }
 
-/// What the cells of a column are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Cells {
-    /// Any numeric type.
-    Numbers,
-    /// Text, plain or dictionary coded, and truth values as `true` and `false`.
-    Words,
-}
-
-/// A column, without its rows.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ColumnFacts {
-    /// As in the file.
-    pub(crate) name: String,
-    /// As the file's field metadata says, or else as the name's suffix does; empty for pure
-    /// numbers.
-    pub(crate) unit: String,
-    /// As the file's field metadata says; may be empty.
-    pub(crate) description: String,
-    /// What its cells are.
-    pub(crate) cells: Cells,
-    /// Which way it is bad, if the file says so.
-    pub(crate) worse: Option<Worse>,
-    /// Up to where it is good, if the file says so.
-    pub(crate) limit: Option<f64>,
-    /// Its place among the file's fields.
-    field: usize,
-}
-
 /// A file whose columns are those of a figure.
 #[derive(Debug)]
 pub(crate) struct Source {
@@ -105,9 +78,6 @@ pub(crate) struct Source {
 /// Key under which Arrow keeps its own copy of the schema: no provenance.
 const ARROW_SCHEMA: &str = "ARROW:schema";
 
-/// Rows decoded at once.
-const BATCH_ROWS: usize = 1 << 12;
-
 impl Source {
     /// Opens a file and reads what it says of itself.
     ///
@@ -125,9 +95,9 @@ impl Source {
                 (entry.key.clone(), serde_json::from_str(&text).unwrap_or(Value::String(text)))
             })
             .collect();
-        let fields = file.schema().fields().iter().enumerate();
+        let columns = files::columns(file.schema()).into_iter();
         let columns: Vec<ColumnFacts> =
-            fields.filter_map(|(place, field)| column(field, place)).collect();
+            columns.map(|column| by_name(column, file.schema())).collect();
         let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
         let kind = recognise(&names).ok_or_else(|| PlotError::UnknownKind {
             path: path.to_owned(),
@@ -141,20 +111,18 @@ impl Source {
     ///
     /// # Errors
     /// [`PlotError::File`].
-    pub(crate) fn batches(&self, names: &[&str]) -> Result<Batches<'_>, PlotError> {
+    pub(crate) fn batches(
+        &self,
+        names: &[&str],
+    ) -> Result<impl Iterator<Item = Result<Batch<'_>, PlotError>> + use<'_>, PlotError> {
         let columns: Vec<&ColumnFacts> =
             names.iter().filter_map(|name| self.column(name)).collect();
-        let mut fields: Vec<usize> = columns.iter().map(|column| column.field).collect();
-        fields.sort_unstable();
-        // Two columns of one name, in a file that is not ours, are the first of them twice.
-        fields.dedup();
-        let at = columns.iter().map(|column| fields.partition_point(|&field| field < column.field));
-        let at = at.collect();
-        let reader = self.file.batches(|builder| {
-            let mask = ProjectionMask::roots(builder.parquet_schema(), fields);
-            builder.with_projection(mask).with_batch_size(BATCH_ROWS)
-        })?;
-        Ok(Batches { path: &self.path, reader, columns, at })
+        let batches = self.file.rows_of(&columns)?;
+        Ok(batches.map(move |batch| {
+            let (rows, cells) = batch?;
+            let columns = columns.iter().copied().zip(cells).collect();
+            Ok(Batch { path: &self.path, columns, rows })
+        }))
     }
 
     /// The column of that name.
@@ -171,7 +139,7 @@ impl Source {
 
     /// Columns of numbers.
     pub(crate) fn numeric(&self) -> impl Iterator<Item = &ColumnFacts> {
-        self.columns.iter().filter(|column| column.cells == Cells::Numbers)
+        self.columns.iter().filter(|column| column.is_number())
     }
 
     /// The error that something the options name is not there, and what is.
@@ -184,6 +152,23 @@ impl Source {
     ) -> PlotError {
         let (given, known) = (given.into(), known.into());
         PlotError::NotThere { option, given, path: self.path.clone(), what, known }
+    }
+
+    /// Nothing in it can be drawn.
+    pub(crate) fn empty(&self, reason: &'static str) -> PlotError {
+        PlotError::Empty { path: self.path.clone(), reason }
+    }
+
+    /// Refuses a file of another kind than an option takes.
+    ///
+    /// # Errors
+    /// [`PlotError::Unfit`], which says what writes such a file.
+    pub(crate) fn expect(&self, kind: Kind, option: &str, hint: &str) -> Result<(), PlotError> {
+        if self.kind == kind {
+            return Ok(());
+        }
+        let (path, own) = (self.path.display(), self.kind.name());
+        Err(PlotError::Unfit(format!("`{option} {path}`: this is a {own} file; {hint}")))
     }
 
     /// A column that this kind of file must have is missing.
@@ -204,6 +189,11 @@ impl Source {
     /// Name of the run, if the file says it, with what its command line set.
     pub(crate) fn run_name(&self) -> Option<&str> {
         self.named.as_deref()
+    }
+
+    /// The run's name, if the file says it, and these notes.
+    pub(crate) fn notes(&self, further: impl IntoIterator<Item = String>) -> Vec<String> {
+        self.named.iter().cloned().chain(further).collect()
     }
 
     /// The run's name, if the file says it, and `rest` as a figure's subtitle.
@@ -243,33 +233,6 @@ impl Source {
     }
 }
 
-/// The cells are not what the schema says.
-fn damaged(path: &Path, error: &ArrowError) -> PlotError {
-    FileError::NotParquet { path: path.to_owned(), reason: error.to_string() }.into()
-}
-
-/// The rows of some columns of a file, in file order.
-pub(crate) struct Batches<'a> {
-    path: &'a Path,
-    reader: files::Batches,
-    columns: Vec<&'a ColumnFacts>,
-    /// Place of each column in what the reader gives.
-    at: Vec<usize>,
-}
-
-impl<'a> Iterator for Batches<'a> {
-    type Item = Result<Batch<'a>, PlotError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let batch = self.reader.next()?.map_err(PlotError::from);
-        Some(batch.map(|batch| {
-            let cells = self.at.iter().map(|&place| batch.column(place).clone());
-            let columns = self.columns.iter().copied().zip(cells).collect();
-            Batch { path: self.path, columns, rows: batch.num_rows() }
-        }))
-    }
-}
-
 /// Some rows of some columns.
 pub(crate) struct Batch<'a> {
     path: &'a Path,
@@ -290,7 +253,7 @@ impl Batch<'_> {
     /// [`PlotError::File`] if the cells are not what the schema says.
     pub(crate) fn numbers(&self, name: &str) -> Result<Vec<f64>, PlotError> {
         let Some(array) = self.array(name) else { return Ok(Vec::new()) };
-        let numbers = cells::numbers(array).map_err(|error| damaged(self.path, &error))?;
+        let numbers = cells::numbers(array).map_err(FileError::cells(self.path))?;
         Ok(numbers.into_iter().map(|value| drawable(value.unwrap_or(f64::NAN))).collect())
     }
 
@@ -306,7 +269,7 @@ impl Batch<'_> {
         } else {
             cells::texts(array)
         };
-        words.map_err(|error| damaged(self.path, &error))
+        Ok(words.map_err(FileError::cells(self.path))?)
     }
 }
 
@@ -391,28 +354,15 @@ pub(crate) fn bracket<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
     Some((with_word(&["low", "lower", "min"])?, with_word(&["high", "upper", "max"])?))
 }
 
-fn column(field: &Field, place: usize) -> Option<ColumnFacts> {
-    let cells = match field.data_type() {
-        DataType::Boolean => Cells::Words,
-        text if cells::is_text(text) => Cells::Words,
-        number if cells::is_number(number) => Cells::Numbers,
-        _ => return None,
+/// A file that went through another program has its columns' names alone, which say something too.
+fn by_name(column: ColumnFacts, schema: &Schema) -> ColumnFacts {
+    let unit = schema.field(column.field).metadata().get("unit");
+    let unit = match unit.is_none_or(String::is_empty) {
+        true => label::unit_of_name(&column.name),
+        false => column.unit,
     };
-    let told = |key: &str| field.metadata().get(key).filter(|text| !text.is_empty()).cloned();
-    let unit = told("unit").unwrap_or_else(|| label::unit_of_name(field.name()));
-    Some(ColumnFacts {
-        name: field.name().clone(),
-        // A pure number's unit is 1, which no label should say.
-        unit: if unit == "1" { String::new() } else { unit },
-        description: told("description").unwrap_or_default(),
-        cells,
-        // A file that went through another program has its columns' names alone.
-        worse: told(key::WORSE)
-            .and_then(|name| Worse::named(&name))
-            .or_else(|| field.name().starts_with("min_").then_some(Worse::Less)),
-        limit: told(key::LIMIT).and_then(|limit| limit.parse().ok()),
-        field: place,
-    })
+    let less = column.name.starts_with("min_").then_some(Worse::Less);
+    ColumnFacts { unit, worse: column.worse.or(less), ..column }
 }
 
 #[cfg(test)]

@@ -112,8 +112,6 @@ impl Scatter {
     /// As [`Source::batches`] and [`layer::chosen`]; [`PlotError::Empty`] without points or
     /// parameters that vary; [`PlotError::Unfit`] for a quantity that is no number.
     pub(crate) fn read(source: Source, options: &PlotOptions) -> Result<Self, PlotError> {
-        let empty =
-            |source: &Source, reason| PlotError::Empty { path: source.path.clone(), reason };
         let Some(shown) = layer::chosen(&source, options)? else {
             return Err(PlotError::Unfit(
                 "status is no number, and figures of designs mark failed points in any case"
@@ -165,7 +163,7 @@ impl Scatter {
             }
         }
         if points.is_empty() {
-            return Err(empty(&source, "the design has no points"));
+            return Err(source.empty("the design has no points"));
         }
         let spread = wanted.axes.iter().zip(values).filter_map(|(name, values)| {
             let facts = source.column(name)?;
@@ -181,7 +179,7 @@ impl Scatter {
         let parameters: Vec<Spread> = spread.collect();
         let Wanted { level, shown, .. } = wanted;
         if parameters.is_empty() {
-            return Err(empty(&source, "no parameter varies from point to point"));
+            return Err(source.empty("no parameter varies from point to point"));
         }
         let spans = || crate::chart::spans_decades(quantity.iter().copied());
         let log = ratio || (level.is_none() && spans());
@@ -226,14 +224,12 @@ impl Scatter {
     /// Name of the run, its points and how they were placed, and what is not shown of them.
     pub(crate) fn subtitle(&self, rest: &[String]) -> String {
         let all: u64 = self.counts.iter().sum();
-        let mut parts: Vec<String> =
-            self.source.run_name().map(str::to_owned).into_iter().collect();
-        parts.push(match self.source.design_method() {
+        let mut parts = self.source.notes([match self.source.design_method() {
             Some("latin_hypercube") => format!("Latin hypercube of {all} points"),
             Some("sobol") => format!("Sobol sequence of {all} points"),
             Some("monte_carlo") => format!("{all} points at random"),
             _ => format!("list of {all} points"),
-        });
+        }]);
         if (self.points.len() as u64) < all {
             parts.push(format!("{} of them picked at random", self.points.len()));
         }

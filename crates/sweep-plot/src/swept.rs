@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::axis::evenly_by_log;
 use super::error::PlotError;
 use super::label;
-use super::read::{Cells, ColumnFacts, Source};
+use super::read::{ColumnFacts, Source};
 
 /// Most different values of an axis that are kept. An axis of more is known by its range alone.
 pub(crate) const MOST_VALUES: usize = 1 << 18;
@@ -36,8 +36,7 @@ impl SweptAxis {
 
     /// A value of the axis, with its name and unit: "Damping 140 N s/m".
     pub(crate) fn said(&self, value: f64) -> String {
-        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
-        format!("{} {}{unit}", self.words, label::significant(value, 4))
+        label::valued(&self.words, value, &self.unit)
     }
 }
 
@@ -102,7 +101,7 @@ pub(crate) fn columns(source: &Source) -> Vec<&ColumnFacts> {
     let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
     let is_result = |name: &str| of_model(name) || name == "ratio_change";
     let before = source.columns.iter().take_while(|column| !is_result(&column.name));
-    before.filter(|column| column.cells == Cells::Numbers && column.name != "point").collect()
+    before.filter(|column| column.is_number() && column.name != "point").collect()
 }
 
 /// Whether a map file's rows are a whole grid over two axes or more, or a curve over one.
@@ -127,14 +126,13 @@ pub(crate) fn is_whole(source: &Source) -> Result<bool, PlotError> {
 /// As [`Source::batches`]; [`PlotError::Empty`] without rows or axes; [`PlotError::NotAGrid`] for
 /// an axis value that is not a number, or rows that do not lie on a grid.
 pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
-    let empty = |reason| PlotError::Empty { path: source.path.clone(), reason };
     if source.rows == 0 {
-        return Err(empty("the map has no rows"));
+        return Err(source.empty("the map has no rows"));
     }
     let no_grid = |reason: String| PlotError::NotAGrid { path: source.path.clone(), reason };
     let columns = columns(source);
     if columns.is_empty() {
-        return Err(empty("the map has no axis"));
+        return Err(source.empty("the map has no axis"));
     }
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
     let mut gathered: Vec<Gathered> = names.iter().map(|_| Gathered::new()).collect();
@@ -157,7 +155,7 @@ pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
     }
     // What the file says of its rows need not be so.
     if gathered.iter().any(|axis| axis.seen.is_empty()) {
-        return Err(empty("the map has no rows"));
+        return Err(source.empty("the map has no rows"));
     }
     Ok(columns.iter().zip(gathered).map(|(column, gathered)| gathered.axis(column)).collect())
 }

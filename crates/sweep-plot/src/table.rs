@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use super::error::PlotError;
-use super::read::{Cells, ColumnFacts, Kind, Source};
+use super::read::{ColumnFacts, Kind, Source};
 use super::thin::{Keep, Stretches, Thinner};
 
 /// Most numbers of a file that are kept for a figure: what a page of some megabytes carries.
@@ -152,9 +152,9 @@ impl Table {
         let mut values: Vec<Values> = source
             .columns
             .iter()
-            .map(|column| match column.cells {
-                Cells::Numbers => Values::Numbers(Vec::with_capacity(source.rows)),
-                Cells::Words => Values::Words(Words::default()),
+            .map(|column| match column.is_number() {
+                true => Values::Numbers(Vec::with_capacity(source.rows)),
+                false => Values::Words(Words::default()),
             })
             .collect();
         let mut rows = 0;

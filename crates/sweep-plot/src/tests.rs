@@ -283,7 +283,7 @@ fn a_trace_is_held_against_another() {
     );
     let modes = against(modes().write(folder.path(), "modes.parquet"));
     assert!(
-        message(draw(trace(), &modes, "a.svg")).contains("this is a modes file, expected a trace")
+        message(draw(trace(), &modes, "a.svg")).contains("this is a modes file; `sweep trace`")
     );
 }
 

@@ -7,7 +7,7 @@ mod side;
 use std::collections::HashMap;
 
 use serde::Serialize;
-use sweep_files::key;
+use sweep_files::FileKind;
 
 pub use boundary::{Crossing, Moved};
 pub use plans::PlanChange;
@@ -111,6 +111,7 @@ pub struct ColumnChange {
     /// The greatest difference of numbers.
     pub greatest: f64,
     /// Where that is, as a place among the shared rows.
+    #[serde(skip)]
     pub at: usize,
 }
 
@@ -178,16 +179,10 @@ impl Comparison {
 }
 
 /// The kind of a file, for telling what cannot be compared.
-fn kind(table: &ResultTable) -> String {
-    let prefix = key::PLAN.split('.').next().unwrap_or_default();
-    let named = table.file().pairs().find_map(|pair| {
-        let name = pair.key.strip_prefix(prefix)?.strip_prefix('.')?;
-        let is_kind =
-            !["plan", "plan_hash", "version", "numerics", "columns", "digest"].contains(&name);
-        is_kind.then(|| name.to_owned())
-    });
-    let is_map = || table.column("ratio_max").is_some() && table.column("status").is_some();
-    named.or_else(|| is_map().then(|| "map".to_owned())).unwrap_or_else(|| "other".to_owned())
+fn kind(table: &ResultTable) -> &'static str {
+    let is_map = table.column("ratio_max").is_some() && table.column("status").is_some();
+    let other = if is_map { "map" } else { "other" };
+    table.file().kind().map_or(other, FileKind::word)
 }
 
 /// Compares the second file with the first.

@@ -4,7 +4,8 @@
 use std::ops::Range;
 
 use crate::error::ResultsError;
-use crate::rows::{Cell, CellKind, ResultTable, Rows};
+use crate::rows::{Cell, ResultTable, Rows};
+use sweep_files::CellKind;
 
 /// A mistake in the text of a condition.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -142,10 +143,7 @@ impl Node {
             Self::Compare(comparison, left, right) => {
                 comparison.of(&left.value(at), &right.value(at))
             }
-            other => match other.value(at) {
-                Cell::Flag(flag) => Some(flag),
-                _ => None,
-            },
+            other => other.value(at).flag(),
         }
     }
 }

@@ -6,7 +6,8 @@ use arrow_schema::ArrowError;
 
 use crate::condition::{Condition, Context, Folding, Mistake, Node};
 use crate::parse::expression;
-use crate::rows::{Cell, CellKind, Column, Rows};
+use crate::rows::{Cell, Rows};
+use sweep_files::{CellKind, Column};
 
 /// A number of rows that a search drives down.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,8 +125,8 @@ mod tests {
     use arrow_schema::{Field, Schema};
 
     use super::*;
-    use crate::rows::columns;
     use crate::sample::{flags, numbers};
+    use sweep_files::columns;
 
     fn batch() -> RecordBatch {
         let arrays = [

@@ -28,5 +28,6 @@ pub use error::ResultsError;
 pub use export::{Format, export};
 pub use goal::Goal;
 pub use require::{Checked, Offender, check};
-pub use rows::{Cell, CellKind, Column, ResultTable, columns, ratio_limits};
+pub use rows::{Cell, ResultTable, ratio_limits};
+pub use sweep_files::{CellKind, Column, columns};
 pub use top::top;

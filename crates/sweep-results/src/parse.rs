@@ -16,7 +16,8 @@
 use std::ops::Range;
 
 use crate::condition::{Comparison, Condition, Fold, Mistake, Node, Operation, Typed};
-use crate::rows::{Cell, CellKind, Column, ResultTable};
+use crate::rows::{Cell, ResultTable};
+use sweep_files::{CellKind, Column};
 
 /// Deepest nesting: what no person writes, and no stack minds.
 const DEEPEST: usize = 64;

@@ -4,56 +4,13 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use arrow_array::{ArrayRef, RecordBatch};
-use arrow_schema::{ArrowError, DataType, Field, Schema};
-use parquet::arrow::ProjectionMask;
+use arrow_schema::ArrowError;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
-use sweep_files::{FileError, ParquetFile, cells, key};
-use sweep_parameter::{RatioLimits, Worse};
+use sweep_files::{CellKind, Column, FileError, ParquetFile, cells, columns, key};
+use sweep_parameter::RatioLimits;
 
 use crate::error::ResultsError;
-
-/// What the cells of a column are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CellKind {
-    /// Integers or floats.
-    Number,
-    /// Words.
-    Text,
-    /// True or false.
-    Flag,
-}
-
-impl CellKind {
-    /// In a sentence: "a number".
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Number => "a number",
-            Self::Text => "a text",
-            Self::Flag => "true or false",
-        }
-    }
-}
-
-/// A column, without its rows.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Column {
-    /// As in the file.
-    pub name: String,
-    /// From the field's metadata; empty for pure numbers and words.
-    pub unit: String,
-    /// From the field's metadata; may be empty.
-    pub description: String,
-    /// What its cells are.
-    pub kind: CellKind,
-    /// Whether the file keeps it as whole numbers.
-    pub whole: bool,
-    /// Which way it is bad, if the file says so.
-    pub worse: Option<Worse>,
-    /// Up to where it is good, if the file says so.
-    pub limit: Option<f64>,
-    field: usize,
-}
 
 /// One cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +26,14 @@ pub enum Cell {
 }
 
 impl Cell {
+    /// Whether it is true or false, if it is either.
+    pub const fn flag(&self) -> Option<bool> {
+        match self {
+            Self::Flag(flag) => Some(*flag),
+            _ => None,
+        }
+    }
+
     /// The number, if it is one.
     pub const fn number(&self) -> Option<f64> {
         match self {
@@ -96,9 +61,6 @@ pub fn ratio_limits(plan: &Value) -> Option<RatioLimits> {
     Some(RatioLimits { most, least: reliability["ratio_min"].as_f64() })
 }
 
-/// Rows decoded at once.
-const BATCH_ROWS: usize = 1 << 12;
-
 /// An open result file of any kind.
 #[derive(Debug)]
 pub struct ResultTable {
@@ -121,7 +83,7 @@ impl ResultTable {
     /// The columns of an open file.
     pub fn of(file: ParquetFile) -> Self {
         let columns = columns(file.schema());
-        let plan = file.value(key::PLAN).and_then(|plan| serde_json::from_str(plan).ok());
+        let plan = file.json(key::PLAN);
         Self { columns, plan, file }
     }
 
@@ -159,7 +121,7 @@ impl ResultTable {
             return Vec::new();
         }
         before
-            .filter(|column| column.kind == CellKind::Number && column.name != "point")
+            .filter(|column| column.is_number() && column.name != "point")
             .map(|column| column.name.as_str())
             .collect()
     }
@@ -183,31 +145,16 @@ impl ResultTable {
         names: &[&str],
     ) -> Result<impl Iterator<Item = Result<Rows, ResultsError>> + use<'_>, ResultsError> {
         let chosen: Vec<&Column> = names.iter().filter_map(|name| self.column(name)).collect();
-        let mut fields: Vec<usize> = chosen.iter().map(|column| column.field).collect();
-        fields.sort_unstable();
-        fields.dedup();
-        let places: Vec<(usize, CellKind)> = chosen
-            .iter()
-            .map(|column| {
-                let place = fields.iter().position(|field| *field == column.field);
-                (place.unwrap_or_default(), column.kind)
-            })
-            .collect();
-        let batches = self.file.batches(|builder| {
-            let mask = ProjectionMask::roots(builder.parquet_schema(), fields);
-            builder.with_projection(mask).with_batch_size(BATCH_ROWS)
-        })?;
+        let kinds: Vec<CellKind> = chosen.iter().map(|column| column.kind).collect();
+        let batches = self.file.rows_of(&chosen)?;
         let mut first = 0;
         Ok(batches.map(move |batch| {
-            let batch = batch?;
-            let read = |(place, kind): &(usize, CellKind)| decode(batch.column(*place), *kind);
-            let columns = places.iter().map(read).collect::<Result<Vec<_>, _>>();
-            let columns = columns.map_err(|error| FileError::NotParquet {
-                path: self.path().to_owned(),
-                reason: error.to_string(),
-            })?;
-            let rows = Rows { first, count: batch.num_rows(), columns };
-            first += rows.count as u64;
+            let (count, cells) = batch?;
+            let columns = cells.iter().zip(&kinds).map(|(cells, kind)| decode(cells, *kind));
+            let columns: Result<_, _> = columns.collect();
+            let rows =
+                Rows { first, count, columns: columns.map_err(FileError::cells(self.path()))? };
+            first += count as u64;
             Ok(rows)
         }))
     }
@@ -275,33 +222,5 @@ fn decode(array: &ArrayRef, kind: CellKind) -> Result<Decoded, ArrowError> {
             let codes = cells::texts(array)?.into_iter().map(|word| word.map(&mut code)).collect();
             Decoded::Texts { names, codes }
         }
-    })
-}
-
-/// The columns of rows, without those of types that none of our files has.
-#[must_use]
-pub fn columns(schema: &Schema) -> Vec<Column> {
-    let fields = schema.fields().iter().enumerate();
-    fields.filter_map(|(place, field)| column(field, place)).collect()
-}
-
-fn column(field: &Field, place: usize) -> Option<Column> {
-    let kind = match field.data_type() {
-        DataType::Boolean => CellKind::Flag,
-        text if cells::is_text(text) => CellKind::Text,
-        number if cells::is_number(number) => CellKind::Number,
-        _ => return None,
-    };
-    let told = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
-    let unit = told("unit");
-    Some(Column {
-        name: field.name().clone(),
-        unit: if unit == "1" { String::new() } else { unit },
-        description: told("description"),
-        kind,
-        whole: field.data_type().is_integer(),
-        worse: Worse::named(&told(key::WORSE)),
-        limit: told(key::LIMIT).parse().ok(),
-        field: place,
     })
 }

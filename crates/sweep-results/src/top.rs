@@ -4,7 +4,8 @@ use std::cmp::Ordering;
 
 use crate::condition::{Condition, each_row};
 use crate::error::ResultsError;
-use crate::rows::{Cell, CellKind, ResultTable};
+use crate::rows::{Cell, ResultTable};
+use sweep_files::CellKind;
 use sweep_parameter::Worse;
 
 /// The first `count` rows by the column `by`, as if it were the worse the greater or the less it

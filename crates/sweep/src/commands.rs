@@ -5,9 +5,7 @@ mod dwell;
 mod explain;
 mod fit;
 mod held;
-mod held_args;
 mod init;
-mod lines;
 mod man;
 mod merge;
 mod modes;
@@ -28,19 +26,8 @@ use sweep_engine::commands::examples::{self, Examples};
 use sweep_engine::commands::{
     boundary, check, compare, export, optimise, parameters, report, require, show as show_engine,
 };
-
 use sweep_engine::exit::{Error, Exit};
 use sweep_engine::nearest::nearest;
-
-/// Shown by `--help`.
-const EXAMPLES: Examples = &[
-    ["sweep init my.toml", "a commented grid file to start from"],
-    ["sweep check my.toml", "every mistake in it, or what it would do"],
-    ["sweep run my.toml", "do it; again after an interruption, it goes on"],
-    ["sweep show results/first.parquet", "what came of it"],
-    ["sweep plot results/first.parquet", "the map as a picture"],
-    ["sweep parameters", "every number that can be set or swept"],
-];
 
 /// Subcommands by what they are for, as help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [
@@ -50,6 +37,9 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Cluster", &["status", "merge", "slurm"]),
     ("Set up", &["init", "parameters", "schema", "man", "completions"]),
 ];
+
+/// Examples of the program and of every subcommand.
+const EXAMPLES: &str = include_str!("commands/examples.txt");
 
 /// Maps where a washing machine's linear suspension model can be trusted.
 #[derive(Debug, Parser)]
@@ -123,45 +113,21 @@ pub enum Command {
     Reference(reference::Args),
 }
 
-/// The examples of a subcommand; of the program, by the empty name.
+/// The examples of a subcommand; of the program, by its name.
 fn examples_of(name: &str) -> Examples {
-    match name {
-        "" => EXAMPLES,
-        "run" => lines::RUN,
-        "check" => lines::CHECK,
-        "merge" => lines::MERGE,
-        "status" => lines::STATUS,
-        "slurm" => slurm::EXAMPLES,
-        "show" => lines::SHOW,
-        "report" => lines::REPORT,
-        "require" => lines::REQUIRE,
-        "compare" => lines::COMPARE,
-        "export" => lines::EXPORT,
-        "trace" => trace::EXAMPLES,
-        "modes" => modes::EXAMPLES,
-        "stability" => stability::EXAMPLES,
-        "dwell" => dwell::EXAMPLES,
-        "explain" => explain::EXAMPLES,
-        "fit" => fit::EXAMPLES,
-        "boundary" => lines::BOUNDARY,
-        "optimise" => lines::OPTIMISE,
-        "plot" => plot::EXAMPLES,
-        "parameters" => lines::PARAMETERS,
-        "init" => init::EXAMPLES,
-        "schema" => schema::EXAMPLES,
-        "completions" => completions::EXAMPLES,
-        "man" => man::EXAMPLES,
-        _ => &[],
-    }
+    let parts = EXAMPLES.split("\n\n");
+    let own = parts.filter_map(|part| part.strip_prefix(name)?.strip_prefix(":\n")).next();
+    let lines: Vec<&str> = own.unwrap_or_default().lines().map(str::trim).collect();
+    lines.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
 /// The command line with everything that its help shows.
 pub(crate) fn command() -> clap::Command {
-    let with = |command: clap::Command, lines: Examples| match examples::shown(lines) {
+    let with = |command: clap::Command, lines: Examples| match examples::shown(&lines) {
         Some(examples) => command.before_help(examples),
         None => command,
     };
-    let program = with(Cli::command(), EXAMPLES);
+    let program = with(Cli::command(), examples_of("sweep"));
     let names: Vec<String> =
         program.get_subcommands().map(|command| command.get_name().to_owned()).collect();
     let program = names.into_iter().fold(program, |program, name| {
@@ -316,9 +282,10 @@ mod tests {
     fn every_visible_command_has_examples_and_every_example_parses() {
         let whole = command();
         let shown = whole.get_subcommands().filter(|command| !command.is_hide_set());
-        for name in shown.map(clap::Command::get_name).chain([""]) {
+        for name in shown.map(clap::Command::get_name).chain(["sweep"]) {
             // A command's own first; what follows may go on with its output.
-            let (lines, own) = (examples_of(name), format!("sweep {name}"));
+            let (lines, own) =
+                (examples_of(name), format!("sweep {name}").replace("sweep sweep", "sweep "));
             assert!(lines.first().is_some_and(|[line, _]| line.starts_with(&own)), "{name}");
             for [line, _] in lines {
                 let line = line.split(" 2>").next().unwrap_or_default();
@@ -330,9 +297,9 @@ mod tests {
 
     #[test]
     fn no_example_is_wider_than_a_terminal_or_changed_by_folding() {
-        for name in command().get_subcommands().map(clap::Command::get_name).chain([""]) {
+        for name in command().get_subcommands().map(clap::Command::get_name).chain(["sweep"]) {
             let lines = examples_of(name);
-            let shown = examples::shown(lines).unwrap_or_default();
+            let shown = examples::shown(&lines).unwrap_or_default();
             assert!(shown.lines().all(|line| line.len() <= examples::WIDEST), "{shown}");
             // As a shell reads it, which takes a folded line for one.
             let words = shown.replace("\\\n", "").split_whitespace().collect::<Vec<_>>().join(" ");

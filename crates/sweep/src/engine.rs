@@ -10,7 +10,7 @@ pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
 pub(crate) use sweep_engine::{Engine, Watch};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock};
 
 use ladder::ladder;
 use lane_ode::Simd;
@@ -23,6 +23,7 @@ use crate::plan::{Plan, Scenario};
 use sweep_engine::interrupt::Interrupt;
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::store::Done;
+use sweep_files::panics::{lock, unlocked};
 
 /// Parts of a run at whose ends two runs of a trajectory are compared.
 pub(crate) const CHECKPOINTS: u32 = 128;
@@ -132,7 +133,7 @@ impl<'a> ModelEngine<'a> {
         if let Some(found) = self.ladders.get() {
             return Some(found);
         }
-        let _one_thread = self.finding.lock().unwrap_or_else(PoisonError::into_inner);
+        let _one_thread = lock(&self.finding);
         if let Some(found) = self.ladders.get() {
             return Some(found);
         }
@@ -191,7 +192,7 @@ impl<'a> ModelEngine<'a> {
     ) -> Option<Vec<Outcome>> {
         let next = Mutex::new(0..axis_values.len());
         let feed = |most: usize| {
-            let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut next = lock(&next);
             let positions: Vec<usize> = next.by_ref().take(most).collect();
             positions
                 .into_iter()
@@ -202,10 +203,10 @@ impl<'a> ModelEngine<'a> {
         let keep = |outcome: Outcome| {
             watch.done(1);
             seen(&outcome);
-            found.lock().unwrap_or_else(PoisonError::into_inner).push(outcome);
+            lock(&found).push(outcome);
         };
         self.through_lanes(demand, &feed, &keep, watch);
-        let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut found = unlocked(found);
         found.sort_by_key(|outcome| outcome.point);
         (found.len() == axis_values.len()).then_some(found)
     }

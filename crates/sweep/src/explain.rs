@@ -160,14 +160,11 @@ fn looked(point: &Point, fastest_rpm: f64) -> Result<Speeds, Error> {
     if fastest_rpm > from_rpm {
         return Ok(Speeds::new(from_rpm, fastest_rpm, STEP_RPM));
     }
-    Err(Error::Option {
-        option: "[spin]",
-        given: format!("at most {fastest_rpm:.3} rpm"),
-        expected: format!(
-            "a profile that exceeds {from_rpm} rpm, half of the slowest mode's frequency, within \
-             the run; to look at other speeds, give --speed FROM:TO:STEP"
-        ),
-    })
+    let expected = format!(
+        "a profile that exceeds {from_rpm} rpm, half of the slowest mode's frequency, within the \
+         run; to look at other speeds, give --speed FROM:TO:STEP"
+    );
+    Err(Error::option("[spin]", format!("at most {fastest_rpm:.3} rpm"), expected))
 }
 
 fn swept(plan: &Plan, interrupt: &Interrupt) -> Result<Swept, Error> {

@@ -32,6 +32,7 @@ use sweep_engine::config::report::{Diagnostic, Report as Mistakes};
 use sweep_engine::config::source::Location;
 use sweep_engine::design::{Design, Distribution, Shape};
 use sweep_engine::exit::{Error, tell};
+use sweep_engine::threads::Stop;
 
 use algebra::Symmetric;
 use journal::Journal;
@@ -106,7 +107,7 @@ pub(crate) struct Fitted {
 /// How a fit goes about its work.
 pub(crate) struct Work<'a> {
     /// Ends it early; what comes then means nothing.
-    pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
+    pub(crate) stop: Stop<'a>,
     /// Hears of every evaluation: how many there were.
     pub(crate) seen: &'a (dyn Fn(usize) + Sync),
     /// Where answers are kept.
@@ -382,7 +383,7 @@ fn by_tachometer(
     problem: &Problem,
     best: &Descent,
     against: &[Against],
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop<'_>,
 ) -> Vec<Vec<f64>> {
     let n = problem.unknowns();
     let bread = algebra::inverse(&best.summary.normal);

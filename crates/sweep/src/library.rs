@@ -30,9 +30,31 @@ pub use stability::{find_held, held_to_file};
 pub use trace::{TraceOptions, trace_point};
 
 pub use sweep_engine::effort::Effort;
+use sweep_engine::exit::Error;
+
+use crate::speeds::MOST_SPEEDS;
 
 /// Speeds that make no sense.
-fn refused_speeds(count: usize, expected: String) -> sweep_engine::exit::Error {
-    let given = format!("with {count} values");
-    sweep_engine::exit::Error::Option { option: "speeds", given, expected }
+fn refused_speeds(count: usize, expected: String) -> Error {
+    Error::option("speeds", format!("with {count} values"), expected)
+}
+
+/// Refuses speeds (rpm) that do not rise, fewer than `least` of them or too many, and any that is
+/// not `allowed`, which are those `said`.
+fn check_speeds(
+    speeds_rpm: &[f64],
+    least: usize,
+    allowed: fn(f64) -> bool,
+    said: &str,
+) -> Result<(), Error> {
+    let count = speeds_rpm.len();
+    let rise = speeds_rpm.windows(2).all(|pair| pair[0] < pair[1]);
+    let are_speeds = speeds_rpm.iter().all(|speed| speed.is_finite() && allowed(*speed));
+    if rise && are_speeds && count >= least && count as f64 <= MOST_SPEEDS + 1.0 {
+        return Ok(());
+    }
+    let expected = format!(
+        "from {least} to {MOST_SPEEDS} finite speeds in rpm{said}, each above the one before"
+    );
+    Err(refused_speeds(count, expected))
 }

@@ -4,7 +4,6 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use lane_ode::Simd;
-use serde_json::Value;
 use sweep_files::{ParquetFile, key};
 use sweep_plot::{Live, Slider};
 use washer_live::{Setup, Sliders};
@@ -160,14 +159,9 @@ fn slider(parameter: &Parameter, from: f64, to: f64, value: Option<f64>) -> Slid
 
 /// The plan that a map was made by.
 fn plan_of(file: &Path) -> Result<Plan, Error> {
-    let refused = |expected: &str| Error::Option {
-        option: "--live",
-        given: file.display().to_string(),
-        expected: expected.to_owned(),
-    };
+    let refused = |expected: &str| Error::option("--live", file.display(), expected);
     let opened = ParquetFile::open(file)?;
-    let text = opened.value(key::PLAN).map(str::to_owned);
-    let json = text.and_then(|text| serde_json::from_str::<Value>(&text).ok());
+    let json = opened.json(key::PLAN);
     let mut json = json.ok_or_else(|| refused("a map by `sweep run`, which carries its plan"))?;
     let name = file.display().to_string();
     if json.get("design").is_none() {
@@ -228,39 +222,28 @@ fn usual(plan: &Plan) -> Vec<Range> {
 
 /// The sliders that `--slider` asks for.
 fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Range>, Error> {
-    let refused = |range: &SliderRange, expected: String| Error::Option {
-        option: "--slider",
-        given: format!("{}={}:{}", range.name, range.from, range.to),
-        expected,
-    };
     let mut found: Vec<Range> = Vec::new();
-    for range in ranges {
-        let SliderRange { name, from, to } = range;
+    for SliderRange { name, from, to } in ranges {
+        let refused =
+            |expected: String| Error::option("--slider", format!("{name}={from}:{to}"), expected);
         let parameter = Parameter::find(name, &plan.model.machine, &plan.model.spin)
-            .map_err(|why| refused(range, format!("a name of `sweep parameters`: {why}")))?;
-        if plan.axes.iter().any(|axis| axis.parameter == parameter)
-            || found.iter().any(|(other, ..)| *other == parameter)
-        {
-            return Err(refused(range, "a parameter that has no slider yet".to_owned()));
-        }
+            .map_err(|why| refused(format!("a name of `sweep parameters`: {why}")))?;
+        let has_slider = plan.axes.iter().any(|axis| axis.parameter == parameter)
+            || found.iter().any(|(other, ..)| *other == parameter);
         let is_spread = parameter.get(&plan.model.machine, &plan.model.spin).is_none();
-        if is_spread {
-            let expected = "a parameter that has one value in this map".to_owned();
-            return Err(refused(range, expected));
-        }
-        if let Some(end) = [*from, *to].into_iter().find(|end| !parameter.range().contains(*end)) {
-            return Err(refused(
-                range,
-                format!("{} at both ends", parameter.range().instead_of(end)),
-            ));
-        }
+        let beyond = [*from, *to].into_iter().find(|end| !parameter.range().contains(*end));
         found.push((parameter, *from, *to));
-        if found.len() > MOST_SLIDERS {
-            return Err(refused(range, format!("at most {MOST_SLIDERS} sliders")));
-        }
-        if !is_sound(plan, &found) {
-            return Err(refused(range, "values that a machine can have together".to_owned()));
-        }
+        let expected = match beyond {
+            _ if has_slider => "a parameter that has no slider yet".to_owned(),
+            _ if is_spread => "a parameter that has one value in this map".to_owned(),
+            Some(end) => {
+                format!("{} at both ends", found[found.len() - 1].0.range().instead_of(end))
+            }
+            None if found.len() > MOST_SLIDERS => format!("at most {MOST_SLIDERS} sliders"),
+            None if !is_sound(plan, &found) => "values that a machine can have together".to_owned(),
+            None => continue,
+        };
+        return Err(refused(expected));
     }
     Ok(found)
 }

@@ -5,8 +5,7 @@ use washer_model::decimal;
 
 /// The axes that a file has columns of.
 pub(crate) fn axes(file: &ParquetFile) -> Vec<String> {
-    let plan = file.value(key::PLAN).and_then(|plan| serde_json::from_str(plan).ok());
-    let plan: serde_json::Value = plan.unwrap_or_default();
+    let plan = file.json(key::PLAN).unwrap_or_default();
     let axes = plan["axis"].as_array().into_iter().flatten();
     let names = axes.filter_map(|axis| axis["parameter"].as_str());
     names.filter(|name| file.schema().index_of(name).is_ok()).map(str::to_owned).collect()

@@ -32,8 +32,7 @@ const AT_ONCE: [u64; 2] = [32, 2048];
 /// # Errors
 /// [`Error::Option`].
 pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<(), Error> {
-    let refuse =
-        |expected: String| Err(Error::Option { option, given: given.to_owned(), expected });
+    let refuse = |expected: String| Err(Error::option(option, given, expected));
     for axis in &plan.axes {
         let name = axis.parameter.name();
         match axis.parameter.target() {
@@ -100,7 +99,7 @@ impl<'a> DwellEngine<'a> {
     /// # Errors
     /// An instruction set that is not there.
     pub(crate) fn new(plan: &'a Plan, speeds_rpm: &'a [f64]) -> Result<Self, EngineError> {
-        Self::asking(plan, speeds_rpm, Asked::Responses(Columns::of_dwells(plan, speeds_rpm)))
+        Self::asking(plan, speeds_rpm, Asked::Responses(Columns::of_dwells(plan)))
     }
 
     /// As [`Self::new`], of anything.

@@ -25,7 +25,7 @@ use sweep_engine::exit::Error;
 use sweep_engine::method::Integrator as _;
 use sweep_engine::store::{StoreError, read};
 use sweep_engine::table::Table;
-use sweep_engine::threads;
+use sweep_engine::threads::{self, Stop};
 use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
 use washer_row::Level;
 
@@ -115,14 +115,11 @@ pub(crate) fn every(every_s: Option<f64>, plan: &Plan) -> Result<Option<f64>, Er
             // The start is an instant too.
             count += 1.0 + plan.scenario(point).model.spin.turns_within([0.0, plan.end_s]);
             if count > MOST_INSTANTS {
-                return Err(Error::Option {
-                    option: "--turns",
-                    given: format!("to {} s", plan.end_s),
-                    expected: format!(
-                        "at most {MOST_INSTANTS} turns of the drum, over all points: an earlier \
-                         end_s, or fewer points"
-                    ),
-                });
+                let expected = format!(
+                    "at most {MOST_INSTANTS} turns of the drum, over all points: an earlier end_s, \
+                     or fewer points"
+                );
+                return Err(Error::option("--turns", format!("to {} s", plan.end_s), expected));
             }
         }
         return Ok(None);
@@ -131,11 +128,7 @@ pub(crate) fn every(every_s: Option<f64>, plan: &Plan) -> Result<Option<f64>, Er
     if (least..=plan.end_s).contains(&every_s) {
         return Ok(Some(every_s));
     }
-    Err(Error::Option {
-        option: "--every",
-        given: every_s.to_string(),
-        expected: format!("from {least:e} to {} s", plan.end_s),
-    })
+    Err(Error::option("--every", every_s, format!("from {least:e} to {} s", plan.end_s)))
 }
 
 /// What of a point's histories is looked at.
@@ -187,7 +180,7 @@ pub(crate) fn in_pool(
     plan: &Plan,
     at: Option<Vec<(String, f64)>>,
     view: &View,
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop<'_>,
 ) -> Result<Trace, NoEquilibrium> {
     // A thread for each model, where there may be two.
     let wanted = if at.is_some() { 2 } else { threads::cores() };
@@ -213,7 +206,7 @@ pub(crate) fn trace(
     scenario: Scenario,
     at: NamedValues,
     view: &View,
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop<'_>,
 ) -> Result<Trace, NoEquilibrium> {
     let run = Run::new(plan, scenario, view)?;
     let runs = [&run];
@@ -246,7 +239,7 @@ pub(crate) fn trace(
 /// As [`trace`] of every point of a plan, in one table with the points' numbers and axes: so many
 /// at once as there are lanes, each with the bits that it has alone. A point without equilibrium
 /// has no rows, and is among the failures.
-pub(crate) fn trace_all(plan: &Plan, view: &View, stop: &(dyn Fn() -> bool + Sync)) -> Trace {
+pub(crate) fn trace_all(plan: &Plan, view: &View, stop: Stop<'_>) -> Trace {
     let mut failures = Vec::new();
     let mut runs = Vec::new();
     for number in 0..plan.points() {
@@ -262,10 +255,9 @@ pub(crate) fn trace_all(plan: &Plan, view: &View, stop: &(dyn Fn() -> bool + Syn
     let numbers = rows().flat_map(|(number, count)| repeat_n(number, count));
     table.counts("point", "number of the point in its grid", numbers);
     for (k, axis) in plan.axes.iter().enumerate() {
-        let of = &axis.parameter;
         let values = rows()
             .flat_map(|(number, count)| repeat_n(plan.axis_values(number).get(k).copied(), count));
-        table.numbers(of.name(), of.unit(), of.description(), values);
+        table.parameter(&axis.parameter, values);
     }
     let failed = columns(&mut table, &each, &models, view.extras);
     for (k, (number, _)) in runs.iter().enumerate() {
@@ -310,7 +302,7 @@ impl Run {
 fn integrate<'a>(
     runs: &[&'a Run],
     models: Models,
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop<'_>,
 ) -> Vec<(ModelKind, Vec<History<'a>>)> {
     let kinds = models.kinds();
     let groups: Vec<(ModelKind, &[&'a Run])> = kinds
@@ -392,7 +384,7 @@ pub(crate) fn keep(
     result: &ParquetFile,
     folder: &Path,
     threads: usize,
-    stop: &(dyn Fn() -> bool + Sync),
+    stop: Stop<'_>,
     done: &(dyn Fn() + Sync),
 ) -> Result<(), StoreError> {
     let plan = engine.plan();
@@ -488,6 +480,9 @@ fn methods(plan: &Plan, point: &Point, spin: &Spin, quick: Option<Quick>) -> ([M
     }
 }
 
+/// The forces of all elements of a kind (N).
+type ForcesOfEach = fn(&Forces) -> &[f64];
+
 /// One model's columns.
 struct Columns<'a> {
     model: &'static str,
@@ -565,20 +560,16 @@ impl<'a> Columns<'a> {
             table.numbers(&name, "N", &description, forces.iter().map(|at| at.as_ref().map(of)));
         };
         let Some(first) = forces.first().and_then(Option::as_ref) else { return };
-        for k in 0..first.springs_n.len() {
-            let what = format!("spring_{}_tension", k + 1);
-            add(&what, "tension of the spring, negative where it pushes", &|at| at.springs_n[k]);
-        }
-        for k in 0..first.dampers_n.len() {
-            let what = format!("damper_{}_tension", k + 1);
-            add(&what, "tension of the damper, positive while it is drawn out", &|at| {
-                at.dampers_n[k]
-            });
-        }
-        for k in 0..first.stops_n.len() {
-            let what = format!("stop_{}_force", k + 1);
-            add(&what, "push between the tub and the stop", &|at| at.stops_n[k]);
-        }
+        let mut add_each = |part: &str, what: &str, description: &str, of: ForcesOfEach| {
+            for k in 0..of(first).len() {
+                add(&format!("{part}_{}_{what}", k + 1), description, &|at| of(at)[k]);
+            }
+        };
+        let pushes = "tension of the spring, negative where it pushes";
+        add_each("spring", "tension", pushes, |at| &at.springs_n);
+        let drawn = "tension of the damper, positive while it is drawn out";
+        add_each("damper", "tension", drawn, |at| &at.dampers_n);
+        add_each("stop", "force", "push between the tub and the stop", |at| &at.stops_n);
         let axes = ["x", "y", "z"];
         for k in 0..first.bushings_n.len() {
             for (i, axis) in axes.into_iter().enumerate() {
@@ -596,10 +587,8 @@ impl<'a> Columns<'a> {
             add(&format!("cabinet_force_{axis}"), &description, &|at| at.cabinet_n[k]);
         }
         for k in 0..first.feet_n.len() {
-            let what = format!("foot_{}_load", k + 1);
-            add(&what, "vertical load of the foot, negative where it would lift", &|at| {
-                at.feet_n[k]
-            });
+            let description = "vertical load of the foot, negative where it would lift";
+            add(&format!("foot_{}_load", k + 1), description, &|at| at.feet_n[k]);
         }
         if first.slip_margin_n.is_some() {
             let description = "margin of the cabinet against slipping, friction on all feet \

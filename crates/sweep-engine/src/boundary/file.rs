@@ -103,28 +103,19 @@ fn add_columns<M: Rows>(
          in range",
         lines.iter().map(|line| line.number as u64),
     );
-    table.counts(
-        "crossings",
-        "how many changes of side there are",
-        lines
-            .iter()
-            .map(|line| line.row.edges.iter().filter(|edge| edge.bracket.is_some()).count() as u64),
-    );
+    let changes = lines
+        .iter()
+        .map(|line| line.row.edges.iter().filter(|edge| edge.bracket.is_some()).count() as u64);
+    table.counts("crossings", "how many changes of side there are", changes);
     for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
-        table.numbers(
-            &format!("quantity_{word}"),
-            &quantity.unit,
-            &format!("{} at the bracket's {side} end; null where not defined", quantity.name),
-            lines
-                .iter()
-                .map(|line| line.edge.distances[end].map(|distance| quantity.value(distance))),
-        );
+        let (name, unit) = (format!("quantity_{word}"), &quantity.unit);
+        let of = &quantity.name;
+        let said = format!("{of} at the bracket's {side} end; null where not defined");
+        let value = |line: &Line<'_>| Some(quantity.value(line.edge.distances[end]?));
+        table.numbers(&name, unit, &said, lines.iter().map(value));
     }
-    table.counts(
-        "points",
-        "points evaluated at this value of the first axis",
-        lines.iter().map(|line| line.row.trials as u64),
-    );
+    let trials = lines.iter().map(|line| line.row.trials as u64);
+    table.counts("points", "points evaluated at this value of the first axis", trials);
 }
 
 /// Where the boundary is: both axes, the bracket, and the axes beyond the second.
@@ -136,12 +127,7 @@ fn add_axes<M: Rows>(
 ) {
     let [first, second, further @ ..] = plan.axes.as_slice() else { return };
     let (name, unit) = (second.parameter.name(), second.parameter.unit());
-    table.numbers(
-        first.parameter.name(),
-        first.parameter.unit(),
-        first.parameter.description(),
-        lines.iter().map(|line| Some(line.row.first)),
-    );
+    table.parameter(&first.parameter, lines.iter().map(|line| Some(line.row.first)));
     let said = format!(
         "{}, where {} = {}; null unless it is a crossing",
         second.parameter.description(),
@@ -150,22 +136,15 @@ fn add_axes<M: Rows>(
     );
     table.numbers(name, unit, &said, lines.iter().map(|line| line.edge.at));
     for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
-        table.numbers(
-            &within(name, unit, word),
-            unit,
-            &format!(
-                "{side} end of the bracket in which the side changes; null where none is in range"
-            ),
-            lines.iter().map(|line| line.edge.bracket.map(|bracket| bracket[end])),
+        let said = format!(
+            "{side} end of the bracket in which the side changes; null where none is in range"
         );
+        let value = |line: &Line<'_>| Some(line.edge.bracket?[end]);
+        table.numbers(&within(name, unit, word), unit, &said, lines.iter().map(value));
     }
     for (k, axis) in further.iter().enumerate() {
-        table.numbers(
-            axis.parameter.name(),
-            axis.parameter.unit(),
-            axis.parameter.description(),
-            lines.iter().map(|line| further_values(plan, line.curve).get(k).copied()),
-        );
+        let values = lines.iter().map(|line| further_values(plan, line.curve).get(k).copied());
+        table.parameter(&axis.parameter, values);
     }
 }
 

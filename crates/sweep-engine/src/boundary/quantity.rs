@@ -73,20 +73,20 @@ pub fn traced<M: Swept>(
             names.join(", "),
             M::FURTHER
         );
-        return Err(Error::Option { option: "--quantity", given: name.to_owned(), expected });
+        return Err(Error::option("--quantity", name, expected));
     };
     let (column, mut plan) = offered.swap_remove(at);
     let own = column.limit;
     let Some(value) = limit.or(own.map(|limit| limit.value)) else {
-        let (given, unit) = (name.to_owned(), &column.unit);
+        let unit = &column.unit;
         let expected = format!("--limit with it, in {unit}: it has no limit of its own");
-        return Err(Error::Option { option: "--quantity", given, expected });
+        return Err(Error::option("--quantity", name, expected));
     };
     let is_ratio = name.starts_with(RATIO);
     let scale = own.map_or(value.abs(), |limit| limit.scale);
     if !value.is_finite() || (is_ratio && value <= 0.0) || scale == 0.0 {
         let expected = format!("a number greater than 0, as {name} is never below");
-        return Err(Error::Option { option: "--limit", given: value.to_string(), expected });
+        return Err(Error::option("--limit", value, expected));
     }
     if name == LEAST_RATIO {
         plan.reliability.limits.least = Some(value);

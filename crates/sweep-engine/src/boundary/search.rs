@@ -2,7 +2,7 @@
 //! settings a plan gives a search.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 
 use super::distance::TracedQuantity;
 use super::{Evaluate, Search, Trial};
@@ -12,6 +12,7 @@ use crate::plan::{Axis, AxisValues, Plan};
 use crate::store::{Key, StoreError, Trials};
 use crate::threads::{self, ThreadsError};
 use crate::watch::Watch;
+use sweep_files::panics::{lock, unlocked};
 use sweep_parameter::Parameter as _;
 
 /// Rows of all curves together that are accepted: what is known of them stays in memory.
@@ -195,11 +196,11 @@ impl<'a, M: Model> Models<'a, M> {
 
     /// The memory, at the end.
     pub fn into_kept(self) -> Option<Trials> {
-        self.kept.map(|kept| kept.into_inner().unwrap_or_else(PoisonError::into_inner))
+        self.kept.map(unlocked)
     }
 
     fn kept(&self) -> Option<MutexGuard<'_, Trials>> {
-        self.kept.as_ref().map(|kept| kept.lock().unwrap_or_else(PoisonError::into_inner))
+        self.kept.as_ref().map(lock)
     }
 
     /// Counts trials that are done.
@@ -238,14 +239,14 @@ impl<M: Model> Evaluate for Models<'_, M> {
             if let (Some(mut kept), Some(position)) = (self.kept(), new.get(place))
                 && let Err(error) = kept.keep(key(&trials[*position]), distance(value))
             {
-                failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                lock(&failure).get_or_insert(error);
                 watch.abort();
             }
             self.count(1);
         };
         let found = self.pool.install(|| self.values.values(&axis_values, &seen, &watch));
         let settled = self.kept().map_or(Ok(()), |kept| kept.settle());
-        let failure = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let failure = unlocked(failure);
         if let Some(error) = failure.or(settled.err()) {
             return Err(Stopped::Failed(error));
         }

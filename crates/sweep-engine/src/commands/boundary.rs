@@ -2,27 +2,26 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use super::cells::short;
-use super::grid::{GridArgs, quoted};
+use super::cells::{Lines as _, short};
+use super::grid::GridArgs;
 use super::plot::finite;
-use super::run::{installed, line};
+use super::run::installed;
 use crate::boundary::distance::TracedQuantity;
 use crate::boundary::file::{self, job};
 use crate::boundary::quantity::{offered, traced};
 use crate::boundary::search::{BoundaryTask, Models, Stopped};
 use crate::boundary::{EdgeKind, Standing, Traced, trace};
-use crate::effort::Effort;
+use crate::effort::{Effort, EffortArgs};
 use crate::exit::{Error, Exit, show, tell};
 use crate::plan::Plan;
-use crate::program::program;
-use crate::progress::{Progress, ProgressMode, duration};
+use crate::progress::{Progress, duration};
 use crate::store::{Column, OpenedTrials, StoreError, Trials};
 use crate::swept::Swept;
-use crate::threads;
+use sweep_files::panics::lock;
 use sweep_files::{FileKind, Output};
 use sweep_parameter::{Parameter as _, Worse};
 
@@ -63,16 +62,12 @@ pub struct Args {
         value_parser = clap::value_parser!(u16).range(1..=1000)
     )]
     pub lattice: u16,
-    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
-    pub threads: Option<usize>,
+    /// How it goes about it.
+    #[command(flatten)]
+    pub effort: EffortArgs,
     /// Start over, even if the boundary is there or another plan was begun
     #[arg(long)]
     pub fresh: bool,
-    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
-    /// 5 s) or none
-    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
-    pub progress: ProgressMode,
 }
 
 /// What `--help` adds.
@@ -109,8 +104,8 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let mut trials = match Trials::open(&output, &job, args.fresh)? {
         OpenedTrials::Open(trials) => *trials,
         OpenedTrials::Finished => {
-            tell(&already(&plan, &output));
-            return Ok(Exit::Done);
+            let there = "the boundary is there already (--fresh traces it again)";
+            return Ok(told(format!("{}: {there}\n", plan.name), &output));
         }
     };
     trials.take_notes().iter().for_each(|note| tell(note));
@@ -119,7 +114,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         tell(&format!("going on: {there} points are there"));
     }
     let began = Instant::now();
-    let effort = Effort { threads: args.threads, progress: args.progress, interrupt: &interrupt };
+    let effort = args.effort.with(&interrupt);
     let (found, trials) = search(&plan, &quantity, &task, Some(trials), effort)?;
     let found = match found {
         Ok(found) => found,
@@ -129,7 +124,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
             let wall = duration(began.elapsed().as_secs_f64());
             let mut text =
                 format!("{}: interrupted with {kept} points kept, after {wall}\n", plan.name);
-            line(&mut text, "go on", "the same command");
+            text.line("go on", "the same command");
             tell(text.trim_end());
             return Ok(Exit::interrupted(interrupt.signal()));
         }
@@ -139,10 +134,8 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
-    let mut text = summary(&plan, &quantity, &task, &found, began.elapsed().as_secs_f64());
-    next(&mut text, &output);
-    tell(text.trim_end());
-    Ok(Exit::Done)
+    let text = summary(&plan, &quantity, &task, &found, began.elapsed().as_secs_f64());
+    Ok(told(text, &output))
 }
 
 /// Every column that a boundary can be drawn through: unit, bad side, limit, meaning.
@@ -159,19 +152,12 @@ fn listing<M: Swept>(plan: &Plan<M>) -> String {
     columns.iter().map(row).collect()
 }
 
-/// What there is to say if the boundary is there.
-fn already<M: Swept>(plan: &Plan<M>, output: &Path) -> String {
-    let mut text =
-        format!("{}: the boundary is there already (--fresh traces it again)\n", plan.name);
-    next(&mut text, output);
-    text.trim_end().to_owned()
-}
-
-/// The file, and what to do with it.
-fn next(text: &mut String, output: &Path) {
-    let shown = output.display().to_string();
-    line(text, "file", &shown);
-    line(text, "next", &format!("{} plot {}", program(), quoted(&shown)));
+/// Says it, with the file and what to do with it.
+fn told(mut text: String, output: &Path) -> Exit {
+    text.line("file", output.display());
+    text.next("plot", output);
+    tell(text.trim_end());
+    Exit::Done
 }
 
 fn summary<M: Swept>(
@@ -203,20 +189,16 @@ fn summary<M: Swept>(
         .filter(|(_, count)| *count > 0)
         .map(|(kind, count)| format!("{count} {}", kind.name()))
         .collect();
-    line(&mut text, "found", &counts.join(", "));
+    text.line("found", counts.join(", "));
     let several = rows().filter(|row| row.edges.len() > 1).count();
     if several > 0 {
-        line(
-            &mut text,
-            "folds",
-            &format!("{several} values of the first axis have several crossings"),
-        );
+        text.line("folds", format!("{several} values of the first axis have several crossings"));
     }
     let brackets = rows().flat_map(|row| &row.edges).filter_map(|edge| edge.bracket);
     if let Some(widest) = brackets.map(|[low, high]| high - low).reduce(f64::max) {
         let unit = plan.axes.get(1).map_or("", |axis| axis.parameter.unit());
         let told = format!("at most {widest:.3} {unit} wide (asked: {})", task.search.tolerance);
-        line(&mut text, "brackets", &told);
+        text.line("brackets", told);
     }
     // Cells of a logarithmic axis grow: the largest counts.
     let cells: Vec<String> = plan
@@ -230,10 +212,9 @@ fn summary<M: Swept>(
         })
         .collect();
     let cell = cells.join(" by ");
-    line(
-        &mut text,
+    text.line(
         "promises",
-        &format!("every island of {cell}; smaller ones may be missed (--lattice)"),
+        format!("every island of {cell}; smaller ones may be missed (--lattice)"),
     );
     text
 }
@@ -269,6 +250,6 @@ pub fn search<M: Swept>(
     let mut standing =
         |standing: &Standing| rows_done.store(standing.rows as u64, Ordering::Relaxed);
     let found = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
-    progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+    lock(&progress).finish();
     Ok((found, models.into_kept()))
 }

@@ -1,6 +1,30 @@
 //! Cells of results as people read them.
 
+use std::fmt::{Display, Write as _};
+use std::path::Path;
+
+use super::grid::quoted;
+use crate::program::program;
 use sweep_results::Cell;
+
+/// Lines of a summary, each of a name and what is said of it.
+pub trait Lines {
+    /// Adds a line.
+    fn line(&mut self, name: &str, said: impl Display);
+
+    /// Adds the command that comes next, of this file.
+    fn next(&mut self, verb: &str, file: &Path) {
+        let file = quoted(&file.display().to_string());
+        self.line("next", format!("{} {verb} {file}", program()));
+    }
+}
+
+impl Lines for String {
+    fn line(&mut self, name: &str, said: impl Display) {
+        // Writing to a String cannot fail.
+        let _ = writeln!(self, "{name:>10}  {said}");
+    }
+}
 
 /// Six digits, without an exponent where that reads well.
 pub fn short(value: f64) -> String {

@@ -32,7 +32,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     if args.json {
         return show(&format!("{:#}\n", plan.to_json()));
     }
-    let estimate = M::estimate(&plan, threads::count(None, &|name| std::env::var(name).ok())?)?;
+    let estimate = M::estimate(&plan, threads::count(None, &threads::process)?)?;
     tell(summary(&plan, &estimate).trim_end());
     Ok(Exit::Done)
 }

@@ -8,14 +8,14 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::cells::{short, table};
+use super::cells::{Lines as _, short, table};
 use super::grid::quoted;
-use super::run::line;
 use crate::build::Build;
 use crate::exit::{Error, Exit, show, tell};
 use crate::store::StoreError;
 use fail_on::FailOn;
 use sweep_files::{FileKind, Output};
+use sweep_plot::capitalised;
 use sweep_results::{Comparison, Flip, Moved, PlanChange, ResultTable, SharedRow, compare};
 
 /// Arguments of `sweep compare`.
@@ -78,16 +78,12 @@ pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
     let tables = [ResultTable::open(files[0])?, ResultTable::open(files[1])?];
     let found = compare(&tables[0], &tables[1])?;
     if let Some([given, of]) = args.fail_on.iter().find_map(|fail_on| fail_on.lacks(&found)) {
-        let (given, expected) = (given.to_owned(), of.to_owned());
-        return Err(Error::Option { option: "--fail-on", given, expected });
+        return Err(Error::option("--fail-on", given, of));
     }
     if let (Some(output), Some(path)) = (output, &args.out) {
         if !found.has_verdicts {
-            return Err(Error::Option {
-                option: "--out",
-                given: path.display().to_string(),
-                expected: "two maps: other files have no differences row by row".to_owned(),
-            });
+            let expected = "two maps: other files have no differences row by row";
+            return Err(Error::option("--out", path.display(), expected));
         }
         let bytes = differences::bytes(args, &found, &tables, build)
             .map_err(StoreError::parquet("write", path))?;
@@ -302,20 +298,20 @@ fn boundary(moved: &Moved) -> String {
 /// What differs, for people.
 fn text(args: &Args, found: &Comparison) -> String {
     let mut text = String::new();
-    line(&mut text, "A", &args.first.display().to_string());
-    line(&mut text, "B", &args.second.display().to_string());
+    text.line("A", args.first.display());
+    text.line("B", args.second.display());
     if found.is_empty() {
-        line(&mut text, "differ", "not at all");
+        text.line("differ", "not at all");
         return text;
     }
     for PlanChange { path, first, second } in found.plan.iter().take(PLAN_SHOWN) {
-        line(&mut text, "plan", &format!("{path}: {} -> {}", brief(first), brief(second)));
+        text.line("plan", format!("{path}: {} -> {}", brief(first), brief(second)));
     }
     if found.plan.len() > PLAN_SHOWN {
-        line(&mut text, "", &format!("and {} more (--json)", found.plan.len() - PLAN_SHOWN));
+        text.line("", format!("and {} more (--json)", found.plan.len() - PLAN_SHOWN));
     }
     for (name, told) in facts(found) {
-        line(&mut text, name, &told);
+        text.line(name, &told);
     }
     for Listed { title, headings, rows } in lists(args, found) {
         // Writing to a String cannot fail.
@@ -355,7 +351,7 @@ fn markdown(args: &Args, found: &Comparison, broken: &[String]) -> String {
             let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
             format!("| {} |\n", cells.join(" | "))
         };
-        let _ = writeln!(text, "\n#### {}\n", capital(&escaped(&title)));
+        let _ = writeln!(text, "\n#### {}\n", capitalised(&escaped(&title)));
         text.push_str(&row(&headings));
         let _ = writeln!(text, "|{}", "---:|".repeat(headings.len()));
         rows.iter().for_each(|cells| text.push_str(&row(cells)));
@@ -378,11 +374,6 @@ fn escaped(text: &str) -> String {
         escaped.push(c);
     }
     escaped
-}
-
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or(String::new(), |first| first.to_uppercase().chain(chars).collect())
 }
 
 /// What differs, for programs.
@@ -420,10 +411,7 @@ fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
         "axes_left_out": found.fixed.iter().map(|(place, name, value)| json!({
             "file": (["first", "second"][*place]), "parameter": name, "value": value,
         })).collect::<Value>(),
-        "columns": found.columns.iter().map(|column| json!({
-            "name": column.name, "unit": column.unit, "rows": column.rows,
-            "greatest": column.greatest,
-        })).collect::<Value>(),
+        "columns": found.columns,
         "columns_only_in": { "first": found.columns_alone[0], "second": found.columns_alone[1] },
         "flips": found.flips(false).map(row).collect::<Value>(),
         "greatest": greatest(false),

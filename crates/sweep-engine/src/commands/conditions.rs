@@ -32,10 +32,9 @@ pub fn rows_only(
 ) -> Result<Vec<Condition>, Error> {
     match conditions.iter().find(|condition| condition.has_folds()) {
         None => Ok(conditions),
-        Some(condition) => Err(Error::Option {
-            option,
-            given: condition.text.clone(),
-            expected: "an expression without count(), share(), min(), max() and mean()".to_owned(),
-        }),
+        Some(condition) => {
+            let expected = "an expression without count(), share(), min(), max() and mean()";
+            Err(Error::option(option, &condition.text, expected))
+        }
     }
 }

@@ -2,13 +2,13 @@
 //! works. Each subcommand's are in its module.
 
 /// Lines to type, each with what it does.
-pub type Examples = &'static [[&'static str; 2]];
+pub type Examples = Vec<[&'static str; 2]>;
 
 /// Widest line of help that an ordinary terminal shows as it is.
 pub const WIDEST: usize = 80;
 
 /// Examples as help shows them; `None` if there are none.
-pub fn shown(lines: Examples) -> Option<String> {
+pub fn shown(lines: &[[&str; 2]]) -> Option<String> {
     let width = lines.iter().map(|[line, _]| line.len()).max()?;
     let fits = lines.iter().all(|[_, does]| 2 + width + 3 + does.len() <= WIDEST);
     let mut text = String::from("Examples:");

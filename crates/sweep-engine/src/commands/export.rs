@@ -24,11 +24,7 @@ pub struct Args {
 /// that cannot be written.
 pub fn run(args: &Args) -> Result<Exit, Error> {
     let Some(format) = Format::of(&args.out) else {
-        return Err(Error::Option {
-            option: "OUT",
-            given: args.out.display().to_string(),
-            expected: "a name that ends in .csv or .xlsx".to_owned(),
-        });
+        return Err(Error::option("OUT", args.out.display(), "a name that ends in .csv or .xlsx"));
     };
     let output = Output::begin(&args.out, format.kind())?;
     let file = ResultTable::open(&args.file)?;

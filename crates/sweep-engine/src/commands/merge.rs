@@ -3,7 +3,8 @@
 use super::grid::ResultArgs;
 use std::path::Path;
 
-use super::run::{installed, line, rows};
+use super::cells::Lines as _;
+use super::run::{installed, rows};
 use crate::exit::{Error, Exit, tell};
 use crate::plan::Plan;
 use crate::store::Job;
@@ -56,7 +57,7 @@ pub fn of_job(name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
     }
     let mut text = format!("{}: joined {} points\n", name, joined.tally.points);
     text.push_str(&rows(&joined.tally, job));
-    line(&mut text, "file", &output.display().to_string());
+    text.line("file", output.display());
     tell(text.trim_end());
     Ok(Exit::Done)
 }

@@ -3,21 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::cells::{table as text_table, word};
-use super::grid::quoted;
-use super::run::line;
+use super::cells::{Lines as _, table as text_table, word};
+use super::run::installed;
 use crate::boundary::search::Stopped;
-use crate::effort::Effort;
+use crate::effort::EffortArgs;
 use crate::exit::{Error, Exit, tell};
-use crate::interrupt::Interrupt;
 use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
-use crate::program::program;
-use crate::progress::{ProgressMode, duration};
+use crate::progress::duration;
 use crate::store::{OpenedTrials, StoreError, Trials};
 use crate::swept::Swept;
-use crate::threads;
 use sweep_files::{FileKind, Output, atomic, key};
 use sweep_parameter::Parameter as _;
 use sweep_results::{Cell, ResultTable};
@@ -41,16 +37,11 @@ pub struct Args {
     /// With --best: of this candidate instead
     #[arg(long, value_name = "N", requires = "best")]
     candidate: Option<u64>,
-    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
-    threads: Option<usize>,
+    #[command(flatten)]
+    effort: EffortArgs,
     /// Start over, even if the file is there or another study was begun
     #[arg(long)]
     fresh: bool,
-    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
-    /// 5 s) or none
-    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
-    progress: ProgressMode,
 }
 
 /// What `--help` adds.
@@ -77,11 +68,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let default = || PathBuf::from(format!("results/{}.parquet", study.name));
     let output = args.out.clone().unwrap_or_else(default);
     let file = Output::begin(&output, FileKind::Optimise)?;
-    let interrupt = Interrupt::install().map_err(|source| Error::File {
-        action: "install signal handlers for",
-        path: PathBuf::from("this process"),
-        source,
-    })?;
+    let interrupt = installed()?;
     let mut trials = match Trials::open(&output, &study.job(), args.fresh)? {
         OpenedTrials::Open(trials) => *trials,
         OpenedTrials::Finished => {
@@ -90,7 +77,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     };
     trials.take_notes().iter().for_each(|note| tell(note));
     let began = Instant::now();
-    let effort = Effort { threads: args.threads, progress: args.progress, interrupt: &interrupt };
+    let effort = args.effort.with(&interrupt);
     let (tried, trials) = search(&study, Some(trials), effort)?;
     let wall_s = began.elapsed().as_secs_f64();
     let tried = match tried {
@@ -99,10 +86,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         Err(Stopped::Interrupted) => {
             let wall = duration(wall_s);
             tell(&format!("{}: interrupted after {wall}; the same command goes on", study.name));
-            return Ok(match interrupt.signal() {
-                Some(15) => Exit::Terminated,
-                _ => Exit::Interrupted,
-            });
+            return Ok(Exit::interrupted(interrupt.signal()));
         }
     };
     let bytes = table(&study, &tried).into_bytes();
@@ -123,11 +107,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
 fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Result<Exit, Error> {
     let mut text = format!("{}: {how}\n", study.name);
     let file = ResultTable::open(output)?;
-    let about: serde_json::Value = file
-        .file()
-        .value(key::OPTIMISE)
-        .and_then(|text| serde_json::from_str(text).ok())
-        .unwrap_or_default();
+    let about = file.file().json(key::OPTIMISE).unwrap_or_default();
     let own = parameters(study).iter().map(|axis| axis.parameter.name());
     let objectives = study.objectives.iter().map(|one| one.name.as_str());
     let names: Vec<&str> =
@@ -149,9 +129,9 @@ fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Re
         }
     }
     let all = file.rows();
-    line(&mut text, "feasible", &format!("{feasible} of {all}, {} on the front", front.len()));
+    text.line("feasible", format!("{feasible} of {all}, {} on the front", front.len()));
     if let Some(best) = about["best"].as_u64() {
-        line(&mut text, "best", &format!("candidate {best}"));
+        text.line("best", format!("candidate {best}"));
     }
     front.sort_by(|a, b| {
         let of = |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);
@@ -165,24 +145,19 @@ fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Re
     text.push_str(&text_table(&headings, &listed, "  "));
     if let Some(path) = &args.best {
         let own = values.as_deref().and_then(|values| own_file(study, values));
-        let own = own.ok_or_else(|| Error::Option {
-            option: "--best",
-            given: path.display().to_string(),
-            expected: match chosen {
-                None => "a study with a feasible candidate; this one has none".to_owned(),
-                Some(chosen) => {
-                    format!("a model with a file of its own, and candidate {chosen} of {all}")
-                }
-            },
-        })?;
+        let expected = match chosen {
+            None => "a study with a feasible candidate; this one has none".to_owned(),
+            Some(chosen) => {
+                format!("a model with a file of its own, and candidate {chosen} of {all}")
+            }
+        };
+        let own = own.ok_or_else(|| Error::option("--best", path.display(), expected))?;
         let own = format!("# Candidate {} of {}.\n{own}", chosen.unwrap_or_default(), study.name);
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        atomic::write(folder.unwrap_or(Path::new(".")), path, own.as_bytes())?;
-        line(&mut text, "wrote", &path.display().to_string());
+        atomic::write(atomic::parent(path), path, own.as_bytes())?;
+        text.line("wrote", path.display());
     }
-    let shown = output.display().to_string();
-    line(&mut text, "file", &shown);
-    line(&mut text, "next", &format!("{} plot {}", program(), quoted(&shown)));
+    text.line("file", output.display());
+    text.next("plot", output);
     tell(text.trim_end());
     // Nothing that keeps the conditions was found.
     Ok(if front.is_empty() { Exit::NotHeld } else { Exit::Done })

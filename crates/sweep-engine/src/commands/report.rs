@@ -53,10 +53,9 @@ pub fn run<M: Swept>(
     let output = args.out.clone().unwrap_or_else(|| args.result.with_extension("html"));
     let page = Output::begin(&output, FileKind::Html)?;
     let file = ResultTable::open(&args.result)?;
-    if !FileKind::Map.has_keys(&|key| file.file().value(key).is_some()) {
-        let (option, given) = ("RESULT", args.result.display().to_string());
+    if file.file().kind() != Some(FileKind::Map) {
         let expected = format!("a {}; other files go behind it", FileKind::Map.name());
-        return Err(Error::Option { option, given, expected });
+        return Err(Error::option("RESULT", args.result.display(), expected));
     }
     let requirements = conditions::parse("--require", &args.requirements, &file)?;
     let (picture, about) = described(&args.result)?;

@@ -3,19 +3,19 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::cells::short;
-use super::grid::{ResultArgs, quoted};
+use super::cells::{Lines as _, short};
+use super::grid::ResultArgs;
+use crate::effort::EffortArgs;
 use crate::exit::{Error, Exit, tell};
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
-use crate::program::program;
-use crate::progress::{ProgressMode, duration, per_second};
+use crate::progress::{duration, per_second};
 use crate::run::{self as runner, Ended, RunOptions, RunReport};
 use crate::store::provenance::Session;
 use crate::store::read::{FAR_OFF, Tally};
 use crate::store::{Job, ShardRequest};
 use crate::swept::Swept;
-use crate::threads::{self, Environment};
+use crate::threads;
 use crate::watch::Engine;
 use sweep_parameter::RatioLimits;
 use sweep_plot::Share;
@@ -37,9 +37,9 @@ pub struct Args {
 /// How a run is done, by whichever engine.
 #[derive(Debug, clap::Args)]
 pub struct WorkArgs {
-    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
-    pub threads: Option<usize>,
+    /// Its threads and progress.
+    #[command(flatten)]
+    pub effort: EffortArgs,
     /// Compute one of N equal shards only, to be joined by `sweep merge`; `auto/N` takes the place
     /// from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX. In a Slurm array the default is that
     /// array's task and count (--shard 1/1 is the whole)
@@ -48,24 +48,17 @@ pub struct WorkArgs {
     /// Start over, even if the result is there or another plan was begun
     #[arg(long)]
     pub fresh: bool,
-    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
-    /// 5 s) or none
-    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
-    pub progress: ProgressMode,
 }
 
 impl WorkArgs {
     /// As the runner takes them.
-    ///
-    /// # Errors
-    /// A scheduler's number of threads that is none.
-    pub fn options<'a>(&self, environment: Environment<'a>) -> Result<RunOptions<'a>, Error> {
+    fn options(&self) -> Result<RunOptions<'static>, Error> {
         Ok(RunOptions {
-            threads: threads::count(self.threads, environment)?,
+            threads: threads::count(self.effort.threads, &threads::process)?,
             fresh: self.fresh,
             shard: self.shard,
-            progress: self.progress,
-            environment,
+            progress: self.effort.progress,
+            environment: &threads::process,
             tell: &tell,
         })
     }
@@ -78,8 +71,7 @@ impl WorkArgs {
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     let engine = M::engine(&plan)?;
-    let interrupt = installed()?;
-    let report = execute(args, &plan, engine.as_ref(), &interrupt, "")?;
+    let report = execute(args, &plan, engine.as_ref(), &installed()?, "")?;
     Ok(exit(args.fail_on_error, &report))
 }
 
@@ -103,14 +95,25 @@ pub fn execute<M: Swept>(
     interrupt: &Interrupt,
     options: &str,
 ) -> Result<RunReport, Error> {
-    let (job, output) = (Job::of(plan), args.target.output(plan));
-    let environment: Environment<'_> = &|name| std::env::var(name).ok();
-    let report = runner::run(engine, &job, &output, args.work.options(environment)?, interrupt)?;
-    for note in &report.notes {
-        tell(note);
-    }
-    tell(summary(args, plan, &job, &output, &report, options).trim_end());
-    Ok(report)
+    let (job, output) = (&Job::of(plan), &args.target.output(plan));
+    let finished = |text: &mut String, tally: &Tally| {
+        text.push_str(&rows(tally, job));
+        text.line("file", output.display());
+        if plan.design.is_some() {
+            text.line("share", share(tally));
+        }
+        text.next("plot", output);
+        Ok(())
+    };
+    let run = RunCommand {
+        name: &plan.name,
+        verb: "run",
+        rows: "points",
+        target: &args.target,
+        work: &args.work,
+        options: [options, ""],
+    };
+    run.execute(engine, job, output, interrupt, &finished)
 }
 
 /// How a run ends the program.
@@ -126,88 +129,81 @@ pub fn exit(fail_on_error: bool, report: &RunReport) -> Exit {
     }
 }
 
-/// What came of the run, in at most twelve lines.
-fn summary<M: Swept>(
-    args: &Args,
-    plan: &Plan<M>,
-    job: &Job<'_>,
-    output: &Path,
-    report: &RunReport,
-    options: &str,
-) -> String {
-    let mut text = String::new();
-    // Writing to a String cannot fail.
-    let _ = match (&report.ended, &report.session) {
-        (Ended::Already(file, _), _) => {
-            writeln!(
-                text,
-                "{}: all {} points are there already (--fresh computes them again)",
-                plan.name, file.points
-            )
-        }
-        (Ended::Interrupted { kept, points, .. }, session) => writeln!(
-            text,
-            "{}: interrupted with {kept} of {points} points kept{}",
-            plan.name,
-            session
-                .as_ref()
-                .map(|session| format!(", after {}", duration(session.wall_s)))
-                .unwrap_or_default()
-        ),
-        (Ended::Shard(shard), Some(session)) => {
-            writeln!(
-                text,
-                "{}, shard {} of {}: {}",
-                plan.name,
-                shard.index,
-                shard.of,
-                work(session)
-            )
-        }
-        (_, Some(session)) => writeln!(text, "{}: {}", plan.name, work(session)),
-        (_, None) => Ok(()),
-    };
-    match &report.ended {
-        Ended::Already(_, tally) | Ended::Finished(tally) => text.push_str(&rows(tally, job)),
-        Ended::Interrupted { .. } | Ended::Shard(_) => {}
-    }
-    let out = quoted(&output.display().to_string());
-    match &report.ended {
-        Ended::Already(..) | Ended::Finished(_) => {
-            line(&mut text, "file", &output.display().to_string());
-            if let (true, Ended::Already(_, tally) | Ended::Finished(tally)) =
-                (plan.design.is_some(), &report.ended)
-            {
-                line(&mut text, "share", &share(tally));
-            }
-            line(&mut text, "next", &format!("{} plot {out}", program()));
-        }
-        Ended::Shard(_) => {
-            line(
-                &mut text,
-                "next",
-                &format!("{}, when all shards are done", args.target.command("merge")),
-            );
-        }
-        Ended::Interrupted { .. } => {
-            line(&mut text, "go on", &go_on(args, report.session.as_ref(), options))
-        }
-    }
-    text
+/// A command that computes the rows of a file, as its summary speaks of it.
+pub struct RunCommand<'a> {
+    /// The name of the run.
+    pub name: &'a str,
+    /// The command.
+    pub verb: &'static str,
+    /// What its rows are called.
+    pub rows: &'static str,
+    /// The run.
+    pub target: &'a ResultArgs,
+    /// How it is done.
+    pub work: &'a WorkArgs,
+    /// Options beside the target's, to copy: those of the command, and those that tell `merge` the
+    /// same. Each begins with a space, or is empty.
+    pub options: [&'a str; 2],
 }
 
-/// The command that goes on with an interrupted run, or with this shard of it.
-fn go_on(args: &Args, session: Option<&Session>, options: &str) -> String {
-    let mut line = args.target.command("run");
-    if let Some(shard) = session.and_then(|session| session.shard.as_deref()) {
-        // Writing to a String cannot fail.
-        let _ = write!(line, " --shard {shard}");
+/// Says what a finished file holds, where it is and what to do with it.
+type Finished<'a> = &'a dyn Fn(&mut String, &Tally) -> Result<(), Error>;
+
+impl RunCommand<'_> {
+    /// Computes the rows and prints a summary.
+    ///
+    /// # Errors
+    /// Whatever keeps the file from being written; finished chunks are kept.
+    pub fn execute(
+        &self,
+        engine: &dyn Engine,
+        job: &Job<'_>,
+        output: &Path,
+        interrupt: &Interrupt,
+        finished: Finished<'_>,
+    ) -> Result<RunReport, Error> {
+        let report = runner::run(engine, job, output, self.work.options()?, interrupt)?;
+        report.notes.iter().for_each(|note| tell(note));
+        tell(self.summary(&report, finished)?.trim_end());
+        Ok(report)
     }
-    line + options
+
+    /// What came of the run, in at most twelve lines.
+    fn summary(&self, report: &RunReport, finished: Finished<'_>) -> Result<String, Error> {
+        let Self { name, rows, target, options: [own, of_merge], .. } = self;
+        let session = report.session.as_ref();
+        let work = session.map(work).unwrap_or_default();
+        let mut text;
+        match &report.ended {
+            Ended::Already(file, tally) => {
+                let there = format!("all {} {rows} are there already", file.points);
+                text = format!("{name}: {there} (--fresh computes them again)\n");
+                finished(&mut text, tally)?;
+            }
+            Ended::Finished(tally) => {
+                text = format!("{name}: {work}\n");
+                finished(&mut text, tally)?;
+            }
+            Ended::Shard(shard) => {
+                text = format!("{name}, shard {} of {}: {work}\n", shard.index, shard.of);
+                let merge = target.command("merge") + of_merge;
+                text.line("next", format!("{merge}, when all shards are done"));
+            }
+            Ended::Interrupted { kept, points, .. } => {
+                let after = session.map(|it| format!(", after {}", duration(it.wall_s)));
+                let after = after.unwrap_or_default();
+                text = format!("{name}: interrupted with {kept} of {points} {rows} kept{after}\n");
+                let shard = session.and_then(|session| session.shard.as_deref());
+                let shard = shard.map(|shard| format!(" --shard {shard}")).unwrap_or_default();
+                text.line("go on", format!("{}{own}{shard}", target.command(self.verb)));
+            }
+        }
+        Ok(text)
+    }
 }
 
 /// What this process did.
-pub fn work(session: &Session) -> String {
+fn work(session: &Session) -> String {
     format!(
         "{} points in {}, {} on {} thread{} ({})",
         session.points,
@@ -233,7 +229,7 @@ pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
         if dwells.beyond > 0 {
             let _ = write!(told, ", {} beyond what a machine can do", dwells.beyond);
         }
-        line(&mut text, "stable", &told);
+        text.line("stable", &told);
         return text;
     }
     let at = |point: u64| {
@@ -279,7 +275,7 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         tally.unreliable,
         tally.undefined
     );
-    line(&mut text, "reliable", &verdicts);
+    text.line("reliable", &verdicts);
     if tally.over_estimated > 0 {
         let told = format!(
             "in {} ({:.1} %), {} of them reliable: the linear model over-estimates, a ratio is \
@@ -289,21 +285,21 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
             tally.over_estimated_reliable,
             short(limits.over_estimate())
         );
-        line(&mut text, "too high", &told);
+        text.line("too high", &told);
     }
     if tally.by_status.failed() > 0 {
         let by_status = tally.by_status.iter().filter(|(status, _)| *status != "ok");
         let list: Vec<String> =
             by_status.map(|(status, count)| format!("{count} {status}")).collect();
-        line(&mut text, "failed", &list.join(", "));
+        text.line("failed", list.join(", "));
     }
     if tally.sensitive > 0 {
         let told = format!("{}: chaotic, a near twin departs exponentially", tally.sensitive);
-        line(&mut text, "sensitive", &told);
+        text.line("sensitive", &told);
     }
     if tally.unconverged > 0 {
         let told = format!("all but {}, whose error is above the accuracy", tally.unconverged);
-        line(&mut text, "converged", &told);
+        text.line("converged", &told);
     }
     if let Some(greatest) = &tally.greatest_error {
         let methods: Vec<String> =
@@ -313,7 +309,7 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
             greatest.value,
             methods.join(", ")
         );
-        line(&mut text, "error", &told);
+        text.line("error", &told);
     }
     let place = |point: u64| match at(point) {
         place if place.is_empty() => place,
@@ -327,25 +323,15 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
             greatest.value,
             place(greatest.point)
         );
-        line(&mut text, "friction", &told);
+        text.line("friction", &told);
     }
     if let Some(greatest) = &tally.greatest_ratio {
-        line(
-            &mut text,
-            "greatest",
-            &format!("ratio {:.3}{}", greatest.value, place(greatest.point)),
-        );
+        text.line("greatest", format!("ratio {:.3}{}", greatest.value, place(greatest.point)));
     }
     if let Some(least) = &tally.least_gap_nonlinear_m {
-        line(&mut text, "least gap", &format!("{:.5} m{}", least.value, place(least.point)));
+        text.line("least gap", format!("{:.5} m{}", least.value, place(least.point)));
     }
     text
-}
-
-/// A named line of a summary.
-pub fn line(text: &mut String, name: &str, value: &str) {
-    // Writing to a String cannot fail.
-    let _ = writeln!(text, "{name:>10}  {value}");
 }
 
 #[cfg(test)]

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
-use super::cells::{clipped, short, table, word};
+use super::cells::{Lines as _, clipped, short, table, word};
 use super::conditions;
-use super::run::{counts, line};
+use super::run::counts;
 use crate::exit::{Error, Exit, show};
 use crate::nearest::nearest;
 use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, Tally, overview, row, tally};
@@ -82,16 +82,12 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
         return show(&format!("{:#}\n", in_json(args, &opened, &file)?));
     }
     let mut text = String::new();
-    line(&mut text, "file", &args.file.display().to_string());
+    text.line("file", args.file.display());
     match &file.result {
         Some(result) => {
             provenance(&mut text, result);
             if !opened.is_sealed() {
-                line(
-                    &mut text,
-                    "checked",
-                    "no: it carries no digest, as files of older builds do not",
-                );
+                text.line("checked", "no: it carries no digest, as files of older builds do not");
             }
             let tally = tally(&opened)?;
             let limits = ratio_limits(&result.plan).unwrap_or(f64::NAN.into());
@@ -107,24 +103,19 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
             text.push_str(&counts(&tally, limits, &at));
         }
         None => {
-            line(&mut text, "made by", opened.created_by().unwrap_or("unknown"));
+            text.line("made by", opened.created_by().unwrap_or("unknown"));
             for (name, words) in (further.lines)(&opened)? {
-                line(&mut text, name, &words);
+                text.line(name, &words);
             }
-            if let Some(traced) = own_json(&opened, key::BOUNDARY) {
+            if let Some(traced) = opened.json(key::BOUNDARY) {
                 let quantity = traced["quantity"].as_str().unwrap_or("unknown");
                 let limit = traced["limit"].as_f64().map_or("unknown".to_owned(), short);
-                line(&mut text, "boundary", &format!("where {quantity} = {limit}"));
+                text.line("boundary", format!("where {quantity} = {limit}"));
             }
         }
     }
     columns(&mut text, &file, args.all || file.result.is_none(), further.is_of_a_metric);
     show(&text)
-}
-
-/// One JSON value of the file's metadata.
-fn own_json(file: &ParquetFile, key: &str) -> Option<Value> {
-    serde_json::from_str(file.value(key)?).ok()
 }
 
 /// Some rows of the file.
@@ -145,12 +136,10 @@ fn rows(args: &Args) -> Result<Exit, Error> {
     let rows = top(&file, &names, keep.as_ref(), by, count);
     let rows = rows.map_err(|error| with_nearest(error, &file))?;
     if args.json {
-        let object = |row: &Vec<Cell>| {
-            let cells = columns.iter().zip(row).map(|(name, cell)| (name.clone(), json!(cell)));
-            Value::Object(cells.collect::<Map<_, _>>())
+        let object = |row: &Vec<Cell>| -> Value {
+            columns.iter().zip(row).map(|(name, cell)| (name.as_str(), json!(cell))).collect()
         };
-        let rows: Vec<Value> = rows.iter().map(object).collect();
-        return show(&format!("{:#}\n", json!(rows)));
+        return show(&format!("{:#}\n", rows.iter().map(object).collect::<Value>()));
     }
     let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(word).collect()).collect();
     if rows.is_empty() {
@@ -198,8 +187,7 @@ fn shown_columns(args: &Args, file: &ResultTable, keep: Option<&Condition>) -> V
 /// Everything that the text says, and the whole plan.
 fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, Error> {
     let column = |column: &ColumnRange| {
-        let names: Map<String, Value> =
-            column.names.iter().map(|(name, count)| (name.clone(), json!(count))).collect();
+        let counts = || column.names.iter().cloned().collect::<Value>();
         json!({
             "name": column.name,
             "unit": column.unit,
@@ -207,7 +195,7 @@ fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, 
             "nulls": column.nulls,
             "least": column.range.map(|(least, _)| least),
             "greatest": column.range.map(|(_, greatest)| greatest),
-            "counts": if names.is_empty() { Value::Null } else { Value::Object(names) },
+            "counts": (!column.names.is_empty()).then(counts),
         })
     };
     let mut said = json!({
@@ -216,22 +204,20 @@ fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, 
         "made_by": opened.created_by(),
         "is_sealed": opened.is_sealed(),
         "columns": file.columns.iter().map(column).collect::<Value>(),
-        "boundary": own_json(opened, key::BOUNDARY),
-        "plan": own_json(opened, key::PLAN),
+        "boundary": opened.json(key::BOUNDARY),
+        "plan": opened.json(key::PLAN),
     });
     if let Some(result) = &file.result {
         let tally = tally(opened)?;
         let places = extremes_at(opened, result, &tally)?;
-        let places = places.into_iter().map(|(point, values)| {
-            let values: Map<String, Value> =
-                values.into_iter().map(|(axis, value)| (axis, json!(value))).collect();
-            (point.to_string(), Value::Object(values))
-        });
+        let places = places
+            .into_iter()
+            .map(|(point, values)| (point.to_string(), values.into_iter().collect::<Value>()));
         said["version"] = json!(result.version);
         said["numerics"] = json!(result.numerics);
         said["plan_hash"] = json!(result.plan_hash);
         said["summary"] = json!(tally);
-        said["points"] = Value::Object(places.collect());
+        said["points"] = places.collect();
     }
     Ok(said)
 }
@@ -255,19 +241,19 @@ fn extremes_at(
 
 fn provenance(text: &mut String, result: &ResultFile) {
     let plan = &result.plan;
-    line(text, "name", plan["name"].as_str().unwrap_or_default());
+    text.line("name", plan["name"].as_str().unwrap_or_default());
     let build = crate::build::words(&result.version, result.numerics);
-    line(text, "made by", &format!("{build}, plan {}", &result.plan_hash));
+    text.line("made by", format!("{build}, plan {}", &result.plan_hash));
     let told =
         [("spin", "spin"), ("values", "parameters"), ("time", "time"), ("method", "integrator")];
     for (name, key) in told.into_iter().filter(|(_, key)| !plan[*key].is_null()) {
-        line(text, name, &brief(&plan[key]));
+        text.line(name, brief(&plan[key]));
     }
     if let Some(criterion) = plan["reliability"]["criterion"].as_str() {
-        line(text, "criterion", criterion);
+        text.line("criterion", criterion);
     }
     if let Some(design) = plan.get("design") {
-        line(text, "design", &brief(design));
+        text.line("design", brief(design));
     }
     for axis in axes(plan) {
         let name = axis["parameter"].as_str().unwrap_or_default();
@@ -275,11 +261,11 @@ fn provenance(text: &mut String, result: &ResultFile) {
         let values = ["range", "values", "distribution"].iter().find_map(|key| axis.get(key));
         let values = values.map(brief);
         let values = values.map_or(String::new(), |values| format!(": {values}"));
-        line(text, "axis", &format!("{name}{values}"));
+        text.line("axis", format!("{name}{values}"));
     }
     if let Some(set) = plan["set"].as_object() {
         let told = set.iter().map(|(name, value)| format!("{name} = {}", brief(value)));
-        line(text, "--set", &told.collect::<Vec<_>>().join(", "));
+        text.line("--set", told.collect::<Vec<_>>().join(", "));
     }
 }
 
@@ -312,7 +298,7 @@ fn axes(plan: &Value) -> &[Value] {
 
 /// All columns with their units and ranges, or those of metrics and how many others there are.
 fn columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> bool) {
-    line(text, "rows", &file.rows.to_string());
+    text.line("rows", file.rows);
     let shown: Vec<&ColumnRange> =
         file.columns.iter().filter(|column| all || is_shown(&column.name)).collect();
     let width = shown.iter().map(|column| column.name.len()).max().unwrap_or(0);
@@ -322,7 +308,7 @@ fn columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> 
     }
     let others = file.columns.len() - shown.len();
     if others > 0 {
-        line(text, "columns", &format!("{others} more, shown by --all"));
+        text.line("columns", format!("{others} more, shown by --all"));
     }
 }
 

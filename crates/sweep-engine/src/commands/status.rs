@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde_json::json;
 
+use super::cells::Lines as _;
 use super::grid::ResultArgs;
-use super::run::line;
 use crate::exit::{Error, Exit, show, tell};
 use crate::plan::Plan;
 use crate::store::Job;
@@ -54,12 +54,11 @@ fn summary(args: &Args, found: &FolderStatus, [verb, options]: [&str; 2]) -> Str
         State::Complete => "complete, to be merged",
         State::Finished => "finished",
     };
-    line(&mut text, "state", state);
-    line(&mut text, "file", &found.output.display().to_string());
-    line(
-        &mut text,
+    text.line("state", state);
+    text.line("file", found.output.display());
+    text.line(
         "points",
-        &format!("{} of {} done, {} failed", found.points_done, found.points, found.points_failed),
+        format!("{} of {} done, {} failed", found.points_done, found.points, found.points_failed),
     );
     if found.state == State::Finished || found.state == State::NotStarted {
         return text;
@@ -72,18 +71,18 @@ fn summary(args: &Args, found: &FolderStatus, [verb, options]: [&str; 2]) -> Str
         "{} of {} done, {} missing{damaged}",
         found.chunks_done, found.chunks, found.chunks_missing
     );
-    line(&mut text, "chunks", &chunks);
+    text.line("chunks", &chunks);
     for holder in &found.running {
         let shard = holder.shard.map(|shard| format!(", shard {shard}")).unwrap_or_default();
-        line(&mut text, "running", &format!("process {} on {}{shard}", holder.pid, holder.host));
+        text.line("running", format!("process {} on {}{shard}", holder.pid, holder.host));
     }
     if let Some(shards) = found.shards {
-        line(&mut text, "shards", &shards.to_string());
+        text.line("shards", shards);
         let missing = shard_list(found.missing_shard_numbers.iter().copied());
         if !missing.is_empty() {
             let run = format!("{} --shard I/{shards}", args.target.command("run"));
-            line(&mut text, "again", &format!("{run}, for I = {missing}"));
-            line(&mut text, "on Slurm", &format!("sbatch --array={} ...", found.missing_shards));
+            text.line("again", format!("{run}, for I = {missing}"));
+            text.line("on Slurm", format!("sbatch --array={} ...", found.missing_shards));
         }
     }
     let next = match found.state {
@@ -91,7 +90,7 @@ fn summary(args: &Args, found: &FolderStatus, [verb, options]: [&str; 2]) -> Str
         _ => args.target.command(verb),
     } + options;
     if found.running.is_empty() && (found.shards.is_none() || found.state == State::Complete) {
-        line(&mut text, "next", &next);
+        text.line("next", &next);
     }
     text
 }

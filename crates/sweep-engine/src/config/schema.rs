@@ -4,6 +4,7 @@
 use serde_json::{Map, Value, json};
 use sweep_parameter::{Channel as _, Parameter, Range};
 
+use super::axes::DISTRIBUTIONS;
 use super::design::{DEFAULT_SEED, MOST_SEED, MOST_SOBOL};
 use super::grid::DEFAULT_RATIO_LIMIT;
 use super::read::{Read, Schema};
@@ -192,25 +193,20 @@ fn reliability<M: Read>(further: Vec<(&'static str, Value)>) -> Value {
 }
 
 fn distribution() -> Value {
-    let one = |kind: &'static str, numbers: &[(&'static str, Range)], required: &[&str]| {
-        let mut properties = vec![("kind", json!({ "const": kind }))];
-        properties.extend(numbers.iter().map(|(key, range)| (*key, number(*range))));
-        properties.extend(["from", "to"].map(|key| (key, number(Range::Any))));
-        table(properties, required)
+    let one = |&(kind, numbers): &(&'static str, &[(&'static str, Range)])| {
+        let own = numbers.iter().map(|(key, range)| (*key, number(*range)));
+        let ends = ["from", "to"].map(|key| (key, number(Range::Any)));
+        let mut required = vec!["kind"];
+        match numbers {
+            [] => required.extend(["from", "to"]),
+            numbers => required.extend(numbers.iter().map(|(key, _)| *key)),
+        }
+        table([("kind", json!({ "const": kind }))].into_iter().chain(own).chain(ends), &required)
     };
-    let (any, positive) = (Range::Any, Range::Positive);
     json!({
         "description": "of a design, cut at `from` and `to`; left out, they lie six standard \
                         deviations from the middle",
-        "oneOf": [
-            one("normal", &[("mean", any), ("sd", positive)], &["kind", "mean", "sd"]),
-            one(
-                "lognormal",
-                &[("median", positive), ("sigma", positive)],
-                &["kind", "median", "sigma"],
-            ),
-            one("uniform", &[], &["kind", "from", "to"]),
-        ],
+        "oneOf": DISTRIBUTIONS.iter().map(one).collect::<Value>(),
     })
 }
 

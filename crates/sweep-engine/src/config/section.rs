@@ -11,7 +11,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::report::{Diagnostic, Report};
-use super::source::{Located, Location, SourceId};
+use super::source::{Located, Location};
 
 /// A key's value: not written, written wrong (already reported), or as written.
 pub enum Field<T> {
@@ -139,11 +139,27 @@ impl<'a> Section<'a> {
             .push_missing(Diagnostic::new(title).at(&self.at, format!("expected {expected}")));
     }
 
+    /// What is read of the value under a key; where nothing is, that has been reported.
+    fn read<T>(
+        &self,
+        key: &'static str,
+        read: impl FnOnce(&'a Value<'a>, &Location) -> Option<T>,
+    ) -> Field<T> {
+        let Some(value) = self.get(key) else { return Field::Absent };
+        let at = self.place(value.span());
+        let found = read(value, &at);
+        found.map_or(Field::Bad, |value| Field::Given(Located { value, at }))
+    }
+
+    /// Reports a value of the wrong type.
+    fn wrong<T>(&self, what: &str, value: &Value<'_>, expected: &str) -> Option<T> {
+        self.report.push(wrong_kind(what, &self.place(value.span()), expected, value.get_ref()));
+        None
+    }
+
     /// A finite number in a range.
     pub fn number(&self, key: &'static str, range: Range) -> Field<f64> {
-        let Some(value) = self.get(key) else { return Field::Absent };
-        number(&quoted(key), self.at.source, value, range, self.report)
-            .map_or(Field::Bad, Field::Given)
+        self.read(key, |value, _| Some(self.number_of(&quoted(key), value, range)?.value))
     }
 
     /// A whole number from 1 to `most`.
@@ -153,44 +169,32 @@ impl<'a> Section<'a> {
 
     /// A whole number within bounds.
     pub fn whole(&self, key: &'static str, bounds: RangeInclusive<u64>) -> Field<u64> {
-        let Some(value) = self.get(key) else { return Field::Absent };
-        let at = self.place(value.span());
-        let expected =
-            format!("expected a whole number from {} to {}", bounds.start(), bounds.end());
-        match value.get_ref() {
-            DeValue::Integer(integer) => {
-                match u64::from_str_radix(integer.as_str(), integer.radix()) {
-                    Ok(count) if bounds.contains(&count) => {
-                        Field::Given(Located { value: count, at })
-                    }
-                    _ => {
-                        let title = format!("`{key}` = {integer} is out of range");
-                        self.report.refuse(&at, title, expected).map_or(Field::Bad, Field::Given)
-                    }
-                }
-            }
-            other => {
-                self.report.push(wrong_kind(&quoted(key), &at, "a whole number", other));
-                Field::Bad
-            }
-        }
+        self.read(key, |value, at| {
+            let DeValue::Integer(integer) = value.get_ref() else {
+                return self.wrong(&quoted(key), value, "a whole number");
+            };
+            let count = u64::from_str_radix(integer.as_str(), integer.radix()).ok();
+            count.filter(|count| bounds.contains(count)).or_else(|| {
+                let title = format!("`{key}` = {integer} is out of range");
+                let (least, most) = (bounds.start(), bounds.end());
+                let expected = format!("expected a whole number from {least} to {most}");
+                self.report.refuse(at, title, expected)
+            })
+        })
     }
 
     /// A string.
     pub fn text(&self, key: &'static str) -> Field<&'a str> {
-        let Some(value) = self.get(key) else { return Field::Absent };
-        text(&quoted(key), self.at.source, value, self.report).map_or(Field::Bad, Field::Given)
+        self.read(key, |value, _| Some(self.text_of(&quoted(key), value)?.value))
     }
 
     /// A string, or a number alone as it is written.
     pub fn text_or_number(&self, key: &'static str) -> Field<&'a str> {
-        let Some(value) = self.get(key) else { return Field::Absent };
-        let written = match value.get_ref() {
-            DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str(),
-            DeValue::Float(float) => float.as_str(),
-            _ => return self.text(key),
-        };
-        Field::Given(Located { value: written, at: self.place(value.span()) })
+        self.read(key, |value, _| match value.get_ref() {
+            DeValue::Integer(integer) if integer.radix() == 10 => Some(integer.as_str()),
+            DeValue::Float(float) => Some(float.as_str()),
+            _ => Some(self.text_of(&quoted(key), value)?.value),
+        })
     }
 
     /// Whether a string stands there, where something else may.
@@ -223,89 +227,48 @@ impl<'a> Section<'a> {
         key: &'static str,
         range: Range,
     ) -> Field<(Vec<Located<f64>>, bool)> {
-        let source = self.at.source;
-        self.items(key, "an array of numbers").then(|items| {
-            let numbers: Vec<_> = items
-                .value
-                .iter()
-                .filter_map(|item| number(&entry(key), source, item, range, self.report))
-                .collect();
+        self.items(key, "an array of numbers").map(|items| {
+            let number = |item| self.number_of(&entry(key), item, range);
+            let numbers: Vec<_> = items.value.iter().filter_map(number).collect();
             let all = numbers.len() == items.value.len();
-            Some(Located { value: (numbers, all), at: items.at })
+            (numbers, all)
         })
     }
 
     /// An array of strings, wrong ones left out and reported.
     pub fn texts(&self, key: &'static str) -> Field<Vec<Located<&'a str>>> {
-        let source = self.at.source;
-        self.items(key, "an array of strings").then(|items| {
-            let texts = items
-                .value
-                .iter()
-                .filter_map(|item| text(&entry(key), source, item, self.report))
-                .collect();
-            Some(Located { value: texts, at: items.at })
+        self.items(key, "an array of strings").map(|items| {
+            items.value.iter().filter_map(|item| self.text_of(&entry(key), item)).collect()
         })
     }
 
     fn items(&self, key: &'static str, kind: &str) -> Field<&'a [Value<'a>]> {
-        let Some(value) = self.get(key) else { return Field::Absent };
-        let at = self.place(value.span());
-        match value.get_ref() {
-            DeValue::Array(items) => Field::Given(Located { value: items, at }),
-            other => {
-                self.report.push(wrong_kind(&quoted(key), &at, kind, other));
-                Field::Bad
-            }
-        }
+        self.read(key, |value, _| match value.get_ref() {
+            DeValue::Array(items) => Some(&items[..]),
+            _ => self.wrong(&quoted(key), value, kind),
+        })
     }
 
     /// A table under this key.
     pub fn table(&self, key: &'static str, title: &str) -> Field<Section<'a>> {
-        let Some(value) = self.get(key) else { return Field::Absent };
-        let at = self.place(value.span());
-        match value.get_ref() {
-            DeValue::Table(table) => Field::Given(Located {
-                value: Section::new(title, at.clone(), table, self.report),
-                at,
-            }),
-            other => {
-                self.report.push(wrong_kind(
-                    &quoted(key),
-                    &at,
-                    &format!("a table, {title}"),
-                    other,
-                ));
-                Field::Bad
-            }
-        }
+        self.read(key, |value, at| match value.get_ref() {
+            DeValue::Table(table) => Some(Section::new(title, at.clone(), table, self.report)),
+            _ => self.wrong(&quoted(key), value, &format!("a table, {title}")),
+        })
     }
 
     /// An array of tables, `[[key]]`; empty if it is not written.
     pub fn tables(&self, key: &'static str) -> Vec<Section<'a>> {
         let kind = format!("tables, each under [[{key}]]");
-        let items = match self.get(key).map(|value| (value, value.get_ref())) {
-            None => return Vec::new(),
-            Some((_, DeValue::Array(items))) => items,
-            Some((value, other)) => {
-                self.report.push(wrong_kind(&quoted(key), &self.place(value.span()), &kind, other));
-                return Vec::new();
-            }
+        let items = self.items(key, &kind).given().map_or(&[][..], |items| items.value);
+        let section = |(k, item): (usize, &'a Value<'a>)| {
+            let DeValue::Table(table) = item.get_ref() else {
+                return self.wrong(&entry(key), item, &kind);
+            };
+            let title = format!("[[{key}]] number {}", k + 1);
+            Some(Section::new(title, self.place(item.span()), table, self.report))
         };
-        let mut sections = Vec::new();
-        for (k, item) in items.iter().enumerate() {
-            let at = self.place(item.span());
-            match item.get_ref() {
-                DeValue::Table(table) => sections.push(Section::new(
-                    format!("[[{key}]] number {}", k + 1),
-                    at,
-                    table,
-                    self.report,
-                )),
-                other => self.report.push(wrong_kind(&entry(key), &at, &kind, other)),
-            }
-        }
-        sections
+        items.iter().enumerate().filter_map(section).collect()
     }
 
     /// Every key as written, for tables whose keys are names of parameters.
@@ -319,7 +282,27 @@ impl<'a> Section<'a> {
 
     /// The number under a name from [`Section::names`].
     pub fn number_named(&self, name: &str, range: Range) -> Option<Located<f64>> {
-        number(&quoted(name), self.at.source, self.table.get(name)?, range, self.report)
+        self.number_of(&quoted(name), self.table.get(name)?, range)
+    }
+
+    fn text_of(&self, what: &str, value: &'a Value<'a>) -> Option<Located<&'a str>> {
+        match value.get_ref() {
+            DeValue::String(text) => Some(Located { value: text, at: self.place(value.span()) }),
+            _ => self.wrong(what, value, "a string"),
+        }
+    }
+
+    fn number_of(&self, what: &str, value: &Value<'_>, range: Range) -> Option<Located<f64>> {
+        let number = match value.get_ref() {
+            DeValue::Float(float) => float.as_str().parse().ok(),
+            DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
+            DeValue::Integer(integer) => u64::from_str_radix(integer.as_str(), integer.radix())
+                .ok()
+                .map(|value| value as f64),
+            _ => return self.wrong(what, value, "a number"),
+        };
+        let number = number.unwrap_or(f64::INFINITY);
+        check_number(what, number, self.place(value.span()), range, self.report)
     }
 
     /// Reports every key that was not asked for.
@@ -398,44 +381,6 @@ pub fn cut(text: &str, most: usize) -> String {
         Some((end, _)) => format!("{}...", &text[..end]),
         None => text.to_owned(),
     }
-}
-
-fn text<'a>(
-    what: &str,
-    source: SourceId,
-    value: &'a Value<'a>,
-    report: &Report,
-) -> Option<Located<&'a str>> {
-    let at = Location::new(source, value.span());
-    match value.get_ref() {
-        DeValue::String(text) => Some(Located { value: text, at }),
-        other => {
-            report.push(wrong_kind(what, &at, "a string", other));
-            None
-        }
-    }
-}
-
-fn number(
-    what: &str,
-    source: SourceId,
-    value: &Value<'_>,
-    range: Range,
-    report: &Report,
-) -> Option<Located<f64>> {
-    let at = Location::new(source, value.span());
-    let number = match value.get_ref() {
-        DeValue::Float(float) => float.as_str().parse().ok(),
-        DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
-        DeValue::Integer(integer) => {
-            u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|value| value as f64)
-        }
-        other => {
-            report.push(wrong_kind(what, &at, "a number", other));
-            return None;
-        }
-    };
-    check_number(what, number.unwrap_or(f64::INFINITY), at, range, report)
 }
 
 /// The number if it is finite and in range.

@@ -1,6 +1,5 @@
 //! Texts a user wrote (files and command-line arguments), and places in them.
 
-use std::fmt;
 use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
@@ -52,62 +51,43 @@ struct Source {
 }
 
 /// Why a file's text could not be had.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// What the system said.
-    Io(std::io::Error),
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
     /// Longer than any file of ours.
+    #[error(
+        "it is longer than {} KiB: give values as a range, or points as a list in a file of their \
+         own",
+        LONGEST_BYTES >> 10
+    )]
     TooLong,
     /// A result, which begins as Parquet files do.
+    #[error("it is a Parquet file, not text: `sweep show` reads it")]
     Parquet,
-    /// No text.
-    NotUtf8 {
-        /// From 0.
-        first_bad_byte: usize,
-        /// It is UTF-16.
-        utf16: bool,
-    },
-}
-
-impl fmt::Display for ReadError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Io(error) => write!(f, "{error}"),
-            Self::TooLong => write!(
-                f,
-                "it is longer than {} KiB: give values as a range, or points as a list in a file \
-                 of their own",
-                LONGEST_BYTES >> 10
-            ),
-            Self::Parquet => f.write_str("it is a Parquet file, not text: `sweep show` reads it"),
-            Self::NotUtf8 { utf16: true, .. } => {
-                f.write_str("it is UTF-16, not UTF-8: save it as UTF-8")
-            }
-            Self::NotUtf8 { first_bad_byte, .. } => {
-                write!(
-                    f,
-                    "it is not UTF-8 text: the first bad byte is number {}",
-                    first_bad_byte + 1
-                )
-            }
-        }
-    }
+    /// UTF-16.
+    #[error("it is UTF-16, not UTF-8: save it as UTF-8")]
+    Utf16,
+    /// No text: the first bad byte, from 0.
+    #[error("it is not UTF-8 text: the first bad byte is number {}", .0 + 1)]
+    NotUtf8(usize),
 }
 
 /// Reads a whole file, of bounded length. Pipes work as well as plain files.
 pub fn read(path: &Path) -> Result<String, ReadError> {
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(ReadError::Io)?;
-    file.take(LONGEST_BYTES + 1).read_to_end(&mut bytes).map_err(ReadError::Io)?;
+    let file = std::fs::File::open(path)?;
+    file.take(LONGEST_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.starts_with(b"PAR1") {
         return Err(ReadError::Parquet);
     }
     if bytes.len() as u64 > LONGEST_BYTES {
         return Err(ReadError::TooLong);
     }
-    String::from_utf8(bytes).map_err(|error| {
-        let utf16 = matches!(error.as_bytes(), [0xff, 0xfe, ..] | [0xfe, 0xff, ..]);
-        ReadError::NotUtf8 { first_bad_byte: error.utf8_error().valid_up_to(), utf16 }
+    String::from_utf8(bytes).map_err(|error| match error.as_bytes() {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => ReadError::Utf16,
+        _ => ReadError::NotUtf8(error.utf8_error().valid_up_to()),
     })
 }
 
@@ -207,11 +187,8 @@ mod tests {
             read(&path)
         };
         assert_eq!(file(b"name = 1").unwrap(), "name = 1");
-        assert!(matches!(
-            file(b"ab\xffc"),
-            Err(ReadError::NotUtf8 { first_bad_byte: 2, utf16: false })
-        ));
-        assert!(matches!(file(b"\xff\xfen\0"), Err(ReadError::NotUtf8 { utf16: true, .. })));
+        assert!(matches!(file(b"ab\xffc"), Err(ReadError::NotUtf8(2))));
+        assert!(matches!(file(b"\xff\xfen\0"), Err(ReadError::Utf16)));
         assert!(matches!(file(b"PAR1\xff"), Err(ReadError::Parquet)));
         assert!(matches!(file(&vec![b' '; LONGEST_BYTES as usize + 1]), Err(ReadError::TooLong)));
         assert!(file(&vec![b' '; LONGEST_BYTES as usize]).is_ok());

@@ -1,7 +1,6 @@
 //! The file of a study: a row per candidate, in the order in which they were tried.
 
 use sweep_files::key;
-use sweep_parameter::Parameter as _;
 
 use super::evolve::{Candidate, front};
 use super::study::Study;
@@ -21,7 +20,7 @@ pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
     let values: Vec<Vec<f64>> = tried.iter().map(|one| study.values(&one.place)).collect();
     for (k, Axis { parameter, .. }) in parameters(study).iter().enumerate() {
         let column = values.iter().map(|values| Some(values[k]));
-        table.numbers(parameter.name(), parameter.unit(), parameter.description(), column);
+        table.parameter(parameter, column);
     }
     let answer = |k: usize, sign: f64| {
         tried.iter().map(move |one| one.answers.as_ref().map(|answers| sign * answers[k]))

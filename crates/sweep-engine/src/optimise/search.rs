@@ -1,7 +1,7 @@
 //! Candidates through a model's engine, with a memory.
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use arrow_schema::ArrowError;
 use rayon::ThreadPool;
@@ -16,6 +16,7 @@ use crate::store::{Done, Key, Layout, ResultRows, Row, StoreError, Trials};
 use crate::swept::Swept;
 use crate::threads;
 use crate::watch::{Engine, Watch};
+use sweep_files::panics::{lock, unlocked};
 use sweep_results::Goal;
 
 /// Everything that a study tries, with a memory of trials if there is one, which it gives back.
@@ -50,7 +51,7 @@ pub fn search<M: Swept>(
     };
     let found = evolve(&evolution, &mut |places| asked.ask(places));
     lock(&asked.progress).finish();
-    let trials = asked.trials.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let trials = unlocked(asked.trials);
     Ok((found, trials))
 }
 
@@ -118,11 +119,11 @@ impl<M: Swept> Asked<'_, M> {
             self.pool.install(|| self.engine.evaluate(&next, &keep, &watch));
         }
         let settled = lock(&self.trials).as_ref().map_or(Ok(()), Trials::settle);
-        let failure = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let failure = unlocked(failure);
         if let Some(error) = failure.or(settled.err()) {
             return Err(Stopped::Failed(error));
         }
-        let answers = answers.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let answers = unlocked(answers);
         self.count += places.len() as u64;
         answers.into_iter().collect::<Option<_>>().ok_or(Stopped::Interrupted)
     }
@@ -173,8 +174,4 @@ fn key(number: u64, answer: usize, values: &[f64]) -> Key {
     let hash = blake3::hash(&bytes);
     let word = hash.as_bytes().first_chunk().copied().unwrap_or_default();
     [number, answer as u64, u64::from_le_bytes(word)]
-}
-
-fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

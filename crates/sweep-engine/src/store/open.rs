@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{self, ErrorKind, Read as _};
 use std::ops::Range;
 use std::path::Path;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 
 use arrow_schema::SchemaRef;
 
@@ -20,7 +20,8 @@ use super::schema::Done;
 use super::shard::{self, Dealing, Shard, ShardRequest};
 use super::{Folder, Job, TRIALS, chunk_of_name, chunk_points};
 use crate::threads::Environment;
-use sweep_files::{FileError, atomic, regular};
+use sweep_files::panics::lock;
+use sweep_files::{FileError, ParquetFile, atomic, regular};
 
 /// How a run is opened.
 #[derive(Clone, Copy)]
@@ -157,7 +158,7 @@ impl OpenRun {
             }
         }
         *self.present() = present;
-        *lock_of(&self.parts) = parts;
+        *lock(&self.parts) = parts;
         Ok(())
     }
 
@@ -211,14 +212,14 @@ impl OpenRun {
         if is_whole {
             self.present().insert(chunk);
         } else {
-            lock_of(&self.parts).insert(chunk, outcomes);
+            lock(&self.parts).insert(chunk, outcomes);
         }
         Ok(())
     }
 
     /// The outcomes there are of chunks that are not whole, to go on from.
     pub fn take_parts(&self) -> BTreeMap<u64, Vec<Done>> {
-        std::mem::take(&mut *lock_of(&self.parts))
+        std::mem::take(&mut *lock(&self.parts))
     }
 
     /// How many chunks make up the whole result.
@@ -252,7 +253,7 @@ impl OpenRun {
     }
 
     fn present(&self) -> MutexGuard<'_, BTreeSet<u64>> {
-        lock_of(&self.present)
+        lock(&self.present)
     }
 
     /// Points this process answers for, and how many of them are there.
@@ -269,8 +270,7 @@ impl OpenRun {
             _ => 0,
         };
         let whole: u64 = self.present().iter().map(|&chunk| length(chunk)).sum();
-        let there =
-            whole + lock_of(&self.parts).values().map(|part| part.len() as u64).sum::<u64>();
+        let there = whole + lock(&self.parts).values().map(|part| part.len() as u64).sum::<u64>();
         (own.saturating_mul(self.chunk_points).saturating_sub(short), there)
     }
 
@@ -332,10 +332,6 @@ pub(super) enum ChunkFile {
     Damaged(Damage),
 }
 
-fn lock_of<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// Reads a chunk's file.
 pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
     let path = &folder.chunk(place.chunk);
@@ -363,35 +359,46 @@ pub(super) fn chunks_there(folder: &Folder) -> Result<BTreeSet<u64>, StoreError>
     Ok(chunks)
 }
 
-/// The finished file, whole, if it is of this plan and build.
+/// The result at the output, checked; `None` if there is none.
+///
+/// # Errors
+/// [`StoreError::OutputDiffers`] if another plan or build made it.
 pub(super) fn finished(
     folder: &Folder,
     job: &Job<'_>,
 ) -> Result<Option<(ResultFile, Tally)>, StoreError> {
-    let Some(file) = read::finished(&folder.output)? else { return Ok(None) };
-    let result = ResultFile::of(&file, job.layout.file_kind())?;
-    let same_plan = result.plan_hash == job.hash().to_hex().as_str();
+    let Some((file, result)) = of_plan(folder, job)? else { return Ok(None) };
     let schema = job.layout.schema();
     let [was, is] = [file.schema(), &schema].map(column_names);
-    if same_plan && was != is {
+    if was != is {
         let differences = vec![columns_apart(&was, &is)];
         return Err(StoreError::OutputDiffers { output: folder.output.clone(), differences });
     }
-    if same_plan {
-        // Files of this build carry a digest.
-        if !file.is_sealed() {
-            return Err(FileError::Damaged { path: folder.output.clone() }.into());
-        }
-        let tally = read::tally(&file)?;
-        return Ok(Some((result, tally)));
+    // Files of this build carry a digest.
+    if !file.is_sealed() {
+        return Err(FileError::Damaged { path: folder.output.clone() }.into());
     }
-    let was = PlanFile {
-        plan: result.plan,
-        version: result.version,
-        numerics: result.numerics,
-        ..PlanFile::of(job)
-    };
-    let differences = was.differences(&PlanFile::of(job));
+    let tally = read::tally(&file)?;
+    Ok(Some((result, tally)))
+}
+
+/// The file at the output and its own word, if this very plan and build made it; `None` if there is
+/// none.
+///
+/// # Errors
+/// [`StoreError::OutputDiffers`] if another plan or build made it.
+pub(super) fn of_plan(
+    folder: &Folder,
+    job: &Job<'_>,
+) -> Result<Option<(ParquetFile, ResultFile)>, StoreError> {
+    let Some(file) = read::finished(&folder.output)? else { return Ok(None) };
+    let result = ResultFile::of(&file, job.layout.file_kind())?;
+    if result.plan_hash == job.hash().to_hex().as_str() {
+        return Ok(Some((file, result)));
+    }
+    let ResultFile { plan, version, numerics, .. } = result;
+    let ours = PlanFile::of(job);
+    let differences = PlanFile { plan, version, numerics, ..ours.clone() }.differences(&ours);
     Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
 }
 

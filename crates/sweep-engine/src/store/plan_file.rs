@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::differences::{PlanDifference, differences};
@@ -16,7 +16,7 @@ use sweep_files::{atomic, regular};
 const FORMAT: u32 = 2;
 
 /// What `plan.json` says.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PlanFile {
     /// Layout of this file and of the chunks beside it.
@@ -80,16 +80,7 @@ impl PlanFile {
 
     /// Writes the plan unless another process was first.
     pub(super) fn freeze(&self, folder: &Folder) -> Result<(), StoreError> {
-        let value = json!({
-            "format": self.format,
-            "version": self.version,
-            "numerics": self.numerics,
-            "plan_hash": self.plan_hash,
-            "points": self.points,
-            "chunk_points": self.chunk_points,
-            "plan": self.plan,
-        });
-        let text = pretty(&value);
+        let text = pretty(&json!(self));
         if text.len() as u64 >= regular::LONGEST_JSON_BYTES {
             return Err(StoreError::LongPlan { folder: folder.path.clone() });
         }

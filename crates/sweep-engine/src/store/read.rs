@@ -43,19 +43,19 @@ impl ResultFile {
     /// [`StoreError::Parquet`] for a file that is not the result of a run.
     pub fn of(file: &ParquetFile, kind: FileKind<'_>) -> Result<Self, StoreError> {
         own_word(file, kind).ok_or_else(|| {
-            let reason = "its metadata is not that of a result of this command";
-            StoreError::parquet("read", file.path())(ParquetError::General(reason.into()))
+            let reason = format!("its metadata is not that of a {}", kind.name());
+            StoreError::parquet("read", file.path())(ParquetError::General(reason))
         })
     }
 }
 
 fn own_word(file: &ParquetFile, kind: FileKind<'_>) -> Option<ResultFile> {
     // Other files of this program carry the plan too: a boundary's rows are not points.
-    if !kind.has_keys(&|key| file.value(key).is_some()) {
+    if file.kind() != Some(kind) {
         return None;
     }
     Some(ResultFile {
-        plan: serde_json::from_str(file.value(key::PLAN)?).ok()?,
+        plan: file.json(key::PLAN)?,
         plan_hash: file.value(key::PLAN_HASH)?.to_owned(),
         version: file.value(key::VERSION)?.to_owned(),
         numerics: file.value(key::NUMERICS).and_then(|numerics| numerics.parse().ok()).unwrap_or(0),
@@ -188,13 +188,9 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
     let mut tally = Tally::default();
     let fields = file.schema().fields().iter().map(|field| field.name().clone());
     let ratios: Vec<String> = fields.filter(|name| name.starts_with("ratio_")).collect();
-    let batches = file.batches(|builder| {
-        let columns = COLUMNS.into_iter().chain(ratios.iter().map(String::as_str));
-        let mask = ProjectionMask::columns(builder.parquet_schema(), columns);
-        builder.with_projection(mask)
-    })?;
-    let limits =
-        file.value(key::PLAN).and_then(|plan| ratio_limits(&serde_json::from_str(plan).ok()?));
+    let columns = COLUMNS.into_iter().chain(ratios.iter().map(String::as_str));
+    let batches = file.batches_of(columns)?;
+    let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
     for batch in batches {
         count(&batch?, &ratios, limits, &mut tally).map_err(&failed)?;
     }
@@ -297,11 +293,7 @@ pub fn levels(file: &ParquetFile) -> Result<Vec<Option<String>>, StoreError> {
     let failed = StoreError::parquet("read", file.path());
     let absent = || ParquetError::General("there is no column `method`".to_owned());
     let mut levels = Vec::new();
-    let batches = file.batches(|builder| {
-        let mask = ProjectionMask::columns(builder.parquet_schema(), ["method"]);
-        builder.with_projection(mask)
-    })?;
-    for batch in batches {
+    for batch in file.batches_of(["method"])? {
         let batch = batch?;
         let names = batch.column_by_name("method").ok_or_else(absent).map_err(&failed)?;
         let names = cells::texts(names).map_err(|error| failed(error.into()))?;

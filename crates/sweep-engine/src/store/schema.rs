@@ -97,6 +97,14 @@ pub struct Done {
     pub rows: Vec<Row>,
 }
 
+impl Layout {
+    /// Of a map: a row a point.
+    pub fn of_map(axes: Vec<Column>, columns: Vec<Column>) -> Self {
+        let (kind, metadata) = (FileKind::Map, Vec::new());
+        Self { axes, columns, kind, rows_a_point: 1, has_several: false, metadata }
+    }
+}
+
 impl Column {
     /// A column.
     pub fn new(

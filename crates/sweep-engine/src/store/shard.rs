@@ -8,7 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::Folder;
@@ -75,7 +75,7 @@ impl FromStr for ShardRequest {
 }
 
 /// What the first shard froze.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Dealing {
     /// How many parts.
@@ -113,7 +113,7 @@ impl Dealing {
 
     /// Writes the dealing unless another shard was first, and says what holds.
     pub(super) fn freeze(self, folder: &Folder) -> Result<Self, StoreError> {
-        let text = pretty(&json!({ "shards": self.shards, "first_array_id": self.first_array_id }));
+        let text = pretty(&json!(self));
         let path = folder.shards();
         if atomic::create(&folder.path, &path, &text)? {
             return Ok(self);

@@ -15,10 +15,11 @@ use super::shard::{self, Dealing};
 use super::{Folder, Job, chunk_points, lock};
 
 /// How far a run is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum State {
     /// Nothing is there.
+    #[default]
     NotStarted,
     /// Chunks are missing.
     Unfinished,
@@ -29,7 +30,7 @@ pub enum State {
 }
 
 /// Progress of a run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FolderStatus {
     /// The finished file, or where it will be.
     pub output: PathBuf,
@@ -73,19 +74,10 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     let chunks = job.points.div_ceil(points_a_chunk);
     let mut status = FolderStatus {
         output: output.to_path_buf(),
-        state: State::NotStarted,
         points: job.points,
-        points_done: 0,
-        points_failed: 0,
-        by_status: StatusCounts::default(),
         chunks,
-        chunks_done: 0,
         chunks_missing: chunks,
-        chunks_damaged: Vec::new(),
-        running: Vec::new(),
-        shards: None,
-        missing_shards: String::new(),
-        missing_shard_numbers: Vec::new(),
+        ..FolderStatus::default()
     };
     let (ours, hash) = (PlanFile::of(job), job.hash());
     match PlanFile::read(&folder)? {

@@ -24,10 +24,9 @@ use std::path::{Path, PathBuf};
 use super::error::StoreError;
 use super::lock::Lock;
 use super::open;
-use super::plan_file::{PlanFile, set_aside};
-use super::read;
+use super::plan_file::set_aside;
 use super::{Folder, Job, TRIALS};
-use sweep_files::{FileError, FileKind, ParquetFile, atomic, key, regular};
+use sweep_files::{FileError, atomic, regular};
 
 /// Bytes of a point and its answer.
 const CONTENT_BYTES: usize = 32;
@@ -172,36 +171,12 @@ fn contents(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> Result<(File, usize, K
 
 /// Whether the output is the finished file of this search and build.
 fn is_finished(folder: &Folder, job: &Job<'_>) -> Result<bool, StoreError> {
-    let Some(file) = read::finished(&folder.output)? else { return Ok(false) };
-    let ours = PlanFile::of(job);
-    let was = frozen(&file, job.layout.kind, &ours).ok_or_else(|| {
-        let reason = format!("its metadata is not that of a {}", job.layout.kind.name());
-        let error = parquet::errors::ParquetError::General(reason);
-        StoreError::parquet("read", file.path())(error)
-    })?;
-    if was.plan_hash != ours.plan_hash {
-        let differences = was.differences(&ours);
-        return Err(StoreError::OutputDiffers { output: folder.output.clone(), differences });
-    }
+    let Some((file, _)) = open::of_plan(folder, job)? else { return Ok(false) };
     // Files of this build carry a digest.
     if !file.is_sealed() {
         return Err(FileError::Damaged { path: folder.output.clone() }.into());
     }
     Ok(true)
-}
-
-/// The plan that a finished file was made with.
-fn frozen(file: &ParquetFile, kind: FileKind<'_>, ours: &PlanFile) -> Option<PlanFile> {
-    if !kind.has_keys(&|key| file.value(key).is_some()) {
-        return None;
-    }
-    Some(PlanFile {
-        plan: serde_json::from_str(file.value(key::PLAN)?).ok()?,
-        plan_hash: file.value(key::PLAN_HASH)?.to_owned(),
-        version: file.value(key::VERSION)?.to_owned(),
-        numerics: file.value(key::NUMERICS).and_then(|numerics| numerics.parse().ok()).unwrap_or(0),
-        ..ours.clone()
-    })
 }
 
 fn encode(plan: &[u8; blake3::OUT_LEN], key: Key, answer: Option<f64>) -> [u8; RECORD_BYTES] {
@@ -247,6 +222,7 @@ mod tests {
     use super::*;
     use crate::build::Build;
     use crate::table::Table;
+    use sweep_files::{FileKind, key};
 
     const BUILD: Build = Build { version: "0.0.0-test", numerics: 1 };
 

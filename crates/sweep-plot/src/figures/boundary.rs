@@ -35,10 +35,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let columns: Vec<&Column> =
         table.columns.iter().filter(|column| column.numbers().is_some()).collect();
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-    let empty = || PlotError::Empty {
-        path: table.source.path.clone(),
-        reason: "a curve needs at least two points",
-    };
+    let empty = || table.source.empty("a curve needs at least two points");
     let (low, high) = bracket(&names).ok_or_else(empty)?;
     let (x, y) = (columns[0], columns[1]);
     let [xs, ys, lows, highs] = [
@@ -81,7 +78,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         series.extend(branches(&grid, places).into_iter().map(|branch| {
             let pick = |of: fn(&Place) -> f64| branch.iter().map(of).collect::<Vec<f64>>();
             let style = Style::Band(pick(|place| place.low), pick(|place| place.high));
-            Series { name: name.clone(), colour, grid: 0, y: pick(|place| place.y), style }
+            Series::new(name.clone(), colour, 0, pick(|place| place.y), style)
         }));
     }
     let side = far_side(&curves, side_words(table));
@@ -217,7 +214,7 @@ fn limit(table: &Table) -> String {
     let unit = table.column("quantity_low").map_or("", |column| &column.unit);
     let (unit, factor) = label::shown(unit);
     let limit = told.map_or(table.source.ratio_limit(), |limit| limit * factor);
-    let limit = format!("{} {unit}", label::significant(limit, 4)).trim_end().to_owned();
+    let limit = label::valued("", limit, unit);
     match quantity(table) {
         "ratio_max" => format!("ratio {limit}"),
         growth if is_growth(growth) && told.is_none_or(|limit| limit == 0.0) => {
@@ -234,10 +231,10 @@ fn further(table: &Table, row: usize) -> String {
         axes.into_iter().flatten().skip(2).filter_map(|axis| axis.get("parameter")?.as_str());
     let said = names.filter_map(|name| {
         let column = table.column(name)?;
-        let value = label::significant(*column.numbers()?.get(row)?, 4);
-        Some(format!("{} {value} {}", label::words(name), column.unit))
+        let value = *column.numbers()?.get(row)?;
+        Some(label::valued(&label::words(name), value, &column.unit))
     });
-    said.collect::<Vec<_>>().join(", ").trim_end().to_owned()
+    said.collect::<Vec<_>>().join(", ")
 }
 
 /// A curve's places as lines that have one each along the grid: where there are several, each goes

@@ -33,10 +33,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let modes = modes(table)?;
     let top = modes.iter().flat_map(|mode| &mode.speed).fold(0.0_f64, |top, &speed| top.max(speed));
     if top <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
-        return Err(PlotError::Empty {
-            path: table.source.path.clone(),
-            reason: "the modes are given at one speed only",
-        });
+        return Err(table.source.empty("the modes are given at one speed only"));
     }
     let (near, far): (Vec<Mode>, Vec<Mode>) = modes
         .into_iter()
@@ -55,40 +52,21 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         for speed in crossings(&mode) {
             stars.push((speed, speed, format!("{speed:.1} rpm")));
         }
-        series.push(Series {
-            name: mode.name,
-            colour: DISTINCT[k % DISTINCT.len()],
-            grid: grids.len(),
-            y: mode.frequency,
-            style: match mode.band {
-                Some((low, high)) => Style::Band(low, high),
-                None => Style::Solid(2.2),
-            },
-        });
+        let style = mode.band.map_or(Style::Solid(2.2), |(low, high)| Style::Band(low, high));
+        let colour = DISTINCT[k % DISTINCT.len()];
+        series.push(Series::new(mode.name, colour, grids.len(), mode.frequency, style));
         grids.push(mode.speed);
     }
     for sum in sums {
         for speed in crossings(&sum) {
             stars.push((speed, speed, format!("{speed:.1} rpm")));
         }
-        series.push(Series {
-            name: sum.name,
-            colour: MUTED,
-            grid: grids.len(),
-            y: sum.frequency,
-            style: Style::Dashed,
-        });
+        series.push(Series::new(sum.name, MUTED, grids.len(), sum.frequency, Style::Dashed));
         grids.push(sum.speed);
     }
-    let line = Series {
-        name: "frequency = spin speed".to_owned(),
-        colour: INK,
-        grid: 0,
-        y: vec![0.0, top],
-        style: Style::Dashed,
-    };
+    let line = Series::new("frequency = spin speed", INK, 0, vec![0.0, top], Style::Dashed);
     series.push(line);
-    let mut notes: Vec<String> = table.source.run_name().map(str::to_owned).into_iter().collect();
+    let mut notes = table.source.notes([]);
     if series.iter().any(|series| matches!(series.style, Style::Band(..))) {
         notes.push("shaded: least to greatest over a turn of the drum".to_owned());
     }
@@ -124,13 +102,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
 /// [`PlotError::Unfit`] when the file is not a modes file, [`PlotError::Column`] when it lacks a
 /// column.
 pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
-    if table.source.kind != Kind::Modes {
-        return Err(PlotError::Unfit(format!(
-            "`--modes {}`: this is a {} file; `sweep modes --out FILE` writes a modes file",
-            table.source.path.display(),
-            table.source.kind.name()
-        )));
-    }
+    table.source.expect(Kind::Modes, "--modes", "`sweep modes --out FILE` writes a modes file")?;
     let mut speeds: Vec<f64> = modes(table)?.iter().flat_map(crossings).collect();
     speeds.sort_by(f64::total_cmp);
     Ok(speeds)

@@ -130,7 +130,7 @@ fn ratios(
 }
 
 fn line(name: &str, colour: Colour, y: Vec<f64>) -> Series {
-    Series { name: name.to_owned(), colour, grid: 0, y, style: Style::Solid(2.2) }
+    Series::new(name, colour, 0, y, Style::Solid(2.2))
 }
 
 /// Where a cell holds reliable and unreliable points, as ranges of the axis. Those too near to each

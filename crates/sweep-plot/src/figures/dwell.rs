@@ -9,7 +9,7 @@ use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, LINEAR, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::stability::{
-    UNSTABLE, axes, axis_columns, one_point, part, row_values, said_within, shown, unstable,
+    UNSTABLE, axes, axis_columns, notes_at, one_point, part, row_values, shown, unstable,
 };
 use crate::figures::{passages, trace};
 use crate::label::{self, Label};
@@ -59,7 +59,8 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         .into_iter()
         .filter(|(name, _)| source.column(&format!("periodic_{name}")).is_some())
         .collect();
-    let is_shown = shown(source, &channels, &options.channels)?;
+    let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
+    let is_shown = shown(source, &names, &options.channels)?;
     let axes = axes(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
     let held = read(source, &axes, &point, &channels)?;
@@ -79,13 +80,7 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         let scaled = |values: &[f64]| values.iter().map(|value| value * factor).collect();
         let [linear, periodic]: [Vec<f64>; 2] =
             [scaled(&held.lines[k][0]), scaled(&held.lines[k][1])];
-        let line = |name: &str, colour, y, style| Series {
-            name: name.to_owned(),
-            colour,
-            grid: 0,
-            y,
-            style,
-        };
+        let line = |name: &str, colour, y, style| Series::new(name, colour, 0, y, style);
         let of = |wanted| part(&periodic, &held.growth, wanted);
         let mut series = vec![
             line("linear model", LINEAR, linear, Style::Solid(1.6)),
@@ -96,30 +91,17 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
             let y: Vec<f64> = of_kind(kind).map(|(_, _, values)| values[k] * factor).collect();
             if !y.is_empty() {
                 let name = format!("ends in: {words}");
-                series.push(Series {
-                    name,
-                    colour: *colour,
-                    grid: 1 + kind,
-                    y,
-                    style: Style::Dots,
-                });
+                series.push(Series::new(name, *colour, 1 + kind, y, Style::Dots));
             }
         }
         let runs = passing.iter().flat_map(|run| &run.panels).filter(|panel| panel.name == *name);
         let runs = runs.flat_map(|panel| &panel.series);
         let rising = runs.filter(|run| run.name == RISING);
         series.extend(passing.iter().zip(rising).map(|(chart, run)| {
-            Series {
-                name: "a run that passes these speeds".to_owned(),
-                colour: INK,
-                grid: of_run + run.grid,
-                y: chart.grids[run.grid]
-                    .iter()
-                    .zip(&run.y)
-                    .filter_map(|(speed, y)| is_held(speed).then_some(*y))
-                    .collect(),
-                style: Style::Solid(1.4),
-            }
+            let of_run_y = chart.grids[run.grid].iter().zip(&run.y);
+            let y = of_run_y.filter_map(|(speed, y)| is_held(speed).then_some(*y)).collect();
+            let name = "a run that passes these speeds";
+            Series::new(name, INK, of_run + run.grid, y, Style::Solid(1.4))
         }));
         let motions = series.iter().flat_map(|series| &series.y).copied();
         let log =
@@ -133,7 +115,7 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         }
     });
     let panels = panels.collect();
-    let mut notes = notes(source, &axes, &point);
+    let mut notes = notes_at(source, &axes, &point);
     notes.push("largest deviation from equilibrium".to_owned());
     Ok(Chart {
         title: "What a held speed ends in".to_owned(),
@@ -252,13 +234,11 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
         states.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let (_, words, colour) = KINDS[kind];
         let said = format!("{} rpm", label::significant(speed, 6));
-        let series = Series {
-            name: format!("motion {motion}: {words}"),
-            colour: if motion == 0.0 { colour } else { DISTINCT[motion as usize % DISTINCT.len()] },
-            grid: grids.len(),
-            y: states.iter().map(|state| state[1]).collect(),
-            style: Style::Dots,
-        };
+        let further = DISTINCT[motion as usize % DISTINCT.len()];
+        let colour = if motion == 0.0 { colour } else { further };
+        let name = format!("motion {motion}: {words}");
+        let pitch = states.iter().map(|state| state[1]).collect();
+        let series = Series::new(name, colour, grids.len(), pitch, Style::Dots);
         grids.push(states.iter().map(|state| state[0]).collect());
         match panels.last_mut().filter(|panel| panel.name == said) {
             Some(panel) => panel.series.push(series),
@@ -270,20 +250,10 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
     }
     Ok(Chart {
         title: "States once a turn, where the unbalance is up".to_owned(),
-        subtitle: notes(source, &axes, &point).join(" · "),
+        subtitle: notes_at(source, &axes, &point).join(" · "),
         x_label: Label::new("Yaw of the tub from equilibrium", "mrad"),
-        x_log: false,
         grids,
         panels,
-        marks: Vec::new(),
-        mark_meaning: String::new(),
-        shades: Vec::new(),
-        shade_meaning: String::new(),
+        ..Chart::default()
     })
-}
-
-/// The run and the point.
-fn notes(source: &Source, axes: &[&ColumnFacts], point: &[f64]) -> Vec<String> {
-    let run = source.run_name().map(str::to_owned).into_iter();
-    run.chain(axes.iter().zip(point).map(|(axis, value)| said_within(axis, *value))).collect()
 }

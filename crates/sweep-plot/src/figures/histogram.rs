@@ -63,8 +63,7 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
         }],
         mark_meaning: level.map_or(String::new(), |level| level.line.clone()),
         marks: mark.into_iter().collect(),
-        shades: Vec::new(),
-        shade_meaning: String::new(),
+        ..Chart::default()
     }
 }
 

@@ -154,9 +154,8 @@ fn places(panel: &Panel, line: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
 /// Name of the run, how many points it has and how many failed, and what is fixed, left out or
 /// merged.
 pub(crate) fn subtitle(map: &Map, notes: &[String]) -> String {
-    let mut parts: Vec<String> =
-        map.table.source.run_name().map(str::to_owned).into_iter().collect();
-    parts.push(format!("{} points", map.table.source.rows));
+    let source = &map.table.source;
+    let mut parts = source.notes([format!("{} points", source.rows)]);
     let failed = map.failed();
     if failed > 0 {
         parts.push(format!("{failed} failed"));
@@ -257,23 +256,13 @@ impl<'a> Cells<'a> {
         // no seams.
         let mut shapes: BTreeMap<Fill, Outline> = BTreeMap::new();
         let mut lone: Vec<[f64; 4]> = Vec::new();
-        let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
-        let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.at_y(border)).collect();
-        for (x, pair) in x_axis.borders.windows(2).enumerate() {
-            let (left, right) = (panel.at_x(pair[0]), panel.at_x(pair[1]));
-            let fill = |y: usize| self.fills[self.map.grid.cell(x, y, rest)];
-            for (start, end, here) in runs(ys.len() - 1, fill, |fill| fill == Some(Fill::Undefined))
-            {
-                match here {
-                    Some(Fill::Undefined) => {
-                        lone.push([left, ys[end], right - left, ys[start] - ys[end]])
-                    }
-                    Some(fill) => {
-                        let shape = shapes.entry(fill).or_default();
-                        shape.add_rectangle(left, ys[end], right - left, ys[start] - ys[end]);
-                    }
-                    None => {}
-                }
+        let fill = |cell: usize| self.fills[cell];
+        let is_lone = |fill| fill == Some(Fill::Undefined);
+        for ([x, y, width, height], fill) in self.strips(panel, rest, fill, is_lone) {
+            match fill {
+                Some(Fill::Undefined) => lone.push([x, y, width, height]),
+                Some(fill) => shapes.entry(fill).or_default().add_rectangle(x, y, width, height),
+                None => {}
             }
         }
         for (fill, shape) in shapes {
@@ -296,18 +285,40 @@ impl<'a> Cells<'a> {
     /// The cells that `holds` is true of.
     fn area(&self, panel: &Panel, rest: &[usize], holds: impl Fn(usize) -> bool) -> Outline {
         let mut area = Outline::default();
-        let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
-        let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.at_y(border)).collect();
-        for (x, pair) in x_axis.borders.windows(2).enumerate() {
-            let (left, right) = (panel.at_x(pair[0]), panel.at_x(pair[1]));
-            let within = |y: usize| holds(self.map.grid.cell(x, y, rest));
-            for (start, end, _) in
-                runs(ys.len() - 1, within, |_| false).filter(|(_, _, within)| *within)
-            {
-                area.add_rectangle(left, ys[end], right - left, ys[start] - ys[end]);
+        for ([x, y, width, height], holds) in self.strips(panel, rest, holds, |_| false) {
+            if holds {
+                area.add_rectangle(x, y, width, height);
             }
         }
         area
+    }
+
+    /// Rectangles `[x, y, width, height]` of neighbours along y with the same content, px; those of
+    /// content that is `lone` are one cell each.
+    fn strips<T: Copy + PartialEq>(
+        &self,
+        panel: &Panel,
+        rest: &[usize],
+        content: impl Fn(usize) -> T,
+        lone: impl Fn(T) -> bool,
+    ) -> Vec<([f64; 4], T)> {
+        let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
+        let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.at_y(border)).collect();
+        let mut strips = Vec::new();
+        for (x, pair) in x_axis.borders.windows(2).enumerate() {
+            let (left, right) = (panel.at_x(pair[0]), panel.at_x(pair[1]));
+            let of_cell = |y: usize| content(self.map.grid.cell(x, y, rest));
+            let mut start = 0;
+            while start + 1 < ys.len() {
+                let (here, mut end) = (of_cell(start), start + 1);
+                while !lone(here) && end + 1 < ys.len() && of_cell(end) == here {
+                    end += 1;
+                }
+                strips.push(([left, ys[end], right - left, ys[start] - ys[end]], here));
+                start = end;
+            }
+        }
+        strips
     }
 
     /// Whether a cell has points that failed or have no value beside others that have one.
@@ -471,27 +482,6 @@ fn is_near(panel: &Panel, lines: &[Vec<Option<[f64; 2]>>], [x, y]: [f64; 2]) -> 
     let pairs = lines.iter().flat_map(|line| line.windows(2));
     let mut known = pairs.filter_map(|pair| pair[0].zip(pair[1]));
     known.any(|(from, to)| near(from, to))
-}
-
-/// Neighbouring places with the same content as `(first, one past the last, content)`, those alone
-/// that `lone` says.
-fn runs<T: Copy + PartialEq>(
-    count: usize,
-    content: impl Fn(usize) -> T,
-    lone: impl Fn(T) -> bool,
-) -> impl Iterator<Item = (usize, usize, T)> {
-    let mut next = 0;
-    std::iter::from_fn(move || {
-        if next >= count {
-            return None;
-        }
-        let (start, here) = (next, content(next));
-        next += 1;
-        while !lone(here) && next < count && content(next) == here {
-            next += 1;
-        }
-        Some((start, next, here))
-    })
 }
 
 fn colour_bar(scene: &mut Scene, layer: &Layer, [x, y, width, height]: [f64; 4]) {

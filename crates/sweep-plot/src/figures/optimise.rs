@@ -67,12 +67,8 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
     let grids: Vec<Vec<f64>> = (0..KINDS.len()).map(|kind| of(kind, 0)).collect();
     let panels = shown.iter().enumerate().map(|(k, (column, words))| {
         let colours = [FAILED, DISTINCT[5], NONLINEAR];
-        let dots = |kind: usize| Series {
-            name: KINDS[kind].to_owned(),
-            colour: colours[kind],
-            grid: kind,
-            y: of(kind, k + 1),
-            style: Style::Dots,
+        let dots = |kind: usize| {
+            Series::new(KINDS[kind], colours[kind], kind, of(kind, k + 1), Style::Dots)
         };
         let drawn = (0..KINDS.len()).filter(|&kind| !grids[kind].is_empty());
         let label = Label::new(words, units[k + 1].0);
@@ -87,12 +83,8 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
             .to_owned(),
         subtitle: source.subtitle(&format!("{} candidates", source.rows)),
         x_label: Label::new(&x.1, units[0].0),
-        x_log: false,
-        shades: Vec::new(),
-        shade_meaning: String::new(),
-        panels: panels.collect(),
         grids,
-        marks: Vec::new(),
-        mark_meaning: String::new(),
+        panels: panels.collect(),
+        ..Chart::default()
     })
 }

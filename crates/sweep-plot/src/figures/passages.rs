@@ -32,10 +32,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         .filter(|(_, turns)| !turns.is_empty())
         .collect();
     if turns.is_empty() {
-        return Err(PlotError::Empty {
-            path: table.source.path.clone(),
-            reason: "the drum makes no whole turn while its speed changes",
-        });
+        return Err(table.source.empty("the drum makes no whole turn while its speed changes"));
     }
     chart.grids = turns
         .iter()
@@ -59,12 +56,12 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
 /// A curve over time as one over speed for each stretch.
 fn by_turn(series: &Series, stretches: &[(bool, Vec<[usize; 2]>)]) -> Vec<Series> {
     let linear = series.name.starts_with("linear") || series.name == "model";
-    let curve = |(grid, (gains, turns)): (usize, &(bool, Vec<[usize; 2]>))| Series {
-        name: format!("{}, speed {}", series.name, if *gains { "rising" } else { "falling" }),
-        colour: DISTINCT[usize::from(!gains)],
-        grid,
-        y: turns.iter().map(|&[from, to]| greatest(&series.y[from..=to])).collect(),
-        style: if linear { Style::Dashed } else { Style::Solid(1.8) },
+    let curve = |(grid, (gains, turns)): (usize, &(bool, Vec<[usize; 2]>))| {
+        let way = if *gains { "rising" } else { "falling" };
+        let name = format!("{}, speed {way}", series.name);
+        let y = turns.iter().map(|&[from, to]| greatest(&series.y[from..=to])).collect();
+        let style = if linear { Style::Dashed } else { Style::Solid(1.8) };
+        Series::new(name, DISTINCT[usize::from(!gains)], grid, y, style)
     };
     stretches.iter().enumerate().map(curve).collect()
 }

@@ -17,9 +17,10 @@ const AT_95: f64 = 3.84;
 /// # Errors
 /// [`PlotError::Empty`] for a file that has no profiles.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
-    let empty = || PlotError::Empty {
-        path: table.source.path.clone(),
-        reason: "it has no profiles: they are in the curves of `sweep fit`, if the model follows",
+    let empty = || {
+        table.source.empty(
+            "it has no profiles: they are in the curves of `sweep fit`, if the model follows",
+        )
     };
     let profiles = table.source.find("profiles").and_then(Value::as_array).ok_or_else(empty)?;
     let grid = profiles.first().map(|profile| numbers(&profile["deviations"]));
@@ -27,16 +28,10 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let series = profiles.iter().enumerate().map(|(k, profile)| {
         let name = label::words(profile["name"].as_str().unwrap_or_default());
         let y = numbers(&profile["cost_above"]);
-        Series { name, colour: DISTINCT[k % 6], grid: 0, y, style: Style::Solid(1.8) }
+        Series::new(name, DISTINCT[k % 6], 0, y, Style::Solid(1.8))
     });
     let parabola = grid.iter().map(|deviation| deviation * deviation).collect();
-    let parabola = Series {
-        name: "by the standard errors".to_owned(),
-        colour: MUTED,
-        grid: 0,
-        y: parabola,
-        style: Style::Dashed,
-    };
+    let parabola = Series::new("by the standard errors", MUTED, 0, parabola, Style::Dashed);
     let series = series.chain([parabola]).collect();
     let panel = ChartPanel {
         levels: vec![(AT_95, "95 %".to_owned())],
@@ -46,13 +41,9 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         title: "How well the fitted numbers are known".to_owned(),
         subtitle: table.source.subtitle("each moved, the others fitted again"),
         x_label: Label::new("Distance from the fitted number in standard errors", ""),
-        x_log: false,
         grids: vec![grid],
         panels: vec![panel],
-        marks: Vec::new(),
-        mark_meaning: String::new(),
-        shades: Vec::new(),
-        shade_meaning: String::new(),
+        ..Chart::default()
     })
 }
 

@@ -33,9 +33,8 @@ type Line = [Vec<Phasor>; 2];
 /// # Errors
 /// [`PlotError::Empty`] where the file holds no machine or no resonances.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
-    let empty = |reason| PlotError::Empty { path: table.source.path.clone(), reason };
     let places = places(table)
-        .ok_or_else(|| empty("the file does not say where the machine's parts are"))?;
+        .ok_or_else(|| table.source.empty("the file does not say where the machine's parts are"))?;
     let modes = table.source.find(key::MODES).and_then(Value::as_array).into_iter().flatten();
     let mut panels = Vec::new();
     for mode in modes {
@@ -57,9 +56,9 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         }
     }
     if panels.is_empty() {
-        return Err(empty(
-            "the file holds no resonance; `sweep modes --speed` over faster speeds may",
-        ));
+        return Err(table
+            .source
+            .empty("the file holds no resonance; `sweep modes --speed` over faster speeds may"));
     }
     Ok(Chart {
         title: "Mode shapes at the resonance speeds".to_owned(),
@@ -140,13 +139,9 @@ fn series(places: &Places, q: &[Phasor]) -> Vec<Series> {
                 (0, 1.0, Style::Solid(2.6), ""),
                 (1, -1.0, Style::Dashed, ", a quarter of a period later"),
             ] {
-                series.push(Series {
-                    name: format!("{body}{direction}{when}"),
-                    colour: DISTINCT[colour],
-                    grid,
-                    y: line.iter().map(|phasor| sign * phasor[part]).collect(),
-                    style,
-                });
+                let name = format!("{body}{direction}{when}");
+                let y = line.iter().map(|phasor| sign * phasor[part]).collect();
+                series.push(Series::new(name, DISTINCT[colour], grid, y, style));
             }
         };
         add("", 0, &tub_line, k);

@@ -14,19 +14,16 @@ use crate::table::Table;
 /// # Errors
 /// [`PlotError::Empty`] for a file that has no spectra.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
-    let spectra = table.source.find("spectra").ok_or_else(|| PlotError::Empty {
-        path: table.source.path.clone(),
-        reason: "it has no spectra: they are in the curves of `sweep fit`",
+    let spectra = table.source.find("spectra").ok_or_else(|| {
+        table.source.empty("it has no spectra: they are in the curves of `sweep fit`")
     })?;
     let panel = |column: &Value| {
         let text = |key: &str| column[key].as_str().unwrap_or_default();
         let (unit, factor) = label::shown(text("unit"));
-        let curve = |key: &str, colour| Series {
-            name: key.to_owned(),
-            colour,
-            grid: 0,
-            y: numbers(&column[key]).iter().map(|value| value * factor).collect(),
-            style: Style::Solid(1.3),
+        let curve = |key: &str, colour| {
+            let values = numbers(&column[key]);
+            let y = values.iter().map(|value| value * factor).collect();
+            Series::new(key, colour, 0, y, Style::Solid(1.3))
         };
         let series = vec![curve("measured", MUTED), curve("residual", INK)];
         let label = Label::new(&label::words(text("name")), &format!("{unit} per root Hz"));

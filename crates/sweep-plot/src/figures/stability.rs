@@ -9,7 +9,7 @@ use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::machine::machine;
 use crate::label::{self, Label};
-use crate::read::{Batch, Cells, ColumnFacts, Kind, Source};
+use crate::read::{Batch, ColumnFacts, Kind, Source};
 use crate::swept::SweptAxis;
 use crate::table::Table;
 use crate::together;
@@ -43,7 +43,7 @@ type Points = Vec<Vec<f64>>;
 /// The columns of numbers between the point's index and the speed.
 pub(super) fn axes(source: &Source) -> Vec<&ColumnFacts> {
     let before = source.columns.iter().take_while(|column| column.name != "speed_rpm");
-    before.filter(|column| column.cells == Cells::Numbers && column.name != "point").collect()
+    before.filter(|column| column.is_number() && column.name != "point").collect()
 }
 
 /// The chart of a stability file: growth over speed.
@@ -66,16 +66,11 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
         let named: Vec<String> = named.map(|(_, (axis, value))| said(axis, *value)).collect();
         if named.is_empty() { "growth".to_owned() } else { named.join(", ") }
     };
-    let series = swept.iter().enumerate().map(|(k, point)| Series {
-        name: name(&point.values),
-        colour: DISTINCT[k],
-        grid: k,
-        y: point.growth.clone(),
-        style: Style::Solid(2.2),
+    let series = swept.iter().enumerate().map(|(k, point)| {
+        Series::new(name(&point.values), DISTINCT[k], k, point.growth.clone(), Style::Solid(2.2))
     });
-    let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
     let common = axes.iter().zip(&shown[0]).enumerate().filter(|(k, _)| !differs(*k));
-    notes.extend(common.map(|(_, (axis, value))| said_within(axis, *value)));
+    let mut notes = source.notes(common.map(|(_, (axis, value))| said_within(axis, *value)));
     if shown.len() < all.len() {
         notes.push(format!("{} of {} points", shown.len(), all.len()));
     }
@@ -118,8 +113,8 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         .into_iter()
         .filter(|(name, _)| source.column(&format!("linear_{name}")).is_some())
         .collect();
-    let is_shown = shown(source, &channels, &options.channels)?;
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
+    let is_shown = shown(source, &names, &options.channels)?;
     let columns: Vec<String> = names
         .iter()
         .flat_map(|name| ["nonlinear", "linear"].map(|model| format!("{model}_{name}")))
@@ -135,13 +130,7 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         };
         let nonlinear = scaled(2 * k);
         let of = |wanted: bool| part(&nonlinear, &one.growth, wanted);
-        let series = |name: &str, colour, y, style| Series {
-            name: name.to_owned(),
-            colour,
-            grid: 0,
-            y,
-            style,
-        };
+        let series = |name: &str, colour, y, style| Series::new(name, colour, 0, y, style);
         let lines = vec![
             series("linear model", LINEAR, scaled(2 * k + 1), Style::Solid(1.6)),
             series("nonlinear model, stable", NONLINEAR, of(false), Style::Solid(2.2)),
@@ -155,9 +144,7 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         }
     });
     let panels = panels.collect();
-    let mut notes: Vec<String> = source.run_name().map(str::to_owned).into_iter().collect();
-    let named = axes.iter().zip(&one.values);
-    notes.extend(named.map(|(axis, value)| said_within(axis, *value)));
+    let mut notes = notes_at(source, &axes, &one.values);
     notes.push("largest deviation from equilibrium over a turn".to_owned());
     Ok(Chart {
         title: "Periodic responses at constant speed".to_owned(),
@@ -185,10 +172,9 @@ pub(super) fn part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
 /// [`PlotError::NotThere`] for an unknown channel.
 pub(super) fn shown(
     source: &Source,
-    channels: &[(&str, &ColumnFacts)],
+    names: &[&str],
     asked: &[String],
 ) -> Result<Vec<bool>, PlotError> {
-    let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     if let Some(unknown) = asked.iter().find(|asked| !names.contains(&asked.as_str())) {
         return Err(source.not_there("--channel", unknown, "channel", names.join(", ")));
     }
@@ -199,22 +185,6 @@ pub(super) fn shown(
         (asked, _) => asked.iter().any(|asked| asked == name),
     };
     Ok(names.iter().map(is_shown).collect())
-}
-
-/// A file of `--stability`.
-///
-/// # Errors
-/// As [`Source::open`]; [`PlotError::Unfit`] for a file of another kind.
-fn open(path: &Path) -> Result<Source, PlotError> {
-    let source = Source::open(path)?;
-    if source.kind == Kind::Stability {
-        return Ok(source);
-    }
-    Err(PlotError::Unfit(format!(
-        "`--stability {}`: this is a {} file; `sweep stability` writes a stability file",
-        path.display(),
-        source.kind.name()
-    )))
 }
 
 /// What a stability file says of another file's machine.
@@ -229,10 +199,11 @@ pub(super) struct Unstable {
 /// The unstable speeds of the machine that a trace or a modes file is of.
 ///
 /// # Errors
-/// As [`open`]; [`PlotError::Unfit`] or [`PlotError::NotThere`] where the stability file does not
-/// have this machine.
+/// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] or [`PlotError::NotThere`]
+/// where the stability file does not have this machine.
 pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
-    let source = open(path)?;
+    let source = Source::open(path)?;
+    source.expect(Kind::Stability, "--stability", "`sweep stability` writes a stability file")?;
     let axes = axes(&source);
     let mut at: Vec<(String, f64)> =
         machine(table).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
@@ -258,14 +229,17 @@ pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotEr
 }
 
 fn said(axis: &ColumnFacts, value: f64) -> String {
-    let unit = if axis.unit.is_empty() { String::new() } else { format!(" {}", axis.unit) };
-    format!("{} {}{unit}", label::words(&axis.name), label::significant(value, 4))
+    label::valued(&label::words(&axis.name), value, &axis.unit)
 }
 
 /// As [`said`], within a sentence: the words are small, the unit keeps its letters.
-pub(super) fn said_within(axis: &ColumnFacts, value: f64) -> String {
-    let words = label::words(&axis.name);
-    said(axis, value).replacen(&words, &words.to_lowercase(), 1)
+fn said_within(axis: &ColumnFacts, value: f64) -> String {
+    label::valued(&label::words(&axis.name).to_lowercase(), value, &axis.unit)
+}
+
+/// The run and the point.
+pub(super) fn notes_at(source: &Source, axes: &[&ColumnFacts], point: &[f64]) -> Vec<String> {
+    source.notes(axes.iter().zip(point).map(|(axis, value)| said_within(axis, *value)))
 }
 
 /// The values of a row's axes, and whether it is at the values asked for.
@@ -321,8 +295,7 @@ fn points(
         }
     }
     if !seen_rows {
-        let reason = "it has no rows";
-        return Err(PlotError::Empty { path: source.path.clone(), reason });
+        return Err(source.empty("it has no rows"));
     }
     if found.is_empty() {
         let given: Vec<String> = at.iter().map(|(name, value)| format!("{name}={value}")).collect();

@@ -2,8 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
 use crate::PlotOptions;
 use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
@@ -17,9 +15,6 @@ use crate::scene::INK;
 use crate::table::Table;
 use crate::together::{self, At};
 
-/// Channels that a picture shows by default: one for each way in which the tub can move.
-const USUAL: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
-
 /// The chart of a trace file.
 ///
 /// # Errors
@@ -28,10 +23,7 @@ const USUAL: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
 pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
     let time = table.numbers("time_s")?.to_vec();
     if time.len() < 2 {
-        return Err(PlotError::Empty {
-            path: table.source.path.clone(),
-            reason: "a trace needs at least two instants",
-        });
+        return Err(table.source.empty("a trace needs at least two instants"));
     }
     if table.column("point").is_some() {
         let path = table.source.path.display();
@@ -41,20 +33,13 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     }
     let sides = sides(table);
     let found = quantities(table, sides);
-    let channels: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
-    if let Some(unknown) = options.channels.iter().find(|asked| !channels.contains(&asked.as_str()))
-    {
-        return Err(table.source.not_there("--channel", unknown, "channel", channels.join(", ")));
-    }
-    let usual: Vec<&str> = USUAL.into_iter().filter(|name| channels.contains(name)).collect();
-    let shown: Vec<&str> = match (&options.channels[..], &usual[..]) {
-        ([], []) => {
-            found.iter().filter(|quantity| quantity.channel).map(|quantity| quantity.name).collect()
-        }
-        ([], usual) => usual.to_vec(),
-        (asked, _) => asked.iter().map(String::as_str).collect(),
-    };
-
+    let names: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
+    let is_shown = stability::shown(&table.source, &names, &options.channels)?;
+    // Where no channel is usual, all are, and nothing else that is in the file.
+    let any = !options.channels.is_empty();
+    let shown =
+        found.iter().zip(is_shown).filter(|(of, is_shown)| *is_shown && (any || of.channel));
+    let shown: Vec<&str> = shown.map(|(quantity, _)| quantity.name).collect();
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
     let names = other.as_ref().map(|other| told_apart(table, other));
     let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
@@ -76,7 +61,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             .filter_map(|(table, column, name, colour, grid)| {
                 let y =
                     table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
-                Some(Series { name, colour, grid, y, style: Style::Solid(1.3) })
+                Some(Series::new(name, colour, grid, y, Style::Solid(1.3)))
             })
             .collect()
     };
@@ -103,8 +88,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     for (name, column) in table.with_prefix("residual_") {
         let (unit, factor) = label::shown(&column.unit);
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
-        let residual =
-            Series { name: "residual".to_owned(), colour: INK, grid: 0, y, style: Style::Dots };
+        let residual = Series::new("residual", INK, 0, y, Style::Dots);
         let words = format!("residual, {}", label::words(name));
         let shown = shown.contains(&name);
         let label = Label::new(&words, unit);
@@ -136,8 +120,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         }
         shades = stability::stretches_within(&time, speed, &unstable);
         let y = speed.to_vec();
-        let series =
-            Series { name: String::new(), colour: INK, grid: 0, y, style: Style::Solid(2.0) };
+        let series = Series::new(String::new(), INK, 0, y, Style::Solid(2.0));
         let height = 130.0;
         panels.push(ChartPanel {
             height,
@@ -152,7 +135,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         },
         subtitle: match &names {
             // What one of them is would be wrong of the other.
-            Some(_) => of_both(&least, apart),
+            Some(_) => of_both(&least, apart).join(" · "),
             None => subtitle(table, &least, apart),
         } + &note,
         x_label: Label::new("Time", "s"),
@@ -240,14 +223,8 @@ fn difference(panels: &[ChartPanel]) -> Option<f64> {
 /// The trace whose nonlinear model is drawn in place of the linear one.
 pub(super) fn other_trace(path: &Path) -> Result<Table, PlotError> {
     let table = Table::open(path)?;
-    if table.source.kind == Kind::Trace {
-        return Ok(table);
-    }
-    let kind = table.source.kind.name();
-    Err(PlotError::Unfit(format!(
-        "`--against {}`: this is a {kind} file, expected a trace",
-        path.display()
-    )))
+    table.source.expect(Kind::Trace, "--against", "`sweep trace` writes a trace")?;
+    Ok(table)
 }
 
 /// What a run is called: its name, or else its file's.
@@ -264,17 +241,10 @@ fn told_apart(one: &Table, other: &Table) -> [String; 2] {
     if names[0] != names[1] {
         return names;
     }
-    let at = tables.map(|table| {
-        let at = table.source.find("at").and_then(Value::as_object).into_iter().flatten();
-        at.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect::<Vec<_>>()
-    });
+    let at = tables.map(|table| together::at(&table.source));
     let own = |side: usize| -> Vec<String> {
         let differs = at[side].iter().filter(|own| !at[1 - side].contains(own));
-        let words = differs.map(|(name, value)| {
-            let (words, unit) = (label::words(name).to_lowercase(), label::unit_of_name(name));
-            format!("{words} {} {unit}", label::significant(*value, 4)).trim_end().to_owned()
-        });
-        words.collect()
+        differs.map(|(name, value)| parameter(name, *value)).collect()
     };
     let named = [own(0), own(1)].map(|words| words.join(", "));
     if named[0] != named[1] && named.iter().all(|name| !name.is_empty()) {
@@ -284,16 +254,18 @@ fn told_apart(one: &Table, other: &Table) -> [String; 2] {
     files.map(|file| file.to_string_lossy().into_owned())
 }
 
-/// What is so of two traces together.
-fn of_both(least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> String {
+/// A parameter and its value within a sentence.
+fn parameter(name: &str, value: f64) -> String {
+    label::valued(&label::words(name).to_lowercase(), value, &label::unit_of_name(name))
+}
+
+/// What is so of both motions together.
+fn of_both(least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> Vec<String> {
     let gaps = least_gaps_mm.iter().map(|(name, gap)| format!("{gap:.2} mm {name}"));
     let gaps = gaps.collect::<Vec<_>>().join(", ");
-    let mut parts = Vec::new();
-    if !gaps.is_empty() {
-        parts.push(format!("least gap {gaps}"));
-    }
-    parts.extend(apart.map(|apart| format!("largest difference {apart:.1e} of the peak")));
-    parts.join(" · ")
+    let gaps = (!gaps.is_empty()).then(|| format!("least gap {gaps}"));
+    let apart = apart.map(|apart| format!("largest difference {apart:.1e} of the peak"));
+    gaps.into_iter().chain(apart).collect()
 }
 
 /// The least gap of each model that has one, in the unit shown.
@@ -313,26 +285,12 @@ pub(super) fn subtitle(
     least_gaps_mm: &[(String, f64)],
     apart: Option<f64>,
 ) -> String {
-    let mut parts: Vec<String> = table.source.run_name().map(str::to_owned).into_iter().collect();
-    let mut said: Vec<(&str, f64)> = machine(table);
-    for (name, value) in table.source.find("at").and_then(Value::as_object).into_iter().flatten() {
-        if let Some(value) = value.as_f64().filter(|_| !said.iter().any(|(known, _)| known == name))
-        {
-            said.push((name, value));
-        }
-    }
-    for (name, value) in said {
-        let (words, unit) = (label::words(name).to_lowercase(), label::unit_of_name(name));
-        parts.push(format!("{words} {} {unit}", label::significant(value, 4)));
-    }
-    let gaps: Vec<String> =
-        least_gaps_mm.iter().map(|(model, gap)| format!("{gap:.2} mm {model}")).collect();
-    if !gaps.is_empty() {
-        parts.push(format!("least gap {}", gaps.join(", ")));
-    }
-    if let Some(apart) = apart {
-        parts.push(format!("largest difference {apart:.1e} of the peak"));
-    }
+    let (of_machine, at) = (machine(table), together::at(&table.source));
+    let further = at.iter().filter(|(name, _)| of_machine.iter().all(|(known, _)| known != name));
+    let further = further.map(|(name, value)| (name.as_str(), *value));
+    let said = of_machine.iter().copied().chain(further);
+    let mut parts = table.source.notes(said.map(|(name, value)| parameter(name, value)));
+    parts.extend(of_both(least_gaps_mm, apart));
     if let Some(rows) = table.stretch {
         parts.push(format!("least and greatest of every {rows} instants"));
     }

@@ -32,20 +32,12 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         for speed in resonances {
             stars.push((speed, between(&mode.speed, &percent, speed), format!("{speed:.1} rpm")));
         }
-        series.push(Series {
-            name: mode.name,
-            colour: DISTINCT[k % DISTINCT.len()],
-            grid: grids.len(),
-            y: percent,
-            style: Style::Solid(2.2),
-        });
+        let colour = DISTINCT[k % DISTINCT.len()];
+        series.push(Series::new(mode.name, colour, grids.len(), percent, Style::Solid(2.2)));
         grids.push(mode.speed);
     }
     if series.is_empty() {
-        return Err(PlotError::Empty {
-            path: table.source.path.clone(),
-            reason: "no mode's frequency meets the spin speed",
-        });
+        return Err(table.source.empty("no mode's frequency meets the spin speed"));
     }
     Ok(Chart {
         title: "Natural frequencies over a turn of the drum".to_owned(),

@@ -18,29 +18,14 @@ pub(crate) fn json(live: &Live, axes: &[(&str, bool)]) -> Value {
         let (unit, factor) = label::shown(label::unit_of_channel(name));
         json!({ "name": name, "words": label::channel(name), "unit": unit, "factor": factor })
     };
-    json!({
-        "module": embed::bytes(MODULE.iter().copied()),
-        "setup": embed::doubles(&live.setup),
-        "sliders": live.sliders.iter().map(|one| slider(one, axes)).collect::<Vec<_>>(),
-        "everyS": live.every_s,
-        "endS": live.end_s,
-        "windowS": live.window_s,
-        "channels": live.channels.iter().map(channel).collect::<Vec<_>>(),
-        "compared": live.compared,
-        "criterion": live.criterion,
-        "metrics": live.metrics.iter().map(metric).collect::<Vec<_>>(),
-        "staticSag": live.has_static_sag,
-        "growthSpeeds": live.growth_speeds_rpm,
-        "hasSlowGrowth": live.has_slow_growth,
-        "leftOut": live.left_out,
-        "kinds": live.kinds.iter().map(|kind| kind.replace('_', " ")).collect::<Vec<_>>(),
-        "levels": live.levels,
-        "accuracy": live.accuracy,
-        "ratioLimit": live.ratio_limit,
-        "ratioMin": live.ratio_min,
-        "rungs": live.rungs,
-        "version": live.version,
-    })
+    let mut data = json!(live);
+    data["module"] = embed::bytes(MODULE.iter().copied()).into();
+    data["setup"] = embed::doubles(&live.setup).into();
+    data["sliders"] = live.sliders.iter().map(|one| slider(one, axes)).collect();
+    data["channels"] = live.channels.iter().map(channel).collect();
+    data["metrics"] = live.metrics.iter().map(metric).collect();
+    data["kinds"] = live.kinds.iter().map(|kind| kind.replace('_', " ")).collect();
+    data
 }
 
 fn metric(columns: &[String; 2]) -> Value {

@@ -146,7 +146,7 @@ fn a_map_takes_the_line_of_a_boundary_over_its_axes() {
     assert_eq!(dashed(&figure), dashed(&plain) + 2);
     for (path, format, said) in [
         (&other, "a.svg", "is a boundary over unbalance_mass_kg, tub_mass_kg"),
-        (&no_boundary, "a.svg", "`--boundary` takes a boundary file"),
+        (&no_boundary, "a.svg", "`sweep boundary` writes a boundary file"),
         (&same, "a.html", "`--boundary` is for maps drawn as .svg or .png"),
     ] {
         let refused = message(draw(map(), &with(path), format));

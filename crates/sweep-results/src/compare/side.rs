@@ -2,7 +2,8 @@
 
 use super::{Flip, SharedRow, is_compared};
 use crate::error::ResultsError;
-use crate::rows::{Cell, CellKind, Column, ResultTable};
+use crate::rows::{Cell, ResultTable};
+use sweep_files::{CellKind, Column};
 
 /// Most cells of a file that are kept: two files of so many take some gigabytes.
 const MOST_CELLS: u64 = 100_000_000;
@@ -35,10 +36,7 @@ impl Cells {
     fn push(&mut self, cell: Cell) {
         match self {
             Self::Numbers(cells) => cells.push(cell.number().unwrap_or(f64::NAN)),
-            Self::Flags(cells) => cells.push(match cell {
-                Cell::Flag(flag) => Some(flag),
-                _ => None,
-            }),
+            Self::Flags(cells) => cells.push(cell.flag()),
             Self::Texts { names, codes } => codes.push(match cell {
                 Cell::Text(text) => {
                     let known = names.iter().position(|name| *name == text);
@@ -174,12 +172,7 @@ impl Side {
     pub(super) fn shared(&self, other: &Self, pair: [usize; 2]) -> SharedRow {
         let cells = |name: &str| [self.cell(name, pair[0]), other.cell(name, pair[1])];
         let numbers = |name: &str| cells(name).map(|cell| cell.number());
-        let flags = |name: &str| {
-            cells(name).map(|cell| match cell {
-                Cell::Flag(flag) => Some(flag),
-                _ => None,
-            })
-        };
+        let flags = |name: &str| cells(name).map(|cell| cell.flag());
         let verdicts = flags("reliable");
         let flip = match verdicts {
             [first, second] if first == second => Flip::None,

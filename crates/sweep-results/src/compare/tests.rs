@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use sweep_files::key;
 
 use arrow_array::UInt64Array;
 use serde_json::{Value, json};

@@ -8,7 +8,8 @@ use sweep_files::key;
 
 use super::{Format, names, no_room};
 use crate::error::ResultsError;
-use crate::rows::{Cell, Column, ResultTable};
+use crate::rows::{Cell, ResultTable};
+use sweep_files::Column;
 
 /// Rows of a sheet, less the two of headings.
 const MOST_ROWS: u64 = (1 << 20) - 2;

@@ -8,11 +8,15 @@ use super::*;
 
 const CHANNELS: [Channel; 2] = [Channel::TubFrontY, Channel::TubYaw];
 
+fn columns(measures: &Measures) -> Columns {
+    Columns::of_measures(&CHANNELS, 2.0.into(), measures, false)
+}
+
 fn layout(measures: Measures) -> Layout {
     let axis =
         |name: &str, unit: &str| Column::new(name, unit, format!("swept {name}"), Cells::Axis);
     let axes = vec![axis("unbalance_mass_kg", "kg"), axis("damping_n_s_per_m", "N s/m")];
-    of_measures(axes, &CHANNELS, 2.0.into(), measures, false)
+    Layout::of_map(axes, columns(&measures).declared())
 }
 
 #[test]
@@ -56,13 +60,6 @@ fn metrics_have_columns_in_the_order_asked_for_and_criteria_say_what_they_are() 
     let metrics = vec![Metric::StaticSag, Metric::ClashTime, Metric::CabinetForce];
     let measures = Measures { criterion: Criterion::Rms, metrics, ..Measures::default() };
     let layout = layout(measures.clone());
-    let asked = Asked {
-        channels: CHANNELS.to_vec(),
-        limits: 2.0.into(),
-        measures,
-        has_friction: false,
-        rows: RowKind::Run,
-    };
     let model = |metrics: &[f64]| Trajectory {
         amplitudes: vec![0.1, 0.2],
         metrics: metrics.to_vec(),
@@ -71,7 +68,7 @@ fn metrics_have_columns_in_the_order_asked_for_and_criteria_say_what_they_are() 
     let mut outcome = Outcome::new(0, model(&[1.5, 400.0]), model(&[0.5, 300.0]));
     outcome.static_sag_m = Some(0.013);
     let mut rows = ResultRows::new(&layout);
-    rows.push(0, vec![0.1, 60.0], Columns::of(&asked).row(outcome));
+    rows.push(0, vec![0.1, 60.0], columns(&measures).row(outcome));
     let batch = rows.take().unwrap();
     assert_eq!(batch.num_columns(), plain + 5);
     let expected = [

@@ -2,12 +2,7 @@
 
 use clap_complete::Shell;
 
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::exit::{Error, Exit, print};
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples =
-    &[["sweep completions bash", "to be sourced, or put where the shell looks"]];
 
 /// Arguments of `sweep completions`.
 #[derive(Debug, clap::Args)]

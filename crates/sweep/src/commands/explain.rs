@@ -4,23 +4,10 @@ use crate::config;
 use crate::engine::simd_from_environment;
 use crate::explain::{explain, json, words};
 use crate::speeds::{Speeds, turning};
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::GridArgs;
 use sweep_engine::exit::{Error, Exit, show};
 use sweep_engine::interrupt::Interrupt;
 use sweep_engine::threads;
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    [
-        "sweep explain my.toml --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=100",
-        "why the linear model fails there, and what would help",
-    ],
-    [
-        "sweep explain my.toml --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=100 --json",
-        "the same for programs",
-    ],
-];
 
 /// Arguments of `sweep explain`.
 #[derive(Debug, clap::Args)]
@@ -53,7 +40,7 @@ disturbance is measured by its energy. docs/stability.md explains every line.";
 /// without equilibrium or modes.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let (plan, at) = config::load_point(&args.grid.grid, &args.grid.sets, &args.grid.at)?;
-    let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
+    let threads = threads::count(args.threads, &threads::process)?;
     let simd = simd_from_environment()?;
     // A signal ends the process: there is nothing to keep.
     let interrupt = Interrupt::new();

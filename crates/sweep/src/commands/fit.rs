@@ -4,34 +4,18 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::PoisonError;
 
 use crate::config::{self, GridInput};
 use crate::fit::{self, FitOptions, Measured, Work};
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::GridArgs;
+use sweep_engine::effort::EffortArgs;
 use sweep_engine::exit::{Error, Exit, show, tell};
 use sweep_engine::interrupt::Interrupt;
-use sweep_engine::progress::{Progress, ProgressMode};
+use sweep_engine::progress::Progress;
 use sweep_engine::store::StoreError;
 use sweep_engine::threads;
+use sweep_files::panics::lock;
 use sweep_files::{self as files, FileKind, atomic};
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    [
-        "sweep fit my.toml run.csv --free unbalance_mass_kg,damping_n_s_per_m --out bench.toml",
-        "the machine on the bench, as a machine file",
-    ],
-    [
-        "sweep fit my.toml a.csv b.csv@unbalance_mass_kg=0.6 --free damping_n_s_per_m",
-        "two runs with loads of their own",
-    ],
-    [
-        "sweep fit my.toml run.csv --free damping_n_s_per_m,friction_n=0:100 --starts 24 --json",
-        "every minimum that two dozen starts lead to, for programs",
-    ],
-];
 
 /// Arguments of `sweep fit`.
 #[derive(Debug, clap::Args)]
@@ -78,13 +62,8 @@ pub struct Args {
     /// Print everything as JSON
     #[arg(long)]
     json: bool,
-    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
-    threads: Option<usize>,
-    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
-    /// 5 s) or none
-    #[arg(long, value_name = "auto|plain|none", default_value = "auto")]
-    progress: ProgressMode,
+    #[command(flatten)]
+    effort: EffortArgs,
 }
 
 /// What `--help` adds.
@@ -134,9 +113,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         files::judge(path, FileKind::Fit)?;
     }
     let interrupt = Interrupt::install().map_err(Error::signals)?;
-    let progress = Mutex::new(Progress::of_search(args.progress, 0, 0));
+    let progress = Mutex::new(Progress::of_search(args.effort.progress, 0, 0));
     let seen = |made: usize| {
-        progress.lock().unwrap_or_else(PoisonError::into_inner).show_search(0, made as u64);
+        lock(&progress).show_search(0, made as u64);
     };
     let journal = args.out.as_ref().map(|out| {
         let mut name = out.as_os_str().to_owned();
@@ -145,9 +124,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     });
     let stop = || interrupt.stopped();
     let work = Work { stop: &stop, seen: &seen, journal };
-    let threads = threads::count(args.threads, &|name| std::env::var(name).ok())?;
+    let threads = threads::count(args.effort.threads, &threads::process)?;
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &options, &work))?;
-    progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+    lock(&progress).finish();
     let Some(fitted) = found else {
         tell("interrupted: with --out, what was found out is kept, and the same command goes on");
         return Ok(Exit::interrupted(interrupt.signal()));

@@ -1,17 +1,20 @@
-//! What commands about held speeds have in common: doing it and what came of it.
+//! What commands about held speeds have in common: doing it, what came of it, and which job it is.
 
-use std::fmt::Write as _;
-use std::path::Path;
+use std::fmt;
+use std::path::{Path, PathBuf};
 
+use washer_model::{Starts, decimal};
+
+use crate::dwell::{Carry, POSITIVE, Search, is_positive, motions};
 use crate::engine::Engine;
+use crate::plan::Plan;
 use crate::speeds::SpeedList;
-use sweep_engine::commands::grid::{ResultArgs, quoted};
-use sweep_engine::commands::run::{WorkArgs, exit, installed, line, work};
-use sweep_engine::exit::{Error, Exit, tell};
-use sweep_engine::progress::duration;
-use sweep_engine::run::{self as runner, Ended, RunReport};
+use crate::stability::dwells;
+use sweep_engine::commands::cells::Lines as _;
+use sweep_engine::commands::grid::ResultArgs;
+use sweep_engine::commands::run::{RunCommand, exit, installed};
+use sweep_engine::exit::{Error, Exit};
 use sweep_engine::store::{Job, StoreError};
-use sweep_engine::threads::Environment;
 use sweep_files::ParquetFile;
 
 /// Speeds that the drum holds.
@@ -22,86 +25,130 @@ pub(super) struct SpeedArgs {
     pub(super) speed: SpeedList,
 }
 
-/// A command about held speeds.
-pub(super) struct Held<'a> {
-    pub(super) verb: &'static str,
-    pub(super) target: &'a ResultArgs,
-    pub(super) work: &'a WorkArgs,
-    /// Its options, to copy: those of the command, and those that tell `merge` the same.
-    pub(super) options: [String; 2],
-    pub(super) fail_on_error: bool,
-    /// What a finished file says, a line each with its name.
-    pub(super) lines: fn(&ParquetFile) -> Result<Vec<(&'static str, String)>, StoreError>,
+/// How motions are looked for, as `dwell`, `status` and `merge` take it.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct SearchArgs {
+    /// Starts a speed, the disturbed periodic response among them
+    #[arg(long, value_name = "N", default_value_t = 8,
+          value_parser = clap::value_parser!(u16).range(1..=Search::MOST_STARTS))]
+    starts: u16,
+    /// Hardest kick, in rad/s of the tub's rocking
+    #[arg(long, value_name = "RAD/S", default_value_t = 6.0, value_parser = positive)]
+    kick: f64,
+    /// Take the motion along from speed to speed, up or down, instead of starts at each
+    #[arg(long, value_name = "up|down", conflicts_with_all = ["starts", "kick", "threshold"])]
+    carry: Option<Carry>,
+    /// Look for the smallest kick that does not come back, where there are several motions
+    #[arg(long)]
+    threshold: bool,
+    /// Keep so many states of each motion, once a turn: a row each, with its coordinates
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true,
+          value_parser = clap::value_parser!(u16).range(..=256))]
+    sections: u16,
+    /// Follow a motion that does not settle for at most this long, in s
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0, value_parser = positive)]
+    longest: f64,
 }
 
-impl Held<'_> {
-    /// Does it and says what came of it.
-    ///
-    /// # Errors
-    /// Mistakes in the options, and whatever keeps the file from being written; finished chunks are
-    /// kept.
-    pub(super) fn carry_out(
-        &self,
-        name: &str,
-        engine: &(dyn Engine + Sync),
-        job: &Job<'_>,
-        output: &Path,
-    ) -> Result<Exit, Error> {
-        let interrupt = installed()?;
-        let environment: Environment<'_> = &|name| std::env::var(name).ok();
-        let options = self.work.options(environment)?;
-        let report = runner::run(engine, job, output, options, &interrupt)?;
-        for note in &report.notes {
-            tell(note);
-        }
-        tell(self.summary(name, output, &report)?.trim_end());
-        Ok(exit(self.fail_on_error, &report))
-    }
+fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value| is_positive(*value));
+    value.ok_or_else(|| format!("expected {POSITIVE}"))
+}
 
-    /// What came of it.
-    fn summary(&self, name: &str, output: &Path, report: &RunReport) -> Result<String, Error> {
-        let mut text = String::new();
-        let [own, of_merge] = &self.options;
-        // Writing to a String cannot fail.
-        let _ = match (&report.ended, &report.session) {
-            (Ended::Already(file, _), _) => writeln!(
-                text,
-                "{name}: all {} rows are there already (--fresh computes them again)",
-                file.points
-            ),
-            (Ended::Interrupted { kept, points, .. }, session) => {
-                let after = session.as_ref().map(|session| duration(session.wall_s));
-                let after = after.map(|wall| format!(", after {wall}")).unwrap_or_default();
-                writeln!(text, "{name}: interrupted with {kept} of {points} rows kept{after}")
-            }
-            (Ended::Shard(shard), Some(session)) => {
-                writeln!(text, "{name}, shard {} of {}: {}", shard.index, shard.of, work(session))
-            }
-            (_, Some(session)) => writeln!(text, "{name}: {}", work(session)),
-            (_, None) => Ok(()),
-        };
-        match &report.ended {
-            Ended::Already(..) | Ended::Finished(_) => {
-                for (name, words) in (self.lines)(&ParquetFile::open(output)?)? {
-                    line(&mut text, name, &words);
-                }
-                let shown = output.display().to_string();
-                line(&mut text, "file", &shown);
-                line(&mut text, "next", &format!("sweep show {}", quoted(&shown)));
-            }
-            Ended::Shard(_) => {
-                let merge = self.target.command("merge");
-                line(&mut text, "next", &format!("{merge} {of_merge}, when all shards are done"));
-            }
-            Ended::Interrupted { .. } => {
-                let mut again = format!("{} {own}", self.target.command(self.verb));
-                let shard = report.session.as_ref().and_then(|session| session.shard.as_deref());
-                if let Some(shard) = shard {
-                    let _ = write!(again, " --shard {shard}");
-                }
-                line(&mut text, "go on", &again);
-            }
+impl fmt::Display for SearchArgs {
+    /// What differs from the defaults, as it is written on a command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let usual = Starts::default();
+        let starts = self.search().starts;
+        if let Some(carry) = self.carry {
+            write!(f, " --carry {}", carry.name())?;
         }
-        Ok(text)
+        if starts.count != usual.count {
+            write!(f, " --starts {}", starts.count)?;
+        }
+        if starts.kick_rad_per_s != usual.kick_rad_per_s {
+            write!(f, " --kick {}", decimal(starts.kick_rad_per_s))?;
+        }
+        if starts.longest_s != usual.longest_s {
+            write!(f, " --longest {}", decimal(starts.longest_s))?;
+        }
+        if self.sections > 0 {
+            write!(f, " --sections {}", self.sections)?;
+        }
+        if self.threshold { f.write_str(" --threshold") } else { Ok(()) }
+    }
+}
+
+impl SearchArgs {
+    pub(super) fn search(&self) -> Search {
+        let starts = Starts {
+            count: usize::from(self.starts),
+            kick_rad_per_s: self.kick,
+            longest_s: self.longest,
+            with_threshold: self.threshold,
+            ..Starts::default()
+        };
+        Search { starts, carry: self.carry, sections: usize::from(self.sections) }
+    }
+}
+
+/// Does it, says what came of it by the `lines` of the file, and how the program ends.
+///
+/// # Errors
+/// Mistakes in the options, and whatever keeps the file from being written; finished chunks are
+/// kept.
+pub(super) fn carry_out(
+    command: &RunCommand<'_>,
+    engine: &dyn Engine,
+    (job, output): (&Job<'_>, &Path),
+    lines: impl Fn(&ParquetFile) -> Result<Vec<(&'static str, String)>, StoreError>,
+    fail_on_error: bool,
+) -> Result<Exit, Error> {
+    let finished = |text: &mut String, _: &_| {
+        for (name, words) in lines(&ParquetFile::open(output)?)? {
+            text.line(name, words);
+        }
+        text.line("file", output.display());
+        text.next("show", output);
+        Ok(())
+    };
+    let report = command.execute(engine, job, output, &installed()?, &finished)?;
+    Ok(exit(fail_on_error, &report))
+}
+
+/// Which job `status` and `merge` mean.
+#[derive(Debug, clap::Args)]
+pub(super) struct HeldArgs {
+    /// Constant spin speeds in rpm of `sweep stability`, or of `sweep dwell`: as there
+    #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
+    speed: Option<SpeedList>,
+    /// The run is of `sweep dwell`, not of `sweep stability`
+    #[arg(long, requires = "speed")]
+    dwell: bool,
+    /// How it looks for motions.
+    #[command(flatten)]
+    search: SearchArgs,
+}
+
+impl HeldArgs {
+    /// The job on a plan and its output, the command that goes on with it and what stands behind
+    /// its arguments.
+    pub(super) fn job<'a>(
+        &self,
+        plan: &'a Plan,
+        target: &ResultArgs,
+    ) -> (Job<'a>, PathBuf, [String; 2]) {
+        let out = target.out.as_deref();
+        let Some(speed) = &self.speed else {
+            return (Job::of(plan), target.output(plan), ["run".to_owned(), String::new()]);
+        };
+        if self.dwell {
+            let search = self.search.search();
+            let (job, output) = motions(plan, speed.values(), &search, out);
+            let options = format!(" --speed {speed}{}", self.search);
+            return (job, output, ["dwell".to_owned(), options]);
+        }
+        let (job, output) = dwells(plan, speed, out);
+        (job, output, ["stability".to_owned(), format!(" --speed {speed}")])
     }
 }

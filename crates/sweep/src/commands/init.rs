@@ -6,18 +6,11 @@ use std::path::{Path, PathBuf};
 use washer_model::Machine;
 
 use crate::config;
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::exit::{Error, Exit, print, tell};
 use sweep_files::atomic;
 
 /// The commented grid file.
 const GRID: &str = include_str!("starter.toml");
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    ["sweep init my.toml", "a commented grid file"],
-    ["sweep init --machine washer.toml", "the built-in machine, to be changed into one's own"],
-];
 
 /// Arguments of `sweep init`.
 #[derive(Debug, clap::Args)]

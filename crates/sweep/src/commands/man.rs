@@ -10,10 +10,6 @@ use sweep_engine::commands::examples::Examples;
 use sweep_engine::exit::{Error, Exit};
 use sweep_files::{self as files, FileKind};
 
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples =
-    &[["sweep man ~/.local/share/man/man1", "then `man sweep`, `man sweep-run`"]];
-
 /// Arguments of `sweep man`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -41,7 +37,7 @@ pub(crate) fn run(
         let name = command.get_name();
         write(&format!("sweep-{name}.1"), &page(command, name, examples(name)).map_err(failed)?)?;
     }
-    write("sweep.1", &page(&program, "", examples("")).map_err(failed)?)?;
+    write("sweep.1", &page(&program, "", examples("sweep")).map_err(failed)?)?;
     Ok(Exit::Done)
 }
 
@@ -66,7 +62,7 @@ fn page(command: &clap::Command, name: &str, examples: Examples) -> io::Result<V
     }
     rest.control("SH", ["EXAMPLES"]);
     for [line, does] in examples {
-        rest.control("TP", []).text([bold(*line)]).text([roman(*does)]);
+        rest.control("TP", []).text([bold(line)]).text([roman(does)]);
     }
     rest.to_writer(&mut text)?;
     Ok(text)

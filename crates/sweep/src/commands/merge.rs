@@ -1,6 +1,6 @@
 //! `sweep merge GRID.toml`: finished shards into the one file, of a run or of dwells.
 
-use super::held_args::HeldArgs;
+use super::held::HeldArgs;
 use crate::plan::Plan;
 use sweep_engine::commands::merge::{self, of_job};
 use sweep_engine::exit::{Error, Exit};
@@ -21,8 +21,6 @@ pub struct Args {
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let target = &args.merge.target;
     let plan: Plan = target.grid.load()?;
-    let Some((job, output, _)) = args.held.job(&plan, target.out.as_deref()) else {
-        return merge::run::<crate::Washer>(&args.merge);
-    };
+    let (job, output, _) = args.held.job(&plan, target);
     of_job(&plan.name, &job, &output)
 }

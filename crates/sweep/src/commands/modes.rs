@@ -8,22 +8,12 @@ use washer_model::{Exact, ModeAtSpeed, ModeOverSpeed, decimal};
 use crate::config;
 use crate::library::modes::{Analysis, built_in, of_plan};
 use crate::speeds::Speeds;
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::exit::{Error, Exit, show, tell};
 use sweep_engine::store::StoreError;
 use sweep_files::{FileKind, Output};
 
 /// Modes of the suspension, which differ from exact motions most.
 const SUSPENSION_MODES: usize = 4;
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    ["sweep modes", "resonance speeds of the built-in machine"],
-    [
-        "sweep modes my.toml --speed 0:400:10 --out modes.parquet",
-        "a Campbell diagram's data, for `sweep plot`",
-    ],
-];
 
 /// Arguments of `sweep modes`.
 #[derive(Debug, clap::Args)]

@@ -3,19 +3,9 @@
 use std::path::PathBuf;
 
 use crate::live::{SliderRange, live, slider_range};
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::plot::{self, finite};
 use sweep_engine::exit::{Error, Exit};
 use sweep_plot::PlotOptions;
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    ["sweep plot results/first.parquet", "results/first.svg: ratios, and the line of the limit"],
-    ["sweep plot results/first.parquet -o map.html", "a page to point and click in"],
-    ["sweep plot results/first.parquet -o map.html --live", "one that computes any point itself"],
-    ["sweep plot results/first.parquet --quantity nonlinear_tub_yaw", "one channel's amplitude"],
-    ["sweep plot results/design.parquet --view influence", "which parameters of a design matter"],
-];
 
 /// Arguments of `sweep plot`.
 #[derive(Debug, clap::Args)]

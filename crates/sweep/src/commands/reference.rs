@@ -8,11 +8,12 @@ use std::iter;
 use washer_model::{Channel, Machine, Parameter, Range, Source, Spin, Target};
 use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 
+use crate::columns::Columns;
+use crate::config;
 use crate::method::Integrator;
-use crate::{columns, config};
 use sweep_engine::exit::{Error, Exit, print};
 use sweep_engine::method::{Integrator as _, default_method};
-use sweep_engine::store::{Column, Kind};
+use sweep_engine::store::{Column, Kind, Layout};
 use sweep_files::key;
 
 /// Arguments of `sweep reference`.
@@ -208,7 +209,8 @@ fn columns() -> String {
         .collect();
     let metrics = Metric::ALL.to_vec();
     let measures = Measures { metrics, stops: 2, feet: 3, dampers: 2, ..Measures::default() };
-    let layout = columns::of_measures(axes, &Channel::ALL, 2.0.into(), measures, true);
+    let columns = Columns::of_measures(&Channel::ALL, 2.0.into(), &measures, true);
+    let layout = Layout::of_map(axes, columns.declared());
     row(&mut text, &["column", "type", "unit", "worse", "limit", "meaning"]);
     row(&mut text, &["---"; 6]);
     let mut names = HashSet::new();

@@ -1,7 +1,7 @@
 //! `sweep run GRID.toml`: the sweep, with time histories beside it.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
@@ -11,6 +11,7 @@ use sweep_engine::exit::{Error, Exit, tell};
 use sweep_engine::progress::Progress;
 use sweep_engine::run::Ended;
 use sweep_engine::threads;
+use sweep_files::panics::lock;
 use sweep_files::{self as files, ParquetFile};
 
 /// Arguments of `sweep run`.
@@ -33,21 +34,19 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan: Plan = args.run.target.grid.load()?;
     let engine = ModelEngine::new(&plan)?;
     if args.keep_traces && plan.points() > MOST_KEPT {
-        return Err(Error::Option {
-            option: "--keep-traces",
-            given: format!("with {} points", plan.points()),
-            expected: format!("at most {MOST_KEPT}; `sweep trace` writes those of single points"),
-        });
+        let given = format!("with {} points", plan.points());
+        let expected = format!("at most {MOST_KEPT}; `sweep trace` writes those of single points");
+        return Err(Error::option("--keep-traces", given, expected));
     }
     let interrupt = installed()?;
     let options = if args.keep_traces { " --keep-traces" } else { "" };
     let report = execute(&args.run, &plan, &engine, &interrupt, options)?;
     let output = args.run.target.output(&plan);
     if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
-        let threads = threads::count(args.run.work.threads, &|name| std::env::var(name).ok())?;
+        let threads = threads::count(args.run.work.effort.threads, &threads::process)?;
         let folder = files::beside(&output, "traces");
         tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
-        let progress = Mutex::new(Progress::new(args.run.work.progress, plan.points(), 0));
+        let progress = Mutex::new(Progress::new(args.run.work.effort.progress, plan.points(), 0));
         let kept = AtomicU64::new(0);
         let done = || {
             let kept = kept.fetch_add(1, Ordering::Relaxed) + 1;
@@ -59,7 +58,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         let map = ParquetFile::open(&output)?;
         let stop = || interrupt.stopped();
         let ended = trace::keep(&engine, &map, &folder, threads, &stop, &done);
-        progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+        lock(&progress).finish();
         ended?;
         if let Some(signal) = interrupt.signal() {
             tell("interrupted; the map is kept, and the traces so far");

@@ -1,12 +1,7 @@
 //! `sweep schema`: JSON Schema of the files a user writes.
 
 use crate::config::schema;
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::exit::{Error, Exit, print};
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples =
-    &[["sweep schema", "for editors that complete and check TOML"]];
 
 /// Arguments of `sweep schema`.
 #[derive(Debug, clap::Args)]

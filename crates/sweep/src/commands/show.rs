@@ -19,13 +19,11 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 pub(super) const FURTHER: Further<'static> = Further { lines: &lines, is_of_a_metric };
 
 fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
-    if FileKind::Stability.has_keys(&|key| file.value(key).is_some()) {
-        return Ok(tongues::summary(file)?.lines());
-    }
-    if FileKind::Dwell.has_keys(&|key| file.value(key).is_some()) {
-        return Ok(dwell::summary::lines(file)?);
-    }
-    Ok(Vec::new())
+    Ok(match file.kind() {
+        Some(FileKind::Stability) => tongues::summary(file)?.lines(),
+        Some(FileKind::Dwell) => dwell::summary::lines(file)?,
+        _ => Vec::new(),
+    })
 }
 
 /// Whether a result has this column because a metric asked for it.

@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::plan::Plan;
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::{ResultArgs, quoted};
 use sweep_engine::exit::{Error, Exit, print, tell};
 use sweep_engine::store::{ShardRequest, chunk_points};
@@ -13,10 +12,6 @@ use sweep_engine::store::{ShardRequest, chunk_points};
 /// Tasks that a Slurm array may have unless its administrator allowed more (`MaxArraySize` 1001
 /// counts from 0).
 const USUAL_MOST_TASKS: u64 = 1000;
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples =
-    &[["sweep slurm my.toml --shards 16 --time 30", "the script that submits them"]];
 
 /// Arguments of `sweep slurm`.
 #[derive(Debug, clap::Args)]
@@ -115,11 +110,8 @@ fn names_fit(args: &Args, folder: &Path, program: &Path) -> Result<(), Error> {
     let at = grid.at.iter().map(|at| ("--at", OsStr::new(at)));
     for (option, name) in paths.chain(sets).chain(at) {
         if name.to_str().is_none_or(|name| word(name).is_err()) {
-            return Err(Error::Option {
-                option,
-                given: format!("{name:?}"),
-                expected: "a name in UTF-8 without control characters, as a script needs".into(),
-            });
+            let expected = "a name in UTF-8 without control characters, as a script needs";
+            return Err(Error::option(option, format!("{name:?}"), expected));
         }
     }
     Ok(())

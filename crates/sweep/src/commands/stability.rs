@@ -1,22 +1,12 @@
 //! `sweep stability GRID.toml --speed FROM:TO:STEP`: periodic responses and whether they are
 //! stable.
 
-use super::held::{Held, SpeedArgs};
+use super::held::{SpeedArgs, carry_out};
 use crate::plan::Plan;
 use crate::stability::{DwellEngine, check, dwells, tongues};
-use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::grid::ResultArgs;
-use sweep_engine::commands::run::WorkArgs;
+use sweep_engine::commands::run::{RunCommand, WorkArgs};
 use sweep_engine::exit::{Error, Exit};
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    [
-        "sweep stability my.toml --speed 60:400:1",
-        "where a dwell at constant speed would shake itself up",
-    ],
-    ["sweep show results/first-stability.parquet", "the unstable speeds, and why"],
-];
 
 /// Arguments of `sweep stability`.
 #[derive(Debug, clap::Args)]
@@ -59,14 +49,15 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     check(&plan, "--speed", &args.held.speed.to_string())?;
     let engine = DwellEngine::new(&plan, args.held.speed.values())?;
     let (job, output) = dwells(&plan, &args.held.speed, args.target.out.as_deref());
-    let options = format!("--speed {}", args.held.speed);
-    let held = Held {
+    let options = format!(" --speed {}", args.held.speed);
+    let command = RunCommand {
+        name: &plan.name,
         verb: "stability",
+        rows: "rows",
         target: &args.target,
         work: &args.work,
-        options: [options.clone(), options],
-        fail_on_error: args.fail_on_error,
-        lines: |file| Ok(tongues::summary(file)?.lines()),
+        options: [&options; 2],
     };
-    held.carry_out(&plan.name, &engine, &job, &output)
+    let lines = |file: &_| Ok(tongues::summary(file)?.lines());
+    carry_out(&command, &engine, (&job, &output), lines, args.fail_on_error)
 }

@@ -1,6 +1,6 @@
 //! `sweep status GRID.toml`: progress of a run, or of dwells.
 
-use super::held_args::HeldArgs;
+use super::held::HeldArgs;
 use crate::plan::Plan;
 use sweep_engine::commands::status::{self, of_job};
 use sweep_engine::exit::{Error, Exit};
@@ -21,8 +21,6 @@ pub struct Args {
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let target = &args.status.target;
     let plan: Plan = target.grid.load()?;
-    let Some((job, output, [verb, options])) = args.held.job(&plan, target.out.as_deref()) else {
-        return status::run::<crate::Washer>(&args.status);
-    };
+    let (job, output, [verb, options]) = args.held.job(&plan, target);
     of_job(&args.status, &job, &output, [&verb, &options])
 }

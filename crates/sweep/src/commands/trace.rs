@@ -7,31 +7,14 @@ use crate::config;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use crate::trace::{Extras, Models, StartValue, View, every, in_pool, start_of, start_value};
-use sweep_engine::commands::cells::{short, table};
-use sweep_engine::commands::examples::Examples;
+use sweep_engine::commands::cells::{Lines as _, short, table};
 use sweep_engine::commands::grid::quoted;
-use sweep_engine::commands::run::line;
 use sweep_engine::exit::{Error, Exit, tell};
 use sweep_engine::store::Job;
 use sweep_files::{FileKind, Output, key};
 use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::{Cell, ResultTable, top};
 use washer_row::{Trajectory, Verdict};
-
-/// Shown by `--help`.
-pub(super) const EXAMPLES: Examples = &[
-    [
-        "sweep trace my.toml --at unbalance_mass_kg=0.4 --at damping_n_s_per_m=100 --out \
-                 rocking.parquet",
-        "both models at one point",
-    ],
-    ["sweep trace my.toml --worst --out worst.parquet", "the greatest ratio of its map"],
-    [
-        "sweep trace my.toml --all --turns --model nonlinear --states --out turns.parquet",
-        "the state once a turn at every point, for a bifurcation diagram",
-    ],
-    ["sweep plot rocking.parquet", "drawn over time and spin speed"],
-];
 
 /// Arguments of `sweep trace`.
 #[derive(Debug, clap::Args)]
@@ -141,11 +124,7 @@ fn chosen(args: &Args) -> Result<Vec<String>, Error> {
         (None, point) => point.unwrap_or_default(),
     };
     if point >= plan.points() {
-        return Err(Error::Option {
-            option: "--point",
-            given: point.to_string(),
-            expected: format!("from 0 to {}", plan.points() - 1),
-        });
+        return Err(Error::option("--point", point, format!("from 0 to {}", plan.points() - 1)));
     }
     let names = plan.axes.iter().map(|axis| axis.parameter.name());
     // The shortest decimals read back to the same values.
@@ -156,8 +135,7 @@ fn chosen(args: &Args) -> Result<Vec<String>, Error> {
 fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> {
     let default = || PathBuf::from(format!("results/{}.parquet", plan.name));
     let path = args.result.clone().unwrap_or_else(default);
-    let refused =
-        |expected: String| Error::Option { option: "--worst", given: column.to_owned(), expected };
+    let refused = |expected: String| Error::option("--worst", column, expected);
     if !path.exists() {
         let run = format!("`sweep run {}`", quoted(&args.grid.grid.display().to_string()));
         let expected = format!("a result at {} (--result); {run} makes it", path.display());
@@ -235,13 +213,13 @@ fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
             ),
             _ => "undefined: no ratio is".to_owned(),
         };
-        line(&mut text, "verdict", &said);
+        text.line("verdict", &said);
         if outcome.sensitive == Some(true) {
-            line(&mut text, "sensitive", "chaotic: the digits are those of one trajectory");
+            text.line("sensitive", "chaotic: the digits are those of one trajectory");
         }
         let gaps = [&outcome.nonlinear, &outcome.linear].map(|model| number(model.min_gap_m));
         let told = format!("{} m nonlinear, {} m linear, over the whole run", gaps[0], gaps[1]);
-        line(&mut text, "least gap", &told);
+        text.line("least gap", &told);
     }
     Ok(text)
 }

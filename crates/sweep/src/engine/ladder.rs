@@ -13,7 +13,7 @@
 //!
 //! Friction and stops give forces corners. A step that spans one errs by its own length, whatever
 //! the order of its formula, and two long steps that pass the same corner in the same way agree on
-//! an error that neither shows. Nor do caps serve: of 36 rows of `sweeps/friction.toml`, the 7 whose
+//! an error that neither shows. Nor do caps serve: of 36 rows of `sweeps/friction.toml`, 7 whose
 //! friction holds the machine keep to 1e-8 with bearings capped at 1300 rad/s, but half of all err
 //! by more than 4.2e-3, and by 1.5e-3 at 2600 rad/s, in steps of half a millisecond that shrink
 //! towards corners and in others alike. Capped bearings that are damped err as much at any cap. So

@@ -9,7 +9,7 @@
 //! What a lane computes does not depend on its company, so neither does a row.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::Duration;
 
 use lane_ode::MAX_LANES;
@@ -18,6 +18,7 @@ use washer_row::{Climbs, Demand, Ladder, Next, Outcome, Rule, Status, Trajectory
 
 use super::{ModelEngine, Watch, growth};
 use crate::plan::Scenario;
+use sweep_files::panics::lock;
 
 /// Points that are made ready together.
 const FED: usize = MAX_LANES;
@@ -178,7 +179,7 @@ impl Pool<'_> {
     }
 
     fn lock(&self) -> MutexGuard<'_, PoolState> {
-        self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.shared.state)
     }
 
     /// New rows from the feed; none at its end.

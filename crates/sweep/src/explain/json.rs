@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use washer_model::{Ending, LeftRange, Participant};
 
-use super::{Closing, End, Explanation, Passage, Resonance, Swept, Tongue};
+use super::{Closing, Explanation, Passage, Resonance, Swept, Tongue};
 
 /// Everything that was found; units stand in the names.
 pub(crate) fn of(found: &Explanation) -> Value {
@@ -76,7 +76,7 @@ fn of_tongue(tongue: &Tongue, passages: &[Passage], swept: &Swept) -> Value {
     json!({
         "from_rpm": tongue.from_to_rpm[0],
         "to_rpm": tongue.from_to_rpm[1],
-        "ends": tongue.ends.map(end),
+        "ends": tongue.ends,
         "kind": at.kind().name(),
         "growth_per_s": at.growth_per_s(),
         "growth_at_rpm": at.speed_rpm,
@@ -92,15 +92,6 @@ fn of_tongue(tongue: &Tongue, passages: &[Passage], swept: &Swept) -> Value {
         })),
         "closed_by": tongue.closing.map(closing),
     })
-}
-
-const fn end(end: End) -> &'static str {
-    match end {
-        End::Edge => "edge",
-        End::OtherKind => "other_kind",
-        End::Range => "range",
-        End::NoResponse => "no_response",
-    }
 }
 
 fn participant(mode: &Participant) -> Value {

@@ -28,14 +28,11 @@ pub(super) fn range(spin: &Spin, end_s: f64) -> Result<[f64; 2], Error> {
         most = most.max(speed);
     }
     if least < 0.0 {
-        return Err(Error::Option {
-            option: "[spin]",
-            given: format!("{least:.3} rpm at {} s", decimal(least_at_s)),
-            expected: "a drum that turns forwards or stands, at 0 rpm or more: the machine is not \
-                       the same backwards, and responses are found for forward speeds; explain a \
-                       profile that turns one way"
-                .to_owned(),
-        });
+        let given = format!("{least:.3} rpm at {} s", decimal(least_at_s));
+        let expected = "a drum that turns forwards or stands, at 0 rpm or more: the machine is not \
+                        the same backwards, and responses are found for forward speeds; explain a \
+                        profile that turns one way";
+        return Err(Error::option("[spin]", given, expected));
     }
     // As they were written, without the last bits of the way through rad/s.
     Ok([least, most].map(|rpm| (1e9 * rpm).round() / 1e9))

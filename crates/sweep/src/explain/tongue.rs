@@ -4,6 +4,7 @@
 use lane_ode::Simd;
 use rayon::iter::ParallelIterator as _;
 use rayon::slice::ParallelSlice as _;
+use serde::Serialize;
 use washer_model::{
     Beyond, Dwell, Ending, Kind, Point, Response, Responses, Starts, endings_beside, modes,
 };
@@ -93,7 +94,8 @@ impl Asker<'_> {
 }
 
 /// What a tongue ends in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub(crate) enum End {
     /// Growth is 0.
     Edge,

@@ -17,10 +17,10 @@ const MARGIN: usize = 10;
 struct Text(String);
 
 impl Text {
-    fn line(&mut self, name: &str, words: &str) {
+    fn line(&mut self, name: &str, words: impl AsRef<str>) {
         let mut line = format!("{name:>MARGIN$} ");
         let mut is_empty = true;
-        for word in words.split_whitespace() {
+        for word in words.as_ref().split_whitespace() {
             if !is_empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
                 self.end(&line);
                 line = " ".repeat(MARGIN + 1);
@@ -48,27 +48,22 @@ pub(crate) fn of(found: &Explanation) -> String {
     verdict(&mut text, &found.swept);
     let [from, to] = [found.looked.from, found.looked.to].map(decimal);
     if found.tongues.is_empty() {
-        text.line(
-            "dwells",
-            &format!(
-                "the periodic response is stable at every speed from {from} to {to} rpm, where \
-                 there is one"
-            ),
+        let words = format!(
+            "the periodic response is stable at every speed from {from} to {to} rpm, where \
+             there is one"
         );
+        text.line("dwells", words);
     } else {
-        text.line(
-            "dwells",
-            &format!(
-                "the periodic response is unstable in {} from {from} to {to} rpm:",
-                bands(found.tongues.iter().map(|(tongue, _)| tongue.ends))
-            ),
-        );
+        let unstable = bands(found.tongues.iter().map(|(tongue, _)| tongue.ends));
+        let words =
+            format!("the periodic response is unstable in {unstable} from {from} to {to} rpm:");
+        text.line("dwells", words);
     }
     for rpm in &found.jumps_rpm {
         let words = format!(
             "at {rpm:.2} rpm the response folds back: a machine that runs up jumps to another there"
         );
-        text.line("jump", &words);
+        text.line("jump", words);
     }
     if let (Some((from, what)), Some((to, _))) = (found.beyond.first(), found.beyond.last()) {
         let words = format!(
@@ -79,7 +74,7 @@ pub(crate) fn of(found: &Explanation) -> String {
             decimal(*to),
             what.name().replace('_', " ")
         );
-        text.line("beyond", &words);
+        text.line("beyond", words);
     }
     for (tongue, passages) in &found.tongues {
         text.end("");
@@ -125,7 +120,7 @@ fn verdict(text: &mut Text, swept: &Swept) {
             "ok" => "every linear amplitude is zero".to_owned(),
             status => format!("the run ends as `{status}`{when}"),
         };
-        text.line("swept", &format!("no ratio is defined: {why}"));
+        text.line("swept", format!("no ratio is defined: {why}"));
         return;
     };
     let channel = swept.channels[place];
@@ -135,17 +130,15 @@ fn verdict(text: &mut Text, swept: &Swept) {
         .iter()
         .filter_map(|of| of.get(place).map(|value| milli(*value, channel)))
         .collect();
-    text.line(
-        "swept",
-        &format!(
-            "the linear model is {word}: most in {}, where the nonlinear motion is {} times the \
-             linear one ({} from {from} to {to} s); the limit is {}",
-            channel.name(),
-            significant(ratio),
-            amplitudes.join(" against "),
-            decimal(swept.limits.most)
-        ),
+    let words = format!(
+        "the linear model is {word}: most in {}, where the nonlinear motion is {} times the \
+         linear one ({} from {from} to {to} s); the limit is {}",
+        channel.name(),
+        significant(ratio),
+        amplitudes.join(" against "),
+        decimal(swept.limits.most)
     );
+    text.line("swept", words);
     let others: Vec<String> = swept
         .channels
         .iter()
@@ -157,7 +150,7 @@ fn verdict(text: &mut Text, swept: &Swept) {
         })
         .collect();
     if !others.is_empty() {
-        text.line("ratios", &others.join(", "));
+        text.line("ratios", others.join(", "));
     }
 }
 
@@ -170,15 +163,13 @@ fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[
         Kind::Stable => "it is stable",
     };
     let [from, to] = tongue.from_to_rpm;
-    text.line(
-        "tongue",
-        &format!(
-            "{from:.2} to {to:.2} rpm: {kind}, at up to {:.4} /s at {:.2} rpm{}",
-            at.growth_per_s(),
-            at.speed_rpm,
-            ends(tongue)
-        ),
+    let words = format!(
+        "{from:.2} to {to:.2} rpm: {kind}, at up to {:.4} /s at {:.2} rpm{}",
+        at.growth_per_s(),
+        at.speed_rpm,
+        ends(tongue)
     );
+    text.line("tongue", words);
     let (low, high) = (at.frequency_cpm(), at.speed_rpm - at.frequency_cpm());
     let lines = match at.kind() {
         Kind::PeriodDoubling => format!("at half the speed, {low:.2} per minute"),
@@ -187,18 +178,16 @@ fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[
             format!("at {low:.2} and {high:.2} per minute, which add up to the speed")
         }
     };
-    text.line("lines", &lines);
+    text.line("lines", lines);
     for mode in &at.participants {
-        text.line(
-            "mode",
-            &format!(
-                "{}, {}: {:.2} per minute at this speed; {:.0} % of the energy",
-                mode.mode,
-                mode.motion,
-                mode.frequency_cpm,
-                100.0 * mode.share
-            ),
+        let words = format!(
+            "{}, {}: {:.2} per minute at this speed; {:.0} % of the energy",
+            mode.mode,
+            mode.motion,
+            mode.frequency_cpm,
+            100.0 * mode.share
         );
+        text.line("mode", words);
     }
     let words = match &tongue.resonance {
         Some(resonance) => meeting(resonance, at.speed_rpm),
@@ -206,16 +195,14 @@ fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[
                  the speed: what feeds this is not explained"
             .to_owned(),
     };
-    text.line("meeting", &words);
+    text.line("meeting", words);
     if let Some(ends_in) = &tongue.ends_in {
-        text.line("ends in", &end(ends_in));
+        text.line("ends in", end(ends_in));
     }
     if passages.is_empty() {
         let [least, most] = found.profile_rpm.map(decimal);
-        text.line(
-            "crossed",
-            &format!("never: the profile stays between {least} and {most} rpm in this run"),
-        );
+        let words = format!("never: the profile stays between {least} and {most} rpm in this run");
+        text.line("crossed", words);
     }
     for passage in passages {
         crossed(text, passage);
@@ -312,7 +299,7 @@ fn crossed(text: &mut Text, passage: &Passage) {
             }
         }
     }
-    text.line("crossed", &words);
+    text.line("crossed", words);
 }
 
 fn closes(text: &mut Text, tongue: &Tongue) {
@@ -329,7 +316,7 @@ fn closes(text: &mut Text, tongue: &Tongue) {
         }
         Some(Closing::NoDampers) | None => "the machine has no damping to raise".to_owned(),
     };
-    text.line("remedy", &words);
+    text.line("remedy", words);
 }
 
 /// What the tongues have to do with the swept verdict.
@@ -382,7 +369,7 @@ fn judgement(text: &mut Text, found: &Explanation) {
             }
         },
     };
-    text.line("so", &words);
+    text.line("so", words);
 }
 
 fn limits(text: &mut Text, found: &Explanation) {
@@ -399,7 +386,7 @@ fn limits(text: &mut Text, found: &Explanation) {
             found.without_response
         );
     }
-    text.line("limits", &words);
+    text.line("limits", words);
 }
 
 #[cfg(test)]
@@ -415,7 +402,7 @@ mod tests {
     #[test]
     fn long_lines_are_folded_beneath_their_start() {
         let mut text = Text::default();
-        text.line("name", &"word ".repeat(40));
+        text.line("name", "word ".repeat(40));
         let lines: Vec<&str> = text.0.lines().collect();
         assert!(lines.len() > 1 && lines.iter().all(|line| line.chars().count() <= WIDTH));
         assert!(lines[0].starts_with("      name  word"), "{}", lines[0]);

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 use sweep_engine::table::Table;
+use sweep_engine::threads::Stop;
 use sweep_files::key;
 
 use super::algebra::inverse;
@@ -16,7 +17,7 @@ const REACH: i32 = 6;
 impl Fitted {
     /// How the cost rises beside each free number, the others fitted again as far as they go along
     /// straight lines.
-    fn profiles(&self, stop: &(dyn Fn() -> bool + Sync)) -> Value {
+    fn profiles(&self, stop: Stop<'_>) -> Value {
         let Problem { free, .. } = &self.problem;
         let summary = self.problem.summary(&self.against);
         let bread = inverse(&summary.normal);
@@ -75,7 +76,7 @@ impl Fitted {
     }
 
     /// The curves of one case.
-    pub(crate) fn curves(&self, case: usize, stop: &(dyn Fn() -> bool + Sync)) -> Table {
+    pub(crate) fn curves(&self, case: usize, stop: Stop<'_>) -> Table {
         let at = &self.problem.cases[case];
         let measured = &at.measured;
         let mut table = Table::new(crate::identity::BUILD);

@@ -6,12 +6,13 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use blake3::Hash;
 use sweep_files::regular;
 
 use super::model::Summary;
+use sweep_files::panics::lock;
 
 /// Answers by the hash of their question.
 type Known = BTreeMap<[u8; 32], Option<Summary>>;
@@ -54,7 +55,7 @@ impl Journal {
             key.update(&x.to_bits().to_le_bytes());
         }
         let key = *key.finalize().as_bytes();
-        let lock = || self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let lock = || lock(&self.state);
         if let Some(known) = lock().1.get(&key) {
             return Ok(known.clone());
         }
@@ -67,7 +68,7 @@ impl Journal {
 
     /// How many answers are there.
     pub(crate) fn count(&self) -> usize {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).1.len()
+        lock(&self.state).1.len()
     }
 
     /// Removes it: what it was for is done.

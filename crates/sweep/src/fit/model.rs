@@ -16,6 +16,7 @@ use super::measured::{Measured, Quantity, Signal};
 use super::speed::Smoothed;
 use crate::engine::reference_step_s;
 use crate::plan::Plan;
+use sweep_engine::threads::Stop;
 
 /// Neighbours are this share of a number away from it.
 const NEAR: f64 = 1e-5;
@@ -193,12 +194,7 @@ impl Problem {
 
     /// Every signal at several sets of unknowns; `None` of one whose machine is none, or whose
     /// trajectory fails, and of all once `stop` says so.
-    fn seen(
-        &self,
-        case: usize,
-        sets: &[Vec<f64>],
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Vec<Option<Vec<Vec<f64>>>> {
+    fn seen(&self, case: usize, sets: &[Vec<f64>], stop: Stop<'_>) -> Vec<Option<Vec<Vec<f64>>>> {
         let machines: Vec<_> = sets.iter().map(|x| self.machine(case, x)).collect();
         self.seen_of(case, sets, &machines, stop)
     }
@@ -209,7 +205,7 @@ impl Problem {
         case: usize,
         sets: &[Vec<f64>],
         machines: &[(Machine, Spin)],
-        stop: &(dyn Fn() -> bool + Sync),
+        stop: Stop<'_>,
     ) -> Vec<Option<Vec<Vec<f64>>>> {
         let mut found = vec![None; sets.len()];
         let (measured, end_s) = (&self.cases[case].measured, self.cases[case].end_s());
@@ -253,11 +249,7 @@ impl Problem {
     }
 
     /// Every signal against the model. On all threads of the rayon pool it is called in.
-    pub(crate) fn against(
-        &self,
-        x: &[f64],
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Option<Vec<Against>> {
+    pub(crate) fn against(&self, x: &[f64], stop: Stop<'_>) -> Option<Vec<Against>> {
         let unknowns = self.unknowns();
         let nudges: Vec<f64> = (0..unknowns).map(|k| self.nudge(k, x)).collect();
         // The point, then a neighbour along each unknown that matters to the case.
@@ -311,7 +303,7 @@ impl Problem {
         case: usize,
         x: &[f64],
         against: &[Against],
-        stop: &(dyn Fn() -> bool + Sync),
+        stop: Stop<'_>,
     ) -> Vec<Vec<Vec<f64>>> {
         let drawn = self.cases[case].smoothed.as_ref().map(|it| &it.drawn[..]).unwrap_or_default();
         let (machine, _) = self.machine(case, x);
@@ -334,7 +326,7 @@ impl Problem {
     }
 
     /// The cost of many sets of unknowns, without derivatives; infinite where there is no answer.
-    pub(crate) fn costs(&self, sets: &[Vec<f64>], stop: &(dyn Fn() -> bool + Sync)) -> Vec<f64> {
+    pub(crate) fn costs(&self, sets: &[Vec<f64>], stop: Stop<'_>) -> Vec<f64> {
         let groups: Vec<&[Vec<f64>]> = sets.chunks(self.simd.lanes().max(2)).collect();
         let work: Vec<(usize, &[Vec<f64>])> = groups
             .iter()

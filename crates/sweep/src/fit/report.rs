@@ -17,9 +17,9 @@ use super::statistics::Statistics;
 use crate::config;
 use crate::engine::{ModelEngine, responses};
 use crate::plan::{Axis, AxisValues, Plan};
-use sweep_engine::commands::cells::table;
-use sweep_engine::commands::run::line;
+use sweep_engine::commands::cells::{Lines as _, table};
 use sweep_engine::exit::Error;
+use sweep_engine::threads::Stop;
 
 /// Standard errors to either end of a 95 % interval.
 const REACH: f64 = 1.959_964;
@@ -150,11 +150,7 @@ pub(super) struct Found<'a> {
 
 impl Found<'_> {
     /// The whole.
-    pub(super) fn report(
-        &self,
-        draws: u64,
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Report, Error> {
+    pub(super) fn report(&self, draws: u64, stop: Stop<'_>) -> Result<Report, Error> {
         let Self { problem, statistics, .. } = *self;
         let best = &self.minima[0];
         let objection = statistics.objection(problem);
@@ -239,7 +235,7 @@ impl Found<'_> {
         covariance: &[Vec<f64>],
         draws: u64,
         follows: bool,
-        stop: &(dyn Fn() -> bool + Sync),
+        stop: Stop<'_>,
     ) -> Result<OfFile, Error> {
         let problem = self.problem;
         let x = &self.minima[0].x;
@@ -287,7 +283,7 @@ impl Found<'_> {
         covariance: &[Vec<f64>],
         draws: u64,
         follows: bool,
-        stop: &(dyn Fn() -> bool + Sync),
+        stop: Stop<'_>,
     ) -> Result<Verdict, Error> {
         let problem = self.problem;
         let x = &self.minima[0].x;
@@ -337,12 +333,7 @@ impl Found<'_> {
 
     /// The fastest growing disturbance of the fitted machine at speeds up to its fastest: its
     /// growth (1/s), and where (rpm).
-    fn growth(
-        &self,
-        case: usize,
-        plan: &Plan,
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Option<[f64; 2]> {
+    fn growth(&self, case: usize, plan: &Plan, stop: Stop<'_>) -> Option<[f64; 2]> {
         let (machine, spin) = self.problem.machine(case, &self.minima[0].x);
         let fastest = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
@@ -462,7 +453,7 @@ impl Report {
         }
         // Without a free number the model is compared alone.
         let mut text = if rows.is_empty() { String::new() } else { table(&headings, &rows, "") };
-        let mut say = |what: &str, said: &str| line(&mut text, what, said);
+        let mut say = |what: &str, said: &str| text.line(what, said);
         match &self.objection {
             None => say("model", "follows the measurement within its noise"),
             Some(reason) => say("model", &format!("does not follow: {reason}; so no intervals")),

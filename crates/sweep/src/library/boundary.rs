@@ -43,8 +43,7 @@ pub fn find_boundary(
     effort: Effort<'_>,
 ) -> Result<Option<ResultTable>, Error> {
     if !(1..=1000).contains(&options.lattice) {
-        let given = options.lattice.to_string();
-        return Err(Error::Option { option: "lattice", given, expected: "from 1 to 1000".into() });
+        return Err(Error::option("lattice", options.lattice, "from 1 to 1000"));
     }
     let (quantity, plan) = &traced(plan, options.quantity, options.limit)?;
     let task = BoundaryTask::new(plan, options.tolerance, usize::from(options.lattice))?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock};
 use std::time::Duration;
 
 use arrow_array::RecordBatch;
@@ -19,7 +19,7 @@ use sweep_engine::progress::Progress;
 use sweep_engine::store::Done;
 use sweep_engine::store::{BATCH_ROWS, Job, Layout, ResultRows, StoreError};
 use sweep_engine::threads::{self, ThreadsError};
-use sweep_files::panics;
+use sweep_files::panics::{self, lock};
 use washer_row::Ladder;
 
 /// How often progress is shown while rows are computed.
@@ -197,10 +197,6 @@ impl<'a> Gathered<'a> {
         }
         batches.into_values().collect()
     }
-}
-
-fn lock<T: ?Sized>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

@@ -7,11 +7,10 @@ use washer_model::{
     campbell_until, exact_motions, prepare,
 };
 
-use super::refused_speeds;
+use super::check_speeds;
 use super::result::ResultTable;
 use crate::config::{self, GridInput};
 use crate::plan::{Plan, friction_speeds, timing};
-use crate::speeds::MOST_SPEEDS;
 use sweep_engine::exit::Error;
 use sweep_engine::interrupt::Interrupt;
 use sweep_engine::table::Table;
@@ -28,20 +27,9 @@ pub fn find_modes(
     speeds_rpm: &[f64],
     interrupt: &Interrupt,
 ) -> Result<Option<ResultTable>, Error> {
-    let rise = speeds_rpm.windows(2).all(|pair| pair[0] < pair[1]);
-    let are_speeds = speeds_rpm.iter().all(|speed| speed.is_finite() && *speed >= 0.0);
-    let count = speeds_rpm.len();
-    if !(rise && are_speeds && count > 1 && count as f64 <= MOST_SPEEDS + 1.0) {
-        return Err(refused_speeds(
-            count,
-            format!(
-                "from 2 to {MOST_SPEEDS} finite speeds in rpm, 0 or greater, each above the one \
-                 before"
-            ),
-        ));
-    }
+    check_speeds(speeds_rpm, 2, |speed| speed >= 0.0, ", 0 or greater")?;
     let (name, machine, spin, timing) = match grid {
-        None => built_in(speeds_rpm[count - 1]),
+        None => built_in(speeds_rpm[speeds_rpm.len() - 1]),
         Some(grid) => {
             let plan = if at.is_empty() { grid.load()? } else { grid.load_point(at)?.0 };
             of_plan(plan)
@@ -128,72 +116,40 @@ impl Analysis {
         let (speeds, modes) = (&self.speeds_rpm, &self.modes);
         let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
         let mut table = Table::new(crate::identity::BUILD);
-        table.numbers(
-            "speed_rpm",
-            "rpm",
-            "spin of the shaft",
-            rows().map(|(k, _)| Some(speeds[k])),
-        );
-        table.counts(
-            "mode",
-            "number of the mode, by its frequency at the lowest speed",
-            rows().map(|(_, mode)| mode as u64 + 1),
-        );
+        let speed = rows().map(|(k, _)| Some(speeds[k]));
+        table.numbers("speed_rpm", "rpm", "spin of the shaft", speed);
+        let said = "number of the mode, by its frequency at the lowest speed";
+        table.counts("mode", said, rows().map(|(_, mode)| mode as u64 + 1));
         let names: Vec<String> = modes.iter().map(|mode| mode.motion.to_string()).collect();
-        table.words(
-            "name",
-            "what moves, at the first resonance or the lowest speed",
-            rows().map(|(_, mode)| names[mode].as_str()),
-        );
-        let columns: [(&str, &str, &str, fn(&ModeAtSpeed) -> f64); 7] = [
-            (
-                "frequency_rpm",
-                "rpm",
-                "damped natural frequency in cycles per minute, mean over a turn",
-                |at| at.frequency_rpm,
-            ),
-            ("frequency_hz", "Hz", "the same in cycles per second", |at| at.frequency_rpm / 60.0),
-            ("damping_ratio", "1", "share of critical damping, mean over a turn", |at| {
-                at.damping_ratio
-            }),
-            ("eigenvalue_re", "1/s", "real part of the eigenvalue, mean over a turn", |at| {
-                at.re_per_s
-            }),
-            (
-                "eigenvalue_im",
-                "rad/s",
-                "imaginary part of the eigenvalue, mean over a turn",
-                |at| at.im_rad_per_s,
-            ),
-            ("frequency_min_rpm", "rpm", "least damped natural frequency over a turn", |at| {
-                at.least_rpm
-            }),
-            ("frequency_max_rpm", "rpm", "greatest damped natural frequency over a turn", |at| {
-                at.greatest_rpm
-            }),
-        ];
-        for (column, unit, description, of) in columns {
-            table.numbers(
-                column,
-                unit,
-                description,
-                rows().map(|(k, mode)| Some(of(&modes[mode].at_speed[k]))),
-            );
-        }
-        let columns: [(&str, &str, &str, fn(&Exact) -> f64); 2] = [
-            (
-                "exact_frequency_rpm",
-                "rpm",
-                "frequency by the linear model's Floquet exponent over whole turns, nearest to \
-                 frequency_rpm; null at standstill",
-                Exact::frequency_rpm,
-            ),
-            ("exact_damping_ratio", "1", "share of critical damping by it", Exact::damping_ratio),
-        ];
-        for (column, unit, description, of) in self.exact.as_ref().map_or(&[][..], |_| &columns[..])
-        {
-            let values = rows().map(|(k, mode)| self.exact.as_ref()?[k][mode].as_ref().map(of));
-            table.numbers(column, unit, description, values);
+        let said = "what moves, at the first resonance or the lowest speed";
+        table.words("name", said, rows().map(|(_, mode)| names[mode].as_str()));
+        let mut add = |name: &str, unit: &str, said: &str, of: fn(&ModeAtSpeed) -> f64| {
+            let values = rows().map(|(k, mode)| Some(of(&modes[mode].at_speed[k])));
+            table.numbers(name, unit, said, values);
+        };
+        let said = "damped natural frequency in cycles per minute, mean over a turn";
+        add("frequency_rpm", "rpm", said, |at| at.frequency_rpm);
+        add("frequency_hz", "Hz", "the same in cycles per second", |at| at.frequency_rpm / 60.0);
+        let said = "share of critical damping, mean over a turn";
+        add("damping_ratio", "1", said, |at| at.damping_ratio);
+        let said = "real part of the eigenvalue, mean over a turn";
+        add("eigenvalue_re", "1/s", said, |at| at.re_per_s);
+        let said = "imaginary part of the eigenvalue, mean over a turn";
+        add("eigenvalue_im", "rad/s", said, |at| at.im_rad_per_s);
+        let said = "least damped natural frequency over a turn";
+        add("frequency_min_rpm", "rpm", said, |at| at.least_rpm);
+        let said = "greatest damped natural frequency over a turn";
+        add("frequency_max_rpm", "rpm", said, |at| at.greatest_rpm);
+        if let Some(exact) = &self.exact {
+            let mut add = |name: &str, unit: &str, said: &str, of: fn(&Exact) -> f64| {
+                let values = rows().map(|(k, mode)| exact[k][mode].as_ref().map(of));
+                table.numbers(name, unit, said, values);
+            };
+            let said = "frequency by the linear model's Floquet exponent over whole turns, nearest \
+                        to frequency_rpm; null at standstill";
+            add("exact_frequency_rpm", "rpm", said, Exact::frequency_rpm);
+            let said = "share of critical damping by it";
+            add("exact_damping_ratio", "1", said, Exact::damping_ratio);
         }
         let plan = json!({ "name": name, "machine": config::machine_json(machine) });
         table.metadata(key::PLAN, &plan);

@@ -79,19 +79,15 @@ impl ResultTable {
             path: path.to_path_buf(),
             reason: "it is no result of this program".to_owned(),
         };
-        let plan = file.value(key::PLAN).or_else(|| file.value(key::DIFFERENCES));
-        let plan = plan.and_then(|plan| serde_json::from_str(plan).ok());
+        let plan = file.json(key::PLAN).or_else(|| file.json(key::DIFFERENCES));
         let plan = plan.ok_or_else(not_ours)?;
-        let kind = FileKind::of_result(&|key| file.value(key).is_some()).ok_or_else(not_ours)?;
+        let kind = file.kind().ok_or_else(not_ours)?;
         let batches = file.batches(|builder| builder)?.collect::<Result<Vec<_>, _>>()?;
         // The file's own keys are no part of the rows' schema.
         let schema = SchemaRef::new(Schema::new(file.schema().fields().clone()));
         let alike = |batch: RecordBatch| batch.with_schema(SchemaRef::clone(&schema));
         let batches = batches.into_iter().map(alike).collect::<Result<Vec<_>, _>>();
-        let batches = batches.map_err(|error| FileError::NotParquet {
-            path: path.to_path_buf(),
-            reason: error.to_string(),
-        })?;
+        let batches = batches.map_err(FileError::cells(path))?;
         let file = FileContent::Bytes(file.bytes()?);
         Ok(Self { kind, plan, schema, batches, file })
     }
@@ -158,11 +154,8 @@ impl MapPlan {
     fn write(&self, batches: &[RecordBatch], path: &Path) -> Result<(), Error> {
         if !self.is_whole {
             let rows: usize = batches.iter().map(RecordBatch::num_rows).sum();
-            return Err(Error::Option {
-                option: "save",
-                given: format!("with {rows} of {} rows", self.points),
-                expected: "a result that was not interrupted".to_owned(),
-            });
+            let given = format!("with {rows} of {} rows", self.points);
+            return Err(Error::option("save", given, "a result that was not interrupted"));
         }
         let job = Job {
             plan: self.plan.clone(),

@@ -4,10 +4,9 @@ use std::path::Path;
 
 use super::evaluate::{Evaluated, in_memory};
 use super::run::{RanToFile, into_file};
-use super::{Effort, refused_speeds};
+use super::{Effort, check_speeds};
 use crate::dwell::{Motions, Search, motions};
 use crate::plan::Plan;
-use crate::speeds::MOST_SPEEDS;
 use crate::stability::{Asked, DwellEngine, check, job};
 use sweep_engine::exit::Error;
 use sweep_engine::store::Job;
@@ -51,7 +50,8 @@ fn asked<'a>(
     speeds_rpm: &'a [f64],
     search: Option<Search>,
 ) -> Result<(DwellEngine<'a>, Job<'a>), Error> {
-    check_speeds(plan, speeds_rpm)?;
+    check_speeds(speeds_rpm, 1, |speed| speed > 0.0, " above 0")?;
+    check(plan, "speeds", &format!("with {} values", speeds_rpm.len()))?;
     let Some(search) = search else {
         return Ok((DwellEngine::new(plan, speeds_rpm)?, job(plan, speeds_rpm)));
     };
@@ -59,19 +59,4 @@ fn asked<'a>(
     let asked = Asked::Motions(Motions::new(plan, search));
     let engine = DwellEngine::asking(plan, speeds_rpm, asked)?;
     Ok((engine, motions(plan, speeds_rpm, &search, None).0))
-}
-
-fn check_speeds(plan: &Plan, speeds_rpm: &[f64]) -> Result<(), Error> {
-    let rise = speeds_rpm.windows(2).all(|pair| pair[0] < pair[1]);
-    let turn = speeds_rpm.iter().all(|speed| speed.is_finite() && *speed > 0.0);
-    let count = speeds_rpm.len();
-    if !(rise && turn && count > 0 && count as f64 <= MOST_SPEEDS + 1.0) {
-        return Err(refused_speeds(
-            count,
-            format!(
-                "from 1 to {MOST_SPEEDS} finite speeds in rpm above 0, each above the one before"
-            ),
-        ));
-    }
-    check(plan, "speeds", &format!("with {count} values"))
 }

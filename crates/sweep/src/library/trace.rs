@@ -48,21 +48,16 @@ pub fn trace_point(
         false => grid.load_point(at).map(|(plan, at)| (plan, Some(at)))?,
     };
     let every_s = every(options.every_s, &plan)?;
-    let refused = |option: &'static str, given: &str, expected: &str| Error::Option {
-        option,
-        given: given.to_owned(),
-        expected: expected.to_owned(),
-    };
     let start = options.start.iter().map(|text| {
-        let expected =
-            |expected: String| refused("start", text, expected.trim_start_matches("expected "));
-        start_value(text).map_err(expected)
+        start_value(text).map_err(|expected| {
+            Error::option("start", text, expected.trim_start_matches("expected "))
+        })
     });
     let start = start_of(&start.collect::<Result<Vec<_>, _>>()?);
     let models = match options.model.as_deref() {
         None => Models::Both,
         Some(name) => Models::from_str(name, false)
-            .map_err(|_| refused("model", name, "nonlinear, linear or both"))?,
+            .map_err(|_| Error::option("model", name, "nonlinear, linear or both"))?,
     };
     let TraceOptions { rates, states, forces, angle, .. } = *options;
     let extras = Extras { rates, states, forces, angle };

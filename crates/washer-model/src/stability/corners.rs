@@ -4,13 +4,15 @@
 //! are r dF + F dr: F and its slopes turn within a step, while r, dr and how the motion hangs on
 //! the tub's coordinates are smooth over a turn.
 
-use super::monodromy::Slopes;
 use crate::coordinates::{COORDINATES, ROTOR_TURNS, STATES, TUB};
 use crate::lanes::lane_struct;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::run::model::Nonlinear;
 use lane_ode::{Dual, Lane, N};
+
+/// Of every acceleration, its derivative by each coordinate, then by each speed.
+pub(super) type Slopes = [[N<f64>; STATES]; COORDINATES];
 
 /// Coordinates on which responses hang, the tub's first.
 const BENDS: [usize; TUB.len() + ROTOR_TURNS.len()] = {

@@ -6,7 +6,7 @@
 //! from the trigonometric polynomial through those at all others. Classical Runge-Kutta takes all
 //! disturbances through the turn together. Lanes share a row's instants, then its disturbances.
 
-use super::corners::Corner;
+use super::corners::{Corner, Slopes};
 use super::turn::{Clock, REACH, WEIGHT};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::InLanes as _;
@@ -33,9 +33,6 @@ const AT_ONCE: usize = 8;
 /// Starts, middles and ends of these. Where forces have corners, steps are so short that what is
 /// smooth is a parabola through the first, the middle and the last.
 const PLACES: usize = 2 * AT_ONCE + 1;
-
-/// Of every acceleration, its derivative by each coordinate, then by each speed.
-pub(super) type Slopes = [[N<f64>; STATES]; COORDINATES];
 
 /// Rows along their turns.
 pub(super) struct Along<'a, T> {

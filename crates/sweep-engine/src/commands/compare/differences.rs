@@ -28,46 +28,23 @@ pub(super) fn bytes(
         let unit = if unit.is_empty() { "1" } else { unit };
         table.numbers(name, unit, &description, rows().map(|row| Some(row.place[k])));
     }
-    table.numbers(
-        "ratio_change",
-        "1",
-        "greatest ratio of B over that of A; null where either has none",
-        rows().map(SharedRow::ratio_change),
-    );
+    let said = "greatest ratio of B over that of A; null where either has none";
+    table.numbers("ratio_change", "1", said, rows().map(SharedRow::ratio_change));
     table.worse(Worse::Greater);
-    table.numbers(
-        "gap_change_m",
-        "m",
-        "least gap of the nonlinear model in B less that in A; null where either has none",
-        rows().map(SharedRow::gap_change_m),
-    );
+    let said = "least gap of the nonlinear model in B less that in A; null where either has none";
+    table.numbers("gap_change_m", "m", said, rows().map(SharedRow::gap_change_m));
     table.worse(Worse::Less);
-    for (side, which) in ["A", "B"].into_iter().enumerate() {
-        let suffix = ["a", "b"][side];
-        let values = rows().map(|row| row.ratio[side]);
-        table.numbers(
-            &format!("ratio_max_{suffix}"),
-            "1",
-            &format!("greatest ratio of {which}"),
-            values,
-        );
+    for (side, [suffix, which]) in [["a", "A"], ["b", "B"]].into_iter().enumerate() {
+        let (name, said) = (format!("ratio_max_{suffix}"), format!("greatest ratio of {which}"));
+        table.numbers(&name, "1", &said, rows().map(|row| row.ratio[side]));
     }
-    table.words(
-        "flip",
-        "none, lost (reliable in A alone), gained (reliable in B alone), defined (a verdict in one \
-         file alone)",
-        rows().map(|row| row.flip.name()),
-    );
-    table.words(
-        "sensitive",
-        "true where either file calls the row chaotic",
-        rows().map(|row| if row.sensitive { "true" } else { "false" }),
-    );
-    table.words(
-        "status",
-        "ok, or no_ratio where either file has none",
-        rows().map(|row| if row.ratio_change().is_some() { "ok" } else { "no_ratio" }),
-    );
+    let said = "none, lost (reliable in A alone), gained (reliable in B alone), defined (a verdict \
+                in one file alone)";
+    table.words("flip", said, rows().map(|row| row.flip.name()));
+    let sensitive = rows().map(|row| if row.sensitive { "true" } else { "false" });
+    table.words("sensitive", "true where either file calls the row chaotic", sensitive);
+    let status = rows().map(|row| if row.ratio_change().is_some() { "ok" } else { "no_ratio" });
+    table.words("status", "ok, or no_ratio where either file has none", status);
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let hashes =
         tables.each_ref().map(|table| table.file().value(key::PLAN_HASH).map(str::to_owned));
