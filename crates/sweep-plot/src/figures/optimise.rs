@@ -83,8 +83,8 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
             .to_owned(),
         subtitle: source.subtitle(&format!("{} candidates", source.rows)),
         x_label: Label::new(&x.1, units[0].0),
-        grids,
         panels: panels.collect(),
+        grids,
         ..Chart::default()
     })
 }
