@@ -81,8 +81,8 @@ fn a_point_may_stand_in_place_of_an_axis() {
         let stability = ["stability", "grid.toml", "--speed", "250", "--fresh"];
         said(&sweep(&folder, &[&stability[..], more].concat(), None))
     };
-    assert!(of(&[]).contains("unbalance_mass_kg 0.4: 250 to 250 rpm, quasi periodic"));
-    assert!(of(&["--at", "unbalance_mass_kg=0.4"]).contains("unstable  250 to 250 rpm"));
+    assert!(of(&[]).contains("unbalance_mass_kg 0.4: 250 rpm, quasi periodic"));
+    assert!(of(&["--at", "unbalance_mass_kg=0.4"]).contains("unstable  250 rpm, quasi"));
     let twice = of(&["--at", "unbalance_mass_kg=0.4", "--set", "unbalance_mass_kg=0.1"]);
     assert!(twice.contains("given twice"), "{twice}");
 }
