@@ -549,7 +549,7 @@ fn val_machines_with_elements_match_an_independent_program() {
             let growth = number(row, "growth_per_s");
             if growth > 0.0 {
                 let apart = ours.growth_per_s() - growth;
-                assert!(apart.abs() < 5e-4, "{place}: {apart:e}");
+                assert!(apart.abs() < 1e-3, "{place}: {apart:e}");
             }
             compared += 1;
         }
