@@ -1,7 +1,6 @@
 """A trace's page in headless Chromium, held against the Parquet file it was made from.
 
-    python check_chart.py TRACE.parquet PAGE.html [--dwell FILE.parquet PAGE.html]
-        [--screenshots FOLDER]
+    python check_chart.py TRACE.parquet PAGE.html [--screenshots FOLDER]
 
 The pointer is moved over the chart with the browser's own input events; what the page then says is
 compared with the file's row at the instant that it names. Exits with 1 at the first thing that is
@@ -192,26 +191,6 @@ def narrow_and_dark(page):
     return "400 and 1400 px, light and dark"
 
 
-def hovering_reads_a_dwell(page, rows):
-    """Over the width, what is said of the response is the file's at that speed."""
-    speeds = rows["speed_rpm"]
-    seen = set()
-    for part in range(1, 8):
-        bounds = page.bounds()
-        x = bounds["left"] + 100 + (bounds["width"] - 130) * part / 8
-        page.mouse("mouseMoved", x, bounds["top"] + 150)
-        page.frame()
-        page.wait(lambda: page.tip()[0] is not None, "hovering never showed a speed")
-        speed, said = page.tip()
-        row = min(range(len(speeds)), key=lambda row: abs(speeds[row] - speed))
-        value, unit = said.get("Tub yaw, linear model", ("", ""))
-        true = 1e3 * rows["linear_tub_yaw"][row]
-        check(same(number_in(value), true) and unit == "mrad", f"{speed} rpm: {value} for {true}")
-        seen.add(speeds[row])
-    check(len(seen) > 3, f"speeds {sorted(seen)} of {sorted(set(speeds))}")
-    return f"{len(seen)} speeds"
-
-
 def main():
     """Run every check on one page."""
     parser = argparse.ArgumentParser(
@@ -219,7 +198,6 @@ def main():
     )
     parser.add_argument("trace")
     parser.add_argument("page")
-    parser.add_argument("--dwell", nargs=2, help="a dwell's file and its page")
     parser.add_argument("--screenshots", help="folder for pictures of what was seen")
     arguments = parser.parse_args()
     rows = pq.read_table(arguments.trace).to_pydict()
@@ -234,10 +212,6 @@ def main():
         ("switch", lambda: switches_and_zoom_redraw(page)),
         ("widths", lambda: narrow_and_dark(page)),
     ])
-    if arguments.dwell:
-        file, path = arguments.dwell
-        dwell, rows = Chart(path, arguments.screenshots), pq.read_table(file).to_pydict()
-        dwell.run([("dwell", lambda: hovering_reads_a_dwell(dwell, rows))])
 
 
 if __name__ == "__main__":

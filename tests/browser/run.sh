@@ -26,15 +26,12 @@ else
 fi
 "$venv/bin/python" "$here/check_page.py" "$map" "$work/page.html" ${SHOTS:+--screenshots "$SHOTS"}
 
-# The page of a trace: curves, with resonance passages marked; and that of a dwell.
+# The page of a trace: curves, with resonance passages marked.
 "$sweep" modes --speed 0:400:50 --out "$work/modes.parquet" 2> /dev/null
 "$sweep" trace "$root/sweeps/fig11.toml" --every 0.02 --out "$work/trace.parquet"
 "$sweep" plot "$work/trace.parquet" --modes "$work/modes.parquet" -o "$work/trace.html"
-"$sweep" dwell "$root/docs/examples/plateau.toml" --speed 240:300:10 --progress none \
-    --out "$work/dwell.parquet"
-"$sweep" plot "$work/dwell.parquet" -o "$work/dwell.html"
 "$venv/bin/python" "$here/check_chart.py" "$work/trace.parquet" "$work/trace.html" \
-    --dwell "$work/dwell.parquet" "$work/dwell.html" ${SHOTS:+--screenshots "$SHOTS"}
+    ${SHOTS:+--screenshots "$SHOTS"}
 
 # A page that computes, against the map and the trace of a point between its own.
 "$sweep" plot "$map" --live -o "$work/live.html"

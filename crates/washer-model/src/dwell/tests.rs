@@ -173,34 +173,6 @@ fn given(name: &str, or: u64) -> u64 {
     std::env::var(name).map_or(or, |given| given.parse().unwrap())
 }
 
-/// What starts that are more and other than the usual ones lead to is rarely new. SEED and
-/// MACHINES choose other machines.
-#[test]
-#[ignore = "friction takes short steps: minutes"]
-fn a_second_search_finds_little_that_is_new() {
-    let mut numbers = fastrand::Rng::with_seed(given("SEED", 35));
-    let (mut new, mut all) = ([0; 3], [0; 3]);
-    for number in 0..given("MACHINES", 12) {
-        let (keys, speed_rpm) = random(number, &mut numbers);
-        let point = at(&keys, 100.0, 1.0);
-        let dwells = [Dwell { point: &point, speed_rpm }];
-        let search = |starts: &Starts| {
-            endings(Simd::best(), &dwells, &[], starts, &|| false).remove(0).unwrap().motions
-        };
-        let usual = Starts { longest_s: 100.0, ..Starts::default() };
-        let first = search(&usual);
-        let others = Starts { count: 14, kick_rad_per_s: 4.3, ..usual };
-        for motion in search(&others) {
-            let is_new = !first.iter().any(|known| are_same(known, &motion));
-            println!("{number}: {speed_rpm:.1} rpm {:?} {is_new} {keys}", motion.settled);
-            all[(number % 3) as usize] += 1;
-            new[(number % 3) as usize] += usize::from(is_new);
-        }
-    }
-    println!("smooth, with friction, with stops too: {new:?} of {all:?} are new");
-    assert!(new.iter().sum::<usize>() * 10 <= all.iter().sum());
-}
-
 /// Motions of random machines go on as they are in short steps of plain RK4. SEED and MACHINES
 /// choose others.
 #[test]
