@@ -37,6 +37,12 @@ mod tests;
 mod trace;
 mod warm;
 
+pub use distance::TracedQuantity;
+use neighbour::{Neighbour, hint, nearest, shared};
+use net::{Net, Want};
+use row::RowSearch;
+pub use search::BoundaryTask;
+use span::{Hint, Question, Side, SideRange, Span, Tried};
 pub use trace::trace;
 
 /// Evaluates trial points.

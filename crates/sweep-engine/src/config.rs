@@ -40,6 +40,7 @@ pub mod source;
 pub mod syntax;
 pub mod whole;
 pub mod words;
+pub mod written;
 
 use std::marker::PhantomData;
 use std::path::PathBuf;
@@ -48,11 +49,12 @@ pub use draft::Draft;
 pub use grid::plain_name;
 pub use points::{check_columns, not_numbers, other_length};
 pub use read::{Read, Schema};
-pub use report::{Diagnostics, Mistake};
+pub use report::{Diagnostic, Diagnostics, Mistake, Report};
+pub use section::{Field, Section, quoted, refused_number, short, twice, unknown_word};
+pub use source::{Located, Location, SourceId, Sources};
+pub use written::Written;
 
-use report::{Diagnostic, Report};
 use serde_json::Value;
-use source::Location;
 
 use crate::plan::{Plan, WrittenIn};
 

@@ -7,9 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use crate::boundary::search::BoundaryError;
-use crate::config::Diagnostics;
-use crate::store::StoreError;
-use crate::threads::ThreadsError;
+use crate::{Diagnostics, StoreError, ThreadsError};
 use sweep_files::FileError;
 use sweep_plot::PlotError;
 use sweep_results::ResultsError;

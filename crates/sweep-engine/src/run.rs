@@ -14,12 +14,10 @@ use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 use crate::interrupt::Interrupt;
-use crate::progress::{Progress, ProgressMode};
 use crate::store::provenance::{self, Session};
-use crate::store::read::{ResultFile, Tally};
-use crate::store::{Done, Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, StoreError};
-use crate::threads::{self, Environment, ThreadsError};
-use crate::watch::{Engine, Watch};
+use crate::store::{Done, OpenOptions, OpenRun, Opened, ResultFile, Shard, ShardRequest, Tally};
+use crate::threads::{self};
+use crate::{Engine, Environment, Job, Progress, ProgressMode, StoreError, ThreadsError, Watch};
 use sweep_files::panics::{self, lock};
 
 /// How to run.

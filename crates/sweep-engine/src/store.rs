@@ -38,22 +38,22 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-pub use chunk::Shape;
-pub use error::StoreError;
+pub use chunk::{Place, Shape};
+pub use differences::PlanDifference;
+pub use error::{Holder, StoreError};
+use lock::Lock;
 pub use merge::write_map;
 pub use open::{OpenOptions, OpenRun, Opened};
+pub use provenance::Session;
+pub use read::{ResultFile, Tally};
 pub use schema::{BATCH_ROWS, Column, Done, Kind, Layout, ResultRows, Row};
-pub use shard::list as shard_list;
-pub use shard::{Shard, ShardRequest};
-pub use status::FolderStatus;
-pub use status::{State, status};
+pub use shard::{Shard, ShardRequest, list as shard_list};
+pub use status::{FolderStatus, State, status};
 pub use trials::{Key, OpenedTrials, Trials};
 
 use sweep_parameter::{Parameter as _, RatioLimits};
 
-use crate::config::Read;
-use crate::model::Model;
-use crate::plan::{Axis, Plan};
+use crate::{Axis, Model, Plan, Read};
 use sweep_files::{self as files, FileKind};
 
 /// The values of the axes at a point of the grid, first axis first.
@@ -150,7 +150,7 @@ impl Folder {
     /// Those of the run with this output. Neither it nor its sidecar is anything but absent or
     /// ours.
     pub fn of(output: &Path, layout: &Layout) -> Result<Self, StoreError> {
-        let folder = Self::beside(output, layout.file_kind())?;
+        let folder = Self::beside(output, layout.kind)?;
         files::judge(&folder.sidecar(), folder.account())?;
         Ok(folder)
     }

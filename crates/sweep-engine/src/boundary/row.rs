@@ -1,8 +1,7 @@
 //! One row: the trials along it, the sides that they show, and the trials that it wants next.
 
-use super::net::{self, Net, Want};
-use super::span::{Hint, Question, Side, SideRange, Span, Tried};
-use super::{Edge, EdgeKind, look};
+use super::net::{self};
+use super::{Edge, EdgeKind, Hint, Net, Question, Side, SideRange, Span, Tried, Want, look};
 
 /// After so many rounds brackets are cut evenly, and after so many looks none is taken any more:
 /// whatever the function does, it ends.

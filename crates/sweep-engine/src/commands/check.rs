@@ -2,15 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::cells::short;
-use super::grid::GridArgs;
+use super::{GridArgs, short};
 use crate::design::{Design, Distribution};
-use crate::estimate::{Estimate, size};
-use crate::exit::{Error, Exit, show, tell};
-use crate::plan::{Axis, AxisValues, Plan};
-use crate::progress::duration;
-use crate::swept::Swept;
-use crate::threads;
+use crate::estimate::size;
+use crate::{Axis, AxisValues, Error, Estimate, Exit, Plan, Swept, duration, show, tell, threads};
 use sweep_parameter::{Channel as _, Parameter as _};
 
 /// Arguments of `sweep check`.

@@ -8,11 +8,8 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::cells::{Lines as _, short, table};
-use super::grid::quoted;
-use crate::build::Build;
-use crate::exit::{Error, Exit, show, tell};
-use crate::store::StoreError;
+use super::{Lines as _, quoted, short, table};
+use crate::{Build, Error, Exit, StoreError, show, tell};
 use fail_on::FailOn;
 use sweep_files::{FileKind, Output};
 use sweep_plot::capitalised;

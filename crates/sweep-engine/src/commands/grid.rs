@@ -2,11 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::config::Read;
-use crate::config::{self, Diagnostics, GridInput};
-use crate::exit::tell;
-use crate::plan::Plan;
-use crate::program::program;
+use crate::config::{self};
+use crate::{Diagnostics, GridInput, Plan, Read, program, tell};
 
 /// A grid file and changes to its constants, as most commands take them.
 #[derive(Debug, clap::Args)]

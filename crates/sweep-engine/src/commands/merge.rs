@@ -1,15 +1,10 @@
 //! `sweep merge GRID.toml`: finished shards into the one file.
 
-use super::grid::ResultArgs;
-use std::path::Path;
-
-use super::cells::Lines as _;
-use super::run::{installed, rows};
-use crate::exit::{Error, Exit, tell};
-use crate::plan::Plan;
-use crate::store::Job;
+use super::run::rows;
+use super::{Lines as _, ResultArgs, installed};
 use crate::store::{OpenRun, Opened};
-use crate::swept::Swept;
+use crate::{Error, Exit, Job, Plan, Swept, tell};
+use std::path::Path;
 
 /// Arguments of `sweep merge`.
 #[derive(Debug, clap::Args)]

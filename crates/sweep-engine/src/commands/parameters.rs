@@ -6,9 +6,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 use sweep_parameter::{Parameter as _, Range};
 
-use crate::config::GridInput;
-use crate::exit::{Error, Exit, show};
-use crate::swept::{Listed, Swept};
+use crate::{Error, Exit, GridInput, Listed, Swept, show};
 
 /// Arguments of `sweep parameters`.
 #[derive(Debug, clap::Args)]

@@ -4,14 +4,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use super::cells::{short, word};
-use super::conditions;
 use super::show::Further;
-use crate::config::GridInput;
-use crate::exit::{Error, Exit, tell};
-use crate::plan::Plan;
+use super::{conditions, short, word};
 use crate::store::read::tally;
-use crate::swept::Swept;
+use crate::{Error, Exit, GridInput, Plan, Swept, tell};
 use sweep_files::{FileKind, Output, ParquetFile, key};
 use sweep_parameter::{Parameter as _, RatioLimits};
 use sweep_plot::{described, escape, quantity, sheet, significant, table, words};

@@ -5,9 +5,8 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::cells::{table, word};
-use super::conditions;
-use crate::exit::{Error, Exit, show, tell};
+use super::{conditions, table, word};
+use crate::{Error, Exit, show, tell};
 use sweep_results::{Checked, ResultTable, check};
 
 /// Arguments of `sweep require`.

@@ -3,20 +3,14 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::cells::{Lines as _, short};
-use super::grid::ResultArgs;
-use crate::effort::EffortArgs;
-use crate::exit::{Error, Exit, tell};
-use crate::interrupt::Interrupt;
-use crate::plan::Plan;
-use crate::progress::{duration, per_second};
+use super::{Lines as _, ResultArgs, short};
+use crate::progress::per_second;
 use crate::run::{self as runner, Ended, RunOptions, RunReport};
-use crate::store::provenance::Session;
-use crate::store::read::{FAR_OFF, Tally};
-use crate::store::{Job, ShardRequest};
-use crate::swept::Swept;
-use crate::threads;
-use crate::watch::Engine;
+use crate::store::read::{FAR_OFF, failed, failures};
+use crate::store::{Session, ShardRequest, Tally};
+use crate::{
+    EffortArgs, Engine, Error, Exit, Interrupt, Job, Plan, Swept, duration, tell, threads,
+};
 use sweep_parameter::RatioLimits;
 use sweep_plot::Share;
 
@@ -121,7 +115,7 @@ pub fn exit(fail_on_error: bool, report: &RunReport) -> Exit {
     match &report.ended {
         Ended::Interrupted { signal, .. } => Exit::interrupted(Some(*signal)),
         Ended::Already(_, tally) | Ended::Finished(tally)
-            if fail_on_error && tally.by_status.failed() > 0 =>
+            if fail_on_error && failed(&tally.by_status) > 0 =>
         {
             Exit::PointsFailed
         }
@@ -287,11 +281,10 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         );
         text.line("too high", &told);
     }
-    if tally.by_status.failed() > 0 {
-        let by_status = tally.by_status.iter().filter(|(status, _)| *status != "ok");
-        let list: Vec<String> =
-            by_status.map(|(status, count)| format!("{count} {status}")).collect();
-        text.line("failed", list.join(", "));
+    let failed: Vec<String> =
+        failures(&tally.by_status).map(|(status, count)| format!("{count} {status}")).collect();
+    if !failed.is_empty() {
+        text.line("failed", failed.join(", "));
     }
     if tally.sensitive > 0 {
         let told = format!("{}: chaotic, a near twin departs exponentially", tally.sensitive);

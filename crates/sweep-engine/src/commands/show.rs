@@ -5,12 +5,10 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::cells::{Lines as _, clipped, short, table, word};
-use super::conditions;
 use super::run::counts;
-use crate::exit::{Error, Exit, show};
-use crate::nearest::nearest;
+use super::{Lines as _, clipped, conditions, short, table, word};
 use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, Tally, overview, row, tally};
+use crate::{Error, Exit, nearest, show};
 use sweep_files::{ParquetFile, key};
 use sweep_parameter::Worse;
 use sweep_results::{Cell, Condition, ResultTable, ResultsError, ratio_limits, top};

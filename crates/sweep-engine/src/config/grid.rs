@@ -5,14 +5,13 @@ use std::path::Path;
 
 use sweep_parameter::{Channel, Range, RatioLimits, decimal};
 
-use super::Read;
 use super::draft::Draft;
-use super::report::{Diagnostic, Report};
-use super::section::{Field, Section};
 use super::source::{Located, Location, ReadError, is_blank, read};
 use super::syntax::parse;
 use super::words::names;
-use super::{GridInput, axes, design, parameters, scalars};
+use super::{
+    Diagnostic, Field, GridInput, Read, Report, Section, axes, design, parameters, scalars,
+};
 use crate::method::{Integrator, default_method, settings};
 use crate::plan::{LONGEST_S, Plan, RATIO_MIN, Reliability, WrittenIn};
 

@@ -3,9 +3,7 @@
 use toml::Spanned;
 use toml::de::{DeTable, Error};
 
-use super::report::{Diagnostic, Report};
-use super::section::quoted;
-use super::source::{Location, SourceId};
+use super::{Diagnostic, Location, Report, SourceId, quoted};
 
 /// The table a text holds; what is not TOML is reported, what can be made out of the rest is
 /// returned.

@@ -4,15 +4,13 @@ use std::collections::BTreeSet;
 
 use sweep_parameter::decimal;
 
-use super::Read;
-use super::draft::Draft;
-use super::report::Diagnostic;
-use super::source::{Location, Sources};
+use super::{Diagnostic, Draft, Location, Sources};
 use crate::method::{Integrator as _, Steps};
-use crate::plan::{MOST_STEPS, Scenario, shortest_step_s};
+use crate::plan::{MOST_STEPS, shortest_step_s};
+use crate::{Model, Scenario};
 
 /// A window that is none, at any corner of the grid.
-pub fn windows<M: Read>(draft: &Draft<'_, M>) {
+pub fn windows<M: Model>(draft: &Draft<'_, M>) {
     let mut reported = BTreeSet::new();
     for corner in 0..draft.plan.corners() {
         if draft.report.is_full() || !reported.is_empty() {
@@ -24,7 +22,7 @@ pub fn windows<M: Read>(draft: &Draft<'_, M>) {
 }
 
 /// A window that constants or axes have turned round, or moved past the end.
-pub fn window<M: Read>(
+pub fn window<M: Model>(
     draft: &Draft<'_, M>,
     scenario: &Scenario<M>,
     reported: &mut BTreeSet<Vec<String>>,
@@ -57,7 +55,7 @@ pub fn window<M: Read>(
 
 /// Where the concerned numbers were written: the axes that sweep them first, then files and
 /// arguments.
-pub fn places<M: Read>(
+pub fn places<M: Model>(
     draft: &Draft<'_, M>,
     concerns: &[String],
     sources: &Sources,
@@ -87,7 +85,7 @@ pub fn places<M: Read>(
 }
 
 /// A fixed step that is longer than the run, or so short that a trajectory would never end.
-pub fn steps<M: Read>(draft: &Draft<'_, M>) {
+pub fn steps<M: Model>(draft: &Draft<'_, M>) {
     let Steps::Fixed(step_s) = draft.plan.integrator.steps() else { return };
     let end_s = draft.plan.end_s;
     let steps = end_s / step_s;
@@ -115,7 +113,7 @@ pub fn steps<M: Read>(draft: &Draft<'_, M>) {
 }
 
 /// A refusal of the step, pointing at it, or at the section that leaves it out.
-pub fn refuse_step<M: Read>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
+pub fn refuse_step<M: Model>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
     let step = draft.report.place("integrator.step_s").or_else(|| draft.report.place("integrator"));
     step.into_iter().fold(Diagnostic::new(title), |diagnostic, at| diagnostic.at(&at, expected))
 }

@@ -6,16 +6,10 @@ use std::sync::Mutex;
 use arrow_schema::ArrowError;
 use rayon::ThreadPool;
 
-use super::evolve::{Candidate, Evolution, evolve};
-use super::study::Study;
+use super::{Candidate, Evolution, Study, evolve};
 use crate::boundary::search::Stopped;
-use crate::effort::Effort;
-use crate::exit::Error;
-use crate::progress::Progress;
-use crate::store::{Done, Key, Layout, ResultRows, Row, StoreError, Trials};
-use crate::swept::Swept;
-use crate::threads;
-use crate::watch::{Engine, Watch};
+use crate::store::{Done, Key, Layout, ResultRows, Row, Trials};
+use crate::{Effort, Engine, Error, Progress, StoreError, Swept, Watch, threads};
 use sweep_files::panics::{lock, unlocked};
 use sweep_results::Goal;
 

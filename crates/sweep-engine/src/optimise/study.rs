@@ -8,20 +8,16 @@ use sweep_files::FileKind;
 use sweep_parameter::{Parameter as _, Range};
 use sweep_results::{Column, Goal, Mistake, columns};
 
-use crate::config::Draft;
 use crate::config::axes::{add, spacing};
 use crate::config::design::{DEFAULT_SEED, MOST_SEED};
 use crate::config::grid::{draft, name};
 use crate::config::parameters::find;
-use crate::config::report::{Diagnostic, Report};
-use crate::config::section::{Field, Section, listed, twice};
-use crate::config::source::{Located, Location, ReadError, beside, read};
+use crate::config::section::listed;
+use crate::config::source::{ReadError, beside, read};
 use crate::config::syntax::parse;
-use crate::config::{Diagnostics, GridInput, whole};
-use crate::design::{Design, MOST_AXES};
-use crate::model::Model;
-use crate::plan::{AxisValues, Plan};
-use crate::store::{Job, Rows};
+use crate::config::{Diagnostic, Draft, Field, Located, Location, Report, Section, twice, whole};
+use crate::design::MOST_AXES;
+use crate::{AxisValues, Design, Diagnostics, GridInput, Job, Model, Plan, Rows};
 
 /// Most candidates, most rows that a candidate is tried at, and most parameters.
 const MOST: [u64; 3] = [1_000_000, 100_000, 20];

@@ -20,8 +20,7 @@
 
 use std::sync::Arc;
 
-use super::error::StoreError;
-use super::schema::{Column, Done, Layout, Row};
+use super::{Column, Done, Layout, Row, StoreError};
 
 const MAGIC: [u8; 8] = *b"SWEEPCHK";
 const FORMAT: u32 = 5;

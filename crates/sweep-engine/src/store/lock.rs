@@ -11,8 +11,7 @@ use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::Folder;
-use super::error::{Holder, StoreError};
+use super::{Folder, Holder, StoreError};
 use sweep_files::{FileError, atomic, regular};
 
 /// Most bytes of a holder's name.

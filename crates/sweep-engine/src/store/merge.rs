@@ -9,12 +9,11 @@ use parquet::arrow::ArrowWriter;
 use parquet::errors::ParquetError;
 use tempfile::NamedTempFile;
 
-use super::Job;
-use super::error::StoreError;
-use super::open::{OpenRun, remove};
-use super::provenance::{self, Session};
-use super::read::{self, Tally};
-use super::schema::{self, BATCH_ROWS, ResultRows};
+use super::open::remove;
+use super::provenance::{self};
+use super::read::{self};
+use super::schema::{self};
+use super::{BATCH_ROWS, Job, OpenRun, ResultRows, Session, StoreError, Tally};
 use sweep_files::panics;
 use sweep_files::{self as files, ParquetFile, atomic, seal};
 
@@ -69,13 +68,13 @@ impl<'a> MapWriter<'a> {
 /// # Errors
 /// [`StoreError::File`].
 pub fn write_map(job: &Job<'_>, batches: &[RecordBatch], output: &Path) -> Result<(), StoreError> {
-    files::judge(output, job.layout.file_kind())?;
+    files::judge(output, job.layout.kind)?;
     let folder = atomic::parent(output);
     files::ready(folder)?;
     let mut writer = MapWriter::begin(job, atomic::begin(folder)?, output)?;
     batches.iter().try_for_each(|batch| writer.write(batch))?;
     let file = writer.finish()?;
-    files::judge(output, job.layout.file_kind())?;
+    files::judge(output, job.layout.kind)?;
     Ok(atomic::publish(file, output)?)
 }
 
@@ -123,7 +122,7 @@ impl OpenRun {
         let file = writer.finish()?;
         // Read back before it takes its place: what cannot be read must not replace anything.
         let tally = read::tally(&ParquetFile::open(file.path())?)?;
-        files::judge(&output, job.layout.file_kind())?;
+        files::judge(&output, job.layout.kind)?;
         atomic::publish(file, &output)?;
         Ok(Some(tally))
     }

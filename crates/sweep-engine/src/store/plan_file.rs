@@ -7,9 +7,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::differences::{PlanDifference, differences};
-use super::error::StoreError;
-use super::{Folder, Job};
+use super::differences::differences;
+use super::{Folder, Job, PlanDifference, StoreError};
 use sweep_files::{atomic, regular};
 
 /// Format of `plan.json`; a folder of another format is another plan.
