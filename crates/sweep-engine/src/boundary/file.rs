@@ -124,12 +124,8 @@ fn add_axes<M: Rows>(
     let [first, second, further @ ..] = plan.axes.as_slice() else { return };
     let (name, unit) = (second.parameter.name(), second.parameter.unit());
     table.parameter(&first.parameter, lines.iter().map(|line| Some(line.row.first)));
-    let said = format!(
-        "{}, where {} = {}; null unless it is a crossing",
-        second.parameter.description(),
-        quantity.name,
-        quantity.limit
-    );
+    let (what, TracedQuantity { name: of, limit, .. }) = (second.parameter.description(), quantity);
+    let said = format!("{what}, where {of} = {limit}; null unless it is a crossing");
     table.numbers(name, unit, &said, lines.iter().map(|line| line.edge.at));
     for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
         let said = format!(

@@ -274,16 +274,11 @@ fn brief(value: &Value) -> String {
         Value::Object(map) => {
             list(map.iter().map(|(key, value)| format!("{key} {}", brief(value))).collect())
         }
-        Value::Array(values) => match values.get(..12) {
-            Some(first) if values.len() > 12 => {
-                format!(
-                    "{}, ... ({} values)",
-                    list(first.iter().map(brief).collect()),
-                    values.len()
-                )
-            }
-            _ => list(values.iter().map(brief).collect()),
-        },
+        Value::Array(values) if values.len() > 12 => {
+            let first = list(values.iter().take(12).map(brief).collect());
+            format!("{first}, ... ({} values)", values.len())
+        }
+        Value::Array(values) => list(values.iter().map(brief).collect()),
         Value::String(text) => text.clone(),
         Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), short),
         other => other.to_string(),
@@ -313,18 +308,12 @@ fn columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> 
 fn range(column: &ColumnRange) -> String {
     let mut parts = Vec::new();
     if let Some((least, greatest)) = column.range {
-        let unit = column
-            .unit
-            .as_deref()
-            .filter(|unit| *unit != "1")
-            .map(|unit| format!(" {unit}"))
-            .unwrap_or_default();
+        let unit = column.unit.as_deref().filter(|unit| *unit != "1");
+        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
         parts.push(format!("{} to {}{unit}", short(least), short(greatest)));
     }
-    parts.extend(column.names.iter().map(|(name, count)| {
-        let name = clipped(name);
-        format!("{count} {name}")
-    }));
+    let names = column.names.iter();
+    parts.extend(names.map(|(name, count)| format!("{count} {}", clipped(name))));
     if column.nulls > 0 {
         parts.push(format!("{} null", column.nulls));
     }

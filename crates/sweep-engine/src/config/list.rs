@@ -136,8 +136,8 @@ fn shown(path: &Path) -> String {
     cut(&path.display().to_string(), LONGEST_PATH)
 }
 
-/// The table of a file, and the hash of its bytes; `None` after mistakes, which are reported. `file`
-/// is where it is named. With `gaps`, a missing value is NaN.
+/// The table of a file, and the hash of its bytes; `None` after mistakes, which are reported. The
+/// file is named at `file`. With `gaps`, a missing value is NaN.
 fn table(
     path: &Path,
     file: &Location,
