@@ -90,17 +90,12 @@ impl<M: Read> GridInput<M> {
         let is_read = |key: &str| {
             !["design", "set", "boundary", "optimise"].contains(&key) && Some(key) != M::OWN_FILE
         };
-        let entries = |value: Option<&'_ Value>| -> Vec<(String, Value)> {
-            let object = value.and_then(Value::as_object).into_iter().flatten();
-            object.map(|(key, value)| (key.clone(), value.clone())).collect()
-        };
-        let top = entries(Some(plan)).into_iter().filter(|(key, _)| is_read(key));
-        let own = M::OWN_FILE.and_then(|key| plan.get(key)).filter(|own| own.is_object());
+        let top = plan.as_object().into_iter().flatten().filter(|(key, _)| is_read(key));
+        let own = M::OWN_FILE.and_then(|key| plan.get(key)?.as_object());
         Self {
-            path: name.into(),
             text: Some(again::file(top)),
-            own_file: own.map(|own| again::file(entries(Some(own)))),
-            ..Self::file(PathBuf::new(), Vec::new())
+            own_file: own.map(again::file),
+            ..Self::file(name.into(), Vec::new())
         }
     }
 

@@ -134,7 +134,10 @@ pub const fn chunk_points(points: u64) -> u64 {
     }
 }
 
-/// The file of a search's folder that holds its trials.
+// The files of a folder that have one name: those of every run, of shards, and of searches.
+const PLAN: &str = "plan.json";
+const LOCK: &str = "lock";
+const SHARDS: &str = "shards.json";
 const TRIALS: &str = "trials.bin";
 
 /// The paths of one run.
@@ -162,24 +165,9 @@ impl Folder {
         Ok(Self { output: output.to_path_buf(), path: output.with_file_name(name) })
     }
 
-    fn plan(&self) -> PathBuf {
-        self.path.join("plan.json")
-    }
-
-    fn shards(&self) -> PathBuf {
-        self.path.join("shards.json")
-    }
-
-    fn lock(&self) -> PathBuf {
-        self.path.join("lock")
-    }
-
-    fn shard_lock(&self, shard: u64) -> PathBuf {
-        self.path.join(format!("shard-{shard}.lock"))
-    }
-
-    fn chunk(&self, chunk: u64) -> PathBuf {
-        self.path.join(chunk_name(chunk))
+    /// A file of the folder.
+    fn file(&self, name: impl AsRef<Path>) -> PathBuf {
+        self.path.join(name)
     }
 
     /// The sidecar that says how the run went.

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use super::{Lines as _, quoted, short, table};
+use crate::config::section::cut;
 use crate::{Build, Error, Exit, StoreError, show, tell};
 use fail_on::FailOn;
 use sweep_files::{FileKind, Output};
@@ -111,13 +112,7 @@ fn brief(value: &Value) -> String {
         Value::Null => "absent".to_owned(),
         Value::String(text) => text.clone(),
         Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), short),
-        other => {
-            let text = other.to_string();
-            match text.char_indices().nth(48) {
-                Some((cut, _)) => format!("{}...", &text[..cut]),
-                None => text,
-            }
-        }
+        other => cut(&other.to_string(), 48),
     }
 }
 

@@ -57,9 +57,7 @@ The exit code is 0 where every expression holds, else 4.";
 pub fn run(args: &Args) -> Result<Exit, Error> {
     let file = ResultTable::open(&args.file)?;
     let conditions = conditions::parse("EXPRESSION", &args.expressions, &file)?;
-    let keep = args.keep.iter().cloned().collect::<Vec<_>>();
-    let keep = conditions::parse("--where", &keep, &file)?;
-    let keep = conditions::rows_only("--where", keep)?.pop();
+    let keep = conditions::of_rows(args.keep.as_ref(), &file)?;
     let shown = usize::from(args.rows);
     let checked = conditions
         .iter()

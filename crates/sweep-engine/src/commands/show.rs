@@ -119,9 +119,7 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
 /// Some rows of the file.
 fn rows(args: &Args) -> Result<Exit, Error> {
     let file = ResultTable::open(&args.file)?;
-    let keep: Vec<String> = args.keep.iter().cloned().collect();
-    let keep = conditions::parse("--where", &keep, &file)?;
-    let keep = conditions::rows_only("--where", keep)?.pop();
+    let keep = conditions::of_rows(args.keep.as_ref(), &file)?;
     let columns = shown_columns(args, &file, keep.as_ref());
     let order = |by| match (args.ascending, args.descending) {
         (true, _) => Worse::Less,

@@ -11,7 +11,7 @@ use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::{Folder, Holder, StoreError};
+use super::{Folder, Holder, LOCK, StoreError};
 use sweep_files::{FileError, atomic, regular};
 
 /// Most bytes of a holder's name.
@@ -35,7 +35,7 @@ pub struct Lock {
 impl Lock {
     /// Makes the folder if need be and takes the whole run's lock, or one shard's share of it.
     pub fn acquire(folder: &Folder, shard: Option<u64>) -> Result<Self, StoreError> {
-        let path = folder.lock();
+        let path = folder.file(LOCK);
         for attempt in 0..ATTEMPTS {
             if attempt > 0 {
                 std::thread::sleep(PAUSE);
@@ -103,7 +103,7 @@ pub(super) fn holders(folder: &Folder) -> Vec<Holder> {
         .collect();
     // Shards share the folder's lock, and whoever last held it alone has left his name in it.
     if found.is_empty() {
-        found.extend(held_by(&folder.lock(), None));
+        found.extend(held_by(&folder.file(LOCK), None));
     }
     found
 }
@@ -126,7 +126,7 @@ fn refuse_strangers(file: &mut File, path: &Path) -> Result<(), StoreError> {
 }
 
 fn take_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
-    let path = folder.shard_lock(shard);
+    let path = folder.file(format!("shard-{shard}.lock"));
     let mut file =
         regular::open_or_create(&path).map_err(StoreError::io("open the lock", &path))?;
     refuse_strangers(&mut file, &path)?;
@@ -231,7 +231,7 @@ mod tests {
         fs::create_dir_all(&folder.path).unwrap();
         let mine = home.path().join("thesis.tex");
         fs::write(&mine, "my thesis").unwrap();
-        for (name, shard) in [(folder.lock(), None), (folder.shard_lock(3), Some(3))] {
+        for (name, shard) in [(folder.file(LOCK), None), (folder.file("shard-3.lock"), Some(3))] {
             std::os::unix::fs::symlink(&mine, &name).unwrap();
             let error = Lock::acquire(&folder, shard).unwrap_err().to_string();
             assert!(error.contains("it is a symbolic link"), "{error}");
@@ -251,10 +251,10 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
         let first = Lock::acquire(&folder, None).unwrap();
-        let stale = regular::open_or_create(&folder.lock()).unwrap();
+        let stale = regular::open_or_create(&folder.file(LOCK)).unwrap();
         first.retire().unwrap();
         stale.try_lock().unwrap();
-        assert!(!atomic::is_named(&stale, &folder.lock()));
+        assert!(!atomic::is_named(&stale, &folder.file(LOCK)));
         Lock::acquire(&folder, None).unwrap();
     }
 }

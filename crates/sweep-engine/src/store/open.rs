@@ -19,7 +19,7 @@ use super::provenance::{self, Session};
 use super::read::{self, ResultFile, Tally};
 use super::schema::Done;
 use super::shard::{self, Dealing, Shard, ShardRequest};
-use super::{Folder, Job, TRIALS, chunk_of_name, chunk_points};
+use super::{Folder, Job, PLAN, SHARDS, TRIALS, chunk_name, chunk_of_name, chunk_points};
 use crate::threads::Environment;
 use sweep_files::panics::lock;
 use sweep_files::{FileError, ParquetFile, atomic, regular};
@@ -176,7 +176,7 @@ impl OpenRun {
             ChunkFile::There(outcomes) => Ok(Some(outcomes)),
             ChunkFile::Absent => Ok(None),
             ChunkFile::Damaged(damage) => {
-                let path = self.folder.chunk(chunk);
+                let path = self.folder.file(chunk_name(chunk));
                 let aside = set_aside(&path)?;
                 self.notes.push(format!(
                     "{}: {damage}; kept as {} and computed again",
@@ -205,7 +205,7 @@ impl OpenRun {
         {
             return Ok(());
         }
-        atomic::write(&self.folder.path, &self.folder.chunk(chunk), &bytes)?;
+        atomic::write(&self.folder.path, &self.folder.file(chunk_name(chunk)), &bytes)?;
         if is_whole {
             self.present().insert(chunk);
         } else {
@@ -328,7 +328,7 @@ pub(super) enum ChunkFile {
 
 /// Reads a chunk's file.
 pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
-    let path = &folder.chunk(place.chunk);
+    let path = &folder.file(chunk_name(place.chunk));
     let mut bytes = Vec::new();
     // A byte too many is enough to know that it is too long.
     let read = regular::open(path)
@@ -436,7 +436,7 @@ pub(super) fn claim<T>(
     match PlanFile::read(folder)? {
         Found::Plan(found) => refuse_other_plan(folder, &found, &ours)?,
         Found::Damaged => {
-            let aside = set_aside(&folder.plan())?;
+            let aside = set_aside(&folder.file(PLAN))?;
             notes.push(format!("the frozen plan was damaged; kept as {}", aside.display()));
             ours.freeze(folder)?;
         }
@@ -474,7 +474,7 @@ pub(super) fn refuse_other_plan(
 /// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers'
 /// files stay.
 pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
-    atomic::remove(&folder.plan())?;
+    atomic::remove(&folder.file(PLAN))?;
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         if name.to_str().is_some_and(is_ours) {
             atomic::remove(&folder.path.join(name))?;
@@ -486,7 +486,7 @@ pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
 /// Whether a run writes files of this name into its folder, the lock aside.
 fn is_ours(name: &str) -> bool {
     let whole = name.strip_suffix(".damaged").unwrap_or(name);
-    ["plan.json", "shards.json", TRIALS].contains(&whole)
+    [PLAN, SHARDS, TRIALS].contains(&whole)
         || chunk_of_name(whole).is_some()
         || lock::shard_of_name(name).is_some()
         || provenance::is_session(name)

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::plan_file::pretty;
-use super::{Folder, StoreError};
+use super::{Folder, SHARDS, StoreError};
 use crate::Environment;
 use sweep_files::{atomic, regular};
 
@@ -87,7 +87,7 @@ impl Dealing {
     /// The number of shards of a run folder, if any shard has started. An unreadable file counts as
     /// none: it only says who computes a chunk, never what is in it.
     pub(super) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
-        let path = folder.shards();
+        let path = folder.file(SHARDS);
         match regular::read_json(&path) {
             Ok(text) => Ok(serde_json::from_slice(&text)
                 .ok()
@@ -113,7 +113,7 @@ impl Dealing {
     /// Writes the dealing unless another shard was first, and says what holds.
     pub(super) fn freeze(self, folder: &Folder) -> Result<Self, StoreError> {
         let text = pretty(&json!(self));
-        let path = folder.shards();
+        let path = folder.file(SHARDS);
         if atomic::create(&folder.path, &path, &text)? {
             return Ok(self);
         }

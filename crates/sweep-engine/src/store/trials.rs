@@ -76,7 +76,7 @@ impl Trials {
             Claim::Finished(()) => return Ok(OpenedTrials::Finished),
             Claim::Held(lock, notes) => (lock, notes),
         };
-        let path = folder.path.join(TRIALS);
+        let path = folder.file(TRIALS);
         let plan = *job.hash().as_bytes();
         let (mut file, found, known) = contents(&path, &plan)?;
         if known.is_empty() && found > 0 {
@@ -170,27 +170,18 @@ fn is_finished(folder: &Folder, job: &Job<'_>) -> Result<bool, StoreError> {
     Ok(true)
 }
 
-fn encode(plan: &[u8; blake3::OUT_LEN], key: Key, answer: Option<f64>) -> [u8; RECORD_BYTES] {
-    let mut record = [0; RECORD_BYTES];
-    let answer = answer.unwrap_or(f64::NAN).to_bits();
-    for (place, word) in record.chunks_exact_mut(8).zip(key.into_iter().chain([answer])) {
-        place.copy_from_slice(&word.to_le_bytes());
-    }
-    let check = check(plan, &record[..CONTENT_BYTES]);
-    record[CONTENT_BYTES..].copy_from_slice(&check);
-    record
+fn encode(plan: &[u8; blake3::OUT_LEN], key: Key, answer: Option<f64>) -> Vec<u8> {
+    let [a, b, c] = key;
+    let content = [a, b, c, answer.unwrap_or(f64::NAN).to_bits()].map(u64::to_le_bytes);
+    [content.as_flattened(), &check(plan, content.as_flattened())].concat()
 }
 
 fn decode(plan: &[u8; blake3::OUT_LEN], record: &[u8]) -> Option<(Key, Option<f64>)> {
     let (content, found) = record.split_at_checked(CONTENT_BYTES)?;
-    if check(plan, content) != found {
-        return None;
-    }
-    let mut words = content.chunks_exact(8).map(|word| word.try_into().map(u64::from_le_bytes));
-    let mut word = || words.next()?.ok();
-    let key = [word()?, word()?, word()?];
-    let answer = f64::from_bits(word()?);
-    Some((key, if answer.is_nan() { None } else { Some(answer) }))
+    let &[a, b, c, answer] = content.as_chunks().0 else { return None };
+    let [a, b, c, answer] = [a, b, c, answer].map(u64::from_le_bytes);
+    let answer = Some(f64::from_bits(answer)).filter(|answer| !answer.is_nan());
+    (check(plan, content) == found).then_some(([a, b, c], answer))
 }
 
 fn check(plan: &[u8; blake3::OUT_LEN], content: &[u8]) -> [u8; RECORD_BYTES - CONTENT_BYTES] {
