@@ -152,12 +152,8 @@ pub fn mistakes_in_expressions<'a>(
     let report = Report::default();
     for (text, mistake) in mistakes {
         let source = report.add(option, text);
-        let at = Location::new(source, mistake.span);
-        let mut diagnostic = Diagnostic::new(mistake.title).at(&at, mistake.expected);
-        if let Some((typed, names)) = &mistake.candidates {
-            diagnostic = diagnostic.nearest(typed, names.iter().map(String::as_str));
-        }
-        report.push(diagnostic);
+        let at = Location::new(source, mistake.span.clone());
+        report.push(Diagnostic::of_expression(mistake, &at));
     }
     report.into_diagnostics()
 }

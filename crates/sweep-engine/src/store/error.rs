@@ -160,11 +160,7 @@ impl StoreError {
             | Self::Shard(_) => true,
             Self::Threads(error) => error.is_refusal(),
             Self::File(error) => error.is_refusal(),
-            Self::Busy { .. }
-            | Self::Incomplete { .. }
-            | Self::NoRun { .. }
-            | Self::Engine { .. }
-            | Self::Parquet { .. } => false,
+            _ => false,
         }
     }
 }
