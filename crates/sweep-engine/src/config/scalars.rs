@@ -7,7 +7,7 @@ use sweep_parameter::{Channel, Range, decimal};
 use super::design::{MOST_SEED, MOST_SOBOL};
 use super::{Draft, Read, Written, twice};
 use crate::Design;
-use crate::method::{Integrator, settings};
+use crate::method::{Entry, Integrator, settings};
 use crate::plan::{LONGEST_S, MOST_POINTS, RATIO_MIN};
 
 /// Those that stand outside of `[integrator]`.
@@ -91,10 +91,8 @@ fn put<M: Read>(written: &Written<'_>, draft: &mut Draft<'_, M>) -> Option<Value
         "method" => {
             let names: Vec<_> = M::Integrator::methods().iter().map(|entry| entry.name).collect();
             let entry = &M::Integrator::methods()[written.choice(&names)?];
-            let was = plan.integrator.to_json();
             // Settings that both methods have stay as they are.
-            plan.integrator =
-                (entry.with)(&mut |setting| was[setting.key].as_f64().unwrap_or(setting.default));
+            plan.integrator = changed(&plan.integrator, entry, None);
             report.put("integrator", written.value.at.clone());
             json!(entry.name)
         }
@@ -102,24 +100,26 @@ fn put<M: Read>(written: &Written<'_>, draft: &mut Draft<'_, M>) -> Option<Value
         key => {
             let (setting, owners) =
                 settings::<M::Integrator>().into_iter().find(|(setting, _)| setting.key == key)?;
-            let was = plan.integrator.to_json();
             if !owners.contains(&plan.integrator.name()) {
                 let title = format!("the method \"{}\" has no `{key}`", plan.integrator.name());
                 let expected = format!("`{key}` belongs to \"{}\"", owners.join("\", \""));
                 return report.refuse(&written.name.at, title, expected);
             }
             let number = written.number(setting.range)?.value;
-            let entry = M::Integrator::methods()
-                .iter()
-                .find(|entry| entry.name == plan.integrator.name())?;
-            plan.integrator = (entry.with)(&mut |setting| {
-                let own = (setting.key == key).then_some(number);
-                own.or(was[setting.key].as_f64()).unwrap_or(setting.default)
-            });
+            let mut entries = M::Integrator::methods().iter();
+            let entry = entries.find(|entry| entry.name == plan.integrator.name())?;
+            plan.integrator = changed(&plan.integrator, entry, Some((key, number)));
             report.put(format!("integrator.{key}"), written.value.at.clone());
             json!(number)
         }
     })
+}
+
+/// A method with the settings of another, and one of its own.
+fn changed<I: Integrator>(was: &I, entry: &Entry<I>, own: Option<(&str, f64)>) -> I {
+    let was = was.settings();
+    let of = |key: &str| was.iter().copied().chain(own).rfind(|(known, _)| *known == key);
+    (entry.with)(&mut |setting| of(setting.key).map_or(setting.default, |(_, number)| number))
 }
 
 /// The number of points, or the seed, of a design that has one.

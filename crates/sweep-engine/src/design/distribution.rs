@@ -146,11 +146,8 @@ fn standard_quantile(p: f64) -> f64 {
         return if q < 0.0 { f64::NEG_INFINITY } else { f64::INFINITY };
     }
     let r = (-libm::log(tail)).sqrt();
-    let value = if r <= 5.0 {
-        polynomial(&C, r - 1.6) / polynomial(&D, r - 1.6)
-    } else {
-        polynomial(&E, r - 5.0) / polynomial(&F, r - 5.0)
-    };
+    let (above, below, r) = if r <= 5.0 { (C, D, r - 1.6) } else { (E, F, r - 5.0) };
+    let value = polynomial(&above, r) / polynomial(&below, r);
     if q < 0.0 { -value } else { value }
 }
 

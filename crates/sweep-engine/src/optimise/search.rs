@@ -23,9 +23,7 @@ pub fn search<M: Swept>(
     effort: Effort<'_>,
 ) -> Result<(Result<Vec<Candidate>, Stopped>, Option<Trials>), Error> {
     let pool = threads::pool(effort.threads()?)?;
-    let objectives = study.objectives.len();
-    let answers = objectives + study.conditions.len();
-    let there = trials.as_ref().map_or(0, |trials| trials.count() / answers) as u64;
+    let there = trials.as_ref().map_or(0, |trials| trials.count() / study.answers()) as u64;
     let mut asked = Asked {
         study,
         engine: M::engine(&study.plan)?,
@@ -38,7 +36,7 @@ pub fn search<M: Swept>(
     };
     let evolution = Evolution {
         parameters: study.parameters.len(),
-        objectives,
+        objectives: study.objectives.len(),
         population: study.population,
         candidates: study.candidates,
         seed: study.seed,
@@ -147,8 +145,8 @@ impl<M: Swept> Asked<'_, M> {
 
     fn recall(&self, number: u64, values: &[f64]) -> Option<Answers> {
         let trials = lock(&self.trials);
-        let answers = self.study.objectives.len() + self.study.conditions.len();
-        let recalled = (0..answers).map(|k| trials.as_ref()?.recall(&key(number, k, values)));
+        let recalled =
+            (0..self.study.answers()).map(|k| trials.as_ref()?.recall(&key(number, k, values)));
         // Without one number there are none.
         Some(recalled.collect::<Option<Vec<Option<f64>>>>()?.into_iter().collect())
     }
@@ -156,9 +154,8 @@ impl<M: Swept> Asked<'_, M> {
     fn keep(&self, number: u64, values: &[f64], found: &Answers) -> Result<(), StoreError> {
         let mut trials = lock(&self.trials);
         let Some(trials) = trials.as_mut() else { return Ok(()) };
-        let answers = self.study.objectives.len() + self.study.conditions.len();
         let of = |k: usize| found.as_ref().map(|found| found[k]);
-        (0..answers).try_for_each(|k| trials.keep(key(number, k, values), of(k)))
+        (0..self.study.answers()).try_for_each(|k| trials.keep(key(number, k, values), of(k)))
     }
 }
 

@@ -138,6 +138,12 @@ impl<M: Rows> Study<M> {
         })
     }
 
+    /// Numbers that answer a candidate: objectives, then excesses over conditions.
+    #[must_use]
+    pub fn answers(&self) -> usize {
+        self.objectives.len() + self.conditions.len()
+    }
+
     /// Rows of a candidate.
     #[must_use]
     pub fn rows(&self) -> u64 {

@@ -6,6 +6,7 @@
 //! refused: a scheduler that lost sight of a node does exactly that, and must not wait for the lost
 //! node's lock to expire.
 
+use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -78,14 +79,8 @@ impl Lock {
 
     /// What a user should hear of a file system without locks.
     pub fn note(&self, folder: &Folder) -> Option<String> {
-        let folder = folder.path.display();
-        let note = || {
-            format!(
-                "{folder} is on a file system without locks: make sure that nothing else runs on \
-                 this output"
-            )
-        };
-        self.missing.then(note)
+        let said = "is on a file system without locks: make sure that nothing else runs on this";
+        self.missing.then(|| format!("{} {said} output", folder.path.display()))
     }
 
     /// Deletes the lock's file while it is still held, so that no one can take it over, then lets
@@ -97,10 +92,9 @@ impl Lock {
 
 /// Everyone who holds the folder now, as far as it can be read without disturbing them.
 pub(super) fn holders(folder: &Folder) -> Vec<Holder> {
-    let mut found: Vec<Holder> = shard_locks(folder)
-        .into_iter()
-        .filter_map(|(shard, path)| held_by(&path, Some(shard)))
-        .collect();
+    let locks = shard_locks(folder).into_iter();
+    let mut found: Vec<Holder> =
+        locks.filter_map(|(shard, path)| held_by(&path, Some(shard))).collect();
     // Shards share the folder's lock, and whoever last held it alone has left his name in it.
     if found.is_empty() {
         found.extend(held_by(&folder.file(LOCK), None));
@@ -154,11 +148,9 @@ fn no_locks_here(error: &io::Error) -> bool {
 }
 
 fn shard_locks(folder: &Folder) -> Vec<(u64, PathBuf)> {
-    let names = regular::names(&folder.path).unwrap_or_default();
-    let mut found: Vec<(u64, PathBuf)> = names
-        .iter()
-        .filter_map(|name| Some((shard_of_name(name.to_str()?)?, folder.path.join(name))))
-        .collect();
+    let names = regular::names(&folder.path).unwrap_or_default().into_iter();
+    let lock = |name: OsString| Some((shard_of_name(name.to_str()?)?, folder.file(name)));
+    let mut found: Vec<(u64, PathBuf)> = names.filter_map(lock).collect();
     found.sort_unstable();
     found
 }

@@ -39,14 +39,11 @@ impl<'a> MapWriter<'a> {
         let (schema, properties) = (job.layout.schema(), schema::properties(job));
         let handle = file.as_file().try_clone().map_err(StoreError::io("write", output))?;
         let begin = || ArrowWriter::try_new(BufWriter::new(handle), schema, Some(properties));
-        let writer = panics::in_parquet("the library gave up writing", begin)
-            .map_err(StoreError::parquet("write", output))?;
-        Ok(Self { output, file, writer })
+        Ok(Self { output, file, writer: written(output, begin)? })
     }
 
     fn write(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
-        panics::in_parquet("the library gave up writing", || self.writer.write(batch))
-            .map_err(StoreError::parquet("write", self.output))
+        written(self.output, || self.writer.write(batch))
     }
 
     /// The whole file, with its digest.
@@ -55,11 +52,19 @@ impl<'a> MapWriter<'a> {
         // Closing flushes to the file. (Taking the file back out of the writer would tell a full
         // disk as text only.)
         writer.append_key_value_metadata(seal::blank());
-        panics::in_parquet("the library gave up writing", || writer.close())
-            .map_err(StoreError::parquet("write", output))?;
+        written(output, || writer.close())?;
         seal::seal(file.as_file_mut()).map_err(StoreError::io("write", output))?;
         Ok(file)
     }
+}
+
+/// Has the library write.
+fn written<T>(
+    output: &Path,
+    work: impl FnOnce() -> Result<T, ParquetError>,
+) -> Result<T, StoreError> {
+    panics::in_parquet("the library gave up writing", work)
+        .map_err(StoreError::parquet("write", output))
 }
 
 /// Writes the result file of a job whose rows are in memory, in batches of [`BATCH_ROWS`]: the same
