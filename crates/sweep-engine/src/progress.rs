@@ -73,12 +73,17 @@ impl Progress {
     /// Shows that so many rows of a search are done, with so many points.
     pub fn show_search(&mut self, rows: u64, points: u64) {
         self.tell(rows, |progress, counts_rows| {
-            let points = format!("{points} points, {}", per_second(progress.rate(points)));
+            let points = progress.points(points);
             match progress.total {
                 total if total > 0 && !counts_rows => format!("{rows} of {total} rows, {points}"),
                 _ => points,
             }
         });
+    }
+
+    /// The points of a search and their rate.
+    fn points(&self, points: u64) -> String {
+        format!("{points} points, {}", per_second(self.rate(points)))
     }
 
     /// Says it beside the bar, which counts on its own; or in a line, and then none for a while.
