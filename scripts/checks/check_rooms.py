@@ -42,7 +42,7 @@ def code(file):
 
 def paths(tree):
     """The paths of one `use`: a::{b, c::d} is a::b and a::c::d."""
-    head, brace, rest = tree.partition("{")
+    head, brace, rest = re.sub(r"\s+", " ", tree).partition("{")
     if not brace:
         return [tree.split(" as ")[0].strip()]
     parts, depth = [""], 0
@@ -55,28 +55,45 @@ def paths(tree):
     return [path for part in parts if part.strip() for path in paths(head.strip() + part.strip())]
 
 
-def imported(own, text, known):
+def handed_on(known):
+    """The names that each module has from others, with the paths that lead to them."""
+    found = {}
+    for own, file in known.items():
+        # Not those of blocks and modules within it.
+        text = re.sub(r"^\s.*?use .*", "", code(file), flags=re.MULTILINE)
+        named = [path for tree in USE.findall(text) for path in paths(tree)]
+        found[own] = {path.split("::")[-1]: path for path in named}
+    return found
+
+
+def module(own, path, known, handed):
+    """The module that a path leads to from a module, through those that hand its name on."""
+    names = path.split("::")
+    at = own if names[0] in ("self", "super") else ()
+    while names and names[0] in ("self", "super", "crate"):
+        at = at[:-1] if names.pop(0) == "super" else at
+    if at == () and path.split("::")[0] not in ("crate", "super"):
+        at = own
+    while names and (*at, names[0]) in known:
+        at = (*at, names.pop(0))
+    further = handed[at].get(names[0]) if names else None
+    return module(at, further, known, handed) if further and at != own else at
+
+
+def imported(own, text, known, handed):
     """The modules that a file's text names, by `use` or where it stands."""
-    named = [path for tree in USE.findall(text) for path in paths(re.sub(r"\s+", " ", tree))]
+    named = [path for tree in USE.findall(text) for path in paths(tree)]
     named += re.findall(r"\b(?:crate|super|self)(?:::\w+)+", USE.sub("", text))
-    for path in named:
-        names = path.split("::")
-        at = own if names[0] in ("self", "super") else ()
-        while names and names[0] in ("self", "super", "crate"):
-            at = at[:-1] if names.pop(0) == "super" else at
-        if at == () and path.split("::")[0] not in ("crate", "super"):
-            at = own
-        while names and (*at, names[0]) in known:
-            at = (*at, names.pop(0))
-        yield at
+    return (module(own, path, known, handed) for path in named)
 
 
 def imports(source):
     """Of each file, the files that it imports; not those of the modules that it is in."""
     known = modules(source)
+    handed = handed_on(known)
     graph = {}
     for own, file in known.items():
-        others = set(imported(own, code(file), known))
+        others = set(imported(own, code(file), known, handed))
         # A module's file is made of those in its folder.
         related = [it for it in others if own[: len(it)] == it or it[: len(own)] == own]
         graph[own] = others.difference(related)

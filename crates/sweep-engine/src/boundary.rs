@@ -37,6 +37,12 @@ mod tests;
 mod trace;
 mod warm;
 
+pub use distance::TracedQuantity;
+use neighbour::{Neighbour, hint, nearest, shared};
+use net::{Net, Want};
+use row::RowSearch;
+pub use search::BoundaryTask;
+use span::{Hint, Question, Side, SideRange, Span, Tried};
 pub use trace::trace;
 
 /// Evaluates trial points.
@@ -100,26 +106,19 @@ pub enum EdgeKind {
 }
 
 impl EdgeKind {
-    /// Every kind, in the order of the file's dictionary.
-    pub const ALL: [Self; 6] = [
-        Self::Crossing,
-        Self::Jump,
-        Self::Undefined,
-        Self::NoneReliable,
-        Self::NoneUnreliable,
-        Self::NoneUndefined,
+    /// Every kind with its name, in the order of the file's dictionary, which is that above.
+    pub const ALL: [(Self, &'static str); 6] = [
+        (Self::Crossing, "crossing"),
+        (Self::Jump, "jump"),
+        (Self::Undefined, "undefined"),
+        (Self::NoneReliable, "none_in_range_reliable"),
+        (Self::NoneUnreliable, "none_in_range_unreliable"),
+        (Self::NoneUndefined, "none_in_range_undefined"),
     ];
 
     /// As in the file.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Crossing => "crossing",
-            Self::Jump => "jump",
-            Self::Undefined => "undefined",
-            Self::NoneReliable => "none_in_range_reliable",
-            Self::NoneUnreliable => "none_in_range_unreliable",
-            Self::NoneUndefined => "none_in_range_undefined",
-        }
+        Self::ALL[self as usize].1
     }
 }
 

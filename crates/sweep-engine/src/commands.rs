@@ -23,10 +23,13 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use crate::exit::{Error, Exit};
-use crate::interrupt::survive_file_size_limits;
 use crate::program::call_program;
-use crate::swept::Swept;
+use crate::survive_file_size_limits;
+use crate::{Error, Exit, Swept};
+use cells::{Lines, clipped, short, table, word};
+use grid::{GridArgs, ResultArgs, quoted};
+use plot::finite;
+use run::installed;
 
 #[derive(Debug, Parser)]
 #[command(after_help = Exit::table(), disable_help_subcommand = true)]

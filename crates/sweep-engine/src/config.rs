@@ -40,6 +40,7 @@ pub mod source;
 pub mod syntax;
 pub mod whole;
 pub mod words;
+pub mod written;
 
 use std::marker::PhantomData;
 use std::path::PathBuf;
@@ -48,11 +49,12 @@ pub use draft::Draft;
 pub use grid::plain_name;
 pub use points::{check_columns, not_numbers, other_length};
 pub use read::{Read, Schema};
-pub use report::{Diagnostics, Mistake};
+pub use report::{Diagnostic, Diagnostics, Mistake, Report};
+pub use section::{Field, Section, quoted, refused_number, short, twice, unknown_word};
+pub use source::{Located, Location, SourceId, Sources};
+pub use written::Written;
 
-use report::{Diagnostic, Report};
 use serde_json::Value;
-use source::Location;
 
 use crate::plan::{Plan, WrittenIn};
 
@@ -88,17 +90,12 @@ impl<M: Read> GridInput<M> {
         let is_read = |key: &str| {
             !["design", "set", "boundary", "optimise"].contains(&key) && Some(key) != M::OWN_FILE
         };
-        let entries = |value: Option<&'_ Value>| -> Vec<(String, Value)> {
-            let object = value.and_then(Value::as_object).into_iter().flatten();
-            object.map(|(key, value)| (key.clone(), value.clone())).collect()
-        };
-        let top = entries(Some(plan)).into_iter().filter(|(key, _)| is_read(key));
-        let own = M::OWN_FILE.and_then(|key| plan.get(key)).filter(|own| own.is_object());
+        let top = plan.as_object().into_iter().flatten().filter(|(key, _)| is_read(key));
+        let own = M::OWN_FILE.and_then(|key| plan.get(key)?.as_object());
         Self {
-            path: name.into(),
             text: Some(again::file(top)),
-            own_file: own.map(|own| again::file(entries(Some(own)))),
-            ..Self::file(PathBuf::new(), Vec::new())
+            own_file: own.map(again::file),
+            ..Self::file(name.into(), Vec::new())
         }
     }
 
@@ -155,12 +152,8 @@ pub fn mistakes_in_expressions<'a>(
     let report = Report::default();
     for (text, mistake) in mistakes {
         let source = report.add(option, text);
-        let at = Location::new(source, mistake.span);
-        let mut diagnostic = Diagnostic::new(mistake.title).at(&at, mistake.expected);
-        if let Some((typed, names)) = &mistake.candidates {
-            diagnostic = diagnostic.nearest(typed, names.iter().map(String::as_str));
-        }
-        report.push(diagnostic);
+        let at = Location::new(source, mistake.span.clone());
+        report.push(Diagnostic::of_expression(mistake, &at));
     }
     report.into_diagnostics()
 }

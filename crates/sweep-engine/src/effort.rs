@@ -1,8 +1,7 @@
 //! The effort of a search or an evaluation: its threads and its interruption.
 
-use crate::interrupt::Interrupt;
-use crate::progress::ProgressMode;
-use crate::threads::{self, ThreadsError};
+use crate::threads::{self};
+use crate::{Interrupt, ProgressMode, ThreadsError};
 
 /// How a search or an evaluation is to be done.
 #[derive(Clone, Copy, Debug)]

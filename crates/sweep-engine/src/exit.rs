@@ -7,9 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use crate::boundary::search::BoundaryError;
-use crate::config::Diagnostics;
-use crate::store::StoreError;
-use crate::threads::ThreadsError;
+use crate::{Diagnostics, StoreError, ThreadsError};
 use sweep_files::FileError;
 use sweep_plot::PlotError;
 use sweep_results::ResultsError;
@@ -36,16 +34,16 @@ pub enum Exit {
 }
 
 impl Exit {
-    /// Every exit code.
-    pub const ALL: [Self; 8] = [
-        Self::Done,
-        Self::Failed,
-        Self::BadInput,
-        Self::PointsFailed,
-        Self::NotHeld,
-        Self::Busy,
-        Self::Interrupted,
-        Self::Terminated,
+    /// Every exit code, with what it means to a script.
+    pub const ALL: [(Self, &'static str); 8] = [
+        (Self::Done, "done"),
+        (Self::Failed, "an I/O or internal failure"),
+        (Self::BadInput, "bad input, refused before any work"),
+        (Self::PointsFailed, "with --fail-on-error: done, but some points failed"),
+        (Self::NotHeld, "done: a `require`, or a `compare --fail-on`, does not hold"),
+        (Self::Busy, "another run holds this output"),
+        (Self::Interrupted, "interrupted; finished work is kept"),
+        (Self::Terminated, "terminated; finished work is kept"),
     ];
 
     /// What a process ends with that this signal has interrupted.
@@ -53,28 +51,10 @@ impl Exit {
         if signal == Some(15) { Self::Terminated } else { Self::Interrupted }
     }
 
-    /// What it means to a script.
-    pub const fn meaning(self) -> &'static str {
-        match self {
-            Self::Done => "done",
-            Self::Failed => "an I/O or internal failure",
-            Self::BadInput => "bad input, refused before any work",
-            Self::PointsFailed => "with --fail-on-error: done, but some points failed",
-            Self::NotHeld => "done: a `require`, or a `compare --fail-on`, does not hold",
-            Self::Busy => "another run holds this output",
-            Self::Interrupted => "interrupted; finished work is kept",
-            Self::Terminated => "terminated; finished work is kept",
-        }
-    }
-
     /// All codes with their meanings, for `--help`.
     pub fn table() -> String {
-        let mut table = "Exit codes:".to_owned();
-        for exit in Self::ALL {
-            // Writing to a String cannot fail.
-            let _ = write!(table, "\n  {:>3}  {}", exit as u8, exit.meaning());
-        }
-        table
+        let line = |(exit, meaning)| format!("\n  {:>3}  {meaning}", exit as u8);
+        format!("Exit codes:{}", Self::ALL.map(line).concat())
     }
 }
 
@@ -154,20 +134,17 @@ impl Error {
 
     /// The exit code it ends with.
     pub fn exit(&self) -> Exit {
-        match self {
-            Self::Input(_) => Exit::BadInput,
-            Self::Model(_) | Self::Option { .. } => Exit::BadInput,
-            Self::Boundary(_) => Exit::BadInput,
-            Self::Files(error) if error.is_refusal() => Exit::BadInput,
-            Self::Threads(error) if error.is_refusal() => Exit::BadInput,
-            Self::Store(StoreError::Busy { .. }) => Exit::Busy,
-            Self::Store(error) if error.is_refusal() => Exit::BadInput,
-            Self::Plot(error) if error.is_usage() => Exit::BadInput,
-            Self::Results(error) if error.is_refusal() => Exit::BadInput,
-            Self::Plot(_) | Self::Results(_) => Exit::Failed,
-            Self::Store(_) | Self::Files(_) | Self::Threads(_) => Exit::Failed,
-            Self::File { .. } | Self::Stdout(_) => Exit::Failed,
-        }
+        let is_refusal = match self {
+            Self::Input(_) | Self::Model(_) | Self::Option { .. } | Self::Boundary(_) => true,
+            Self::Store(StoreError::Busy { .. }) => return Exit::Busy,
+            Self::Store(error) => error.is_refusal(),
+            Self::Files(error) => error.is_refusal(),
+            Self::Threads(error) => error.is_refusal(),
+            Self::Results(error) => error.is_refusal(),
+            Self::Plot(error) => error.is_usage(),
+            Self::File { .. } | Self::Stdout(_) => false,
+        };
+        if is_refusal { Exit::BadInput } else { Exit::Failed }
     }
 
     /// What to do about it, where something can be said.
@@ -255,9 +232,9 @@ mod tests {
 
     #[test]
     fn the_codes_are_the_contract() {
-        assert_eq!(Exit::ALL.map(|exit| exit as u8), [0, 1, 2, 3, 4, 75, 130, 143]);
-        for exit in Exit::ALL {
-            assert!(Exit::table().contains(exit.meaning()));
+        assert_eq!(Exit::ALL.map(|(exit, _)| exit as u8), [0, 1, 2, 3, 4, 75, 130, 143]);
+        for (_, meaning) in Exit::ALL {
+            assert!(Exit::table().contains(meaning));
         }
     }
 

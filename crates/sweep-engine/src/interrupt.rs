@@ -42,11 +42,7 @@ impl Interrupt {
             // Order matters: the shutdown looks at the flag before this signal's own registration
             // sets it.
             flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.stop))?;
-            flag::register_usize(
-                signal,
-                Arc::clone(&interrupt.signal),
-                usize::try_from(signal).unwrap_or(0),
-            )?;
+            flag::register_usize(signal, Arc::clone(&interrupt.signal), signal as usize)?;
             flag::register(signal, Arc::clone(&interrupt.stop))?;
         }
         Ok(interrupt)

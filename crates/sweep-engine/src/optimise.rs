@@ -10,4 +10,5 @@ pub mod file;
 pub mod search;
 pub mod study;
 
+use evolve::{Candidate, Evolution, evolve, front};
 pub use study::Study;

@@ -6,8 +6,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 use sweep_parameter::{Parameter as _, Range, RatioLimits};
 
-use crate::design::{Design, Distribution};
-use crate::model::Model;
+use crate::{Design, Distribution, Model};
 
 /// Most grid points that are accepted. A hundred thousand points a second would take four months.
 pub const MOST_POINTS: u64 = 1_000_000_000_000;

@@ -67,32 +67,18 @@ impl Progress {
 
     /// Shows that `done` points of the total are there.
     pub fn show(&mut self, done: u64) {
-        match &self.shown {
-            Shown::Bar(bar) => {
-                bar.set_position(done);
-                bar.set_message(self.line(done));
-            }
-            Shown::Lines { next, .. } if Instant::now() >= *next => self.say(&self.line(done)),
-            _ => {}
-        }
+        self.tell(done, |progress, _| progress.line(done));
     }
 
     /// Shows that so many rows of a search are done, with so many points.
     pub fn show_search(&mut self, rows: u64, points: u64) {
-        match &self.shown {
-            Shown::Bar(bar) => {
-                bar.set_position(rows);
-                bar.set_message(self.points(points));
+        self.tell(rows, |progress, counts_rows| {
+            let points = progress.points(points);
+            match progress.total {
+                total if total > 0 && !counts_rows => format!("{rows} of {total} rows, {points}"),
+                _ => points,
             }
-            Shown::Lines { next, .. } if Instant::now() >= *next => {
-                let rows = match self.total {
-                    0 => String::new(),
-                    total => format!("{rows} of {total} rows, "),
-                };
-                self.say(&format!("{rows}{}", self.points(points)));
-            }
-            _ => {}
-        }
+        });
     }
 
     /// The points of a search and their rate.
@@ -100,12 +86,19 @@ impl Progress {
         format!("{points} points, {}", per_second(self.rate(points)))
     }
 
-    /// Writes a line, and none for a while.
-    fn say(&mut self, text: &str) {
-        if let Shown::Lines { every, next } = &mut self.shown {
-            *next = Instant::now() + *every;
-            // A log that cannot be written to must not end the run.
-            let _ = writeln!(std::io::stderr(), "{text}");
+    /// Says it beside the bar, which counts on its own; or in a line, and then none for a while.
+    fn tell(&mut self, position: u64, text: impl FnOnce(&Self, bool) -> String) {
+        match self.shown {
+            Shown::Bar(ref bar) => {
+                bar.set_position(position);
+                bar.set_message(text(self, true));
+            }
+            Shown::Lines { every, next } if Instant::now() >= next => {
+                // A log that cannot be written to must not end the run.
+                let _ = writeln!(std::io::stderr(), "{}", text(self, false));
+                self.shown = Shown::Lines { every, next: Instant::now() + every };
+            }
+            _ => {}
         }
     }
 

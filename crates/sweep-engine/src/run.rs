@@ -7,6 +7,7 @@
 //! but one set entry a chunk.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Mutex;
@@ -14,12 +15,10 @@ use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 use crate::interrupt::Interrupt;
-use crate::progress::{Progress, ProgressMode};
 use crate::store::provenance::{self, Session};
-use crate::store::read::{ResultFile, Tally};
-use crate::store::{Done, Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, StoreError};
-use crate::threads::{self, Environment, ThreadsError};
-use crate::watch::{Engine, Watch};
+use crate::store::{Done, OpenOptions, OpenRun, Opened, ResultFile, Shard, ShardRequest, Tally};
+use crate::threads::{self};
+use crate::{Engine, Environment, Job, Progress, ProgressMode, StoreError, ThreadsError, Watch};
 use sweep_files::panics::{self, lock};
 
 /// How to run.
@@ -99,12 +98,26 @@ pub fn run(
     if there > 0 {
         (options.tell)(&format!("going on: {there} of {points} points are there"));
     }
-    let clock =
-        Clock { began: Instant::now(), started_unix_s: provenance::now_unix_s(), threads, there };
+    let (began, started_unix_s) = (Instant::now(), provenance::now_unix_s());
     let mut progress = Progress::new(options.progress, points, there);
     let result = compute_and_join(engine, job, &mut run, threads, &mut progress, interrupt);
     progress.finish();
-    let session = clock.session(engine, job, &run);
+    let wall_s = began.elapsed().as_secs_f64();
+    let computed = run.own_points().1.saturating_sub(there);
+    let session = Session {
+        started_unix_s,
+        wall_s,
+        host: provenance::host(),
+        pid: std::process::id(),
+        cpus: threads::cores(),
+        cpu_model: provenance::cpu_model(),
+        simd: engine.simd().to_owned(),
+        threads,
+        shard: run.shard().map(|shard| format!("{}/{}", shard.index, shard.of)),
+        points: computed,
+        points_per_s: if wall_s > 0.0 { computed as f64 / wall_s } else { 0.0 },
+        version: job.version.to_owned(),
+    };
     match result {
         Ok(Some(tally)) => {
             let joined = run.complete(job, tally, Some(session.clone()))?;
@@ -258,15 +271,12 @@ impl<'a> Hand<'a> {
         };
         let parts = lock(&self.parts);
         let unfinished = parts.keys().next().map(|&chunk| self.run.chunk_range(chunk));
-        let untouched = lock(&self.left).next();
-        match (unfinished, untouched) {
-            (None, None) => Ok(()),
-            (Some(points), _) => Err(StoreError::Engine {
-                first: points.start,
-                last: points.end.saturating_sub(1),
-                reason,
-            }),
-            (None, Some(point)) => Err(StoreError::Engine { first: point, last: point, reason }),
+        let untouched = lock(&self.left).next().map(|point| point..point + 1);
+        match unfinished.or(untouched) {
+            None => Ok(()),
+            Some(Range { start: first, end }) => {
+                Err(StoreError::Engine { first, last: end.saturating_sub(1), reason })
+            }
         }
     }
 
@@ -285,36 +295,6 @@ impl<'a> Hand<'a> {
         outcomes.sort_by_key(|outcome| outcome.point);
         // The receiver outlives the engine's work.
         let _ = self.whole.send((chunk, outcomes));
-    }
-}
-
-/// What a session is made of, besides what the engine knows.
-struct Clock {
-    began: Instant,
-    started_unix_s: u64,
-    threads: usize,
-    /// Points that were there at the start.
-    there: u64,
-}
-
-impl Clock {
-    fn session(&self, engine: &dyn Engine, job: &Job<'_>, run: &OpenRun) -> Session {
-        let points = run.own_points().1.saturating_sub(self.there);
-        let wall_s = self.began.elapsed().as_secs_f64();
-        Session {
-            started_unix_s: self.started_unix_s,
-            wall_s,
-            host: provenance::host(),
-            pid: std::process::id(),
-            cpus: threads::cores(),
-            cpu_model: provenance::cpu_model(),
-            simd: engine.simd().to_owned(),
-            threads: self.threads,
-            shard: run.shard().map(|shard| format!("{}/{}", shard.index, shard.of)),
-            points,
-            points_per_s: if wall_s > 0.0 { points as f64 / wall_s } else { 0.0 },
-            version: job.version.to_owned(),
-        }
     }
 }
 

@@ -38,22 +38,22 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-pub use chunk::Shape;
-pub use error::StoreError;
+pub use chunk::{Place, Shape};
+pub use differences::PlanDifference;
+pub use error::{Holder, StoreError};
+use lock::Lock;
 pub use merge::write_map;
 pub use open::{OpenOptions, OpenRun, Opened};
+pub use provenance::Session;
+pub use read::{ResultFile, Tally};
 pub use schema::{BATCH_ROWS, Column, Done, Kind, Layout, ResultRows, Row};
-pub use shard::list as shard_list;
-pub use shard::{Shard, ShardRequest};
-pub use status::FolderStatus;
-pub use status::{State, status};
+pub use shard::{Shard, ShardRequest, list as shard_list};
+pub use status::{FolderStatus, State, status};
 pub use trials::{Key, OpenedTrials, Trials};
 
 use sweep_parameter::{Parameter as _, RatioLimits};
 
-use crate::config::Read;
-use crate::model::Model;
-use crate::plan::{Axis, Plan};
+use crate::{Axis, Model, Plan, Read};
 use sweep_files::{self as files, FileKind};
 
 /// The values of the axes at a point of the grid, first axis first.
@@ -134,7 +134,10 @@ pub const fn chunk_points(points: u64) -> u64 {
     }
 }
 
-/// The file of a search's folder that holds its trials.
+// The files of a folder that have one name: those of every run, of shards, and of searches.
+const PLAN: &str = "plan.json";
+const LOCK: &str = "lock";
+const SHARDS: &str = "shards.json";
 const TRIALS: &str = "trials.bin";
 
 /// The paths of one run.
@@ -150,7 +153,7 @@ impl Folder {
     /// Those of the run with this output. Neither it nor its sidecar is anything but absent or
     /// ours.
     pub fn of(output: &Path, layout: &Layout) -> Result<Self, StoreError> {
-        let folder = Self::beside(output, layout.file_kind())?;
+        let folder = Self::beside(output, layout.kind)?;
         files::judge(&folder.sidecar(), folder.account())?;
         Ok(folder)
     }
@@ -162,24 +165,9 @@ impl Folder {
         Ok(Self { output: output.to_path_buf(), path: output.with_file_name(name) })
     }
 
-    fn plan(&self) -> PathBuf {
-        self.path.join("plan.json")
-    }
-
-    fn shards(&self) -> PathBuf {
-        self.path.join("shards.json")
-    }
-
-    fn lock(&self) -> PathBuf {
-        self.path.join("lock")
-    }
-
-    fn shard_lock(&self, shard: u64) -> PathBuf {
-        self.path.join(format!("shard-{shard}.lock"))
-    }
-
-    fn chunk(&self, chunk: u64) -> PathBuf {
-        self.path.join(chunk_name(chunk))
+    /// A file of the folder.
+    fn file(&self, name: impl AsRef<Path>) -> PathBuf {
+        self.path.join(name)
     }
 
     /// The sidecar that says how the run went.

@@ -1,12 +1,7 @@
 //! What computes a model's rows.
 
 use crate::boundary::search::Values;
-use crate::estimate::Estimate;
-use crate::exit::Error;
-use crate::model::Model;
-use crate::plan::Plan;
-use crate::store::Rows;
-use crate::watch::Engine;
+use crate::{Engine, Error, Estimate, Model, Plan, Rows};
 
 /// A model whose rows can be computed: all that commands need.
 pub trait Swept: Rows {

@@ -1,7 +1,6 @@
 //! A small result file: columns with units and descriptions, metadata as in the map's file
 //! (`store::schema`), in one piece.
 
-use std::collections::HashMap;
 use std::io::Cursor;
 use std::sync::Arc;
 
@@ -11,48 +10,27 @@ use arrow_array::{
 };
 use arrow_schema::{DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
-use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
-use serde_json::{Map, Value, json};
+use serde_json::Value;
 
 use crate::build::Build;
+use crate::store::schema::{Column, Kind, writer};
 use sweep_files::panics;
-use sweep_files::{CREATED_BY, key, seal};
+use sweep_files::{key, seal};
 use sweep_parameter::{Parameter, Worse};
-
-/// A column's metadata in the Arrow schema.
-pub fn field_metadata(unit: &str, description: &str) -> HashMap<String, String> {
-    [("unit", unit), ("description", description)]
-        .map(|(key, text)| (key.to_owned(), text.to_owned()))
-        .into()
-}
-
-/// A column's entry in the column dictionary, the JSON under `key::COLUMNS`.
-pub fn dictionary_entry(type_name: &str, unit: &str, description: &str) -> Value {
-    json!({ "type": type_name, "unit": unit, "description": description })
-}
 
 /// Columns on their way to a file.
 pub struct Table {
     build: Build,
-    fields: Vec<Field>,
-    arrays: Vec<ArrayRef>,
-    dictionary: Map<String, Value>,
+    columns: Vec<(Column, ArrayRef)>,
     metadata: Vec<KeyValue>,
 }
 
 impl Table {
     /// Without columns, by this build.
     pub fn new(build: Build) -> Self {
-        Self {
-            build,
-            fields: Vec::new(),
-            arrays: Vec::new(),
-            dictionary: Map::new(),
-            metadata: Vec::new(),
-        }
+        Self { build, columns: Vec::new(), metadata: Vec::new() }
     }
 
     /// Adds numbers; unknown ones are null.
@@ -64,7 +42,7 @@ impl Table {
         values: impl IntoIterator<Item = Option<f64>>,
     ) {
         let array: Float64Array = values.into_iter().collect();
-        self.add(name, unit, description, "float64", Arc::new(array));
+        self.add(name, unit, description, Kind::Measured, Arc::new(array));
     }
 
     /// Adds values of a parameter.
@@ -78,17 +56,15 @@ impl Table {
 
     /// Says of the last column which way it is bad.
     pub fn worse(&mut self, worse: Worse) {
-        if let Some(field) = self.fields.pop() {
-            let mut metadata = field.metadata().clone();
-            metadata.insert(key::WORSE.to_owned(), worse.name().to_owned());
-            self.dictionary[field.name()][key::WORSE] = worse.name().into();
-            self.fields.push(field.with_metadata(metadata));
+        if let Some((column, _)) = self.columns.last_mut() {
+            column.worse = Some(worse);
         }
     }
 
     /// Adds counts.
     pub fn counts(&mut self, name: &str, description: &str, values: impl IntoIterator<Item = u64>) {
-        self.add(name, "1", description, "uint64", Arc::new(UInt64Array::from_iter_values(values)));
+        let array = UInt64Array::from_iter_values(values);
+        self.add(name, "1", description, Kind::Count, Arc::new(array));
     }
 
     /// Adds words from a short list.
@@ -99,23 +75,17 @@ impl Table {
         values: impl IntoIterator<Item = &'a str>,
     ) {
         let array: DictionaryArray<Int32Type> = values.into_iter().collect();
-        self.add(name, "", description, "string", Arc::new(array));
+        self.add(name, "", description, Kind::Name(Vec::new()), Arc::new(array));
     }
 
     /// Adds truth values.
     pub fn flags(&mut self, name: &str, description: &str, values: impl Iterator<Item = bool>) {
         let array: BooleanArray = values.map(Some).collect();
-        self.add(name, "", description, "bool", Arc::new(array));
+        self.add(name, "", description, Kind::Flag, Arc::new(array));
     }
 
-    fn add(&mut self, name: &str, unit: &str, description: &str, type_name: &str, array: ArrayRef) {
-        let nullable = matches!(array.data_type(), DataType::Float64);
-        self.fields.push(
-            Field::new(name, array.data_type().clone(), nullable)
-                .with_metadata(field_metadata(unit, description)),
-        );
-        self.arrays.push(array);
-        self.dictionary.insert(name.to_owned(), dictionary_entry(type_name, unit, description));
+    fn add(&mut self, name: &str, unit: &str, description: &str, kind: Kind, array: ArrayRef) {
+        self.columns.push((Column::new(name, unit, description, kind), array));
     }
 
     /// Adds an entry to the file's key-value metadata.
@@ -151,18 +121,17 @@ impl Table {
         let Build { version, numerics } = self.build;
         self.text(key::VERSION, version.to_owned());
         self.text(key::NUMERICS, numerics.to_string());
-        self.metadata.push(KeyValue::new(
-            key::COLUMNS.to_owned(),
-            Value::Object(self.dictionary).to_string(),
-        ));
-        let properties = WriterProperties::builder()
-            .set_created_by(format!("{CREATED_BY}{version}"))
-            .set_compression(Compression::ZSTD(ZstdLevel::default()))
-            .set_dictionary_enabled(false)
-            .set_key_value_metadata(Some(self.metadata))
-            .build();
-        let schema = Arc::new(Schema::new(self.fields));
-        let batch = RecordBatch::try_new(schema.clone(), self.arrays)?;
+        let dictionary: Value = self.columns.iter().map(|(column, _)| column.entry()).collect();
+        self.metadata(key::COLUMNS, &dictionary);
+        let properties = writer(version, self.metadata).set_dictionary_enabled(false).build();
+        let field = |(column, array): (Column, ArrayRef)| {
+            let data_type = array.data_type().clone();
+            let nullable = data_type == DataType::Float64;
+            (column.declared(data_type, nullable), array)
+        };
+        let (fields, arrays): (Vec<Field>, _) = self.columns.into_iter().map(field).unzip();
+        let schema = Arc::new(Schema::new(fields));
+        let batch = RecordBatch::try_new(schema.clone(), arrays)?;
         let rows = batch.clone();
         let bytes = panics::in_parquet("the library gave up writing", move || {
             let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;

@@ -1,10 +1,10 @@
 //! A column's cells, whatever type of numbers or text holds them: other programs may have rewritten
 //! our files.
 
-use arrow_array::cast::{AsArray, as_dictionary_array};
+use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    ArrowDictionaryKeyType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
-    UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
+    UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, BooleanArray};
 use arrow_schema::{ArrowError, DataType};
@@ -61,17 +61,12 @@ pub fn texts(array: &dyn Array) -> Result<Vec<Option<&str>>, ArrowError> {
         DataType::Utf8 => array.as_string::<i32>().iter().collect(),
         DataType::LargeUtf8 => array.as_string::<i64>().iter().collect(),
         DataType::Utf8View => array.as_string_view().iter().collect(),
-        DataType::Dictionary(key, _) => match key.as_ref() {
-            DataType::Int8 => coded::<Int8Type>(array)?,
-            DataType::Int16 => coded::<Int16Type>(array)?,
-            DataType::Int32 => coded::<Int32Type>(array)?,
-            DataType::Int64 => coded::<Int64Type>(array)?,
-            DataType::UInt8 => coded::<UInt8Type>(array)?,
-            DataType::UInt16 => coded::<UInt16Type>(array)?,
-            DataType::UInt32 => coded::<UInt32Type>(array)?,
-            DataType::UInt64 => coded::<UInt64Type>(array)?,
-            _ => return Err(unreadable(array, "text")),
-        },
+        DataType::Dictionary(..) => {
+            let coded = array.as_any_dictionary();
+            let names = texts(coded.values().as_ref())?;
+            let name = |key: Option<f64>| names.get(key? as usize).copied().flatten();
+            numbers(coded.keys())?.into_iter().map(name).collect()
+        }
         _ => return Err(unreadable(array, "text")),
     })
 }
@@ -82,13 +77,6 @@ pub fn is_text(data_type: &DataType) -> bool {
         DataType::Dictionary(_, value) => is_text(value),
         other => matches!(other, DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View),
     }
-}
-
-fn coded<K: ArrowDictionaryKeyType>(array: &dyn Array) -> Result<Vec<Option<&str>>, ArrowError> {
-    let coded = as_dictionary_array::<K>(array);
-    let names = texts(coded.values().as_ref())?;
-    let name = |row| coded.key(row).and_then(|key| names.get(key).copied().flatten());
-    Ok((0..coded.len()).map(name).collect())
 }
 
 #[cfg(test)]

@@ -61,8 +61,17 @@ impl FileError {
 
     /// The cells of a file are not what its schema says.
     pub fn cells(path: &Path) -> impl FnOnce(ArrowError) -> Self {
-        let path = path.to_path_buf();
-        move |error| Self::NotParquet { path, reason: error.to_string() }
+        move |error| Self::not_parquet(path, error.to_string())
+    }
+
+    /// A file that the reader cannot read, for this reason.
+    pub(crate) fn not_parquet(path: &Path, reason: impl Into<String>) -> Self {
+        Self::NotParquet { path: path.to_path_buf(), reason: reason.into() }
+    }
+
+    /// A file of this program that has changed.
+    pub fn damaged(path: &Path) -> Self {
+        Self::Damaged { path: path.to_path_buf() }
     }
 
     /// Whether the request is at fault, and nothing was done.
@@ -119,30 +128,4 @@ fn near(path: &Path) -> Option<PathBuf> {
     let folders = [path.with_file_name(""), path.with_file_name("results"), "results".into()];
     let mut places = folders.map(|folder: PathBuf| folder.join(&whole)).into_iter();
     places.find(|place| place.is_file())
-}
-
-/// Why a Parquet file is not read, found before the library would fail at it.
-#[derive(Debug, thiserror::Error)]
-pub enum Refused {
-    /// The file cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// A footer that is none, or declares what cannot be.
-    #[error("its footer makes no sense")]
-    Footer,
-    /// A footer of more bytes than any file needs.
-    #[error("its footer is longer than {} MiB", crate::footer::LONGEST_BYTES >> 20)]
-    LongFooter,
-    /// Columns and groups of them, more than any file needs.
-    #[error("it has more than {} columns", crate::footer::MOST_COLUMNS)]
-    TooManyColumns,
-    /// Groups of columns within each other, more than any file needs.
-    #[error("its columns are nested more than {} deep", crate::footer::DEEPEST)]
-    TooDeep,
-    /// A page's header that is none, or declares what cannot be.
-    #[error("the header of a page makes no sense")]
-    PageHeader,
-    /// Pages that unpack into more bytes than was said to be the most.
-    #[error("its pages unpack into too many bytes")]
-    TooLong,
 }

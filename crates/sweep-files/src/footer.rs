@@ -3,9 +3,8 @@
 //! A footer of a few bytes can make the library count for minutes, recurse until the stack is full,
 //! or allocate for columns that are not there.
 
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 
-use crate::Refused;
 use crate::thrift::{self, Found, Kind, Shape};
 use Kind::{Binary, Bool, Byte, Double, List, Number, Struct};
 
@@ -65,6 +64,32 @@ const COLUMN_META_DATA: Shape = &[
 pub(crate) const STATISTICS: Shape =
     &[(1..=2, Binary), (3..=4, Number), (5..=6, Binary), (7..=8, Bool), (9..=9, Number)];
 const EMPTY: Kind = Struct(&[]);
+
+/// Why a Parquet file is not read, found before the library would fail at it.
+#[derive(Debug, thiserror::Error)]
+pub enum Refused {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// A footer that is none, or declares what cannot be.
+    #[error("its footer makes no sense")]
+    Footer,
+    /// A footer of more bytes than any file needs.
+    #[error("its footer is longer than {} MiB", LONGEST_BYTES >> 20)]
+    LongFooter,
+    /// Columns and groups of them, more than any file needs.
+    #[error("it has more than {} columns", MOST_COLUMNS)]
+    TooManyColumns,
+    /// Groups of columns within each other, more than any file needs.
+    #[error("its columns are nested more than {} deep", DEEPEST)]
+    TooDeep,
+    /// A page's header that is none, or declares what cannot be.
+    #[error("the header of a page makes no sense")]
+    PageHeader,
+    /// Pages that unpack into more bytes than was said to be the most.
+    #[error("its pages unpack into too many bytes")]
+    TooLong,
+}
 
 /// The path to a group's number of columns.
 const CHILDREN: &[i16] = &[2, 5];

@@ -4,46 +4,7 @@ use std::ffi::OsStr;
 use std::io::Read as _;
 use std::path::Path;
 
-use crate::regular;
-use crate::{FileError, ParquetFile};
-
-/// Keys of a Parquet file's own key-value metadata.
-pub mod key {
-    /// The plan as JSON: grid as run, full machine, method.
-    pub const PLAN: &str = "sweep.plan";
-    /// Hash over identity and plan, hexadecimal.
-    pub const PLAN_HASH: &str = "sweep.plan_hash";
-    /// Version of the program.
-    pub const VERSION: &str = "sweep.version";
-    /// Version of the program's numerics: what decides the numbers besides the plan.
-    pub const NUMERICS: &str = "sweep.numerics";
-    /// JSON object: column name to `type`, `unit`, `description`, and [`WORSE`] and [`LIMIT`] if
-    /// the column can be bad.
-    pub const COLUMNS: &str = "sweep.columns";
-    /// Which way a column is bad: `greater` or `less`.
-    pub const WORSE: &str = "worse";
-    /// The value up to which a column is good, if that has a meaning of its own.
-    pub const LIMIT: &str = "limit";
-    /// What was traced: quantity, limit, tolerance, lattice, trials, rounds. In boundary files
-    /// alone.
-    pub const BOUNDARY: &str = "sweep.boundary";
-    /// Which point, how often, how integrated, and how it ended. In traces alone.
-    pub const TRACE: &str = "sweep.trace";
-    /// Resonances and shapes. In modes files alone.
-    pub const MODES: &str = "sweep.modes";
-    /// Speeds, and what the rows mean. In files of `sweep stability` alone.
-    pub const STABILITY: &str = "sweep.stability";
-    /// Speeds and starts. In files of `sweep dwell` alone.
-    pub const DWELL: &str = "sweep.dwell";
-    /// What was looked for, and which candidate is the best. In files of `sweep optimise` alone.
-    pub const OPTIMISE: &str = "sweep.optimise";
-    /// What a fit found. In the curves of `sweep fit` alone.
-    pub const FIT: &str = "sweep.fit";
-    /// Which files were compared, and where their plans part. In files of differences alone.
-    pub const DIFFERENCES: &str = "sweep.differences";
-    /// BLAKE3 hash of the whole file with zeros in this place, hexadecimal.
-    pub const DIGEST: &str = "sweep.digest";
-}
+use crate::{FileError, ParquetFile, key, regular};
 
 /// A kind of file. One may be written over another of the same kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,16 +47,16 @@ pub enum FileKind<'a> {
     ManPage,
 }
 
-/// Results that are no maps: each kind in a word, and the key that only its files have.
-const OWN: [(FileKind<'static>, &str, &str); 8] = [
-    (FileKind::Trace, "trace", key::TRACE),
-    (FileKind::Modes, "modes", key::MODES),
-    (FileKind::Boundary, "boundary", key::BOUNDARY),
-    (FileKind::Stability, "stability", key::STABILITY),
-    (FileKind::Dwell, "dwell", key::DWELL),
-    (FileKind::Optimise, "study", key::OPTIMISE),
-    (FileKind::Fit, "fit", key::FIT),
-    (FileKind::Differences, "differences", key::DIFFERENCES),
+/// Results that are no maps: each kind in a word, the key that only its files have, and its name.
+const OWN: [(FileKind<'static>, &str, &str, &str); 8] = [
+    (FileKind::Trace, "trace", key::TRACE, "result of `sweep trace`"),
+    (FileKind::Modes, "modes", key::MODES, "result of `sweep modes`"),
+    (FileKind::Boundary, "boundary", key::BOUNDARY, "result of `sweep boundary`"),
+    (FileKind::Stability, "stability", key::STABILITY, "result of `sweep stability`"),
+    (FileKind::Dwell, "dwell", key::DWELL, "result of `sweep dwell`"),
+    (FileKind::Optimise, "study", key::OPTIMISE, "result of `sweep optimise`"),
+    (FileKind::Fit, "fit", key::FIT, "curves of `sweep fit`"),
+    (FileKind::Differences, "differences", key::DIFFERENCES, "result of `sweep compare --out`"),
 ];
 
 /// The first line of an exported CSV file.
@@ -103,23 +64,15 @@ pub const EXPORTED_CSV: &str = "# exported by sweep ";
 
 impl FileKind<'_> {
     /// The kind in words: "the file there is no NAME".
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Map => "result of `sweep run`",
-            Self::Trace => "result of `sweep trace`",
-            Self::Modes => "result of `sweep modes`",
-            Self::Boundary => "result of `sweep boundary`",
-            Self::Stability => "result of `sweep stability`",
-            Self::Dwell => "result of `sweep dwell`",
-            Self::Optimise => "result of `sweep optimise`",
-            Self::Fit => "curves of `sweep fit`",
-            Self::Differences => "result of `sweep compare --out`",
             Self::Exported { .. } => "table of `sweep export`",
             Self::Account { .. } => "account of the run with this --out",
             Self::Svg => "SVG picture of `sweep plot`",
             Self::Png => "PNG picture",
             Self::Html => "HTML page",
             Self::ManPage => "manual page of `sweep man`",
+            _ => self.own().map_or("result of `sweep run`", |(.., name)| name),
         }
     }
 
@@ -131,6 +84,7 @@ impl FileKind<'_> {
             read.map_err(FileError::io("read", path))?;
             Ok(start.starts_with(with))
         };
+        let objection = format!("the file there is no {}", self.name());
         let is_ours = match self {
             Self::Exported { ending: "csv" } => begins(EXPORTED_CSV.as_bytes())?,
             Self::Exported { .. } => begins(b"PK\x03\x04")?,
@@ -147,20 +101,21 @@ impl FileKind<'_> {
                     false
                 }
                 Err(FileError::NotParquet { reason, .. }) => {
-                    let name = self.name();
-                    return Ok(Some(format!(
-                        "the file there is no {name}, nor a Parquet file ({reason})"
-                    )));
+                    return Ok(Some(format!("{objection}, nor a Parquet file ({reason})")));
                 }
                 Err(error) => return Err(error),
             },
         };
-        Ok(if is_ours { None } else { Some(format!("the file there is no {}", self.name())) })
+        Ok((!is_ours).then_some(objection))
     }
 
     /// A kind of result in one word.
     pub fn word(self) -> &'static str {
-        OWN.iter().find(|(kind, ..)| *kind == self).map_or("map", |(_, word, _)| word)
+        self.own().map_or("map", |(_, word, ..)| word)
+    }
+
+    fn own(self) -> Option<&'static (FileKind<'static>, &'static str, &'static str, &'static str)> {
+        OWN.iter().find(|(kind, ..)| *kind == self)
     }
 }
 
@@ -168,7 +123,7 @@ impl ParquetFile {
     /// The kind of result that the metadata speaks of, if of any.
     pub fn kind(&self) -> Option<FileKind<'static>> {
         let has = |key: &str| self.value(key).is_some();
-        let own = OWN.iter().find(|(.., key)| has(key)).map(|(kind, ..)| *kind);
+        let own = OWN.iter().find(|(_, _, key, _)| has(key)).map(|(kind, ..)| *kind);
         own.or_else(|| has(key::PLAN).then_some(FileKind::Map))
     }
 }

@@ -21,6 +21,7 @@ pub mod cells;
 mod columns;
 mod error;
 pub mod footer;
+pub mod key;
 mod kind;
 mod output;
 pub mod pages;
@@ -31,7 +32,8 @@ pub mod seal;
 mod thrift;
 
 pub use columns::{CellKind, Column, columns};
-pub use error::{FileError, Refused};
-pub use kind::{EXPORTED_CSV, FileKind, key};
+pub use error::FileError;
+pub use footer::Refused;
+pub use kind::{EXPORTED_CSV, FileKind};
 pub use output::{Output, beside, judge, ready, write};
 pub use parquet::{Batches, CREATED_BY, ParquetFile};

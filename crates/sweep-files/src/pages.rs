@@ -8,8 +8,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use flate2::read::MultiGzDecoder;
 use parquet::basic::Compression;
 
-use crate::Refused;
-use crate::footer::STATISTICS;
+use crate::footer::{Refused, STATISTICS};
 use crate::thrift::{self, Found, Kind, Shape};
 use Kind::{Bool, Number, Struct};
 

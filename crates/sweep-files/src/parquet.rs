@@ -50,12 +50,12 @@ impl ParquetFile {
                  `sweep status GRID.toml` says how far it is",
                 path.with_extension("").display()
             );
-            return Err(FileError::NotParquet { path: path.to_path_buf(), reason });
+            return Err(FileError::not_parquet(path, reason));
         }
         let mut file = regular::open(path).map_err(FileError::io("open", path))?;
         let seal = seal::check(&mut file).map_err(FileError::io("read", path))?;
         if seal == Seal::Broken {
-            return Err(FileError::Damaged { path: path.to_path_buf() });
+            return Err(FileError::damaged(path));
         }
         let file = Self::parse(path, file, seal)?;
         // The library finds a digest where `seal` does not. Every file of this program has one in
@@ -63,7 +63,7 @@ impl ParquetFile {
         let is_ours = file.created_by().is_some_and(|by| by.starts_with(CREATED_BY));
         let has_digest = file.pairs().any(|pair| pair.key == key::DIGEST);
         if seal == Seal::Absent && (is_ours || has_digest) {
-            return Err(FileError::Damaged { path: path.to_path_buf() });
+            return Err(FileError::damaged(path));
         }
         file.check_pages()?;
         Ok(file)
@@ -76,10 +76,8 @@ impl ParquetFile {
             for column in group.columns() {
                 // It panics where the file places a column before its beginning.
                 let range = panics::caught(|| column.byte_range());
-                let (start, length) = range.map_err(|_| FileError::NotParquet {
-                    path: self.path.clone(),
-                    reason: "a column lies outside of it".to_owned(),
-                })?;
+                let outside = |_| FileError::not_parquet(&self.path, "a column lies outside of it");
+                let (start, length) = range.map_err(outside)?;
                 let is_words = column.column_type() == Type::BYTE_ARRAY;
                 let most = if is_words { MOST_WORDS_AT_ONCE } else { MOST_AT_ONCE };
                 let most = Unpacked { total: u64::MAX, at_once: most.min(MOST_AT_ONCE - at_once) };
@@ -97,7 +95,7 @@ impl ParquetFile {
         let parsed = Self::parse(path, open()?, Seal::Absent);
         let is_damaged = matches!(parsed, Err(FileError::NotParquet { .. }))
             && seal::check(&mut open()?).map_err(FileError::io("read", path))? == Seal::Broken;
-        if is_damaged { Err(FileError::Damaged { path: path.to_path_buf() }) } else { parsed }
+        if is_damaged { Err(FileError::damaged(path)) } else { parsed }
     }
 
     fn parse(path: &Path, file: File, seal: Seal) -> Result<Self, FileError> {
@@ -132,7 +130,7 @@ impl ParquetFile {
         read.map_err(FileError::io("read", &self.path))?;
         let seal = seal::check(&mut io::Cursor::new(&bytes));
         if seal.map_err(FileError::io("read", &self.path))? != self.seal {
-            return Err(FileError::Damaged { path: self.path.clone() });
+            return Err(FileError::damaged(&self.path));
         }
         Ok(bytes)
     }
@@ -186,10 +184,8 @@ impl ParquetFile {
             choose(ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone()))
                 .build()
         });
-        Ok(Batches {
-            path: self.path.clone(),
-            reader: Some(reader.map_err(not_parquet(&self.path))?),
-        })
+        let reader = Some(reader.map_err(not_parquet(&self.path))?);
+        Ok(Batches { path: self.path.clone(), reader })
     }
 }
 
@@ -241,19 +237,18 @@ fn refused(path: &Path) -> impl FnOnce(Refused) -> FileError {
             let reason = format!(
                 "its pages unpack into more than {all} MiB at once, or into {words} MiB of words"
             );
-            FileError::NotParquet { path: path.to_path_buf(), reason }
+            FileError::not_parquet(path, reason)
         }
-        refused => FileError::NotParquet { path: path.to_path_buf(), reason: refused.to_string() },
+        refused => FileError::not_parquet(path, refused.to_string()),
     }
 }
 
 /// What the library reported, as a plain I/O failure where it was one.
 fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
-    let path = path.to_path_buf();
     move |error| match error {
         ParquetError::External(inner) => match inner.downcast::<io::Error>() {
-            Ok(source) => FileError::Io { action: "read", path, source: *source },
-            Err(inner) => FileError::NotParquet { path, reason: inner.to_string() },
+            Ok(source) => FileError::io("read", path)(*source),
+            Err(inner) => FileError::not_parquet(path, inner.to_string()),
         },
         error => {
             let text = error.to_string();
@@ -262,7 +257,7 @@ fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
                 true => "a grid or machine file is no result; `sweep run GRID.toml` writes one",
                 false => reason,
             };
-            FileError::NotParquet { reason: reason.to_owned(), path }
+            FileError::not_parquet(path, reason)
         }
     }
 }

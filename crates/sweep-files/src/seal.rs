@@ -75,26 +75,11 @@ fn place(file: &mut (impl Read + Seek)) -> io::Result<Option<u64>> {
 fn digest(file: &mut (impl Read + Seek), place: u64) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
     file.seek(SeekFrom::Start(0))?;
-    update(&mut hasher, file.by_ref().take(place))?;
+    hasher.update_reader(file.by_ref().take(place))?;
     hasher.update(&BLANK);
     file.seek(SeekFrom::Start(place + DIGITS as u64))?;
-    update(&mut hasher, file)?;
+    hasher.update_reader(file)?;
     Ok(hasher.finalize().to_hex().to_string())
-}
-
-fn update(hasher: &mut blake3::Hasher, mut bytes: impl Read) -> io::Result<()> {
-    // Long enough for every lane of the hash, short enough for the cache.
-    let mut buffer = vec![0; 1 << 17];
-    loop {
-        match bytes.read(&mut buffer) {
-            Ok(0) => return Ok(()),
-            Ok(read) => {
-                hasher.update(&buffer[..read]);
-            }
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! A batch of trials and what it costs: a lane group takes as long with one trial in it as with all
 //! its lanes full.
 
-use super::net::Want;
-use super::span::Span;
+use super::{Span, Want};
 
 /// Trials that cost as much as one. Fixed, so that which trials are made depends neither on the
 /// instruction set nor on the number of threads.

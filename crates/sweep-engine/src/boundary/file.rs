@@ -4,12 +4,9 @@
 use serde_json::{Value, json};
 use sweep_parameter::{Parameter as _, unit_suffix};
 
-use super::distance::TracedQuantity;
-use super::search::{BoundaryTask, further_values};
-use super::{Edge, Traced, TracedRow};
-use crate::plan::Plan;
-use crate::store::{Job, Rows};
-use crate::table::Table;
+use super::search::further_values;
+use super::{BoundaryTask, Edge, Traced, TracedQuantity, TracedRow};
+use crate::{Job, Plan, Rows, Table};
 use sweep_files::{FileKind, key};
 
 /// One line of the file.
@@ -99,8 +96,7 @@ fn add_columns<M: Rows>(
     table.counts(
         "crossing",
         "number of this change of side at this value of the first axis, from 1 upwards along the \
-         second; 0 where none is \
-         in range",
+         second; 0 where none is in range",
         lines.iter().map(|line| line.number as u64),
     );
     let changes = lines
@@ -128,12 +124,8 @@ fn add_axes<M: Rows>(
     let [first, second, further @ ..] = plan.axes.as_slice() else { return };
     let (name, unit) = (second.parameter.name(), second.parameter.unit());
     table.parameter(&first.parameter, lines.iter().map(|line| Some(line.row.first)));
-    let said = format!(
-        "{}, where {} = {}; null unless it is a crossing",
-        second.parameter.description(),
-        quantity.name,
-        quantity.limit
-    );
+    let (what, TracedQuantity { name: of, limit, .. }) = (second.parameter.description(), quantity);
+    let said = format!("{what}, where {of} = {limit}; null unless it is a crossing");
     table.numbers(name, unit, &said, lines.iter().map(|line| line.edge.at));
     for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
         let said = format!(

@@ -1,7 +1,6 @@
 //! Looks between samples of one side, where their distances hint at a change of side between them.
 
-use super::net::{Net, Want};
-use super::span::{Span, Tried};
+use super::{Net, Span, Tried, Want};
 
 /// Distances below this are near the limit: neighbouring samples there should not differ by more
 /// than [`STRIDE`].

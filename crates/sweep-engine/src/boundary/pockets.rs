@@ -1,9 +1,7 @@
 //! Pockets that a neighbour announces: places to look at in a row because the row beside it is on
 //! another side there.
 
-use super::neighbour::{Neighbour, hint, nearest, shared};
-use super::row::RowSearch;
-use super::span::{Question, SideRange, Span};
+use super::{Neighbour, Question, RowSearch, SideRange, Span, hint, nearest, shared};
 
 /// A neighbour's pocket is looked for until no gap between trials is wider than this part of it.
 const PART: f64 = 0.25;

@@ -3,11 +3,8 @@
 use sweep_parameter::{Channel as _, Worse};
 
 use super::distance::{Scale, TracedQuantity};
-use crate::exit::Error;
-use crate::nearest::nearest;
-use crate::plan::Plan;
 use crate::store::{Column, Kind};
-use crate::swept::Swept;
+use crate::{Error, Plan, Swept, nearest};
 
 /// What the columns of ratios start with.
 const RATIO: &str = "ratio_";

@@ -1,8 +1,7 @@
 //! One row: the trials along it, the sides that they show, and the trials that it wants next.
 
-use super::net::{self, Net, Want};
-use super::span::{Hint, Question, Side, SideRange, Span, Tried};
-use super::{Edge, EdgeKind, look};
+use super::net::{self};
+use super::{Edge, EdgeKind, Hint, Net, Question, Side, SideRange, Span, Tried, Want, look};
 
 /// After so many rounds brackets are cut evenly, and after so many looks none is taken any more:
 /// whatever the function does, it ends.
@@ -18,7 +17,7 @@ const CLOSER: f64 = 1.0 / 16.0;
 const PLACED: f64 = 4.0;
 
 /// A row in the making.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct RowSearch {
     /// In order of position, no two at the same.
     samples: Vec<Tried>,
@@ -47,16 +46,7 @@ struct End {
 impl RowSearch {
     /// A row that begins with this question.
     pub(super) fn new(asked: Question, assumed: [Option<Side>; 2]) -> Self {
-        Self {
-            samples: Vec::new(),
-            asked,
-            perhaps: Vec::new(),
-            assumed,
-            cast: Vec::new(),
-            strain: 1.0,
-            rounds: 0,
-            looks: 0,
-        }
+        Self { asked, assumed, strain: 1.0, ..Self::default() }
     }
 
     /// Has this looked into.
@@ -135,14 +125,10 @@ impl RowSearch {
         let assumed = |at, side| End { at, side, sample: None };
         let mut ends: Vec<End> = self.samples.iter().map(tried).collect();
         let [low, high] = self.assumed;
-        if let Some(side) = low
-            && !self.knows(span.least)
-        {
+        if let Some(side) = low.filter(|_| !self.knows(span.least)) {
             ends.insert(0, assumed(span.least, side));
         }
-        if let Some(side) = high
-            && !self.knows(span.greatest)
-        {
+        if let Some(side) = high.filter(|_| !self.knows(span.greatest)) {
             ends.push(assumed(span.greatest, side));
         }
         ends
@@ -257,15 +243,11 @@ impl RowSearch {
             if a.side() == b.side() {
                 continue;
             }
+            let is_narrow = b.at - a.at <= span.tolerance;
+            let leaps = |leap: f64| !leap.is_finite() || (leap.abs() > LEAP && is_narrow);
             let kind = match (a.distance, b.distance) {
-                (Some(from), Some(to)) => {
-                    let leaps = (from - to).abs() > LEAP && b.at - a.at <= span.tolerance;
-                    if leaps || !(from - to).is_finite() {
-                        EdgeKind::Jump
-                    } else {
-                        EdgeKind::Crossing
-                    }
-                }
+                (Some(from), Some(to)) if leaps(from - to) => EdgeKind::Jump,
+                (Some(_), Some(_)) => EdgeKind::Crossing,
                 _ => EdgeKind::Undefined,
             };
             edges.push(Edge {

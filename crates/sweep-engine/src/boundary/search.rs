@@ -4,14 +4,10 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard};
 
-use super::distance::TracedQuantity;
-use super::{Evaluate, Search, Trial};
-use crate::interrupt::Interrupt;
-use crate::model::Model;
-use crate::plan::{Axis, AxisValues, Plan};
-use crate::store::{Key, StoreError, Trials};
-use crate::threads::{self, ThreadsError};
-use crate::watch::Watch;
+use super::{Evaluate, Search, TracedQuantity, Trial};
+use crate::store::{Key, Trials};
+use crate::threads::{self};
+use crate::{Axis, AxisValues, Interrupt, Model, Plan, StoreError, ThreadsError, Watch};
 use sweep_files::panics::{lock, unlocked};
 use sweep_parameter::Parameter as _;
 
@@ -43,15 +39,13 @@ pub enum BoundaryError {
     /// The second axis has no extent.
     #[error(
         "the second axis, `{0}`, has one value: give it the range to search, as range = {{ from, \
-         to, count }} or as \
-         `values` whose least and greatest are its ends"
+         to, count }} or as `values` whose least and greatest are its ends"
     )]
     NoRange(String),
     /// Too many rows.
     #[error(
         "{rows} rows (values of the first axis, times the combinations of the axes beyond the \
-         second) are more than \
-         {MOST_ROWS}: trace parts of them"
+         second) are more than {MOST_ROWS}: trace parts of them"
     )]
     Rows {
         /// How many.

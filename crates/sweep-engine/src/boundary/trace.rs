@@ -2,13 +2,10 @@
 //! tell where to begin, and again where they announce something.
 
 use super::batch::{LANES, deal, lane_groups};
-use super::neighbour::Neighbour;
-use super::net::Want;
 use super::pockets::Beside;
-use super::row::RowSearch;
 use super::span::{Question, SideRange, Span, Tried};
 use super::warm::{self, HEARD};
-use super::{Evaluate, Search, Standing, Traced, TracedRow, Trial};
+use super::{Evaluate, Neighbour, RowSearch, Search, Standing, Traced, TracedRow, Trial, Want};
 
 /// Rows that are worked on at once, in whole curves: bounds memory, and is plenty to fill lanes.
 const ROWS_AT_ONCE: usize = 1 << 14;

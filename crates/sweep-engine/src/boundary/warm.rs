@@ -1,9 +1,7 @@
 //! Warm starts: where the side should change in a row, by the rows around it that are done.
 
-use super::neighbour::{Neighbour, hint, nearest, shared};
 use super::pockets::missing;
-use super::row::RowSearch;
-use super::span::{Hint, Question, SideRange, Span};
+use super::{Hint, Neighbour, Question, RowSearch, SideRange, Span, hint, nearest, shared};
 
 /// Most rows on each side that a prediction is made from.
 pub(super) const HEARD: usize = 2;

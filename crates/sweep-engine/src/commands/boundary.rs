@@ -1,26 +1,18 @@
 //! `sweep boundary GRID.toml`: the curve itself.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use super::cells::{Lines as _, short};
-use super::grid::GridArgs;
-use super::plot::finite;
-use super::run::installed;
-use crate::boundary::distance::TracedQuantity;
+use super::{GridArgs, Lines as _, finite, installed, short};
 use crate::boundary::file::{self, job};
 use crate::boundary::quantity::{offered, traced};
-use crate::boundary::search::{BoundaryTask, Models, Stopped};
-use crate::boundary::{EdgeKind, Standing, Traced, trace};
+use crate::boundary::search::{Models, Stopped};
+use crate::boundary::{BoundaryTask, EdgeKind, Standing, Traced, TracedQuantity, trace};
 use crate::effort::{Effort, EffortArgs};
-use crate::exit::{Error, Exit, show, tell};
-use crate::plan::Plan;
-use crate::progress::{Progress, duration};
-use crate::store::{Column, OpenedTrials, StoreError, Trials};
-use crate::swept::Swept;
+use crate::store::{Column, OpenedTrials, Trials};
+use crate::{Axis, Error, Exit, Plan, Progress, StoreError, Swept, duration, show, tell};
 use sweep_files::panics::lock;
 use sweep_files::{FileKind, Output};
 use sweep_parameter::{Parameter as _, Worse};
@@ -167,29 +159,22 @@ fn summary<M: Swept>(
     traced: &Traced,
     wall_s: f64,
 ) -> String {
-    let mut text = String::new();
     let grid: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
-    // Writing to a String cannot fail.
-    let _ = writeln!(
-        text,
-        "{}: {} = {} traced with {} points (the grid has {grid}) in {} rounds, {}",
-        plan.name,
-        quantity.name,
-        quantity.limit,
-        traced.trials,
-        traced.rounds,
-        duration(wall_s)
+    let (name, TracedQuantity { name: of, limit, .. }) = (&plan.name, quantity);
+    let (Traced { trials, rounds, .. }, wall) = (traced, duration(wall_s));
+    let mut text = format!(
+        "{name}: {of} = {limit} traced with {trials} points (the grid has {grid}) in {rounds} \
+         rounds, {wall}\n"
     );
     let rows = || traced.curves.iter().flatten();
-    let counts: Vec<String> = EdgeKind::ALL
-        .into_iter()
-        .map(|kind| {
-            (kind, rows().flat_map(|row| &row.edges).filter(|edge| edge.kind == kind).count())
-        })
-        .filter(|(_, count)| *count > 0)
-        .map(|(kind, count)| format!("{count} {}", kind.name()))
-        .collect();
-    text.line("found", counts.join(", "));
+    let counted = |(kind, name): (EdgeKind, &str)| {
+        let count = rows().flat_map(|row| &row.edges).filter(|edge| edge.kind == kind).count();
+        (count > 0).then(|| format!("{count} {name}"))
+    };
+    text.line(
+        "found",
+        EdgeKind::ALL.into_iter().filter_map(counted).collect::<Vec<_>>().join(", "),
+    );
     let several = rows().filter(|row| row.edges.len() > 1).count();
     if several > 0 {
         text.line("folds", format!("{several} values of the first axis have several crossings"));
@@ -201,21 +186,14 @@ fn summary<M: Swept>(
         text.line("brackets", told);
     }
     // Cells of a logarithmic axis grow: the largest counts.
-    let cells: Vec<String> = plan
-        .axes
-        .iter()
-        .map(|axis| {
-            let edge = |k: usize| axis.values.between(k as f64 / task.search.lattice as f64);
-            let cells = (0..task.search.lattice).map(|k| (edge(k + 1) - edge(k)).abs());
-            let cell = cells.fold(0.0, f64::max);
-            format!("{cell:.3} {}", axis.parameter.unit())
-        })
-        .collect();
-    let cell = cells.join(" by ");
-    text.line(
-        "promises",
-        format!("every island of {cell}; smaller ones may be missed (--lattice)"),
-    );
+    let cell = |axis: &Axis<M>| {
+        let edge = |k: usize| axis.values.between(k as f64 / task.search.lattice as f64);
+        let cells = (0..task.search.lattice).map(|k| (edge(k + 1) - edge(k)).abs());
+        format!("{:.3} {}", cells.fold(0.0, f64::max), axis.parameter.unit())
+    };
+    let cell = plan.axes.iter().map(cell).collect::<Vec<_>>().join(" by ");
+    let told = format!("every island of {cell}; smaller ones may be missed (--lattice)");
+    text.line("promises", told);
     text
 }
 

@@ -2,16 +2,11 @@
 
 use std::fmt::Write as _;
 
-use super::cells::short;
-use super::grid::GridArgs;
+use super::{GridArgs, short};
 use crate::design::{Design, Distribution};
-use crate::estimate::{Estimate, size};
-use crate::exit::{Error, Exit, show, tell};
-use crate::plan::{Axis, AxisValues, Plan};
-use crate::progress::duration;
-use crate::swept::Swept;
-use crate::threads;
-use sweep_parameter::{Channel as _, Parameter as _};
+use crate::estimate::size;
+use crate::{Axis, AxisValues, Error, Estimate, Exit, Plan, Swept, duration, show, tell, threads};
+use sweep_parameter::{Channel as _, Parameter as _, RatioLimits};
 
 /// Arguments of `sweep check`.
 #[derive(Debug, clap::Args)]
@@ -56,47 +51,27 @@ fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
         None => points.to_string(),
     };
     line("points", laid_out);
-    line(
-        "time",
-        format!("0 to {} s, window {} to {} s", plan.end_s, plan.window_s[0], plan.window_s[1]),
-    );
+    let (end_s, [from_s, to_s]) = (plan.end_s, plan.window_s);
+    line("time", format!("0 to {end_s} s, window {from_s} to {to_s} s"));
     line("method", estimate.method.clone());
     for (name, words) in M::words(plan) {
         line(name, words);
     }
     let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name()).collect();
     line("channels", channels.join(", "));
-    line(
-        "verdict",
-        format!(
-            "reliable where every ratio is below {}{}{}",
-            plan.reliability.limits.most,
-            plan.reliability
-                .limits
-                .least
-                .map_or(String::new(), |least| format!(" and above {least}")),
-            plan.model.criterion()
-        ),
-    );
+    let (RatioLimits { most, least }, criterion) =
+        (plan.reliability.limits, plan.model.criterion());
+    let least = least.map_or(String::new(), |least| format!(" and above {least}"));
+    line("verdict", format!("reliable where every ratio is below {most}{least}{criterion}"));
     line("output", format!("results/{}.parquet", plan.name));
-    line(
-        "runs on",
-        format!(
-            "{} thread{}, instruction set {}",
-            estimate.threads,
-            plural(estimate.threads as u64),
-            estimate.simd
-        ),
-    );
+    let Estimate { threads, simd, .. } = estimate;
+    let plural = plural(*threads as u64);
+    line("runs on", format!("{threads} thread{plural}, instruction set {simd}"));
     line("takes", took(plan, estimate));
     let [memory, disk, result] =
         [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(size);
-    line(
-        "",
-        format!(
-            "{memory} of memory; on disk {disk} while it runs, and at most {result} for the result"
-        ),
-    );
+    let disk = format!("on disk {disk} while it runs, and at most {result} for the result");
+    line("", format!("{memory} of memory; {disk}"));
     text
 }
 
@@ -118,12 +93,11 @@ fn plural(count: u64) -> &'static str {
 
 fn describe<M: Swept>(axis: &Axis<M>, design: Option<&Design>) -> String {
     let (name, count) = (axis.parameter.name(), axis.values.len());
+    let values = if design.is_some() { String::new() } else { format!("{count} values ") };
     match &axis.values {
-        AxisValues::Linear { from, to, .. } if design.is_some() => {
-            format!("{name}: from {from} to {to}")
-        }
-        AxisValues::Log { from, to, .. } if design.is_some() => {
-            format!("{name}: from {from} to {to}, logarithmic")
+        AxisValues::Linear { from, to, .. } => format!("{name}: {values}from {from} to {to}"),
+        AxisValues::Log { from, to, .. } => {
+            format!("{name}: {values}from {from} to {to}, logarithmic")
         }
         AxisValues::Distributed(Distribution { shape, from, to }) => {
             let numbers = shape.numbers().map(|(key, number)| format!("{key} {number}"));
@@ -134,12 +108,6 @@ fn describe<M: Swept>(axis: &Axis<M>, design: Option<&Design>) -> String {
             let shown: Vec<_> = values.iter().take(8).map(f64::to_string).collect();
             let more = if values.len() > shown.len() { ", ..." } else { "" };
             format!("{name}: {count} values, {}{more}", shown.join(", "))
-        }
-        AxisValues::Linear { from, to, .. } => {
-            format!("{name}: {count} values from {from} to {to}")
-        }
-        AxisValues::Log { from, to, .. } => {
-            format!("{name}: {count} values from {from} to {to}, logarithmic")
         }
     }
 }

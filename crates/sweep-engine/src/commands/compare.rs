@@ -8,15 +8,15 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::cells::{Lines as _, short, table};
-use super::grid::quoted;
-use crate::build::Build;
-use crate::exit::{Error, Exit, show, tell};
-use crate::store::StoreError;
+use super::{Lines as _, quoted, short, table};
+use crate::config::section::cut;
+use crate::{Build, Error, Exit, StoreError, show, tell};
 use fail_on::FailOn;
 use sweep_files::{FileKind, Output};
 use sweep_plot::capitalised;
-use sweep_results::{Comparison, Flip, Moved, PlanChange, ResultTable, SharedRow, compare};
+use sweep_results::{
+    ColumnChange, Comparison, Flip, Moved, PlanChange, ResultTable, SharedRow, compare,
+};
 
 /// Arguments of `sweep compare`.
 #[derive(Debug, clap::Args)]
@@ -98,11 +98,8 @@ pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
     } else {
         show(&text(args, &found))?;
         if let Some(out) = &args.out {
-            tell(&format!(
-                "wrote {0}: sweep plot {1}",
-                out.display(),
-                quoted(&out.display().to_string())
-            ));
+            let out = out.display();
+            tell(&format!("wrote {out}: sweep plot {}", quoted(&out.to_string())));
         }
         broken.iter().for_each(|broken| tell(&format!("--fail-on: {broken}")));
     }
@@ -115,13 +112,7 @@ fn brief(value: &Value) -> String {
         Value::Null => "absent".to_owned(),
         Value::String(text) => text.clone(),
         Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), short),
-        other => {
-            let text = other.to_string();
-            match text.char_indices().nth(48) {
-                Some((cut, _)) => format!("{}...", &text[..cut]),
-                None => text,
-            }
-        }
+        other => cut(&other.to_string(), 48),
     }
 }
 
@@ -219,14 +210,10 @@ fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
     }
     if found.has_verdicts {
         let count = |flip: Flip| found.flips(false).filter(|row| row.flip == flip).count();
-        let told = format!(
-            "{} lost, {} gained, {} defined in one file alone; of sensitive rows {}",
-            count(Flip::Lost),
-            count(Flip::Gained),
-            count(Flip::Defined),
-            found.flips(true).count()
-        );
-        facts.push(("verdicts", told));
+        let [lost, gained, defined] = [Flip::Lost, Flip::Gained, Flip::Defined].map(count);
+        let flips = format!("{lost} lost, {gained} gained, {defined} defined in one file alone");
+        let sensitive = found.flips(true).count();
+        facts.push(("verdicts", format!("{flips}; of sensitive rows {sensitive}")));
     }
     if let Some([first, second]) = found.over_estimated.filter(|of| *of != [0, 0]) {
         let told = format!(
@@ -242,12 +229,8 @@ fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
     let told = match differing {
         0 => "every shared cell is the same, bit for bit".to_owned(),
         count => {
-            let names: Vec<String> = found
-                .columns
-                .iter()
-                .take(6)
-                .map(|column| format!("{} ({})", column.name, column.rows))
-                .collect();
+            let name = |column: &ColumnChange| format!("{} ({})", column.name, column.rows);
+            let names: Vec<String> = found.columns.iter().take(6).map(name).collect();
             let more = if found.columns.len() > 6 { ", ..." } else { "" };
             format!("{count} rows, in {}{more}", names.join(", "))
         }
@@ -265,27 +248,17 @@ fn boundary(moved: &Moved) -> String {
             format!("{} crossings, none moved", moved.crossings.len())
         }
         Some(farthest) => {
-            let place: Vec<String> = moved
-                .keys
-                .iter()
-                .zip(&farthest.place)
-                .map(|(name, value)| format!("{name} {}", short(*value)))
-                .collect();
-            let bracket = |side: usize| {
-                let [low, high] = farthest.bracket[side];
-                format!("{} to {}", short(low), short(high))
-            };
-            let range = |[least, greatest]: [f64; 2]| format!("{least:+.3} to {greatest:+.3}");
+            let place = moved.keys.iter().zip(&farthest.place);
+            let place: Vec<String> =
+                place.map(|(name, value)| format!("{name} {}", short(*value))).collect();
+            let [from, to] =
+                farthest.bracket.map(|[low, high]| format!("{} to {}", short(low), short(high)));
+            let (crossings, axis, certain) = (moved.crossings.len(), &moved.axis, moved.certain());
+            let ([least, greatest], place) = (moved.mean(), place.join(", "));
             format!(
-                "{} crossings along {}, {} moved farther than their brackets explain; in the mean \
-                 they moved by {} {unit}; farthest at {}: from within {} to within {}",
-                moved.crossings.len(),
-                moved.axis,
-                moved.certain(),
-                range(moved.mean()),
-                place.join(", "),
-                bracket(0),
-                bracket(1),
+                "{crossings} crossings along {axis}, {certain} moved farther than their brackets \
+                 explain; in the mean they moved by {least:+.3} to {greatest:+.3} {unit}; farthest \
+                 at {place}: from within {from} to within {to}"
             )
         }
     };

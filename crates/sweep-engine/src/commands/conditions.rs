@@ -22,19 +22,15 @@ pub fn parse(
     Err(config::mistakes_in_expressions(option, mistakes))
 }
 
-/// Refuses conditions of the file as a whole where rows are chosen.
+/// The condition of `--where`, which chooses rows.
 ///
 /// # Errors
-/// [`Error::Option`].
-pub fn rows_only(
-    option: &'static str,
-    conditions: Vec<Condition>,
-) -> Result<Vec<Condition>, Error> {
-    match conditions.iter().find(|condition| condition.has_folds()) {
-        None => Ok(conditions),
-        Some(condition) => {
-            let expected = "an expression without count(), share(), min(), max() and mean()";
-            Err(Error::option(option, &condition.text, expected))
-        }
+/// Mistakes in it; [`Error::Option`] for one of the file as a whole.
+pub fn of_rows(text: Option<&String>, table: &ResultTable) -> Result<Option<Condition>, Error> {
+    let condition = parse("--where", text.map_or(&[], std::slice::from_ref), table)?.pop();
+    if let Some(Condition { text, .. }) = condition.as_ref().filter(|one| one.has_folds()) {
+        let expected = "an expression without count(), share(), min(), max() and mean()";
+        return Err(Error::option("--where", text, expected));
     }
+    Ok(condition)
 }

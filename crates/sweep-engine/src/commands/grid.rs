@@ -2,11 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::config::Read;
-use crate::config::{self, Diagnostics, GridInput};
-use crate::exit::tell;
-use crate::plan::Plan;
-use crate::program::program;
+use crate::config::{self};
+use crate::{Diagnostics, GridInput, Plan, Read, program, tell};
 
 /// A grid file and changes to its constants, as most commands take them.
 #[derive(Debug, clap::Args)]
@@ -82,21 +79,14 @@ impl ResultArgs {
 
     /// A command line about the same run, for a user to copy.
     pub fn command(&self, verb: &str) -> String {
-        let mut line =
-            format!("{} {verb} {}", program(), quoted(&self.grid.grid.display().to_string()));
-        for set in self.grid.sets() {
-            line.push_str(&format!(" --set {}", quoted(&set)));
-        }
-        for at in &self.grid.at {
-            line.push_str(&format!(" --at {}", quoted(at)));
-        }
-        if let Some(name) = &self.grid.name {
-            line.push_str(&format!(" --name {}", quoted(name)));
-        }
-        if let Some(out) = &self.out {
-            line.push_str(&format!(" --out {}", quoted(&out.display().to_string())));
-        }
-        line
+        let (grid, shown) = (&self.grid, |path: &PathBuf| path.display().to_string());
+        let sets = grid.sets().into_iter().map(|set| ("set", set));
+        let further = grid.at.iter().map(|at| ("at", at.clone()));
+        let further = further.chain(grid.name.iter().map(|name| ("name", name.clone())));
+        let further = further.chain(self.out.iter().map(|out| ("out", shown(out))));
+        let line = format!("{} {verb} {}", program(), quoted(&shown(&grid.grid)));
+        sets.chain(further)
+            .fold(line, |line, (name, value)| line + &format!(" --{name} {}", quoted(&value)))
     }
 }
 

@@ -1,15 +1,10 @@
 //! `sweep merge GRID.toml`: finished shards into the one file.
 
-use super::grid::ResultArgs;
-use std::path::Path;
-
-use super::cells::Lines as _;
-use super::run::{installed, rows};
-use crate::exit::{Error, Exit, tell};
-use crate::plan::Plan;
-use crate::store::Job;
+use super::run::rows;
+use super::{Lines as _, ResultArgs, installed};
 use crate::store::{OpenRun, Opened};
-use crate::swept::Swept;
+use crate::{Error, Exit, Job, Plan, Swept, tell};
+use std::path::Path;
 
 /// Arguments of `sweep merge`.
 #[derive(Debug, clap::Args)]
@@ -38,25 +33,20 @@ pub fn of_job(name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
     let mut run = match OpenRun::open_for_merge(output, job)? {
         Opened::Run(run) => run,
         Opened::Finished(file, tally) => {
-            let mut text = format!("{}: all {} points are there already\n", name, file.points);
-            text.push_str(&rows(&tally, job));
-            tell(text.trim_end());
+            let there = format!("{name}: all {} points are there already\n", file.points);
+            tell((there + &rows(&tally, job)).trim_end());
             return Ok(Exit::Done);
         }
     };
-    for note in run.take_notes() {
-        tell(&note);
-    }
+    run.take_notes().iter().for_each(|note| tell(note));
     let Some(tally) = run.join(job, &|| interrupt.stopped())? else {
         tell("interrupted; the chunks are kept");
         return Ok(Exit::interrupted(interrupt.signal()));
     };
     let joined = run.complete(job, tally, None)?;
-    for note in &joined.notes {
-        tell(note);
-    }
-    let mut text = format!("{}: joined {} points\n", name, joined.tally.points);
-    text.push_str(&rows(&joined.tally, job));
+    joined.notes.iter().for_each(|note| tell(note));
+    let mut text = format!("{name}: joined {} points\n", joined.tally.points);
+    text += &rows(&joined.tally, job);
     text.line("file", output.display());
     tell(text.trim_end());
     Ok(Exit::Done)

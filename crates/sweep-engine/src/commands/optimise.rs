@@ -3,17 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::cells::{Lines as _, table as text_table, word};
-use super::run::installed;
+use super::cells::table as text_table;
+use super::{Lines as _, installed, word};
 use crate::boundary::search::Stopped;
-use crate::effort::EffortArgs;
-use crate::exit::{Error, Exit, tell};
 use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
-use crate::progress::duration;
-use crate::store::{OpenedTrials, StoreError, Trials};
-use crate::swept::Swept;
+use crate::store::{OpenedTrials, Trials};
+use crate::{EffortArgs, Error, Exit, StoreError, Swept, duration, tell};
 use sweep_files::{FileKind, Output, atomic, key};
 use sweep_parameter::Parameter as _;
 use sweep_results::{Cell, ResultTable};

@@ -1,14 +1,11 @@
 //! `sweep parameters`: the parameter table, for reading or for programs.
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
 use sweep_parameter::{Parameter as _, Range};
 
-use crate::config::GridInput;
-use crate::exit::{Error, Exit, show};
-use crate::swept::{Listed, Swept};
+use crate::{Error, Exit, GridInput, Listed, Swept, show};
 
 /// Arguments of `sweep parameters`.
 #[derive(Debug, clap::Args)]
@@ -39,20 +36,14 @@ fn as_text<M: Swept>(rows: &[Listed<M>]) -> String {
     let name_width = width(&|row| row.parameter.name().len());
     let value_width = width(&|row| value(row).len());
     let unit_width = width(&|row| row.parameter.unit().len());
-    let mut text = String::new();
-    for row in rows {
-        // Writing to a String cannot fail.
-        let _ = writeln!(
-            text,
-            "{:name_width$}  {:>value_width$} {:unit_width$}  {} [{}]",
-            row.parameter.name(),
-            value(row),
-            row.parameter.unit(),
-            row.parameter.description(),
-            row.source,
-        );
-    }
-    text
+    let line = |row: &Listed<M>| {
+        let (name, value, unit) = (row.parameter.name(), value(row), row.parameter.unit());
+        let (meaning, source) = (row.parameter.description(), &row.source);
+        format!(
+            "{name:name_width$}  {value:>value_width$} {unit:unit_width$}  {meaning} [{source}]\n"
+        )
+    };
+    rows.iter().map(line).collect()
 }
 
 /// The listing as JSON.

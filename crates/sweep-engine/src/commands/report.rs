@@ -1,17 +1,12 @@
 //! `sweep report RESULT [FILE ...]`: one page to print, for whoever decides.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use super::cells::{short, word};
-use super::conditions;
 use super::show::Further;
-use crate::config::GridInput;
-use crate::exit::{Error, Exit, tell};
-use crate::plan::Plan;
-use crate::store::read::tally;
-use crate::swept::Swept;
+use super::{conditions, short, word};
+use crate::store::read::{Tally, tally};
+use crate::{Error, Exit, GridInput, Plan, Swept, tell};
 use sweep_files::{FileKind, Output, ParquetFile, key};
 use sweep_parameter::{Parameter as _, RatioLimits};
 use sweep_plot::{described, escape, quantity, sheet, significant, table, words};
@@ -62,31 +57,22 @@ pub fn run<M: Swept>(
     let plan = file.plan.clone().unwrap_or_default();
     let name = plan["name"].as_str().unwrap_or_default();
 
-    // Writing to a String cannot fail.
-    let mut body = String::new();
-    let _ = writeln!(
-        body,
-        "<header><h1>{}</h1><p>{}</p></header>",
-        escape(&args.question),
-        escape(name)
-    );
+    let question = escape(&args.question);
+    let mut body = format!("<header><h1>{question}</h1><p>{}</p></header>\n", escape(name));
     let tally = tally(file.file())?;
     let limits = ratio_limits(&plan);
     let share = 100.0 * tally.reliable as f64 / (tally.points as f64).max(1.0);
-    let _ = writeln!(
-        body,
-        "<p class=\"share\">{share:.1} %</p>\n<p>{} of {} points are reliable: every ratio of the \
-         nonlinear model to the linear one is {}. {} are chaotic, {} have no verdict.{}</p>",
-        tally.reliable,
-        tally.points,
-        limits.map_or_else(String::new, within),
-        tally.sensitive,
-        tally.undefined,
-        limits.filter(|_| tally.over_estimated > 0).map_or_else(String::new, |limits| format!(
-            " At {}, the linear model over-estimates: a ratio is below {}.",
-            tally.over_estimated,
-            short(limits.over_estimate())
-        ))
+    let Tally { reliable, points, sensitive, undefined, over_estimated, .. } = &tally;
+    let range = limits.map_or_else(String::new, within);
+    let over = |limits: RatioLimits| {
+        let below = short(limits.over_estimate());
+        format!(" At {over_estimated}, the linear model over-estimates: a ratio is below {below}.")
+    };
+    let over = limits.filter(|_| *over_estimated > 0).map_or_else(String::new, over);
+    body += &format!(
+        "<p class=\"share\">{share:.1} %</p>\n<p>{reliable} of {points} points are reliable: every \
+         ratio of the nonlinear model to the linear one is {range}. {sensitive} are chaotic, \
+         {undefined} have no verdict.{over}</p>\n"
     );
     let heads = ["nonlinear model", "worst", "limit", "at"];
     body += &table("The worst of it", &heads, &worst(&file, limits)?);
@@ -105,7 +91,7 @@ pub fn run<M: Swept>(
         claims.push(vec![checked.expression, found, verdict.to_owned()]);
     }
     body += &table("What is required", &["", "found", ""], &claims);
-    let _ = writeln!(body, "<figure>{picture}</figure>");
+    body += &format!("<figure>{picture}</figure>\n");
     for path in &args.further {
         let opened = ParquetFile::open(path)?;
         let (picture, _) = described(path)?;
@@ -114,7 +100,7 @@ pub fn run<M: Swept>(
             lines.into_iter().map(|(name, text)| vec![name.to_owned(), text]).collect();
         let shown = path.file_stem().unwrap_or_default().to_string_lossy();
         body += &table(&shown, &["", ""], &lines);
-        let _ = writeln!(body, "<figure>{picture}</figure>");
+        body += &format!("<figure>{picture}</figure>\n");
     }
     let run = GridInput::<M>::of_plan(name, &plan).load();
     if let Ok(run) = &run {
@@ -129,12 +115,9 @@ pub fn run<M: Swept>(
     let hashes = [key::PLAN_HASH, key::VERSION, key::NUMERICS, key::DIGEST].into_iter();
     let hashes = hashes.filter_map(|key| Some((key, file.file().value(key)?)));
     let hashes: Vec<String> = hashes.map(|(key, value)| format!("{key} {value}")).collect();
-    let _ = writeln!(
-        body,
-        "<details><summary>File and hashes</summary><p>{}</p><p>{}</p></details>",
-        escape(&args.result.display().to_string()),
-        escape(&hashes.join(", "))
-    );
+    let (path, hashes) = (escape(&args.result.display().to_string()), escape(&hashes.join(", ")));
+    body += "<details><summary>File and hashes</summary>";
+    body += &format!("<p>{path}</p><p>{hashes}</p></details>\n");
     page.finish(sheet(&args.question, &body).as_bytes())?;
     tell(&format!("wrote {}", output.display()));
     Ok(if held { Exit::Done } else { Exit::NotHeld })

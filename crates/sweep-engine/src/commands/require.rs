@@ -5,9 +5,8 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::cells::{table, word};
-use super::conditions;
-use crate::exit::{Error, Exit, show, tell};
+use super::{conditions, table, word};
+use crate::{Error, Exit, show, tell};
 use sweep_results::{Checked, ResultTable, check};
 
 /// Arguments of `sweep require`.
@@ -58,9 +57,7 @@ The exit code is 0 where every expression holds, else 4.";
 pub fn run(args: &Args) -> Result<Exit, Error> {
     let file = ResultTable::open(&args.file)?;
     let conditions = conditions::parse("EXPRESSION", &args.expressions, &file)?;
-    let keep = args.keep.iter().cloned().collect::<Vec<_>>();
-    let keep = conditions::parse("--where", &keep, &file)?;
-    let keep = conditions::rows_only("--where", keep)?.pop();
+    let keep = conditions::of_rows(args.keep.as_ref(), &file)?;
     let shown = usize::from(args.rows);
     let checked = conditions
         .iter()

@@ -1,22 +1,15 @@
 //! `sweep run GRID.toml`: the sweep.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
-use super::cells::{Lines as _, short};
-use super::grid::ResultArgs;
-use crate::effort::EffortArgs;
-use crate::exit::{Error, Exit, tell};
-use crate::interrupt::Interrupt;
-use crate::plan::Plan;
-use crate::progress::{duration, per_second};
+use super::{Lines as _, ResultArgs, short};
+use crate::progress::per_second;
 use crate::run::{self as runner, Ended, RunOptions, RunReport};
-use crate::store::provenance::Session;
-use crate::store::read::{FAR_OFF, Tally};
-use crate::store::{Job, ShardRequest};
-use crate::swept::Swept;
-use crate::threads;
-use crate::watch::Engine;
+use crate::store::read::{DwellCounts, FAR_OFF, failed, failures};
+use crate::store::{Session, ShardRequest, Tally};
+use crate::{
+    EffortArgs, Engine, Error, Exit, Interrupt, Job, Plan, Swept, duration, tell, threads,
+};
 use sweep_parameter::RatioLimits;
 use sweep_plot::Share;
 
@@ -121,7 +114,7 @@ pub fn exit(fail_on_error: bool, report: &RunReport) -> Exit {
     match &report.ended {
         Ended::Interrupted { signal, .. } => Exit::interrupted(Some(*signal)),
         Ended::Already(_, tally) | Ended::Finished(tally)
-            if fail_on_error && tally.by_status.failed() > 0 =>
+            if fail_on_error && failed(&tally.by_status) > 0 =>
         {
             Exit::PointsFailed
         }
@@ -204,42 +197,30 @@ impl RunCommand<'_> {
 
 /// What this process did.
 fn work(session: &Session) -> String {
-    format!(
-        "{} points in {}, {} on {} thread{} ({})",
-        session.points,
-        duration(session.wall_s),
-        per_second(session.points_per_s),
-        session.threads,
-        if session.threads == 1 { "" } else { "s" },
-        session.simd
-    )
+    let Session { points, threads, simd, .. } = session;
+    let (wall, rate) = (duration(session.wall_s), per_second(session.points_per_s));
+    let plural = if *threads == 1 { "" } else { "s" };
+    format!("{points} points in {wall}, {rate} on {threads} thread{plural} ({simd})")
 }
 
 /// A result's rows: verdicts, failures, extremes. At most six lines.
 pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
     if let Some(dwells) = &tally.dwells {
+        let DwellCounts { stable, unstable, beyond, unknown } = dwells;
+        let (able, points) = (stable - beyond, tally.points);
+        let beyond = match beyond {
+            0 => String::new(),
+            beyond => format!(", {beyond} beyond what a machine can do"),
+        };
+        let rows = format!("{able} of {points} rows, {unstable} not");
         let mut text = String::new();
-        let mut told = format!(
-            "{} of {} rows, {} not, {} without a response",
-            dwells.stable - dwells.beyond,
-            tally.points,
-            dwells.unstable,
-            dwells.unknown
-        );
-        if dwells.beyond > 0 {
-            let _ = write!(told, ", {} beyond what a machine can do", dwells.beyond);
-        }
-        text.line("stable", &told);
+        text.line("stable", format!("{rows}, {unknown} without a response{beyond}"));
         return text;
     }
     let at = |point: u64| {
         let values = (job.axis_values)(point);
-        let place = job
-            .layout
-            .axes
-            .iter()
-            .zip(values)
-            .map(|(axis, value)| format!("{} {}", axis.name, short(value)));
+        let place = job.layout.axes.iter().zip(values);
+        let place = place.map(|(axis, value)| format!("{} {}", axis.name, short(value)));
         place.collect::<Vec<_>>().join(", ")
     };
     counts(tally, job.limits, &at)
@@ -250,12 +231,12 @@ pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
 fn share(tally: &Tally) -> String {
     match Share::of(tally.reliable, tally.reliable + tally.unreliable) {
         None => "no point has a verdict".to_owned(),
-        Some(Share { part, low, high }) => format!(
-            "{:.1} % reliable, with 95 % confidence {:.1} to {:.1} % for points at random",
-            100.0 * part,
-            100.0 * low,
-            100.0 * high
-        ),
+        Some(Share { part, low, high }) => {
+            let [part, low, high] = [part, low, high].map(|part| format!("{:.1}", 100.0 * part));
+            format!(
+                "{part} % reliable, with 95 % confidence {low} to {high} % for points at random"
+            )
+        }
     }
 }
 
@@ -268,62 +249,44 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         || format!("below ratio {most}"),
         |least| format!("with ratios from {least} to {most}"),
     );
-    let verdicts = format!(
-        "{} ({:.1} %) {range}, {} not, {} undefined",
-        tally.reliable,
-        percent(tally.reliable),
-        tally.unreliable,
-        tally.undefined
-    );
-    text.line("reliable", &verdicts);
-    if tally.over_estimated > 0 {
-        let told = format!(
-            "in {} ({:.1} %), {} of them reliable: the linear model over-estimates, a ratio is \
-             below {}",
-            tally.over_estimated,
-            percent(tally.over_estimated),
-            tally.over_estimated_reliable,
-            short(limits.over_estimate())
-        );
-        text.line("too high", &told);
+    let Tally { reliable, unreliable, undefined, over_estimated, sensitive, unconverged, .. } =
+        tally;
+    let share = percent(*reliable);
+    let others = format!("{unreliable} not, {undefined} undefined");
+    text.line("reliable", format!("{reliable} ({share:.1} %) {range}, {others}"));
+    if *over_estimated > 0 {
+        let (share, below) = (percent(*over_estimated), short(limits.over_estimate()));
+        let rows = format!("in {over_estimated} ({share:.1} %)");
+        let which = format!("{rows}, {} of them reliable", tally.over_estimated_reliable);
+        let told = format!("{which}: the linear model over-estimates, a ratio is below {below}");
+        text.line("too high", told);
     }
-    if tally.by_status.failed() > 0 {
-        let by_status = tally.by_status.iter().filter(|(status, _)| *status != "ok");
-        let list: Vec<String> =
-            by_status.map(|(status, count)| format!("{count} {status}")).collect();
-        text.line("failed", list.join(", "));
+    let failed: Vec<String> =
+        failures(&tally.by_status).map(|(status, count)| format!("{count} {status}")).collect();
+    if !failed.is_empty() {
+        text.line("failed", failed.join(", "));
     }
-    if tally.sensitive > 0 {
-        let told = format!("{}: chaotic, a near twin departs exponentially", tally.sensitive);
-        text.line("sensitive", &told);
+    if *sensitive > 0 {
+        text.line("sensitive", format!("{sensitive}: chaotic, a near twin departs exponentially"));
     }
-    if tally.unconverged > 0 {
-        let told = format!("all but {}, whose error is above the accuracy", tally.unconverged);
-        text.line("converged", &told);
+    if *unconverged > 0 {
+        let told = format!("all but {unconverged}, whose error is above the accuracy");
+        text.line("converged", told);
     }
     if let Some(greatest) = &tally.greatest_error {
         let methods: Vec<String> =
             tally.by_method.iter().map(|(method, count)| format!("{count} {method}")).collect();
-        let told = format!(
-            "at most {:.1e} left in a row; rows by method: {}",
-            greatest.value,
-            methods.join(", ")
-        );
-        text.line("error", &told);
+        let (error, methods) = (greatest.value, methods.join(", "));
+        text.line("error", format!("at most {error:.1e} left in a row; rows by method: {methods}"));
     }
     let place = |point: u64| match at(point) {
         place if place.is_empty() => place,
         place => format!(" at {place}"),
     };
     if let Some(greatest) = &tally.greatest_off {
-        let told = format!(
-            "{} rows whose linear model takes it at a speed off by more than {FAR_OFF}; at most \
-             {:.3}{}",
-            tally.far_off,
-            greatest.value,
-            place(greatest.point)
-        );
-        text.line("friction", &told);
+        let (rows, most, place) = (tally.far_off, greatest.value, place(greatest.point));
+        let which = format!("{rows} rows whose linear model takes it at a speed off by more than");
+        text.line("friction", format!("{which} {FAR_OFF}; at most {most:.3}{place}"));
     }
     if let Some(greatest) = &tally.greatest_ratio {
         text.line("greatest", format!("ratio {:.3}{}", greatest.value, place(greatest.point)));

@@ -1,8 +1,7 @@
 //! `schema`: the JSON Schema of grid files.
 
 use crate::config::schema::grid;
-use crate::exit::{Error, Exit, print};
-use crate::swept::Swept;
+use crate::{Error, Exit, Swept, print};
 
 /// Arguments of `schema`.
 #[derive(Debug, clap::Args)]

@@ -5,12 +5,10 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::cells::{Lines as _, clipped, short, table, word};
-use super::conditions;
 use super::run::counts;
-use crate::exit::{Error, Exit, show};
-use crate::nearest::nearest;
+use super::{Lines as _, clipped, conditions, short, table, word};
 use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, Tally, overview, row, tally};
+use crate::{Error, Exit, nearest, show};
 use sweep_files::{ParquetFile, key};
 use sweep_parameter::Worse;
 use sweep_results::{Cell, Condition, ResultTable, ResultsError, ratio_limits, top};
@@ -121,9 +119,7 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
 /// Some rows of the file.
 fn rows(args: &Args) -> Result<Exit, Error> {
     let file = ResultTable::open(&args.file)?;
-    let keep: Vec<String> = args.keep.iter().cloned().collect();
-    let keep = conditions::parse("--where", &keep, &file)?;
-    let keep = conditions::rows_only("--where", keep)?.pop();
+    let keep = conditions::of_rows(args.keep.as_ref(), &file)?;
     let columns = shown_columns(args, &file, keep.as_ref());
     let order = |by| match (args.ascending, args.descending) {
         (true, _) => Worse::Less,
@@ -276,16 +272,11 @@ fn brief(value: &Value) -> String {
         Value::Object(map) => {
             list(map.iter().map(|(key, value)| format!("{key} {}", brief(value))).collect())
         }
-        Value::Array(values) => match values.get(..12) {
-            Some(first) if values.len() > 12 => {
-                format!(
-                    "{}, ... ({} values)",
-                    list(first.iter().map(brief).collect()),
-                    values.len()
-                )
-            }
-            _ => list(values.iter().map(brief).collect()),
-        },
+        Value::Array(values) if values.len() > 12 => {
+            let first = list(values.iter().take(12).map(brief).collect());
+            format!("{first}, ... ({} values)", values.len())
+        }
+        Value::Array(values) => list(values.iter().map(brief).collect()),
         Value::String(text) => text.clone(),
         Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), short),
         other => other.to_string(),
@@ -315,18 +306,12 @@ fn columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> 
 fn range(column: &ColumnRange) -> String {
     let mut parts = Vec::new();
     if let Some((least, greatest)) = column.range {
-        let unit = column
-            .unit
-            .as_deref()
-            .filter(|unit| *unit != "1")
-            .map(|unit| format!(" {unit}"))
-            .unwrap_or_default();
+        let unit = column.unit.as_deref().filter(|unit| *unit != "1");
+        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
         parts.push(format!("{} to {}{unit}", short(least), short(greatest)));
     }
-    parts.extend(column.names.iter().map(|(name, count)| {
-        let name = clipped(name);
-        format!("{count} {name}")
-    }));
+    let names = column.names.iter();
+    parts.extend(names.map(|(name, count)| format!("{count} {}", clipped(name))));
     if column.nulls > 0 {
         parts.push(format!("{} null", column.nulls));
     }

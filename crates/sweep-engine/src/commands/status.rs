@@ -4,13 +4,9 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::cells::Lines as _;
-use super::grid::ResultArgs;
-use crate::exit::{Error, Exit, show, tell};
-use crate::plan::Plan;
-use crate::store::Job;
+use super::{Lines as _, ResultArgs};
 use crate::store::{FolderStatus, State, shard_list, status};
-use crate::swept::Swept;
+use crate::{Error, Exit, Job, Plan, Swept, show, tell};
 
 /// Arguments of `sweep status`.
 #[derive(Debug, clap::Args)]

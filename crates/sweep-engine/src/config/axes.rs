@@ -5,15 +5,13 @@ use std::collections::BTreeMap;
 
 use sweep_parameter::{Parameter as _, Range, decimal};
 
-use super::Read;
-use super::draft::Draft;
 use super::list::{self, List};
 use super::parameters::find;
 use super::report::{Diagnostic, Report};
-use super::section::{Field, Section, quoted, refused_number, twice};
-use super::source::{Located, Location};
-use crate::design::{Design, Distribution, MOST_AXES, REACH, Shape};
-use crate::plan::{Axis, AxisValues, MOST_POINTS};
+use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number, twice};
+use crate::design::{MOST_AXES, REACH, Shape};
+use crate::plan::MOST_POINTS;
+use crate::{Axis, AxisValues, Design, Distribution};
 
 /// What axes write so far, by the single numbers.
 type Swept = BTreeMap<Cow<'static, str>, Located<String>>;
@@ -72,7 +70,7 @@ pub fn axes<M: Read>(
                 usize::MAX => "expected at least one [[axis]] with a range".to_owned(),
                 most => format!("expected from 1 to {most} [[axis]], each with a range"),
             };
-            report.push(Diagnostic::new(title).at(at, expected));
+            report.refuse::<()>(at, title, expected);
         }
     }
     let mut points: Option<u64> = Some(1);
@@ -97,7 +95,7 @@ pub fn axes<M: Read>(
                 let title =
                     format!("too many grid points: {points} before this axis, times {count}");
                 let expected = format!("expected at most {MOST_POINTS} in all");
-                report.push(Diagnostic::new(title).at(&values.at, expected));
+                report.refuse::<()>(&values.at, title, expected);
             }
             points = product;
         }
@@ -123,12 +121,11 @@ pub fn add<M: Read>(axis: Axis<M>, at: Location, draft: &mut Draft<'_, M>) {
 pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draft<'_, M>) {
     let report = root.report;
     for section in root.tables("axis") {
-        let diagnostic = Diagnostic::new("an [[axis]] beside a list of points");
-        report
-            .push(diagnostic.at(section.at(), "the columns of the list are the axes; remove this"));
+        let expected = "the columns of the list are the axes; remove this";
+        report.refuse::<()>(section.at(), "an [[axis]] beside a list of points", expected);
     }
     let mut swept = Swept::new();
-    for (k, column) in std::mem::take(&mut list.columns).into_iter().enumerate() {
+    for (k, column) in std::mem::take(&mut list.table.columns).into_iter().enumerate() {
         let name = Located { value: column.name.value.as_str(), at: column.name.at.clone() };
         if name.value == list::ID {
             continue;
@@ -142,7 +139,7 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
             sound = false;
             report.push_with(|sources| {
                 let what = format!("value {} of {}", row + 1, quoted(name.value));
-                refused_number(&what, value, &list.place(sources, k, row), range)
+                refused_number(&what, value, &list.table.place(sources, k, row), range)
             });
         }
         if claim(&name, &parameter, &mut swept, draft) && sound {

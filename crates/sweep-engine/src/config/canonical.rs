@@ -4,9 +4,8 @@ use serde_json::{Value, json};
 use sweep_parameter::{Channel as _, Parameter as _};
 
 use super::Read;
-use crate::design::{Design, Distribution};
 use crate::method::Integrator as _;
-use crate::plan::{Axis, AxisValues, Plan};
+use crate::{Axis, AxisValues, Design, Distribution, Plan};
 
 impl<M: Read> Plan<M> {
     /// The whole plan with every default and constant in place, in the grid file's own terms:

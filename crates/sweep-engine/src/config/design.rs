@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use super::list::{self, List};
-use super::section::{Field, Section};
-use super::source::Located;
-use crate::design::Design;
+use super::{Field, Located, Section};
+use crate::Design;
 use crate::plan::MOST_POINTS;
 
 /// The methods by name.

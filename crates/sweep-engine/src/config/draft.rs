@@ -2,13 +2,11 @@
 
 use std::borrow::Cow;
 
-use super::Read;
-use super::report::Report;
-use super::source::Located;
-use crate::plan::Plan;
+use super::{Located, Report};
+use crate::{Model, Plan};
 
 /// A plan in the making: whole, but sound only if nothing was reported.
-pub struct Draft<'a, M: Read> {
+pub struct Draft<'a, M: Model> {
     /// The plan.
     pub plan: Plan<M>,
     /// Where its numbers were written, and what is wrong.

@@ -1,18 +1,16 @@
 //! The grid file, section by section. What is left out has the defaults of the constants below.
 
-use std::io::ErrorKind;
 use std::path::Path;
 
 use sweep_parameter::{Channel, Range, RatioLimits, decimal};
 
-use super::Read;
 use super::draft::Draft;
-use super::report::{Diagnostic, Report};
-use super::section::{Field, Section};
-use super::source::{Located, Location, ReadError, is_blank, read};
-use super::syntax::parse;
+use super::source::{Located, Location, is_blank};
+use super::syntax::{self, parse};
 use super::words::names;
-use super::{GridInput, axes, design, parameters, scalars};
+use super::{
+    Diagnostic, Field, GridInput, Read, Report, Section, axes, design, parameters, scalars,
+};
 use crate::method::{Integrator, default_method, settings};
 use crate::plan::{LONGEST_S, Plan, RATIO_MIN, Reliability, WrittenIn};
 
@@ -22,27 +20,16 @@ pub const DEFAULT_RATIO_LIMIT: f64 = 2.0;
 /// Reads the grid file and puts the constants in place. `None` if the grid file has no text.
 pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
     let GridInput { path, text, sets, at, .. } = input;
-    let to_start = |diagnostic: Diagnostic| match M::TO_START {
-        Some(help) => diagnostic.help(help),
-        None => diagnostic,
-    };
     let shown = path.display();
-    let text = match text.clone().map_or_else(|| read(path), Ok) {
-        Ok(text) => text,
-        Err(error) => {
-            let missing =
-                matches!(&error, ReadError::Io(error) if error.kind() == ErrorKind::NotFound);
-            let diagnostic = Diagnostic::new(format!("cannot read the grid file {shown}: {error}"));
-            report.push(if missing { to_start(diagnostic) } else { diagnostic });
-            return None;
-        }
+    let (text, source) = match text {
+        Some(text) => (text.clone(), report.add(shown.to_string(), text.as_str())),
+        None => syntax::text(path, "grid", M::TO_START, report)?,
     };
-    let source = report.add(shown.to_string(), text.as_str());
     if is_blank(&text) {
         let at = Location::new(source, 0..0);
-        let diagnostic =
+        let refusal =
             Diagnostic::new(format!("the grid file {shown} is empty")).at(&at, "expected a grid");
-        report.push(to_start(diagnostic));
+        report.push(M::TO_START.into_iter().fold(refusal, Diagnostic::help));
         return None;
     }
     let table = parse(&text, source, report);

@@ -39,8 +39,8 @@ impl NumberTable {
     pub fn read(path: &Path, report: &Report) -> Option<Self> {
         let shown = shown(path);
         let file = Location::new(report.add(shown.as_str(), String::new()), 0..0);
-        match columns(path, &file, true, report) {
-            Ok(read) => read.map(|(columns, rows, _)| Self { columns, rows }),
+        match table(path, &file, true, report) {
+            Ok(read) => read.map(|(table, _)| table),
             Err(reason) => {
                 let title = format!("cannot read {shown}: {reason}");
                 let help = "expected a CSV or Parquet file of numbers under a line of names";
@@ -66,7 +66,14 @@ impl NumberTable {
 
     /// The place of a value, both counted from 0.
     pub fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
-        self.rows.place(sources, column, row)
+        match &self.rows {
+            Rows::Binary(at) => at.clone(),
+            Rows::Lines { source, starts, separator } => {
+                let start = starts.get(row).map_or(0, |&start| start as usize);
+                let span = csv::cell_span(sources.text(*source), start, *separator, column);
+                Location::new(*source, span)
+            }
+        }
     }
 }
 
@@ -74,9 +81,8 @@ impl NumberTable {
 pub struct List {
     /// The design of its points.
     pub design: Design,
-    /// Its parameters.
-    pub columns: Vec<ListColumn>,
-    rows: Rows,
+    /// Its parameters with their values.
+    pub table: NumberTable,
 }
 
 /// A column of numbers.
@@ -125,39 +131,19 @@ enum Unreadable {
     Damaged(String),
 }
 
-impl List {
-    /// The place of a value, both counted from 0.
-    pub fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
-        self.rows.place(sources, column, row)
-    }
-}
-
-impl Rows {
-    fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
-        match self {
-            Self::Binary(at) => at.clone(),
-            Self::Lines { source, starts, separator } => {
-                let start = starts.get(row).map_or(0, |&start| start as usize);
-                let span = csv::cell_span(sources.text(*source), start, *separator, column);
-                Location::new(*source, span)
-            }
-        }
-    }
-}
-
 /// A path in a message.
 fn shown(path: &Path) -> String {
     cut(&path.display().to_string(), LONGEST_PATH)
 }
 
-/// Columns of a file of numbers, the places of its rows, and the hash of its bytes; `None` after
-/// mistakes, which are reported. `file` is where it is named. With `gaps`, a missing value is NaN.
-fn columns(
+/// The table of a file, and the hash of its bytes; `None` after mistakes, which are reported. The
+/// file is named at `file`. With `gaps`, a missing value is NaN.
+fn table(
     path: &Path,
     file: &Location,
     gaps: bool,
     report: &Report,
-) -> Result<Option<(Vec<ListColumn>, Rows, String)>, Unreadable> {
+) -> Result<Option<(NumberTable, String)>, Unreadable> {
     let bytes = bytes(path)?;
     let hash = blake3::hash(&bytes).to_hex().to_string();
     if bytes.starts_with(b"PAR1") {
@@ -165,7 +151,7 @@ fn columns(
         let located = |value| Located { value, at: file.clone() };
         let column = |(name, values)| ListColumn { name: located(name), values };
         let columns = columns.into_iter().map(column).collect();
-        return Ok(Some((columns, Rows::Binary(file.clone()), hash)));
+        return Ok(Some((NumberTable { columns, rows: Rows::Binary(file.clone()) }, hash)));
     }
     let text = String::from_utf8(bytes)
         .map_err(|error| Unreadable::NotText(error.utf8_error().valid_up_to() + 1))?;
@@ -173,40 +159,36 @@ fn columns(
     let source = report.add(shown(path), String::new());
     let read = csv::read(&text, source, gaps, report);
     report.fill(source, text);
-    let lines =
-        |(columns, starts, separator)| (columns, Rows::Lines { source, starts, separator }, hash);
-    Ok(read?.map(lines))
+    Ok(read?.map(|(columns, starts, separator)| {
+        (NumberTable { columns, rows: Rows::Lines { source, starts, separator } }, hash)
+    }))
 }
 
 /// Reads the listed points.
 pub(super) fn read(file: &Located<&str>, grid: &Path, report: &Report) -> Option<List> {
     let path = beside(grid, file.value);
     let shown = shown(&path);
-    let read = columns(&path, &file.at, false, report);
-    let (columns, rows, hash) = match read {
+    let (table, hash) = match table(&path, &file.at, false, report) {
         Ok(read) => read?,
         Err(reason) => {
             let title = format!("cannot read the list of points {shown}: {reason}");
             let expected = "expected a CSV or Parquet file of numbers, one column a parameter, \
                 relative to this file";
-            report.push(Diagnostic::new(title).at(&file.at, expected));
-            return None;
+            return report.refuse(&file.at, title, expected);
         }
     };
-    let points = columns.first().map_or(0, |column: &ListColumn| column.values.len());
+    let points = table.columns.first().map_or(0, |column| column.values.len());
     if points == 0 {
         let title = format!("the list of points {shown} is empty");
         let expected = "expected a line of parameter names, and under it a row of numbers a point";
-        report.push(Diagnostic::new(title).at(&file.at, expected));
-        return None;
+        return report.refuse(&file.at, title, expected);
     }
-    if columns.iter().all(|column: &ListColumn| column.name.value == ID) {
+    if table.columns.iter().all(|column| column.name.value == ID) {
         let title = format!("the list of points {shown} has no column but `{ID}`");
-        report.push(Diagnostic::new(title).at(&file.at, "expected a column of a parameter"));
-        return None;
+        return report.refuse(&file.at, title, "expected a column of a parameter");
     }
     let design = Design::List { file: file.value.to_owned(), points: points as u64, hash };
-    Some(List { design, columns, rows })
+    Some(List { design, table })
 }
 
 fn bytes(path: &Path) -> Result<Vec<u8>, Unreadable> {

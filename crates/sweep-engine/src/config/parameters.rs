@@ -5,16 +5,9 @@ use std::collections::BTreeMap;
 
 use sweep_parameter::{Parameter as _, Range};
 
-use super::NamedValues;
-use super::Read;
 use super::draft::{Draft, WrittenConstant};
-use super::report::Diagnostic;
-use super::scalars::{self, Written};
-use super::section::{Section, quoted, twice};
-use super::source::Located;
-use crate::model::UnknownParameter;
-use crate::plan::Plan;
-use crate::program::program;
+use super::{Diagnostic, Located, NamedValues, Read, Section, Written, quoted, scalars, twice};
+use crate::{Plan, UnknownParameter, program};
 
 /// Names offered as the nearest one; a machine of thousands of springs has more than a reader wants
 /// compared.

@@ -2,12 +2,9 @@
 
 use sweep_parameter::Parameter as _;
 
-use super::Read;
 use super::parameters::unknown;
-use super::report::{Diagnostic, Diagnostics, Report};
-use super::section::{quoted, refused_number};
-use super::source::{Located, Location};
-use crate::plan::{Axis, Plan};
+use super::{Diagnostic, Diagnostics, Located, Location, Read, Report, quoted, refused_number};
+use crate::{Axis, Plan};
 
 /// Finds the column of each axis of a plan: its position among `names`, or none for an axis of one
 /// value that the table leaves out. Every value must lie on its axis, from the least to the
@@ -52,10 +49,12 @@ where
         of_axes[place] = Some(k);
         let axis = &plan.axes[place];
         let ends = axis.values.extremes().map(|k| axis.values.value(k));
-        for (row, value) in values(k).enumerate() {
-            if let Err(wrong) = judge(value, row, axis, ends, &name) {
-                report.push_with(|_| wrong());
-            }
+        let [least, greatest] = ends;
+        let is_on_axis = |value: &f64| (least..=greatest).contains(value);
+        for (row, value) in
+            values(k).enumerate().filter(|(_, value)| !value.is_some_and(|v| is_on_axis(&v)))
+        {
+            report.push_with(|_| off_axis(value, row, axis, ends, &name));
         }
     }
     for (axis, column) in plan.axes.iter().zip(&of_axes) {
@@ -91,34 +90,29 @@ fn of_column(names: &[String], column: usize, title: String, expected: String) -
     report.into_diagnostics()
 }
 
-/// Judges one value; what is wrong is put in words only where it is shown.
-fn judge<'a, M: Read>(
+/// The mistake of a value that is not on its axis.
+fn off_axis<M: Read>(
     value: Option<f64>,
     row: usize,
-    axis: &'a Axis<M>,
+    axis: &Axis<M>,
     [least, greatest]: [f64; 2],
-    name: &'a Located<&str>,
-) -> Result<(), impl FnOnce() -> Diagnostic + 'a> {
-    if value.is_some_and(|value| (least..=greatest).contains(&value)) {
-        return Ok(());
-    }
-    Err(move || {
-        let what = format!("row {} of {}", row + 1, quoted(name.value));
-        let range = axis.parameter.range();
-        match value {
-            None => Diagnostic::new(format!("{what} has no value"))
-                .at(&name.at, format!("expected {range}")),
-            Some(value) if !range.contains(value) => refused_number(&what, value, &name.at, range),
-            Some(value) => {
-                let title = format!("{what} = {value} is off the plan's axis");
-                let expected = format!("expected a number from {least} to {greatest}");
-                Diagnostic::new(title).at(&name.at, expected).help(format!(
-                    "give `{}` a wider range in the plan's [[axis]]",
-                    axis.parameter.name()
-                ))
-            }
+    name: &Located<&str>,
+) -> Diagnostic {
+    let what = format!("row {} of {}", row + 1, quoted(name.value));
+    let range = axis.parameter.range();
+    match value {
+        None => Diagnostic::new(format!("{what} has no value"))
+            .at(&name.at, format!("expected {range}")),
+        Some(value) if !range.contains(value) => refused_number(&what, value, &name.at, range),
+        Some(value) => {
+            let title = format!("{what} = {value} is off the plan's axis");
+            let expected = format!("expected a number from {least} to {greatest}");
+            let axis = axis.parameter.name();
+            Diagnostic::new(title)
+                .at(&name.at, expected)
+                .help(format!("give `{axis}` a wider range in the plan's [[axis]]"))
         }
-    })
+    }
 }
 
 /// A column that is no axis: of a parameter that the plan holds, or of nothing.

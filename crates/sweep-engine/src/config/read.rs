@@ -2,10 +2,8 @@
 
 use serde_json::{Map, Value};
 
-use super::scalars::Written;
-use super::section::Section;
-use super::{Draft, GridInput};
-use crate::model::Model;
+use super::{Draft, GridInput, Section, Written};
+use crate::Model;
 
 /// A model in grid files. The engine reads `name`, `[set]`, `[time]`, `[integrator]`,
 /// `[reliability]`, `[design]` and `[[axis]]`; what else there is, the model reads.

@@ -27,6 +27,13 @@ impl Diagnostic {
         Self { title: title.into(), places: Vec::new(), help: Vec::new() }
     }
 
+    /// A mistake in an expression, at this place.
+    pub fn of_expression(mistake: sweep_results::Mistake, at: &Location) -> Self {
+        let (typed, names) = mistake.candidates.unwrap_or_default();
+        let names = names.iter().map(String::as_str);
+        Self::new(mistake.title).at(at, mistake.expected).nearest(&typed, names)
+    }
+
     /// Adds a place, with what was expected there.
     pub fn at(mut self, at: &Location, expected: impl Into<String>) -> Self {
         self.places.push((at.clone(), expected.into()));

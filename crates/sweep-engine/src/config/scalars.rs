@@ -4,15 +4,10 @@
 use serde_json::{Value, json};
 use sweep_parameter::{Channel, Range, decimal};
 
-use super::Read;
 use super::design::{MOST_SEED, MOST_SOBOL};
-use super::draft::Draft;
-use super::report::Report;
-use super::section::{check_number, quoted, short, twice, unknown_word};
-use super::source::{Located, Location};
-use super::words::some_of;
-use crate::design::Design;
-use crate::method::{Integrator, settings};
+use super::{Draft, Read, Written, twice};
+use crate::Design;
+use crate::method::{Entry, Integrator, settings};
 use crate::plan::{LONGEST_S, MOST_POINTS, RATIO_MIN};
 
 /// Those that stand outside of `[integrator]`.
@@ -29,80 +24,6 @@ pub fn names<M: Read>() -> impl Iterator<Item = &'static str> {
 pub fn is_one<M: Read>(argument: &str) -> bool {
     let name = argument.split('=').next().unwrap_or_default().trim();
     argument.contains('=') && names::<M>().any(|known| known == name)
-}
-
-/// One argument NAME=VALUE, taken apart.
-pub struct Written<'a> {
-    /// What is set.
-    pub name: Located<&'a str>,
-    /// To what.
-    pub value: Located<&'a str>,
-    report: &'a Report,
-}
-
-impl<'a> Written<'a> {
-    /// Takes an option's argument apart.
-    pub fn read(option: &str, argument: &'a str, report: &'a Report) -> Option<Self> {
-        let source = report.add(option, argument);
-        let located =
-            |value: &'a str, span| Located { value: value.trim(), at: Location::new(source, span) };
-        match argument.split_once('=') {
-            Some((name, value)) => {
-                let equals = name.len();
-                let name = located(name, 0..equals);
-                Some(Self { name, value: located(value, equals + 1..argument.len()), report })
-            }
-            None => {
-                let title = format!("`{}` is not a constant", short(argument));
-                let whole = Location::new(source, 0..argument.len());
-                report.refuse(&whole, title, "expected NAME=VALUE")
-            }
-        }
-    }
-
-    /// The number, in a range.
-    pub fn number(&self, range: Range) -> Option<Located<f64>> {
-        let at = self.value.at.clone();
-        match self.value.value.parse() {
-            Ok(number) => check_number(&quoted(self.name.value), number, at, range, self.report),
-            Err(_) => {
-                let title = format!("`{}` is not a number", short(self.value.value));
-                self.report.refuse(&at, title, format!("expected {range}"))
-            }
-        }
-    }
-
-    /// A whole number within bounds.
-    pub fn whole(&self, least: u64, most: u64) -> Option<u64> {
-        let number = self.value.value.parse::<u64>().ok();
-        number.filter(|number| (least..=most).contains(number)).or_else(|| {
-            let title = format!("`{}` is no such number", short(self.value.value));
-            let expected = format!("expected a whole number from {least} to {most}");
-            self.report.refuse(&self.value.at, title, expected)
-        })
-    }
-
-    /// One of a few words, by its place.
-    pub fn choice(&self, choices: &[&str]) -> Option<usize> {
-        let place = choices.iter().position(|choice| *choice == self.value.value);
-        if place.is_none() {
-            self.report.push_with(|_| unknown_word(self.name.value, &self.value, choices));
-        }
-        place
-    }
-
-    /// Names separated by commas, each once and at least one.
-    pub fn list<T: Copy + PartialEq>(
-        &self,
-        what: &str,
-        all: &[T],
-        name: fn(T) -> &'static str,
-    ) -> Option<Vec<T>> {
-        let Located { value, at } = &self.value;
-        let parts = value.split(',').map(|part| Located { value: part.trim(), at: at.clone() });
-        let (chosen, is_sound) = some_of(parts, what, all, name, self.report);
-        is_sound.then_some(chosen)
-    }
 }
 
 /// Puts the scalars among `sets` in place, over those of the grid file. The plan has its design
@@ -170,10 +91,8 @@ fn put<M: Read>(written: &Written<'_>, draft: &mut Draft<'_, M>) -> Option<Value
         "method" => {
             let names: Vec<_> = M::Integrator::methods().iter().map(|entry| entry.name).collect();
             let entry = &M::Integrator::methods()[written.choice(&names)?];
-            let was = plan.integrator.to_json();
             // Settings that both methods have stay as they are.
-            plan.integrator =
-                (entry.with)(&mut |setting| was[setting.key].as_f64().unwrap_or(setting.default));
+            plan.integrator = changed(&plan.integrator, entry, None);
             report.put("integrator", written.value.at.clone());
             json!(entry.name)
         }
@@ -181,24 +100,26 @@ fn put<M: Read>(written: &Written<'_>, draft: &mut Draft<'_, M>) -> Option<Value
         key => {
             let (setting, owners) =
                 settings::<M::Integrator>().into_iter().find(|(setting, _)| setting.key == key)?;
-            let was = plan.integrator.to_json();
             if !owners.contains(&plan.integrator.name()) {
                 let title = format!("the method \"{}\" has no `{key}`", plan.integrator.name());
                 let expected = format!("`{key}` belongs to \"{}\"", owners.join("\", \""));
                 return report.refuse(&written.name.at, title, expected);
             }
             let number = written.number(setting.range)?.value;
-            let entry = M::Integrator::methods()
-                .iter()
-                .find(|entry| entry.name == plan.integrator.name())?;
-            plan.integrator = (entry.with)(&mut |setting| {
-                let own = (setting.key == key).then_some(number);
-                own.or(was[setting.key].as_f64()).unwrap_or(setting.default)
-            });
+            let mut entries = M::Integrator::methods().iter();
+            let entry = entries.find(|entry| entry.name == plan.integrator.name())?;
+            plan.integrator = changed(&plan.integrator, entry, Some((key, number)));
             report.put(format!("integrator.{key}"), written.value.at.clone());
             json!(number)
         }
     })
+}
+
+/// A method with the settings of another, and one of its own.
+fn changed<I: Integrator>(was: &I, entry: &Entry<I>, own: Option<(&str, f64)>) -> I {
+    let was = was.settings();
+    let of = |key: &str| was.iter().copied().chain(own).rfind(|(known, _)| *known == key);
+    (entry.with)(&mut |setting| of(setting.key).map_or(setting.default, |(_, number)| number))
 }
 
 /// The number of points, or the seed, of a design that has one.

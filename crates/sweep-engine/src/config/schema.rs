@@ -51,21 +51,14 @@ pub fn grid<M: Read>() -> Value {
 fn design() -> Value {
     let one = |method: &'static str, description: &str, most: u64| {
         let method = json!({ "const": method, "description": description });
-        let points =
-            json!({ "type": "integer", "minimum": 1, "maximum": most, "description": "how many" });
-        let seed = json!({
-            "type": "integer",
-            "minimum": 0,
-            "maximum": MOST_SEED,
-            "default": DEFAULT_SEED,
-            "description": "another seed, another draw",
-        });
+        let points = whole(1, most, "how many");
+        let mut seed = whole(0, MOST_SEED, "another seed, another draw");
+        seed["default"] = DEFAULT_SEED.into();
         table([("method", method), ("points", points), ("seed", seed)], &["method", "points"])
     };
     let list = json!({ "const": "list", "description": "points as listed" });
-    let file = json!({ "type": "string", "description": "CSV or Parquet, relative to this file: \
-                                                         one column a parameter, one row a \
-                                                         point" });
+    let listed = "CSV or Parquet, relative to this file: one column a parameter, one row a point";
+    let file = json!({ "type": "string", "description": listed });
     json!({
         "oneOf": [
             one("latin_hypercube", "every axis cut into as many strata as there are points, one \
@@ -98,6 +91,10 @@ pub fn table<'k>(
         "required": required,
         "additionalProperties": false,
     })
+}
+
+fn whole(least: u64, most: u64, description: &str) -> Value {
+    json!({ "type": "integer", "minimum": least, "maximum": most, "description": description })
 }
 
 /// A number in a range.
@@ -212,23 +209,11 @@ fn distribution() -> Value {
 
 fn axis() -> Value {
     let parameter = json!({ "type": "string", "description": "a name of `sweep parameters`" });
-    let range = table(
-        [
-            ("from", number(Range::Any)),
-            ("to", number(Range::Any)),
-            (
-                "count",
-                json!({
-                    "type": "integer",
-                    "minimum": 1,
-                    "maximum": MOST_POINTS,
-                    "description": "how many, both ends included",
-                }),
-            ),
-            ("spacing", json!({ "enum": ["linear", "log"], "default": "linear" })),
-        ],
-        &["from", "to"],
-    );
+    let count = whole(1, MOST_POINTS, "how many, both ends included");
+    let spacing = json!({ "enum": ["linear", "log"], "default": "linear" });
+    let ends = ["from", "to"].map(|key| (key, number(Range::Any)));
+    let further = [("count", count), ("spacing", spacing)];
+    let range = table(ends.into_iter().chain(further), &["from", "to"]);
     let values =
         json!({ "type": "array", "items": number(Range::Any), "minItems": 1, "uniqueItems": true });
     json!({

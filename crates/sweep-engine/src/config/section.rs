@@ -10,8 +10,7 @@ use sweep_parameter::{Range, decimal};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::report::{Diagnostic, Report};
-use super::source::{Located, Location};
+use super::{Diagnostic, Located, Location, Report};
 
 /// A key's value: not written, written wrong (already reported), or as written.
 pub enum Field<T> {

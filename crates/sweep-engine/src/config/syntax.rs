@@ -1,11 +1,35 @@
 //! From text to a TOML table, with every mistake of syntax the parser can recover from.
 
+use std::io::ErrorKind;
+use std::path::Path;
+
 use toml::Spanned;
 use toml::de::{DeTable, Error};
 
-use super::report::{Diagnostic, Report};
-use super::section::quoted;
-use super::source::{Location, SourceId};
+use super::source::{ReadError, read};
+use super::{Diagnostic, Location, Report, SourceId, quoted};
+
+/// The text of a file that is named in words, kept under its path; none where it cannot be read,
+/// which is reported, with what to do where there is no such file.
+pub fn text(
+    path: &Path,
+    what: &str,
+    to_start: Option<&str>,
+    report: &Report,
+) -> Option<(String, SourceId)> {
+    let shown = path.display();
+    let error = match read(path) {
+        Ok(text) => {
+            let source = report.add(shown.to_string(), text.as_str());
+            return Some((text, source));
+        }
+        Err(error) => error,
+    };
+    let is_missing = matches!(&error, ReadError::Io(error) if error.kind() == ErrorKind::NotFound);
+    let refusal = Diagnostic::new(format!("cannot read the {what} file {shown}: {error}"));
+    report.push(to_start.filter(|_| is_missing).into_iter().fold(refusal, Diagnostic::help));
+    None
+}
 
 /// The table a text holds; what is not TOML is reported, what can be made out of the rest is
 /// returned.

@@ -1,18 +1,17 @@
 //! Checks of the resolved plan as a whole, each pointing back at the numbers it concerns.
 
 use std::collections::BTreeSet;
+use std::iter::{once, repeat};
 
 use sweep_parameter::decimal;
 
-use super::Read;
-use super::draft::Draft;
-use super::report::Diagnostic;
-use super::source::{Location, Sources};
+use super::{Diagnostic, Draft, Location, Sources};
 use crate::method::{Integrator as _, Steps};
-use crate::plan::{MOST_STEPS, Scenario, shortest_step_s};
+use crate::plan::{MOST_STEPS, shortest_step_s};
+use crate::{Model, Scenario};
 
 /// A window that is none, at any corner of the grid.
-pub fn windows<M: Read>(draft: &Draft<'_, M>) {
+pub fn windows<M: Model>(draft: &Draft<'_, M>) {
     let mut reported = BTreeSet::new();
     for corner in 0..draft.plan.corners() {
         if draft.report.is_full() || !reported.is_empty() {
@@ -24,7 +23,7 @@ pub fn windows<M: Read>(draft: &Draft<'_, M>) {
 }
 
 /// A window that constants or axes have turned round, or moved past the end.
-pub fn window<M: Read>(
+pub fn window<M: Model>(
     draft: &Draft<'_, M>,
     scenario: &Scenario<M>,
     reported: &mut BTreeSet<Vec<String>>,
@@ -38,26 +37,20 @@ pub fn window<M: Read>(
     if !reported.insert(concerns.clone()) {
         return;
     }
-    let title = format!(
-        "the window from {} s to {} s does not fit into a run to {} s",
-        decimal(from_s),
-        decimal(to_s),
-        decimal(end_s)
-    );
+    let [from_s, to_s, end_s] = [from_s, to_s, end_s].map(decimal);
+    let title =
+        format!("the window from {from_s} s to {to_s} s does not fit into a run to {end_s} s");
     draft.report.push_with(|sources| {
-        let mut diagnostic = Diagnostic::new(title);
-        for (k, place) in places(draft, &concerns, sources).iter().enumerate() {
-            let label =
-                if k == 0 { "expected window_from_s < window_to_s <= end_s" } else { "and this" };
-            diagnostic = diagnostic.at(place, label);
-        }
-        diagnostic
+        let expected = "expected window_from_s < window_to_s <= end_s";
+        let labels = once(expected).chain(repeat("and this"));
+        let places = places(draft, &concerns, sources);
+        places.iter().zip(labels).fold(Diagnostic::new(title), |all, (at, label)| all.at(at, label))
     });
 }
 
 /// Where the concerned numbers were written: the axes that sweep them first, then files and
 /// arguments.
-pub fn places<M: Read>(
+pub fn places<M: Model>(
     draft: &Draft<'_, M>,
     concerns: &[String],
     sources: &Sources,
@@ -87,35 +80,26 @@ pub fn places<M: Read>(
 }
 
 /// A fixed step that is longer than the run, or so short that a trajectory would never end.
-pub fn steps<M: Read>(draft: &Draft<'_, M>) {
+pub fn steps<M: Model>(draft: &Draft<'_, M>) {
     let Steps::Fixed(step_s) = draft.plan.integrator.steps() else { return };
     let end_s = draft.plan.end_s;
     let steps = end_s / step_s;
+    let [step, end] = [step_s, end_s].map(decimal);
     let title = if step_s > end_s {
-        format!(
-            "a step of {} s is longer than the whole run, {} s",
-            decimal(step_s),
-            decimal(end_s)
-        )
+        format!("a step of {step} s is longer than the whole run, {end} s")
     } else if steps > MOST_STEPS {
-        format!("a step of {} s makes {steps:.1e} steps to {} s", decimal(step_s), decimal(end_s))
+        format!("a step of {step} s makes {steps:.1e} steps to {end} s")
     } else {
         return;
     };
-    let expected =
-        format!("expected a step from {:e} s to {} s", shortest_step_s(end_s), decimal(end_s));
+    let expected = format!("expected a step from {:e} s to {end} s", shortest_step_s(end_s));
     let refusal = refuse_step(draft, title, &expected);
-    draft.report.push(
-        draft
-            .report
-            .place("time.end_s")
-            .into_iter()
-            .fold(refusal, |all, end| all.at(&end, "and this")),
-    );
+    let end = draft.report.place("time.end_s").into_iter();
+    draft.report.push(end.fold(refusal, |all, end| all.at(&end, "and this")));
 }
 
 /// A refusal of the step, pointing at it, or at the section that leaves it out.
-pub fn refuse_step<M: Read>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
+pub fn refuse_step<M: Model>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
     let step = draft.report.place("integrator.step_s").or_else(|| draft.report.place("integrator"));
     step.into_iter().fold(Diagnostic::new(title), |diagnostic, at| diagnostic.at(&at, expected))
 }

@@ -1,8 +1,6 @@
 //! Lists of words, each one of those that there are.
 
-use super::report::{Diagnostic, Report};
-use super::section::{Section, unknown_word};
-use super::source::Located;
+use super::{Diagnostic, Located, Report, Section, unknown_word};
 
 /// A list of some of `all`, each once, by their names; an empty one is a mistake.
 pub fn names<T: Copy + PartialEq>(

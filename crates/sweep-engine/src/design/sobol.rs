@@ -1,5 +1,8 @@
 //! Sobol's sequence, scrambled by Owen's nested permutations through a hash.
 
+use std::array::from_fn;
+use std::sync::LazyLock;
+
 use super::axis_key;
 
 /// Axes that there are direction numbers for.
@@ -48,37 +51,20 @@ const JOE_KUO: [(u32, &[u32]); MOST_AXES - 1] = [
 ];
 
 /// Direction numbers of every dimension, the first bit of a coordinate foremost.
-static DIRECTIONS: [[u32; BITS]; MOST_AXES] = directions();
+static DIRECTIONS: LazyLock<[[u32; BITS]; MOST_AXES]> = LazyLock::new(|| from_fn(directions));
 
-const fn directions() -> [[u32; BITS]; MOST_AXES] {
-    let mut v = [[0; BITS]; MOST_AXES];
-    let mut i = 0;
-    while i < BITS {
-        v[0][i] = 1 << (BITS - 1 - i);
-        i += 1;
-    }
-    let mut axis = 1;
-    while axis < MOST_AXES {
-        let (a, m) = JOE_KUO[axis - 1];
-        let s = m.len();
-        let mut i = 0;
-        while i < BITS {
-            if i < s {
-                v[axis][i] = m[i] << (BITS - 1 - i);
-            } else {
-                let mut next = v[axis][i - s] ^ (v[axis][i - s] >> s);
-                let mut k = 1;
-                while k < s {
-                    if a >> (s - 1 - k) & 1 == 1 {
-                        next ^= v[axis][i - k];
-                    }
-                    k += 1;
-                }
-                v[axis][i] = next;
-            }
-            i += 1;
-        }
-        axis += 1;
+fn directions(axis: usize) -> [u32; BITS] {
+    let Some((a, m)) = axis.checked_sub(1).map(|of| JOE_KUO[of]) else {
+        return from_fn(|i| 1 << (BITS - 1 - i));
+    };
+    let (s, mut v) = (m.len(), [0; BITS]);
+    for i in 0..BITS {
+        v[i] = match i.checked_sub(s) {
+            None => m[i] << (BITS - 1 - i),
+            Some(before) => (1..s)
+                .filter(|k| a >> (s - 1 - k) & 1 == 1)
+                .fold(v[before] ^ (v[before] >> s), |next, k| next ^ v[i - k]),
+        };
     }
     v
 }

@@ -2,12 +2,8 @@
 
 use sweep_files::key;
 
-use super::evolve::{Candidate, front};
-use super::study::Study;
-use crate::config::GridInput;
-use crate::plan::Axis;
-use crate::store::Rows;
-use crate::table::Table;
+use super::{Candidate, Study, front};
+use crate::{Axis, GridInput, Rows, Table};
 
 /// The file of what a study has tried.
 #[must_use]

@@ -6,16 +6,10 @@ use std::sync::Mutex;
 use arrow_schema::ArrowError;
 use rayon::ThreadPool;
 
-use super::evolve::{Candidate, Evolution, evolve};
-use super::study::Study;
+use super::{Candidate, Evolution, Study, evolve};
 use crate::boundary::search::Stopped;
-use crate::effort::Effort;
-use crate::exit::Error;
-use crate::progress::Progress;
-use crate::store::{Done, Key, Layout, ResultRows, Row, StoreError, Trials};
-use crate::swept::Swept;
-use crate::threads;
-use crate::watch::{Engine, Watch};
+use crate::store::{Done, Key, Layout, ResultRows, Row, Trials};
+use crate::{Effort, Engine, Error, Progress, StoreError, Swept, Watch, threads};
 use sweep_files::panics::{lock, unlocked};
 use sweep_results::Goal;
 
@@ -29,9 +23,7 @@ pub fn search<M: Swept>(
     effort: Effort<'_>,
 ) -> Result<(Result<Vec<Candidate>, Stopped>, Option<Trials>), Error> {
     let pool = threads::pool(effort.threads()?)?;
-    let objectives = study.objectives.len();
-    let answers = objectives + study.conditions.len();
-    let there = trials.as_ref().map_or(0, |trials| trials.count() / answers) as u64;
+    let there = trials.as_ref().map_or(0, |trials| trials.count() / study.answers()) as u64;
     let mut asked = Asked {
         study,
         engine: M::engine(&study.plan)?,
@@ -44,7 +36,7 @@ pub fn search<M: Swept>(
     };
     let evolution = Evolution {
         parameters: study.parameters.len(),
-        objectives,
+        objectives: study.objectives.len(),
         population: study.population,
         candidates: study.candidates,
         seed: study.seed,
@@ -153,8 +145,8 @@ impl<M: Swept> Asked<'_, M> {
 
     fn recall(&self, number: u64, values: &[f64]) -> Option<Answers> {
         let trials = lock(&self.trials);
-        let answers = self.study.objectives.len() + self.study.conditions.len();
-        let recalled = (0..answers).map(|k| trials.as_ref()?.recall(&key(number, k, values)));
+        let recalled =
+            (0..self.study.answers()).map(|k| trials.as_ref()?.recall(&key(number, k, values)));
         // Without one number there are none.
         Some(recalled.collect::<Option<Vec<Option<f64>>>>()?.into_iter().collect())
     }
@@ -162,9 +154,8 @@ impl<M: Swept> Asked<'_, M> {
     fn keep(&self, number: u64, values: &[f64], found: &Answers) -> Result<(), StoreError> {
         let mut trials = lock(&self.trials);
         let Some(trials) = trials.as_mut() else { return Ok(()) };
-        let answers = self.study.objectives.len() + self.study.conditions.len();
         let of = |k: usize| found.as_ref().map(|found| found[k]);
-        (0..answers).try_for_each(|k| trials.keep(key(number, k, values), of(k)))
+        (0..self.study.answers()).try_for_each(|k| trials.keep(key(number, k, values), of(k)))
     }
 }
 

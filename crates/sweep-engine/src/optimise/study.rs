@@ -1,6 +1,5 @@
 //! A study file: what is minimised over which parameters, and what must hold.
 
-use std::io::ErrorKind;
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -8,20 +7,16 @@ use sweep_files::FileKind;
 use sweep_parameter::{Parameter as _, Range};
 use sweep_results::{Column, Goal, Mistake, columns};
 
-use crate::config::Draft;
 use crate::config::axes::{add, spacing};
 use crate::config::design::{DEFAULT_SEED, MOST_SEED};
 use crate::config::grid::{draft, name};
 use crate::config::parameters::find;
-use crate::config::report::{Diagnostic, Report};
-use crate::config::section::{Field, Section, listed, twice};
-use crate::config::source::{Located, Location, ReadError, beside, read};
-use crate::config::syntax::parse;
-use crate::config::{Diagnostics, GridInput, whole};
-use crate::design::{Design, MOST_AXES};
-use crate::model::Model;
-use crate::plan::{AxisValues, Plan};
-use crate::store::{Job, Rows};
+use crate::config::section::listed;
+use crate::config::source::beside;
+use crate::config::syntax::{self, parse};
+use crate::config::{Diagnostic, Draft, Field, Located, Location, Report, Section, twice, whole};
+use crate::design::MOST_AXES;
+use crate::{AxisValues, Design, Diagnostics, GridInput, Job, Model, Plan, Rows};
 
 /// Most candidates, most rows that a candidate is tried at, and most parameters.
 const MOST: [u64; 3] = [1_000_000, 100_000, 20];
@@ -88,20 +83,8 @@ impl<M: Rows> Study<M> {
     }
 
     fn read(path: &Path, sets: &[String], report: &Report) -> Option<Self> {
-        let shown = path.display();
-        let text = match read(path) {
-            Ok(text) => text,
-            Err(error) => {
-                let refusal =
-                    Diagnostic::new(format!("cannot read the study file {shown}: {error}"));
-                let is_missing =
-                    matches!(&error, ReadError::Io(error) if error.kind() == ErrorKind::NotFound);
-                let help = "docs/optimise.md has one to start from";
-                report.push(if is_missing { refusal.help(help) } else { refusal });
-                return None;
-            }
-        };
-        let source = report.add(shown.to_string(), text.as_str());
+        let help = "docs/optimise.md has one to start from";
+        let (text, source) = syntax::text(path, "study", Some(help), report)?;
         let table = parse(&text, source, report);
         let root =
             Section::new("the study file", Location::new(source, 0..0), table.get_ref(), report);
@@ -153,6 +136,12 @@ impl<M: Rows> Study<M> {
             candidates,
             seed,
         })
+    }
+
+    /// Numbers that answer a candidate: objectives, then excesses over conditions.
+    #[must_use]
+    pub fn answers(&self) -> usize {
+        self.objectives.len() + self.conditions.len()
     }
 
     /// Rows of a candidate.
@@ -372,11 +361,7 @@ impl Goals<'_> {
         let span = start + mistake.span.start..start + mistake.span.end;
         let at =
             Location::new(found.at.source, if is_plain { span } else { found.at.span.clone() });
-        let diagnostic = Diagnostic::new(mistake.title).at(&at, mistake.expected);
-        self.report.push(match &mistake.candidates {
-            Some((typed, names)) => diagnostic.nearest(typed, names.iter().map(String::as_str)),
-            None => diagnostic,
-        });
+        self.report.push(Diagnostic::of_expression(mistake, &at));
         None
     }
 }

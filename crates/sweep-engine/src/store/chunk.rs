@@ -20,8 +20,7 @@
 
 use std::sync::Arc;
 
-use super::error::StoreError;
-use super::schema::{Column, Done, Layout, Row};
+use super::{Column, Done, Layout, Row, StoreError};
 
 const MAGIC: [u8; 8] = *b"SWEEPCHK";
 const FORMAT: u32 = 5;
@@ -157,15 +156,10 @@ pub(super) fn decode(place: &Place, bytes: &[u8]) -> Result<Vec<Done>, Damage> {
 }
 
 fn header(place: &Place) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(HEADER);
-    bytes.extend_from_slice(&MAGIC);
-    bytes.extend_from_slice(&FORMAT.to_le_bytes());
-    bytes.extend_from_slice(&(place.shape.columns.len() as u32).to_le_bytes());
-    bytes.extend_from_slice(place.plan.as_bytes());
-    for number in [place.chunk, place.first, place.count] {
-        bytes.extend_from_slice(&number.to_le_bytes());
-    }
-    bytes
+    let kind = [FORMAT, place.shape.columns.len() as u32].map(u32::to_le_bytes);
+    let place_bytes = [place.chunk, place.first, place.count].map(u64::to_le_bytes);
+    let plan = place.plan.as_bytes();
+    [&MAGIC, kind.as_flattened(), plan, place_bytes.as_flattened()].concat()
 }
 
 fn record(point: u64, row: &Row, bytes: &mut Vec<u8>) {
@@ -182,12 +176,11 @@ fn record(point: u64, row: &Row, bytes: &mut Vec<u8>) {
 /// Takes a fixed-length record apart; `None` where it makes no sense.
 fn read_record(bytes: &[u8], shape: &Shape) -> Option<(u64, Row)> {
     let columns = &shape.columns;
-    let mut rest = bytes;
-    let point = u64::from_le_bytes(take(&mut rest)?);
-    let (bits, mut rest) = rest.split_at_checked(columns.len().div_ceil(8))?;
+    let (point, rest) = bytes.split_first_chunk()?;
+    let (bits, cells) = rest.split_at_checked(columns.len().div_ceil(8))?;
     let mut row = Row::with_capacity(columns.len());
-    for (k, column) in columns.iter().enumerate() {
-        let number = u64::from_le_bytes(take(&mut rest)?);
+    for (k, (column, cell)) in columns.iter().zip(cells.as_chunks().0).enumerate() {
+        let number = u64::from_le_bytes(*cell);
         let is_there = bits[k / 8] >> (k % 8) & 1 == 1;
         let cell = is_there.then_some(number);
         if !column.takes(cell) || (!is_there && number != 0) {
@@ -195,13 +188,7 @@ fn read_record(bytes: &[u8], shape: &Shape) -> Option<(u64, Row)> {
         }
         row.push(cell);
     }
-    Some((point, row))
-}
-
-fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
-    let (head, tail) = rest.split_first_chunk::<N>()?;
-    *rest = tail;
-    Some(*head)
+    Some((u64::from_le_bytes(*point), row))
 }
 
 #[cfg(test)]

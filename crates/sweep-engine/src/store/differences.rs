@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde_json::Value;
 
+use crate::config::section::cut;
+
 /// One place where two plans part.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlanDifference {
@@ -69,12 +71,7 @@ fn descend(
 
 /// A value on one line; long ones (a whole machine part) are cut.
 fn brief(value: &Value) -> String {
-    const SHOWN: usize = 60;
-    let text = value.to_string();
-    match text.char_indices().nth(SHOWN) {
-        Some((cut, _)) => format!("{}...", &text[..cut]),
-        None => text,
-    }
+    cut(&value.to_string(), 60)
 }
 
 #[cfg(test)]

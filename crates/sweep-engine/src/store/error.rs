@@ -1,6 +1,5 @@
 //! What can go wrong with a run's files, each with the path and what to do about it.
 
-use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +15,7 @@ pub enum StoreError {
     File(#[from] FileError),
     /// Another process runs on this output.
     #[error("{} is in use by {}\n  = help: wait for it to end, or give another \
-             --out", output.display(), Holders(holders))]
+             --out", output.display(), named(holders))]
     Busy {
         /// The output both want.
         output: PathBuf,
@@ -26,11 +25,10 @@ pub enum StoreError {
     /// The run folder belongs to another plan, or was begun by a build that computes other numbers.
     #[error(
         "{} was begun with another plan or by another build:\n{}  = help: end it with that plan \
-         and \
-         build, give another --out, or start over with --fresh (which deletes that folder's \
+         and build, give another --out, or start over with --fresh (which deletes that folder's \
          finished chunks)",
         folder.display(),
-        Differences(differences)
+        listed(differences)
     )]
     PlanDiffers {
         /// The run folder.
@@ -54,7 +52,7 @@ pub enum StoreError {
         "{} already holds the result of another plan or build:\n{}  = help: give another --out, or \
          replace it with --fresh",
         output.display(),
-        Differences(differences)
+        listed(differences)
     )]
     OutputDiffers {
         /// The finished file.
@@ -67,7 +65,7 @@ pub enum StoreError {
     Shard(String),
     /// Chunks are missing, so there is no whole result to write.
     #[error("{} is incomplete: {missing} of {chunks} chunks are missing{}\n  = help: \
-         {}", folder.display(), ShardsMissing(missing_shards), how_to_complete(missing_shards))]
+         {}", folder.display(), of_shards(missing_shards), how_to_complete(missing_shards))]
     Incomplete {
         /// The run folder.
         folder: PathBuf,
@@ -162,11 +160,7 @@ impl StoreError {
             | Self::Shard(_) => true,
             Self::Threads(error) => error.is_refusal(),
             Self::File(error) => error.is_refusal(),
-            Self::Busy { .. }
-            | Self::Incomplete { .. }
-            | Self::NoRun { .. }
-            | Self::Engine { .. }
-            | Self::Parquet { .. } => false,
+            _ => false,
         }
     }
 }
@@ -178,46 +172,29 @@ fn how_to_complete(missing_shards: &Option<String>) -> &'static str {
     }
 }
 
-struct ShardsMissing<'a>(&'a Option<String>);
+fn of_shards(missing: &Option<String>) -> String {
+    missing.as_ref().map_or(String::new(), |list| format!(", of shards {list}"))
+}
 
-impl fmt::Display for ShardsMissing<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            Some(list) => write!(f, ", of shards {list}"),
-            None => Ok(()),
-        }
+fn named(holders: &[Holder]) -> String {
+    let name = |Holder { pid, host, shard }: &Holder| {
+        let shard = shard.map_or(String::new(), |shard| format!(" (shard {shard})"));
+        format!("process {pid} on {host}{shard}")
+    };
+    let first: Vec<String> = holders.iter().take(4).map(name).collect();
+    match holders.len() {
+        0 => "another run".to_owned(),
+        1..=4 => first.join(", "),
+        all => format!("{} and {} more", first.join(", "), all - 4),
     }
 }
 
-struct Holders<'a>(&'a [Holder]);
-
-impl fmt::Display for Holders<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_empty() {
-            return f.write_str("another run");
-        }
-        for (i, holder) in self.0.iter().take(4).enumerate() {
-            let comma = if i > 0 { ", " } else { "" };
-            write!(f, "{comma}process {} on {}", holder.pid, holder.host)?;
-            if let Some(shard) = holder.shard {
-                write!(f, " (shard {shard})")?;
-            }
-        }
-        if self.0.len() > 4 { write!(f, " and {} more", self.0.len() - 4) } else { Ok(()) }
+/// Differences, a line each.
+fn listed(differences: &[PlanDifference]) -> String {
+    const SHOWN: usize = 12;
+    let mut text: String = differences.iter().take(SHOWN).map(|one| format!("  {one}\n")).collect();
+    if differences.len() > SHOWN {
+        text += &format!("  and {} more differences\n", differences.len() - SHOWN);
     }
-}
-
-struct Differences<'a>(&'a [PlanDifference]);
-
-impl fmt::Display for Differences<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const SHOWN: usize = 12;
-        for difference in self.0.iter().take(SHOWN) {
-            writeln!(f, "  {difference}")?;
-        }
-        if self.0.len() > SHOWN {
-            writeln!(f, "  and {} more differences", self.0.len() - SHOWN)?;
-        }
-        Ok(())
-    }
+    text
 }

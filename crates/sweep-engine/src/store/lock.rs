@@ -6,13 +6,13 @@
 //! refused: a scheduler that lost sight of a node does exactly that, and must not wait for the lost
 //! node's lock to expire.
 
+use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::Folder;
-use super::error::{Holder, StoreError};
+use super::{Folder, Holder, LOCK, StoreError};
 use sweep_files::{FileError, atomic, regular};
 
 /// Most bytes of a holder's name.
@@ -36,7 +36,7 @@ pub struct Lock {
 impl Lock {
     /// Makes the folder if need be and takes the whole run's lock, or one shard's share of it.
     pub fn acquire(folder: &Folder, shard: Option<u64>) -> Result<Self, StoreError> {
-        let path = folder.lock();
+        let path = folder.file(LOCK);
         for attempt in 0..ATTEMPTS {
             if attempt > 0 {
                 std::thread::sleep(PAUSE);
@@ -79,14 +79,8 @@ impl Lock {
 
     /// What a user should hear of a file system without locks.
     pub fn note(&self, folder: &Folder) -> Option<String> {
-        let folder = folder.path.display();
-        let note = || {
-            format!(
-                "{folder} is on a file system without locks: make sure that nothing else runs on \
-                 this output"
-            )
-        };
-        self.missing.then(note)
+        let said = "is on a file system without locks: make sure that nothing else runs on this";
+        self.missing.then(|| format!("{} {said} output", folder.path.display()))
     }
 
     /// Deletes the lock's file while it is still held, so that no one can take it over, then lets
@@ -98,13 +92,12 @@ impl Lock {
 
 /// Everyone who holds the folder now, as far as it can be read without disturbing them.
 pub(super) fn holders(folder: &Folder) -> Vec<Holder> {
-    let mut found: Vec<Holder> = shard_locks(folder)
-        .into_iter()
-        .filter_map(|(shard, path)| held_by(&path, Some(shard)))
-        .collect();
+    let locks = shard_locks(folder).into_iter();
+    let mut found: Vec<Holder> =
+        locks.filter_map(|(shard, path)| held_by(&path, Some(shard))).collect();
     // Shards share the folder's lock, and whoever last held it alone has left his name in it.
     if found.is_empty() {
-        found.extend(held_by(&folder.lock(), None));
+        found.extend(held_by(&folder.file(LOCK), None));
     }
     found
 }
@@ -127,7 +120,7 @@ fn refuse_strangers(file: &mut File, path: &Path) -> Result<(), StoreError> {
 }
 
 fn take_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
-    let path = folder.shard_lock(shard);
+    let path = folder.file(format!("shard-{shard}.lock"));
     let mut file =
         regular::open_or_create(&path).map_err(StoreError::io("open the lock", &path))?;
     refuse_strangers(&mut file, &path)?;
@@ -155,11 +148,9 @@ fn no_locks_here(error: &io::Error) -> bool {
 }
 
 fn shard_locks(folder: &Folder) -> Vec<(u64, PathBuf)> {
-    let names = regular::names(&folder.path).unwrap_or_default();
-    let mut found: Vec<(u64, PathBuf)> = names
-        .iter()
-        .filter_map(|name| Some((shard_of_name(name.to_str()?)?, folder.path.join(name))))
-        .collect();
+    let names = regular::names(&folder.path).unwrap_or_default().into_iter();
+    let lock = |name: OsString| Some((shard_of_name(name.to_str()?)?, folder.file(name)));
+    let mut found: Vec<(u64, PathBuf)> = names.filter_map(lock).collect();
     found.sort_unstable();
     found
 }
@@ -232,7 +223,7 @@ mod tests {
         fs::create_dir_all(&folder.path).unwrap();
         let mine = home.path().join("thesis.tex");
         fs::write(&mine, "my thesis").unwrap();
-        for (name, shard) in [(folder.lock(), None), (folder.shard_lock(3), Some(3))] {
+        for (name, shard) in [(folder.file(LOCK), None), (folder.file("shard-3.lock"), Some(3))] {
             std::os::unix::fs::symlink(&mine, &name).unwrap();
             let error = Lock::acquire(&folder, shard).unwrap_err().to_string();
             assert!(error.contains("it is a symbolic link"), "{error}");
@@ -252,10 +243,10 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
         let first = Lock::acquire(&folder, None).unwrap();
-        let stale = regular::open_or_create(&folder.lock()).unwrap();
+        let stale = regular::open_or_create(&folder.file(LOCK)).unwrap();
         first.retire().unwrap();
         stale.try_lock().unwrap();
-        assert!(!atomic::is_named(&stale, &folder.lock()));
+        assert!(!atomic::is_named(&stale, &folder.file(LOCK)));
         Lock::acquire(&folder, None).unwrap();
     }
 }

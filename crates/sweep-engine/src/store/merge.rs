@@ -9,12 +9,11 @@ use parquet::arrow::ArrowWriter;
 use parquet::errors::ParquetError;
 use tempfile::NamedTempFile;
 
-use super::Job;
-use super::error::StoreError;
-use super::open::{OpenRun, remove};
-use super::provenance::{self, Session};
-use super::read::{self, Tally};
-use super::schema::{self, BATCH_ROWS, ResultRows};
+use super::open::remove;
+use super::provenance::{self};
+use super::read::{self};
+use super::schema::{self};
+use super::{BATCH_ROWS, Job, OpenRun, ResultRows, Session, StoreError, Tally};
 use sweep_files::panics;
 use sweep_files::{self as files, ParquetFile, atomic, seal};
 
@@ -40,14 +39,11 @@ impl<'a> MapWriter<'a> {
         let (schema, properties) = (job.layout.schema(), schema::properties(job));
         let handle = file.as_file().try_clone().map_err(StoreError::io("write", output))?;
         let begin = || ArrowWriter::try_new(BufWriter::new(handle), schema, Some(properties));
-        let writer = panics::in_parquet("the library gave up writing", begin)
-            .map_err(StoreError::parquet("write", output))?;
-        Ok(Self { output, file, writer })
+        Ok(Self { output, file, writer: written(output, begin)? })
     }
 
     fn write(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
-        panics::in_parquet("the library gave up writing", || self.writer.write(batch))
-            .map_err(StoreError::parquet("write", self.output))
+        written(self.output, || self.writer.write(batch))
     }
 
     /// The whole file, with its digest.
@@ -56,11 +52,19 @@ impl<'a> MapWriter<'a> {
         // Closing flushes to the file. (Taking the file back out of the writer would tell a full
         // disk as text only.)
         writer.append_key_value_metadata(seal::blank());
-        panics::in_parquet("the library gave up writing", || writer.close())
-            .map_err(StoreError::parquet("write", output))?;
+        written(output, || writer.close())?;
         seal::seal(file.as_file_mut()).map_err(StoreError::io("write", output))?;
         Ok(file)
     }
+}
+
+/// Has the library write.
+fn written<T>(
+    output: &Path,
+    work: impl FnOnce() -> Result<T, ParquetError>,
+) -> Result<T, StoreError> {
+    panics::in_parquet("the library gave up writing", work)
+        .map_err(StoreError::parquet("write", output))
 }
 
 /// Writes the result file of a job whose rows are in memory, in batches of [`BATCH_ROWS`]: the same
@@ -69,13 +73,13 @@ impl<'a> MapWriter<'a> {
 /// # Errors
 /// [`StoreError::File`].
 pub fn write_map(job: &Job<'_>, batches: &[RecordBatch], output: &Path) -> Result<(), StoreError> {
-    files::judge(output, job.layout.file_kind())?;
+    files::judge(output, job.layout.kind)?;
     let folder = atomic::parent(output);
     files::ready(folder)?;
     let mut writer = MapWriter::begin(job, atomic::begin(folder)?, output)?;
     batches.iter().try_for_each(|batch| writer.write(batch))?;
     let file = writer.finish()?;
-    files::judge(output, job.layout.file_kind())?;
+    files::judge(output, job.layout.kind)?;
     Ok(atomic::publish(file, output)?)
 }
 
@@ -123,7 +127,7 @@ impl OpenRun {
         let file = writer.finish()?;
         // Read back before it takes its place: what cannot be read must not replace anything.
         let tally = read::tally(&ParquetFile::open(file.path())?)?;
-        files::judge(&output, job.layout.file_kind())?;
+        files::judge(&output, job.layout.kind)?;
         atomic::publish(file, &output)?;
         Ok(Some(tally))
     }

@@ -8,17 +8,18 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard};
 
 use arrow_schema::SchemaRef;
+use serde_json::json;
 
 use super::chunk::{self, Damage, Place, Shape};
 use super::differences::PlanDifference;
 use super::error::StoreError;
 use super::lock::{self, Lock};
-use super::plan_file::{Found, PlanFile, set_aside};
+use super::plan_file::{Found, PlanFile, pretty, set_aside};
 use super::provenance::{self, Session};
 use super::read::{self, ResultFile, Tally};
 use super::schema::Done;
 use super::shard::{self, Dealing, Shard, ShardRequest};
-use super::{Folder, Job, TRIALS, chunk_of_name, chunk_points};
+use super::{Folder, Job, PLAN, SHARDS, TRIALS, chunk_name, chunk_of_name, chunk_points};
 use crate::threads::Environment;
 use sweep_files::panics::lock;
 use sweep_files::{FileError, ParquetFile, atomic, regular};
@@ -92,18 +93,14 @@ impl OpenRun {
                 folder.path.display()
             )));
         }
-        let lock = Lock::acquire(&folder, dealt.map(|(shard, _)| shard.index))?;
-        let mut notes: Vec<String> = lock.note(&folder).into_iter().collect();
-        if options.fresh {
-            clear(&folder)?;
-        }
-        atomic::clear_leftovers(&folder.path);
-        let finished = || if options.fresh { Ok(None) } else { finished(&folder, job) };
-        if let Some((file, tally)) = agree_on_plan(&folder, job, &mut notes, finished)? {
-            // What a run leaves that dies between publishing its file and removing its folder.
-            remove(&folder, lock);
-            return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
-        }
+        let shard = dealt.map(|(shard, _)| shard.index);
+        let finished = || finished(&folder, job);
+        let (lock, notes) = match claim(&folder, job, options.fresh, shard, finished)? {
+            Claim::Finished((file, tally)) => {
+                return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
+            }
+            Claim::Held(lock, notes) => (lock, notes),
+        };
         if let Some((_, dealing)) = dealt {
             let frozen = dealing.freeze(&folder)?;
             dealt = shard::resolve(options.shard, options.environment, Some(frozen))?;
@@ -179,7 +176,7 @@ impl OpenRun {
             ChunkFile::There(outcomes) => Ok(Some(outcomes)),
             ChunkFile::Absent => Ok(None),
             ChunkFile::Damaged(damage) => {
-                let path = self.folder.chunk(chunk);
+                let path = self.folder.file(chunk_name(chunk));
                 let aside = set_aside(&path)?;
                 self.notes.push(format!(
                     "{}: {damage}; kept as {} and computed again",
@@ -208,7 +205,7 @@ impl OpenRun {
         {
             return Ok(());
         }
-        atomic::write(&self.folder.path, &self.folder.chunk(chunk), &bytes)?;
+        atomic::write(&self.folder.path, &self.folder.file(chunk_name(chunk)), &bytes)?;
         if is_whole {
             self.present().insert(chunk);
         } else {
@@ -304,10 +301,7 @@ impl OpenRun {
         let name =
             format!("session-{}-{}-{}.json", session.host, session.pid, session.started_unix_s);
         let path = self.folder().join(name.replace(['/', '\0'], "_"));
-        let text = serde_json::to_vec_pretty(session)
-            .map_err(io::Error::from)
-            .map_err(StoreError::io("write", &path))?;
-        Ok(atomic::write(self.folder(), &path, &text)?)
+        Ok(atomic::write(self.folder(), &path, &pretty(&json!(session)))?)
     }
 
     /// The error that says which chunks, and of which shards, are missing from the whole.
@@ -334,7 +328,7 @@ pub(super) enum ChunkFile {
 
 /// Reads a chunk's file.
 pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
-    let path = &folder.chunk(place.chunk);
+    let path = &folder.file(chunk_name(place.chunk));
     let mut bytes = Vec::new();
     // A byte too many is enough to know that it is too long.
     let read = regular::open(path)
@@ -376,7 +370,7 @@ pub(super) fn finished(
     }
     // Files of this build carry a digest.
     if !file.is_sealed() {
-        return Err(FileError::Damaged { path: folder.output.clone() }.into());
+        return Err(FileError::damaged(&folder.output).into());
     }
     let tally = read::tally(&file)?;
     Ok(Some((result, tally)))
@@ -392,7 +386,7 @@ pub(super) fn of_plan(
     job: &Job<'_>,
 ) -> Result<Option<(ParquetFile, ResultFile)>, StoreError> {
     let Some(file) = read::finished(&folder.output)? else { return Ok(None) };
-    let result = ResultFile::of(&file, job.layout.file_kind())?;
+    let result = ResultFile::of(&file, job.layout.kind)?;
     if result.plan_hash == job.hash().to_hex().as_str() {
         return Ok(Some((file, result)));
     }
@@ -415,25 +409,42 @@ fn columns_apart(was: &[&str], is: &[&str]) -> PlanDifference {
     PlanDifference { pointer: "/columns".to_owned(), was: only(was, is), is: only(is, was) }
 }
 
-/// Finds this plan frozen in the folder, or freezes it. Where there was none, `finished` has the
-/// first word: what it finds is returned, and nothing is frozen.
-pub(super) fn agree_on_plan<T>(
+/// What claiming an output came to.
+pub(super) enum Claim<T> {
+    /// The output is there, whole, and of this very plan.
+    Finished(T),
+    /// The folder's lock, and what a user should hear of.
+    Held(Lock, Vec<String>),
+}
+
+/// Takes a folder's lock, and finds this plan frozen in the folder or freezes it. Where there was
+/// none, `finished` has the first word unless the work is to start over: nothing is frozen then.
+pub(super) fn claim<T>(
     folder: &Folder,
     job: &Job<'_>,
-    notes: &mut Vec<String>,
+    fresh: bool,
+    shard: Option<u64>,
     finished: impl FnOnce() -> Result<Option<T>, StoreError>,
-) -> Result<Option<T>, StoreError> {
+) -> Result<Claim<T>, StoreError> {
+    let lock = Lock::acquire(folder, shard)?;
+    let mut notes: Vec<String> = lock.note(folder).into_iter().collect();
+    if fresh {
+        clear(folder)?;
+    }
+    atomic::clear_leftovers(&folder.path);
     let ours = PlanFile::of(job);
     match PlanFile::read(folder)? {
         Found::Plan(found) => refuse_other_plan(folder, &found, &ours)?,
         Found::Damaged => {
-            let aside = set_aside(&folder.plan())?;
+            let aside = set_aside(&folder.file(PLAN))?;
             notes.push(format!("the frozen plan was damaged; kept as {}", aside.display()));
             ours.freeze(folder)?;
         }
         Found::Nothing => {
-            if let Some(finished) = finished()? {
-                return Ok(Some(finished));
+            if !fresh && let Some(finished) = finished()? {
+                // What dies between publishing its file and removing its folder leaves that.
+                remove(folder, lock);
+                return Ok(Claim::Finished(finished));
             }
             ours.freeze(folder)?;
             // Another process, a shard, may have been first, with another plan.
@@ -442,11 +453,15 @@ pub(super) fn agree_on_plan<T>(
             }
         }
     }
-    Ok(None)
+    Ok(Claim::Held(lock, notes))
 }
 
 /// Refuses a folder that another plan was begun in.
-fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Result<(), StoreError> {
+pub(super) fn refuse_other_plan(
+    folder: &Folder,
+    found: &PlanFile,
+    ours: &PlanFile,
+) -> Result<(), StoreError> {
     if found == ours {
         return Ok(());
     }
@@ -459,7 +474,7 @@ fn refuse_other_plan(folder: &Folder, found: &PlanFile, ours: &PlanFile) -> Resu
 /// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers'
 /// files stay.
 pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
-    atomic::remove(&folder.plan())?;
+    atomic::remove(&folder.file(PLAN))?;
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         if name.to_str().is_some_and(is_ours) {
             atomic::remove(&folder.path.join(name))?;
@@ -471,7 +486,7 @@ pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
 /// Whether a run writes files of this name into its folder, the lock aside.
 fn is_ours(name: &str) -> bool {
     let whole = name.strip_suffix(".damaged").unwrap_or(name);
-    ["plan.json", "shards.json", TRIALS].contains(&whole)
+    [PLAN, SHARDS, TRIALS].contains(&whole)
         || chunk_of_name(whole).is_some()
         || lock::shard_of_name(name).is_some()
         || provenance::is_session(name)

@@ -7,9 +7,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::differences::{PlanDifference, differences};
-use super::error::StoreError;
-use super::{Folder, Job};
+use super::differences::differences;
+use super::{Folder, Job, PLAN, PlanDifference, StoreError};
 use sweep_files::{atomic, regular};
 
 /// Format of `plan.json`; a folder of another format is another plan.
@@ -61,7 +60,7 @@ impl PlanFile {
 
     /// Reads the plan of a run folder.
     pub(super) fn read(folder: &Folder) -> Result<Found, StoreError> {
-        let path = folder.plan();
+        let path = folder.file(PLAN);
         let text = match regular::read_json(&path) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
@@ -84,7 +83,7 @@ impl PlanFile {
         if text.len() as u64 >= regular::LONGEST_JSON_BYTES {
             return Err(StoreError::LongPlan { folder: folder.path.clone() });
         }
-        atomic::create(&folder.path, &folder.plan(), &text)?;
+        atomic::create(&folder.path, &folder.file(PLAN), &text)?;
         Ok(())
     }
 

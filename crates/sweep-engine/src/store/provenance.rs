@@ -2,14 +2,13 @@
 //! in it.
 
 use std::fs;
-use std::io;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
-use super::error::StoreError;
-use super::read::Tally;
-use super::{Folder, Job};
+use super::plan_file::pretty;
+use super::{Folder, Job, StoreError, Tally};
 use sweep_files::regular;
 
 /// How one process worked on a run.
@@ -41,26 +40,6 @@ pub struct Session {
     pub version: String,
 }
 
-/// The sidecar's content.
-#[derive(Serialize)]
-struct Sidecar<'a> {
-    file: String,
-    version: &'a str,
-    numerics: u32,
-    plan_hash: String,
-    points: u64,
-    /// Sum over the sessions, so shards count as if one after the other.
-    wall_s: f64,
-    points_per_s: f64,
-    host: &'a str,
-    cpus: usize,
-    cpu_model: Option<&'a str>,
-    simd: &'a str,
-    threads: usize,
-    rows: &'a Tally,
-    sessions: &'a [Session],
-}
-
 /// The sidecar: this session and those that were recorded before. Killed sessions left no record.
 pub fn sidecar(
     folder: &Folder,
@@ -75,29 +54,23 @@ pub fn sidecar(
     });
     let wall_s: f64 = sessions.iter().map(|session| session.wall_s).sum();
     let computed: u64 = sessions.iter().map(|session| session.points).sum();
-    let last = sessions.last();
-    let sidecar = Sidecar {
-        file: folder.output.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        version: job.version,
-        numerics: job.numerics,
-        plan_hash: job.hash().to_hex().to_string(),
-        points: job.points,
-        wall_s,
-        points_per_s: if wall_s > 0.0 { computed as f64 / wall_s } else { 0.0 },
-        host: last.map_or("", |session| &session.host),
-        cpus: last.map_or(0, |session| session.cpus),
-        cpu_model: last.and_then(|session| session.cpu_model.as_deref()),
-        simd: last.map_or("", |session| &session.simd),
-        threads: last.map_or(0, |session| session.threads),
-        rows: tally,
-        sessions: &sessions,
-    };
-    let path = folder.sidecar();
-    let mut text = serde_json::to_vec_pretty(&sidecar)
-        .map_err(io::Error::from)
-        .map_err(StoreError::io("write", &path))?;
-    text.push(b'\n');
-    Ok(text)
+    let mut sidecar = json!({
+        "file": folder.output.file_name().unwrap_or_default().to_string_lossy(),
+        "version": job.version,
+        "numerics": job.numerics,
+        "plan_hash": job.hash().to_hex().as_str(),
+        "points": job.points,
+        // Sum over the sessions, so shards count as if one after the other.
+        "wall_s": wall_s,
+        "points_per_s": if wall_s > 0.0 { computed as f64 / wall_s } else { 0.0 },
+        "rows": tally,
+        "sessions": sessions,
+    });
+    let last = json!(sessions.last());
+    for key in ["host", "cpus", "cpu_model", "simd", "threads"] {
+        sidecar[key] = last[key].clone();
+    }
+    Ok(pretty(&sidecar))
 }
 
 /// Sessions on record; one that cannot be read is left out.

@@ -96,7 +96,7 @@ pub struct Tally {
     /// Rows.
     pub points: u64,
     /// Rows by status.
-    pub by_status: StatusCounts,
+    pub by_status: NameCounts,
     /// Rows whose ratio is below the limit.
     pub reliable: u64,
     /// Rows whose ratio is at or above the limit.
@@ -113,7 +113,7 @@ pub struct Tally {
     /// Rows whose error is above the accuracy asked for.
     pub unconverged: u64,
     /// Rows by the method that their numbers come from, where the file says so.
-    pub by_method: BTreeMap<String, u64>,
+    pub by_method: NameCounts,
     /// The greatest error left in a row.
     pub greatest_error: Option<Extreme>,
     /// The greatest ratio.
@@ -144,25 +144,22 @@ pub struct DwellCounts {
     pub unknown: u64,
 }
 
-/// Rows by status.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(transparent)]
-pub struct StatusCounts(BTreeMap<String, u64>);
+/// How often each name occurs.
+pub type NameCounts = BTreeMap<String, u64>;
 
-impl StatusCounts {
-    /// The statuses that occur, and how often.
-    pub fn iter(&self) -> impl Iterator<Item = (&str, u64)> + '_ {
-        self.0.iter().map(|(name, count)| (name.as_str(), *count))
-    }
+/// Rows by status, without those that are `ok`.
+pub fn failures(by_status: &NameCounts) -> impl Iterator<Item = (&String, &u64)> {
+    by_status.iter().filter(|(status, _)| *status != "ok")
+}
 
-    /// Rows whose status is not `ok`.
-    pub fn failed(&self) -> u64 {
-        self.iter().filter(|(name, _)| *name != "ok").map(|(_, count)| count).sum()
-    }
+/// Rows whose status is not `ok`.
+pub fn failed(by_status: &NameCounts) -> u64 {
+    failures(by_status).map(|(_, count)| count).sum()
+}
 
-    pub(crate) fn add(&mut self, status: &str) {
-        *self.0.entry(status.to_owned()).or_default() += 1;
-    }
+/// Counts one more of a name.
+pub(super) fn add(counts: &mut NameCounts, name: &str) {
+    *counts.entry(name.to_owned()).or_default() += 1;
 }
 
 /// Counts a result file's rows, in bounded memory.
@@ -213,7 +210,7 @@ fn count(
         ParquetError::General(format!("column `point` is of type {}", points.data_type()))
     })?;
     for name in cells::texts(column("status")?)?.into_iter().flatten() {
-        tally.by_status.add(name);
+        add(&mut tally.by_status, name);
     }
     tally.points += batch.num_rows() as u64;
     if let Some(stable) = batch.column_by_name("stable") {
@@ -260,7 +257,7 @@ fn count(
         tally.unconverged += cells::flags(converged)?.false_count() as u64;
     }
     for name in cells::texts(column("method")?)?.into_iter().flatten() {
-        *tally.by_method.entry(name.to_owned()).or_default() += 1;
+        add(&mut tally.by_method, name);
     }
     let extreme = |name: &str, best: &mut Option<Extreme>, better: fn(f64, f64) -> bool| {
         let Some(column) = batch.column_by_name(name) else { return Ok(()) };

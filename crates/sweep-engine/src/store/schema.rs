@@ -2,6 +2,7 @@
 //! the file. A row is kept by its cells, so that neither unfinished work nor joining knows what a
 //! model computes.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use arrow_array::types::Int32Type;
@@ -9,16 +10,14 @@ use arrow_array::{
     ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray,
     UInt64Array,
 };
-use arrow_schema::ArrowError;
-use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 use parquet::schema::types::ColumnPath;
-use serde_json::{Map, Value};
+use serde_json::{Value, json};
 
 use super::Job;
-use crate::table::{dictionary_entry, field_metadata};
 use sweep_files::{CREATED_BY, FileKind, key};
 use sweep_parameter::{Limit, Worse};
 
@@ -127,12 +126,32 @@ impl Column {
             Kind::Flag => (DataType::Boolean, true),
             Kind::Name(_) => (names(), true),
         };
-        let mut metadata = field_metadata(&self.unit, &self.description);
+        self.declared(data_type, nullable)
+    }
+
+    /// The field of such data, with what the file says of the column.
+    pub(crate) fn declared(&self, data_type: DataType, nullable: bool) -> Field {
+        let told = [("unit", &self.unit), ("description", &self.description)];
+        let told = told.map(|(key, text)| (key.to_owned(), text.clone()));
         let of_worth = self.of_worth().map(|(key, value)| {
             (key.to_owned(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
         });
-        metadata.extend(of_worth);
+        let metadata: HashMap<String, String> = told.into_iter().chain(of_worth).collect();
         Field::new(&self.name, data_type, nullable).with_metadata(metadata)
+    }
+
+    /// Its entry in the column dictionary, the JSON under `key::COLUMNS`: type, unit, description.
+    pub(crate) fn entry(&self) -> (String, Value) {
+        let type_name = match self.kind {
+            Kind::Count | Kind::KnownCount => "uint64",
+            Kind::Axis | Kind::Measured | Kind::Time => "float64",
+            Kind::Flag => "bool",
+            Kind::Name(_) => "string",
+        };
+        let mut entry =
+            json!({ "type": type_name, "unit": self.unit, "description": self.description });
+        self.of_worth().for_each(|(key, value)| entry[key] = value);
+        (self.name.clone(), entry)
     }
 
     /// Which way it is bad, and up to where it is good, as the file says them.
@@ -174,24 +193,9 @@ impl Column {
             (Kind::Name(names), Some(name)) => name < names.len() as u64,
         }
     }
-
-    /// Name of the type in the column dictionary.
-    const fn type_name(&self) -> &'static str {
-        match self.kind {
-            Kind::Count | Kind::KnownCount => "uint64",
-            Kind::Axis | Kind::Measured | Kind::Time => "float64",
-            Kind::Flag => "bool",
-            Kind::Name(_) => "string",
-        }
-    }
 }
 
 impl Layout {
-    /// The kind of the result file.
-    pub(crate) const fn file_kind(&self) -> FileKind<'static> {
-        self.kind
-    }
-
     /// Every column, in order.
     fn all(&self) -> impl Iterator<Item = &Column> + Clone {
         static POINT: std::sync::LazyLock<Column> = std::sync::LazyLock::new(|| {
@@ -209,16 +213,6 @@ impl Layout {
     pub fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column.name == name)
     }
-
-    /// The column dictionary: name to type, unit and description.
-    fn dictionary(&self) -> Value {
-        let entry = |column: &Column| {
-            let mut entry = dictionary_entry(column.type_name(), &column.unit, &column.description);
-            column.of_worth().for_each(|(key, value)| entry[key] = value);
-            (column.name.clone(), entry)
-        };
-        Value::Object(self.all().map(entry).collect::<Map<_, _>>())
-    }
 }
 
 /// Writer settings and metadata of a result file. Nothing in them depends on when, where or how the
@@ -230,17 +224,22 @@ pub fn properties(job: &Job<'_>) -> WriterProperties {
         pair(key::PLAN_HASH, job.hash().to_hex().to_string()),
         pair(key::VERSION, job.version.to_owned()),
         pair(key::NUMERICS, job.numerics.to_string()),
-        pair(key::COLUMNS, job.layout.dictionary().to_string()),
+        pair(key::COLUMNS, job.layout.all().map(Column::entry).collect::<Value>().to_string()),
     ];
     metadata.extend(job.layout.metadata.iter().map(|(key, value)| pair(key, value.to_string())));
-    let builder = WriterProperties::builder()
-        // The library's own default names its version, and an upgrade would change the bytes.
-        .set_created_by(format!("{CREATED_BY}{}", job.version))
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+    let builder = writer(job.version, metadata)
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
-        .set_max_row_group_bytes(None)
-        .set_key_value_metadata(Some(metadata));
+        .set_max_row_group_bytes(None);
     job.layout.all().fold(builder, encoding).build()
+}
+
+/// Settings of every file that this program writes.
+pub(crate) fn writer(version: &str, metadata: Vec<KeyValue>) -> WriterPropertiesBuilder {
+    WriterProperties::builder()
+        // The library's own default names its version, and an upgrade would change the bytes.
+        .set_created_by(format!("{CREATED_BY}{version}"))
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_key_value_metadata(Some(metadata))
 }
 
 fn encoding(builder: WriterPropertiesBuilder, column: &Column) -> WriterPropertiesBuilder {

@@ -11,10 +11,9 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::Folder;
-use super::error::StoreError;
 use super::plan_file::pretty;
-use crate::threads::Environment;
+use super::{Folder, SHARDS, StoreError};
+use crate::Environment;
 use sweep_files::{atomic, regular};
 
 /// More parts than any scheduler's array has tasks; a bound for loops over them.
@@ -88,7 +87,7 @@ impl Dealing {
     /// The number of shards of a run folder, if any shard has started. An unreadable file counts as
     /// none: it only says who computes a chunk, never what is in it.
     pub(super) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
-        let path = folder.shards();
+        let path = folder.file(SHARDS);
         match regular::read_json(&path) {
             Ok(text) => Ok(serde_json::from_slice(&text)
                 .ok()
@@ -114,7 +113,7 @@ impl Dealing {
     /// Writes the dealing unless another shard was first, and says what holds.
     pub(super) fn freeze(self, folder: &Folder) -> Result<Self, StoreError> {
         let text = pretty(&json!(self));
-        let path = folder.shards();
+        let path = folder.file(SHARDS);
         if atomic::create(&folder.path, &path, &text)? {
             return Ok(self);
         }
@@ -141,41 +140,35 @@ pub(super) fn resolve(
     frozen: Option<Dealing>,
 ) -> Result<Option<(Shard, Dealing)>, StoreError> {
     let refuse = |text: String| Err(StoreError::Shard(text));
+    let other = |shards: u64, asked: u64, help: String| {
+        refuse(format!(
+            "this run was dealt into {shards} shards by the first to start, not {asked}\n  = help: \
+             use --shard {help}"
+        ))
+    };
     if let Some(ShardRequest::Given(shard)) = request {
         let dealing = frozen.unwrap_or(Dealing { shards: shard.of, first_array_id: 1 });
-        if dealing.shards != shard.of {
-            return refuse(format!(
-                "this run was dealt into {} shards by the first to start, not {}\n  = help: use \
-                 --shard I/{}, or run it \
-                 whole without --shard",
-                dealing.shards, shard.of, dealing.shards
-            ));
+        let shards = dealing.shards;
+        if shards != shard.of {
+            let help = format!("I/{shards}, or run it whole without --shard");
+            return other(shards, shard.of, help);
         }
         return Ok(Some((shard, dealing)));
     }
-    let asked = match request {
-        Some(ShardRequest::Auto { of }) => Some(of),
-        _ => None,
-    };
+    let asked =
+        request.map(|(ShardRequest::Auto { of } | ShardRequest::Given(Shard { of, .. }))| of);
     let Some(scheduler) = Scheduler::read(environment)? else {
         return match asked {
             None => Ok(None),
             Some(of) => refuse(format!(
                 "--shard auto/{of} takes its place from SLURM_ARRAY_TASK_ID or \
-                 JOB_COMPLETION_INDEX, and neither is \
-                 set\n  = help: give it as --shard I/{of}"
+                 JOB_COMPLETION_INDEX, and neither is set\n  = help: give it as --shard I/{of}"
             )),
         };
     };
     let dealing = match (frozen, asked.or(scheduler.count)) {
-        (Some(dealing), _) if asked.is_some_and(|of| of != dealing.shards) => {
-            return refuse(format!(
-                "this run was dealt into {} shards by the first to start, not {}\n  = help: use \
-                 --shard auto/{}",
-                dealing.shards,
-                asked.unwrap_or_default(),
-                dealing.shards
-            ));
+        (Some(Dealing { shards, .. }), Some(of)) if asked.is_some() && of != shards => {
+            return other(shards, of, format!("auto/{shards}"));
         }
         (Some(dealing), _) => dealing,
         (None, Some(shards)) => Dealing { shards, first_array_id: scheduler.first },
@@ -215,12 +208,9 @@ impl Scheduler {
     fn read(environment: Environment<'_>) -> Result<Option<Self>, StoreError> {
         let number = |name: &'static str| match environment(name) {
             None => Ok(None),
-            Some(text) => match text.parse::<u64>() {
-                Ok(number) => Ok(Some(number)),
-                Err(_) => {
-                    Err(StoreError::Shard(format!("{name} is `{text}`, which is not a number")))
-                }
-            },
+            Some(text) => text.parse::<u64>().map(Some).map_err(|_| {
+                StoreError::Shard(format!("{name} is `{text}`, which is not a number"))
+            }),
         };
         if let Some(id) = number("SLURM_ARRAY_TASK_ID")? {
             let first = number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(id);

@@ -5,14 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::chunk::{Place, Shape};
-use super::error::{Holder, StoreError};
 use super::open::{self, ChunkFile, chunks_there, read_chunk};
 use super::plan_file::{Found, PlanFile};
-use super::read::StatusCounts;
-use super::schema::{Done, Kind};
+use super::read::{NameCounts, add, failed};
 use super::shard::{self, Dealing};
-use super::{Folder, Job, chunk_points, lock};
+use super::{Done, Folder, Holder, Job, Kind, Place, Shape, StoreError, chunk_points, lock};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -43,7 +40,7 @@ pub struct FolderStatus {
     /// Of those, rows whose status is not `ok`.
     pub points_failed: u64,
     /// Rows that are there, by status.
-    pub by_status: StatusCounts,
+    pub by_status: NameCounts,
     /// Chunks of the whole.
     pub chunks: u64,
     /// Chunks that are there and whole.
@@ -81,14 +78,9 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     };
     let (ours, hash) = (PlanFile::of(job), job.hash());
     match PlanFile::read(&folder)? {
-        Found::Plan(found) if *found != ours => {
-            return Err(StoreError::PlanDiffers {
-                folder: folder.path,
-                differences: found.differences(&ours),
-            });
-        }
+        Found::Plan(found) => open::refuse_other_plan(&folder, &found, &ours)?,
         Found::Nothing => return finished(&folder, job, status),
-        Found::Plan(_) | Found::Damaged => {}
+        Found::Damaged => {}
     }
     let place = |chunk: u64| {
         let first = chunk * points_a_chunk;
@@ -110,7 +102,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
                     present.insert(chunk);
                 }
                 status.points_done += points.len() as u64;
-                points.iter().filter_map(name).for_each(|name| status.by_status.add(name));
+                points.iter().filter_map(name).for_each(|name| add(&mut status.by_status, name));
             }
             ChunkFile::Damaged(_) => status.chunks_damaged.push(chunk),
             // The run was finished, or the chunk set aside, a moment ago.
@@ -118,7 +110,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         }
     }
     status.chunks_done = present.len() as u64;
-    status.points_failed = status.by_status.failed();
+    status.points_failed = failed(&status.by_status);
     status.chunks_missing = chunks - status.chunks_done;
     status.state = if status.chunks_missing == 0 { State::Complete } else { State::Unfinished };
     status.running = lock::holders(&folder);
@@ -144,7 +136,7 @@ fn finished(
     if let Some((_, tally)) = open::finished(folder, job)? {
         status.state = State::Finished;
         status.points_done = tally.points;
-        status.points_failed = tally.by_status.failed();
+        status.points_failed = failed(&tally.by_status);
         status.by_status = tally.by_status;
         status.chunks_done = status.chunks;
         status.chunks_missing = 0;

@@ -21,12 +21,10 @@ use std::fs::File;
 use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::error::StoreError;
-use super::lock::Lock;
-use super::open;
+use super::open::{self, Claim};
 use super::plan_file::set_aside;
-use super::{Folder, Job, TRIALS};
-use sweep_files::{FileError, atomic, regular};
+use super::{Folder, Job, Lock, StoreError, TRIALS};
+use sweep_files::{FileError, regular};
 
 /// Bytes of a point and its answer.
 const CONTENT_BYTES: usize = 32;
@@ -73,19 +71,12 @@ impl Trials {
         if !fresh && !folder.path.exists() && is_finished(&folder, job)? {
             return Ok(OpenedTrials::Finished);
         }
-        let lock = Lock::acquire(&folder, None)?;
-        let mut notes: Vec<String> = lock.note(&folder).into_iter().collect();
-        if fresh {
-            open::clear(&folder)?;
-        }
-        atomic::clear_leftovers(&folder.path);
-        let finished = || Ok((!fresh && is_finished(&folder, job)?).then_some(()));
-        if open::agree_on_plan(&folder, job, &mut notes, finished)?.is_some() {
-            // What a search leaves that dies between publishing its file and removing its folder.
-            open::remove(&folder, lock);
-            return Ok(OpenedTrials::Finished);
-        }
-        let path = folder.path.join(TRIALS);
+        let finished = || Ok(is_finished(&folder, job)?.then_some(()));
+        let (lock, mut notes) = match open::claim(&folder, job, fresh, None, finished)? {
+            Claim::Finished(()) => return Ok(OpenedTrials::Finished),
+            Claim::Held(lock, notes) => (lock, notes),
+        };
+        let path = folder.file(TRIALS);
         let plan = *job.hash().as_bytes();
         let (mut file, found, known) = contents(&path, &plan)?;
         if known.is_empty() && found > 0 {
@@ -174,41 +165,27 @@ fn is_finished(folder: &Folder, job: &Job<'_>) -> Result<bool, StoreError> {
     let Some((file, _)) = open::of_plan(folder, job)? else { return Ok(false) };
     // Files of this build carry a digest.
     if !file.is_sealed() {
-        return Err(FileError::Damaged { path: folder.output.clone() }.into());
+        return Err(FileError::damaged(&folder.output).into());
     }
     Ok(true)
 }
 
-fn encode(plan: &[u8; blake3::OUT_LEN], key: Key, answer: Option<f64>) -> [u8; RECORD_BYTES] {
-    let mut record = [0; RECORD_BYTES];
-    let answer = answer.unwrap_or(f64::NAN).to_bits();
-    for (place, word) in record.chunks_exact_mut(8).zip(key.into_iter().chain([answer])) {
-        place.copy_from_slice(&word.to_le_bytes());
-    }
-    let check = check(plan, &record[..CONTENT_BYTES]);
-    record[CONTENT_BYTES..].copy_from_slice(&check);
-    record
+fn encode(plan: &[u8; blake3::OUT_LEN], key: Key, answer: Option<f64>) -> Vec<u8> {
+    let [a, b, c] = key;
+    let content = [a, b, c, answer.unwrap_or(f64::NAN).to_bits()].map(u64::to_le_bytes);
+    [content.as_flattened(), &check(plan, content.as_flattened())].concat()
 }
 
 fn decode(plan: &[u8; blake3::OUT_LEN], record: &[u8]) -> Option<(Key, Option<f64>)> {
     let (content, found) = record.split_at_checked(CONTENT_BYTES)?;
-    if check(plan, content) != found {
-        return None;
-    }
-    let mut words = content.chunks_exact(8).map(|word| word.try_into().map(u64::from_le_bytes));
-    let mut word = || words.next()?.ok();
-    let key = [word()?, word()?, word()?];
-    let answer = f64::from_bits(word()?);
-    Some((key, if answer.is_nan() { None } else { Some(answer) }))
+    let &[a, b, c, answer] = content.as_chunks().0 else { return None };
+    let [a, b, c, answer] = [a, b, c, answer].map(u64::from_le_bytes);
+    let answer = Some(f64::from_bits(answer)).filter(|answer| !answer.is_nan());
+    (check(plan, content) == found).then_some(([a, b, c], answer))
 }
 
 fn check(plan: &[u8; blake3::OUT_LEN], content: &[u8]) -> [u8; RECORD_BYTES - CONTENT_BYTES] {
-    let hash = blake3::keyed_hash(plan, content);
-    let mut check = [0; RECORD_BYTES - CONTENT_BYTES];
-    for (to, from) in check.iter_mut().zip(hash.as_bytes()) {
-        *to = *from;
-    }
-    check
+    blake3::keyed_hash(plan, content).as_bytes().first_chunk().copied().unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -57,8 +57,8 @@ fn page(command: &clap::Command, name: &str, examples: Examples) -> io::Result<V
     }
     let mut rest = Roff::new();
     rest.control("SH", ["EXIT STATUS"]);
-    for exit in Exit::ALL {
-        rest.control("TP", []).text([bold((exit as u8).to_string())]).text([roman(exit.meaning())]);
+    for (exit, meaning) in Exit::ALL {
+        rest.control("TP", []).text([bold((exit as u8).to_string())]).text([roman(meaning)]);
     }
     rest.control("SH", ["EXAMPLES"]);
     for [line, does] in examples {

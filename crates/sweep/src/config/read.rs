@@ -2,9 +2,9 @@
 
 use serde_json::{Map, Value, json};
 use sweep_engine::Schema;
-use sweep_engine::config::scalars::Written;
 use sweep_engine::config::section::Section;
 use sweep_engine::config::words::names;
+use sweep_engine::config::written::Written;
 use sweep_engine::config::{Draft, Read};
 use washer_row::{Criterion, Measures, Metric};
 

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use sweep_engine::config::Draft;
-use sweep_engine::config::scalars::Written;
+use sweep_engine::config::written::Written;
 use washer_row::{Criterion, Metric};
 
 use super::spin;

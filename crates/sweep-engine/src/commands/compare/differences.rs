@@ -6,8 +6,7 @@ use parquet::errors::ParquetError;
 use serde_json::json;
 
 use super::Args;
-use crate::build::Build;
-use crate::table::Table;
+use crate::{Build, Table};
 use sweep_files::key;
 use sweep_parameter::Worse;
 use sweep_results::{Comparison, ResultTable, SharedRow};

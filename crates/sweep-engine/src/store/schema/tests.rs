@@ -6,7 +6,7 @@ use crate::store::synthetic;
 #[test]
 fn every_field_carries_unit_and_description() {
     let layout = synthetic::layout();
-    let dictionary = layout.dictionary();
+    let dictionary: Value = layout.all().map(Column::entry).collect();
     for field in layout.schema().fields() {
         let unit = &field.metadata()["unit"];
         assert_eq!(dictionary[field.name()]["unit"], unit.as_str());

@@ -1,0 +1,81 @@
+//! Arguments NAME=VALUE of the command line.
+
+use sweep_parameter::Range;
+
+use super::section::check_number;
+use super::words::some_of;
+use super::{Located, Location, Report, quoted, short, unknown_word};
+
+/// One argument NAME=VALUE, taken apart.
+pub struct Written<'a> {
+    /// What is set.
+    pub name: Located<&'a str>,
+    /// To what.
+    pub value: Located<&'a str>,
+    report: &'a Report,
+}
+
+impl<'a> Written<'a> {
+    /// Takes an option's argument apart.
+    pub fn read(option: &str, argument: &'a str, report: &'a Report) -> Option<Self> {
+        let source = report.add(option, argument);
+        let located =
+            |value: &'a str, span| Located { value: value.trim(), at: Location::new(source, span) };
+        match argument.split_once('=') {
+            Some((name, value)) => {
+                let equals = name.len();
+                let name = located(name, 0..equals);
+                Some(Self { name, value: located(value, equals + 1..argument.len()), report })
+            }
+            None => {
+                let title = format!("`{}` is not a constant", short(argument));
+                let whole = Location::new(source, 0..argument.len());
+                report.refuse(&whole, title, "expected NAME=VALUE")
+            }
+        }
+    }
+
+    /// The number, in a range.
+    pub fn number(&self, range: Range) -> Option<Located<f64>> {
+        let at = self.value.at.clone();
+        match self.value.value.parse() {
+            Ok(number) => check_number(&quoted(self.name.value), number, at, range, self.report),
+            Err(_) => {
+                let title = format!("`{}` is not a number", short(self.value.value));
+                self.report.refuse(&at, title, format!("expected {range}"))
+            }
+        }
+    }
+
+    /// A whole number within bounds.
+    pub fn whole(&self, least: u64, most: u64) -> Option<u64> {
+        let number = self.value.value.parse::<u64>().ok();
+        number.filter(|number| (least..=most).contains(number)).or_else(|| {
+            let title = format!("`{}` is no such number", short(self.value.value));
+            let expected = format!("expected a whole number from {least} to {most}");
+            self.report.refuse(&self.value.at, title, expected)
+        })
+    }
+
+    /// One of a few words, by its place.
+    pub fn choice(&self, choices: &[&str]) -> Option<usize> {
+        let place = choices.iter().position(|choice| *choice == self.value.value);
+        if place.is_none() {
+            self.report.push_with(|_| unknown_word(self.name.value, &self.value, choices));
+        }
+        place
+    }
+
+    /// Names separated by commas, each once and at least one.
+    pub fn list<T: Copy + PartialEq>(
+        &self,
+        what: &str,
+        all: &[T],
+        name: fn(T) -> &'static str,
+    ) -> Option<Vec<T>> {
+        let Located { value, at } = &self.value;
+        let parts = value.split(',').map(|part| Located { value: part.trim(), at: at.clone() });
+        let (chosen, is_sound) = some_of(parts, what, all, name, self.report);
+        is_sound.then_some(chosen)
+    }
+}
