@@ -24,12 +24,12 @@ pub(crate) struct Tick {
 
 impl Scale {
     /// An even scale from one value to another.
-    pub(crate) fn linear(from: f64, to: f64) -> Self {
+    pub(crate) const fn linear(from: f64, to: f64) -> Self {
         Self { log: false, from, to }
     }
 
     /// A logarithmic scale between two positive values.
-    pub(crate) fn log(from: f64, to: f64) -> Self {
+    pub(crate) const fn log(from: f64, to: f64) -> Self {
         Self { log: true, from, to }
     }
 

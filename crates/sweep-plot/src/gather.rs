@@ -114,7 +114,7 @@ impl Map {
     ) -> Result<Self, PlotError> {
         let mut gather = Gather::new(&source, &grid, columns, divide);
         let mut wanted = columns.to_vec();
-        wanted.extend(grid.axes.iter().map(|axis| axis.name.as_str()));
+        wanted.extend(grid.axes.iter().map(|axis| axis.swept.name.as_str()));
         wanted.extend(["status", "reliable", "sensitive", "ratio_max"]);
         wanted.sort_unstable();
         wanted.dedup();
@@ -318,7 +318,7 @@ impl<'a> Gather<'a> {
     fn cells(&mut self, batch: &Batch<'_>) -> Result<Vec<Option<usize>>, PlotError> {
         let mut cells = vec![Some(0_usize); batch.rows];
         for (axis, last) in self.grid.axes.iter().zip(&mut self.last) {
-            for (cell, value) in cells.iter_mut().zip(batch.numbers(&axis.name)?) {
+            for (cell, value) in cells.iter_mut().zip(batch.numbers(&axis.swept.name)?) {
                 if value != last.0 {
                     *last = (value, GridAxis::place(axis, value));
                 }

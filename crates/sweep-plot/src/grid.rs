@@ -8,14 +8,8 @@ use super::swept::{MOST_VALUES, SweptAxis};
 /// A swept parameter as the map shows it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GridAxis {
-    /// Name of the parameter.
-    pub(crate) name: String,
-    /// Its name in words.
-    pub(crate) words: String,
-    /// Unit of the values.
-    pub(crate) unit: String,
-    /// Better shown by the logarithm.
-    pub(crate) log: bool,
+    /// The parameter with its values.
+    pub(crate) swept: SweptAxis,
     /// Rising: the value of each place, of a block the middle.
     pub(crate) values: Vec<f64>,
     /// The borders of the cells around the values, one more than those: halfway between neighbours.
@@ -29,9 +23,9 @@ pub(crate) struct GridAxis {
 #[derive(Clone, Debug, PartialEq)]
 enum Places {
     /// This many neighbouring values share a place, fewer the last one.
-    Blocks { values: Vec<f64>, size: usize },
-    /// These values have a place, and no others.
-    Picked(Vec<f64>),
+    Blocks(usize),
+    /// The values have a place, and no others.
+    Picked,
     /// The borders place a value, where an axis is known by its range alone.
     Borders,
 }
@@ -61,9 +55,8 @@ impl GridAxis {
             let spans = starts.clone().map(|start| ends(start).map(|end| axis.values[end]));
             (starts.clone().map(|start| middle(ends(start))).collect(), Some(spans.collect()))
         };
-        let places = Places::Blocks { values: axis.values.clone(), size };
         let borders = borders.into_iter().map(|border| un_even(border, axis.log)).collect();
-        Self { spans, places, ..Self::new(axis, values, borders) }
+        Self { spans, places: Places::Blocks(size), ..Self::new(axis, values, borders) }
     }
 
     /// An axis known by its range alone, in `count` equal parts.
@@ -81,39 +74,44 @@ impl GridAxis {
     fn picked(axis: &SweptAxis, picks: &[usize]) -> Self {
         let values: Vec<f64> = picks.iter().map(|&pick| axis.values[pick]).collect();
         let shown = SweptAxis { values, ..axis.clone() };
-        let places = Places::Picked(shown.values.clone());
-        Self { places, ..Self::in_blocks(&shown, 1) }
+        Self { places: Places::Picked, ..Self::in_blocks(&shown, 1) }
     }
 
     fn new(axis: &SweptAxis, values: Vec<f64>, borders: Vec<f64>) -> Self {
-        let SweptAxis { name, words, unit, log, .. } = axis.clone();
-        Self { name, words, unit, log, values, borders, spans: None, places: Places::Borders }
+        Self { swept: axis.clone(), values, borders, spans: None, places: Places::Borders }
     }
 
     /// From the first border to the last.
     pub(crate) fn scale(&self) -> Scale {
-        Scale { log: self.log, from: self.borders[0], to: self.borders[self.borders.len() - 1] }
+        Scale {
+            log: self.swept.log,
+            from: self.borders[0],
+            to: self.borders[self.borders.len() - 1],
+        }
     }
 
     /// Words and unit.
     pub(crate) fn label(&self) -> String {
-        label::with_unit(&self.words, &self.unit)
+        label::with_unit(&self.swept.words, &self.swept.unit)
     }
 
     /// The values in the units in which the axis is even.
     pub(crate) fn even(&self) -> Vec<f64> {
-        evened(&self.values, self.log)
+        evened(&self.values, self.swept.log)
+    }
+
+    /// The value of which [`GridAxis::even`] is this.
+    pub(crate) fn un_even(&self, even: f64) -> f64 {
+        un_even(even, self.swept.log)
     }
 
     /// The place that one of the axis' values belongs to; none if it is not shown.
     pub(crate) fn place(&self, value: f64) -> Option<usize> {
-        let below = |known: &f64| *known < value;
-        match &self.places {
-            Places::Blocks { values, size } => {
-                Some(values.partition_point(below).min(values.len() - 1) / size)
-            }
-            Places::Picked(values) => {
-                let place = values.partition_point(below);
+        let values = &self.swept.values;
+        let place = values.partition_point(|known| *known < value);
+        match self.places {
+            Places::Blocks(size) => Some(place.min(values.len() - 1) / size),
+            Places::Picked => {
                 values.get(place).is_some_and(|known| *known == value).then_some(place)
             }
             Places::Borders => {
@@ -126,19 +124,18 @@ impl GridAxis {
     /// The place of the axis' value that a number is, but for what writing it as text may have
     /// lost.
     pub(crate) fn place_near(&self, value: f64) -> Option<usize> {
-        let values = match &self.places {
-            Places::Blocks { values, .. } | Places::Picked(values) => values,
-            Places::Borders => return self.place(value),
-        };
-        let known = values.iter().find(|&&known| SweptAxis::near(known, value))?;
+        if self.places == Places::Borders {
+            return self.place(value);
+        }
+        let known = self.swept.values.iter().find(|&&known| SweptAxis::near(known, value))?;
         self.place(*known)
     }
 
     /// How many of the axis' values share a place; none where that is not known.
     fn shared(&self, place: usize) -> Option<usize> {
-        match &self.places {
-            Places::Blocks { values, size } => Some((*size).min(values.len() - place * size)),
-            Places::Picked(_) => Some(1),
+        match self.places {
+            Places::Blocks(size) => Some(size.min(self.swept.values.len() - place * size)),
+            Places::Picked => Some(1),
             Places::Borders => None,
         }
     }
@@ -172,18 +169,14 @@ impl Grid {
         let mut block = [Some(1); 2];
         let mut grid: Vec<GridAxis> = Vec::with_capacity(axes.len());
         for (k, axis) in axes.iter().take(2).enumerate() {
-            if axis.complete {
-                let size = counts[k].div_ceil(shown[k]);
-                grid.push(GridAxis::in_blocks(axis, size));
-                block[k] = Some(size);
-            } else {
-                grid.push(GridAxis::in_parts(axis, shown[k]));
-                block[k] = None;
-            }
+            block[k] = axis.complete.then(|| counts[k].div_ceil(shown[k]));
+            grid.push(match block[k] {
+                Some(size) => GridAxis::in_blocks(axis, size),
+                None => GridAxis::in_parts(axis, shown[k]),
+            });
         }
-        grid.extend(
-            axes.iter().skip(2).zip(picks).map(|(axis, picks)| GridAxis::picked(axis, picks)),
-        );
+        let cut = axes.iter().skip(2).zip(picks);
+        grid.extend(cut.map(|(axis, picks)| GridAxis::picked(axis, picks)));
         Self { axes: grid, block }
     }
 
@@ -204,12 +197,8 @@ impl Grid {
 
     /// Index of the cell at `x` on the first axis, `y` on the second, and `rest` on those after.
     pub(crate) fn cell(&self, x: usize, y: usize, rest: &[usize]) -> usize {
-        let second = self.axes.get(1).map(|axis| (axis, &y));
-        let rest = self.axes.iter().skip(2).zip(rest);
-        second
-            .into_iter()
-            .chain(rest)
-            .fold(x, |index, (axis, &place)| index * axis.values.len() + place)
+        let further = self.axes.iter().skip(1).zip([&y].into_iter().chain(rest));
+        further.fold(x, |index, (axis, &place)| index * axis.values.len() + place)
     }
 
     /// How many grid points a cell has; none where that is not known.

@@ -293,7 +293,7 @@ impl Shown {
             title,
             label,
             values: numbers.iter().map(|number| value(number * factor)).collect(),
-            level: level.filter(|_| matches!(scale, ColourScale::Diverging { .. })),
+            level: level.filter(|_| scale.centre.is_some()),
             scale,
             divided: map.sides.get(self.column()).map(|sides| Sides {
                 mean: sides.mean.iter().map(|mean| mean * factor).collect(),

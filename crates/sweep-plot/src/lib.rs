@@ -51,7 +51,6 @@ use cuts::Cuts;
 use figures::boundary::Overlay;
 use gather::{Divide, Map};
 use grid::Grid;
-use raster::Typeface;
 use read::{Kind, Source};
 use scatter::Scatter;
 use scene::Scene;
@@ -296,14 +295,13 @@ fn is_scattered(source: &Source, options: &PlotOptions) -> Result<bool, PlotErro
 
 fn design(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
     let scatter = Scatter::read(source, options)?;
-    let typeface = Typeface::load()?;
     if format == Format::Html {
-        return Ok(html::design_page(&scatter, options, &typeface).into_bytes());
+        return Ok(html::design_page(&scatter, options).into_bytes());
     }
     let scene = match options.view {
-        Some(View::Histogram) => chart::draw(&figures::histogram::chart(&scatter), &typeface),
-        Some(View::Influence) => figures::influence::draw(&scatter, &typeface),
-        _ => figures::matrix::draw(&scatter, &typeface).0,
+        Some(View::Histogram) => chart::draw(&figures::histogram::chart(&scatter)),
+        Some(View::Influence) => figures::influence::draw(&scatter),
+        _ => figures::matrix::draw(&scatter).0,
     };
     image(&scene, format)
 }
@@ -324,12 +322,11 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
         let cuts = Cuts::of_picture(&source, &axes, options)?;
         let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
         let map = Map::read(source, grid, &columns, divide)?;
-        let typeface = Typeface::load()?;
         let overlay = match &options.boundary {
             Some(path) => Some(overlay(path, &axes, &map.table.source)?),
             None => None,
         };
-        let scene = figures::map::draw(&map, &cuts, shown.as_ref(), overlay.as_ref(), &typeface)?;
+        let scene = figures::map::draw(&map, &cuts, shown.as_ref(), overlay.as_ref())?;
         return image(&scene, format);
     }
     let columns: Vec<String> =
@@ -411,7 +408,7 @@ fn curves(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u
 fn written(source: &Source, chart: &Chart, format: Format) -> Result<Vec<u8>, PlotError> {
     match format {
         Format::Html => Ok(html::chart_page(source, chart, None).into_bytes()),
-        Format::Svg | Format::Png => image(&chart::draw(chart, &Typeface::load()?), format),
+        Format::Svg | Format::Png => image(&chart::draw(chart), format),
     }
 }
 

@@ -1,5 +1,7 @@
 //! A scene as PNG, with the typeface it carries: the same picture on every machine.
 
+use std::sync::LazyLock;
+
 use tiny_skia::{
     FillRule, LineCap, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap, StrokeDash, Transform,
 };
@@ -12,35 +14,19 @@ use super::svg::halo_width;
 const REGULAR: &[u8] = include_bytes!("fonts/NotoSans-Regular.subset.ttf");
 const BOLD: &[u8] = include_bytes!("fonts/NotoSans-Bold.subset.ttf");
 
-/// The two weights.
-pub(crate) struct Typeface {
-    regular: Face<'static>,
-    bold: Face<'static>,
+/// The weight of text that is bold, and of other text.
+fn face(bold: bool) -> &'static Face<'static> {
+    static FACES: LazyLock<[Face<'static>; 2]> = LazyLock::new(|| {
+        [REGULAR, BOLD].map(|font| Face::parse(font, 0).expect("a font that is in the program"))
+    });
+    &FACES[usize::from(bold)]
 }
 
-impl Typeface {
-    /// Opens the fonts that are part of the program.
-    ///
-    /// # Errors
-    /// [`PlotError::Drawing`] if they are damaged, which is a defect of the build.
-    pub(crate) fn load() -> Result<Self, PlotError> {
-        let open = |bytes| {
-            Face::parse(bytes, 0)
-                .map_err(|error| PlotError::Drawing(format!("embedded typeface: {error}")))
-        };
-        Ok(Self { regular: open(REGULAR)?, bold: open(BOLD)? })
-    }
-
-    fn face(&self, bold: bool) -> &Face<'static> {
-        if bold { &self.bold } else { &self.regular }
-    }
-
-    /// Width of `text` in type `size` px high, px.
-    pub(crate) fn width(&self, text: &str, size: f64, bold: bool) -> f64 {
-        let face = self.face(bold);
-        let advances: u32 = text.chars().map(|letter| u32::from(advance(face, letter))).sum();
-        f64::from(advances) * size / f64::from(face.units_per_em())
-    }
+/// Width of `text` in type `size` px high, px.
+pub(crate) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
+    let face = face(bold);
+    let advances: u32 = text.chars().map(|letter| u32::from(advance(face, letter))).sum();
+    f64::from(advances) * size / f64::from(face.units_per_em())
 }
 
 fn advance(face: &Face<'_>, letter: char) -> u16 {
@@ -60,7 +46,6 @@ pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>, PlotError> {
         pixmap: Pixmap::new(size[0], size[1]).ok_or_else(too_large)?,
         transform: Transform::from_scale(scale as f32, scale as f32),
         clips: Vec::new(),
-        typeface: Typeface::load()?,
     };
     for item in &scene.items {
         match item {
@@ -86,7 +71,6 @@ struct Canvas {
     pixmap: Pixmap,
     transform: Transform,
     clips: Vec<Mask>,
-    typeface: Typeface,
 }
 
 impl Canvas {
@@ -137,9 +121,9 @@ impl Canvas {
     }
 
     fn text(&mut self, text: &Text) {
-        let face = self.typeface.face(text.bold);
+        let face = face(text.bold);
         let scale = (text.size / f64::from(face.units_per_em())) as f32;
-        let width = self.typeface.width(&text.text, text.size, text.bold) as f32;
+        let width = text_width(&text.text, text.size, text.bold) as f32;
         let mut pen = Pen { builder: PathBuilder::new(), x: 0.0, scale };
         pen.x = match text.anchor {
             Anchor::Start => 0.0,

@@ -70,10 +70,7 @@ impl Words {
     pub(crate) fn sort(&mut self) {
         let mut sorted = self.names.clone();
         sorted.sort();
-        let place = |name: &String| {
-            let place = sorted.binary_search(name).ok()?;
-            u8::try_from(place).ok()
-        };
+        let place = |name: &String| u8::try_from(sorted.binary_search(name).ok()?).ok();
         let places: Vec<u8> = self.names.iter().map(|name| place(name).unwrap_or(NONE)).collect();
         for code in &mut self.codes {
             *code = places.get(usize::from(*code)).copied().unwrap_or(*code);
@@ -141,12 +138,15 @@ impl Table {
     /// keeps.
     pub(crate) fn read(source: Source) -> Result<Self, PlotError> {
         let most = MOST_NUMBERS / source.numeric().count().max(1);
+        let too_many = |source: &Source, rows| {
+            let (path, kind) = (source.path.clone(), source.kind.name());
+            PlotError::TooMany { path, kind, rows, most }
+        };
         if source.rows > most {
             if source.kind == Kind::Trace {
                 return Self::read_thinned(source, most / 2);
             }
-            let (path, kind, rows) = (source.path.clone(), source.kind.name(), source.rows);
-            return Err(PlotError::TooMany { path, kind, rows, most });
+            return Err(too_many(&source, source.rows));
         }
         let names: Vec<&str> = source.columns.iter().map(|column| column.name.as_str()).collect();
         let mut values: Vec<Values> = source
@@ -174,8 +174,7 @@ impl Table {
             rows += batch.rows;
             // What the file says of its rows need not be so.
             if rows > most {
-                let (path, kind) = (source.path.clone(), source.kind.name());
-                return Err(PlotError::TooMany { path, kind, rows, most });
+                return Err(too_many(&source, rows));
             }
         }
         let columns = source.columns.iter().zip(values);

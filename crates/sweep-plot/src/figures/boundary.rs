@@ -38,12 +38,8 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let empty = || table.source.empty("a curve needs at least two points");
     let (low, high) = bracket(&names).ok_or_else(empty)?;
     let (x, y) = (columns[0], columns[1]);
-    let [xs, ys, lows, highs] = [
-        table.numbers(&x.name)?,
-        table.numbers(&y.name)?,
-        table.numbers(low)?,
-        table.numbers(high)?,
-    ];
+    let (xs, ys) = (table.numbers(&x.name)?, table.numbers(&y.name)?);
+    let (lows, highs) = (table.numbers(low)?, table.numbers(high)?);
     let mut grid: Vec<f64> = xs.iter().copied().filter(|x| x.is_finite()).collect();
     grid.sort_by(f64::total_cmp);
     grid.dedup();
@@ -188,9 +184,7 @@ pub(crate) struct Overlay {
 /// # Errors
 /// [`PlotError::Unfit`] if it has others, or further ones; otherwise as [`chart`].
 pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay, PlotError> {
-    let named = table.source.find("axis").and_then(Value::as_array);
-    let names: Vec<&str> =
-        named.into_iter().flatten().filter_map(|axis| axis.get("parameter")?.as_str()).collect();
+    let names: Vec<&str> = table.source.planned_axes().collect();
     if names != axes {
         return Err(PlotError::Unfit(format!(
             "{} is a boundary over {}; the map is over {}",
@@ -226,10 +220,7 @@ fn limit(table: &Table) -> String {
 
 /// The values of the axes beyond the second, which the plan in the file names.
 fn further(table: &Table, row: usize) -> String {
-    let axes = table.source.find("axis").and_then(Value::as_array);
-    let names =
-        axes.into_iter().flatten().skip(2).filter_map(|axis| axis.get("parameter")?.as_str());
-    let said = names.filter_map(|name| {
+    let said = table.source.planned_axes().skip(2).filter_map(|name| {
         let column = table.column(name)?;
         let value = *column.numbers()?.get(row)?;
         Some(label::valued(&label::words(name), value, &column.unit))

@@ -48,21 +48,16 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let mut grids = vec![vec![0.0, top]];
     let mut series = Vec::new();
     let mut stars = Vec::new();
-    for (k, mode) in near.into_iter().enumerate() {
-        for speed in crossings(&mode) {
-            stars.push((speed, speed, format!("{speed:.1} rpm")));
-        }
-        let style = mode.band.map_or(Style::Solid(2.2), |(low, high)| Style::Band(low, high));
-        let colour = DISTINCT[k % DISTINCT.len()];
+    let of_modes = near.into_iter().enumerate().map(|(k, mut mode)| {
+        let band = mode.band.take();
+        let style = band.map_or(Style::Solid(2.2), |(low, high)| Style::Band(low, high));
+        (mode, DISTINCT[k % DISTINCT.len()], style)
+    });
+    let of_sums = sums.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
+    for (mode, colour, style) in of_modes.chain(of_sums) {
+        stars.extend(crossings(&mode).into_iter().map(|at| (at, at, format!("{at:.1} rpm"))));
         series.push(Series::new(mode.name, colour, grids.len(), mode.frequency, style));
         grids.push(mode.speed);
-    }
-    for sum in sums {
-        for speed in crossings(&sum) {
-            stars.push((speed, speed, format!("{speed:.1} rpm")));
-        }
-        series.push(Series::new(sum.name, MUTED, grids.len(), sum.frequency, Style::Dashed));
-        grids.push(sum.speed);
     }
     let line = Series::new("frequency = spin speed", INK, 0, vec![0.0, top], Style::Dashed);
     series.push(line);
@@ -151,16 +146,21 @@ fn sums(modes: &[Mode], unstable: &Unstable) -> Vec<Mode> {
     pairs.into_iter().map(sum).collect()
 }
 
-/// A mode's frequency at a speed, straight between the given ones.
+/// A mode's frequency at a speed.
 fn at_speed(mode: &Mode, speed: f64) -> f64 {
-    let above = mode.speed.partition_point(|known| *known < speed).min(mode.speed.len() - 1);
+    between(&mode.speed, &mode.frequency, speed)
+}
+
+/// The value at `x`, straight between the given ones and even beyond them.
+pub(super) fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
+    let above = xs.partition_point(|known| *known < x).min(xs.len() - 1);
     let below = above.saturating_sub(1);
-    let step = mode.speed[above] - mode.speed[below];
+    let step = xs[above] - xs[below];
     if step == 0.0 {
-        return mode.frequency[above];
+        return ys[above];
     }
-    let part = ((speed - mode.speed[below]) / step).clamp(0.0, 1.0);
-    mode.frequency[below] + part * (mode.frequency[above] - mode.frequency[below])
+    let part = ((x - xs[below]) / step).clamp(0.0, 1.0);
+    ys[below] + part * (ys[above] - ys[below])
 }
 
 /// Every mode of a file, by number.

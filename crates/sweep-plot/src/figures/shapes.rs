@@ -35,9 +35,8 @@ type Line = [Vec<Phasor>; 2];
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let places = places(table)
         .ok_or_else(|| table.source.empty("the file does not say where the machine's parts are"))?;
-    let modes = table.source.find(key::MODES).and_then(Value::as_array).into_iter().flatten();
     let mut panels = Vec::new();
-    for mode in modes {
+    for mode in table.source.list(key::MODES) {
         let name = mode["name"].as_str().unwrap_or_default();
         for resonance in mode["resonances"].as_array().into_iter().flatten() {
             let (Some(speed), Some(q)) =

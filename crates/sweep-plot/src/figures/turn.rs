@@ -3,7 +3,7 @@
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
 use crate::error::PlotError;
-use crate::figures::campbell::{crossings, modes};
+use crate::figures::campbell::{between, crossings, modes};
 use crate::label::Label;
 use crate::table::Table;
 
@@ -54,11 +54,4 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         }],
         ..Chart::default()
     })
-}
-
-/// The value at `x`, linear between the given ones.
-fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
-    let after = xs.partition_point(|known| *known < x).clamp(1, xs.len() - 1);
-    let part = (x - xs[after - 1]) / (xs[after] - xs[after - 1]);
-    ys[after - 1] + part * (ys[after] - ys[after - 1])
 }
