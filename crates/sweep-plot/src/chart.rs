@@ -154,11 +154,8 @@ pub(crate) fn draw(chart: &Chart) -> Scene {
     let width = WIDTH - LEFT - RIGHT;
     let of_legend = legend_height(&entries, width);
     let heights: f64 = panels.iter().map(|panel| panel.height + GAP).sum();
-    let strip = chart
-        .marks
-        .iter()
-        .map(|mark| text_width(&mark.label, TICK_SIZE, false) + 22.0)
-        .fold(0.0, f64::max);
+    let labels = chart.marks.iter().map(|mark| text_width(&mark.label, TICK_SIZE, false) + 22.0);
+    let strip = labels.fold(0.0, f64::max);
     let total = HEADING_HEIGHT + strip + heights + BELOW + of_legend + 4.0;
     let mut scene = Scene::new(WIDTH, total, format!("{}. {}", chart.title, chart.subtitle));
     heading(&mut scene, &chart.title, &chart.subtitle);
@@ -402,8 +399,8 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
     for panel in panels {
         for series in &panel.series {
             if series.style == Style::Dots {
-                let dot = (Outline::circle([0.0, 0.0], 1.4 * DOT), true);
-                add(Sign::Dot(dot, series.colour), &series.name);
+                let dot = Outline::circle([0.0, 0.0], 1.4 * DOT);
+                add(Sign::Shape(dot, true, series.colour), &series.name);
                 continue;
             }
             let mut stroke = stroke(series);
@@ -423,7 +420,7 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
             add(Sign::Area(BOTH_SIDES), MIXED);
         }
         if !panel.stars.is_empty() {
-            add(Sign::Star(INK), STARS);
+            add(Sign::Shape(Outline::star([0.0, 0.0], 9.0), true, INK), STARS);
         }
     }
     if !chart.marks.is_empty() {

@@ -198,10 +198,8 @@ pub(crate) enum Sign {
     Hatched(Hatch),
     /// A dotted mark: undefined points.
     Undefined,
-    /// A star.
-    Star(Colour),
-    /// A dot around the origin, filled or not.
-    Dot((Outline, bool), Colour),
+    /// A shape around the origin, filled or not.
+    Shape(Outline, bool, Colour),
 }
 
 /// Height of a row of a legend, px.
@@ -231,7 +229,7 @@ pub(crate) fn legend(scene: &mut Scene, entries: &[(Sign, String)], x: f64, y: f
                 scene.line(area, Stroke::solid(MUTED, 1.0));
             }
             Sign::Undefined => undefined(scene, &[[x, y - 8.0, 28.0, 16.0]]),
-            Sign::Dot((outline, filled), colour) => {
+            Sign::Shape(outline, filled, colour) => {
                 let outline = outline.moved([x + 14.0, y]);
                 if *filled {
                     scene.fill(outline, *colour);
@@ -239,7 +237,6 @@ pub(crate) fn legend(scene: &mut Scene, entries: &[(Sign, String)], x: f64, y: f
                     scene.line(outline, Stroke::solid(*colour, 1.4));
                 }
             }
-            Sign::Star(colour) => scene.fill(Outline::star([x + 14.0, y], 9.0), *colour),
         }
         scene.text(Text::new(text.clone(), [x + 36.0, y + 0.35 * TICK_SIZE], TICK_SIZE));
     }

@@ -54,11 +54,12 @@ const START: &str = include_str!("html/start.js");
 const CELL_BYTES: usize = 7_000_000;
 
 /// Columns of a map file that a page carries: all results but the counts of steps.
-pub(crate) fn carried<'a>(source: &'a Source, axes: &[SweptAxis]) -> Vec<&'a str> {
+pub(crate) fn carried(source: &Source, axes: &[SweptAxis]) -> Vec<String> {
     let names = source.columns.iter().map(|column| column.name.as_str());
     names
         .filter(|name| !name.starts_with("steps_") && !name.starts_with("rejected_"))
         .filter(|name| axes.iter().all(|axis| axis.name != *name))
+        .map(str::to_owned)
         .collect()
 }
 

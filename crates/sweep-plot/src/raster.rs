@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use tiny_skia::{
-    FillRule, LineCap, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap, StrokeDash, Transform,
+    FillRule, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap, StrokeDash, Transform,
 };
 use ttf_parser::{Face, OutlineBuilder};
 
@@ -89,16 +89,9 @@ impl Canvas {
 
     fn line(&mut self, outline: &Outline, stroke: &Stroke) {
         if let Some(path) = path(outline) {
-            let style = tiny_skia::Stroke {
-                width: stroke.width as f32,
-                line_join: LineJoin::Round,
-                line_cap: LineCap::Butt,
-                dash: StrokeDash::new(
-                    stroke.dash.iter().map(|&length| length as f32).collect(),
-                    0.0,
-                ),
-                ..tiny_skia::Stroke::default()
-            };
+            let dash = stroke.dash.iter().map(|&length| length as f32).collect();
+            let style =
+                tiny_skia::Stroke { dash: StrokeDash::new(dash, 0.0), ..line(stroke.width) };
             let paint = paint(stroke.colour, true);
             self.pixmap.stroke_path(&path, &paint, &style, self.transform, self.clips.last());
         }
@@ -144,15 +137,17 @@ impl Canvas {
         let transform = self.transform.pre_concat(place).pre_concat(turn);
         let clip = self.clips.last();
         if let Some(halo) = text.halo {
-            let style = tiny_skia::Stroke {
-                width: halo_width(text.size) as f32,
-                line_join: LineJoin::Round,
-                ..tiny_skia::Stroke::default()
-            };
+            let style = line(halo_width(text.size));
             self.pixmap.stroke_path(&path, &paint(halo, true), &style, transform, clip);
         }
         self.pixmap.fill_path(&path, &paint(text.colour, true), FillRule::Winding, transform, clip);
     }
+}
+
+/// A solid line as wide as that.
+fn line(width: f64) -> tiny_skia::Stroke {
+    let (width, line_join) = (width as f32, LineJoin::Round);
+    tiny_skia::Stroke { width, line_join, ..tiny_skia::Stroke::default() }
 }
 
 fn paint(colour: Colour, anti_alias: bool) -> Paint<'static> {

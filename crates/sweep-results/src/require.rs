@@ -19,7 +19,7 @@ pub struct Offender {
 }
 
 /// What came of one condition.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Checked {
     /// The condition as typed.
     pub expression: String,
@@ -64,14 +64,10 @@ pub fn check(
     let folded: Vec<Cell> = folds.iter().map(known).collect();
     let mut checked = Checked {
         expression: condition.text.clone(),
-        holds: false,
         by_row: condition.by_row,
-        rows: 0,
-        failing: 0,
-        undefined: 0,
         folded_rows: folds.iter().map(|fold| fold.over).collect(),
         folded: folds.into_iter().map(|fold| fold.value).collect(),
-        offenders: Vec::new(),
+        ..Checked::default()
     };
     let column = |(k, name): (usize, &String)| Some((k, table.column(name)?.worse?));
     let by = condition.columns.iter().enumerate().find_map(column);

@@ -86,10 +86,8 @@ pub(crate) fn draw(scatter: &Scatter) -> Scene {
     let noise = chance(scatter.valued());
     span(&mut scene, -noise, noise, panel.y, height, GREY);
     let middle = panel.at_x(0.0);
-    scene.line(
-        Outline::line(&[[middle, panel.y], [middle, panel.y + height]]),
-        Stroke::solid(INK, 1.2),
-    );
+    let axis = Outline::line(&[[middle, panel.y], [middle, panel.y + height]]);
+    scene.line(axis, Stroke::solid(INK, 1.2));
     for (row, &k) in places.iter().enumerate() {
         let centre = panel.y + 6.0 + ROW * (row as f64 + 0.5);
         let text = Text::new(words(k), [left - 12.0, centre + 0.35 * LABEL_SIZE], LABEL_SIZE);

@@ -229,17 +229,8 @@ impl Dots {
 fn add(outline: &mut Outline, side: Side, [x, y]: [f64; 2], radius: f64) {
     match side {
         Side::Good | Side::Undefined => {
-            let [near, far] = [0.414 * radius, radius];
-            let corners = [
-                [near, far],
-                [far, near],
-                [far, -near],
-                [near, -far],
-                [-near, -far],
-                [-far, -near],
-                [-far, near],
-                [-near, far],
-            ];
+            let (n, f) = (0.414 * radius, radius);
+            let corners = [[n, f], [f, n], [f, -n], [n, -f], [-n, -f], [-f, -n], [-f, n], [-n, f]];
             outline.add_polygon(&corners.map(|[dx, dy]| [x + dx, y + dy]));
         }
         Side::Bad => {
@@ -259,7 +250,7 @@ fn entries(scatter: &Scatter) -> Vec<(Sign, String)> {
     for (side, count) in Side::ALL.into_iter().zip(scatter.counts) {
         if count > 0 {
             let words = format!("{} ({count})", scatter.words(side));
-            entries.push((Sign::Dot(side_shape(side), colour(side)), words));
+            entries.push((sign(side), words));
         }
     }
     if let Some(level) = &scatter.level {
@@ -268,9 +259,9 @@ fn entries(scatter: &Scatter) -> Vec<(Sign, String)> {
     entries
 }
 
-/// A dot of a side as a legend draws it: its outline around the origin, and whether it is filled.
-fn side_shape(side: Side) -> (Outline, bool) {
+/// A dot of a side as a legend draws it.
+fn sign(side: Side) -> Sign {
     let mut outline = Outline::default();
     add(&mut outline, side, [0.0, 0.0], 5.0);
-    (outline, matches!(side, Side::Good | Side::Bad))
+    Sign::Shape(outline, matches!(side, Side::Good | Side::Bad), colour(side))
 }

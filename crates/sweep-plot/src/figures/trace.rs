@@ -42,10 +42,10 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let shown: Vec<&str> = shown.map(|(quantity, _)| quantity.name).collect();
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
     let names = other.as_ref().map(|other| told_apart(table, other));
-    let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
+    let pair = |columns: &[String; 2], factor: f64| -> Vec<Series> {
         // The second curve lies in front; where it hides the first one, this must shine through.
         let front = LINEAR.with_alpha(165);
-        let [first, second] = &columns;
+        let [first, second] = columns;
         let curves = match (&other, &names) {
             (Some(other), Some([one, another])) => [
                 (table, first, one.clone(), NONLINEAR, 0),
@@ -78,7 +78,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
                 quantity.name,
                 Label::new(&words, unit),
                 shown.contains(&quantity.name),
-                pair(quantity.columns(sides), factor),
+                pair(&quantity.columns, factor),
             )
         })
         .collect();
@@ -94,7 +94,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         let label = Label::new(&words, unit);
         panels.push(panel(&format!("residual_{name}"), label, shown, vec![residual]));
     }
-    let mut gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
+    let mut gaps = pair(&["gap_nonlinear_m", "gap_linear_m"].map(str::to_owned), 1e3);
     if other.is_some() && gaps.len() < 2 {
         gaps.clear();
     }
@@ -172,38 +172,26 @@ struct Quantity<'a> {
     /// `spring_1_tension`.
     name: &'a str,
     unit: &'a str,
-    /// The column's end after the model's name; empty for a channel.
-    end: &'a str,
     channel: bool,
-}
-
-impl Quantity<'_> {
-    /// Columns of both sides.
-    fn columns(&self, sides: [&str; 2]) -> [String; 2] {
-        sides.map(|model| {
-            if self.channel {
-                format!("{model}_{}", self.name)
-            } else {
-                format!("{}_{model}_{}", self.name, self.end)
-            }
-        })
-    }
+    /// Of both sides.
+    columns: [String; 2],
 }
 
 /// Channels first, then states and forces; the gap has its own panel.
 fn quantities<'a>(table: &'a Table, sides: [&str; 2]) -> Vec<Quantity<'a>> {
-    let channels =
-        table.with_prefix(&format!("{}_", sides[0])).into_iter().map(|(name, column)| {
-            let unit =
-                if column.unit.is_empty() { label::unit_of_channel(name) } else { &column.unit };
-            Quantity { name, unit, end: "", channel: true }
-        });
-    let further =
-        table.columns.iter().filter(|column| column.numbers().is_some()).filter_map(|column| {
-            let (name, end) =
-                column.name.split_once("_nonlinear_").filter(|(name, _)| *name != "gap")?;
-            Some(Quantity { name, unit: &column.unit, end, channel: false })
-        });
+    let channels = table.with_prefix(&format!("{}_", sides[0])).into_iter();
+    let channels = channels.map(|(name, column)| {
+        let own = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
+        let unit = own.unwrap_or(label::unit_of_channel(name));
+        Quantity { name, unit, channel: true, columns: sides.map(|side| format!("{side}_{name}")) }
+    });
+    let numbers = table.columns.iter().filter(|column| column.numbers().is_some());
+    let further = numbers.filter_map(|column| {
+        let split = column.name.split_once("_nonlinear_");
+        let (name, end) = split.filter(|(name, _)| *name != "gap")?;
+        let columns = sides.map(|side| format!("{name}_{side}_{end}"));
+        Some(Quantity { name, unit: &column.unit, channel: false, columns })
+    });
     channels.chain(further).collect()
 }
 
@@ -227,17 +215,17 @@ pub(super) fn other_trace(path: &Path) -> Result<Table, PlotError> {
     Ok(table)
 }
 
-/// What a run is called: its name, or else its file's.
-fn said(table: &Table) -> String {
-    let file = || table.source.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    table.source.run_name().map_or_else(file, str::to_owned)
+/// The name of a file without its ending.
+fn stem(table: &Table) -> String {
+    table.source.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// What two traces are called, so that they are told apart: by their runs' names, or what `--at`
 /// says otherwise of them, or else by their files.
 fn told_apart(one: &Table, other: &Table) -> [String; 2] {
     let tables = [one, other];
-    let names = tables.map(said);
+    let names =
+        tables.map(|table| table.source.run_name().map_or_else(|| stem(table), str::to_owned));
     if names[0] != names[1] {
         return names;
     }
@@ -250,8 +238,7 @@ fn told_apart(one: &Table, other: &Table) -> [String; 2] {
     if named[0] != named[1] && named.iter().all(|name| !name.is_empty()) {
         return named;
     }
-    let files = tables.map(|table| table.source.path.file_stem().unwrap_or_default());
-    files.map(|file| file.to_string_lossy().into_owned())
+    tables.map(stem)
 }
 
 /// A parameter and its value within a sentence.
