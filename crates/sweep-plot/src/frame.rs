@@ -245,18 +245,16 @@ pub(crate) fn legend(scene: &mut Scene, entries: &[(Sign, String)], x: f64, y: f
 /// Offset and row of each entry.
 fn lay_out(entries: &[(Sign, String)], width: f64) -> Vec<(f64, usize)> {
     let (mut x, mut row) = (0.0, 0);
-    entries
-        .iter()
-        .map(|(_, text)| {
-            let taken = 36.0 + text_width(text, TICK_SIZE, false);
-            if x > 0.0 && x + taken > width {
-                (x, row) = (0.0, row + 1);
-            }
-            let place = (x, row);
-            x += taken + 26.0;
-            place
-        })
-        .collect()
+    let place = |(_, text): &(Sign, String)| {
+        let taken = 36.0 + text_width(text, TICK_SIZE, false);
+        if x > 0.0 && x + taken > width {
+            (x, row) = (0.0, row + 1);
+        }
+        let place = (x, row);
+        x += taken + 26.0;
+        place
+    };
+    entries.iter().map(place).collect()
 }
 
 /// Draws an area of failed points: grey and hatched.

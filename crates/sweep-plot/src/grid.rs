@@ -33,7 +33,7 @@ enum Places {
 impl GridAxis {
     /// An axis whose neighbouring values share a place, `size` of them each.
     fn in_blocks(axis: &SweptAxis, size: usize) -> Self {
-        let even = evened(&axis.values, axis.log);
+        let even = axis.evened(&axis.values);
         let last = even.len() - 1;
         let starts = (0..even.len()).step_by(size);
         let mut borders: Vec<f64> =
@@ -51,21 +51,20 @@ impl GridAxis {
         let (values, spans) = if size == 1 {
             (axis.values.clone(), None)
         } else {
-            let middle = |[from, to]: [usize; 2]| un_even((even[from] + even[to]) / 2.0, axis.log);
+            let middle = |[from, to]: [usize; 2]| axis.un_even((even[from] + even[to]) / 2.0);
             let spans = starts.clone().map(|start| ends(start).map(|end| axis.values[end]));
             (starts.clone().map(|start| middle(ends(start))).collect(), Some(spans.collect()))
         };
-        let borders = borders.into_iter().map(|border| un_even(border, axis.log)).collect();
+        let borders = borders.into_iter().map(|border| axis.un_even(border)).collect();
         Self { spans, places: Places::Blocks(size), ..Self::new(axis, values, borders) }
     }
 
     /// An axis known by its range alone, in `count` equal parts.
     fn in_parts(axis: &SweptAxis, count: usize) -> Self {
-        let even = evened(&axis.values, axis.log);
+        let even = axis.evened(&axis.values);
         let border = |k: usize| even[0] + (even[1] - even[0]) * k as f64 / count as f64;
-        let borders: Vec<f64> = (0..=count).map(|k| un_even(border(k), axis.log)).collect();
-        let values =
-            (0..count).map(|k| un_even((border(k) + border(k + 1)) / 2.0, axis.log)).collect();
+        let borders: Vec<f64> = (0..=count).map(|k| axis.un_even(border(k))).collect();
+        let values = (0..count).map(|k| axis.un_even((border(k) + border(k + 1)) / 2.0)).collect();
         let spans = borders.windows(2).map(|pair| [pair[0], pair[1]]).collect();
         Self { spans: Some(spans), ..Self::new(axis, values, borders) }
     }
@@ -97,12 +96,7 @@ impl GridAxis {
 
     /// The values in the units in which the axis is even.
     pub(crate) fn even(&self) -> Vec<f64> {
-        evened(&self.values, self.swept.log)
-    }
-
-    /// The value of which [`GridAxis::even`] is this.
-    pub(crate) fn un_even(&self, even: f64) -> f64 {
-        un_even(even, self.swept.log)
+        self.swept.evened(&self.values)
     }
 
     /// The place that one of the axis' values belongs to; none if it is not shown.
@@ -141,15 +135,6 @@ impl GridAxis {
     }
 }
 
-/// The values in the units in which an axis is even.
-fn evened(values: &[f64], log: bool) -> Vec<f64> {
-    values.iter().map(|value| if log { value.ln() } else { *value }).collect()
-}
-
-fn un_even(value: f64, log: bool) -> f64 {
-    if log { value.exp() } else { value }
-}
-
 /// The cells of a map, on the grid of its axes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Grid {
@@ -164,7 +149,8 @@ impl Grid {
     /// more, for each of the values picked of every axis after them.
     pub(crate) fn new(axes: &[SweptAxis], picks: &[Vec<usize>], most: usize) -> Self {
         let cuts: usize = picks.iter().map(Vec::len).product();
-        let counts = [0, 1].map(|k| axes.get(k).map_or(1, places_wanted));
+        let wanted = |axis: &SweptAxis| if axis.complete { axis.values.len() } else { MOST_VALUES };
+        let counts = [0, 1].map(|k| axes.get(k).map_or(1, wanted));
         let shown = sides(counts, most / cuts.max(1));
         let mut block = [Some(1); 2];
         let mut grid: Vec<GridAxis> = Vec::with_capacity(axes.len());
@@ -191,14 +177,13 @@ impl Grid {
     }
 
     /// Index of a cell in grid order, from its place on each axis.
-    pub(crate) fn index(&self, at: &[usize]) -> usize {
-        self.axes.iter().zip(at).fold(0, |index, (axis, &place)| index * axis.values.len() + place)
+    pub(crate) fn index(&self, at: impl IntoIterator<Item = usize>) -> usize {
+        self.axes.iter().zip(at).fold(0, |index, (axis, place)| index * axis.values.len() + place)
     }
 
     /// Index of the cell at `x` on the first axis, `y` on the second, and `rest` on those after.
     pub(crate) fn cell(&self, x: usize, y: usize, rest: &[usize]) -> usize {
-        let further = self.axes.iter().skip(1).zip([&y].into_iter().chain(rest));
-        further.fold(x, |index, (axis, &place)| index * axis.values.len() + place)
+        self.index([x, y].into_iter().chain(rest.iter().copied()))
     }
 
     /// How many grid points a cell has; none where that is not known.
@@ -222,10 +207,6 @@ impl Grid {
         };
         Some(format!("a cell holds {said} and shows the worst"))
     }
-}
-
-fn places_wanted(axis: &SweptAxis) -> usize {
-    if axis.complete { axis.values.len() } else { MOST_VALUES }
 }
 
 /// How many places each of two axes gets so that there are at most `most` cells: as even a share as

@@ -112,12 +112,8 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
     if map.grid.merged() {
         data["counts"] = counts_json(map);
     }
-    let axes = map
-        .grid
-        .axes
-        .iter()
-        .map(|axis| (axis.swept.name.as_str(), axis.swept.log))
-        .collect::<Vec<_>>();
+    let axes = map.grid.axes.iter().map(|axis| (axis.swept.name.as_str(), axis.swept.log));
+    let axes: Vec<(&str, bool)> = axes.collect();
     let computing = computing(&mut data, options.live.as_ref(), &axes);
     let scripts = [&[CORE, CHART, BAR, CELLS, MAP][..], computing, &[REPORT, START]].concat();
     let told = report::told(source, options.live.as_ref()) + &report::caveats(map);
@@ -250,9 +246,12 @@ fn log_ticks_json(scale: Scale) -> Value {
     if !scale.log {
         return Value::Null;
     }
-    let tick = |tick: Tick| json!([embed::short(tick.value), tick.label]);
     let sets = log_sets(scale.from.min(scale.to), scale.from.max(scale.to));
-    json!(sets.map(|set| set.into_iter().map(tick).collect::<Vec<_>>()))
+    json!(sets.map(|set| set.into_iter().map(tick_json).collect::<Vec<_>>()))
+}
+
+fn tick_json(tick: Tick) -> Value {
+    json!([embed::short(tick.value), tick.label])
 }
 
 /// The rows of a point's table: name, words, unit, and the columns that hold the values of both
@@ -364,12 +363,7 @@ fn layer_json(map: &Map, shown: &Shown, layer: Layer, room: usize) -> Value {
     let (Scale { log, from, to }, limit) = (layer.scale.scale, layer.scale.centre);
     let middle = limit.unwrap_or(if log { (from * to).sqrt() } else { 0.5 * (from + to) });
     let colours = (0..LEVELS).map(|level| layer.scale.colour(level).css());
-    let ticks: Vec<Value> = layer
-        .scale
-        .ticks()
-        .iter()
-        .map(|tick| json!([embed::short(tick.value), tick.label]))
-        .collect();
+    let ticks = layer.scale.ticks().into_iter().map(tick_json);
     let mut data = json!({
         "group": shown.group.name(),
         "groupWords": shown.group.words(),
@@ -381,7 +375,7 @@ fn layer_json(map: &Map, shown: &Shown, layer: Layer, room: usize) -> Value {
         "column": shown.column(),
         "scale": { "log": log, "stops": [from, middle, to], "limit": limit },
         "colours": colours.collect::<Value>(),
-        "ticks": ticks,
+        "ticks": ticks.collect::<Value>(),
         "nonlinear": layer.nonlinear,
         "lines": layer.level.as_ref().map(|level| level_json(map, &layer, level, room)),
     });

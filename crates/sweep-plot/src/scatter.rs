@@ -4,7 +4,7 @@ use super::PlotOptions;
 use super::error::PlotError;
 use super::influence::Influence;
 use super::label::{self, Label};
-use super::layer::{self, Group, Level, Shown};
+use super::layer::{self, Group, Level};
 use super::read::Source;
 use super::share::Share;
 use super::swept;

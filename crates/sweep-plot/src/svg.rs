@@ -146,13 +146,9 @@ fn hundredths(point: [f64; 2]) -> [i64; 2] {
 fn fixed(hundredths: i64) -> String {
     let sign = if hundredths < 0 { "-" } else { "" };
     let (whole, part) = (hundredths.unsigned_abs() / 100, hundredths.unsigned_abs() % 100);
-    match (whole, part) {
-        (_, 0) => format!("{sign}{whole}"),
-        (0, part) if part % 10 == 0 => format!("{sign}.{}", part / 10),
-        (0, part) => format!("{sign}.{part:02}"),
-        (_, part) if part % 10 == 0 => format!("{sign}{whole}.{}", part / 10),
-        (_, part) => format!("{sign}{whole}.{part:02}"),
-    }
+    let whole = if whole == 0 && part > 0 { String::new() } else { whole.to_string() };
+    let part = format!(".{part:02}");
+    format!("{sign}{whole}{}", part.trim_end_matches(['0', '.']))
 }
 
 /// A number of pixels, to a hundredth.

@@ -101,18 +101,14 @@ impl Column {
 
     /// The values, if they are numbers.
     pub(crate) fn numbers(&self) -> Option<&[f64]> {
-        match &self.values {
-            Values::Numbers(values) => Some(values),
-            Values::Words(_) => None,
-        }
+        let Values::Numbers(values) = &self.values else { return None };
+        Some(values)
     }
 
     /// The values, if they are words.
     pub(crate) fn words(&self) -> Option<&Words> {
-        match &self.values {
-            Values::Words(words) => Some(words),
-            Values::Numbers(_) => None,
-        }
+        let Values::Words(words) = &self.values else { return None };
+        Some(words)
     }
 }
 
@@ -149,14 +145,11 @@ impl Table {
             return Err(too_many(&source, source.rows));
         }
         let names: Vec<&str> = source.columns.iter().map(|column| column.name.as_str()).collect();
-        let mut values: Vec<Values> = source
-            .columns
-            .iter()
-            .map(|column| match column.is_number() {
-                true => Values::Numbers(Vec::with_capacity(source.rows)),
-                false => Values::Words(Words::default()),
-            })
-            .collect();
+        let empty = |column: &ColumnFacts| match column.is_number() {
+            true => Values::Numbers(Vec::with_capacity(source.rows)),
+            false => Values::Words(Words::default()),
+        };
+        let mut values: Vec<Values> = source.columns.iter().map(empty).collect();
         let mut rows = 0;
         for batch in source.batches(&names)? {
             let batch = batch?;
@@ -231,10 +224,7 @@ impl Table {
 
     /// Columns of numbers whose name starts with `prefix`, without it.
     pub(crate) fn with_prefix(&self, prefix: &str) -> Vec<(&str, &Column)> {
-        self.columns
-            .iter()
-            .filter(|column| column.numbers().is_some())
-            .filter_map(|column| Some((column.name.strip_prefix(prefix)?, column)))
-            .collect()
+        let numbers = self.columns.iter().filter(|column| column.numbers().is_some());
+        numbers.filter_map(|column| Some((column.name.strip_prefix(prefix)?, column))).collect()
     }
 }

@@ -236,10 +236,8 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     let mut shared: Vec<SharedRow> =
         pairs.iter().map(|&pair| sides[0].shared(&sides[1], pair)).collect();
     let columns = changes(&sides, &pairs, &mut shared);
-    let key_units = keys
-        .iter()
-        .map(|name| first.column(name).map(|column| column.unit.clone()).unwrap_or_default())
-        .collect();
+    let unit = |name: &String| first.column(name).map(|column| column.unit.clone());
+    let key_units = keys.iter().map(|name| unit(name).unwrap_or_default()).collect();
     let boundary = if is_boundary {
         boundary::of_boundaries(first, second)?
     } else {

@@ -29,18 +29,14 @@ pub enum Cell {
 impl Cell {
     /// Whether it is true or false, if it is either.
     pub const fn flag(&self) -> Option<bool> {
-        match self {
-            Self::Flag(flag) => Some(*flag),
-            _ => None,
-        }
+        let Self::Flag(flag) = self else { return None };
+        Some(*flag)
     }
 
     /// The number, if it is one.
     pub const fn number(&self) -> Option<f64> {
-        match self {
-            Self::Number(number) => Some(*number),
-            _ => None,
-        }
+        let Self::Number(number) = self else { return None };
+        Some(*number)
     }
 }
 

@@ -103,7 +103,9 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
 /// What the region above the uppermost places is, where all of these say the same.
 fn far_side(curves: &[(String, Vec<Place>)], [falling, rising]: [&str; 2]) -> String {
     let mut uppermost: Vec<Place> = Vec::new();
-    for place in curves.iter().flat_map(|(_, places)| places).filter(|place| place.y.is_finite()) {
+    let all = || curves.iter().flat_map(|(_, places)| places);
+    let crossings = || all().filter(|place| place.y.is_finite());
+    for place in crossings() {
         match uppermost.iter_mut().find(|known| known.x == place.x) {
             Some(known) if known.y < place.y => *known = *place,
             Some(_) => {}
@@ -118,11 +120,7 @@ fn far_side(curves: &[(String, Vec<Place>)], [falling, rising]: [&str; 2]) -> St
         (true, false) => rising,
         _ => return String::new(),
     };
-    let places: usize = curves
-        .iter()
-        .map(|(_, places)| places.iter().filter(|place| place.y.is_finite()).count())
-        .sum();
-    let line = if places > uppermost.len() { "highest crossing" } else { "line" };
+    let line = if crossings().count() > uppermost.len() { "highest crossing" } else { "line" };
     format!(" · {side} above the {line}")
 }
 
@@ -236,11 +234,8 @@ fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
         |place: &Place| if place.y.is_nan() { 0.5 * (place.low + place.high) } else { place.y };
     let mut lines: Vec<Vec<Place>> = Vec::new();
     for (k, &x) in grid.iter().enumerate() {
-        let mut here: Vec<Place> = places
-            .iter()
-            .copied()
-            .filter(|place| place.x == x && height(place).is_finite())
-            .collect();
+        let here = places.iter().filter(|place| place.x == x && height(place).is_finite());
+        let here: Vec<Place> = here.copied().collect();
         // Pairs of a line that was there at the last value and a place here, nearest first.
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (line, known) in lines.iter().enumerate() {
@@ -259,7 +254,7 @@ fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
                 taken[place] = Some(line);
             }
         }
-        for (place, line) in here.drain(..).zip(taken) {
+        for (place, line) in here.into_iter().zip(taken) {
             match line {
                 Some(line) => lines[line].push(place),
                 None => {

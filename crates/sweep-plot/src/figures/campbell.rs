@@ -35,9 +35,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     if top <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
         return Err(table.source.empty("the modes are given at one speed only"));
     }
-    let (near, far): (Vec<Mode>, Vec<Mode>) = modes
-        .into_iter()
-        .partition(|mode| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top));
+    let is_near = |mode: &Mode| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top);
+    let (near, far): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(is_near);
     let (_, highest) =
         extremes(near.iter().flat_map(|mode| mode.frequency.iter().copied())).unwrap_or((0.0, top));
     let sums = unstable.as_ref().map_or_else(Vec::new, |unstable| sums(&near, unstable));
@@ -183,32 +182,25 @@ pub(super) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
     let mut numbers = number.to_vec();
     numbers.sort_by(f64::total_cmp);
     numbers.dedup();
-    Ok(numbers
-        .into_iter()
-        .map(|wanted| {
-            let mut rows: Vec<usize> =
-                (0..table.rows).filter(|&row| number[row] == wanted).collect();
-            rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
-            let pick = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
-            let said = names.and_then(|names| names.get(*rows.first()?));
-            Mode {
-                name: said.map_or(format!("mode {wanted}"), |said| format!("{wanted} {said}")),
-                speed: pick(speed),
-                frequency: pick(frequency),
-                band: band.map(|(low, high)| (pick(low), pick(high))),
-            }
-        })
-        .collect())
+    let mode = |wanted: f64| {
+        let mut rows: Vec<usize> = (0..table.rows).filter(|&row| number[row] == wanted).collect();
+        rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
+        let pick = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
+        let said = names.and_then(|names| names.get(*rows.first()?));
+        Mode {
+            name: said.map_or(format!("mode {wanted}"), |said| format!("{wanted} {said}")),
+            speed: pick(speed),
+            frequency: pick(frequency),
+            band: band.map(|(low, high)| (pick(low), pick(high))),
+        }
+    };
+    Ok(numbers.into_iter().map(mode).collect())
 }
 
 /// Speeds at which the mode's frequency, taken as linear between the given speeds, is the speed.
 pub(super) fn crossings(mode: &Mode) -> Vec<f64> {
-    let excess: Vec<f64> = mode
-        .frequency
-        .iter()
-        .zip(&mode.speed)
-        .map(|(frequency, speed)| frequency - speed)
-        .collect();
+    let both = mode.frequency.iter().zip(&mode.speed);
+    let excess: Vec<f64> = both.map(|(frequency, speed)| frequency - speed).collect();
     (1..excess.len())
         .filter(|&k| excess[k - 1] > 0.0 && excess[k] <= 0.0)
         .map(|k| {

@@ -9,7 +9,8 @@ use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::stability::{
-    UNSTABLE, axes, channels_of, each_row, notes_at, one_point, response, shown, unstable,
+    UNSTABLE, axes, channels_of, columns_of, each_row, notes_at, one_point, response, shown,
+    unstable,
 };
 use crate::figures::{passages, trace};
 use crate::label::{self, Label};
@@ -141,10 +142,7 @@ fn read(
     point: &[f64],
     channels: &[(&str, &ColumnFacts)],
 ) -> Result<Held, PlotError> {
-    let mut columns: Vec<String> = channels
-        .iter()
-        .flat_map(|(name, _)| ["linear", "periodic", "nonlinear"].map(|of| format!("{of}_{name}")))
-        .collect();
+    let mut columns = columns_of(channels, ["linear", "periodic", "nonlinear"]);
     let mut held = Held {
         speed: Vec::new(),
         growth: Vec::new(),

@@ -197,7 +197,7 @@ pub(crate) fn level_lines(
     let mut lines: Vec<Vec<Vec<[f64; 2]>>> = (0..cuts).map(of_cut).collect();
     leave_out_shortest(&mut lines, room);
     for [x, y] in lines.iter_mut().flatten().flatten() {
-        (*x, *y) = (xs.un_even(*x), ys.un_even(*y));
+        (*x, *y) = (xs.swept.un_even(*x), ys.swept.un_even(*y));
     }
     lines
 }

@@ -157,11 +157,9 @@ fn apart(places: &Places, tub: &[Phasor], drum: &[Phasor]) -> f64 {
         let part = (x - places.rear) / (places.tub_front - places.rear);
         [0, 1].map(|k| tub[0][k] + part * (tub[1][k] - tub[0][k]))
     };
-    [places.rear, places.hinge, places.drum_front]
-        .into_iter()
-        .zip(drum)
-        .map(|(x, point)| (point[0] - on_tub(x)[0]).hypot(point[1] - on_tub(x)[1]))
-        .fold(0.0, f64::max)
+    let points = [places.rear, places.hinge, places.drum_front].into_iter().zip(drum);
+    let apart = points.map(|(x, at)| (at[0] - on_tub(x)[0]).hypot(at[1] - on_tub(x)[1]));
+    apart.fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -111,10 +111,7 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
     let channels = channels_of(source, "linear");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
-    let columns: Vec<String> = names
-        .iter()
-        .flat_map(|name| ["linear", "nonlinear"].map(|of| format!("{of}_{name}")))
-        .collect();
+    let columns = columns_of(&channels, ["linear", "nonlinear"]);
     let axes = axes(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
     let mut swept = read(source, &axes, &[point], &columns)?;
@@ -151,6 +148,14 @@ pub(super) fn channels_of<'a>(source: &'a Source, kind: &str) -> Vec<(&'a str, &
     let mut channels = source.with_prefix("nonlinear_");
     channels.retain(|(name, _)| source.column(&format!("{kind}_{name}")).is_some());
     channels
+}
+
+/// The columns of these kinds of each channel.
+pub(super) fn columns_of<const N: usize>(
+    channels: &[(&str, &ColumnFacts)],
+    kinds: [&str; N],
+) -> Vec<String> {
+    channels.iter().flat_map(|(name, _)| kinds.map(|kind| format!("{kind}_{name}"))).collect()
 }
 
 /// A channel's lines in the linear model and in the periodic response of the nonlinear one, where
@@ -353,21 +358,14 @@ pub(super) fn one_point(
 ) -> Result<Vec<f64>, PlotError> {
     let mut found = points(source, axes, at, option)?;
     if found.len() > 1 {
-        let free: Vec<&str> = axes
-            .iter()
-            .filter(|axis| !at.iter().any(|(name, _)| *name == axis.name))
-            .map(|axis| axis.name.as_str())
-            .collect();
-        let free = free.join(", ");
+        let free = axes.iter().map(|axis| axis.name.as_str());
+        let free = some_of(free.filter(|axis| !at.iter().any(|(name, _)| name == axis)));
         let what = match option {
             "--at" => format!("one is wanted: give --at NAME=VALUE for {free}"),
             _ => format!("the file to be drawn does not say which by {free}"),
         };
-        return Err(PlotError::Unfit(format!(
-            "{}: this file has {} points, and {what}",
-            source.path.display(),
-            found.len()
-        )));
+        let (path, count) = (source.path.display(), found.len());
+        return Err(PlotError::Unfit(format!("{path}: this file has {count} points, and {what}")));
     }
     Ok(found.remove(0))
 }
@@ -379,15 +377,13 @@ fn read(
     points: &[Vec<f64>],
     columns: &[String],
 ) -> Result<Vec<Swept>, PlotError> {
-    let mut swept: Vec<Swept> = points
-        .iter()
-        .map(|values| Swept {
-            values: values.clone(),
-            speed: Vec::new(),
-            growth: Vec::new(),
-            columns: vec![Vec::new(); columns.len()],
-        })
-        .collect();
+    let empty = |values: &Vec<f64>| Swept {
+        values: values.clone(),
+        speed: Vec::new(),
+        growth: Vec::new(),
+        columns: vec![Vec::new(); columns.len()],
+    };
+    let mut swept: Vec<Swept> = points.iter().map(empty).collect();
     each_row(source, axes, columns, |row| {
         let Some(point) = swept.iter_mut().find(|point| point.values == row.point) else { return };
         // Further rows of a speed are other responses; a machine that runs up is on the first.

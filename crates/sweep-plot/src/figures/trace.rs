@@ -56,32 +56,20 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
                 (table, second, said_of(sides[1]), front, 0),
             ],
         };
-        curves
-            .into_iter()
-            .filter_map(|(table, column, name, colour, grid)| {
-                let y =
-                    table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
-                Some(Series::new(name, colour, grid, y, Style::Solid(1.3)))
-            })
-            .collect()
+        let curves = curves.into_iter().filter_map(|(table, column, name, colour, grid)| {
+            let y = table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
+            Some(Series::new(name, colour, grid, y, Style::Solid(1.3)))
+        });
+        curves.collect()
     };
-    let mut panels: Vec<ChartPanel> = found
-        .iter()
-        .map(|quantity| {
-            let (unit, factor) = label::shown(quantity.unit);
-            let words = if quantity.channel && sides == MODELS {
-                label::channel(quantity.name)
-            } else {
-                label::words(quantity.name)
-            };
-            panel(
-                quantity.name,
-                Label::new(&words, unit),
-                shown.contains(&quantity.name),
-                pair(&quantity.columns, factor),
-            )
-        })
-        .collect();
+    let of = |quantity: &Quantity<'_>| {
+        let (name, (unit, factor)) = (quantity.name, label::shown(quantity.unit));
+        let is_channel = quantity.channel && sides == MODELS;
+        let words = if is_channel { label::channel(name) } else { label::words(name) };
+        let lines = pair(&quantity.columns, factor);
+        panel(name, Label::new(&words, unit), shown.contains(&name), lines)
+    };
+    let mut panels: Vec<ChartPanel> = found.iter().map(of).collect();
     // Rows of two files that were thinned do not lie at the same instants.
     let whole = other.as_ref().is_some_and(|other| table.stretch.or(other.stretch).is_none());
     let apart = if whole { difference(&panels) } else { None };
@@ -105,27 +93,20 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         let widest = gaps.iter().flat_map(|series| &series.y).copied().fold(0.0, f64::max);
         let near = least.iter().any(|(_, gap)| *gap < 0.5 * widest);
         let levels = if near { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() };
-        panels.push(ChartPanel {
-            levels,
-            ..panel("gap", Label::new("gap, drum to tub", "mm"), true, gaps)
-        });
+        let gap = panel("gap", Label::new("gap, drum to tub", "mm"), true, gaps);
+        panels.push(ChartPanel { levels, ..gap });
     }
     let mut marks = Vec::new();
     let mut shades = Vec::new();
     let unstable = unstable_speeds(table, options)?;
     let (resonances, note) = resonances(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
-        for (x, resonance) in passages(&time, speed, &resonances) {
-            marks.push(Mark::of_speed(x, resonance));
-        }
+        let passed = passages(&time, speed, &resonances).into_iter();
+        marks.extend(passed.map(|(x, resonance)| Mark::of_speed(x, resonance)));
         shades = stability::stretches_within(&time, speed, &unstable);
-        let y = speed.to_vec();
-        let series = Series::new(String::new(), INK, 0, y, Style::Solid(2.0));
-        let height = 130.0;
-        panels.push(ChartPanel {
-            height,
-            ..panel("speed", Label::new("spin", "rpm"), true, vec![series])
-        });
+        let series = Series::new(String::new(), INK, 0, speed.to_vec(), Style::Solid(2.0));
+        let spin = panel("speed", Label::new("spin", "rpm"), true, vec![series]);
+        panels.push(ChartPanel { height: 130.0, ..spin });
     }
     Ok(Chart {
         title: match &names {

@@ -23,12 +23,8 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         let Some((least, greatest)) = mode.band.filter(|_| !resonances.is_empty()) else {
             continue;
         };
-        let percent: Vec<f64> = least
-            .iter()
-            .zip(&greatest)
-            .zip(&mode.frequency)
-            .map(|((least, greatest), mean)| 50.0 * (greatest - least) / mean)
-            .collect();
+        let percent = |k: usize| 50.0 * (greatest[k] - least[k]) / mode.frequency[k];
+        let percent: Vec<f64> = (0..mode.frequency.len()).map(percent).collect();
         for speed in resonances {
             stars.push((speed, between(&mode.speed, &percent, speed), format!("{speed:.1} rpm")));
         }

@@ -71,7 +71,7 @@ fn cell(trace: &Source, at: &At, map: &Map) -> Option<usize> {
             |name: &str| at.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
         let places = map.grid.axes.iter().map(|axis| axis.place_near(value(&axis.swept.name)?));
         let places: Vec<usize> = places.collect::<Option<_>>()?;
-        return Some(map.grid.index(&places)).filter(|&cell| map.filled(cell));
+        return Some(map.grid.index(places)).filter(|&cell| map.filled(cell));
     }
     let stem = trace.path.file_stem()?.to_str()?;
     let digits = stem.rsplit(|letter: char| !letter.is_ascii_digit()).next()?;

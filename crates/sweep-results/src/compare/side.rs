@@ -58,32 +58,25 @@ impl Side {
         other: &ResultTable,
         keys: &[String],
     ) -> Result<Self, ResultsError> {
-        let columns: Vec<&Column> = table
-            .columns
-            .iter()
-            .filter(|column| column.name != "point" && !keys.contains(&column.name))
-            .filter(|column| {
-                other.column(&column.name).is_some_and(|other| other.kind == column.kind)
-            })
-            .collect();
+        let in_both = |column: &Column| {
+            let beside = other.column(&column.name);
+            let is_same = beside.is_some_and(|beside| beside.kind == column.kind);
+            is_same && column.name != "point" && !keys.contains(&column.name)
+        };
+        let mut columns = table.columns.clone();
+        columns.retain(in_both);
         let cells = table.rows().saturating_mul((columns.len() + keys.len()) as u64);
         if cells > MOST_CELLS {
-            return Err(ResultsError::TooLarge {
-                path: table.path().to_owned(),
-                cells,
-                most: MOST_CELLS,
-            });
+            let path = table.path().to_owned();
+            return Err(ResultsError::TooLarge { path, cells, most: MOST_CELLS });
         }
-        let names: Vec<&str> = keys
-            .iter()
-            .map(String::as_str)
-            .chain(columns.iter().map(|column| column.name.as_str()))
-            .collect();
+        let names = keys.iter().chain(columns.iter().map(|column| &column.name));
+        let names: Vec<&str> = names.map(String::as_str).collect();
         let mut cells = Rows::default();
         for rows in table.read(&names)? {
             cells.extend(rows?);
         }
-        Ok(Self { cells, keys: keys.len(), columns: columns.into_iter().cloned().collect() })
+        Ok(Self { cells, keys: keys.len(), columns })
     }
 
     /// How many rows it has.
