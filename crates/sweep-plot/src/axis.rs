@@ -24,12 +24,12 @@ pub(crate) struct Tick {
 
 impl Scale {
     /// An even scale from one value to another.
-    pub(crate) fn linear(from: f64, to: f64) -> Self {
+    pub(crate) const fn linear(from: f64, to: f64) -> Self {
         Self { log: false, from, to }
     }
 
     /// A logarithmic scale between two positive values.
-    pub(crate) fn log(from: f64, to: f64) -> Self {
+    pub(crate) const fn log(from: f64, to: f64) -> Self {
         Self { log: true, from, to }
     }
 
@@ -61,13 +61,8 @@ impl Scale {
 
 /// Least and greatest of the finite values.
 pub(crate) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    values.filter(|value| value.is_finite()).fold(None, |found, value| {
-        Some(
-            found.map_or((value, value), |(low, high): (f64, f64)| {
-                (low.min(value), high.max(value))
-            }),
-        )
-    })
+    let known = values.filter(|value| value.is_finite()).map(|value| (value, value));
+    known.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
 }
 
 /// A distance between ticks: 1, 2 or 5 times a power of ten.

@@ -3,11 +3,9 @@
 use super::axis::{Scale, extremes};
 use super::colour::{BOTH as BOTH_SIDES, ColourScale, SHADE};
 use super::decimate::envelope;
-use super::frame::{
-    HEADING_HEIGHT, LEGEND_ROW, Panel, Sign, TICK_SIZE, heading, legend, legend_rows,
-};
+use super::frame::{HEADING_HEIGHT, Panel, Sign, TICK_SIZE, heading, legend, legend_height};
 use super::label::{self, Label};
-use super::raster::Typeface;
+use super::raster::text_width;
 use super::scene::{Colour, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
 
 /// A figure of curves.
@@ -150,20 +148,17 @@ const STARS: &str = "resonance speed";
 const BOTH: &str = "both, one over the other";
 
 /// Draws the panels that are shown.
-pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
+pub(crate) fn draw(chart: &Chart) -> Scene {
     let panels: Vec<&ChartPanel> = chart.panels.iter().filter(|panel| panel.shown).collect();
     let entries = entries(chart, &panels);
     let width = WIDTH - LEFT - RIGHT;
-    let legend_height = LEGEND_ROW * legend_rows(typeface, &entries, width) as f64;
+    let of_legend = legend_height(&entries, width);
     let heights: f64 = panels.iter().map(|panel| panel.height + GAP).sum();
-    let strip = chart
-        .marks
-        .iter()
-        .map(|mark| typeface.width(&mark.label, TICK_SIZE, false) + 22.0)
-        .fold(0.0, f64::max);
-    let total = HEADING_HEIGHT + strip + heights + BELOW + legend_height + 4.0;
+    let labels = chart.marks.iter().map(|mark| text_width(&mark.label, TICK_SIZE, false) + 22.0);
+    let strip = labels.fold(0.0, f64::max);
+    let total = HEADING_HEIGHT + strip + heights + BELOW + of_legend + 4.0;
     let mut scene = Scene::new(WIDTH, total, format!("{}. {}", chart.title, chart.subtitle));
-    heading(&mut scene, typeface, &chart.title, &chart.subtitle);
+    heading(&mut scene, &chart.title, &chart.subtitle);
     let xs = x_scale(chart);
     let mut y = HEADING_HEIGHT + strip;
     for (index, &content) in panels.iter().enumerate() {
@@ -174,7 +169,7 @@ pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
             dots = draw_panel(scene, chart, content, &panel);
         });
         draw_marks(&mut scene, chart, &panel, index == 0);
-        draw_stars(&mut scene, typeface, (chart, content), &panel);
+        draw_stars(&mut scene, (chart, content), &panel);
         let last = index + 1 == panels.len();
         panel.frame(&mut scene, last, true);
         // Whole at the panel's edge too.
@@ -182,13 +177,13 @@ pub(crate) fn draw(chart: &Chart, typeface: &Typeface) -> Scene {
         for (place, radius, colour) in dots.into_iter().filter(|([_, y], ..)| within(*y)) {
             scene.fill(Outline::circle(place, radius), colour);
         }
-        panel.y_label(&mut scene, typeface, &content.label.to_string(), 62.0);
+        panel.y_label(&mut scene, &content.label.to_string(), 62.0);
         if last {
             panel.x_label(&mut scene, &chart.x_label.to_string());
         }
         y += content.height + GAP;
     }
-    legend(&mut scene, typeface, &entries, LEFT, y - GAP + BELOW + LEGEND_ROW / 2.0, width);
+    legend(&mut scene, &entries, LEFT, y - GAP + BELOW, width);
     scene
 }
 
@@ -291,7 +286,8 @@ fn stroke(series: &Series) -> Stroke {
     }
 }
 
-fn level_stroke() -> Stroke {
+/// Lines at a level.
+pub(crate) fn level_stroke() -> Stroke {
     Stroke::dashed(INK, 1.6, &[3.0, 3.0])
 }
 
@@ -310,12 +306,7 @@ type Extent = [f64; 4];
 
 /// Stars first, then their labels, each where it covers neither a star nor a label before it, if
 /// there is such a place; of several, the one that the fewest lines run through.
-fn draw_stars(
-    scene: &mut Scene,
-    typeface: &Typeface,
-    (chart, content): (&Chart, &ChartPanel),
-    panel: &Panel,
-) {
+fn draw_stars(scene: &mut Scene, (chart, content): (&Chart, &ChartPanel), panel: &Panel) {
     let mut taken: Vec<Extent> = Vec::new();
     for (x, y, _) in &content.stars {
         let [x, y] = panel.at(*x, *y);
@@ -324,7 +315,7 @@ fn draw_stars(
     }
     for (x, y, label) in &content.stars {
         let [x, y] = panel.at(*x, *y);
-        let width = typeface.width(label, TICK_SIZE, true);
+        let width = text_width(label, TICK_SIZE, true);
         // On either side of the star, and from close to it to farther above and below.
         let sides = [x - STAR - 2.0 - width, x + STAR + 2.0];
         let heights = [-6.0, 18.0, -24.0, 36.0, -42.0, 54.0];
@@ -408,8 +399,8 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
     for panel in panels {
         for series in &panel.series {
             if series.style == Style::Dots {
-                let dot = (Outline::circle([0.0, 0.0], 1.4 * DOT), true);
-                add(Sign::Dot(dot, series.colour), &series.name);
+                let dot = Outline::circle([0.0, 0.0], 1.4 * DOT);
+                add(Sign::Shape(dot, true, series.colour), &series.name);
                 continue;
             }
             let mut stroke = stroke(series);
@@ -429,7 +420,7 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
             add(Sign::Area(BOTH_SIDES), MIXED);
         }
         if !panel.stars.is_empty() {
-            add(Sign::Star(INK), STARS);
+            add(Sign::Shape(Outline::star([0.0, 0.0], 9.0), true, INK), STARS);
         }
     }
     if !chart.marks.is_empty() {
@@ -446,7 +437,7 @@ pub(crate) const MIXED: &str = "both: reliable and unreliable points";
 
 /// Whether positive values span so much that only a logarithm shows them all.
 pub(crate) fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
-    matches!(ColourScale::amplitude(values), ColourScale::Sequential(Scale { log: true, .. }))
+    ColourScale::amplitude(values).scale.log
 }
 
 #[cfg(test)]
@@ -478,8 +469,7 @@ mod tests {
             shades: Vec::new(),
             shade_meaning: String::new(),
         };
-        let typeface = Typeface::load().unwrap();
-        let drawn = draw(&chart, &typeface);
+        let drawn = draw(&chart);
         let labels = drawn.items.iter().filter_map(|item| match item {
             crate::scene::Item::Text(text) if text.halo.is_some() => Some(text),
             _ => None,
@@ -491,7 +481,7 @@ mod tests {
         let mut count = 0;
         for text in labels {
             let [left, base] = text.at;
-            let width = typeface.width(&text.text, TICK_SIZE, true);
+            let width = text_width(&text.text, TICK_SIZE, true);
             let extent = [left, base - TICK_SIZE, left + width, base + 4.0];
             assert_eq!(lines_through(&chart, content, &panel, extent), 0, "{}", text.text);
             count += 1;

@@ -2,6 +2,7 @@
 //! them.
 
 use super::axis::{Scale, Tick, extremes};
+use super::label::significant;
 use super::scene::Colour;
 
 /// The calm side of a limit, from its end to the limit: after the light blues of ColorBrewer's
@@ -58,52 +59,41 @@ pub(crate) const LEVELS: usize = 64;
 
 /// Values to colours.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum ColourScale {
-    /// Both sides of a centre have half the colours each, whatever their extent.
-    Diverging {
-        /// Whether the scale is logarithmic.
-        log: bool,
-        /// Value of the first colour.
-        low: f64,
-        /// Value of the middle.
-        centre: f64,
-        /// Value of the last colour.
-        high: f64,
-        /// The red side is the low one.
-        reversed: bool,
-        /// The middle is no limit: values near it have no colour.
-        neutral: bool,
-    },
-    /// One run of colours, dark to light.
-    Sequential(Scale),
+pub(crate) struct ColourScale {
+    /// From the value of the first colour to that of the last.
+    pub(crate) scale: Scale,
+    /// Both sides of this value have half the colours each, whatever their extent. None where there
+    /// is one run of colours, dark to light.
+    pub(crate) centre: Option<f64>,
+    /// The red side is the low one.
+    reversed: bool,
+    /// The middle is no limit: values near it have no colour.
+    neutral: bool,
 }
 
 impl ColourScale {
+    /// One run of colours.
+    const fn sequential(scale: Scale) -> Self {
+        Self { scale, centre: None, reversed: false, neutral: false }
+    }
+
+    /// Colours on both sides of a limit.
+    const fn diverging(scale: Scale, limit: f64, reversed: bool) -> Self {
+        Self { scale, centre: Some(limit), reversed, neutral: false }
+    }
+
     /// For ratios around a limit.
     pub(crate) fn ratio(values: impl Iterator<Item = f64>, limit: f64, reversed: bool) -> Self {
         let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((limit, limit));
-        Self::Diverging {
-            log: true,
-            low: low.min(limit / 2.0),
-            centre: limit,
-            high: high.max(limit * 2.0),
-            reversed,
-            neutral: false,
-        }
+        let scale = Scale::log(low.min(limit / 2.0), high.max(limit * 2.0));
+        Self::diverging(scale, limit, reversed)
     }
 
     /// For factors: the scale reaches as far below 1 as above it.
     pub(crate) fn factor(values: impl Iterator<Item = f64>) -> Self {
         let farthest = |so_far: f64, value: f64| so_far.max(value).max(1.0 / value);
         let most = values.filter(|value| *value > 0.0).fold(LEAST_CHANGE, farthest);
-        Self::Diverging {
-            log: true,
-            low: 1.0 / most,
-            centre: 1.0,
-            high: most,
-            reversed: false,
-            neutral: true,
-        }
+        Self { neutral: true, ..Self::diverging(Scale::log(1.0 / most, most), 1.0, false) }
     }
 
     /// For differences: the scale reaches as far below 0 as above it. `reversed` where less is
@@ -112,7 +102,7 @@ impl ColourScale {
         let farthest = |so_far: f64, value: f64| so_far.max(value.abs());
         let most = values.filter(|value| value.is_finite()).fold(0.0, farthest);
         let most = if most > 0.0 { most } else { 1.0 };
-        Self::Diverging { log: false, low: -most, centre: 0.0, high: most, reversed, neutral: true }
+        Self { neutral: true, ..Self::diverging(Scale::linear(-most, most), 0.0, reversed) }
     }
 
     /// For what has a limit, which is the middle. Values that are all on one side of it have all
@@ -120,7 +110,7 @@ impl ColourScale {
     pub(crate) fn about(values: impl Iterator<Item = f64>, limit: f64, reversed: bool) -> Self {
         match extremes(values) {
             Some((low, high)) if low < limit && high > limit => {
-                Self::Diverging { log: false, low, centre: limit, high, reversed, neutral: false }
+                Self::diverging(Scale::linear(low, high), limit, reversed)
             }
             found => Self::even(found.unwrap_or((0.0, 1.0))),
         }
@@ -129,7 +119,7 @@ impl ColourScale {
     /// From the least value to the greatest.
     fn even((low, high): (f64, f64)) -> Self {
         let high = if high > low { high } else { low + (0.1 * low.abs()).max(f64::EPSILON) };
-        Self::Sequential(Scale::linear(low, high))
+        Self::sequential(Scale::linear(low, high))
     }
 
     /// For what has no limit: by the logarithm where all is above zero and spans more than a factor
@@ -140,7 +130,7 @@ impl ColourScale {
             return Self::even((low, high));
         }
         let (low, high) = if high > low { (low, high) } else { (0.9 * low, 1.1 * low) };
-        Self::Sequential(if high > 10.0 * low {
+        Self::sequential(if high > 10.0 * low {
             Scale::log(low, high)
         } else {
             Scale::linear(low, high)
@@ -149,15 +139,15 @@ impl ColourScale {
 
     /// Place of a value among the colours, 0 to 1; values off the scale take its ends.
     pub(crate) fn position(&self, value: f64) -> f64 {
-        let position = match *self {
-            Self::Diverging { log, low, centre, high, .. } => {
-                let even = |value: f64| if log { value.ln() } else { value };
-                let offset = even(value) - even(centre);
-                let half =
-                    if offset < 0.0 { even(centre) - even(low) } else { even(high) - even(centre) };
+        let position = match self.centre {
+            Some(centre) => {
+                let offset = self.scale.even(value) - self.scale.even(centre);
+                let [low, centre, high] =
+                    [self.scale.from, centre, self.scale.to].map(|value| self.scale.even(value));
+                let half = if offset < 0.0 { centre - low } else { high - centre };
                 0.5 + 0.5 * offset / half
             }
-            Self::Sequential(scale) => scale.position(value),
+            None => self.scale.position(value),
         };
         position.clamp(0.0, 1.0)
     }
@@ -170,35 +160,22 @@ impl ColourScale {
     /// Colour of a step of the scale.
     pub(crate) fn colour(&self, level: usize) -> Colour {
         let place = (level as f64 + 0.5) / LEVELS as f64;
-        match self {
-            Self::Diverging { reversed, neutral, .. } => {
-                let place = if *reversed { 1.0 - place } else { place };
-                let [below, above] = if *neutral { [&LESS, &MORE] } else { [&BELOW, &ABOVE] };
-                if place < 0.5 {
-                    blend(below, 2.0 * place)
-                } else {
-                    blend(above, 2.0 * place - 1.0)
-                }
-            }
-            Self::Sequential(_) => blend(&SEQUENTIAL, place),
+        if self.centre.is_none() {
+            return blend(&SEQUENTIAL, place);
         }
+        let place = if self.reversed { 1.0 - place } else { place };
+        let [below, above] = if self.neutral { [&LESS, &MORE] } else { [&BELOW, &ABOVE] };
+        if place < 0.5 { blend(below, 2.0 * place) } else { blend(above, 2.0 * place - 1.0) }
     }
 
     /// Round values to mark on the colour bar.
     pub(crate) fn ticks(&self) -> Vec<Tick> {
-        match *self {
-            Self::Diverging { log, low, centre, high, .. } => {
-                let scale =
-                    |from, to| if log { Scale::log(from, to) } else { Scale::linear(from, to) };
-                let centre_label = super::label::significant(centre, 3);
-                let mut ticks = scale(low, centre).ticks(3);
-                ticks.extend(scale(centre, high).ticks(4));
-                ticks.retain(|tick| (self.position(tick.value) - 0.5).abs() > 0.04);
-                ticks.push(Tick { value: centre, label: centre_label });
-                ticks
-            }
-            Self::Sequential(scale) => scale.ticks(6),
-        }
+        let Some(centre) = self.centre else { return self.scale.ticks(6) };
+        let mut ticks = Scale { to: centre, ..self.scale }.ticks(3);
+        ticks.extend(Scale { from: centre, ..self.scale }.ticks(4));
+        ticks.retain(|tick| (self.position(tick.value) - 0.5).abs() > 0.04);
+        ticks.push(Tick { value: centre, label: significant(centre, 3) });
+        ticks
     }
 }
 

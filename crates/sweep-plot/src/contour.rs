@@ -40,10 +40,8 @@ pub fn zero_lines(
             }
         }
     }
-    join(&mut links)
-        .into_iter()
-        .map(|line| line.into_iter().map(|edge| crossings[&edge]).collect())
-        .collect()
+    let line = |edges: Vec<Edge>| edges.iter().map(|edge| crossings[edge]).collect();
+    join(&mut links).into_iter().map(line).collect()
 }
 
 /// The pieces of line within one square, each from edge to edge.
@@ -80,14 +78,10 @@ fn square(i: usize, j: usize, value: &impl Fn(usize, usize) -> f64) -> Vec<(Edge
             let diagonal =
                 if missing % 2 == 0 { (i, j, Run::Falling) } else { (i, j, Run::Rising) };
             let [next, opposite, last] = [1, 2, 3].map(|step| (missing + step) % 4);
-            let crossed: Vec<Edge> = [
-                (above[next] != above[opposite], edges[next]),
-                (above[opposite] != above[last], edges[opposite]),
-                (above[last] != above[next], diagonal),
-            ]
-            .into_iter()
-            .filter_map(|(crossed, edge)| crossed.then_some(edge))
-            .collect();
+            let sides = [(next, opposite, edges[next]), (opposite, last, edges[opposite])];
+            let sides = sides.into_iter().chain([(last, next, diagonal)]);
+            let crossed = sides.filter(|(from, to, _)| above[*from] != above[*to]);
+            let crossed: Vec<Edge> = crossed.map(|(.., edge)| edge).collect();
             match crossed[..] {
                 [from, to] => vec![(from, to)],
                 _ => Vec::new(),

@@ -3,7 +3,7 @@
 use super::PlotOptions;
 use super::error::PlotError;
 use super::label;
-use super::read::Source;
+use super::read::{Source, some_of};
 use super::swept::SweptAxis;
 
 /// Most values of a third axis that are drawn side by side.
@@ -155,8 +155,7 @@ fn pins(
         let missing =
             |what, known: String| source.not_there("--at", format!("{name}={value}"), what, known);
         let place = extra.iter().position(|axis| axis.name == *name).ok_or_else(|| {
-            let known: Vec<&str> = extra.iter().map(|axis| axis.name.as_str()).collect();
-            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            let known = some_of(extra.iter().map(|axis| axis.name.as_str()));
             missing("axis beyond the second", known)
         })?;
         let values = &extra[place].values;

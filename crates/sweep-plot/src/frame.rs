@@ -2,7 +2,7 @@
 
 use super::axis::{Scale, Tick};
 use super::colour::FAILED;
-use super::raster::Typeface;
+use super::raster::text_width;
 use super::scene::{Anchor, Colour, FAINT, Hatch, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
 
 /// Type sizes, px: legible at half a figure's size.
@@ -80,9 +80,9 @@ impl Panel {
     /// The numbers at the x axis, and where their middles are, px: as many as have room beside each
     /// other, at every tick, every second one and so on. Those at the ends do not reach into the
     /// panels beside this one.
-    fn numbers_that_fit(&self, typeface: &Typeface) -> Vec<(f64, String)> {
+    fn numbers_that_fit(&self) -> Vec<(f64, String)> {
         let numbers = self.x_ticks().into_iter().map(|tick| {
-            let width = typeface.width(&tick.label, TICK_SIZE, false);
+            let width = text_width(&tick.label, TICK_SIZE, false);
             let (left, right) = (self.x - OVERHANG, self.x + self.width + OVERHANG);
             let middle = self.at_x(tick.value).min(right - width / 2.0).max(left + width / 2.0);
             (middle, width, tick.label)
@@ -106,19 +106,12 @@ impl Panel {
     /// or to the left.
     pub(crate) fn frame(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
         let numbers = self.x_ticks().into_iter().map(|tick| (self.at_x(tick.value), tick.label));
-        let numbers = numbers.filter(|_| x_numbers).collect();
-        self.frame_with(scene, numbers, y_numbers);
+        self.frame_with(scene, numbers.filter(|_| x_numbers).collect(), y_numbers);
     }
 
     /// The same with others close beside it.
-    pub(crate) fn frame_beside(
-        &self,
-        scene: &mut Scene,
-        typeface: &Typeface,
-        x_numbers: bool,
-        y_numbers: bool,
-    ) {
-        let numbers = if x_numbers { self.numbers_that_fit(typeface) } else { Vec::new() };
+    pub(crate) fn frame_beside(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
+        let numbers = if x_numbers { self.numbers_that_fit() } else { Vec::new() };
         self.frame_with(scene, numbers, y_numbers);
     }
 
@@ -153,14 +146,8 @@ impl Panel {
 
     /// What the y axis shows, `distance` px left of the panel; in two lines where one is longer
     /// than the panel is high.
-    pub(crate) fn y_label(
-        &self,
-        scene: &mut Scene,
-        typeface: &Typeface,
-        label: &str,
-        distance: f64,
-    ) {
-        let fits = |text: &str| typeface.width(text, LABEL_SIZE, false) <= self.height;
+    pub(crate) fn y_label(&self, scene: &mut Scene, label: &str, distance: f64) {
+        let fits = |text: &str| text_width(text, LABEL_SIZE, false) <= self.height;
         // A unit, in brackets, stays whole.
         let words_end = label.rfind(" (").map_or(label.len(), |place| place + 1);
         let spaces = label[..words_end].match_indices(' ').map(|(place, _)| place);
@@ -178,12 +165,10 @@ impl Panel {
 }
 
 /// Title, and a line below it that is shortened to fit.
-pub(crate) fn heading(scene: &mut Scene, typeface: &Typeface, title: &str, subtitle: &str) {
+pub(crate) fn heading(scene: &mut Scene, title: &str, subtitle: &str) {
     let room = scene.width - 40.0;
-    scene.text(
-        Text::new(fit(typeface, title, TITLE_SIZE, true, room), [20.0, 32.0], TITLE_SIZE).bold(),
-    );
-    let subtitle = fit(typeface, subtitle, TICK_SIZE, false, room);
+    scene.text(Text::new(fit(title, TITLE_SIZE, true, room), [20.0, 32.0], TITLE_SIZE).bold());
+    let subtitle = fit(subtitle, TICK_SIZE, false, room);
     scene.text(Text::new(subtitle, [20.0, 55.0], TICK_SIZE).colour(MUTED));
 }
 
@@ -191,9 +176,9 @@ pub(crate) fn heading(scene: &mut Scene, typeface: &Typeface, title: &str, subti
 pub(crate) const HEADING_HEIGHT: f64 = 72.0;
 
 /// `text`, or as much of it as fits into `room` px.
-fn fit(typeface: &Typeface, text: &str, size: f64, bold: bool, room: f64) -> String {
+fn fit(text: &str, size: f64, bold: bool, room: f64) -> String {
     let mut shown: String = text.to_owned();
-    while typeface.width(&shown, size, bold) > room {
+    while text_width(&shown, size, bold) > room {
         let kept = shown.trim_end_matches('…').chars().count().saturating_sub(1);
         shown = shown.chars().take(kept).collect::<String>().trim_end().to_owned() + "…";
     }
@@ -213,47 +198,38 @@ pub(crate) enum Sign {
     Hatched(Hatch),
     /// A dotted mark: undefined points.
     Undefined,
-    /// A star.
-    Star(Colour),
-    /// A dot around the origin, filled or not.
-    Dot((Outline, bool), Colour),
+    /// A shape around the origin, filled or not.
+    Shape(Outline, bool, Colour),
 }
 
 /// Height of a row of a legend, px.
-pub(crate) const LEGEND_ROW: f64 = 25.0;
+const LEGEND_ROW: f64 = 25.0;
 
-/// Rows that a legend takes in `width` px.
-pub(crate) fn legend_rows(typeface: &Typeface, entries: &[(Sign, String)], width: f64) -> usize {
-    lay_out(typeface, entries, width).last().map_or(0, |(_, row)| row + 1)
+/// Height of a legend in `width` px, px.
+pub(crate) fn legend_height(entries: &[(Sign, String)], width: f64) -> f64 {
+    LEGEND_ROW * lay_out(entries, width).last().map_or(0, |(_, row)| row + 1) as f64
 }
 
-/// Draws a legend with its first row's middle at `y`, px.
-pub(crate) fn legend(
-    scene: &mut Scene,
-    typeface: &Typeface,
-    entries: &[(Sign, String)],
-    x: f64,
-    y: f64,
-    width: f64,
-) {
-    for ((sign, text), (offset, row)) in entries.iter().zip(lay_out(typeface, entries, width)) {
-        let (x, y) = (x + offset, y + row as f64 * LEGEND_ROW);
+/// Draws a legend below `y`, px.
+pub(crate) fn legend(scene: &mut Scene, entries: &[(Sign, String)], x: f64, y: f64, width: f64) {
+    for ((sign, text), (offset, row)) in entries.iter().zip(lay_out(entries, width)) {
+        let (x, y) = (x + offset, y + LEGEND_ROW / 2.0 + row as f64 * LEGEND_ROW);
+        let area = Outline::rectangle(x, y - 8.0, 28.0, 16.0);
         match sign {
             Sign::Line(stroke) => {
                 scene.line(Outline::line(&[[x, y], [x + 28.0, y]]), stroke.clone())
             }
             Sign::Area(colour) => {
-                scene.fill(Outline::rectangle(x, y - 8.0, 28.0, 16.0), *colour);
-                scene.line(Outline::rectangle(x, y - 8.0, 28.0, 16.0), Stroke::solid(MUTED, 1.0));
+                scene.fill(area.clone(), *colour);
+                scene.line(area, Stroke::solid(MUTED, 1.0));
             }
-            Sign::Failed => failed(scene, Outline::rectangle(x, y - 8.0, 28.0, 16.0)),
+            Sign::Failed => failed(scene, area),
             Sign::Hatched(hatch) => {
-                let area = Outline::rectangle(x, y - 8.0, 28.0, 16.0);
                 scene.hatch(area.clone(), hatch);
                 scene.line(area, Stroke::solid(MUTED, 1.0));
             }
             Sign::Undefined => undefined(scene, &[[x, y - 8.0, 28.0, 16.0]]),
-            Sign::Dot((outline, filled), colour) => {
+            Sign::Shape(outline, filled, colour) => {
                 let outline = outline.moved([x + 14.0, y]);
                 if *filled {
                     scene.fill(outline, *colour);
@@ -261,27 +237,24 @@ pub(crate) fn legend(
                     scene.line(outline, Stroke::solid(*colour, 1.4));
                 }
             }
-            Sign::Star(colour) => scene.fill(Outline::star([x + 14.0, y], 9.0), *colour),
         }
         scene.text(Text::new(text.clone(), [x + 36.0, y + 0.35 * TICK_SIZE], TICK_SIZE));
     }
 }
 
 /// Offset and row of each entry.
-fn lay_out(typeface: &Typeface, entries: &[(Sign, String)], width: f64) -> Vec<(f64, usize)> {
+fn lay_out(entries: &[(Sign, String)], width: f64) -> Vec<(f64, usize)> {
     let (mut x, mut row) = (0.0, 0);
-    entries
-        .iter()
-        .map(|(_, text)| {
-            let taken = 36.0 + typeface.width(text, TICK_SIZE, false);
-            if x > 0.0 && x + taken > width {
-                (x, row) = (0.0, row + 1);
-            }
-            let place = (x, row);
-            x += taken + 26.0;
-            place
-        })
-        .collect()
+    let place = |(_, text): &(Sign, String)| {
+        let taken = 36.0 + text_width(text, TICK_SIZE, false);
+        if x > 0.0 && x + taken > width {
+            (x, row) = (0.0, row + 1);
+        }
+        let place = (x, row);
+        x += taken + 26.0;
+        place
+    };
+    entries.iter().map(place).collect()
 }
 
 /// Draws an area of failed points: grey and hatched.

@@ -101,20 +101,19 @@ const UNKNOWN: &str = "unknown";
 pub(crate) const OK: &str = "ok";
 
 impl Map {
-    /// Reads the named columns of a map file into the cells of a grid. `divide` says which columns
-    /// have a level.
+    /// Reads the named columns of a map file into the cells of a grid. Some columns have levels.
     ///
     /// # Errors
     /// As [`Source::batches`]; [`PlotError::NotAGrid`] for two rows at one point.
     pub(crate) fn read(
         source: Source,
         grid: Grid,
-        columns: &[&str],
-        divide: impl Fn(&str) -> Option<Divide>,
+        columns: &[String],
+        levels: &BTreeMap<String, Divide>,
     ) -> Result<Self, PlotError> {
-        let mut gather = Gather::new(&source, &grid, columns, divide);
-        let mut wanted = columns.to_vec();
-        wanted.extend(grid.axes.iter().map(|axis| axis.name.as_str()));
+        let mut gather = Gather::new(&source, &grid, columns, levels);
+        let mut wanted: Vec<&str> = columns.iter().map(String::as_str).collect();
+        wanted.extend(grid.axes.iter().map(|axis| axis.swept.name.as_str()));
         wanted.extend(["status", "reliable", "sensitive", "ratio_max"]);
         wanted.sort_unstable();
         wanted.dedup();
@@ -205,8 +204,8 @@ struct Gathered<'a> {
 /// Cells on their way to [`Sides`].
 struct Dividing {
     divide: Divide,
-    above: Vec<bool>,
-    below: Vec<bool>,
+    /// Whether a cell has points below the level, and at it or above.
+    sides: Vec<[bool; 2]>,
     undefined: Vec<bool>,
     /// Sum and count of the values, or of their logarithms.
     sums: Vec<(f64, u32)>,
@@ -214,16 +213,14 @@ struct Dividing {
 
 impl Dividing {
     fn new(divide: Divide, cells: usize) -> Self {
-        let none = || vec![false; cells];
-        let (above, below, undefined) = (none(), none(), none());
-        Self { divide, above, below, undefined, sums: vec![(0.0, 0); cells] }
+        let (sides, undefined) = (vec![[false; 2]; cells], vec![false; cells]);
+        Self { divide, sides, undefined, sums: vec![(0.0, 0); cells] }
     }
 
     fn take(&mut self, cell: usize, value: f64, failed: bool) {
         let even = if self.divide.log { value.ln() } else { value };
         if even.is_finite() {
-            let side = if value >= self.divide.value { &mut self.above } else { &mut self.below };
-            side[cell] = true;
+            self.sides[cell][usize::from(value >= self.divide.value)] = true;
             let (sum, count) = self.sums[cell];
             self.sums[cell] = (sum + even, count + 1);
         } else if !failed {
@@ -236,9 +233,8 @@ impl Dividing {
             let mean = sum / f64::from(count);
             if self.divide.log { mean.exp() } else { mean }
         };
-        let sides = self.above.into_iter().zip(self.below);
         Sides {
-            both: sides.map(|(above, below)| above && below).collect(),
+            both: self.sides.into_iter().map(|sides| sides == [true; 2]).collect(),
             undefined: self.undefined,
             mean: self.sums.into_iter().map(mean).collect(),
         }
@@ -270,11 +266,11 @@ impl<'a> Gather<'a> {
     fn new(
         source: &'a Source,
         grid: &'a Grid,
-        columns: &[&str],
-        divide: impl Fn(&str) -> Option<Divide>,
+        columns: &[String],
+        levels: &BTreeMap<String, Divide>,
     ) -> Self {
         let cells = grid.cells();
-        let wanted = source.columns.iter().filter(|column| columns.contains(&column.name.as_str()));
+        let wanted = source.columns.iter().filter(|column| columns.contains(&column.name));
         let columns = wanted.map(|facts| Gathered {
             facts,
             rule: Rule::of(facts),
@@ -284,9 +280,10 @@ impl<'a> Gather<'a> {
             },
             extent: Extent::NONE,
             // A cell of one point lies on one side, and its value is its mean.
-            dividing: divide(&facts.name)
+            dividing: levels
+                .get(&facts.name)
                 .filter(|_| grid.merged())
-                .map(|divide| Dividing::new(divide, cells)),
+                .map(|divide| Dividing::new(*divide, cells)),
         });
         Self {
             source,
@@ -318,7 +315,7 @@ impl<'a> Gather<'a> {
     fn cells(&mut self, batch: &Batch<'_>) -> Result<Vec<Option<usize>>, PlotError> {
         let mut cells = vec![Some(0_usize); batch.rows];
         for (axis, last) in self.grid.axes.iter().zip(&mut self.last) {
-            for (cell, value) in cells.iter_mut().zip(batch.numbers(&axis.name)?) {
+            for (cell, value) in cells.iter_mut().zip(batch.numbers(&axis.swept.name)?) {
                 if value != last.0 {
                     *last = (value, GridAxis::place(axis, value));
                 }

@@ -8,14 +8,8 @@ use super::swept::{MOST_VALUES, SweptAxis};
 /// A swept parameter as the map shows it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GridAxis {
-    /// Name of the parameter.
-    pub(crate) name: String,
-    /// Its name in words.
-    pub(crate) words: String,
-    /// Unit of the values.
-    pub(crate) unit: String,
-    /// Better shown by the logarithm.
-    pub(crate) log: bool,
+    /// The parameter with its values.
+    pub(crate) swept: SweptAxis,
     /// Rising: the value of each place, of a block the middle.
     pub(crate) values: Vec<f64>,
     /// The borders of the cells around the values, one more than those: halfway between neighbours.
@@ -29,9 +23,9 @@ pub(crate) struct GridAxis {
 #[derive(Clone, Debug, PartialEq)]
 enum Places {
     /// This many neighbouring values share a place, fewer the last one.
-    Blocks { values: Vec<f64>, size: usize },
-    /// These values have a place, and no others.
-    Picked(Vec<f64>),
+    Blocks(usize),
+    /// The values have a place, and no others.
+    Picked,
     /// The borders place a value, where an axis is known by its range alone.
     Borders,
 }
@@ -39,7 +33,7 @@ enum Places {
 impl GridAxis {
     /// An axis whose neighbouring values share a place, `size` of them each.
     fn in_blocks(axis: &SweptAxis, size: usize) -> Self {
-        let even = evened(&axis.values, axis.log);
+        let even = axis.evened(&axis.values);
         let last = even.len() - 1;
         let starts = (0..even.len()).step_by(size);
         let mut borders: Vec<f64> =
@@ -57,22 +51,20 @@ impl GridAxis {
         let (values, spans) = if size == 1 {
             (axis.values.clone(), None)
         } else {
-            let middle = |[from, to]: [usize; 2]| un_even((even[from] + even[to]) / 2.0, axis.log);
+            let middle = |[from, to]: [usize; 2]| axis.un_even((even[from] + even[to]) / 2.0);
             let spans = starts.clone().map(|start| ends(start).map(|end| axis.values[end]));
             (starts.clone().map(|start| middle(ends(start))).collect(), Some(spans.collect()))
         };
-        let places = Places::Blocks { values: axis.values.clone(), size };
-        let borders = borders.into_iter().map(|border| un_even(border, axis.log)).collect();
-        Self { spans, places, ..Self::new(axis, values, borders) }
+        let borders = borders.into_iter().map(|border| axis.un_even(border)).collect();
+        Self { spans, places: Places::Blocks(size), ..Self::new(axis, values, borders) }
     }
 
     /// An axis known by its range alone, in `count` equal parts.
     fn in_parts(axis: &SweptAxis, count: usize) -> Self {
-        let even = evened(&axis.values, axis.log);
+        let even = axis.evened(&axis.values);
         let border = |k: usize| even[0] + (even[1] - even[0]) * k as f64 / count as f64;
-        let borders: Vec<f64> = (0..=count).map(|k| un_even(border(k), axis.log)).collect();
-        let values =
-            (0..count).map(|k| un_even((border(k) + border(k + 1)) / 2.0, axis.log)).collect();
+        let borders: Vec<f64> = (0..=count).map(|k| axis.un_even(border(k))).collect();
+        let values = (0..count).map(|k| axis.un_even((border(k) + border(k + 1)) / 2.0)).collect();
         let spans = borders.windows(2).map(|pair| [pair[0], pair[1]]).collect();
         Self { spans: Some(spans), ..Self::new(axis, values, borders) }
     }
@@ -81,39 +73,39 @@ impl GridAxis {
     fn picked(axis: &SweptAxis, picks: &[usize]) -> Self {
         let values: Vec<f64> = picks.iter().map(|&pick| axis.values[pick]).collect();
         let shown = SweptAxis { values, ..axis.clone() };
-        let places = Places::Picked(shown.values.clone());
-        Self { places, ..Self::in_blocks(&shown, 1) }
+        Self { places: Places::Picked, ..Self::in_blocks(&shown, 1) }
     }
 
     fn new(axis: &SweptAxis, values: Vec<f64>, borders: Vec<f64>) -> Self {
-        let SweptAxis { name, words, unit, log, .. } = axis.clone();
-        Self { name, words, unit, log, values, borders, spans: None, places: Places::Borders }
+        Self { swept: axis.clone(), values, borders, spans: None, places: Places::Borders }
     }
 
     /// From the first border to the last.
     pub(crate) fn scale(&self) -> Scale {
-        Scale { log: self.log, from: self.borders[0], to: self.borders[self.borders.len() - 1] }
+        Scale {
+            log: self.swept.log,
+            from: self.borders[0],
+            to: self.borders[self.borders.len() - 1],
+        }
     }
 
     /// Words and unit.
     pub(crate) fn label(&self) -> String {
-        label::with_unit(&self.words, &self.unit)
+        label::with_unit(&self.swept.words, &self.swept.unit)
     }
 
     /// The values in the units in which the axis is even.
     pub(crate) fn even(&self) -> Vec<f64> {
-        evened(&self.values, self.log)
+        self.swept.evened(&self.values)
     }
 
     /// The place that one of the axis' values belongs to; none if it is not shown.
     pub(crate) fn place(&self, value: f64) -> Option<usize> {
-        let below = |known: &f64| *known < value;
-        match &self.places {
-            Places::Blocks { values, size } => {
-                Some(values.partition_point(below).min(values.len() - 1) / size)
-            }
-            Places::Picked(values) => {
-                let place = values.partition_point(below);
+        let values = &self.swept.values;
+        let place = values.partition_point(|known| *known < value);
+        match self.places {
+            Places::Blocks(size) => Some(place.min(values.len() - 1) / size),
+            Places::Picked => {
                 values.get(place).is_some_and(|known| *known == value).then_some(place)
             }
             Places::Borders => {
@@ -126,31 +118,21 @@ impl GridAxis {
     /// The place of the axis' value that a number is, but for what writing it as text may have
     /// lost.
     pub(crate) fn place_near(&self, value: f64) -> Option<usize> {
-        let values = match &self.places {
-            Places::Blocks { values, .. } | Places::Picked(values) => values,
-            Places::Borders => return self.place(value),
-        };
-        let known = values.iter().find(|&&known| SweptAxis::near(known, value))?;
+        if self.places == Places::Borders {
+            return self.place(value);
+        }
+        let known = self.swept.values.iter().find(|&&known| SweptAxis::near(known, value))?;
         self.place(*known)
     }
 
     /// How many of the axis' values share a place; none where that is not known.
     fn shared(&self, place: usize) -> Option<usize> {
-        match &self.places {
-            Places::Blocks { values, size } => Some((*size).min(values.len() - place * size)),
-            Places::Picked(_) => Some(1),
+        match self.places {
+            Places::Blocks(size) => Some(size.min(self.swept.values.len() - place * size)),
+            Places::Picked => Some(1),
             Places::Borders => None,
         }
     }
-}
-
-/// The values in the units in which an axis is even.
-fn evened(values: &[f64], log: bool) -> Vec<f64> {
-    values.iter().map(|value| if log { value.ln() } else { *value }).collect()
-}
-
-fn un_even(value: f64, log: bool) -> f64 {
-    if log { value.exp() } else { value }
 }
 
 /// The cells of a map, on the grid of its axes.
@@ -167,23 +149,20 @@ impl Grid {
     /// more, for each of the values picked of every axis after them.
     pub(crate) fn new(axes: &[SweptAxis], picks: &[Vec<usize>], most: usize) -> Self {
         let cuts: usize = picks.iter().map(Vec::len).product();
-        let counts = [0, 1].map(|k| axes.get(k).map_or(1, places_wanted));
+        let wanted = |axis: &SweptAxis| if axis.complete { axis.values.len() } else { MOST_VALUES };
+        let counts = [0, 1].map(|k| axes.get(k).map_or(1, wanted));
         let shown = sides(counts, most / cuts.max(1));
         let mut block = [Some(1); 2];
         let mut grid: Vec<GridAxis> = Vec::with_capacity(axes.len());
         for (k, axis) in axes.iter().take(2).enumerate() {
-            if axis.complete {
-                let size = counts[k].div_ceil(shown[k]);
-                grid.push(GridAxis::in_blocks(axis, size));
-                block[k] = Some(size);
-            } else {
-                grid.push(GridAxis::in_parts(axis, shown[k]));
-                block[k] = None;
-            }
+            block[k] = axis.complete.then(|| counts[k].div_ceil(shown[k]));
+            grid.push(match block[k] {
+                Some(size) => GridAxis::in_blocks(axis, size),
+                None => GridAxis::in_parts(axis, shown[k]),
+            });
         }
-        grid.extend(
-            axes.iter().skip(2).zip(picks).map(|(axis, picks)| GridAxis::picked(axis, picks)),
-        );
+        let cut = axes.iter().skip(2).zip(picks);
+        grid.extend(cut.map(|(axis, picks)| GridAxis::picked(axis, picks)));
         Self { axes: grid, block }
     }
 
@@ -198,18 +177,13 @@ impl Grid {
     }
 
     /// Index of a cell in grid order, from its place on each axis.
-    pub(crate) fn index(&self, at: &[usize]) -> usize {
-        self.axes.iter().zip(at).fold(0, |index, (axis, &place)| index * axis.values.len() + place)
+    pub(crate) fn index(&self, at: impl IntoIterator<Item = usize>) -> usize {
+        self.axes.iter().zip(at).fold(0, |index, (axis, place)| index * axis.values.len() + place)
     }
 
     /// Index of the cell at `x` on the first axis, `y` on the second, and `rest` on those after.
     pub(crate) fn cell(&self, x: usize, y: usize, rest: &[usize]) -> usize {
-        let second = self.axes.get(1).map(|axis| (axis, &y));
-        let rest = self.axes.iter().skip(2).zip(rest);
-        second
-            .into_iter()
-            .chain(rest)
-            .fold(x, |index, (axis, &place)| index * axis.values.len() + place)
+        self.index([x, y].into_iter().chain(rest.iter().copied()))
     }
 
     /// How many grid points a cell has; none where that is not known.
@@ -233,10 +207,6 @@ impl Grid {
         };
         Some(format!("a cell holds {said} and shows the worst"))
     }
-}
-
-fn places_wanted(axis: &SweptAxis) -> usize {
-    if axis.complete { axis.values.len() } else { MOST_VALUES }
 }
 
 /// How many places each of two axes gets so that there are at most `most` cells: as even a share as

@@ -14,8 +14,8 @@ use serde_json::{Value, json};
 
 use super::axis::{LEAST_TICKS, SLACK, Scale, Step, Tick, log_sets};
 use super::chart::{Chart, ChartPanel, Series, Style, x_scale, y_scale};
-use super::colour::{BOTH, ColourScale, FAILED, LEVELS, SHADE};
-use super::contour::{MOST_POINTS, leave_out_shortest, zero_lines};
+use super::colour::{BOTH, FAILED, LEVELS, SHADE};
+use super::contour::MOST_POINTS;
 use super::cuts::Cuts;
 use super::error::PlotError;
 use super::figures;
@@ -54,11 +54,12 @@ const START: &str = include_str!("html/start.js");
 const CELL_BYTES: usize = 7_000_000;
 
 /// Columns of a map file that a page carries: all results but the counts of steps.
-pub(crate) fn carried<'a>(source: &'a Source, axes: &[SweptAxis]) -> Vec<&'a str> {
+pub(crate) fn carried(source: &Source, axes: &[SweptAxis]) -> Vec<String> {
     let names = source.columns.iter().map(|column| column.name.as_str());
     names
         .filter(|name| !name.starts_with("steps_") && !name.starts_with("rejected_"))
         .filter(|name| axes.iter().all(|axis| axis.name != *name))
+        .map(str::to_owned)
         .collect()
 }
 
@@ -111,7 +112,8 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
     if map.grid.merged() {
         data["counts"] = counts_json(map);
     }
-    let axes = map.grid.axes.iter().map(|axis| (axis.name.as_str(), axis.log)).collect::<Vec<_>>();
+    let axes = map.grid.axes.iter().map(|axis| (axis.swept.name.as_str(), axis.swept.log));
+    let axes: Vec<(&str, bool)> = axes.collect();
     let computing = computing(&mut data, options.live.as_ref(), &axes);
     let scripts = [&[CORE, CHART, BAR, CELLS, MAP][..], computing, &[REPORT, START]].concat();
     let told = report::told(source, options.live.as_ref()) + &report::caveats(map);
@@ -244,9 +246,12 @@ fn log_ticks_json(scale: Scale) -> Value {
     if !scale.log {
         return Value::Null;
     }
-    let tick = |tick: Tick| json!([embed::short(tick.value), tick.label]);
     let sets = log_sets(scale.from.min(scale.to), scale.from.max(scale.to));
-    json!(sets.map(|set| set.into_iter().map(tick).collect::<Vec<_>>()))
+    json!(sets.map(|set| set.into_iter().map(tick_json).collect::<Vec<_>>()))
+}
+
+fn tick_json(tick: Tick) -> Value {
+    json!([embed::short(tick.value), tick.label])
 }
 
 /// The rows of a point's table: name, words, unit, and the columns that hold the values of both
@@ -271,10 +276,10 @@ fn rows_json(source: &Source) -> Value {
 
 fn axis_json(axis: &GridAxis) -> Value {
     let mut data = json!({
-        "name": axis.name,
-        "words": axis.words,
-        "unit": axis.unit,
-        "log": axis.log,
+        "name": axis.swept.name,
+        "words": axis.swept.words,
+        "unit": axis.swept.unit,
+        "log": axis.swept.log,
         "ticks": log_ticks_json(axis.scale()),
         "values": axis.values,
         "borders": axis.borders,
@@ -355,22 +360,10 @@ fn legend_json(entries: &[(Sign, String)]) -> Value {
 }
 
 fn layer_json(map: &Map, shown: &Shown, layer: Layer, room: usize) -> Value {
-    let (log, stops, limit) = match layer.scale {
-        ColourScale::Diverging { log, low, centre, high, .. } => {
-            (log, [low, centre, high], Some(centre))
-        }
-        ColourScale::Sequential(Scale { log, from, to }) => {
-            let middle = if log { (from * to).sqrt() } else { 0.5 * (from + to) };
-            (log, [from, middle, to], None)
-        }
-    };
+    let (Scale { log, from, to }, limit) = (layer.scale.scale, layer.scale.centre);
+    let middle = limit.unwrap_or(if log { (from * to).sqrt() } else { 0.5 * (from + to) });
     let colours = (0..LEVELS).map(|level| layer.scale.colour(level).css());
-    let ticks: Vec<Value> = layer
-        .scale
-        .ticks()
-        .iter()
-        .map(|tick| json!([embed::short(tick.value), tick.label]))
-        .collect();
+    let ticks = layer.scale.ticks().into_iter().map(tick_json);
     let mut data = json!({
         "group": shown.group.name(),
         "groupWords": shown.group.words(),
@@ -380,9 +373,9 @@ fn layer_json(map: &Map, shown: &Shown, layer: Layer, room: usize) -> Value {
         "title": layer.title,
         "label": layer.label,
         "column": shown.column(),
-        "scale": { "log": log, "stops": stops, "limit": limit },
+        "scale": { "log": log, "stops": [from, middle, to], "limit": limit },
         "colours": colours.collect::<Value>(),
-        "ticks": ticks,
+        "ticks": ticks.collect::<Value>(),
         "nonlinear": layer.nonlinear,
         "lines": layer.level.as_ref().map(|level| level_json(map, &layer, level, room)),
     });
@@ -395,24 +388,14 @@ fn layer_json(map: &Map, shown: &Shown, layer: Layer, room: usize) -> Value {
 }
 
 /// The level's lines in data coordinates for each cut through the axes after the second, in grid
-/// order. Where a ragged boundary has more than `room` points, its shortest lines are left
-/// out: the cells on either side show them.
+/// order.
 fn level_json(map: &Map, layer: &Layer, level: &Level, room: usize) -> Value {
-    let [x_axis, y_axis] = [&map.grid.axes[0], &map.grid.axes[1]];
     let cuts: usize = map.grid.axes[2..].iter().map(|axis| axis.values.len()).product();
-    let (xs, ys) = (x_axis.even(), y_axis.even());
-    let mut lines: Vec<Vec<Vec<[f64; 2]>>> = (0..cuts)
-        .map(|cut| {
-            zero_lines(&xs, &ys, |x, y| {
-                let cell = (x * ys.len() + y) * cuts + cut;
-                level.offset(if map.filled(cell) { layer.typical(cell) } else { f64::NAN })
-            })
-        })
-        .collect();
-    leave_out_shortest(&mut lines, room);
-    let back = |axis: &GridAxis, even: f64| embed::short(if axis.log { even.exp() } else { even });
+    let ys = map.grid.axes[1].values.len();
+    let cell = |cut: usize, x: usize, y: usize| (x * ys + y) * cuts + cut;
+    let lines = figures::map::level_lines(map, (layer, level), cuts, cell, room);
     let flat = |line: &Vec<[f64; 2]>| -> Vec<f64> {
-        line.iter().flat_map(|[x, y]| [back(x_axis, *x), back(y_axis, *y)]).collect()
+        line.iter().flatten().map(|value| embed::short(*value)).collect()
     };
     lines.iter().map(|cut| cut.iter().map(flat).collect::<Value>()).collect()
 }

@@ -36,24 +36,23 @@ impl Group {
     /// Every group, in the order in which a page offers them.
     pub(crate) const ALL: [Self; 4] = [Self::Ratio, Self::Nonlinear, Self::Linear, Self::Other];
 
-    /// As a page knows it; what the names of a channel's columns start with.
-    pub(crate) const fn name(self) -> &'static str {
+    /// As a page knows it, which is what the names of a channel's columns start with; and in words,
+    /// for a list to choose from.
+    const fn named(self) -> [&'static str; 2] {
         match self {
-            Self::Ratio => "ratio",
-            Self::Nonlinear => "nonlinear",
-            Self::Linear => "linear",
-            Self::Other => "other",
+            Self::Ratio => ["ratio", "ratio, nonlinear / linear"],
+            Self::Nonlinear => ["nonlinear", "amplitude, nonlinear model"],
+            Self::Linear => ["linear", "amplitude, linear model"],
+            Self::Other => ["other", "further quantities"],
         }
     }
 
-    /// In words, for a list to choose from.
+    pub(crate) const fn name(self) -> &'static str {
+        self.named()[0]
+    }
+
     pub(crate) const fn words(self) -> &'static str {
-        match self {
-            Self::Ratio => "ratio, nonlinear / linear",
-            Self::Nonlinear => "amplitude, nonlinear model",
-            Self::Linear => "amplitude, linear model",
-            Self::Other => "further quantities",
-        }
+        self.named()[1]
     }
 }
 
@@ -217,8 +216,8 @@ pub(crate) fn all(source: &Source) -> Vec<Shown> {
 }
 
 /// The level of a column that has one.
-pub(crate) fn divide(source: &Source, column: &str) -> Option<Divide> {
-    let shown = Shown::new(source.column(column)?);
+pub(crate) fn divide(source: &Source, column: &ColumnFacts) -> Option<Divide> {
+    let shown = Shown::new(column);
     let (value, log) = (shown.limit(source)?, shown.group == Group::Ratio);
     Some(Divide { value, log })
 }
@@ -267,9 +266,8 @@ impl Shown {
     pub(crate) fn layer(&self, map: &Map) -> Result<Layer, PlotError> {
         let numbers = map.table.numbers(self.column())?;
         let (unit, factor) = label::shown(&self.facts.unit);
-        let extent = map.extents.get(self.column()).copied();
-        let extent =
-            extent.into_iter().flat_map(|extent| extent.values().map(|value| value * factor));
+        let extent = map.extents.get(self.column()).into_iter().flat_map(|extent| extent.values());
+        let extent = extent.map(|value| value * factor);
         let source = &map.table.source;
         let ratio = self.group == Group::Ratio;
         // No excitation can leave an infinite ratio, which has no place on any scale.
@@ -286,14 +284,14 @@ impl Shown {
             (_, Some(limit)) => ColourScale::about(extent, limit * factor, is_less_worse),
             (_, None) => ColourScale::amplitude(extent),
         };
-        let (title, label) = self.words(source, unit);
+        let (title, words) = self.words(source);
         let level = self.level(source);
         Ok(Layer {
             nonlinear: self.group == Group::Ratio || label::of_model(self.column()).1 != "linear",
             title,
-            label,
+            label: label::with_unit(&words, unit),
             values: numbers.iter().map(|number| value(number * factor)).collect(),
-            level: level.filter(|_| matches!(scale, ColourScale::Diverging { .. })),
+            level: level.filter(|_| scale.centre.is_some()),
             scale,
             divided: map.sides.get(self.column()).map(|sides| Sides {
                 mean: sides.mean.iter().map(|mean| mean * factor).collect(),
@@ -314,8 +312,8 @@ impl Shown {
         }
     }
 
-    /// For the heading, and beside the colours.
-    pub(crate) fn words(&self, source: &Source, unit: &str) -> (String, String) {
+    /// For the heading, and beside the colours without their unit.
+    pub(crate) fn words(&self, source: &Source) -> (String, String) {
         let compared = source.compared();
         // Which of two files is over which.
         let told = self.facts.description.split(';').next().unwrap_or_default();
@@ -337,17 +335,15 @@ impl Shown {
                 format!("Ratio of {compared}: {channel}"),
                 format!("ratio of {compared}, nonlinear / linear"),
             ),
-            (group @ (Group::Nonlinear | Group::Linear), Some(channel)) => (
-                capitalised(&format!("{}: {channel}", group.words())),
-                label::with_unit(group.words(), unit),
-            ),
+            (group @ (Group::Nonlinear | Group::Linear), Some(channel)) => {
+                (capitalised(&format!("{}: {channel}", group.words())), group.words().to_owned())
+            }
             _ => {
-                let (words, _) = label::of_model(self.column());
                 let title = match source.kind {
                     Kind::Differences => capitalised(told),
                     _ => self.short(),
                 };
-                (title, label::with_unit(&words, unit))
+                (title, label::of_model(self.column()).0)
             }
         }
     }

@@ -51,8 +51,7 @@ use cuts::Cuts;
 use figures::boundary::Overlay;
 use gather::{Divide, Map};
 use grid::Grid;
-use raster::Typeface;
-use read::{Kind, Source};
+use read::{ColumnFacts, Kind, Source};
 use scatter::Scatter;
 use scene::Scene;
 use swept::SweptAxis;
@@ -209,32 +208,16 @@ pub struct Slider {
     pub value: Option<f64>,
 }
 
-/// How a figure is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
-    Svg,
-    Png,
-    Html,
-}
+/// How a figure is written, and what it may be written over.
+type Format = files::FileKind<'static>;
 
-impl Format {
-    fn of(path: &Path) -> Result<Self, PlotError> {
-        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        match ending.to_ascii_lowercase().as_str() {
-            "svg" => Ok(Self::Svg),
-            "png" => Ok(Self::Png),
-            "html" | "htm" => Ok(Self::Html),
-            _ => Err(PlotError::Format { path: path.to_owned() }),
-        }
-    }
-
-    /// What such a figure may be written over.
-    const fn kind(self) -> files::FileKind<'static> {
-        match self {
-            Self::Svg => files::FileKind::Svg,
-            Self::Png => files::FileKind::Png,
-            Self::Html => files::FileKind::Html,
-        }
+fn format_of(path: &Path) -> Result<Format, PlotError> {
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    match ending.to_ascii_lowercase().as_str() {
+        "svg" => Ok(Format::Svg),
+        "png" => Ok(Format::Png),
+        "html" | "htm" => Ok(Format::Html),
+        _ => Err(PlotError::Format { path: path.to_owned() }),
     }
 }
 
@@ -244,8 +227,8 @@ impl Format {
 /// Any [`PlotError`]: an unreadable file, options that do not fit it, an output that cannot be
 /// written. The output's name and the options are judged before the output is touched.
 pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), PlotError> {
-    let format = Format::of(output)?;
-    let file = Output::begin(output, format.kind())?;
+    let format = format_of(output)?;
+    let file = Output::begin(output, format)?;
     let mut bytes = figure(input, options, format)?;
     if format == Format::Html {
         let still = figure(input, &of_still(options), Format::Png)?;
@@ -296,14 +279,13 @@ fn is_scattered(source: &Source, options: &PlotOptions) -> Result<bool, PlotErro
 
 fn design(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
     let scatter = Scatter::read(source, options)?;
-    let typeface = Typeface::load()?;
     if format == Format::Html {
-        return Ok(html::design_page(&scatter, options, &typeface).into_bytes());
+        return Ok(html::design_page(&scatter, options).into_bytes());
     }
     let scene = match options.view {
-        Some(View::Histogram) => chart::draw(&figures::histogram::chart(&scatter), &typeface),
-        Some(View::Influence) => figures::influence::draw(&scatter, &typeface),
-        _ => figures::matrix::draw(&scatter, &typeface).0,
+        Some(View::Histogram) => chart::draw(&figures::histogram::chart(&scatter)),
+        Some(View::Influence) => figures::influence::draw(&scatter),
+        _ => figures::matrix::draw(&scatter).0,
     };
     image(&scene, format)
 }
@@ -313,33 +295,26 @@ const PICTURE_CELLS: usize = 1 << 17;
 
 fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
     let axes = swept::axes(&source)?;
-    let levels: BTreeMap<String, Divide> = (source.columns.iter())
-        .filter_map(|column| Some((column.name.clone(), layer::divide(&source, &column.name)?)))
-        .collect();
-    let divide = |name: &str| levels.get(name).copied();
+    let level = |column: &ColumnFacts| Some((column.name.clone(), layer::divide(&source, column)?));
+    let levels: BTreeMap<String, Divide> = source.columns.iter().filter_map(level).collect();
     if format != Format::Html && axes.len() > 1 {
         let shown = layer::chosen(&source, options)?;
-        let columns: Vec<&str> =
-            shown.iter().map(|shown| shown.column()).chain([layer::STATUS]).collect();
+        let columns = shown.iter().map(|shown| shown.column()).chain([layer::STATUS]);
+        let columns: Vec<String> = columns.map(str::to_owned).collect();
         let cuts = Cuts::of_picture(&source, &axes, options)?;
         let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
-        let map = Map::read(source, grid, &columns, divide)?;
-        let typeface = Typeface::load()?;
-        let overlay = match &options.boundary {
-            Some(path) => Some(overlay(path, &axes, &map.table.source)?),
-            None => None,
-        };
-        let scene = figures::map::draw(&map, &cuts, shown.as_ref(), overlay.as_ref(), &typeface)?;
+        let map = Map::read(source, grid, &columns, &levels)?;
+        let overlay = options.boundary.as_ref();
+        let overlay = overlay.map(|path| overlay_of(path, &axes, &map.table.source)).transpose()?;
+        let scene = figures::map::draw(&map, &cuts, shown.as_ref(), overlay.as_ref())?;
         return image(&scene, format);
     }
-    let columns: Vec<String> =
-        html::carried(&source, &axes).into_iter().map(str::to_owned).collect();
-    let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let columns = html::carried(&source, &axes);
     let most = html::most_cells(columns.len());
     let cuts = Cuts::of_page(&source, &axes, options, most)?;
     let grid = Grid::new(&axes, &cuts.picks, most);
+    let map = Map::read(source, grid, &columns, &levels)?;
     if axes.len() == 1 {
-        let map = Map::read(source, grid, &columns, divide)?;
         let (source, chart) = (&map.table.source, figures::curves::chart(&map, options)?);
         return match &options.live {
             Some(live) if format == Format::Html => {
@@ -348,12 +323,11 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
             _ => written(source, &chart, format),
         };
     }
-    let map = Map::read(source, grid, &columns, divide)?;
     Ok(html::map_page(&map, &cuts, options)?.into_bytes())
 }
 
 /// The boundary file beside a map of these axes.
-fn overlay(path: &Path, axes: &[SweptAxis], map: &Source) -> Result<Overlay, PlotError> {
+fn overlay_of(path: &Path, axes: &[SweptAxis], map: &Source) -> Result<Overlay, PlotError> {
     let source = Source::open(path)?;
     source.expect(Kind::Boundary, "--boundary", "`sweep boundary` writes a boundary file")?;
     let table = Table::read(source)?;
@@ -370,8 +344,8 @@ fn differences(
     options: &PlotOptions,
     format: Format,
 ) -> Result<Vec<u8>, PlotError> {
-    let (path, axes) = (source.path.display().to_string(), swept::axes(&source)?.len());
-    if format == Format::Html || axes < 2 {
+    if format == Format::Html || swept::axes(&source)?.len() < 2 {
+        let path = source.path.display();
         return Err(PlotError::Unfit(format!(
             "{path} is a differences file, which is drawn as .svg or .png over two axes or more"
         )));
@@ -411,7 +385,7 @@ fn curves(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u
 fn written(source: &Source, chart: &Chart, format: Format) -> Result<Vec<u8>, PlotError> {
     match format {
         Format::Html => Ok(html::chart_page(source, chart, None).into_bytes()),
-        Format::Svg | Format::Png => image(&chart::draw(chart, &Typeface::load()?), format),
+        _ => image(&chart::draw(chart), format),
     }
 }
 
@@ -435,12 +409,11 @@ fn view_of(options: &PlotOptions) -> &'static str {
 
 /// Refuses options that the file's kind or the output's format would leave without effect.
 fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
-    let map = matches!(source.kind, Kind::Map | Kind::Differences);
-    let design = source.kind == Kind::Design;
-    let trace = source.kind == Kind::Trace;
     let view_fits = options.view.is_some_and(|view| view.of() == source.kind);
-    let (modes, stability) = (source.kind == Kind::Modes, source.kind == Kind::Stability);
-    let dwell = source.kind == Kind::Dwell;
+    let is = |kind| source.kind == kind;
+    let (map, design) = (is(Kind::Map) || is(Kind::Differences), is(Kind::Design));
+    let (trace, modes) = (is(Kind::Trace), is(Kind::Modes));
+    let (stability, dwell) = (is(Kind::Stability), is(Kind::Dwell));
     let over_modes = modes && matches!(options.view, None | Some(View::Frequencies));
     let responses = stability && options.view == Some(View::Responses);
     let over_time = trace && matches!(options.view, None | Some(View::Time));
@@ -495,8 +468,7 @@ fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Resu
     ];
     for (option, given, fits, where_it_does) in rules {
         if given && !fits {
-            let kind = source.kind.name();
-            let path = source.path.display();
+            let (kind, path) = (source.kind.name(), source.path.display());
             return Err(PlotError::Unfit(format!(
                 "`{option}` is for {where_it_does}; {path} is a {kind} file"
             )));

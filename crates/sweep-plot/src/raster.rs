@@ -1,7 +1,9 @@
 //! A scene as PNG, with the typeface it carries: the same picture on every machine.
 
+use std::sync::LazyLock;
+
 use tiny_skia::{
-    FillRule, LineCap, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap, StrokeDash, Transform,
+    FillRule, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap, StrokeDash, Transform,
 };
 use ttf_parser::{Face, OutlineBuilder};
 
@@ -12,35 +14,19 @@ use super::svg::halo_width;
 const REGULAR: &[u8] = include_bytes!("fonts/NotoSans-Regular.subset.ttf");
 const BOLD: &[u8] = include_bytes!("fonts/NotoSans-Bold.subset.ttf");
 
-/// The two weights.
-pub(crate) struct Typeface {
-    regular: Face<'static>,
-    bold: Face<'static>,
+/// The weight of text that is bold, and of other text.
+fn face(bold: bool) -> &'static Face<'static> {
+    static FACES: LazyLock<[Face<'static>; 2]> = LazyLock::new(|| {
+        [REGULAR, BOLD].map(|font| Face::parse(font, 0).expect("a font that is in the program"))
+    });
+    &FACES[usize::from(bold)]
 }
 
-impl Typeface {
-    /// Opens the fonts that are part of the program.
-    ///
-    /// # Errors
-    /// [`PlotError::Drawing`] if they are damaged, which is a defect of the build.
-    pub(crate) fn load() -> Result<Self, PlotError> {
-        let open = |bytes| {
-            Face::parse(bytes, 0)
-                .map_err(|error| PlotError::Drawing(format!("embedded typeface: {error}")))
-        };
-        Ok(Self { regular: open(REGULAR)?, bold: open(BOLD)? })
-    }
-
-    fn face(&self, bold: bool) -> &Face<'static> {
-        if bold { &self.bold } else { &self.regular }
-    }
-
-    /// Width of `text` in type `size` px high, px.
-    pub(crate) fn width(&self, text: &str, size: f64, bold: bool) -> f64 {
-        let face = self.face(bold);
-        let advances: u32 = text.chars().map(|letter| u32::from(advance(face, letter))).sum();
-        f64::from(advances) * size / f64::from(face.units_per_em())
-    }
+/// Width of `text` in type `size` px high, px.
+pub(crate) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
+    let face = face(bold);
+    let advances: u32 = text.chars().map(|letter| u32::from(advance(face, letter))).sum();
+    f64::from(advances) * size / f64::from(face.units_per_em())
 }
 
 fn advance(face: &Face<'_>, letter: char) -> u16 {
@@ -60,7 +46,6 @@ pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>, PlotError> {
         pixmap: Pixmap::new(size[0], size[1]).ok_or_else(too_large)?,
         transform: Transform::from_scale(scale as f32, scale as f32),
         clips: Vec::new(),
-        typeface: Typeface::load()?,
     };
     for item in &scene.items {
         match item {
@@ -86,7 +71,6 @@ struct Canvas {
     pixmap: Pixmap,
     transform: Transform,
     clips: Vec<Mask>,
-    typeface: Typeface,
 }
 
 impl Canvas {
@@ -105,16 +89,9 @@ impl Canvas {
 
     fn line(&mut self, outline: &Outline, stroke: &Stroke) {
         if let Some(path) = path(outline) {
-            let style = tiny_skia::Stroke {
-                width: stroke.width as f32,
-                line_join: LineJoin::Round,
-                line_cap: LineCap::Butt,
-                dash: StrokeDash::new(
-                    stroke.dash.iter().map(|&length| length as f32).collect(),
-                    0.0,
-                ),
-                ..tiny_skia::Stroke::default()
-            };
+            let dash = stroke.dash.iter().map(|&length| length as f32).collect();
+            let style =
+                tiny_skia::Stroke { dash: StrokeDash::new(dash, 0.0), ..line(stroke.width) };
             let paint = paint(stroke.colour, true);
             self.pixmap.stroke_path(&path, &paint, &style, self.transform, self.clips.last());
         }
@@ -137,9 +114,9 @@ impl Canvas {
     }
 
     fn text(&mut self, text: &Text) {
-        let face = self.typeface.face(text.bold);
+        let face = face(text.bold);
         let scale = (text.size / f64::from(face.units_per_em())) as f32;
-        let width = self.typeface.width(&text.text, text.size, text.bold) as f32;
+        let width = text_width(&text.text, text.size, text.bold) as f32;
         let mut pen = Pen { builder: PathBuilder::new(), x: 0.0, scale };
         pen.x = match text.anchor {
             Anchor::Start => 0.0,
@@ -160,15 +137,17 @@ impl Canvas {
         let transform = self.transform.pre_concat(place).pre_concat(turn);
         let clip = self.clips.last();
         if let Some(halo) = text.halo {
-            let style = tiny_skia::Stroke {
-                width: halo_width(text.size) as f32,
-                line_join: LineJoin::Round,
-                ..tiny_skia::Stroke::default()
-            };
+            let style = line(halo_width(text.size));
             self.pixmap.stroke_path(&path, &paint(halo, true), &style, transform, clip);
         }
         self.pixmap.fill_path(&path, &paint(text.colour, true), FillRule::Winding, transform, clip);
     }
+}
+
+/// A solid line as wide as that.
+fn line(width: f64) -> tiny_skia::Stroke {
+    let (width, line_join) = (width as f32, LineJoin::Round);
+    tiny_skia::Stroke { width, line_join, ..tiny_skia::Stroke::default() }
 }
 
 fn paint(colour: Colour, anti_alias: bool) -> Paint<'static> {

@@ -215,22 +215,34 @@ impl Source {
         self.find("design")?.get("method")?.as_str()
     }
 
+    /// The entries of a list that the provenance has under `key`.
+    pub(crate) fn list(&self, key: &str) -> impl Iterator<Item = &Value> {
+        self.find(key).and_then(Value::as_array).into_iter().flatten()
+    }
+
+    /// The swept parameters that the plan names.
+    pub(crate) fn planned_axes(&self) -> impl Iterator<Item = &str> {
+        self.list("axis").filter_map(|axis| axis.get("parameter")?.as_str())
+    }
+
     /// Whether the plan spreads an axis by the logarithm.
     pub(crate) fn is_log(&self, parameter: &str) -> bool {
-        let axes = self.find("axis").and_then(Value::as_array).into_iter().flatten();
-        axes.filter(|axis| axis["parameter"] == parameter).any(|axis| {
+        self.list("axis").filter(|axis| axis["parameter"] == parameter).any(|axis| {
             axis["range"]["spacing"] == "log" || axis["distribution"]["kind"] == "lognormal"
         })
     }
 
     /// The ratio from which on a point is unreliable: the run's limit, or else the paper's, 2.
     pub(crate) fn ratio_limit(&self) -> f64 {
-        self.find("ratio_limit")
-            .and_then(Value::as_f64)
-            .map(drawable)
-            .filter(|limit| *limit > 0.0)
-            .unwrap_or(2.0)
+        let limit = self.find("ratio_limit").and_then(Value::as_f64).map(drawable);
+        limit.filter(|limit| *limit > 0.0).unwrap_or(2.0)
     }
+}
+
+/// The names of what there is.
+pub(crate) fn some_of<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 /// Some rows of some columns.
@@ -322,28 +334,23 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 }
 
 fn recognise(names: &[&str]) -> Option<Kind> {
-    let has = |name: &str| names.contains(&name);
-    if has("candidate") && has("on_front") {
-        Some(Kind::Optimise)
-    } else if has("motion") && has("speed_rpm") {
-        Some(Kind::Dwell)
-    } else if has("growth_per_s") && has("speed_rpm") {
-        Some(Kind::Stability)
-    } else if has("status") && has("ratio_max") {
-        Some(Kind::Map)
-    } else if has("ratio_change") && has("flip") {
-        Some(Kind::Differences)
-    } else if has("time_s")
-        && names.iter().any(|name| name.starts_with("nonlinear_") || name.starts_with("measured_"))
-    {
-        Some(Kind::Trace)
-    } else if has("mode") && has("frequency_rpm") && has("speed_rpm") {
-        Some(Kind::Modes)
-    } else if bracket(names).is_some() {
-        Some(Kind::Boundary)
-    } else {
-        None
-    }
+    // The columns that show a kind, the surest first.
+    const SHOWN_BY: [(Kind, &[&str]); 5] = [
+        (Kind::Optimise, &["candidate", "on_front"]),
+        (Kind::Dwell, &["motion", "speed_rpm"]),
+        (Kind::Stability, &["growth_per_s", "speed_rpm"]),
+        (Kind::Map, &["status", "ratio_max"]),
+        (Kind::Differences, &["ratio_change", "flip"]),
+    ];
+    let has = |all: &[&str]| all.iter().all(|name| names.contains(name));
+    let of_trace = |name: &&str| name.starts_with("nonlinear_") || name.starts_with("measured_");
+    let sure = SHOWN_BY.iter().find(|(_, columns)| has(columns)).map(|(kind, _)| *kind);
+    let further = [
+        (Kind::Trace, has(&["time_s"]) && names.iter().any(of_trace)),
+        (Kind::Modes, has(&["mode", "frequency_rpm", "speed_rpm"])),
+        (Kind::Boundary, bracket(names).is_some()),
+    ];
+    sure.or_else(|| further.into_iter().find(|(_, is)| *is).map(|(kind, _)| kind))
 }
 
 /// The two columns between which a boundary is known to lie, after its two coordinates.

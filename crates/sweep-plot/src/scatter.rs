@@ -4,7 +4,7 @@ use super::PlotOptions;
 use super::error::PlotError;
 use super::influence::Influence;
 use super::label::{self, Label};
-use super::layer::{self, Group, Level, Shown};
+use super::layer::{self, Group, Level};
 use super::read::Source;
 use super::share::Share;
 use super::swept;
@@ -71,37 +71,23 @@ pub(crate) struct Scatter {
     pub(crate) counts: [u64; 4],
 }
 
-/// The columns of a design's file that its figures take.
-struct Wanted<'a> {
-    axes: Vec<&'a str>,
-    shown: Shown,
-    factor: f64,
-    level: Option<Level>,
-    /// The quantity is what the verdict goes by.
-    is_verdict: bool,
-}
-
-impl Wanted<'_> {
-    fn side(&self, raw: f64, verdict: Option<&str>, status: Option<&str>) -> Side {
-        // The verdict itself, where that is what is shown or nothing else divides the points.
-        let own = self.level.as_ref().filter(|_| !self.is_verdict);
-        let good = match own {
-            Some(level) => {
-                let value = raw * self.factor;
-                let is_good = match level.worse {
-                    Worse::Greater => value < level.value,
-                    Worse::Less => value >= level.value,
-                };
-                (raw.is_finite() && (raw > 0.0 || !level.log)).then_some(is_good)
-            }
-            None => verdict.map(|verdict| verdict == "true"),
-        };
-        match good {
-            Some(true) => Side::Good,
-            Some(false) => Side::Bad,
-            None if status == Some("ok") => Side::Undefined,
-            None => Side::Failed,
+/// What a point is by its value, or by the verdict where no level divides the points.
+fn side_of(level: Option<&Level>, value: f64, verdict: Option<&str>, status: Option<&str>) -> Side {
+    let good = match level {
+        Some(level) => {
+            let is_good = match level.worse {
+                Worse::Greater => value < level.value,
+                Worse::Less => value >= level.value,
+            };
+            (value.is_finite() && (value > 0.0 || !level.log)).then_some(is_good)
         }
+        None => verdict.map(|verdict| verdict == "true"),
+    };
+    match good {
+        Some(true) => Side::Good,
+        Some(false) => Side::Bad,
+        None if status == Some("ok") => Side::Undefined,
+        None => Side::Failed,
     }
 }
 
@@ -120,42 +106,36 @@ impl Scatter {
         };
         let facts = source.column(shown.column());
         let (unit, factor) = label::shown(facts.map_or("", |facts| &facts.unit));
-        let (title, label) = shown.words(&source, unit);
+        let (title, words) = shown.words(&source);
         let level = shown.level(&source);
         let ratio = shown.group == Group::Ratio;
         let axes: Vec<&str> =
             swept::columns(&source).iter().map(|column| column.name.as_str()).collect();
         let stride = (source.rows * (axes.len() + 3)).div_ceil(MOST_NUMBERS).max(1) as u64;
-        let is_verdict = shown.is_verdict(&source);
-        let wanted = Wanted { axes, shown, factor, level, is_verdict };
-        let mut values: Vec<Vec<f64>> = vec![Vec::new(); wanted.axes.len()];
+        // The verdict itself, where that is what is shown.
+        let dividing = level.as_ref().filter(|_| !shown.is_verdict(&source));
+        let mut values: Vec<Vec<f64>> = vec![Vec::new(); axes.len()];
         let (mut points, mut quantity, mut sides) = (Vec::new(), Vec::new(), Vec::new());
         let (mut counts, mut row) = ([0; 4], 0_usize);
-        let names: Vec<&str> = wanted
-            .axes
-            .iter()
-            .copied()
-            .chain([wanted.shown.column(), "reliable", layer::STATUS])
-            .collect();
+        let names = [&axes[..], &[shown.column(), "reliable", layer::STATUS]].concat();
         for batch in source.batches(&names)? {
             let batch = batch?;
-            let raw = batch.numbers(wanted.shown.column())?;
+            let raw = batch.numbers(shown.column())?;
             let (verdicts, statuses) = (batch.words("reliable")?, batch.words("status")?);
-            let axes = wanted.axes.iter().map(|name| batch.numbers(name));
-            let axes = axes.collect::<Result<Vec<_>, _>>()?;
+            let of_axes = axes.iter().map(|name| batch.numbers(name));
+            let of_axes = of_axes.collect::<Result<Vec<_>, _>>()?;
             for k in 0..batch.rows {
                 let [verdict, status] =
                     [&verdicts, &statuses].map(|words| words.get(k).copied().flatten());
-                let raw = raw.get(k).copied().unwrap_or(f64::NAN);
-                let side = wanted.side(raw, verdict, status);
+                let value = raw.get(k).copied().unwrap_or(f64::NAN) * factor;
+                let side = side_of(dividing, value, verdict, status);
                 counts[side as usize] += 1;
                 if picked(row as u64, stride) {
-                    let value = raw * factor;
                     let none = ratio && !(value > 0.0 && value.is_finite());
                     quantity.push(if none { f64::NAN } else { value });
                     sides.push(side);
                     points.push(row);
-                    for (values, axis) in values.iter_mut().zip(&axes) {
+                    for (values, axis) in values.iter_mut().zip(&of_axes) {
                         values.push(axis.get(k).copied().unwrap_or(f64::NAN));
                     }
                 }
@@ -165,7 +145,7 @@ impl Scatter {
         if points.is_empty() {
             return Err(source.empty("the design has no points"));
         }
-        let spread = wanted.axes.iter().zip(values).filter_map(|(name, values)| {
+        let spread = axes.iter().zip(values).filter_map(|(name, values)| {
             let facts = source.column(name)?;
             let varies = values.iter().any(|value| *value != values[0]);
             varies.then(|| Spread {
@@ -177,15 +157,13 @@ impl Scatter {
             })
         });
         let parameters: Vec<Spread> = spread.collect();
-        let Wanted { level, shown, .. } = wanted;
         if parameters.is_empty() {
             return Err(source.empty("no parameter varies from point to point"));
         }
         let spans = || crate::chart::spans_decades(quantity.iter().copied());
         let log = ratio || (level.is_none() && spans());
-        let words = label.strip_suffix(&format!(" ({unit})")).unwrap_or(&label);
-        let (label, short) =
-            (Label::new(&label::capitalised(words), unit), Label::new(&shown.short(), unit));
+        let label = Label::new(&label::capitalised(&words), unit);
+        let short = Label::new(&shown.short(), unit);
         Ok(Self {
             source,
             title,

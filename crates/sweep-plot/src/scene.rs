@@ -73,9 +73,9 @@ impl Outline {
 
     /// Adds an open part through the points.
     pub(crate) fn add_line(&mut self, points: &[[f64; 2]]) {
-        for (index, &point) in points.iter().enumerate() {
-            self.0.push(if index == 0 { Segment::Move(point) } else { Segment::Line(point) });
-        }
+        let mut points = points.iter().copied();
+        self.0.extend(points.next().map(Segment::Move));
+        self.0.extend(points.map(Segment::Line));
     }
 
     /// One open line through the points.
@@ -102,42 +102,34 @@ impl Outline {
     /// The same, elsewhere.
     pub(crate) fn moved(&self, [dx, dy]: [f64; 2]) -> Self {
         let moved = |[x, y]: [f64; 2]| [x + dx, y + dy];
-        Self(
-            self.0
-                .iter()
-                .map(|segment| match *segment {
-                    Segment::Move(point) => Segment::Move(moved(point)),
-                    Segment::Line(point) => Segment::Line(moved(point)),
-                    Segment::Close => Segment::Close,
-                })
-                .collect(),
-        )
+        let segments = self.0.iter().map(|segment| match *segment {
+            Segment::Move(point) => Segment::Move(moved(point)),
+            Segment::Line(point) => Segment::Line(moved(point)),
+            Segment::Close => Segment::Close,
+        });
+        Self(segments.collect())
     }
 
     /// A disc around `centre`.
     pub(crate) fn circle(centre: [f64; 2], radius: f64) -> Self {
-        let points: Vec<[f64; 2]> = (0..16)
-            .map(|k| {
-                let (sin, cos) = (std::f64::consts::PI * f64::from(k) / 8.0).sin_cos();
-                [centre[0] + radius * sin, centre[1] - radius * cos]
-            })
-            .collect();
-        let mut outline = Self::default();
-        outline.add_polygon(&points);
-        outline
+        Self::around(centre, [radius; 16])
     }
 
     /// A five-pointed star around `centre`, `radius` from centre to tip.
     pub(crate) fn star(centre: [f64; 2], radius: f64) -> Self {
-        let points: Vec<[f64; 2]> = (0..10)
-            .map(|k| {
-                let reach = if k % 2 == 0 { radius } else { 0.42 * radius };
-                let (sin, cos) = (std::f64::consts::PI * f64::from(k) / 5.0).sin_cos();
-                [centre[0] + reach * sin, centre[1] - reach * cos]
-            })
-            .collect();
+        let [tip, notch] = [radius, 0.42 * radius];
+        Self::around(centre, [tip, notch, tip, notch, tip, notch, tip, notch, tip, notch])
+    }
+
+    /// Corners evenly around `centre`, these distances from it, clockwise from the top.
+    fn around<const N: usize>([x, y]: [f64; 2], reaches: [f64; N]) -> Self {
         let mut outline = Self::default();
-        outline.add_polygon(&points);
+        let half = (N / 2) as f64;
+        let corners: [[f64; 2]; N] = std::array::from_fn(|k| {
+            let (sin, cos) = (std::f64::consts::PI * k as f64 / half).sin_cos();
+            [x + reaches[k] * sin, y - reaches[k] * cos]
+        });
+        outline.add_polygon(&corners);
         outline
     }
 }

@@ -12,33 +12,22 @@ const FAMILY: &str = "'Noto Sans', 'Segoe UI', 'Helvetica Neue', Arial, sans-ser
 pub(crate) fn write(scene: &Scene) -> String {
     let mut out = String::new();
     let (width, height) = (number(scene.width), number(scene.height));
-    let view = format!(r#"viewBox="0 0 {width} {height}""#);
+    let size = format!(r#"width="{width}" height="{height}" viewBox="0 0 {width} {height}""#);
     let role = format!(r#"role="img" font-family="{FAMILY}""#);
     // Writing to a string cannot fail, so the results below carry nothing.
-    let _ = writeln!(
-        out,
-        r#"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" {view} {role}>"#
-    );
+    let _ = writeln!(out, r#"<svg xmlns="http://www.w3.org/2000/svg" {size} {role}>"#);
     let _ = writeln!(out, "<title>{}</title>", escape(&scene.description));
     let clips = write_clips(&mut out, scene);
     for item in &scene.items {
         match item {
             Item::Fill { outline, colour, crisp } => {
                 let edges = if *crisp { r#" shape-rendering="crispEdges""# } else { "" };
-                let _ = writeln!(
-                    out,
-                    r#"<path d="{}"{}{edges}/>"#,
-                    path(outline),
-                    paint("fill", *colour)
-                );
+                let (path, fill) = (path(outline), paint("fill", *colour));
+                let _ = writeln!(out, r#"<path d="{path}"{fill}{edges}/>"#);
             }
             Item::Line { outline, stroke } => {
-                let _ = writeln!(
-                    out,
-                    r#"<path d="{}" fill="none"{}/>"#,
-                    path(outline),
-                    stroke_style(stroke)
-                );
+                let (path, style) = (path(outline), stroke_style(stroke));
+                let _ = writeln!(out, r#"<path d="{path}" fill="none"{style}/>"#);
             }
             Item::Text(text) => write_text(&mut out, text),
             Item::Clip(outline) => {
@@ -81,18 +70,12 @@ fn write_text(out: &mut String, text: &Text) {
     let weight = if text.bold { r#" font-weight="bold""# } else { "" };
     let size = number(text.size);
     let halo = text.halo.map_or(String::new(), |colour| {
-        format!(
-            r#"{} stroke-width="{}" stroke-linejoin="round" paint-order="stroke""#,
-            paint("stroke", colour),
-            number(halo_width(text.size))
-        )
+        let (stroke, width) = (paint("stroke", colour), number(halo_width(text.size)));
+        format!(r#"{stroke} stroke-width="{width}" stroke-linejoin="round" paint-order="stroke""#)
     });
-    let _ = writeln!(
-        out,
-        r#"<text {place} font-size="{size}"{weight}{anchor}{}{halo}>{}</text>"#,
-        paint("fill", text.colour),
-        escape(&text.text)
-    );
+    let (fill, said) = (paint("fill", text.colour), escape(&text.text));
+    let style = format!(r#"font-size="{size}"{weight}{anchor}{fill}{halo}"#);
+    let _ = writeln!(out, "<text {place} {style}>{said}</text>");
 }
 
 /// Positions farther out than this are drawn here, px: out of sight either way.
@@ -104,20 +87,17 @@ pub(crate) fn halo_width(size: f64) -> f64 {
 }
 
 fn paint(attribute: &str, colour: Colour) -> String {
-    if colour.alpha == 255 {
-        format!(r#" {attribute}="{}""#, colour.css())
-    } else {
+    let mut paint = format!(r#" {attribute}="{}""#, colour.css());
+    if colour.alpha < 255 {
         let opacity = number(f64::from(colour.alpha) / 255.0);
-        format!(r#" {attribute}="{}" {attribute}-opacity="{opacity}""#, colour.css())
+        let _ = write!(paint, r#" {attribute}-opacity="{opacity}""#);
     }
+    paint
 }
 
 fn stroke_style(stroke: &Stroke) -> String {
-    let mut style = format!(
-        r#"{} stroke-width="{}" stroke-linejoin="round""#,
-        paint("stroke", stroke.colour),
-        number(stroke.width)
-    );
+    let (paint, width) = (paint("stroke", stroke.colour), number(stroke.width));
+    let mut style = format!(r#"{paint} stroke-width="{width}" stroke-linejoin="round""#);
     if !stroke.dash.is_empty() {
         let dash: Vec<String> = stroke.dash.iter().map(|&length| number(length)).collect();
         let _ = write!(style, r#" stroke-dasharray="{}""#, dash.join(" "));
@@ -139,19 +119,13 @@ fn path(outline: &Outline) -> String {
             }
             Segment::Line(point) => {
                 let there = hundredths(point);
-                let step = [there[0] - here[0], there[1] - here[1]];
-                match step {
-                    [dx, 0] => {
-                        let _ = write!(d, "h{}", fixed(dx));
-                    }
-                    [0, dy] => {
-                        let _ = write!(d, "v{}", fixed(dy));
-                    }
-                    [dx, dy] => {
-                        let gap = if dy < 0 { "" } else { " " };
-                        let _ = write!(d, "l{}{gap}{}", fixed(dx), fixed(dy));
-                    }
-                }
+                let [dx, dy] = [there[0] - here[0], there[1] - here[1]];
+                d += &match (fixed(dx), fixed(dy)) {
+                    (dx, _) if dy == 0 => format!("h{dx}"),
+                    (_, dy) if dx == 0 => format!("v{dy}"),
+                    (dx, dy) if dy.starts_with('-') => format!("l{dx}{dy}"),
+                    (dx, dy) => format!("l{dx} {dy}"),
+                };
                 here = there;
             }
             Segment::Close => {
@@ -172,13 +146,9 @@ fn hundredths(point: [f64; 2]) -> [i64; 2] {
 fn fixed(hundredths: i64) -> String {
     let sign = if hundredths < 0 { "-" } else { "" };
     let (whole, part) = (hundredths.unsigned_abs() / 100, hundredths.unsigned_abs() % 100);
-    match (whole, part) {
-        (_, 0) => format!("{sign}{whole}"),
-        (0, part) if part % 10 == 0 => format!("{sign}.{}", part / 10),
-        (0, part) => format!("{sign}.{part:02}"),
-        (_, part) if part % 10 == 0 => format!("{sign}{whole}.{}", part / 10),
-        (_, part) => format!("{sign}{whole}.{part:02}"),
-    }
+    let whole = if whole == 0 && part > 0 { String::new() } else { whole.to_string() };
+    let part = format!(".{part:02}");
+    format!("{sign}{whole}{}", part.trim_end_matches(['0', '.']))
 }
 
 /// A number of pixels, to a hundredth.

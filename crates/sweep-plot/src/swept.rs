@@ -34,6 +34,16 @@ impl SweptAxis {
         (known - value).abs() <= 1e-9 * value.abs().max(known.abs())
     }
 
+    /// Values in the units in which the axis is even.
+    pub(crate) fn evened(&self, values: &[f64]) -> Vec<f64> {
+        values.iter().map(|value| if self.log { value.ln() } else { *value }).collect()
+    }
+
+    /// The value that is this one in those units.
+    pub(crate) fn un_even(&self, even: f64) -> f64 {
+        if self.log { even.exp() } else { even }
+    }
+
     /// A value of the axis, with its name and unit: "Damping 140 N s/m".
     pub(crate) fn said(&self, value: f64) -> String {
         label::valued(&self.words, value, &self.unit)

@@ -70,10 +70,7 @@ impl Words {
     pub(crate) fn sort(&mut self) {
         let mut sorted = self.names.clone();
         sorted.sort();
-        let place = |name: &String| {
-            let place = sorted.binary_search(name).ok()?;
-            u8::try_from(place).ok()
-        };
+        let place = |name: &String| u8::try_from(sorted.binary_search(name).ok()?).ok();
         let places: Vec<u8> = self.names.iter().map(|name| place(name).unwrap_or(NONE)).collect();
         for code in &mut self.codes {
             *code = places.get(usize::from(*code)).copied().unwrap_or(*code);
@@ -104,18 +101,14 @@ impl Column {
 
     /// The values, if they are numbers.
     pub(crate) fn numbers(&self) -> Option<&[f64]> {
-        match &self.values {
-            Values::Numbers(values) => Some(values),
-            Values::Words(_) => None,
-        }
+        let Values::Numbers(values) = &self.values else { return None };
+        Some(values)
     }
 
     /// The values, if they are words.
     pub(crate) fn words(&self) -> Option<&Words> {
-        match &self.values {
-            Values::Words(words) => Some(words),
-            Values::Numbers(_) => None,
-        }
+        let Values::Words(words) = &self.values else { return None };
+        Some(words)
     }
 }
 
@@ -141,22 +134,22 @@ impl Table {
     /// keeps.
     pub(crate) fn read(source: Source) -> Result<Self, PlotError> {
         let most = MOST_NUMBERS / source.numeric().count().max(1);
+        let too_many = |source: &Source, rows| {
+            let (path, kind) = (source.path.clone(), source.kind.name());
+            PlotError::TooMany { path, kind, rows, most }
+        };
         if source.rows > most {
             if source.kind == Kind::Trace {
                 return Self::read_thinned(source, most / 2);
             }
-            let (path, kind, rows) = (source.path.clone(), source.kind.name(), source.rows);
-            return Err(PlotError::TooMany { path, kind, rows, most });
+            return Err(too_many(&source, source.rows));
         }
         let names: Vec<&str> = source.columns.iter().map(|column| column.name.as_str()).collect();
-        let mut values: Vec<Values> = source
-            .columns
-            .iter()
-            .map(|column| match column.is_number() {
-                true => Values::Numbers(Vec::with_capacity(source.rows)),
-                false => Values::Words(Words::default()),
-            })
-            .collect();
+        let empty = |column: &ColumnFacts| match column.is_number() {
+            true => Values::Numbers(Vec::with_capacity(source.rows)),
+            false => Values::Words(Words::default()),
+        };
+        let mut values: Vec<Values> = source.columns.iter().map(empty).collect();
         let mut rows = 0;
         for batch in source.batches(&names)? {
             let batch = batch?;
@@ -174,8 +167,7 @@ impl Table {
             rows += batch.rows;
             // What the file says of its rows need not be so.
             if rows > most {
-                let (path, kind) = (source.path.clone(), source.kind.name());
-                return Err(PlotError::TooMany { path, kind, rows, most });
+                return Err(too_many(&source, rows));
             }
         }
         let columns = source.columns.iter().zip(values);
@@ -232,10 +224,7 @@ impl Table {
 
     /// Columns of numbers whose name starts with `prefix`, without it.
     pub(crate) fn with_prefix(&self, prefix: &str) -> Vec<(&str, &Column)> {
-        self.columns
-            .iter()
-            .filter(|column| column.numbers().is_some())
-            .filter_map(|column| Some((column.name.strip_prefix(prefix)?, column)))
-            .collect()
+        let numbers = self.columns.iter().filter(|column| column.numbers().is_some());
+        numbers.filter_map(|column| Some((column.name.strip_prefix(prefix)?, column))).collect()
     }
 }

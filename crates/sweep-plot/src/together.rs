@@ -37,14 +37,12 @@ pub(crate) fn parted(files: [(&Source, &At); 2], parts: &[&str]) -> Vec<String> 
     let mut found = Vec::new();
     for part in parts {
         let mut path: Vec<String> = part.split('.').map(str::to_owned).collect();
-        let within = |plan: &'_ Value| -> Option<Value> {
+        let sides = [first, second].map(|plan| {
             let section = plan.get(&path[0])?;
-            Some(
-                path.get(1).map_or(section, |key| section.get(key).unwrap_or(&Value::Null)).clone(),
-            )
-        };
-        if let (Some(first), Some(second)) = (within(first), within(second)) {
-            descend([(&first, files[0].1), (&second, files[1].1)], &mut path, &mut found);
+            Some(path.get(1).map_or(section, |key| &section[key.as_str()]))
+        });
+        if let [Some(first), Some(second)] = sides {
+            descend([(first, files[0].1), (second, files[1].1)], &mut path, &mut found);
         }
     }
     found

@@ -205,26 +205,19 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     }
     let is_boundary = kinds[0] == "boundary";
     let tables = [first, second];
-    let mut keys: Vec<String> = Vec::new();
-    let mut fixed = Vec::new();
     let own_keys = tables.map(|table| side::keys(table, is_boundary));
+    let [firsts, seconds] = &own_keys;
+    let keys: Vec<String> = firsts.iter().filter(|name| seconds.contains(name)).cloned().collect();
+    let mut fixed = Vec::new();
     for (place, names) in own_keys.iter().enumerate() {
-        for name in names {
-            if own_keys[1 - place].contains(name) {
-                if place == 0 {
-                    keys.push(name.clone());
-                }
-            } else {
-                match side::only_value(tables[place], name)? {
-                    Some(value) => fixed.push((place, name.clone(), value)),
-                    None => {
-                        let which = ["first", "second"][place];
-                        return Err(refuse(format!(
-                            "only the {which} has the axis `{name}`, with several values"
-                        )));
-                    }
-                }
-            }
+        for name in names.iter().filter(|name| !keys.contains(name)) {
+            let Some(value) = side::only_value(tables[place], name)? else {
+                let which = ["first", "second"][place];
+                return Err(refuse(format!(
+                    "only the {which} has the axis `{name}`, with several values"
+                )));
+            };
+            fixed.push((place, name.clone(), value));
         }
     }
     let columns_alone = [0, 1].map(|place| {
@@ -236,17 +229,15 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     });
     let sides = [Side::read(first, second, &keys)?, Side::read(second, first, &keys)?];
     let pairs = matched(&sides);
-    if pairs.is_empty() && sides.iter().any(|side| side.rows > 0) {
+    if pairs.is_empty() && sides.iter().any(|side| side.rows() > 0) {
         let keys = if keys.is_empty() { "rows".to_owned() } else { keys.join(", ") };
         return Err(refuse(format!("they share no row: no values of {keys} are in both")));
     }
     let mut shared: Vec<SharedRow> =
         pairs.iter().map(|&pair| sides[0].shared(&sides[1], pair)).collect();
     let columns = changes(&sides, &pairs, &mut shared);
-    let key_units = keys
-        .iter()
-        .map(|name| first.column(name).map(|column| column.unit.clone()).unwrap_or_default())
-        .collect();
+    let unit = |name: &String| first.column(name).map(|column| column.unit.clone());
+    let key_units = keys.iter().map(|name| unit(name).unwrap_or_default()).collect();
     let boundary = if is_boundary {
         boundary::of_boundaries(first, second)?
     } else {
@@ -255,7 +246,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     let both_have = |name: &str| tables.iter().all(|table| table.column(name).is_some());
     Ok(Comparison {
         plan: plans::changes(first.file(), second.file()),
-        alone: [0, 1].map(|place| (sides[place].rows - pairs.len()) as u64),
+        alone: [0, 1].map(|place| (sides[place].rows() - pairs.len()) as u64),
         has_verdicts: both_have("reliable"),
         over_estimated: over_estimated(tables, &shared),
         has_ratios: both_have("ratio_max"),
@@ -285,9 +276,9 @@ fn over_estimated(tables: [&ResultTable; 2], shared: &[SharedRow]) -> Option<[us
 fn matched(sides: &[Side; 2]) -> Vec<[usize; 2]> {
     let mut seen = HashMap::new();
     let known: HashMap<_, usize> =
-        (0..sides[1].rows).map(|row| (numbered(&sides[1], row, &mut seen), row)).collect();
+        (0..sides[1].rows()).map(|row| (numbered(&sides[1], row, &mut seen), row)).collect();
     seen.clear();
-    (0..sides[0].rows)
+    (0..sides[0].rows())
         .filter_map(|row| Some([row, *known.get(&numbered(&sides[0], row, &mut seen))?]))
         .collect()
 }
@@ -303,12 +294,8 @@ fn numbered(side: &Side, row: usize, seen: &mut HashMap<Vec<u64>, usize>) -> (Ve
 /// The columns that differ in the shared rows, which are marked.
 fn changes(sides: &[Side; 2], pairs: &[[usize; 2]], shared: &mut [SharedRow]) -> Vec<ColumnChange> {
     let mut changes = Vec::new();
-    for (column, first) in &sides[0].columns {
-        let Some((_, second)) =
-            sides[1].columns.iter().find(|(other, _)| other.name == column.name)
-        else {
-            continue;
-        };
+    for (first, column) in sides[0].columns() {
+        let Some(second) = sides[1].place(&column.name) else { continue };
         let mut change = ColumnChange {
             name: column.name.clone(),
             unit: column.unit.clone(),
@@ -317,7 +304,7 @@ fn changes(sides: &[Side; 2], pairs: &[[usize; 2]], shared: &mut [SharedRow]) ->
             at: 0,
         };
         for (place, (pair, row)) in pairs.iter().zip(shared.iter_mut()).enumerate() {
-            let (first, second) = (first.get(pair[0]), second.get(pair[1]));
+            let [first, second] = [sides[0].cell(first, pair[0]), sides[1].cell(second, pair[1])];
             if first == second {
                 continue;
             }
@@ -335,11 +322,6 @@ fn changes(sides: &[Side; 2], pairs: &[[usize; 2]], shared: &mut [SharedRow]) ->
         }
     }
     changes
-}
-
-/// Whether a column takes part in a comparison.
-fn is_compared(name: &str, keys: &[String]) -> bool {
-    name != "point" && !keys.iter().any(|key| key == name)
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! Conditions over the columns of a result, with the three truth values of SQL: a comparison with a
 //! missing value is neither true nor false.
 
+use std::cmp::Ordering;
 use std::ops::Range;
 
 use crate::error::ResultsError;
 use crate::rows::{Cell, ResultTable, Rows};
-use sweep_files::CellKind;
 
 /// A mistake in the text of a condition.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,16 +20,10 @@ pub struct Mistake {
     pub candidates: Option<(String, Vec<String>)>,
 }
 
-/// How two values are compared.
+/// Which orders of two values keep a comparison: the first one less, both equal, the first one
+/// greater.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Comparison {
-    Less,
-    AtMost,
-    Greater,
-    AtLeast,
-    Equal,
-    NotEqual,
-}
+pub(crate) struct Comparison(pub(crate) [bool; 3]);
 
 /// How two numbers become one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,7 +107,13 @@ impl Node {
             Self::Negative(node) => number(node.number(at).map(|number| -number)),
             Self::Absolute(node) => number(node.number(at).map(f64::abs)),
             Self::Calculate(operation, left, right) => {
-                number(operation.of(left.number(at), right.number(at)))
+                let both = left.number(at).zip(right.number(at));
+                number(both.map(|(left, right)| match operation {
+                    Operation::Add => left + right,
+                    Operation::Subtract => left - right,
+                    Operation::Multiply => left * right,
+                    Operation::Divide => left / right,
+                }))
             }
             Self::Not(_) | Self::And(..) | Self::Or(..) | Self::IsNull(_) | Self::Compare(..) => {
                 self.truth(at).map_or(Cell::Null, Cell::Flag)
@@ -153,26 +153,14 @@ fn number(number: Option<f64>) -> Cell {
     number.filter(|number| !number.is_nan()).map_or(Cell::Null, Cell::Number)
 }
 
-impl Operation {
-    fn of(self, left: Option<f64>, right: Option<f64>) -> Option<f64> {
-        let (left, right) = (left?, right?);
-        Some(match self {
-            Self::Add => left + right,
-            Self::Subtract => left - right,
-            Self::Multiply => left * right,
-            Self::Divide => left / right,
-        })
-    }
-}
-
 impl Comparison {
     /// How far two numbers are from keeping it; 0 where they do.
     pub(crate) fn excess(self, left: f64, right: f64) -> f64 {
-        match self {
-            Self::Less | Self::AtMost => (left - right).max(0.0),
-            Self::Greater | Self::AtLeast => (right - left).max(0.0),
-            Self::Equal => (left - right).abs(),
-            Self::NotEqual => 1.0,
+        match self.0 {
+            [true, _, true] => 1.0,
+            [true, ..] => (left - right).max(0.0),
+            [.., true] => (right - left).max(0.0),
+            _ => (left - right).abs(),
         }
     }
 
@@ -183,13 +171,11 @@ impl Comparison {
             (Cell::Flag(left), Cell::Flag(right)) => left.cmp(right),
             _ => return None,
         };
-        Some(match self {
-            Self::Less => order.is_lt(),
-            Self::AtMost => order.is_le(),
-            Self::Greater => order.is_gt(),
-            Self::AtLeast => order.is_ge(),
-            Self::Equal => order.is_eq(),
-            Self::NotEqual => order.is_ne(),
+        let [less, equal, greater] = self.0;
+        Some(match order {
+            Ordering::Less => less,
+            Ordering::Equal => equal,
+            Ordering::Greater => greater,
         })
     }
 }
@@ -293,38 +279,27 @@ pub(crate) fn each_row(
     keep: Option<&Condition>,
     mut work: impl FnMut(&Context<'_>) -> Result<(), ResultsError>,
 ) -> Result<(), ResultsError> {
-    let own: Vec<&str> = conditions
-        .iter()
-        .flat_map(|condition| condition.columns.iter().map(String::as_str))
-        .collect();
-    // Every row counts, whether or not a column is read of it.
-    let counted = || table.columns.first().map(|column| column.name.as_str());
-    let own = if own.is_empty() { counted().into_iter().collect() } else { own };
-    let kept: Vec<&str> =
-        keep.into_iter().flat_map(|keep| keep.columns.iter().map(String::as_str)).collect();
-    let kept = if kept.is_empty() { counted().into_iter().collect() } else { kept };
-    let mut filter = keep.map(|_| table.read(&kept)).transpose()?;
-    for rows in table.read(&own)? {
+    let read = |conditions: &[&Condition]| {
+        let names = conditions.iter().flat_map(|condition| &condition.columns);
+        let mut names: Vec<&str> = names.map(String::as_str).collect();
+        if names.is_empty() {
+            // Every row counts, whether or not a column is read of it.
+            names.extend(table.columns.first().map(|column| column.name.as_str()));
+        }
+        table.read(&names)
+    };
+    let mut filter = keep.map(|keep| read(&[keep])).transpose()?;
+    for rows in read(conditions)? {
         let rows = rows?;
         let beside = filter.as_mut().and_then(Iterator::next).transpose()?;
-        for row in 0..rows.count {
-            let is_kept = match (keep, &beside) {
-                (Some(keep), Some(beside)) => {
-                    keep.root.truth(&Context { rows: beside, row, folded: &[] }) == Some(true)
-                }
-                _ => true,
-            };
-            if is_kept {
-                work(&Context { rows: &rows, row, folded: &[] })?;
-            }
+        let is_kept = |row: &usize| {
+            keep.zip(beside.as_ref()).is_none_or(|(keep, rows)| {
+                keep.root.truth(&Context { rows, row: *row, folded: &[] }) == Some(true)
+            })
+        };
+        for row in (0..rows.count).filter(is_kept) {
+            work(&Context { rows: &rows, row, folded: &[] })?;
         }
     }
     Ok(())
-}
-
-/// What a node is, for the parser.
-pub(crate) struct Typed {
-    pub(crate) node: Node,
-    pub(crate) kind: CellKind,
-    pub(crate) span: Range<usize>,
 }

@@ -15,7 +15,7 @@
 
 use std::ops::Range;
 
-use crate::condition::{Comparison, Condition, Fold, Mistake, Node, Operation, Typed};
+use crate::condition::{Comparison, Condition, Fold, Mistake, Node, Operation};
 use crate::rows::{Cell, ResultTable};
 use sweep_files::{CellKind, Column};
 
@@ -41,26 +41,57 @@ const SIGNS: [&str; 13] = ["<=", ">=", "==", "!=", "<", ">", "(", ")", "+", "-",
 const FOREIGN: [(&str, &str); 5] =
     [("&&", "and"), ("||", "or"), ("!", "not"), ("=", "=="), ("<>", "!=")];
 
-/// Words that are no columns.
-const FUNCTIONS: [&str; 7] = ["abs", "count", "share", "min", "max", "mean", "quantile"];
+/// Words that are no columns, and how they fold all rows.
+const FUNCTIONS: [(&str, Option<Fold>); 7] = [
+    ("abs", None),
+    ("count", Some(Fold::Count)),
+    ("share", Some(Fold::Share)),
+    ("min", Some(Fold::Least)),
+    ("max", Some(Fold::Greatest)),
+    ("mean", Some(Fold::Mean)),
+    ("quantile", Some(Fold::Quantile(f64::NAN))),
+];
 
 type Spanned = (Token, Range<usize>);
 
-fn mistake(title: impl Into<String>, span: Range<usize>, expected: impl Into<String>) -> Mistake {
-    Mistake { title: title.into(), span, expected: expected.into(), candidates: None }
+/// What a node is.
+struct Typed {
+    node: Node,
+    kind: CellKind,
+    span: Range<usize>,
+}
+
+type Parsed = Result<Typed, Mistake>;
+
+const COMPARISONS: [(&str, Comparison); 6] = [
+    ("<", Comparison([true, false, false])),
+    ("<=", Comparison([true, true, false])),
+    (">", Comparison([false, false, true])),
+    (">=", Comparison([false, true, true])),
+    ("==", Comparison([false, true, false])),
+    ("!=", Comparison([true, false, true])),
+];
+const SUMS: [(&str, Operation); 2] = [("+", Operation::Add), ("-", Operation::Subtract)];
+const PRODUCTS: [(&str, Operation); 2] = [("*", Operation::Multiply), ("/", Operation::Divide)];
+
+fn wrong<T>(
+    title: impl Into<String>,
+    span: Range<usize>,
+    expected: impl Into<String>,
+) -> Result<T, Mistake> {
+    let (title, expected) = (title.into(), expected.into());
+    Err(Mistake { title, span, expected, candidates: None })
 }
 
 fn tokens(text: &str) -> Result<Vec<Spanned>, Mistake> {
     if text.len() > LONGEST {
         let expected = format!("expected at most {LONGEST} characters");
-        return Err(mistake("the expression is too long", 0..LONGEST.min(1), expected));
+        return wrong("the expression is too long", 0..LONGEST.min(1), expected);
     }
     let mut found = Vec::new();
     let mut at = 0;
     while let Some(first) = text[at..].chars().next() {
         let rest = &text[at..];
-        let taken =
-            |matches: &dyn Fn(char) -> bool| rest.find(|c: char| !matches(c)).unwrap_or(rest.len());
         let (token, length) = if first.is_whitespace() {
             at += first.len_utf8();
             continue;
@@ -69,37 +100,30 @@ fn tokens(text: &str) -> Result<Vec<Spanned>, Mistake> {
             let number = rest[..length].parse::<f64>().ok().filter(|number| number.is_finite());
             let Some(number) = number else {
                 let title = format!("`{}` is not a number", &rest[..length]);
-                return Err(mistake(
-                    title,
-                    at..at + length,
-                    "expected a number such as 1.5 or 2e-3",
-                ));
+                return wrong(title, at..at + length, "expected a number such as 1.5 or 2e-3");
             };
             (Token::Number(number), length)
         } else if first.is_alphabetic() || first == '_' {
-            let length = taken(&|c| c.is_alphanumeric() || c == '_');
+            let ends = |c: char| !(c.is_alphanumeric() || c == '_');
+            let length = rest.find(ends).unwrap_or(rest.len());
             (Token::Word(rest[..length].to_owned()), length)
         } else if first == '"' || first == '\'' {
             let Some(end) = rest[1..].find(first) else {
                 let span = at..text.len();
-                return Err(mistake(
-                    "a text without an end",
-                    span,
-                    format!("expected a closing {first}"),
-                ));
+                return wrong("a text without an end", span, format!("expected a closing {first}"));
             };
             (Token::Text(rest[1..=end].to_owned()), end + 2)
         } else if let Some((foreign, own)) = FOREIGN.iter().find(|(foreign, _)| {
             rest.starts_with(foreign) && !(rest.starts_with("==") || rest.starts_with("!="))
         }) {
             let title = format!("`{foreign}` is not part of an expression");
-            return Err(mistake(title, at..at + foreign.len(), format!("expected `{own}`")));
+            return wrong(title, at..at + foreign.len(), format!("expected `{own}`"));
         } else if let Some(sign) = SIGNS.iter().find(|sign| rest.starts_with(*sign)) {
             (Token::Sign(sign), sign.len())
         } else {
             let title = format!("`{first}` is not part of an expression");
             let expected = "expected columns, numbers, `<`, `and`, ...";
-            return Err(mistake(title, at..at + first.len_utf8(), expected));
+            return wrong(title, at..at + first.len_utf8(), expected);
         };
         found.push((token, at..at + length));
         at += length;
@@ -161,7 +185,7 @@ pub(crate) fn expression(
     let (token, span) = parser.peek().clone();
     if token != Token::End {
         let expected = "expected `and`, `or`, a comparison, or the end";
-        return Err(mistake("the expression goes on after its end", span, expected));
+        return wrong("the expression goes on after its end", span, expected);
     }
     if root.kind != wanted {
         let (not, expected) = match wanted {
@@ -171,7 +195,7 @@ pub(crate) fn expression(
             _ => ("cannot be minimised", "expected a number, as in `max(ratio_max)`"),
         };
         let title = format!("the expression is {}, which {not}", root.kind.name());
-        return Err(mistake(title, root.span, expected));
+        return wrong(title, root.span, expected);
     }
     let Parser { used, folds, by_row, .. } = parser;
     let by_row = by_row || folds.is_empty();
@@ -195,35 +219,37 @@ impl Parser<'_> {
         is
     }
 
-    fn takes_sign(&mut self, signs: &[&'static str]) -> Option<&'static str> {
-        match self.peek().0 {
-            Token::Sign(sign) if signs.contains(&sign) => {
-                self.next += 1;
-                Some(sign)
-            }
-            _ => None,
-        }
+    /// What the next sign means, if it is one of these.
+    fn takes_one<T: Copy>(&mut self, signs: &[(&'static str, T)]) -> Option<T> {
+        let Token::Sign(next) = self.peek().0 else { return None };
+        let (_, meaning) = signs.iter().find(|(sign, _)| *sign == next)?;
+        self.next += 1;
+        Some(*meaning)
     }
 
-    fn any_of(&mut self) -> Result<Typed, Mistake> {
-        let mut left = self.all_of()?;
-        while self.takes_word("or") {
-            let right = self.all_of()?;
-            left = logical(left, right, "or", Node::Or)?;
+    fn any_of(&mut self) -> Parsed {
+        self.logical(Self::all_of, "or", Node::Or)
+    }
+
+    fn all_of(&mut self) -> Parsed {
+        self.logical(Self::negated, "and", Node::And)
+    }
+
+    fn logical(
+        &mut self,
+        part: fn(&mut Self) -> Parsed,
+        word: &str,
+        node: fn(Box<Node>, Box<Node>) -> Node,
+    ) -> Parsed {
+        let mut left = part(self)?;
+        while self.takes_word(word) {
+            let why = format!("`{word}` joins what is true or false");
+            left = joined(left, part(self)?, CellKind::Flag, &why, node)?;
         }
         Ok(left)
     }
 
-    fn all_of(&mut self) -> Result<Typed, Mistake> {
-        let mut left = self.negated()?;
-        while self.takes_word("and") {
-            let right = self.negated()?;
-            left = logical(left, right, "and", Node::And)?;
-        }
-        Ok(left)
-    }
-
-    fn negated(&mut self) -> Result<Typed, Mistake> {
+    fn negated(&mut self) -> Parsed {
         let start = self.peek().1.start;
         if !self.takes_word("not") {
             return self.comparison();
@@ -234,28 +260,20 @@ impl Parser<'_> {
         Ok(Typed { node: Node::Not(Box::new(inner.node)), kind: CellKind::Flag, span })
     }
 
-    fn comparison(&mut self) -> Result<Typed, Mistake> {
-        const SIGNS: [(&str, Comparison); 6] = [
-            ("<", Comparison::Less),
-            ("<=", Comparison::AtMost),
-            (">", Comparison::Greater),
-            (">=", Comparison::AtLeast),
-            ("==", Comparison::Equal),
-            ("!=", Comparison::NotEqual),
-        ];
+    fn comparison(&mut self) -> Parsed {
         let left = self.sum()?;
         if self.takes_word("is") {
             let negated = self.takes_word("not");
             let end = self.peek().1.clone();
             if !self.takes_word("null") {
-                return Err(mistake("`is` asks for null", end, "expected `null` or `not null`"));
+                return wrong("`is` asks for null", end, "expected `null` or `not null`");
             }
             let span = left.span.start..end.end;
             let node = Node::IsNull(Box::new(left.node));
             let node = if negated { Node::Not(Box::new(node)) } else { node };
             return Ok(Typed { node, kind: CellKind::Flag, span });
         }
-        let Some(sign) = self.takes_sign(&SIGNS.map(|(sign, _)| sign)) else { return Ok(left) };
+        let Some(comparison) = self.takes_one(&COMPARISONS) else { return Ok(left) };
         let right = self.sum()?;
         if left.kind != right.kind {
             let title = format!("{} is compared with {}", left.kind.name(), right.kind.name());
@@ -263,41 +281,41 @@ impl Parser<'_> {
                 CellKind::Text => "expected a text, as in \"ok\"".to_owned(),
                 kind => format!("expected {}", kind.name()),
             };
-            return Err(mistake(title, right.span, expected));
+            return wrong(title, right.span, expected);
         }
         let again = self.peek().1.clone();
-        if self.takes_sign(&SIGNS.map(|(sign, _)| sign)).is_some() {
+        if self.takes_one(&COMPARISONS).is_some() {
             let expected = "expected `and`: write `a < x and x < b`";
-            return Err(mistake("a comparison of three values", again, expected));
+            return wrong("a comparison of three values", again, expected);
         }
-        let comparison =
-            SIGNS.iter().find(|(known, _)| *known == sign).map_or(Comparison::Equal, |(_, c)| *c);
         let span = left.span.start..right.span.end;
         let node = Node::Compare(comparison, Box::new(left.node), Box::new(right.node));
         Ok(Typed { node, kind: CellKind::Flag, span })
     }
 
-    fn sum(&mut self) -> Result<Typed, Mistake> {
-        let mut left = self.product()?;
-        while let Some(sign) = self.takes_sign(&["+", "-"]) {
-            let right = self.product()?;
-            let operation = if sign == "+" { Operation::Add } else { Operation::Subtract };
-            left = calculated(left, right, operation)?;
+    fn sum(&mut self) -> Parsed {
+        self.calculated(Self::product, &SUMS)
+    }
+
+    fn product(&mut self) -> Parsed {
+        self.calculated(Self::factor, &PRODUCTS)
+    }
+
+    fn calculated(
+        &mut self,
+        part: fn(&mut Self) -> Parsed,
+        signs: &[(&'static str, Operation)],
+    ) -> Parsed {
+        let mut left = part(self)?;
+        while let Some(operation) = self.takes_one(signs) {
+            let node = |left, right| Node::Calculate(operation, left, right);
+            let why = "only numbers are calculated with";
+            left = joined(left, part(self)?, CellKind::Number, why, node)?;
         }
         Ok(left)
     }
 
-    fn product(&mut self) -> Result<Typed, Mistake> {
-        let mut left = self.factor()?;
-        while let Some(sign) = self.takes_sign(&["*", "/"]) {
-            let right = self.factor()?;
-            let operation = if sign == "*" { Operation::Multiply } else { Operation::Divide };
-            left = calculated(left, right, operation)?;
-        }
-        Ok(left)
-    }
-
-    fn factor(&mut self) -> Result<Typed, Mistake> {
+    fn factor(&mut self) -> Parsed {
         let (token, span) = self.take();
         let typed = |node, kind| Ok(Typed { node, kind, span: span.clone() });
         match token {
@@ -318,34 +336,32 @@ impl Parser<'_> {
             Token::Word(word) if word == "true" || word == "false" => {
                 typed(Node::Literal(Cell::Flag(word == "true")), CellKind::Flag)
             }
-            Token::Word(word)
-                if FUNCTIONS.contains(&word.as_str()) && self.peek().0 == Token::Sign("(") =>
-            {
-                self.function(&word, span)
-            }
-            Token::Word(word) => self.column(&word, span),
-            Token::Sign(sign) => Err(mistake(
+            Token::Word(word) => match FUNCTIONS.iter().find(|(name, _)| *name == word) {
+                Some((name, fold)) if self.peek().0 == Token::Sign("(") => {
+                    self.function(name, *fold, span)
+                }
+                _ => self.column(&word, span),
+            },
+            Token::Sign(sign) => wrong(
                 format!("`{sign}` where a value should be"),
                 span,
                 "expected a column, a number or `(`",
-            )),
-            Token::End => Err(mistake(
-                "the expression ends too early",
-                span,
-                "expected a column, a number or `(`",
-            )),
+            ),
+            Token::End => {
+                wrong("the expression ends too early", span, "expected a column, a number or `(`")
+            }
         }
     }
 
-    fn column(&mut self, word: &str, span: Range<usize>) -> Result<Typed, Mistake> {
+    fn column(&mut self, word: &str, span: Range<usize>) -> Parsed {
         let Some(column) = self.columns.iter().find(|column| column.name == word) else {
             let names = self.columns.iter().map(|column| column.name.clone());
-            let names = names.chain(FUNCTIONS.map(str::to_owned)).collect();
-            let title = format!("unknown column `{word}`");
-            let expected = "expected a column of the file, or a \"text\" in quotes";
+            let names = names.chain(FUNCTIONS.map(|(name, _)| name.to_owned())).collect();
             return Err(Mistake {
+                title: format!("unknown column `{word}`"),
+                span,
+                expected: "expected a column of the file, or a \"text\" in quotes".to_owned(),
                 candidates: Some((word.to_owned(), names)),
-                ..mistake(title, span, expected)
             });
         };
         self.by_row |= !self.in_fold;
@@ -357,30 +373,20 @@ impl Parser<'_> {
         Ok(Typed { node: Node::Column(place), kind: column.kind, span })
     }
 
-    fn function(&mut self, word: &str, span: Range<usize>) -> Result<Typed, Mistake> {
+    fn function(&mut self, word: &str, mut fold: Option<Fold>, span: Range<usize>) -> Parsed {
         self.next += 1;
-        let fold = match word {
-            "count" => Some(Fold::Count),
-            "share" => Some(Fold::Share),
-            "min" => Some(Fold::Least),
-            "max" => Some(Fold::Greatest),
-            "mean" => Some(Fold::Mean),
-            "quantile" => Some(Fold::Quantile(f64::NAN)),
-            _ => None,
-        };
         if fold.is_some() && self.in_fold {
             let title = format!("`{word}` within another function over all rows");
-            return Err(mistake(title, span, "expected a value of single rows"));
+            return wrong(title, span, "expected a value of single rows");
         }
         let outer = self.in_fold;
         self.in_fold |= fold.is_some();
         let inner = self.deeper(Self::any_of);
         self.in_fold = outer;
         let inner = inner?;
-        let fold = match fold {
-            Some(Fold::Quantile(_)) => Some(Fold::Quantile(self.part()?)),
-            other => other,
-        };
+        if let Some(Fold::Quantile(part)) = &mut fold {
+            *part = self.part()?;
+        }
         let end = self.closing()?;
         let wanted = match fold {
             Some(Fold::Count | Fold::Share) => CellKind::Flag,
@@ -402,15 +408,11 @@ impl Parser<'_> {
         let expected = "expected a comma and a number from 0 to 1, as in `quantile(x, 0.95)`";
         let (sign, span) = self.take();
         if sign != Token::Sign(",") {
-            return Err(mistake(
-                "`quantile` takes a number and a part of all rows",
-                span,
-                expected,
-            ));
+            return wrong("`quantile` takes a number and a part of all rows", span, expected);
         }
         match self.take() {
             (Token::Number(part), _) if part <= 1.0 => Ok(part),
-            (_, span) => Err(mistake("no part of all rows", span, expected)),
+            (_, span) => wrong("no part of all rows", span, expected),
         }
     }
 
@@ -420,17 +422,14 @@ impl Parser<'_> {
         if token == Token::Sign(")") {
             return Ok(span.end);
         }
-        Err(mistake("a parenthesis without an end", span, "expected `)`"))
+        wrong("a parenthesis without an end", span, "expected `)`")
     }
 
-    fn deeper<T>(
-        &mut self,
-        parse: impl FnOnce(&mut Self) -> Result<T, Mistake>,
-    ) -> Result<T, Mistake> {
+    fn deeper(&mut self, parse: fn(&mut Self) -> Parsed) -> Parsed {
         if self.depth == DEEPEST {
             let span = self.peek().1.clone();
             let expected = format!("expected at most {DEEPEST} levels");
-            return Err(mistake("the expression is nested too deeply", span, expected));
+            return wrong("the expression is nested too deeply", span, expected);
         }
         self.depth += 1;
         let parsed = parse(self);
@@ -444,30 +443,22 @@ fn expect(found: &Typed, wanted: CellKind, why: &str) -> Result<(), Mistake> {
         return Ok(());
     }
     let expected = format!("expected {}, found {}", wanted.name(), found.kind.name());
-    Err(mistake(why, found.span.clone(), expected))
+    wrong(why, found.span.clone(), expected)
 }
 
-fn logical(
+/// Two parts of one kind as a part of that kind.
+fn joined(
     left: Typed,
     right: Typed,
-    word: &str,
-    node: fn(Box<Node>, Box<Node>) -> Node,
-) -> Result<Typed, Mistake> {
+    kind: CellKind,
+    why: &str,
+    node: impl FnOnce(Box<Node>, Box<Node>) -> Node,
+) -> Parsed {
     for side in [&left, &right] {
-        expect(side, CellKind::Flag, &format!("`{word}` joins what is true or false"))?;
+        expect(side, kind, why)?;
     }
     let span = left.span.start..right.span.end;
-    let node = node(Box::new(left.node), Box::new(right.node));
-    Ok(Typed { node, kind: CellKind::Flag, span })
-}
-
-fn calculated(left: Typed, right: Typed, operation: Operation) -> Result<Typed, Mistake> {
-    for side in [&left, &right] {
-        expect(side, CellKind::Number, "only numbers are calculated with")?;
-    }
-    let span = left.span.start..right.span.end;
-    let node = Node::Calculate(operation, Box::new(left.node), Box::new(right.node));
-    Ok(Typed { node, kind: CellKind::Number, span })
+    Ok(Typed { node: node(Box::new(left.node), Box::new(right.node)), kind, span })
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::condition::{Condition, Context, Folded, each_row};
 use crate::error::ResultsError;
 use crate::rows::{Cell, ResultTable};
-use crate::top::{keep_worst, most_held};
+use crate::top::Worst;
 
 /// A row that does not keep a condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -19,7 +19,7 @@ pub struct Offender {
 }
 
 /// What came of one condition.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Checked {
     /// The condition as typed.
     pub expression: String,
@@ -64,19 +64,14 @@ pub fn check(
     let folded: Vec<Cell> = folds.iter().map(known).collect();
     let mut checked = Checked {
         expression: condition.text.clone(),
-        holds: false,
         by_row: condition.by_row,
-        rows: 0,
-        failing: 0,
-        undefined: 0,
         folded_rows: folds.iter().map(|fold| fold.over).collect(),
         folded: folds.into_iter().map(|fold| fold.value).collect(),
-        offenders: Vec::new(),
+        ..Checked::default()
     };
-    let (mut whole, mut offenders) = (None, Vec::new());
     let column = |(k, name): (usize, &String)| Some((k, table.column(name)?.worse?));
     let by = condition.columns.iter().enumerate().find_map(column);
-    let held = if by.is_some() { most_held(most_offenders) } else { most_offenders };
+    let (mut whole, mut offenders) = (None, Worst::new(by.map(|(_, worse)| worse), most_offenders));
     let places = table.places();
     let place = Condition {
         columns: places.iter().map(|name| (*name).to_owned()).collect(),
@@ -94,8 +89,11 @@ pub fn check(
             Some(false) => checked.failing += 1,
             None => checked.undefined += 1,
         }
-        let offends = !(allow_null && truth.is_none());
-        if offends && offenders.len() < held {
+        if allow_null && truth.is_none() {
+            return Ok(());
+        }
+        let value = by.and_then(|(column, _)| at.rows.cell(column, at.row).number());
+        offenders.take(value, || {
             let own = condition.columns.len();
             let placed = places.iter().enumerate().map(|(k, name)| (*name, own + k));
             let read = condition.columns.iter().enumerate().map(|(k, name)| (name.as_str(), k));
@@ -103,25 +101,15 @@ pub fn check(
             let cells = placed
                 .chain(read)
                 .map(|(name, column)| (name.to_owned(), at.rows.cell(column, at.row)));
-            let offender = Offender {
+            Offender {
                 row: at.rows.first + at.row as u64,
                 undefined: truth.is_none(),
                 cells: cells.collect(),
-            };
-            let value = by.and_then(|(column, _)| at.rows.cell(column, at.row).number());
-            offenders.push((value, offender));
-            if let Some((_, worse)) = by
-                && offenders.len() == held
-            {
-                keep_worst(&mut offenders, worse, most_offenders);
             }
-        }
+        });
         Ok(())
     })?;
-    if let Some((_, worse)) = by {
-        keep_worst(&mut offenders, worse, most_offenders);
-    }
-    checked.offenders = offenders.into_iter().map(|(_, offender)| offender).collect();
+    checked.offenders = offenders.finish();
     checked.holds = checked.rows > 0
         && if condition.by_row {
             checked.failing == 0 && (allow_null || checked.undefined == 0)

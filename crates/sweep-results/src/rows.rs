@@ -5,7 +5,7 @@ use std::path::Path;
 
 use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::ArrowError;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use serde_json::Value;
 use sweep_files::{CellKind, Column, FileError, ParquetFile, cells, columns, key};
 use sweep_parameter::RatioLimits;
@@ -13,7 +13,8 @@ use sweep_parameter::RatioLimits;
 use crate::error::ResultsError;
 
 /// One cell.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Cell {
     /// No value; a number that is none counts as such.
     Null,
@@ -28,29 +29,14 @@ pub enum Cell {
 impl Cell {
     /// Whether it is true or false, if it is either.
     pub const fn flag(&self) -> Option<bool> {
-        match self {
-            Self::Flag(flag) => Some(*flag),
-            _ => None,
-        }
+        let Self::Flag(flag) = self else { return None };
+        Some(*flag)
     }
 
     /// The number, if it is one.
     pub const fn number(&self) -> Option<f64> {
-        match self {
-            Self::Number(number) => Some(*number),
-            _ => None,
-        }
-    }
-}
-
-impl Serialize for Cell {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Null => serializer.serialize_none(),
-            Self::Number(number) => serializer.serialize_f64(*number),
-            Self::Text(text) => serializer.serialize_str(text),
-            Self::Flag(flag) => serializer.serialize_bool(*flag),
-        }
+        let Self::Number(number) = self else { return None };
+        Some(*number)
     }
 }
 
@@ -161,13 +147,13 @@ impl ResultTable {
 }
 
 /// Some rows of some columns.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Rows {
     /// Number of the first of them in the file, from 0.
     pub first: u64,
     /// How many there are.
     pub count: usize,
-    columns: Vec<Decoded>,
+    columns: Vec<Cells>,
 }
 
 impl Rows {
@@ -180,47 +166,94 @@ impl Rows {
 
     /// The cell of a row in the `column`-th of the columns that were asked for.
     pub fn cell(&self, column: usize, row: usize) -> Cell {
-        match self.columns.get(column) {
-            Some(Decoded::Numbers(cells)) => {
-                cells[row].filter(|number| !number.is_nan()).map_or(Cell::Null, Cell::Number)
-            }
-            Some(Decoded::Texts { names, codes }) => {
-                codes[row].map_or(Cell::Null, |code| Cell::Text(names[code].clone()))
-            }
-            Some(Decoded::Flags(cells)) => cells[row].map_or(Cell::Null, Cell::Flag),
-            None => Cell::Null,
+        self.columns.get(column).map_or(Cell::Null, |cells| cells.get(row))
+    }
+
+    /// Takes up further rows of these columns.
+    pub(crate) fn extend(&mut self, further: Self) {
+        self.count += further.count;
+        if self.columns.is_empty() {
+            self.columns = further.columns;
+            return;
+        }
+        for (cells, further) in self.columns.iter_mut().zip(further.columns) {
+            cells.extend(further);
         }
     }
 }
 
-/// The cells of a batch's column.
+/// The cells of a column.
 #[derive(Debug)]
-enum Decoded {
-    Numbers(Vec<Option<f64>>),
-    /// Few words are many rows' word.
+enum Cells {
+    /// Missing ones are NaN.
+    Numbers(Vec<f64>),
+    /// Few words are many rows' word: places among the names; missing ones are the greatest.
     Texts {
         names: Vec<String>,
-        codes: Vec<Option<usize>>,
+        codes: Vec<u32>,
     },
     Flags(Vec<Option<bool>>),
 }
 
-fn decode(array: &ArrayRef, kind: CellKind) -> Result<Decoded, ArrowError> {
+impl Cells {
+    fn get(&self, row: usize) -> Cell {
+        match self {
+            Self::Numbers(cells) if cells[row].is_nan() => Cell::Null,
+            Self::Numbers(cells) => Cell::Number(cells[row]),
+            Self::Texts { names, codes } => {
+                names.get(codes[row] as usize).map_or(Cell::Null, |name| Cell::Text(name.clone()))
+            }
+            Self::Flags(cells) => cells[row].map_or(Cell::Null, Cell::Flag),
+        }
+    }
+
+    fn extend(&mut self, further: Self) {
+        match (self, further) {
+            (Self::Numbers(cells), Self::Numbers(further)) => cells.extend(further),
+            (Self::Flags(cells), Self::Flags(further)) => cells.extend(further),
+            (Self::Texts { names, codes }, Self::Texts { names: words, codes: further }) => {
+                let place = |word: String| {
+                    let known = names.iter().position(|name| *name == word);
+                    known.unwrap_or_else(|| {
+                        names.push(word);
+                        names.len() - 1
+                    })
+                };
+                let places: Vec<u32> = words.into_iter().map(place).map(code).collect();
+                let place = |code: u32| places.get(code as usize).copied().unwrap_or(u32::MAX);
+                codes.extend(further.into_iter().map(place));
+            }
+            // A column is of one kind.
+            _ => {}
+        }
+    }
+}
+
+/// A place among names.
+fn code(place: usize) -> u32 {
+    u32::try_from(place).unwrap_or(u32::MAX)
+}
+
+fn decode(array: &ArrayRef, kind: CellKind) -> Result<Cells, ArrowError> {
     Ok(match kind {
-        CellKind::Number => Decoded::Numbers(cells::numbers(array)?),
-        CellKind::Flag => Decoded::Flags(cells::flags(array)?.iter().collect()),
+        CellKind::Number => {
+            let cells = cells::numbers(array)?.into_iter();
+            Cells::Numbers(cells.map(|cell| cell.unwrap_or(f64::NAN)).collect())
+        }
+        CellKind::Flag => Cells::Flags(cells::flags(array)?.iter().collect()),
         CellKind::Text => {
             let mut names: Vec<String> = Vec::new();
             // Keyed by place: the words of a batch lie there once, and may be long.
             let mut places = HashMap::new();
-            let mut code = |word: &str| {
+            let mut place = |word: &str| {
                 *places.entry((word.as_ptr(), word.len())).or_insert_with(|| {
                     names.push(word.to_owned());
-                    names.len() - 1
+                    code(names.len() - 1)
                 })
             };
-            let codes = cells::texts(array)?.into_iter().map(|word| word.map(&mut code)).collect();
-            Decoded::Texts { names, codes }
+            let words = cells::texts(array)?.into_iter();
+            let codes = words.map(|word| word.map_or(u32::MAX, &mut place)).collect();
+            Cells::Texts { names, codes }
         }
     })
 }

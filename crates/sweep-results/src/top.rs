@@ -1,8 +1,6 @@
 //! The rows that come first in an order.
 
-use std::cmp::Ordering;
-
-use crate::condition::{Condition, each_row};
+use crate::condition::{Condition, Node, each_row};
 use crate::error::ResultsError;
 use crate::rows::{Cell, ResultTable};
 use sweep_files::CellKind;
@@ -38,50 +36,63 @@ pub fn top(
     let cells = Condition {
         text: String::new(),
         columns: read.iter().map(|name| (*name).to_owned()).collect(),
-        root: crate::condition::Node::Literal(Cell::Null),
+        root: Node::Literal(Cell::Null),
         folds: Vec::new(),
         by_row: true,
     };
-    let mut found: Vec<(Option<f64>, Vec<Cell>)> = Vec::new();
+    let mut found = Worst::new(by.map(|(_, worse)| worse), count);
     each_row(table, &[&cells], keep, |at| {
-        if by.is_none() && found.len() == count {
-            return Ok(());
-        }
         let value = by.and_then(|_| match at.rows.cell(columns.len(), at.row) {
             Cell::Flag(flag) => Some(f64::from(u8::from(flag))),
             cell => cell.number(),
         });
-        let row = (0..columns.len()).map(|column| at.rows.cell(column, at.row)).collect();
-        found.push((value, row));
-        if let Some((_, worse)) = by
-            && found.len() == most_held(count)
-        {
-            keep_worst(&mut found, worse, count);
-        }
+        let cell = |column| at.rows.cell(column, at.row);
+        found.take(value, || (0..columns.len()).map(cell).collect());
         Ok(())
     })?;
-    if let Some((_, worse)) = by {
-        keep_worst(&mut found, worse, count);
+    Ok(found.finish())
+}
+
+/// The worst of many, those without a value last; or the first, where nothing is bad.
+pub(crate) struct Worst<T> {
+    worse: Option<Worse>,
+    count: usize,
+    found: Vec<(Option<f64>, T)>,
+}
+
+impl<T> Worst<T> {
+    /// So many at most.
+    pub(crate) const fn new(worse: Option<Worse>, count: usize) -> Self {
+        Self { worse, count, found: Vec::new() }
     }
-    Ok(found.into_iter().map(|(_, row)| row).collect())
-}
 
-/// Puts the worst first, those without a value last, and keeps so many.
-pub(crate) fn keep_worst<T>(found: &mut Vec<(Option<f64>, T)>, worse: Worse, count: usize) {
-    // A stable sort: rows of one value stay in file order.
-    found.sort_by(|(a, _), (b, _)| match (a, b) {
-        (Some(a), Some(b)) if worse == Worse::Less => a.total_cmp(b),
-        (Some(a), Some(b)) => b.total_cmp(a),
-        (Some(_), None) => Ordering::Less,
-        (None, Some(_)) => Ordering::Greater,
-        (None, None) => Ordering::Equal,
-    });
-    found.truncate(count);
-}
+    /// Takes one more, if it could be among them.
+    pub(crate) fn take(&mut self, value: Option<f64>, one: impl FnOnce() -> T) {
+        if self.worse.is_none() && self.found.len() == self.count {
+            return;
+        }
+        self.found.push((value, one()));
+        // Sorting now and then keeps what is held at twice what is asked for.
+        if self.found.len() == self.count.saturating_mul(2).max(1024) {
+            self.sort();
+        }
+    }
 
-/// Sorting now and then keeps what is held at twice what is asked for.
-pub(crate) fn most_held(count: usize) -> usize {
-    count.saturating_mul(2).max(1024)
+    pub(crate) fn finish(mut self) -> Vec<T> {
+        self.sort();
+        self.found.into_iter().map(|(_, one)| one).collect()
+    }
+
+    fn sort(&mut self) {
+        let Some(worse) = self.worse else { return };
+        // A stable sort: rows of one value stay in file order.
+        self.found.sort_by(|(a, _), (b, _)| match (a, b) {
+            (Some(a), Some(b)) if worse == Worse::Less => a.total_cmp(b),
+            (Some(a), Some(b)) => b.total_cmp(a),
+            _ => b.is_some().cmp(&a.is_some()),
+        });
+        self.found.truncate(self.count);
+    }
 }
 
 #[cfg(test)]

@@ -38,12 +38,8 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let empty = || table.source.empty("a curve needs at least two points");
     let (low, high) = bracket(&names).ok_or_else(empty)?;
     let (x, y) = (columns[0], columns[1]);
-    let [xs, ys, lows, highs] = [
-        table.numbers(&x.name)?,
-        table.numbers(&y.name)?,
-        table.numbers(low)?,
-        table.numbers(high)?,
-    ];
+    let (xs, ys) = (table.numbers(&x.name)?, table.numbers(&y.name)?);
+    let (lows, highs) = (table.numbers(low)?, table.numbers(high)?);
     let mut grid: Vec<f64> = xs.iter().copied().filter(|x| x.is_finite()).collect();
     grid.sort_by(f64::total_cmp);
     grid.dedup();
@@ -107,7 +103,9 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
 /// What the region above the uppermost places is, where all of these say the same.
 fn far_side(curves: &[(String, Vec<Place>)], [falling, rising]: [&str; 2]) -> String {
     let mut uppermost: Vec<Place> = Vec::new();
-    for place in curves.iter().flat_map(|(_, places)| places).filter(|place| place.y.is_finite()) {
+    let all = || curves.iter().flat_map(|(_, places)| places);
+    let crossings = || all().filter(|place| place.y.is_finite());
+    for place in crossings() {
         match uppermost.iter_mut().find(|known| known.x == place.x) {
             Some(known) if known.y < place.y => *known = *place,
             Some(_) => {}
@@ -122,11 +120,7 @@ fn far_side(curves: &[(String, Vec<Place>)], [falling, rising]: [&str; 2]) -> St
         (true, false) => rising,
         _ => return String::new(),
     };
-    let places: usize = curves
-        .iter()
-        .map(|(_, places)| places.iter().filter(|place| place.y.is_finite()).count())
-        .sum();
-    let line = if places > uppermost.len() { "highest crossing" } else { "line" };
+    let line = if crossings().count() > uppermost.len() { "highest crossing" } else { "line" };
     format!(" · {side} above the {line}")
 }
 
@@ -188,9 +182,7 @@ pub(crate) struct Overlay {
 /// # Errors
 /// [`PlotError::Unfit`] if it has others, or further ones; otherwise as [`chart`].
 pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay, PlotError> {
-    let named = table.source.find("axis").and_then(Value::as_array);
-    let names: Vec<&str> =
-        named.into_iter().flatten().filter_map(|axis| axis.get("parameter")?.as_str()).collect();
+    let names: Vec<&str> = table.source.planned_axes().collect();
     if names != axes {
         return Err(PlotError::Unfit(format!(
             "{} is a boundary over {}; the map is over {}",
@@ -226,10 +218,7 @@ fn limit(table: &Table) -> String {
 
 /// The values of the axes beyond the second, which the plan in the file names.
 fn further(table: &Table, row: usize) -> String {
-    let axes = table.source.find("axis").and_then(Value::as_array);
-    let names =
-        axes.into_iter().flatten().skip(2).filter_map(|axis| axis.get("parameter")?.as_str());
-    let said = names.filter_map(|name| {
+    let said = table.source.planned_axes().skip(2).filter_map(|name| {
         let column = table.column(name)?;
         let value = *column.numbers()?.get(row)?;
         Some(label::valued(&label::words(name), value, &column.unit))
@@ -245,11 +234,8 @@ fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
         |place: &Place| if place.y.is_nan() { 0.5 * (place.low + place.high) } else { place.y };
     let mut lines: Vec<Vec<Place>> = Vec::new();
     for (k, &x) in grid.iter().enumerate() {
-        let mut here: Vec<Place> = places
-            .iter()
-            .copied()
-            .filter(|place| place.x == x && height(place).is_finite())
-            .collect();
+        let here = places.iter().filter(|place| place.x == x && height(place).is_finite());
+        let here: Vec<Place> = here.copied().collect();
         // Pairs of a line that was there at the last value and a place here, nearest first.
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (line, known) in lines.iter().enumerate() {
@@ -268,7 +254,7 @@ fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
                 taken[place] = Some(line);
             }
         }
-        for (place, line) in here.drain(..).zip(taken) {
+        for (place, line) in here.into_iter().zip(taken) {
             match line {
                 Some(line) => lines[line].push(place),
                 None => {

@@ -35,9 +35,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     if top <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
         return Err(table.source.empty("the modes are given at one speed only"));
     }
-    let (near, far): (Vec<Mode>, Vec<Mode>) = modes
-        .into_iter()
-        .partition(|mode| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top));
+    let is_near = |mode: &Mode| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top);
+    let (near, far): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(is_near);
     let (_, highest) =
         extremes(near.iter().flat_map(|mode| mode.frequency.iter().copied())).unwrap_or((0.0, top));
     let sums = unstable.as_ref().map_or_else(Vec::new, |unstable| sums(&near, unstable));
@@ -48,21 +47,16 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let mut grids = vec![vec![0.0, top]];
     let mut series = Vec::new();
     let mut stars = Vec::new();
-    for (k, mode) in near.into_iter().enumerate() {
-        for speed in crossings(&mode) {
-            stars.push((speed, speed, format!("{speed:.1} rpm")));
-        }
-        let style = mode.band.map_or(Style::Solid(2.2), |(low, high)| Style::Band(low, high));
-        let colour = DISTINCT[k % DISTINCT.len()];
+    let of_modes = near.into_iter().enumerate().map(|(k, mut mode)| {
+        let band = mode.band.take();
+        let style = band.map_or(Style::Solid(2.2), |(low, high)| Style::Band(low, high));
+        (mode, DISTINCT[k % DISTINCT.len()], style)
+    });
+    let of_sums = sums.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
+    for (mode, colour, style) in of_modes.chain(of_sums) {
+        stars.extend(crossings(&mode).into_iter().map(|at| (at, at, format!("{at:.1} rpm"))));
         series.push(Series::new(mode.name, colour, grids.len(), mode.frequency, style));
         grids.push(mode.speed);
-    }
-    for sum in sums {
-        for speed in crossings(&sum) {
-            stars.push((speed, speed, format!("{speed:.1} rpm")));
-        }
-        series.push(Series::new(sum.name, MUTED, grids.len(), sum.frequency, Style::Dashed));
-        grids.push(sum.speed);
     }
     let line = Series::new("frequency = spin speed", INK, 0, vec![0.0, top], Style::Dashed);
     series.push(line);
@@ -151,16 +145,21 @@ fn sums(modes: &[Mode], unstable: &Unstable) -> Vec<Mode> {
     pairs.into_iter().map(sum).collect()
 }
 
-/// A mode's frequency at a speed, straight between the given ones.
+/// A mode's frequency at a speed.
 fn at_speed(mode: &Mode, speed: f64) -> f64 {
-    let above = mode.speed.partition_point(|known| *known < speed).min(mode.speed.len() - 1);
+    between(&mode.speed, &mode.frequency, speed)
+}
+
+/// The value at `x`, straight between the given ones and even beyond them.
+pub(super) fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
+    let above = xs.partition_point(|known| *known < x).min(xs.len() - 1);
     let below = above.saturating_sub(1);
-    let step = mode.speed[above] - mode.speed[below];
+    let step = xs[above] - xs[below];
     if step == 0.0 {
-        return mode.frequency[above];
+        return ys[above];
     }
-    let part = ((speed - mode.speed[below]) / step).clamp(0.0, 1.0);
-    mode.frequency[below] + part * (mode.frequency[above] - mode.frequency[below])
+    let part = ((x - xs[below]) / step).clamp(0.0, 1.0);
+    ys[below] + part * (ys[above] - ys[below])
 }
 
 /// Every mode of a file, by number.
@@ -183,32 +182,25 @@ pub(super) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
     let mut numbers = number.to_vec();
     numbers.sort_by(f64::total_cmp);
     numbers.dedup();
-    Ok(numbers
-        .into_iter()
-        .map(|wanted| {
-            let mut rows: Vec<usize> =
-                (0..table.rows).filter(|&row| number[row] == wanted).collect();
-            rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
-            let pick = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
-            let said = names.and_then(|names| names.get(*rows.first()?));
-            Mode {
-                name: said.map_or(format!("mode {wanted}"), |said| format!("{wanted} {said}")),
-                speed: pick(speed),
-                frequency: pick(frequency),
-                band: band.map(|(low, high)| (pick(low), pick(high))),
-            }
-        })
-        .collect())
+    let mode = |wanted: f64| {
+        let mut rows: Vec<usize> = (0..table.rows).filter(|&row| number[row] == wanted).collect();
+        rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
+        let pick = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
+        let said = names.and_then(|names| names.get(*rows.first()?));
+        Mode {
+            name: said.map_or(format!("mode {wanted}"), |said| format!("{wanted} {said}")),
+            speed: pick(speed),
+            frequency: pick(frequency),
+            band: band.map(|(low, high)| (pick(low), pick(high))),
+        }
+    };
+    Ok(numbers.into_iter().map(mode).collect())
 }
 
 /// Speeds at which the mode's frequency, taken as linear between the given speeds, is the speed.
 pub(super) fn crossings(mode: &Mode) -> Vec<f64> {
-    let excess: Vec<f64> = mode
-        .frequency
-        .iter()
-        .zip(&mode.speed)
-        .map(|(frequency, speed)| frequency - speed)
-        .collect();
+    let both = mode.frequency.iter().zip(&mode.speed);
+    let excess: Vec<f64> = both.map(|(frequency, speed)| frequency - speed).collect();
     (1..excess.len())
         .filter(|&k| excess[k - 1] > 0.0 && excess[k] <= 0.0)
         .map(|k| {

@@ -51,10 +51,9 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
             Some(line(&said, colour, values(table.column(&facts.name)?, factor)))
         });
         let limit = columns[0].1.limit.map(|limit| limit * factor);
+        let is_asked = |name: &String| asked.iter().any(|shown| shown.column() == name);
         ChartPanel {
-            shown: columns
-                .iter()
-                .any(|(_, facts)| asked.iter().any(|shown| shown.column() == facts.name)),
+            shown: columns.iter().any(|(_, facts)| is_asked(&facts.name)),
             levels: limit.map(|limit| (limit, "limit".to_owned())).into_iter().collect(),
             ..ChartPanel::new(name, Label::new(&label::capitalised(words), unit), lines.collect())
         }
@@ -89,8 +88,8 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
             _ => "Where the linear model can be trusted".to_owned(),
         },
         subtitle: super::map::subtitle(map, &[]),
-        x_label: Label::new(&axis.words, &axis.unit),
-        x_log: axis.log,
+        x_label: Label::new(&axis.swept.words, &axis.swept.unit),
+        x_log: axis.swept.log,
         marks: failed.iter().step_by(each).map(mark).collect(),
         mark_meaning,
         grids: vec![cells.iter().map(|&cell| axis.values[cell]).collect()],
@@ -106,15 +105,12 @@ fn ratios(
     wanted: &impl Fn(&str) -> bool,
 ) -> ChartPanel {
     let limit = map.table.source.ratio_limit();
-    let mut series: Vec<Series> = layer::channels(&map.table.source, Group::Ratio)
-        .into_iter()
-        .enumerate()
-        .filter(|(_, (name, _))| wanted(name))
-        .filter_map(|(k, (name, facts))| {
-            let column = map.table.column(&facts.name)?;
-            Some(line(&label::channel(name), DISTINCT[k % DISTINCT.len()], values(column, 1.0)))
-        })
-        .collect();
+    let channels = layer::channels(&map.table.source, Group::Ratio).into_iter().enumerate();
+    let ratio = |(k, (name, facts)): (usize, (&str, &ColumnFacts))| {
+        let column = map.table.column(&facts.name).filter(|_| wanted(name))?;
+        Some(line(&label::channel(name), DISTINCT[k % DISTINCT.len()], values(column, 1.0)))
+    };
+    let mut series: Vec<Series> = channels.filter_map(ratio).collect();
     if let Some(column) = map.table.column("ratio_max") {
         let largest = Series { style: Style::Dashed, ..line("largest", INK, values(column, 1.0)) };
         series.push(largest);

@@ -6,10 +6,11 @@ use std::path::Path;
 use crate::PlotOptions;
 use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Series, Style};
-use crate::colour::{DISTINCT, FAILED, LINEAR, NONLINEAR};
+use crate::colour::{DISTINCT, FAILED, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::stability::{
-    UNSTABLE, axes, axis_columns, notes_at, one_point, part, row_values, shown, unstable,
+    UNSTABLE, axes, channels_of, columns_of, each_row, notes_at, one_point, response, shown,
+    unstable,
 };
 use crate::figures::{passages, trace};
 use crate::label::{self, Label};
@@ -54,11 +55,7 @@ struct Held {
 /// # Errors
 /// As [`one_point`] and [`shown`].
 pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
-    let channels: Vec<(&str, &ColumnFacts)> = source
-        .with_prefix("nonlinear_")
-        .into_iter()
-        .filter(|(name, _)| source.column(&format!("periodic_{name}")).is_some())
-        .collect();
+    let channels = channels_of(source, "periodic");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
     let axes = axes(source);
@@ -78,15 +75,9 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
         let (unit, factor) = label::shown(&facts.unit);
         let scaled = |values: &[f64]| values.iter().map(|value| value * factor).collect();
-        let [linear, periodic]: [Vec<f64>; 2] =
-            [scaled(&held.lines[k][0]), scaled(&held.lines[k][1])];
-        let line = |name: &str, colour, y, style| Series::new(name, colour, 0, y, style);
-        let of = |wanted| part(&periodic, &held.growth, wanted);
-        let mut series = vec![
-            line("linear model", LINEAR, linear, Style::Solid(1.6)),
-            line("periodic response, stable", NONLINEAR, of(false), Style::Solid(2.2)),
-            line("periodic response, unstable", NONLINEAR, of(true), Style::Dashed),
-        ];
+        let [linear, periodic] = &held.lines[k];
+        let lines = [scaled(linear), scaled(periodic)];
+        let mut series = response("periodic response", lines, &held.growth);
         for (kind, (_, words, colour)) in KINDS.iter().enumerate() {
             let y: Vec<f64> = of_kind(kind).map(|(_, _, values)| values[k] * factor).collect();
             if !y.is_empty() {
@@ -151,46 +142,32 @@ fn read(
     point: &[f64],
     channels: &[(&str, &ColumnFacts)],
 ) -> Result<Held, PlotError> {
-    let columns: Vec<String> = channels
-        .iter()
-        .flat_map(|(name, _)| ["linear", "periodic", "nonlinear"].map(|of| format!("{of}_{name}")))
-        .collect();
-    let mut names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
-    names.extend(["speed_rpm", "growth_per_s", "kind"]);
-    names.extend(columns.iter().map(String::as_str));
+    let mut columns = columns_of(channels, ["linear", "periodic", "nonlinear"]);
     let mut held = Held {
         speed: Vec::new(),
         growth: Vec::new(),
         lines: vec![[Vec::new(), Vec::new()]; channels.len()],
         motions: Vec::new(),
     };
+    columns.push(TURN.to_owned());
     let has_turns = source.column(TURN).is_some();
-    names.extend(has_turns.then_some(TURN));
-    for batch in source.batches(&names)? {
-        let batch = batch?;
-        let of_axes = axis_columns(&batch, axes)?;
-        let (speed, growth) = (batch.numbers("speed_rpm")?, batch.numbers("growth_per_s")?);
-        let kinds = batch.words("kind")?;
-        let values: Vec<Vec<f64>> =
-            columns.iter().map(|name| batch.numbers(name)).collect::<Result<_, _>>()?;
-        let turns = if has_turns { batch.numbers(TURN)? } else { Vec::new() };
+    each_row(source, axes, &columns, |row| {
         // The first turn of each motion.
-        let is_shown = |row: &usize| {
-            row_values(&of_axes, *row) == point && turns.get(*row).is_none_or(|t| *t <= 0.0)
-        };
-        for row in (0..batch.rows).filter(is_shown) {
-            if held.speed.last() != Some(&speed[row]) {
-                held.speed.push(speed[row]);
-                held.growth.push(growth[row]);
-                for (k, [linear, periodic]) in held.lines.iter_mut().enumerate() {
-                    linear.push(values[3 * k][row]);
-                    periodic.push(values[3 * k + 1][row]);
-                }
-            }
-            let deviations = (0..channels.len()).map(|k| values[3 * k + 2][row]).collect();
-            held.motions.push((speed[row], place_of(kinds[row]), deviations));
+        let is_first = !has_turns || row.values.last().is_some_and(|turn| *turn <= 0.0);
+        if row.point != point || !is_first {
+            return;
         }
-    }
+        if held.speed.last() != Some(&row.speed) {
+            held.speed.push(row.speed);
+            held.growth.push(row.growth);
+            for (lines, of) in held.lines.iter_mut().zip(row.values.chunks(3)) {
+                lines[0].push(of[0]);
+                lines[1].push(of[1]);
+            }
+        }
+        let deviations = row.values.chunks_exact(3).map(|of| of[2]).collect();
+        held.motions.push((row.speed, place_of(row.kind), deviations));
+    })?;
     Ok(held)
 }
 
@@ -208,26 +185,23 @@ fn place_of(kind: Option<&str>) -> usize {
 pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
     let axes = axes(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
-    let mut names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
-    names.extend(["speed_rpm", "motion", "kind", YAW, PITCH]);
+    let columns = ["motion", YAW, PITCH];
+    if let Some(name) = columns.into_iter().find(|name| source.column(name).is_none()) {
+        return Err(source.lacks(name, "numeric"));
+    }
     // Speed, motion, its kind, and its states by yaw.
     let mut found: Vec<(f64, f64, usize, Vec<[f64; 2]>)> = Vec::new();
-    for batch in source.batches(&names)? {
-        let batch = batch?;
-        let of_axes = axis_columns(&batch, &axes)?;
-        let [speed, motion, yaw, pitch] =
-            ["speed_rpm", "motion", YAW, PITCH].map(|name| batch.numbers(name));
-        let (speed, motion, yaw, pitch) = (speed?, motion?, yaw?, pitch?);
-        let kinds = batch.words("kind")?;
-        for row in (0..batch.rows).filter(|&row| row_values(&of_axes, row) == point) {
-            if found.last().is_none_or(|last| (last.0, last.1) != (speed[row], motion[row])) {
-                found.push((speed[row], motion[row], place_of(kinds[row]), Vec::new()));
-            }
-            found.iter_mut().last().into_iter().for_each(|(.., states)| {
-                states.push([1e3 * yaw[row], 1e3 * pitch[row]]);
-            });
+    each_row(source, &axes, &columns, |row| {
+        let [motion, yaw, pitch] = [0, 1, 2].map(|k| row.values[k]);
+        if row.point != point {
+            return;
         }
-    }
+        let state = [1e3 * yaw, 1e3 * pitch];
+        match found.last_mut().filter(|last| (last.0, last.1) == (row.speed, motion)) {
+            Some((.., states)) => states.push(state),
+            None => found.push((row.speed, motion, place_of(row.kind), vec![state])),
+        }
+    })?;
     let mut grids = Vec::new();
     let mut panels: Vec<ChartPanel> = Vec::new();
     for (speed, motion, kind, mut states) in found {

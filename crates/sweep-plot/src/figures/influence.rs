@@ -3,11 +3,11 @@
 use crate::axis::Scale;
 use crate::colour::{CALM, FAILED};
 use crate::frame::{
-    HEADING_HEIGHT, LABEL_SIZE, LEGEND_ROW, Panel, Sign, TICK_SIZE, heading, legend, legend_rows,
+    HEADING_HEIGHT, LABEL_SIZE, Panel, Sign, TICK_SIZE, heading, legend, legend_height,
 };
 use crate::influence::chance;
 use crate::label;
-use crate::raster::Typeface;
+use crate::raster::text_width;
 use crate::scatter::Scatter;
 use crate::scene::{Anchor, Colour, INK, Outline, Scene, Stroke, Text};
 
@@ -51,11 +51,11 @@ pub(crate) fn subtitle(scatter: &Scatter) -> String {
 }
 
 /// Draws a bar for each parameter, the most influential on top.
-pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> Scene {
+pub(crate) fn draw(scatter: &Scatter) -> Scene {
     let mut places = scatter.by_influence();
     places.truncate(MOST_PARAMETERS);
     let words = |k: usize| scatter.parameters[k].label.words.clone();
-    let widest = places.iter().map(|&k| typeface.width(&words(k), LABEL_SIZE, false));
+    let widest = places.iter().map(|&k| text_width(&words(k), LABEL_SIZE, false));
     let left = widest.fold(80.0, f64::max).min(320.0) + 40.0;
     let entries = [
         (Sign::Area(CALM), "rank correlation".to_owned()),
@@ -63,12 +63,12 @@ pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> Scene {
         (Sign::Area(GREY), CHANCE.to_owned()),
     ];
     let room = WIDTH - left - RIGHT;
-    let legend_height = LEGEND_ROW * legend_rows(typeface, &entries, WIDTH - 60.0) as f64;
+    let of_legend = legend_height(&entries, WIDTH - 60.0);
     let height = ROW * places.len() as f64 + 12.0;
-    let total = HEADING_HEIGHT + height + BELOW + legend_height + 8.0;
+    let total = HEADING_HEIGHT + height + BELOW + of_legend + 8.0;
     let (title, subtitle) = (title(scatter), subtitle(scatter));
     let mut scene = Scene::new(WIDTH, total, format!("{title}. {subtitle}"));
-    heading(&mut scene, typeface, &title, &subtitle);
+    heading(&mut scene, &title, &subtitle);
     let panel = Panel {
         x: left,
         y: HEADING_HEIGHT,
@@ -86,10 +86,8 @@ pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> Scene {
     let noise = chance(scatter.valued());
     span(&mut scene, -noise, noise, panel.y, height, GREY);
     let middle = panel.at_x(0.0);
-    scene.line(
-        Outline::line(&[[middle, panel.y], [middle, panel.y + height]]),
-        Stroke::solid(INK, 1.2),
-    );
+    let axis = Outline::line(&[[middle, panel.y], [middle, panel.y + height]]);
+    scene.line(axis, Stroke::solid(INK, 1.2));
     for (row, &k) in places.iter().enumerate() {
         let centre = panel.y + 6.0 + ROW * (row as f64 + 0.5);
         let text = Text::new(words(k), [left - 12.0, centre + 0.35 * LABEL_SIZE], LABEL_SIZE);
@@ -108,8 +106,8 @@ pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> Scene {
     }
     panel.frame(&mut scene, true, false);
     panel.x_label(&mut scene, MEASURE);
-    let y = panel.y + height + BELOW + LEGEND_ROW / 2.0;
-    legend(&mut scene, typeface, &entries, 40.0, y, WIDTH - 60.0);
+    let y = panel.y + height + BELOW;
+    legend(&mut scene, &entries, 40.0, y, WIDTH - 60.0);
     scene
 }
 

@@ -3,19 +3,19 @@
 use std::collections::BTreeMap;
 
 use crate::axis::Scale;
-use crate::colour::{BOTH, ColourScale, DISTINCT, LEVELS};
+use crate::colour::{BOTH, DISTINCT, LEVELS};
 use crate::contour::{MOST_POINTS, leave_out_shortest, zero_lines};
 use crate::cuts::Cuts;
 use crate::error::PlotError;
 use crate::figures::boundary::Overlay;
 use crate::frame::{
-    self, HEADING_HEIGHT, LABEL_SIZE, LEGEND_ROW, Panel, Sign, TICK_SIZE, failed, failed_hatch,
-    heading, legend_rows, sensitive_hatch, undefined,
+    self, HEADING_HEIGHT, LABEL_SIZE, Panel, Sign, TICK_SIZE, failed, failed_hatch, heading,
+    legend_height, sensitive_hatch, undefined,
 };
 use crate::gather::{Map, OK};
 use crate::grid::GridAxis;
 use crate::layer::{Layer, Level, Shown};
-use crate::raster::Typeface;
+use crate::raster::text_width;
 use crate::region::roomiest;
 use crate::scene::{Anchor, Colour, Hatch, INK, Outline, PAPER, Scene, Stroke, Text};
 
@@ -41,7 +41,6 @@ pub(crate) fn draw(
     cuts: &Cuts,
     shown: Option<&Shown>,
     overlay: Option<&Overlay>,
-    typeface: &Typeface,
 ) -> Result<Scene, PlotError> {
     let mut cells = match shown {
         Some(shown) => Cells::by_value(map, shown.layer(map)?),
@@ -68,14 +67,14 @@ pub(crate) fn draw(
     if let Some(overlay) = overlay {
         entries.push((Sign::Line(overlay_stroke()), overlay.name.clone()));
     }
-    let legend_height = LEGEND_ROW * legend_rows(typeface, &entries, WIDTH - LEFT - 20.0) as f64;
+    let of_legend = legend_height(&entries, WIDTH - LEFT - 20.0);
     let panels_height = rows as f64 * (height + head) + gap * (rows - 1) as f64;
-    let total = HEADING_HEIGHT + panels_height + BELOW + legend_height + 14.0;
+    let total = HEADING_HEIGHT + panels_height + BELOW + of_legend + 14.0;
 
     let [x_axis, y_axis] = [&grid.axes[0], &grid.axes[1]];
     let described = format!("{}: {} over {}", cells.title, y_axis.label(), x_axis.label());
     let mut scene = Scene::new(WIDTH, total, described);
-    heading(&mut scene, typeface, &cells.title, &subtitle(map, &cuts.notes));
+    heading(&mut scene, &cells.title, &subtitle(map, &cuts.notes));
     for (index, cut) in cuts.cuts.iter().enumerate() {
         let (column, row) = (index % columns, index / columns);
         let panel = Panel {
@@ -99,7 +98,7 @@ pub(crate) fn draw(
         if let Some(divided) = divided {
             let overlaid = overlay.iter().flat_map(|overlay| &overlay.lines);
             let overlaid: Vec<_> = overlaid.map(|line| places(&panel, line)).collect();
-            cells.name_regions(&mut scene, typeface, &panel, divided, (&cut.rest, &overlaid));
+            cells.name_regions(&mut scene, &panel, divided, (&cut.rest, &overlaid));
         }
         let lowest = index + columns >= cuts.cuts.len();
         panel.frame(&mut scene, lowest, column == 0);
@@ -111,15 +110,15 @@ pub(crate) fn draw(
             panel.x_label(&mut scene, &x_axis.label());
         }
         if column == 0 {
-            panel.y_label(&mut scene, typeface, &y_axis.label(), 60.0);
+            panel.y_label(&mut scene, &y_axis.label(), 60.0);
         }
     }
     if let Some(layer) = &cells.layer {
         let area = [WIDTH - RIGHT + 20.0, HEADING_HEIGHT + head, 22.0, panels_height - head];
         colour_bar(&mut scene, layer, area);
     }
-    let y = HEADING_HEIGHT + panels_height + BELOW + LEGEND_ROW / 2.0;
-    frame::legend(&mut scene, typeface, &entries, LEFT, y, WIDTH - LEFT - 20.0);
+    let y = HEADING_HEIGHT + panels_height + BELOW;
+    frame::legend(&mut scene, &entries, LEFT, y, WIDTH - LEFT - 20.0);
     Ok(scene)
 }
 
@@ -178,6 +177,31 @@ pub(crate) fn kinds(map: &Map) -> BTreeMap<String, String> {
     (0..cells.kinds.len()).map(colour).collect()
 }
 
+/// A level's lines in so many cuts of a map, through the values of its axes, with at most `room`
+/// points. Where a ragged boundary has more, its shortest lines are left out: the cells on either
+/// side show them. `cell` is the index of a cut's cell.
+pub(crate) fn level_lines(
+    map: &Map,
+    (layer, level): (&Layer, &Level),
+    cuts: usize,
+    cell: impl Fn(usize, usize, usize) -> usize,
+    room: usize,
+) -> Vec<Vec<Vec<[f64; 2]>>> {
+    let [xs, ys] = [&map.grid.axes[0], &map.grid.axes[1]];
+    let of_cut = |cut: usize| {
+        zero_lines(&xs.even(), &ys.even(), |x, y| {
+            let cell = cell(cut, x, y);
+            level.offset(if map.filled(cell) { layer.typical(cell) } else { f64::NAN })
+        })
+    };
+    let mut lines: Vec<Vec<Vec<[f64; 2]>>> = (0..cuts).map(of_cut).collect();
+    leave_out_shortest(&mut lines, room);
+    for [x, y] in lines.iter_mut().flatten().flatten() {
+        (*x, *y) = (xs.swept.un_even(*x), ys.swept.un_even(*y));
+    }
+    lines
+}
+
 /// What is drawn in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Fill {
@@ -203,6 +227,13 @@ struct Cells<'a> {
 }
 
 impl<'a> Cells<'a> {
+    fn new(map: &'a Map, title: String, fill: impl Fn(usize) -> Fill) -> Self {
+        let fill = |cell: usize| map.filled(cell).then(|| fill(cell));
+        let fills = (0..map.counts.len()).map(fill).collect();
+        let hatches = [failed_hatch(), sensitive_hatch()];
+        Self { map, title, fills, layer: None, kinds: Vec::new(), hatches }
+    }
+
     fn by_value(map: &'a Map, layer: Layer) -> Self {
         let fill = |cell: usize| match (layer.values[cell].is_finite(), map.counts[cell].failed) {
             (true, _) if layer.both(cell) => Fill::Both,
@@ -210,10 +241,8 @@ impl<'a> Cells<'a> {
             (false, 0) => Fill::Undefined,
             (false, _) => Fill::Failed,
         };
-        let fills =
-            (0..map.counts.len()).map(|cell| map.filled(cell).then(|| fill(cell))).collect();
-        let (title, hatches) = (layer.title.clone(), [failed_hatch(), sensitive_hatch()]);
-        Self { map, title, fills, layer: Some(layer), kinds: Vec::new(), hatches }
+        let cells = Self::new(map, layer.title.clone(), fill);
+        Self { layer: Some(layer), ..cells }
     }
 
     fn by_status(map: &'a Map) -> Self {
@@ -225,11 +254,8 @@ impl<'a> Cells<'a> {
                 Fill::Kind(kinds.iter().position(|(kind, _)| kind == status).unwrap_or_default())
             })
         };
-        let fills =
-            (0..map.counts.len()).map(|cell| map.filled(cell).then(|| fill(cell))).collect();
-        let (title, hatches) =
-            ("How each point ended".to_owned(), [failed_hatch(), sensitive_hatch()]);
-        Self { map, title, fills, layer: None, kinds, hatches }
+        let cells = Self::new(map, "How each point ended".to_owned(), fill);
+        Self { kinds, ..cells }
     }
 
     /// Makes hatches fine enough to show on the smallest cell of a panel of that size, px.
@@ -345,30 +371,15 @@ impl<'a> Cells<'a> {
         &self,
         scene: &mut Scene,
         panel: &Panel,
-        (layer, level): (&Layer, &Level),
+        divided: (&Layer, &Level),
         rest: &[usize],
         room: usize,
     ) {
-        let [x_axis, y_axis] = [&self.map.grid.axes[0], &self.map.grid.axes[1]];
-        let lines = zero_lines(&x_axis.even(), &y_axis.even(), |x, y| {
-            level.offset(self.map.cell(x, y, rest).map_or(f64::NAN, |cell| layer.typical(cell)))
-        });
-        let mut lines = [lines];
-        leave_out_shortest(&mut lines, room);
-        let place = |scale: Scale, even: f64| {
-            if scale.log { scale.position(even.exp()) } else { scale.position(even) }
-        };
+        let cell = |_, x, y| self.map.grid.cell(x, y, rest);
+        let lines = level_lines(self.map, divided, 1, cell, room);
         let mut outline = Outline::default();
-        for line in lines.into_iter().flatten() {
-            let points: Vec<[f64; 2]> = line
-                .into_iter()
-                .map(|[x, y]| {
-                    [
-                        panel.x + place(panel.xs, x) * panel.width,
-                        panel.y + (1.0 - place(panel.ys, y)) * panel.height,
-                    ]
-                })
-                .collect();
+        for line in lines.iter().flatten() {
+            let points: Vec<[f64; 2]> = line.iter().map(|&[x, y]| panel.at(x, y)).collect();
             outline.add_line(&points);
         }
         scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
@@ -378,7 +389,6 @@ impl<'a> Cells<'a> {
     fn name_regions(
         &self,
         scene: &mut Scene,
-        typeface: &Typeface,
         panel: &Panel,
         (layer, level): (&Layer, &Level),
         (rest, overlaid): (&[usize], &[Vec<Option<[f64; 2]>>]),
@@ -400,7 +410,7 @@ impl<'a> Cells<'a> {
                 let offset = offset(point);
                 offset.is_finite() && (offset >= 0.0) == wanted_above
             };
-            let size = [typeface.width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
+            let size = [text_width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
             let area = [panel.width, panel.height];
             // Off the other file's line, unless that leaves no room.
             let clear = |point: [f64; 2]| inside(point) && !is_near(panel, overlaid, point);
@@ -495,8 +505,7 @@ fn colour_bar(scene: &mut Scene, layer: &Layer, [x, y, width, height]: [f64; 4])
     for tick in layer.scale.ticks() {
         let at = y + (1.0 - layer.scale.position(tick.value)) * height;
         marks.add_line(&[[x + width, at], [x + width + 5.0, at]]);
-        let centre =
-            matches!(layer.scale, ColourScale::Diverging { centre, .. } if centre == tick.value);
+        let centre = layer.scale.centre == Some(tick.value);
         let text = Text::new(tick.label, [x + width + 8.0, at + 0.35 * TICK_SIZE], TICK_SIZE);
         scene.text(if centre { text.bold() } else { text });
         if centre {

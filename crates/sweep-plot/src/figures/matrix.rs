@@ -1,12 +1,11 @@
 //! A design's points over every pair of parameters, and the quantity over each of them.
 
-use crate::axis::Scale;
+use crate::axis::{Scale, extremes};
+use crate::chart::level_stroke;
 use crate::colour::{CALM, HARSH};
-use crate::frame::{
-    HEADING_HEIGHT, LABEL_SIZE, LEGEND_ROW, Panel, Sign, heading, legend, legend_rows,
-};
+use crate::frame::{HEADING_HEIGHT, LABEL_SIZE, Panel, Sign, heading, legend, legend_height};
 use crate::label::Label;
-use crate::raster::Typeface;
+use crate::raster::text_width;
 use crate::scatter::{Scatter, Side};
 use crate::scene::{Colour, INK, MUTED, Outline, Scene, Stroke};
 
@@ -68,7 +67,7 @@ pub(crate) fn scale(values: &[f64], log: bool) -> Scale {
         return Scale::around(values.iter().copied());
     }
     let positive = values.iter().copied().filter(|value| *value > 0.0);
-    let (low, high) = crate::axis::extremes(positive).unwrap_or((1.0, 10.0));
+    let (low, high) = extremes(positive).unwrap_or((1.0, 10.0));
     let room = (high / low).powf(0.05).max(1.02);
     Scale::log(low / room, high * room)
 }
@@ -90,7 +89,7 @@ pub(crate) fn directions(scatter: &Scatter) -> Vec<Direction<'_>> {
 pub(crate) type Places = Vec<(usize, usize, f64, f64, f64, f64)>;
 
 /// The matrix: below its diagonal every pair of parameters, and in its last row the quantity.
-pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> (Scene, Places) {
+pub(crate) fn draw(scatter: &Scatter) -> (Scene, Places) {
     let directions = directions(scatter);
     let parameters = &directions[..directions.len() - 1];
     let count = parameters.len();
@@ -98,15 +97,15 @@ pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> (Scene, Places) {
     let height = (0.8 * width).clamp(130.0, TALLEST);
     let entries = entries(scatter);
     let room = WIDTH - LEFT - RIGHT;
-    let legend_height = LEGEND_ROW * legend_rows(typeface, &entries, room) as f64;
-    let lines = parameters.iter().map(|one| x_lines(typeface, one.label, width).len()).max();
+    let of_legend = legend_height(&entries, room);
+    let lines = parameters.iter().map(|one| x_lines(one.label, width).len()).max();
     let below = BELOW + 1.2 * LABEL_SIZE * lines.unwrap_or(1).saturating_sub(1) as f64;
     let panels_height = count as f64 * (height + GAP) - GAP;
-    let total = HEADING_HEIGHT + panels_height + below + legend_height + 8.0;
+    let total = HEADING_HEIGHT + panels_height + below + of_legend + 8.0;
     let title = &scatter.title;
     let subtitle = scatter.subtitle(&notes(scatter));
     let mut scene = Scene::new(WIDTH, total, format!("{title}. {subtitle}"));
-    heading(&mut scene, typeface, title, &subtitle);
+    heading(&mut scene, title, &subtitle);
     let dots = Dots::new(scatter, width);
     let mut places = Places::new();
     for row in 0..count {
@@ -131,32 +130,28 @@ pub(crate) fn draw(scatter: &Scatter, typeface: &Typeface) -> (Scene, Places) {
                 }
                 dots.draw(scene, &panel, x.values, y.values);
             });
-            panel.frame_beside(&mut scene, typeface, last, column == 0);
+            panel.frame_beside(&mut scene, last, column == 0);
             if last {
-                x_label(&mut scene, typeface, &panel, x.label);
+                x_label(&mut scene, &panel, x.label);
             }
             if column == 0 {
-                panel.y_label(&mut scene, typeface, &y.label.to_string(), 66.0);
+                panel.y_label(&mut scene, &y.label.to_string(), 66.0);
             }
         }
     }
-    let y = HEADING_HEIGHT + panels_height + below + LEGEND_ROW / 2.0;
-    legend(&mut scene, typeface, &entries, LEFT, y, room);
+    let y = HEADING_HEIGHT + panels_height + below;
+    legend(&mut scene, &entries, LEFT, y, room);
     (scene, places)
 }
 
-fn level_stroke() -> Stroke {
-    Stroke::dashed(INK, 1.6, &[3.0, 3.0])
-}
-
 /// A label in lines that fit below a panel; its unit stays whole.
-fn x_lines(typeface: &Typeface, label: &Label, width: f64) -> Vec<String> {
+fn x_lines(label: &Label, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let unit = (!label.unit.is_empty()).then(|| format!("({})", label.unit));
     for word in label.words.split(' ').chain(unit.as_deref()) {
         let longer = lines.last().map(|line| format!("{line} {word}"));
         match longer {
-            Some(longer) if typeface.width(&longer, LABEL_SIZE, false) <= width => {
+            Some(longer) if text_width(&longer, LABEL_SIZE, false) <= width => {
                 lines.pop();
                 lines.push(longer);
             }
@@ -166,8 +161,8 @@ fn x_lines(typeface: &Typeface, label: &Label, width: f64) -> Vec<String> {
     lines
 }
 
-fn x_label(scene: &mut Scene, typeface: &Typeface, panel: &Panel, label: &Label) {
-    for (k, line) in x_lines(typeface, label, panel.width).iter().enumerate() {
+fn x_label(scene: &mut Scene, panel: &Panel, label: &Label) {
+    for (k, line) in x_lines(label, panel.width).iter().enumerate() {
         let below = Panel { y: panel.y + 1.2 * LABEL_SIZE * k as f64, ..panel.clone() };
         below.x_label(scene, line);
     }
@@ -234,17 +229,8 @@ impl Dots {
 fn add(outline: &mut Outline, side: Side, [x, y]: [f64; 2], radius: f64) {
     match side {
         Side::Good | Side::Undefined => {
-            let [near, far] = [0.414 * radius, radius];
-            let corners = [
-                [near, far],
-                [far, near],
-                [far, -near],
-                [near, -far],
-                [-near, -far],
-                [-far, -near],
-                [-far, near],
-                [-near, far],
-            ];
+            let (n, f) = (0.414 * radius, radius);
+            let corners = [[n, f], [f, n], [f, -n], [n, -f], [-n, -f], [-f, -n], [-f, n], [-n, f]];
             outline.add_polygon(&corners.map(|[dx, dy]| [x + dx, y + dy]));
         }
         Side::Bad => {
@@ -264,7 +250,7 @@ fn entries(scatter: &Scatter) -> Vec<(Sign, String)> {
     for (side, count) in Side::ALL.into_iter().zip(scatter.counts) {
         if count > 0 {
             let words = format!("{} ({count})", scatter.words(side));
-            entries.push((Sign::Dot(side_shape(side), colour(side)), words));
+            entries.push((sign(side), words));
         }
     }
     if let Some(level) = &scatter.level {
@@ -273,9 +259,9 @@ fn entries(scatter: &Scatter) -> Vec<(Sign, String)> {
     entries
 }
 
-/// A dot of a side as a legend draws it: its outline around the origin, and whether it is filled.
-fn side_shape(side: Side) -> (Outline, bool) {
+/// A dot of a side as a legend draws it.
+fn sign(side: Side) -> Sign {
     let mut outline = Outline::default();
     add(&mut outline, side, [0.0, 0.0], 5.0);
-    (outline, matches!(side, Side::Good | Side::Bad))
+    Sign::Shape(outline, matches!(side, Side::Good | Side::Bad), colour(side))
 }

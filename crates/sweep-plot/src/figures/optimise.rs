@@ -20,9 +20,9 @@ fn in_words(column: &ColumnFacts) -> (&ColumnFacts, String) {
 /// # Errors
 /// A file without objectives.
 pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
-    let named = source.find("objective").and_then(|all| all.as_array()).into_iter().flatten();
     // In the study's own words: a name says no quantile.
-    let objectives: Vec<(&ColumnFacts, String)> = named
+    let objectives: Vec<(&ColumnFacts, String)> = source
+        .list("objective")
         .filter_map(|one| {
             let text = one.get("minimise").or_else(|| one.get("maximise"))?.as_str()?;
             Some((source.column(one["name"].as_str()?)?, text.to_owned()))

@@ -26,18 +26,15 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let mut chart = trace::chart(table, options)?;
     let time = table.numbers("time_s")?;
     let speed: Vec<f64> = table.numbers("speed_rpm")?.iter().map(|speed| speed.abs()).collect();
-    let turns: Vec<(bool, Vec<[usize; 2]>)> = stretches(&speed)
-        .into_iter()
-        .map(|stretch| (stretch.gains, turns(time, &speed, stretch)))
-        .filter(|(_, turns)| !turns.is_empty())
-        .collect();
+    let turns = |stretch: Stretch| (stretch.gains, turns(time, &speed, stretch));
+    let mut turns: Vec<(bool, Vec<[usize; 2]>)> =
+        stretches(&speed).into_iter().map(turns).collect();
+    turns.retain(|(_, turns)| !turns.is_empty());
     if turns.is_empty() {
         return Err(table.source.empty("the drum makes no whole turn while its speed changes"));
     }
-    chart.grids = turns
-        .iter()
-        .map(|(_, turns)| turns.iter().map(|&[from, to]| 0.5 * (speed[from] + speed[to])).collect())
-        .collect();
+    let mean = |&[from, to]: &[usize; 2]| 0.5 * (speed[from] + speed[to]);
+    chart.grids = turns.iter().map(|(_, turns)| turns.iter().map(mean).collect()).collect();
     chart.panels.retain(|panel| panel.name != "gap" && panel.name != "speed");
     for panel in &mut chart.panels {
         panel.series = panel.series.iter().flat_map(|series| by_turn(series, &turns)).collect();

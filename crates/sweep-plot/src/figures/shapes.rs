@@ -35,9 +35,8 @@ type Line = [Vec<Phasor>; 2];
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let places = places(table)
         .ok_or_else(|| table.source.empty("the file does not say where the machine's parts are"))?;
-    let modes = table.source.find(key::MODES).and_then(Value::as_array).into_iter().flatten();
     let mut panels = Vec::new();
-    for mode in modes {
+    for mode in table.source.list(key::MODES) {
         let name = mode["name"].as_str().unwrap_or_default();
         for resonance in mode["resonances"].as_array().into_iter().flatten() {
             let (Some(speed), Some(q)) =
@@ -158,11 +157,9 @@ fn apart(places: &Places, tub: &[Phasor], drum: &[Phasor]) -> f64 {
         let part = (x - places.rear) / (places.tub_front - places.rear);
         [0, 1].map(|k| tub[0][k] + part * (tub[1][k] - tub[0][k]))
     };
-    [places.rear, places.hinge, places.drum_front]
-        .into_iter()
-        .zip(drum)
-        .map(|(x, point)| (point[0] - on_tub(x)[0]).hypot(point[1] - on_tub(x)[1]))
-        .fold(0.0, f64::max)
+    let points = [places.rear, places.hinge, places.drum_front].into_iter().zip(drum);
+    let apart = points.map(|(x, at)| (at[0] - on_tub(x)[0]).hypot(at[1] - on_tub(x)[1]));
+    apart.fold(0.0, f64::max)
 }
 
 #[cfg(test)]

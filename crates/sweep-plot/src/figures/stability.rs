@@ -9,7 +9,7 @@ use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::machine::machine;
 use crate::label::{self, Label};
-use crate::read::{Batch, ColumnFacts, Kind, Source};
+use crate::read::{ColumnFacts, Kind, Source, some_of};
 use crate::swept::SweptAxis;
 use crate::table::Table;
 use crate::together;
@@ -27,7 +27,7 @@ const MOST_EDGES: usize = 16;
 pub(super) const UNSTABLE: &str = "a dwell at this speed is unstable";
 
 /// One point over speed.
-pub(super) struct Swept {
+struct Swept {
     /// Values of the file's axes.
     values: Vec<f64>,
     speed: Vec<f64>,
@@ -108,34 +108,19 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
 /// # Errors
 /// As [`one_point`]; [`PlotError::NotThere`] for an unknown channel.
 pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
-    let channels: Vec<(&str, &ColumnFacts)> = source
-        .with_prefix("nonlinear_")
-        .into_iter()
-        .filter(|(name, _)| source.column(&format!("linear_{name}")).is_some())
-        .collect();
+    let channels = channels_of(source, "linear");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
-    let columns: Vec<String> = names
-        .iter()
-        .flat_map(|name| ["nonlinear", "linear"].map(|model| format!("{model}_{name}")))
-        .collect();
+    let columns = columns_of(&channels, ["linear", "nonlinear"]);
     let axes = axes(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
     let mut swept = read(source, &axes, &[point], &columns)?;
     let one = swept.remove(0);
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
         let (unit, factor) = label::shown(&facts.unit);
-        let scaled = |place: usize| -> Vec<f64> {
-            one.columns[place].iter().map(|value| value * factor).collect()
-        };
-        let nonlinear = scaled(2 * k);
-        let of = |wanted: bool| part(&nonlinear, &one.growth, wanted);
-        let series = |name: &str, colour, y, style| Series::new(name, colour, 0, y, style);
-        let lines = vec![
-            series("linear model", LINEAR, scaled(2 * k + 1), Style::Solid(1.6)),
-            series("nonlinear model, stable", NONLINEAR, of(false), Style::Solid(2.2)),
-            series("nonlinear model, unstable", NONLINEAR, of(true), Style::Dashed),
-        ];
+        let scaled = |column: &Vec<f64>| column.iter().map(|value| value * factor).collect();
+        let [linear, nonlinear] = [0, 1].map(|model| scaled(&one.columns[2 * k + model]));
+        let lines = response("nonlinear model", [linear, nonlinear], &one.growth);
         let words = label::capitalised(&label::channel(name));
         ChartPanel {
             shown: is_shown[k],
@@ -158,9 +143,40 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
     })
 }
 
+/// Channels of the nonlinear model for which the file has a column of this kind too.
+pub(super) fn channels_of<'a>(source: &'a Source, kind: &str) -> Vec<(&'a str, &'a ColumnFacts)> {
+    let mut channels = source.with_prefix("nonlinear_");
+    channels.retain(|(name, _)| source.column(&format!("{kind}_{name}")).is_some());
+    channels
+}
+
+/// The columns of these kinds of each channel.
+pub(super) fn columns_of<const N: usize>(
+    channels: &[(&str, &ColumnFacts)],
+    kinds: [&str; N],
+) -> Vec<String> {
+    channels.iter().flat_map(|(name, _)| kinds.map(|kind| format!("{kind}_{name}"))).collect()
+}
+
+/// A channel's lines in the linear model and in the periodic response of the nonlinear one, where
+/// that is stable and where it is not.
+pub(super) fn response(
+    name: &str,
+    [linear, periodic]: [Vec<f64>; 2],
+    growth: &[f64],
+) -> Vec<Series> {
+    let of = |wanted: bool| part(&periodic, growth, wanted);
+    let [stable, unstable] = ["stable", "unstable"].map(|word| format!("{name}, {word}"));
+    vec![
+        Series::new("linear model", LINEAR, 0, linear, Style::Solid(1.6)),
+        Series::new(stable, NONLINEAR, 0, of(false), Style::Solid(2.2)),
+        Series::new(unstable, NONLINEAR, 0, of(true), Style::Dashed),
+    ]
+}
+
 /// The part of a line over speed where the response is unstable, or where it is not. Each dash
 /// begins and ends where the solid line does.
-pub(super) fn part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
+fn part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
     let at = |i: usize| growth.get(i).is_some_and(|growth| (*growth > 0.0) == wanted);
     let near = |i: usize| at(i) || (!wanted && (i > 0 && at(i - 1) || at(i + 1)));
     (0..line.len()).map(|i| if near(i) { line[i] } else { f64::NAN }).collect()
@@ -242,16 +258,46 @@ pub(super) fn notes_at(source: &Source, axes: &[&ColumnFacts], point: &[f64]) ->
     source.notes(axes.iter().zip(point).map(|(axis, value)| said_within(axis, *value)))
 }
 
-/// The values of a row's axes, and whether it is at the values asked for.
-pub(super) fn row_values(columns: &[Vec<f64>], row: usize) -> Vec<f64> {
-    columns.iter().map(|column| column[row]).collect()
+/// A row of a file over constant speeds. What the file does not have is NaN.
+pub(super) struct Row<'a> {
+    /// Values of the file's axes.
+    pub(super) point: Vec<f64>,
+    pub(super) speed: f64,
+    pub(super) growth: f64,
+    pub(super) kind: Option<&'a str>,
+    /// Of the columns asked for.
+    pub(super) values: Vec<f64>,
 }
 
-pub(super) fn axis_columns(
-    batch: &Batch<'_>,
+/// Reads such a file row by row.
+///
+/// # Errors
+/// As [`Source::batches`].
+pub(super) fn each_row<S: AsRef<str>>(
+    source: &Source,
     axes: &[&ColumnFacts],
-) -> Result<Vec<Vec<f64>>, PlotError> {
-    axes.iter().map(|axis| batch.numbers(&axis.name)).collect()
+    columns: &[S],
+    mut take: impl FnMut(Row<'_>),
+) -> Result<(), PlotError> {
+    let own = axes.iter().map(|axis| axis.name.as_str()).chain(["speed_rpm", "growth_per_s"]);
+    let numbers: Vec<&str> = own.chain(columns.iter().map(S::as_ref)).collect();
+    for batch in source.batches(&[&numbers[..], &["kind"]].concat())? {
+        let batch = batch?;
+        let numbers = numbers.iter().map(|name| batch.numbers(name));
+        let numbers: Vec<Vec<f64>> = numbers.collect::<Result<_, _>>()?;
+        let kinds = batch.words("kind")?;
+        for row in 0..batch.rows {
+            let mut values = numbers.iter().map(|of| of.get(row).copied().unwrap_or(f64::NAN));
+            take(Row {
+                point: values.by_ref().take(axes.len()).collect(),
+                speed: values.next().unwrap_or(f64::NAN),
+                growth: values.next().unwrap_or(f64::NAN),
+                kind: kinds.get(row).copied().flatten(),
+                values: values.collect(),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Every point of the file at the values asked for, in file order.
@@ -270,30 +316,21 @@ fn points(
         match axes.iter().position(|axis| axis.name == *name) {
             Some(place) => pins.push((place, *value)),
             None => {
-                let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
-                let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-                return Err(source.not_there(option, name, "axis", known));
+                let names = axes.iter().map(|axis| axis.name.as_str());
+                return Err(source.not_there(option, name, "axis", some_of(names)));
             }
         }
     }
-    let names: Vec<&str> =
-        axes.iter().map(|axis| axis.name.as_str()).chain(["speed_rpm"]).collect();
     let mut found: Points = Vec::new();
     let mut seen_rows = false;
-    for batch in source.batches(&names)? {
-        let batch = batch?;
-        let columns = axis_columns(&batch, axes)?;
-        for row in 0..batch.rows {
-            seen_rows = true;
-            let values = row_values(&columns, row);
-            let is_pinned =
-                pins.iter().all(|&(place, value)| SweptAxis::near(values[place], value));
-            // Speeds vary fastest: a point's rows follow each other.
-            if is_pinned && found.last() != Some(&values) {
-                found.push(values);
-            }
+    each_row(source, axes, &[""; 0], |row| {
+        seen_rows = true;
+        let is_pinned = pins.iter().all(|&(place, value)| SweptAxis::near(row.point[place], value));
+        // Speeds vary fastest: a point's rows follow each other.
+        if is_pinned && found.last() != Some(&row.point) {
+            found.push(row.point);
         }
-    }
+    })?;
     if !seen_rows {
         return Err(source.empty("it has no rows"));
     }
@@ -321,21 +358,14 @@ pub(super) fn one_point(
 ) -> Result<Vec<f64>, PlotError> {
     let mut found = points(source, axes, at, option)?;
     if found.len() > 1 {
-        let free: Vec<&str> = axes
-            .iter()
-            .filter(|axis| !at.iter().any(|(name, _)| *name == axis.name))
-            .map(|axis| axis.name.as_str())
-            .collect();
-        let free = free.join(", ");
+        let free = axes.iter().map(|axis| axis.name.as_str());
+        let free = some_of(free.filter(|axis| !at.iter().any(|(name, _)| name == axis)));
         let what = match option {
             "--at" => format!("one is wanted: give --at NAME=VALUE for {free}"),
             _ => format!("the file to be drawn does not say which by {free}"),
         };
-        return Err(PlotError::Unfit(format!(
-            "{}: this file has {} points, and {what}",
-            source.path.display(),
-            found.len()
-        )));
+        let (path, count) = (source.path.display(), found.len());
+        return Err(PlotError::Unfit(format!("{path}: this file has {count} points, and {what}")));
     }
     Ok(found.remove(0))
 }
@@ -347,43 +377,25 @@ fn read(
     points: &[Vec<f64>],
     columns: &[String],
 ) -> Result<Vec<Swept>, PlotError> {
-    let names: Vec<&str> = axes
-        .iter()
-        .map(|axis| axis.name.as_str())
-        .chain(["speed_rpm", "growth_per_s"])
-        .chain(columns.iter().map(String::as_str))
-        .collect();
-    let mut swept: Vec<Swept> = points
-        .iter()
-        .map(|values| Swept {
-            values: values.clone(),
-            speed: Vec::new(),
-            growth: Vec::new(),
-            columns: vec![Vec::new(); columns.len()],
-        })
-        .collect();
-    for batch in source.batches(&names)? {
-        let batch = batch?;
-        let of_axes = axis_columns(&batch, axes)?;
-        let (speed, growth) = (batch.numbers("speed_rpm")?, batch.numbers("growth_per_s")?);
-        let further: Vec<Vec<f64>> =
-            columns.iter().map(|name| batch.numbers(name)).collect::<Result<_, _>>()?;
-        for row in 0..batch.rows {
-            let values = row_values(&of_axes, row);
-            let Some(point) = swept.iter_mut().find(|point| point.values == values) else {
-                continue;
-            };
-            // Further rows of a speed are other responses; a machine that runs up is on the first.
-            if point.speed.last() == Some(&speed[row]) {
-                continue;
-            }
-            point.speed.push(speed[row]);
-            point.growth.push(growth[row]);
-            for (kept, column) in point.columns.iter_mut().zip(&further) {
-                kept.push(column[row]);
-            }
+    let empty = |values: &Vec<f64>| Swept {
+        values: values.clone(),
+        speed: Vec::new(),
+        growth: Vec::new(),
+        columns: vec![Vec::new(); columns.len()],
+    };
+    let mut swept: Vec<Swept> = points.iter().map(empty).collect();
+    each_row(source, axes, columns, |row| {
+        let Some(point) = swept.iter_mut().find(|point| point.values == row.point) else { return };
+        // Further rows of a speed are other responses; a machine that runs up is on the first.
+        if point.speed.last() == Some(&row.speed) {
+            return;
         }
-    }
+        point.speed.push(row.speed);
+        point.growth.push(row.growth);
+        for (kept, value) in point.columns.iter_mut().zip(row.values) {
+            kept.push(value);
+        }
+    })?;
     Ok(swept)
 }
 

@@ -42,10 +42,10 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let shown: Vec<&str> = shown.map(|(quantity, _)| quantity.name).collect();
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
     let names = other.as_ref().map(|other| told_apart(table, other));
-    let pair = |columns: [String; 2], factor: f64| -> Vec<Series> {
+    let pair = |columns: &[String; 2], factor: f64| -> Vec<Series> {
         // The second curve lies in front; where it hides the first one, this must shine through.
         let front = LINEAR.with_alpha(165);
-        let [first, second] = &columns;
+        let [first, second] = columns;
         let curves = match (&other, &names) {
             (Some(other), Some([one, another])) => [
                 (table, first, one.clone(), NONLINEAR, 0),
@@ -56,32 +56,20 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
                 (table, second, said_of(sides[1]), front, 0),
             ],
         };
-        curves
-            .into_iter()
-            .filter_map(|(table, column, name, colour, grid)| {
-                let y =
-                    table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
-                Some(Series::new(name, colour, grid, y, Style::Solid(1.3)))
-            })
-            .collect()
+        let curves = curves.into_iter().filter_map(|(table, column, name, colour, grid)| {
+            let y = table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
+            Some(Series::new(name, colour, grid, y, Style::Solid(1.3)))
+        });
+        curves.collect()
     };
-    let mut panels: Vec<ChartPanel> = found
-        .iter()
-        .map(|quantity| {
-            let (unit, factor) = label::shown(quantity.unit);
-            let words = if quantity.channel && sides == MODELS {
-                label::channel(quantity.name)
-            } else {
-                label::words(quantity.name)
-            };
-            panel(
-                quantity.name,
-                Label::new(&words, unit),
-                shown.contains(&quantity.name),
-                pair(quantity.columns(sides), factor),
-            )
-        })
-        .collect();
+    let of = |quantity: &Quantity<'_>| {
+        let (name, (unit, factor)) = (quantity.name, label::shown(quantity.unit));
+        let is_channel = quantity.channel && sides == MODELS;
+        let words = if is_channel { label::channel(name) } else { label::words(name) };
+        let lines = pair(&quantity.columns, factor);
+        panel(name, Label::new(&words, unit), shown.contains(&name), lines)
+    };
+    let mut panels: Vec<ChartPanel> = found.iter().map(of).collect();
     // Rows of two files that were thinned do not lie at the same instants.
     let whole = other.as_ref().is_some_and(|other| table.stretch.or(other.stretch).is_none());
     let apart = if whole { difference(&panels) } else { None };
@@ -94,7 +82,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         let label = Label::new(&words, unit);
         panels.push(panel(&format!("residual_{name}"), label, shown, vec![residual]));
     }
-    let mut gaps = pair(["gap_nonlinear_m".to_owned(), "gap_linear_m".to_owned()], 1e3);
+    let mut gaps = pair(&["gap_nonlinear_m", "gap_linear_m"].map(str::to_owned), 1e3);
     if other.is_some() && gaps.len() < 2 {
         gaps.clear();
     }
@@ -105,27 +93,20 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         let widest = gaps.iter().flat_map(|series| &series.y).copied().fold(0.0, f64::max);
         let near = least.iter().any(|(_, gap)| *gap < 0.5 * widest);
         let levels = if near { vec![(0.0, "gap closed".to_owned())] } else { Vec::new() };
-        panels.push(ChartPanel {
-            levels,
-            ..panel("gap", Label::new("gap, drum to tub", "mm"), true, gaps)
-        });
+        let gap = panel("gap", Label::new("gap, drum to tub", "mm"), true, gaps);
+        panels.push(ChartPanel { levels, ..gap });
     }
     let mut marks = Vec::new();
     let mut shades = Vec::new();
     let unstable = unstable_speeds(table, options)?;
     let (resonances, note) = resonances(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
-        for (x, resonance) in passages(&time, speed, &resonances) {
-            marks.push(Mark::of_speed(x, resonance));
-        }
+        let passed = passages(&time, speed, &resonances).into_iter();
+        marks.extend(passed.map(|(x, resonance)| Mark::of_speed(x, resonance)));
         shades = stability::stretches_within(&time, speed, &unstable);
-        let y = speed.to_vec();
-        let series = Series::new(String::new(), INK, 0, y, Style::Solid(2.0));
-        let height = 130.0;
-        panels.push(ChartPanel {
-            height,
-            ..panel("speed", Label::new("spin", "rpm"), true, vec![series])
-        });
+        let series = Series::new(String::new(), INK, 0, speed.to_vec(), Style::Solid(2.0));
+        let spin = panel("speed", Label::new("spin", "rpm"), true, vec![series]);
+        panels.push(ChartPanel { height: 130.0, ..spin });
     }
     Ok(Chart {
         title: match &names {
@@ -172,38 +153,26 @@ struct Quantity<'a> {
     /// `spring_1_tension`.
     name: &'a str,
     unit: &'a str,
-    /// The column's end after the model's name; empty for a channel.
-    end: &'a str,
     channel: bool,
-}
-
-impl Quantity<'_> {
-    /// Columns of both sides.
-    fn columns(&self, sides: [&str; 2]) -> [String; 2] {
-        sides.map(|model| {
-            if self.channel {
-                format!("{model}_{}", self.name)
-            } else {
-                format!("{}_{model}_{}", self.name, self.end)
-            }
-        })
-    }
+    /// Of both sides.
+    columns: [String; 2],
 }
 
 /// Channels first, then states and forces; the gap has its own panel.
 fn quantities<'a>(table: &'a Table, sides: [&str; 2]) -> Vec<Quantity<'a>> {
-    let channels =
-        table.with_prefix(&format!("{}_", sides[0])).into_iter().map(|(name, column)| {
-            let unit =
-                if column.unit.is_empty() { label::unit_of_channel(name) } else { &column.unit };
-            Quantity { name, unit, end: "", channel: true }
-        });
-    let further =
-        table.columns.iter().filter(|column| column.numbers().is_some()).filter_map(|column| {
-            let (name, end) =
-                column.name.split_once("_nonlinear_").filter(|(name, _)| *name != "gap")?;
-            Some(Quantity { name, unit: &column.unit, end, channel: false })
-        });
+    let channels = table.with_prefix(&format!("{}_", sides[0])).into_iter();
+    let channels = channels.map(|(name, column)| {
+        let own = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
+        let unit = own.unwrap_or(label::unit_of_channel(name));
+        Quantity { name, unit, channel: true, columns: sides.map(|side| format!("{side}_{name}")) }
+    });
+    let numbers = table.columns.iter().filter(|column| column.numbers().is_some());
+    let further = numbers.filter_map(|column| {
+        let split = column.name.split_once("_nonlinear_");
+        let (name, end) = split.filter(|(name, _)| *name != "gap")?;
+        let columns = sides.map(|side| format!("{name}_{side}_{end}"));
+        Some(Quantity { name, unit: &column.unit, channel: false, columns })
+    });
     channels.chain(further).collect()
 }
 
@@ -227,17 +196,17 @@ pub(super) fn other_trace(path: &Path) -> Result<Table, PlotError> {
     Ok(table)
 }
 
-/// What a run is called: its name, or else its file's.
-fn said(table: &Table) -> String {
-    let file = || table.source.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    table.source.run_name().map_or_else(file, str::to_owned)
+/// The name of a file without its ending.
+fn stem(table: &Table) -> String {
+    table.source.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// What two traces are called, so that they are told apart: by their runs' names, or what `--at`
 /// says otherwise of them, or else by their files.
 fn told_apart(one: &Table, other: &Table) -> [String; 2] {
     let tables = [one, other];
-    let names = tables.map(said);
+    let names =
+        tables.map(|table| table.source.run_name().map_or_else(|| stem(table), str::to_owned));
     if names[0] != names[1] {
         return names;
     }
@@ -250,8 +219,7 @@ fn told_apart(one: &Table, other: &Table) -> [String; 2] {
     if named[0] != named[1] && named.iter().all(|name| !name.is_empty()) {
         return named;
     }
-    let files = tables.map(|table| table.source.path.file_stem().unwrap_or_default());
-    files.map(|file| file.to_string_lossy().into_owned())
+    tables.map(stem)
 }
 
 /// A parameter and its value within a sentence.

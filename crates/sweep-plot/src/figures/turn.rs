@@ -3,7 +3,7 @@
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
 use crate::error::PlotError;
-use crate::figures::campbell::{crossings, modes};
+use crate::figures::campbell::{between, crossings, modes};
 use crate::label::Label;
 use crate::table::Table;
 
@@ -23,12 +23,8 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         let Some((least, greatest)) = mode.band.filter(|_| !resonances.is_empty()) else {
             continue;
         };
-        let percent: Vec<f64> = least
-            .iter()
-            .zip(&greatest)
-            .zip(&mode.frequency)
-            .map(|((least, greatest), mean)| 50.0 * (greatest - least) / mean)
-            .collect();
+        let percent = |k: usize| 50.0 * (greatest[k] - least[k]) / mode.frequency[k];
+        let percent: Vec<f64> = (0..mode.frequency.len()).map(percent).collect();
         for speed in resonances {
             stars.push((speed, between(&mode.speed, &percent, speed), format!("{speed:.1} rpm")));
         }
@@ -54,11 +50,4 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         }],
         ..Chart::default()
     })
-}
-
-/// The value at `x`, linear between the given ones.
-fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
-    let after = xs.partition_point(|known| *known < x).clamp(1, xs.len() - 1);
-    let part = (x - xs[after - 1]) / (xs[after] - xs[after - 1]);
-    ys[after - 1] + part * (ys[after] - ys[after - 1])
 }

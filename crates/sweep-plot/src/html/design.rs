@@ -5,13 +5,12 @@ use serde_json::{Value, json};
 use super::{CHART, CORE, DESIGN, START, chart_json, computing, curve, embed, page, report};
 use crate::figures::{histogram, influence, matrix};
 use crate::frame::HEADING_HEIGHT;
-use crate::raster::Typeface;
 use crate::scatter::{Scatter, Side};
 use crate::svg;
 use crate::{PlotOptions, View};
 
 /// The page, which opens with the view that the options name.
-pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions, typeface: &Typeface) -> String {
+pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions) -> String {
     let title = &scatter.title;
     let drawn = matrix::drawn(scatter);
     let chart = histogram::chart(scatter);
@@ -26,7 +25,7 @@ pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions, typeface: &Typef
             "range": [one.scale.from, one.scale.to],
         })
     };
-    let (picture, panels) = matrix::draw(scatter, typeface);
+    let (picture, panels) = matrix::draw(scatter);
     let [top, width, height] = [HEADING_HEIGHT, picture.width, picture.height - HEADING_HEIGHT];
     let sides = Side::ALL.map(|side| scatter.words(side));
     let mut data = json!({
@@ -51,7 +50,7 @@ pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions, typeface: &Typef
         "histogram": {
             "title": chart.title, "subtitle": chart.subtitle, "chart": chart_json(&chart, curve),
         },
-        "influence": svg::write(&influence::draw(scatter, typeface)),
+        "influence": svg::write(&influence::draw(scatter)),
     });
     let axes: Vec<(&str, bool)> =
         scatter.parameters.iter().map(|one| (one.name.as_str(), one.log)).collect();

@@ -29,10 +29,8 @@ pub(crate) fn bits(values: &[bool]) -> String {
 /// Values as little-endian 16 bit integers, base64, and the size of their unit: a curve to 1/32767
 /// of its peak. What is not finite becomes the least integer.
 pub(crate) fn quantised(values: &[f64]) -> (String, f64) {
-    let peak = values
-        .iter()
-        .filter(|value| value.is_finite())
-        .fold(0.0_f64, |peak, value| peak.max(value.abs()));
+    let known = values.iter().filter(|value| value.is_finite());
+    let peak = known.fold(0.0_f64, |peak, value| peak.max(value.abs()));
     let unit = short(if peak > 0.0 { peak * 1.001 / f64::from(i16::MAX) } else { 1.0 });
     let integer =
         |value: &f64| if value.is_finite() { (value / unit).round() as i16 } else { i16::MIN };

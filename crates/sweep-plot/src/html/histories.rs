@@ -69,9 +69,9 @@ fn cell(trace: &Source, at: &At, map: &Map) -> Option<usize> {
     if !at.is_empty() {
         let value =
             |name: &str| at.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
-        let places = map.grid.axes.iter().map(|axis| axis.place_near(value(&axis.name)?));
+        let places = map.grid.axes.iter().map(|axis| axis.place_near(value(&axis.swept.name)?));
         let places: Vec<usize> = places.collect::<Option<_>>()?;
-        return Some(map.grid.index(&places)).filter(|&cell| map.filled(cell));
+        return Some(map.grid.index(places)).filter(|&cell| map.filled(cell));
     }
     let stem = trace.path.file_stem()?.to_str()?;
     let digits = stem.rsplit(|letter: char| !letter.is_ascii_digit()).next()?;
@@ -84,9 +84,9 @@ fn point(at: &At, cell: usize, map: &Map) -> At {
     let mut rest = cell;
     let mut point = At::new();
     for axis in map.grid.axes.iter().rev() {
-        let named = at.iter().find(|(name, _)| *name == axis.name);
+        let named = at.iter().find(|(name, _)| *name == axis.swept.name);
         let value = named.map_or(axis.values[rest % axis.values.len()], |(_, value)| *value);
-        point.push((axis.name.clone(), value));
+        point.push((axis.swept.name.clone(), value));
         rest /= axis.values.len();
     }
     point

@@ -104,14 +104,13 @@ fn middles(figure: &str) -> Vec<([f64; 2], f64, String)> {
 #[test]
 fn numbers_below_neighbouring_panels_do_not_touch() {
     let figure = svg(long_numbers(), &PlotOptions::default());
-    let typeface = raster::Typeface::load().unwrap();
     let texts = middles(&figure);
     let numbers: Vec<_> = texts.iter().filter(|(_, _, text)| text.parse::<f64>().is_ok()).collect();
     assert!(numbers.len() >= 10, "two below each panel: {numbers:?}");
     let mut ends: Vec<_> = numbers
         .iter()
         .map(|([x, _], size, text)| {
-            let half = typeface.width(text, *size, false) / 2.0;
+            let half = raster::text_width(text, *size, false) / 2.0;
             (x - half, x + half, text)
         })
         .collect();

@@ -31,7 +31,7 @@ fn a_crossing_that_no_line_runs_to_is_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let table = Table::open(&folded("").write(folder.path(), "boundary.parquet")).unwrap();
     let chart = figures::boundary::chart(&table).unwrap();
-    let scene = chart::draw(&chart, &Typeface::load().unwrap());
+    let scene = chart::draw(&chart);
     let segments = Outline::circle([0.0, 0.0], 3.0).0.len();
     let is_disc =
         |item: &&Item| matches!(item, Item::Fill { outline, .. } if outline.0.len() == segments);

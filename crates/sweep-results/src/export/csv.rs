@@ -34,22 +34,15 @@ pub(super) fn write(
         let rows = rows?;
         for row in 0..rows.count {
             for column in 0..names.len() {
-                if column > 0 {
-                    text.push(',');
-                }
-                match rows.cell(column, row) {
-                    Cell::Null => {}
+                let _ = match rows.cell(column, row) {
+                    Cell::Null => Ok(()),
                     // The shortest digits that read back to the same number.
-                    Cell::Number(number) => {
-                        let _ = write!(text, "{}", shortest(number));
-                    }
-                    Cell::Text(word) => text.push_str(&quoted(&word)),
-                    Cell::Flag(flag) => {
-                        let _ = write!(text, "{flag}");
-                    }
-                }
+                    Cell::Number(number) => text.write_str(&shortest(number)),
+                    Cell::Text(word) => text.write_str(&quoted(&word)),
+                    Cell::Flag(flag) => write!(text, "{flag}"),
+                };
+                text.push(if column + 1 < names.len() { ',' } else { '\n' });
             }
-            text.push('\n');
             if text.len() >= AT_ONCE {
                 put(&text)?;
                 text.clear();
