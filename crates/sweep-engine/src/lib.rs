@@ -35,9 +35,12 @@ pub mod watch;
 
 pub use build::Build;
 pub use config::{Diagnostics, GridInput, Mistake, Schema};
-pub use exit::{Error, Exit, tell};
+pub use effort::{Effort, EffortArgs};
+pub use exit::{Error, Exit, print, show, tell};
 pub use interrupt::{Interrupt, survive_file_size_limits};
 pub use model::{Model, UnknownParameter};
 pub use plan::{Axis, AxisValues, Plan, Reliability, Scenario};
+pub use store::{Job, StoreError};
 pub use swept::{Listed, Swept};
+pub use table::Table;
 pub use watch::{Engine, Watch};

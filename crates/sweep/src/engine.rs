@@ -20,7 +20,7 @@ use washer_row::{Demand, Ladder, Level, MODELS, Outcome, Rule, RungRun, Status, 
 
 use crate::columns::Columns;
 use crate::plan::{Plan, Scenario};
-use sweep_engine::interrupt::Interrupt;
+use sweep_engine::Interrupt;
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::store::Done;
 use sweep_files::panics::{lock, unlocked};

@@ -17,8 +17,7 @@ use crate::engine::{ModelEngine, Watch, reference_step_s};
 use crate::plan::{Plan, Scenario};
 use crate::speeds::Speeds;
 use sweep_engine::config::NamedValues;
-use sweep_engine::exit::Error;
-use sweep_engine::interrupt::Interrupt;
+use sweep_engine::{Error, Interrupt};
 
 use sweep_parameter::RatioLimits;
 use tongue::{Asker, Seen, tongues};

@@ -27,12 +27,11 @@ use washer_model::{Method, ModelKind, Parameter, Target};
 
 use crate::config::GridInput;
 use crate::engine::simd_from_environment;
-use sweep_engine::config::Diagnostics;
 use sweep_engine::config::report::{Diagnostic, Report as Mistakes};
 use sweep_engine::config::source::Location;
 use sweep_engine::design::{Design, Distribution, Shape};
-use sweep_engine::exit::{Error, tell};
 use sweep_engine::threads::Stop;
+use sweep_engine::{Diagnostics, Error, tell};
 
 use algebra::Symmetric;
 use journal::Journal;
@@ -56,23 +55,38 @@ const HALVINGS: usize = 2;
 const MOST_AT_START: f64 = 0.1;
 
 /// What is asked of a fit.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct FitOptions {
-    /// Parameters to fit: `NAME` or `NAME=FROM:TO`.
+    /// Parameters to fit, each perhaps between two values; separated by commas
+    #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
     pub free: Vec<String>,
-    /// Parameters of which every measurement has its own.
+    /// Parameters of which every file has its own
+    #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
     pub own: Vec<String>,
-    /// The linear model instead of the nonlinear one.
-    pub linear: bool,
-    /// Whether each measurement's clock may be off.
-    pub with_shift: bool,
-    /// How many starts are looked at.
-    pub starts: usize,
-    /// How many times the fit is repeated with resampled residuals.
-    pub bootstrap: usize,
-    /// Rows of the map over the fitted distribution; none if 0.
-    pub draws: u64,
+    /// Fit the nonlinear model, or the linear one
+    #[arg(long, value_name = "MODEL", default_value = NONLINEAR)]
+    #[arg(value_parser = [NONLINEAR, LINEAR])]
+    pub model: String,
+    /// Take the clock of every file as it is, instead of fitting a shift of it
+    #[arg(long)]
+    pub no_shift: bool,
+    /// Starts that are looked at for further minima
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub starts: u32,
+    /// Fit again so many times with resampled residuals
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    pub bootstrap: u32,
+    /// Rows of the map over the fitted distribution, for the verdict's probability; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub draws: u32,
 }
+
+/// The models that can be fitted.
+const NONLINEAR: &str = "nonlinear";
+const LINEAR: &str = "linear";
 
 /// Why there is no fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -232,9 +246,9 @@ pub(crate) fn fit(
 ) -> Result<Option<Fitted>, Error> {
     let free = free(options, &cases)?;
     let method = Problem::method(&cases).map_err(Error::model)?;
-    let model = if options.linear { ModelKind::Linear } else { ModelKind::Nonlinear };
+    let model = if options.model == LINEAR { ModelKind::Linear } else { ModelKind::Nonlinear };
     let simd = simd_from_environment()?;
-    let with_shift = options.with_shift;
+    let with_shift = !options.no_shift;
     let mut problem = Problem { cases, free, model, with_shift, method, simd };
     let samples: usize = problem.cases.iter().map(|case| case.measured.count()).sum();
     let unknowns = problem.unknowns() + problem.signals().count();
@@ -252,7 +266,7 @@ pub(crate) fn fit(
     let journal = journal.map(|path| open(path, &problem)).transpose()?;
     let made = AtomicUsize::new(0);
     let search = Search { problem: &problem, journal: journal.as_ref(), work, made: &made };
-    let Ok(minima) = search.minima(options.starts) else { return Ok(None) };
+    let Ok(minima) = search.minima(u64::from(options.starts)) else { return Ok(None) };
     let mut minima = minima.map_err(Error::model)?;
     if minima.is_empty() {
         return Err(Error::model(FitError::NoAnswer));
@@ -317,7 +331,7 @@ pub(crate) fn fit(
         step_effect,
         repeated: repeated.as_deref(),
     };
-    let report = found.report(options.draws, work.stop)?;
+    let report = found.report(options.draws.into(), work.stop)?;
     if (work.stop)() {
         return Ok(None);
     }
@@ -409,14 +423,14 @@ fn bootstrap(
     problem: &mut Problem,
     x: &[f64],
     against: &[Against],
-    count: usize,
+    count: u32,
     work: &Work<'_>,
 ) -> Option<Vec<Vec<f64>>> {
     const BLOCK: usize = 100;
     let measured = problem.cases.clone();
     let draw = Design::MonteCarlo { points: 0, seed: SEED };
     let mut drawn = 0;
-    let mut found = Vec::with_capacity(count);
+    let mut found = Vec::new();
     for _ in 0..count {
         for one in against {
             let residual = &one.residual;
@@ -476,7 +490,7 @@ impl Search<'_> {
     }
 
     /// Every minimum that is found from so many starts, the least first.
-    fn minima(&self, starts: usize) -> Result<Result<Vec<Descent>, FitError>, Stopped> {
+    fn minima(&self, starts: u64) -> Result<Result<Vec<Descent>, FitError>, Stopped> {
         let start = self.problem.start();
         let dead = |summary: &Summary| {
             let dead = |k: &usize| summary.normal[*k][*k] == 0.0;
@@ -490,7 +504,7 @@ impl Search<'_> {
         }
         let mut chosen = vec![start.clone()];
         if starts > 1 {
-            let design = Design::LatinHypercube { points: starts as u64 - 1, seed: SEED };
+            let design = Design::LatinHypercube { points: starts - 1, seed: SEED };
             let place = |point: u64, k: usize| {
                 let free = &self.problem.free[k];
                 let around = AROUND.map(|share| share * free.start);
@@ -502,7 +516,7 @@ impl Search<'_> {
                     if bounded { free.range } else { [around[0].max(ends[0]), around[1]] };
                 from + design.place(point, k).unwrap_or(0.5) * (to - from)
             };
-            let sets: Vec<Vec<f64>> = (0..starts as u64 - 1)
+            let sets: Vec<Vec<f64>> = (0..starts - 1)
                 .map(|point| {
                     let mut x = start.clone();
                     (0..self.problem.free.len()).for_each(|k| x[k] = place(point, k));

@@ -15,7 +15,7 @@ use crate::engine::{CHECKPOINTS, ModelEngine, rule};
 use crate::method::Integrator;
 use crate::model::Washer;
 use crate::plan::{Axis, AxisValues, Plan, corners_of_forces, timing};
-use sweep_engine::exit::Error;
+use sweep_engine::Error;
 use sweep_engine::method::{ACCURACY, Integrator as _, Steps};
 use sweep_engine::store::read::overview;
 

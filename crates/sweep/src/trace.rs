@@ -21,11 +21,10 @@ use crate::method::Integrator;
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, friction_speeds};
 use sweep_engine::config::NamedValues;
-use sweep_engine::exit::Error;
 use sweep_engine::method::Integrator as _;
-use sweep_engine::store::{StoreError, read};
-use sweep_engine::table::Table;
-use sweep_engine::threads::{self, Stop};
+use sweep_engine::store::read;
+use sweep_engine::threads::Stop;
+use sweep_engine::{Error, StoreError, Table, threads};
 use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
 use washer_row::Level;
 

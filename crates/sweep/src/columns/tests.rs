@@ -1,7 +1,7 @@
 //! Which columns there are, in which order, and what they say.
 
 use arrow_array::Float64Array;
-use sweep_engine::store::ResultRows;
+use sweep_engine::store::{Kind as Cells, ResultRows};
 use washer_row::{Criterion, Status};
 
 use super::*;

@@ -5,9 +5,7 @@ use crate::engine::simd_from_environment;
 use crate::explain::{explain, json, words};
 use crate::speeds::{Speeds, turning};
 use sweep_engine::commands::grid::GridArgs;
-use sweep_engine::exit::{Error, Exit, show};
-use sweep_engine::interrupt::Interrupt;
-use sweep_engine::threads;
+use sweep_engine::{Error, Exit, Interrupt, show, threads};
 
 /// Arguments of `sweep explain`.
 #[derive(Debug, clap::Args)]

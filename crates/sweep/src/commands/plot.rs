@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use crate::live::{SliderRange, live, slider_range};
-use sweep_engine::commands::plot::{self, finite};
-use sweep_engine::exit::{Error, Exit};
+use sweep_engine::commands::plot;
+use sweep_engine::commands::plot::finite;
+use sweep_engine::{Error, Exit};
 use sweep_plot::PlotOptions;
 
 /// Arguments of `sweep plot`.

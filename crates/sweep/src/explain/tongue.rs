@@ -12,7 +12,7 @@ use washer_model::{
 use super::ready;
 use crate::plan::{Plan, Scenario};
 use crate::speeds::Speeds;
-use sweep_engine::interrupt::Interrupt;
+use sweep_engine::Interrupt;
 
 /// Speeds that are asked at once: enough to fill lanes.
 const AT_ONCE: usize = 32;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::algebra::{centred, quantile};
-use sweep_engine::config::Diagnostics;
+use sweep_engine::Diagnostics;
 use sweep_engine::config::list::NumberTable;
 use sweep_engine::config::report::{Diagnostic, Report};
 use washer_model::Channel;

@@ -17,8 +17,8 @@ use super::statistics::Statistics;
 use crate::config;
 use crate::engine::{ModelEngine, responses};
 use crate::plan::{Axis, AxisValues, Plan};
+use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, table};
-use sweep_engine::exit::Error;
 use sweep_engine::threads::Stop;
 
 /// Standard errors to either end of a 95 % interval.

@@ -14,11 +14,10 @@ use super::points::PointTable;
 use super::result::{MapPlan, ResultTable};
 use crate::engine::{Engine, ModelEngine, Watch};
 use crate::plan::Plan;
-use sweep_engine::exit::Error;
 use sweep_engine::progress::Progress;
-use sweep_engine::store::Done;
-use sweep_engine::store::{BATCH_ROWS, Job, Layout, ResultRows, StoreError};
-use sweep_engine::threads::{self, ThreadsError};
+use sweep_engine::store::{BATCH_ROWS, Done, Layout, ResultRows};
+use sweep_engine::threads::ThreadsError;
+use sweep_engine::{Error, Job, StoreError, threads};
 use sweep_files::panics::{self, lock};
 use washer_row::Ladder;
 

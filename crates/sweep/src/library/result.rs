@@ -7,9 +7,8 @@ use arrow_schema::{Schema, SchemaRef};
 use serde_json::Value;
 
 use crate::identity;
-use sweep_engine::exit::Error;
-use sweep_engine::store::{Job, Layout, StoreError, write_map};
-use sweep_engine::table::Table;
+use sweep_engine::store::{Layout, write_map};
+use sweep_engine::{Error, Job, StoreError, Table};
 use sweep_files::{FileError, FileKind, Output, ParquetFile, key};
 use sweep_plot::{PlotOptions, render};
 

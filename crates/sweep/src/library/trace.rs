@@ -5,8 +5,7 @@ use clap::ValueEnum as _;
 use super::result::ResultTable;
 use crate::config::GridInput;
 use crate::trace::{self, Extras, Models, View, every, start_of, start_value};
-use sweep_engine::exit::Error;
-use sweep_engine::interrupt::Interrupt;
+use sweep_engine::{Error, Interrupt};
 use sweep_files::FileKind;
 
 /// What a trace holds.
