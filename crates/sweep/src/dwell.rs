@@ -214,11 +214,8 @@ impl Motions {
             let dwells: Vec<(Dwell<'_>, Carried)> =
                 asked.iter().map(|(_, dwell)| (*dwell, None)).collect();
             let found = motions_of(simd, &dwells, &self.starts, is_stopped);
-            return asked
-                .iter()
-                .zip(found)
-                .map(|((row, _), found)| self.done(*row, found))
-                .collect();
+            let each = asked.iter().zip(found);
+            return each.map(|((row, _), found)| self.done(*row, found)).collect();
         };
         let speeds = speeds_rpm.len() as u64;
         let mut done = Vec::with_capacity(asked.len());
@@ -228,14 +225,12 @@ impl Motions {
         for step in 0..speeds {
             let place = if carry == Carry::Up { step } else { speeds - 1 - step };
             // Speeds before the first that is asked for lead to it.
-            let is_needed = |group: &[(u64, Dwell<'_>)]| {
-                let is_further = |row: &u64| match carry {
-                    Carry::Up => row % speeds >= place,
-                    Carry::Down => row % speeds <= place,
-                };
-                group.iter().any(|(row, _)| is_further(row))
+            let is_further = |(row, _): &(u64, Dwell<'_>)| match carry {
+                Carry::Up => row % speeds >= place,
+                Carry::Down => row % speeds <= place,
             };
-            let needed: Vec<usize> = (0..groups.len()).filter(|&k| is_needed(groups[k])).collect();
+            let is_needed = |k: &usize| groups[*k].iter().any(is_further);
+            let needed: Vec<usize> = (0..groups.len()).filter(is_needed).collect();
             let dwell = |k: &usize| {
                 let speed_rpm = speeds_rpm[place as usize];
                 (Dwell { point: groups[*k][0].1.point, speed_rpm }, carried[*k])

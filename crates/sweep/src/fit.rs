@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
-use washer_model::{Method, ModelKind, Parameter, Target};
+use washer_model::{Method, ModelKind, Parameter, Range, Target};
 
 use crate::config::GridInput;
 use crate::engine::simd_from_environment;
@@ -160,79 +160,74 @@ fn middle(grid: &GridInput, constants: &[String]) -> Result<Vec<String>, Diagnos
 fn free(options: &FitOptions, cases: &[Case]) -> Result<Vec<Free>, Diagnostics> {
     let mistakes = Mistakes::default();
     let mut found: Vec<Free> = Vec::new();
-    let shared = options.free.iter().map(|text| (text, "--free", 1));
-    let own = options.own.iter().map(|text| (text, "--own", cases.len()));
-    for (text, option, count) in shared.chain(own) {
-        let source = mistakes.add(option, text.as_str());
-        let (name, range) = match text.split_once('=') {
-            Some((name, range)) => (name.trim(), Some(range)),
-            None => (text.trim(), None),
-        };
-        let at = Location::new(source, 0..text.len());
-        let refuse = |title: String, expected: &str| {
-            mistakes.push(Diagnostic::new(title).at(&at, expected));
-        };
-        for k in 0..count {
-            let model = &cases[k].plan.model;
-            let spin = cases[k].spin();
-            let parameter = match Parameter::find(name, &model.machine, spin) {
-                Ok(parameter) if !matches!(parameter.target(), Target::Window(_)) => parameter,
-                Ok(_) => {
-                    refuse(format!("`{name}` is no number of the machine"), "expected another");
-                    break;
-                }
-                Err(error) => {
-                    let known = Parameter::all(&model.machine, spin);
-                    let title = format!("`{name}` cannot be fitted: {error}");
-                    let refusal = Diagnostic::new(title).at(&at, "expected a parameter");
-                    mistakes.push(refusal.nearest(name, known.iter().map(|known| known.name())));
-                    break;
-                }
-            };
-            if found.iter().any(|free| free.parameter == parameter && count == 1) {
-                refuse(format!("`{name}` is free twice"), "expected each once");
-                break;
-            }
-            let least = match parameter.range() {
-                washer_model::Range::Within(from, to) => [from, to],
-                washer_model::Range::NonNegative | washer_model::Range::Positive => {
-                    [0.0, f64::INFINITY]
-                }
-                washer_model::Range::Negative => [f64::NEG_INFINITY, 0.0],
-                washer_model::Range::Any => [f64::NEG_INFINITY, f64::INFINITY],
-            };
-            let parsed = range.map(|range| {
-                let (from, to) = range.split_once(':')?;
-                let (from, to) = (from.trim().parse().ok()?, to.trim().parse().ok()?);
-                let within = least[0] <= from && from < to && to <= least[1];
-                (within && f64::is_finite(from) && f64::is_finite(to)).then_some([from, to])
-            });
-            let range = match parsed {
-                Some(Some(range)) => range,
-                Some(None) => {
-                    let title = format!("`{text}` is no range");
-                    refuse(title, "expected NAME=FROM:TO with FROM below TO, both allowed");
-                    break;
-                }
-                None => least,
-            };
-            let known = parameter.get(&model.machine, spin);
-            let inside = known.filter(|value| (range[0]..=range[1]).contains(value));
-            let bounded = range.iter().all(|end| end.is_finite()) && parsed.is_some();
-            let start = match inside {
-                Some(value) if value != 0.0 || bounded => value,
-                _ if bounded => 0.5 * (range[0] + range[1]),
-                _ => {
-                    let title = format!("`{name}` has no value to start from");
-                    refuse(title, "expected a range, NAME=FROM:TO, or a value by --set");
-                    break;
-                }
-            };
-            let case = (option == "--own").then_some(k);
-            found.push(Free { parameter, range, start, case });
+    let shared = options.free.iter().map(|text| (text, "--free", &cases[..1]));
+    let own = options.own.iter().map(|text| (text, "--own", cases));
+    for (text, option, cases) in shared.chain(own) {
+        let at = Location::new(mistakes.add(option, text.as_str()), 0..text.len());
+        for (k, case) in cases.iter().enumerate() {
+            let known: &[Free] = if cases.len() == 1 { &found } else { &[] };
+            let Some(free) = free_number(text, case, known, (&at, &mistakes)) else { break };
+            found.push(Free { case: (option == "--own").then_some(k), ..free });
         }
     }
     mistakes.finish(found)
+}
+
+/// One of them, of a case, beside those that are known; what is wrong with it is reported.
+fn free_number(
+    text: &str,
+    case: &Case,
+    known: &[Free],
+    (at, mistakes): (&Location, &Mistakes),
+) -> Option<Free> {
+    let refuse = |title: String, expected: &str| mistakes.refuse(at, title, expected);
+    let (name, range) = match text.split_once('=') {
+        Some((name, range)) => (name.trim(), Some(range)),
+        None => (text.trim(), None),
+    };
+    let (machine, spin) = (&case.plan.model.machine, case.spin());
+    let parameter = match Parameter::find(name, machine, spin) {
+        Ok(parameter) if !matches!(parameter.target(), Target::Window(_)) => parameter,
+        Ok(_) => {
+            return refuse(format!("`{name}` is no number of the machine"), "expected another");
+        }
+        Err(error) => {
+            let known = Parameter::all(machine, spin);
+            let title = format!("`{name}` cannot be fitted: {error}");
+            let refusal = Diagnostic::new(title).at(at, "expected a parameter");
+            mistakes.push(refusal.nearest(name, known.iter().map(|known| known.name())));
+            return None;
+        }
+    };
+    if known.iter().any(|free| free.parameter == parameter) {
+        return refuse(format!("`{name}` is free twice"), "expected each once");
+    }
+    let allowed = match parameter.range() {
+        Range::Within(from, to) => [from, to],
+        Range::NonNegative | Range::Positive => [0.0, f64::INFINITY],
+        Range::Negative => [f64::NEG_INFINITY, 0.0],
+        Range::Any => [f64::NEG_INFINITY, f64::INFINITY],
+    };
+    let parsed = range.map(|range| {
+        let (from, to) = range.split_once(':')?;
+        let [from, to] = [from.trim().parse().ok()?, to.trim().parse().ok()?];
+        let within = allowed[0] <= from && from < to && to <= allowed[1];
+        (within && f64::is_finite(from) && f64::is_finite(to)).then_some([from, to])
+    });
+    let Some(range) = parsed.unwrap_or(Some(allowed)) else {
+        let expected = "expected NAME=FROM:TO with FROM below TO, both allowed";
+        return refuse(format!("`{text}` is no range"), expected);
+    };
+    let value = parameter.get(machine, spin).filter(|it| (range[0]..=range[1]).contains(it));
+    let start = match value {
+        _ if parsed.is_some() => Some(value.unwrap_or(0.5 * (range[0] + range[1]))),
+        value => value.filter(|value| *value != 0.0),
+    };
+    let Some(start) = start else {
+        let expected = "expected a range, NAME=FROM:TO, or a value by --set";
+        return refuse(format!("`{name}` has no value to start from"), expected);
+    };
+    Some(Free { parameter, range, start, case: None })
 }
 
 /// Fits; `None` if it was stopped. On all threads of the rayon pool it is called in.
@@ -314,13 +309,13 @@ pub(crate) fn fit(
             .map(|nonlinear| effect(&statistics.covariance, &best.summary, &against, &nonlinear));
         problem.model = ModelKind::Linear;
     }
-    let repeated = match options.bootstrap {
-        0 => None,
-        count => match bootstrap(&mut problem, &best.x, &against, count, work) {
-            Some(repeated) => Some(repeated),
-            None => return Ok(None),
-        },
-    };
+    let mut repeated = None;
+    if options.bootstrap > 0 {
+        repeated = bootstrap(&mut problem, &best.x, &against, options.bootstrap, work);
+        if repeated.is_none() {
+            return Ok(None);
+        }
+    }
     let found = report::Found {
         problem: &problem,
         minima: &minima,
@@ -330,8 +325,10 @@ pub(crate) fn fit(
         evaluations,
         step_effect,
         repeated: repeated.as_deref(),
+        draws: options.draws.into(),
+        stop: work.stop,
     };
-    let report = found.report(options.draws.into(), work.stop)?;
+    let report = found.report()?;
     if (work.stop)() {
         return Ok(None);
     }

@@ -166,15 +166,11 @@ impl DwellEngine<'_> {
         wanted.dedup();
         let points: BTreeMap<u64, Result<Point, Status>> =
             wanted.iter().copied().zip(self.ready(&wanted)).collect();
-        let (mut done, mut dwells) = (Vec::with_capacity(rows.len()), Vec::new());
-        let mut asked = Vec::with_capacity(rows.len());
+        let (mut done, mut asked) = (Vec::with_capacity(rows.len()), Vec::new());
         for &row in rows {
+            let speed_rpm = self.speeds_rpm[(row % speeds) as usize];
             match &points[&(row / speeds)] {
-                Ok(point) => {
-                    let speed_rpm = self.speeds_rpm[(row % speeds) as usize];
-                    dwells.push(Dwell { point, speed_rpm });
-                    asked.push(row);
-                }
+                Ok(point) => asked.push((row, Dwell { point, speed_rpm })),
                 Err(status) => done.push(match &self.asked {
                     Asked::Responses(columns) => columns.done(failed(row, *status)),
                     Asked::Motions(motions) => motions.failed(row, *status),
@@ -183,15 +179,14 @@ impl DwellEngine<'_> {
         }
         match &self.asked {
             Asked::Responses(columns) => {
-                for (row, found) in asked.into_iter().zip(responses(&dwells, is_stopped)) {
-                    done.push(columns.done(match found {
-                        Ok(responses) => self.outcome(row, &responses),
-                        Err(status) => failed(row, status),
-                    }));
+                let dwells: Vec<Dwell<'_>> = asked.iter().map(|(_, dwell)| *dwell).collect();
+                for ((row, _), found) in asked.iter().zip(responses(&dwells, is_stopped)) {
+                    let none = |status| failed(*row, status);
+                    let outcome = found.map_or_else(none, |found| self.outcome(*row, &found));
+                    done.push(columns.done(outcome));
                 }
             }
             Asked::Motions(motions) => {
-                let asked: Vec<_> = asked.into_iter().zip(dwells).collect();
                 done.extend(motions.find(self.simd, self.speeds_rpm, &asked, is_stopped));
             }
         }

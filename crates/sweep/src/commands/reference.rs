@@ -100,7 +100,8 @@ fn parameters() -> String {
         // The first of three coordinates tells of all.
         let of_three = description.strip_suffix("towards the door");
         let axes: &[&str] = if of_three.is_some() { &["_x", "_y", "_z"] } else { &["_x"] };
-        let value = |axis: &&str| value_of(&name.replacen("_x", axis, 1)).unwrap_or_else(|| none.into());
+        let value =
+            |axis: &&str| value_of(&name.replacen("_x", axis, 1)).unwrap_or_else(|| none.into());
         let mut values: Vec<String> = axes.iter().map(value).collect();
         if values.iter().all(|value| *value == values[0]) {
             values.truncate(1);

@@ -30,12 +30,8 @@ pub struct Args {
     #[arg(long, value_name = "NAME", value_parser = word)]
     account: Option<String>,
     /// Cores a task, and so its threads
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 1,
-        value_parser = clap::value_parser!(u32).range(1..=4096)
-    )]
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=4096))]
     cpus_per_task: u32,
     /// Memory a task, as sbatch takes it: 500M, 2G
     #[arg(long, value_name = "SIZE", value_parser = word)]

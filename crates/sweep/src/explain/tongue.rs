@@ -334,57 +334,33 @@ fn resonance(point: &Point, at: &Response) -> Option<Resonance> {
     };
     let here = frequencies(at.speed_rpm)?;
     let named: Vec<usize> = at.participants.iter().map(|mode| mode.mode - 1).collect();
-    let (&a, partners) = match named.as_slice() {
-        [] => return None,
-        [one] => (one, (0..SUSPENSION_MODES).collect::<Vec<_>>()),
-        [one, other, ..] => (one, vec![*one, *other]),
-    };
-    let is_pair = at.kind() == Kind::QuasiPeriodic;
-    let mut best: Option<(f64, Resonance)> = None;
-    let ones: Vec<usize> = if is_pair { vec![a] } else { named.clone() };
-    for &one in &ones {
-        for &other in if is_pair { &partners } else { &ones } {
-            let is_same = one == other;
-            if is_pair == is_same {
-                continue;
-            }
-            for sign in [1.0, -1.0] {
-                for order in 1..=MOST_ORDER {
-                    let admits = match at.kind() {
-                        Kind::PeriodDoubling => order % 2 == 1,
-                        Kind::Fold => order % 2 == 0,
-                        Kind::QuasiPeriodic | Kind::Stable => true,
-                    };
-                    let (first, second) = if sign < 0.0 && here[one] < here[other] {
-                        (other, one)
-                    } else {
-                        (one, other)
-                    };
-                    let sum = |of: &[f64]| of[first] + sign * of[second];
-                    let target = f64::from(order) * at.speed_rpm;
-                    let miss = (sum(&here) / target - 1.0).abs();
-                    if !admits || best.is_some_and(|(so_far, _)| miss >= so_far) {
-                        continue;
-                    }
-                    let ordered = if sign > 0.0 {
-                        [first.min(second), first.max(second)]
-                    } else {
-                        [first, second]
-                    };
-                    best = Some((
-                        miss,
-                        Resonance {
-                            modes: ordered.map(|mode| mode + 1),
-                            frequencies_cpm: ordered.map(|mode| here[mode]),
-                            sign,
-                            order,
-                        },
-                    ));
-                }
-            }
+    let pairs: Vec<(usize, usize)> = match (at.kind(), named.as_slice()) {
+        (_, []) => return None,
+        (Kind::QuasiPeriodic, &[one]) => {
+            (0..SUSPENSION_MODES).filter(|other| *other != one).map(|other| (one, other)).collect()
         }
-    }
-    best.filter(|(miss, _)| *miss < FARTHEST_MISS).map(|(_, resonance)| resonance)
+        (Kind::QuasiPeriodic, &[one, other, ..]) => vec![(one, other)],
+        (_, named) => named.iter().map(|&one| (one, one)).collect(),
+    };
+    let admits = |order: &u32| match at.kind() {
+        Kind::PeriodDoubling => order % 2 == 1,
+        Kind::Fold => order % 2 == 0,
+        Kind::QuasiPeriodic | Kind::Stable => true,
+    };
+    let meeting = |(one, other): (usize, usize), sign: f64, order: u32| {
+        let is_turned = if sign > 0.0 { one > other } else { here[one] < here[other] };
+        let modes = if is_turned { [other, one] } else { [one, other] };
+        let frequencies_cpm = modes.map(|mode| here[mode]);
+        Resonance { modes: modes.map(|mode| mode + 1), frequencies_cpm, sign, order }
+    };
+    let orders = || (1..=MOST_ORDER).filter(admits);
+    let all = pairs.iter().flat_map(|&pair| {
+        let signed = [1.0, -1.0].into_iter().flat_map(|sign| orders().map(move |at| (sign, at)));
+        signed.map(move |(sign, order)| meeting(pair, sign, order))
+    });
+    let miss = |of: &Resonance| (of.sum_cpm() / (f64::from(of.order) * at.speed_rpm) - 1.0).abs();
+    let nearest = all.min_by(|a, b| miss(a).total_cmp(&miss(b)));
+    nearest.filter(|nearest| miss(nearest) < FARTHEST_MISS)
 }
 
 /// Factors to try next, between one that leaves growth and one that does not if that is known, each
