@@ -6,7 +6,7 @@ use sweep_engine::columns::{
     Cell, Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
 use sweep_engine::store::read::FAR_OFF;
-use sweep_engine::store::{Column, Done, Layout, Row, Rows, axis_columns};
+use sweep_engine::store::{Column, Done, Layout, Rows, axis_columns};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, Motion};
 use washer_row::{
@@ -92,11 +92,8 @@ impl Columns {
     /// The rows of what came of a point.
     pub(crate) fn done(&self, outcome: Outcome) -> Done {
         let point = outcome.point;
-        Done { point, rows: outcome.into_rows().map(|outcome| self.row(outcome)).collect() }
-    }
-
-    fn row(&self, outcome: Outcome) -> Row {
-        row(&self.columns, &self.result(outcome))
+        let rows = outcome.into_rows().map(|outcome| row(&self.columns, &self.result(outcome)));
+        Done { point, rows: rows.collect() }
     }
 
     /// The number of one column of what came of a point.

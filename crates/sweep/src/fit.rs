@@ -503,14 +503,11 @@ impl Search<'_> {
         if starts > 1 {
             let design = Design::LatinHypercube { points: starts - 1, seed: SEED };
             let place = |point: u64, k: usize| {
-                let free = &self.problem.free[k];
-                let around = AROUND.map(|share| share * free.start);
-                let ends = free.range.iter().zip(around);
-                let ends: Vec<f64> =
-                    ends.map(|(end, near)| if end.is_finite() { *end } else { near }).collect();
-                let bounded = free.range.iter().all(|end| end.is_finite());
+                let Free { range, start, .. } = &self.problem.free[k];
+                let around = AROUND.map(|share| share * start);
+                let is_bounded = range.iter().all(|end| end.is_finite());
                 let [from, to] =
-                    if bounded { free.range } else { [around[0].max(ends[0]), around[1]] };
+                    if is_bounded { *range } else { [around[0].max(range[0]), around[1]] };
                 from + design.place(point, k).unwrap_or(0.5) * (to - from)
             };
             let sets: Vec<Vec<f64>> = (0..starts - 1)

@@ -43,7 +43,7 @@ const KEPT_INSTANTS: f64 = 2000.0;
 
 /// What a trace holds beside channels, gap and speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Extras {
+pub struct Extras {
     /// Rates and accelerations of the channels.
     pub rates: bool,
     /// Coordinates and their speeds.
@@ -74,22 +74,19 @@ pub(crate) fn start_value(text: &str) -> Result<StartValue, String> {
     let expected =
         "expected a coordinate q1 to q10 or a speed u1 to u10 with its value, as in q5=0.1";
     let (name, value) = text.split_once('=').ok_or(expected)?;
-    let (is_speed, number) = match (name.trim().strip_prefix('q'), name.trim().strip_prefix('u')) {
-        (Some(number), _) => (false, number),
-        (_, Some(number)) => (true, number),
+    let (is_speed, number) = match name.trim().split_at_checked(1) {
+        Some(("q", number)) => (false, number),
+        Some(("u", number)) => (true, number),
         _ => return Err(expected.to_owned()),
     };
-    let index = number
-        .parse::<usize>()
-        .ok()
-        .filter(|number| (1..=COORDINATES).contains(number))
-        .ok_or(expected)?;
-    let value =
-        value.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or(expected)?;
+    let number = number.parse().ok().filter(|number| (1..=COORDINATES).contains(number));
+    let index = number.ok_or(expected)? - 1;
+    let value = value.trim().parse().ok().filter(|value: &f64| value.is_finite());
+    let value = value.ok_or(expected)?;
     if !is_speed && value.abs() > FARTHEST_START {
         return Err(format!("expected at most {FARTHEST_START} m or rad from equilibrium"));
     }
-    Ok(StartValue { is_speed, index: index - 1, value })
+    Ok(StartValue { is_speed, index, value })
 }
 
 /// The start with these values, and everything else at equilibrium.
@@ -396,17 +393,15 @@ pub(crate) fn keep(
             if stop() {
                 return Ok(());
             }
-            let values = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
-            let at = values.zip(plan.axis_values(point)).collect();
+            let names = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
+            let at = names.zip(plan.axis_values(point)).collect();
+            let level = level.and_then(|name| Level::ALL.into_iter().find(|it| it.name() == name));
             let view = View {
                 every_s: Some(plan.end_s / KEPT_INSTANTS),
                 models: Models::Both,
                 start: Start::default(),
                 extras: Extras::default(),
-                quick: level.and_then(|level| {
-                    let named = |known: &Level| known.name() == level;
-                    engine.quick(Level::ALL.into_iter().find(named)?)
-                }),
+                quick: level.and_then(|level| engine.quick(level)),
             };
             let found = trace(plan, plan.scenario(point), at, &view, stop);
             if stop() {

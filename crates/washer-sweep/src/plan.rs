@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
-use sweep::{BoundaryOptions, Evaluator, GridInput, TraceOptions};
+use sweep::{BoundaryOptions, Evaluator, GridInput, TraceExtras, TraceOptions};
 
 use crate::mappings::{self, assignments};
 use crate::result::PyResultTable;
@@ -112,7 +112,8 @@ impl PyPlan {
     ) -> PyResult<PyResultTable> {
         let (at, start) = (assignments(at)?, assignments(start)?);
         let every_s = (!turns).then_some(every);
-        let options = TraceOptions { every_s, model, all, rates, states, forces, angle, start };
+        let extras = TraceExtras { rates, states, forces, angle };
+        let options = TraceOptions { every_s, model, all, extras, start };
         let input = self.input.clone();
         let (table, failures) = abandonable(py, None, move |effort| {
             sweep::trace_point(&input, &at, &options, effort.interrupt)

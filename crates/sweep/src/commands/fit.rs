@@ -69,18 +69,17 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     if let Some(path) = args.out.as_ref().filter(|path| path.exists()) {
         return Err(taken(path));
     }
-    let count = if args.curves.is_some() { cases.len() } else { 0 };
-    let curves: Vec<PathBuf> =
-        (0..count).filter_map(|case| Some(numbered(args.curves.as_ref()?, case))).collect();
+    let numbers = 0..cases.len();
+    let of_path =
+        args.curves.iter().flat_map(|path| numbers.clone().map(move |k| numbered(path, k)));
+    let curves: Vec<PathBuf> = of_path.collect();
     for path in &curves {
         files::ready(atomic::parent(path))?;
         files::judge(path, FileKind::Fit)?;
     }
     let interrupt = Interrupt::install().map_err(Error::signals)?;
     let progress = Mutex::new(Progress::of_search(args.effort.progress, 0, 0));
-    let seen = |made: usize| {
-        lock(&progress).show_search(0, made as u64);
-    };
+    let seen = |made: usize| lock(&progress).show_search(0, made as u64);
     let journal = args.out.as_ref().map(|out| {
         let mut name = out.as_os_str().to_owned();
         name.push(".partial");

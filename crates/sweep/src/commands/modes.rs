@@ -129,22 +129,19 @@ fn listing(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
     );
     for (k, mode) in modes.iter().enumerate() {
         let start = mode.at_speed[0].frequency_rpm;
-        let mut line = |resonance: String, turn: String, at: &ModeAtSpeed, motion: String| {
+        let rows = mode.resonances.iter().map(|resonance| {
+            let swing = 0.5 * (resonance.mode.greatest_rpm - resonance.mode.least_rpm);
+            (format!("{:.2}", resonance.speed_rpm), format!("{swing:.3}"), &resonance.mode)
+        });
+        let none = ("none".to_owned(), "-".to_owned(), &mode.at_speed[0]);
+        let none = Some(none).filter(|_| mode.resonances.is_empty());
+        for (resonance, turn, at) in none.into_iter().chain(rows) {
+            let (number, damping, motion) = (k + 1, at.damping_ratio, mode.motion.to_string());
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
-                "{:>4}{resonance:>12}{turn:>14}{:>10.4}{start:>12.2}   {motion}",
-                k + 1,
-                at.damping_ratio
+                "{number:>4}{resonance:>12}{turn:>14}{damping:>10.4}{start:>12.2}   {motion}"
             );
-        };
-        if mode.resonances.is_empty() {
-            line("none".to_owned(), "-".to_owned(), &mode.at_speed[0], mode.motion.to_string());
-        }
-        for resonance in &mode.resonances {
-            let swing = 0.5 * (resonance.mode.greatest_rpm - resonance.mode.least_rpm);
-            let speed = format!("{:.2}", resonance.speed_rpm);
-            line(speed, format!("{swing:.3}"), &resonance.mode, mode.motion.to_string());
         }
     }
     if let Some((swing, mode, speed)) = widest_swing(speeds, modes) {

@@ -126,7 +126,7 @@ pub(crate) struct Tongue {
 }
 
 /// Two frequencies of modes whose sum or difference is a multiple of the speed; or one, twice.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(crate) struct Resonance {
     /// Numbers of the modes; the same for one mode.
     pub(crate) modes: [usize; 2],
@@ -134,40 +134,41 @@ pub(crate) struct Resonance {
     pub(crate) frequencies_cpm: [f64; 2],
     /// The sign of the second frequency: 1 in a sum, -1 in a difference.
     pub(crate) sign: f64,
+    /// Sum or difference (cycles per minute).
+    pub(crate) sum_cpm: f64,
     /// Turns of the drum to which the sum belongs.
     pub(crate) order: u32,
 }
 
-impl Resonance {
-    /// Sum or difference (cycles per minute).
-    pub(crate) fn sum_cpm(&self) -> f64 {
-        self.frequencies_cpm[0] + self.sign * self.frequencies_cpm[1]
-    }
-}
-
 /// How much more damping closes a tongue: nothing grows then, in any way, about where it was.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub(crate) enum Closing {
     /// Every damper this many times as strong, tried; the damping (N s/m) if all have the same.
     Factor {
         /// How many times.
+        #[serde(rename = "damping_factor")]
         factor: f64,
         /// What each damper then has, if all have the same.
         damping_n_s_per_m: Option<f64>,
         /// The speeds (rpm) between which nothing grew.
+        #[serde(rename = "nothing_grows_from_to_rpm")]
         looked_rpm: [f64; 2],
     },
     /// Not up to this many times.
-    NotUpTo(f64),
+    NotUpTo {
+        #[serde(rename = "damping_factor_above")]
+        factor: f64,
+    },
     /// There is no damping to raise.
     NoDampers,
 }
 
-/// What is seen over a range of speeds.
-#[derive(Default)]
+/// What is seen over a range of speeds beside tongues.
 pub(crate) struct Seen {
-    pub(crate) tongues: Vec<Tongue>,
-    /// How many speeds have no response.
+    /// The speeds that were looked at.
+    pub(crate) looked: Speeds,
+    /// How many of them have no response.
     pub(crate) without_response: usize,
     /// Speeds (rpm) at which a machine that runs up leaves its branch of responses.
     pub(crate) jumps_rpm: Vec<f64>,
@@ -176,7 +177,7 @@ pub(crate) struct Seen {
 }
 
 /// The tongues within a range of speeds, and what else is seen there.
-pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> Seen {
+pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> (Vec<Tongue>, Seen) {
     let speeds = looked.values();
     let responses = asker.responses(&speeds);
     let there = || responses.iter().flatten();
@@ -210,12 +211,9 @@ pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> Seen {
         tongues.push(tongue(asker, of_run, &run, [from, to]));
         first = last + 1;
     }
-    Seen {
-        tongues,
-        without_response: responses.iter().filter(|response| response.is_none()).count(),
-        jumps_rpm,
-        beyond: there().filter_map(|it| Some((it.speed_rpm, it.beyond?))).collect(),
-    }
+    let without_response = responses.iter().filter(|response| response.is_none()).count();
+    let beyond = there().filter_map(|it| Some((it.speed_rpm, it.beyond?))).collect();
+    (tongues, Seen { looked, without_response, jumps_rpm, beyond })
 }
 
 /// What the drum ends in that is held where each of these grows most, slightly disturbed.
@@ -351,14 +349,15 @@ fn resonance(point: &Point, at: &Response) -> Option<Resonance> {
         let is_turned = if sign > 0.0 { one > other } else { here[one] < here[other] };
         let modes = if is_turned { [other, one] } else { [one, other] };
         let frequencies_cpm = modes.map(|mode| here[mode]);
-        Resonance { modes: modes.map(|mode| mode + 1), frequencies_cpm, sign, order }
+        let sum_cpm = frequencies_cpm[0] + sign * frequencies_cpm[1];
+        Resonance { modes: modes.map(|mode| mode + 1), frequencies_cpm, sign, sum_cpm, order }
     };
     let orders = || (1..=MOST_ORDER).filter(admits);
     let all = pairs.iter().flat_map(|&pair| {
         let signed = [1.0, -1.0].into_iter().flat_map(|sign| orders().map(move |at| (sign, at)));
         signed.map(move |(sign, order)| meeting(pair, sign, order))
     });
-    let miss = |of: &Resonance| (of.sum_cpm() / (f64::from(of.order) * at.speed_rpm) - 1.0).abs();
+    let miss = |of: &Resonance| (of.sum_cpm / (f64::from(of.order) * at.speed_rpm) - 1.0).abs();
     let nearest = all.min_by(|a, b| miss(a).total_cmp(&miss(b)));
     nearest.filter(|nearest| miss(nearest) < FARTHEST_MISS)
 }
@@ -396,7 +395,7 @@ impl Tongue {
                 open = tried;
             }
             if closed.is_none() && open[0] > MOST_DAMPING_FACTOR {
-                return Closing::NotUpTo(MOST_DAMPING_FACTOR);
+                return Closing::NotUpTo { factor: MOST_DAMPING_FACTOR };
             }
         }
         let closed = closed.map_or(MOST_DAMPING_FACTOR, |[factor, _]| factor);
