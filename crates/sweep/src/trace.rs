@@ -160,11 +160,11 @@ impl Models {
 
 /// The histories of one point, or of all of a plan one below the other.
 pub(crate) struct Trace {
-    table: Table,
+    pub(crate) table: Table,
     /// Instants.
-    pub instants: usize,
+    pub(crate) instants: usize,
     /// How each model failed that did, in words.
-    pub failures: Vec<String>,
+    pub(crate) failures: Vec<String>,
 }
 
 /// Histories of a plan's only point, which `at` names, or of all of its points, in a pool of their
@@ -410,7 +410,9 @@ pub(crate) fn keep(
             // The row of a point without an equilibrium says so.
             if let Ok(trace) = found {
                 let path = folder.join(format!("point-{point}.parquet"));
-                files::write(&path, FileKind::Trace, &trace.into_bytes(&path)?)?;
+                let bytes =
+                    trace.table.into_bytes().map_err(StoreError::parquet("write", &path))?;
+                files::write(&path, FileKind::Trace, &bytes)?;
             }
             done();
             Ok(())
@@ -431,21 +433,6 @@ fn remove_former(folder: &Path) -> Result<(), StoreError> {
         }
     }
     Ok(())
-}
-
-impl Trace {
-    /// The bytes of its file, which is to be at `path`.
-    ///
-    /// # Errors
-    /// What the Parquet library refuses: a defect of this program.
-    pub(crate) fn into_bytes(self, path: &Path) -> Result<Vec<u8>, StoreError> {
-        self.table.into_bytes().map_err(StoreError::parquet("write", path))
-    }
-
-    /// The table, for its columns as well as its bytes.
-    pub(crate) fn into_table(self) -> Table {
-        self.table
-    }
 }
 
 /// Ten numbers as q1 to q10 or u1 to u10.
@@ -661,7 +648,7 @@ mod tests {
             let models = Models::Both;
             let view = View { every_s: Some(every_s), models, start, extras, quick: Some(quick) };
             let by_row = trace(&plan, scenario, Vec::new(), &view, &|| false);
-            let (rows, _) = by_row.unwrap().into_table().finish().unwrap();
+            let (rows, _) = by_row.unwrap().table.finish().unwrap();
             // The row says the nonlinear model's rung; the linear one's may have been another.
             for (name, model, over) in
                 [("nonlinear", &row.nonlinear, 1e-9), ("linear", &row.linear, 1e-3)]
@@ -694,11 +681,11 @@ mod tests {
             let view = View { every_s, models, start: Start::default(), extras, quick: None };
             let all = trace_all(&plan, &view, &|| false);
             assert_eq!(every_s.is_none(), all.instants < 9 * 20);
-            let (all, _) = all.into_table().finish().unwrap();
+            let (all, _) = all.table.finish().unwrap();
             let mut from = 0;
             for point in 0..plan.points() {
                 let one = trace(&plan, plan.scenario(point), Vec::new(), &view, &|| false).unwrap();
-                let (one, _) = one.into_table().finish().unwrap();
+                let (one, _) = one.table.finish().unwrap();
                 for (k, field) in one.schema().fields().iter().enumerate() {
                     let together = all.column_by_name(field.name()).unwrap();
                     let together = together.slice(from, one.num_rows());
@@ -739,7 +726,7 @@ mod tests {
         let view = View { every_s: None, models, start, extras, quick: None };
         let all = trace_all(&turning(4.05), &view, &|| false);
         assert_eq!(all.instants, 2 * 31);
-        let (rows, _) = all.into_table().finish().unwrap();
+        let (rows, _) = all.table.finish().unwrap();
         assert_eq!(peak(&rows, "drum_angle_rad", 0), 0.0);
     }
 }

@@ -7,16 +7,10 @@ use pyo3::types::{PyDict, PyList};
 use sweep::{Diagnostics, Error, Exit, Mistake, StoreError};
 use sweep_plot::PlotError;
 
-/// A class of the package's own.
-fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-    py.import("washer_sweep._errors")?.getattr(name)
-}
-
-fn raised(py: Python<'_>, name: &str, text: String, with: Py<PyAny>) -> PyErr {
-    match class(py, name).and_then(|class| class.call1((text, with))) {
-        Ok(error) => PyErr::from_value(error),
-        Err(error) => error,
-    }
+/// An error of one of the package's own classes.
+fn raised(py: Python<'_>, class: &str, text: String, with: Py<PyAny>) -> PyErr {
+    let own = py.import("washer_sweep._errors").and_then(|own| own.getattr(class));
+    own.and_then(|class| class.call1((text, with))).map_or_else(|error| error, PyErr::from_value)
 }
 
 /// Mistakes in a plan, or in a table given to it.

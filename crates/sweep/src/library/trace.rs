@@ -58,8 +58,7 @@ pub fn trace_point(
     if interrupt.stopped() {
         return Ok(None);
     }
-    let failures = trace.failures.clone();
-    Ok(Some((ResultTable::of_table(FileKind::Trace, trace.into_table())?, failures)))
+    Ok(Some((ResultTable::of_table(FileKind::Trace, trace.table)?, trace.failures)))
 }
 
 #[cfg(test)]
