@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{Read as _, Write as _};
+use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -37,6 +37,7 @@ impl Journal {
         file.read_to_end(&mut bytes)?;
         let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
         file.set_len(whole as u64)?;
+        file.seek(SeekFrom::End(0))?;
         let known = bytes[..whole].split(|byte| *byte == b'\n').filter_map(record).collect();
         Ok(Self { path: path.to_owned(), problem, state: Mutex::new((file, known)) })
     }
