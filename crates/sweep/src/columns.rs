@@ -2,13 +2,11 @@
 
 use std::mem::take;
 
-use serde_json::{Value, json};
 use sweep_engine::columns::{
     Cell, Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
 use sweep_engine::store::read::FAR_OFF;
-use sweep_engine::store::{Column, Done, Job, Kind as Cells, Layout, Row, Rows, axis_columns};
-use sweep_files::{FileKind, key};
+use sweep_engine::store::{Column, Done, Layout, Rows, axis_columns};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, Motion};
 use washer_row::{
@@ -94,11 +92,8 @@ impl Columns {
     /// The rows of what came of a point.
     pub(crate) fn done(&self, outcome: Outcome) -> Done {
         let point = outcome.point;
-        Done { point, rows: outcome.into_rows().map(|outcome| self.row(outcome)).collect() }
-    }
-
-    fn row(&self, outcome: Outcome) -> Row {
-        row(&self.columns, &self.result(outcome))
+        let rows = outcome.into_rows().map(|outcome| row(&self.columns, &self.result(outcome)));
+        Done { point, rows: rows.collect() }
     }
 
     /// The number of one column of what came of a point.
@@ -128,45 +123,6 @@ impl Columns {
             fail_time_s,
         };
         ResultRow { outcome, compared }
-    }
-}
-
-/// The layout of the dwells of a plan's points at these speeds (rpm), speeds varying fastest.
-pub(crate) fn of_dwells(plan: &Plan, speeds_rpm: &[f64]) -> Layout {
-    let mut axes = axis_columns(plan);
-    axes.push(Column::new("speed_rpm", "rpm", "constant spin of the shaft", Cells::Axis));
-    Layout {
-        axes,
-        columns: Columns::of_dwells(plan).declared(),
-        kind: FileKind::Stability,
-        rows_a_point: speeds_rpm.len() as u64,
-        has_several: true,
-        metadata: vec![(key::STABILITY, json!({ "speeds_rpm": speeds_rpm }))],
-    }
-}
-
-/// Rows of this layout for each point and speed; the plan says what was asked under a name.
-pub(crate) fn at_speeds<'a>(
-    plan: &'a Plan,
-    speeds_rpm: &[f64],
-    layout: Layout,
-    (name, asked): (&str, Value),
-) -> Job<'a> {
-    let of_run = Job::of(plan);
-    let mut json = of_run.plan;
-    json[name] = asked;
-    let speeds_rpm = speeds_rpm.to_vec();
-    let speeds = speeds_rpm.len() as u64;
-    Job {
-        plan: json,
-        points: plan.points() * speeds,
-        layout,
-        axis_values: Box::new(move |row| {
-            let mut values = plan.axis_values(row / speeds);
-            values.push(speeds_rpm[(row % speeds) as usize]);
-            values
-        }),
-        ..of_run
     }
 }
 

@@ -22,12 +22,13 @@ mod trace;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use sweep_engine::commands::examples::{self, Examples};
+use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::{
-    boundary, check, compare, export, optimise, parameters, report, require, show as show_engine,
+    boundary, check, compare, examples, export, optimise, parameters, report, require,
+    show as show_engine,
 };
-use sweep_engine::exit::{Error, Exit};
 use sweep_engine::nearest::nearest;
+use sweep_engine::{Error, Exit};
 
 /// Subcommands by what they are for, as help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [

@@ -23,7 +23,6 @@ use washer_model::Machine;
 
 use crate::model::Washer;
 use crate::plan::Plan;
-use sweep_engine::config::NamedValues;
 
 pub use sweep_engine::config::{Diagnostics, Mistake};
 pub(crate) use sweep_engine::config::{check_columns, not_numbers, other_length};
@@ -38,18 +37,6 @@ pub type GridInput = sweep_engine::GridInput<Washer>;
 /// Every mistake found, in one pass.
 pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
     GridInput::file(path.to_owned(), sets.to_vec()).load()
-}
-
-/// As [`load`], for one point: [`GridInput::load_point`].
-///
-/// # Errors
-/// Every mistake found, in one pass.
-pub(crate) fn load_point(
-    path: &Path,
-    sets: &[String],
-    at: &[String],
-) -> Result<(Plan, NamedValues), Diagnostics> {
-    GridInput::file(path.to_owned(), sets.to_vec()).load_point(at)
 }
 
 pub(crate) use machine::with_one_of_each;

@@ -4,23 +4,21 @@
 mod columns;
 pub(crate) mod summary;
 
-use std::path::{Path, PathBuf};
+use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use lane_ode::Simd;
 use serde_json::{Value, json};
-use washer_model::{Dwell, Endings, Starts, State, Wanted};
+use washer_model::{Dwell, Endings, Starts, State, Wanted, decimal};
 use washer_row::Status;
 
-use crate::columns::at_speeds;
 use crate::engine::{Carried, motions as motions_of};
 use crate::plan::Plan;
-use columns::{DwellColumn, RowOf, columns};
+use columns::{DwellColumn, RowOf};
 use sweep_engine::Error;
-use sweep_engine::columns::row;
-use sweep_engine::store::{Column, Done, Job, Kind as Cells, Layout, axis_columns};
-use sweep_files::{FileKind, key};
+use sweep_engine::columns::{declared, row};
+use sweep_engine::store::{Column, Done};
 
 /// Rows that a thread takes at once, at most: their starts fill lanes. Where rows have more starts
 /// than these, they are fewer: what is kept of a trajectory is 0.1 MB.
@@ -58,53 +56,91 @@ impl Carry {
 }
 
 /// What a kick and the longest time may be.
-pub(crate) const POSITIVE: &str = "a number above 0, at most 1e5";
+const POSITIVE: &str = "a number above 0, at most 1e5";
 
-/// Whether it is that.
-pub(crate) fn is_positive(value: f64) -> bool {
+fn is_positive(value: f64) -> bool {
     value > 0.0 && value <= 1e5
 }
 
+fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value| is_positive(*value));
+    value.ok_or_else(|| format!("expected {POSITIVE}"))
+}
+
 /// How motions are looked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, clap::Args)]
 pub struct Search {
-    /// From where and for how long.
-    pub starts: Starts,
-    /// A motion that is taken along instead of starts at each speed.
+    /// Starts a speed, the disturbed periodic response among them
+    #[arg(long, value_name = "N", default_value_t = 8,
+          value_parser = clap::value_parser!(u64).range(1..=Search::MOST_STARTS))]
+    pub starts: u64,
+    /// Hardest kick, in rad/s of the tub's rocking
+    #[arg(long, value_name = "RAD/S", default_value_t = 6.0, value_parser = positive)]
+    pub kick: f64,
+    /// Take the motion along from speed to speed, up or down, instead of starts at each
+    #[arg(long, value_name = "up|down", conflicts_with_all = ["starts", "kick", "threshold"])]
     pub carry: Option<Carry>,
-    /// How many states once a turn are kept of each motion, a row each.
-    pub sections: usize,
+    /// Look for the smallest kick that does not come back, where there are several motions
+    #[arg(long)]
+    pub threshold: bool,
+    /// Keep so many states of each motion, once a turn: a row each, with its coordinates
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true,
+          value_parser = clap::value_parser!(u64).range(..=256))]
+    pub sections: u64,
+    /// Follow a motion that does not settle for at most this long, in s
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0, value_parser = positive)]
+    pub longest: f64,
+}
+
+impl fmt::Display for Search {
+    /// What differs from the defaults, as it is written on a command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let usual = Starts::default();
+        if let Some(carry) = self.carry {
+            write!(f, " --carry {}", carry.name())?;
+        }
+        if self.starts != usual.count as u64 {
+            write!(f, " --starts {}", self.starts)?;
+        }
+        if self.kick != usual.kick_rad_per_s {
+            write!(f, " --kick {}", decimal(self.kick))?;
+        }
+        if self.longest != usual.longest_s {
+            write!(f, " --longest {}", decimal(self.longest))?;
+        }
+        if self.sections > 0 {
+            write!(f, " --sections {}", self.sections)?;
+        }
+        if self.threshold { f.write_str(" --threshold") } else { Ok(()) }
+    }
 }
 
 impl Search {
     /// Most starts a speed.
-    pub(crate) const MOST_STARTS: i64 = 1024;
+    const MOST_STARTS: u64 = 1024;
 
     /// Refuses what is out of bounds.
     ///
     /// # Errors
     /// [`Error::Option`].
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let Starts { count, kick_rad_per_s, longest_s, .. } = self.starts;
-        let refuse = |option, given: String, expected: &str| {
-            Err(Error::Option { option, given, expected: expected.to_owned() })
-        };
-        if !(1..=Self::MOST_STARTS as usize).contains(&count) {
-            return refuse("starts", count.to_string(), "a number from 1 to 1024");
+        if !(1..=Self::MOST_STARTS).contains(&self.starts) {
+            return Err(Error::option("starts", self.starts, "a number from 1 to 1024"));
         }
-        for (option, value) in [("kick", kick_rad_per_s), ("longest", longest_s)] {
+        for (option, value) in [("kick", self.kick), ("longest", self.longest)] {
             if !is_positive(value) {
-                return refuse(option, value.to_string(), POSITIVE);
+                return Err(Error::option(option, value, POSITIVE));
             }
         }
         Ok(())
     }
 
-    fn json(&self, speeds_rpm: &[f64]) -> Value {
+    /// As a plan says what was asked at these speeds.
+    pub(crate) fn json(&self, speeds_rpm: &[f64]) -> Value {
         let mut json = json!({
             "speed_rpm": speeds_rpm,
-            "longest_s": self.starts.longest_s,
-            "threshold": self.starts.with_threshold,
+            "longest_s": self.longest,
+            "threshold": self.threshold,
         });
         if self.sections > 0 {
             json["sections"] = json!(self.sections);
@@ -112,54 +148,43 @@ impl Search {
         match self.carry {
             Some(carry) => json["carry"] = json!(carry.name()),
             None => {
-                json["starts"] = json!(self.starts.count);
-                json["kick_rad_per_s"] = json!(self.starts.kick_rad_per_s);
+                json["starts"] = json!(self.starts);
+                json["kick_rad_per_s"] = json!(self.kick);
             }
         }
         json
     }
-}
 
-/// The motions of a plan's points at these speeds (rpm), and where their result goes unless it is
-/// said: a row for each point, speed and motion.
-pub(crate) fn motions<'a>(
-    plan: &'a Plan,
-    speeds_rpm: &[f64],
-    search: &Search,
-    out: Option<&Path>,
-) -> (Job<'a>, PathBuf) {
-    let asked = search.json(speeds_rpm);
-    let mut axes = axis_columns(plan);
-    axes.push(Column::new("speed_rpm", "rpm", "constant spin of the shaft", Cells::Axis));
-    let layout = Layout {
-        axes,
-        columns: columns(plan, search.sections).into_iter().map(|column| column.declared).collect(),
-        kind: FileKind::Dwell,
-        rows_a_point: speeds_rpm.len() as u64,
-        has_several: true,
-        metadata: vec![(key::DWELL, asked.clone())],
-    };
-    let default = || PathBuf::from(format!("results/{}-dwell.parquet", plan.name));
-    let job = at_speeds(plan, speeds_rpm, layout, ("dwell", asked));
-    (job, out.map_or_else(default, Path::to_owned))
+    /// The columns of a file.
+    pub(crate) fn columns(&self, plan: &Plan) -> Vec<Column> {
+        declared(columns::columns(plan, self.sections > 0))
+    }
 }
 
 /// What the engine is asked for.
 pub(crate) struct Motions {
     search: Search,
+    starts: Starts,
     columns: Vec<DwellColumn>,
 }
 
 impl Motions {
-    pub(crate) fn new(plan: &Plan, mut search: Search) -> Self {
+    pub(crate) fn new(plan: &Plan, search: Search) -> Self {
         // A motion that goes on for ever has no times and no windows.
-        search.starts.wanted = Wanted {
+        let wanted = Wanted {
             root_mean_squares: false,
             turns: false,
             clash_time: false,
             ..plan.model.measures.wanted()
         };
-        Self { columns: columns(plan, search.sections), search }
+        let starts = Starts {
+            count: if search.carry.is_some() { 1 } else { search.starts as usize },
+            kick_rad_per_s: search.kick,
+            longest_s: search.longest,
+            with_threshold: search.threshold,
+            wanted,
+        };
+        Self { search, starts, columns: columns::columns(plan, search.sections > 0) }
     }
 
     /// Rows that a thread takes at once, of its share and of a number of speeds a point.
@@ -167,9 +192,7 @@ impl Motions {
         match self.search.carry {
             // The motion goes through all speeds of its point.
             Some(_) => speeds * (share / speeds).clamp(1, MOST_AT_ONCE),
-            None => {
-                share.min(STARTS_AT_ONCE / self.search.starts.count as u64).clamp(1, MOST_AT_ONCE)
-            }
+            None => share.min(STARTS_AT_ONCE / self.search.starts).clamp(1, MOST_AT_ONCE),
         }
     }
 
@@ -190,12 +213,9 @@ impl Motions {
         let Some(carry) = self.search.carry else {
             let dwells: Vec<(Dwell<'_>, Carried)> =
                 asked.iter().map(|(_, dwell)| (*dwell, None)).collect();
-            let found = self.ask(simd, &dwells, is_stopped);
-            return asked
-                .iter()
-                .zip(found)
-                .map(|((row, _), found)| self.done(*row, found))
-                .collect();
+            let found = motions_of(simd, &dwells, &self.starts, is_stopped);
+            let each = asked.iter().zip(found);
+            return each.map(|((row, _), found)| self.done(*row, found)).collect();
         };
         let speeds = speeds_rpm.len() as u64;
         let mut done = Vec::with_capacity(asked.len());
@@ -205,20 +225,19 @@ impl Motions {
         for step in 0..speeds {
             let place = if carry == Carry::Up { step } else { speeds - 1 - step };
             // Speeds before the first that is asked for lead to it.
-            let is_needed = |group: &[(u64, Dwell<'_>)]| {
-                let is_further = |row: &u64| match carry {
-                    Carry::Up => row % speeds >= place,
-                    Carry::Down => row % speeds <= place,
-                };
-                group.iter().any(|(row, _)| is_further(row))
+            let is_further = |(row, _): &(u64, Dwell<'_>)| match carry {
+                Carry::Up => row % speeds >= place,
+                Carry::Down => row % speeds <= place,
             };
-            let needed: Vec<usize> = (0..groups.len()).filter(|&k| is_needed(groups[k])).collect();
+            let is_needed = |k: &usize| groups[*k].iter().any(is_further);
+            let needed: Vec<usize> = (0..groups.len()).filter(is_needed).collect();
             let dwell = |k: &usize| {
                 let speed_rpm = speeds_rpm[place as usize];
                 (Dwell { point: groups[*k][0].1.point, speed_rpm }, carried[*k])
             };
             let dwells: Vec<(Dwell<'_>, Carried)> = needed.iter().map(dwell).collect();
-            for (k, found) in needed.into_iter().zip(self.ask(simd, &dwells, is_stopped)) {
+            let found = motions_of(simd, &dwells, &self.starts, is_stopped);
+            for (k, found) in needed.into_iter().zip(found) {
                 carried[k] = found.as_ref().ok().and_then(last_state);
                 let row = groups[k][0].0 / speeds * speeds + place;
                 if groups[k].iter().any(|(asked, _)| *asked == row) {
@@ -229,31 +248,15 @@ impl Motions {
         done
     }
 
-    fn ask(
-        &self,
-        simd: Simd,
-        dwells: &[(Dwell<'_>, Carried)],
-        is_stopped: &dyn Fn() -> bool,
-    ) -> Vec<Result<Endings, Status>> {
-        let mut starts = self.search.starts;
-        if self.search.carry.is_some() {
-            starts.count = 1;
-        }
-        motions_of(simd, dwells, &starts, is_stopped)
-    }
-
-    fn with_last_sections(&self, mut found: Endings) -> Endings {
-        for motion in &mut found.motions {
-            let others = motion.sections.len().saturating_sub(self.search.sections);
-            motion.sections.drain(..others);
-        }
-        found
-    }
-
     fn done(&self, number: u64, found: Result<Endings, Status>) -> Done {
         match found {
-            Ok(found) => {
-                let found = Arc::new(self.with_last_sections(found));
+            Ok(mut found) => {
+                for motion in &mut found.motions {
+                    let others =
+                        motion.sections.len().saturating_sub(self.search.sections as usize);
+                    motion.sections.drain(..others);
+                }
+                let found = Arc::new(found);
                 let turns = |motion: usize| 0..found.motions[motion].sections.len().max(1);
                 let places = (0..found.motions.len())
                     .flat_map(|motion| turns(motion).map(move |turn| (motion, turn)));

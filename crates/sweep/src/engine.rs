@@ -10,17 +10,18 @@ pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
 pub(crate) use sweep_engine::{Engine, Watch};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Mutex, OnceLock};
+use std::sync::Mutex;
 
 use ladder::ladder;
 use lane_ode::Simd;
+use once_cell::sync::OnceCell;
 use pool::{Feed, Keep, Pool, Shared};
 use washer_model::{Cases, Machine, Method, Point, Spin, Timing, prepare};
 use washer_row::{Demand, Ladder, Level, MODELS, Outcome, Rule, RungRun, Status, runs};
 
 use crate::columns::Columns;
 use crate::plan::{Plan, Scenario};
-use sweep_engine::interrupt::Interrupt;
+use sweep_engine::Interrupt;
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::store::Done;
 use sweep_files::panics::{lock, unlocked};
@@ -60,9 +61,7 @@ pub struct ModelEngine<'a> {
     timing: Timing,
     rule: Rule,
     /// The ladders of both models; found when first asked for.
-    ladders: OnceLock<[Ladder; 2]>,
-    /// Held by the thread that finds them.
-    finding: Mutex<()>,
+    ladders: OnceCell<[Ladder; 2]>,
 }
 
 /// The instruction set that `SWEEP_SIMD` asks for, else the best.
@@ -101,8 +100,8 @@ impl<'a> ModelEngine<'a> {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
-        let (forced, ladders) = (forced_simd()?, OnceLock::new());
-        Ok(Self { plan, forced, timing, rule: rule(plan), ladders, finding: Mutex::new(()) })
+        let forced = forced_simd()?;
+        Ok(Self { plan, forced, timing, rule: rule(plan), ladders: OnceCell::new() })
     }
 
     /// As [`Self::new`], with the rungs of another engine.
@@ -110,7 +109,7 @@ impl<'a> ModelEngine<'a> {
     /// # Errors
     /// As there.
     pub(crate) fn with_ladders(plan: &'a Plan, ladders: [Ladder; 2]) -> Result<Self, EngineError> {
-        Ok(Self { ladders: OnceLock::from(ladders), ..Self::new(plan)? })
+        Ok(Self { ladders: OnceCell::with_value(ladders), ..Self::new(plan)? })
     }
 
     /// What it computes.
@@ -130,16 +129,13 @@ impl<'a> ModelEngine<'a> {
 
     /// As [`Self::ladders`]; `None` if `watch` says to stop before they are found.
     fn ladders_under(&self, watch: &Watch<'_>) -> Option<&[Ladder; 2]> {
-        if let Some(found) = self.ladders.get() {
-            return Some(found);
-        }
-        let _one_thread = lock(&self.finding);
-        if let Some(found) = self.ladders.get() {
-            return Some(found);
-        }
-        let found = self.find_ladders(&|| watch.stopped());
-        // They may have been cut short.
-        if watch.stopped() { None } else { Some(self.ladders.get_or_init(|| found)) }
+        // The standard library's cell has no `get_or_try_init` yet.
+        let find = || {
+            let found = self.find_ladders(&|| watch.stopped());
+            // They may have been cut short.
+            if watch.stopped() { Err(()) } else { Ok(found) }
+        };
+        self.ladders.get_or_try_init(find).ok()
     }
 
     /// How the trajectories of a row of this level were integrated; `None` where modes were not

@@ -11,10 +11,10 @@ use washer_row::{Demand, Deviations, Ladder, Metric, Outcome};
 use crate::engine::{Engine, EngineError, MOST_WAITING, ModelEngine, ROWS_A_THREAD, Watch};
 use crate::plan::Plan;
 use sweep_engine::estimate::Estimate;
-use sweep_engine::interrupt::Interrupt;
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::plan::shortest_step_s;
-use sweep_engine::store::{Job, Shape, chunk_points};
+use sweep_engine::store::{Shape, chunk_points};
+use sweep_engine::{Interrupt, Job};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long.
 const LONG_ENOUGH: Duration = Duration::from_millis(60);

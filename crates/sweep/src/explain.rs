@@ -9,16 +9,15 @@ pub(crate) mod words;
 use lane_ode::Simd;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use washer_model::{
-    Beyond, Cases, Channel, Crossed, Crossing, LeftRange, NoEquilibrium, Point, Response, Timing,
-    cross, modes, peaks_without_departures, prepare,
+    Cases, Channel, Crossed, Crossing, LeftRange, NoEquilibrium, Point, Response, Timing, cross,
+    modes, peaks_without_departures, prepare,
 };
 
 use crate::engine::{ModelEngine, Watch, reference_step_s};
 use crate::plan::{Plan, Scenario};
 use crate::speeds::Speeds;
 use sweep_engine::config::NamedValues;
-use sweep_engine::exit::Error;
-use sweep_engine::interrupt::Interrupt;
+use sweep_engine::{Error, Interrupt};
 
 use sweep_parameter::RatioLimits;
 use tongue::{Asker, Seen, tongues};
@@ -40,14 +39,8 @@ pub(crate) struct Explanation {
     pub(crate) at: NamedValues,
     /// The swept verdict.
     pub(crate) swept: Swept,
-    /// The speeds that were looked at.
-    pub(crate) looked: Speeds,
-    /// How many of them have no response.
-    pub(crate) without_response: usize,
-    /// Speeds (rpm) at which a machine that runs up leaves its branch of responses.
-    pub(crate) jumps_rpm: Vec<f64>,
-    /// Speeds (rpm) at which the response passes the machine's geometry, and what of it.
-    pub(crate) beyond: Vec<(f64, Beyond)>,
+    /// What is seen beside tongues.
+    pub(crate) seen: Seen,
     /// From lowest to fastest speed of the profile within the run (rpm).
     pub(crate) profile_rpm: [f64; 2],
     /// Each, with the times at which the run crosses it.
@@ -122,7 +115,7 @@ pub(crate) fn explain(
         Asker { simd, plan, scenario: &scenario, point: &point, interrupt, followed: Vec::new() };
     asker.follow(looked.to.max(profile_rpm[1]));
     let (seen, swept) = rayon::join(|| tongues(&asker, looked), || swept(plan, interrupt));
-    let (Seen { tongues: found, without_response, jumps_rpm, beyond }, swept) = (seen, swept?);
+    let ((found, seen), swept) = (seen, swept?);
     let ((crossings, ends_in), closings) = rayon::join(
         || rayon::join(|| crossings(&asker, &found, &swept), || tongue::ends_in(&asker, &found)),
         || found.par_iter().map(|tongue| tongue.closing(&asker)).collect::<Vec<_>>(),
@@ -135,10 +128,7 @@ pub(crate) fn explain(
     Ok(Explanation {
         name: plan.name.clone(),
         at,
-        looked,
-        without_response,
-        jumps_rpm,
-        beyond,
+        seen,
         profile_rpm,
         tongues: tongues.collect(),
         without_departures,

@@ -23,16 +23,15 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
-use washer_model::{Method, ModelKind, Parameter, Target};
+use washer_model::{Method, ModelKind, Parameter, Range, Target};
 
 use crate::config::GridInput;
 use crate::engine::simd_from_environment;
-use sweep_engine::config::Diagnostics;
 use sweep_engine::config::report::{Diagnostic, Report as Mistakes};
 use sweep_engine::config::source::Location;
 use sweep_engine::design::{Design, Distribution, Shape};
-use sweep_engine::exit::{Error, tell};
 use sweep_engine::threads::Stop;
+use sweep_engine::{Diagnostics, Error, tell};
 
 use algebra::Symmetric;
 use journal::Journal;
@@ -56,23 +55,38 @@ const HALVINGS: usize = 2;
 const MOST_AT_START: f64 = 0.1;
 
 /// What is asked of a fit.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct FitOptions {
-    /// Parameters to fit: `NAME` or `NAME=FROM:TO`.
+    /// Parameters to fit, each perhaps between two values; separated by commas
+    #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
     pub free: Vec<String>,
-    /// Parameters of which every measurement has its own.
+    /// Parameters of which every file has its own
+    #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
     pub own: Vec<String>,
-    /// The linear model instead of the nonlinear one.
-    pub linear: bool,
-    /// Whether each measurement's clock may be off.
-    pub with_shift: bool,
-    /// How many starts are looked at.
-    pub starts: usize,
-    /// How many times the fit is repeated with resampled residuals.
-    pub bootstrap: usize,
-    /// Rows of the map over the fitted distribution; none if 0.
-    pub draws: u64,
+    /// Fit the nonlinear model, or the linear one
+    #[arg(long, value_name = "MODEL", default_value = NONLINEAR)]
+    #[arg(value_parser = [NONLINEAR, LINEAR])]
+    pub model: String,
+    /// Take the clock of every file as it is, instead of fitting a shift of it
+    #[arg(long)]
+    pub no_shift: bool,
+    /// Starts that are looked at for further minima
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub starts: u32,
+    /// Fit again so many times with resampled residuals
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    pub bootstrap: u32,
+    /// Rows of the map over the fitted distribution, for the verdict's probability; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub draws: u32,
 }
+
+/// The models that can be fitted.
+const NONLINEAR: &str = "nonlinear";
+const LINEAR: &str = "linear";
 
 /// Why there is no fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -146,79 +160,74 @@ fn middle(grid: &GridInput, constants: &[String]) -> Result<Vec<String>, Diagnos
 fn free(options: &FitOptions, cases: &[Case]) -> Result<Vec<Free>, Diagnostics> {
     let mistakes = Mistakes::default();
     let mut found: Vec<Free> = Vec::new();
-    let shared = options.free.iter().map(|text| (text, "--free", 1));
-    let own = options.own.iter().map(|text| (text, "--own", cases.len()));
-    for (text, option, count) in shared.chain(own) {
-        let source = mistakes.add(option, text.as_str());
-        let (name, range) = match text.split_once('=') {
-            Some((name, range)) => (name.trim(), Some(range)),
-            None => (text.trim(), None),
-        };
-        let at = Location::new(source, 0..text.len());
-        let refuse = |title: String, expected: &str| {
-            mistakes.push(Diagnostic::new(title).at(&at, expected));
-        };
-        for k in 0..count {
-            let model = &cases[k].plan.model;
-            let spin = cases[k].spin();
-            let parameter = match Parameter::find(name, &model.machine, spin) {
-                Ok(parameter) if !matches!(parameter.target(), Target::Window(_)) => parameter,
-                Ok(_) => {
-                    refuse(format!("`{name}` is no number of the machine"), "expected another");
-                    break;
-                }
-                Err(error) => {
-                    let known = Parameter::all(&model.machine, spin);
-                    let title = format!("`{name}` cannot be fitted: {error}");
-                    let refusal = Diagnostic::new(title).at(&at, "expected a parameter");
-                    mistakes.push(refusal.nearest(name, known.iter().map(|known| known.name())));
-                    break;
-                }
-            };
-            if found.iter().any(|free| free.parameter == parameter && count == 1) {
-                refuse(format!("`{name}` is free twice"), "expected each once");
-                break;
-            }
-            let least = match parameter.range() {
-                washer_model::Range::Within(from, to) => [from, to],
-                washer_model::Range::NonNegative | washer_model::Range::Positive => {
-                    [0.0, f64::INFINITY]
-                }
-                washer_model::Range::Negative => [f64::NEG_INFINITY, 0.0],
-                washer_model::Range::Any => [f64::NEG_INFINITY, f64::INFINITY],
-            };
-            let parsed = range.map(|range| {
-                let (from, to) = range.split_once(':')?;
-                let (from, to) = (from.trim().parse().ok()?, to.trim().parse().ok()?);
-                let within = least[0] <= from && from < to && to <= least[1];
-                (within && f64::is_finite(from) && f64::is_finite(to)).then_some([from, to])
-            });
-            let range = match parsed {
-                Some(Some(range)) => range,
-                Some(None) => {
-                    let title = format!("`{text}` is no range");
-                    refuse(title, "expected NAME=FROM:TO with FROM below TO, both allowed");
-                    break;
-                }
-                None => least,
-            };
-            let known = parameter.get(&model.machine, spin);
-            let inside = known.filter(|value| (range[0]..=range[1]).contains(value));
-            let bounded = range.iter().all(|end| end.is_finite()) && parsed.is_some();
-            let start = match inside {
-                Some(value) if value != 0.0 || bounded => value,
-                _ if bounded => 0.5 * (range[0] + range[1]),
-                _ => {
-                    let title = format!("`{name}` has no value to start from");
-                    refuse(title, "expected a range, NAME=FROM:TO, or a value by --set");
-                    break;
-                }
-            };
-            let case = (option == "--own").then_some(k);
-            found.push(Free { parameter, range, start, case });
+    let shared = options.free.iter().map(|text| (text, "--free", &cases[..1]));
+    let own = options.own.iter().map(|text| (text, "--own", cases));
+    for (text, option, cases) in shared.chain(own) {
+        let at = Location::new(mistakes.add(option, text.as_str()), 0..text.len());
+        for (k, case) in cases.iter().enumerate() {
+            let known: &[Free] = if cases.len() == 1 { &found } else { &[] };
+            let Some(free) = free_number(text, case, known, (&at, &mistakes)) else { break };
+            found.push(Free { case: (option == "--own").then_some(k), ..free });
         }
     }
     mistakes.finish(found)
+}
+
+/// One of them, of a case, beside those that are known; what is wrong with it is reported.
+fn free_number(
+    text: &str,
+    case: &Case,
+    known: &[Free],
+    (at, mistakes): (&Location, &Mistakes),
+) -> Option<Free> {
+    let refuse = |title: String, expected: &str| mistakes.refuse(at, title, expected);
+    let (name, range) = match text.split_once('=') {
+        Some((name, range)) => (name.trim(), Some(range)),
+        None => (text.trim(), None),
+    };
+    let (machine, spin) = (&case.plan.model.machine, case.spin());
+    let parameter = match Parameter::find(name, machine, spin) {
+        Ok(parameter) if !matches!(parameter.target(), Target::Window(_)) => parameter,
+        Ok(_) => {
+            return refuse(format!("`{name}` is no number of the machine"), "expected another");
+        }
+        Err(error) => {
+            let known = Parameter::all(machine, spin);
+            let title = format!("`{name}` cannot be fitted: {error}");
+            let refusal = Diagnostic::new(title).at(at, "expected a parameter");
+            mistakes.push(refusal.nearest(name, known.iter().map(|known| known.name())));
+            return None;
+        }
+    };
+    if known.iter().any(|free| free.parameter == parameter) {
+        return refuse(format!("`{name}` is free twice"), "expected each once");
+    }
+    let allowed = match parameter.range() {
+        Range::Within(from, to) => [from, to],
+        Range::NonNegative | Range::Positive => [0.0, f64::INFINITY],
+        Range::Negative => [f64::NEG_INFINITY, 0.0],
+        Range::Any => [f64::NEG_INFINITY, f64::INFINITY],
+    };
+    let parsed = range.map(|range| {
+        let (from, to) = range.split_once(':')?;
+        let [from, to] = [from.trim().parse().ok()?, to.trim().parse().ok()?];
+        let within = allowed[0] <= from && from < to && to <= allowed[1];
+        (within && f64::is_finite(from) && f64::is_finite(to)).then_some([from, to])
+    });
+    let Some(range) = parsed.unwrap_or(Some(allowed)) else {
+        let expected = "expected NAME=FROM:TO with FROM below TO, both allowed";
+        return refuse(format!("`{text}` is no range"), expected);
+    };
+    let value = parameter.get(machine, spin).filter(|it| (range[0]..=range[1]).contains(it));
+    let start = match value {
+        _ if parsed.is_some() => Some(value.unwrap_or(0.5 * (range[0] + range[1]))),
+        value => value.filter(|value| *value != 0.0),
+    };
+    let Some(start) = start else {
+        let expected = "expected a range, NAME=FROM:TO, or a value by --set";
+        return refuse(format!("`{name}` has no value to start from"), expected);
+    };
+    Some(Free { parameter, range, start, case: None })
 }
 
 /// Fits; `None` if it was stopped. On all threads of the rayon pool it is called in.
@@ -232,9 +241,9 @@ pub(crate) fn fit(
 ) -> Result<Option<Fitted>, Error> {
     let free = free(options, &cases)?;
     let method = Problem::method(&cases).map_err(Error::model)?;
-    let model = if options.linear { ModelKind::Linear } else { ModelKind::Nonlinear };
+    let model = if options.model == LINEAR { ModelKind::Linear } else { ModelKind::Nonlinear };
     let simd = simd_from_environment()?;
-    let with_shift = options.with_shift;
+    let with_shift = !options.no_shift;
     let mut problem = Problem { cases, free, model, with_shift, method, simd };
     let samples: usize = problem.cases.iter().map(|case| case.measured.count()).sum();
     let unknowns = problem.unknowns() + problem.signals().count();
@@ -252,7 +261,7 @@ pub(crate) fn fit(
     let journal = journal.map(|path| open(path, &problem)).transpose()?;
     let made = AtomicUsize::new(0);
     let search = Search { problem: &problem, journal: journal.as_ref(), work, made: &made };
-    let Ok(minima) = search.minima(options.starts) else { return Ok(None) };
+    let Ok(minima) = search.minima(u64::from(options.starts)) else { return Ok(None) };
     let mut minima = minima.map_err(Error::model)?;
     if minima.is_empty() {
         return Err(Error::model(FitError::NoAnswer));
@@ -300,13 +309,13 @@ pub(crate) fn fit(
             .map(|nonlinear| effect(&statistics.covariance, &best.summary, &against, &nonlinear));
         problem.model = ModelKind::Linear;
     }
-    let repeated = match options.bootstrap {
-        0 => None,
-        count => match bootstrap(&mut problem, &best.x, &against, count, work) {
-            Some(repeated) => Some(repeated),
-            None => return Ok(None),
-        },
-    };
+    let mut repeated = None;
+    if options.bootstrap > 0 {
+        repeated = bootstrap(&mut problem, &best.x, &against, options.bootstrap, work);
+        if repeated.is_none() {
+            return Ok(None);
+        }
+    }
     let found = report::Found {
         problem: &problem,
         minima: &minima,
@@ -316,8 +325,10 @@ pub(crate) fn fit(
         evaluations,
         step_effect,
         repeated: repeated.as_deref(),
+        draws: options.draws.into(),
+        stop: work.stop,
     };
-    let report = found.report(options.draws, work.stop)?;
+    let report = found.report()?;
     if (work.stop)() {
         return Ok(None);
     }
@@ -409,14 +420,14 @@ fn bootstrap(
     problem: &mut Problem,
     x: &[f64],
     against: &[Against],
-    count: usize,
+    count: u32,
     work: &Work<'_>,
 ) -> Option<Vec<Vec<f64>>> {
     const BLOCK: usize = 100;
     let measured = problem.cases.clone();
     let draw = Design::MonteCarlo { points: 0, seed: SEED };
     let mut drawn = 0;
-    let mut found = Vec::with_capacity(count);
+    let mut found = Vec::new();
     for _ in 0..count {
         for one in against {
             let residual = &one.residual;
@@ -476,7 +487,7 @@ impl Search<'_> {
     }
 
     /// Every minimum that is found from so many starts, the least first.
-    fn minima(&self, starts: usize) -> Result<Result<Vec<Descent>, FitError>, Stopped> {
+    fn minima(&self, starts: u64) -> Result<Result<Vec<Descent>, FitError>, Stopped> {
         let start = self.problem.start();
         let dead = |summary: &Summary| {
             let dead = |k: &usize| summary.normal[*k][*k] == 0.0;
@@ -490,19 +501,16 @@ impl Search<'_> {
         }
         let mut chosen = vec![start.clone()];
         if starts > 1 {
-            let design = Design::LatinHypercube { points: starts as u64 - 1, seed: SEED };
+            let design = Design::LatinHypercube { points: starts - 1, seed: SEED };
             let place = |point: u64, k: usize| {
-                let free = &self.problem.free[k];
-                let around = AROUND.map(|share| share * free.start);
-                let ends = free.range.iter().zip(around);
-                let ends: Vec<f64> =
-                    ends.map(|(end, near)| if end.is_finite() { *end } else { near }).collect();
-                let bounded = free.range.iter().all(|end| end.is_finite());
+                let Free { range, start, .. } = &self.problem.free[k];
+                let around = AROUND.map(|share| share * start);
+                let is_bounded = range.iter().all(|end| end.is_finite());
                 let [from, to] =
-                    if bounded { free.range } else { [around[0].max(ends[0]), around[1]] };
+                    if is_bounded { *range } else { [around[0].max(range[0]), around[1]] };
                 from + design.place(point, k).unwrap_or(0.5) * (to - from)
             };
-            let sets: Vec<Vec<f64>> = (0..starts as u64 - 1)
+            let sets: Vec<Vec<f64>> = (0..starts - 1)
                 .map(|point| {
                     let mut x = start.clone();
                     (0..self.problem.free.len()).for_each(|k| x[k] = place(point, k));

@@ -79,5 +79,6 @@ pub use sweep_engine::store::{
     Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, State, StoreError, status,
 };
 pub use sweep_engine::{Error, Exit, Interrupt, survive_file_size_limits, tell};
+pub use trace::Extras as TraceExtras;
 pub use washer_model::Starts;
 pub use washer_row::{Floor, Outcome, Status, Trajectory, Verdict};

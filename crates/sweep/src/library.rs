@@ -3,36 +3,42 @@
 //! Functions that may take long take an [`Interrupt`](crate::Interrupt). Raised from another
 //! thread, it ends the work in a fraction of a second.
 
-pub(crate) mod boundary;
 mod evaluate;
 mod explain;
 mod fit;
 pub(crate) mod modes;
-mod optimise;
-pub(crate) mod parameters;
 mod points;
 mod result;
 mod run;
+mod search;
 mod stability;
 mod trace;
 
-pub use boundary::{BoundaryOptions, find_boundary};
 pub use evaluate::{Evaluated, Evaluator};
 pub use explain::{Explained, explain_point};
 pub use fit::fit_tables;
 pub use modes::find_modes;
-pub use optimise::optimise_study;
-pub use parameters::list_parameters;
 pub use points::PointTable;
 pub use result::ResultTable;
 pub use run::{RanToFile, run_to_file};
+pub use search::{BoundaryOptions, find_boundary, optimise_study};
 pub use stability::{find_held, held_to_file};
 pub use trace::{TraceOptions, trace_point};
 
+use sweep_engine::commands::parameters::as_json;
 pub use sweep_engine::effort::Effort;
-use sweep_engine::exit::Error;
+use sweep_engine::{Error, Swept as _};
 
+use crate::model::Washer;
+use crate::plan::Plan;
 use crate::speeds::MOST_SPEEDS;
+
+/// Every number that can be set or swept as a JSON array of objects: `name`, `value`, `unit`,
+/// `description`, `range` and `source`. The values are the plan's, before its axes; without a plan
+/// those of the built-in machine.
+pub fn list_parameters(plan: Option<&Plan>) -> String {
+    as_json(&Washer::listed(plan))
+}
 
 /// Speeds that make no sense.
 fn refused_speeds(count: usize, expected: String) -> Error {

@@ -15,8 +15,8 @@ use crate::engine::{CHECKPOINTS, ModelEngine, rule};
 use crate::method::Integrator;
 use crate::model::Washer;
 use crate::plan::{Axis, AxisValues, Plan, corners_of_forces, timing};
-use sweep_engine::exit::Error;
-use sweep_engine::method::{ACCURACY, Integrator as _, Steps};
+use sweep_engine::Error;
+use sweep_engine::method::ACCURACY;
 use sweep_engine::store::read::overview;
 
 /// What a page says of the metric dwell, and of growth with friction or stops.
@@ -101,6 +101,9 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     let further = sliders.iter().map(|(parameter, from, to)| {
         slider(parameter, *from, *to, parameter.get(&plan.model.machine, &plan.model.spin))
     });
+    let criterion = plan.model.measures.criterion;
+    // What a column has where there is no ratio is not a page's.
+    let ratio = criterion.ratio().split(';').next().unwrap_or_default();
     Ok(Live {
         setup: setup.to_numbers(),
         sliders: plan.axes.iter().map(axis).chain(further).collect(),
@@ -108,12 +111,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         end_s: plan.end_s,
         window_s: plan.window_s,
         channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
-        criterion: {
-            let criterion = plan.model.measures.criterion;
-            // What a column has where there is no ratio is not a page's.
-            let ratio = criterion.ratio().split(';').next().unwrap_or_default();
-            [criterion.amplitude(), ratio].map(str::to_owned)
-        },
+        criterion: [criterion.amplitude(), ratio].map(str::to_owned),
         metrics: plan.model.measures.of_model().map(columns).collect(),
         growth_speeds_rpm,
         has_slow_growth,
@@ -194,24 +192,16 @@ fn take_growth(plan: &mut Plan) -> Vec<f64> {
     speeds.map_or_else(Vec::new, |speeds| speeds.values().to_vec())
 }
 
-/// What checked amplitudes are good for: the map's own accuracy, or the usual one.
-fn accuracy(plan: &Plan) -> f64 {
-    match plan.integrator.steps() {
-        Steps::Checked(accuracy) => accuracy,
-        Steps::Fixed(_) | Steps::Explicit | Steps::Implicit => ACCURACY.default,
-    }
-}
-
 type Range = (Parameter, f64, f64);
 
 /// The usual sliders: about the plan's values, as far as machines can be.
 fn usual(plan: &Plan) -> Vec<Range> {
     let is_axis = |name: &str| plan.axes.iter().any(|axis| axis.parameter.name() == name);
     let offered = OFFERED.into_iter().filter(|name| !is_axis(name));
+    let Washer { machine, spin, .. } = &plan.model;
     let range = |name| {
-        let parameter = Parameter::find(name, &plan.model.machine, &plan.model.spin).ok()?;
-        let value =
-            parameter.get(&plan.model.machine, &plan.model.spin).filter(|value| *value != 0.0)?;
+        let parameter = Parameter::find(name, machine, spin).ok()?;
+        let value = parameter.get(machine, spin).filter(|value| *value != 0.0)?;
         let ends = [(1.0 - SPREAD) * value, (1.0 + SPREAD) * value];
         let [from, to] = if value > 0.0 { ends } else { [ends[1], ends[0]] };
         let range = (parameter, from, to);
@@ -231,14 +221,13 @@ fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Range>, Error> {
         let has_slider = plan.axes.iter().any(|axis| axis.parameter == parameter)
             || found.iter().any(|(other, ..)| *other == parameter);
         let is_spread = parameter.get(&plan.model.machine, &plan.model.spin).is_none();
-        let beyond = [*from, *to].into_iter().find(|end| !parameter.range().contains(*end));
+        let range = parameter.range();
+        let beyond = [*from, *to].into_iter().find(|end| !range.contains(*end));
         found.push((parameter, *from, *to));
         let expected = match beyond {
             _ if has_slider => "a parameter that has no slider yet".to_owned(),
             _ if is_spread => "a parameter that has one value in this map".to_owned(),
-            Some(end) => {
-                format!("{} at both ends", found[found.len() - 1].0.range().instead_of(end))
-            }
+            Some(end) => format!("{} at both ends", range.instead_of(end)),
             None if found.len() > MOST_SLIDERS => format!("at most {MOST_SLIDERS} sliders"),
             None if !is_sound(plan, &found) => "values that a machine can have together".to_owned(),
             None => continue,
@@ -270,16 +259,15 @@ fn widened(plan: &Plan, sliders: &[Range]) -> Plan {
 
 /// The setup, and the rungs of both models in words.
 fn setup(plan: &Plan, sliders: &[Range]) -> Result<(Setup, [Vec<String>; 2]), Error> {
-    // By the fast method, whatever the map's.
-    let accuracy = accuracy(plan);
+    // By the fast method, whatever the map's; as accurate as that, or as usual.
+    let own = rule(plan).accuracy;
+    let accuracy = if own.is_finite() { own } else { ACCURACY.default };
     let plan = &Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
     let ladders = ModelEngine::new(plan)?.ladders().clone();
     let wide = widened(plan, sliders);
     let wide_ladders = ModelEngine::new(&wide)?.ladders().clone();
-    let models = [(&ladders[0], ModelKind::Nonlinear), (&ladders[1], ModelKind::Linear)];
-    let words = models.map(|(ladder, model)| {
-        ladder.rungs.iter().map(|rung| rung.describe(model)).collect::<Vec<String>>()
-    });
+    let words = [(&ladders[0], ModelKind::Nonlinear), (&ladders[1], ModelKind::Linear)]
+        .map(|(ladder, model)| ladder.rungs.iter().map(|rung| rung.describe(model)).collect());
     let parameters = wide.axes.iter().map(|axis| axis.parameter.clone()).collect();
     let setup = Setup {
         machine: plan.model.machine.clone(),

@@ -35,17 +35,7 @@ impl FromStr for Speeds {
         let Some([from, to, step]) = numbers.as_deref() else {
             return Err("expected FROM:TO:STEP in rpm, as in 0:1200:10".to_owned());
         };
-        let (from, to, step) = (*from, *to, *step);
-        let count = (to - from) / step;
-        if !(from >= 0.0 && to > from && step > 0.0 && to.is_finite()) {
-            return Err(
-                "expected speeds of 0 rpm or more, TO above FROM, and a STEP above 0".to_owned()
-            );
-        }
-        if count > MOST_SPEEDS {
-            return Err(format!("these are {count:.0} speeds, expected at most {MOST_SPEEDS}"));
-        }
-        Ok(Self { from, to, step })
+        Self::new(*from, *to, *step).judged()
     }
 }
 
@@ -55,14 +45,24 @@ impl Speeds {
         Self { from, to, step }
     }
 
+    fn judged(self) -> Result<Self, String> {
+        let Self { from, to, step } = self;
+        let count = (to - from) / step;
+        if !(from >= 0.0 && to > from && step > 0.0 && to.is_finite()) {
+            return Err(
+                "expected speeds of 0 rpm or more, TO above FROM, and a STEP above 0".to_owned()
+            );
+        }
+        if count > MOST_SPEEDS {
+            return Err(format!("these are {count:.0} speeds, expected at most {MOST_SPEEDS}"));
+        }
+        Ok(self)
+    }
+
     /// The even speeds whose [`Self::values`] are these, but for rounding.
     pub(crate) fn of_values(speeds_rpm: &[f64]) -> Option<Self> {
         let (&[from, second, ..], &[.., to]) = (speeds_rpm, speeds_rpm) else { return None };
-        let speeds = Self::new(from, to, second - from);
-        let is_range = from >= 0.0 && to > from && speeds.step > 0.0 && to.is_finite();
-        if !(is_range && (to - from) / speeds.step <= MOST_SPEEDS) {
-            return None;
-        }
+        let speeds = Self::new(from, to, second - from).judged().ok()?;
         let alike = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * to;
         let values = speeds.values();
         let is_even = values.len() == speeds_rpm.len() && values.iter().zip(speeds_rpm).all(alike);

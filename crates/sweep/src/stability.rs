@@ -7,19 +7,19 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use lane_ode::Simd;
+use serde_json::json;
 use washer_model::{Dwell, Machine, Point, Response, Spin, Target, Timing, prepare};
 use washer_row::{Growth, Outcome, Status, Trajectory};
 
-use crate::columns::{self, Columns};
-use crate::dwell::Motions;
+use crate::columns::Columns;
+use crate::dwell::{Motions, Search};
 use crate::engine::{
     Engine, EngineError, Watch, responses, simd_from_environment, together_or_alone,
 };
 use crate::plan::Plan;
-use crate::speeds::SpeedList;
-use serde_json::json;
-use sweep_engine::exit::Error;
-use sweep_engine::store::{Done, Job};
+use sweep_engine::store::{Column, Done, Kind, Layout, axis_columns};
+use sweep_engine::{Error, Job};
+use sweep_files::{FileKind, key};
 
 /// Rows that a thread takes at once: those of enough points to fill lanes, because a point's rows
 /// share its curve of responses; but no fewer and no more than these.
@@ -59,25 +59,89 @@ pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<()
     Ok(())
 }
 
-/// The dwells of a plan's points at these speeds (rpm), for `sweep stability`: a row for each point
-/// and speed, speeds varying fastest.
-pub(crate) fn job<'a>(plan: &'a Plan, speeds_rpm: &[f64]) -> Job<'a> {
-    let asked = json!({ "speed_rpm": speeds_rpm });
-    columns::at_speeds(plan, speeds_rpm, columns::of_dwells(plan, speeds_rpm), ("stability", asked))
+/// A plan's points at constant speeds, speeds varying fastest: by a search the motions that they
+/// end in, else their periodic responses.
+#[derive(Clone, Copy)]
+pub(crate) struct Held<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) speeds_rpm: &'a [f64],
+    pub(crate) search: Option<Search>,
 }
 
-/// The dwells of a plan at these speeds, and where their result goes unless it is said.
-pub(crate) fn dwells<'a>(
-    plan: &'a Plan,
-    speeds: &SpeedList,
-    out: Option<&Path>,
-) -> (Job<'a>, PathBuf) {
-    let default = || PathBuf::from(format!("results/{}-stability.parquet", plan.name));
-    (job(plan, speeds.values()), out.map_or_else(default, Path::to_owned))
+impl<'a> Held<'a> {
+    const fn kind(&self) -> FileKind<'static> {
+        match self.search {
+            Some(_) => FileKind::Dwell,
+            None => FileKind::Stability,
+        }
+    }
+
+    /// The command that does it.
+    pub(crate) fn verb(&self) -> &'static str {
+        self.kind().word()
+    }
+
+    /// Where its result goes, unless it is said.
+    pub(crate) fn output(&self, out: Option<&Path>) -> PathBuf {
+        let default = || format!("results/{}-{}.parquet", self.plan.name, self.verb()).into();
+        out.map_or_else(default, Path::to_owned)
+    }
+
+    /// A row for each point and speed, or several.
+    pub(crate) fn job(&self) -> Job<'a> {
+        let Self { plan, speeds_rpm, search } = *self;
+        let (columns, asked, metadata) = match search {
+            Some(search) => {
+                let asked = search.json(speeds_rpm);
+                (search.columns(plan), asked.clone(), (key::DWELL, asked))
+            }
+            None => {
+                let asked = json!({ "speed_rpm": speeds_rpm });
+                let metadata = (key::STABILITY, json!({ "speeds_rpm": speeds_rpm }));
+                (Columns::of_dwells(plan).declared(), asked, metadata)
+            }
+        };
+        let mut axes = axis_columns(plan);
+        axes.push(Column::new("speed_rpm", "rpm", "constant spin of the shaft", Kind::Axis));
+        let speeds = speeds_rpm.len() as u64;
+        let layout = Layout {
+            axes,
+            columns,
+            kind: self.kind(),
+            rows_a_point: speeds,
+            has_several: true,
+            metadata: vec![metadata],
+        };
+        let mut job = Job::of(plan);
+        job.plan[self.verb()] = asked;
+        Job {
+            points: plan.points() * speeds,
+            layout,
+            axis_values: Box::new(move |row| {
+                let mut values = plan.axis_values(row / speeds);
+                values.push(speeds_rpm[(row % speeds) as usize]);
+                values
+            }),
+            ..job
+        }
+    }
+
+    /// What does it, on the best instruction set or the one asked for.
+    ///
+    /// # Errors
+    /// An instruction set that is not there.
+    pub(crate) fn engine(&self) -> Result<DwellEngine<'a>, EngineError> {
+        let Self { plan, speeds_rpm, search } = *self;
+        let asked = match search {
+            Some(search) => Asked::Motions(Motions::new(plan, search)),
+            None => Asked::Responses(Columns::of_dwells(plan)),
+        };
+        Ok(DwellEngine { plan, speeds_rpm, simd: simd_from_environment()?, asked })
+    }
 }
 
 /// What is asked of a plan's points at its speeds.
-pub(crate) enum Asked {
+enum Asked {
     /// The periodic responses of both models.
     Responses(Columns),
     /// The motions that the nonlinear one ends in.
@@ -93,27 +157,7 @@ pub(crate) struct DwellEngine<'a> {
     asked: Asked,
 }
 
-impl<'a> DwellEngine<'a> {
-    /// Responses, on the best instruction set or the one asked for.
-    ///
-    /// # Errors
-    /// An instruction set that is not there.
-    pub(crate) fn new(plan: &'a Plan, speeds_rpm: &'a [f64]) -> Result<Self, EngineError> {
-        Self::asking(plan, speeds_rpm, Asked::Responses(Columns::of_dwells(plan)))
-    }
-
-    /// As [`Self::new`], of anything.
-    ///
-    /// # Errors
-    /// As there.
-    pub(crate) fn asking(
-        plan: &'a Plan,
-        speeds_rpm: &'a [f64],
-        asked: Asked,
-    ) -> Result<Self, EngineError> {
-        Ok(Self { plan, speeds_rpm, simd: simd_from_environment()?, asked })
-    }
-
+impl DwellEngine<'_> {
     /// These rows, those of neighbouring points and speeds in lanes together. Once `is_stopped`
     /// says so, what comes means nothing.
     fn rows(&self, rows: &[u64], is_stopped: &dyn Fn() -> bool) -> Vec<Done> {
@@ -122,15 +166,11 @@ impl<'a> DwellEngine<'a> {
         wanted.dedup();
         let points: BTreeMap<u64, Result<Point, Status>> =
             wanted.iter().copied().zip(self.ready(&wanted)).collect();
-        let (mut done, mut dwells) = (Vec::with_capacity(rows.len()), Vec::new());
-        let mut asked = Vec::with_capacity(rows.len());
+        let (mut done, mut asked) = (Vec::with_capacity(rows.len()), Vec::new());
         for &row in rows {
+            let speed_rpm = self.speeds_rpm[(row % speeds) as usize];
             match &points[&(row / speeds)] {
-                Ok(point) => {
-                    let speed_rpm = self.speeds_rpm[(row % speeds) as usize];
-                    dwells.push(Dwell { point, speed_rpm });
-                    asked.push(row);
-                }
+                Ok(point) => asked.push((row, Dwell { point, speed_rpm })),
                 Err(status) => done.push(match &self.asked {
                     Asked::Responses(columns) => columns.done(failed(row, *status)),
                     Asked::Motions(motions) => motions.failed(row, *status),
@@ -139,15 +179,14 @@ impl<'a> DwellEngine<'a> {
         }
         match &self.asked {
             Asked::Responses(columns) => {
-                for (row, found) in asked.into_iter().zip(responses(&dwells, is_stopped)) {
-                    done.push(columns.done(match found {
-                        Ok(responses) => self.outcome(row, &responses),
-                        Err(status) => failed(row, status),
-                    }));
+                let dwells: Vec<Dwell<'_>> = asked.iter().map(|(_, dwell)| *dwell).collect();
+                for ((row, _), found) in asked.iter().zip(responses(&dwells, is_stopped)) {
+                    let none = |status| failed(*row, status);
+                    let outcome = found.map_or_else(none, |found| self.outcome(*row, &found));
+                    done.push(columns.done(outcome));
                 }
             }
             Asked::Motions(motions) => {
-                let asked: Vec<_> = asked.into_iter().zip(dwells).collect();
                 done.extend(motions.find(self.simd, self.speeds_rpm, &asked, is_stopped));
             }
         }

@@ -1,8 +1,9 @@
 //! What computes the washing machine's rows, for the engine's commands.
 
+use std::borrow::Cow;
+
 use sweep_engine::boundary::search::Values;
 use sweep_engine::estimate::Estimate;
-use sweep_engine::plan::WrittenIn;
 use sweep_engine::{Engine, Error, Swept, Watch};
 use washer_model::{Machine, Parameter, Spin, Target};
 use washer_row::{Criterion, Demand, Metric, Outcome};
@@ -66,42 +67,24 @@ pub(crate) type Listed = sweep_engine::Listed<Washer>;
 
 /// Every parameter with its value.
 fn listed(plan: Option<&Plan>) -> Vec<Listed> {
-    match plan {
-        Some(plan) => {
-            rows(&plan.model.machine, &plan.model.spin, Some(plan.window_s), &plan.written)
-        }
-        // The spin's parameters exist without a grid, but have no value.
-        None => {
-            let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
-            rows(&Machine::paper(), &spin, None, &WrittenIn::default())
-        }
-    }
-}
-
-/// Every parameter with its value; those of spin and window have one only if a grid gives its
-/// window.
-fn rows(
-    machine: &Machine,
-    spin: &Spin,
-    window_s: Option<[f64; 2]>,
-    WrittenIn(written): &WrittenIn,
-) -> Vec<Listed> {
+    // The spin's parameters exist without a grid, but have no value.
+    let (paper, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
+    let (machine, spin) =
+        plan.map_or((&paper, &spin), |plan| (&plan.model.machine, &plan.model.spin));
     let row = |parameter: Parameter| {
         let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
         let value = match parameter.target() {
-            Target::Window(edge) => window_s.map(|window_s| window_s[edge]),
-            _ => parameter.get(machine, spin).filter(|_| window_s.is_some() || !of_grid),
+            Target::Window(edge) => plan.map(|plan| plan.window_s[edge]),
+            _ => parameter.get(machine, spin).filter(|_| plan.is_some() || !of_grid),
         };
         // A parameter of several numbers: each may have been written elsewhere.
-        let mut places: Vec<&str> = Vec::new();
-        for part in parameter.parts(machine) {
-            places.extend(written.get(part.as_ref()).map(String::as_str));
-        }
+        let place = |part: Cow<'_, str>| plan?.written.0.get(part.as_ref()).map(String::as_str);
+        let mut places: Vec<&str> =
+            parameter.parts(machine).into_iter().filter_map(place).collect();
         places.dedup();
-        let source = match places[..] {
-            _ if of_grid => parameter.source().to_string(),
-            [] => parameter.source().to_string(),
-            _ => format!("given: {}", places.join(", ")),
+        let source = match of_grid || places.is_empty() {
+            true => parameter.source().to_string(),
+            false => format!("given: {}", places.join(", ")),
         };
         Listed { parameter, value, source }
     };
@@ -153,8 +136,7 @@ mod tests {
     #[test]
     fn json_holds_every_parameter() {
         let spin = Spin::Ramp { peak_rpm: 120.0, ramp_s: 2.0 };
-        let rows = rows(&Machine::paper(), &spin, Some([0.0, 1.0]), &WrittenIn::default());
-        let json: Value = serde_json::from_str(&as_json(&rows)).unwrap();
+        let json: Value = serde_json::from_str(&as_json(&listed(None))).unwrap();
         assert_eq!(
             json.as_array().map(Vec::len),
             Some(Parameter::all(&Machine::paper(), &spin).len())

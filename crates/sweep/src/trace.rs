@@ -21,11 +21,10 @@ use crate::method::Integrator;
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, friction_speeds};
 use sweep_engine::config::NamedValues;
-use sweep_engine::exit::Error;
 use sweep_engine::method::Integrator as _;
-use sweep_engine::store::{StoreError, read};
-use sweep_engine::table::Table;
-use sweep_engine::threads::{self, Stop};
+use sweep_engine::store::read;
+use sweep_engine::threads::Stop;
+use sweep_engine::{Error, StoreError, Table, threads};
 use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
 use washer_row::Level;
 
@@ -44,7 +43,7 @@ const KEPT_INSTANTS: f64 = 2000.0;
 
 /// What a trace holds beside channels, gap and speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Extras {
+pub struct Extras {
     /// Rates and accelerations of the channels.
     pub rates: bool,
     /// Coordinates and their speeds.
@@ -75,22 +74,19 @@ pub(crate) fn start_value(text: &str) -> Result<StartValue, String> {
     let expected =
         "expected a coordinate q1 to q10 or a speed u1 to u10 with its value, as in q5=0.1";
     let (name, value) = text.split_once('=').ok_or(expected)?;
-    let (is_speed, number) = match (name.trim().strip_prefix('q'), name.trim().strip_prefix('u')) {
-        (Some(number), _) => (false, number),
-        (_, Some(number)) => (true, number),
+    let (is_speed, number) = match name.trim().split_at_checked(1) {
+        Some(("q", number)) => (false, number),
+        Some(("u", number)) => (true, number),
         _ => return Err(expected.to_owned()),
     };
-    let index = number
-        .parse::<usize>()
-        .ok()
-        .filter(|number| (1..=COORDINATES).contains(number))
-        .ok_or(expected)?;
-    let value =
-        value.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or(expected)?;
+    let number = number.parse().ok().filter(|number| (1..=COORDINATES).contains(number));
+    let index = number.ok_or(expected)? - 1;
+    let value = value.trim().parse().ok().filter(|value: &f64| value.is_finite());
+    let value = value.ok_or(expected)?;
     if !is_speed && value.abs() > FARTHEST_START {
         return Err(format!("expected at most {FARTHEST_START} m or rad from equilibrium"));
     }
-    Ok(StartValue { is_speed, index: index - 1, value })
+    Ok(StartValue { is_speed, index, value })
 }
 
 /// The start with these values, and everything else at equilibrium.
@@ -164,11 +160,11 @@ impl Models {
 
 /// The histories of one point, or of all of a plan one below the other.
 pub(crate) struct Trace {
-    table: Table,
+    pub(crate) table: Table,
     /// Instants.
-    pub instants: usize,
+    pub(crate) instants: usize,
     /// How each model failed that did, in words.
-    pub failures: Vec<String>,
+    pub(crate) failures: Vec<String>,
 }
 
 /// Histories of a plan's only point, which `at` names, or of all of its points, in a pool of their
@@ -397,17 +393,15 @@ pub(crate) fn keep(
             if stop() {
                 return Ok(());
             }
-            let values = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
-            let at = values.zip(plan.axis_values(point)).collect();
+            let names = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
+            let at = names.zip(plan.axis_values(point)).collect();
+            let level = level.and_then(|name| Level::ALL.into_iter().find(|it| it.name() == name));
             let view = View {
                 every_s: Some(plan.end_s / KEPT_INSTANTS),
                 models: Models::Both,
                 start: Start::default(),
                 extras: Extras::default(),
-                quick: level.and_then(|level| {
-                    let named = |known: &Level| known.name() == level;
-                    engine.quick(Level::ALL.into_iter().find(named)?)
-                }),
+                quick: level.and_then(|level| engine.quick(level)),
             };
             let found = trace(plan, plan.scenario(point), at, &view, stop);
             if stop() {
@@ -416,7 +410,9 @@ pub(crate) fn keep(
             // The row of a point without an equilibrium says so.
             if let Ok(trace) = found {
                 let path = folder.join(format!("point-{point}.parquet"));
-                files::write(&path, FileKind::Trace, &trace.into_bytes(&path)?)?;
+                let bytes =
+                    trace.table.into_bytes().map_err(StoreError::parquet("write", &path))?;
+                files::write(&path, FileKind::Trace, &bytes)?;
             }
             done();
             Ok(())
@@ -437,21 +433,6 @@ fn remove_former(folder: &Path) -> Result<(), StoreError> {
         }
     }
     Ok(())
-}
-
-impl Trace {
-    /// The bytes of its file, which is to be at `path`.
-    ///
-    /// # Errors
-    /// What the Parquet library refuses: a defect of this program.
-    pub(crate) fn into_bytes(self, path: &Path) -> Result<Vec<u8>, StoreError> {
-        self.table.into_bytes().map_err(StoreError::parquet("write", path))
-    }
-
-    /// The table, for its columns as well as its bytes.
-    pub(crate) fn into_table(self) -> Table {
-        self.table
-    }
 }
 
 /// Ten numbers as q1 to q10 or u1 to u10.
@@ -667,7 +648,7 @@ mod tests {
             let models = Models::Both;
             let view = View { every_s: Some(every_s), models, start, extras, quick: Some(quick) };
             let by_row = trace(&plan, scenario, Vec::new(), &view, &|| false);
-            let (rows, _) = by_row.unwrap().into_table().finish().unwrap();
+            let (rows, _) = by_row.unwrap().table.finish().unwrap();
             // The row says the nonlinear model's rung; the linear one's may have been another.
             for (name, model, over) in
                 [("nonlinear", &row.nonlinear, 1e-9), ("linear", &row.linear, 1e-3)]
@@ -700,11 +681,11 @@ mod tests {
             let view = View { every_s, models, start: Start::default(), extras, quick: None };
             let all = trace_all(&plan, &view, &|| false);
             assert_eq!(every_s.is_none(), all.instants < 9 * 20);
-            let (all, _) = all.into_table().finish().unwrap();
+            let (all, _) = all.table.finish().unwrap();
             let mut from = 0;
             for point in 0..plan.points() {
                 let one = trace(&plan, plan.scenario(point), Vec::new(), &view, &|| false).unwrap();
-                let (one, _) = one.into_table().finish().unwrap();
+                let (one, _) = one.table.finish().unwrap();
                 for (k, field) in one.schema().fields().iter().enumerate() {
                     let together = all.column_by_name(field.name()).unwrap();
                     let together = together.slice(from, one.num_rows());
@@ -745,7 +726,7 @@ mod tests {
         let view = View { every_s: None, models, start, extras, quick: None };
         let all = trace_all(&turning(4.05), &view, &|| false);
         assert_eq!(all.instants, 2 * 31);
-        let (rows, _) = all.into_table().finish().unwrap();
+        let (rows, _) = all.table.finish().unwrap();
         assert_eq!(peak(&rows, "drum_angle_rad", 0), 0.0);
     }
 }

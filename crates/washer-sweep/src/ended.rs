@@ -1,53 +1,45 @@
 //! How a work ended: rows, a file, or Ctrl-C with what is there.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sweep::{Error, Evaluated, ProgressMode, RanToFile};
+use sweep::{Effort, Error, Evaluated, RanToFile, ResultTable};
 
 use crate::errors;
 use crate::result::PyResultTable;
-use crate::work::Attended;
-
-/// How progress is shown.
-pub(crate) const fn mode(progress: bool) -> ProgressMode {
-    if progress { ProgressMode::Auto } else { ProgressMode::None }
-}
-
-/// Shows what matters before the work starts, if progress is wanted.
-pub(crate) fn teller(progress: bool) -> &'static dyn Fn(&str) {
-    if progress { &sweep::tell } else { &|_| () }
-}
+use crate::work::{Attended, How, attended};
 
 /// The rows, or those that were computed before Ctrl-C.
-pub(crate) fn rows(
-    py: Python<'_>,
-    evaluated: Attended<Result<Evaluated, Error>>,
-) -> PyResult<PyResultTable> {
+pub(crate) fn rows(py: Python<'_>, evaluated: Attended<Evaluated>) -> PyResult<PyResultTable> {
     let evaluated = evaluated.or_raise(py, |evaluated| match evaluated {
         Err(error) => errors::error(py, &error),
         Ok(evaluated) => {
             let rows = evaluated.table.rows();
             let text = format!("interrupted; `result` of this exception holds {rows} rows");
-            holding(py, text, Some(PyResultTable::new(evaluated.table)))
+            holding(py, text, Some(evaluated.table))
         }
     })?;
-    let evaluated = evaluated.map_err(|error| errors::error(py, &error))?;
     Ok(PyResultTable::new(evaluated.table))
 }
 
-/// The rows of a file that was computed, or the word that the same call goes on.
-pub(crate) fn file(
+/// The rows of a work that keeps them in memory or, if there is one, in a file; if it is shown, it
+/// says beforehand what matters. Of a file that Ctrl-C leaves unfinished, the same call goes on.
+pub(crate) fn rows_or_file(
     py: Python<'_>,
-    ran: Attended<Result<RanToFile, Error>>,
-    out: &Path,
+    out: Option<&PathBuf>,
+    how: How,
+    in_memory: impl FnOnce(Effort<'_>) -> Result<Evaluated, Error> + Send,
+    to_file: impl FnOnce(&Path, &dyn Fn(&str), Effort<'_>) -> Result<RanToFile, Error> + Send,
 ) -> PyResult<PyResultTable> {
+    let Some(out) = out else { return rows(py, attended(py, how, in_memory)?) };
+    let tell: fn(&str) = if how.progress { sweep::tell } else { |_| () };
+    let ran = attended(py, how, |effort| to_file(out, &tell, effort))?;
     let ran = ran.or_raise(py, |ran| match ran {
         Err(error) => errors::error(py, &error),
         Ok(RanToFile::Whole(table)) => {
             let text = format!("interrupted when {} was done", out.display());
-            holding(py, text, Some(PyResultTable::new(table)))
+            holding(py, text, Some(table))
         }
         Ok(RanToFile::Interrupted { kept, points }) => {
             let text = format!(
@@ -57,7 +49,7 @@ pub(crate) fn file(
             holding(py, text, None)
         }
     })?;
-    match ran.map_err(|error| errors::error(py, &error))? {
+    match ran {
         RanToFile::Whole(table) => Ok(PyResultTable::new(table)),
         RanToFile::Interrupted { kept, points } => Err(PyValueError::new_err(format!(
             "stopped with {kept} of {points} points, though nothing interrupted it"
@@ -65,9 +57,19 @@ pub(crate) fn file(
     }
 }
 
+/// A search's table, or what `interrupted` raises.
+pub(crate) fn table(
+    py: Python<'_>,
+    found: Attended<Option<ResultTable>>,
+    interrupted: impl Fn() -> PyErr,
+) -> PyResult<PyResultTable> {
+    let found = found.or_raise(py, |_| interrupted())?;
+    found.map(PyResultTable::new).ok_or_else(interrupted)
+}
+
 /// An interruption that holds what was computed.
-pub(crate) fn holding(py: Python<'_>, text: String, result: Option<PyResultTable>) -> PyErr {
-    match result.map(|result| Py::new(py, result)).transpose() {
+pub(crate) fn holding(py: Python<'_>, text: String, result: Option<ResultTable>) -> PyErr {
+    match result.map(|result| Py::new(py, PyResultTable::new(result))).transpose() {
         Ok(result) => {
             let result = result.map_or_else(|| py.None(), Py::into_any);
             errors::interrupted(py, text, result)

@@ -4,43 +4,33 @@
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sweep::{Diagnostics, Error, Exit, StoreError};
+use sweep::{Diagnostics, Error, Exit, Mistake, StoreError};
 use sweep_plot::PlotError;
 
-/// A class of the package's own.
-fn class<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-    py.import("washer_sweep._errors")?.getattr(name)
-}
-
-fn raised(py: Python<'_>, name: &str, text: String, with: Py<PyAny>) -> PyErr {
-    match class(py, name).and_then(|class| class.call1((text, with))) {
-        Ok(error) => PyErr::from_value(error),
-        Err(error) => error,
-    }
+/// An error of one of the package's own classes.
+fn raised(py: Python<'_>, class: &str, text: String, with: Py<PyAny>) -> PyErr {
+    let own = py.import("washer_sweep._errors").and_then(|own| own.getattr(class));
+    own.and_then(|class| class.call1((text, with))).map_or_else(|error| error, PyErr::from_value)
 }
 
 /// Mistakes in a plan, or in a table given to it.
 pub(crate) fn plan_error(py: Python<'_>, mistakes: &Diagnostics) -> PyErr {
-    let listed = PyList::empty(py);
-    for mistake in mistakes.mistakes() {
+    let entry = |mistake: Mistake| -> PyResult<Bound<'_, PyDict>> {
         let entry = PyDict::new(py);
-        let filled = entry
-            .set_item("file", mistake.file)
-            .and_then(|()| entry.set_item("line", mistake.line))
-            .and_then(|()| entry.set_item("column", mistake.column))
-            .and_then(|()| entry.set_item("message", mistake.message))
-            .and_then(|()| entry.set_item("expected", mistake.expected))
-            .and_then(|()| entry.set_item("hint", none_if_empty(mistake.hints.join("\n"))))
-            .and_then(|()| listed.append(entry));
-        if let Err(error) = filled {
-            return error;
-        }
+        entry.set_item("file", mistake.file)?;
+        entry.set_item("line", mistake.line)?;
+        entry.set_item("column", mistake.column)?;
+        entry.set_item("message", mistake.message)?;
+        entry.set_item("expected", mistake.expected)?;
+        let hint = mistake.hints.join("\n");
+        entry.set_item("hint", (!hint.is_empty()).then_some(hint))?;
+        Ok(entry)
+    };
+    let listed = mistakes.mistakes().into_iter().map(entry).collect::<PyResult<Vec<_>>>();
+    match listed.and_then(|listed| PyList::new(py, listed)) {
+        Ok(listed) => raised(py, "PlanError", mistakes.to_string(), listed.into_any().unbind()),
+        Err(error) => error,
     }
-    raised(py, "PlanError", mistakes.to_string(), listed.into_any().unbind())
-}
-
-fn none_if_empty(text: String) -> Option<String> {
-    if text.is_empty() { None } else { Some(text) }
 }
 
 /// Any error of the engine's.

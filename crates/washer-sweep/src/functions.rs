@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyMapping};
-use sweep::{Effort, Explained, FitOptions, ProgressMode, Search, Starts};
+use sweep::{Explained, FitOptions, Search};
 
 use crate::columns::{numbers, points};
 use crate::ended;
@@ -13,7 +13,7 @@ use crate::errors;
 use crate::mappings::assignments;
 use crate::plan::PyPlan;
 use crate::result::PyResultTable;
-use crate::work::{abandonable, attended};
+use crate::work::{How, abandonable, attended};
 
 /// Natural frequencies over spin speed.
 #[pyfunction]
@@ -31,10 +31,10 @@ pub(crate) fn modes(
     }
     let speeds = speeds_rpm.unwrap_or_else(|| (0..=120_u32).map(|k| 10.0 * f64::from(k)).collect());
     let input = plan.map(|plan| plan.get().input.clone());
-    let work = move |interrupt: &_| sweep::find_modes(input.as_ref(), &at, &speeds, interrupt);
-    let found = abandonable(py, work)?;
-    let found = found.map_err(|error| errors::error(py, &error))?;
-    found.map(PyResultTable::new).ok_or_else(|| errors::early(py))
+    let found = abandonable(py, None, move |effort| {
+        sweep::find_modes(input.as_ref(), &at, &speeds, effort.interrupt)
+    })?;
+    Ok(PyResultTable::new(found))
 }
 
 /// Periodic responses at constant speeds, and whether they are stable.
@@ -48,7 +48,7 @@ pub(crate) fn stability(
     progress: bool,
     fresh: bool,
 ) -> PyResult<PyResultTable> {
-    held(plan, speeds_rpm, None, out, (threads, progress, fresh))
+    held(plan, speeds_rpm, None, (out, fresh), How { threads, progress })
 }
 
 /// The motions that constant speeds end in.
@@ -61,53 +61,41 @@ pub(crate) fn dwell(
     plan: &Bound<'_, PyPlan>,
     speeds_rpm: &Bound<'_, PyAny>,
     out: Option<PathBuf>,
-    starts: usize,
+    starts: u64,
     kick: f64,
     carry: Option<&str>,
     threshold: bool,
     longest: f64,
-    sections: usize,
+    sections: u64,
     threads: Option<usize>,
     progress: bool,
     fresh: bool,
 ) -> PyResult<PyResultTable> {
-    let starts = Starts {
-        count: starts,
-        kick_rad_per_s: kick,
-        longest_s: longest,
-        with_threshold: threshold,
-        ..Starts::default()
-    };
     let carry = carry.map(str::parse).transpose();
     let carry = carry.map_err(|wrong: String| PyValueError::new_err(format!("carry: {wrong}")))?;
-    let search = Search { starts, carry, sections };
-    held(plan, speeds_rpm, Some(search), out, (threads, progress, fresh))
+    let search = Search { starts, kick, carry, threshold, sections, longest };
+    held(plan, speeds_rpm, Some(search), (out, fresh), How { threads, progress })
 }
 
 fn held(
     plan: &Bound<'_, PyPlan>,
     speeds_rpm: &Bound<'_, PyAny>,
     search: Option<Search>,
-    out: Option<PathBuf>,
-    (threads, progress, fresh): (Option<usize>, bool, bool),
+    (out, fresh): (Option<PathBuf>, bool),
+    how: How,
 ) -> PyResult<PyResultTable> {
     let py = plan.py();
-    let speeds_rpm = numbers(speeds_rpm)?;
+    let speeds_rpm = &numbers(speeds_rpm)?;
     let plan = plan.get().evaluator.plan();
-    let mode = ended::mode(progress);
-    let Some(out) = out else {
-        let found = attended(py, |interrupt| {
-            let effort = Effort { threads, progress: mode, interrupt };
-            sweep::find_held(plan, &speeds_rpm, search, effort)
-        })?;
-        return ended::rows(py, found);
-    };
-    let ran = attended(py, |interrupt| {
-        let effort = Effort { threads, progress: mode, interrupt };
-        let tell = ended::teller(progress);
-        sweep::held_to_file(plan, (&speeds_rpm, search), &out, fresh, tell, effort)
-    })?;
-    ended::file(py, ran, &out)
+    ended::rows_or_file(
+        py,
+        out.as_ref(),
+        how,
+        |effort| sweep::find_held(plan, speeds_rpm, search, effort),
+        |out, tell, effort| {
+            sweep::held_to_file(plan, (speeds_rpm, search), out, fresh, tell, effort)
+        },
+    )
 }
 
 /// Candidates of a study.
@@ -123,13 +111,10 @@ pub(crate) fn optimise(
     fresh: bool,
 ) -> PyResult<PyResultTable> {
     let sets = assignments(set)?;
-    let found = attended(py, |interrupt| {
-        let effort = Effort { threads, progress: ended::mode(progress), interrupt };
+    let found = attended(py, How { threads, progress }, |effort| {
         sweep::optimise_study(&study, &sets, out.as_deref(), fresh, effort)
     })?;
-    let found = found.or_raise(py, |_| errors::early(py))?;
-    let found = found.map_err(|error| errors::error(py, &error))?;
-    found.map(PyResultTable::new).ok_or_else(|| errors::early(py))
+    ended::table(py, found, || errors::early(py))
 }
 
 /// Why the linear model fails at a point.
@@ -144,12 +129,10 @@ pub(crate) fn explain<'py>(
     let py = plan.py();
     let speeds_rpm = speeds_rpm.map(numbers).transpose()?;
     let (at, input) = (assignments(at)?, plan.get().input.clone());
-    let explained = abandonable(py, move |interrupt| {
-        let effort = Effort { threads, progress: ProgressMode::None, interrupt };
+    let explained = abandonable(py, threads, move |effort| {
         sweep::explain_point(&input, &at, speeds_rpm.as_deref(), effort)
     })?;
-    let explained = explained.map_err(|error| errors::error(py, &error))?;
-    explanation(py, explained.ok_or_else(|| errors::early(py))?)
+    explanation(py, explained)
 }
 
 /// Numbers of a machine from measured run-ups.
@@ -167,9 +150,9 @@ pub(crate) fn fit<'py>(
     at: Option<&Bound<'py, PyAny>>,
     linear: bool,
     shift: bool,
-    starts: usize,
-    bootstrap: usize,
-    draws: u64,
+    starts: u32,
+    bootstrap: u32,
+    draws: u32,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = plan.py();
@@ -187,14 +170,13 @@ pub(crate) fn fit<'py>(
     };
     let tables = tables.iter().enumerate().map(|(k, table)| Ok((points(table)?, constants(k)?)));
     let tables = tables.collect::<PyResult<Vec<_>>>()?;
-    let options = FitOptions { free, own, linear, with_shift: shift, starts, bootstrap, draws };
+    let model = if linear { "linear" } else { "nonlinear" }.to_owned();
+    let options = FitOptions { free, own, model, no_shift: !shift, starts, bootstrap, draws };
     let input = plan.get().input.clone();
-    let fitted = abandonable(py, move |interrupt| {
-        let effort = Effort { threads, progress: ProgressMode::None, interrupt };
+    let fitted = abandonable(py, threads, move |effort| {
         sweep::fit_tables(&input, tables, &options, effort)
     })?;
-    let fitted = fitted.map_err(|error| errors::error(py, &error))?;
-    explanation(py, fitted.ok_or_else(|| errors::early(py))?)
+    explanation(py, fitted)
 }
 
 /// Data and words, as Python has them.

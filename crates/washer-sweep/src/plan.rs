@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
-use sweep::{BoundaryOptions, Effort, Evaluator, GridInput, TraceOptions};
+use sweep::{BoundaryOptions, Evaluator, GridInput, TraceExtras, TraceOptions};
 
 use crate::mappings::{self, assignments};
 use crate::result::PyResultTable;
-use crate::work::{abandonable, attended};
+use crate::work::{How, abandonable, attended};
 use crate::{columns, ended, errors};
 
 /// Name of a plan that comes from no file, where it gives none.
@@ -65,8 +65,7 @@ impl PyPlan {
     ) -> PyResult<PyResultTable> {
         let py = table.py();
         let points = columns::points(table)?;
-        let evaluated = attended(py, |interrupt| {
-            let effort = Effort { threads, progress: ended::mode(progress), interrupt };
+        let evaluated = attended(py, How { threads, progress }, |effort| {
             self.evaluator.evaluate(&points, effort)
         })?;
         ended::rows(py, evaluated)
@@ -82,18 +81,13 @@ impl PyPlan {
         progress: bool,
         fresh: bool,
     ) -> PyResult<PyResultTable> {
-        let Some(out) = out else {
-            let evaluated = attended(py, |interrupt| {
-                let effort = Effort { threads, progress: ended::mode(progress), interrupt };
-                self.evaluator.run(effort)
-            })?;
-            return ended::rows(py, evaluated);
-        };
-        let ran = attended(py, |interrupt| {
-            let effort = Effort { threads, progress: ended::mode(progress), interrupt };
-            sweep::run_to_file(self.evaluator.plan(), &out, fresh, ended::teller(progress), effort)
-        })?;
-        ended::file(py, ran, &out)
+        ended::rows_or_file(
+            py,
+            out.as_ref(),
+            How { threads, progress },
+            |effort| self.evaluator.run(effort),
+            |out, tell, effort| sweep::run_to_file(self.evaluator.plan(), out, fresh, tell, effort),
+        )
     }
 
     /// Time histories of both models at one point, or at every one.
@@ -118,11 +112,12 @@ impl PyPlan {
     ) -> PyResult<PyResultTable> {
         let (at, start) = (assignments(at)?, assignments(start)?);
         let every_s = (!turns).then_some(every);
-        let options = TraceOptions { every_s, model, all, rates, states, forces, angle, start };
+        let extras = TraceExtras { rates, states, forces, angle };
+        let options = TraceOptions { every_s, model, all, extras, start };
         let input = self.input.clone();
-        let work = move |interrupt: &_| sweep::trace_point(&input, &at, &options, interrupt);
-        let traced = abandonable(py, work)?.map_err(|error| errors::error(py, &error))?;
-        let (table, failures) = traced.ok_or_else(|| errors::early(py))?;
+        let (table, failures) = abandonable(py, None, move |effort| {
+            sweep::trace_point(&input, &at, &options, effort.interrupt)
+        })?;
         for failure in failures {
             py.import("warnings")?.call_method1("warn", (failure,))?;
         }
@@ -149,11 +144,10 @@ impl PyPlan {
     ) -> PyResult<PyResultTable> {
         let output = out.as_deref();
         let options = BoundaryOptions { quantity, limit, tolerance, lattice, output, fresh };
-        let found = attended(py, |interrupt| {
-            let effort = Effort { threads, progress: ended::mode(progress), interrupt };
+        let found = attended(py, How { threads, progress }, |effort| {
             sweep::find_boundary(self.evaluator.plan(), options, effort)
         })?;
-        let interrupted = || {
+        ended::table(py, found, || {
             let text = match output {
                 Some(out) => format!(
                     "interrupted; what was found is kept beside {}, and the same call goes on",
@@ -162,10 +156,7 @@ impl PyPlan {
                 None => "interrupted; with `out` the search would have kept what it found".into(),
             };
             ended::holding(py, text, None)
-        };
-        let found = found.or_raise(py, |_| interrupted())?;
-        let found = found.map_err(|error| errors::error(py, &error))?;
-        found.map(PyResultTable::new).ok_or_else(interrupted)
+        })
     }
 
     /// Name of the plan.

@@ -99,13 +99,8 @@ impl PyResultTable {
                 (counts.flat_map(|count| count.to_ne_bytes()).collect::<Vec<u8>>(), "uint64")
             }
             number if cells::is_number(number) => {
-                let mut bytes = Vec::with_capacity(8 * self.0.rows());
-                for part in parts {
-                    for value in cells::numbers(part).unwrap_or_default() {
-                        bytes.extend(value.unwrap_or(f64::NAN).to_ne_bytes());
-                    }
-                }
-                (bytes, "float64")
+                let values = parts.iter().flat_map(|part| cells::numbers(part).unwrap_or_default());
+                (values.flat_map(|it| it.unwrap_or(f64::NAN).to_ne_bytes()).collect(), "float64")
             }
             _ => {
                 let values = PyList::empty(py);

@@ -1,33 +1,49 @@
 //! The engine's work under Python's eyes: without the interpreter's lock, stopped by its signals.
 
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::thread::Builder;
 use std::time::Duration;
 
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
-use sweep::Interrupt;
+use sweep::{Effort, Error, Interrupt, ProgressMode};
 
 use crate::errors;
 
 /// How often signals are looked for.
 const LOOK_UP: Duration = Duration::from_millis(50);
 
+/// How a work is to be done, as keywords say.
+#[derive(Clone, Copy)]
+pub(crate) struct How {
+    pub(crate) threads: Option<usize>,
+    /// Whether progress is shown.
+    pub(crate) progress: bool,
+}
+
+impl How {
+    fn until(self, interrupt: &Interrupt) -> Effort<'_> {
+        let progress = if self.progress { ProgressMode::Auto } else { ProgressMode::None };
+        Effort { threads: self.threads, progress, interrupt }
+    }
+}
+
 /// What came of a work, and what a signal's handler has raised meanwhile.
 pub(crate) struct Attended<T> {
-    pub(crate) value: T,
-    pub(crate) raised: Option<PyErr>,
+    value: Result<T, Error>,
+    raised: Option<PyErr>,
 }
 
 impl<T> Attended<T> {
-    /// The value, unless a handler raised: Ctrl-C becomes what `interrupted` makes of the value,
-    /// and anything else goes on as it is.
+    /// The value, unless it is an error or a handler raised: Ctrl-C becomes what `interrupted`
+    /// makes of the value, and anything else goes on as it is.
     pub(crate) fn or_raise(
         self,
         py: Python<'_>,
-        interrupted: impl FnOnce(T) -> PyErr,
+        interrupted: impl FnOnce(Result<T, Error>) -> PyErr,
     ) -> PyResult<T> {
         match self.raised {
-            None => Ok(self.value),
+            None => self.value.map_err(|error| errors::error(py, &error)),
             Some(raised) if raised.is_instance_of::<PyKeyboardInterrupt>(py) => {
                 Err(interrupted(self.value))
             }
@@ -36,11 +52,38 @@ impl<T> Attended<T> {
     }
 }
 
+/// Waits for what a work sends, and looks for signals meanwhile. A signal whose handler raises, as
+/// Ctrl-C's does, raises the interrupt; a work that `is_left` then is not waited for. Nothing comes
+/// of a work that panics.
+fn waited<T>(
+    ended: &Receiver<T>,
+    interrupt: &Interrupt,
+    is_left: bool,
+) -> (Option<T>, Option<PyErr>) {
+    let mut raised = None;
+    loop {
+        let come = ended.recv_timeout(LOOK_UP);
+        // Of a work that is done too: a signal since the last look is its own.
+        if raised.is_none() {
+            raised = Python::attach(|py| py.check_signals().err());
+            if raised.is_some() {
+                // As SIGINT would.
+                interrupt.raise(2);
+            }
+        }
+        let goes_on = come.as_ref().err() == Some(&RecvTimeoutError::Timeout);
+        if !goes_on || is_left && raised.is_some() {
+            return (come.ok(), raised);
+        }
+    }
+}
+
 /// As [`attended`], for a work of which nothing is worth waiting for: Ctrl-C raises the interrupt
 /// and leaves the thread to end by itself, and what comes of it is dropped.
 pub(crate) fn abandonable<T: Send + 'static>(
     py: Python<'_>,
-    work: impl FnOnce(&Interrupt) -> T + Send + 'static,
+    threads: Option<usize>,
+    work: impl FnOnce(Effort<'_>) -> Result<Option<T>, Error> + Send + 'static,
 ) -> PyResult<T> {
     let left = py.detach(|| {
         let (done, ended) = channel();
@@ -48,28 +91,19 @@ pub(crate) fn abandonable<T: Send + 'static>(
         let of_work = interrupt.clone();
         let work = move || {
             // Nobody may wait for it any more.
-            let _ = done.send(work(&of_work));
+            let _ = done.send(work(How { threads, progress: false }.until(&of_work)));
         };
-        std::thread::Builder::new().spawn(work).map_err(no_thread)?;
-        loop {
-            let come = ended.recv_timeout(LOOK_UP);
-            // Of a work that is done too: a signal since the last look is its own.
-            if let Err(raised) = Python::attach(|py| py.check_signals()) {
-                // As SIGINT would.
-                interrupt.raise(2);
-                return Err(raised);
-            }
-            match come {
-                Ok(value) => return Ok(value),
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return Err(panicked()),
-            }
+        Builder::new().spawn(work).map_err(no_thread)?;
+        match waited(&ended, &interrupt, true) {
+            (_, Some(raised)) => Err(raised),
+            (value, None) => value.ok_or_else(panicked),
         }
     });
-    left.map_err(|raised| match raised.is_instance_of::<PyKeyboardInterrupt>(py) {
+    let value = left.map_err(|raised| match raised.is_instance_of::<PyKeyboardInterrupt>(py) {
         true => errors::early(py),
         false => raised,
-    })
+    })?;
+    value.map_err(|error| errors::error(py, &error))?.ok_or_else(|| errors::early(py))
 }
 
 fn no_thread(error: std::io::Error) -> PyErr {
@@ -84,39 +118,23 @@ fn panicked() -> PyErr {
 /// raises, as Ctrl-C's does, raises the interrupt, and the work is waited for.
 pub(crate) fn attended<T: Send>(
     py: Python<'_>,
-    work: impl FnOnce(&Interrupt) -> T + Send,
+    how: How,
+    work: impl FnOnce(Effort<'_>) -> Result<T, Error> + Send,
 ) -> PyResult<Attended<T>> {
     py.detach(|| {
         let interrupt = Interrupt::new();
-        let mut raised = None;
         std::thread::scope(|scope| {
             let (done, ended) = channel();
             let interrupt = &interrupt;
             let work = move || {
                 // The receiver waits for it.
-                let _ = done.send(work(interrupt));
+                let _ = done.send(work(how.until(interrupt)));
             };
-            let worker =
-                std::thread::Builder::new().spawn_scoped(scope, work).map_err(no_thread)?;
-            loop {
-                let come = ended.recv_timeout(LOOK_UP);
-                if raised.is_none() {
-                    raised = Python::attach(|py| py.check_signals().err());
-                    if raised.is_some() {
-                        // As SIGINT would.
-                        interrupt.raise(2);
-                    }
-                }
-                match come {
-                    Ok(value) => return Ok(Attended { value, raised }),
-                    Err(RecvTimeoutError::Timeout) => {}
-                    Err(RecvTimeoutError::Disconnected) => {
-                        // Joined here, or the scope would pass the panic on.
-                        let _ = worker.join();
-                        return Err(panicked());
-                    }
-                }
-            }
+            let worker = Builder::new().spawn_scoped(scope, work).map_err(no_thread)?;
+            let (value, raised) = waited(&ended, interrupt, false);
+            // Joined here, or the scope would pass a panic on.
+            let _ = worker.join();
+            value.map(|value| Attended { value, raised }).ok_or_else(panicked)
         })
     })
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::config::{self};
+use crate::config::{self, NamedValues};
 use crate::{Diagnostics, GridInput, Plan, Read, program, tell};
 
 /// A grid file and changes to its constants, as most commands take them.
@@ -38,17 +38,32 @@ impl GridArgs {
     /// # Errors
     /// Every mistake in the grid file and the constants.
     pub fn load<M: Read>(&self) -> Result<Plan<M>, Diagnostics> {
-        let mut plan =
-            GridInput::<M>::file(self.grid.clone(), self.sets()).fixing(&self.at).load()?;
+        let plan = GridInput::<M>::file(self.grid.clone(), self.sets()).fixing(&self.at).load()?;
+        Ok(self.named(plan))
+    }
+
+    /// The plan at one point, with the values of its axes.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_point<M: Read>(
+        &self,
+        at: &[String],
+    ) -> Result<(Plan<M>, NamedValues), Diagnostics> {
+        let (plan, at) = GridInput::<M>::file(self.grid.clone(), self.sets()).load_point(at)?;
+        Ok((self.named(plan), at))
+    }
+
+    fn named<M: Read>(&self, mut plan: Plan<M>) -> Plan<M> {
         if let Some(name) = &self.name {
             plan.name.clone_from(name);
         }
         self.tell_window(&plan);
-        Ok(plan)
+        plan
     }
 
     /// Says so where `--set end_s` leaves the window's end where the grid file puts it.
-    pub fn tell_window<M: Read>(&self, plan: &Plan<M>) {
+    fn tell_window<M: Read>(&self, plan: &Plan<M>) {
         let is_set =
             |name| self.sets.iter().any(|set| set.split('=').next().map(str::trim) == Some(name));
         let ([from, to], end_s) = (plan.window_s, plan.end_s);

@@ -1,7 +1,7 @@
 //! Which columns there are, in which order, and what they say.
 
 use arrow_array::Float64Array;
-use sweep_engine::store::ResultRows;
+use sweep_engine::store::{Kind as Cells, ResultRows};
 use washer_row::{Criterion, Status};
 
 use super::*;
@@ -68,7 +68,7 @@ fn metrics_have_columns_in_the_order_asked_for_and_criteria_say_what_they_are() 
     let mut outcome = Outcome::new(0, model(&[1.5, 400.0]), model(&[0.5, 300.0]));
     outcome.static_sag_m = Some(0.013);
     let mut rows = ResultRows::new(&layout);
-    rows.push(0, vec![0.1, 60.0], columns(&measures).row(outcome));
+    rows.push(0, vec![0.1, 60.0], columns(&measures).done(outcome).rows.remove(0));
     let batch = rows.take().unwrap();
     assert_eq!(batch.num_columns(), plain + 5);
     let expected = [

@@ -2,7 +2,7 @@
 
 use clap_complete::Shell;
 
-use sweep_engine::exit::{Error, Exit, print};
+use sweep_engine::{Error, Exit, print};
 
 /// Arguments of `sweep completions`.
 #[derive(Debug, clap::Args)]

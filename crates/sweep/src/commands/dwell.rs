@@ -1,12 +1,10 @@
 //! `sweep dwell GRID.toml --speed SPEEDS`: the motions that held speeds end in.
 
-use super::held::{SearchArgs, SpeedArgs, carry_out};
-use crate::dwell::{Motions, motions, summary};
-use crate::plan::Plan;
-use crate::stability::{Asked, DwellEngine, check};
+use super::held::SpeedArgs;
+use crate::dwell::Search;
 use sweep_engine::commands::grid::ResultArgs;
-use sweep_engine::commands::run::{RunCommand, WorkArgs};
-use sweep_engine::exit::{Error, Exit};
+use sweep_engine::commands::run::WorkArgs;
+use sweep_engine::{Error, Exit};
 
 /// Where the result goes.
 const OUT: &str = "Result file [default: results/NAME-dwell.parquet]";
@@ -22,7 +20,7 @@ pub struct Args {
     held: SpeedArgs,
     /// How motions are looked for.
     #[command(flatten)]
-    search: SearchArgs,
+    search: Search,
     /// How it is done.
     #[command(flatten)]
     work: WorkArgs,
@@ -49,20 +47,5 @@ interrupted command has computed stays in FILE.partial, and the same command goe
 /// Mistakes in the grid file or the options, and whatever keeps the file from being written;
 /// finished chunks are kept.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let plan: Plan = args.target.grid.load()?;
-    check(&plan, "--speed", &args.held.speed.to_string())?;
-    let (search, speeds_rpm) = (args.search.search(), args.held.speed.values());
-    let engine =
-        DwellEngine::asking(&plan, speeds_rpm, Asked::Motions(Motions::new(&plan, search)))?;
-    let (job, output) = motions(&plan, speeds_rpm, &search, args.target.out.as_deref());
-    let options = format!(" --speed {}{}", args.held.speed, args.search);
-    let command = RunCommand {
-        name: &plan.name,
-        verb: "dwell",
-        rows: "rows",
-        target: &args.target,
-        work: &args.work,
-        options: [&options, &format!(" --dwell{options}")],
-    };
-    carry_out(&command, &engine, (&job, &output), summary::lines, args.fail_on_error)
+    args.held.run(Some(args.search), &args.target, &args.work, args.fail_on_error)
 }

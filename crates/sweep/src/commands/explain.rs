@@ -1,13 +1,11 @@
 //! `sweep explain GRID.toml --at NAME=VALUE`: why the linear model fails at a point.
 
-use crate::config;
+use crate::config::GridInput;
 use crate::engine::simd_from_environment;
 use crate::explain::{explain, json, words};
 use crate::speeds::{Speeds, turning};
 use sweep_engine::commands::grid::GridArgs;
-use sweep_engine::exit::{Error, Exit, show};
-use sweep_engine::interrupt::Interrupt;
-use sweep_engine::threads;
+use sweep_engine::{Error, Exit, Interrupt, show, threads};
 
 /// Arguments of `sweep explain`.
 #[derive(Debug, clap::Args)]
@@ -39,7 +37,8 @@ disturbance is measured by its energy. docs/stability.md explains every line.";
 /// Mistakes in the grid file or the options, a profile that cannot be explained, and a machine
 /// without equilibrium or modes.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let (plan, at) = config::load_point(&args.grid.grid, &args.grid.sets, &args.grid.at)?;
+    let grid = GridInput::file(args.grid.grid.clone(), args.grid.sets.clone());
+    let (plan, at) = grid.load_point(&args.grid.at)?;
     let threads = threads::count(args.threads, &threads::process)?;
     let simd = simd_from_environment()?;
     // A signal ends the process: there is nothing to keep.

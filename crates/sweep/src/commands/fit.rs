@@ -8,12 +8,8 @@ use std::sync::Mutex;
 use crate::config::{self, GridInput};
 use crate::fit::{self, FitOptions, Measured, Work};
 use sweep_engine::commands::grid::GridArgs;
-use sweep_engine::effort::EffortArgs;
-use sweep_engine::exit::{Error, Exit, show, tell};
-use sweep_engine::interrupt::Interrupt;
 use sweep_engine::progress::Progress;
-use sweep_engine::store::StoreError;
-use sweep_engine::threads;
+use sweep_engine::{EffortArgs, Error, Exit, Interrupt, StoreError, show, tell, threads};
 use sweep_files::panics::lock;
 use sweep_files::{self as files, FileKind, atomic};
 
@@ -27,31 +23,8 @@ pub struct Args {
     /// units; after @ constants of its own
     #[arg(value_name = "FILE[@NAME=VALUE,...]", required = true)]
     measured: Vec<String>,
-    /// Parameters to fit, each perhaps between two values; separated by commas
-    #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
-    free: Vec<String>,
-    /// Parameters of which every file has its own
-    #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
-    own: Vec<String>,
-    /// Fit the nonlinear model, or the linear one
-    #[arg(long, value_name = "MODEL", default_value = "nonlinear")]
-    #[arg(value_parser = ["nonlinear", "linear"])]
-    model: String,
-    /// Take the clock of every file as it is, instead of fitting a shift of it
-    #[arg(long)]
-    no_shift: bool,
-    /// Starts that are looked at for further minima
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    starts: u32,
-    /// Fit again so many times with resampled residuals
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    #[arg(value_parser = clap::value_parser!(u32).range(0..=10_000))]
-    bootstrap: u32,
-    /// Rows of the map over the fitted distribution, for the verdict's probability; 0 for none
-    #[arg(long, value_name = "N", default_value_t = 64)]
-    #[arg(value_parser = clap::value_parser!(u32).range(0..=100_000))]
-    draws: u32,
+    #[command(flatten)]
+    options: FitOptions,
     /// Machine file to write
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -88,15 +61,6 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         let (path, constants) = parted(text);
         cases.push(fit::case(&grid, &constants, Measured::read(path)?)?);
     }
-    let options = FitOptions {
-        free: args.free.clone(),
-        own: args.own.clone(),
-        linear: args.model == "linear",
-        with_shift: !args.no_shift,
-        starts: args.starts as usize,
-        bootstrap: args.bootstrap as usize,
-        draws: u64::from(args.draws),
-    };
     let taken = |path: &PathBuf| Error::File {
         action: "write",
         path: path.clone(),
@@ -105,18 +69,17 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     if let Some(path) = args.out.as_ref().filter(|path| path.exists()) {
         return Err(taken(path));
     }
-    let count = if args.curves.is_some() { cases.len() } else { 0 };
-    let curves: Vec<PathBuf> =
-        (0..count).filter_map(|case| Some(numbered(args.curves.as_ref()?, case))).collect();
+    let numbers = 0..cases.len();
+    let of_path =
+        args.curves.iter().flat_map(|path| numbers.clone().map(move |k| numbered(path, k)));
+    let curves: Vec<PathBuf> = of_path.collect();
     for path in &curves {
         files::ready(atomic::parent(path))?;
         files::judge(path, FileKind::Fit)?;
     }
     let interrupt = Interrupt::install().map_err(Error::signals)?;
     let progress = Mutex::new(Progress::of_search(args.effort.progress, 0, 0));
-    let seen = |made: usize| {
-        lock(&progress).show_search(0, made as u64);
-    };
+    let seen = |made: usize| lock(&progress).show_search(0, made as u64);
     let journal = args.out.as_ref().map(|out| {
         let mut name = out.as_os_str().to_owned();
         name.push(".partial");
@@ -125,7 +88,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let stop = || interrupt.stopped();
     let work = Work { stop: &stop, seen: &seen, journal };
     let threads = threads::count(args.effort.threads, &threads::process)?;
-    let found = threads::pool(threads)?.install(|| fit::fit(cases, &options, &work))?;
+    let found = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &work))?;
     lock(&progress).finish();
     let Some(fitted) = found else {
         tell("interrupted: with --out, what was found out is kept, and the same command goes on");

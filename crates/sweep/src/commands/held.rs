@@ -1,20 +1,16 @@
-//! What commands about held speeds have in common: doing it, what came of it, and which job it is.
+//! What commands about held speeds have in common: doing it, and which job it is.
 
-use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use washer_model::{Starts, decimal};
-
-use crate::dwell::{Carry, POSITIVE, Search, is_positive, motions};
-use crate::engine::Engine;
+use super::show::lines;
+use crate::dwell::Search;
 use crate::plan::Plan;
 use crate::speeds::SpeedList;
-use crate::stability::dwells;
+use crate::stability::{Held, check};
 use sweep_engine::commands::cells::Lines as _;
 use sweep_engine::commands::grid::ResultArgs;
-use sweep_engine::commands::run::{RunCommand, exit, installed};
-use sweep_engine::exit::{Error, Exit};
-use sweep_engine::store::{Job, StoreError};
+use sweep_engine::commands::run::{RunCommand, WorkArgs, exit, installed};
+use sweep_engine::{Error, Exit, Job};
 use sweep_files::ParquetFile;
 
 /// Speeds that the drum holds.
@@ -22,98 +18,54 @@ use sweep_files::ParquetFile;
 pub(super) struct SpeedArgs {
     /// Constant spin speeds in rpm, above 0: one, several with commas, FROM:TO:STEP
     #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
-    pub(super) speed: SpeedList,
+    speed: SpeedList,
 }
 
-/// How motions are looked for, as `dwell`, `status` and `merge` take it.
-#[derive(Clone, Debug, clap::Args)]
-pub(super) struct SearchArgs {
-    /// Starts a speed, the disturbed periodic response among them
-    #[arg(long, value_name = "N", default_value_t = 8,
-          value_parser = clap::value_parser!(u16).range(1..=Search::MOST_STARTS))]
-    starts: u16,
-    /// Hardest kick, in rad/s of the tub's rocking
-    #[arg(long, value_name = "RAD/S", default_value_t = 6.0, value_parser = positive)]
-    kick: f64,
-    /// Take the motion along from speed to speed, up or down, instead of starts at each
-    #[arg(long, value_name = "up|down", conflicts_with_all = ["starts", "kick", "threshold"])]
-    carry: Option<Carry>,
-    /// Look for the smallest kick that does not come back, where there are several motions
-    #[arg(long)]
-    threshold: bool,
-    /// Keep so many states of each motion, once a turn: a row each, with its coordinates
-    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true,
-          value_parser = clap::value_parser!(u16).range(..=256))]
-    sections: u16,
-    /// Follow a motion that does not settle for at most this long, in s
-    #[arg(long, value_name = "SECONDS", default_value_t = 600.0, value_parser = positive)]
-    longest: f64,
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value| is_positive(*value));
-    value.ok_or_else(|| format!("expected {POSITIVE}"))
-}
-
-impl fmt::Display for SearchArgs {
-    /// What differs from the defaults, as it is written on a command line.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let usual = Starts::default();
-        let starts = self.search().starts;
-        if let Some(carry) = self.carry {
-            write!(f, " --carry {}", carry.name())?;
-        }
-        if starts.count != usual.count {
-            write!(f, " --starts {}", starts.count)?;
-        }
-        if starts.kick_rad_per_s != usual.kick_rad_per_s {
-            write!(f, " --kick {}", decimal(starts.kick_rad_per_s))?;
-        }
-        if starts.longest_s != usual.longest_s {
-            write!(f, " --longest {}", decimal(starts.longest_s))?;
-        }
-        if self.sections > 0 {
-            write!(f, " --sections {}", self.sections)?;
-        }
-        if self.threshold { f.write_str(" --threshold") } else { Ok(()) }
-    }
-}
-
-impl SearchArgs {
-    pub(super) fn search(&self) -> Search {
-        let starts = Starts {
-            count: usize::from(self.starts),
-            kick_rad_per_s: self.kick,
-            longest_s: self.longest,
-            with_threshold: self.threshold,
-            ..Starts::default()
+impl SpeedArgs {
+    /// Does what a search asks at these speeds, or finds the periodic responses there; says what
+    /// came of it, and how the program ends.
+    ///
+    /// # Errors
+    /// Mistakes in the grid file or the options, and whatever keeps the file from being written;
+    /// finished chunks are kept.
+    pub(super) fn run(
+        &self,
+        search: Option<Search>,
+        target: &ResultArgs,
+        work: &WorkArgs,
+        fail_on_error: bool,
+    ) -> Result<Exit, Error> {
+        let plan: Plan = target.grid.load()?;
+        check(&plan, "--speed", &self.speed.to_string())?;
+        let held = Held { plan: &plan, speeds_rpm: self.speed.values(), search };
+        let (job, output) = (held.job(), held.output(target.out.as_deref()));
+        let options = options(&self.speed, search);
+        let of_merge = if search.is_some() { " --dwell" } else { "" };
+        let command = RunCommand {
+            name: &plan.name,
+            verb: held.verb(),
+            rows: "rows",
+            target,
+            work,
+            options: [&options, &format!("{of_merge}{options}")],
         };
-        Search { starts, carry: self.carry, sections: usize::from(self.sections) }
+        let finished = |text: &mut String, _: &_| {
+            for (name, words) in lines(&ParquetFile::open(&output)?)? {
+                text.line(name, words);
+            }
+            text.line("file", output.display());
+            text.next("show", &output);
+            Ok(())
+        };
+        let report = command.execute(&held.engine()?, &job, &output, &installed()?, &finished)?;
+        Ok(exit(fail_on_error, &report))
     }
 }
 
-/// Does it, says what came of it by the `lines` of the file, and how the program ends.
-///
-/// # Errors
-/// Mistakes in the options, and whatever keeps the file from being written; finished chunks are
-/// kept.
-pub(super) fn carry_out(
-    command: &RunCommand<'_>,
-    engine: &dyn Engine,
-    (job, output): (&Job<'_>, &Path),
-    lines: impl Fn(&ParquetFile) -> Result<Vec<(&'static str, String)>, StoreError>,
-    fail_on_error: bool,
-) -> Result<Exit, Error> {
-    let finished = |text: &mut String, _: &_| {
-        for (name, words) in lines(&ParquetFile::open(output)?)? {
-            text.line(name, words);
-        }
-        text.line("file", output.display());
-        text.next("show", output);
-        Ok(())
-    };
-    let report = command.execute(engine, job, output, &installed()?, &finished)?;
-    Ok(exit(fail_on_error, &report))
+/// The options of a command line that ask the same.
+fn options(speed: &SpeedList, search: Option<Search>) -> String {
+    let search = search.map(|search| search.to_string()).unwrap_or_default();
+    format!(" --speed {speed}{search}")
 }
 
 /// Which job `status` and `merge` mean.
@@ -127,28 +79,23 @@ pub(super) struct HeldArgs {
     dwell: bool,
     /// How it looks for motions.
     #[command(flatten)]
-    search: SearchArgs,
+    search: Search,
 }
 
 impl HeldArgs {
     /// The job on a plan and its output, the command that goes on with it and what stands behind
     /// its arguments.
     pub(super) fn job<'a>(
-        &self,
+        &'a self,
         plan: &'a Plan,
         target: &ResultArgs,
     ) -> (Job<'a>, PathBuf, [String; 2]) {
-        let out = target.out.as_deref();
         let Some(speed) = &self.speed else {
             return (Job::of(plan), target.output(plan), ["run".to_owned(), String::new()]);
         };
-        if self.dwell {
-            let search = self.search.search();
-            let (job, output) = motions(plan, speed.values(), &search, out);
-            let options = format!(" --speed {speed}{}", self.search);
-            return (job, output, ["dwell".to_owned(), options]);
-        }
-        let (job, output) = dwells(plan, speed, out);
-        (job, output, ["stability".to_owned(), format!(" --speed {speed}")])
+        let search = self.dwell.then_some(self.search);
+        let held = Held { plan, speeds_rpm: speed.values(), search };
+        let again = [held.verb().to_owned(), options(speed, search)];
+        (held.job(), held.output(target.out.as_deref()), again)
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use washer_model::Machine;
 
 use crate::config;
-use sweep_engine::exit::{Error, Exit, print, tell};
+use sweep_engine::{Error, Exit, print, tell};
 use sweep_files::atomic;
 
 /// The commented grid file.

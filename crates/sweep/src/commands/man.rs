@@ -7,7 +7,7 @@ use clap_mangen::Man;
 use clap_mangen::roff::{Roff, bold, roman};
 
 use sweep_engine::commands::examples::Examples;
-use sweep_engine::exit::{Error, Exit};
+use sweep_engine::{Error, Exit};
 use sweep_files::{self as files, FileKind};
 
 /// Arguments of `sweep man`.

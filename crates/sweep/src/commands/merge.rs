@@ -2,8 +2,9 @@
 
 use super::held::HeldArgs;
 use crate::plan::Plan;
-use sweep_engine::commands::merge::{self, of_job};
-use sweep_engine::exit::{Error, Exit};
+use sweep_engine::commands::merge;
+use sweep_engine::commands::merge::of_job;
+use sweep_engine::{Error, Exit};
 
 /// Arguments of `sweep merge`.
 #[derive(Debug, clap::Args)]

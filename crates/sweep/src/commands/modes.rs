@@ -5,11 +5,10 @@ use std::path::PathBuf;
 
 use washer_model::{Exact, ModeAtSpeed, ModeOverSpeed, decimal};
 
-use crate::config;
-use crate::library::modes::{Analysis, built_in, of_plan};
+use crate::config::GridInput;
+use crate::library::modes::{Analysis, Asked};
 use crate::speeds::Speeds;
-use sweep_engine::exit::{Error, Exit, show, tell};
-use sweep_engine::store::StoreError;
+use sweep_engine::{Error, Exit, StoreError, show, tell};
 use sweep_files::{FileKind, Output};
 
 /// Modes of the suspension, which differ from exact motions most.
@@ -48,25 +47,16 @@ pub struct Args {
 /// Mistakes in the grid file or the options, a machine without equilibrium or modes, and what
 /// cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let (name, machine, spin, timing) = match &args.grid {
-        None => built_in(args.speed.to),
-        Some(grid) => {
-            let plan = if args.at.is_empty() {
-                config::load(grid, &args.sets)?
-            } else {
-                config::load_point(grid, &args.sets, &args.at)?.0
-            };
-            of_plan(plan)
-        }
-    };
+    let grid = args.grid.clone().map(|grid| GridInput::file(grid, args.sets.clone()));
+    let asked = Asked::of(grid.as_ref(), &args.at, args.speed.to)?;
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
     let speeds = args.speed.values();
     // A signal ends the process: there is nothing to keep.
-    let found = Analysis::new(&machine, &spin, &timing, &speeds, args.exact, &|| false)?;
+    let found = Analysis::new(&asked, &speeds, args.exact, &|| false)?;
     let Some(analysis) = found else { return Ok(Exit::Interrupted) };
     if let (Some(path), Some(output)) = (&args.out, output) {
-        let bytes = analysis.table(&name, &machine).into_bytes();
+        let bytes = analysis.table(&asked).into_bytes();
         let bytes = bytes.map_err(StoreError::parquet("write", path))?;
         output.finish(&bytes)?;
         tell(&format!(
@@ -77,19 +67,16 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         ));
     }
     if args.json {
-        return show(&format!("{:#}\n", analysis.to_json(&name)));
+        return show(&format!("{:#}\n", analysis.to_json(&asked.name)));
     }
     let mut text = listing(&speeds, &analysis.modes);
     text.push_str(&differences(&analysis));
     if !analysis.friction_speeds.is_empty() {
-        let taken: Vec<String> = analysis
-            .friction_speeds
-            .iter()
-            .map(|(damper, speed)| {
-                let speed = speed.as_f64().unwrap_or_default();
-                format!("{} at {speed:.3} m/s", damper.replace('_', " "))
-            })
-            .collect();
+        let taken = analysis.friction_speeds.iter().map(|(damper, speed)| {
+            let speed = speed.as_f64().unwrap_or_default();
+            format!("{} at {speed:.3} m/s", damper.replace('_', " "))
+        });
+        let taken: Vec<String> = taken.collect();
         text.push_str(&format!("friction is taken as in the run: {}\n", taken.join(", ")));
     }
     tell(text.trim_end());
@@ -142,22 +129,19 @@ fn listing(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
     );
     for (k, mode) in modes.iter().enumerate() {
         let start = mode.at_speed[0].frequency_rpm;
-        let mut line = |resonance: String, turn: String, at: &ModeAtSpeed, motion: String| {
+        let rows = mode.resonances.iter().map(|resonance| {
+            let swing = 0.5 * (resonance.mode.greatest_rpm - resonance.mode.least_rpm);
+            (format!("{:.2}", resonance.speed_rpm), format!("{swing:.3}"), &resonance.mode)
+        });
+        let none = ("none".to_owned(), "-".to_owned(), &mode.at_speed[0]);
+        let none = Some(none).filter(|_| mode.resonances.is_empty());
+        for (resonance, turn, at) in none.into_iter().chain(rows) {
+            let (number, damping, motion) = (k + 1, at.damping_ratio, mode.motion.to_string());
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
-                "{:>4}{resonance:>12}{turn:>14}{:>10.4}{start:>12.2}   {motion}",
-                k + 1,
-                at.damping_ratio
+                "{number:>4}{resonance:>12}{turn:>14}{damping:>10.4}{start:>12.2}   {motion}"
             );
-        };
-        if mode.resonances.is_empty() {
-            line("none".to_owned(), "-".to_owned(), &mode.at_speed[0], mode.motion.to_string());
-        }
-        for resonance in &mode.resonances {
-            let swing = 0.5 * (resonance.mode.greatest_rpm - resonance.mode.least_rpm);
-            let speed = format!("{:.2}", resonance.speed_rpm);
-            line(speed, format!("{swing:.3}"), &resonance.mode, mode.motion.to_string());
         }
     }
     if let Some((swing, mode, speed)) = widest_swing(speeds, modes) {

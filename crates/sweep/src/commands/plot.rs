@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use crate::live::{SliderRange, live, slider_range};
-use sweep_engine::commands::plot::{self, finite};
-use sweep_engine::exit::{Error, Exit};
+use sweep_engine::commands::plot;
+use sweep_engine::commands::plot::finite;
+use sweep_engine::{Error, Exit};
 use sweep_plot::PlotOptions;
 
 /// Arguments of `sweep plot`.
@@ -14,13 +15,8 @@ pub struct Args {
     plot: plot::Args,
 
     /// Trace: mark where these speeds are passed, in rpm, separated by commas
-    #[arg(
-        long,
-        value_name = "RPM,...",
-        value_delimiter = ',',
-        allow_negative_numbers = true,
-        value_parser = speed
-    )]
+    #[arg(long, value_name = "RPM,...", value_delimiter = ',', value_parser = speed)]
+    #[arg(allow_negative_numbers = true)]
     pub resonances: Vec<f64>,
 
     /// Trace: mark where the resonance speeds of this modes file are passed
@@ -42,12 +38,8 @@ pub struct Args {
     pub live: bool,
 
     /// With --live: a slider for this parameter; may be repeated [default: a usual choice]
-    #[arg(
-        long = "slider",
-        value_name = "NAME=FROM:TO",
-        requires = "live",
-        value_parser = slider_range
-    )]
+    #[arg(long = "slider", value_name = "NAME=FROM:TO", requires = "live")]
+    #[arg(value_parser = slider_range)]
     pub sliders: Vec<SliderRange>,
 
     /// Map as .html: folder of trace files; clicking a point that has one shows its time histories
@@ -60,10 +52,7 @@ pub struct Args {
 /// # Errors
 /// As the engine's command, and a map that no page can compute.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let live = match args.live {
-        true => Some(live(&args.plot.file, &args.sliders)?),
-        false => None,
-    };
+    let live = args.live.then(|| live(&args.plot.file, &args.sliders)).transpose()?;
     let further = PlotOptions {
         resonances_rpm: args.resonances.clone(),
         modes: args.modes.clone(),

@@ -11,9 +11,9 @@ use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 use crate::columns::Columns;
 use crate::config;
 use crate::method::Integrator;
-use sweep_engine::exit::{Error, Exit, print};
 use sweep_engine::method::{Integrator as _, default_method};
 use sweep_engine::store::{Column, Kind, Layout};
+use sweep_engine::{Error, Exit, print};
 use sweep_files::key;
 
 /// Arguments of `sweep reference`.
@@ -74,22 +74,7 @@ fn parameters() -> String {
         _ => None,
     });
     let how = told.unwrap_or_default();
-    let _ = writeln!(
-        text,
-        "Every number of the machine and of the spin has one name, in `[set]`, in `--set \
-         NAME=VALUE` and as\n\
-         the `parameter` of an `[[axis]]`. Values are the built-in machine's. *Paper* means \
-         printed there,\n\
-         *derived* is {how}, *assumed* is this \
-         project's choice.\n\n\
-         Springs, dampers, stops, bushings, unbalances and feet are numbered in the order of the \
-         machine file.\n\
-         The table shows the first of each, without a source where the built-in machine has none, \
-         and one\n\
-         row for x (towards the door), y (upwards) and z (sideways). `end_s` and the integrator's \
-         settings are\n\
-         not parameters, because rows of different length or method would not compare.\n"
-    );
+    text.push_str(&format!(include_str!("reference/parameters.txt"), how = how));
     row(&mut text, &["name", "built in", "unit", "meaning", "values", "source"]);
     row(&mut text, &["---"; 6]);
     let machine = Machine::paper();
@@ -100,10 +85,8 @@ fn parameters() -> String {
     };
     for parameter in &all {
         let (name, description) = (parameter.name(), parameter.description());
-        if is_a_further_one(name)
-            || description.ends_with("upwards")
-            || description.ends_with("sideways")
-        {
+        let is_told = ["upwards", "sideways"].iter().any(|way| description.ends_with(way));
+        if is_told || is_a_further_one(name) {
             continue;
         }
         let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
@@ -117,24 +100,16 @@ fn parameters() -> String {
         // The first of three coordinates tells of all.
         let of_three = description.strip_suffix("towards the door");
         let axes: &[&str] = if of_three.is_some() { &["_x", "_y", "_z"] } else { &["_x"] };
-        let mut values: Vec<String> = Vec::new();
-        for axis in axes {
-            values.push(value_of(&name.replacen("_x", axis, 1)).unwrap_or_else(|| none.into()));
-        }
+        let value =
+            |axis: &&str| value_of(&name.replacen("_x", axis, 1)).unwrap_or_else(|| none.into());
+        let mut values: Vec<String> = axes.iter().map(value).collect();
         if values.iter().all(|value| *value == values[0]) {
             values.truncate(1);
         }
-        row(
-            &mut text,
-            &[
-                &format!("`{name}`{}", if of_three.is_some() { ", y, z" } else { "" }),
-                &values.join(", "),
-                parameter.unit(),
-                of_three.unwrap_or(description).trim_end_matches([',', ' ']),
-                &allowed(parameter.range()),
-                &source,
-            ],
-        );
+        let name = format!("`{name}`{}", if of_three.is_some() { ", y, z" } else { "" });
+        let meaning = of_three.unwrap_or(description).trim_end_matches([',', ' ']);
+        let (values, range) = (values.join(", "), allowed(parameter.range()));
+        row(&mut text, &[&name, &values, parameter.unit(), meaning, &range, &source]);
     }
     text
 }
@@ -181,24 +156,7 @@ fn methods() -> String {
 
 fn columns() -> String {
     let mut text = head("Columns of a result file", "columns");
-    text.push_str(
-        "A result has one row per grid point, in grid order. One column per axis follows `point`, \
-         named as its\n\
-         parameter: here the two axes of `sweeps/fig12.toml`. MODEL is `nonlinear` or `linear`, \
-         CHANNEL a\n\
-         channel of `[reliability]`. What a model gives is null if that model failed.\n\n\
-         The file holds each column's unit and description, which way it is bad and up to where it \
-         is good,\n\
-         in the Arrow metadata of its field (`unit`, `description`, `worse`, `limit`) and as JSON \
-         under the key\n\
-         `sweep.columns`. Where `[reliability]` has a `ratio_min`, `ratio_min` and \
-         `ratio_min_channel` stand behind\n\
-         `ratio_max_channel`. Other keys are `sweep.plan` \
-         (the grid as run,\n\
-         with the full machine), `sweep.plan_hash`, `sweep.version`, `sweep.numerics` (which \
-         builds write the\n\
-         same bytes) and `sweep.digest`, by which every command notices a changed bit.\n\n",
-    );
+    text.push_str(include_str!("reference/columns.txt"));
     let (machine, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
     let axes = Parameter::all(&machine, &spin)
         .into_iter()
@@ -220,28 +178,18 @@ fn columns() -> String {
             continue;
         }
         let told = |key: &str| field.metadata().get(key).map_or("", String::as_str);
-        let mut data_type = match field.data_type() {
+        let data_type = match field.data_type() {
             arrow_schema::DataType::Dictionary(..) => "text".to_owned(),
             plain => plain.to_string().to_lowercase(),
         };
-        if !field.is_nullable() {
-            data_type.push_str(", never null");
-        }
-        row(
-            &mut text,
-            &[
-                &format!("`{name}`"),
-                &data_type,
-                if name.ends_with("CHANNEL") && told("unit") != "1" {
-                    "the channel's"
-                } else {
-                    told("unit")
-                },
-                told(key::WORSE),
-                told(key::LIMIT),
-                &of_any_model(told("description")),
-            ],
-        );
+        let data_type = data_type + if field.is_nullable() { "" } else { ", never null" };
+        let unit = match told("unit") {
+            unit if unit != "1" && name.ends_with("CHANNEL") => "the channel's",
+            unit => unit,
+        };
+        let (name, meaning) = (format!("`{name}`"), of_any_model(told("description")));
+        let [worse, limit] = [key::WORSE, key::LIMIT].map(told);
+        row(&mut text, &[&name, &data_type, unit, worse, limit, &meaning]);
     }
     text.push_str("\nChannels:\n\n");
     row(&mut text, &["channel", "unit", "what moves"]);
@@ -253,25 +201,17 @@ fn columns() -> String {
     row(&mut text, &["criterion", "`nonlinear_` and `linear_`", "`ratio_`"]);
     row(&mut text, &["---"; 3]);
     for criterion in Criterion::ALL {
-        row(
-            &mut text,
-            &[&format!("`{}`", criterion.name()), criterion.amplitude(), criterion.ratio()],
-        );
+        let name = format!("`{}`", criterion.name());
+        row(&mut text, &[&name, criterion.amplitude(), criterion.ratio()]);
     }
-    let metrics: Vec<String> =
-        Metric::ALL.iter().map(|metric| format!("`{}`", metric.name())).collect();
-    // Writing to a String cannot fail.
-    let _ = writeln!(
-        text,
-        "\nThe columns of a metric ({}) are there only where the grid file's `metrics` names it, \
-         in its order. Machines with two stops or more have those of `stop_1` for each of them \
-         (`stop_2_force_nonlinear_n`), and so have feet and dampers. `growth_mode_2` is the mode \
-         that takes part next to the first.",
-        metrics.join(", ")
-    );
-    let statuses: Vec<String> = ROW_STATUSES.iter().map(|status| format!("`{status}`")).collect();
-    // Writing to a String cannot fail.
-    let _ = writeln!(text, "\nValues of `status`: {}.", statuses.join(", "));
+    let listed = |names: &mut dyn Iterator<Item = &'static str>| {
+        names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+    };
+    text.push_str(&format!(
+        include_str!("reference/metrics.txt"),
+        metrics = listed(&mut Metric::ALL.iter().map(|metric| metric.name())),
+        statuses = listed(&mut ROW_STATUSES.into_iter()),
+    ));
     text
 }
 

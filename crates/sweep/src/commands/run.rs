@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use crate::trace::{self, MOST_KEPT};
-use sweep_engine::commands::run::{self as engine_run, execute, exit, installed};
-use sweep_engine::exit::{Error, Exit, tell};
+use sweep_engine::commands::run as engine_run;
+use sweep_engine::commands::run::{execute, exit, installed};
 use sweep_engine::progress::Progress;
 use sweep_engine::run::Ended;
-use sweep_engine::threads;
+use sweep_engine::{Error, Exit, tell, threads};
 use sweep_files::panics::lock;
 use sweep_files::{self as files, ParquetFile};
 

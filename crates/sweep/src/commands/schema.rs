@@ -1,7 +1,7 @@
 //! `sweep schema`: JSON Schema of the files a user writes.
 
 use crate::config::schema;
-use sweep_engine::exit::{Error, Exit, print};
+use sweep_engine::{Error, Exit, print};
 
 /// Arguments of `sweep schema`.
 #[derive(Debug, clap::Args)]

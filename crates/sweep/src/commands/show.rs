@@ -2,8 +2,9 @@
 
 use crate::dwell;
 use crate::stability::tongues;
-use sweep_engine::commands::show::{self, Args, Further};
-use sweep_engine::exit::{Error, Exit};
+use sweep_engine::commands::show;
+use sweep_engine::commands::show::{Args, Further};
+use sweep_engine::{Error, Exit};
 use sweep_files::{FileKind, ParquetFile};
 use washer_row::Metric;
 
@@ -18,7 +19,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 /// What is said beside what all models' files say.
 pub(super) const FURTHER: Further<'static> = Further { lines: &lines, is_of_a_metric };
 
-fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
+/// What a file about held speeds says as a whole: lines, each with its name.
+pub(super) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
     Ok(match file.kind() {
         Some(FileKind::Stability) => tongues::summary(file)?.lines(),
         Some(FileKind::Dwell) => dwell::summary::lines(file)?,

@@ -1,13 +1,12 @@
 //! `sweep slurm GRID.toml --shards N`: the script that submits a sweep to a Slurm cluster.
 
 use std::ffi::OsStr;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::plan::Plan;
 use sweep_engine::commands::grid::{ResultArgs, quoted};
-use sweep_engine::exit::{Error, Exit, print, tell};
 use sweep_engine::store::{ShardRequest, chunk_points};
+use sweep_engine::{Error, Exit, print, tell};
 
 /// Tasks that a Slurm array may have unless its administrator allowed more (`MaxArraySize` 1001
 /// counts from 0).
@@ -31,12 +30,8 @@ pub struct Args {
     #[arg(long, value_name = "NAME", value_parser = word)]
     account: Option<String>,
     /// Cores a task, and so its threads
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 1,
-        value_parser = clap::value_parser!(u32).range(1..=4096)
-    )]
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=4096))]
     cpus_per_task: u32,
     /// Memory a task, as sbatch takes it: 500M, 2G
     #[arg(long, value_name = "SIZE", value_parser = word)]
@@ -68,15 +63,11 @@ fn word(text: &str) -> Result<String, String> {
 /// cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan: Plan = args.target.grid.load()?;
-    let path_of = |what: &str, found: std::io::Result<PathBuf>| {
-        found.map_err(|source| Error::File {
-            action: "find the path of",
-            path: what.into(),
-            source,
-        })
+    let no_path = |what: &'static str| {
+        move |source| Error::File { action: "find the path of", path: what.into(), source }
     };
-    let folder = path_of("the working folder", std::env::current_dir())?;
-    let program = path_of("this program", std::env::current_exe())?;
+    let folder = std::env::current_dir().map_err(no_path("the working folder"))?;
+    let program = std::env::current_exe().map_err(no_path("this program"))?;
     names_fit(args, &folder, &program)?;
     let chunks = plan.points().div_ceil(chunk_points(plan.points()));
     if args.shards > chunks {
@@ -119,7 +110,6 @@ fn names_fit(args: &Args, folder: &Path, program: &Path) -> Result<(), Error> {
 
 /// The script: the array, and the merge that waits for it.
 fn script(args: &Args, plan: &Plan, folder: &Path, program: &Path) -> String {
-    let name = quoted(&plan.name);
     let output = args.target.output(plan);
     let results = match output.parent() {
         Some(parent) if parent != Path::new("") => parent.to_path_buf(),
@@ -130,70 +120,34 @@ fn script(args: &Args, plan: &Plan, folder: &Path, program: &Path) -> String {
         let stem = results.join(&plan.name).display().to_string().replace('%', "%%");
         quoted_pattern(&format!("{stem}.slurm-{field}.log"))
     };
-    let command = |verb: &str| {
-        let line = args.target.command(verb);
-        // `command` begins with the program's bare name; on a node only its path is sure to be
-        // found.
-        line.replacen("sweep", &quoted(&program.display().to_string()), 1)
-    };
-    let mut common = String::new();
-    for (option, value) in [
-        ("time", &args.time),
-        ("partition", &args.partition),
-        ("account", &args.account),
-        ("mem", &args.mem),
-    ] {
-        if let Some(value) = value {
-            // Writing to a String cannot fail.
-            let _ = write!(common, " --{option}={}", quoted(value));
-        }
-    }
-    for option in &args.sbatch {
-        let _ = write!(common, " {}", quoted(option));
-    }
-    let (shards, cpus) = (args.shards, args.cpus_per_task);
-    let (folder, results) =
-        (quoted(&folder.display().to_string()), quoted(&results.display().to_string()));
-    let (array_log, merge_log) = (log("%A_%a"), log("merge-%j"));
-    let (run, merge) = (command("run"), command("merge"));
+    // `command` begins with the program's bare name; on a node only its path is sure to be found.
+    let program = quoted(&program.display().to_string());
+    let command = |verb: &str| args.target.command(verb).replacen("sweep", &program, 1);
+    let Args { time, partition, account, mem, .. } = args;
+    let named = [("time", time), ("partition", partition), ("account", account), ("mem", mem)];
+    let named = named.into_iter().filter_map(|(option, value)| Some((option, value.as_ref()?)));
+    let named = named.map(|(option, value)| format!(" --{option}={}", quoted(value)));
+    let others = args.sbatch.iter().map(|option| format!(" {}", quoted(option)));
+    let common: String = named.chain(others).collect();
     format!(
-        r#"#!/bin/sh
-# Submits the sweep {name}: {shards} shards as one array, and their merge once all have ended.
-# Run it where sbatch is. Arguments go to the array's sbatch: `sh THIS_SCRIPT --array=3,7` submits
-# the shards again that `sweep status` misses, and the merge after them. Slurm queues a task again
-# that loses its node; the task goes on from its finished chunks.
-set -eu
-cd {folder}
-mkdir -p {results}
-
-array=$(sbatch --parsable --job-name={name} --array=1-{shards} --requeue --open-mode=append \
-    --nodes=1 --ntasks=1 --cpus-per-task={cpus} --output={array_log}{common} "$@" <<'END'
-#!/bin/sh
-exec {run} --shard "$SLURM_ARRAY_TASK_ID/{shards}"
-END
-)
-array=${{array%%;*}}
-
-# Whatever became of the tasks: a merge that finds a chunk missing names its shard, and leaves
-# everything in place.
-merge=$(sbatch --parsable --job-name={name}-merge --dependency="afterany:$array" --requeue \
-    --open-mode=append --nodes=1 --ntasks=1 --output={merge_log}{common} <<'END'
-#!/bin/sh
-exec {merge}
-END
-)
-echo "array $array, merge ${{merge%%;*}}"
-"#
+        include_str!("slurm.sh"),
+        name = quoted(&plan.name),
+        folder = quoted(&folder.display().to_string()),
+        results = quoted(&results.display().to_string()),
+        shards = args.shards,
+        cpus = args.cpus_per_task,
+        array_log = log("%A_%a"),
+        merge_log = log("merge-%j"),
+        run = command("run"),
+        merge = command("merge"),
+        common = common,
     )
 }
 
 /// A file name pattern: its `%` is no reason for quotes.
 fn quoted_pattern(pattern: &str) -> String {
-    if quoted(&pattern.replace('%', "")) == pattern.replace('%', "") {
-        pattern.to_owned()
-    } else {
-        quoted(pattern)
-    }
+    let rest = pattern.replace('%', "");
+    if quoted(&rest) == rest { pattern.to_owned() } else { quoted(pattern) }
 }
 
 #[cfg(test)]

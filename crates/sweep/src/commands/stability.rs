@@ -1,12 +1,10 @@
 //! `sweep stability GRID.toml --speed FROM:TO:STEP`: periodic responses and whether they are
 //! stable.
 
-use super::held::{SpeedArgs, carry_out};
-use crate::plan::Plan;
-use crate::stability::{DwellEngine, check, dwells, tongues};
+use super::held::SpeedArgs;
 use sweep_engine::commands::grid::ResultArgs;
-use sweep_engine::commands::run::{RunCommand, WorkArgs};
-use sweep_engine::exit::{Error, Exit};
+use sweep_engine::commands::run::WorkArgs;
+use sweep_engine::{Error, Exit};
 
 /// Arguments of `sweep stability`.
 #[derive(Debug, clap::Args)]
@@ -45,19 +43,5 @@ command goes on from there.";
 /// Mistakes in the grid file or the options, and whatever keeps the file from being written;
 /// finished chunks are kept.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let plan: Plan = args.target.grid.load()?;
-    check(&plan, "--speed", &args.held.speed.to_string())?;
-    let engine = DwellEngine::new(&plan, args.held.speed.values())?;
-    let (job, output) = dwells(&plan, &args.held.speed, args.target.out.as_deref());
-    let options = format!(" --speed {}", args.held.speed);
-    let command = RunCommand {
-        name: &plan.name,
-        verb: "stability",
-        rows: "rows",
-        target: &args.target,
-        work: &args.work,
-        options: [&options; 2],
-    };
-    let lines = |file: &_| Ok(tongues::summary(file)?.lines());
-    carry_out(&command, &engine, (&job, &output), lines, args.fail_on_error)
+    args.held.run(None, &args.target, &args.work, args.fail_on_error)
 }

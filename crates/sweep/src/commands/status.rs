@@ -2,8 +2,9 @@
 
 use super::held::HeldArgs;
 use crate::plan::Plan;
-use sweep_engine::commands::status::{self, of_job};
-use sweep_engine::exit::{Error, Exit};
+use sweep_engine::commands::status;
+use sweep_engine::commands::status::of_job;
+use sweep_engine::{Error, Exit};
 
 /// Arguments of `sweep status`.
 #[derive(Debug, clap::Args)]

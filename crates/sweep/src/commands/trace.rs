@@ -1,19 +1,17 @@
 //! `sweep trace GRID.toml`: time histories of both models at one point, or at every one.
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use crate::config;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use crate::trace::{Extras, Models, StartValue, View, every, in_pool, start_of, start_value};
 use sweep_engine::commands::cells::{Lines as _, short, table};
 use sweep_engine::commands::grid::quoted;
-use sweep_engine::exit::{Error, Exit, tell};
-use sweep_engine::store::Job;
+use sweep_engine::{Error, Exit, Job, StoreError, tell};
 use sweep_files::{FileKind, Output, key};
-use sweep_parameter::{RatioLimits, Worse};
+use sweep_parameter::Worse;
 use sweep_results::{Cell, ResultTable, top};
+use washer_model::Channel;
 use washer_row::{Trajectory, Verdict};
 
 /// Arguments of `sweep trace`.
@@ -25,13 +23,8 @@ pub struct Args {
     #[arg(long, value_name = "N", conflicts_with_all = ["worst", "at"])]
     point: Option<u64>,
     /// The point of the grid's result where this column is worst [default: ratio_max]
-    #[arg(
-        long,
-        value_name = "COLUMN",
-        conflicts_with = "at",
-        num_args = 0..=1,
-        default_missing_value = "ratio_max"
-    )]
+    #[arg(long, value_name = "COLUMN", conflicts_with = "at")]
+    #[arg(num_args = 0..=1, default_missing_value = "ratio_max")]
     worst: Option<String>,
     /// The result that --worst looks into [default: results/NAME.parquet]
     #[arg(long, value_name = "FILE", requires = "worst")]
@@ -76,17 +69,10 @@ pub struct Args {
 /// Mistakes in the grid file or the options, a machine without equilibrium, and a file that cannot
 /// be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let (plan, at, chosen) = match args.all {
-        true => (args.grid.load()?, None, Vec::new()),
-        false => {
-            let chosen = chosen(args)?;
-            let (mut plan, at) = config::load_point(&args.grid.grid, &args.grid.sets(), &chosen)?;
-            if let Some(name) = &args.grid.name {
-                plan.name.clone_from(name);
-            }
-            args.grid.tell_window(&plan);
-            (plan, Some(at), chosen)
-        }
+    let chosen = if args.all { Vec::new() } else { chosen(args)? };
+    let (plan, at) = match args.all {
+        true => (args.grid.load()?, None),
+        false => args.grid.load_point(&chosen).map(|(plan, at)| (plan, Some(at)))?,
     };
     let every_s = every((!args.turns).then_some(args.every), &plan)?;
     let Args { rates, states, forces, angle, model: models, .. } = *args;
@@ -98,7 +84,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let trace = in_pool(&plan, at, &view, &|| false).map_err(Error::model)?;
     trace.failures.iter().for_each(|failure| tell(failure));
     let instants = trace.instants;
-    output.finish(&trace.into_bytes(&args.out)?)?;
+    let bytes = trace.table.into_bytes();
+    output.finish(&bytes.map_err(StoreError::parquet("write", &args.out))?)?;
     let of = if args.all { format!(" of {} points", plan.points()) } else { String::new() };
     let (out, end_s) = (args.out.display(), plan.end_s);
     tell(&format!("wrote {out}: {instants} instants{of} from 0 to {end_s} s"));
@@ -115,14 +102,12 @@ fn chosen(args: &Args) -> Result<Vec<String>, Error> {
         return Ok(args.grid.at.clone());
     }
     let plan: Plan = args.grid.load()?;
-    let point = match (&args.worst, args.point) {
-        (Some(column), _) => {
-            let (point, worse) = worst(args, &plan, column)?;
-            tell(&format!("point {point} is where {column} is {}", worse.extreme()));
-            point
-        }
-        (None, point) => point.unwrap_or_default(),
-    };
+    let mut point = args.point.unwrap_or_default();
+    if let Some(column) = &args.worst {
+        let worse;
+        (point, worse) = worst(args, &plan, column)?;
+        tell(&format!("point {point} is where {column} is {}", worse.extreme()));
+    }
     if point >= plan.points() {
         return Err(Error::option("--point", point, format!("from 0 to {}", plan.points() - 1)));
     }
@@ -147,15 +132,13 @@ fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> 
         let expected = format!("a result of this very grid, which {} is not", path.display());
         return Err(refused(expected));
     }
-    let worse = match file.column(column) {
-        Some(known) => known.worse.ok_or_else(|| {
-            refused(format!(
-                "a column that is bad one way, which {column} is not: --point takes \
-                             the number of any row"
-            ))
-        })?,
-        None => Worse::Greater,
-    };
+    let worse = file.column(column).map_or(Some(Worse::Greater), |known| known.worse);
+    let worse = worse.ok_or_else(|| {
+        refused(format!(
+            "a column that is bad one way, which {column} is not: --point takes the number of any \
+             row"
+        ))
+    })?;
     let rows = top(&file, &["point", column], None, Some((column, worse)), 1);
     let rows = rows.map_err(|error| sweep_engine::commands::show::with_nearest(error, &file))?;
     match rows.first().map(Vec::as_slice) {
@@ -167,59 +150,49 @@ fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> 
 /// Peaks of both models in the window, their ratios and the verdict: what the point's row of a map
 /// holds.
 fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
-    let engine = ModelEngine::new(plan)?;
-    let mut text = String::new();
-    for outcome in engine.evaluate_at(&[Vec::new()]) {
-        let channels = &plan.reliability.channels;
-        let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.limits);
-        let number = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), short);
-        let rows: Vec<Vec<String>> = channels
-            .iter()
-            .enumerate()
-            .map(|(k, channel)| {
-                let amplitude = |model: &Trajectory| number(model.amplitudes.get(k).copied());
-                vec![
-                    channel.name().to_owned(),
-                    channel.unit().to_owned(),
-                    amplitude(&outcome.nonlinear),
-                    amplitude(&outcome.linear),
-                    number(verdict.ratios.get(k).copied().flatten()),
-                ]
-            })
-            .collect();
-        let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
-        let [from, to] = plan.window_s;
-        let what = plan.model.measures.criterion.amplitude();
-        let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{what}, {} to {} s{place}:", short(from), short(to));
-        text.push_str(&table(&headings, &rows, ""));
-        let RatioLimits { most, least } = plan.reliability.limits;
-        // The ratio that is beyond its limit, or the greatest.
-        let too_low = least.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
-        let told = match (verdict.greatest, too_low) {
-            (Some((_, ratio)), Some((limit, least))) if ratio < most => {
-                Some((least, "least", limit))
-            }
-            (greatest, _) => greatest.map(|greatest| (greatest, "greatest", most)),
-        };
-        let said = match (verdict.reliable, told) {
-            (Some(reliable), Some(((channel, ratio), which, limit))) => format!(
-                "{}: the {which} ratio is {} ({}), the limit {}",
-                if reliable { "reliable" } else { "not reliable" },
-                short(ratio),
-                channels.get(channel).map_or("", |channel| channel.name()),
-                short(limit),
-            ),
-            _ => "undefined: no ratio is".to_owned(),
-        };
-        text.line("verdict", &said);
-        if outcome.sensitive == Some(true) {
-            text.line("sensitive", "chaotic: the digits are those of one trajectory");
+    let mut outcomes = ModelEngine::new(plan)?.evaluate_at(&[Vec::new()]);
+    let Some(outcome) = outcomes.pop() else { return Ok(String::new()) };
+    let (channels, limits) = (&plan.reliability.channels, plan.reliability.limits);
+    let verdict = Verdict::new(&outcome, channels.len(), limits);
+    let number = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), short);
+    let row = |(k, channel): (usize, &Channel)| {
+        let amplitude = |model: &Trajectory| number(model.amplitudes.get(k).copied());
+        vec![
+            channel.name().to_owned(),
+            channel.unit().to_owned(),
+            amplitude(&outcome.nonlinear),
+            amplitude(&outcome.linear),
+            number(verdict.ratios.get(k).copied().flatten()),
+        ]
+    };
+    let rows: Vec<Vec<String>> = channels.iter().enumerate().map(row).collect();
+    let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
+    let [from, to] = plan.window_s.map(short);
+    let what = plan.model.measures.criterion.amplitude();
+    let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
+    let mut text = format!("{what}, {from} to {to} s{place}:\n{}", table(&headings, &rows, ""));
+    // The ratio that is beyond its limit, or the greatest.
+    let too_low = limits.least.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
+    let told = match (verdict.greatest, too_low) {
+        (Some((_, ratio)), Some((limit, least))) if ratio < limits.most => {
+            Some((least, "least", limit))
         }
-        let gaps = [&outcome.nonlinear, &outcome.linear].map(|model| number(model.min_gap_m));
-        let told = format!("{} m nonlinear, {} m linear, over the whole run", gaps[0], gaps[1]);
-        text.line("least gap", &told);
+        (greatest, _) => greatest.map(|greatest| (greatest, "greatest", limits.most)),
+    };
+    let said = match (verdict.reliable, told) {
+        (Some(reliable), Some(((channel, ratio), which, limit))) => {
+            let said = if reliable { "reliable" } else { "not reliable" };
+            let (channel, ratio, limit) = (channels[channel].name(), short(ratio), short(limit));
+            format!("{said}: the {which} ratio is {ratio} ({channel}), the limit {limit}")
+        }
+        _ => "undefined: no ratio is".to_owned(),
+    };
+    text.line("verdict", &said);
+    if outcome.sensitive == Some(true) {
+        text.line("sensitive", "chaotic: the digits are those of one trajectory");
     }
+    let gaps = [&outcome.nonlinear, &outcome.linear].map(|model| number(model.min_gap_m));
+    let told = format!("{} m nonlinear, {} m linear, over the whole run", gaps[0], gaps[1]);
+    text.line("least gap", &told);
     Ok(text)
 }

@@ -124,66 +124,46 @@ const fn optional_vector(name: &'static str, parameters: &'static [&'static str;
     Key { name, parameters, left_out: LeftOut::Is(0.0) }
 }
 
+/// A section that every file has once.
+const fn once(section: &'static str, prefix: &'static str, keys: &'static [Key]) -> Part {
+    Part { section, prefix, times: Times::Once, keys, count: |_| 1, fill: |_, _| () }
+}
+
 const INERTIA: Key =
     vector("inertia_kg_m2", &["inertia_11_kg_m2", "inertia_22_kg_m2", "inertia_33_kg_m2"]);
 const CABINET_END: Key = vector("cabinet_m", &["cabinet_x_m", "cabinet_y_m", "cabinet_z_m"]);
 const TUB_END: Key = vector("tub_m", &["tub_x_m", "tub_y_m", "tub_z_m"]);
-/// A section that every file has once.
-const ONCE: Part =
-    Part { section: "", prefix: "", times: Times::Once, keys: &[], count: |_| 1, fill: |_, _| () };
 /// A spring's free length follows its ends where it is left out.
 const FREE_LENGTH: &str = "free_length_m";
 
 /// Every section of a machine file.
 pub(super) const PARTS: [Part; 14] = [
-    Part { keys: &[number("gravity_m_per_s2"), number("radial_clearance_m")], ..ONCE },
-    Part {
-        section: "tub",
-        prefix: "tub_",
-        keys: &[number("mass_kg"), number("centre_x_m"), number("front_x_m"), INERTIA],
-        ..ONCE
-    },
-    Part {
-        section: "shaft",
-        prefix: "shaft_",
-        keys: &[number("mass_kg"), number("centre_x_m"), INERTIA],
-        ..ONCE
-    },
-    Part {
-        section: "drum",
-        prefix: "drum_",
-        keys: &[
+    once("", "", &[number("gravity_m_per_s2"), number("radial_clearance_m")]),
+    once("tub", "tub_", &[number("mass_kg"), number("centre_x_m"), number("front_x_m"), INERTIA]),
+    once("shaft", "shaft_", &[number("mass_kg"), number("centre_x_m"), INERTIA]),
+    once(
+        "drum",
+        "drum_",
+        &[
             number("mass_kg"),
             number("centre_x_m"),
             number("hinge_x_m"),
             number("front_x_m"),
             INERTIA,
         ],
-        ..ONCE
-    },
-    Part {
-        section: "unbalance",
-        prefix: "unbalance_",
-        keys: &[number("mass_kg"), number("x_m"), number("radius_m")],
-        ..ONCE
-    },
-    Part {
-        section: "flexure",
-        prefix: "flexure_",
-        keys: &[number("stiffness_n_m_per_rad")],
-        ..ONCE
-    },
-    Part {
-        section: "bearings",
-        prefix: "bearing_",
-        keys: &[
+    ),
+    once("unbalance", "unbalance_", &[number("mass_kg"), number("x_m"), number("radius_m")]),
+    once("flexure", "flexure_", &[number("stiffness_n_m_per_rad")]),
+    once(
+        "bearings",
+        "bearing_",
+        &[
             number("front_x_m"),
             number("rear_x_m"),
             number("front_stiffness_n_per_m"),
             number("rear_stiffness_n_per_m"),
         ],
-        ..ONCE
-    },
+    ),
     Part {
         section: "cabinet",
         prefix: "cabinet_",

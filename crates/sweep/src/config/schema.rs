@@ -13,8 +13,7 @@ use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
 /// What grid files have beside what the engine reads.
 pub(crate) fn grid() -> Schema {
     let machine = json!({
-        "type": "string",
-        "default": DEFAULT_MACHINE,
+        "type": "string", "default": DEFAULT_MACHINE,
         "description": "\"paper\", or a machine file relative to this file",
     });
     let criterion = json!({
@@ -107,10 +106,8 @@ fn set() -> Value {
             Times::Many(first, _) => Some((part.prefix, first)),
             Times::Once | Times::AtMostOnce => None,
         });
-        match lists
-            .chain([("spin_table_", 1)])
-            .find_map(|(prefix, first)| Some((prefix, first, name.strip_prefix(prefix)?)))
-        {
+        let mut lists = lists.chain([("spin_table_", 1)]);
+        match lists.find_map(|(prefix, first)| Some((prefix, first, name.strip_prefix(prefix)?))) {
             Some((prefix, first, rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => {
                 let suffix = rest.trim_start_matches(|c: char| c.is_ascii_digit());
                 let number = if first == 1 { "[1-9][0-9]*" } else { "([2-9]|[1-9][0-9]+)" };
@@ -132,38 +129,27 @@ fn spin() -> Value {
         ];
         table(keys, &["profile", "peak_rpm", "ramp_s"])
     };
-    let column = |range: Range, description: &str| {
-        let (items, most) = (number(range), MOST_ROWS);
+    let column = |range: Range, said: &str| {
+        let items = number(range);
         json!({
-            "type": "array",
-            "items": items,
-            "minItems": 1,
-            "maxItems": most,
-            "description": description,
+            "type": "array", "items": items, "minItems": 1, "maxItems": MOST_ROWS,
+            "description": said,
         })
     };
-    let tabled = table(
-        [
-            (
-                "profile",
-                json!({ "const": TABLE, "description": "linear between given points, constant \
-                                                        after the last" }),
-            ),
-            ("time_s", column(Range::NonNegative, "increasing times from 0, s")),
-            ("speed_rpm", column(Range::Within(-1e5, 1e5), "speeds at these times, rpm")),
-        ],
-        &["profile", "time_s", "speed_rpm"],
-    );
+    let said = "linear between given points, constant after the last";
+    let keys = [
+        ("profile", json!({ "const": TABLE, "description": said })),
+        ("time_s", column(Range::NonNegative, "increasing times from 0, s")),
+        ("speed_rpm", column(Range::Within(-1e5, 1e5), "speeds at these times, rpm")),
+    ];
+    let tabled = table(keys, &["profile", "time_s", "speed_rpm"]);
     json!({ "oneOf": RAMPED.iter().map(ramped).chain([tabled]).collect::<Value>() })
 }
 
 fn metrics() -> Value {
     json!({
-        "type": "array",
-        "items": { "enum": Metric::ALL.map(Metric::name) },
-        "minItems": 1,
-        "uniqueItems": true,
-        "description": "further columns of the result",
+        "type": "array", "items": { "enum": Metric::ALL.map(Metric::name) }, "minItems": 1,
+        "uniqueItems": true, "description": "further columns of the result",
     })
 }
 

@@ -81,24 +81,6 @@ pub(super) fn by_profile(spin: &Spin, profile: &Ramped) -> Option<Spin> {
     }
 }
 
-/// What `profile` says.
-#[derive(Clone, Copy)]
-enum Profile {
-    Ramped(&'static Ramped),
-    Table,
-    /// None that there is: its numbers are still checked.
-    Unknown,
-}
-
-impl Profile {
-    fn of(choice: Option<usize>) -> Self {
-        match choice {
-            None => Self::Unknown,
-            Some(choice) => RAMPED.get(choice).map_or(Self::Table, Self::Ramped),
-        }
-    }
-}
-
 pub(crate) fn read(root: &Section<'_>) -> Spin {
     // Stands in for a wrong spin, so that axes over its numbers are still known.
     let stand_in = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
@@ -109,19 +91,21 @@ pub(crate) fn read(root: &Section<'_>) -> Spin {
     let profiles = [cycloidal, triangular, ramp, TABLE];
     let field = section.choice("profile", &profiles);
     let profile = section.require(field, "profile", &listed(&profiles));
-    let profile = Profile::of(profile.map(|profile| profile.value));
+    // The table stands behind those that a peak and a ramp give.
+    let profile = profile.map(|profile| RAMPED.get(profile.value));
     let spin = match profile {
-        Profile::Ramped(Ramped { name, make, .. }) => {
+        Some(Some(Ramped { name, make, .. })) => {
             let reason = format!("only the profile \"{TABLE}\" has it, not \"{name}\"");
             section.misplace(&["time_s", "speed_rpm"], &reason);
             ramped(&section, true, &stand_in).map(|[peak_rpm, ramp_s]| make(peak_rpm, ramp_s))
         }
-        Profile::Table => {
+        Some(None) => {
             let reason = "a table gives `time_s` and `speed_rpm` instead";
             section.misplace(&["peak_rpm", "ramp_s"], reason);
             table(&section, true)
         }
-        Profile::Unknown => {
+        // Of none that there is, the numbers are still checked.
+        None => {
             ramped(&section, false, &stand_in);
             table(&section, false);
             None
@@ -129,12 +113,12 @@ pub(crate) fn read(root: &Section<'_>) -> Spin {
     };
     section.finish();
     spin.unwrap_or_else(|| match profile {
-        Profile::Table => {
+        Some(None) => {
             // The table's mistakes are reported; that the stand-in has no rows is not one of them.
             root.report.doubt("spin.time_s");
             machine::no_spin()
         }
-        Profile::Ramped(_) | Profile::Unknown => stand_in,
+        Some(Some(_)) | None => stand_in,
     })
 }
 

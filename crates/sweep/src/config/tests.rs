@@ -57,7 +57,7 @@ fn load_as_told(path: &Path) -> Result<Plan, Diagnostics> {
     if at.is_empty() {
         load(path, &sets)
     } else {
-        load_point(path, &sets, &at).map(|(plan, _)| plan)
+        GridInput::file(path.to_owned(), sets).load_point(&at).map(|(plan, _)| plan)
     }
 }
 
@@ -188,7 +188,8 @@ fn later_layers_override_earlier_ones() {
 fn a_point_may_lie_between_the_grids() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sweeps/fig12.toml");
     let at = |at: &[&str]| {
-        load_point(&path, &[], &at.iter().map(|&at| at.to_owned()).collect::<Vec<_>>())
+        GridInput::file(path.clone(), Vec::new())
+            .load_point(&at.iter().map(|&at| at.to_owned()).collect::<Vec<_>>())
             .map(|(plan, _)| plan)
     };
     let plan = at(&["damping_n_s_per_m=99.5", "unbalance_mass_kg=0.4", "tub_mass_kg=25"]).unwrap();
@@ -570,7 +571,8 @@ fn a_list_is_a_file_of_points_whose_content_counts() {
     let other = load_list(&text.replace("40", "41"));
     assert_ne!(plan.to_json()["design"]["hash"], other.to_json()["design"]["hash"]);
     assert_eq!(plan.to_json()["axis"], other.to_json()["axis"]);
-    let point = load_point(&grid, &[], &["unbalance_mass_kg=0.1".into(), "spin_ramp_s=9".into()])
+    let point = GridInput::file(grid, Vec::new())
+        .load_point(&["unbalance_mass_kg=0.1".into(), "spin_ramp_s=9".into()])
         .unwrap()
         .0;
     assert_eq!((point.points(), point.design), (1, None));

@@ -1,6 +1,7 @@
 //! Checks of the resolved plan as a whole, each pointing back at the numbers it concerns.
 
 use std::collections::BTreeSet;
+use std::iter;
 
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
@@ -74,9 +75,9 @@ impl Swept {
     /// minutes.
     fn is_too_much(self, draft: &Draft<'_, Washer>, scenario: &Scenario) -> bool {
         let Washer { machine, spin, .. } = &scenario.model;
-        let lists = [machine.springs.len(), machine.dampers.len(), machine.stops.len()];
+        let forces = machine.springs.len() + machine.dampers.len() + machine.stops.len();
         let further = machine.bushings.len() + machine.further_unbalances.len();
-        let elements = (lists.iter().sum::<usize>() + further) as u64;
+        let elements = (forces + further) as u64;
         let rows = match spin {
             Spin::Table { time_s, .. } => time_s.len() as u64,
             Spin::Cycloidal { .. } | Spin::Triangular { .. } | Spin::Ramp { .. } => 1,
@@ -152,12 +153,11 @@ fn turns(draft: &Draft<'_, Washer>, scenario: &Scenario, reported: &mut BTreeSet
     if turns <= MOST_TURNS || !reported.insert(vec!["reliability.criterion".to_owned()]) {
         return;
     }
+    let name = Criterion::Envelope.name();
     let title =
         format!("the drum makes {turns:.0} turns in the window, too many to compare one by one");
-    let expected = format!(
-        "expected at most {MOST_TURNS} turns for \"{}\": shorten the window",
-        Criterion::Envelope.name()
-    );
+    let expected =
+        format!("expected at most {MOST_TURNS} turns for \"{name}\": shorten the window");
     draft.report.push(Diagnostic::new(title).at(&criterion, expected));
 }
 
@@ -169,16 +169,10 @@ fn keys(violation: &Violation, of_spin: bool) -> Vec<String> {
 }
 
 fn describe(violation: &Violation, places: &[Location]) -> Diagnostic {
-    let mut diagnostic = Diagnostic::new(violation.to_string());
-    for (k, place) in places.iter().enumerate() {
-        let label = if k == 0 {
-            format!("expected {}", violation.expected())
-        } else {
-            "and this".to_owned()
-        };
-        diagnostic = diagnostic.at(place, label);
-    }
-    diagnostic
+    let expected = format!("expected {}", violation.expected());
+    let labels = iter::once(expected).chain(iter::repeat("and this".to_owned()));
+    let diagnostic = Diagnostic::new(violation.to_string());
+    places.iter().zip(labels).fold(diagnostic, |refusal, (place, label)| refusal.at(place, label))
 }
 
 /// A machine whose fastest motion is too fast for an explicit method: for any number of steps that

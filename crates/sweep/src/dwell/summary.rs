@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use arrow_schema::ArrowError;
 
 use crate::places;
-use sweep_engine::store::StoreError;
+use sweep_engine::StoreError;
 use sweep_files::{ParquetFile, cells};
 
 /// Places that are listed.

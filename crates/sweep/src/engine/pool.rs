@@ -77,13 +77,6 @@ impl Climber {
     }
 }
 
-/// Where a rung is among what threads work at; below all of them is the feed.
-const fn above(rung: usize) -> usize {
-    rung + 1
-}
-
-const BELOW_ALL: usize = 0;
-
 /// Rows and the runs that they wait for.
 #[derive(Default)]
 struct PoolState {
@@ -93,8 +86,8 @@ struct PoolState {
     fed: u64,
     /// Rows that wait for a run, by its kind.
     waiting: BTreeMap<ModelRung, Vec<u64>>,
-    /// What threads are at work on ([`above`]), one entry each.
-    at_work: Vec<usize>,
+    /// The rungs that threads are at work on, one entry each; below all of them is the feed.
+    at_work: Vec<Option<usize>>,
     /// The feed has run dry.
     is_dry: bool,
 }
@@ -133,7 +126,7 @@ impl Pool<'_> {
                 Work::End => break,
                 Work::Wait => drop(self.shared.changed.wait_timeout(state, LOOK_UP)),
                 Work::Feed => {
-                    state.at_work.push(BELOW_ALL);
+                    state.at_work.push(None);
                     drop(state);
                     let mut rows = self.fed();
                     let mut state = self.lock();
@@ -142,10 +135,10 @@ impl Pool<'_> {
                         row.came_as = state.fed;
                         state.fed += 1;
                     }
-                    self.advance(state, rows, BELOW_ALL);
+                    self.advance(state, rows, None);
                 }
                 Work::Runs((model, rung), taken) => {
-                    state.at_work.push(above(rung));
+                    state.at_work.push(Some(rung));
                     drop(state);
                     let Some(ladders) = self.engine.ladders_under(self.watch) else { break };
                     let ladder = &ladders[model];
@@ -171,7 +164,7 @@ impl Pool<'_> {
                         }
                         rows.push(row);
                     }
-                    self.advance(state, rows, above(rung));
+                    self.advance(state, rows, Some(rung));
                 }
             }
         }
@@ -193,7 +186,12 @@ impl Pool<'_> {
     }
 
     /// Asks for what rows need next, and hands over those that need nothing.
-    fn advance(&self, mut state: MutexGuard<'_, PoolState>, rows: Vec<Climber>, finished: usize) {
+    fn advance(
+        &self,
+        mut state: MutexGuard<'_, PoolState>,
+        rows: Vec<Climber>,
+        finished: Option<usize>,
+    ) {
         let mut done = Vec::new();
         for mut row in rows {
             let next = if row.pending > 0 {
@@ -254,7 +252,7 @@ impl PoolState {
         let lowest = lowest.min_by_key(|&(model, rung)| (rung, model));
         match lowest {
             // What is at work below may fill the group.
-            Some((_, rung)) if self.at_work.iter().any(|&level| level < above(rung)) => Work::Wait,
+            Some((_, rung)) if self.at_work.iter().any(|&level| level < Some(rung)) => Work::Wait,
             Some(kind) => self.take(kind),
             None if self.at_work.is_empty() => Work::End,
             None => Work::Wait,

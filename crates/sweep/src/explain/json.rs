@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use washer_model::{Ending, LeftRange, Participant};
 
-use super::{Closing, Explanation, Passage, Resonance, Swept, Tongue};
+use super::{Explanation, Passage, Swept, Tongue};
 
 /// Everything that was found; units stand in the names.
 pub(crate) fn of(found: &Explanation) -> Value {
@@ -27,12 +27,12 @@ pub(crate) fn of(found: &Explanation) -> Value {
         "at": found.at.iter().cloned().collect::<BTreeMap<_, _>>(),
         "swept": of_swept(&found.swept),
         "speeds": {
-            "from_rpm": found.looked.from,
-            "to_rpm": found.looked.to,
-            "step_rpm": found.looked.step,
-            "without_response": found.without_response,
-            "jumps_rpm": found.jumps_rpm,
-            "beyond": found.beyond.iter().map(|(rpm, what)| {
+            "from_rpm": found.seen.looked.from,
+            "to_rpm": found.seen.looked.to,
+            "step_rpm": found.seen.looked.step,
+            "without_response": found.seen.without_response,
+            "jumps_rpm": found.seen.jumps_rpm,
+            "beyond": found.seen.beyond.iter().map(|(rpm, what)| {
                 json!({ "speed_rpm": rpm, "passes": what.name() })
             }).collect::<Value>(),
         },
@@ -83,14 +83,14 @@ fn of_tongue(tongue: &Tongue, passages: &[Passage], swept: &Swept) -> Value {
         "frequency_cpm": at.frequency_cpm(),
         "other_frequency_cpm": at.speed_rpm - at.frequency_cpm(),
         "modes": at.participants.iter().map(participant).collect::<Value>(),
-        "resonance": tongue.resonance.as_ref().map(resonance),
+        "resonance": tongue.resonance,
         "crossed": passages.iter().map(passage).collect::<Value>(),
         "ends_in": tongue.ends_in.as_ref().map(|motion| json!({
             "kind": Ending::KINDS[motion.kind()],
             "amplitudes": by_channel(swept, &swept.of_plan(&motion.peaks)),
             "followed_s": motion.time_s,
         })),
-        "closed_by": tongue.closing.map(closing),
+        "closed_by": tongue.closing,
     })
 }
 
@@ -100,16 +100,6 @@ fn participant(mode: &Participant) -> Value {
         "name": mode.motion.to_string(),
         "frequency_cpm": mode.frequency_cpm,
         "share": mode.share,
-    })
-}
-
-fn resonance(resonance: &Resonance) -> Value {
-    json!({
-        "modes": resonance.modes,
-        "frequencies_cpm": resonance.frequencies_cpm,
-        "sign": resonance.sign,
-        "sum_cpm": resonance.sum_cpm(),
-        "order": resonance.order,
     })
 }
 
@@ -124,16 +114,4 @@ fn passage(passage: &Passage) -> Value {
         "departure_j": crossed.ok().map(|crossed| crossed.departure_j),
         "left_range_at_s": crossed.err().map(|left| left.time_s),
     })
-}
-
-fn closing(closing: Closing) -> Value {
-    match closing {
-        Closing::Factor { factor, damping_n_s_per_m, looked_rpm } => json!({
-            "damping_factor": factor,
-            "damping_n_s_per_m": damping_n_s_per_m,
-            "nothing_grows_from_to_rpm": looked_rpm,
-        }),
-        Closing::NotUpTo(factor) => json!({ "damping_factor_above": factor }),
-        Closing::NoDampers => Value::Null,
-    }
 }

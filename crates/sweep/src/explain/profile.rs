@@ -2,7 +2,7 @@
 
 use washer_model::{Spin, decimal};
 
-use sweep_engine::exit::Error;
+use sweep_engine::Error;
 
 /// Even instants at which a profile is looked at; it is smooth between kinks.
 const INSTANTS: usize = 4000;

@@ -12,7 +12,7 @@ use washer_model::{
 use super::ready;
 use crate::plan::{Plan, Scenario};
 use crate::speeds::Speeds;
-use sweep_engine::interrupt::Interrupt;
+use sweep_engine::Interrupt;
 
 /// Speeds that are asked at once: enough to fill lanes.
 const AT_ONCE: usize = 32;
@@ -126,7 +126,7 @@ pub(crate) struct Tongue {
 }
 
 /// Two frequencies of modes whose sum or difference is a multiple of the speed; or one, twice.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(crate) struct Resonance {
     /// Numbers of the modes; the same for one mode.
     pub(crate) modes: [usize; 2],
@@ -134,40 +134,41 @@ pub(crate) struct Resonance {
     pub(crate) frequencies_cpm: [f64; 2],
     /// The sign of the second frequency: 1 in a sum, -1 in a difference.
     pub(crate) sign: f64,
+    /// Sum or difference (cycles per minute).
+    pub(crate) sum_cpm: f64,
     /// Turns of the drum to which the sum belongs.
     pub(crate) order: u32,
 }
 
-impl Resonance {
-    /// Sum or difference (cycles per minute).
-    pub(crate) fn sum_cpm(&self) -> f64 {
-        self.frequencies_cpm[0] + self.sign * self.frequencies_cpm[1]
-    }
-}
-
 /// How much more damping closes a tongue: nothing grows then, in any way, about where it was.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub(crate) enum Closing {
     /// Every damper this many times as strong, tried; the damping (N s/m) if all have the same.
     Factor {
         /// How many times.
+        #[serde(rename = "damping_factor")]
         factor: f64,
         /// What each damper then has, if all have the same.
         damping_n_s_per_m: Option<f64>,
         /// The speeds (rpm) between which nothing grew.
+        #[serde(rename = "nothing_grows_from_to_rpm")]
         looked_rpm: [f64; 2],
     },
     /// Not up to this many times.
-    NotUpTo(f64),
+    NotUpTo {
+        #[serde(rename = "damping_factor_above")]
+        factor: f64,
+    },
     /// There is no damping to raise.
     NoDampers,
 }
 
-/// What is seen over a range of speeds.
-#[derive(Default)]
+/// What is seen over a range of speeds beside tongues.
 pub(crate) struct Seen {
-    pub(crate) tongues: Vec<Tongue>,
-    /// How many speeds have no response.
+    /// The speeds that were looked at.
+    pub(crate) looked: Speeds,
+    /// How many of them have no response.
     pub(crate) without_response: usize,
     /// Speeds (rpm) at which a machine that runs up leaves its branch of responses.
     pub(crate) jumps_rpm: Vec<f64>,
@@ -176,7 +177,7 @@ pub(crate) struct Seen {
 }
 
 /// The tongues within a range of speeds, and what else is seen there.
-pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> Seen {
+pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> (Vec<Tongue>, Seen) {
     let speeds = looked.values();
     let responses = asker.responses(&speeds);
     let there = || responses.iter().flatten();
@@ -210,12 +211,9 @@ pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> Seen {
         tongues.push(tongue(asker, of_run, &run, [from, to]));
         first = last + 1;
     }
-    Seen {
-        tongues,
-        without_response: responses.iter().filter(|response| response.is_none()).count(),
-        jumps_rpm,
-        beyond: there().filter_map(|it| Some((it.speed_rpm, it.beyond?))).collect(),
-    }
+    let without_response = responses.iter().filter(|response| response.is_none()).count();
+    let beyond = there().filter_map(|it| Some((it.speed_rpm, it.beyond?))).collect();
+    (tongues, Seen { looked, without_response, jumps_rpm, beyond })
 }
 
 /// What the drum ends in that is held where each of these grows most, slightly disturbed.
@@ -334,57 +332,34 @@ fn resonance(point: &Point, at: &Response) -> Option<Resonance> {
     };
     let here = frequencies(at.speed_rpm)?;
     let named: Vec<usize> = at.participants.iter().map(|mode| mode.mode - 1).collect();
-    let (&a, partners) = match named.as_slice() {
-        [] => return None,
-        [one] => (one, (0..SUSPENSION_MODES).collect::<Vec<_>>()),
-        [one, other, ..] => (one, vec![*one, *other]),
-    };
-    let is_pair = at.kind() == Kind::QuasiPeriodic;
-    let mut best: Option<(f64, Resonance)> = None;
-    let ones: Vec<usize> = if is_pair { vec![a] } else { named.clone() };
-    for &one in &ones {
-        for &other in if is_pair { &partners } else { &ones } {
-            let is_same = one == other;
-            if is_pair == is_same {
-                continue;
-            }
-            for sign in [1.0, -1.0] {
-                for order in 1..=MOST_ORDER {
-                    let admits = match at.kind() {
-                        Kind::PeriodDoubling => order % 2 == 1,
-                        Kind::Fold => order % 2 == 0,
-                        Kind::QuasiPeriodic | Kind::Stable => true,
-                    };
-                    let (first, second) = if sign < 0.0 && here[one] < here[other] {
-                        (other, one)
-                    } else {
-                        (one, other)
-                    };
-                    let sum = |of: &[f64]| of[first] + sign * of[second];
-                    let target = f64::from(order) * at.speed_rpm;
-                    let miss = (sum(&here) / target - 1.0).abs();
-                    if !admits || best.is_some_and(|(so_far, _)| miss >= so_far) {
-                        continue;
-                    }
-                    let ordered = if sign > 0.0 {
-                        [first.min(second), first.max(second)]
-                    } else {
-                        [first, second]
-                    };
-                    best = Some((
-                        miss,
-                        Resonance {
-                            modes: ordered.map(|mode| mode + 1),
-                            frequencies_cpm: ordered.map(|mode| here[mode]),
-                            sign,
-                            order,
-                        },
-                    ));
-                }
-            }
+    let pairs: Vec<(usize, usize)> = match (at.kind(), named.as_slice()) {
+        (_, []) => return None,
+        (Kind::QuasiPeriodic, &[one]) => {
+            (0..SUSPENSION_MODES).filter(|other| *other != one).map(|other| (one, other)).collect()
         }
-    }
-    best.filter(|(miss, _)| *miss < FARTHEST_MISS).map(|(_, resonance)| resonance)
+        (Kind::QuasiPeriodic, &[one, other, ..]) => vec![(one, other)],
+        (_, named) => named.iter().map(|&one| (one, one)).collect(),
+    };
+    let admits = |order: &u32| match at.kind() {
+        Kind::PeriodDoubling => order % 2 == 1,
+        Kind::Fold => order % 2 == 0,
+        Kind::QuasiPeriodic | Kind::Stable => true,
+    };
+    let meeting = |(one, other): (usize, usize), sign: f64, order: u32| {
+        let is_turned = if sign > 0.0 { one > other } else { here[one] < here[other] };
+        let modes = if is_turned { [other, one] } else { [one, other] };
+        let frequencies_cpm = modes.map(|mode| here[mode]);
+        let sum_cpm = frequencies_cpm[0] + sign * frequencies_cpm[1];
+        Resonance { modes: modes.map(|mode| mode + 1), frequencies_cpm, sign, sum_cpm, order }
+    };
+    let orders = || (1..=MOST_ORDER).filter(admits);
+    let all = pairs.iter().flat_map(|&pair| {
+        let signed = [1.0, -1.0].into_iter().flat_map(|sign| orders().map(move |at| (sign, at)));
+        signed.map(move |(sign, order)| meeting(pair, sign, order))
+    });
+    let miss = |of: &Resonance| (of.sum_cpm / (f64::from(of.order) * at.speed_rpm) - 1.0).abs();
+    let nearest = all.min_by(|a, b| miss(a).total_cmp(&miss(b)));
+    nearest.filter(|nearest| miss(nearest) < FARTHEST_MISS)
 }
 
 /// Factors to try next, between one that leaves growth and one that does not if that is known, each
@@ -420,7 +395,7 @@ impl Tongue {
                 open = tried;
             }
             if closed.is_none() && open[0] > MOST_DAMPING_FACTOR {
-                return Closing::NotUpTo(MOST_DAMPING_FACTOR);
+                return Closing::NotUpTo { factor: MOST_DAMPING_FACTOR };
             }
         }
         let closed = closed.map_or(MOST_DAMPING_FACTOR, |[factor, _]| factor);

@@ -46,7 +46,7 @@ pub(crate) fn of(found: &Explanation) -> String {
     let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
     text.end(&format!("{}{place}", found.name));
     verdict(&mut text, &found.swept);
-    let [from, to] = [found.looked.from, found.looked.to].map(decimal);
+    let [from, to] = [found.seen.looked.from, found.seen.looked.to].map(decimal);
     if found.tongues.is_empty() {
         let words = format!(
             "the periodic response is stable at every speed from {from} to {to} rpm, where \
@@ -59,17 +59,19 @@ pub(crate) fn of(found: &Explanation) -> String {
             format!("the periodic response is unstable in {unstable} from {from} to {to} rpm:");
         text.line("dwells", words);
     }
-    for rpm in &found.jumps_rpm {
+    for rpm in &found.seen.jumps_rpm {
         let words = format!(
             "at {rpm:.2} rpm the response folds back: a machine that runs up jumps to another there"
         );
         text.line("jump", words);
     }
-    if let (Some((from, what)), Some((to, _))) = (found.beyond.first(), found.beyond.last()) {
+    if let (Some((from, what)), Some((to, _))) =
+        (found.seen.beyond.first(), found.seen.beyond.last())
+    {
         let words = format!(
             "at {} of the speeds, from {} to {} rpm, the response passes what no machine can ({}): \
              there growth says nothing of a machine",
-            found.beyond.len(),
+            found.seen.beyond.len(),
             decimal(*from),
             decimal(*to),
             what.name().replace('_', " ")
@@ -261,11 +263,11 @@ fn meeting(resonance: &Resonance, speed_rpm: f64) -> String {
         order => format!("{order} times the speed"),
     };
     let multiple = f64::from(resonance.order) * speed_rpm;
-    let miss = 100.0 * (resonance.sum_cpm() / multiple - 1.0);
+    let miss = 100.0 * (resonance.sum_cpm / multiple - 1.0);
     format!(
         "{} = {:.2} per minute, against {target}, {multiple:.2} ({miss:+.2} %)",
         sum_words(resonance),
-        resonance.sum_cpm()
+        resonance.sum_cpm
     )
 }
 
@@ -311,7 +313,7 @@ fn closes(text: &mut Text, tongue: &Tongue) {
             };
             format!("with {dampers} nothing grows from {from:.1} to {to:.1} rpm")
         }
-        Some(Closing::NotUpTo(factor)) => {
+        Some(Closing::NotUpTo { factor }) => {
             format!("dampers up to {factor} times as strong do not close it")
         }
         Some(Closing::NoDampers) | None => "the machine has no damping to raise".to_owned(),
@@ -377,13 +379,13 @@ fn limits(text: &mut Text, found: &Explanation) {
         "a tongue narrower than {} rpm may be missed. E-folds hold the speed still at each \
          instant; equal e-folds do not mean equal ratios, and a map's boundary is not the edge of \
          a tongue",
-        decimal(found.looked.step)
+        decimal(found.seen.looked.step)
     );
-    if found.without_response > 0 {
+    if found.seen.without_response > 0 {
         let _ = write!(
             words,
             ". No response was found at {} of the speeds, which are left out",
-            found.without_response
+            found.seen.without_response
         );
     }
     text.line("limits", words);
@@ -421,8 +423,10 @@ mod tests {
 
     #[test]
     fn a_resonance_is_named_by_its_modes() {
-        let of =
-            |modes, sign, order| Resonance { modes, frequencies_cpm: [150.0, 100.0], sign, order };
+        let of = |modes, sign, order| {
+            let frequencies_cpm = [150.0, 100.0];
+            Resonance { modes, frequencies_cpm, sign, sum_cpm: 150.0 + sign * 100.0, order }
+        };
         assert_eq!(sum_words(&of([2, 2], 1.0, 1)), "2 f2");
         assert_eq!(sum_words(&of([1, 2], 1.0, 1)), "f1 + f2");
         assert_eq!(sum_words(&of([2, 1], -1.0, 1)), "f2 - f1");

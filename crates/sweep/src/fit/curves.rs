@@ -1,7 +1,7 @@
 //! A fit as curves: the measurement, the model and what is left, for figures.
 
 use serde_json::{Value, json};
-use sweep_engine::table::Table;
+use sweep_engine::Table;
 use sweep_engine::threads::Stop;
 use sweep_files::key;
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::algebra::{centred, quantile};
-use sweep_engine::config::Diagnostics;
+use sweep_engine::Diagnostics;
 use sweep_engine::config::list::NumberTable;
 use sweep_engine::config::report::{Diagnostic, Report};
 use washer_model::Channel;
@@ -87,7 +87,7 @@ impl Signal {
 }
 
 /// A measurement of one run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Measured {
     /// The file's name, as messages and reports have it.
     pub(crate) name: String,
@@ -134,13 +134,7 @@ impl Measured {
 
 /// The table as a measurement; what is wrong with it is reported.
 fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
-    let mut measured = Measured {
-        name,
-        time_s: Vec::new(),
-        speed_rpm: None,
-        signals: Vec::new(),
-        gaps_s: Vec::new(),
-    };
+    let mut measured = Measured { name, ..Measured::default() };
     let mut seen: Vec<&str> = Vec::new();
     for (k, column) in table.columns.iter().enumerate() {
         let (name, at) = (column.name.value.as_str(), &column.name.at);
@@ -186,10 +180,10 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
         }
     }
     let whole = report.is_clean();
-    for (name, is_there) in
-        [("time_s", seen.contains(&"time_s")), ("any channel", !measured.signals.is_empty())]
-    {
-        if whole && !is_there {
+    let missing =
+        [("time_s", !seen.contains(&"time_s")), ("any channel", measured.signals.is_empty())];
+    for (name, is_missing) in missing {
+        if whole && is_missing {
             let title = format!("{} has no column of {name}", measured.name);
             let help = "expected time_s, and channels of `sweep trace` with their units, as in \
                         tub_front_y_m_per_s2";

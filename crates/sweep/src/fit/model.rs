@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use lane_ode::Simd;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+use serde::{Deserialize, Serialize};
 use washer_model::{
     Cases, Machine, Method, ModelKind, Parameter, Point, Snapshot, Spin, Timing, Wanted, prepare,
     simulate_until,
@@ -107,7 +108,7 @@ pub(crate) struct Against {
 
 /// What a descent needs to know of a point. Costs are twice a negative log-likelihood, with every
 /// signal's noise as its residual says.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Summary {
     pub(crate) cost: f64,
     /// Noise of each signal.

@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use lane_ode::Simd;
 use serde::Serialize;
 use serde_json::Value;
-use washer_model::{Dwell, Method, Timing, prepare};
-use washer_row::Verdict as RowVerdict;
+use washer_model::{Dwell, Method, prepare};
+use washer_row::{Outcome, Verdict as RowVerdict};
 
 use super::algebra::{centred, dot, quantile};
 use super::iso18571::{Rating, rate};
@@ -16,9 +16,9 @@ use super::search::Descent;
 use super::statistics::Statistics;
 use crate::config;
 use crate::engine::{ModelEngine, responses};
-use crate::plan::{Axis, AxisValues, Plan};
+use crate::plan::{Axis, AxisValues, Plan, timing};
+use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, table};
-use sweep_engine::exit::Error;
 use sweep_engine::threads::Stop;
 
 /// Standard errors to either end of a 95 % interval.
@@ -146,31 +146,29 @@ pub(super) struct Found<'a> {
     pub(super) evaluations: usize,
     pub(super) step_effect: Option<f64>,
     pub(super) repeated: Option<&'a [Vec<f64>]>,
+    /// Rows of the map over the fitted distribution.
+    pub(super) draws: u64,
+    pub(super) stop: Stop<'a>,
 }
 
 impl Found<'_> {
     /// The whole.
-    pub(super) fn report(&self, draws: u64, stop: Stop<'_>) -> Result<Report, Error> {
+    pub(super) fn report(&self) -> Result<Report, Error> {
         let Self { problem, statistics, .. } = *self;
         let best = &self.minima[0];
         let objection = statistics.objection(problem);
+        let follows = objection.is_none();
         let covariance = statistics.of_free(problem);
         let error = |k: usize| covariance[k][k].max(0.0).sqrt();
         let free = problem.free.len();
-        let correlation = |i: usize, j: usize| {
-            let size = error(i) * error(j);
-            if i == j {
-                1.0
-            } else if size > 0.0 {
-                covariance[i][j] / size
-            } else {
-                0.0
-            }
+        let correlation = |i: usize, j: usize| match error(i) * error(j) {
+            _ if i == j => 1.0,
+            size if size > 0.0 => covariance[i][j] / size,
+            _ => 0.0,
         };
-        let mut files = Vec::new();
-        for case in 0..problem.cases.len() {
-            files.push(self.of_file(case, &covariance, draws, objection.is_none(), stop)?);
-        }
+        let correlations = |i: usize| (0..free).map(|j| correlation(i, j)).collect();
+        let files = (0..problem.cases.len()).map(|case| self.of_file(case, follows));
+        let files = files.collect::<Result<Vec<OfFile>, Error>>()?;
         let name = |k: usize| self.name(k);
         let minimum = |descent: &Descent| Minimum {
             values: (0..free).map(|k| (name(k), descent.x[k])).collect(),
@@ -178,14 +176,10 @@ impl Found<'_> {
             evaluations: descent.evaluations,
         };
         Ok(Report {
-            follows: objection.is_none(),
-            parameters: (0..free)
-                .map(|k| self.parameter(k, error(k), objection.is_none()))
-                .collect(),
+            follows,
             objection,
-            correlations: (0..free)
-                .map(|i| (0..free).map(|j| correlation(i, j)).collect())
-                .collect(),
+            parameters: (0..free).map(|k| self.parameter(k, error(k), follows)).collect(),
+            correlations: (0..free).map(correlations).collect(),
             untold: statistics.untold(problem, &best.x),
             first: files[0].clone(),
             files,
@@ -229,14 +223,7 @@ impl Found<'_> {
         }
     }
 
-    fn of_file(
-        &self,
-        case: usize,
-        covariance: &[Vec<f64>],
-        draws: u64,
-        follows: bool,
-        stop: Stop<'_>,
-    ) -> Result<OfFile, Error> {
+    fn of_file(&self, case: usize, follows: bool) -> Result<OfFile, Error> {
         let problem = self.problem;
         let x = &self.minima[0].x;
         let measured = &problem.cases[case].measured;
@@ -248,7 +235,6 @@ impl Found<'_> {
         };
         let rms =
             |one: &Against| (dot(&one.residual, &one.residual) / one.residual.len() as f64).sqrt();
-        let rho = &self.statistics.neighbours;
         let smoothed = problem.cases[case].smoothed.as_ref();
         Ok(OfFile {
             file: measured.name.clone(),
@@ -257,7 +243,7 @@ impl Found<'_> {
             offset: by(&|_, one| one.offset),
             shift_s: problem.with_shift.then(|| problem.shift_s(case, x)),
             residual_rms: by(&|_, one| rms(one)),
-            autocorrelation: by(&|k, _| rho[k]),
+            autocorrelation: by(&|k, _| self.statistics.neighbours[k]),
             widening: by(&|k, _| self.statistics.widening[k]),
             iso18571: own()
                 .map(|(_, ((.., it), one))| {
@@ -269,37 +255,27 @@ impl Found<'_> {
             spin: smoothed.map(|it| SpinFit { noise_rpm: it.noise_rpm, knots: it.knots }),
             gaps_s: measured.gaps_s.clone(),
             machine: config::machine_json(&problem.machine(case, x).0),
-            verdict: match draws {
-                0 => None,
-                _ => Some(self.verdict(case, covariance, draws, follows, stop)?),
-            },
+            verdict: (self.draws > 0).then(|| self.verdict(case, follows)).transpose()?,
         })
     }
 
     /// The row of a case's map at its fitted machine, and over the fitted distribution.
-    fn verdict(
-        &self,
-        case: usize,
-        covariance: &[Vec<f64>],
-        draws: u64,
-        follows: bool,
-        stop: Stop<'_>,
-    ) -> Result<Verdict, Error> {
+    fn verdict(&self, case: usize, follows: bool) -> Result<Verdict, Error> {
         let problem = self.problem;
         let x = &self.minima[0].x;
         // The map's spin is the grid's, of which a measured one has no numbers.
         let mut plan = Plan { axes: Vec::new(), design: None, ..problem.cases[case].plan.clone() };
         let own: Vec<usize> =
             (0..problem.free.len()).filter(|&k| problem.free[k].is_of(case)).collect();
-        let sets = if follows { super::draws(problem, x, covariance, draws) } else { Vec::new() };
-        let sets: Vec<&[f64]> =
-            std::iter::once(&x[..]).chain(sets.iter().map(Vec::as_slice)).collect();
+        let covariance = self.statistics.of_free(problem);
+        let mut sets = vec![x.clone()];
+        if follows {
+            sets.extend(super::draws(problem, x, &covariance, self.draws));
+        }
         for &k in &own {
             let values = || sets.iter().map(|set| set[k]);
-            let [from, to] = [
-                values().fold(f64::INFINITY, f64::min),
-                values().fold(f64::NEG_INFINITY, f64::max),
-            ];
+            let from = values().fold(f64::INFINITY, f64::min);
+            let to = values().fold(f64::NEG_INFINITY, f64::max);
             let values = match from < to {
                 true => AxisValues::Linear { from, to, count: 2 },
                 false => AxisValues::List(vec![from]),
@@ -308,17 +284,15 @@ impl Found<'_> {
         }
         let points: Vec<Vec<f64>> =
             sets.iter().map(|set| own.iter().map(|&k| set[k]).collect()).collect();
-        let outcomes =
-            if stop() { Vec::new() } else { ModelEngine::new(&plan)?.evaluate_at(&points) };
-        let limits = plan.reliability.limits;
-        let verdicts: Vec<RowVerdict> = outcomes
-            .iter()
-            .map(|outcome| RowVerdict::new(outcome, plan.reliability.channels.len(), limits))
-            .collect();
+        let engine = ModelEngine::new(&plan)?;
+        let outcomes = if (self.stop)() { Vec::new() } else { engine.evaluate_at(&points) };
+        let (channels, limits) = (plan.reliability.channels.len(), plan.reliability.limits);
+        let verdict = |outcome: &Outcome| RowVerdict::new(outcome, channels, limits);
+        let verdicts: Vec<RowVerdict> = outcomes.iter().map(verdict).collect();
         let ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
         let drawn = verdicts.get(1..).unwrap_or_default();
         let reliable = drawn.iter().filter(|it| it.reliable == Some(true)).count();
-        let growth = self.growth(case, &plan, stop);
+        let growth = self.growth(case, &plan);
         Ok(Verdict {
             reliable: verdicts.first().and_then(|verdict| verdict.reliable),
             ratio_max: verdicts.first().and_then(ratio),
@@ -333,17 +307,16 @@ impl Found<'_> {
 
     /// The fastest growing disturbance of the fitted machine at speeds up to its fastest: its
     /// growth (1/s), and where (rpm).
-    fn growth(&self, case: usize, plan: &Plan, stop: Stop<'_>) -> Option<[f64; 2]> {
+    fn growth(&self, case: usize, plan: &Plan) -> Option<[f64; 2]> {
         let (machine, spin) = self.problem.machine(case, &self.minima[0].x);
         let fastest = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
-        let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 };
-        let point = prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).ok()?;
+        let point = prepare(Simd::Scalar, &[(machine, spin)], &timing(plan)).remove(0).ok()?;
         let speeds: Vec<f64> = (SPEEDS / 5..=SPEEDS)
             .map(|k| fastest * f64::from(k) / f64::from(SPEEDS))
             .filter(|speed| *speed > 0.0)
             .collect();
         let dwell = |&speed_rpm: &f64| Dwell { point: &point, speed_rpm };
-        let found = responses(&speeds.iter().map(dwell).collect::<Vec<_>>(), &|| stop());
+        let found = responses(&speeds.iter().map(dwell).collect::<Vec<_>>(), &|| (self.stop)());
         let there = found.iter().flatten().filter_map(|responses| responses.first());
         there
             .map(|response| [response.growth_per_s(), response.speed_rpm])
@@ -364,27 +337,24 @@ impl Found<'_> {
             let Some((other, factor)) = mistaken else { continue };
             let swing = signal.swing();
             let size = |one: &Against| {
-                let moves = signal.samples().map(|(row, _)| one.model[row]).collect();
-                let (moves, _) = centred(moves);
+                let moves = signal.samples().map(|(row, _)| one.model[row]);
+                let (moves, _) = centred(moves.collect());
                 (dot(&swing, &swing) / dot(&moves, &moves)).sqrt()
             };
             let sizes = [Some(size(end)), by_start.then(|| size(start))];
             let fits =
                 |size: f64, factor: f64| (1.0 / UNIT_SLACK..UNIT_SLACK).contains(&(size / factor));
-            let not_turned = (factor, format!("be in {other}"));
-            let turned_twice =
-                (1.0 / factor, format!("have been converted from {other} once too often"));
-            for (factor, seems) in [not_turned, turned_twice] {
-                let Some(size) = sizes.into_iter().flatten().find(|size| fits(*size, factor))
-                else {
-                    continue;
-                };
-                notes.push(format!(
-                    "{} of {} is {size:.3} times as large as the model's: it seems to {seems} \
-                     ({factor:.4}), expected {unit}",
-                    signal.quantity.column(),
-                    self.problem.cases[case].measured.name
-                ));
+            let twice = format!("have been converted from {other} once too often");
+            let column = signal.quantity.column();
+            let file = &self.problem.cases[case].measured.name;
+            for (factor, seems) in [(factor, format!("be in {other}")), (1.0 / factor, twice)] {
+                let size = sizes.into_iter().flatten().find(|size| fits(*size, factor));
+                notes.extend(size.map(|size| {
+                    format!(
+                        "{column} of {file} is {size:.3} times as large as the model's: it seems \
+                         to {seems} ({factor:.4}), expected {unit}"
+                    )
+                }));
             }
         }
         for case in &self.problem.cases {
@@ -415,7 +385,6 @@ fn middle_95(values: impl Iterator<Item = f64> + Clone) -> Option<[f64; 2]> {
 impl Report {
     /// As a command prints it.
     pub(crate) fn text(&self) -> String {
-        let significant = |value: f64| format!("{value:.6}");
         let short = |value: f64| {
             if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
                 let digits = (5 - value.abs().log10().floor().clamp(-4.0, 5.0) as i32).max(0);
@@ -424,28 +393,18 @@ impl Report {
                 format!("{value:.4e}")
             }
         };
-        let mut rows = Vec::new();
-        for fit in &self.parameters {
+        let interval = |[from, to]: [f64; 2]| format!("{} to {}", short(from), short(to));
+        let row = |fit: &Fit| {
             let file = fit.file.as_ref().map_or_else(String::new, |file| format!(" ({file})"));
-            let interval = |ends: &Option<[f64; 2]>| {
-                ends.map(|[a, b]| format!("{} to {}", short(a), short(b)))
-            };
-            let known = match (&fit.interval_95, fit.at_bound) {
-                (None, true) => "at its bound".to_owned(),
-                (None, false) => "not known".to_owned(),
-                (known, _) => interval(known).unwrap_or_default(),
-            };
+            let unknown = if fit.at_bound { "at its bound" } else { "not known" };
+            let known = fit.interval_95.map_or_else(|| unknown.to_owned(), interval);
             let error = fit.standard_error.map_or_else(|| "-".to_owned(), short);
-            let mut row = vec![
-                format!("{}{file}", fit.name),
-                fit.unit.clone(),
-                short(fit.value),
-                error,
-                known,
-            ];
-            row.extend(interval(&fit.bootstrap_95));
-            rows.push(row);
-        }
+            let name = format!("{}{file}", fit.name);
+            let mut row = vec![name, fit.unit.clone(), short(fit.value), error, known];
+            row.extend(fit.bootstrap_95.map(interval));
+            row
+        };
+        let rows: Vec<Vec<String>> = self.parameters.iter().map(row).collect();
         let mut headings =
             ["", "unit", "value", "standard error", "95 % interval"].map(str::to_owned).to_vec();
         if self.parameters.iter().any(|fit| fit.bootstrap_95.is_some()) {
@@ -460,21 +419,15 @@ impl Report {
         }
         self.untold.iter().for_each(|untold| say("untold", untold));
         for file in &self.files {
-            let columns: Vec<String> = file
-                .noise
-                .iter()
-                .map(|(column, noise)| {
-                    format!(
-                        "{column} {} ({:.3})",
-                        short(*noise),
-                        file.iso18571.get(column).map_or(0.0, |rating| rating.overall)
-                    )
-                })
-                .collect();
+            let column = |(column, noise): (&String, &f64)| {
+                let rating = file.iso18571.get(column).map_or(0.0, |rating| rating.overall);
+                format!("{column} {} ({rating:.3})", short(*noise))
+            };
+            let columns: Vec<String> = file.noise.iter().map(column).collect();
             say("file", &format!("{}: {} samples", file.file, file.samples));
             say("noise", &format!("{} (ISO/TS 18571)", columns.join(", ")));
             if let Some(shift_s) = file.shift_s {
-                say("clock", &format!("shifted by {} s", significant(shift_s)));
+                say("clock", &format!("shifted by {shift_s:.6} s"));
             }
             if let Some(spin) = &file.spin {
                 let noise = short(spin.noise_rpm);
@@ -486,15 +439,13 @@ impl Report {
                     Some(false) => "not reliable",
                     None => "undefined",
                 };
-                let ratio = verdict
-                    .ratio_max
-                    .map_or_else(String::new, |ratio| format!(", greatest ratio {}", short(ratio)));
+                let ratio =
+                    verdict.ratio_max.map(|ratio| format!(", greatest ratio {}", short(ratio)));
+                let ratio = ratio.unwrap_or_default();
                 let chance = match (verdict.probability_reliable, verdict.ratio_max_95) {
-                    (Some(share), Some([from, to])) => format!(
-                        "; reliable with probability {share:.3} (ratio {} to {} in 95 % of {} \
-                         rows)",
-                        short(from),
-                        short(to),
+                    (Some(share), Some(ends)) => format!(
+                        "; reliable with probability {share:.3} (ratio {} in 95 % of {} rows)",
+                        interval(ends),
                         verdict.draws
                     ),
                     _ => "; no probability, because the intervals are not known".to_owned(),

@@ -45,8 +45,8 @@ fn options(free: &[&str]) -> FitOptions {
     FitOptions {
         free: free.iter().map(|name| (*name).to_owned()).collect(),
         own: Vec::new(),
-        linear: false,
-        with_shift: true,
+        model: NONLINEAR.to_owned(),
+        no_shift: false,
         starts: 1,
         bootstrap: 0,
         draws: 0,
@@ -216,7 +216,7 @@ fn intervals_know_that_noise_is_correlated() {
 #[test]
 fn a_linear_model_says_what_the_nonlinear_one_would_have() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 8.0))];
-    let linear = FitOptions { linear: true, ..options(&["spring_stiffness_n_per_m"]) };
+    let linear = FitOptions { model: LINEAR.to_owned(), ..options(&["spring_stiffness_n_per_m"]) };
     let report = fitted(cases, &linear);
     let said = "the nonlinear model would move spring_stiffness_n_per_m by";
     assert!(report.objection.as_ref().is_some_and(|why| why.contains(said)), "{report:?}");

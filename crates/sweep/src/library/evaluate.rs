@@ -11,14 +11,13 @@ use serde_json::json;
 
 use super::Effort;
 use super::points::PointTable;
-use super::result::{MapPlan, ResultTable};
+use super::result::ResultTable;
 use crate::engine::{Engine, ModelEngine, Watch};
 use crate::plan::Plan;
-use sweep_engine::exit::Error;
 use sweep_engine::progress::Progress;
-use sweep_engine::store::Done;
-use sweep_engine::store::{BATCH_ROWS, Job, Layout, ResultRows, StoreError};
-use sweep_engine::threads::{self, ThreadsError};
+use sweep_engine::store::{BATCH_ROWS, Done, Layout, ResultRows};
+use sweep_engine::threads::ThreadsError;
+use sweep_engine::{Error, Job, StoreError, threads};
 use sweep_files::panics::{self, lock};
 use washer_row::Ladder;
 
@@ -109,6 +108,9 @@ pub(super) fn in_memory(
         let row = if watch.stopped() { None } else { lock(&rows).next() }?;
         Some((row, (job.axis_values)(row)))
     };
+    // Of this program.
+    let last = job.points.saturating_sub(1);
+    let defect = |reason| StoreError::Engine { first: 0, last, reason };
     let gathered = Gathered::new(job);
     let keep = |outcome| gathered.keep(outcome, &watch);
     let mut progress = Progress::new(effort.progress, job.points, 0);
@@ -128,21 +130,13 @@ pub(super) fn in_memory(
         }
         work.join().map_err(|panic| {
             let reason = format!("the engine panicked: {}", panics::text(panic.as_ref()));
-            let last = job.points.saturating_sub(1);
-            Error::Store(StoreError::Engine { first: 0, last, reason })
+            Error::Store(defect(reason))
         })
     })?;
     progress.finish();
     let is_whole = watch.points_done() == job.points;
-    let batches = gathered.into_batches().map_err(defect(job))?;
-    let plan = MapPlan::of(job, is_whole);
-    Ok(Evaluated { table: ResultTable::of_rows(plan, batches), is_whole })
-}
-
-/// Rows that cannot be put in columns: a defect of this program.
-fn defect(job: &Job<'_>) -> impl Fn(ArrowError) -> StoreError {
-    let last = job.points.saturating_sub(1);
-    move |error| StoreError::Engine { first: 0, last, reason: error.to_string() }
+    let batches = gathered.into_batches().map_err(|error| defect(error.to_string()))?;
+    Ok(Evaluated { table: ResultTable::of_rows(job, batches, is_whole), is_whole })
 }
 
 /// Outcomes as they come, and the batches that are whole.

@@ -7,8 +7,7 @@ use crate::config::GridInput;
 use crate::engine::simd_from_environment;
 use crate::explain::{explain, json, words};
 use crate::speeds::Speeds;
-use sweep_engine::exit::Error;
-use sweep_engine::threads;
+use sweep_engine::{Error, threads};
 
 /// What is found at a point.
 #[derive(Debug)]

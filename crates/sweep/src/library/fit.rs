@@ -5,8 +5,7 @@ use serde_json::json;
 use super::{Effort, Explained, PointTable};
 use crate::config::GridInput;
 use crate::fit::{self, FitOptions, Measured, Work};
-use sweep_engine::exit::Error;
-use sweep_engine::threads;
+use sweep_engine::{Error, threads};
 
 /// Fits numbers of a grid's machine to measurements: tables of `time_s`, perhaps `speed_rpm`, and
 /// channels, each with constants of its own (`NAME=VALUE`). `None` if it was interrupted.

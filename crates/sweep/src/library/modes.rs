@@ -9,11 +9,10 @@ use washer_model::{
 
 use super::check_speeds;
 use super::result::ResultTable;
-use crate::config::{self, GridInput};
-use crate::plan::{Plan, friction_speeds, timing};
-use sweep_engine::exit::Error;
-use sweep_engine::interrupt::Interrupt;
-use sweep_engine::table::Table;
+use crate::config::{self, Diagnostics, GridInput};
+use crate::model::Washer;
+use crate::plan::{friction_speeds, timing};
+use sweep_engine::{Error, Interrupt, Table};
 use sweep_files::{FileKind, key};
 
 /// The modes of a grid's machine at spin speeds (rpm, rising); `at` gives axes a value, which have
@@ -28,31 +27,43 @@ pub fn find_modes(
     interrupt: &Interrupt,
 ) -> Result<Option<ResultTable>, Error> {
     check_speeds(speeds_rpm, 2, |speed| speed >= 0.0, ", 0 or greater")?;
-    let (name, machine, spin, timing) = match grid {
-        None => built_in(speeds_rpm[speeds_rpm.len() - 1]),
-        Some(grid) => {
-            let plan = if at.is_empty() { grid.load()? } else { grid.load_point(at)?.0 };
-            of_plan(plan)
-        }
-    };
-    let stop = || interrupt.stopped();
-    let Some(analysis) = Analysis::new(&machine, &spin, &timing, speeds_rpm, false, &stop)? else {
-        return Ok(None);
-    };
-    ResultTable::of_table(FileKind::Modes, analysis.table(&name, &machine)).map(Some)
+    let asked = Asked::of(grid, at, speeds_rpm[speeds_rpm.len() - 1])?;
+    let analysis = Analysis::new(&asked, speeds_rpm, false, &|| interrupt.stopped())?;
+    let table = |analysis: Analysis| ResultTable::of_table(FileKind::Modes, analysis.table(&asked));
+    analysis.map(table).transpose()
 }
 
-/// The built-in machine by its name, on its way to a speed (rpm).
-pub(crate) fn built_in(greatest_rpm: f64) -> (String, Machine, Spin, Timing) {
-    let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-    let spin = Spin::Ramp { peak_rpm: greatest_rpm, ramp_s: 1.0 };
-    ("paper".to_owned(), Machine::paper(), spin, timing)
+/// A machine whose modes are asked for, by its name, and the run that it is in.
+pub(crate) struct Asked {
+    pub(crate) name: String,
+    machine: Machine,
+    spin: Spin,
+    timing: Timing,
 }
 
-/// A plan's name, its machine, its spin, and when it runs.
-pub(crate) fn of_plan(plan: Plan) -> (String, Machine, Spin, Timing) {
-    let timing = timing(&plan);
-    (plan.name, plan.model.machine, plan.model.spin, timing)
+impl Asked {
+    /// The machine of a grid, at a point of it if `at` names one; without a grid the built-in
+    /// machine, on its way to a speed (rpm).
+    ///
+    /// # Errors
+    /// Mistakes in the grid.
+    pub(crate) fn of(
+        grid: Option<&GridInput>,
+        at: &[String],
+        greatest_rpm: f64,
+    ) -> Result<Self, Diagnostics> {
+        let Some(grid) = grid else {
+            return Ok(Self {
+                name: "paper".to_owned(),
+                machine: Machine::paper(),
+                spin: Spin::Ramp { peak_rpm: greatest_rpm, ramp_s: 1.0 },
+                timing: Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 },
+            });
+        };
+        let plan = if at.is_empty() { grid.load()? } else { grid.load_point(at)?.0 };
+        let (timing, Washer { machine, spin, .. }) = (timing(&plan), plan.model);
+        Ok(Self { name: plan.name, machine, spin, timing })
+    }
 }
 
 /// The modes of a machine at spin speeds.
@@ -73,14 +84,13 @@ impl Analysis {
     /// # Errors
     /// A machine without equilibrium, or whose modes cannot be computed.
     pub(crate) fn new(
-        machine: &Machine,
-        spin: &Spin,
-        timing: &Timing,
+        asked: &Asked,
         speeds_rpm: &[f64],
         is_exact: bool,
         stop: Stop<'_>,
     ) -> Result<Option<Self>, Error> {
-        let point = prepare(Simd::Scalar, &[(machine.clone(), spin.clone())], timing).remove(0);
+        let machines = [(asked.machine.clone(), asked.spin.clone())];
+        let point = prepare(Simd::Scalar, &machines, &asked.timing).remove(0);
         let point = point.map_err(Error::model)?;
         let modes = campbell_until(&point, speeds_rpm, stop).map_err(Error::model)?;
         let Some(modes) = modes else { return Ok(None) };
@@ -112,7 +122,7 @@ impl Analysis {
     }
 
     /// The modes as columns, with what is known of each in the metadata.
-    pub(crate) fn table(&self, name: &str, machine: &Machine) -> Table {
+    pub(crate) fn table(&self, Asked { name, machine, .. }: &Asked) -> Table {
         let (speeds, modes) = (&self.speeds_rpm, &self.modes);
         let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
         let mut table = Table::new(crate::identity::BUILD);

@@ -7,9 +7,8 @@ use arrow_schema::{Schema, SchemaRef};
 use serde_json::Value;
 
 use crate::identity;
-use sweep_engine::exit::Error;
-use sweep_engine::store::{Job, Layout, StoreError, write_map};
-use sweep_engine::table::Table;
+use sweep_engine::store::{Layout, write_map};
+use sweep_engine::{Error, Job, StoreError, Table};
 use sweep_files::{FileError, FileKind, Output, ParquetFile, key};
 use sweep_plot::{PlotOptions, render};
 
@@ -28,36 +27,17 @@ pub struct ResultTable {
 enum FileContent {
     /// These bytes. Of a file that was read, those of then: another may lie there by now.
     Bytes(Vec<u8>),
-    /// The rows, by the rules of a run's file.
-    Rows(Box<MapPlan>),
-}
-
-/// What a run's file says beside its rows.
-#[derive(Debug)]
-pub(super) struct MapPlan {
-    plan: Value,
-    points: u64,
-    layout: Layout,
-    is_whole: bool,
-}
-
-impl MapPlan {
-    pub(super) fn of(job: &Job<'_>, is_whole: bool) -> Self {
-        let (plan, layout) = (job.plan.clone(), job.layout.clone());
-        Self { plan, points: job.points, layout, is_whole }
-    }
+    /// The rows, by the rules of a run's file of so many points.
+    Rows { points: u64, layout: Box<Layout>, is_whole: bool },
 }
 
 impl ResultTable {
     /// The rows of a run, or of one at constant speeds.
-    pub(super) fn of_rows(map: MapPlan, batches: Vec<RecordBatch>) -> Self {
-        Self {
-            kind: map.layout.kind,
-            plan: map.plan.clone(),
-            schema: map.layout.schema(),
-            batches,
-            file: FileContent::Rows(Box::new(map)),
-        }
+    pub(super) fn of_rows(job: &Job<'_>, batches: Vec<RecordBatch>, is_whole: bool) -> Self {
+        let (plan, layout) = (job.plan.clone(), Box::new(job.layout.clone()));
+        let (kind, schema) = (layout.kind, layout.schema());
+        let file = FileContent::Rows { points: job.points, layout, is_whole };
+        Self { kind, plan, schema, batches, file }
     }
 
     /// A small result.
@@ -123,17 +103,31 @@ impl ResultTable {
     /// A path that holds something else, what the file system refuses, and the rows of an
     /// evaluation that was interrupted, which are no result.
     pub fn save(&self, path: &Path) -> Result<(), Error> {
-        match &self.file {
-            FileContent::Rows(map) => Ok(map.write(&self.batches, path)?),
-            FileContent::Bytes(_) => self.finish(Output::begin(path, self.kind)?),
+        let FileContent::Rows { points, layout, is_whole } = &self.file else {
+            return self.finish(Output::begin(path, self.kind)?);
+        };
+        if !is_whole {
+            let given = format!("with {} of {points} rows", self.rows());
+            return Err(Error::option("save", given, "a result that was not interrupted"));
         }
+        let job = Job {
+            plan: self.plan.clone(),
+            version: identity::VERSION,
+            numerics: identity::NUMERICS_VERSION,
+            points: *points,
+            layout: Layout::clone(layout),
+            // Tables and progress alone need these.
+            limits: f64::NAN.into(),
+            axis_values: Box::new(|_| Vec::new()),
+        };
+        Ok(write_map(&job, &self.batches, path)?)
     }
 
     /// Writes a small result, or a copy of the file that this one was, to an output already begun.
     pub(super) fn finish(&self, output: Output<'_>) -> Result<(), Error> {
         match &self.file {
             FileContent::Bytes(bytes) => Ok(output.finish(bytes)?),
-            FileContent::Rows(_) => Ok(()),
+            FileContent::Rows { .. } => Ok(()),
         }
     }
 
@@ -147,26 +141,5 @@ impl ResultTable {
         let path = folder.path().join("result.parquet");
         self.save(&path)?;
         Ok(render(&path, options, output)?)
-    }
-}
-
-impl MapPlan {
-    fn write(&self, batches: &[RecordBatch], path: &Path) -> Result<(), Error> {
-        if !self.is_whole {
-            let rows: usize = batches.iter().map(RecordBatch::num_rows).sum();
-            let given = format!("with {rows} of {} rows", self.points);
-            return Err(Error::option("save", given, "a result that was not interrupted"));
-        }
-        let job = Job {
-            plan: self.plan.clone(),
-            version: identity::VERSION,
-            numerics: identity::NUMERICS_VERSION,
-            points: self.points,
-            layout: self.layout.clone(),
-            // Tables and progress alone need these.
-            limits: f64::NAN.into(),
-            axis_values: Box::new(|_| Vec::new()),
-        };
-        Ok(write_map(&job, batches, path)?)
     }
 }

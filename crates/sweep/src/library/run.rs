@@ -6,9 +6,8 @@ use super::Effort;
 use super::result::ResultTable;
 use crate::engine::{Engine, ModelEngine};
 use crate::plan::Plan;
-use sweep_engine::exit::Error;
-use sweep_engine::run::{self as runner, Ended, RunOptions};
-use sweep_engine::store::Job;
+use sweep_engine::run::{Ended, RunOptions};
+use sweep_engine::{Error, Job, run as runner};
 
 /// How a run into a file ended.
 #[derive(Debug)]

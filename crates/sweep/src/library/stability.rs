@@ -5,11 +5,10 @@ use std::path::Path;
 use super::evaluate::{Evaluated, in_memory};
 use super::run::{RanToFile, into_file};
 use super::{Effort, check_speeds};
-use crate::dwell::{Motions, Search, motions};
+use crate::dwell::Search;
 use crate::plan::Plan;
-use crate::stability::{Asked, DwellEngine, check, job};
-use sweep_engine::exit::Error;
-use sweep_engine::store::Job;
+use crate::stability::{Held, check};
+use sweep_engine::Error;
 
 /// What becomes of each point of a plan's grid at each constant speed (rpm, rising): by a search
 /// the motions that it ends in, else the periodic responses of both models and how fast
@@ -24,8 +23,8 @@ pub fn find_held(
     search: Option<Search>,
     effort: Effort<'_>,
 ) -> Result<Evaluated, Error> {
-    let (engine, job) = asked(plan, speeds_rpm, search)?;
-    in_memory(&job, effort, &engine)
+    let held = checked(plan, speeds_rpm, search)?;
+    in_memory(&held.job(), effort, &held.engine()?)
 }
 
 /// As [`find_held`], into a result file: the bytes of `sweep dwell` or `sweep stability`, resumed
@@ -41,22 +40,17 @@ pub fn held_to_file(
     tell: &dyn Fn(&str),
     effort: Effort<'_>,
 ) -> Result<RanToFile, Error> {
-    let (engine, job) = asked(plan, speeds_rpm, search)?;
-    into_file(&engine, &job, output, fresh, tell, effort)
+    let held = checked(plan, speeds_rpm, search)?;
+    into_file(&held.engine()?, &held.job(), output, fresh, tell, effort)
 }
 
-fn asked<'a>(
+fn checked<'a>(
     plan: &'a Plan,
     speeds_rpm: &'a [f64],
     search: Option<Search>,
-) -> Result<(DwellEngine<'a>, Job<'a>), Error> {
+) -> Result<Held<'a>, Error> {
     check_speeds(speeds_rpm, 1, |speed| speed > 0.0, " above 0")?;
     check(plan, "speeds", &format!("with {} values", speeds_rpm.len()))?;
-    let Some(search) = search else {
-        return Ok((DwellEngine::new(plan, speeds_rpm)?, job(plan, speeds_rpm)));
-    };
-    search.check()?;
-    let asked = Asked::Motions(Motions::new(plan, search));
-    let engine = DwellEngine::asking(plan, speeds_rpm, asked)?;
-    Ok((engine, motions(plan, speeds_rpm, &search, None).0))
+    search.map_or(Ok(()), |search| search.check())?;
+    Ok(Held { plan, speeds_rpm, search })
 }

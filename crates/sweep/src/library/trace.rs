@@ -5,8 +5,7 @@ use clap::ValueEnum as _;
 use super::result::ResultTable;
 use crate::config::GridInput;
 use crate::trace::{self, Extras, Models, View, every, start_of, start_value};
-use sweep_engine::exit::Error;
-use sweep_engine::interrupt::Interrupt;
+use sweep_engine::{Error, Interrupt};
 use sweep_files::FileKind;
 
 /// What a trace holds.
@@ -18,14 +17,8 @@ pub struct TraceOptions {
     pub model: Option<String>,
     /// Every point of the grid, not one.
     pub all: bool,
-    /// Whether rates and accelerations of the channels are there too.
-    pub rates: bool,
-    /// Whether the ten coordinates and their speeds are there too.
-    pub states: bool,
-    /// Whether the forces of springs and dampers are there too.
-    pub forces: bool,
-    /// Whether the drum's angle is there too.
-    pub angle: bool,
+    /// What it holds beside channels, gap and speed.
+    pub extras: Extras,
     /// Where both models begin, away from equilibrium: `q5=0.1` (m, rad), `u1=2` (per s).
     pub start: Vec<String>,
 }
@@ -59,16 +52,13 @@ pub fn trace_point(
         Some(name) => Models::from_str(name, false)
             .map_err(|_| Error::option("model", name, "nonlinear, linear or both"))?,
     };
-    let TraceOptions { rates, states, forces, angle, .. } = *options;
-    let extras = Extras { rates, states, forces, angle };
-    let view = View { every_s, models, start, extras, quick: None };
+    let view = View { every_s, models, start, extras: options.extras, quick: None };
     let stop = || interrupt.stopped();
     let trace = trace::in_pool(&plan, at, &view, &stop).map_err(Error::model)?;
     if interrupt.stopped() {
         return Ok(None);
     }
-    let failures = trace.failures.clone();
-    Ok(Some((ResultTable::of_table(FileKind::Trace, trace.into_table())?, failures)))
+    Ok(Some((ResultTable::of_table(FileKind::Trace, trace.table)?, trace.failures)))
 }
 
 #[cfg(test)]

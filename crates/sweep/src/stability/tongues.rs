@@ -6,7 +6,7 @@ use arrow_schema::ArrowError;
 use washer_model::decimal;
 
 use crate::places;
-use sweep_engine::store::StoreError;
+use sweep_engine::StoreError;
 use sweep_files::{ParquetFile, cells};
 
 /// Tongues that a summary lists.

@@ -1,0 +1,111 @@
+//! Searches, with or without a file that keeps what they find out.
+
+use std::path::Path;
+
+use super::Effort;
+use super::result::ResultTable;
+use crate::model::Washer;
+use crate::plan::Plan;
+use sweep_engine::boundary::file::{job, table as boundary_table};
+use sweep_engine::boundary::quantity::traced;
+use sweep_engine::boundary::search::{BoundaryTask, Stopped};
+use sweep_engine::commands::boundary::search as trace;
+use sweep_engine::optimise::Study;
+use sweep_engine::optimise::file::table as study_table;
+use sweep_engine::optimise::search::search;
+use sweep_engine::store::{OpenedTrials, Trials};
+use sweep_engine::{Error, Job, Table};
+use sweep_files::{FileKind, Output};
+
+/// What is asked of a boundary.
+#[derive(Clone, Copy, Debug)]
+pub struct BoundaryOptions<'a> {
+    /// Any column of numbers that the plan's rows can have.
+    pub quantity: &'a str,
+    /// Where its limit is, in the column's unit; if `None`, its own.
+    pub limit: Option<f64>,
+    /// Width of the final brackets, in the second axis's unit, or as a fraction of its value if it
+    /// is logarithmic; if `None`, 1/480 of the range.
+    pub tolerance: Option<f64>,
+    /// Cells along each axis of the lattice that guards against islands, 1 to 1000.
+    pub lattice: u16,
+    /// The file to write, which keeps what an interrupted search has found out; without one, it is
+    /// lost.
+    pub output: Option<&'a Path>,
+    /// Whether to start over.
+    pub fresh: bool,
+}
+
+/// Traces the boundary of a plan's grid; `None` if the interrupt was raised.
+///
+/// # Errors
+/// A plan without a range to search, options that make no sense, and whatever keeps the file from
+/// being written.
+pub fn find_boundary(
+    plan: &Plan,
+    options: BoundaryOptions<'_>,
+    effort: Effort<'_>,
+) -> Result<Option<ResultTable>, Error> {
+    if !(1..=1000).contains(&options.lattice) {
+        return Err(Error::option("lattice", options.lattice, "from 1 to 1000"));
+    }
+    let (quantity, plan) = &traced(plan, options.quantity, options.limit)?;
+    let task = BoundaryTask::new(plan, options.tolerance, usize::from(options.lattice))?;
+    let job = job(plan, quantity, &task);
+    found(
+        (&job, FileKind::Boundary),
+        (options.output, options.fresh),
+        |trials| trace(plan, quantity, &task, trials, effort),
+        |found| boundary_table(&job, plan, quantity, &task, found),
+    )
+}
+
+/// The candidates of a study file, constants `NAME=VALUE` over those of its grid; `None` if the
+/// interrupt was raised. With an output it writes that file, byte for byte as `sweep optimise`
+/// does, and goes on there after an interruption; `fresh` starts over.
+///
+/// # Errors
+/// Mistakes in the study and its grid file, and whatever keeps the file from being written.
+pub fn optimise_study(
+    path: &Path,
+    sets: &[String],
+    output: Option<&Path>,
+    fresh: bool,
+    effort: Effort<'_>,
+) -> Result<Option<ResultTable>, Error> {
+    let study = Study::<Washer>::load(path, sets)?;
+    found(
+        (&study.job(), FileKind::Optimise),
+        (output, fresh),
+        |trials| search(&study, trials, effort),
+        |tried| study_table(&study, tried),
+    )
+}
+
+/// What a search finds, with the trials that its output keeps. A finished output is read.
+fn found<T>(
+    (job, kind): (&Job<'_>, FileKind<'static>),
+    (output, fresh): (Option<&Path>, bool),
+    search: impl FnOnce(Option<Trials>) -> Result<(Result<T, Stopped>, Option<Trials>), Error>,
+    table: impl FnOnce(&T) -> Table,
+) -> Result<Option<ResultTable>, Error> {
+    let file = output.map(|path| Output::begin(path, kind)).transpose()?;
+    let trials = match output.map(|path| Trials::open(path, job, fresh)).transpose()? {
+        Some(OpenedTrials::Finished) => return output.map(ResultTable::read).transpose(),
+        Some(OpenedTrials::Open(trials)) => Some(*trials),
+        None => None,
+    };
+    let (found, trials) = search(trials)?;
+    let found = match found {
+        Ok(found) => found,
+        Err(Stopped::Failed(error)) => return Err(error.into()),
+        Err(Stopped::Interrupted) => return Ok(None),
+    };
+    let found = ResultTable::of_table(kind, table(&found))?;
+    if let Some(file) = file {
+        found.finish(file)?;
+    }
+    // What it says matters where a user watches the folder.
+    let _ = trials.and_then(Trials::complete);
+    Ok(Some(found))
+}
