@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use lane_ode::Simd;
 use serde_json::json;
-use washer_model::{Dwell, Machine, Point, Response, Spin, Target, Timing, prepare};
+use washer_model::{Dwell, Machine, Point, Response, Spin, Target, prepare};
 use washer_row::{Growth, Outcome, Status, Trajectory};
 
 use crate::columns::Columns;
@@ -16,7 +16,7 @@ use crate::dwell::{Motions, Search};
 use crate::engine::{
     Engine, EngineError, Watch, responses, simd_from_environment, together_or_alone,
 };
-use crate::plan::Plan;
+use crate::plan::{Plan, timing};
 use sweep_engine::store::{Column, Done, Kind, Layout, axis_columns};
 use sweep_engine::{Error, Job};
 use sweep_files::{FileKind, key};
@@ -194,13 +194,11 @@ impl DwellEngine<'_> {
     }
 
     fn ready(&self, points: &[u64]) -> Vec<Result<Point, Status>> {
-        // The response at a constant speed knows nothing of the run.
-        let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
         let scenarios = points.iter().map(|&point| self.plan.scenario(point));
         let machines: Vec<(Machine, Spin)> =
             scenarios.map(|scenario| (scenario.model.machine, scenario.model.spin)).collect();
         let together = |machines: &[(Machine, Spin)]| {
-            let ready = prepare(self.simd, machines, &timing).into_iter();
+            let ready = prepare(self.simd, machines, &timing(self.plan)).into_iter();
             ready.map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
         };
         together_or_alone(&machines, together, || Err(Status::Panicked))

@@ -56,6 +56,9 @@ const OF_FOLLOWED: Care =
 const LOWEST_SHARE: f64 = 0.45;
 const LOWEST_DIGITS: f64 = 64.0;
 
+/// A mode that damping slows counts as this share of its undamped frequency, at least.
+const HELD_SHARE: f64 = 0.5;
+
 /// Steps of a turn, at most: a drum so slow that it asks for more leaves its machine at rest, but
 /// for its own unbalance going round.
 const MOST_STEPS: usize = 1 << 15;
@@ -133,9 +136,12 @@ impl<'a> Settings<'a> {
 
     /// From where responses are followed (rpm): below all that the suspension answers to.
     pub(super) fn lowest_rpm(&self) -> Result<f64, NoAnswer> {
-        let slowest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?.modes[0].frequency_rpm();
+        let slowest = &self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?.modes[0];
+        // Friction that is taken at a low speed holds the linear model, not the machine.
+        let held = HELD_SHARE * slowest.magnitude_rad_per_s * 60.0 / TAU;
+        let slowest_rpm = slowest.frequency_rpm().max(held);
         // The last digits of an eigenvalue are the processor's own.
-        Ok((LOWEST_SHARE * slowest * LOWEST_DIGITS).ceil() / LOWEST_DIGITS)
+        Ok((LOWEST_SHARE * slowest_rpm * LOWEST_DIGITS).ceil() / LOWEST_DIGITS)
     }
 
     /// That of a speed.
