@@ -69,6 +69,11 @@ impl Search {
         })
     }
 
+    /// From the least speeds, so that a run that gave the point others has no say.
+    pub(crate) fn from_least(point: &Point) -> Option<Self> {
+        Self::new(point).map(|search| Self { reciprocals: search.most.clone(), ..search })
+    }
+
     /// The speeds to take friction at (m/s).
     pub(crate) fn speeds_m_per_s(&self) -> Vec<f64> {
         self.reciprocals.iter().map(|reciprocal| 1.0 / reciprocal).collect()

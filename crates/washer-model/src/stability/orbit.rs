@@ -248,7 +248,7 @@ pub(super) fn linear_responses(
     is_stopped: &dyn Fn() -> bool,
 ) -> Vec<LinearResponse> {
     let mut found = together(rows, is_stopped);
-    let searched = |(k, row): (usize, &Row<'_>)| Some((k, Search::new(row.point)?));
+    let searched = |(k, row): (usize, &Row<'_>)| Some((k, Search::from_least(row.point)?));
     let mut open: Vec<(usize, Search)> = rows.iter().enumerate().filter_map(searched).collect();
     for _ in 0..MOST_MOTIONS {
         let at_speeds =
