@@ -342,7 +342,7 @@ fn resonance(point: &Point, at: &Response) -> Option<Resonance> {
     };
     let admits = |order: &u32| match at.kind() {
         Kind::PeriodDoubling => order % 2 == 1,
-        Kind::Fold => order % 2 == 0,
+        Kind::Fold => order.is_multiple_of(2),
         Kind::QuasiPeriodic | Kind::Stable => true,
     };
     let meeting = |(one, other): (usize, usize), sign: f64, order: u32| {
