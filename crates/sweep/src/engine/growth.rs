@@ -38,40 +38,44 @@ pub(crate) fn motions(
     together_or_alone(dwells, together, || Err(Status::Panicked))
 }
 
-/// Adds what metrics ask of a point at constant speeds (rpm): the fastest growing disturbance of
-/// the response that a machine is in that runs up, where the first speed wins a tie, and how far
-/// its motions go. Speeds without an answer are left out. Where that response is within the
-/// machine's geometry, what another passes is told.
+/// Adds what metrics ask of points at constant speeds (rpm), those of all points in lanes: the
+/// fastest growing disturbance of the response that a machine is in that runs up, where the first
+/// speed wins a tie, and how far its motions go. Speeds without an answer are left out. Where that
+/// response is within the machine's geometry, what another passes is told.
 pub(super) fn add(
-    outcome: &mut Outcome,
+    outcomes: &mut [Outcome],
     simd: Simd,
-    point: &Point,
+    points: &[&Point],
     (speeds_rpm, metrics): (&[f64], &[Metric]),
     is_stopped: &dyn Fn() -> bool,
 ) {
-    let dwell = |&speed_rpm| Dwell { point, speed_rpm };
+    let at_speeds = |point| speeds_rpm.iter().map(move |&speed_rpm| Dwell { point, speed_rpm });
+    let dwells: Vec<Dwell<'_>> = points.iter().copied().flat_map(at_speeds).collect();
     if metrics.contains(&Metric::Growth) {
-        let dwells: Vec<Dwell<'_>> = speeds_rpm.iter().map(dwell).collect();
         let found = responses(&dwells, is_stopped);
-        let there = || found.iter().flatten().filter_map(|responses| responses.first());
-        let fastest =
-            there().reduce(
-                |most, next| {
-                    if next.growth_per_s() > most.growth_per_s() { next } else { most }
-                },
-            );
-        outcome.growth = fastest.map(|fastest| {
-            let beyond = fastest.beyond.or_else(|| there().find_map(|response| response.beyond));
-            Growth { beyond, ..Growth::from(fastest) }
-        });
+        for (outcome, found) in outcomes.iter_mut().zip(found.chunks(speeds_rpm.len())) {
+            let there = || found.iter().flatten().filter_map(|responses| responses.first());
+            let fastest =
+                there().reduce(
+                    |most, next| {
+                        if next.growth_per_s() > most.growth_per_s() { next } else { most }
+                    },
+                );
+            outcome.growth = fastest.map(|fastest| {
+                let others = || there().find_map(|response| response.beyond);
+                Growth { beyond: fastest.beyond.or_else(others), ..Growth::from(fastest) }
+            });
+        }
     }
     if metrics.contains(&Metric::Dwell) {
-        let dwells: Vec<_> = speeds_rpm.iter().map(|speed| (dwell(speed), None)).collect();
+        let dwells: Vec<_> = dwells.iter().map(|dwell| (*dwell, None)).collect();
         let found = motions(simd, &dwells, &Starts::default(), is_stopped);
-        let all = speeds_rpm.iter().zip(&found).flat_map(|(speed, found)| {
-            let motions = found.iter().flat_map(|found| &found.motions);
-            motions.map(|motion| (*speed, motion))
-        });
-        outcome.dwelt = Dwelt::of(all);
+        for (outcome, found) in outcomes.iter_mut().zip(found.chunks(speeds_rpm.len())) {
+            let all = speeds_rpm.iter().zip(found).flat_map(|(speed, found)| {
+                let motions = found.iter().flat_map(|found| &found.motions);
+                motions.map(|motion| (*speed, motion))
+            });
+            outcome.dwelt = Dwelt::of(all);
+        }
     }
 }

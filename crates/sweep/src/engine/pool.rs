@@ -218,19 +218,28 @@ impl Pool<'_> {
         }
         drop(state);
         self.shared.changed.notify_all();
+        let (mut failed, mut outcomes, mut points) = (Vec::new(), Vec::new(), Vec::new());
         for (mut outcome, point) in done {
             outcome.forget_turns();
-            let model = &self.engine.plan.model;
-            if let (Some(speeds), Ok(point)) = (&model.held_speeds, point) {
-                let is_stopped = || self.watch.stopped();
-                let asked = (speeds.values(), model.measures.metrics.as_slice());
-                growth::add(&mut outcome, self.engine.widest(), &point, asked, &is_stopped);
-                if is_stopped() {
-                    return;
+            match point {
+                Ok(point) => {
+                    outcomes.push(outcome);
+                    points.push(point);
                 }
+                Err(_) => failed.push(outcome),
             }
-            (self.keep)(outcome);
         }
+        let model = &self.engine.plan.model;
+        if let Some(speeds) = &model.held_speeds {
+            let is_stopped = || self.watch.stopped();
+            let asked = (speeds.values(), model.measures.metrics.as_slice());
+            let points: Vec<&Point> = points.iter().map(AsRef::as_ref).collect();
+            growth::add(&mut outcomes, self.engine.widest(), &points, asked, &is_stopped);
+            if is_stopped() {
+                return;
+            }
+        }
+        failed.into_iter().chain(outcomes).for_each(&self.keep);
     }
 }
 
