@@ -253,14 +253,19 @@ fn responses_with_friction_are_followed_round_their_folds() {
     let (_, run) = head.split_once("[spin]").expect("a spin");
     let set = "machine = \"machine.toml\"\nset = { unbalance_mass_kg = 1.0, friction_n = 60.0 }";
     fs::write(home.path("g.toml"), format!("{set}\n[spin]{run}")).expect("the grid is written");
-    let found = home.sweep(&["stability", "g.toml", "--speed", "255:256:1", "--out", "s.parquet"]);
-    assert!(found.status.success(), "{}", said(&found));
-    let shown = ["show", "s.parquet", "--columns", "branch,nonlinear_tub_yaw"];
-    let shown = String::from_utf8(home.sweep(&shown).stdout).expect("it is text");
-    let number = |word: &str| word.parse::<f64>().expect("a number");
-    let rows = shown.lines().skip(1).map(|row| row.split_whitespace().map(number).collect());
-    let rows: Vec<Vec<f64>> = rows.collect();
-    // From the linear model's response alone one is found, of half this yaw, off the curve.
-    assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), [0.0, 1.0, 2.0, 0.0, 1.0, 2.0]);
-    assert!(rows.iter().all(|row| (0.045..0.055).contains(&row[1])), "{rows:?}");
+    // By default, and where friction holds the linear model, which says nothing of the response.
+    for given in [&[][..], &["--set", "friction_linear_speed_m_per_s=0.01"]] {
+        let asked = ["stability", "g.toml", "--speed", "255:256:1", "--fresh", "--out"];
+        let found = home.sweep(&[&asked[..], &["s.parquet"], given].concat());
+        assert!(found.status.success(), "{}", said(&found));
+        let shown = ["show", "s.parquet", "--columns", "branch,nonlinear_tub_yaw"];
+        let shown = String::from_utf8(home.sweep(&shown).stdout).expect("it is text");
+        let number = |word: &str| word.parse::<f64>().expect("a number");
+        let rows = shown.lines().skip(1).map(|row| row.split_whitespace().map(number).collect());
+        let rows: Vec<Vec<f64>> = rows.collect();
+        // From the linear model's response alone one is found, of half this yaw, off the curve.
+        let branches: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+        assert_eq!(branches, [0.0, 1.0, 2.0, 0.0, 1.0, 2.0], "{given:?}");
+        assert!(rows.iter().all(|row| (0.045..0.055).contains(&row[1])), "{given:?}: {rows:?}");
+    }
 }

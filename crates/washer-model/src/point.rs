@@ -170,11 +170,23 @@ impl Point {
 
     /// The same point with friction taken at other own speeds, in their order.
     pub(crate) fn at_own_speeds(&self, speeds_m_per_s: &[f64]) -> Self {
+        let mut own = speeds_m_per_s.iter().copied();
+        self.at_speeds(|taken| if taken.is_own { own.next() } else { None })
+    }
+
+    /// The same point whose linear model has no friction.
+    pub(crate) fn without_friction(&self) -> Self {
+        self.at_speeds(|_| Some(f64::INFINITY))
+    }
+
+    /// The same point with friction taken at other speeds (m/s), where there are others.
+    fn at_speeds(&self, mut other: impl FnMut(&FrictionSpeed) -> Option<f64>) -> Self {
         let mut point = self.clone();
-        let own = point.friction_speeds.iter_mut().filter(|taken| taken.is_own);
-        for (taken, speed_m_per_s) in own.zip(speeds_m_per_s) {
-            taken.speed_m_per_s = *speed_m_per_s;
-            point.machine.elements.take_friction_at(taken.damper, *speed_m_per_s);
+        for taken in &mut point.friction_speeds {
+            if let Some(speed_m_per_s) = other(taken) {
+                taken.speed_m_per_s = speed_m_per_s;
+                point.machine.elements.take_friction_at(taken.damper, speed_m_per_s);
+            }
         }
         let tangents =
             tub_tangents(&point.machine.with_viscous_friction(), &self.equilibrium.map(N));

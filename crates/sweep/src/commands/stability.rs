@@ -30,8 +30,9 @@ const OUT: &str = "Result file [default: results/NAME-stability.parquet]";
 const LONG: &str = "\
 A row for every point of the grid and every speed: the periodic response of both models while the \
 drum turns at that speed for ever, and how fast a small disturbance of the nonlinear one grows. \
-The spin profile, the window and the integrator of the grid file do not matter here. The result is \
-written to results/NAME-stability.parquet unless --out names a file.
+The spin profile, the window and the integrator of the grid file do not matter here, but that the \
+modes of a machine with friction are named as in that run. The result is written to \
+results/NAME-stability.parquet unless --out names a file.
 
 The file is a pure function of its input, whatever the number of threads, shards and \
 interruptions. What an interrupted command has computed stays in FILE.partial, and the same \

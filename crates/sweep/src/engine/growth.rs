@@ -43,17 +43,16 @@ pub(crate) fn motions(
 /// speed wins a tie, and how far its motions go. Speeds without an answer are left out. Where that
 /// response is within the machine's geometry, what another passes is told.
 pub(super) fn add(
-    outcomes: &mut [Outcome],
+    rows: &mut [(&mut Outcome, &Point)],
     simd: Simd,
-    points: &[&Point],
     (speeds_rpm, metrics): (&[f64], &[Metric]),
     is_stopped: &dyn Fn() -> bool,
 ) {
     let at_speeds = |point| speeds_rpm.iter().map(move |&speed_rpm| Dwell { point, speed_rpm });
-    let dwells: Vec<Dwell<'_>> = points.iter().copied().flat_map(at_speeds).collect();
+    let dwells: Vec<Dwell<'_>> = rows.iter().flat_map(|(_, point)| at_speeds(*point)).collect();
     if metrics.contains(&Metric::Growth) {
         let found = responses(&dwells, is_stopped);
-        for (outcome, found) in outcomes.iter_mut().zip(found.chunks(speeds_rpm.len())) {
+        for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
             let there = || found.iter().flatten().filter_map(|responses| responses.first());
             let fastest =
                 there().reduce(
@@ -70,7 +69,7 @@ pub(super) fn add(
     if metrics.contains(&Metric::Dwell) {
         let dwells: Vec<_> = dwells.iter().map(|dwell| (*dwell, None)).collect();
         let found = motions(simd, &dwells, &Starts::default(), is_stopped);
-        for (outcome, found) in outcomes.iter_mut().zip(found.chunks(speeds_rpm.len())) {
+        for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
             let all = speeds_rpm.iter().zip(found).flat_map(|(speed, found)| {
                 let motions = found.iter().flat_map(|found| &found.motions);
                 motions.map(|motion| (*speed, motion))

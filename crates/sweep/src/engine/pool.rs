@@ -218,28 +218,20 @@ impl Pool<'_> {
         }
         drop(state);
         self.shared.changed.notify_all();
-        let (mut failed, mut outcomes, mut points) = (Vec::new(), Vec::new(), Vec::new());
-        for (mut outcome, point) in done {
-            outcome.forget_turns();
-            match point {
-                Ok(point) => {
-                    outcomes.push(outcome);
-                    points.push(point);
-                }
-                Err(_) => failed.push(outcome),
-            }
-        }
+        done.iter_mut().for_each(|(outcome, _)| outcome.forget_turns());
         let model = &self.engine.plan.model;
         if let Some(speeds) = &model.held_speeds {
             let is_stopped = || self.watch.stopped();
             let asked = (speeds.values(), model.measures.metrics.as_slice());
-            let points: Vec<&Point> = points.iter().map(AsRef::as_ref).collect();
-            growth::add(&mut outcomes, self.engine.widest(), &points, asked, &is_stopped);
+            let there = done
+                .iter_mut()
+                .filter_map(|(outcome, point)| point.as_deref().ok().map(|point| (outcome, point)));
+            growth::add(&mut there.collect::<Vec<_>>(), self.engine.widest(), asked, &is_stopped);
             if is_stopped() {
                 return;
             }
         }
-        failed.into_iter().chain(outcomes).for_each(&self.keep);
+        done.into_iter().for_each(|(outcome, _)| (self.keep)(outcome));
     }
 }
 

@@ -69,16 +69,22 @@ impl<'a> Responses<'a> {
         for (curve, (_, fastest_rpm)) in curves.iter_mut().zip(points) {
             let lowest = from.map_or_else(|| curve.settings.lowest_rpm(), |it| Ok(it.speed_rpm));
             let lowest = lowest.ok().filter(|lowest| lowest < fastest_rpm);
-            starts.push(lowest.and_then(|lowest| curve.settings.case(lowest).ok()));
+            let case = lowest.and_then(|lowest| curve.settings.case(lowest).ok());
+            starts.push(case.map(|case| (curve.settings.linear(case.row), case)));
         }
-        let of_start = |(curve, case): (&mut Curve<'a>, &Option<Case<'a>>)| {
-            Some(curve.settings.linear(case.as_ref()?.row))
-        };
-        let rows: Vec<Row<'_>> = curves.iter_mut().zip(&starts).filter_map(of_start).collect();
+        // A curve does not depend on where the linear model takes friction.
+        let rows: Vec<Row<'_>> = curves
+            .iter()
+            .zip(&starts)
+            .filter_map(|(curve, start)| {
+                let (row, _) = start.as_ref()?;
+                Some(Row { point: curve.settings.without_friction(), ..*row })
+            })
+            .collect();
         let linear = together(&rows, is_stopped);
         let begun = starts.iter().flatten().zip(&linear);
         let mut solves: Vec<Solve<'_>> = begun
-            .map(|(case, linear)| {
+            .map(|((_, case), linear)| {
                 let state = from.map_or_else(|| from_linear(case, linear).state, |it| it.start);
                 Solve::new(case.row, state, None)
             })
@@ -86,7 +92,7 @@ impl<'a> Responses<'a> {
         let mut is_whole = finish(&mut solves, is_stopped);
         let mut solves = solves.into_iter();
         for ((curve, (_, fastest_rpm)), start) in curves.iter_mut().zip(points).zip(&starts) {
-            if let Some(case) = start
+            if let Some((_, case)) = start
                 && let Some((state, _)) = solves.next().and_then(Solve::found)
             {
                 let until_rpm = from.map_or(BEYOND, |_| 1.0) * fastest_rpm;

@@ -9,6 +9,7 @@ use crate::modes::{Modes, highest_frequency_rad_per_s, modes, motions_with_caps}
 use crate::nonlinear::coupling::Caps;
 use crate::point::Point;
 use core::f64::consts::TAU;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -55,9 +56,6 @@ const OF_FOLLOWED: Care =
 /// parts of a turn per minute.
 const LOWEST_SHARE: f64 = 0.45;
 const LOWEST_DIGITS: f64 = 64.0;
-
-/// A mode that damping slows counts as this share of its undamped frequency, at least.
-const HELD_SHARE: f64 = 0.5;
 
 /// Steps of a turn, at most: a drum so slow that it asks for more leaves its machine at rest, but
 /// for its own unbalance going round.
@@ -108,6 +106,9 @@ fn whole(point: &Point, steps: f64) -> Result<usize, NoAnswer> {
 #[derive(Clone)]
 pub(crate) struct Settings<'a> {
     pub(crate) point: &'a Point,
+    /// Without friction, whose modes are asked for: friction that is taken at a low speed holds the
+    /// linear model, not the machine.
+    free: Cow<'a, Point>,
     rest: Option<Modes>,
     /// Modes where ranges begin, by range.
     frozen: BTreeMap<i64, Result<Arc<Modes>, NoAnswer>>,
@@ -130,18 +131,24 @@ fn begins_rpm(range: i64) -> f64 {
 
 impl<'a> Settings<'a> {
     pub(crate) fn new(point: &'a Point) -> Self {
-        let rest = modes(point, 0.0, 0.0).ok();
-        Self { point, rest, frozen: BTreeMap::new(), ranges: BTreeMap::new() }
+        let free = match point.friction_speeds().is_empty() {
+            true => Cow::Borrowed(point),
+            false => Cow::Owned(point.without_friction()),
+        };
+        let rest = modes(&free, 0.0, 0.0).ok();
+        Self { point, free, rest, frozen: BTreeMap::new(), ranges: BTreeMap::new() }
+    }
+
+    /// The machine without friction.
+    pub(super) fn without_friction(&self) -> &Point {
+        &self.free
     }
 
     /// From where responses are followed (rpm): below all that the suspension answers to.
     pub(super) fn lowest_rpm(&self) -> Result<f64, NoAnswer> {
-        let slowest = &self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?.modes[0];
-        // Friction that is taken at a low speed holds the linear model, not the machine.
-        let held = HELD_SHARE * slowest.magnitude_rad_per_s * 60.0 / TAU;
-        let slowest_rpm = slowest.frequency_rpm().max(held);
+        let slowest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?.modes[0].frequency_rpm();
         // The last digits of an eigenvalue are the processor's own.
-        Ok((LOWEST_SHARE * slowest_rpm * LOWEST_DIGITS).ceil() / LOWEST_DIGITS)
+        Ok((LOWEST_SHARE * slowest * LOWEST_DIGITS).ceil() / LOWEST_DIGITS)
     }
 
     /// That of a speed.
@@ -188,7 +195,7 @@ impl<'a> Settings<'a> {
 
     /// Modes where a range begins.
     fn frozen(&mut self, range: i64) -> Result<Arc<Modes>, NoAnswer> {
-        let found = || modes(self.point, 0.0, begins_rpm(range) * TAU / 60.0);
+        let found = || modes(&self.free, 0.0, begins_rpm(range) * TAU / 60.0);
         let found = || found().map(Arc::new).map_err(|_| NoAnswer::Eigenvalues);
         self.frozen.entry(range).or_insert_with(found).clone()
     }
@@ -215,7 +222,7 @@ impl<'a> Settings<'a> {
             while !is_capped && (steps as f64) < highest * turn_s {
                 let shift = |end: usize| {
                     let caps = caps(steps, 60.0 / ends_rpm[end]);
-                    shift_per_s(point, ends_rpm[end] * TAU / 60.0, &frozen[end], &caps)
+                    shift_per_s(&self.free, ends_rpm[end] * TAU / 60.0, &frozen[end], &caps)
                 };
                 is_capped = shift(0)?.max(shift(1)?) <= care.shift_per_s;
                 if !is_capped {
