@@ -281,6 +281,12 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
         columns.extend(growing_mode_columns(prefix, place));
     }
     columns.extend(branch_columns(prefix));
+    if !in_map {
+        let on_curve = |row: &ResultRow| Some(growth(row)?.is_on_curve);
+        let text = "false where the response is not on that curve, but was found from the linear \
+                    model's response; branch then counts on";
+        columns.push(ResultColumn::flag("on_curve", text, on_curve));
+    }
     columns
 }
 

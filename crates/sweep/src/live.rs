@@ -166,15 +166,17 @@ fn plan_of(file: &Path) -> Result<Plan, Error> {
         let plan: Plan = GridInput::of_plan(&name, &json).load()?;
         return if plan.axes.is_empty() { Err(refused("a map with an axis")) } else { Ok(plan) };
     }
-    // Points of a design are wherever its file has them.
+    // Points of a design are where its axes' ranges have them; of a list and of distributions,
+    // wherever its file does.
     let axes = json["axis"].take();
     let mut plan: Plan = GridInput::of_plan(&name, &json).load()?;
     let columns = overview(&opened)?.columns;
     for axis in axes.as_array().into_iter().flatten() {
         let name = axis["parameter"].as_str().unwrap_or_default();
         let parameter = Parameter::find(name, &plan.model.machine, &plan.model.spin);
-        let range = columns.iter().find(|column| column.name == name);
-        if let (Ok(parameter), Some((from, to))) = (parameter, range.and_then(|one| one.range)) {
+        let [from, to] = ["from", "to"].map(|end| axis["range"][end].as_f64());
+        let in_file = || columns.iter().find(|column| column.name == name)?.range;
+        if let (Ok(parameter), Some((from, to))) = (parameter, from.zip(to).or_else(in_file)) {
             let values = AxisValues::Linear { from, to, count: 2 };
             plan.axes.push(Axis { parameter, values });
         }

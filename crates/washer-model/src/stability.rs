@@ -70,8 +70,10 @@ impl Kind {
 pub struct Response {
     /// The drum's speed (rpm).
     pub speed_rpm: f64,
-    /// How many folds the curve of responses has before this one, followed from a low speed up: 0
-    /// is the branch of a machine that runs up.
+    /// Whether it is on the curve of responses that begins at a low speed.
+    pub is_on_curve: bool,
+    /// How many folds the curve has before this one: 0 is the branch of a machine that runs up. Of
+    /// a response beside the curve, one more than of the last on it.
     pub branch: u32,
     /// Speeds (rpm) of the folds between which that branch lies, lower and upper: none where it
     /// goes on.

@@ -101,7 +101,9 @@ impl Trajectory {
 /// A response at a constant speed, and what becomes of small disturbances of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
-    /// How many folds the curve of responses has before it, followed from a low speed up.
+    /// Whether it is on the curve of responses that begins at a low speed.
+    pub is_on_curve: bool,
+    /// How many folds the curve has before it.
     pub branch: u32,
     /// Speeds (rpm) of the folds between which that branch lies, lower and upper.
     pub between_rpm: [Option<f64>; 2],
@@ -135,6 +137,7 @@ impl From<&Response> for Growth {
             })
         };
         Self {
+            is_on_curve: response.is_on_curve,
             branch: response.branch,
             between_rpm: response.between_rpm,
             beyond: response.beyond,

@@ -32,6 +32,9 @@ const RETURNS: f64 = 2e-4;
 /// A response that is farther than this (m, rad) from where the curve has it is another.
 const FARTHEST_FROM_GUESS: f64 = 5e-3;
 
+/// Responses that are nearer than this (m, rad) are one.
+const SAME: f64 = 1e-6;
+
 /// The periodic responses at constant speeds, on lanes; a run of dwells of one point shares its
 /// curve of responses. Per dwell as [`Responses::at`].
 pub fn respond(
@@ -105,7 +108,8 @@ impl<'a> Responses<'a> {
 
     /// Of each place in `followed` and speed (rpm) the responses that the point's curve passes
     /// there, in its order, on lanes. The first is that of a machine that runs up, until its
-    /// branch ends. What is found does not depend on what else is asked for, nor on how much
+    /// branch ends. Behind them is what a search from the linear model's response finds beside the
+    /// curve, where the machine has friction or stops, or the curve has none. What is found does not depend on what else is asked for, nor on how much
     /// farther the curve was followed.
     ///
     /// Where growth is close to 0, a response is that of the machine as it is, by classical
@@ -135,8 +139,10 @@ impl<'a> Responses<'a> {
             let Ok(case) = case else { continue };
             let Some(linear) = linear.next() else { continue };
             let mut guesses = followed[*place].0.guesses(*speed_rpm);
-            if guesses.is_empty() {
-                guesses.push(from_linear(case, &linear));
+            // Friction and stops make responses beside those of the curve.
+            if guesses.is_empty() || case.row.has_corners() {
+                let branch = guesses.last().map_or(0, |last| last.branch + 1);
+                guesses.push(Guess { branch, ..from_linear(case, &linear) });
             }
             for guess in guesses {
                 solves.push(Solve::new(case.row, guess.state, guess.factors.clone()));
@@ -151,6 +157,7 @@ impl<'a> Responses<'a> {
         if is_stopped() {
             return stopped();
         }
+        forget_known(&looked, &mut found);
         // What is close to an edge, or moved by the caps, is asked of the machine as it is.
         let are_moved = are_moved(&looked, &found, is_stopped);
         let mut close = Vec::new();
@@ -189,6 +196,23 @@ impl<'a> Responses<'a> {
             }
         }
         answers
+    }
+}
+
+/// Leaves out what is found from the linear response and is on the curve all the same.
+fn forget_known(looked: &[Look<'_>], found: &mut [Result<Response, NoAnswer>]) {
+    for place in 0..found.len() {
+        let Look { number, guess, .. } = &looked[place];
+        let Ok(Response { start, .. }) = &found[place] else { continue };
+        let is_same = |known: &Response| {
+            (0..COORDINATES).all(|i| (known.start[i] - start[i]).abs() < SAME)
+        };
+        let before = (0..place).rev().take_while(|before| looked[*before].number == *number);
+        let is_known = !guess.is_on_curve
+            && before.into_iter().any(|before| found[before].as_ref().is_ok_and(is_same));
+        if is_known {
+            found[place] = Err(NoAnswer::NoResponse);
+        }
     }
 }
 
@@ -269,6 +293,7 @@ impl Look<'_> {
             }
             let mut response = Response {
                 speed_rpm: row.speed_rpm,
+                is_on_curve: self.guess.is_on_curve,
                 branch: self.guess.branch,
                 between_rpm: self.guess.between_rpm,
                 beyond: beyond(row.point, &seen),
