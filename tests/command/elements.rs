@@ -243,6 +243,8 @@ fn live_pages_are_for_one_axis_and_for_designs_of_any_machine() {
         let slider =
             "\"axis\":true,\"description\":\"friction of all dampers (F_f)\",\"from\":20.0";
         assert_eq!(text.contains(slider), grid == "l.toml", "{grid}");
+        // The range of the axis, which no point of the design reaches.
+        assert_eq!(text.contains("\"from\":0.05,"), grid == "d.toml", "{grid}");
     }
 }
 
@@ -258,14 +260,18 @@ fn responses_with_friction_are_followed_round_their_folds() {
         let asked = ["stability", "g.toml", "--speed", "255:256:1", "--fresh", "--out"];
         let found = home.sweep(&[&asked[..], &["s.parquet"], given].concat());
         assert!(found.status.success(), "{}", said(&found));
-        let shown = ["show", "s.parquet", "--columns", "branch,nonlinear_tub_yaw"];
+        let shown = ["show", "s.parquet", "--columns", "branch,nonlinear_tub_yaw,on_curve"];
         let shown = String::from_utf8(home.sweep(&shown).stdout).expect("it is text");
         let number = |word: &str| word.parse::<f64>().expect("a number");
-        let rows = shown.lines().skip(1).map(|row| row.split_whitespace().map(number).collect());
-        let rows: Vec<Vec<f64>> = rows.collect();
-        // From the linear model's response alone one is found, of half this yaw, off the curve.
-        let branches: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+        let rows = shown.lines().skip(1).map(|row| row.split_whitespace().collect::<Vec<_>>());
+        let (on_curve, beside): (Vec<_>, Vec<_>) = rows.partition(|row| row[2] == "true");
+        let branches: Vec<f64> = on_curve.iter().map(|row| number(row[0])).collect();
         assert_eq!(branches, [0.0, 1.0, 2.0, 0.0, 1.0, 2.0], "{given:?}");
-        assert!(rows.iter().all(|row| (0.045..0.055).contains(&row[1])), "{given:?}: {rows:?}");
+        let of_yaw = |rows: &[Vec<&str>], range: std::ops::Range<f64>| {
+            rows.iter().all(|row| range.contains(&number(row[1])))
+        };
+        assert!(of_yaw(&on_curve, 0.045..0.055), "{given:?}: {on_curve:?}");
+        // From the linear model's response others are found, of half this yaw.
+        assert!(of_yaw(&beside, 0.02..0.03) && !beside.is_empty(), "{given:?}: {beside:?}");
     }
 }
