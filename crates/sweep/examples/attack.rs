@@ -249,15 +249,25 @@ const ERROR_FLOOR: f64 = 1e-6;
 /// by next to nothing.
 const PUSH_FLOOR: f64 = 1e-3;
 
+/// Fail times that differ by no more than this share of the run are one.
+const SAME_TIME: f64 = 1e-4;
+
 /// The greatest relative difference of two rows' numbers.
 fn difference(plan: &Plan, a: &Outcome, b: &Outcome) -> f64 {
     let models = [(&a.nonlinear, &b.nonlinear), (&a.linear, &b.linear)];
     let amplitudes = models.iter().map(|(a, b)| amplitudes_differ(a, b));
     let metrics = metrics_differ(plan, a, b).into_iter().map(|(_, share)| share);
+    // Both are over the whole run, which goes on behind the window.
+    let clearance_m = plan.model.machine.radial_clearance_m;
+    let gaps = models.iter().filter_map(|(a, b)| a.min_gap_m.zip(b.min_gap_m));
+    let gaps = gaps.map(|(a, b)| relative_from(clearance_m, a, b));
+    let ends = models.iter().filter_map(|(a, b)| a.fail_time_s.zip(b.fail_time_s));
+    let are_apart = |(a, b): (f64, f64)| (a - b).abs() > SAME_TIME * plan.end_s;
+    let ends = ends.map(|ends| if are_apart(ends) { f64::INFINITY } else { 0.0 });
     let turns = a.turn_ratios.iter().flatten().zip(b.turn_ratios.iter().flatten());
     // A ratio has the errors of both models.
     let of_ratios = turns.map(relative).fold(0.0, f64::max) / 2.0;
-    metrics.chain(amplitudes).fold(of_ratios, f64::max)
+    metrics.chain(amplitudes).chain(gaps).chain(ends).fold(of_ratios, f64::max)
 }
 
 /// The relative difference of each metric, by its column.

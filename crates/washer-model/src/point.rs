@@ -15,7 +15,7 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, Motion};
 use crate::point::friction::FrictionSpeed;
-use crate::point::ringing::{Ringing, jumps_rad_per_s2};
+use crate::point::ringing::{Jump, Ringing, jumps};
 use lane_ode::{Kernel, Lane, N, Simd};
 use std::sync::Arc;
 
@@ -56,6 +56,8 @@ pub struct Point {
     pub(crate) stretches: Arc<[SpinStretch]>,
     pub(crate) legs: Arc<[PlannedLeg]>,
     pub(crate) ringing: Ringing,
+    /// Of the drum's acceleration, until the window ends.
+    pub(crate) jumps: Arc<[Jump]>,
     /// By how much the nonlinear model starts beside its equilibrium, in every coordinate (m, rad).
     pub(crate) nudge: f64,
     /// When all outputs are recorded, if they are (s).
@@ -264,7 +266,8 @@ impl Kernel for Prepare<'_> {
                     }
                     let steepest = steepest.map(|tangents| Box::new(linear.with_tub(tangents)));
                     Ok(Point {
-                        ringing: Ringing::new(machine, course.jumps_rad_per_s2),
+                        ringing: Ringing::new(machine, ringing::sum_rad_per_s2(&course.jumps)),
+                        jumps: course.jumps,
                         nudge: 0.0,
                         instants_s: [].into(),
                         machine: coefficients,
@@ -315,8 +318,7 @@ fn steepest<T: Lane>(
 struct Course {
     stretches: Arc<[SpinStretch]>,
     legs: Arc<[PlannedLeg]>,
-    /// All jumps of the drum's acceleration until the window ends, added.
-    jumps_rad_per_s2: f64,
+    jumps: Arc<[Jump]>,
 }
 
 /// One per point. Neighbours with the same spin share it, because a table may have thousands of
@@ -327,9 +329,9 @@ fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<Course> {
         let shared = if k > 0 && points[k - 1].1 == *spin { courses.last().cloned() } else { None };
         courses.push(shared.unwrap_or_else(|| {
             let stretches = spin.stretches();
-            let jumps_rad_per_s2 = jumps_rad_per_s2(&stretches, timing.window_s[1]);
+            let jumps = jumps(&stretches, timing.window_s[1]).into();
             let legs = legs(&stretches, timing).into();
-            Course { legs, jumps_rad_per_s2, stretches: stretches.into() }
+            Course { legs, jumps, stretches: stretches.into() }
         }));
     }
     courses

@@ -45,6 +45,10 @@ const METRIC_FLOOR: f64 = 1e-3;
 /// seen. So motions as small as that bend times this are for plain RK4.
 const SAGS: f64 = 32.0;
 
+/// Ringing that is a greater share of the accuracy is looked at again, by how it decays: that takes
+/// eigenvalues.
+const FREE_OF_DECAY: f64 = 0.1;
+
 /// Differences of a turn's peak count so many times. Where it lies beside the turn's cut, it errs
 /// with the phase of the motion, and shrinks less from rung to rung than the motion's error does.
 const TURN_WEIGHT: f64 = 3.0;
@@ -353,7 +357,10 @@ fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
     }
     let is_capped = rung.level.is_capped();
     let swings = if is_capped { point.ringing() } else { point.bearing_ringing() };
-    let of_swings = of_motion(&swings, &run.trajectory, rule);
+    let mut of_swings = of_motion(&swings, &run.trajectory, rule);
+    if of_swings > FREE_OF_DECAY * rule.accuracy {
+        of_swings *= point.ringing_left();
+    }
     let metrics = rule.measures.of_model().zip(&run.trajectory.metrics);
     let of_clash = metrics.filter(|(number, _)| number.metric == Metric::ClashTime);
     let clash_s = of_clash.map(|(_, time)| *time);

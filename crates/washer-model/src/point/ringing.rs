@@ -29,18 +29,42 @@ pub(crate) struct Ringing {
     span_m: f64,
 }
 
-/// All jumps of the drum's acceleration until `end_s`, added.
-pub(crate) fn jumps_rad_per_s2(stretches: &[SpinStretch], end_s: f64) -> f64 {
-    let mut acceleration = 0.0;
-    let mut jumps = 0.0;
+/// A jump of the drum's acceleration.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Jump {
+    at_s: f64,
+    by_rad_per_s2: f64,
+}
+
+/// All of them until `end_s`.
+pub(crate) fn jumps(stretches: &[SpinStretch], end_s: f64) -> Vec<Jump> {
+    let mut before = 0.0;
+    let mut jumps = Vec::new();
     for (i, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s <= end_s)
     {
-        jumps += (stretch.acceleration_rad_per_s2(stretch.start_s) - acceleration).abs();
+        let at_s = stretch.start_s;
+        let by_rad_per_s2 = (stretch.acceleration_rad_per_s2(at_s) - before).abs();
+        if by_rad_per_s2 != 0.0 {
+            jumps.push(Jump { at_s, by_rad_per_s2 });
+        }
         if let Some(next) = stretches.get(i + 1) {
-            acceleration = stretch.acceleration_rad_per_s2(next.start_s);
+            before = stretch.acceleration_rad_per_s2(next.start_s);
         }
     }
     jumps
+}
+
+/// All jumps, added.
+pub(crate) fn sum_rad_per_s2(jumps: &[Jump]) -> f64 {
+    jumps.iter().fold(0.0, |sum, jump| sum + jump.by_rad_per_s2)
+}
+
+/// What share of their ringing is left from `from_s` on, if it decays at this rate.
+pub(crate) fn left(jumps: &[Jump], decay_per_s: f64, from_s: f64) -> f64 {
+    let share = |jump: &Jump| libm::exp(-decay_per_s * (from_s - jump.at_s).max(0.0));
+    let left = jumps.iter().fold(0.0, |sum, jump| sum + share(jump) * jump.by_rad_per_s2);
+    let sum = sum_rad_per_s2(jumps);
+    if sum > 0.0 { left / sum } else { 0.0 }
 }
 
 impl Ringing {

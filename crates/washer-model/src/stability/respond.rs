@@ -109,8 +109,8 @@ impl<'a> Responses<'a> {
     /// Of each place in `followed` and speed (rpm) the responses that the point's curve passes
     /// there, in its order, on lanes. The first is that of a machine that runs up, until its
     /// branch ends. Behind them is what a search from the linear model's response finds beside the
-    /// curve, where the machine has friction or stops, or the curve has none. What is found does not depend on what else is asked for, nor on how much
-    /// farther the curve was followed.
+    /// curve, where the machine has friction or stops, or the curve has none. What is found does
+    /// not depend on what else is asked for, nor on how much farther the curve was followed.
     ///
     /// Where growth is close to 0, a response is that of the machine as it is, by classical
     /// Runge-Kutta in steps that follow its bearings.
@@ -204,9 +204,8 @@ fn forget_known(looked: &[Look<'_>], found: &mut [Result<Response, NoAnswer>]) {
     for place in 0..found.len() {
         let Look { number, guess, .. } = &looked[place];
         let Ok(Response { start, .. }) = &found[place] else { continue };
-        let is_same = |known: &Response| {
-            (0..COORDINATES).all(|i| (known.start[i] - start[i]).abs() < SAME)
-        };
+        let is_same =
+            |known: &Response| (0..COORDINATES).all(|i| (known.start[i] - start[i]).abs() < SAME);
         let before = (0..place).rev().take_while(|before| looked[*before].number == *number);
         let is_known = !guess.is_on_curve
             && before.into_iter().any(|before| found[before].as_ref().is_ok_and(is_same));
