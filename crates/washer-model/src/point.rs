@@ -97,18 +97,14 @@ impl Point {
     }
 
     /// A bound on the swing of each channel (m, rad; in the order of
-    /// [`Channel::ALL`](crate::Channel::ALL)) by the modes of bearings and hinge, after all jumps
-    /// of the drum's acceleration up to the window's end. Steps longer than their periods leave it
-    /// out.
+    /// [`Channel::ALL`](crate::Channel::ALL)), and of the gap between drum and tub (m), by the
+    /// modes of bearings and hinge, after all jumps of the drum's acceleration up to the window's
+    /// end. Steps longer than their periods leave it out; steps that follow the hinge, what the
+    /// bearings swing.
     #[must_use]
-    pub fn ringing(&self) -> [f64; CHANNELS] {
-        self.ringing.channels()
-    }
-
-    /// As [`Self::ringing`], by the bearings alone: what steps leave out that follow the hinge.
-    #[must_use]
-    pub fn bearing_ringing(&self) -> [f64; CHANNELS] {
-        self.ringing.of_bearings().channels()
+    pub fn ringing(&self, follows_hinge: bool) -> ([f64; CHANNELS], f64) {
+        let ringing = if follows_hinge { self.ringing.of_bearings() } else { self.ringing };
+        (ringing.channels(), ringing.gap_m())
     }
 
     /// How far each channel (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) is

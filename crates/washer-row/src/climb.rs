@@ -355,19 +355,21 @@ fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
     if rung.follows_bearings {
         return 0.0;
     }
-    let is_capped = rung.level.is_capped();
-    let swings = if is_capped { point.ringing() } else { point.bearing_ringing() };
+    let (swings, of_gap_m) = point.ringing(!rung.level.is_capped());
     let mut of_swings = of_motion(&swings, &run.trajectory, rule);
     if of_swings > FREE_OF_DECAY * rule.accuracy {
         of_swings *= point.ringing_left();
     }
+    // The least gap may be before any of it has decayed.
+    let gap_m = run.trajectory.min_gap_m;
+    let of_gap = gap_m.map_or(0.0, |gap_m| of_gap_m / gap_m.abs().max(point.clearance_m()));
     let metrics = rule.measures.of_model().zip(&run.trajectory.metrics);
     let of_clash = metrics.filter(|(number, _)| number.metric == Metric::ClashTime);
     let clash_s = of_clash.map(|(_, time)| *time);
     let of_clash = clash_s
         .zip(run.clash_doubt_s)
         .map(|(time_s, doubt_s)| doubt_s / time_s.max(clash_floor_s(rule)));
-    of_clash.fold(of_swings, f64::max)
+    of_clash.fold(of_swings.max(of_gap), f64::max)
 }
 
 /// What caps make of the hinge's bend under gravity. No motion amplifies that.
