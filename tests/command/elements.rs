@@ -275,3 +275,35 @@ fn responses_with_friction_are_followed_round_their_folds() {
         assert!(of_yaw(&beside, 0.02..0.03) && !beside.is_empty(), "{given:?}: {beside:?}");
     }
 }
+
+#[test]
+#[ignore = "takes half a minute; .ci/run runs it"]
+fn growth_with_friction_ends_where_a_boundary_says() {
+    let point = "machine = \"paper\"\nmetrics = [\"growth\"]\n[set]\ndamping_n_s_per_m = 20.0\n\
+                 [spin]\nprofile = \"ramp\"\npeak_rpm = 350.0\nramp_s = 6.0\n\
+                 [time]\nend_s = 6.0\nwindow_s = [3.0, 6.0]\n[stability]\nspeed_rpm = 250\n";
+    let axes = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.35, 0.4]\n\
+                [[axis]]\nparameter = \"friction_n\"\nvalues = [20.0, 40.0]\n";
+    let home = Home::new(&format!("{point}{axes}"));
+    fs::write(home.path("point.toml"), point).expect("the grid is written");
+    let asked = ["--quantity", "growth_per_s", "--tolerance", "1", "--out", "b.parquet"];
+    let traced = home.sweep(&[&["boundary", "g.toml"], &asked[..]].concat());
+    assert!(traced.status.success(), "{}", said(&traced));
+    let shown = |file: &str, columns: &str| {
+        let shown = home.sweep(&["show", file, "--columns", columns]);
+        let text = String::from_utf8(shown.stdout).expect("it is text");
+        let row = text.lines().nth(1).expect("a row").split_whitespace();
+        row.map(|word| word.parse::<f64>().expect("a number")).collect::<Vec<_>>()
+    };
+    let bracket = shown("b.parquet", "friction_low_n,friction_high_n");
+    assert!(bracket[1] - bracket[0] <= 1.0, "{bracket:?}");
+    for (friction_n, grows) in [(bracket[0], true), (bracket[1], false)] {
+        let set = ["unbalance_mass_kg=0.35".to_owned(), format!("friction_n={friction_n}")];
+        let set = ["--set", &set[0], "--set", &set[1], "--fresh", "--out", "s.parquet"];
+        let found =
+            home.sweep(&[&["stability", "point.toml", "--speed", "250"], &set[..]].concat());
+        assert!(found.status.success(), "{}", said(&found));
+        let growth_per_s = shown("s.parquet", "growth_per_s")[0];
+        assert_eq!(growth_per_s > 0.0, grows, "{growth_per_s} /s at {friction_n} N");
+    }
+}
