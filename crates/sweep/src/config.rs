@@ -10,7 +10,6 @@
 pub(crate) mod grid;
 mod machine;
 mod read;
-mod scalars;
 pub(crate) mod schema;
 mod spin;
 #[cfg(test)]

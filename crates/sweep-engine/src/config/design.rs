@@ -1,74 +1,105 @@
 //! `[design]`: points by a rule over the axes' ranges, or listed in a file of their own.
 
-use std::path::Path;
-
-use super::list::{self, List};
-use super::{Field, Located, Section};
+use super::keys::Variants;
+use super::{Field, Key, Keys, Kind, Walk};
 use crate::Design;
 use crate::plan::MOST_POINTS;
 
-/// The methods by name.
-pub const METHODS: [&str; 4] = ["latin_hypercube", "sobol", "monte_carlo", "list"];
+/// The methods by name, each with what it does.
+const METHODS: [(&str, &str); 4] = [
+    (
+        "latin_hypercube",
+        "every axis cut into as many strata as there are points, one point in each",
+    ),
+    ("sobol", "a scrambled Sobol sequence; a power of two points is the most even"),
+    ("monte_carlo", "every point at random, independent of all others"),
+    ("list", "points as listed"),
+];
 /// `seed` when the grid names none.
 pub const DEFAULT_SEED: u64 = 0;
 /// Greatest seed: what JSON and TOML carry exactly everywhere.
 pub const MOST_SEED: u64 = (1 << 53) - 1;
 /// Points of Sobol's sequence with 32 bits.
-pub const MOST_SOBOL: u64 = 1 << 32;
+const MOST_SOBOL: u64 = 1 << 32;
 
-/// What `[design]` says.
-pub enum WrittenDesign {
-    /// Nothing: a grid.
-    None,
-    /// Something wrong, already reported.
-    Bad,
-    /// Points over ranges.
-    Box(Located<Design>),
-    /// Points as listed.
-    List(List),
+/// Walks over the section. Where it is read there is no design after a mistake, and a list has no
+/// points yet.
+pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
+    keys.table(Key::table("design"), |keys| {
+        let method =
+            Key::new("method", "").needed("`latin_hypercube`, `sobol`, `monte_carlo` or `list`");
+        let variants = Variants { all: METHODS.to_vec(), default: None, set: 0 };
+        let of = |design: &Design| METHODS.iter().position(|(name, _)| *name == design.method());
+        let now = design.as_ref().and_then(of);
+        let chosen = keys.variants(method, &variants, now, |keys, k| match METHODS[k].0 {
+            "list" => listed(design, keys),
+            method => drop(spread(method, design, keys)),
+        });
+        if chosen.is_none() {
+            *design = None;
+        }
+        let is_spread = chosen.is_some_and(|method| METHODS[method].0 != "list");
+        if matches!(keys.walk, Walk::Set(_)) && !is_spread {
+            for (name, field) in spread(METHODS[0].0, &mut None, keys) {
+                let title =
+                    format!("`{name}` belongs to a design, and this grid has none that takes it");
+                if let Field::Given(_) = field {
+                    keys.refuse(name, &title, "expected a grid file with [design]");
+                }
+            }
+        }
+    })
 }
 
-/// Reads the section, and the file it names.
-pub fn read(root: &Section<'_>, grid: &Path) -> WrittenDesign {
-    let section = match root.table("design", "[design]") {
-        Field::Absent => return WrittenDesign::None,
-        Field::Bad => return WrittenDesign::Bad,
-        Field::Given(section) => section.value,
+fn listed(design: &mut Option<Design>, keys: &mut Keys<'_>) {
+    keys.misplace(&["points", "seed"], "a list has the points that it lists");
+    let key = Key::new(
+        "file",
+        "CSV or Parquet, relative to this file: one column a parameter, one row a point",
+    );
+    let (mut file, points, hash) = match design.take() {
+        Some(Design::List { file, points, hash }) => (file, points, hash),
+        _ => Default::default(),
     };
-    let at = section.at().clone();
-    let field = section.choice("method", &METHODS);
-    let expected = "`latin_hypercube`, `sobol`, `monte_carlo` or `list`";
-    let Some(method) = section.require(field, "method", expected) else {
-        // An unknown method has no list of keys, but each key has its range.
-        let _ = section.count("points", MOST_POINTS);
-        let _ = section.whole("seed", 0..=MOST_SEED);
-        let _ = section.text("file");
-        section.finish();
-        return WrittenDesign::Bad;
-    };
-    let written = if METHODS[method.value] == "list" {
-        section.misplace(&["points", "seed"], "a list has the points that it lists");
-        let field = section.text("file");
-        let file = section.require(field, "file", "a CSV or Parquet file, relative to this file");
-        file.and_then(|file| list::read(&file, grid, root.report))
-            .map_or(WrittenDesign::Bad, WrittenDesign::List)
-    } else {
-        section.misplace(&["file"], "only the method \"list\" has it");
-        let chosen = METHODS[method.value];
-        let sobol = chosen == "sobol";
-        let field = section.count("points", if sobol { MOST_SOBOL } else { MOST_POINTS });
-        let points = section.require(field, "points", "the number of points");
-        let seed = section.whole("seed", 0..=MOST_SEED).or(DEFAULT_SEED);
-        // Stand-ins for what was refused, so that the axes are read all the same.
-        let (points, seed) =
-            (points.map_or(1, |points| points.value), seed.unwrap_or(DEFAULT_SEED));
-        let design = match chosen {
-            "sobol" => Design::Sobol { points, seed },
-            "monte_carlo" => Design::MonteCarlo { points, seed },
-            _ => Design::LatinHypercube { points, seed },
-        };
-        WrittenDesign::Box(Located { value: design, at })
-    };
-    section.finish();
-    written
+    let found = keys.key(
+        key.needed("a CSV or Parquet file, relative to this file"),
+        &Kind::Text,
+        &mut file,
+    );
+    keys.write("points", points);
+    keys.write("hash", hash.as_str());
+    if found.given().is_some() || !keys.is_reading() {
+        *design = Some(Design::List { file, points, hash });
+    }
+}
+
+fn spread(
+    method: &str,
+    design: &mut Option<Design>,
+    keys: &mut Keys<'_>,
+) -> [(&'static str, Field<()>); 2] {
+    keys.misplace(&["file"], "only the method \"list\" has it");
+    // Stand-ins for what is refused, so that the axes are read all the same.
+    let mut numbers = [1, DEFAULT_SEED];
+    if let Some(
+        Design::LatinHypercube { points, seed }
+        | Design::Sobol { points, seed }
+        | Design::MonteCarlo { points, seed },
+    ) = design
+    {
+        numbers = [*points, *seed];
+    }
+    let [points, seed] = &mut numbers;
+    let most = if method == "sobol" { MOST_SOBOL } else { MOST_POINTS };
+    let key = Key::new("points", "how many").needed("the number of points").set();
+    let points_found = keys.key(key, &Kind::Whole(1..=most), points);
+    let key = Key::new("seed", "another seed, another draw").set();
+    let seed_found = keys.key(key, &Kind::Whole(0..=MOST_SEED), seed);
+    let (points, seed) = (*points, *seed);
+    *design = Some(match method {
+        "sobol" => Design::Sobol { points, seed },
+        "monte_carlo" => Design::MonteCarlo { points, seed },
+        _ => Design::LatinHypercube { points, seed },
+    });
+    [("points", points_found), ("seed", seed_found)]
 }

@@ -165,29 +165,30 @@ fn table(
 }
 
 /// Reads the listed points.
-pub(super) fn read(file: &Located<&str>, grid: &Path, report: &Report) -> Option<List> {
-    let path = beside(grid, file.value);
+pub(super) fn read(file: &str, grid: &Path, report: &Report) -> Option<List> {
+    let path = beside(grid, file);
+    let at = report.place("design.file")?;
     let shown = shown(&path);
-    let (table, hash) = match table(&path, &file.at, false, report) {
+    let (table, hash) = match table(&path, &at, false, report) {
         Ok(read) => read?,
         Err(reason) => {
             let title = format!("cannot read the list of points {shown}: {reason}");
             let expected = "expected a CSV or Parquet file of numbers, one column a parameter, \
                 relative to this file";
-            return report.refuse(&file.at, title, expected);
+            return report.refuse(&at, title, expected);
         }
     };
     let points = table.columns.first().map_or(0, |column| column.values.len());
     if points == 0 {
         let title = format!("the list of points {shown} is empty");
         let expected = "expected a line of parameter names, and under it a row of numbers a point";
-        return report.refuse(&file.at, title, expected);
+        return report.refuse(&at, title, expected);
     }
     if table.columns.iter().all(|column| column.name.value == ID) {
         let title = format!("the list of points {shown} has no column but `{ID}`");
-        return report.refuse(&file.at, title, "expected a column of a parameter");
+        return report.refuse(&at, title, "expected a column of a parameter");
     }
-    let design = Design::List { file: file.value.to_owned(), points: points as u64, hash };
+    let design = Design::List { file: file.to_owned(), points: points as u64, hash };
     Some(List { design, table })
 }
 

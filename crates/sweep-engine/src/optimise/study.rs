@@ -9,9 +9,10 @@ use sweep_results::{Column, Goal, Mistake, columns};
 
 use crate::config::axes::{add, spacing};
 use crate::config::design::{DEFAULT_SEED, MOST_SEED};
-use crate::config::grid::{draft, name};
+use crate::config::grid::draft;
 use crate::config::parameters::find;
 use crate::config::section::listed;
+use crate::config::sections::name;
 use crate::config::source::beside;
 use crate::config::syntax::{self, parse};
 use crate::config::{Diagnostic, Draft, Field, Located, Location, Report, Section, twice, whole};
@@ -98,9 +99,9 @@ impl<M: Rows> Study<M> {
         }
         let design = grid.as_ref().and_then(|grid| grid.design.as_ref());
         let parameters = parameters(&root, design, &mut draft);
-        let population = root.whole("population", 4..=MOST[0]).or(0);
+        let population = root.whole("population", &(4..=MOST[0])).or(0);
         let candidates = root.count("candidates", MOST[0]).or(0);
-        let seed = root.whole("seed", 0..=MOST_SEED).or(DEFAULT_SEED);
+        let seed = root.whole("seed", &(0..=MOST_SEED)).or(DEFAULT_SEED);
         // Candidates of a single row fill whole groups of lanes.
         let usual = (10 * parameters.len() as u64).next_multiple_of(8).max(32);
         let population = population.filter(|&one| one > 0).unwrap_or(usual);

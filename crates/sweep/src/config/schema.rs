@@ -1,39 +1,12 @@
-//! JSON Schemas of machine files, and of the machine's part of grid files.
+//! JSON Schemas of machine files, and of `[set]` in grid files.
 
 use serde_json::{Map, Value, json};
-use sweep_engine::Schema;
-use sweep_engine::config::schema::{document, number, of, set as set_schema, table};
+use sweep_engine::config::keys::table;
+use sweep_engine::config::kind::number;
+use sweep_engine::config::schema::{document, of, set as set_schema};
 use washer_model::{Parameter, Range, Spin};
-use washer_row::{Criterion, Metric};
 
-use super::grid::DEFAULT_MACHINE;
 use super::machine::{AUTO, Key, LeftOut, PARTS, Part, Times, no_spin, with_one_of_each};
-use super::spin::{MOST_ROWS, RAMPED, Ramped, TABLE};
-
-/// What grid files have beside what the engine reads.
-pub(crate) fn grid() -> Schema {
-    let machine = json!({
-        "type": "string", "default": DEFAULT_MACHINE,
-        "description": "\"paper\", or a machine file relative to this file",
-    });
-    let criterion = json!({
-        "enum": Criterion::ALL.map(Criterion::name),
-        "default": Criterion::default().name(),
-        "description": "what the models are compared by: largest deviations, the same turn by \
-                        turn of the drum, or root mean squares",
-    });
-    Schema {
-        top: vec![
-            ("machine", machine),
-            ("metrics", metrics()),
-            ("spin", spin()),
-            ("stability", stability()),
-        ],
-        required: vec!["spin"],
-        reliability: vec![("criterion", criterion)],
-        set: set(),
-    }
-}
 
 /// The schema of machine files.
 pub(crate) fn machine() -> Value {
@@ -92,8 +65,8 @@ fn vector(first: &str) -> Value {
     json!({ "type": "array", "items": number(range), "minItems": 3, "maxItems": 3 })
 }
 
-/// Names of the table as properties; those of numbered elements as patterns.
-fn set() -> Value {
+/// `[set]`: names of the table as properties; those of numbered elements as patterns.
+pub(super) fn set() -> Value {
     let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
     let machine = with_one_of_each();
     let mut all = Parameter::all(&machine, &spin);
@@ -117,47 +90,4 @@ fn set() -> Value {
         }
     }
     set_schema(&single, patterns)
-}
-
-fn spin() -> Value {
-    let ramped = |profile: &Ramped| {
-        let profile = json!({ "const": profile.name, "description": profile.description });
-        let keys = [
-            ("profile", profile),
-            ("peak_rpm", parameter("spin_peak_rpm")),
-            ("ramp_s", parameter("spin_ramp_s")),
-        ];
-        table(keys, &["profile", "peak_rpm", "ramp_s"])
-    };
-    let column = |range: Range, said: &str| {
-        let items = number(range);
-        json!({
-            "type": "array", "items": items, "minItems": 1, "maxItems": MOST_ROWS,
-            "description": said,
-        })
-    };
-    let said = "linear between given points, constant after the last";
-    let keys = [
-        ("profile", json!({ "const": TABLE, "description": said })),
-        ("time_s", column(Range::NonNegative, "increasing times from 0, s")),
-        ("speed_rpm", column(Range::Within(-1e5, 1e5), "speeds at these times, rpm")),
-    ];
-    let tabled = table(keys, &["profile", "time_s", "speed_rpm"]);
-    json!({ "oneOf": RAMPED.iter().map(ramped).chain([tabled]).collect::<Value>() })
-}
-
-fn metrics() -> Value {
-    json!({
-        "type": "array", "items": { "enum": Metric::ALL.map(Metric::name) }, "minItems": 1,
-        "uniqueItems": true, "description": "further columns of the result",
-    })
-}
-
-fn stability() -> Value {
-    let speeds = json!({
-        "type": ["string", "number"],
-        "description": "constant spin speeds in rpm, above 0, as 250, \"240,305\" or \
-                        \"60:400:1\": those of the metrics `growth` and `dwell`",
-    });
-    table([("speed_rpm", speeds)], &["speed_rpm"])
 }
