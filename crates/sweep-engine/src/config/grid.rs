@@ -47,9 +47,7 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
         (Field::Given(_) | Field::Bad, None) => drop(root.tables("axis")),
         (_, design) => axes::axes(root, design, &mut draft),
     }
-    if let Walk::Read(root) = keys.walk {
-        root.finish();
-    }
+    keys.finish();
     let options = Options::read(options, report);
     walk(&mut draft.plan, &mut Keys::new(Walk::Set(&options)));
     draft.plan.set.extend(options.changed.into_inner());

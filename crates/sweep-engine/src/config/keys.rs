@@ -317,6 +317,44 @@ impl<'a> Keys<'a> {
         at.map_or(Field::Absent, |at| Field::Given(Located { value: (), at }))
     }
 
+    /// An array of tables under a key: those that are read, or so many; `walk` goes over one by its
+    /// position.
+    pub fn tables(
+        &mut self,
+        key: Key,
+        read: Vec<Section<'a>>,
+        count: usize,
+        mut walk: impl FnMut(&mut Keys<'a>, usize),
+    ) {
+        for (k, section) in read.into_iter().enumerate() {
+            let mut keys = Keys::new(Walk::Read(section));
+            walk(&mut keys, k);
+            keys.finish();
+        }
+        match &mut self.walk {
+            Walk::Write(plan) => {
+                let one = |k| Value::from(Keys::written(|keys| walk(keys, k)));
+                plan.insert(key.name.to_owned(), (0..count).map(one).collect());
+            }
+            Walk::Describe(described) => {
+                let items = Keys::described(|keys| walk(keys, 0)).finish();
+                let mut schema = json!({ "type": "array", "items": items });
+                if key.needed.is_some() {
+                    schema["minItems"] = 1.into();
+                }
+                described.add(&key, schema);
+            }
+            Walk::Read(_) | Walk::Set(_) => {}
+        }
+    }
+
+    /// Ends a walk: keys that it did not come to are refused.
+    pub fn finish(self) {
+        if let Walk::Read(section) = self.walk {
+            section.finish();
+        }
+    }
+
     /// A key that says by a word which further keys there are: `walk` goes over those of a word, by
     /// its position. `now` is the word that stands. Gives the word that is chosen.
     pub fn variants(

@@ -1,14 +1,19 @@
 //! Machine files: every section and key is a group of parameters, so one small table of their names
 //! reads a file, writes one, and describes it.
 
-use serde_json::{Map, Value};
+use std::slice;
+
+use serde_json::{Value, json};
 use washer_model::{
     BumpStop, Bushing, Cabinet, Damper, Foot, Machine, Parameter, Spin, Spring, Unbalance,
 };
 
+use sweep_engine::config::keys::{self, Keys, Walk};
+use sweep_engine::config::kind::{Kind, Numbers, about};
 use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_engine::config::schema::{document, of};
 use sweep_engine::config::section::{Field, Section};
-use sweep_engine::config::source::is_blank;
+use sweep_engine::config::source::{Located, is_blank};
 
 /// A section of the machine file. Parameters are named `<prefix>_<number>` and, for vectors, with
 /// the component before the unit: `inertia_kg_m2` holds `inertia_11_kg_m2` and two more.
@@ -21,7 +26,7 @@ pub(super) struct Part {
     /// How often it may stand in a file.
     pub(super) times: Times,
     /// What it holds, in the order in which it is written.
-    pub(super) keys: &'static [Key],
+    keys: &'static [Key],
     /// How many a machine has.
     count: fn(&Machine) -> usize,
     /// Gives a machine so many, each with what may be left out left out.
@@ -39,16 +44,16 @@ pub(super) enum Times {
 }
 
 /// A key of a section: a number, or three in an array.
-pub(super) struct Key {
-    pub(super) name: &'static str,
+struct Key {
+    name: &'static str,
     /// The parameters of the three; none for a number, which is named as its key.
     parameters: &'static [&'static str],
-    pub(super) left_out: LeftOut,
+    left_out: LeftOut,
 }
 
 /// What it means that a key is not there.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum LeftOut {
+enum LeftOut {
     Refused,
     /// It is this.
     Is(f64),
@@ -59,11 +64,16 @@ pub(super) enum LeftOut {
 }
 
 /// What stands for a number that the program finds.
-pub(super) const AUTO: &str = "auto";
+const AUTO: &str = "auto";
 
 impl Part {
+    /// Walks over the keys of element `k`.
+    fn walk(&self, k: usize, machine: &mut Machine, keys: &mut Keys<'_>) {
+        self.keys.iter().for_each(|key| key.walk(self, k, machine, keys));
+    }
+
     /// What the parameters of an element begin with.
-    pub(super) fn prefix(&self, k: usize) -> String {
+    fn prefix(&self, k: usize) -> String {
         match self.times {
             Times::Many(first, _) => format!("{}{}_", self.prefix, k + first),
             Times::Once | Times::AtMostOnce => self.prefix.to_owned(),
@@ -81,12 +91,12 @@ impl Part {
 
 impl Key {
     /// Whether it holds three numbers.
-    pub(super) const fn is_vector(&self) -> bool {
+    const fn is_vector(&self) -> bool {
         !self.parameters.is_empty()
     }
 
     /// Names of its parameters.
-    pub(super) fn names(&self, prefix: &str) -> Vec<String> {
+    fn names(&self, prefix: &str) -> Vec<String> {
         let own = [self.name];
         let names = if self.is_vector() { self.parameters } else { &own };
         names.iter().map(|name| format!("{prefix}{name}")).collect()
@@ -290,45 +300,62 @@ pub(super) fn read(text: &str, root: Section<'_>) -> Machine {
             .push(Diagnostic::new("the machine file is empty").at(root.at(), "expected a machine"));
         return machine;
     }
+    let mut keys = Keys::new(Walk::Read(root));
+    walk(&mut machine, &mut keys);
+    keys.finish();
+    machine
+}
+
+/// The schema of machine files.
+pub(crate) fn schema() -> Value {
+    let described = Keys::described(|keys| walk(&mut with_one_of_each(), keys));
+    document("Machine file of sweep", described.finish())
+}
+
+/// The machine as a machine file's tables hold it; every number as its shortest decimal that reads
+/// back the same.
+pub(crate) fn to_json(machine: &Machine) -> Value {
+    Keys::written(|keys| walk(&mut machine.clone(), keys)).into()
+}
+
+/// Walks over every section.
+fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
     for part in &PARTS {
-        if part.section.is_empty() {
-            part.keys.iter().for_each(|key| read_key(key, "", &root, &mut machine));
-            continue;
-        }
-        let header = part.header();
-        let sections: Vec<Section<'_>> = match part.times {
-            Times::Many(..) => elements(part, &root),
-            Times::Once | Times::AtMostOnce => {
-                let field = root.table(part.section, &header);
-                if matches!((part.times, &field), (Times::Once, Field::Absent)) {
-                    root.missing(part.section, &format!("a section {header}"));
+        let table = keys::Key::table(part.section);
+        match part.times {
+            _ if part.section.is_empty() => part.walk(0, machine, keys),
+            Times::Once => {
+                let field = keys.table(table.needed(""), |keys| part.walk(0, machine, keys));
+                if let (None, Some(report)) = (field.given(), keys.section().map(|it| it.report)) {
+                    part.keys.iter().for_each(|key| doubt(key.names(part.prefix), report));
                 }
-                field.given().map(|section| section.value).into_iter().collect()
             }
-        };
-        if sections.is_empty() {
-            match part.times {
-                Times::Once => {
-                    let keys = part.keys.iter();
-                    keys.for_each(|key| doubt(key.names(part.prefix), report));
+            Times::AtMostOnce => drop(keys.table(table, |keys| {
+                if keys.is_reading() {
+                    (part.fill)(machine, 1);
                 }
-                // The paper's stand in.
-                Times::Many(_, Some(expected)) => {
-                    root.missing(part.section, expected);
-                    continue;
+                (0..(part.count)(machine)).for_each(|k| part.walk(k, machine, keys));
+            })),
+            Times::Many(_, needed) => {
+                let mut sections = Vec::new();
+                if let Some(root) = keys.section() {
+                    sections = elements(part, root);
+                    if let (true, Some(expected)) = (sections.is_empty(), needed) {
+                        // The paper's stand in.
+                        root.missing(part.section, expected);
+                        continue;
+                    }
+                    (part.fill)(machine, sections.len());
                 }
-                Times::AtMostOnce | Times::Many(_, None) => {}
+                // The two that machines have always had are written even where there are none.
+                let count = (part.count)(machine);
+                if count > 0 || ["springs", "dampers"].contains(&part.section) {
+                    let table = needed.map_or(table.clone(), |needed| table.needed(needed));
+                    keys.tables(table, sections, count, |keys, k| part.walk(k, machine, keys));
+                }
             }
-        }
-        (part.fill)(&mut machine, sections.len());
-        for (k, section) in sections.into_iter().enumerate() {
-            let prefix = part.prefix(k);
-            part.keys.iter().for_each(|key| read_key(key, &prefix, &section, &mut machine));
-            section.finish();
         }
     }
-    root.finish();
-    machine
 }
 
 /// The tables of a list, no more of them than are accepted.
@@ -343,39 +370,67 @@ fn elements<'a>(part: &Part, root: &Section<'a>) -> Vec<Section<'a>> {
     sections
 }
 
-fn read_key(key: &Key, prefix: &str, section: &Section<'_>, machine: &mut Machine) {
-    let (names, report) = (key.names(prefix), section.report);
-    if key.left_out == LeftOut::Auto && section.is_text(key.name) {
-        if section.choice(key.name, &[AUTO]).given().is_none() {
-            doubt(names, report);
-        }
-        return;
-    }
-    let parameters: Vec<_> = names.iter().filter_map(|name| find(name, machine)).collect();
-    let Some(first) = parameters.first() else { return };
-    let (field, expected) = if key.is_vector() {
-        (section.numbers(key.name, first.range()), "an array of three numbers".to_owned())
-    } else {
-        let or_auto = if key.left_out == LeftOut::Auto { ", or \"auto\"" } else { "" };
-        let expected = format!("{}: {}{or_auto}", first.description(), first.range());
-        (section.number(key.name, first.range()).map(|number| vec![number]), expected)
-    };
-    if matches!(field, Field::Absent) && key.left_out != LeftOut::Refused {
-        return;
-    }
-    match section.require(field, key.name, &expected) {
-        Some(numbers) if numbers.value.len() == parameters.len() => {
-            for (parameter, number) in parameters.iter().zip(numbers.value) {
-                parameter.set(machine, &mut no_spin(), number.value);
-                report.put(parameter.name(), number.at);
+impl Key {
+    /// Walks over the key of element `k`.
+    fn walk(&self, part: &Part, k: usize, machine: &mut Machine, keys: &mut Keys<'_>) {
+        let names = self.names(&part.prefix(k));
+        let parameters: Vec<_> = names.iter().filter_map(|name| find(name, machine)).collect();
+        let Some(first) = parameters.first() else { return };
+        let number = Kind::Number(first.range());
+        let or_auto = |section: &Section<'_>, key| match section.is_text(key) {
+            true => section.choice(key, &[AUTO]).map(|_| AUTO.into()),
+            false => number.read(section, key, ""),
+        };
+        let (kind, about, expected) = match self.left_out {
+            _ if self.is_vector() => {
+                let three = Numbers::new(first.range(), 3..=3, "expected three numbers");
+                (Kind::Numbers(three), String::new(), "an array of three numbers".to_owned())
             }
+            LeftOut::Auto => {
+                let schema = json!({ "anyOf": [of(first), { "const": AUTO }] });
+                (Kind::Own(&or_auto, schema), String::new(), String::new())
+            }
+            _ => {
+                let expected = format!("{}: {}", first.description(), first.range());
+                (Kind::Number(first.range()), about(first), expected)
+            }
+        };
+        let is_needed = self.left_out == LeftOut::Refused;
+        let key = keys::Key::new(self.name, about);
+        let key = if is_needed { key.needed(expected) } else { key };
+        let mut value = match (&keys.walk, self.left_out) {
+            (Walk::Write(_), _) => self.json(part, k, machine),
+            (Walk::Describe(_), LeftOut::Auto) => AUTO.into(),
+            (Walk::Describe(_), LeftOut::Is(default)) if !self.is_vector() => default.into(),
+            _ => Value::Null,
+        };
+        let found = keys.key(key, &kind, &mut value);
+        let Some(report) = keys.section().map(|section| section.report) else { return };
+        let numbers = value.as_array().map_or(slice::from_ref(&value), Vec::as_slice);
+        match found {
+            Field::Given(Located { at, .. }) => {
+                for (i, (parameter, number)) in parameters.iter().zip(numbers).enumerate() {
+                    let Some(number) = number.as_f64() else { continue };
+                    parameter.set(machine, &mut no_spin(), number);
+                    let place = report.place(&format!("{}{}[{i}]", keys.places, self.name));
+                    report.put(parameter.name(), place.unwrap_or(at.clone()));
+                }
+            }
+            Field::Absent if !is_needed => {}
+            Field::Absent | Field::Bad => doubt(names, report),
         }
-        Some(numbers) => {
-            let title = format!("`{}` has {} numbers", key.name, numbers.value.len());
-            report.push(Diagnostic::new(title).at(&numbers.at, "expected three numbers"));
-            doubt(names, report);
+    }
+
+    /// What a machine's file has under the key; nothing where it is left out.
+    fn json(&self, part: &Part, k: usize, machine: &Machine) -> Value {
+        match self.given(part, k, machine) {
+            Some(values) if self.is_vector() => values.into(),
+            Some(values) => values[0].into(),
+            None if self.left_out == LeftOut::Auto && machine.dampers[k].friction_n != 0.0 => {
+                AUTO.into()
+            }
+            None => Value::Null,
         }
-        None => doubt(names, report),
     }
 }
 
@@ -390,42 +445,6 @@ fn find(name: &str, machine: &Machine) -> Option<Parameter> {
 /// A parameter's value.
 fn value(name: &str, machine: &Machine) -> Option<f64> {
     find(name, machine)?.get(machine, &no_spin())
-}
-
-/// The machine as a machine file's tables hold it; every number as its shortest decimal that reads
-/// back the same.
-pub(crate) fn to_json(machine: &Machine) -> Value {
-    let mut root = Map::new();
-    for part in &PARTS {
-        let count = (part.count)(machine);
-        let entry = |key: &Key, k: usize| {
-            let value = match key.given(part, k, machine) {
-                Some(values) if key.is_vector() => values.into(),
-                Some(values) => values[0].into(),
-                None if key.left_out == LeftOut::Auto && machine.dampers[k].friction_n != 0.0 => {
-                    AUTO.into()
-                }
-                None => return None,
-            };
-            Some((key.name.to_owned(), value))
-        };
-        let element = |k: usize| -> Map<String, Value> {
-            part.keys.iter().filter_map(|key| entry(key, k)).collect()
-        };
-        // The two that machines have always had are written even where there are none.
-        let is_old = ["springs", "dampers"].contains(&part.section);
-        match part.times {
-            _ if part.section.is_empty() => root.extend(element(0)),
-            Times::Many(..) if count > 0 || is_old => {
-                root.insert(part.section.to_owned(), (0..count).map(element).collect());
-            }
-            Times::Once | Times::AtMostOnce if count > 0 => {
-                root.insert(part.section.to_owned(), element(0).into());
-            }
-            _ => {}
-        }
-    }
-    Value::Object(root)
 }
 
 /// The machine as the text of a machine file, each number with its meaning and source.
